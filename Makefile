@@ -6,7 +6,7 @@ SWEEP := $(BIN)/sweep
 STUDIES := $(notdir $(patsubst %/study.toml,%,$(wildcard studies/*/study.toml)))
 
 .DEFAULT_GOAL := help
-.PHONY: test-versions bench-scale smoke-scale three test-browser test-faults bench-object-store site notebooks nightly smoke-nightly bench-estimates bench-enclosures bench-extrema bench-first-use bench-optimise bench-basins help setup test test-long lint types imports check smoke bench bench-scene bench-peers study-accuracy smoke-accuracy search-worse search-wrong docs frames clean $(STUDIES:%=study-%) $(STUDIES:%=smoke-%)
+.PHONY: test-versions bench-latency bench-scale smoke-scale three test-browser test-faults bench-object-store site notebooks nightly smoke-nightly bench-estimates bench-enclosures bench-extrema bench-first-use bench-optimise bench-basins help setup test test-long lint types imports check smoke bench bench-scene bench-peers study-accuracy smoke-accuracy search-worse search-wrong docs frames clean $(STUDIES:%=study-%) $(STUDIES:%=smoke-%)
 
 help:  ## list the targets
 	@grep -hE '^[a-z%-]+:.*##' $(MAKEFILE_LIST) | sed -E 's/:.*## /\t/' | expand -t 22
@@ -17,35 +17,39 @@ help:  ## list the targets
 $(VENV)/ready: pyproject.toml constraints.txt
 	$(PYTHON) -c 'import sys; sys.exit("linksweep needs Python 3.11 or later") if sys.version_info < (3, 11) else None'
 	$(PYTHON) -m venv $(VENV)
-	$(BIN)/python -m pip install --quiet --constraint constraints.txt --editable '.[dev]'
+	$(BIN)/python -m pip install --constraint constraints.txt --editable .
 	@touch $@
 
-setup: $(VENV)/ready  ## create the environment in .venv
+$(VENV)/dev: $(VENV)/ready
+	$(BIN)/python -m pip install --constraint constraints.txt --editable '.[dev]'
+	@touch $@
 
-test: $(VENV)/ready  ## run the tests, in two processes
+setup: $(VENV)/ready  ## create the environment in .venv, with what studies need; targets that need more add it
+
+test: $(VENV)/dev  ## run the tests, in two processes
 	$(BIN)/python -m pytest -n 2 --dist loadfile
 
-test-long: $(VENV)/ready  ## the tests that take minutes, thousands of hostile tables; properties at random; loads against Pinocchio, which it installs
-	$(BIN)/python -m pip install --quiet --constraint constraints.txt --editable '.[dev,peers]'
+test-long: $(VENV)/dev  ## the tests that take minutes, thousands of hostile tables; properties at random; loads against Pinocchio, which it installs
+	$(BIN)/python -m pip install --constraint constraints.txt --editable '.[dev,peers]'
 	$(BIN)/python -m pytest -m 'long or hypothesis' --hypothesis-profile=random
 
-test-faults: $(VENV)/ready  ## kills, signals, full disks, damage: 150 kills and 170 other faults, a table; about 15 minutes
+test-faults: $(VENV)/dev  ## kills, signals, full disks, damage: 150 kills and 170 other faults, a table; about 15 minutes
 	$(BIN)/python -m tests.faults
 
-test-versions: $(VENV)/ready  ## oracle tables, bits and speed with the oldest and the newest dependencies allowed; about 40 minutes
+test-versions: $(VENV)/dev  ## oracle tables, bits and speed with the oldest and the newest dependencies allowed; about 40 minutes
 	$(BIN)/python -m tests.bench.versions
 
-test-browser: $(VENV)/ready  ## the report and exported models in headless Chromium, which has to be installed
+test-browser: $(VENV)/dev  ## the report and exported models in headless Chromium, which has to be installed
 	$(BIN)/python -m pytest -m browser
 
-lint: $(VENV)/ready  ## ruff
+lint: $(VENV)/dev  ## ruff
 	$(BIN)/ruff check .
 	$(BIN)/ruff format --check .
 
-types: $(VENV)/ready  ## mypy --strict
+types: $(VENV)/dev  ## mypy --strict
 	$(BIN)/mypy
 
-imports: $(VENV)/ready  ## studies -> sweep -> kernels, never back
+imports: $(VENV)/dev  ## studies -> sweep -> kernels, never back
 	$(BIN)/lint-imports
 
 check: lint types imports test  ## what CI runs first
@@ -69,78 +73,81 @@ nightly: $(VENV)/ready  ## all studies into a dated folder under nights/, and wh
 smoke-nightly: $(VENV)/ready  ## the same with every study's tiny version, into nights/smoke
 	$(SWEEP) nightly studies --smoke --into $(NIGHTS)/smoke --budget 1h --keep 3
 
-study-accuracy: $(VENV)/ready  ## what accuracy costs in time: writes docs/accuracy.md and docs/accuracy/, about 10 minutes
+study-accuracy: $(VENV)/dev  ## what accuracy costs in time: writes docs/accuracy.md and docs/accuracy/, about 10 minutes
 	$(BIN)/python -m studies.accuracy --out results/accuracy
 	$(BIN)/python -m tests.bench.factors
 
 smoke-accuracy: $(VENV)/ready  ## the same on few designs, writes no page
 	$(BIN)/python -m studies.accuracy --smoke --out results/smoke/accuracy
 
-bench-peers: $(VENV)/ready  ## next to pylinkage and Pinocchio, which get an environment of their own, and loads next to MuJoCo
+bench-peers: $(VENV)/dev  ## next to pylinkage and Pinocchio, which get an environment of their own, and loads next to MuJoCo
 	$(PYTHON) -m venv .venv-peers
-	.venv-peers/bin/python -m pip install --quiet --constraint constraints.txt --editable '.[peers]' 'pylinkage[numba]'
+	.venv-peers/bin/python -m pip install --constraint constraints.txt --editable '.[peers]' 'pylinkage[numba]'
 	.venv-peers/bin/python -m tests.bench.peers --out results/accuracy
 	.venv-peers/bin/python -m tests.bench.peer_loads --out results/accuracy
 	$(BIN)/python -m tests.bench.loads --out results/accuracy
 	$(BIN)/python -m tests.bench.programs --out results/accuracy
 
-bench-scale: $(VENV)/ready  ## 10^5 to 10^9 samples, to 10^8 designs, and reading them: writes docs/scale.md, about 10 minutes
+bench-latency: $(VENV)/dev  ## one design, one pose: next to a plain numba function, and to pylinkage where make bench-peers has been; a minute
+	$(if $(wildcard .venv-peers/bin/python),.venv-peers/bin/python,$(BIN)/python) -m tests.bench.latency
+
+bench-scale: $(VENV)/dev  ## 10^5 to 10^9 samples, to 10^8 designs, and reading them: writes docs/scale.md, about 10 minutes
 	$(BIN)/python -m tests.bench.scale --out docs/scale.md
 
-smoke-scale: $(VENV)/ready  ## the same to 10^7, writes no page
+smoke-scale: $(VENV)/dev  ## the same to 10^7, writes no page
 	$(BIN)/python -m tests.bench.scale --samples 7 --designs 6
 
-bench-object-store: $(VENV)/ready  ## a dataset by way of an object store; its server gets an environment of its own
+bench-object-store: $(VENV)/dev  ## a dataset by way of an object store; its server gets an environment of its own
 	$(PYTHON) -m venv .venv-store
-	.venv-store/bin/python -m pip install --quiet 'moto[server]'
+	.venv-store/bin/python -m pip install 'moto[server]'
 	.venv-store/bin/moto_server -H 127.0.0.1 -p 5005 & server=$$!; trap "kill $$server" EXIT; sleep 5; \
 	$(BIN)/python -m tests.bench.object_store 127.0.0.1:5005
 
-search-worse: $(VENV)/ready  ## look for poses with larger errors than any known; appends to tests/oracle/worst_found.json
+search-worse: $(VENV)/dev  ## look for poses with larger errors than any known; appends to tests/oracle/worst_found.json
 	$(BIN)/python -m tests.search.worse
 
-search-wrong: $(VENV)/ready  ## look for design outputs that are wrong though their status is OK: every family, chain and effect; an hour
+search-wrong: $(VENV)/dev  ## look for design outputs that are wrong though their status is OK: every family, chain and effect; an hour
 	$(BIN)/python -m tests.search.wrong
 
-bench: $(VENV)/ready  ## ns per sample against numpy and C; what everything takes, into sweep/costs.toml and docs
+bench: $(VENV)/dev  ## ns per sample against numpy and C; what everything takes, into sweep/costs.toml and docs
 	$(BIN)/python -m tests.bench.kernels
 	$(BIN)/python -m tests.bench.chains
 	$(BIN)/python -m tests.bench.costs
 	$(SWEEP) effects --markdown > docs/effects.md
 
-docs: $(VENV)/ready  ## make docs/effects.md and docs/study.schema.json from the register
+docs: $(VENV)/dev  ## make docs/effects.md and docs/study.schema.json from the register
 	$(SWEEP) effects --markdown > docs/effects.md
 	$(SWEEP) schema --out docs/study.schema.json
 
-site: $(VENV)/ready  ## the docs as a site, into build/site; no network
+site: $(VENV)/dev  ## the docs as a site, into build/site; no network
 	NO_MKDOCS_2_WARNING=1 $(BIN)/mkdocs build
 	$(BIN)/python docs/site/links.py build/site
 
-notebooks: $(VENV)/ready  ## run the notebooks of docs/notebooks in place
+notebooks: $(VENV)/dev  ## run the notebooks of docs/notebooks in place
 	$(BIN)/python docs/site/notebooks.py
 
-frames: $(VENV)/ready  ## draw the frames of all families for docs/frames.md
+frames: $(VENV)/dev  ## draw the frames of all families for docs/frames.md
 	$(BIN)/python docs/frames.py
 
-bench-estimates: $(VENV)/ready  ## what sweep check expects of every study against what a slice of it takes
+bench-estimates: $(VENV)/dev  ## what sweep check expects of every study against what a slice of it takes
 	$(BIN)/python -m tests.bench.estimates
 
-bench-extrema: $(VENV)/ready  ## errors and times of the search for true extrema, as in docs/extrema.md
+bench-extrema: $(VENV)/dev  ## errors and times of the search for true extrema, as in docs/extrema.md
 	$(BIN)/python -m tests.bench.extrema
 
-bench-enclosures: $(VENV)/ready  ## Taylor models of the proofs against intervals and balls, as in docs/proof.md; about 2 minutes
+bench-enclosures: $(VENV)/dev  ## Taylor models of the proofs against intervals and balls, as in docs/proof.md; about 2 minutes
 	$(BIN)/python -m tests.bench.enclosures
 
-bench-first-use: $(VENV)/ready  ## from an empty cache of kernels to the first number; caches of its own, about 2 minutes
+bench-first-use: $(VENV)/dev  ## from an empty cache of kernels to the first number; caches of its own, about 2 minutes
 	$(BIN)/python -m tests.bench.first_use
 
-bench-scene: $(VENV)/ready  ## all effects on 10^5 designs x 360 angles: rate, its parts, memory; about 5 minutes
+bench-scene: $(VENV)/dev  ## all effects on 10^5 designs x 360 angles: rate, its parts, memory; about 5 minutes
 	$(BIN)/python -m tests.bench.effects
 
-bench-optimise: $(VENV)/ready  ## 60 specifications of a crank-rocker, three seeds each: writes docs/optimise-marks.md, about 10 minutes of processor time
+bench-optimise: $(VENV)/dev  ## 60 specifications of a crank-rocker, three seeds each: writes docs/optimise-marks.md, about 10 minutes of processor time
 	$(BIN)/python -m tests.bench.optimise --out docs/optimise-marks.md
 
-bench-basins: $(VENV)/ready  ## five seeds of the search over proportions, two requirements: writes docs/basins.md, about an hour
+bench-basins: $(VENV)/dev  ## five seeds of the search over proportions, two requirements: writes docs/basins.md, about an hour
 	mkdir -p results
 	$(BIN)/python -m tests.bench.basins --keep results/basins.jsonl --out docs/basins.md
 

@@ -8,7 +8,7 @@ Every kernel of the house is made by one of the decorators below, which are ``nu
 * fast-math stays off.  The full set makes ``isnan`` answer false.  Only the fused sweep loops (:func:`kernel_fused`)
   may contract a product and a sum into one instruction: it gains about 8 % there and costs the promise of equal last
   bits on processors with and without that instruction, which all other kernels keep.  The reductions of
-  :mod:`kernels.arithmetic.max_min` carry the two flags they need themselves.
+  :mod:`kernels.arithmetic.intrinsics` carry the two flags they need themselves.
 * ``no_cfunc_wrapper``: nothing calls kernels from C.  ``no_cpython_wrapper`` of helpers: see :class:`Helper`.
 * Machine code is kept on disk by :mod:`kernels.cache`.
 

@@ -82,7 +82,7 @@ def _reason(outcome: str, kinds: list[int]) -> int:
 
 
 def read(path: Path) -> Space:
-    """Return the boxes of a certificate."""
+    """Boxes of a certificate."""
     table = pq.read_table(path)
     asked = json.loads(table.schema.metadata[b"question"])
     names = tuple(asked["free"])
@@ -123,7 +123,7 @@ def _map(axes: Axes, space: Space, reach: float) -> None:
 
 
 def shares(space: Space, k: int) -> tuple[Array, Array]:
-    """Return the edges of strips across coordinate k, and the share of each strip by reason, (STRIPS, reasons)."""
+    """Edges of strips across coordinate k, and the share of each strip by reason, (STRIPS, reasons)."""
     edges = np.linspace(space.ends[k, 0], space.ends[k, 1], STRIPS + 1)
     width = space.high - space.low
     others = np.prod(np.delete(width / np.diff(space.ends)[:, 0], k, axis=1), axis=1)
@@ -152,7 +152,7 @@ def _strips(axes: Axes, space: Space, k: int) -> None:
 
 
 def draw(space: Space, reach: float) -> Figure:
-    """Return the figure of a space: a map of two free coordinates, of more a panel for each."""
+    """Figure of a space: a map of two free coordinates, of more a panel for each."""
     with house_style():
         n = len(space.names)
         columns = 3 if n == 3 else 2

@@ -227,9 +227,7 @@ def _begins(word: str, name: str) -> bool:
 
 
 def edits(one: str, other: str) -> int:
-    """Return how many letters to change, leave out,
-    put in or exchange with their neighbour to make one word the other.
-    """
+    """Count the letters to change, leave out, put in or exchange with their neighbour to make one word the other."""
     before: list[int] = []
     row = list(range(len(other) + 1))
     for i, a in enumerate(one, 1):

@@ -24,9 +24,7 @@ def divisor(x: Any) -> Any:
 
 
 def arctan2(y: Any, x: Any) -> Any:
-    """Return the angle of the vector (x, y);
-    for complex arguments continued to first order in their imaginary parts.
-    """
+    """Angle of the vector (x, y); complex arguments are continued to first order in their imaginary parts."""
     if isinstance(y, complex) or isinstance(x, complex):
         return _arctan2_complex(y, x)
     return _arctan2_real(y, x)
@@ -73,9 +71,7 @@ def _magnitude_typed(x: Any) -> Any:
 
 
 def hypotenuse(x: Any, y: Any) -> Any:
-    """Return the length of the vector (x, y);
-    for complex arguments continued to first order in their imaginary parts.
-    """
+    """Length of the vector (x, y); complex arguments are continued to first order in their imaginary parts."""
     if isinstance(x, complex) or isinstance(y, complex):
         return _hypotenuse_complex(x, y)
     return _hypotenuse_real(x, y)

@@ -13,6 +13,8 @@ import numpy as np
 from numba import types
 from numba.extending import overload
 
+from kernels.jit import inline
+
 _TWO_PER_PI = 2.0 / math.pi
 _P1 = float.fromhex("0x1.921fb54400000p+0")  # pi/2 in three parts of 33 bits: their products with n < 2^20 are exact
 _P2 = float.fromhex("0x1.0b4611a600000p-34")
@@ -62,3 +64,9 @@ def _sincos_real(x: Any) -> tuple[Any, Any]:
 @overload(sincos, inline="always")
 def _sincos_typed(x: Any) -> Any:
     return _sincos_complex if isinstance(x, types.Complex) else _sincos_real
+
+
+@inline
+def sine_cosine(angle: float) -> tuple[float, float]:
+    """Sine and cosine at one call site, as numba warns when ``sincos`` is expanded twice in one function."""
+    return sincos(angle)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from kernels.arithmetic.max_min import largest, smallest
+from kernels.arithmetic.intrinsics import largest, smallest
 from kernels.jit import kernel
 from kernels.types import Array
 

@@ -18,13 +18,13 @@ def add(a: Vector, b: Vector) -> Vector:
 
 @inline
 def sub(a: Vector, b: Vector) -> Vector:
-    """Return the difference a - b."""
+    """Difference a - b."""
     return a[0] - b[0], a[1] - b[1], a[2] - b[2]
 
 
 @inline
 def scale(x: float, a: Vector) -> Vector:
-    """Return the multiple x a."""
+    """Multiple x a."""
     return x * a[0], x * a[1], x * a[2]
 
 
@@ -36,25 +36,25 @@ def mix(x: float, a: Vector, y: float, b: Vector) -> Vector:
 
 @inline
 def dot(a: Vector, b: Vector) -> float:
-    """Return the scalar product."""
+    """Scalar product of two vectors."""
     return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
 
 
 @inline
 def cross(a: Vector, b: Vector) -> Vector:
-    """Return the vector product a x b."""
+    """Vector product a x b."""
     return a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]
 
 
 @inline
 def norm(a: Vector) -> float:
-    """Return the length of a."""
+    """Length of a."""
     return math.sqrt(a[0] * a[0] + a[1] * a[1] + a[2] * a[2])
 
 
 @inline
 def turned(first: Vector, second: Vector, third: Vector, a: Vector) -> Vector:
-    """Return components along a triad brought to fixed axes: a_1 first + a_2 second + a_3 third."""
+    """Components along a triad brought to fixed axes: a_1 first + a_2 second + a_3 third."""
     return (
         a[0] * first[0] + a[1] * second[0] + a[2] * third[0],
         a[0] * first[1] + a[1] * second[1] + a[2] * third[1],
@@ -64,5 +64,5 @@ def turned(first: Vector, second: Vector, third: Vector, a: Vector) -> Vector:
 
 @inline
 def spun(omega: Vector, eps: Vector, a: Vector) -> Vector:
-    """Return the acceleration of the body-fixed vector a: eps x a + omega x (omega x a)."""
+    """Acceleration of the body-fixed vector a: eps x a + omega x (omega x a)."""
     return add(cross(eps, a), cross(omega, cross(omega, a)))

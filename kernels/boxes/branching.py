@@ -83,8 +83,7 @@ def best_bound(
     rows: Array, count: int, objective: Flags, half: Array, work: Array, basis: Indices, linear: Array, sizes: Array,
     factors: Array, total: Array,
 ) -> tuple[float, bool]:  # fmt: skip
-    """Return the best bound (1) of a box, and whether it is one of limits alone:
-    then a positive one empties the box.
+    """Best bound (1) of a box, and whether it is one of limits alone: then a positive one empties the box.
 
     Parameters
     ----------
@@ -150,7 +149,7 @@ def looseness(rows: Array, factors: Array, count: int, n: int, total: Array, out
 
 @kernel
 def surely_negative(rows: Array, j: int, n: int, total: Array) -> bool:
-    """Return whether no design of the box has a value of the row that is not negative."""
+    """Whether no design of the box has a value of the row that is not negative."""
     for k in range(total.shape[0] - 1):
         total[k] = -rows[j, k]
     total[total.shape[0] - 1] = rows[j, total.shape[0] - 1]
@@ -159,7 +158,7 @@ def surely_negative(rows: Array, j: int, n: int, total: Array) -> bool:
 
 @inline
 def _before(bounds: Array, depths: Indices, one: int, other: int) -> bool:
-    """Return whether a box comes before another: the one of lower bound, among equals the larger one."""
+    """Whether a box comes before another: the one of lower bound, among equals the larger one."""
     if bounds[one] != bounds[other]:
         return bool(bounds[one] < bounds[other])
     return bool(depths[one] < depths[other])

@@ -78,7 +78,7 @@ def multipliers(
     basis: NDArray[np.int64],
     out: Array,
 ) -> int:
-    """Return multipliers of the rows of (1).
+    """Multipliers of the rows of (1).
 
     Parameters
     ----------

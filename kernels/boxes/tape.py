@@ -41,11 +41,11 @@ class Number:
         return self.tape.put(MULTIPLY, self, other)
 
     def times(self, factor: float) -> Number:
-        """Return the product with a number that is exact, as 0.5 or 2."""
+        """Product with a number that is exact, as 0.5 or 2."""
         return self.tape.put(COMBINE, self, self, factor, 0.0)
 
     def square(self) -> Number:
-        """Return the square."""
+        """Square of the number."""
         return self.tape.put(MULTIPLY, self, self)
 
     def inverse(self) -> Number:
@@ -53,11 +53,11 @@ class Number:
         return self.tape.put(INVERSE, self, self)
 
     def root(self) -> Number:
-        """Return the positive square root; the run ends without result where x may be negative or vanish."""
+        """Positive square root; the run ends without result where x may be negative or vanish."""
         return self.tape.put(ROOT, self, self)
 
     def sine_cosine(self, of_half: bool = False) -> tuple[Number, Number]:
-        """Return the sine and cosine of a coordinate, or of half of it."""
+        """Sine and cosine of a coordinate, or of half of it."""
         sine = self.tape.put(SINE, self, self, 0.5 if of_half else 1.0)
         return sine, self.tape.new()
 
@@ -80,7 +80,7 @@ class Tape:
         return Number(self, number)
 
     def new(self) -> Number:
-        """Return the next free form."""
+        """Take the next form that no number has yet."""
         self.forms += 1
         return Number(self, self.forms - 1)
 
@@ -102,7 +102,7 @@ class Tape:
         return len(self.ends) - 1
 
     def recorded(self) -> tuple[Operations, Array, Operations]:
-        """Return operations, their factors and the ends of the parts, for :func:`run`."""
+        """Operations, their factors and the ends of the parts, for :func:`run`."""
         return np.array(self.operations, np.int64), np.array(self.factors), np.array([0, *self.ends], np.int64)
 
 

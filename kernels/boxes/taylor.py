@@ -39,13 +39,13 @@ def up(x: float) -> float:
 
 @inline
 def width(variables: int) -> int:
-    """Return columns of a form."""
+    """Count the columns of a form."""
     return 2 + variables + variables * (variables + 1) // 2
 
 
 @inline
 def sizes(at: Array, a: int, n: int) -> tuple[float, float, float]:
-    """Return sum |L|, sum |Q| and R of a form."""
+    """Sum |L|, sum |Q| and R of a form."""
     linear, square = 0.0, 0.0
     rest = at.shape[1] - 1
     for j in range(LINEAR, LINEAR + n):
@@ -136,7 +136,7 @@ def _composed(
 
 @kernel
 def inverse(at: Array, out: int, a: int, n: int) -> bool:
-    """Return whether 1/a could be computed: not where a may be zero.  ``out`` must not be a.
+    """Whether 1/a could be computed: not where a may be zero.  ``out`` must not be a.
 
     1/(1 + d) = 1 - d + d^2 - d^3/(1 + d).
     """
@@ -155,7 +155,7 @@ def inverse(at: Array, out: int, a: int, n: int) -> bool:
 
 @kernel
 def root(at: Array, out: int, a: int, n: int) -> bool:
-    """Return whether the positive square root could be computed: not where a may be zero or less.
+    """Whether the positive square root could be computed: not where a may be zero or less.
 
     sqrt(1 + d) = 1 + d/2 - d^2/8 + d^3/16 (1 + d')^(-5/2) for some d' between 0 and d.  ``out`` must not be a.
     """

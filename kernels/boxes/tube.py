@@ -24,12 +24,12 @@ THETA, LOW, HIGH, COSINES = range(4)
 
 
 def least_acceleration(stroke: float, time: float) -> float:
-    """Return the least largest acceleration of any motion from rest to rest, rounded down."""
+    """Least largest acceleration of any motion from rest to rest, rounded down."""
     return 4.0 * abs(stroke) / time**2 * (1.0 - ROUNDING)
 
 
 def _high(at: float, stroke: float, time: float, most: float) -> float:
-    """Return (1)."""
+    """Angle of the greatest motion (1) at a time."""
     first = 0.25 * time + stroke / (most * time)
     if at < first:
         return 0.5 * most * at * at
@@ -39,7 +39,7 @@ def _high(at: float, stroke: float, time: float, most: float) -> float:
 
 
 def tube(swing: float, phi0: float, most: float) -> Array:
-    """Return where a rocker is that swings from limit to limit with abs(psi'') of at most ``most``.
+    """Where a rocker is that swings from limit to limit with abs(psi'') of at most ``most``.
 
     Parameters
     ----------

@@ -10,8 +10,7 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from kernels.certified.jets import GUARD, NOISE, ORDER, TAIL
-from kernels.certified.lanes import LANES
+from kernels.certified.jets import GUARD, LANES, NOISE, ORDER, TAIL
 from kernels.jit import inline, kernel
 from kernels.types import EPS, TWO_PI, Array
 
@@ -130,7 +129,7 @@ def _bound(lanes: int, walk: Array, curve: Array) -> None:
 
 @inline
 def past_arc(marching: bool, edge: float, top: float, half: float) -> tuple[float, float]:
-    """Return the edge behind a closed arc that it has reached, and the arc's next copy; both as they were otherwise."""
+    """Edge behind a closed arc that it has reached, and the arc's next copy; both as they were otherwise."""
     past, end = marching & (edge >= top - half), top + half
     return (end if past & (end > edge) else edge), (top + TWO_PI if past else top)
 

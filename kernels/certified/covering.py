@@ -1,8 +1,9 @@
 """Proof that a search has missed no peak of several curves of one motion, for designs side by side.
 
-As :mod:`kernels.certified.certificate`, which has one curve of one design: the turn is divided into cells of crank
-angle, in each the motion is enclosed, and a cell is closed for a curve when its bound exceeds the best known value by
-no more than the wanted relative error.  Here one enclosure serves all curves that are made of the motion.
+The turn is divided into cells of crank angle.  In each the family encloses its motion in jets
+(:mod:`kernels.certified.jets`), which bound |y| there.  A cell is closed for a curve when its bound exceeds the best
+known value by no more than the wanted relative error.  At the end there is a value that |y| takes somewhere, and a
+bound that it exceeds nowhere.  One enclosure serves all curves that are made of the motion.
 
 * First the peak of every curve is climbed and an arc about it is closed by a cell centred at the summit, where the
   bound is sharpest.
@@ -15,7 +16,8 @@ no more than the wanted relative error.  Here one enclosure serves all curves th
 
 Cells are bounded and closed in all lanes at once (:mod:`kernels.certified.cells`); what needs a decision of its own,
 which is climbing and closing arcs and what fails, is done lane by lane (:func:`decide`).  Only the truncation of a jet
-decides; rounding errors are added to the bound afterwards, as in :mod:`kernels.certified.certificate`.
+decides; rounding errors are added to the bound afterwards: a motion that float64 knows badly then gets a wide bound,
+and the cells do not become shorter without end.
 """
 
 from __future__ import annotations
@@ -75,8 +77,7 @@ from kernels.certified.cells import (
     past_arc,
     weigh,
 )
-from kernels.certified.jets import GUARD
-from kernels.certified.lanes import LANES
+from kernels.certified.jets import GUARD, LANES
 from kernels.jit import inline, kernel
 from kernels.types import EPS, Array
 from kernels.types import TWO_PI as TURN
@@ -233,7 +234,7 @@ def _bring_arcs_ahead(lane: int, curves: Array, j: int) -> None:
 
 @inline
 def _furthest_back(lane: int, curves: Array) -> float:
-    """Return the edge at which the next cell begins; infinite where all curves are given up."""
+    """Edge at which the next cell begins; infinite where all curves are given up."""
     start = math.inf
     for j in range(curves.shape[0]):
         start = min(start, curves[j, EDGE + lane])

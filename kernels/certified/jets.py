@@ -1,7 +1,25 @@
-"""The arithmetic of jets, number by number in registers: what :mod:`kernels.certified.enclosure` explains.
+"""Enclosures of analytic functions of the crank angle: polynomials with proven remainders.
+
+docs/extrema.md, section 5, explains the method.
+
+A jet encloses a function f(phi + z) on the complex disc |z| <= reach.  In x = z/reach it is a polynomial of degree
+ORDER plus two remainders of which only the size is known.  ``noise`` is any power series; it stands for rounding errors
+and for inputs that are known to rounding.  ``tail`` is a power series that begins with x^(ORDER + 1); it stands for
+truncation.  The size of a power series is the sum of the magnitudes of its coefficients.  The size of a product is at
+most the product of the sizes, which keeps every rule here short.  The size also bounds the function itself and, on a
+smaller disc, its derivatives.
+
+The processor's rounding mode is left at nearest: every operation adds to ``noise`` what it can have rounded by.  Bounds
+are sums and products of non-negative numbers only, and the factor GUARD covers their own rounding.  An operation whose
+numbers overflow or become nan reports failure; it never returns an enclosure.
 
 The rules are written out for the ORDER of the polynomials and have no branch.  So a loop over designs whose jets lie
-side by side is vector code (:mod:`kernels.certified.lanes`), and the same rules serve one design alone.
+side by side is vector code, and the same rules serve one design alone.
+
+Each of several designs has a lane.  A jet of all lanes is WIDTH rows of LANES numbers, and other numbers stand in rows
+alike.  The lanes in use are the first ones; what stands in the others is never read.  All jets are one array, and
+functions take their places in it: an array of its own for each would have its references counted, which took a third
+of the time.
 """
 
 from __future__ import annotations
@@ -11,6 +29,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from kernels.arithmetic.sincos import sincos
 from kernels.jit import inline
 from kernels.types import EPS, Array
 
@@ -84,7 +103,10 @@ def size_of(jet: Jet) -> Any:
 
 @inline
 def harmonic(c0: Any, c1: Any, c2: Any, reach: Any, error: Any) -> Jet:
-    """Enclose c0 + c1 s + c2 m, as :func:`trigonometric` does."""
+    """Enclose c0 + c1 s + c2 m with s = sin z and m = 1 - cos z on |z| <= reach <= 1.
+
+    ``error`` bounds the size of the function that the errors of c0, c1, c2 themselves make.
+    """
     r2 = reach * reach
     r3, r4 = r2 * reach, r2 * r2
     p = (
@@ -99,7 +121,7 @@ def harmonic(c0: Any, c1: Any, c2: Any, reach: Any, error: Any) -> Jet:
 
 @inline
 def double_harmonic(c0: Any, c1: Any, c2: Any, c3: Any, c4: Any, reach: Any, error: Any) -> Jet:
-    """Enclose c0 + c1 s + c2 m + c3 s m + c4 m^2, as :func:`trigonometric` does."""
+    """Enclose c0 + c1 s + c2 m + c3 s m + c4 m^2, as :func:`harmonic` does."""
     r2 = reach * reach
     r3, r4 = r2 * reach, r2 * r2
     p = (
@@ -110,6 +132,25 @@ def double_harmonic(c0: Any, c1: Any, c2: Any, c3: Any, c4: Any, reach: Any, err
     odd = reach * (abs(c1) * SIZE[1] + r2 * abs(c3) * SIZE[3])
     whole = odd + r2 * (abs(c2) * SIZE[2] + r2 * abs(c4) * SIZE[4])
     rest = abs(c1) * REST[1] + abs(c2) * REST[2] + abs(c3) * REST[3] + abs(c4) * REST[4]
+    noise = (error + (ORDER + 8) * EPS * whole) * GUARD
+    return Jet(p, norm_of(p), noise, rest * (r4 * r3) * (1.0 + 2.0**-30))
+
+
+@inline
+def triple_harmonic(c0: Any, c1: Any, c2: Any, c3: Any, c4: Any, c5: Any, c6: Any, reach: Any, error: Any) -> Jet:
+    """Enclose c0 + c1 s + c2 m + c3 s m + c4 m^2 + c5 s m^2 + c6 m^3, as :func:`harmonic` does."""
+    r2 = reach * reach
+    r3, r4 = r2 * reach, r2 * r2
+    p = (
+        c0, reach * c1 * TABLE[1, 1], r2 * c2 * TABLE[2, 2], r3 * (c1 * TABLE[1, 3] + c3 * TABLE[3, 3]),
+        r4 * (c2 * TABLE[2, 4] + c4 * TABLE[4, 4]),
+        r4 * reach * (c1 * TABLE[1, 5] + c3 * TABLE[3, 5] + c5 * TABLE[5, 5]),
+        r4 * r2 * (c2 * TABLE[2, 6] + c4 * TABLE[4, 6] + c6 * TABLE[6, 6]),
+    )  # fmt: skip
+    odd = reach * (abs(c1) * SIZE[1] + r2 * (abs(c3) * SIZE[3] + r2 * abs(c5) * SIZE[5]))
+    whole = odd + r2 * (abs(c2) * SIZE[2] + r2 * (abs(c4) * SIZE[4] + r2 * abs(c6) * SIZE[6]))
+    rest = abs(c1) * REST[1] + abs(c2) * REST[2] + abs(c3) * REST[3]
+    rest += abs(c4) * REST[4] + abs(c5) * REST[5] + abs(c6) * REST[6]
     noise = (error + (ORDER + 8) * EPS * whole) * GUARD
     return Jet(p, norm_of(p), noise, rest * (r4 * r3) * (1.0 + 2.0**-30))
 
@@ -197,8 +238,14 @@ def reciprocal(a: Jet) -> tuple[Jet, Any]:
 
 
 @inline
-def _root_polynomial(a: Jet) -> tuple[Any, Any, Any, Any]:
-    """Return the polynomial t of a root, its size, and bounds of noise and tail of a - t^2."""
+def root_of(a: Jet) -> tuple[Jet, Any]:
+    """Enclose the positive square root of a; the second result is false if that is impossible.
+
+    Let t be the polynomial of the root, so that a = t^2 (1 + q) with q = (a - t^2)/t^2.  If the size of q is small
+    enough, the power series of sqrt(1 + q) bounds both remainders.  Where a is not positive the numbers become nan, and
+    no comparison with them is true.  The size of 1/t, by which the remainders grow, is bounded without its polynomial:
+    of t = f - r it is at most 1/(f - size of r), which was measured to cost no cell.
+    """
     a0, a1, a2, a3, a4, a5, a6 = a.p
     f = math.sqrt(a0)
     half = 0.5 / f
@@ -210,39 +257,39 @@ def _root_polynomial(a: Jet) -> tuple[Any, Any, Any, Any]:
     t6 = (a6 - t1 * t5 - t2 * t4 - t3 * t3 - t4 * t2 - t5 * t1) * half
     p = (f, t1, t2, t3, t4, t5, t6)
     norm = norm_of(p)
-    return p, norm, _DOT * (a.norm + 2.0 * norm * norm) + a.noise, beyond(p, p) + a.tail
-
-
-@inline
-def root_of(a: Jet) -> tuple[Jet, Jet, Any]:
-    """Enclose the positive square root of a and its inverse; the last result is false if that is impossible.
-
-    Let t be the polynomial of the root, so that a = t^2 (1 + q) with q = (a - t^2)/t^2.  If the size of q is small
-    enough, the power series of sqrt(1 + q) and of its inverse bound both remainders.  Where a is not positive the
-    numbers become nan, and no comparison with them is true.
-    """
-    p, norm, noise, tail = _root_polynomial(a)
-    per, good = reciprocal(Jet(p, norm, 0.0 * norm, 0.0 * norm))
-    bound = size_of(per)
-    q = (noise + tail) * bound * bound * GUARD
-    s = math.sqrt(1.0 - q)
-    by_root, by_inverse = bound / (1.0 + s) * GUARD, bound * bound * bound / (s * (1.0 + s)) * GUARD
-    inverse_of_root = Jet(
-        per.p, per.norm, (per.noise + noise * by_inverse) * GUARD, (per.tail + tail * by_inverse) * GUARD
-    )
-    return Jet(p, norm, noise * by_root, tail * by_root), inverse_of_root, good & (q < _LARGEST_LEFT)
-
-
-@inline
-def root_alone(a: Jet) -> tuple[Jet, Any]:
-    """Enclose the positive square root of a as :func:`root_of` does, where its inverse is not needed.
-
-    The size of 1/t, by which the remainders grow, is then bounded without its polynomial: of t = f - r it is at most
-    1/(f - size of r).  That widens remainders a little and was measured to cost no cell.
-    """
-    p, norm, noise, tail = _root_polynomial(a)
-    least = 2.0 * p[0] - norm
+    noise, tail = _DOT * (a.norm + 2.0 * norm * norm) + a.noise, beyond(p, p) + a.tail
+    least = 2.0 * f - norm
     bound = GUARD / least
     q = (noise + tail) * bound * bound * GUARD
     by_root = bound / (1.0 + math.sqrt(1.0 - q)) * GUARD
     return Jet(p, norm, noise * by_root, tail * by_root), (least > 0.0) & (q < _LARGEST_LEFT)
+
+
+LANES = 32
+
+
+@inline
+def circle(lanes: int, phi: Array, reach: Array, jets: Array, cos: int, sin: int) -> None:
+    """Enclose cosine and sine of phi + z on |z| <= reach <= 1; ``cos`` and ``sin`` are places of jets."""
+    for i in range(lanes):
+        v, u = sincos(phi[i])
+        put(jets, cos + i, LANES, harmonic(u, -v, -u, reach[i], 6.0 * EPS))
+        put(jets, sin + i, LANES, harmonic(v, u, -v, reach[i], 6.0 * EPS))
+
+
+@inline
+def inverse(lanes: int, jets: Array, a: int, out: int, good: Array) -> None:
+    """Enclose 1/a; ``good`` becomes 0 where that is impossible."""
+    for i in range(lanes):
+        jet, possible = reciprocal(get(jets, a + i, LANES))
+        put(jets, out + i, LANES, jet)
+        good[i] = good[i] if possible else 0.0
+
+
+@inline
+def root(lanes: int, jets: Array, a: int, out: int, good: Array) -> None:
+    """Enclose the positive square root of a; ``good`` becomes 0 where that is impossible."""
+    for i in range(lanes):
+        jet, possible = root_of(get(jets, a + i, LANES))
+        put(jets, out + i, LANES, jet)
+        good[i] = good[i] if possible else 0.0

@@ -196,7 +196,7 @@ def _ended(driving: Driving, form: Form, stages: int) -> Chained:
 
 
 def _recorded_first(form: Form) -> Record:
-    """Return the constants of a first stage."""
+    """Constants of a first stage."""
 
     def doubts(c: Any) -> Any:
         return (c.doubt,)
@@ -217,7 +217,7 @@ def _recorded_first(form: Form) -> Record:
 
 
 def _recorded(before: Record, form: Form) -> Record:
-    """Return the constants of some stages and of one more, coupled to them."""
+    """Constants of some stages and of one more, coupled to them."""
     end, link = before.columns + form.columns, before.wide + form.columns
     link_row, stage_row = before.numbers * STRIDE, (before.numbers + NUMBERS) * STRIDE
     constants_before, put_before, get_before, doubts_before = before.constants, before.put, before.get, before.doubts

@@ -69,7 +69,7 @@ def curve(chain: Chained, order: int, along: bool) -> Curve:
 
 
 def _handing(order: int) -> tuple[Helper, Helper]:
-    """Return functions that put an `Input` with so many derivatives to rows, and get it, the others 0."""
+    """Functions that put an `Input` with so many derivatives to rows, and get it, the others 0."""
 
     def hand(rows: Any, i: int, t: Any) -> None:
         rows[0][i], rows[1][i] = t.u, t.v

@@ -5,7 +5,7 @@ from __future__ import annotations
 from functools import lru_cache
 from typing import Any, TypeAlias
 
-from kernels.arithmetic.max_min import largest, smallest
+from kernels.arithmetic.intrinsics import largest, smallest
 from kernels.chains.chain import Chained
 from kernels.chains.form import Helper
 from kernels.jit import generated, generated_inline
@@ -60,7 +60,7 @@ def dense_maxima(chain: Chained) -> Helper:
 
 
 def _lower(stages: int, name: str) -> Helper:
-    """Return the smaller of two tuples, number by number."""
+    """Smaller of two tuples, number by number."""
     last = stages - 1
     if last == 0:
 

@@ -7,7 +7,7 @@ which come as bits of one number.  What needs more samples :mod:`kernels.chains.
 
 from __future__ import annotations
 
-from kernels.arithmetic.max_min import largest, smallest
+from kernels.arithmetic.intrinsics import largest, smallest
 from kernels.chains.curves import Curve
 from kernels.chains.form import BLOCK, Helper
 from kernels.chains.halves import TOGETHER, handed_rows, keepers
@@ -29,7 +29,7 @@ DIPS = (FEWEST + 2) * BLOCK  # by one row, per later stage
 
 @inline
 def _row(rows: Array, i: int) -> Array:
-    """Return one row; an index into it is seen not to be negative, one that is a sum would be written to one by one."""
+    """One row; an index into it is seen not to be negative, one that is a sum would be written to one by one."""
     return rows[i * BLOCK : (i + 1) * BLOCK]
 
 
@@ -127,7 +127,7 @@ def _dip_bit(left: float, here: float, right: float, enough: float) -> float:
 
 @inline
 def nearest_dip(guards: Array, slot: int, lane: int) -> float:
-    """Return the squared distance [samples] of the nearest complex zero of one design's discriminant, by parabolas."""
+    """Squared distance [samples] of the nearest complex zero of one design's discriminant, by parabolas."""
     nearest = 1e300
     for j in range(1, FEWEST + 1):
         at = (slot * (FEWEST + 2) + j) * BLOCK + lane

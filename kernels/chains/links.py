@@ -33,7 +33,7 @@ class Input(NamedTuple):
 
 @inline
 def link_of(kappa: Any, offset: Any) -> Link:
-    """Return the coupling of that sense and angle [rad]; kappa is nan if one of them is refused."""
+    """Coupling of that sense and angle [rad]; kappa is nan if one of them is refused."""
     sine, cosine = sincos(offset)
     return Link(kappa if (kappa * kappa == 1.0) & (abs(offset) < 1e5) else math.nan, cosine, sine)
 
@@ -52,16 +52,14 @@ def get_link(at: Any, place: int) -> Link:
 
 @inline
 def enter(link: Link, m: Turned) -> Input:
-    """Return the input angle of the next stage from kappa times the output angle of this one; (1)."""
+    """Input angle of the next stage from kappa times the output angle of this one; (1)."""
     u, v = m.cos * link.cos - m.sin * link.sin, m.sin * link.cos + m.cos * link.sin
     return Input(u, v, m.d1, m.d2, m.d3, m.d4)
 
 
 @inline
 def through(t: Input, y1: Any, y2: Any, y3: Any, y4: Any) -> tuple[Any, Any, Any, Any]:
-    """Return derivatives by the crank angle of the chain from those by the input angle of a stage;
-    (22) to order four.
-    """
+    """Turn derivatives by the input angle of a stage into those by the chain's crank angle; (22) to order four."""
     t1, t2, square = t.t1, t.t2, t.t1 * t.t1
     second = t2 * y1 + square * y2
     third = t.t3 * y1 + t1 * (3.0 * t2 * y2 + square * y3)

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from kernels import status as st
-from kernels.arithmetic.bits import lowest_bit
+from kernels.arithmetic.intrinsics import lowest_bit
 from kernels.chains.chain import Chained
 from kernels.chains.curves import Curve
 from kernels.chains.form import BLOCK, Helper
@@ -60,7 +60,7 @@ class Room(NamedTuple):
 
 @inline
 def aligned(numbers: int) -> Array:
-    """Return memory that begins where a line of the cache does: a vector that lies across two is fetched twice."""
+    """Memory that begins where a line of the cache does: a vector that lies across two is fetched twice."""
     memory = np.empty(numbers + LINE)
     begin = -(memory.ctypes.data // memory.itemsize) % LINE
     return memory[begin : begin + numbers]
@@ -68,7 +68,7 @@ def aligned(numbers: int) -> Array:
 
 @inline
 def new_room(guarded: int, wide: int) -> Room:
-    """Return the memory for a curve that so many later stages enter, and for designs of so many columns."""
+    """Memory for a curve that so many later stages enter, and for designs of so many columns."""
     stages = max(guarded, 1)
     return Room(
         aligned(ABREAST + SAMPLES), aligned(stages * GUARD_ROW), aligned(stages * DIPS), aligned(LOW + stages * BLOCK),
@@ -77,8 +77,9 @@ def new_room(guarded: int, wide: int) -> Room:
 
 
 def enlister(chain: Chained, of: Curve) -> Helper:
-    """Make the part ``enlist(designs, begin, end, near, ...)``: samples designs begin, ..., end - 1, lists their
-    local maxima, and returns the length of the list, in whole vectors.
+    """Make the part ``enlist(designs, begin, end, near, ...)``, which lists the local maxima of some designs.
+
+    It samples designs begin, ..., end - 1 and returns the length of the list, in whole vectors.
 
     ``near`` has for each the distance of its nearest singularity, 0 for one that is left out.  ``span`` gets for each
     the place of its first maximum, and where the others begin and end.
@@ -159,8 +160,9 @@ def enlister(chain: Chained, of: Curve) -> Helper:
 
 
 def _judge(of: Curve) -> Helper:
-    """Make the function ``judge(limits, lane, dips, said)``: how many samples a design needs by its first look, and its
-    status, as :func:`kernels.chains.look.looker` has it; LOOKING if more are needed than the first 32.
+    """Make the function ``judge(limits, lane, dips, said)``: how many samples a design needs by its first look.
+
+    Its status is that of :func:`kernels.chains.look.looker`; LOOKING if more are needed than the first 32.
     """
     guarded, samples = of.guarded, of.samples
 

@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 
 from kernels import status as st
-from kernels.arithmetic.max_min import largest, smallest
+from kernels.arithmetic.intrinsics import largest, smallest
 from kernels.chains.curves import Curve
 from kernels.chains.form import Helper
 from kernels.chains.halves import TOGETHER, handed_rows, keepers
@@ -39,7 +39,7 @@ def sampling_tables() -> tuple[Array, Array]:
 
 @inline
 def fourth_difference(first: float, left: float, here: float, right: float, last: float) -> float:
-    """Return its magnitude."""
+    """Magnitude of the fourth difference of five samples."""
     return abs((first + last) - 4.0 * (left + right) + 6.0 * here)
 
 
@@ -71,7 +71,7 @@ def _dips(n: int, guards: Array, begin: int) -> tuple[float, float]:
 
 @inline
 def zero_beside(left: float, here: float, right: float) -> float:
-    """Return the squared distance [samples] of the complex zero of a parabola, 1e300 unless the middle is lowest."""
+    """Squared distance [samples] of the complex zero of a parabola, 1e300 unless the middle is lowest."""
     bend, slope = 0.5 * (left + right) - here, 0.5 * (right - left)
     dips = (here <= left) & (here <= right) & (bend > 0.0)
     per_bend = 1.0 / (bend if dips else 1.0)
@@ -81,7 +81,7 @@ def zero_beside(left: float, here: float, right: float) -> float:
 
 @inline
 def samples_for(per_distance: float, n: int, nearest: float, needed: int) -> int:
-    """Return how many samples a zero asks for that n samples see at that squared distance, ``needed`` at least."""
+    """How many samples a zero asks for that n samples see at that squared distance, ``needed`` at least."""
     wanted = per_distance * n / (TWO_PI * math.sqrt(largest(nearest, 1e-12)))
     while needed < min(wanted, AT_ONCE * n):
         needed *= 2

@@ -1,7 +1,7 @@
 """The list of local maxima under refinement: all those of a block of designs, side by side.
 
-As in :mod:`kernels.families.rssr.peaks`: Newton steps on the next derivative, and what a refined maximum must keep to
-be trusted (docs/extrema.md).  A minimum, or a negative peak of a magnitude, is a maximum of the curve times a sign.
+As in :mod:`kernels.families.rssr.sampling`: Newton steps on the next derivative, and what a refined maximum must keep
+to be trusted (docs/extrema.md).  A minimum, or a negative peak of a magnitude, is a maximum of the curve times a sign.
 """
 
 from __future__ import annotations
@@ -9,7 +9,7 @@ from __future__ import annotations
 import math
 from typing import Any
 
-from kernels.arithmetic.max_min import largest
+from kernels.arithmetic.intrinsics import largest
 from kernels.chains.curves import Curve
 from kernels.chains.form import STRIDE, Helper
 from kernels.curves.trigonometric_polynomials import rotate

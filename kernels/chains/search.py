@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from kernels import status as st
-from kernels.arithmetic.prefetch import prefetch_rows
+from kernels.arithmetic.intrinsics import prefetch_rows
 from kernels.chains.chain import Chained
 from kernels.chains.curves import MARGIN, curve
 from kernels.chains.form import BLOCK, STRIDE, Helper

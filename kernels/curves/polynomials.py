@@ -35,9 +35,7 @@ def middle(low: float, high: float) -> float:
 
 @inline
 def bracketed_root(p: Array, degree: int, low: float, high: float, at_low: float) -> float:
-    """Find where p changes its sign between low and high, by Newton's method kept in the bracket;
-    nan if it does not settle.
-    """
+    """Find by bracketed Newton steps where p changes its sign between low and high; nan if they do not settle."""
     x, before = middle(low, high), math.inf
     for _ in range(200):
         value, slope = value_and_slope(p, degree, x)
@@ -58,8 +56,7 @@ def bracketed_root(p: Array, degree: int, low: float, high: float, at_low: float
 
 @inline
 def roots_up_to(end: float, p: Array, degree: int, derivatives: Array, found: Array) -> int:
-    """Return roots of p in (0, end) in ascending order;
-    the roots of each derivative part those of the one before it.
+    """Roots of p in (0, end) in ascending order; the roots of each derivative part those of the one before it.
 
     Parameters
     ----------

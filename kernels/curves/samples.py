@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from kernels import status as st
-from kernels.arithmetic.max_min import largest
+from kernels.arithmetic.intrinsics import largest
 from kernels.jit import inline, kernel
 from kernels.types import EPS, TWO_PI, Array, Status
 

@@ -80,7 +80,7 @@ def _lower(value: float, odd: float, c: float, s: float, best: float, u: float, 
 
 @inline
 def lowest_of_16(c1: float, s1: float, c2: float, s2: float) -> tuple[float, float]:
-    """Return the cosine and sine of the lowest of 16 equally spaced points; without a branch, so that it vectorises."""
+    """Cosine and sine of the lowest of 16 equally spaced points; without a branch, so that it vectorises."""
     best, u, v = _lower(c2, c1, 1.0, 0.0, math.inf, 1.0, 0.0)
     best, u, v = _lower(-c2, s1, 0.0, 1.0, best, u, v)
     best, u, v = _lower(s2, _R * (c1 + s1), _R, _R, best, u, v)
@@ -95,8 +95,7 @@ def lowest_of_16(c1: float, s1: float, c2: float, s2: float) -> tuple[float, flo
 
 @inline
 def approach(c1: float, s1: float, c2: float, s2: float, u: float, v: float) -> tuple[float, float, float]:
-    """Return two cubically converging steps downhill and the size of the last;
-    without a branch, so that it vectorises.
+    """Take two cubically converging steps downhill without a branch, so that they vectorise; the size of the last.
 
     From the lowest of 16 points the second is 2e-4 rad long on average, what is left after it 1e-12.
     """
@@ -116,9 +115,7 @@ def shortfall(c1: float, s1: float, c2: float, s2: float, u: float, v: float) ->
 
 @inline
 def far_minimum(c2: float, s2: float, u: float, v: float) -> tuple[float, float]:
-    """Return the direction that leads from the minimum (u, v) to the other one if there are two;
-    c2, s2 not both zero.
-    """
+    """Direction from the minimum (u, v) to the other one if there are two; c2, s2 not both zero."""
     cos2, sin2 = (u - v) * (u + v), 2.0 * u * v
     even, cross = c2 * cos2 + s2 * sin2, s2 * cos2 - c2 * sin2
     per = 1.0 / math.sqrt(c2 * c2 + s2 * s2)
@@ -127,7 +124,7 @@ def far_minimum(c2: float, s2: float, u: float, v: float) -> tuple[float, float]
 
 @inline
 def point(c1: float, s1: float, c2: float, s2: float, u: float, v: float) -> Minimum:
-    """Return the value and second derivative at (u, v)."""
+    """Value and second derivative at (u, v)."""
     first, even = c1 * u + s1 * v, c2 * ((u - v) * (u + v)) + s2 * (2.0 * u * v)
     return Minimum(u, v, first + even, -first - 4.0 * even)
 
@@ -143,7 +140,7 @@ def _descend(c1: float, s1: float, c2: float, s2: float, u: float, v: float) -> 
 
 @inline
 def minimum(c1: float, s1: float, c2: float, s2: float) -> Minimum:
-    """Return the global minimum of c1 cos t + s1 sin t + c2 cos 2t + s2 sin 2t.
+    """Global minimum of c1 cos t + s1 sin t + c2 cos 2t + s2 sin 2t.
 
     Parameters
     ----------

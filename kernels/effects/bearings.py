@@ -65,7 +65,7 @@ class Criteria(NamedTuple):
 
 @inline
 def sliding_data(data: Array, i: int) -> Sliding:
-    """Return the row of the sliding-bearing matrix."""
+    """Row of the sliding-bearing matrix."""
     return Sliding(
         data[i, 0], data[i, 1], data[i, 2], data[i, 3], data[i, 4], data[i, 5], data[i, 6], data[i, 7], data[i, 8],
         data[i, 9],
@@ -101,7 +101,7 @@ def sliding_criteria(s: Sliding, moment: float, cos1: float, sin1: float, axial:
 def mean_pressures(
     r1: float, r2: float, axial: float, d: float, l1: float, l2: float, d0: float
 ) -> tuple[float, float, float]:
-    """Return mean pressures of two journals, diameter ``d``, lengths ``l1`` and ``l2``, of a collar up to ``d0``."""
+    """Mean pressures of two journals, diameter ``d``, lengths ``l1`` and ``l2``, of a collar up to ``d0``."""
     return r1 / (d * l1), r2 / (d * l2), 4.0 * abs(axial) / (math.pi * (d0 - d) * (d0 + d))
 
 

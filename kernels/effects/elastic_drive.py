@@ -35,7 +35,7 @@ def _kept(cosines: Array, sines: Array) -> int:
 
 @inline
 def _harmonic(cosines: Array, sines: Array, step: int) -> complex:
-    """Return the complex coefficient of a series; harmonics that it does not have are zero."""
+    """Complex coefficient of a series; harmonics that it does not have are zero."""
     k = abs(step)
     if k >= cosines.size:
         return complex(0.0, 0.0)
@@ -67,7 +67,7 @@ def driven_solution(bc: Array, bs: Array, cc: Array, cs: Array, c: Array, s: Arr
 
 @kernel
 def driven_multiplier(bc: Array, bs: Array, cc: Array, cs: Array) -> float:
-    """Return the largest modulus of the multipliers of eta'' + b eta' + c eta = 0 by Magnus steps of fourth order."""
+    """Largest modulus of the multipliers of eta'' + b eta' + c eta = 0 by Magnus steps of fourth order."""
     largest = 0.0
     for k in range(cc.size):
         largest += math.hypot(cc[k], cs[k])

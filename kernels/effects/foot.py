@@ -59,7 +59,7 @@ def _between(p0: float, p1: float, m0: float, m1: float, c0: float, c1: float, s
 
 @inline
 def rack_height(path: Array, j: int, s: float) -> tuple[float, float, float]:
-    """Return the height of the rack above the plate in cell j at the share s, with derivatives by phi."""
+    """Height of the rack above the plate in cell j at the share s, with derivatives by phi."""
     n = path.shape[1]
     h, j, k = TWO_PI / n, j % n, (j + 1) % n
     y, y1, y2 = _between(
@@ -81,7 +81,7 @@ def _along(path: Array, j: int, s: float) -> float:
 
 @inline
 def flown(foot: Foot, state: State, phi: float) -> tuple[float, float]:
-    """Return the height and speed of the flying foot at a crank angle; (6)."""
+    """Height and speed of the flying foot at a crank angle; (6)."""
     t = phi - state.since
     half = 0.5 * foot.kappa * t
     sinc = math.sin(half) / half if half != 0.0 else 1.0
@@ -94,7 +94,7 @@ def flown(foot: Foot, state: State, phi: float) -> tuple[float, float]:
 
 @inline
 def _force(foot: Foot, y: float, bend: float) -> float:
-    """Return the contact force of a foot that follows the rack, divided by m omega^2; (5)."""
+    """Contact force of a foot that follows the rack, divided by m omega^2; (5)."""
     return foot.g0 + foot.kappa * foot.kappa * y + bend
 
 
@@ -135,7 +135,7 @@ def _root(path: Array, foot: Foot, state: State, j: int, low: float, high: float
 
 @kernel
 def _struck(path: Array, foot: Foot, j: int, s: float, speed: float) -> tuple[State, float]:
-    """Return the state after the foot meets rack or plate with a speed, and the relative speed; (7)-(9)."""
+    """State after the foot meets rack or plate with a speed, and the relative speed; (7)-(9)."""
     y, y1, bend = rack_height(path, j, s)
     phi = (j + s) * (TWO_PI / path.shape[1])
     on_rack = y > 0.0 or (y >= -1e-14 * abs(y1) and y1 > 0.0)
@@ -193,7 +193,7 @@ def _next_event(path: Array, foot: Foot, state: State, j: int, s: float) -> tupl
 
 @inline
 def _above(path: Array, foot: Foot, state: State, j: int, low: float, high: float) -> tuple[float, float]:
-    """Return the crank angle and way along the feed between two shares of a cell while the rack is above the plate."""
+    """Crank angle and way along the feed between two shares of a cell while the rack is above the plate."""
     one, two = rack_height(path, j, low)[0], rack_height(path, j, high)[0]
     if one <= 0.0 and two <= 0.0:
         return 0.0, 0.0

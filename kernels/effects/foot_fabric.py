@@ -90,7 +90,7 @@ def _motion(foot: Foot, fabric: Fabric, y: float, v: float, angle: float, ground
 
 @inline
 def _press(fabric: Fabric, ground: Array, y: float, v: float, x: float, angle: float) -> tuple[float, float]:
-    """Return the force of the fabric, and how deep the foot stands in it, for a foot at height y with speed v; (14)."""
+    """Force of the fabric, and how deep the foot stands in it, for a foot at height y with speed v; (14)."""
     g, slope = _value(ground, 6, x)
     return fabric.stiffness * (g - y) + fabric.damping * (slope / angle - v), g - y
 
@@ -111,7 +111,7 @@ def _look(
 
 @kernel
 def _event(foot: Foot, fabric: Fabric, state: State, piece: Piece, ground: Array, series: Array) -> float:
-    """Return the share of the piece at which the state ends; 2 if it lasts beyond."""
+    """Share of the piece at which the state ends; 2 if it lasts beyond."""
     low = 0.0
     for k in range(1, 5):
         high = 0.25 * k

@@ -272,7 +272,7 @@ def _total(answers: Array, x: float, y: float, z: float, total: Array) -> None:
 
 @inline
 def _guidance(total: Array, axis: Vector, f: Friction) -> tuple[float, float, float]:
-    """Return loads of the two supports of the follower and the force along its axis."""
+    """Return the loads of the two supports of the follower and the force along its axis."""
     return supports((total[9], total[10], total[11]), (total[15], total[16], total[17]), axis, f.z_d1, f.z_d2)
 
 
@@ -318,7 +318,7 @@ def _leap(along: float, square: float) -> float:
 
 @inline
 def _largest_change(x: float, dx: float, y: float, dy: float, z: float, dz: float) -> float:
-    """Return the largest change of a couple in proportion to that couple."""
+    """Largest change of a couple in proportion to that couple."""
     worst = 0.0
     for old, change in ((x, dx), (y, dy), (z, dz)):
         size = max(abs(old), abs(old + change))

@@ -82,7 +82,7 @@ def _body(data: Array, x: Vector, y: Vector, z: Vector) -> Body:
 
 @inline
 def _inertia_times(body: Body, a: Vector) -> Vector:
-    """Return the inertia tensor times a vector given in fixed axes."""
+    """Inertia tensor times a vector given in fixed axes."""
     p, q, r = dot(body.first, a), dot(body.second, a), dot(body.third, a)
     xx, xy, xz, yy, yz, zz = body.inertia
     local = (xx * p + xy * q + xz * r, xy * p + yy * q + yz * r, xz * p + yz * q + zz * r)
@@ -91,13 +91,13 @@ def _inertia_times(body: Body, a: Vector) -> Vector:
 
 @inline
 def _torque(body: Body, omega: Vector, eps: Vector) -> Vector:
-    """Return the rate of the moment of momentum about the centre of mass."""
+    """Rate of the moment of momentum about the centre of mass."""
     return add(_inertia_times(body, eps), cross(omega, _inertia_times(body, omega)))
 
 
 @inline
 def inertia_loads(j: Joints, coupler: Coupler, bodies: Array, drive: Array) -> Loads:
-    """Return the inertia forces and torques of the three bodies, reduced inertia and its derivative, for one pose."""
+    """Inertia forces and torques of the three bodies, reduced inertia and its derivative, for one pose."""
     gravity = (bodies[3 * BODY], bodies[3 * BODY + 1], bodies[3 * BODY + 2])
     torque, speed, change = drive[LOAD], drive[SPEED], drive[CHANGE]
     crank = _body(bodies[:BODY], j.rho_b, j.tau_b, j.u)
@@ -158,7 +158,7 @@ def loaded_follower(on: Loads, wrench: Array) -> Loads:
 
 @inline
 def _about_axis(body: Body, axis: Vector) -> float:
-    """Return the moment of inertia about an axis through the frame origin."""
+    """Moment of inertia about an axis through the frame origin."""
     across = cross(axis, body.centre)
     return dot(axis, _inertia_times(body, axis)) + body.mass * dot(across, across)
 
@@ -254,7 +254,7 @@ def kinetostatics(
 
 @inline
 def pose_status(code: int, j: Joints, coupler: Coupler) -> int:
-    """Return the status of a pose for forces: its own, or the reason why its reactions have no digits."""
+    """Status of a pose for forces: its own, or the reason why its reactions have no digits."""
     if code != st.OK:
         return code
     if not abs(j.t_tau) >= LEAST_COSINE:

@@ -36,7 +36,7 @@ SHAFT, HINGED_BALL, GUIDE, BALL, CONTACT = 0, 1, 2, 3, 4
 
 @inline
 def inertia_times(body: Array, tensor: Tensor, a: Vector) -> Vector:
-    """Return the inertia tensor, given in the body's axes, times a vector in fixed axes."""
+    """Inertia tensor, given in the body's axes, times a vector in fixed axes."""
     x, y, z = vector(body[15:]), vector(body[18:]), vector(body[21:])
     p, q, r = dot(x, a), dot(y, a), dot(z, a)
     xx, xy, xz, yy, yz, zz = tensor

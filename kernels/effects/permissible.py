@@ -25,7 +25,7 @@ STEPS = 100
 def sliding_utilisation(
     bearings: Array, limits: Array, i: int, moment: float, cos1: float, sin1: float, axial: float
 ) -> float:
-    """Return the largest mean pressure of journals and collar over its permissible value; inf where friction locks."""
+    """Largest mean pressure of journals and collar over its permissible value; inf where friction locks."""
     r = sliding_criteria(sliding_data(bearings, i), moment, cos1, sin1, axial)
     worst = max(r.p1 / limits[i, 0], max(r.p2 / limits[i, 1], r.p3 / limits[i, 2]))
     return worst if r.arm > 0.0 else math.inf
@@ -35,7 +35,7 @@ def sliding_utilisation(
 def rolling_utilisation(
     bearings: Array, limits: Array, i: int, moment: float, cos1: float, sin1: float, axial: float
 ) -> float:
-    """Return the larger equivalent load of the two bearings over the permissible one; inf where no torque passes."""
+    """Larger equivalent load of the two bearings over the permissible one; inf where no torque passes."""
     pi1, pi2 = support_arms(bearings[i, 0], bearings[i, 1], bearings[i, 2], cos1, sin1, axial)
     force = moment / (bearings[i, 0] * cos1)
     per_span = force / abs(bearings[i, 2] - bearings[i, 1])
@@ -58,7 +58,7 @@ def _spare(utilisation: Any, bearings: Array, limits: Array, i: int, moment: flo
 def _first_crossing(
     utilisation: Any, looks: int, bearings: Array, limits: Array, i: int, moment: float, tan2: float
 ) -> float:
-    """Return the largest theta1 from 0 on with utilisation <= 1 all the way; 0 if there is none."""
+    """Largest theta1 from 0 on with utilisation <= 1 all the way; 0 if there is none."""
     # In half = tan(theta1/2) there is no sine to call; what is spare falls through zero at the crossing.
     low, high, at_high = 0.0, 1.0, -1.0
     at_low = _spare(utilisation, bearings, limits, i, moment, 0.0, tan2)

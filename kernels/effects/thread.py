@@ -1,4 +1,4 @@
-"""T1, T2, W1: tension of a thread behind an eyelet, over its contour, with its speed, and by Euler's law.
+"""T1, T2, W1, U1: a thread over a moving eyelet, its tension behind it, with its speed, and by Euler's law.
 
 The law is that of the source with its misprints corrected; the equation numbers are those of docs/thread.md.  The
 two-term law of friction
@@ -10,6 +10,9 @@ With expm1 all limits are regular: beta = 0, R = 0, alpha = B = 0 (Euler).  All 
 The unit of angle is that of beta and alpha, whichever it is.
 
 Its limit alpha = B = 0 is Euler's law, (5), (6).  What the speed of the thread makes of the tension: (7), (8).
+
+The thread runs from guide N1 over E to guide N2; its wrap angle, length L = |E - N1| + |E - N2| and the derivatives of
+the length hold for an eyelet on any link.
 """
 
 from __future__ import annotations
@@ -17,7 +20,9 @@ from __future__ import annotations
 import math
 
 from kernels import status as st
+from kernels.arithmetic.vectors import Vector, cross, dot, norm, sub
 from kernels.jit import inline, kernel
+from kernels.linkage.thread_path import bend, length, slope, wrap_angle
 from kernels.types import Array, Status
 
 # Columns of the data matrix: radius R, adhesion alpha, friction beta, bending B, metric count N, density gamma.
@@ -28,7 +33,7 @@ SPEED_COLUMNS = ("v_ref", "K", "n")
 
 @inline
 def thread_radius(count: float, density: float) -> float:
-    """Return the radius of a round thread of metric count N [m/g] and density gamma [g/cm^3], in mm; (2)."""
+    """Radius of a round thread of metric count N [m/g] and density gamma [g/cm^3], in mm; (2)."""
     return 1.0 / math.sqrt(math.pi * density * count)
 
 
@@ -99,7 +104,7 @@ def thread_contour(
 
 @inline
 def least_radius(alpha: float, beta: float, stiff: float, thick: float) -> float:
-    """Return the radius of least tension, (2 B beta/alpha)^(1/3) - r, not below 0; inf without adhesion; (4)."""
+    """Radius of least tension, (2 B beta/alpha)^(1/3) - r, not below 0; inf without adhesion; (4)."""
     # no adhesion: the tension falls with R without end, or does not depend on it
     if alpha == 0.0:
         return math.inf if stiff * beta > 0.0 else math.nan
@@ -176,3 +181,73 @@ def capstan(
                 force[i, j] = good * math.hypot(
                     t1 * math.expm1(mu * angle), 2.0 * math.sqrt(t1 * t2) * math.sin(0.5 * angle)
                 )
+
+
+@kernel
+def thread_over_point(
+    guides: Array,
+    position: Array,
+    velocity: Array | None,
+    acceleration: Array | None,
+    status: Status,
+    total: Array | None,
+    first: Array | None,
+    second: Array | None,
+    wrap: Array | None,
+) -> None:
+    """Compute the length of the thread N1, E, N2, its derivatives by the crank angle, and the wrap angle at E.
+
+    Parameters
+    ----------
+    guides : (n, 6), coordinates of N1 and N2 [length]
+    position, velocity, acceleration : (n, m, 3), E and its derivatives; a derivative may be None if not needed
+    status : (n, m), in and out; SINGULAR where E is at a guide; what is not OK gives nan
+    total, first, second : (n, m) or None; L, dL/dphi, d2L/dphi2 [length]
+    wrap : (n, m) or None; angle by which the thread turns at E [rad], 0 to pi
+
+    Notes
+    -----
+    Measured on the oracle table: errors below 4 * 2^-53 * max(cond, |y|).
+    """
+    for i in range(position.shape[0]):
+        n1, n2 = _point(guides[i, :3]), _point(guides[i, 3:])
+        for j in range(position.shape[1]):
+            e = _point(position[i, j])
+            if status[i, j] == st.OK and not math.isfinite(e[0] + e[1] + e[2] + guides[i].sum()):
+                status[i, j] = st.INVALID_INPUT
+            d1, d2 = sub(e, n1), sub(e, n2)
+            if status[i, j] == st.OK and not (dot(d1, d1) > 0.0 and dot(d2, d2) > 0.0):
+                status[i, j] = st.SINGULAR
+            good = 1.0 if status[i, j] == st.OK else math.nan
+            if total is not None:
+                total[i, j] = good * length(e, n1, n2)
+            if first is not None and velocity is not None:
+                first[i, j] = good * slope(e, n1, n2, _point(velocity[i, j]))
+            if second is not None and velocity is not None and acceleration is not None:
+                second[i, j] = good * bend(e, n1, n2, _point(velocity[i, j]), _point(acceleration[i, j]))
+            if wrap is not None:
+                wrap[i, j] = good * wrap_angle(e, n1, n2)
+
+
+@kernel
+def guide_line(guides: Array, position: Array, off: Array, along: Array, half: Array) -> None:
+    """Compute (26): distance of E from the line of the guides, place along it from its middle, half its length.
+
+    Parameters
+    ----------
+    guides : (n, 6), N1 and N2;  position : (n, 3), E;  off, along, half : (n,) out [length], nan if N1 = N2
+    """
+    for i in range(position.shape[0]):
+        n1, n2, e = _point(guides[i, :3]), _point(guides[i, 3:]), _point(position[i])
+        way = sub(n2, n1)
+        distance = norm(way)
+        # E from the middle as the sum of two differences: the middle itself would be rounded.
+        d1, d2 = sub(e, n1), sub(e, n2)
+        off[i] = norm(cross(d1, way)) / distance
+        along[i] = 0.5 * (dot(d1, way) + dot(d2, way)) / distance
+        half[i] = 0.5 * distance
+
+
+@inline
+def _point(a: Array) -> Vector:
+    return a[0], a[1], a[2]

@@ -31,7 +31,7 @@ COLUMNS = 13
 
 @inline
 def arm(j: Joints, data: Array) -> Vector:
-    """Return the point from B in fixed axes; ``across`` is k x s, so the finger of the ball joints does not matter."""
+    """Point from B in fixed axes; ``across`` is k x s, so the finger of the ball joints does not matter."""
     return add(mix(data[1], j.s, data[2], cross(j.k, j.s)), scale(data[3], j.k))
 
 

@@ -21,18 +21,9 @@ from kernels.types import EPS, Array, Numbers, Status
 MOST_TEETH = 64  # largest gear ratio; the pin then turns as often per turn of the carrier
 
 
-class Design(NamedTuple):
-    """Columns of the design matrix, in planet radii: pin distance, offset, and the gear ratio with its kind of mesh."""
-
-    k: float
-    a: float
-    n: float
-    mesh: float  # +1: the planet runs outside the fixed gear, -1: inside a fixed ring
-
-
 @inline
 def power(u: Any, v: Any, times: int) -> tuple[Any, Any]:
-    """Return the cosine and sine of ``times`` the angle, by products: each adds a rounding or two."""
+    """Cosine and sine of ``times`` the angle, by products: each adds a rounding or two."""
     c, s = 1.0 + 0.0 * u, 0.0 * v
     while times > 0:
         if times % 2 == 1:
@@ -67,7 +58,7 @@ def poses(
 
     Parameters
     ----------
-    designs : (n, 4) columns of :class:`Design`
+    designs : (n, 4) columns as `EPICYCLIC_PARAMETERS` of sweep/families/geared_dwell.py
     cos_phi, sin_phi : (n, m), or (1, m) shared by all designs
     status : (n, m) out; OK, SINGULAR (the pin is on the output axis within its rounding) or INVALID_INPUT
     psi ... y_b : (n, m) out, or None: what is None is neither computed nor compiled
@@ -153,7 +144,7 @@ STEPS = 64  # per turn of the pin while the end of the band is looked for
 
 @inline
 def _output(k: float, a: float, arm: float, mesh: float, phi: float) -> tuple[float, float]:
-    """Return the output angle, and its velocity analogue times the squared distance of the pin from the output axis."""
+    """Output angle, and its velocity analogue times the squared distance of the pin from the output axis."""
     x = arm * math.cos(phi) - mesh * k * math.cos(arm * phi) + a
     y = arm * math.sin(phi) - k * math.sin(arm * phi)
     x1 = -arm * math.sin(phi) + mesh * k * arm * math.sin(arm * phi)
@@ -163,11 +154,11 @@ def _output(k: float, a: float, arm: float, mesh: float, phi: float) -> tuple[fl
 
 @kernel
 def dwell_measures(designs: Array, status: Status, dwell_angle: Array, deviation: Array, band: Array) -> None:
-    """Return dwell, largest deviation from mid-dwell and band dwell around phi = 0.
+    """Dwell, largest deviation from mid-dwell and band dwell around phi = 0.
 
     Parameters
     ----------
-    designs : (n, 4) columns of :class:`kernels.families.epicyclic_dwell.Design`
+    designs : (n, 4) columns as `EPICYCLIC_PARAMETERS` of sweep/families/geared_dwell.py
     status : (n,) out; OK, NO_DWELL (the pin starts at or behind the output axis, or passes behind it within the dwell,
         or the angle does not leave the band before phi = pi) or INVALID_INPUT
     dwell_angle, deviation, band : (n,) out [rad]

@@ -18,23 +18,6 @@ from kernels.linkage.thread_path import bend, length, slope, wrap_angle
 from kernels.types import Array, Status
 
 
-class Design(NamedTuple):
-    """Columns of the design matrix: lengths in one unit, angles in radians."""
-
-    a: float
-    e: float
-    f: float
-    alpha: float
-    Z1: float
-    Z2: float
-    phi_h: float
-    P_h: float
-    dX1: float
-    dY1: float
-    dX2: float
-    dY2: float
-
-
 class Reduced(NamedTuple):
     """Per-design numbers in units of ``unit``: guides, crank circle centre + a (cos t, ca sin t, -sa sin t)."""
 
@@ -53,9 +36,7 @@ class Reduced(NamedTuple):
 
 @inline
 def reduce_design(designs: Array, i: int) -> Reduced:
-    """Return constants of one design; ``valid`` is false for a radius that is not positive
-    and for what is not finite.
-    """
+    """Constants of one design; ``valid`` is false for a radius that is not positive and for what is not finite."""
     size = abs(designs[i, 0].real) + abs(designs[i, 1].real) + abs(designs[i, 2].real)
     size += abs(designs[i, 4].real) + abs(designs[i, 5].real) + abs(designs[i, 7].real)
     offsets = abs(designs[i, 8].real) + abs(designs[i, 9].real) + abs(designs[i, 10].real) + abs(designs[i, 11].real)
@@ -76,13 +57,13 @@ def reduce_design(designs: Array, i: int) -> Reduced:
 
 @inline
 def on_circle(r: Reduced, c: float, s: float) -> Vector:
-    """Return the vector from the axis to the eyelet for cosine and sine of its crank angle."""
+    """Vector from the axis to the eyelet for cosine and sine of its crank angle."""
     return r.a * c, r.a * r.cos_alpha * s, -r.a * r.sin_alpha * s
 
 
 @inline
 def eyelet(r: Reduced, u: float, v: float) -> tuple[Vector, Vector, Vector]:
-    """Return the eyelet, its first and second derivative, for u = cos(phi), v = sin(phi); (5)."""
+    """Eyelet, its first and second derivative, for u = cos(phi), v = sin(phi); (5)."""
     # the angle phi_h + phi by the addition theorem: cosine and sine of phi_h are taken once per design
     c, s = r.cos_h * u - r.sin_h * v, r.sin_h * u + r.cos_h * v
     x, y, z = on_circle(r, c, s)
@@ -111,12 +92,11 @@ def poses(
     status: Status,
     out: Outputs,
 ) -> None:
-    """Compute the thread taken up, its derivatives, wrap angle and place of the eyelet;
-    (1) to (6) of docs/takeup.md.
+    """Thread taken up, its derivatives, wrap angle and place of the eyelet; (1) to (6) of docs/takeup.md.
 
     Parameters
     ----------
-    designs : (n, 12) columns of :class:`Design`; complex128 for gradients by the complex step
+    designs : (n, 12) columns as `PARAMETERS` of sweep/families/eyelet.py; complex128 for gradients by the complex step
     cos_phi, sin_phi : (n, m), or (1, m) shared by all designs
     status : (n, m) out; OK, SINGULAR (the eyelet meets a guide) or INVALID_INPUT
     P, dP, d2P : (n, m) out or None; L - P_h and its derivatives with respect to phi [length]
@@ -158,7 +138,7 @@ def weighted_difference(
 
     Parameters
     ----------
-    designs : (n, 12) columns of :class:`kernels.families.eyelet.Design`, guides on the line x = e, y = 0
+    designs : (n, 12) columns as `PARAMETERS` of sweep/families/eyelet.py, guides on the line x = e, y = 0
     cos_phi, sin_phi : (n, m) or (1, m);  wanted : (n, m) or (1, m), wanted P [length]
     difference : (n, m) out, Dq [length^2];  weight : (n, m) out, dDq/dP at the design's own length [length]
     status : (n, m) out, as of :func:`kernels.families.eyelet.poses`; INVALID_INPUT also where P_h + P <= 0 or a
@@ -191,7 +171,7 @@ def length_sensitivities(designs: Array, cos_phi: Array, sin_phi: Array, jacobia
 
     Parameters
     ----------
-    designs : (n, 12) columns of :class:`kernels.families.eyelet.Design`
+    designs : (n, 12) columns as `PARAMETERS` of sweep/families/eyelet.py
     cos_phi, sin_phi : (n, m) or (1, m)
     jacobian : (7, n, m) out [1 or length/rad]; nan where the status is not OK
     status : (n, m) out, as of :func:`kernels.families.eyelet.poses`

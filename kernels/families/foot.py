@@ -6,7 +6,6 @@ The march over events is :mod:`kernels.effects.foot`.
 from __future__ import annotations
 
 import math
-from typing import NamedTuple
 
 from kernels import status as st
 from kernels.jit import inline, kernel
@@ -21,22 +20,9 @@ OUTPUTS = (
 )  # fmt: skip
 
 
-class Design(NamedTuple):
-    """Columns of the design matrix in consistent units; omega in rad per time, X the rack's half travel."""
-
-    m: float
-    k: float
-    F0: float
-    omega: float
-    Y: float
-    p: float
-    restitution: float
-    X: float
-
-
 @inline
 def _free(d: Array, i: int, v0: float, t: float) -> float:
-    """Return the height of the foot at the time t after it left the plate with the speed v0."""
+    """Height of the foot at the time t after it left the plate with the speed v0."""
     m, k, preload = d[i, 0], d[i, 1], d[i, 2]
     half = 0.5 * math.sqrt(k / m) * t
     sinc = math.sin(half) / half if half != 0.0 else 1.0
@@ -46,7 +32,7 @@ def _free(d: Array, i: int, v0: float, t: float) -> float:
 
 @inline
 def _gap(d: Array, i: int, x0: float, v0: float, t: float) -> float:
-    """Return the foot above the rack, or above the plate where the rack is below it."""
+    """Foot above the rack, or above the plate where the rack is below it."""
     rack = d[i, 4] * math.sin(x0 + d[i, 3] * t) - d[i, 5]
     gap: float = _free(d, i, v0, t) - max(rack, 0.0)
     return gap
@@ -54,9 +40,7 @@ def _gap(d: Array, i: int, x0: float, v0: float, t: float) -> float:
 
 @inline
 def _first_contact(d: Array, i: int, x0: float, v0: float, longest: float) -> float:
-    """Return the first time after the launch at which the foot meets rack or plate;
-    the plate is met after ``longest``.
-    """
+    """First time after the launch at which the foot meets rack or plate; the plate is met after ``longest``."""
     low = 0.0
     for j in range(1, _CELLS + 1):
         high = longest * (j / _CELLS)
@@ -85,12 +69,11 @@ def _first_contact(d: Array, i: int, x0: float, v0: float, longest: float) -> fl
 
 @kernel
 def closed_forms(designs: Array, status: Status, outputs: Array) -> None:
-    """Compute the entry, jump, limits of spring and preload, contact forces and first contact again;
-    (1)-(3), (6) of docs/foot.md.
+    """Entry, jump, limits of spring and preload, contact forces and first contact again; (1)-(3), (6) of docs/foot.md.
 
     Parameters
     ----------
-    designs : (n, 8) columns of :class:`Design`
+    designs : (n, 8) columns as `PARAMETERS` of sweep/families/foot.py, without its fabric
     status : (n,) out; OK, NO_EVENT (the rack does not pass the plate) or INVALID_INPUT
     outputs : (10, n) out in the order of :data:`OUTPUTS`; the time of first contact is nan without a rebound
     """
@@ -127,7 +110,8 @@ def rack_path(designs: Array, path: Array) -> None:
 
     Parameters
     ----------
-    designs : (n, 8) columns of :class:`Design`;  path : (n, 6, N) out, for :func:`kernels.effects.foot.march`
+    designs : (n, 8) columns as `PARAMETERS` of sweep/families/foot.py, without its fabric
+    path : (n, 6, N) out, for :func:`kernels.effects.foot.march`
     """
     step = TWO_PI / path.shape[2]
     for i in range(designs.shape[0]):

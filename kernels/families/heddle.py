@@ -19,28 +19,10 @@ from kernels.linkage.verdict import pose_status
 from kernels.types import EPS, Array, Status
 
 
-class Design(NamedTuple):
-    """Columns of the design matrix: lengths in one unit, chi_mid in radians, sides +1 or -1."""
-
-    O2B: float
-    BC: float
-    O3C: float
-    O2O3: float
-    O4E: float
-    chi_mid: float
-    O3D: float
-    O4F: float
-    O3O4: float
-    DF: float
-    EG: float
-    x_s: float
-    side_F: float
-    side_C: float
-
-
 class FourBar(NamedTuple):
-    """A four-bar in scaled lengths: driving arm a, coupler b, driven arm c, pivot distance e; W = k0 - k2 u,
-    R^2 - c^2 = gap - 2 a e u for the distance R of the driving pin from the driven pivot.
+    """A four-bar in scaled lengths: driving arm a, coupler b, driven arm c, pivot distance e.
+
+    W = k0 - k2 u, and R^2 - c^2 = gap - 2 a e u for the distance R of the driving pin from the driven pivot.
     """
 
     a: Any
@@ -75,7 +57,7 @@ class Reduced(NamedTuple):
 
 @inline
 def four_bar(a: Any, b: Any, c: Any, e: Any, side: float) -> FourBar:
-    """Return constants of the closure X C + Y S + W = 0 of a four-bar with coupler b; (3)."""
+    """Constants of the closure X C + Y S + W = 0 of a four-bar with coupler b; (3)."""
     difference = (c - b) * (c + b)
     by = divisor(c)
     k0 = 0.5 * (difference + (a * a + e * e)) / by
@@ -87,7 +69,7 @@ def four_bar(a: Any, b: Any, c: Any, e: Any, side: float) -> FourBar:
 
 @inline
 def reduce_design(designs: Array, i: int) -> Reduced:
-    """Return constants of one design; ``valid`` is false for zero or negative lengths and for what is not finite."""
+    """Constants of one design; ``valid`` is false for zero or negative lengths and for what is not finite."""
     _, exponent = math.frexp(designs[i, 1].real)
     unit, per_unit = math.ldexp(1.0, exponent), math.ldexp(1.0, -exponent)
     a, b, c, e = designs[i, 0] * per_unit, designs[i, 1] * per_unit, designs[i, 2] * per_unit, designs[i, 3] * per_unit
@@ -119,8 +101,7 @@ def reduce_design(designs: Array, i: int) -> Reduced:
 
 @inline
 def driven(bar: FourBar, u: Any, v: Any) -> tuple[Any, Any, Any, Any, int]:
-    """Return the direction (C, S) of the driven arm, signed root t, Delta and status for the driving arm along (u,
-    v); (3)-(4).
+    """Direction (C, S) of the driven arm, signed root t, Delta and status for the driving arm along (u, v); (3)-(4).
 
     The dead-point band is the rounding error of Delta itself.  At a dead point the position stays defined (t = 0).
     """
@@ -142,7 +123,7 @@ def driven(bar: FourBar, u: Any, v: Any) -> tuple[Any, Any, Any, Any, int]:
 
 @inline
 def driven_rates(bar: FourBar, u: Any, v: Any, cos: Any, sin: Any, t: Any) -> tuple[Any, Any, Any]:
-    """Return the first three derivatives of the driven arm's angle with respect to that of the driving arm; (5)."""
+    """First three derivatives of the driven arm's angle with respect to that of the driving arm; (5)."""
     w = bar.k0 - bar.k2 * u
     turn, near = bar.a * (v * cos - u * sin), bar.a * (u * cos + v * sin)
     g = turn + bar.k2 * v
@@ -156,9 +137,7 @@ def driven_rates(bar: FourBar, u: Any, v: Any, cos: Any, sin: Any, t: Any) -> tu
 
 @inline
 def _shaft_lever(r: Reduced, cos_turn: Any, sin_turn: Any, rates: bool) -> tuple[Any, Any, tuple[Any, Any, Any], int]:
-    """Return the cosine and sine of the shaft lever's angle from mid-stroke, its rates by that of the bell crank,
-    status; (6).
-    """
+    """Cosine and sine of the shaft lever's angle from mid-stroke, its rates by the bell crank's, and status; (6)."""
     if r.parallel:
         one = 1.0 + 0.0 * cos_turn
         return cos_turn, sin_turn, (one, 0.0 * one, 0.0 * one), st.OK
@@ -172,7 +151,7 @@ def _shaft_lever(r: Reduced, cos_turn: Any, sin_turn: Any, rates: bool) -> tuple
 
 @inline
 def _chained(outer: tuple[Any, Any, Any], inner: tuple[Any, Any, Any]) -> tuple[Any, Any, Any]:
-    """Return three derivatives of a function of a function."""
+    """Three derivatives of a function of a function."""
     f1, f2, f3 = outer
     g1, g2, g3 = inner
     return f1 * g1, f2 * g1 * g1 + f1 * g2, f3 * g1 * g1 * g1 + 3.0 * f2 * g1 * g2 + f1 * g3
@@ -180,9 +159,7 @@ def _chained(outer: tuple[Any, Any, Any], inner: tuple[Any, Any, Any]) -> tuple[
 
 @inline
 def _lift(r: Reduced, cos: Any, sin: Any, rates: tuple[Any, Any, Any]) -> tuple[Any, Any, Any, Any, bool]:
-    """Return the lift of the shaft and its three derivatives;
-    false if the heddle rod does not reach the slide; (7)-(9).
-    """
+    """Lift of the shaft and its three derivatives; false if the heddle rod does not reach the slide; (7)-(9)."""
     x, y = r.arm * cos, r.arm * sin
     l1, l2, l3 = rates
     y1, y2 = x * l1, x * l2 - y * l1 * l1
@@ -227,14 +204,13 @@ def poses(
     out: Outputs,
     places: Array | None,
 ) -> None:
-    """Compute the bell-crank angle, lift of the shaft
-    and their derivatives with respect to the angle of the cam lever.
+    """Bell-crank angle, lift of the shaft and their derivatives with respect to the angle of the cam lever.
 
     Equations (3)-(9) of docs/heddle.md.
 
     Parameters
     ----------
-    designs : (n, 14) columns of :class:`Design`
+    designs : (n, 14) columns as `PARAMETERS` of sweep/families/heddle.py
     cos_phi, sin_phi : (n, m), or (1, m) shared by all designs; of the cam lever's angle theta
     status : (n, m) out; OK, NOT_ASSEMBLED, DEAD_POINT (rod and bell crank in line), SINGULAR or INVALID_INPUT
     chi ... d3chi : (n, m) out [rad], or None: what is None is neither computed nor compiled

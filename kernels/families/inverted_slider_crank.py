@@ -19,15 +19,6 @@ from kernels.linkage.verdict import follower_status
 from kernels.types import EPS, Numbers, Status
 
 
-class Design(NamedTuple):
-    """Columns of the design matrix: lengths in one unit, branch +1 or -1."""
-
-    a: float
-    e: float
-    h: float
-    branch: float
-
-
 class Outputs(NamedTuple):
     """Pose outputs, each (n, m), or None: what is None is not computed."""
 
@@ -51,12 +42,11 @@ def poses(
     out: Outputs,
     joints: Numbers | None,
 ) -> None:
-    """Compute the rocker angle, place of the pin on the rocker
-    and their derivatives of every design at its crank angles; (1)-(5).
+    """Rocker angle, place of the pin on the rocker and derivatives of every design at its crank angles; (1)-(5).
 
     Parameters
     ----------
-    designs : (n, 4) columns of :class:`Design`
+    designs : (n, 4) columns as `PLANAR_PARAMETERS` of sweep/families/slotted.py
     cos_phi, sin_phi : (n, m), or (1, m) shared by all designs
     status : (n, m) out; OK, NOT_ASSEMBLED, DEAD_POINT, SINGULAR (the crank pin is on the rocker axis) or INVALID_INPUT
     psi ... pressure_angle : (n, m) out, or None: what is None is neither computed nor compiled

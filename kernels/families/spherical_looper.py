@@ -27,41 +27,9 @@ from kernels.linkage.bodies import (
     shaft,
     turned_about,
 )
-from kernels.linkage.driven_ball import Path, Swung, rotated, swing
-from kernels.linkage.looper_drive import Crank, pin_path, reduce_crank
+from kernels.linkage.driven_ball import Crank, Path, Swung, pin_path, reduce_crank, rotated, swing
 from kernels.linkage.outputs import has_point, put_angle, put_loop, put_point
 from kernels.types import Array, Numbers, Status
-
-
-class Design(NamedTuple):
-    """Columns of the design matrix: lengths in one unit, angles in radians, branches +1 or -1."""
-
-    a1: float
-    b1: float
-    c1: float
-    e1: float
-    f1: float
-    g1: float
-    alpha1: float
-    branch1: float
-    o: float
-    delta: float
-    gamma: float
-    c0x: float
-    c0y: float
-    c0z: float
-    p0x: float
-    p0y: float
-    p0z: float
-    a2: float
-    b2: float
-    x2: float
-    y2: float
-    z2: float
-    theta2: float
-    beta2: float
-    offset2: float
-    branch2: float
 
 
 class Reduced(NamedTuple):
@@ -90,7 +58,7 @@ class Reduced(NamedTuple):
 
 @inline
 def reduce_design(designs: Numbers, i: int) -> Reduced:
-    """Return constants of one design; ``valid`` is false for links of no length and for what is not finite."""
+    """Constants of one design; ``valid`` is false for links of no length and for what is not finite."""
     d = designs[i]
     _, exponent = math.frexp(d[0].real)
     unit, per = math.ldexp(1.0, exponent), math.ldexp(1.0, -exponent)
@@ -129,7 +97,7 @@ def reduce_design(designs: Numbers, i: int) -> Reduced:
 
 @inline
 def _second_crank(r: Reduced, u: float, v: float) -> Path:
-    """Return the ball of crank 2 from the common point Os of both axes, (2)."""
+    """Ball of crank 2 from the common point Os of both axes, (2)."""
     u2, v2 = u * r.cos_offset - v * r.sin_offset, v * r.cos_offset + u * r.sin_offset
     radial = mix(r.a2 * u2, r.first, r.a2 * v2, r.second)
     tangential = mix(-r.a2 * v2, r.first, r.a2 * u2, r.second)
@@ -139,13 +107,13 @@ def _second_crank(r: Reduced, u: float, v: float) -> Path:
 
 @inline
 def _in_triad(r: Reduced, a: Vector, lift: float) -> Vector:
-    """Return components in the triad of the looper's axis, from a height along it."""
+    """Components in the triad of the looper's axis, from a height along it."""
     return dot(a, r.radial), dot(a, r.across), dot(a, r.axis) - lift
 
 
 @inline
 def _seen_from_carrier(r: Reduced, carrier: Swung, path: Path) -> Path:
-    """Return the driving ball in the looper's frame, which the carrier takes along, (3)."""
+    """Driving ball in the looper's frame, which the carrier takes along, (3)."""
     # turned back by the carrier's angle: minus the sine and minus all derivatives
     m, m1, m2, m3 = rotated(carrier.cos, -carrier.sin, -carrier.first, -carrier.second, -carrier.third, path)
     return _in_triad(r, m, r.along), _in_triad(r, m1, 0.0), _in_triad(r, m2, 0.0), _in_triad(r, m3, 0.0)
@@ -196,7 +164,7 @@ def poses(
 
     Parameters
     ----------
-    designs : (n, 26) columns of :class:`Design`
+    designs : (n, 26) columns as `PARAMETERS` of sweep/families/spherical_looper.py
     cos_phi, sin_phi : (n, m), or (1, m) shared by all designs
     status : (n, m) out; OK, or that of the first loop that is not: NOT_ASSEMBLED, DEAD_POINT, SINGULAR (a driving ball
         on the axis it turns the link about, or the looper's ball on the looper's axis); INVALID_INPUT.  Where nothing

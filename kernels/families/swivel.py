@@ -32,17 +32,6 @@ from kernels.linkage.outputs import put_block
 from kernels.types import EPS, Array, Numbers, Status
 
 
-class Design(NamedTuple):
-    """Columns of the design matrix: lengths in one unit, alpha in radians."""
-
-    a: float
-    e: float
-    f: float
-    g: float
-    alpha: float
-    Lw: float
-
-
 class Reduced(NamedTuple):
     """Per-design numbers in units of ``unit``: B = (a u, y0 + ka v, lift - na v), Q = (e, 0, g)."""
 
@@ -61,7 +50,7 @@ class Reduced(NamedTuple):
 
 @inline
 def reduce_design(designs: Numbers, i: int) -> Reduced:
-    """Return constants of one design; ``valid`` is false for a crank of no length and for what is not finite."""
+    """Constants of one design; ``valid`` is false for a crank of no length and for what is not finite."""
     _, exponent = math.frexp(designs[i, 0].real)
     unit, per_unit = math.ldexp(1.0, exponent), math.ldexp(1.0, -exponent)
     a, e, f, g = designs[i, 0] * per_unit, designs[i, 1] * per_unit, designs[i, 2] * per_unit, designs[i, 3] * per_unit
@@ -92,14 +81,13 @@ def poses(
     out: Outputs,
     joints: Numbers | None,
 ) -> None:
-    """Compute the rod between crank pin and block, and the working point, with derivatives,
-    of every design and crank angle.
+    """Rod between crank pin and block, and the working point, with derivatives, of every design and crank angle.
 
     Equations (1)-(4) of docs/swivel.md.
 
     Parameters
     ----------
-    designs : (n, 6) columns of :class:`Design`
+    designs : (n, 6) columns as `SWIVEL_PARAMETERS` of sweep/families/slotted.py
     cos_phi, sin_phi : (n, m), or (1, m) shared by all designs
     status : (n, m) out; OK, SINGULAR (the crank pin lies in the block's centre) or INVALID_INPUT
     rod : (4, n, m) out [length], distance of crank pin and block and its three derivatives, or None

@@ -26,7 +26,7 @@ EXCHANGES = 60
 
 @inline
 def _least_squares(bx: Array, by: Array, dx: Array, dy: Array, inside: NDArray[np.bool_]) -> tuple[float, ...]:
-    """Return moments of the masked points: means, and the coefficients of centred Bx and By on centred (dx, dy)."""
+    """Moments of the masked points: means, and the coefficients of centred Bx and By on centred (dx, dy)."""
     count, mbx, mby, mdx, mdy = 0, 0.0, 0.0, 0.0, 0.0
     for j in range(bx.size):
         if inside[j]:
@@ -62,9 +62,7 @@ def _least_squares(bx: Array, by: Array, dx: Array, dy: Array, inside: NDArray[n
 def _direction(
     bx: Array, by: Array, dx: Array, dy: Array, inside: NDArray[np.bool_], moments: tuple[float, ...]
 ) -> float:
-    """Return the direction in [0, pi) of the smallest least-squares deviation:
-    an eigenvector of the residuals' Gram matrix.
-    """
+    """Direction in [0, pi) of the smallest least-squares deviation: an eigenvector of the residuals' Gram matrix."""
     mbx, mby, mdx, mdy, cx_bx, cy_bx, cx_by, cy_by = moments
     gxx, gxy, gyy = 0.0, 0.0, 0.0
     for j in range(bx.size):
@@ -82,9 +80,7 @@ def _direction(
 
 @inline
 def _point(cx_bx: float, cy_bx: float, cx_by: float, cy_by: float, c: float, s: float) -> tuple[float, float]:
-    """Return the coupler point turned into the line's frame:
-    Im(w d) cancels the part of Im(B e^{-i lam}) along (dx, dy).
-    """
+    """Coupler point in the line's frame: Im(w d) cancels the part of Im(B e^{-i lam}) along (dx, dy)."""
     return -(c * cy_by - s * cy_bx), -(c * cx_by - s * cx_bx)
 
 
@@ -129,9 +125,7 @@ def _exchange(
     y: Array,
     points: NDArray[np.int64],
 ) -> bool:
-    """Return the minimax x = (w_x, w_y, h) of |target + w_x dy + w_y dx - h| over the masked points;
-    x starts at least squares.
-    """
+    """Minimax x = (w_x, w_y, h) of |target + w_x dy + w_y dx - h| over the masked points, started at least squares."""
     m = dx.size
     # First reference: the four points of alternating largest residuals along the path.
     count = 0
@@ -201,7 +195,7 @@ def _exchange(
 
 @inline
 def _couplers(b_x: Array, b_y: Array, c_x: Array, c_y: Array, bx: Array, by: Array, dx: Array, dy: Array) -> bool:
-    """Return the pin B and direction d of the coupler at every position; false if one of them is not assembled."""
+    """Pin B and direction d of the coupler at every position; false if one of them is not assembled."""
     good = True
     for j in range(b_x.size):
         bx[j], by[j] = b_x[j], b_y[j]

@@ -50,7 +50,7 @@ def _nothing_held(n: int, m: int) -> Held:
 
 @inline
 def _most_missed(rows: Array, needs: Array, size: Array, m: int, y: Array, h: Held, tolerance: float) -> int:
-    """Return the row that a point misses most, relative to its size; -1 where it keeps the first m of them."""
+    """Row that a point misses most, relative to its size; -1 where it keeps the first m of them."""
     for j in range(m):
         h.room[j] = -needs[j]
     for i in range(len(y)):
@@ -178,7 +178,7 @@ def _pursued(
 
 @kernel
 def nearest(rows: Array, needs: Array, centre: Array, tolerance: float, y: Array, weights: Array) -> int:
-    """Return the point nearest to a centre with ``rows.T y >= needs``.
+    """Point nearest to a centre with ``rows.T y >= needs``.
 
     Parameters
     ----------
@@ -249,7 +249,7 @@ def nearest_of_many(
     there: Array,
     weights: Array,
 ) -> int:
-    """Return the step of a quadratic program with hundreds of rows along turns, of which few matter.
+    """Step of a quadratic program with hundreds of rows along turns, of which few matter.
 
     The step is ``back y`` with y nearest to a centre.  Rows join where they are near their bound and lowest among their
     neighbours along a turn, and later where the step found would miss them.

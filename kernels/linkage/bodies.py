@@ -58,7 +58,7 @@ class Moving(NamedTuple):
 
 @inline
 def vector(a: Array) -> Vector:
-    """Return the first three numbers."""
+    """First three numbers."""
     return a[0], a[1], a[2]
 
 
@@ -78,13 +78,13 @@ def moving(body: Array) -> Moving:
 
 @inline
 def velocity_at(body: Moving, point: Vector) -> Vector:
-    """Return the velocity of the point of a body that is at ``point``."""
+    """Velocity of the point of a body that is at ``point``."""
     return add(body.v, cross(body.omega, sub(point, body.at)))
 
 
 @inline
 def acceleration_at(body: Moving, point: Vector) -> Vector:
-    """Return the acceleration of the point of a body that is at ``point``."""
+    """Acceleration of the point of a body that is at ``point``."""
     return add(body.a, spun(body.omega, body.eps, sub(point, body.at)))
 
 
@@ -167,7 +167,7 @@ def put_ball(out: Array, point: Vector) -> None:
 
 @inline
 def shaft(alpha: float) -> tuple[Vector, Vector]:
-    """Return the axis (0, sin alpha, cos alpha) of a crank, and the direction of its crank angle 90 degrees."""
+    """Axis (0, sin alpha, cos alpha) of a crank, and the direction of its crank angle 90 degrees."""
     sa, ca = math.sin(alpha), math.cos(alpha)
     return (0.0, sa, ca), (0.0, ca, -sa)
 

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 from typing import Any, NamedTuple
 
-from kernels.arithmetic.bits import power_below
+from kernels.arithmetic.intrinsics import power_below
 from kernels.arithmetic.sincos import sincos
 from kernels.jit import inline
 from kernels.types import EPS
@@ -51,21 +51,19 @@ def axial_terms(f: Any, g: Any, alpha: Any, ca: Any) -> tuple[Any, Any, Any]:
 
 @inline
 def within_unit_range(c: float) -> bool:
-    """Return whether a rocker of length c needs no scaling: no square can leave float64."""
+    """Whether a rocker of length c needs no scaling: no square can leave float64."""
     return (c > 1e-6) & (c < 1e6)
 
 
 @inline
 def unit_scale(c: float) -> float:
-    """Return the power of two that brings a rocker of length c to the unit range; 1 where it is near enough."""
+    """Power of two that brings a rocker of length c to the unit range; 1 where it is near enough."""
     return 1.0 if within_unit_range(c) else 0.5 / power_below(c)
 
 
 @inline
 def reduce_scaled(a: Any, b: Any, c: Any, e: Any, f: Any, g: Any, alpha: Any, branch: float) -> Reduced:
-    """Return constants of one design, for lengths whose squares stay in float64;
-    without a branch, so that it vectorises.
-    """
+    """Constants of one design, for lengths whose squares stay in float64; without a branch, so that it vectorises."""
     sa, ca = sincos(alpha)
     q, q_size, rise = axial_terms(f, g, alpha, ca)
     square = (c - b) * (c + b) + (a * a + e * e) + q

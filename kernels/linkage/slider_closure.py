@@ -33,14 +33,15 @@ class Reduced(NamedTuple):
 
 @inline
 def reduce_scaled(a: Any, b: Any, e: Any, f: Any, alpha: Any, branch: Any, unit: float) -> Reduced:
-    """Return constants of one design whose lengths are given in ``unit``; crank a, coupler b, offsets e and f."""
+    """Constants of one design whose lengths are given in ``unit``; crank a, coupler b, offsets e and f."""
     return reduce_along(a, b, e, f, alpha, np.cos(alpha), np.sin(alpha), branch, unit)
 
 
 @inline
 def reduce_along(a: Any, b: Any, e: Any, f: Any, alpha: Any, ca: Any, sa: Any, branch: Any, unit: float) -> Reduced:
-    """As :func:`reduce_scaled`, with cosine and sine of alpha given;
-    without a branch or a call, so that it vectorises.
+    """Constants as of :func:`reduce_scaled`, with cosine and sine of alpha given.
+
+    Without a branch or a call, so that it vectorises.
     """
     m_size, n_size = abs(e.real) + a.real, abs(f.real) + a.real
     valid = (a.real > 0.0) & (b.real > 0.0) & (b.real < 1e140) & (m_size < 1e140) & (n_size < 1e140)
@@ -75,8 +76,9 @@ def tolerance(r: Reduced, at: Place) -> float:
 
 @inline
 def derivatives(r: Reduced, u: Any, v: Any, y: Any, per_w: Any) -> tuple[Any, Any, Any]:
-    """Return the first to third derivative of s by phi;
-    y is y_B, ``per_w`` is branch/sqrt(Q), nan where that does not exist; (3).
+    """First to third derivative of s by phi; (3).
+
+    y is y_B, ``per_w`` is branch/sqrt(Q), nan where that does not exist.
 
     What the caller does not use leaves no instruction.
     """
@@ -86,7 +88,7 @@ def derivatives(r: Reduced, u: Any, v: Any, y: Any, per_w: Any) -> tuple[Any, An
 
 @inline
 def root_derivatives(r: Any, u: Any, v: Any, y: Any, per_w: Any) -> tuple[Any, Any, Any]:
-    """Return the first to third derivative of w = branch sqrt(Q), arguments as of :func:`derivatives`; (5)."""
+    """First to third derivative of w = branch sqrt(Q), arguments as of :func:`derivatives`; (5)."""
     # m m' + n n' with cos^2(phi) + sin^2(phi) = 1 taken out: as it stands it cancels for alpha near 90 deg.
     q1 = r.ka * u * y - r.a * v * r.e
     w1 = q1 * per_w

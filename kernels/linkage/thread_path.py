@@ -19,21 +19,21 @@ from kernels.jit import inline
 
 @inline
 def length(e: Vector, n1: Vector, n2: Vector) -> float:
-    """Return the length of the thread N1, E, N2; (2)."""
+    """Length of the thread N1, E, N2; (2)."""
     d1, d2 = sub(e, n1), sub(e, n2)
     return np.sqrt(dot(d1, d1)) + np.sqrt(dot(d2, d2))  # type: ignore[no-any-return]
 
 
 @inline
 def slope(e: Vector, n1: Vector, n2: Vector, de: Vector) -> float:
-    """Return the first derivative of the length where E has the derivative ``de``; (3)."""
+    """First derivative of the length where E has the derivative ``de``; (3)."""
     d1, d2 = sub(e, n1), sub(e, n2)
     return dot(d1, de) / np.sqrt(dot(d1, d1)) + dot(d2, de) / np.sqrt(dot(d2, d2))  # type: ignore[no-any-return]
 
 
 @inline
 def bend(e: Vector, n1: Vector, n2: Vector, de: Vector, d2e: Vector) -> float:
-    """Return the second derivative of the length; (4)."""
+    """Second derivative of the length; (4)."""
     return _bend(sub(e, n1), de, d2e) + _bend(sub(e, n2), de, d2e)
 
 
@@ -45,9 +45,7 @@ def _bend(d: Vector, de: Vector, d2e: Vector) -> float:
 
 @inline
 def wrap_angle(e: Vector, n1: Vector, n2: Vector) -> float:
-    """Return the angle [rad] by which the thread turns at E: atan2(|d1 x d2|, -d1 .
-    d2), exact near 0 and near pi; (1).
-    """
+    """Angle [rad] by which the thread turns at E: atan2(|d1 x d2|, -d1 . d2), exact near 0 and near pi; (1)."""
     d1, d2 = sub(e, n1), sub(n2, e)
     across = cross(d1, d2)
     square = dot(across, across)

@@ -8,7 +8,7 @@ from kernels.jit import inline
 
 @inline
 def pose_status(valid: bool, discriminant: float, tolerance: float, square: float | None) -> int:
-    """Return whether the links reach at a pose: OK, NOT_ASSEMBLED, DEAD_POINT, SINGULAR or INVALID_INPUT.
+    """Whether the links reach at a pose: OK, NOT_ASSEMBLED, DEAD_POINT, SINGULAR or INVALID_INPUT.
 
     Parameters
     ----------
@@ -44,7 +44,7 @@ def follower_status(valid: bool, undefined: bool, discriminant: float, tolerance
 
 @inline
 def turning_status(least: float, tolerance: float, valid: bool) -> int:
-    """Return whether the crank turns fully: OK, NOT_ROTATABLE, UNDECIDABLE or INVALID_INPUT.
+    """Whether the crank turns fully: OK, NOT_ROTATABLE, UNDECIDABLE or INVALID_INPUT.
 
     ``least`` is the smallest discriminant of the turn and ``tolerance`` the bound of its rounding error.
     """

@@ -54,7 +54,7 @@ def first_failure(point: bool, ahead: float, back: float, a: float, t_ext: float
 
 @inline
 def design_status(valid: bool, failed: int) -> int:
-    """Return the status of a design after the tests (i)-(iii)."""
+    """Status of a design after the tests (i)-(iii)."""
     if not valid:
         return st.INVALID_INPUT
     return st.OK if failed == PASSED else st.NOT_ADMISSIBLE

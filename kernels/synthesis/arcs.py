@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import math
 
+from kernels.arithmetic.sincos import sine_cosine
 from kernels.jit import kernel
-from kernels.synthesis.angles import PI, sine_cosine
-from kernels.types import Array
+from kernels.types import TWO_PI, Array
 
 
 @kernel
@@ -34,12 +34,12 @@ def rssr_arc_ends(requirements: Array, ends: Array) -> None:
         infinite = math.nan
         if inner >= 0.0 and size != 0.0:
             infinite = math.atan2(math.sqrt(inner), math.copysign(level, level * size))
-        ends[i, 0], ends[i, 1] = first, first + PI
-        ends[i, 2], ends[i, 3] = second, second + PI
-        ends[i, 4], ends[i, 5] = 0.5 * (infinite - phi0), 0.5 * (infinite - phi0) + PI
-        ends[i, 6], ends[i, 7] = 0.5 * (-infinite - phi0), 0.5 * (-infinite - phi0) + PI
+        ends[i, 0], ends[i, 1] = first, first + math.pi
+        ends[i, 2], ends[i, 3] = second, second + math.pi
+        ends[i, 4], ends[i, 5] = 0.5 * (infinite - phi0), 0.5 * (infinite - phi0) + math.pi
+        ends[i, 6], ends[i, 7] = 0.5 * (-infinite - phi0), 0.5 * (-infinite - phi0) + math.pi
         for k in range(8):
-            turned = ends[i, k] % (2.0 * PI)
+            turned = ends[i, k] % TWO_PI
             place = k
             while place > 0 and not (ends[i, place - 1] <= turned) and turned == turned:
                 ends[i, place] = ends[i, place - 1]
@@ -49,8 +49,7 @@ def rssr_arc_ends(requirements: Array, ends: Array) -> None:
 
 @kernel
 def rssp_arc_ends(requirements: Array, ends: Array) -> None:
-    """Compute crank angles phi1 at which the slider ball would lie on the crank axis;
-    equation (10) of docs/synthesis.md.
+    """Crank angles phi1 at which the slider ball would lie on the crank axis; equation (10) of docs/synthesis.md.
 
     Parameters
     ----------
@@ -59,9 +58,9 @@ def rssp_arc_ends(requirements: Array, ends: Array) -> None:
     """
     for i in range(requirements.shape[0]):
         phi0 = requirements[i, 1]
-        ends[i, 0], ends[i, 1] = 0.5 * PI, 1.5 * PI
+        ends[i, 0], ends[i, 1] = 0.5 * math.pi, 1.5 * math.pi
         for k in range(2, 4):
-            turned = (0.5 * PI - phi0 + (k - 2) * PI) % (2.0 * PI)
+            turned = (0.5 * math.pi - phi0 + (k - 2) * math.pi) % TWO_PI
             place = k
             while place > 0 and ends[i, place - 1] > turned:
                 ends[i, place] = ends[i, place - 1]

@@ -19,9 +19,7 @@ _MOST_STEPS = 200
 
 @inline
 def half_angle(stroke: float, arm: float, exact: bool) -> float:
-    """Return half of the swing of the shaft lever:
-    by the chord of its end (exact), or by the printed arc tangent; (1).
-    """
+    """Half of the swing of the shaft lever: by the chord of its end (exact), or by the printed arc tangent; (1)."""
     if exact:
         return math.atan2(stroke, math.sqrt((2.0 * arm - stroke) * (2.0 * arm + stroke)))
     return math.atan2(stroke, 2.0 * arm)
@@ -101,7 +99,7 @@ def heddle_lever_angles(positions: Array, angles: Array, status: Status) -> None
 
 @inline
 def _kept_rod(x: float, y: float, one: tuple[float, float], two: tuple[float, float], side: float) -> float:
-    """Return the length of the rod from B = (x, y) to the first C, or nan if B stands on the wrong side of a ray."""
+    """Length of the rod from B = (x, y) to the first C, or nan if B stands on the wrong side of a ray."""
     if side * (one[0] * y - one[1] * x) > 0.0 and side * (two[0] * y - two[1] * x) > 0.0:
         return math.hypot(x - one[0], y - one[1])
     return math.nan
@@ -109,8 +107,7 @@ def _kept_rod(x: float, y: float, one: tuple[float, float], two: tuple[float, fl
 
 @kernel
 def heddle_rods(positions: Array, rods: Array, count: Status, status: Status) -> None:
-    """Compute all rods BC that give the cam lever a wanted swing between the extreme positions;
-    (11) of docs/heddle.md.
+    """Rods BC that give the cam lever a wanted swing between the extreme positions; (11) of docs/heddle.md.
 
     Turn the second position about O2 by the swing: B coincides in both, so it stands on the circle of radius O2B and on
     the perpendicular bisector of the two places of C.  That gives two points for each sense of the swing; those on the
@@ -165,7 +162,7 @@ def heddle_rods(positions: Array, rods: Array, count: Status, status: Status) ->
 
 @inline
 def _travel(arm: float, lever: float, frame: float, end: float, half: float) -> tuple[float, float, int]:
-    """Return the height of E above mid-stroke when the bell crank stands at +half and at -half; (12)."""
+    """Height of E above mid-stroke when the bell crank stands at +half and at -half; (12)."""
     bar = four_bar(arm, math.hypot(frame, arm - lever), lever, frame, 1.0)
     cos, _, _, _, up = driven(bar, -math.sin(half), math.cos(half))
     other, _, _, _, down = driven(bar, math.sin(half), math.cos(half))
@@ -175,8 +172,7 @@ def _travel(arm: float, lever: float, frame: float, end: float, half: float) -> 
 
 @kernel
 def heddle_shaft_arms(shafts: Array, arms: Array, status: Status) -> None:
-    """Compute the arm O3D that gives a shaft its stroke, all other lengths of the link being common to the shafts;
-    (12), (13).
+    """Arm O3D that gives a shaft its stroke, the link's other lengths being common to the shafts; (12), (13).
 
     Parameters
     ----------

@@ -11,10 +11,10 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from kernels.arithmetic.sincos import sine_cosine
 from kernels.jit import inline, kernel
 from kernels.synthesis.acceptance import design_status, first_failure
-from kernels.synthesis.angles import PI, sine_cosine
-from kernels.types import EPS, Array, Status
+from kernels.types import EPS, TWO_PI, Array, Status
 
 
 class Given(NamedTuple):
@@ -97,7 +97,7 @@ def rssp_on_locus(requirements: Array, status: Status, failed: Status, designs: 
         per = stroke / s0
         e, start, end = per * ca * u1 * u2, per * v1 * u2, per * v2 * u1
         middle = 0.5 * per * (v1 * u2 + v2 * u1)
-        valid = _valid(stroke, phi1, f, alpha) and abs(phi1.real) < 1e5 and 0.0 < phi0.real < 2.0 * PI
+        valid = _valid(stroke, phi1, f, alpha) and abs(phi1.real) < 1e5 and 0.0 < phi0.real < TWO_PI
         point = abs(s0.real) > 4.0 * EPS
         at = Limits(start, end, middle, per * ca * u2, per * ca * u1, v1, v2, point)
         _finish(Given(stroke, e, f, alpha, sa, ca, valid), at, i, status, failed, designs)
@@ -153,7 +153,7 @@ def rssp_at_offset(
         else:
             start = middle - 0.5 * stroke
             end = product / start
-        valid = _valid(stroke, e, f, alpha) and 0.0 < phi0 < 2.0 * PI and root[i] * root[i] == 1.0
+        valid = _valid(stroke, e, f, alpha) and 0.0 < phi0 < TWO_PI and root[i] * root[i] == 1.0
         point = inner >= 0.0 and abs(s0) > 4.0 * EPS
         side = (e * e + (ca * start) * (ca * end)) * c0 + e * ca * stroke * s0
         g = Given(stroke, e, f, alpha, sa, ca, valid)
@@ -188,6 +188,6 @@ def rssp_at_place(
         place = _between(g, s1, s2, s1 + 0.5 * stroke, -1.0, True, i, status, failed, designs)
         if phi0 is not None:
             turn = math.atan2(e * ca * stroke, e * e + (s1 * ca) * (s2 * ca))
-            phi0[i] = PI + turn if status[i] == 0 else math.nan
+            phi0[i] = math.pi + turn if status[i] == 0 else math.nan
         if phi1 is not None:
             phi1[i] = place

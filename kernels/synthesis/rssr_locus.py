@@ -15,10 +15,10 @@ from typing import NamedTuple
 import numpy as np
 
 from kernels.arithmetic.complex_step import arctan2
+from kernels.arithmetic.sincos import sine_cosine
 from kernels.jit import inline, kernel
 from kernels.synthesis.acceptance import design_status, first_failure
-from kernels.synthesis.angles import PI, sine_cosine
-from kernels.types import EPS, Array, Status
+from kernels.types import EPS, TWO_PI, Array, Status
 
 
 class _Requirement(NamedTuple):
@@ -52,7 +52,7 @@ def _requirement(requirements: Array, i: int, e: float, f: float, g: float) -> _
     sh, ch = sine_cosine(0.5 * swing)
     s0, c0 = sine_cosine(phi0)
     sa, ca = sine_cosine(alpha)
-    valid = 0.0 < abs(swing.real) < 2.0 * PI and 0.0 < phi0.real < 2.0 * PI and abs(alpha.real) < 1e5
+    valid = 0.0 < abs(swing.real) < TWO_PI and 0.0 < phi0.real < TWO_PI and abs(alpha.real) < 1e5
     valid = valid and abs(requirements[i, 2].real) < 1e5 and abs(e.real) + abs(f.real) + abs(g.real) < 1e150
     branch = -1.0 if swing.real > 0.0 else 1.0  # (3) of docs/synthesis.md and its sign
     return _Requirement(e, f, g, alpha, g * sa, sa, ca, sh, ch, 2.0 * sh * ch, 2.0 * sh * sh, s0, c0, branch, valid)

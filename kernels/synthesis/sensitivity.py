@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import math
 
+from kernels.arithmetic.sincos import sine_cosine
 from kernels.jit import inline, kernel
-from kernels.synthesis.angles import sine_cosine
 from kernels.types import Array
 
 PARAMETERS = ("a", "b", "c", "e", "f", "g", "alpha")

@@ -11,10 +11,11 @@ from typing import Any, NamedTuple, TypeAlias
 
 import numpy as np
 
+from kernels.types import TWO_PI
 from studies.accuracy.witness import Known, extreme
 from sweep.effects import NAMES, effect, extended
 from sweep.families.base import Array, Family
-from sweep.reductions.sampling import TWO_PI, pose_columns
+from sweep.reductions.sampling import pose_columns
 
 SAMPLES, MANY = 8192, 131_072
 # The same with a half and a third of the poses; a reference may be off by twice what these differ from it.

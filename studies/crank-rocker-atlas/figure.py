@@ -31,9 +31,7 @@ TITLES = {0.0: "parallel axes (planar)", 90.0: "axes at right angles"}
 
 
 def atlas(designs: pd.DataFrame) -> pd.DataFrame:
-    """Return one row per cell: the design of least acceleration per radian of swing, in units of the rocker;
-    angles in deg.
-    """
+    """Design of least acceleration per radian of swing for every cell, in units of the rocker; angles in deg."""
     rows = designs[designs.status == 0].copy()
     rows["acceleration"] = rows.max_abs_d2psi / rows.swing
     # What was prescribed comes back with rounding errors; whole degrees name the cell.
@@ -50,7 +48,7 @@ def atlas(designs: pd.DataFrame) -> pd.DataFrame:
 
 
 def chart(table: pd.DataFrame) -> Figure:
-    """Return four panels: acceleration above, pressure angle below, one column per angle of the axes."""
+    """Four panels: acceleration above, pressure angle below, one column per angle of the axes."""
     figure = new_figure(WIDTH, 8.6)
     panels = figure.subplots(2, 2, sharex=True, sharey=True)
     quantities = (

@@ -32,9 +32,7 @@ CAM = {"rise": math.radians(120.0), "dwell": math.radians(60.0), "fall": math.ra
 
 
 def table() -> pd.DataFrame:
-    """Return one row per shaft: stroke of a clear shed, the two dimensions that change,
-    and what the cam makes of it.
-    """
+    """Stroke of a clear shed for every shaft, the two dimensions that change, and what the cam makes of it."""
     number = np.arange(1, SHAFTS + 1)
     strokes = shed({"shaft": number, "d1": FELL, "t": PITCH, "stroke": PAGE["stroke"]})["stroke"].to_numpy()
     ends = extremes(PAGE | LEVER | {"BC": ROD}).iloc[0]
@@ -53,9 +51,7 @@ def table() -> pd.DataFrame:
 
 
 def _drive(ends: pd.Series) -> dict[str, float]:
-    """Return the chain from the cam to the bell crank, common to all shafts;
-    stage 1 is the cam with its roller lever.
-    """
+    """Chain from the cam to the bell crank, common to all shafts; stage 1 is the cam with its roller lever."""
     first, second = float(ends["lever_angle_1"]), float(ends["lever_angle_2"])
     rest = math.pi - math.acos((151.0**2 + ROLLER_LEVER**2 - BASE**2) / (2.0 * 151.0 * ROLLER_LEVER))
     cam = {f"{name}1": value for name, value in CAM.items()}
@@ -69,7 +65,7 @@ def _drive(ends: pd.Series) -> dict[str, float]:
 
 
 def chart(rows: pd.DataFrame) -> Figure:
-    """Return the acceleration and asymmetry from shaft to shaft."""
+    """Acceleration and asymmetry from shaft to shaft."""
     figure = new_figure(WIDTH, 4.6)
     left, right = figure.subplots(1, 2)
     left.bar(rows["shaft"], rows["acceleration"], color=OPTIMUM)

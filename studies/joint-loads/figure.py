@@ -33,9 +33,7 @@ TORQUES = {3000: 350.0, 5000: 950.0, 7000: 1850.0}
 
 
 def table(designs: pd.DataFrame) -> pd.DataFrame:
-    """Return one row per effect and speed:
-    quantiles of its measure over the feasible designs, and whether it matters.
-    """
+    """Quantiles of each effect's measure over the feasible designs at every speed, and whether it matters."""
     rows = []
     for speed, torque in TORQUES.items():
         of_speed = np.isclose(designs["speed"], speed * np.pi / 30.0)
@@ -51,7 +49,7 @@ def table(designs: pd.DataFrame) -> pd.DataFrame:
 
 
 def chart(effects: pd.DataFrame, designs: pd.DataFrame) -> Figure:
-    """Return measures over their thresholds against speed; utilisation against the largest pressure angle."""
+    """Measures over their thresholds against speed; utilisation against the largest pressure angle."""
     figure = new_figure(WIDTH, 8.4)
     above, below = figure.subplots(2, 1)
     for k, label in enumerate(RULES):

@@ -66,9 +66,7 @@ def crank_rocker(ratio: float, known: list[Array], starts: int) -> Result:
 
 
 def crank_rockers(ratios: list[float], starts: int) -> pd.DataFrame:
-    """Return one row per stroke ratio, searched upwards and then downwards again,
-    each also from its neighbour's answer.
-    """
+    """One row per stroke ratio, searched upwards and then downwards again, each also from its neighbour's answer."""
     best: dict[float, Result] = {}
     for ratio in (*ratios, *ratios[-2::-1]):
         known = [best[other].design for other in ratios if other in best]
@@ -88,7 +86,7 @@ def merit(result: Result) -> tuple[bool, float]:
 
 
 def table(front: pd.DataFrame, starts: int) -> pd.DataFrame:
-    """Return one row per stroke ratio and mechanism; one that misses a limit has status LIMIT_EXCEEDED."""
+    """One row per stroke ratio and mechanism; one that misses a limit has status LIMIT_EXCEEDED."""
     slotted = front.sort_values("bound").assign(mechanism="slotted link", ratio=lambda rows: rows["bound"])
     others = crank_rockers(slotted["ratio"].tolist(), starts).assign(mechanism="crank-rocker")
     both = pd.concat([slotted, others], ignore_index=True)
@@ -96,7 +94,7 @@ def table(front: pd.DataFrame, starts: int) -> pd.DataFrame:
 
 
 def chart(drives: pd.DataFrame) -> Figure:
-    """Return the acceleration against the stroke ratio."""
+    """Acceleration against the stroke ratio."""
     figure = new_figure(WIDTH, 4.6)
     axes = figure.subplots()
     for name, colour in (("slotted link", OPTIMUM), ("crank-rocker", REFERENCE)):

@@ -29,9 +29,7 @@ LINKS = ["a", "b", "c", "e", "f", "g", "h", "branch"]
 
 
 def along_h(optimum: pd.Series, lengths: list[float], seconds: float) -> pd.DataFrame:
-    """Return the best five-links for every h [mm], each started from its neighbour,
-    beginning at the h next to the optimum's.
-    """
+    """Best five-links for every h [mm], each started from its neighbour, beginning next to the optimum's h."""
     data = load_study(FOLDER).data
     rows = []
     start = pd.DataFrame([optimum])
@@ -49,7 +47,7 @@ def along_h(optimum: pd.Series, lengths: list[float], seconds: float) -> pd.Data
 
 
 def chart(joint: pd.DataFrame) -> Figure:
-    """Return the acceleration and tilt of the coupler against h."""
+    """Acceleration and tilt of the coupler against h."""
     figure = new_figure(WIDTH, 4.6)
     left, right = figure.subplots(1, 2)
     rows = joint[joint["status"] == 0]

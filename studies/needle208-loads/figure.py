@@ -32,7 +32,7 @@ SHORT = ("rocker pin 1", "rocker shaft 1", "rocker pin 2", "rocker shaft 2")
 
 
 def inputs(study: Study) -> dict[str, float]:
-    """Return bodies, oil and motor of the study, those that nothing wanted takes included."""
+    """Bodies, oil and motor of the study, those that nothing wanted takes included."""
     want = [*study.want, "max_abs_drive_torque_friction1", "unevenness_friction1"]
     scene = {**study.data["scene"], "want": want}
     full = study_from_data({**study.data, "scene": scene}, study.path)
@@ -41,8 +41,9 @@ def inputs(study: Study) -> dict[str, float]:
 
 
 def cases(study: Study, designs: dict[str, dict[str, float]]) -> tuple[pd.DataFrame, dict[str, Array]]:
-    """Return the largest loads and unevenness per design and case;
-    drive torque of the first design over the turn, per case.
+    """Largest loads and unevenness per design and case.
+
+    The drive torque of the first design over the turn comes beside them, per case.
     """
     rows, torques, given = [], {}, inputs(study)
     for label, design in designs.items():
@@ -72,7 +73,7 @@ def cases(study: Study, designs: dict[str, dict[str, float]]) -> tuple[pd.DataFr
 
 
 def chart(table: pd.DataFrame, torques: dict[str, Array]) -> Figure:
-    """Return the driving torque over the turn; largest joint forces load by load."""
+    """Driving torque over the turn; largest joint forces load by load."""
     figure = new_figure(WIDTH, 8.4)
     above, below = figure.subplots(2, 1)
     for case, torque in torques.items():

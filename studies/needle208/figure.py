@@ -37,9 +37,7 @@ LINKS = ["a2", "b2", "c2", "e2"]
 
 
 def price(study: Study, mechanisms: dict[str, np.ndarray]) -> pd.DataFrame:
-    """Return the acceleration, deviation as drawn and as made, shortest link,
-    arm and size of mechanisms side by side.
-    """
+    """Acceleration, deviation as drawn and as made, shortest link, arm and size of mechanisms side by side."""
     if study.tolerance is None:
         raise ValueError("the study has no tolerances")
     names = study.family.parameter_names
@@ -68,9 +66,7 @@ def price(study: Study, mechanisms: dict[str, np.ndarray]) -> pd.DataFrame:
 
 
 def front(study: Study, optimum: np.ndarray, deviations: tuple[float, ...], looks: int, jobs: int) -> pd.DataFrame:
-    """Return the least acceleration where 95 % of what is made deviate by at most so much,
-    each from its neighbour's mechanism.
-    """
+    """Least acceleration where 95 % of what is made deviate by at most so much, each from its neighbour's mechanism."""
     if study.tolerance is None:
         raise ValueError("the study has no tolerances")
     problem = problem_of(study, np.array([0.7 * optimum, 1.3 * optimum]))
@@ -91,14 +87,14 @@ def front(study: Study, optimum: np.ndarray, deviations: tuple[float, ...], look
 
 
 def alone(mechanisms: pd.DataFrame) -> pd.DataFrame:
-    """Return the front of a smoke version, whose optimum is too rough to begin others with: the optimum alone."""
+    """Front of a smoke version, whose optimum is too rough to begin others with: the optimum alone."""
     own = mechanisms[mechanisms["mechanism"] == "optimum"]
     found = {"deviation": own["deviation of 95 % made"], "acceleration": own["acceleration"]}
     return pd.DataFrame({**found, "share": own["made within 0.05 mm [%]"] / 100.0, "kept": True})
 
 
 def chart(table: pd.DataFrame, mechanisms: pd.DataFrame) -> Figure:
-    """Return the front, with the mechanisms as they are made."""
+    """Front, with the mechanisms as they are made."""
     figure = new_figure(WIDTH, 3.8)
     axes = figure.subplots()
     kept = table[table["kept"]]

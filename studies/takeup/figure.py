@@ -28,7 +28,7 @@ MET = (180.0, 216.0)  # the needle is lowest; the looper meets it
 
 
 def balance(study: Study, designs: dict[str, pd.Series | dict[str, float]]) -> pd.DataFrame:
-    """Return the thread over the turn, one row per design and degree of the main shaft."""
+    """Thread over the turn, one row per design and degree of the main shaft."""
     parts = []
     for label, design in designs.items():
         table = {name: float(design[name]) for name in study.family.parameter_names}
@@ -38,7 +38,7 @@ def balance(study: Study, designs: dict[str, pd.Series | dict[str, float]]) -> p
 
 
 def chart(turn: pd.DataFrame) -> Figure:
-    """Return the supply and demand, what is left over, and the tension at the stitch."""
+    """Supply and demand, what is left over, and the tension at the stitch."""
     figure = new_figure(WIDTH, 9.0)
     supply, left, pull = figure.subplots(3, 1, sharex=True)
     colours = dict(zip(turn["label"].unique(), (OPTIMUM, REFERENCE), strict=False))

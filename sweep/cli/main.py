@@ -50,6 +50,10 @@ VERBS = {
     "summarise": ("tables:summarise_table", "Compute design outputs of the designs in TABLE, one row per design."),
     "task": ("task:task", "Answer the [task] table of FILE: mechanisms, the best first."),
     "verify": ("verify:verify", "Check a dataset: every byte against its hash, every row against the plan."),
+    "warm": (
+        "warm:warm",
+        "Compile what studies or families need, before they are run: for images, clusters and nights.",
+    ),
 }
 
 

@@ -14,8 +14,7 @@ from importlib import import_module
 from types import MappingProxyType
 
 from sweep.effects.base import CURVED, Effect, Placed
-from sweep.effects.curve_features import bends, bent, paces, piercing
-from sweep.effects.evaluation import effect_poses, on_own_columns, run_design
+from sweep.effects.evaluation import bends, bent, effect_poses, on_own_columns, paces, piercing, run_design
 from sweep.effects.scene import stages_of
 from sweep.errors import InputError
 from sweep.families.base import Accuracy, Family, Output, Parameter, Step, Work, of_family

@@ -10,18 +10,19 @@ import numpy as np
 
 from kernels import status as st
 from kernels.effects.bearings import bearing_loads
+from kernels.types import EPS, TWO_PI, Status
 from sweep.effects import loads
 from sweep.effects.base import Bend, DesignResult, Effect
 from sweep.effects.bearings import CATALOGUE, SUPPORTS
 from sweep.effects.load_passing import LOADS, reactions
-from sweep.effects.scene import Rows, Scene, Status, refuse
+from sweep.effects.scene import Rows, Scene, refuse
 from sweep.effects.turn import chosen
 from sweep.families.base import Accuracy, Array, Columns, Output
 from sweep.families.capabilities import Assembly
 from sweep.families.poses import filled_each
 from sweep.numerics.events import sign_changes, with_events
 from sweep.numerics.quadrature import integrate
-from sweep.numerics.singularities import TWO_PI, crowded, singularities, turn_edges
+from sweep.numerics.singularities import crowded, singularities, turn_edges
 
 FORMULAS = (
     "(1) F2 = (M x k - z1 F_r)/(z2 - z1), F1 = F_r - F2 from force F and moment M on the shaft; F_r across its axis k",
@@ -32,7 +33,6 @@ PANEL = 1.0  # length of the first panels of a turn against the distance of the 
 LOOK = 1.0 / 16.0  # spacing of the poses among which kinks and jumps are looked for, against that distance
 SIZING = 64  # poses from which the size of the loads is taken, so that no power of them leaves float64
 BLOCK = 256  # designs at once: bisections ask for one pose of each kink
-EPS = 2.0**-53
 
 
 def load_names(shaft: str) -> tuple[str, ...]:

@@ -7,12 +7,13 @@ import numpy as np
 from kernels import status as st
 from kernels.effects.elastic_drive import driven_steady_state
 from kernels.effects.elasticity import quasi_static, steady_state
+from kernels.types import Status
 from sweep.effects import loads
 from sweep.effects.base import Advice, DesignResult, Effect
 from sweep.effects.driven import DrivenSide, driven_side, drives_something
 from sweep.effects.load_passing import LOADS, behind
 from sweep.effects.loads import SPEED
-from sweep.effects.scene import Scene, Status, take_over
+from sweep.effects.scene import Scene, take_over
 from sweep.effects.turn import at_poses, backwards, on_finer_grids, per_turn, reduction_outputs
 from sweep.families.base import Accuracy, Array, Columns, Output, Parameter
 from sweep.families.poses import optional_outputs

@@ -10,9 +10,10 @@ import numpy as np
 
 from kernels.effects.friction import friction_loads
 from kernels.effects.kinetostatics import kinetostatics
+from kernels.types import Status
 from sweep.effects import loads
 from sweep.effects.loads import FRICTION_SUFFIX, FRICTION_TEXT, Named, together
-from sweep.effects.scene import Scene, Status, refuse
+from sweep.effects.scene import Scene, refuse
 from sweep.effects.tool import weighs
 from sweep.families.base import Array, Columns, Parameter
 from sweep.families.poses import optional_outputs

@@ -8,9 +8,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from kernels.effects import link_friction, link_loads
+from kernels.types import Status
 from sweep.effects import loads
 from sweep.effects.loads import FRICTION_SUFFIX, FRICTION_TEXT, Named, together
-from sweep.effects.scene import Index, Scene, Status, refuse
+from sweep.effects.scene import Index, Scene, refuse
 from sweep.families.base import Array, Columns, Parameter
 from sweep.families.link_tree import LinkJoint, LinkTree
 

@@ -12,9 +12,10 @@ from typing import NamedTuple, TypeAlias
 
 import numpy as np
 
+from kernels.types import Status
 from sweep.effects import kinetostatics, link_loads, loads
 from sweep.effects.base import tool_place
-from sweep.effects.scene import Scene, Status, take_over
+from sweep.effects.scene import Scene, take_over
 from sweep.families.base import Array, Columns, Family, Parameter
 from sweep.families.capabilities import JointRecords
 from sweep.families.link_tree import LinkTree

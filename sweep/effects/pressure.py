@@ -7,8 +7,9 @@ from functools import partial
 import numpy as np
 
 from kernels.effects.pressure import directions, pressure_extrema
+from kernels.types import Status
 from sweep.effects.base import DesignResult, Effect, largest, no_poses
-from sweep.effects.scene import Scene, Status
+from sweep.effects.scene import Scene
 from sweep.effects.turn import chosen
 from sweep.families.base import Accuracy, Array, Columns, Output
 from sweep.families.capabilities import PressureEllipse

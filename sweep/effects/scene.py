@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from kernels import status as st
 from kernels.linkage.bodies import PER_BODY, PER_LINE, Links
 from kernels.linkage.joints import PER_DESIGN, PER_POSE
+from kernels.types import Status
 from sweep.families.base import Angles, Array, Columns, Family
 from sweep.families.capabilities import JointRecords
 from sweep.families.chain import Chain, drive, driving_names
@@ -23,7 +24,6 @@ from sweep.numerics.curves import Curve
 
 _PER_LINK = (PER_BODY, 3, PER_LINE)
 
-Status: TypeAlias = NDArray[np.uint8]
 Rows: TypeAlias = NDArray[np.intp]
 Index: TypeAlias = NDArray[np.int64]
 

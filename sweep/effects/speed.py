@@ -9,11 +9,12 @@ from numpy.typing import NDArray
 
 from kernels import status as st
 from kernels.effects.speed_fluctuation import RESOLVED, speed_fluctuation
+from kernels.types import Status
 from sweep.effects import load_effects, loads
 from sweep.effects.base import Advice, DesignResult, Effect
 from sweep.effects.load_passing import FRICTION, LOADS, compute_friction, compute_loads
 from sweep.effects.loads import FRICTION_SUFFIX, FRICTION_TEXT
-from sweep.effects.scene import Scene, Status, take_over
+from sweep.effects.scene import Scene, take_over
 from sweep.effects.turn import at_poses, backwards, on_finer_grids, per_turn, reduction_outputs
 from sweep.families import family
 from sweep.families.base import Accuracy, Array, Columns, Output, Parameter

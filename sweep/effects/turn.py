@@ -9,8 +9,9 @@ from typing import TypeAlias
 import numpy as np
 
 from kernels import status as st
-from kernels.curves.turn_series import turn_extremes
-from sweep.effects.scene import Scene, Status, take_over
+from kernels.curves.periodic import turn_extremes
+from kernels.types import Status
+from sweep.effects.scene import Scene, take_over
 from sweep.families.base import Array, Columns, Output
 from sweep.families.domain import Turn
 from sweep.families.reduction import REDUCTIONS

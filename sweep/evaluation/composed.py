@@ -5,12 +5,13 @@ from __future__ import annotations
 import numpy as np
 
 from kernels import status as st
+from kernels.types import TWO_PI
 from sweep.families.base import Accuracy, Array, Columns
 from sweep.families.machines import Machine
 from sweep.families.names import by_magnitude, error_of
 from sweep.families.relations import Reading, Timing
 from sweep.quantities.box import ROUNDING, Box
-from sweep.reductions.sampling import TWO_PI, pose_columns
+from sweep.reductions.sampling import pose_columns
 
 SLOPE = 1e-5  # rad, for the slope that says what the error of an angle does to a value there
 

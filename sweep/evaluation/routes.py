@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from kernels import status as st
+from kernels.types import TWO_PI
 from sweep import costs
 from sweep.errors import InputError
 from sweep.evaluation import composed
@@ -29,7 +30,7 @@ from sweep.quantities.kinds import Extent, Group, Margin, Negative, Quantity, Ti
 from sweep.quantities.resolve import resolve
 from sweep.reductions.margins import NAMES as MARGINS
 from sweep.reductions.margins import combined, margin_suffixes, margins, with_transmission
-from sweep.reductions.sampling import TWO_PI, Index, on_closed_turn
+from sweep.reductions.sampling import Index, on_closed_turn
 from sweep.reductions.steps import applying_step, group_ns
 from sweep.reductions.turn import margin_group
 

@@ -23,7 +23,7 @@ NAMED = "LINKSWEEP"  # application under which entities carry their names
 
 
 def ezdxf_or_refuse() -> Any:
-    """Return the package ezdxf.
+    """Package ezdxf.
 
     Raises
     ------
@@ -38,8 +38,9 @@ def ezdxf_or_refuse() -> Any:
 
 
 def write_dxf(placed: list[Placed], path: Path, unit: str) -> None:
-    """Write the first pose with the joints' paths:
-    planar parts from the front, spatial ones from the side and top as well.
+    """Write the first pose with the joints' paths.
+
+    Planar parts are drawn from the front, spatial ones from the side and top as well.
 
     Layers are LINKS, JOINTS, PIVOTS, AXES, PATHS and TEXT.  Every frame has its views side by side, the front view of
     the first one standing at its own coordinates.  In front views points and axes keep their third coordinate and carry

@@ -67,7 +67,7 @@ class Model:
         return len(self.accessors) - 1
 
     def mesh(self, shape: str, colour: str) -> int:
-        """Return the mesh of a shape in a colour, made when it is first asked for."""
+        """Mesh of a shape in a colour, made when it is first asked for."""
         if (shape, colour) not in self.mesh_of:
             self.mesh_of[shape, colour] = len(self.meshes)
             primitive = self.shapes[shape] | {"material": self.materials.index(colour)}
@@ -129,7 +129,7 @@ def _material(name: str, rgb: tuple[float, float, float]) -> dict[str, Any]:
 
 
 def _group(model: Model, one: Placed, times: int, size: float) -> int:
-    """Return the node of a part with those of its links, joints and axes."""
+    """Node of a part with those of its links, joints and axes."""
     part, children, thick = one.part, [], 0.008 * size
     for k, link in enumerate(part.links):
         pairs = list(zip(link.joints, link.joints[1:], strict=False))
@@ -174,7 +174,7 @@ def _group(model: Model, one: Placed, times: int, size: float) -> int:
 
 
 def _slides(part: Part, link: Link) -> bool:
-    """Return whether a link is known by one joint only, and that one moves."""
+    """Whether a link is known by one joint only, and that one moves."""
     return len(link.joints) == 1 and link.joints[0] not in part.kinds
 
 
@@ -210,7 +210,7 @@ def _bar(model: Model, name: str, colour: str, start: Array, end: Array, times: 
 
 
 def _following(directions: Array) -> Array:
-    """Return quaternions (x, y, z, w) that turn z into each direction, each from the one before by the shortest way."""
+    """Quaternions (x, y, z, w) that turn z into each direction, each from the one before by the shortest way."""
     found = np.empty((len(directions), 4))
     found[0] = _unit(_from_z(directions[0]))
     for k in range(1, len(directions)):

@@ -96,15 +96,13 @@ def _tag(part: Part) -> str:
 
 
 def _of_member(design: Mapping[str, float], member: str) -> dict[str, float]:
-    """Return the columns of one member without its name, of a family all."""
+    """Columns of one member without its name, of a family all."""
     head = f"{member}." if member else ""
     return {name.removeprefix(head): float(value) for name, value in design.items() if name.startswith(head)}
 
 
 def _driver(machine: Machine, name: str, first: str) -> tuple[str, float]:
-    """Return the joint that drives a member's crank, and the ratio of both;
-    ``first`` is the crank of the first member.
-    """
+    """Joint that drives a member's crank, and the ratio of both; ``first`` is the crank of the first member."""
     members = {member.name: member for member in machine.members}
     member = members[name]
     if member.driver is None:
@@ -155,7 +153,7 @@ def _loop(one: Placed, finger: float, metres: float) -> Loop:
 
 
 def _triad(along: Array, axis: Array) -> Array:
-    """Return columns x along a link, y across, z its axis."""
+    """Columns x along a link, y across, z its axis."""
     x = along / np.linalg.norm(along)
     return np.column_stack([x, np.cross(axis, x), axis])
 
@@ -222,7 +220,7 @@ SPARE = 2.0  # moments that do not count are made so many times what they have t
 
 
 def inertial(design: Mapping[str, float], name: str, stage: str, unit: str) -> Xml.Element:
-    """Return the mass, centre and inertia of a body.
+    """Mass, centre and inertia of a body.
 
     A body about a fixed axis turns by its moment about that axis and its products with it alone, a slider by none: what
     does not count is filled up, so that the tensor is that of a body.

@@ -56,7 +56,7 @@ class PlacedDesign:
 
 
 def from_points(family: str, *, tolerance: float = TOLERANCE, **points: Sequence[float] | Array) -> PlacedDesign:
-    """Return the mechanism whose joints stand on given points of a drawing, in one position.
+    """Mechanism whose joints stand on given points of a drawing, in one position.
 
     Parameters
     ----------
@@ -237,7 +237,7 @@ def _label(member: str, stage: str) -> str:
 
 
 def _of_dxf(file: Path) -> tuple[Groups, bool]:
-    """Return the named points and axes of the front views, whose third coordinate is kept."""
+    """Named points and axes of the front views, whose third coordinate is kept."""
     ezdxf = ezdxf_or_refuse()
     try:
         space = ezdxf.readfile(file).modelspace()
@@ -257,7 +257,7 @@ def _of_dxf(file: Path) -> tuple[Groups, bool]:
 
 
 def _of_glb(file: Path) -> tuple[Groups, bool]:
-    """Return the joints of the first pose and the axes; coordinates are float32."""
+    """Joints of the first pose and the axes; coordinates are float32."""
     data = file.read_bytes()
     if len(data) < 20 or data[:4] != b"glTF":
         raise InputError("file", file.name, "a model by sweep export (glTF 2.0, binary)", str(file))

@@ -34,7 +34,7 @@ class Placed:
 
 
 def turn(mechanism: Mechanism, design: Table, phi: float, poses: int) -> list[Placed]:
-    """Return all parts over one turn as of :func:`over`, each with its place in the scene.
+    """All parts over one turn as of :func:`over`, each with its place in the scene.
 
     Raises
     ------
@@ -58,7 +58,7 @@ def turn(mechanism: Mechanism, design: Table, phi: float, poses: int) -> list[Pl
 
 
 def over(mechanism: Mechanism, design: Table, phi: float, poses: int) -> list[Part]:
-    """Return all parts over one turn from ``phi`` on, the last pose being the first one again.
+    """All parts over one turn from ``phi`` on, the last pose being the first one again.
 
     An interval is run through to its end, back to its beginning and to ``phi`` again, which is its beginning if it lies
     outside.  A march begins at 0.
@@ -82,7 +82,7 @@ def _there_and_back(ends: Array, start: float, poses: int) -> Array:
 
 
 def _closed(part: Part) -> Part:
-    """Return the first pose once more behind the last."""
+    """First pose once more behind the last."""
     return _taken(part, [*range(part.phi.size), 0], np.append(part.phi, 2.0 * math.pi))
 
 
@@ -93,7 +93,7 @@ def _taken(part: Part, rows: list[int], phi: Array) -> Part:
 
 
 def pose(mechanism: Mechanism, design: Table, phi: float) -> list[Part]:
-    """Return all parts in one position.
+    """All parts in one position.
 
     Raises
     ------
@@ -124,7 +124,7 @@ def side_by_side(found: Sequence[Part]) -> list[Placed]:
 
 
 def extent(found: Sequence[Part]) -> float:
-    """Return the largest extent of all joints over the turn."""
+    """Largest extent of all joints over the turn."""
     points = np.vstack([path for part in found for path in part.joints.values()])
     return float(np.nanmax(np.nanmax(points, axis=0) - np.nanmin(points, axis=0)))
 

@@ -103,7 +103,7 @@ class Accuracy:
     proven: tuple[str, ...] = ()
 
     def of(self, name: str) -> Accuracy:
-        """Return the accuracy of one output: without proof where only others are to be proven."""
+        """Accuracy of one output: without proof where only others are to be proven."""
         return replace(self, certify=False) if self.certify and self.proven and name not in self.proven else self
 
 
@@ -202,11 +202,11 @@ class Family:
         return replace(self, poses=self.precise_poses)
 
     def find(self, kind: type[Capability]) -> Capability | None:
-        """Return the first capability of a type, None where the family has none."""
+        """First capability of a type, None where the family has none."""
         return next(iter(self.every(kind)), None)
 
     def every(self, kind: type[Capability]) -> tuple[Capability, ...]:
-        """Return all capabilities of a type: a chain has one of each stage."""
+        """All capabilities of a type: a chain has one of each stage."""
         return tuple(found for found in self.capabilities if isinstance(found, kind))
 
     @cached_property

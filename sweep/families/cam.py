@@ -56,12 +56,12 @@ _LAW = ("rise", "dwell", "fall", "start", "law")
 
 
 def with_kinks(outputs: tuple[Output, ...]) -> tuple[Output, ...]:
-    """Return outputs of a cam, whose phases meet in kinks or jumps; an angle made continuous is left as it is."""
+    """Return the outputs of a cam, whose phases meet in kinks or jumps; an angle made continuous is left as it is."""
     return tuple(replace(o, kinks=not o.wraps) for o in outputs)
 
 
 def phase_ends(designs: Array) -> Array:
-    """Return the cam angles at which a phase, or a piece of the modified sine, ends; of a Fourier table 0 (n, 8)."""
+    """Cam angles at which a phase, or a piece of the modified sine, ends; of a Fourier table 0 (n, 8)."""
     rise, dwell, fall, start, kind = (parameter(PARAMETERS, name, designs)[:, None] for name in _LAW)
     shares = np.array([0.0, 0.125, 0.875, 1.0])
     ends = np.concatenate([start + rise * shares, start + rise + dwell + fall * shares], axis=1)
@@ -91,7 +91,7 @@ def poses(designs: Array, angles: Angles, wanted: frozenset[str]) -> Columns:
 
 
 def follower_line(designs: Array) -> tuple[Array, Array]:
-    """Return the point of the follower's line nearest to the cam's axis, and the direction of lift, each (n, 3)."""
+    """Point of the follower's line nearest to the cam's axis, and the direction of lift, each (n, 3)."""
     zero = np.zeros(len(designs))
     at = np.stack([zero, -parameter(PARAMETERS, "e", designs), zero], axis=1)
     return at, np.tile(X, (len(designs), 1))
@@ -139,7 +139,7 @@ def lever_poses(designs: Array, angles: Angles, wanted: frozenset[str]) -> Colum
 
 
 def lever_origin(designs: Array) -> Array:
-    """Return the axis of the lever, (n, 3)."""
+    """Axis of the lever, (n, 3)."""
     origin = np.zeros((len(designs), 3), designs.dtype)
     origin[:, 0] = parameter(LEVER_PARAMETERS, "e", designs)
     return origin

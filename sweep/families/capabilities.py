@@ -110,7 +110,7 @@ class CrankRockerLoop:
 class GuidedPoint:
     """A coupler point that runs along a line: its position is linear in the directions of crank, coupler and rocker.
 
-    ``shares(designs)``, (n, 8), are the factors that the proof of its maxima takes (:mod:`sweep.reductions.travel`).
+    ``shares(designs)``, (n, 8), are the factors that the proof of its maxima takes (:mod:`sweep.reductions.extrema`).
     The coupler point, the line and the scale can be fitted: ``fitted`` are the parameters of the point along and across
     the coupler, of the line's direction and of its distance from the origin, ``scaled`` the lengths that grow with the
     stroke, ``direction`` the third of the fitted ones.  ``links`` are the crank, the coupler and the other lengths of

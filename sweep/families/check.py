@@ -24,7 +24,7 @@ class FamilyError(TypeError):
 
 
 def check_family(family: Family) -> Family:
-    """Return the family itself, once every rule of an entry is kept.
+    """Family itself, once every rule of an entry is kept.
 
     Raises
     ------

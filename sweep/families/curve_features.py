@@ -84,7 +84,7 @@ class Bends:
 
 
 def waves(family: Family, designs: Array) -> Array:
-    """Return how many waves one turn holds at least, (n,)."""
+    """How many waves one turn holds at least, (n,)."""
     most = np.ones(len(designs))
     for fast in family.every(Waves):
         count = np.abs(fast.count(designs))
@@ -93,14 +93,14 @@ def waves(family: Family, designs: Array) -> Array:
 
 
 def switches(family: Family, designs: Array) -> Array:
-    """Return the angles at which outputs switch, in [0, 2 pi), (n, k); 0 for what is no number."""
+    """Angles at which outputs switch, in [0, 2 pi), (n, k); 0 for what is no number."""
     every = [np.zeros((len(designs), 0)), *(known.angles(designs) for known in family.every(Switches))]
     angles = np.mod(np.concatenate(every, axis=1), TWO_PI)
     return np.where(np.isfinite(angles), angles, 0.0)
 
 
 def crossed(family: Family, designs: Array) -> NDArray[np.bool_]:
-    """Return which designs have outputs that jump where a pose output passes a level, (n,)."""
+    """Which designs have outputs that jump where a pose output passes a level, (n,)."""
     found: NDArray[np.bool_] = np.zeros(len(designs), np.bool_)
     for known in family.every(Crossing):
         found = found | known.matters(designs)
@@ -113,13 +113,13 @@ def bends(family: Family, output: str) -> tuple[Bends, ...]:
 
 
 def singular_curves(family: Family) -> Sequence[SingularCurve]:
-    """Return the functions of designs (n, P) and angles whose complex zeros are the motion's singularities."""
+    """Functions of designs (n, P) and angles whose complex zeros are the motion's singularities."""
     loops = [Singular(_only, (loop.discriminant,)) for loop in family.every(Assembly)]
     return [partial(_measured, family, known) for known in (*loops, *family.every(Singular))]
 
 
 def _only(designs: Array, angles: Angles, found: Columns) -> Array:
-    """Return the one pose output that is needed."""
+    """One pose output that is needed."""
     (value,) = (np.asarray(values, np.float64) for name, values in found.items() if name != "status")
     return value
 
@@ -130,12 +130,12 @@ def _measured(family: Family, known: Singular, designs: Array, angles: Angles) -
 
 
 def of_table(phi: Sequence[float]) -> Switches:
-    """Return the switches at the points of a table that all designs share."""
+    """Switches at the points of a table that all designs share."""
     return Switches(partial(_alike, np.array(phi, np.float64)))
 
 
 def of_order(order: int) -> Waves:
-    """Return the waves of a Fourier series of that order."""
+    """Waves of a Fourier series of that order."""
     return Waves(partial(_many, float(order)))
 
 
@@ -181,7 +181,7 @@ def _of_shaft(member: Member, known: Bends) -> Bends:
 
 
 def _turned(member: Member, curves: Callable[[Array, Angles], Array], designs: Array, angles: Angles) -> Array:
-    """Return functions of a member that the main shaft drives, at angles of the main shaft."""
+    """Functions of a member that the main shaft drives, at angles of the main shaft."""
     phase = member.phase(designs)
     return curves(member.designs(designs), Angles.of(member.ratio * angles.phi + phase[:, None]))
 
@@ -222,7 +222,7 @@ def _of_member(members: tuple[Member, ...], designs: Array) -> Array:
 
 
 def _on_shaft(member: Member, angles: DesignMap, designs: Array) -> Array:
-    """Return angles of the main shaft at which a member's crank passes its switches."""
+    """Angles of the main shaft at which a member's crank passes its switches."""
     own = angles(member.designs(designs)) - member.phase(designs)[:, None]
     turns = TWO_PI * np.arange(abs(member.ratio))
     every: Array = (own[:, :, None] + turns) / member.ratio

@@ -110,12 +110,12 @@ def second_coupler_square(designs: Array) -> Array:
 
 
 def rocker_foot(designs: Array, angles: Angles, motion: Columns) -> Array:
-    """Return the point of the shaft at the height of the rocker's ball, (n, m, 3)."""
+    """Point of the shaft at the height of the rocker's ball, (n, m, 3)."""
     return _on_shaft(designs, np.asarray(motion["z_c1"], np.float64))
 
 
 def looper_foot(designs: Array, angles: Angles, motion: Columns) -> Array:
-    """Return the point of the shaft at the height of the working point, (n, m, 3)."""
+    """Point of the shaft at the height of the working point, (n, m, 3)."""
     return _on_shaft(designs, np.asarray(motion["z_p"], np.float64))
 
 

@@ -16,7 +16,7 @@ TWO_TURNS, TWO_TURNS_DEG = 2.0 * TWO_PI * (1.0 + 1e-9), 720.0
 
 
 def reads_as_degrees(largest: float) -> bool:
-    """Return whether crank angles, the largest of which is given, were written in degrees though rad were expected.
+    """Whether crank angles, the largest of which is given, were written in degrees though rad were expected.
 
     Crank angles may run on over many turns.  Between two turns in rad and two turns in degrees a grid whose largest
     value is a whole or half number was written in degrees: one in rad ends at a multiple of pi.

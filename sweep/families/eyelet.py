@@ -45,7 +45,7 @@ poses = poses_of(eyelet.poses, eyelet.Outputs)
 
 
 def guide(number: int) -> Fixed:
-    """Return guide 1 or 2, where the thread comes from and goes to."""
+    """Guide 1 or 2, where the thread comes from and goes to."""
 
     def at(designs: Array) -> Array:
         e, x, y, z = (parameter(PARAMETERS, name.format(number), designs) for name in ("e", "dX{}", "dY{}", "Z{}"))
@@ -58,7 +58,7 @@ EYELET = ("X_E", "Y_E", "Z_E")
 
 
 def thread_squared(number: int, designs: Array, angles: Angles, found: Columns) -> Array:
-    """Return the squared length of thread from a guide to the eyelet, (n, m): near the guide it turns fast."""
+    """Squared length of thread from a guide to the eyelet, (n, m): near the guide it turns fast."""
     place = guide(number).at(designs)
     squares = [np.square(np.asarray(found[name], np.float64) - place[:, [k]]) for k, name in enumerate(EYELET)]
     total: Array = squares[0] + squares[1] + squares[2]

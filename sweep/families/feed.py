@@ -98,7 +98,7 @@ def poses(designs: Array, angles: Angles, wanted: frozenset[str]) -> Columns:
 
 
 def rocker_loop(designs: Array, angles: Angles, found: Columns) -> Array:
-    """Return the discriminant of the horizontal chain, (n, m)."""
+    """Discriminant of the horizontal chain, (n, m)."""
     return np.asarray(CRANK_ROCKER.poses(horizontal_chain(designs), angles, _DELTA)["discriminant"], np.float64)
 
 
@@ -232,7 +232,7 @@ def triad_loop(designs: Array, angles: Angles, found: Columns) -> Array:
 
 
 def determinant_squared(designs: Array, angles: Angles, found: Columns) -> Array:
-    """Return the square of the determinant of the closures, (n, m): it falls like a root where the leads lock."""
+    """Square of the determinant of the closures, (n, m): it falls like a root where the leads lock."""
     return np.square(np.asarray(found["determinant"], np.float64))
 
 
@@ -250,7 +250,7 @@ def rocker_pin(designs: Array, angles: Angles, found: Columns) -> Array:
 
 
 def eccentric(number: int) -> Made:
-    """Return the centre of an eccentric."""
+    """Centre of an eccentric."""
 
     def at(designs: Array, angles: Angles, found: Columns) -> Array:
         x, y, radius, ahead = _columns(designs, *(f"{name}{number}" for name in ("xE", "yE", "rE", "dE")))
@@ -261,7 +261,7 @@ def eccentric(number: int) -> Made:
 
 
 def rack_joint(number: int) -> Made:
-    """Return the joint of a link on the rack."""
+    """Joint of a link on the rack."""
 
     def at(designs: Array, angles: Angles, found: Columns) -> Array:
         x, y, chi = (np.asarray(found[name], np.float64) for name in ("x_t", "y_t", "chi"))

@@ -85,7 +85,7 @@ FEET = [0, 1, 2, 3, 6, 8, 9]  # columns of what the march takes
 
 
 def marched(path: Array, feet: Array) -> tuple[Columns, Array, Array]:
-    """Return events, status and the heights and forces at the nodes of the last turn.
+    """Events, status and the heights and forces at the nodes of the last turn.
 
     ``feet`` (n, 7) are mass, spring, preload, speed, restitution, stiffness and damping of the fabric.
     """
@@ -106,13 +106,13 @@ def marched(path: Array, feet: Array) -> tuple[Columns, Array, Array]:
 
 
 def nodes_for(poses: int) -> tuple[int, int]:
-    """Return how many nodes are marched for so many poses of a turn, and how many nodes apart the poses stand."""
+    """How many nodes are marched for so many poses of a turn, and how many nodes apart the poses stand."""
     apart = -(-NODES // poses)
     return poses * apart, apart
 
 
 def chosen(columns: Columns, wanted: frozenset[str]) -> Columns:
-    """Return the wanted columns and the status: NO_EVENT where one of them is about an event that does not happen."""
+    """Wanted columns and the status: NO_EVENT where one of them is about an event that does not happen."""
     found = {name: x for name, x in columns.items() if name in wanted}
     status = np.array(columns["status"], np.uint8)
     for values in found.values():
@@ -121,7 +121,7 @@ def chosen(columns: Columns, wanted: frozenset[str]) -> Columns:
 
 
 def path_of(designs: Array, nodes: int) -> Array:
-    """Return the path of the rack at so many equal crank angles, (n, 6, nodes)."""
+    """Path of the rack at so many equal crank angles, (n, 6, nodes)."""
     path = np.empty((len(designs), 6, nodes))
     foot.rack_path(designs, path)
     return path
@@ -138,7 +138,7 @@ def poses(designs: Array, angles: Angles, wanted: frozenset[str]) -> Columns:
 
 
 def closed(designs: Array, wanted: frozenset[str], accuracy: Accuracy) -> Columns:
-    """Return the entry, first jump, limits of spring and preload."""
+    """Entry, first jump, limits of spring and preload."""
     status, values = np.empty(len(designs), np.uint8), np.empty((len(_CLOSED), len(designs)))
     foot.closed_forms(designs, status, values)
     columns: Columns = dict(zip(_CLOSED, values, strict=True))
@@ -146,13 +146,13 @@ def closed(designs: Array, wanted: frozenset[str], accuracy: Accuracy) -> Column
 
 
 def events(designs: Array, wanted: frozenset[str], accuracy: Accuracy) -> Columns:
-    """Return the loss of contact, landing, impacts and what they cost, of the last turn marched."""
+    """Loss of contact, landing, impacts and what they cost, of the last turn marched."""
     columns, _, _ = marched(path_of(designs, NODES), designs[:, FEET])
     return chosen(columns, wanted)
 
 
 def foot_place(designs: Array, angles: Angles, found: Columns) -> Array:
-    """Return the foot, above the middle of the rack's travel."""
+    """Foot, above the middle of the rack's travel."""
     y = np.asarray(found["y_foot"], np.float64)
     return np.stack([0.0 * y, y, 0.0 * y], axis=-1)
 
@@ -231,7 +231,7 @@ def feed_poses(designs: Array, angles: Angles, wanted: frozenset[str]) -> Column
 
 
 def feed_events(designs: Array, wanted: frozenset[str], accuracy: Accuracy) -> Columns:
-    """Return the loss of contact, landing, impacts and what they cost, of the last turn marched."""
+    """Loss of contact, landing, impacts and what they cost, of the last turn marched."""
     return chosen(_on_feed(designs, NODES)[0], wanted)
 
 
@@ -254,7 +254,7 @@ def contact(designs: Array, wanted: frozenset[str], accuracy: Accuracy) -> Colum
 
 
 def feeding(designs: Array, wanted: frozenset[str], accuracy: Accuracy) -> Columns:
-    """Return the entry, leaving and path of the tooth, as of the rack alone."""
+    """Entry, leaving and path of the tooth, as of the rack alone."""
     return feed.events(np.ascontiguousarray(designs[:, :_RACK_COLUMNS]), wanted, accuracy)
 
 
@@ -280,7 +280,7 @@ def plate(designs: Array) -> Array:
 
 
 def feed_foot_place(designs: Array, angles: Angles, found: Columns) -> Array:
-    """Return the foot."""
+    """Foot."""
     y = np.asarray(found["y_foot"], np.float64)
     return plate(designs)[:, None, :] + np.stack([0.0 * y, y, 0.0 * y], axis=-1)
 

@@ -25,9 +25,9 @@ from sweep.families.capabilities import (
     Skeleton,
     ToolPoint,
 )
-from sweep.families.converted import of_matrix, step_of
 from sweep.families.hardpoints import FOUR_BAR_POINTS
 from sweep.families.outputs import angle_outputs, ladders
+from sweep.families.poses import of_matrix, step_of
 from sweep.families.skeletons import CRANK, ORIGIN, ROCKER, links, standing
 
 PARAMETERS = (
@@ -75,7 +75,7 @@ def as_crank_rocker(designs: Array) -> Array:
 
 
 def as_guide(designs: Array) -> Array:
-    """Return the design matrix of the same linkage as a guide whose line is the frame's, (n, 9)."""
+    """Design matrix of the same linkage as a guide whose line is the frame's, (n, 9)."""
     matrix = np.zeros((len(designs), len(guide.PARAMETERS)), designs.dtype)
     matrix[:, :6], matrix[:, 8] = designs[:, :6], designs[:, 6]
     return matrix

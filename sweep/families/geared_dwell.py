@@ -56,13 +56,13 @@ def poses(designs: Array, angles: Angles, wanted: frozenset[str]) -> Columns:
 
 
 def pin_distance_squared(designs: Array, angles: Angles, found: Columns) -> Array:
-    """Return the squared distance of the pin from the output axis, (n, m): near the axis the output turns at once."""
+    """Squared distance of the pin from the output axis, (n, m): near the axis the output turns at once."""
     x, y = (np.asarray(found[name], np.float64) for name in ("x_b", "y_b"))
     return x * x + y * y
 
 
 def dwell(designs: Array, wanted: frozenset[str], accuracy: Accuracy) -> Columns:
-    """Return dwell measures from their closed forms and a bracketed root; to rounding, whatever the accuracy asked.
+    """Dwell measures from their closed forms and a bracketed root; to rounding, whatever the accuracy asked.
 
     The errors are bounds of those measured: below 8 roundings on the oracle table.
     """
@@ -76,7 +76,7 @@ def dwell(designs: Array, wanted: frozenset[str], accuracy: Accuracy) -> Columns
 
 
 def exact_maxima(designs: Array, wanted: frozenset[str], accuracy: Accuracy) -> Columns:
-    """Return the maxima over the turn from all stationary points, to rounding.
+    """Maxima over the turn from all stationary points, to rounding.
 
     The errors are bounds of those measured against 60 digits on 1100 designs: below 40 roundings, growing towards
     k = 1, a = -1, where three singularities meet, as the distance to the power -5/4.  They are relative for a maximum,
@@ -94,7 +94,7 @@ def exact_maxima(designs: Array, wanted: frozenset[str], accuracy: Accuracy) -> 
 
 
 def sampled_maxima(designs: Array, wanted: frozenset[str], accuracy: Accuracy) -> Columns:
-    """Return the maxima over ``accuracy.samples`` equidistant carrier angles, the first at phi = 0."""
+    """Maxima over ``accuracy.samples`` equidistant carrier angles, the first at phi = 0."""
     assert accuracy.samples is not None
     status, outputs = _empty(_SAMPLED_OUTPUTS, wanted, len(designs))
     geared_dwell.dense_maxima(designs, *half_turn(accuracy.samples), status, *outputs.values())
@@ -196,7 +196,7 @@ epicyclic_poses = poses_of(epicyclic_dwell.poses, epicyclic_dwell.Outputs)
 
 
 def epicyclic_measures(designs: Array, wanted: frozenset[str], accuracy: Accuracy) -> Columns:
-    """Return dwell measures to rounding: every root is bisected."""
+    """Dwell measures to rounding: every root is bisected."""
     n = len(designs)
     status, values = np.empty(n, np.uint8), [np.empty(n) for _ in EPICYCLIC_DWELL]
     epicyclic_dwell.dwell_measures(designs, status, *values)
@@ -205,7 +205,7 @@ def epicyclic_measures(designs: Array, wanted: frozenset[str], accuracy: Accurac
 
 
 def planet_turns(designs: Array) -> Array:
-    """Return how often the planet turns while the carrier turns once, (n,)."""
+    """How often the planet turns while the carrier turns once, (n,)."""
     n, mesh = (parameter(EPICYCLIC_PARAMETERS, name, designs) for name in ("n", "mesh"))
     found: Array = np.abs(n + mesh)
     return found

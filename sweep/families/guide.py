@@ -29,10 +29,9 @@ from sweep.families.capabilities import (
     ToolPoint,
     constant,
 )
-from sweep.families.converted import of_matrix
 from sweep.families.hardpoints import GUIDE_POINTS
 from sweep.families.outputs import ladders, place_outputs
-from sweep.families.poses import filled_with_places, together
+from sweep.families.poses import filled_with_places, of_matrix, together
 from sweep.families.skeletons import CRANK, ORIGIN, ROCKER, Z, line, links, parameter, standing
 
 PARAMETERS = (
@@ -132,7 +131,7 @@ def point_shares(designs: Array) -> Array:
 
 
 def guiding_line(designs: Array) -> tuple[Array, Array]:
-    """Return the point of the guiding line nearest to the crank pivot, and the line's direction, each (n, 3)."""
+    """Point of the guiding line nearest to the crank pivot, and the line's direction, each (n, 3)."""
     lam, h = parameter(PARAMETERS, "lam", designs), parameter(PARAMETERS, "h", designs)
     along = np.stack([np.cos(lam), np.sin(lam), np.zeros(len(designs))], axis=1)
     return h[:, None] * np.cross(Z, along), along
@@ -144,7 +143,7 @@ def tool_point(designs: Array) -> Array:
 
 
 def tool_direction(designs: Array) -> Array:
-    """Return unit vector of the guiding line, (n, 3)."""
+    """Return the unit vector of the guiding line, (n, 3)."""
     return np.column_stack([np.cos(designs[:, 6]), np.sin(designs[:, 6]), 0.0 * designs[:, 6]])
 
 

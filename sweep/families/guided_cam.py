@@ -53,7 +53,7 @@ _PROFILE = tuple(o.name for o in PROFILE_OUTPUTS)
 
 
 def displacement_squared(designs: Array, angles: Angles, found: Columns) -> Array:
-    """Return the square of the follower's displacement, (n, m): where it nearly vanishes its speed is large."""
+    """Square of the follower's displacement, (n, m): where it nearly vanishes its speed is large."""
     return np.square(np.asarray(found["S"], np.float64))
 
 
@@ -99,13 +99,13 @@ def follower_line(designs: Array) -> tuple[Array, Array]:
 
 
 def follower(designs: Array, angles: Angles, found: Columns) -> Array:
-    """Return the end of the follower, which lies on the cam and carries the thread."""
+    """End of the follower, which lies on the cam and carries the thread."""
     s = np.asarray(found["S"], np.float64)
     return np.stack([np.broadcast_to(parameter(PARAMETERS, "e", designs)[:, None], s.shape), s, 0.0 * s], axis=-1)
 
 
 def guide(side: float) -> Fixed:
-    """Return one of the two guides, on either side of the plane of the cam."""
+    """One of the two guides, on either side of the plane of the cam."""
 
     def at(designs: Array) -> Array:
         x, z = (parameter(PARAMETERS, name, designs) for name in ("X1", "Z1"))

@@ -21,7 +21,7 @@ PLACE = "points"
 
 
 def crank_rocker(points: Mapping[str, Array]) -> Reading:
-    """Return dimensions of a spatial crank-rocker from A, axis_A, B, C, D, axis_D."""
+    """Dimensions of a spatial crank-rocker from A, axis_A, B, C, D, axis_D."""
     a, b, c, d, u, z = (points[name] for name in ("A", "B", "C", "D", "axis_A", "axis_D"))
     small = NOTHING * size(points)
     across = np.cross(z, u)
@@ -97,7 +97,7 @@ def guide(points: Mapping[str, Array]) -> Reading:
 
 
 def planar_slider_crank(points: Mapping[str, Array]) -> Reading:
-    """Return dimensions of a planar slider-crank from A, B, C, axis_D and, if wanted, D and axis_A (else z)."""
+    """Dimensions of a planar slider-crank from A, B, C, axis_D and, if wanted, D and axis_A (else z)."""
     a, b, c = (points[name] for name in ("A", "B", "C"))
     z, small = points.get("axis_A", np.array([0.0, 0.0, 1.0])), NOTHING * size(points)
     x = points["axis_D"] - (points["axis_D"] @ z) * z
@@ -136,13 +136,13 @@ def _planar(points: Mapping[str, Array], point: Array | None) -> Reading:
 
 
 def size(points: Mapping[str, Array]) -> float:
-    """Return the largest extent of the points."""
+    """Largest extent of the points."""
     places = np.array([point for name, point in points.items() if not name.startswith("axis_")])
     return float(np.ptp(places, axis=0).max())
 
 
 def _square(vector: Array, axis: Array, small: float) -> Array:
-    """Return the direction of the part of a vector that is square to an axis."""
+    """Direction of the part of a vector that is square to an axis."""
     rest = vector - (vector @ axis) * axis
     length = float(np.linalg.norm(rest))
     if length <= small:

@@ -86,7 +86,7 @@ def shaft_line(designs: Array) -> tuple[Array, Array]:
 
 
 def _arm(pivot: Array, length: Array, angle: Array) -> Array:
-    """Return the end of an arm at an angle from x, (n, m, 3)."""
+    """End of an arm at an angle from x, (n, m, 3)."""
     end: Array = np.stack([np.cos(angle), np.sin(angle), 0.0 * angle], axis=-1) * length[:, None, None]
     return pivot[:, None, :] + end
 

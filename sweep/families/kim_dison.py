@@ -22,8 +22,8 @@ from sweep.families.capabilities import (
     PressureEllipse,
     Skeleton,
 )
-from sweep.families.converted import move_records, of_matrix, step_of
 from sweep.families.outputs import angle_outputs, ladders
+from sweep.families.poses import move_records, of_matrix, step_of
 from sweep.families.skeletons import CRANK_ROCKER, Y, links, standing
 
 PARAMETERS = (

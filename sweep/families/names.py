@@ -34,12 +34,12 @@ def parts(name: str) -> Parts:
 
 
 def stem(name: str) -> str:
-    """Return the name without member and stage."""
+    """Name without member and stage."""
     return parts(name).stem
 
 
 def at_stage(name: str, number: str) -> str:
-    """Return the name at the stage of that number without the number; "" for a name of another stage.
+    """Name at the stage of that number without the number; "" for a name of another stage.
 
     Names such as ``support_d1`` end in a digit of their own, so that the stage has to be known.
 
@@ -50,7 +50,7 @@ def at_stage(name: str, number: str) -> str:
 
 
 def reduced(prefix: str, name: str) -> str:
-    """Return the name of a reduction of an output.
+    """Name of a reduction of an output.
 
     >>> reduced("max_abs", "needle.d2s")
     'needle.max_abs_d2s'
@@ -60,17 +60,17 @@ def reduced(prefix: str, name: str) -> str:
 
 
 def is_error(name: str) -> bool:
-    """Return whether a column holds the error of another."""
+    """Whether a column holds the error of another."""
     return without_error(name) != name
 
 
 def without_error(name: str) -> str:
-    """Return the name of the column whose error a column holds, or the name itself."""
+    """Name of the column whose error a column holds, or the name itself."""
     return name.removeprefix(ERROR)
 
 
 def error_of(name: str) -> str:
-    """Return the name of the column that holds the error of another."""
+    """Name of the column that holds the error of another."""
     return f"{ERROR}{name}"
 
 
@@ -78,12 +78,12 @@ ERROR = "err_"
 
 
 def negative(name: str) -> str:
-    """Return the name of the negative of a design output, which is small where the output is to be large."""
+    """Name of the negative of a design output, which is small where the output is to be large."""
     return f"{MINUS}{name}"
 
 
 def without_minus(name: str) -> str:
-    """Return the output that a name is the negative of; "" for any other name."""
+    """Output that a name is the negative of; "" for any other name."""
     return name.removeprefix(MINUS) if name.startswith(MINUS) else ""
 
 
@@ -91,17 +91,17 @@ MINUS = "minus_"
 
 
 def is_place(name: str) -> bool:
-    """Return whether a design output is a crank angle at which something happens, not a size that could be compared."""
+    """Whether a design output is a crank angle at which something happens, not a size that could be compared."""
     return parts(name).stem.startswith("phi_")
 
 
 def is_largest(name: str, *, magnitude: bool = False) -> bool:
-    """Return whether a design output is the largest value of a pose output, or its largest magnitude."""
+    """Whether a design output is the largest value of a pose output, or its largest magnitude."""
     return stem(name).startswith("max_abs_" if magnitude else "max_")
 
 
 def is_flag(name: str) -> bool:
-    """Return whether a design output is a yes or no."""
+    """Whether a design output is a yes or no."""
     return stem(name) == "rotatable"
 
 

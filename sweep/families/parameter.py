@@ -39,7 +39,7 @@ class Parameter:
         return next((word for holds, word in words if holds), "")
 
     def wrong_sign(self, values: NDArray[np.float64] | float) -> NDArray[np.bool_]:
-        """Return which values have a sign that it may not have."""
+        """Which values have a sign that it may not have."""
         if self.not_zero:
             return np.asarray(values == 0.0)
         if not self.sign:
@@ -83,7 +83,7 @@ def spelt_out(word: str) -> str:
 
 
 def is_known(word: str) -> bool:
-    """Return whether a unit is written in these words, so that study files can convert it and results can name it.
+    """Whether a unit is written in these words, so that study files can convert it and results can name it.
 
     >>> is_known("length/time"), is_known("parsec"), is_known("N s")
     (True, False, False)

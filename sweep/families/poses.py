@@ -6,6 +6,9 @@ thousand poses.  So in :class:`Together` a set on few poses is taken from a larg
 as soon as it is asked for on many.  The larger set is that of all outputs.  Where arguments are complex, which takes
 longer to compile, it is the first set that was asked for, as long as that will do: who wants slopes asks for all curves
 first.  The bits are the same.
+
+Families that take no complex numbers answer a complex step by central differences (:func:`differentiable`).  Families
+that have the kernels of another one, with other symbols or in another frame, carry its steps and records over.
 """
 
 from __future__ import annotations
@@ -13,7 +16,8 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from contextvars import ContextVar
-from functools import update_wrapper
+from dataclasses import replace
+from functools import partial, update_wrapper
 from typing import Any
 
 import numpy as np
@@ -21,7 +25,8 @@ from numpy.typing import DTypeLike
 
 from kernels.status import INVALID_INPUT, OK
 from kernels.types import Array, Status
-from sweep.families.base import Angles, Columns, Output, PoseFunction
+from sweep.families.base import Accuracy, Angles, Columns, Family, Output, PoseFunction, Step
+from sweep.families.capabilities import DesignMap
 
 
 def guarded(poses: PoseFunction) -> PoseFunction:
@@ -171,7 +176,7 @@ class Together:
         return self._poses.__qualname__
 
     def __call__(self, designs: Array, angles: Angles, wanted: frozenset[str]) -> Columns:
-        """Return the wanted outputs and the status of every design at its angles, each (n, m)."""
+        """Wanted outputs and the status of every design at its angles, each (n, m)."""
         key = wanted, np.iscomplexobj(angles.cos) or np.iscomplexobj(designs)
         count = len(designs) * angles.cos.shape[1]
         self._asked[key] = self._asked.get(key, 0) + count
@@ -181,7 +186,7 @@ class Together:
         return {name: found[name] for name in (*wanted, "status")}
 
     def _larger(self, wanted: frozenset[str], is_complex: bool) -> frozenset[str]:
-        """Return the set that a set on few poses is taken from."""
+        """Set that a set on few poses is taken from."""
         if is_complex and self._first is None:
             self._first = wanted
         return self._first if is_complex and self._first is not None and wanted <= self._first else self._all
@@ -190,3 +195,81 @@ class Together:
 def together(*names: str) -> Callable[[PoseFunction], PoseFunction]:
     """Decorate poses whose kernel gives these outputs."""
     return lambda poses: Together(poses, names)
+
+
+# Where a record per pose and one per design have points (kernels/linkage/joints.py); the other vectors are directions.
+_POINTS_OF_POSE, _POINTS_OF_DESIGN = (0, 3), (6, 9)
+
+
+def _same(name: str) -> str:
+    return name
+
+
+def step_of(
+    step: Step, matrix: DesignMap, ours: Callable[[str], str] = _same, theirs: Callable[[str], str] = _same
+) -> Step:
+    """Take a step of the other family for designs of this one, whose design matrix there is ``matrix(designs)``.
+
+    ``theirs`` gives the other family's name of an output, ``ours`` the way back.
+    """
+
+    def run(designs: Array, wanted: frozenset[str], accuracy: Accuracy) -> Columns:
+        asked = frozenset(theirs(name) for name in wanted)
+        if accuracy.proven:
+            accuracy = replace(accuracy, proven=tuple(map(theirs, accuracy.proven)))
+        found = step.run(matrix(designs), asked, accuracy)
+        return {ours(name): values for name, values in found.items()}
+
+    provides = tuple(replace(o, name=ours(o.name), equation="") for o in step.provides)
+    return replace(step, provides=provides, run=run)
+
+
+def of_matrix(of_theirs: DesignMap, matrix: DesignMap) -> DesignMap:
+    """Take what the other family has of each design, for designs of this one."""
+    return lambda designs: of_theirs(matrix(designs))
+
+
+def move_records(rotation: Array, origin: Array, per_pose: Array, per_design: Array) -> None:
+    """Bring joint records that were filled in the frame of another family into a family's own frame, in place.
+
+    A vector v of the other frame is ``rotation`` v in the own one, (3, 3), and its origin stands at ``origin``, (n, 3).
+    Quarter turns, which have one 1 or -1 a row, change no digit.
+    """
+    for vectors, points, shift in (
+        (per_pose, _POINTS_OF_POSE, origin[:, None, :]),
+        (per_design, _POINTS_OF_DESIGN, origin),
+    ):
+        for k in range(0, 21 if vectors is per_pose else 12, 3):
+            vectors[..., k : k + 3] = vectors[..., k : k + 3] @ rotation.T
+        for k in points:
+            vectors[..., k : k + 3] += shift
+
+
+# Of the size of what is moved: error of second order against rounding, some 1e-10 of the derivative.
+DIFFERENCE = 1e-5
+
+
+def differentiable(family: Family) -> Family:
+    """Family with poses that take complex designs and angles; the family itself where they do already."""
+    if family.analytic:
+        return family
+    return replace(family, poses=partial(_poses, family.poses), analytic=True)
+
+
+def _poses(poses: PoseFunction, designs: Array, angles: Angles, wanted: frozenset[str]) -> Columns:
+    if not (np.iscomplexobj(designs) or np.iscomplexobj(angles.phi)):
+        return poses(designs, angles, wanted)
+    parts = (designs, *angles)
+    sizes = [np.abs(x.imag) / np.maximum(np.abs(x.real), 1e-3) for x in parts]
+    step = DIFFERENCE / max(max(float(size.max(initial=0.0)) for size in sizes), 1e-300)
+
+    def moved(sign: float) -> Columns:
+        x, phi, cos, sin = (np.ascontiguousarray(part.real + sign * step * part.imag) for part in parts)
+        return poses(x, Angles(phi, cos, sin), wanted)
+
+    here, ahead, behind = moved(0.0), moved(1.0), moved(-1.0)
+    columns: Columns = {"status": here["status"]}
+    for name in wanted:
+        slope = (np.asarray(ahead[name], np.float64) - np.asarray(behind[name], np.float64)) / (2.0 * step)
+        columns[name] = np.asarray(here[name], np.float64) + 1j * slope
+    return columns

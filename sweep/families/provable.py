@@ -15,7 +15,7 @@ _by_rocker = cache(box_by_rocker.recorded)
 
 
 def _explored(formulas: Formulas, searched: Searched, leaves: tuple[Numbers, ...]) -> tuple[int, int]:
-    """Return leaves filled and boxes judged by :func:`kernels.families.rssr.proof.explore`."""
+    """Leaves filled and boxes judged by :func:`kernels.families.rssr.proof.explore`."""
     s = searched
     problem = Problem(s.branch, s.objective, s.cos2, s.links, s.target, s.tube)
     found = proof.explore(

@@ -46,7 +46,7 @@ class Reduction:
         return f"{domain.name}_{self.name}_" if self.place else f"{self.name}_"
 
     def output(self, of: Output, domain: Domain) -> Output:
-        """Return the design output: this reduction of a pose output."""
+        """Design output: this reduction of a pose output."""
         over = "one turn" if domain.unit == "rad" else f"the interval of the {domain.text}"
         variable = "crank angle" if isinstance(domain, Turn) else domain.text
         text = f"{self.text.format(over=over, variable=variable)} {of.name}: {of.text}"
@@ -74,7 +74,7 @@ _BY_LENGTH = sorted(REDUCTIONS, key=lambda reduction: -len(reduction.name) - red
 
 
 def prefixes(domain: Domain) -> tuple[str, ...]:
-    """Return the prefixes of all reductions that serve a domain."""
+    """Prefixes of all reductions that serve a domain."""
     return tuple(reduction.prefix(domain) for reduction in REDUCTIONS if domain.kind in reduction.domains)
 
 
@@ -93,7 +93,7 @@ def reduced(name: str, domain: Domain) -> set[str]:
 
 
 def reduction_of(family: Family, name: str) -> tuple[Reduction, Output] | None:
-    """Return the reduction and the pose output that a name stands for; None where it stands for none."""
+    """Reduction and the pose output that a name stands for; None where it stands for none."""
     for reduction, rest in split(name, family.domain):
         pose = family.pose_output.get(rest)
         if pose is not None:

@@ -25,10 +25,9 @@ from sweep.families.capabilities import (
     Skeleton,
     constant,
 )
-from sweep.families.converted import move_records, step_of
 from sweep.families.hardpoints import PLANAR_SLIDER_POINTS, SLIDER_CRANK_POINTS
 from sweep.families.outputs import ladders, place_outputs
-from sweep.families.poses import filled_with_places
+from sweep.families.poses import filled_with_places, move_records, step_of
 from sweep.families.skeletons import ORIGIN, SLIDER_CRANK, SLIDER_CRANK_SIZES, X, Y, crank_axis, standing
 
 PARAMETERS = (
@@ -85,7 +84,7 @@ def precise_poses(designs: Array, angles: Angles, wanted: frozenset[str]) -> Col
 
 
 def margins(designs: Array, wanted: frozenset[str], accuracy: Accuracy) -> Columns:
-    """Return rotatability, margin and largest pressure angle, exact."""
+    """Rotatability, margin and largest pressure angle, exact."""
     n = len(designs)
     status = np.empty(n, np.uint8)
     least, turns, angle = np.empty(n), np.empty(n), np.empty(n)
@@ -110,7 +109,7 @@ def margins(designs: Array, wanted: frozenset[str], accuracy: Accuracy) -> Colum
 
 
 def limit_positions(designs: Array, wanted: frozenset[str], accuracy: Accuracy) -> Columns:
-    """Return both limit positions of the slider, to rounding; the errors are bounds of the rounding errors."""
+    """Both limit positions of the slider, to rounding; the errors are bounds of the rounding errors."""
     n = len(designs)
     status = np.empty(n, np.uint8)
     values = {o.name: np.empty(n) for o in LIMIT_OUTPUTS}
@@ -152,7 +151,7 @@ def joint_records(designs: Array, angles: Angles, motion: Columns, per_pose: Arr
 
 
 def ellipse(designs: Array) -> Array:
-    """Return the curve of the coupler direction across the slide, (n, 7)."""
+    """Curve of the coupler direction across the slide, (n, 7)."""
     out = np.empty((len(designs), 7))
     rssp.pressure_ellipse(designs, out)
     return out
@@ -231,14 +230,14 @@ _FROM_SPATIAL = np.array([[0.0, 1.0, 0.0], [-1.0, 0.0, 0.0], [0.0, 0.0, 1.0]])
 
 
 def as_spatial(designs: Array) -> Array:
-    """Return the design matrix of the same linkage as a spatial slider-crank, (n, 6)."""
+    """Design matrix of the same linkage as a spatial slider-crank, (n, 6)."""
     matrix = np.zeros((len(designs), len(PARAMETERS)), designs.dtype)
     matrix[:, 0], matrix[:, 1], matrix[:, 2], matrix[:, 5] = designs[:, 0], designs[:, 1], -designs[:, 2], designs[:, 3]
     return matrix
 
 
 def turned(angles: Angles) -> Angles:
-    """Return the crank angles counted from the common perpendicular, with the same bits."""
+    """Crank angles counted from the common perpendicular, with the same bits."""
     return Angles(angles.phi + 0.5 * np.pi, np.ascontiguousarray(-angles.sin), angles.cos)
 
 

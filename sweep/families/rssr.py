@@ -130,7 +130,7 @@ def joint_records(designs: Array, angles: Angles, motion: Columns, per_pose: Arr
 
 
 def ellipse(designs: Array) -> Array:
-    """Return the curve of the coupler direction across the rocker's motion, (n, 7)."""
+    """Curve of the coupler direction across the rocker's motion, (n, 7)."""
     out = np.empty((len(designs), 7))
     rssr.pressure_ellipse(designs, out)
     return out
@@ -143,7 +143,7 @@ def discriminant_scale(designs: Array) -> Array:
 
 
 def rocker_origin(designs: Array) -> Array:
-    """Return the foot of the common perpendicular on the rocker axis, (n, 3)."""
+    """Foot of the common perpendicular on the rocker axis, (n, 3)."""
     origin = np.zeros((len(designs), 3), designs.dtype)
     origin[:, 0] = designs[:, 3]
     return origin
@@ -224,7 +224,7 @@ def certified_maxima(designs: Array, wanted: frozenset[str], accuracy: Accuracy)
     assert accuracy.target is not None
     n = len(designs)
     columns: Columns = {"status": np.zeros(n, np.uint8)}
-    for order, name in enumerate(("dpsi", "d2psi", "d3psi"), start=1):
+    for order, name in enumerate(("dpsi", "d2psi", "d3psi")):  # of the velocity
         most, phi = f"max_abs_{name}", f"phi_max_abs_{name}"
         if not wanted & {most, phi}:
             continue
@@ -232,7 +232,10 @@ def certified_maxima(designs: Array, wanted: frozenset[str], accuracy: Accuracy)
         status = searched["status"].astype(np.uint8)
         value, place = (np.array(searched[key], np.float64) for key in (most, phi))
         error, far = np.full(n, np.nan), np.asarray(searched[f"err_{phi}"], np.float64)
-        rssr.certify_maxima(designs, order, accuracy.target, MOST_CELLS, status, value, place, error, np.empty(n))
+        rssr.certify_maxima(
+            np.ascontiguousarray(designs)[None], np.empty((0, n, 2)), np.zeros((n, 8)), np.array([(2, order)]),
+            accuracy.target, MOST_CELLS, status[None], value[None], place[None], error[None], np.empty(n),
+        )  # fmt: skip
         # Where the proof found a higher peak it climbed it to a thousandth of the target.
         elsewhere = np.abs(place - np.asarray(searched[phi], np.float64)) > far
         far = np.where(elsewhere, np.maximum(far, np.sqrt(accuracy.target)), far)

@@ -19,7 +19,7 @@ SLIDER_CRANK = (CRANK, COUPLER, Link("slider", ("c",)))
 
 
 def links(names: str) -> tuple[tuple[str, ...], ...]:
-    """Return links that are each given by one length, the names with blanks between."""
+    """Links that are each given by one length, the names with blanks between."""
     return tuple((name,) for name in names.split())
 
 
@@ -28,7 +28,7 @@ SLIDER_CRANK_SIZES = Dimensions(links("a b"))
 
 
 def parameter(parameters: tuple[Parameter, ...], name: str | None, designs: Array) -> Array:
-    """Return the column of a parameter, (n,); zeros where there is none."""
+    """Column of a parameter, (n,); zeros where there is none."""
     if name is None:
         return np.zeros(len(designs))
     column: Array = designs[:, [p.name for p in parameters].index(name)]

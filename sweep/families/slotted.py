@@ -73,7 +73,7 @@ def unit(designs: Array) -> Array:
 
 
 def driven_origin(designs: Array) -> Array:
-    """Return the point (e, 0, 0) of the driven axis, (n, 3)."""
+    """Point (e, 0, 0) of the driven axis, (n, 3)."""
     origin = np.zeros((len(designs), 3), designs.dtype)
     origin[:, 0] = designs[:, 1]
     return origin
@@ -160,12 +160,12 @@ def planar_poses(designs: Array, angles: Angles, wanted: frozenset[str]) -> Colu
 
 
 def slot_squared(designs: Array, angles: Angles, found: Columns) -> Array:
-    """Return the square of the pin's place in the slot, (n, m): where it nearly vanishes the rocker turns at once."""
+    """Square of the pin's place in the slot, (n, m): where it nearly vanishes the rocker turns at once."""
     return np.square(np.asarray(found["s"], np.float64))
 
 
 def slot_foot(designs: Array, angles: Angles, motion: Columns) -> Array:
-    """Return the foot of the rocker pivot on the slot, (n, m, 3): ``h`` from the pivot, square to the slot."""
+    """Foot of the rocker pivot on the slot, (n, m, 3): ``h`` from the pivot, square to the slot."""
     psi = np.asarray(motion["psi"], np.float64)
     h, e = (parameter(PLANAR_PARAMETERS, name, designs)[:, None] for name in ("h", "e"))
     return np.stack([e - h * np.sin(psi), h * np.cos(psi), np.zeros_like(psi)], axis=-1)
@@ -221,7 +221,7 @@ def swivel_poses(designs: Array, angles: Angles, wanted: frozenset[str]) -> Colu
 
 
 def pin_distance_squared(designs: Array, angles: Angles, found: Columns) -> Array:
-    """Return the square of the rod between pin and block, (n, m): where it nearly vanishes the rod turns at once."""
+    """Square of the rod between pin and block, (n, m): where it nearly vanishes the rod turns at once."""
     return np.square(np.asarray(found["rho"], np.float64))
 
 

@@ -13,13 +13,7 @@ from kernels.types import Array
 from sweep.families.base import Angles, Columns, Family, Output, Parameter
 from sweep.families.capabilities import Arm, Assembly, Dimensions, Fixed, Link, Points, Skeleton
 from sweep.families.link_tree import LinkBody, LinkJoint, LinkTree, filled_by
-from sweep.families.outputs import (
-    angle_outputs,
-    joint_outputs,
-    ladders,
-    magnitude_outputs,
-    point_outputs,
-)
+from sweep.families.outputs import angle_outputs, joint_outputs, ladders, magnitude_outputs, point_outputs
 from sweep.families.poses import filled_blocks
 from sweep.families.skeletons import crank_axis, links, parameter, standing
 
@@ -93,7 +87,7 @@ def second_coupler_square(designs: Array) -> Array:
 
 
 def second_shaft(designs: Array) -> Array:
-    """Return the direction of the shaft of crank 2, (n, 3)."""
+    """Direction of the shaft of crank 2, (n, 3)."""
     theta, beta = parameter(PARAMETERS, "theta2", designs), parameter(PARAMETERS, "beta2", designs)
     return np.stack([np.sin(theta) * np.cos(beta), np.sin(theta) * np.sin(beta), np.cos(theta)], axis=1)
 

@@ -160,7 +160,7 @@ class ThreadBalance:
         return {f"{self.name}_{key}": values for key, values in columns.items()}
 
     def _tension(self, surplus: Any, wraps: Sequence[Any]) -> Any:
-        """Return the tension behind the last bend by the law of contours, with the reported constants of the thread."""
+        """Tension behind the last bend by the law of contours, with the reported constants of the thread."""
         pull = (self.tension - self.stiffness * surplus) / GF
         pull = np.where(np.real(pull) > 0.0, pull, 0.0)
         alpha, beta, bending, count, density = (float(p.default or 0.0) for p in (ALPHA, BETA, BENDING, COUNT, DENSITY))
@@ -185,7 +185,7 @@ def _size(parts: Sequence[Any]) -> Any:
 
 
 def _piece(start: Vector, end: Vector) -> tuple[Any, Vector]:
-    """Return the length and direction of a straight piece; a piece of no length has no direction (nan)."""
+    """Length and direction of a straight piece; a piece of no length has no direction (nan)."""
     parts = [b - a for a, b in zip(start, end, strict=True)]
     length = _size(parts)
     with np.errstate(divide="ignore", invalid="ignore"):
@@ -201,14 +201,14 @@ def _point(place: Any, found: Mapping[str, Any]) -> Vector:
 
 
 def _over(curve: TableCurve, phi: Any) -> Any:
-    """Return the curve at real or complex angles (derivative by the complex step)."""
+    """Curve at real or complex angles (derivative by the complex step)."""
     if not np.iscomplexobj(phi):
         return curve(phi)
     return curve(phi.real) + 1j * phi.imag * curve.slope(phi.real)
 
 
 def thread_balance(name: str, table: Mapping[str, Any], members: Mapping[str, Member]) -> ThreadBalance:
-    """Return the relation of a user's table, checked.
+    """Relation of a user's table, checked.
 
     Raises
     ------

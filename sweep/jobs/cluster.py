@@ -102,7 +102,7 @@ class Dask:
         return self._client
 
     def _jobs(self, jobs: int) -> Callable[[], int]:
-        """Return how many threads the cluster has at the moment; workers may come and go."""
+        """How many threads the cluster has at the moment; workers may come and go."""
 
         def now() -> int:
             if time.monotonic() - self._counted > COUNT_SECONDS:

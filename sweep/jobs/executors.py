@@ -176,7 +176,7 @@ _searches: ContextVar[Executor | None] = ContextVar("linksweep_searches", defaul
 
 
 def executor(name: str, jobs: int) -> Executor:
-    """Return the executor of that name in `EXECUTORS`, checked together with the number of its workers.
+    """Executor of that name in `EXECUTORS`, checked together with the number of its workers.
 
     Parameters
     ----------

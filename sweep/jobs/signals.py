@@ -1,7 +1,11 @@
-"""Stopping on request: the first signal sets a flag, the second ends the process."""
+"""Stopping on request: the first signal sets a flag, the second ends the process.
+
+A deadline is one clock for all parts of a search, which looks at it where it may stop.
+"""
 
 from __future__ import annotations
 
+import math
 import os
 import signal
 import sys
@@ -55,8 +59,9 @@ class Stop:
 
     @contextmanager
     def raising(self) -> Iterator[None]:
-        """Let a signal within this context raise KeyboardInterrupt as well:
-        for work of one process that looks at no flag.
+        """Let a signal raise KeyboardInterrupt as well within this context.
+
+        This is for work of one process that looks at no flag.
 
         It ends the context without a word; the flag says why.  A compiler may swallow the interruption and fail over it
         later: once the flag is set, any error is a consequence.
@@ -92,7 +97,8 @@ def stop_on_signal() -> Iterator[Stop]:
 
 @contextmanager
 def unheard() -> Iterator[None]:
-    """Keep signals from processes begun within:
+    """Keep signals from processes begun within.
+
     Ctrl-C reaches the whole group, also those that are still starting up.
 
     This process hears what came in between as soon as the context ends.
@@ -178,8 +184,9 @@ def _leave(number: int, words: str) -> None:
 
 
 def depend_on_parent(parent: int) -> None:
-    """Leave signals, which a terminal sends to the whole group, to the parent of this worker process,
-    and die with it.
+    """Leave signals to the parent of this worker process, and die with it.
+
+    A terminal sends them to the whole group.
 
     Without its parent a worker holds no lock on the folder and would wait for work for minutes.
     """
@@ -194,3 +201,16 @@ def _end_with(parent: int) -> None:
     while os.getppid() == parent:
         time.sleep(WATCH_SECONDS)
     os._exit(1)
+
+
+class Deadline:
+    """Asked often; true once the budget [s] is used up or the caller wants to stop.  ``pulled`` remembers it."""
+
+    def __init__(self, budget: float | None, stop: Callable[[], bool] | None) -> None:
+        self.end = math.inf if budget is None else time.monotonic() + budget
+        self.stop, self.pulled = stop, False
+
+    def __call__(self) -> bool:
+        """Whether to stop."""
+        self.pulled = self.pulled or time.monotonic() >= self.end or (self.stop is not None and self.stop())
+        return self.pulled

@@ -50,7 +50,7 @@ def chosen(places: Iterable[Path], smoke: bool) -> list[Chosen]:
     places = list(places)
     found: list[Chosen] = []
     broken: list[tuple[int, Path, str]] = []
-    for path in [path for place in places for path in _files(place)]:
+    for path in [path for place in places for path in files_of(place)]:
         try:
             study = load_study(path, smoke=smoke)
         except (LinksweepError, OSError) as error:
@@ -72,7 +72,7 @@ def chosen(places: Iterable[Path], smoke: bool) -> list[Chosen]:
     return found
 
 
-def _files(place: Path) -> list[Path]:
+def files_of(place: Path) -> list[Path]:
     """Return the study files of a place; a link that leads nowhere is one, with a fault."""
     if not place.is_dir():
         return [place]

@@ -6,9 +6,8 @@ from functools import lru_cache
 
 import numpy as np
 from numpy.polynomial import chebyshev
-from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
+from kernels.types import Array
 
 DENSE = 33  # places at which the highest point of a polynomial is looked for, its ends included
 PASSES = 8  # of Newton's method between two of them, or by halves: then a top is found to 1e-4 of a panel at least
@@ -17,7 +16,7 @@ NODES = 8  # of a panel, its ends among them: a jump just inside would be seen b
 
 @lru_cache
 def basis() -> tuple[Array, Array]:
-    """Return the nodes on [-1, 1], its ends among them, and the matrix that makes coefficients of values there."""
+    """Nodes on [-1, 1], its ends among them, and the matrix that makes coefficients of values there."""
     order = np.arange(NODES, dtype=np.float64)
     nodes: Array = -np.cos(np.pi * order / (NODES - 1))
     weights = np.where((order == 0) | (order == NODES - 1), 0.5, 1.0)
@@ -26,7 +25,7 @@ def basis() -> tuple[Array, Array]:
 
 
 def at_nodes(series: Array) -> Array:
-    """Return the values at the nodes, (k, NODES), of polynomials with these coefficients, (k, NODES)."""
+    """Values at the nodes, (k, NODES), of polynomials with these coefficients, (k, NODES)."""
     return product(series, rising(basis()[0]))
 
 
@@ -37,7 +36,7 @@ def rising(x: Array) -> Array:
 
 
 def product(rows: Array, matrix: Array) -> Array:
-    """Return the matrix product, summed in one order: that of a library depends on how many rows there are."""
+    """Matrix product, summed in one order: that of a library depends on how many rows there are."""
     total: Array = rows[:, 0, None] * matrix[0]
     for k in range(1, matrix.shape[0]):
         total += rows[:, k, None] * matrix[k]
@@ -45,7 +44,7 @@ def product(rows: Array, matrix: Array) -> Array:
 
 
 def summits(series: Array, mode: int) -> tuple[Array, Array]:
-    """Return the highest points of polynomials on [-1, 1]: places and measured values; each (k,).
+    """Highest points of polynomials on [-1, 1]: places and measured values; each (k,).
 
     Parameters
     ----------

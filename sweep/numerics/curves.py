@@ -7,13 +7,12 @@ from functools import cached_property
 from typing import TYPE_CHECKING, TypeAlias
 
 import numpy as np
-from numpy.typing import NDArray
+
+from kernels.types import TWO_PI, Array
 
 if TYPE_CHECKING:
     from scipy.interpolate import PchipInterpolator
 
-Array: TypeAlias = NDArray[np.float64]
-TWO_PI = 2.0 * np.pi
 AROUND = 3  # points of the next and the last turn: the slope at a point depends on its two neighbours alone
 
 
@@ -34,7 +33,7 @@ class TableCurve:
     values: tuple[float, ...]
 
     def __call__(self, phi: Array) -> Array:
-        """Return values at any angles, of the same shape."""
+        """Values at any angles, of the same shape."""
         start = self.phi[0]
         found: Array = self._cubics(start + np.mod(phi - start, TWO_PI))
         return found
@@ -66,7 +65,7 @@ class SeriesCurve:
     sin: tuple[float, ...] = ()
 
     def __call__(self, phi: Array) -> Array:
-        """Return values at any angles, of the same shape."""
+        """Values at any angles, of the same shape."""
         total = np.full_like(phi, self.mean)
         for factors, function in ((self.cos, np.cos), (self.sin, np.sin)):
             for order, factor in enumerate(factors, start=1):
@@ -78,7 +77,7 @@ Curve: TypeAlias = TableCurve | SeriesCurve
 
 
 def table_curve(phi: Array, values: Array) -> TableCurve:
-    """Return the curve of a table, its points in any order of the turn.
+    """Curve of a table, its points in any order of the turn.
 
     Parameters
     ----------

@@ -7,9 +7,9 @@ from typing import TypeAlias
 
 import numpy as np
 
-from sweep.numerics.quadrature import Array, Index, Mask
+from kernels.types import TWO_PI, Array
+from sweep.numerics.quadrature import Index, Mask
 
-TWO_PI = 2.0 * np.pi
 GOLDEN = 0.5 * (np.sqrt(5.0) - 1.0)
 SECTIONS = 12
 PARABOLAS = 4
@@ -87,8 +87,9 @@ def _zeros(functions: Functions, row: Index, which: Index, low: Array, high: Arr
 
 
 def _inverse(x1: Array, x2: Array, x3: Array, at1: Array, at2: Array, at3: Array) -> Array:
-    """Return the share of the way from x1 to x2 at which the inverse parabola through three points is zero;
-    a half where it is not safe.
+    """Share of the way from x1 to x2 at which the inverse parabola through three points is zero.
+
+    It is a half where the parabola is not safe.
     """
     with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
         place, height = (x1 - x2) / (x3 - x2), (at1 - at2) / (at3 - at2)
@@ -146,9 +147,7 @@ def _one(functions: Functions, row: Index, which: Index, phi: Array) -> Array:
 
 
 def _reaches(values: Array, left: Array, right: Array, row: Index, column: Index, which: Index) -> Mask:
-    """Return whether a dip may go through zero:
-    a parabola goes below its lowest sample by an eighth of the bend at most.
-    """
+    """Whether a dip may go through zero: a parabola goes below its lowest sample by an eighth of the bend at most."""
     a, b, c = (np.abs(y[row, column, which]) for y in (left, values, right))
     return np.asarray(b <= a + c - 2.0 * b)
 
@@ -202,7 +201,7 @@ def _bottom(
 
 
 def with_events(edges: Array, rows: Index, phi: Array) -> Array:
-    """Return ends of panels (n, p + 1) with further ends (k,) put in; rows with fewer of them repeat their last end."""
+    """Put further ends (k,) into those of panels (n, p + 1); rows with fewer of them repeat their last end."""
     n = len(edges)
     count = np.bincount(rows, minlength=n)
     added = np.repeat(edges[:, -1:], int(count.max(initial=0)), axis=1)

@@ -12,7 +12,8 @@ from typing import NamedTuple, TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
-Array: TypeAlias = NDArray[np.float64]
+from kernels.types import EPS, Array
+
 Index: TypeAlias = NDArray[np.intp]
 Mask: TypeAlias = NDArray[np.bool_]
 
@@ -35,7 +36,6 @@ NODES = np.array([*(-x for x in _NODES), 0.0, *_NODES[::-1]])
 KRONROD = np.array([*_KRONROD, 0.209482141084727828012999174891714, *_KRONROD[::-1]])
 GAUSS = np.array([*_GAUSS, 0.417959183673469387755102040816327, *_GAUSS[::-1]])
 
-EPS = 2.0**-53
 PASSES = 60  # halvings of a first panel, after which a jump between two doubles is all that can be left
 MOST = 4096  # panels of one curve
 SHARED = 0.1  # of the error of a panel is left in each of its halves, where it is noise
@@ -74,7 +74,7 @@ class _Panels(NamedTuple):
 
 
 def integrate(function: Integrand, edges: Array, target: float) -> Integrals:
-    """Return integrals of n curves over x, each to a relative error.
+    """Integrals of n curves over x, each to a relative error.
 
     Parameters
     ----------
@@ -140,7 +140,7 @@ def _halved(function: Integrand, panels: _Panels) -> _Panels:
 
 
 def _weighted(weights: Array, values: Array) -> Array:
-    """Return sums (k, q) over the nodes of values (k, j, q), in one order: that of a library depends on k."""
+    """Return the sums (k, q) over the nodes of values (k, j, q), in one order: that of a library depends on k."""
     total: Array = weights[0] * values[:, 0]
     for j in range(1, weights.size):
         total += weights[j] * values[:, j]

@@ -11,9 +11,8 @@ from typing import NamedTuple, TypeAlias
 
 import numpy as np
 
-from sweep.numerics.quadrature import Array, Index
-
-TWO_PI = 2.0 * np.pi
+from kernels.types import TWO_PI, Array
+from sweep.numerics.quadrature import Index
 
 Curve: TypeAlias = Callable[[Index, Array], Array]
 """``f(rows, phi)``: values of a discriminant of the designs ``rows`` (k,) at crank angles (k, m), or (1, m) for all."""
@@ -33,11 +32,11 @@ class Singularities(NamedTuple):
     rho: Array
 
     def only(self, which: Index) -> Singularities:
-        """Return those of some designs."""
+        """Those of some designs."""
         return Singularities(self.phi[which], self.rho[which])
 
     def distance(self, phi: Array) -> Array:
-        """Return how far the nearest zero is from crank angles (n,), or (n, m)."""
+        """How far the nearest zero is from crank angles (n,), or (n, m)."""
         one = phi[:, None] if phi.ndim == 1 else phi
         away = np.abs(one[:, :, None] - self.phi[:, None, :])
         away = np.abs(away - TWO_PI * np.round(away / TWO_PI))
@@ -46,7 +45,7 @@ class Singularities(NamedTuple):
 
 
 def singularities(discriminants: Sequence[Curve], n: int, within: float = FAR) -> Singularities:
-    """Return the nearest complex zeros of the discriminants of n designs, from their dips over the turn.
+    """Nearest complex zeros of the discriminants of n designs, from their dips over the turn.
 
     A dip D + D''/2 x^2 vanishes at x = +- i rho with rho^2 = D/(D''/2).  The parabola through three samples is taken
     again ever closer to the dip, unless the first one puts the zero farther away than ``within`` [rad]: such zeros
@@ -110,8 +109,7 @@ def _closer(curve: Curve, row: Index, phi: Array) -> tuple[Array, Array]:
 
 
 def crowded(near: Singularities, share: float) -> Array:
-    """Return crank angles (n, m) of a turn in rising order,
-    spaced by at most a share of the distance of the nearest zero.
+    """Crank angles (n, m) of a turn in rising order, spaced by at most a share of the nearest zero's distance.
 
     About each zero they stand at phi + rho sinh(t) for equidistant t, which spaces them by hypot(rho, x) dt.  A design
     that needs fewer than others repeats some: its angles do not depend on what else is asked.
@@ -126,14 +124,14 @@ def crowded(near: Singularities, share: float) -> Array:
 
 
 def steps(near: Singularities, share: float) -> Index:
-    """Return how many angles on either side of its zeros each design needs, (n,)."""
+    """How many angles on either side of its zeros each design needs, (n,)."""
     reach = np.arcsinh(np.pi / near.rho).max(axis=1, initial=1.0)
     found: Index = np.ceil(reach / share).astype(np.int64)
     return found
 
 
 def turn_edges(near: Singularities, share: float) -> Array:
-    """Return ends of panels of a turn from 0 to 2 pi, (n, p + 1), no longer than a share of the distance of a zero."""
+    """Cut a turn from 0 to 2 pi into panels, (n, p + 1) ends, no longer than a share of the distance of a zero."""
     inner = crowded(near, share)
     ends = np.zeros((len(inner), 1))
     return np.concatenate([ends, inner, ends + TWO_PI], axis=1)

@@ -129,8 +129,7 @@ def tolerance(folder: str | Path, output: str | None = None) -> Axes:
 
 
 def sensitivity(folder: str | Path) -> Axes:
-    """Show by how much a small change of each dimension changes the objective at the optimum,
-    the most telling first.
+    """Show by how much a small change of each dimension changes the objective at the optimum, the most telling first.
 
     Parameters
     ----------

@@ -93,8 +93,7 @@ def mechanism(
     unit: str = "mm",
     angles: AngleUnit | None = None,
 ) -> NDArray[Any]:
-    """Return the mechanism in one or several positions with paths of its joints, axes and senses;
-    a panel for each frame.
+    """Draw the mechanism in one or several positions with paths of its joints, axes and senses; a panel per frame.
 
     Parameters
     ----------
@@ -199,7 +198,7 @@ def polar_load(
 
 
 def _plain(mechanism: Mechanism, design: Table) -> dict[str, Any]:
-    """Return the columns that are parameters of the mechanism itself."""
+    """Columns that are parameters of the mechanism itself."""
     names = find_family(mechanism).parameter_names
     columns: Mapping[Any, Any] = design if isinstance(design, Mapping) else {key: design[key] for key in design}
     return {str(key): values for key, values in columns.items() if str(key) in names}

@@ -58,7 +58,7 @@ class Question:
         return max(least_acceleration(swing, phi0), least_acceleration(swing, 2.0 * np.pi - phi0))
 
     def tube(self, target: float) -> Array:
-        """Return where a rocker can be that has an acceleration of at most ``target``; empty where nothing is known.
+        """Where a rocker can be that has an acceleration of at most ``target``; empty where nothing is known.
 
         Only poses are given at which the row of the proof tells the sides of the tube apart: across the tube, psi must
         not meet the other assembly mode.  That one is 2 atan(T/W) away, T at least b cos(mu), W at most b + c.
@@ -85,7 +85,7 @@ class Question:
         return float(self.given[self.provable.coordinates.index("c")])
 
     def _motion(self) -> tuple[float, float] | None:
-        """Return swing and phi0 where the objective is an acceleration and both are given."""
+        """Swing and phi0 where the objective is an acceleration and both are given."""
         order = self.provable.objectives[self.objective]
         return None if order != 2 or set(self.names) & {"swing", "phi0"} else (self.given[0], self.given[1])
 
@@ -94,7 +94,7 @@ class Question:
         return float(np.sin(value) ** 2) if self.provable.objectives[self.objective] == 0 else value
 
     def outside(self, bound: float) -> float:
-        """Return the value of the objective that a bound in the unit of the rows means."""
+        """Value of the objective that a bound in the unit of the rows means."""
         if self.provable.objectives[self.objective] == 0:
             return float(np.arcsin(np.sqrt(min(max(bound, 0.0), 1.0))))
         return bound
@@ -134,7 +134,7 @@ def question_of(study: Study) -> Question:
 
 
 def _suited(study: Study) -> ProvableLocus | None:
-    """Return the locus whose coordinates the study gives: with a rocker of one length that by the rocker.
+    """Locus whose coordinates the study gives: with a rocker of one length that by the rocker.
 
     There e and g follow, and their ranges become limits; elsewhere e and g are coordinates, and the rocker follows.
     """
@@ -171,7 +171,7 @@ def _entries(study: Study, coordinates: tuple[str, ...], place: str) -> dict[str
 
 
 def _limits(study: Study, provable: ProvableLocus) -> tuple[float, Array, tuple[str, ...]]:
-    """Return the least cos^2 of the pressure angle, least and most of every link, and the limits that are not used."""
+    """Least cos^2 of the pressure angle, least and most of every link, and the limits that are not used."""
     cos2, left_out = 0.0, []
     links = np.array([-np.inf, np.inf] * len(provable.links))
     for number, name in enumerate(provable.links):

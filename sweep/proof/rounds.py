@@ -66,7 +66,7 @@ def empty(rows: int, free: int) -> Leaves:
 
 
 def joined(parts: list[Leaves]) -> Leaves:
-    """Return all leaves in one."""
+    """All leaves in one."""
     return Leaves(*(np.concatenate([getattr(p, n) for p in parts]) for n in Leaves.__dataclass_fields__))
 
 
@@ -104,7 +104,7 @@ class Unit:
     round: int
 
     def path(self, number: int) -> Path:
-        """Return the path at which the result of a unit stands."""
+        """Path at which the result of a unit stands."""
         return self.folder / f"round-{self.round}-unit-{number:02d}.npz"
 
     def __call__(self, number: int, should_stop: Callable[[], bool]) -> tuple[int, int]:

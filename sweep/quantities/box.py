@@ -46,8 +46,7 @@ class Box:
 
 @of_family
 def boxes(family: Family) -> dict[str, Box]:
-    """Return the boxes of a family by name:
-    its own, of a chain every stage's, of a machine the whole and every member's.
+    """Boxes of a family by name: its own, of a chain every stage's, of a machine the whole and every member's.
 
     The stages of a chain share an axis, but the angle between their frames is nobody's parameter: only a machine, whose
     members are placed, has a box of several of them.
@@ -64,7 +63,7 @@ def boxes(family: Family) -> dict[str, Box]:
 
 
 def _own(family: Family, stage: str, columns: slice, axis: int) -> Box | None:
-    """Return the box of a family that stands alone, in its own frame."""
+    """Box of a family that stands alone, in its own frame."""
     at = {name: points[axis] for name, points in _moving(family).items()}
     curves = tuple(dict.fromkeys(f"{name}{stage}" for name in at.values() if name is not None))
     if not curves:
@@ -89,7 +88,7 @@ def _of_member(m: Member, found: Box) -> Box:
 
 
 def _whole(machine: Machine, axis: int) -> Box | None:
-    """Return the box of all members in the machine's frame; of a chain its last stage, which is what stands there."""
+    """Box of all members in the machine's frame; of a chain its last stage, which is what stands there."""
     curves, pairs, still = [], [], list[Piece]()
     for m in machine.members:
         last = m.family.stages[-1].family if isinstance(m.family, Chain) else m.family
@@ -111,9 +110,7 @@ def _whole(machine: Machine, axis: int) -> Box | None:
 
 
 def _moving(family: Family) -> Mapping[str, Coordinates]:
-    """Return the moving joints of all links;
-    none where one of them is no pose output, so that its place is not known.
-    """
+    """List the moving joints of all links; none where one of them is no pose output, so that its place is not known."""
     at = {name: points for found in family.every(Points) for name, points in found.at.items()}
     for skeleton in family.every(Skeleton):
         joints = [joint for link in skeleton.links for joint in link.joints if joint not in skeleton.fixed]

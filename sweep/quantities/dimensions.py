@@ -51,8 +51,9 @@ class Size:
     pieces: tuple[Piece, ...]
 
     def values(self, family: Family, designs: Array) -> Array:
-        """Return the size of every design, (n,);
-        lengths are brought near 1 by a power of two first: nothing overflows.
+        """Size of every design, (n,).
+
+        Lengths are brought near 1 by a power of two first: nothing overflows.
         """
         lengths = [k for k, p in enumerate(family.parameters) if p.unit == "length"]
         _, exponent = np.frexp(np.abs(designs[:, lengths]).max(axis=1))
@@ -85,7 +86,7 @@ def _of_columns(piece: Piece, columns: NDArray[np.intp], designs: Any) -> Any:
 
 @of_family
 def sizes(family: Family) -> dict[str, Size]:
-    """Return all sizes of a family by name: of the whole, of every member, and of every stage."""
+    """All sizes of a family by name: of the whole, of every member, and of every stage."""
     groups: dict[tuple[str, str], list[_Part]] = {}
     for part in _parts(family):
         for key in dict.fromkeys((("", ""), (part.member, ""), (part.member, part.stage))):
@@ -99,7 +100,7 @@ def sizes(family: Family) -> dict[str, Size]:
 
 
 def dimension_step(family: Family) -> Step | None:
-    """Return the route to all sizes; None where a family has none."""
+    """Route to all sizes; None where a family has none."""
     found = sizes(family)
     if not found:
         return None
@@ -117,7 +118,7 @@ def dimension_step(family: Family) -> Step | None:
 
 
 def lengths(family: Family) -> tuple[str, ...]:
-    """Return parameters that are lengths of the mechanism itself, not of bodies and bearings that effects ask for."""
+    """Parameters that are lengths of the mechanism itself, not of bodies and bearings that effects ask for."""
     others = set(input_names(family))
     if isinstance(family, Machine):
         others |= {p.name for relation in family.relations for p in relation.parameters}
@@ -125,7 +126,7 @@ def lengths(family: Family) -> tuple[str, ...]:
 
 
 def size_step(family: Family) -> Step | None:
-    """Return the route to ``size``; None where a family has ratios of lengths only."""
+    """Route to ``size``; None where a family has ratios of lengths only."""
     names = lengths(family)
     if not names:
         return None
@@ -155,7 +156,7 @@ def _parts(family: Family) -> Iterator[_Part]:
 
 
 def _size(of: Output, member: str, stage: str, parts: list[_Part]) -> Size | None:
-    """Return the size of some parts together; several stages or members give the least or the largest of all."""
+    """Size of some parts together; several stages or members give the least or the largest of all."""
     pieces = tuple(part.of(piece) for part in parts for piece in _PIECES[of.name](part.family))
     if not pieces:
         return None
@@ -166,7 +167,7 @@ def _size(of: Output, member: str, stage: str, parts: list[_Part]) -> Size | Non
 
 
 def _links(family: Family) -> list[Piece]:
-    """Return the lengths of the moving links; one that is not there (length 0) counts as the longest of the others."""
+    """Lengths of the moving links; one that is not there (length 0) counts as the longest of the others."""
     found: list[Piece] = []
     for dimensions in family.every(Dimensions):
         always = [partial(_length, _columns(family, names)) for names in dimensions.links]
@@ -180,7 +181,7 @@ def _ratios(family: Family) -> list[Piece]:
 
 
 def _arms(family: Family) -> list[Piece]:
-    """Return squares of the distances of a carried point from both joints of its link, over that of the joints."""
+    """Squares of the distances of a carried point from both joints of its link, over that of the joints."""
     return [
         partial(_arm, _columns(family, arm.point), _columns(family, arm.link), share)
         for dimensions in family.every(Dimensions)
@@ -190,7 +191,7 @@ def _arms(family: Family) -> list[Piece]:
 
 
 def _pivots(family: Family) -> list[Piece]:
-    """Return squares of the distances between the centres of all bearings of links that turn about a fixed axis."""
+    """Squares of the distances between the centres of all bearings of links that turn about a fixed axis."""
     return [
         partial(_apart, one.at, other.at)
         for skeleton in family.every(Skeleton)

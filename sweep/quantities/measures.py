@@ -99,7 +99,7 @@ class Measure:
         return self.is_angle or any(part.follows_angles for part in self.parts)
 
     def to_inner(self, value: float) -> float:
-        """Return the inner value that stands for a value of the output."""
+        """Inner value that stands for a value of the output."""
         if self.kind == "minus":
             return -self.parts[0].to_inner(-value)
         if self.inner == "pressure":
@@ -115,9 +115,7 @@ class Measure:
         return value
 
     def from_inner(self, value: float) -> float:
-        """Return the value of the output for an inner value;
-        nan where there is none (a mechanism that does not turn).
-        """
+        """Value of the output for an inner value; nan where there is none (a mechanism that does not turn)."""
         if self.kind == "minus":
             return -self.parts[0].from_inner(-value)
         if self.inner == "pressure":
@@ -135,7 +133,7 @@ class Measure:
 
 
 def curve(family: Family, output: str, window: tuple[float, float] | None = None) -> Series:
-    """Return the series of a plain pose output."""
+    """Series of a plain pose output."""
     return Series(output, window=window, wrapped=family.pose_output[output].wraps)
 
 

@@ -238,7 +238,7 @@ def _limit(family: Family, name: str) -> LimitPosition | None:
 
 
 def limit_order(family: Family, position: str) -> tuple[str, str]:
-    """Return how the extended and the folded position are told apart, in words."""
+    """How the extended and the folded position are told apart, in words."""
     sign = family.outward_sign(position)
     if sign:
         return f"largest (smallest if {sign} = -1)", f"smallest (largest if {sign} = -1)"
@@ -259,9 +259,7 @@ def _reduction(family: Family, name: str) -> Reduced | None:
 
 
 def output_names(family: Family) -> tuple[str, ...]:
-    """Return all design outputs worth listing:
-    the family's own, margins, limit positions, reductions of every pose output.
-    """
+    """Design outputs worth listing: the family's own, margins, limit positions, reductions of every pose output."""
     if isinstance(family, Machine):
         dotted = [f"{m.name}.{name}" for m in family.members for name in output_names(m.family)]
         own = [o.name for relation in family.relations for o in relation.outputs]
@@ -298,7 +296,7 @@ def _unknown(family: Family, name: str) -> InputError:
 
 
 def _known(family: Family, name: str) -> str:
-    """Return words for an unknown name: what there is, and the nearest."""
+    """Words for an unknown name: what there is, and the nearest."""
     names = output_names(family)
     grammar = prefixes(family.domain)
     special = listed(n for n in names if not n.startswith(grammar))

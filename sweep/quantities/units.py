@@ -93,7 +93,7 @@ def internal_unit(word: str) -> str:
 
 @lru_cache
 def factor(unit: str, internal: str) -> float:
-    """Return the multiplier from a written unit to the internal one.
+    """Multiplier from a written unit to the internal one.
 
     Angles count as a dimension, so 45 deg is no ratio; but an analogue such as d2s may be given per rad or rad^2.
 

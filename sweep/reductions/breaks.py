@@ -11,8 +11,9 @@ from typing import NamedTuple, TypeAlias
 
 import numpy as np
 
+from kernels.types import EPS, TWO_PI
 from sweep.families.base import Array
-from sweep.reductions.sampling import TWO_PI, Index, Mask
+from sweep.reductions.sampling import Index, Mask
 
 Curve: TypeAlias = Callable[[Array, Index], Array]
 """Values (j,) of some curves at angles (j,), one each; the curves by their numbers (j,)."""
@@ -24,7 +25,6 @@ BESIDE = 4  # samples on either side of a jump whose peaks are looked for up to 
 BISECTIONS = 48
 SECTIONS = 44
 GOLDEN = 0.5 * (np.sqrt(5.0) - 1.0)
-EPS = 2.0**-53
 
 
 class Arcs(NamedTuple):
@@ -60,15 +60,16 @@ def jumps(values: Array, size: Array, rough: float) -> tuple[Mask, Mask]:
 
 
 def near_jumps(between: Mask, row: Index, column: Index) -> Mask:
-    """Return which samples (row, column) lie within `BESIDE` samples of a jump."""
+    """Which samples (row, column) lie within `BESIDE` samples of a jump."""
     near = np.logical_or.reduce([np.roll(between, k, axis=1) for k in range(-BESIDE + 1, BESIDE + 1)])
     found: Mask = near[row, column]
     return found
 
 
 def level(values: Array, mode: int, share: float) -> Array:
-    """Return what a peak of each row of samples must reach to be looked at: of a magnitude this share of the largest,
-    of values this share of their range.
+    """Return what a peak of each row of samples must reach to be looked at.
+
+    Of a magnitude it is this share of the largest, of values this share of their range.
     """
     height = np.abs(values) if mode == 0 else mode * values
     most: Array = height.max(axis=1)
@@ -76,7 +77,7 @@ def level(values: Array, mode: int, share: float) -> Array:
 
 
 def search(curve: Curve, measured: Curve, column: Index, samples: int, least: Array) -> Arcs:
-    """Return the highest measured values on the arcs that end and begin at jumps.
+    """Highest measured values on the arcs that end and begin at jumps.
 
     Parameters
     ----------

@@ -8,20 +8,20 @@ import numpy as np
 
 from kernels import status as st
 from kernels.curves import samples as scan
+from kernels.types import EPS, TWO_PI, Status
 from sweep.families.base import Accuracy, Array, Columns, Event, Family
 from sweep.families.domain import Interval
 from sweep.families.names import error_of
 from sweep.quantities.resolve import event_names
 from sweep.reductions.resolution import denser
-from sweep.reductions.sampling import DESIGN_STATUS, TWO_PI, Index, Status, blocks, pose_columns, sample_turn, variable
+from sweep.reductions.sampling import DESIGN_STATUS, Index, blocks, pose_columns, sample_turn, variable
 
 START, LIMIT = 256, 16384  # samples of the first look, and those beyond which a design is given up
 PASSES = 80
-EPS = 2.0**-53
 
 
 def event_outputs(family: Family, designs: Array, names: Sequence[str], accuracy: Accuracy) -> Columns:
-    """Return the first place and number of the events that the names are about.
+    """First place and number of the events that the names are about.
 
     Parameters
     ----------
@@ -54,7 +54,7 @@ def event_outputs(family: Family, designs: Array, names: Sequence[str], accuracy
 
 
 def _events(family: Family, designs: Array, event: Event, accuracy: Accuracy) -> tuple[Array, Array, Array, Status]:
-    """Return the first angle of the event and its error, how often it happens, and status, each (n,)."""
+    """First angle of the event and its error, how often it happens, and status, each (n,)."""
     n = len(designs)
     phi, err, number, status = np.full(n, np.nan), np.full(n, np.nan), np.zeros(n), np.zeros(n, np.uint8)
     samples = accuracy.samples or START
@@ -82,9 +82,7 @@ def _events(family: Family, designs: Array, event: Event, accuracy: Accuracy) ->
 
 
 def _crossings(family: Family, designs: Array, rows: Index, values: Array, event: Event) -> tuple[Array, Array, Array]:
-    """Return how often samples (r, m) pass the level in the event's sense,
-    and the first place with its error, each (r,).
-    """
+    """How often samples (r, m) pass the level in the event's sense, and the first place with its error, each (r,)."""
     off = (values - event.level) * (1.0 if event.rising else -1.0)
     passes = (off < 0.0) & (np.roll(off, -1, axis=1) >= 0.0)
     if isinstance(family.domain, Interval):
@@ -103,8 +101,9 @@ def _crossings(family: Family, designs: Array, rows: Index, values: Array, event
 def _root(
     family: Family, designs: Array, event: Event, left: Array, right: Array, low: Array, high: Array
 ) -> tuple[Array, Array]:
-    """Find a passage between two samples by regula falsi in the Illinois form, all designs at once;
-    its error is from the last slope.
+    """Find a passage between two samples by regula falsi in the Illinois form, all designs at once.
+
+    Its error is from the last slope.
     """
     sense = 1.0 if event.rising else -1.0
     slope = (high - low) / (right - left)

@@ -12,12 +12,13 @@ from collections.abc import Sequence
 import numpy as np
 
 from kernels import status as st
+from kernels.types import Status
 from sweep.families.base import Array, Family
 from sweep.families.curve_features import crossed
 from sweep.quantities.kinds import Request
 from sweep.reductions import fused, panels, peak_search
 from sweep.reductions.peak_search import LIMIT
-from sweep.reductions.sampling import Extremum, Mask, Status, blocks
+from sweep.reductions.sampling import Extremum, Mask, blocks
 from sweep.reductions.window import Window
 
 HARD = 512  # samples of the first look at what the fused search has left open

@@ -13,13 +13,14 @@ import numpy as np
 from kernels import chains
 from kernels import status as st
 from kernels.chains.curves import MARGIN
+from kernels.types import EPS, TWO_PI, Status
 from sweep.families.base import Array, Family
 from sweep.families.capabilities import Assembly, Curve, DesignMap, InSeries
 from sweep.families.chain import Chain, stages_of
 from sweep.quantities.kinds import Request
 from sweep.reductions.peak_search import TIE
-from sweep.reductions.refine import EPS, SHRINK, Peaks, confirmed, polished
-from sweep.reductions.sampling import TWO_PI, Extremum, Index, Mask, Status, pose_columns, turn
+from sweep.reductions.refine import SHRINK, Peaks, confirmed, polished
+from sweep.reductions.sampling import Extremum, Index, Mask, pose_columns, turn
 
 sampling_tables = lru_cache(chains.sampling_tables)
 
@@ -116,7 +117,7 @@ class FusedCurve:
         found.err[rows] = peaks.err_height + self._behind(designs[rows], there) * np.abs(peaks.height)
 
     def _precisely(self, precise: Family, designs: Array, phi: Array) -> dict[str, Array]:
-        """Return the pose output and the discriminants of the later stages, each at one crank angle of each design."""
+        """Pose output and the discriminants of the later stages, each at one crank angle of each design."""
         names = [self.request.pose, *(loop.discriminant for loop in self._later())]
         poses, _ = pose_columns(precise, designs, phi[:, None], list(dict.fromkeys(names)))
         return {name: values[:, 0].copy() for name, values in poses.items()}
@@ -133,7 +134,7 @@ class FusedCurve:
 
 
 def curve_of(family: Family, request: Request, anywhere: bool) -> FusedCurve | None:
-    """Return the fused curve of what is requested; None where there is none.
+    """Fused curve of what is requested; None where there is none.
 
     ``anywhere`` as of `sweep.reductions.extrema.true_extrema`: then the least discriminant of a later stage.
     """

@@ -29,8 +29,7 @@ def margin_suffixes(family: Family) -> tuple[str, ...]:
 
 
 def margins(family: Family, designs: Array, suffixes: tuple[str, ...], accuracy: Accuracy) -> Columns:
-    """Return whether the stages turn fully,
-    their smallest cos^2(pressure angle) and largest pressure angle over the turn.
+    """Whether the stages turn fully, their smallest cos^2(pressure angle) and largest pressure angle over the turn.
 
     Parameters
     ----------
@@ -66,7 +65,7 @@ def margins(family: Family, designs: Array, suffixes: tuple[str, ...], accuracy:
 
 
 def combined(columns: Columns, suffixes: tuple[str, ...]) -> Columns:
-    """Return the whole chain's margins from those of its stages: the weakest stage decides."""
+    """Whole chain's margins from those of its stages: the weakest stage decides."""
     rotatable = np.logical_and.reduce([columns[f"rotatable{s}"] for s in suffixes])
     result: Columns = {"rotatable": rotatable, "err_rotatable": np.zeros(rotatable.size)}
     for name, sign in (("margin", -1.0), ("max_pressure_angle", 1.0)):
@@ -81,8 +80,7 @@ def combined(columns: Columns, suffixes: tuple[str, ...]) -> Columns:
 
 
 def with_transmission(columns: Columns, suffixes: tuple[str, ...]) -> Columns:
-    """Return the columns with the least transmission angle of each suffix:
-    90 degrees less the largest pressure angle.
+    """Add the least transmission angle of each suffix to the columns: 90 degrees less the largest pressure angle.
 
     It is made of the cosine and the sine of that angle, so that it stays exact where the linkage nearly locks.
     """
@@ -124,7 +122,7 @@ def _stage_margin(family: Family, designs: Array, suffix: str, accuracy: Accurac
 
 
 def _from_poses(family: Family, designs: Array, suffix: str) -> Columns:
-    """Return the margin from the family's discriminant, refined to its least value."""
+    """Margin from the family's discriminant, refined to its least value."""
     designs = _unit_lengths(family, designs)
     loop = next(found for found in family.every(Assembly) if found.stage == suffix)
     discriminant, angle = loop.discriminant, loop.pressure_angle
@@ -156,9 +154,7 @@ def _from_poses(family: Family, designs: Array, suffix: str) -> Columns:
 
 
 def _unit_lengths(family: Family, designs: Array) -> Array:
-    """Return the same mechanisms, brought near unit size by a power of two:
-    no discriminant overflows, no bit changes.
-    """
+    """Return the same mechanisms near unit size, by a power of two: no discriminant overflows, no bit changes."""
     lengths = [k for k, p in enumerate(family.parameters) if p.unit == "length"]
     scaled = designs.copy()
     if lengths:

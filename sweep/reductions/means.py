@@ -13,6 +13,7 @@ import numpy as np
 
 from kernels import status as st
 from kernels.curves import samples as scan
+from kernels.types import EPS, TWO_PI, Status
 from sweep.families.base import Accuracy, Array, Columns, Family
 from sweep.families.curve_features import Singular, Switches, crossed, singular_curves
 from sweep.numerics.events import with_events
@@ -20,18 +21,8 @@ from sweep.numerics.quadrature import integrate
 from sweep.numerics.singularities import Singularities, crowded, steps, turn_edges
 from sweep.reductions.peak_search import LIMIT, START
 from sweep.reductions.resolution import denser, ends, nearest
-from sweep.reductions.sampling import (
-    DESIGN_STATUS,
-    TWO_PI,
-    Index,
-    Status,
-    blocks,
-    discriminants,
-    pose_columns,
-    sample_turn,
-)
+from sweep.reductions.sampling import DESIGN_STATUS, Index, blocks, discriminants, pose_columns, sample_turn
 
-EPS = 2.0**-53
 KINKED = 1e-2  # relative change of a mean from which on its convergence tells kinks from smooth curves
 SHIFT = 0.37  # of their spacing: how far samples stand aside that tell whether two grids agree by chance
 NEAR = 0.3  # distance of a singularity [rad] as samples see it, from which on it is looked at closely
@@ -45,7 +36,7 @@ PREFIX = "rms_"
 
 
 def mean_squares(family: Family, designs: Array, names: Sequence[str], accuracy: Accuracy) -> Columns:
-    """Return the root mean squares over one turn, on samples, or refined until they have settled.
+    """Root mean squares over one turn, on samples, or refined until they have settled.
 
     Parameters
     ----------
@@ -75,7 +66,7 @@ def mean_squares(family: Family, designs: Array, names: Sequence[str], accuracy:
 
 
 def _refined(family: Family, designs: Array, poses: Sequence[str], target: float) -> tuple[Array, Array, Status]:
-    """Return means and their errors (n, q), and the status."""
+    """Means and their errors (n, q), and the status."""
     n = len(designs)
     found, status = _on_grid(family, designs, np.arange(n), START, poses)
     err = np.full_like(found, np.nan)
@@ -163,9 +154,7 @@ def _by_grids(
 def _on_panels(
     family: Family, designs: Array, poses: Sequence[str], edges: Array, target: float
 ) -> tuple[Array, Array, Status]:
-    """Return means, their errors and the status by adaptive quadrature of precise poses:
-    plain ones may be noise alone.
-    """
+    """Means, their errors and the status by adaptive quadrature of precise poses: plain ones may be noise alone."""
     family, n = family.precise(), len(designs)
     status = np.zeros(n, np.uint8)
     names = list(dict.fromkeys(poses))
@@ -203,9 +192,7 @@ def _on_panels(
 
 
 def _blur(values: Array) -> Array:
-    """Return what the rounding of the crank angles may do to the integral of the squares:
-    their variation times that.
-    """
+    """Bound what the rounding of the crank angles may do to the integral of the squares: their variation times that."""
     squares = values * values
     # One after the other: repeated angles add nothing, however many there are.
     variation: Array = np.cumsum(np.abs(squares - np.roll(squares, 1, axis=1)), axis=1)[:, -1]
@@ -213,7 +200,7 @@ def _blur(values: Array) -> Array:
 
 
 def _singularities(family: Family, designs: Array) -> Singularities:
-    """Return the nearest singularities: as a few samples see them, and closely where they may matter."""
+    """Nearest singularities: as a few samples see them, and closely where they may matter."""
     n, names = len(designs), discriminants(family)
     rows = np.arange(n)
     if family.every(Singular):

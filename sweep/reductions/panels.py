@@ -17,23 +17,14 @@ from numpy.polynomial import chebyshev
 
 from kernels import status as st
 from kernels.curves import samples as scan
+from kernels.types import EPS, TWO_PI, Status
 from sweep.families.base import Array, Family
 from sweep.families.curve_features import Bends, Singular, bends
 from sweep.numerics.chebyshev import DENSE, NODES, at_nodes, basis, product, rising, summits
 from sweep.quantities.kinds import Request
 from sweep.reductions.resolution import MATTERS, ends, nearest
 from sweep.reductions.rounding import order_of, singular_share
-from sweep.reductions.sampling import (
-    DESIGN_STATUS,
-    TWO_PI,
-    Extremum,
-    Index,
-    Mask,
-    Status,
-    blocks,
-    discriminants,
-    pose_columns,
-)
+from sweep.reductions.sampling import DESIGN_STATUS, Extremum, Index, Mask, blocks, discriminants, pose_columns
 
 PANELS = 64  # of a turn at first, besides those that begin where a follower reverses
 TAIL = 4  # last coefficients that tell how wrong a polynomial may be; of a tent in the middle three nearly vanish ...
@@ -46,7 +37,6 @@ CROWD = 48  # panels of one curve beyond which rounding alone is halved
 ALLOWED = 1.0 / 32.0  # of the target: what two successive polynomials may differ by
 AGAIN = 8.0  # times that difference is claimed: poses see a kink between them as low as that
 SLOPE = 2.0 * (NODES - 1) ** 2  # of a polynomial bounded by 1 on a panel of width 1 (Markov)
-EPS = 2.0**-53
 
 
 class Panels(NamedTuple):
@@ -81,7 +71,7 @@ class Top(NamedTuple):
 
 
 def has_kinks(family: Family, request: Request, jumps: bool = False) -> bool:
-    """Return whether an extremum is to be searched for on panels; ``jumps``: all curves of these designs may jump."""
+    """Whether an extremum is to be searched for on panels; ``jumps``: all curves of these designs may jump."""
     output = family.pose_output[request.pose]
     return (output.kinks or jumps) and not output.wraps and not request.windowed
 
@@ -89,7 +79,7 @@ def has_kinks(family: Family, request: Request, jumps: bool = False) -> bool:
 def extrema(
     family: Family, designs: Array, requests: Sequence[Request], target: float, locate: bool
 ) -> tuple[dict[Request, Extremum], Status]:
-    """Return extrema over one turn of curves with kinks and jumps.
+    """Extrema over one turn of curves with kinks and jumps.
 
     Parameters
     ----------
@@ -153,7 +143,7 @@ def _block(
 
 
 def _cut(family: Family, designs: Array, output: str) -> tuple[Index, Array, Array]:
-    """Return design and ends of the first panels for curves of a pose output."""
+    """Design and ends of the first panels for curves of a pose output."""
     edges = ends(family, designs, PANELS, PANELS * NODES, output)
     low, high = edges[:, :-1], edges[:, 1:]
     row, column = np.nonzero(high - low > NARROWEST)
@@ -163,7 +153,7 @@ def _cut(family: Family, designs: Array, output: str) -> tuple[Index, Array, Arr
 def _climbed(
     family: Family, designs: Array, panels: Panels, request: Request, target: float, locate: bool
 ) -> tuple[Top, Array]:
-    """Return the highest point of every curve that has panels, and the sizes of these curves."""
+    """Highest point of every curve that has panels, and the sizes of these curves."""
     n = len(designs)
     best, least = np.full(n, -np.inf), np.full(n, np.inf)
     np.maximum.at(best, panels.row, panels.peak)
@@ -198,7 +188,7 @@ def _climbed(
 
 
 def _halved(family: Family, designs: Array, panels: Panels, request: Request) -> tuple[Panels, Array]:
-    """Return both halves of each panel, and how far their poses are from its polynomial."""
+    """Both halves of each panel, and how far their poses are from its polynomial."""
     middle = 0.5 * (panels.low + panels.high)
     low, high = (np.stack(ends, axis=1).ravel() for ends in ((panels.low, middle), (middle, panels.high)))
     row = np.repeat(panels.row, 2)
@@ -219,7 +209,7 @@ def _halved(family: Family, designs: Array, panels: Panels, request: Request) ->
 
 
 def _off(family: Family, designs: Array, panels: Panels, top: Top, request: Request, which: Index) -> Array:
-    """Return how far poses at some tops are from these: a kink next to an end is seen by no other pose."""
+    """How far poses at some tops are from these: a kink next to an end is seen by no other pose."""
     off = np.zeros(top.row.size)
     place = _inside(top.phi, panels.low, panels.high)
     for some in blocks(which, 1):
@@ -229,7 +219,7 @@ def _off(family: Family, designs: Array, panels: Panels, top: Top, request: Requ
 
 
 def _tops(panels: Panels, mode: int, err: Array) -> Top:
-    """Return the highest points of the polynomials, whose heights are wrong by ``err`` at most."""
+    """Highest points of the polynomials, whose heights are wrong by ``err`` at most."""
     x, value = summits(panels.series, mode)
     bow = np.abs(chebyshev.chebval(x, chebyshev.chebder(panels.series, 2, axis=1).T, tensor=False))
     half = 0.5 * (panels.high - panels.low)
@@ -241,13 +231,13 @@ def _tops(panels: Panels, mode: int, err: Array) -> Top:
 
 
 def _held(panels: Panels, before: Array, size: Array) -> Top:
-    """Return the highest poses of panels as narrow as crank angles can be told apart; ``before`` they were halved."""
+    """Highest poses of panels as narrow as crank angles can be told apart; ``before`` they were halved."""
     err = np.abs(panels.peak - before) + EDGE * EPS * np.maximum(size[panels.row], np.abs(panels.peak))
     return Top(panels.row, panels.at, panels.peak, err, panels.high - panels.low + 8.0 * EPS * np.pi)
 
 
 def _beside(family: Family, designs: Array, panels: Panels, request: Request) -> Array:
-    """Return how far the highest poses of narrow panels are from poses beside them, on the side where that is less.
+    """How far the highest poses of narrow panels are from poses beside them, on the side where that is less.
 
     Beside a jump the curve is level on its higher side.  Next to a cusp it goes on rising where no pose can be, by as
     much again, and a few times that where it rises like a small power of the distance.
@@ -262,13 +252,13 @@ def _beside(family: Family, designs: Array, panels: Panels, request: Request) ->
 
 
 def _given_up(panels: Panels, mode: int) -> Top:
-    """Return the highest poses of panels that are no longer halved, and how much higher their polynomials may be."""
+    """Highest poses of panels that are no longer halved, and how much higher their polynomials may be."""
     err = _upper(panels, mode) - panels.peak
     return Top(panels.row, panels.at, panels.peak, err, panels.high - panels.low)
 
 
 def _highest(tops: list[Top], n: int) -> Top:
-    """Return the highest top of each row; what another one may be higher by is part of its error."""
+    """Highest top of each row; what another one may be higher by is part of its error."""
     every = Top(*(np.concatenate(parts) for parts in zip(*tops, strict=True)))
     order = np.lexsort((every.phi, -every.value, every.row))
     row, first = np.unique(every.row[order], return_index=True)
@@ -309,7 +299,7 @@ def _measured(values: Array, mode: int) -> Array:
 
 
 def _places(low: Array, high: Array) -> Array:
-    """Return the nodes of panels; at the very end the curve may already have jumped, so it is not touched."""
+    """Nodes of panels; at the very end the curve may already have jumped, so it is not touched."""
     nodes, _ = basis()
     places = 0.5 * (low + high)[:, None] + 0.5 * (high - low)[:, None] * nodes
     return _inside(places, low[:, None], high[:, None])
@@ -320,7 +310,7 @@ def _inside(phi: Array, low: Array, high: Array) -> Array:
 
 
 def _fitted(row: Index, low: Array, high: Array, values: Array, mode: int) -> Panels:
-    """Return panels with the polynomials through their poses."""
+    """Panels with the polynomials through their poses."""
     measured, every = _measured(values, mode), np.arange(row.size)
     top = measured.argmax(axis=1)
     series: Array = product(values, basis()[1].T)
@@ -328,7 +318,7 @@ def _fitted(row: Index, low: Array, high: Array, values: Array, mode: int) -> Pa
 
 
 def _worst(row: Index, each: Status, n: int) -> Status:
-    """Return the gravest status of each design from the poses of its panels."""
+    """Gravest status of each design from the poses of its panels."""
     first = np.searchsorted(row, np.arange(n))
     count = np.bincount(row, minlength=n)
     turn = np.zeros((n, int(count.max(initial=0)), NODES), np.uint8)

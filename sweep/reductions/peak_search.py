@@ -9,13 +9,13 @@ import numpy as np
 
 from kernels import status as st
 from kernels.curves import samples as scan
+from kernels.types import EPS, TWO_PI, Status
 from sweep.families.base import Array, Family
 from sweep.families.curve_features import Singular
 from sweep.numerics.singularities import Singularities
 from sweep.quantities.kinds import Request
 from sweep.reductions.breaks import jumps, level, near_jumps, search
 from sweep.reductions.refine import (
-    EPS,
     SHRINK,
     VARIES,
     Peaks,
@@ -29,17 +29,7 @@ from sweep.reductions.refine import (
 )
 from sweep.reductions.resolution import MATTERS, broken, denser, nearest
 from sweep.reductions.rounding import measure_constants, order_of, rounding_share, shaken, singular_share, tells
-from sweep.reductions.sampling import (
-    DESIGN_STATUS,
-    TWO_PI,
-    Extremum,
-    Index,
-    Mask,
-    Status,
-    discriminants,
-    pose_columns,
-    sample_turn,
-)
+from sweep.reductions.sampling import DESIGN_STATUS, Extremum, Index, Mask, discriminants, pose_columns, sample_turn
 from sweep.reductions.window import Window, edges
 
 START = 32  # samples of the first look
@@ -103,13 +93,13 @@ class Search:
         self.names = list(dict.fromkeys([*(r.pose for r in self.requests), *position, *self.guards]))
 
     def needed(self, rows: Index) -> Index:
-        """Return the fewest samples that a request of these designs still needs, 0 where all are found."""
+        """Fewest samples that a request of these designs still needs, 0 where all are found."""
         left = np.where(self.undone[:, rows] > 0, self.undone[:, rows], NEVER).min(axis=0, initial=NEVER)
         fewest: Index = np.where(left < NEVER, left, 0)
         return fewest
 
     def places(self, number: Index) -> Mask:
-        """Return whether the crank angles of these requests are wanted."""
+        """Whether the crank angles of these requests are wanted."""
         wanted: Mask = np.array([self.locate or request.place for request in self.requests], np.bool_)[number]
         return wanted
 
@@ -153,9 +143,7 @@ class Search:
     def _candidates(
         self, rows: Index, columns: dict[str, Array], samples: int
     ) -> tuple[Candidates, dict[Request, Array], Index, dict[Request, Mask]]:
-        """Return candidates of all requests, sizes and jumps of their curves,
-        samples needed by the look of the curves.
-        """
+        """Candidates of all requests, sizes and jumps of their curves, samples needed by the look of the curves."""
         needed, pieces, scales, breaks = np.full((len(self.requests), rows.size), START), [], {}, {}
         for number, request in enumerate(self.requests):
             values = columns[request.pose]
@@ -255,9 +243,7 @@ class Search:
             column[rivals] = found
 
     def _sampler(self, family: Family, rows: Index, candidates: Candidates, middle: Array) -> Sampler:
-        """Return measured values of candidates by the poses of ``family``,
-        angles continuous with the values ``middle``.
-        """
+        """Measure candidates by the poses of ``family``, angles continuous with the values ``middle``."""
         number, row, _, sign = candidates
 
         def sample(active: Index, phi: Array) -> Array:
@@ -279,7 +265,7 @@ class Search:
         return sample
 
     def _rounding(self, rows: Index, columns: dict[str, Array], candidates: Candidates, guards: list[str]) -> Array:
-        """Return the share of a value that rounding may have changed alike at neighbouring poses."""
+        """Share of a value that rounding may have changed alike at neighbouring poses."""
         given = self.designs[rows], columns, candidates.row, candidates.column
         return rounding_share(self.family, *given, guards, self._orders(candidates))
 

@@ -8,8 +8,9 @@ from typing import NamedTuple, TypeAlias
 import numpy as np
 
 from kernels.curves import samples as scan
+from kernels.types import EPS, TWO_PI
 from sweep.families.base import Array, Family
-from sweep.reductions.sampling import TWO_PI, Index, Mask, pose_columns
+from sweep.reductions.sampling import Index, Mask, pose_columns
 
 Sampler: TypeAlias = Callable[[Index, Array], Array]
 """``sample(candidates, phi)``: measured values (k, m) of the candidates with these numbers at the angles phi (k, m)."""
@@ -30,7 +31,6 @@ BENT, CLOSELY_BENT = 0.4, 0.15  # change of second differences against the large
 LEARNT = 0.8  # of the error before: what a narrower window about a kink leaves of it at most
 SHORTEST, SHORTEST_KINKED = 1e-6, 1e-12  # of the spacing of the samples: steps of the last windows
 VARIES = 8.0  # times the rounding at one pose: what that of its neighbours may be
-EPS = 2.0**-53
 
 
 class Peaks(NamedTuple):
@@ -58,7 +58,7 @@ class Peaks(NamedTuple):
 
 
 def first_peaks(centre: Array, spacing: Array, around: Array) -> Peaks:
-    """Return peaks of the quartics through five samples.
+    """Peaks of the quartics through five samples.
 
     Parameters
     ----------
@@ -82,7 +82,7 @@ def first_peaks(centre: Array, spacing: Array, around: Array) -> Peaks:
 
 
 def sharpen(sample: Sampler, peaks: Peaks, tolerance: Array, locate: Array) -> Peaks:
-    """Return the highest points near the given ones, by quartics through five points ever closer together.
+    """Highest points near the given ones, by quartics through five points ever closer together.
 
     Parameters
     ----------
@@ -134,7 +134,7 @@ def confirmed(
     sample: Sampler, peaks: Peaks, tolerance: Array, locate: Array, rounding: Array | float = 0.0,
     there: Array | None = None,
 ) -> Peaks:  # fmt: skip
-    """Return peaks as poses of higher precision have them: their heights are values at their places.
+    """Peaks as poses of higher precision have them: their heights are values at their places.
 
     One pose at the place of a peak measures how far rounding, and what was left of interpolation, have moved its
     value.  Only where that is more than the ``tolerance``, or the place is not known to ``locate``, the peak is
@@ -178,12 +178,12 @@ def confirmed(
 
 
 def attained(sample: Sampler, peaks: Peaks, which: Index) -> Peaks:
-    """Return heights at the very places: there the slope is zero and the rounding of the crank angle has no effect."""
+    """Heights at the very places: there the slope is zero and the rounding of the crank angle has no effect."""
     return reaching(sample(which, peaks.phi[:, None])[:, 0], peaks)
 
 
 def reaching(height: Array, peaks: Peaks) -> Peaks:
-    """Return peaks of these heights, and by how much that changes them added to their errors."""
+    """Peaks of these heights, and by how much that changes them added to their errors."""
     return peaks._replace(height=height, err_height=peaks.err_height + np.abs(height - peaks.height))
 
 

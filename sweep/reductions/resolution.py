@@ -8,6 +8,7 @@ from __future__ import annotations
 import numpy as np
 
 from kernels import status as st
+from kernels.types import TWO_PI, Status
 from sweep.families.base import Angles, Array, Family
 from sweep.families.curve_features import (
     Bends,
@@ -21,7 +22,7 @@ from sweep.families.curve_features import (
 )
 from sweep.numerics.events import near_zeros, sign_changes, with_events
 from sweep.numerics.singularities import FAR, SAMPLES, SHORTEST, Curve, Singularities, crowded, singularities
-from sweep.reductions.sampling import DESIGN_STATUS, TWO_PI, Index, Status, blocks, pose_columns
+from sweep.reductions.sampling import DESIGN_STATUS, Index, blocks, pose_columns
 
 PER_WAVE = 2.0  # waves that the fewest samples of any curve resolve
 SHARES = 16.0  # samples of a turn are a multiple of this over the shortest way between two switches
@@ -54,7 +55,7 @@ def denser(family: Family, designs: Array, near: Singularities | None = None) ->
 
 
 def nearest(family: Family, designs: Array, within: float = FAR) -> Singularities:
-    """Return the nearest singularities of a family's designs, from its most accurate poses.
+    """Nearest singularities of a family's designs, from its most accurate poses.
 
     Those farther away than ``within`` [rad] are as good as even samples show them.
     """
@@ -73,8 +74,9 @@ def nearest(family: Family, designs: Array, within: float = FAR) -> Singularitie
 
 
 def broken(family: Family, designs: Array, near: Singularities, status: Status) -> None:
-    """Write the status of designs that have no pose where a singularity is as near as can be told: the gap may be
-    narrower than any samples.
+    """Write the status of designs that have no pose where a singularity is as near as can be told.
+
+    The gap may be narrower than any samples.
     """
     close = np.flatnonzero((near.rho <= SHORTEST).any(axis=1))
     for rows in blocks(close, near.phi.shape[1]):
@@ -91,7 +93,7 @@ PER_PANEL = 0.25  # waves that a first panel may hold
 
 
 def ends(family: Family, designs: Array, even: int, looks: int, output: str) -> Array:
-    """Return ends of panels of a turn for curves of a pose output, in rising order, (n, p + 1).
+    """Return the ends of panels of a turn for curves of a pose output, in rising order, (n, p + 1).
 
     There are ``even`` panels, and more about singularities.  They are cut at angles known beforehand, and where one of
     ``looks`` samples or the next shows that a pose output passes its level, that a follower reverses, or that a
@@ -149,13 +151,13 @@ def _passed(family: Family, designs: Array, speeds: tuple[str, ...], looked: Arr
 
 
 def _looked(n: int, even: int, close: Index, angles: Array) -> Array:
-    """Return even angles of a turn, (n, m), and further ones of the designs ``close``."""
+    """Even angles of a turn, (n, m), and further ones of the designs ``close``."""
     looked = np.tile(np.arange(even) * (TWO_PI / even), (n, 1))
     return with_events(looked, np.repeat(close, angles.shape[1]), angles.ravel())
 
 
 def reversing(family: Family) -> tuple[str, ...]:
-    """Return the pose outputs whose zeros cut the turn: the speeds of all positions of the family."""
+    """Pose outputs whose zeros cut the turn: the speeds of all positions of the family."""
     speeds = set(family.derivative_of.values())
     dear = set(family.dear)
     return tuple(rate for of, rate in family.derivative_of.items() if of not in speeds and rate not in dear)

@@ -6,12 +6,13 @@ import numpy as np
 
 from kernels import status as st
 from kernels.curves import samples as scan
+from kernels.types import EPS, TWO_PI
 from sweep.families.base import Accuracy, Array, Columns, Family, Step
 from sweep.families.capabilities import Assembly
 from sweep.numerics.singularities import Singularities, crowded
-from sweep.reductions.refine import EPS, Peaks, confirmed, first_peaks, polish_places
+from sweep.reductions.refine import Peaks, confirmed, first_peaks, polish_places
 from sweep.reductions.resolution import nearest
-from sweep.reductions.sampling import TWO_PI, Index, Mask, blocks, pose_columns
+from sweep.reductions.sampling import Index, Mask, blocks, pose_columns
 
 TRIES = 3
 CONSTANT = 64.0 * EPS  # of its size: a curve that varies by no more tells nothing but rounding
@@ -36,7 +37,7 @@ def rounding_share(
     family: Family, designs: Array, columns: dict[str, Array], row: Index, column: Index, guards: list[str],
     order: Index,
 ) -> Array:  # fmt: skip
-    """Return the share of values that rounding may have changed (docs/extrema.md, section 3).
+    """Share of values that rounding may have changed (docs/extrema.md, section 3).
 
     Parameters
     ----------
@@ -75,7 +76,7 @@ def singular_share(near: Singularities, phi: Array, order: Index) -> Array:
 
 
 def _of_order(order: Index, amplified: Array) -> Array:
-    """Return the share of rounding: a derivative of order n grows like the power 1/2 - n of what vanishes."""
+    """Share of rounding: a derivative of order n grows like the power 1/2 - n of what vanishes."""
     found: Array = 4.0 * EPS * np.where(order == 0, np.sqrt(amplified), np.where(order < 3, amplified, 2.0 * amplified))
     return found
 
@@ -99,7 +100,7 @@ def shaken(family: Family, designs: Array, phi: Array, name: str) -> Array:
 
 
 def order_of(family: Family, pose: str) -> int:
-    """Return the order of the derivative that a pose output is; 3 for what may be made of any: a magnitude, a force."""
+    """Order of the derivative that a pose output is; 3 for what may be made of any: a magnitude, a force."""
     lower = {derivative: of for of, derivative in family.derivative_of.items()}
     if pose not in lower:
         return 0 if pose in family.derivative_of else 3
@@ -107,7 +108,7 @@ def order_of(family: Family, pose: str) -> int:
 
 
 def tells(discriminant: Array) -> Mask:
-    """Return whether a discriminant is a number to rely on: at scales such as 1e100 or 1e-80 it leaves float64."""
+    """Whether a discriminant is a number to rely on: at scales such as 1e100 or 1e-80 it leaves float64."""
     usable: Mask = (discriminant > 1e-280) & (discriminant < 1e280)
     return usable
 
@@ -155,8 +156,7 @@ def sharpen_maxima(
 
 
 def precise_maxima(family: Family, designs: Array, pose: str, phi: Array, target: float, locate: bool) -> Peaks:
-    """Return the largest magnitudes (n,) over the turn from the family's precise poses alone;
-    error inf where they are lost.
+    """Largest magnitudes (n,) over the turn from the family's precise poses alone; error inf where they are lost.
 
     Parameters
     ----------

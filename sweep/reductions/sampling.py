@@ -12,22 +12,21 @@ from numpy.typing import NDArray
 
 from kernels import status as st
 from kernels.curves import samples as scan
+from kernels.types import TWO_PI, Status
 from sweep.families.base import Angles, Array, Columns, Family, PoseFunction, of_family
 from sweep.families.capabilities import Assembly
 from sweep.families.domain import Interval
 
 Index: TypeAlias = NDArray[np.int64]
 Mask: TypeAlias = NDArray[np.bool_]
-Status: TypeAlias = NDArray[np.uint8]
 
 BLOCK = 2**17  # samples handled at once: a few columns of that many stay in the cache
 FEW = 4  # columns from which on there are fewer samples at once
-TWO_PI = 2.0 * np.pi
 
 
 @lru_cache(maxsize=32)
 def turn(samples: int, shift: float = 0.0) -> Angles:
-    """Return the equidistant crank angles of one turn, from 0 or a share of their spacing, shape (1, samples)."""
+    """Equidistant crank angles of one turn, from 0 or a share of their spacing, shape (1, samples)."""
     # Not locked: kernels would be compiled once more, for arrays that cannot be written.
     phi: Array = (np.arange(samples, dtype=np.float64)[None, :] + shift) * (TWO_PI / samples)
     return Angles.of(phi)
@@ -41,14 +40,14 @@ def blocks(rows: Index, samples: int, columns: int = 1) -> Iterator[Index]:
 
 
 def discriminants(family: Family) -> tuple[str, ...]:
-    """Return pose outputs that tell how near a stage is to a dead point: one per stage of a chain."""
+    """Pose outputs that tell how near a stage is to a dead point: one per stage of a chain."""
     return tuple(loop.discriminant for loop in family.every(Assembly))
 
 
 def sample_turn(
     family: Family, designs: Array, samples: int, names: Sequence[str], shift: float = 0.0
 ) -> tuple[dict[str, Array], Status, Mask]:
-    """Return pose outputs over one turn, (n, samples), with angles made continuous.
+    """Pose outputs over one turn, (n, samples), with angles made continuous.
 
     The first crank angle is 0, or that share of the spacing by which all are shifted.
 
@@ -70,7 +69,7 @@ def sample_turn(
 
 
 def pose_columns(family: Family, designs: Array, phi: Array, names: Sequence[str]) -> tuple[dict[str, Array], Status]:
-    """Return pose outputs of each design at its own crank angles, (n, m), and their status."""
+    """Pose outputs of each design at its own crank angles, (n, m), and their status."""
     return _evaluate(family, designs, Angles.of(phi), names)
 
 
@@ -82,7 +81,7 @@ def _evaluate(family: Family, designs: Array, angles: Angles, names: Sequence[st
 
 @of_family
 def on_closed_turn(family: Family) -> Family:
-    """Return the family with poses over a closed turn; the family itself unless its domain is an interval."""
+    """Family with poses over a closed turn; the family itself unless its domain is an interval."""
     domain = family.domain
     if not isinstance(domain, Interval):
         return family

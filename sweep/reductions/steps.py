@@ -31,9 +31,7 @@ def steps_of(family: Family) -> tuple[Step, ...]:
 
 
 def own_steps(family: Family, name: str) -> list[tuple[Step, Output, Stage | None]]:
-    """Return the family's own routes to an output, and those of a chain's first stage,
-    which turns as if it were alone.
-    """
+    """List the own routes to an output, and those of a chain's first stage, which turns as if it were alone."""
     found: list[tuple[Step, Output, Stage | None]] = [
         (step, o, None) for step in steps_of(family) for o in step.provides if o.name == name
     ]
@@ -44,13 +42,13 @@ def own_steps(family: Family, name: str) -> list[tuple[Step, Output, Stage | Non
 
 
 def applying_step(family: Family, name: str, accuracy: Accuracy) -> tuple[Step, Stage | None] | None:
-    """Return the own route to an output that serves this accuracy; there is one at most (tests/run/test_costs.py)."""
+    """Own route to an output that serves this accuracy; there is one at most (tests/run/test_costs.py)."""
     able = ((step, stage) for step, _, stage in own_steps(family, name) if step.applies(accuracy.of(name)))
     return next(able, None)
 
 
 def step_ns(family: Family, step: Step, accuracy: Accuracy) -> float:
-    """Return the estimated time of a family's own step [ns per design]."""
+    """Estimated time of a family's own step [ns per design]."""
     if step.cost is not None:
         return step.cost(accuracy)
     row = f"{family.name}: {step.name}"
@@ -58,7 +56,7 @@ def step_ns(family: Family, step: Step, accuracy: Accuracy) -> float:
 
 
 def certified_names(family: Family) -> tuple[str, ...]:
-    """Return outputs whose maxima can be proven, those of a chain's first stage included."""
+    """Return the outputs whose maxima can be proven, those of a chain's first stage included."""
     names = [o.name for step in steps_of(family) if step.certifies for o in step.provides]
     if isinstance(family, Chain):
         names += [f"{o.name}1" for step in family.stages[0].family.steps if step.certifies for o in step.provides]
@@ -79,7 +77,7 @@ def proofs(certify: bool | Sequence[str]) -> tuple[bool, tuple[str, ...]]:
 
 
 def is_proven(family: Family, name: str, accuracy: Accuracy) -> bool:
-    """Return whether the error of an output is a proven bound."""
+    """Whether the error of an output is a proven bound."""
     return accuracy.of(name).certify and name in certified_names(family) and name not in place_names(family)
 
 
@@ -129,7 +127,7 @@ POSES_PLACE = 240.0  # of a place after a fused search: nine precise poses take 
 
 
 def group_ns(family: Family, group: Group, names: Sequence[str], accuracy: Accuracy) -> float:
-    """Return the estimated time of a general route [ns per design], made of measured times of poses and of searches."""
+    """Estimated time of a general route [ns per design], made of measured times of poses and of searches."""
     stages, pose = _stages(family), pose_ns(family)
     if group == "margin":
         return sum(_margin_ns(family, suffix, accuracy) for suffix in margin_suffixes(family))
@@ -154,7 +152,7 @@ def group_ns(family: Family, group: Group, names: Sequence[str], accuracy: Accur
 
 
 def _margin_ns(family: Family, suffix: str, accuracy: Accuracy) -> float:
-    """Return the estimated time of the margin of a stage, which all stages before it drive."""
+    """Estimated time of the margin of a stage, which all stages before it drive."""
     if isinstance(family, Machine):
         name, own = suffix.split(".")
         return _margin_ns(family.member(name).family, own, accuracy)
@@ -176,7 +174,7 @@ def _stages(family: Family) -> int:
 
 
 def pose_ns(family: Family) -> float:
-    """Return the estimated time of the motion of a pose: of a chain or a machine that of all its stages and members."""
+    """Estimated time of the motion of a pose: of a chain or a machine that of all its stages and members."""
     if isinstance(family, Machine):
         return sum(pose_ns(member.family) for member in family.members)
     if isinstance(family, Chain):

@@ -21,9 +21,7 @@ ORDERS = 3  # derivatives that the proof knows
 
 
 def certified_travel(family: Family) -> Step | None:
-    """Return the step that proves maxima of a guided point's travel and deviation;
-    None for a family or chain that has none to prove.
-    """
+    """Step that proves maxima of a guided point's travel and deviation; None for a family that has none to prove."""
     stages = stages_of(family)
     guided = stages[-1].family.find(GuidedPoint)
     if guided is None or any(s.family.find(CrankRockerLoop) is None for s in stages):
@@ -42,7 +40,7 @@ def certified_travel(family: Family) -> Step | None:
 
 
 def proven_curves(family: Family, guided: GuidedPoint) -> dict[str, tuple[int, int]]:
-    """Return the pose outputs whose maxima the proof knows.
+    """Pose outputs whose maxima the proof knows.
 
     To each: 0 for the travel along the line, 1 for the deviation across it, and the order of the derivative.
     """
@@ -83,7 +81,7 @@ def _proven(
     value = np.stack([found[request].value for request in requests])
     phi = np.stack([found[request].phi for request in requests])
     status, error = np.tile(searched, (len(names), 1)), np.full(value.shape, np.nan)
-    rssr.certify_point(
+    rssr.certify_maxima(
         np.stack(loops), joined, shares, np.array([known[name] for name in names], np.int64), accuracy.target,
         MOST_CELLS, status, value, phi, error, np.empty(n),
     )  # fmt: skip

@@ -9,6 +9,7 @@ import numpy as np
 
 from kernels import status as st
 from kernels.curves import samples as scan
+from kernels.types import TWO_PI, Status
 from sweep.errors import InputError
 from sweep.families.base import Accuracy, Array, Columns, Family
 from sweep.quantities.kinds import LimitPosition, Margin, Quantity, Reduced, Request, WindowAngle, requests
@@ -16,17 +17,7 @@ from sweep.quantities.resolve import STAY, resolve
 from sweep.reductions.extrema import true_extrema
 from sweep.reductions.fused import sampled_maxima
 from sweep.reductions.margins import combined, margin_suffixes, margins, with_transmission
-from sweep.reductions.sampling import (
-    DESIGN_STATUS,
-    TWO_PI,
-    Extremum,
-    Index,
-    Mask,
-    Status,
-    blocks,
-    sample_turn,
-    variable,
-)
+from sweep.reductions.sampling import DESIGN_STATUS, Extremum, Index, Mask, blocks, sample_turn, variable
 from sweep.reductions.window import Window, window_angle
 
 Found: TypeAlias = dict[Request, Extremum]
@@ -203,8 +194,9 @@ def _extended_is_largest(family: Family, designs: Array, position: str) -> Mask:
 
 
 def _limit(kind: str, wraps: bool, most: Extremum, least: Extremum, outward: Mask) -> tuple[Array, Array]:
-    """Return what the two limit positions say; ``wraps`` is about the position, ``outward`` (n,):
-    the largest is extended.
+    """Return what the two limit positions say; ``wraps`` is about the position.
+
+    ``outward`` (n,) tells where the largest position is the extended one.
     """
     ext = Extremum(*(np.where(outward, a, b) for a, b in zip(most, least, strict=True)))
     fold = Extremum(*(np.where(outward, b, a) for a, b in zip(most, least, strict=True)))
@@ -224,5 +216,5 @@ def _limit(kind: str, wraps: bool, most: Extremum, least: Extremum, outward: Mas
 
 
 def _principal(angle: Array) -> Array:
-    """Return the angle in (-pi, pi], as atan2 has it."""
+    """Angle in (-pi, pi], as atan2 has it."""
     return angle - TWO_PI * np.ceil((angle - np.pi) / TWO_PI)

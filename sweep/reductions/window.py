@@ -7,10 +7,10 @@ from typing import NamedTuple
 import numpy as np
 
 from kernels.curves import samples as scan
+from kernels.types import EPS, TWO_PI
 from sweep.families.base import Array, Family
-from sweep.reductions.refine import EPS
 from sweep.reductions.resolution import denser
-from sweep.reductions.sampling import TWO_PI, Index, Mask, blocks, pose_columns, sample_turn
+from sweep.reductions.sampling import Index, Mask, blocks, pose_columns, sample_turn
 
 PASSES = 60
 
@@ -24,18 +24,18 @@ class Window(NamedTuple):
 
     @classmethod
     def of_stroke(cls, least: Array, most: Array, err: Array, part: tuple[float, float]) -> Window:
-        """Return the part (fractions of the stroke, from the smallest position) of a motion between two positions."""
+        """Part (fractions of the stroke, from the smallest position) of a motion between two positions."""
         # A fraction 0 or 1 is open: rounding of the extreme position must not cut off the pose that reaches it.
         low = least + part[0] * (most - least) if part[0] > 0.0 else np.full(least.size, -np.inf)
         high = least + part[1] * (most - least) if part[1] < 1.0 else np.full(least.size, np.inf)
         return cls(low, high, err)
 
     def holds(self, rows: Index, positions: Array) -> Mask:
-        """Return whether the positions (k, m) of the designs ``rows`` (k,) lie in the window."""
+        """Whether the positions (k, m) of the designs ``rows`` (k,) lie in the window."""
         return (positions >= self.low[rows, None]) & (positions <= self.high[rows, None])
 
     def grazed(self, rows: Index, positions: Array) -> Mask:
-        """Return whether the motion may enter or leave the window between two samples and come back at once."""
+        """Whether the motion may enter or leave the window between two samples and come back at once."""
         doubtful = np.zeros(rows.size, np.bool_)
         for level in (self.low[rows], self.high[rows]):
             scan.grazes(positions, level, doubtful)
@@ -128,8 +128,7 @@ SAMPLES = 512
 
 
 def window_angle(family: Family, designs: Array, window: Window) -> tuple[Array, Array]:
-    """Return the crank angle over which the position lies in the window, of every design, and its error,
-    each (n,) [rad].
+    """Crank angle over which the position lies in the window, of every design, and its error, each (n,) [rad].
 
     Parameters
     ----------

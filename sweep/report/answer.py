@@ -10,8 +10,7 @@ from kernels import status as codes
 from sweep.dataset import store
 from sweep.optimise.local.start import DIFFERS
 from sweep.proof import read_proof
-from sweep.proof.study import EVENT
-from sweep.proof.words import proof_words
+from sweep.proof.study import EVENT, proof_words
 from sweep.quantities.limits import compared
 from sweep.report.dataset import Dataset, Row
 from sweep.report.front import front_sentence
@@ -31,9 +30,7 @@ NO_PROOF = "This is no proof of a global optimum"
 
 
 def answer(data: Dataset, found: Scan, further: Sequence[str] = ()) -> list[str]:
-    """Return sentences that answer the study's question, the most important first;
-    ``further`` ones come before the limits.
-    """
+    """Sentences that answer the study's question, the most important first; ``further`` ones before the limits."""
     total = data.designs
     if data.result is None:
         stops = max(fates(data, found)[:-1], key=lambda fate: fate.count, default=None)
@@ -110,7 +107,7 @@ def _limit_sentences(states: list[LimitState]) -> list[str]:
 
 
 def _edge_sentence(data: Dataset) -> list[str]:
-    """Return parameters that lie on the edge of what was searched."""
+    """Parameters that lie on the edge of what was searched."""
     edges = [f"{row.name} ({row.edge}, {row.value})" for row in parameter_rows(data) if row.edge]
     return (
         [f"On the edge of the space that was searched: {'; '.join(edges)}. A wider one may hold better."]
@@ -120,9 +117,7 @@ def _edge_sentence(data: Dataset) -> list[str]:
 
 
 def not_achieved(data: Dataset, found: Scan) -> list[str]:
-    """Return what the result does not reach:
-    limits it misses, an optimiser that did not settle or lost a better design.
-    """
+    """Say what is not reached: limits that are missed, an optimiser that did not settle or lost a better design."""
     faults = [f"{s.shown.words}: {s.value} instead of {s.bound}" for s in limit_states(data) if s.state in MISSED]
     objective = data.study.objective
     if data.optimum is not None:
@@ -185,7 +180,7 @@ def _residual(value: float) -> str:
 
 
 def _search(data: Dataset, found: Scan, *, proven: bool) -> str:
-    """Return how the optimum was searched, and that this proves nothing where there is no proof besides."""
+    """How the optimum was searched, and that this proves nothing where there is no proof besides."""
     if data.optimum is None:
         return f"{NO_PROOF}: no optimiser was run, and the best of the sweep is as fine as the spacing of its designs."
     starts, agree = data.starts, value_of(data.optimum, "agree")
@@ -214,7 +209,7 @@ def _count(n: float) -> str:
 
 
 def proof_sentence(data: Dataset) -> str:
-    """Return one sentence; empty where the study asked for no proof."""
+    """One sentence; empty where the study asked for no proof."""
     found = read_proof(store.beside(data.folder) / store.PROOF)
     if found is None:
         return ""
@@ -241,7 +236,7 @@ def _is_proven(data: Dataset) -> bool:
 
 
 def _unconfirmed(data: Dataset) -> tuple[str, ...]:
-    """Return that the search followed other extrema than the true ones, where it did."""
+    """Say that the search followed other extrema than the true ones, where it did."""
     best = data.optimum
     if best is None or best.get("ended") != DIFFERS:
         return ()

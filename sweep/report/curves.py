@@ -32,14 +32,12 @@ NOT_CURVES = ("role", "phi", "status")
 
 
 def style_of(role: str) -> dict[str, Any]:
-    """Return the style of a line: the reference is dashed, the result solid."""
+    """Style of a line: the reference is dashed, the result solid."""
     return {"color": REFERENCE, "linestyle": (0, (4, 2))} if role == "reference" else {"color": OPTIMUM}
 
 
 def shown_curves(columns: list[str], position: str) -> list[str]:
-    """Return columns that get a panel, in the order in which they stand:
-    the position, and all that are no coordinates.
-    """
+    """Columns that get a panel, in the order in which they stand: the position, and all that are no coordinates."""
     return [name for name in columns if name not in NOT_CURVES and (name == position or coordinate(name) is None)]
 
 
@@ -52,8 +50,7 @@ def motion_figure(
     window: tuple[float, float] | None,
     names: list[str] | None = None,
 ) -> Figure:
-    """Return panels over the crank angle from the lowest position,
-    so that two mechanisms can be laid over each other.
+    """Panels over the crank angle from the lowest position, so that two mechanisms can be laid over each other.
 
     ``names`` are the curves that get a panel, all that are none of coordinates if left out.
     """
@@ -117,24 +114,24 @@ def in_window(path: Array, window: tuple[float, float]) -> NDArray[np.bool_]:
 
 
 def is_angle(position: str) -> bool:
-    """Return whether a position is a follower's angle, known up to full turns."""
+    """Whether a position is a follower's angle, known up to full turns."""
     return stem(position) == "psi"
 
 
 def rotates(turn: pd.DataFrame, position: str) -> bool:
-    """Return whether the follower itself turns fully, so that it has no lowest position."""
+    """Whether the follower itself turns fully, so that it has no lowest position."""
     if not is_angle(position):
         return False
     return turns_fully(np.unwrap(turn[position].to_numpy(float)))
 
 
 def turns_fully(path: Array) -> bool:
-    """Return whether an unwrapped angle over one turn of the crank makes a turn itself."""
+    """Whether an unwrapped angle over one turn of the crank makes a turn itself."""
     return bool(abs(path[-1] - path[0]) > 0.9 * 2.0 * np.pi)
 
 
 def turning(curves: pd.DataFrame, position: str) -> bool:
-    """Return whether the follower of any of the mechanisms turns fully."""
+    """Whether the follower of any of the mechanisms turns fully."""
     return any(rotates(turn, position) for _, turn in curves.groupby("role", sort=False))
 
 
@@ -151,7 +148,7 @@ def motion_caption(curves: pd.DataFrame, position: str, speed: str, window: tupl
 
 
 def aligned_turn(turn: pd.DataFrame, name: str, position: str) -> tuple[Array, Array]:
-    """Return one closed turn that starts where the position is smallest; the position itself counts from there."""
+    """One closed turn that starts where the position is smallest; the position itself counts from there."""
     phi, values = turn["phi"].to_numpy(float), turn[name].to_numpy(float)
     path = turn[position].to_numpy(float)
     if is_angle(position):
@@ -176,9 +173,7 @@ def _limit_lines(axes: Axes, name: str, shown: Quantity, limits: tuple[Limit, ..
 
 
 def limit_values(name: str, limits: tuple[Limit, ...]) -> list[float]:
-    """Return ordinates, in stored units, that the limits set to a curve itself;
-    both signs where its size is limited.
-    """
+    """Ordinates, in stored units, that the limits set to a curve itself; both signs where its size is limited."""
     found = []
     for limit in limits:
         for value, outputs in (
@@ -196,7 +191,7 @@ POSES = 720
 
 
 def reference_row(study: Study) -> dict[str, float] | None:
-    """Return parameters and outputs of the study's reference design, computed as the sweep computes its designs."""
+    """Parameters and outputs of the study's reference design, computed as the sweep computes its designs."""
     if study.reference is None:
         return None
     matrix, _ = design_matrix(study.family, study.reference)
@@ -224,7 +219,7 @@ def curves(study: Study, rows: Mapping[str, Mapping[str, Any] | None]) -> pd.Dat
 
 
 def motion(data: Dataset) -> Figure | None:
-    """Return the curves over one turn."""
+    """Curves over one turn."""
     if data.curves is None or not len(data.curves):
         return None
     study = data.study

@@ -184,13 +184,13 @@ def read_dataset(folder: Path) -> Dataset:
 
 
 def study_of(plan: Mapping[str, Any], folder: Path) -> Study:
-    """Return the study a dataset answers, from its plan; its title and question stand there under ``about``."""
+    """Study a dataset answers, from its plan; its title and question stand there under ``about``."""
     about = plan.get("about", {"name": plan["name"]})
     return study_from_data({**plan["data"], "study": about}, store.beside(folder) / store.PLAN)
 
 
 def field_metadata(files: Sequence[Path]) -> tuple[dict[str, str], dict[str, str]]:
-    """Return units and definitions that stand in the schemas of Parquet files."""
+    """Units and definitions that stand in the schemas of Parquet files."""
     import pyarrow.parquet as pq
 
     units: dict[str, str] = {}
@@ -261,12 +261,12 @@ def _chosen(data: Dataset, design: dict[str, float]) -> Chosen:
 
 
 def objective_of(study: Study) -> str | None:
-    """Return the output that is to be small, if the study names one."""
+    """Output that is to be small, if the study names one."""
     return None if study.objective is None else study.objective.output
 
 
 def shown_objective(data: Dataset) -> Quantity | None:
-    """Return the objective as it is shown."""
+    """Objective as it is shown."""
     name = objective_of(data.study)
     return None if name is None else quantity(name, data.units.get(name, ""))
 
@@ -292,7 +292,7 @@ def gather(folder: Path) -> tuple[Dataset, Scan, list[Cells]]:
 
 
 def divided_axes(study: Study, feasible: int) -> list[Cells]:
-    """Return the swept axes, divided into cells: finely if a single map shows them all, else coarsely.
+    """Swept axes, divided into cells: finely if a single map shows them all, else coarsely.
 
     Axes of a sample are divided so that a cell holds some of the ``feasible`` designs on average.  Left out are signs,
     which make no map, and what [locus] or [fit] makes.

@@ -37,7 +37,7 @@ class FrontRow:
 
 
 def front_rows(data: Dataset) -> list[FrontRow]:
-    """Return the front, the loosest bound first; empty where the study asks for none."""
+    """Front, the loosest bound first; empty where the study asks for none."""
     objective, second = _quantities(data)
     if objective is None or second is None or data.study.pareto is None:
         return []
@@ -61,7 +61,7 @@ def front_rows(data: Dataset) -> list[FrontRow]:
 
 
 def front_names(data: Dataset) -> tuple[str, str]:
-    """Return symbols of the objective and the second output."""
+    """Symbols of the objective and the second output."""
     objective, second = _quantities(data)
     return (objective.symbol, second.symbol) if objective is not None and second is not None else ("", "")
 
@@ -81,7 +81,7 @@ def front_sentence(data: Dataset) -> str:
 
 
 def front_note(data: Dataset) -> str:
-    """Return how much of the front was searched."""
+    """How much of the front was searched."""
     if data.study.pareto is None or data.front is None:
         return ""
     given, begun = len(set(data.study.pareto.bounds)), len(data.front)

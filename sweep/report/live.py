@@ -40,9 +40,7 @@ SPATIAL, PLANE = ("three.min.js", "view.js"), ("charts.js", "lines.js", "page.js
 
 
 def live(data: Dataset, cells: Sequence[Cells], different: Sequence[Group]) -> dict[str, Any]:
-    """Return variables of the template:
-    the data of both moving sections as JSON, empty where there is nothing to show.
-    """
+    """Variables of the template: the data of both moving sections as JSON, empty where there is nothing to show."""
     shown = shown_designs(data, different)
     motion = moving(data, shown)
     lines = parallel(data, cells, shown)
@@ -139,7 +137,7 @@ def _motion(data: Dataset, shown: Shown, names: list[str]) -> Motion:
 
 
 def _placed(family: Family, design: dict[str, float], phi: Array, order: NDArray[np.intp]) -> tuple[Placed, ...]:
-    """Return stages and members with their joints in the order of the poses; a march is made in its own order."""
+    """Stages and members with their joints in the order of the poses; a march is made in its own order."""
     try:
         found = parts(family, design, phi)
     except InputError:  # a mechanism without joints has curves only
@@ -150,7 +148,7 @@ def _placed(family: Family, design: dict[str, float], phi: Array, order: NDArray
 
 
 def _panel(data: Dataset, name: str, motions: list[Motion]) -> dict[str, Any]:
-    """Return one curve: words, unit, limits, the range that its panel shows."""
+    """One curve: words, unit, limits, the range that its panel shows."""
     shown = quantity(name, data.units.get(name, ""))
     speed = data.study.speed
     windowed = name == "dev" and data.study.window is not None
@@ -191,7 +189,7 @@ def _design(data: Dataset, motion: Motion, factor: float) -> dict[str, Any]:
 
 
 def _part(one: Placed) -> dict[str, Any]:
-    """Return joints over the poses, fixed ones once; axes, kinds and links by the names that the page shows."""
+    """Joints over the poses, fixed ones once; axes, kinds and links by the names that the page shows."""
     part: Part = one.part
     name = {joint: f"{shown_name(joint)}{part.stage}" for joint in part.joints}
     return {
@@ -223,7 +221,7 @@ CONSTANT = 1e-12
 
 
 def parallel(data: Dataset, cells: Sequence[Cells], shown: Sequence[Shown]) -> dict[str, Any] | None:
-    """Return lines, their axes and the named designs among them; None where there are no two designs to compare.
+    """Lines, their axes and the named designs among them; None where there are no two designs to compare.
 
     A line's number is that of its row in :func:`sweep.load`, by which ``sweep export`` finds the design.
     """
@@ -253,7 +251,7 @@ def parallel(data: Dataset, cells: Sequence[Cells], shown: Sequence[Shown]) -> d
 
 
 def _axes(data: Dataset, cells: Sequence[Cells]) -> list[Quantity]:
-    """Return swept dimensions, then the objective and what is limited."""
+    """Swept dimensions, then the objective and what is limited."""
     study = data.study
     objective = [] if study.objective is None else [study.objective.output]
     second = [] if data.second is None else [data.second]
@@ -265,7 +263,7 @@ def _axes(data: Dataset, cells: Sequence[Cells]) -> list[Quantity]:
 
 
 def _lines(parts: Sequence[Path], names: list[str], objective: str | None) -> tuple[Array, Array]:
-    """Return row numbers and values of the best and of evenly spaced feasible designs, in the order of the rows."""
+    """Row numbers and values of the best and of evenly spaced feasible designs, in the order of the rows."""
     total = sum(int(rows.size) for rows, _ in _feasible(parts, names))
     step = max(1, -(-total // SPREAD))
     seen = 0

@@ -97,7 +97,7 @@ def made(data: Dataset) -> Made | None:
 
 
 def made_sentence(found: Made | None, tolerance: str) -> str:
-    """Return the yield and what costs most, for the answer."""
+    """Yield and what costs most, for the answer."""
     if found is None:
         return ""
     text = f"Of what is made within {tolerance}, {number(100.0 * found.share, 3)}\u00a0% keeps all limits"
@@ -110,7 +110,7 @@ def made_sentence(found: Made | None, tolerance: str) -> str:
 
 
 def histogram(data: Dataset, output: str) -> Histogram | None:
-    """Return one output of the optimum over what is made; None without tolerances or an optimum."""
+    """One output of the optimum over what is made; None without tolerances or an optimum."""
     study, row = data.study, data.optimum
     if study.tolerance is None or study.optimise is None or row is None:
         return None
@@ -137,9 +137,7 @@ def _kept(
 
 
 def _costs(study: Study, limits: list[Limit], worst: Limit, design: Array) -> list[Cost]:
-    """Return dimensions by what their tolerances cost, the dearest first:
-    the same mechanisms with one dimension exact.
-    """
+    """Dimensions by what their tolerances cost, the dearest first: the same mechanisms with one dimension exact."""
     assert study.tolerance is not None and study.optimise is not None
     designs = deviating(study.family, design, study.tolerance, study.optimise.seed, SINGLE)
     columns, kept = _kept(study, limits, designs)

@@ -51,8 +51,7 @@ def map_figure(
     marks: dict[str, tuple[float, float]],
     overlays: Sequence[Overlay],
 ) -> Figure:
-    """Return the best objective per cell, and the share of the cell's designs that is feasible;
-    ``marks`` in stored units.
+    """Best objective per cell, and the share of the cell's designs that is feasible; ``marks`` in stored units.
 
     Marks outside the space that was searched are left out.
     """
@@ -130,7 +129,7 @@ def trade_off_figure(
     limit: float | None,
     front: Callable[[Axes], None] | None = None,
 ) -> Figure:
-    """Return feasible designs, objective against a second criterion, with those that no other beats in both.
+    """Feasible designs, objective against a second criterion, with those that no other beats in both.
 
     ``front`` draws what the optimiser made of it.
     """
@@ -182,8 +181,9 @@ def _place(axes: Axes, marks: dict[str, tuple[float, float]], x_factor: float, y
 
 
 def _norm(values: Array) -> object:
-    """Choose a logarithmic scale where the values span more than a decade,
-    so that a few bad cells do not hide the good ones.
+    """Choose a logarithmic scale where the values span more than a decade.
+
+    So a few bad cells do not hide the good ones.
     """
     from matplotlib.colors import LogNorm, Normalize
 
@@ -210,9 +210,7 @@ def _share_norm(values: Array) -> object:
 
 
 def design_map(data: Dataset, found: Scan, cells: list[Cells], pair: tuple[str, str] | None = None) -> Figure | None:
-    """Show what the best design of each cell attains over two axes, the most telling pair if none is given,
-    or over one.
-    """
+    """Show what the best design of each cell attains over one or two axes, by default the most telling pair."""
     by_name = {c.name: c for c in cells}
     marks = {role: row for role, row in marked(data).items() if row is not None}
     shown = shown_objective(data)
@@ -253,9 +251,7 @@ def axis_quantity(data: Dataset, name: str) -> Quantity:
 
 
 def overlays(study: Study, x: str, y: str) -> list[Overlay]:
-    """Return known lines, ``[report] curves`` of the study, that lie in the plane of the map;
-    points in the axes' units.
-    """
+    """Known lines, ``[report] curves`` of the study, that lie in the plane of the map; points in the axes' units."""
     factors = {axis.name: axis.factor for axis in study.space.axes}
     found = []
     for curve in study.data.get("report", {}).get("curves", []):

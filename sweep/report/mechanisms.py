@@ -29,7 +29,7 @@ WORDS = {"space": "corner", "xy": "front", "zy": "side", "xz": "top"}
 
 
 def frames_of(parts: Sequence[Part]) -> dict[str, list[Part]]:
-    """Return parts by the frame that they stand in, in their order."""
+    """Parts by the frame that they stand in, in their order."""
     return {frame: [part for part in parts if part.frame == frame] for frame in dict.fromkeys(p.frame for p in parts)}
 
 
@@ -69,7 +69,7 @@ def mechanism_figure(
 
 
 def small_figures(designs: Mapping[str, Sequence[Part]], unit: str) -> dict[str, Figure]:
-    """Return one small picture of every design, its frames side by side, all to the same scale."""
+    """One small picture of every design, its frames side by side, all to the same scale."""
     columns = _columns(designs, None)
     figures, panels = {}, []
     for name, parts in designs.items():
@@ -100,13 +100,13 @@ def draw(axes: Axes, parts: Sequence[Part], view: str, unit: str, positions: int
 
 
 def first_pose(parts: Sequence[Part]) -> int:
-    """Return the first pose in which every joint exists; 0 where there is none."""
+    """First pose in which every joint exists; 0 where there is none."""
     whole = np.logical_and.reduce([np.isfinite(path).all(axis=1) for part in parts for path in part.joints.values()])
     return int(np.argmax(whole))
 
 
 def exists(parts: Sequence[Part]) -> bool:
-    """Return whether there are joints, and a pose in which all of them exist."""
+    """Whether there are joints, and a pose in which all of them exist."""
     found: list[Array] = [path for part in parts for path in part.joints.values()]
     return bool(found) and bool(np.logical_and.reduce([np.isfinite(path).all(axis=1) for path in found]).any())
 
@@ -128,7 +128,7 @@ def mechanism_caption(designs: Mapping[str, Sequence[Part]]) -> str:
 
 
 def _columns(designs: Mapping[str, Sequence[Part]], views: Sequence[str] | None) -> list[tuple[str, str]]:
-    """Return frames and views of the panels, the same for every design."""
+    """Frames and views of the panels, the same for every design."""
     by_frame: dict[str, list[Part]] = {}
     for parts in designs.values():
         for frame, same in frames_of(parts).items():
@@ -163,7 +163,7 @@ def projection(view: str) -> Array:
 
 
 def is_spatial(parts: Sequence[Part]) -> bool:
-    """Return whether joints leave the plane z = 0, or an axis is not square to it."""
+    """Whether joints leave the plane z = 0, or an axis is not square to it."""
     points = np.vstack([path for part in parts for path in part.joints.values()])
     turned = [axis for part in parts for name, axis in part.axes.items() if part.kinds[name] == "axis"]
     lean = any(abs(axis[0]) + abs(axis[1]) > 1e-9 for axis in turned)
@@ -241,7 +241,7 @@ def _axis(axes: Axes, at: Array, axis: Array, kind: str, seen: Array, reach: flo
 
 
 def parts_over_turn(study: Study, rows: Mapping[str, Mapping[str, Any]]) -> dict[str, list[Part]]:
-    """Return joints and links over one closed turn, for every role whose design has a pose."""
+    """Joints and links over one closed turn, for every role whose design has a pose."""
     found = {}
     for role, row in rows.items():
         design = {name: float(row[name]) for name in study.family.parameter_names}
@@ -260,9 +260,7 @@ def mechanism(parts: Mapping[str, Sequence[Part]]) -> Figure | None:
 
 
 def drawn_parts(data: Dataset) -> dict[str, list[Part]]:
-    """Return the result and reference with their joints over a turn;
-    empty where the study wants none, or they have none.
-    """
+    """Draw result and reference with their joints over a turn; empty where the study wants none, or they have none."""
     if data.study.output.curves == "none":
         return {}
     rows = {role: row for role, row in marked(data).items() if row is not None}

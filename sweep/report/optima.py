@@ -16,6 +16,7 @@ import numpy as np
 
 from kernels import status as codes
 from sweep.evaluation.summaries import design_outputs
+from sweep.optimise.local.kkt import AGREE
 from sweep.optimise.manufacture.tolerance import deviating
 from sweep.quantities.dimensions import sizes
 from sweep.quantities.limits import compared, meets
@@ -48,7 +49,7 @@ class Group:
 
 
 def groups(data: Dataset) -> list[Group]:
-    """Return the different optima, the study's answer first, then by their objective; empty without a search."""
+    """Different optima, the study's answer first, then by their objective; empty without a search."""
     objective = data.study.objective
     if data.optima is None or objective is None:
         return []
@@ -73,7 +74,7 @@ def groups(data: Dataset) -> list[Group]:
 
 
 def _places(data: Dataset, rows: list[dict[str, Any]]) -> tuple[Array, Array, Array]:
-    """Return lengths and ratios over the largest of them, angles over half a turn, signs; (k, number of each)."""
+    """Lengths and ratios over the largest of them, angles over half a turn, signs; (k, number of each)."""
     own = [p for p in data.study.bare.parameters if p.name in data.study.family.parameter_names]
     of = {unit: [p.name for p in own if p.unit == unit and p.choices is None] for unit in ("length", "ratio", "angle")}
     signs = [p.name for p in own if p.choices is not None]
@@ -94,9 +95,7 @@ def _apart(places: tuple[Array, Array, Array], j: int, k: int) -> float:
 
 
 def _mirrored(places: tuple[Array, Array, Array], values: list[float], j: int, k: int) -> bool:
-    """Return whether two designs have the same lengths but for signs, and the same objective:
-    one is the other in a mirror.
-    """
+    """Whether two designs have the same lengths but for signs, and the same objective: one mirrors the other."""
     sized = np.abs(places[0])
     same = abs(values[j] - values[k]) <= SAME * max(abs(values[j]), 1e-300)
     return same and float(np.abs(sized[j] - sized[k]).max(initial=0.0)) <= 1e-3 * ALIKE
@@ -182,7 +181,7 @@ class Optimum:
 
 
 def optima(data: Dataset, found: list[Group], folder: Path) -> list[Optimum]:
-    """Return the cards of the first few, with their pictures saved in ``folder``; none where there is only one."""
+    """Cards of the first few, with their pictures saved in ``folder``; none where there is only one."""
     objective = data.study.objective
     if len(found) < 2 or objective is None:
         return []
@@ -211,14 +210,16 @@ def optima(data: Dataset, found: list[Group], folder: Path) -> list[Optimum]:
 
 
 def optima_sentence(data: Dataset, found: list[Group]) -> str:
-    """Return how many different optima there are, for the answer."""
+    """How many different optima there are, for the answer."""
     objective = data.study.objective
     if len(found) < 2 or objective is None:
         return ""
     shown = quantity(objective.output, data.units.get(objective.output, ""))
     value, best = (float(group.row[objective.output]) for group in (found[1], found[0]))
     difference = change(shown, value, best)
+    same = sum(abs(float(group.row[objective.output]) - best) <= AGREE * abs(best) for group in found)
     text = f"The search ended in {len(found)} structurally different optima"
+    text += f", {same} of them in the best basin, whose values agree" if same > 1 else ""
     row = found[1].row
     paper = row.get("role") == "nominal"
     text += f"; the {'best on paper' if paper else 'next'} has {shown.show(value)}"
@@ -228,7 +229,7 @@ def optima_sentence(data: Dataset, found: list[Group]) -> str:
 
 
 def _made(data: Dataset, row: dict[str, Any]) -> str:
-    """Return the share of what is made within the tolerances that keeps all limits."""
+    """Share of what is made within the tolerances that keeps all limits."""
     study, known = data.study, float(row.get("yield", math.nan))
     limits = [x for x in study.output_limits if x.minimum is None or x.minimum != x.maximum]
     if study.tolerance is None or study.optimise is None or not limits:
@@ -257,7 +258,7 @@ def _sizes(data: Dataset, row: dict[str, Any]) -> tuple[tuple[str, str], ...]:
 
 
 def _extras(data: Dataset, row: dict[str, Any]) -> tuple[tuple[str, str], ...]:
-    """Return outputs of the dimensions alone that tell whether one would build it."""
+    """Return the outputs of the dimensions alone that tell whether one would build it."""
     family = data.study.bare
     design = np.array([[float(row[name]) for name in family.parameter_names]])
     found = []

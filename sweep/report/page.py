@@ -94,7 +94,7 @@ def _write(folder: Path, out: Path, say: Say) -> Path:
 def draw(
     data: Dataset, found: Scan, cells: list[Cells], parts: dict[str, list[Part]], folder: Path
 ) -> dict[str, Saved]:
-    """Return every figure the data allow, saved; keys are the names the template knows."""
+    """Every figure the data allow, saved; keys are the names the template knows."""
     made = {
         "map": maps.design_map(data, found, cells),
         "trade_off": maps.trade_off(data, found),
@@ -122,7 +122,7 @@ class OwnFigure:
 
 
 def own_figures(study: Study, folder: Path) -> list[OwnFigure]:
-    """Return the pictures that ``[report] figures`` names, as far as they lie in the folder."""
+    """Pictures that ``[report] figures`` names, as far as they lie in the folder."""
     found = []
     for entry in study.data.get("report", {}).get("figures", []):
         path = folder / entry["file"]
@@ -212,9 +212,7 @@ COSTS = 8  # dimensions that are shown
 
 
 def buildable(data: Dataset, several: list[Group], folder: Path) -> dict[str, Any]:
-    """Return names of the template with what they stand for;
-    pictures are saved in ``folder``, in the style in force.
-    """
+    """Names of the template with what they stand for; pictures are saved in ``folder``, in the style in force."""
     make, within = made(data), tolerance_words(data)
     costs = (
         ()

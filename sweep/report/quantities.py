@@ -71,7 +71,7 @@ class Quantity:
         return with_unit(number(stored * self.factor, digits), self.unit)
 
     def at_speed(self, stored: float, speed: float | None, digits: int = 4) -> str:
-        """Return the value at the size of the scene's speed with its unit, or nothing where a speed says nothing."""
+        """Value at the size of the scene's speed with its unit, or nothing where a speed says nothing."""
         if speed is None or self.order == 0:
             return ""
         return with_unit(number(stored * self.speed_scale * abs(speed) ** self.order, digits), self.speed_unit)
@@ -85,7 +85,7 @@ def with_unit(text: str, unit: str) -> str:
 
 
 def quantity(name: str, unit: str) -> Quantity:
-    """Return how the column ``name``, stored in ``unit`` ("mm" or "length", "rad", "1" ...), is shown."""
+    """How the column ``name``, stored in ``unit`` ("mm" or "length", "rad", "1" ...), is shown."""
     unit = internal_unit(unit)
     if of := without_minus(name):  # what is to be made large is shown as itself
         shown = quantity(of, unit)
@@ -129,7 +129,7 @@ SUBSCRIPTS = str.maketrans("0123456789", "₀₁₂₃₄₅₆₇₈₉")
 
 
 def _derivative(base: str) -> tuple[int, str, str]:
-    """Return the order, quantity and stage number of ``d2psi1``."""
+    """Order, quantity and stage number of ``d2psi1``."""
     _, root, stage = parts(base)
     match = re.fullmatch(r"(d[23]?)?(s|psi|dev)", root)
     if match:

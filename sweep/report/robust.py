@@ -49,7 +49,7 @@ class SlopeRow:
 
 
 def tolerance_rows(data: Dataset) -> list[ToleranceRow]:
-    """Return the distribution of the outputs of the optimum; empty where the study names no tolerances."""
+    """Distribution of the outputs of the optimum; empty where the study names no tolerances."""
     rows = []
     for row in optimum_rows(data, store.TOLERANCE):
         name = str(row["output"])
@@ -68,7 +68,7 @@ def tolerance_rows(data: Dataset) -> list[ToleranceRow]:
 
 
 def tolerance_words(data: Dataset) -> str:
-    """Return the tolerances as they are meant."""
+    """Tolerances as they are meant."""
     tolerance = data.study.tolerance
     if tolerance is None:
         return ""
@@ -93,7 +93,7 @@ class Slope:
 
 
 def slope_rows(data: Dataset) -> list[SlopeRow]:
-    """Return dimensions by how much they change the objective, the most telling first."""
+    """Dimensions by how much they change the objective, the most telling first."""
     texts = {p.name: p.text for p in data.study.family.parameters}
     return [
         SlopeRow(s.name, texts.get(s.name, ""), s.step, _percent(s.growing), _percent(s.shrinking))
@@ -126,7 +126,7 @@ def _percent(value: float) -> str:
 
 
 def optimum_rows(data: Dataset, file: str) -> list[dict[str, Any]]:
-    """Return rows of the optimum in a table beside the dataset; none where there is no such table."""
+    """Rows of the optimum in a table beside the dataset; none where there is no such table."""
     path = store.beside(data.folder) / file
     if not path.exists():
         return []
@@ -135,7 +135,7 @@ def optimum_rows(data: Dataset, file: str) -> list[dict[str, Any]]:
 
 
 def spread_figure(rows: Sequence[tuple[Quantity, float, float, float]], title: str) -> Figure:
-    """Return outputs with low end, mean and high end of what is made, in percent of the nominal value."""
+    """Return the outputs with low end, mean and high end of what is made, in percent of the nominal value."""
     figure = new_figure(NARROW, 0.27 * len(rows) + 1.1)
     axes = figure.subplots()
     for k, (_, low, mean, high) in enumerate(rows):
@@ -150,7 +150,7 @@ def spread_figure(rows: Sequence[tuple[Quantity, float, float, float]], title: s
 
 
 def slopes_figure(ranked: Sequence[Slope], objective: Quantity) -> Figure:
-    """Return two bars for each dimension: made larger, made smaller; the most telling first."""
+    """Two bars for each dimension: made larger, made smaller; the most telling first."""
     figure = new_figure(NARROW, 0.28 * len(ranked) + 1.1)
     axes = figure.subplots()
     for offset, values, colour, label in (

@@ -50,7 +50,7 @@ def limited(data: Dataset, name: str) -> Quantity:
 def limit_state(
     limit: Limit, row: Row | None, reference: Row | None, shown: Quantity, active_names: frozenset[str]
 ) -> LimitState:
-    """Return whether a design keeps a limit, and with how much room."""
+    """Whether a design keeps a limit, and with how much room."""
     value, other = value_of(row, limit.output), value_of(reference, limit.output)
     if _is_flag(limit.output):
         words = {1.0: "yes", 0.0: "no"}
@@ -101,7 +101,7 @@ def bound_words(limit: Limit, shown: Quantity) -> str:
 
 
 def limit_states(data: Dataset) -> list[LimitState]:
-    """Return every limit of the study at the result of the study."""
+    """Every limit of the study at the result of the study."""
     row = data.result
     active = frozenset(data.active)
     return [limit_state(x, row, data.reference, limited(data, x.output), active) for x in data.study.limits]
@@ -159,7 +159,7 @@ class Fate:
 
 
 def output_rows(data: Dataset) -> list[OutputRow]:
-    """Return the wanted outputs in designer's units, the objective first."""
+    """Wanted outputs in designer's units, the objective first."""
     study = data.study
     objective = [study.objective.output] if study.objective is not None else []
     rows = []
@@ -183,7 +183,7 @@ def output_rows(data: Dataset) -> list[OutputRow]:
 
 
 def parameter_rows(data: Dataset) -> list[ParameterRow]:
-    """Return all parameters of the mechanism with what was searched."""
+    """All parameters of the mechanism with what was searched."""
     study, rows = data.study, []
     links = () if study.locus is None else study.locus.made
     own = study.bare.parameter_names
@@ -213,7 +213,7 @@ def parameter_rows(data: Dataset) -> list[ParameterRow]:
 
 
 def _few_values(study: Study, name: str) -> list[float] | None:
-    """Return two or three listed values of an axis: to a sweep they are a choice, not a range."""
+    """Two or three listed values of an axis: to a sweep they are a choice, not a range."""
     axis = next((axis for axis in study.space.axes if axis.name == name), None)
     listed = "values" in study.written.get(name, {})
     return None if axis is None or axis.values is None or not listed or axis.count > FEW else axis.values.tolist()
@@ -248,9 +248,7 @@ def _by_limit(data: Dataset) -> list[tuple[str, int]]:
 
 
 def error_rows(data: Dataset, found: Scan) -> list[tuple[str, str, str, str]]:
-    """Return for every output its symbol, the error estimate at the result, the largest one in the sweep,
-    and that one relative.
-    """
+    """Symbol of every output, error estimate at the result, the largest one in the sweep, and that one relative."""
     rows = []
     for name in data.study.want:
         error = f"err_{name}"

@@ -17,6 +17,7 @@ from sweep.dataset import store
 from sweep.evaluation.statuses import meaning
 from sweep.evaluation.summaries import design_outputs
 from sweep.optimise import read_survey
+from sweep.optimise.local.descent import KKT
 from sweep.optimise.multistart.survey import started
 from sweep.quantities.limits import compared
 from sweep.report.answer import proof_sentence, search_words, survey_warnings
@@ -41,7 +42,7 @@ class Ending:
 
 
 def ending(folder: Path) -> Ending:
-    """Return the answer of a complete dataset in a few lines.
+    """Answer of a complete dataset in a few lines.
 
     Parameters
     ----------
@@ -92,7 +93,7 @@ def _best_of_sweep(data: Dataset, feasible: int) -> str:
 
 
 def _column(path: Path, name: str) -> Any:
-    """Return finite values of a column where the status is OK."""
+    """Finite values of a column where the status is OK."""
     import pyarrow.parquet as pq
 
     table = pq.read_table(path, columns=[name, "status"])
@@ -128,13 +129,16 @@ def held_back(held: list[str], ended: str) -> str:
 
 
 def _nearest(data: Dataset) -> list[str]:
-    """Return which limits the nearest design found misses, by how much."""
+    """Which limits the nearest design found misses, by how much."""
     assert data.optimum is not None
-    return ["no design keeps all limits", *_give_way(data, data.optimum, "the nearest design found")]
+    residual = float(data.optimum.get("kkt_residual", math.nan))
+    # Only where the conditions of the smallest relaxation hold is what is missed the least that has to give way.
+    open_end = [] if residual <= KKT else ["the search did not settle there: less may have to give way than it says"]
+    return ["no design keeps all limits", *_give_way(data, data.optimum, "the nearest design found"), *open_end]
 
 
 def _nearest_of_space(study: Study, data: Dataset) -> list[str]:
-    """Return the nearest miss among some designs of the space; where there are no limits, what most designs fail by."""
+    """Nearest miss among some designs of the space; where there are no limits, what most designs fail by."""
     if not study.limits:
         status, count = max(((s, n) for s, n in data.counts.items() if s != codes.OK), key=lambda item: item[1])
         return [f"no design has all that is wanted; {count} of {data.designs}: {meaning(status)}"]
@@ -174,9 +178,7 @@ def _give_way(data: Dataset, row: Mapping[str, Any], who: str) -> list[str]:
 
 
 def _shortfall(limit: Limit, values: Any) -> tuple[Any, Any]:
-    """Return by how much values miss a limit, in their unit and relative to the bound;
-    what does not exist misses by far.
-    """
+    """By how much values miss a limit, in their unit and relative to the bound; what does not exist misses by far."""
     x = compared(limit.output, np.asarray(values, np.float64))
     low = -math.inf if limit.minimum is None else limit.minimum
     high = math.inf if limit.maximum is None else limit.maximum

@@ -36,7 +36,7 @@ class LiftChain(NamedTuple):
 
 
 def rack_angles(table: Table, phi: Sequence[float] | Array, height: Sequence[float] | Array, side: int = 1) -> Array:
-    """Return angles of the rack at which the tooth has wanted heights; (18) of docs/feed.md.
+    """Angles of the rack at which the tooth has wanted heights; (18) of docs/feed.md.
 
     Parameters
     ----------
@@ -79,7 +79,7 @@ def lift_chain(
     weights: Sequence[float] | Array | None = None,
     norm: Norm = "squares",
 ) -> LiftChain:
-    """Return the joint F and coupler q that lead the rack best through wanted angles; (10), (19) of docs/feed.md.
+    """Joint F and coupler q that lead the rack best through wanted angles; (10), (19) of docs/feed.md.
 
     The weighted difference |F - E|^2 - q^2 is linear in fx, fy and q^2 - fx^2 - fy^2, so no start is needed.
 
@@ -150,7 +150,7 @@ def _least(system: Array, right: Array, weights: Array) -> Array:
 
 
 def _minimax(system: Array, right: Array, weights: Array) -> Array:
-    """Return the least largest weighted residual: a linear programme in the three unknowns and the bound."""
+    """Least largest weighted residual: a linear programme in the three unknowns and the bound."""
     from scipy.optimize import linprog
 
     start = _least(system, right, weights)

@@ -111,7 +111,7 @@ def fit_line(
 def _fitted(
     guide: Family, guided: GuidedPoint, own: Array, angles: Array, fit: LineFit, limits: Array
 ) -> tuple[Array, Array, NDArray[np.uint8]]:
-    """Return the fitted parameters (4, n), the travel (n,) and the status of guides at their input angles (n, m)."""
+    """Fitted parameters (4, n), the travel (n,) and the status of guides at their input angles (n, m)."""
     names = ("x_b", "y_b", "x_c", "y_c")
     pins = guide.poses(own, Angles.of(angles), frozenset(names))
     parts = [np.asarray(pins[name], np.float64) for name in names]
@@ -147,7 +147,7 @@ def driving_outputs(family: Family) -> tuple[str, ...]:
 
 
 def _guided(family: Family) -> tuple[GuidedPoint, str]:
-    """Return the guided point, and what follows the names of its stage's parameters: the stage's number in a chain."""
+    """Guided point, and what follows the names of its stage's parameters: the stage's number in a chain."""
     last = stages_of(family)[-1]
     guided = last.family.find(GuidedPoint)
     if guided is not None:
@@ -156,7 +156,7 @@ def _guided(family: Family) -> tuple[GuidedPoint, str]:
 
 
 def _driven(family: Family, designs: Array) -> tuple[Array, Array, NDArray[np.uint8]]:
-    """Return where the angle that drives the guide starts, how far it goes, each (n,), and the status of its drive."""
+    """Where the angle that drives the guide starts, how far it goes, each (n,), and the status of its drive."""
     n = len(designs)
     if not isinstance(family, Chain):
         return np.zeros(n), np.full(n, 2.0 * np.pi), np.zeros(n, np.uint8)
@@ -168,7 +168,7 @@ def _driven(family: Family, designs: Array) -> tuple[Array, Array, NDArray[np.ui
 
 
 def _input_angles(family: Family, designs: Array, driving: Array) -> Array:
-    """Return input angles of the guide (n, m) from those of what drives it."""
+    """Input angles of the guide (n, m) from those of what drives it."""
     if not isinstance(family, Chain):
         return driving
     last = family.stages[-1]

@@ -91,7 +91,7 @@ _ARMS = _Requirement(
 
 
 def extremes(table: Table, mode: Mode = "exact") -> pd.DataFrame:
-    """Return both extreme positions of a heddle drive for a wanted stroke, one row per row of the table.
+    """Both extreme positions of a heddle drive for a wanted stroke, one row per row of the table.
 
     Equations (1), (2) and, where the table has the columns O2B and BC, (10) of docs/heddle.md.
 
@@ -130,7 +130,7 @@ def extremes(table: Table, mode: Mode = "exact") -> pd.DataFrame:
 
 
 def rods(table: Table, mode: Mode = "exact") -> pd.DataFrame:
-    """Return all rods BC that give the cam lever a wanted swing, one row per rod; (11) of docs/heddle.md.
+    """All rods BC that give the cam lever a wanted swing, one row per rod; (11) of docs/heddle.md.
 
     Parameters
     ----------
@@ -169,8 +169,7 @@ def rods(table: Table, mode: Mode = "exact") -> pd.DataFrame:
 
 
 def shed(table: Table) -> pd.DataFrame:
-    """Return strokes of the shafts for a clear shed: proportional to the distance from the fell;
-    (14) of docs/heddle.md.
+    """Strokes of the shafts for a clear shed: proportional to the distance from the fell; (14) of docs/heddle.md.
 
     Parameters
     ----------
@@ -193,7 +192,7 @@ def shed(table: Table) -> pd.DataFrame:
 
 
 def arms(table: Table) -> pd.DataFrame:
-    """Return the arm O3D of every shaft, the other lengths being common to all shafts; (12), (13) of docs/heddle.md.
+    """Arm O3D of every shaft, the other lengths being common to all shafts; (12), (13) of docs/heddle.md.
 
     Parameters
     ----------
@@ -220,7 +219,7 @@ def arms(table: Table) -> pd.DataFrame:
 
 
 def _frame(columns: Mapping[str, np.ndarray], index: pd.Index) -> pd.DataFrame:
-    """Return the columns with their units: angles by their names, all others but number and status are lengths."""
+    """Columns with their units: angles by their names, all others but number and status are lengths."""
     import pandas as pd
 
     found = pd.DataFrame(columns, index=index)
@@ -230,7 +229,7 @@ def _frame(columns: Mapping[str, np.ndarray], index: pd.Index) -> pd.DataFrame:
 
 
 def _positions(matrix: Array, mode: Mode) -> tuple[Array, np.ndarray]:
-    """Return columns of the extreme positions by one of the two half angles, and their status."""
+    """Columns of the extreme positions by one of the two half angles, and their status."""
     if mode not in ("exact", "printed"):
         raise InputError("mode", mode, "exact or printed", "synthesis of a heddle drive")
     _refuse(matrix[:, 3] <= matrix[:, 2], matrix[:, 3], "O1O3", "a length above O1O2")
@@ -242,7 +241,7 @@ def _positions(matrix: Array, mode: Mode) -> tuple[Array, np.ndarray]:
 
 
 def _closure(matrix: Array, found: Array, lever: Array) -> Array:
-    """Return rows for the kernels: O2O3, O3C, both angles xi, and what is given of the cam lever."""
+    """Rows for the kernels: O2O3, O3C, both angles xi, and what is given of the cam lever."""
     return np.column_stack([matrix[:, 3] - matrix[:, 2], matrix[:, 4], found[:, 1], found[:, 2], lever])
 
 

@@ -1,27 +1,101 @@
-"""``synthesise``: families of mechanisms from a table of requirements, each with the verdict of its tests."""
+"""``synthesise``: families of mechanisms from a table of requirements, each with the verdict of its tests.
+
+Slotted links for a wanted crank angle between the limit positions follow from (8) of docs/slotted.md.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from kernels import status as st
+from kernels.families.slotted import crank_of_phi0
 from kernels.synthesis import acceptance
+from kernels.types import TWO_PI
 from sweep.errors import InputError
 from sweep.evaluation.angles import AngleUnit, in_radians, plain_names
 from sweep.evaluation.summaries import design_outputs
-from sweep.evaluation.tables import parameter_units
+from sweep.evaluation.tables import design_matrix, parameter_units
 from sweep.families import family as find_family
-from sweep.families.base import Accuracy, Array
-from sweep.synthesis.locus import TWO_PI, Found, Locus, locus
-from sweep.synthesis.slotted import CentralSlot, central_slots
+from sweep.families.base import Accuracy, Array, Parameter
+from sweep.synthesis.locus import Found, Locus, locus
 
 if TYPE_CHECKING:
     import pandas as pd
 
     from sweep.evaluation.tables import Table
+
+_LIMITS = ("phi_ext", "phi_fold", "psi_ext", "psi_fold", "swing", "phi0", "margin", "max_pressure_angle")
+
+
+@dataclass(frozen=True)
+class CentralSlot:
+    """The columns of the requirement."""
+
+    name: str = "slotted"
+    parameters: tuple[Parameter, ...] = (
+        Parameter("phi0", "angle", "crank angle of the shorter stroke, below 180 deg"),
+        Parameter("e", "length", "common perpendicular"),
+        Parameter("f", "length", "offset of the crank plane", default=0.0),
+        Parameter("alpha", "angle", "angle from the crank axis to the driven axis", default=0.0),
+    )
+
+    @property
+    def parameter_names(self) -> tuple[str, ...]:
+        """Columns of the requirement in order."""
+        return tuple(p.name for p in self.parameters)
+
+
+def central_slots(table: Table) -> pd.DataFrame:
+    """Fork slots with s = 0 for a wanted crank angle between the limit positions, one row per row of the table.
+
+    Parameters
+    ----------
+    table : DataFrame or mapping with phi0 [rad], the crank angle of the shorter stroke, below pi; e; f and alpha (0)
+
+    Returns
+    -------
+    DataFrame
+        the parameters of ``slotted``; ``phi_ext phi_fold psi_ext psi_fold swing phi0`` of the mechanism found, where
+        extended is the larger psi, so that ``phi0`` is the wanted angle or 2 pi minus it; ``margin`` (1),
+        ``max_pressure_angle`` (0) and ``status``: OK, or NOT_ADMISSIBLE where both axes meet at the driven pivot or
+        alpha is a right angle.
+
+    Raises
+    ------
+    InputError
+        for a missing or misspelt column, a bad number, a phi0 outside (0, pi).
+    """
+    import pandas as pd
+
+    matrix, _ = design_matrix(CentralSlot(), table)
+    phi0, e, f, alpha = matrix.T.copy()
+    bad = ~((phi0 > 0.0) & (phi0 < np.pi))
+    if bad.any():
+        row = int(np.argmax(bad))
+        raise InputError("phi0", float(phi0[row]), "an angle between 0 and pi", f"column phi0, row {row}")
+    status, a = np.empty(len(matrix), np.uint8), np.empty(len(matrix))
+    crank_of_phi0(phi0, e, f, alpha, status, a)
+    slotted = find_family("slotted")
+    given = {"a": a, "e": e, "f": f, "alpha": alpha}
+    columns: dict[str, object] = {p.name: given.get(p.name, p.default or 0.0) for p in slotted.parameters}
+    index = table.index if isinstance(table, pd.DataFrame) else pd.RangeIndex(len(matrix))
+    frame = pd.DataFrame(columns, index=index)
+    alive = np.flatnonzero(status == st.OK)
+    turn = design_outputs(slotted, frame.to_numpy()[alive], list(_LIMITS), Accuracy(target=1e-12))
+    status[alive] = turn["status"]
+    for name in _LIMITS:
+        values = np.full(len(matrix), np.nan)
+        values[alive] = turn[name]
+        frame[name] = values
+    frame["status"] = status
+    limits = dict.fromkeys(_LIMITS, "rad") | {"margin": "1"}
+    frame.attrs["units"] = parameter_units(slotted.parameters) | limits
+    return frame
+
 
 _EXACT = Accuracy(target=1e-12)
 # Requirements that are met by other mechanisms than those on a locus.
@@ -31,7 +105,7 @@ _OF_THEIR_OWN: dict[str, Callable[[Table], pd.DataFrame]] = {CentralSlot.name: c
 def synthesise(
     family: str, table: Table, *, max_pressure_angle: float | None = None, angles: AngleUnit | None = None
 ) -> pd.DataFrame:
-    """Return mechanisms that meet requirements, one row per solution, in the order of the table.
+    """Mechanisms that meet requirements, one row per solution, in the order of the table.
 
     Parameters
     ----------
@@ -40,7 +114,7 @@ def synthesise(
         place on the locus: crank angle of the extended position) or psi1 (rocker angle there); or phi1, c and
         direction = atan2(g, e) instead of e and g.  ``rssp``: stroke, f, alpha and phi0 with either phi1 or e; or,
         without phi0, e and the place s1 where the stroke begins.  ``slotted``: phi0, e, f and alpha of a fork slot with
-        s = 0 (:func:`sweep.synthesis.slotted.central_slots` says what it returns).
+        s = 0 (:func:`sweep.synthesis.mechanisms.central_slots` says what it returns).
         Swing and stroke are signed, folded minus extended.  Where psi1 or e is given there are two solutions, told
         apart by ``root``; without such a column both are returned, one row each.
     max_pressure_angle : limit for test (v) [rad]; none if not given
@@ -99,7 +173,7 @@ def synthesise(
 
 
 def _units(way: Locus) -> dict[str, str]:
-    """Return units of the columns that have one, by the letter of the output: an angle psi, a displacement s."""
+    """Units of the columns that have one, by the letter of the output: an angle psi, a displacement s."""
     mechanism, amplitude = find_family(way.family), way.parameter_names[0]
     letter, unit = mechanism.position, mechanism.pose_output[mechanism.position].unit
     angles = dict.fromkeys(("phi_ext", "phi_fold", "phi0", "max_pressure_angle"), "rad")

@@ -13,9 +13,10 @@ from functools import cached_property
 
 import numpy as np
 
+from kernels.types import TWO_PI, Status
 from sweep.families import family as find_family
 from sweep.families.base import Array, Parameter
-from sweep.synthesis.locus import TWO_PI, Found, Locus, Status, locus
+from sweep.synthesis.locus import Found, Locus, locus
 
 # The synthesis calls the crank angle of the extended position phi1; as a design output it is phi_ext.
 _PLACE = ("phi1", "phi_ext")
@@ -67,7 +68,7 @@ class OnLocus:
         return words if bad.any() else None
 
     def links(self, columns: Mapping[str, Array]) -> tuple[dict[str, Array], Status]:
-        """Return the parameters in ``made``, (n,) each, and the status of each design.
+        """Parameters in ``made``, (n,) each, and the status of each design.
 
         Parameters
         ----------
@@ -83,7 +84,7 @@ class OnLocus:
         return self.links_of(found), found.status
 
     def links_of(self, found: Found) -> dict[str, Array]:
-        """Return the parameters in ``made`` out of mechanisms of this stage alone."""
+        """Parameters in ``made`` out of mechanisms of this stage alone."""
         own = find_family(self.family).parameter_names
         return {name: found.designs[:, own.index(name.removesuffix(self.number))] for name in self.made}
 

@@ -109,7 +109,7 @@ class _Problem:
     sought: list[int]
 
     def solved(self, start: Array) -> dict[str, float | str]:
-        """Return the eyelet reached from one start."""
+        """Eyelet reached from one start."""
         from scipy.optimize import least_squares
 
         unit = float(np.abs(start[[SOUGHT.index(name) for name in LENGTHS]]).max())
@@ -150,7 +150,7 @@ class _Problem:
         return whole
 
     def errors(self, start: Array, x: Array) -> Array:
-        """Return errors of P, weighted, with the best P_h."""
+        """Errors of P, weighted, with the best P_h."""
         left = self.lengths(self.design(start, x)) - self.wanted
         errors: Array = np.sqrt(self.weights) * (left - self.weights @ left)
         return errors

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 
-from kernels.arithmetic.max_min import largest, smallest
+from kernels.arithmetic.intrinsics import largest, smallest
 from kernels.families.rssr.closure import Array, reduce_design
 from kernels.jit import kernel_fused
 

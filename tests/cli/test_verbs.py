@@ -17,6 +17,7 @@ from sweep.cli import main
 from sweep.cli.families import family_names
 from sweep.cli.main import VERBS
 from sweep.cli.tables import read_table, wanted
+from sweep.cli.warm import Part, rounds
 from sweep.report.terminal import Ending
 
 STUDY = """
@@ -242,6 +243,20 @@ def test_run_passes_its_options_on(study: Path, monkeypatch: pytest.MonkeyPatch)
     assert call("run", study, *options).output == "the answer\ndataset: somewhere\n"
     assert given["positional"] == (study, Path("x"), 3, "loky")
     assert {given["accuracy"], given["smoke"], given["force"]} == {1e-5, True}
+
+
+def test_warm_compiles_levels_in_processes_and_the_rest_by_the_tiny_version(study: Path) -> None:
+    first, then = rounds([str(study), "geared_dwell"])
+    assert [part.of for part in first].count("geared_dwell") > 1 and Part("geared_dwell") in first
+    assert [part.outputs for part in first if part.of.startswith(str(study))]
+    assert all(part.of.startswith(str(study)) and not part.outputs for part in then)
+    result = call("warm", study, "geared_dwell")
+    assert result.exit_code == 0, result.output
+
+
+def test_warm_refuses_what_is_neither_study_nor_family() -> None:
+    result = call("warm", "rsrr")
+    assert result.exit_code == 2 and "did you mean 'rssr'?" in result.output
 
 
 def test_interrupt_ends_with_130(study: Path, monkeypatch: pytest.MonkeyPatch) -> None:

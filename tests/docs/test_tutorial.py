@@ -43,8 +43,9 @@ def test_tutorial_gives_the_answers_it_shows(tmp_path, monkeypatch):
     for command in others:
         done = typed(command)
         assert done.exit_code == 0, done.output
-    (code,) = re.findall(r"```python\n(.*?)```", TEXT, flags=re.DOTALL)
-    exec(code, {})
+    names = {}
+    for code in re.findall(r"```python\n(.*?)```", TEXT, flags=re.DOTALL):
+        exec(code, names)
     study.write_text(re.sub(r"(?m)^b = .*$", "b = 40.0", text), encoding="utf-8")
     said += typed(check).output
     for line in ANSWERS:

@@ -14,7 +14,7 @@ import sweep
 import sweep.synthesis
 from sweep.dataset import reading
 from sweep.families import NAMES, family
-from sweep.synthesis import five_link, heddle, slotted
+from sweep.synthesis import five_link, heddle, mechanisms
 from sweep.synthesis.tasks import task3
 from tests.support.report_dataset import write_dataset
 
@@ -68,6 +68,7 @@ GUIDES = {"X1": 0.0, "Y1": 0.0, "Z1": 0.0, "X2": 4.0, "Y2": 0.0, "Z2": 0.0}
 POINT = {"X_E": 2.0, "Y_E": 2.0, "Z_E": 0.0}
 LEVER = {"stroke": 60.0, "O4E": 90.0, "O1O2": 100.0, "O1O3": 250.0, "O3C": 120.0, "kappa": 1.6}
 CRANK = {"a": 2.0, "e": 3.0, "f": 1.0, "alpha": 0.5, "Z1": -3.0, "Z2": 4.0, "phi_h": 0.0, "P_h": 8.0, "phi": 1.0}
+SLOT = {"phi0": 2.8, "e": 10.0, "f": 2.0, "alpha": 0.4}
 LOCUS = {"swing": 0.785, "phi0": 3.403, "phi1": 0.0, "e": 100.0, "f": 0.0, "g": 10.0, "alpha": 1.047}
 TABLES = {
     sweep.evaluate: lambda folder: sweep.evaluate("rssr", RSSR, "psi, dpsi", phi=[0.0]),
@@ -77,7 +78,9 @@ TABLES = {
     reading.best: lambda folder: reading.best(folder, "stroke"),
     reading.pareto: lambda folder: reading.pareto(folder, "stroke", "max_abs_dev"),
     sweep.synthesise: lambda folder: sweep.synthesise("rssr", LOCUS),
-    slotted.central_slots: lambda folder: sweep.synthesise("slotted", {"phi0": 2.8, "e": 10.0, "f": 2.0, "alpha": 0.4}),
+    mechanisms.central_slots: lambda folder: sweep.synthesise(
+        "slotted", {"phi0": 2.8, "e": 10.0, "f": 2.0, "alpha": 0.4}
+    ),
     five_link.five_links_with_limits: lambda folder: five_link.five_links_with_limits(RSSR, 0.1),
     task3.adjustments: lambda folder: task3.adjustments(RSSR),
     heddle.extremes: lambda folder: heddle.extremes(LEVER),

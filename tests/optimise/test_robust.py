@@ -13,7 +13,7 @@ import pytest
 import sweep
 import sweep.optimise.study
 from sweep.errors import SearchCutShort, StudyError
-from sweep.jobs.deadline import Deadline
+from sweep.jobs.signals import Deadline
 from sweep.optimise import Problem, explore
 from sweep.optimise.study import read_survey
 from sweep.study import Limit, OptimiseSettings, load_study, study_from_data

@@ -17,7 +17,7 @@ from sweep.jobs.signals import Stop
 from sweep.proof.certificate import concluded, read_proof, write
 from sweep.proof.question import question_of
 from sweep.proof.rounds import Cores, explored
-from sweep.proof.words import proof_words
+from sweep.proof.study import proof_words
 from sweep.study import ProveSettings, study_from_data
 from sweep.study.load import load_study
 from tests.reference.proof import covers, refuted

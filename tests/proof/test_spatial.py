@@ -15,7 +15,7 @@ from sweep.jobs.signals import Stop
 from sweep.proof.certificate import Proof, concluded, write
 from sweep.proof.question import Question, question_of
 from sweep.proof.rounds import Cores, explored
-from sweep.proof.words import proof_words
+from sweep.proof.study import proof_words
 from sweep.study import ProveSettings
 from sweep.study.load import load_study
 from tests.reference.proof import covers, refuted

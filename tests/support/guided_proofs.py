@@ -55,7 +55,7 @@ def rotating(name, n, seed, curves=("d2s",)):
     return designs[good], *map(np.array, columns)
 
 
-def certify(name, designs, curves, value, phi, target=1e-8, most=1000, function=rssr.certify_point):
+def certify(name, designs, curves, value, phi, target=1e-8, most=1000, function=rssr.certify_maxima):
     """Maxima, places, errors, status and number of enclosures, from claimed maxima."""
     _, _, rockers, couplings, last = MAKERS[name]
     which = np.array([CURVES[curve] for curve in curves], np.int64)

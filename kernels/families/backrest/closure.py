@@ -118,7 +118,8 @@ def scaled(designs: Array, i: int, row: Array) -> tuple[float, bool]:
 
 @inline
 def place(d: Array, phi: Any, rho: Any) -> Place:
-    """Return the axis of the back-rest, yarn branches, wrap angle; (1)-(5).
+    """Axis of the back-rest, yarn branches and wrap angle; (1)-(5).
+
     ``defined`` is false where a length is not real.
     """
     sin_p, cos_p = np.sin(phi), np.cos(phi)
@@ -144,9 +145,7 @@ def place(d: Array, phi: Any, rho: Any) -> Place:
 
 @inline
 def spring(d: Array, phi: Any) -> tuple[Any, Any, Any]:
-    """Return the length and force of the spring,
-    and the moment about O2 that it and the brackets' weight exert; (6), (7).
-    """
+    """Length and force of the spring, and the moment about O2 of it and the brackets' weight; (6), (7)."""
     px, py = -(d[13] * np.cos(phi + d[14])), d[13] * np.sin(phi + d[14])
     qx, qy = d[15] - d[2], d[16] - d[3]
     length = hypotenuse(qx - px, qy - py)
@@ -157,7 +156,7 @@ def spring(d: Array, phi: Any) -> tuple[Any, Any, Any]:
 
 @inline
 def directions(d: Array, phi: Any, at: Place, s1: Any, s2: Any) -> tuple[Any, Any, Any, Any, Any, Any, Any, Any]:
-    """Return projections of both reactions on the yarn's resultant and across it; (8).
+    """Projections of both reactions on the yarn's resultant and across it; (8).
 
     A, S, Q2, k1, k2, sin v, cos v and twice the sine of half the wrap angle, in the words of the page.
     """
@@ -174,7 +173,7 @@ def directions(d: Array, phi: Any, at: Place, s1: Any, s2: Any) -> tuple[Any, An
 
 @inline
 def forces(d: Array, phi: Any, at: Place, moment: Any, s1: Any, s2: Any) -> Forces:
-    """Return the yarn tension and reactions of guide and bracket; (9), and (10), (11) with the slider's couple."""
+    """Yarn tension and reactions of guide and bracket; (9), and (10), (11) with the slider's couple."""
     a, s, q2, k1, k2, sin_v, cos_v, both = directions(d, phi, at, s1, s2)
     weight = d[11]
     n2 = moment * (at.sin_d / divisor(at.numerator))
@@ -191,7 +190,7 @@ def forces(d: Array, phi: Any, at: Place, moment: Any, s1: Any, s2: Any) -> Forc
 
 @inline
 def residual(d: Array, phi: Any, rho: Any, mode: int) -> tuple[Any, bool]:
-    """Return the left side of the equation for the bracket angle with its poles multiplied out; (12).
+    """Left side of the equation for the bracket angle with its poles multiplied out; (12).
 
     False where the geometry is not defined or the slider would stand on the other side of the bracket's pivot.
     """

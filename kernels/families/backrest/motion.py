@@ -22,7 +22,7 @@ _MOST_STEPS = 200  # a bound, so that the loops always end; halving takes some 6
 
 @inline
 def _edge(d: Array, good: float, bad: float, rho: float, mode: int) -> float:
-    """Return the last angle from ``good`` towards ``bad`` at which the equation is defined."""
+    """Last angle from ``good`` towards ``bad`` at which the equation is defined."""
     for _ in range(_MOST_STEPS):
         middle = 0.5 * (good + bad)
         # no number lies between: the edge is known to the last bit
@@ -38,9 +38,7 @@ def _edge(d: Array, good: float, bad: float, rho: float, mode: int) -> float:
 
 @inline
 def _bracketed(d: Array, a: float, fa: float, b: float, fb: float, rho: float, mode: int) -> float:
-    """Return the root between a and b, where the signs differ:
-    inverse quadratic steps kept in the bracket (Chandrupatla).
-    """
+    """Root between a and b, where the signs differ: inverse quadratic steps kept in the bracket (Chandrupatla)."""
     c, fc, t = a, fa, 0.5
     for _ in range(_MOST_STEPS):
         x = a + t * (b - a)
@@ -98,8 +96,7 @@ def _kept(roots: Any, count: int, root: float) -> int:
 
 @inline
 def all_roots(d: Array, rho: float, mode: int, roots: Array) -> int:
-    """Find the roots between phi_lo and phi_hi, write them ascending into ``roots`` (at least MOST long);
-    return how many there are.
+    """Write the roots between phi_lo and phi_hi ascending into ``roots``, which is at least MOST long; their number.
 
     The interval is cut into CELLS cells.  A cell with one undefined end is cut at the edge; a cell pair whose middle is
     a dip towards zero is searched for a pair of roots, so that two close roots are not stepped over.

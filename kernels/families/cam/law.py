@@ -67,7 +67,7 @@ def _modified_sine(x: Any) -> Motion:
 
 @inline
 def normalised(law: int, x: Any) -> Motion:
-    """Return the curve of a rise at x in [0, 1], and its derivatives with respect to x; (2)-(4)."""
+    """Curve of a rise at x in [0, 1], and its derivatives with respect to x; (2)-(4)."""
     if law == POLYNOMIAL_345:
         return _polynomial(x)
     if law == MODIFIED_SINE:
@@ -77,7 +77,7 @@ def normalised(law: int, x: Any) -> Motion:
 
 @inline
 def fourier(designs: Numbers, i: int, first: int, phi: Any) -> Motion:
-    """Return the sum of c_k cos(k phi) + s_k sin(k phi), and its derivatives; (5)."""
+    """Sum of c_k cos(k phi) + s_k sin(k phi), and its derivatives; (5)."""
     u, v = np.cos(phi), np.sin(phi)
     c, s = u, v
     y, d1, d2, d3 = 0.0 * phi, 0.0 * phi, 0.0 * phi, 0.0 * phi
@@ -92,7 +92,7 @@ def fourier(designs: Numbers, i: int, first: int, phi: Any) -> Motion:
 
 @inline
 def law_is_valid(designs: Numbers, i: int, first: int) -> bool:
-    """Return whether the columns of the law mean something: a whole law, phases within a turn, numbers."""
+    """Whether the columns of the law mean something: a whole law, phases within a turn, numbers."""
     law, rise, dwell, fall = (
         designs[i, LAW].real, designs[i, RISE].real, designs[i, DWELL].real, designs[i, FALL].real,
     )  # fmt: skip
@@ -106,7 +106,7 @@ def law_is_valid(designs: Numbers, i: int, first: int) -> bool:
 
 @inline
 def motion(designs: Numbers, i: int, first: int, phi: Any) -> Motion:
-    """Return the law of one valid design at one cam angle, and its derivatives with respect to the angle; (1)."""
+    """Law of one valid design at one cam angle, and its derivatives with respect to the angle; (1)."""
     law = int(designs[i, LAW].real)
     if law == FOURIER:
         return fourier(designs, i, first, phi)

@@ -36,8 +36,7 @@ def poses(
     status: Status,
     out: Outputs,
 ) -> None:
-    """Compute the follower displacement, derivatives,
-    pressure angle and pitch curve of every design at its cam angles.
+    """Follower displacement, derivatives, pressure angle and pitch curve of every design at its cam angles.
 
     Parameters
     ----------

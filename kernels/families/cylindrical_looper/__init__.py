@@ -4,8 +4,6 @@
 drive has its ball beside the shaft's axis.
 """
 
-from kernels.families.cylindrical_looper.closure import Design as Design
-from kernels.families.cylindrical_looper.coupled import Offset as Offset
 from kernels.families.cylindrical_looper.coupled import coupled_poses as coupled_poses
 from kernels.families.cylindrical_looper.motion import Outputs as Outputs
 from kernels.families.cylindrical_looper.motion import poses as poses

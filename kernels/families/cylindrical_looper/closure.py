@@ -21,34 +21,10 @@ from numpy.typing import NDArray
 from kernels import status as st
 from kernels.arithmetic.vectors import Vector
 from kernels.jit import inline, kernel
-from kernels.linkage.looper_drive import Crank, reduce_crank
+from kernels.linkage.driven_ball import Crank, reduce_crank
 from kernels.linkage.slider_closure import Reduced as Slider
 from kernels.linkage.slider_closure import reduce_scaled
 from kernels.types import Numbers
-
-
-class Design(NamedTuple):
-    """Columns of the design matrix: lengths in one unit, angles in radians, branches +1 or -1, slides 0 or 1."""
-
-    a1: float
-    b1: float
-    c1: float
-    e1: float
-    f1: float
-    g1: float
-    alpha1: float
-    branch1: float
-    a2: float
-    b2: float
-    e2: float
-    f2: float
-    alpha2: float
-    offset2: float
-    branch2: float
-    slides: float
-    p0x: float
-    p0y: float
-    p0z: float
 
 
 class Reduced(NamedTuple):
@@ -67,7 +43,7 @@ class Reduced(NamedTuple):
 
 @inline
 def reduce_design(designs: Numbers, i: int) -> Reduced:
-    """Return constants of one design; ``valid`` is false for links of no length and for what is not finite."""
+    """Constants of one design; ``valid`` is false for links of no length and for what is not finite."""
     d = designs[i]
     _, exponent = math.frexp(d[0].real)
     unit, per = math.ldexp(1.0, exponent), math.ldexp(1.0, -exponent)
@@ -138,16 +114,14 @@ def place(k: Loops, cos: Any, sin: Any) -> Place:
 
 @inline
 def _at(k: Loops, centre: float, half: float, tau: float) -> tuple[float, float]:
-    """Return the angle of the shaft for the scan's parameter, and H there;
-    on an arc the root of its ends becomes smooth.
-    """
+    """Angle of the shaft for the scan's parameter, and H there; on an arc the root of its ends becomes smooth."""
     psi = tau if half >= math.pi else centre - half * math.cos(tau)
     return psi, place(k, math.cos(psi), math.sin(psi)).value
 
 
 @kernel
 def _bracketed(k: Loops, centre: float, half: float, lo: float, hi: float, f_lo: float) -> float:
-    """Return the shaft angle of the root between two places of opposite sign: bisection, which no shape misleads."""
+    """Shaft angle of the root between two places of opposite sign: bisection, which no shape misleads."""
     # 30 halvings of a cell leave 1e-10 rad, of which the caller's Newton steps leave rounding
     for _ in range(30):
         mid = 0.5 * (lo + hi)
@@ -181,9 +155,7 @@ def _dip(k: Loops, centre: float, half: float, lo: float, hi: float, sign: float
 
 @inline
 def _arc(k: Loops) -> tuple[float, float]:
-    """Return the centre and half width of the arc of shaft angles at which the second coupler reaches;
-    half 0 where none.
-    """
+    """Centre and half width of the arc of shaft angles at which the second coupler reaches; half 0 where none."""
     reach, away = 2.0 * k.d * math.hypot(k.x2, k.y2), math.hypot(k.x2, k.y2)
     # q = b2^2 - |ball - pin|^2 lies between (b2 - away - d)(b2 + away + d) and (b2 - |away - d|)(b2 + |away - d|)
     low = (k.b2 - away - abs(k.d)) * (k.b2 + away + abs(k.d))
@@ -198,8 +170,9 @@ def _arc(k: Loops) -> tuple[float, float]:
 
 @kernel
 def shaft_angles(k: Loops, noise: float, at: NDArray[np.float64]) -> tuple[int, float, float]:
-    """Find the shaft angles of all solutions, write them into ``at`` (MOST numbers);
-    return their number, the least and the largest H met.
+    """Write the shaft angles of all solutions into ``at`` (MOST numbers).
+
+    Returns their number, the least and the largest H met.
 
     A place where |H| comes as near to zero as ``noise`` without crossing it counts as one.
     """
@@ -245,9 +218,7 @@ def shaft_angles(k: Loops, noise: float, at: NDArray[np.float64]) -> tuple[int, 
 def chosen(
     k: Loops, branch1: float, mode: int, noise: float, at: NDArray[np.float64]
 ) -> tuple[int, float, float, float]:
-    """Return the status, cosine and sine of the solution that branches and mode name,
-    and -|least H largest H| where none.
-    """
+    """Status, cosine and sine of the solution that branches and mode name; -|least H largest H| where there is none."""
     count, least, most = shaft_angles(k, noise, at)
     best, second, found, other = -math.inf, -math.inf, math.nan, math.nan
     for n in range(count):

@@ -23,18 +23,6 @@ from kernels.linkage.outputs import put_angle, put_block, put_loop, put_point
 from kernels.types import EPS, Numbers, Status
 
 
-class Offset(NamedTuple):
-    """Columns of the design matrix after those of :class:`Design`: the second ball on the shaft, and crank 2's place.
-
-    ``mode`` 1 or 2 names one of several solutions of the same branches.
-    """
-
-    d2: float
-    beta2: float
-    gamma2: float
-    mode: float
-
-
 class Fixed(NamedTuple):
     """What the offset adds to the constants of a design, in units of the first crank's."""
 
@@ -63,13 +51,13 @@ def _fixed(designs: Numbers, i: int, r: Reduced) -> Fixed:
 
 @inline
 def _solve2(j11: Any, j12: Any, j21: Any, j22: Any, per: Any, p: Any, q: Any) -> tuple[Any, Any]:
-    """Return the solution of the two linear equations, ``per`` one over the determinant."""
+    """Solution of the two linear equations, ``per`` one over the determinant."""
     return (p * j22 - q * j12) * per, (q * j11 - p * j21) * per
 
 
 @inline
 def _square(t: Vector, d: Vector) -> Any:
-    """Return the square of the part of d across t."""
+    """Square of the part of d across t."""
     along = dot(t, d)
     size = dot(t, t)
     rest = dot(d, d) - along * along / size if size.real > 0.0 else dot(d, d)
@@ -78,14 +66,14 @@ def _square(t: Vector, d: Vector) -> Any:
 
 @inline
 def _along(t: Vector, d: Vector) -> Any:
-    """Return the part of d along t; 0 where t has no direction."""
+    """Part of d along t; 0 where t has no direction."""
     size = dot(t, t)
     return dot(t, d) / np.sqrt(size) if size.real > 0.0 else 0.0 * size
 
 
 @inline
 def _together(k: Loops, cos: Any, sin: Any, s: Any) -> tuple[Any, Any, Any]:
-    """Return one step of Newton's method for angle and place at once.
+    """One step of Newton's method for angle and place at once.
 
     The place that belongs to a rounded angle is off by more than a rounding where the second coupler stands across the
     shaft; the place that solves both equations is not.
@@ -106,7 +94,7 @@ def _together(k: Loops, cos: Any, sin: Any, s: Any) -> tuple[Any, Any, Any]:
 
 @inline
 def _derived(k: Loops, first: Path, second: Path, cos: Any, sin: Any, s: Any, code: int) -> tuple[Swung, Slide]:
-    """Return derivatives of angle and place from d . d = b^2 of both couplers, to the third; (8), (9)."""
+    """Return the derivatives of angle and place from d . d = b^2 of both couplers, to the third; (8), (9)."""
     r1: Vector = (k.c1 * cos, k.c1 * sin, 0.0 * cos)
     r2: Vector = (
         k.d * (cos * k.cos_beta - sin * k.sin_beta), k.d * (sin * k.cos_beta + cos * k.sin_beta), 0.0 * cos,
@@ -152,7 +140,7 @@ def _curve(r: Vector, t: Vector, p1: Any, p2: Any, s2: Any, pin: Vector) -> Vect
 
 @inline
 def _pins(r: Reduced, o: Fixed, u: float, v: float) -> tuple[Path, Path]:
-    """Return pins of both cranks from the rocker's foot at s = 0, with three derivatives; (2), (6)."""
+    """Pins of both cranks from the rocker's foot at s = 0, with three derivatives; (2), (6)."""
     one, two = r.swings, r.moves
     hu, hv, tu, tv = one.a * (one.ca * u), one.a * (one.ca * v), one.a * (one.sa * u), one.a * (one.sa * v)
     pin1 = (one.a * u - one.e, one.y0 + hv, one.lift - one.g - tv)
@@ -176,7 +164,7 @@ def _about(o: Fixed, x: Any, z: Any, y: Any) -> Vector:
 
 @inline
 def _solved(r: Reduced, o: Fixed, first: Path, second: Path, at: NDArray[np.float64]) -> tuple[Swung, Slide]:
-    """Return both loops at one crank angle; ``at`` is room for the scan."""
+    """Both loops at one crank angle; ``at`` is room for the scan."""
     p1, p2 = first[0], second[0]
     b1, c1, b2, branch = r.swings.b, r.swings.c, r.moves.b, r.moves.branch
     k = Loops(p1[0], p1[1], p1[2], p2[0], p2[1], p2[2], b1, c1, b2, o.d, o.cos_beta, o.sin_beta, branch, r.slides)
@@ -224,12 +212,11 @@ def coupled_poses(
     out: Outputs,
     joints: Numbers | None,
 ) -> None:
-    """Compute what :func:`kernels.families.cylindrical_looper.motion.poses` does,
-    for designs whose second ball is off the axis.
+    """Poses as of the module ``motion``, for designs whose second ball is off the shaft's axis.
 
     Parameters
     ----------
-    designs : (n, 23) columns of :class:`kernels.families.cylindrical_looper.closure.Design` and :class:`Offset`
+    designs : (n, 23) columns as `PARAMETERS` of sweep/families/cylindrical_looper.py
     cos_phi, sin_phi : (n, m), or (1, m) shared by all designs
     status : (n, m) out; OK, NOT_ASSEMBLED (no solution on these branches), DEAD_POINT (the determinant of both loops
         vanishes), INVALID_INPUT

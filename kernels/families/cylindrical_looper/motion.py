@@ -16,8 +16,7 @@ from kernels.arithmetic.vectors import add, cross, mix, scale
 from kernels.families.cylindrical_looper.closure import Reduced, reduce_design
 from kernels.jit import inline, kernel
 from kernels.linkage.bodies import FRAME, Links, Moving, put, put_ball, put_body, put_crank, put_line, put_rod, shaft
-from kernels.linkage.driven_ball import Path, Swung, rotated, swing
-from kernels.linkage.looper_drive import pin_path
+from kernels.linkage.driven_ball import Path, Swung, pin_path, rotated, swing
 from kernels.linkage.outputs import has_point, put_angle, put_block, put_loop, put_point
 from kernels.linkage.slider_closure import Reduced as Slider
 from kernels.linkage.slider_closure import derivatives, place, tolerance
@@ -55,7 +54,7 @@ def _slide(r: Slider, u: float, v: float) -> Slide:
 
 @inline
 def _first_crank(r: Reduced, slide: Slide, u: float, v: float) -> Path:
-    """Return the ball of crank 1 from the foot of the shaft's rocker, which slides with the shaft or does not, (2)."""
+    """Ball of crank 1 from the foot of the shaft's rocker, which slides with the shaft or does not, (2)."""
     m, m1, m2, m3 = pin_path(r.swings, u, v)
     if r.slides == 1.0:
         m, m1 = (m[0], m[1], m[2] - slide.s), (m1[0], m1[1], m1[2] - slide.first)
@@ -86,14 +85,13 @@ def poses(
     out: Outputs,
     joints: Numbers | None,
 ) -> None:
-    """Compute the angle and place of the looper's shaft and the working point, with derivatives,
-    of every design and crank angle.
+    """Angle and place of the looper's shaft and the working point, with derivatives, of every design and crank angle.
 
     Equations (1)-(5) of docs/cylindrical_looper.md.
 
     Parameters
     ----------
-    designs : (n, 19) columns of :class:`Design`
+    designs : (n, 19) columns as `PARAMETERS` of sweep/families/cylindrical_looper.py
     cos_phi, sin_phi : (n, m), or (1, m) shared by all designs
     status : (n, m) out; OK, or that of the first loop that is not, the slider-crank's before the crank-rocker's:
         NOT_ASSEMBLED, DEAD_POINT, SINGULAR (crank pin 1 on the shaft's axis); INVALID_INPUT.  A loop that nothing
@@ -141,7 +139,7 @@ def poses(
 
 @inline
 def _code(valid: bool, slide_counts: bool, of_slide: int, shaft_counts: bool, of_shaft: int) -> int:
-    """Return the status of the first loop that counts and is not OK."""
+    """Status of the first loop that counts and is not OK."""
     if not valid:
         return st.INVALID_INPUT
     # the slider-crank first: the crank-rocker's driving ball may hang on it
@@ -152,7 +150,7 @@ def _code(valid: bool, slide_counts: bool, of_slide: int, shaft_counts: bool, of
 
 @inline
 def carried(r: Reduced, one: Swung, two: Slide) -> Path:
-    """Return the working point from the shaft's foot: fixed to the shaft, which turns and slides, (4)."""
+    """Working point from the shaft's foot: fixed to the shaft, which turns and slides, (4)."""
     # zeros of the design's own kind: complex where the design is, or the tuples would mix two types
     none = 0.0 * r.swings.e
     along = (

@@ -4,10 +4,8 @@
 and leaving, ``triad`` is the rack on three leads.
 """
 
-from kernels.families.feed.closure import Design as Design
 from kernels.families.feed.motion import differences as differences
 from kernels.families.feed.motion import feeding as feeding
 from kernels.families.feed.motion import lift_rows as lift_rows
 from kernels.families.feed.motion import poses as poses
-from kernels.families.feed.triad import TriadDesign as TriadDesign
 from kernels.families.feed.triad import triad_poses as triad_poses

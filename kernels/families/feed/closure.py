@@ -18,34 +18,6 @@ from kernels.linkage.verdict import follower_status, pose_status
 from kernels.types import EPS, Array
 
 
-class Design(NamedTuple):
-    """Columns of the design matrix: lengths in one unit, angles in radians, assembly modes +1 or -1."""
-
-    h_a: float
-    h_b: float
-    h_c: float
-    h_e: float
-    h_f: float
-    h_g: float
-    h_alpha: float
-    rh: float
-    dh: float
-    xE: float
-    yE: float
-    rE: float
-    dE: float
-    q: float
-    fx: float
-    fy: float
-    tx: float
-    ty: float
-    tooth: float
-    pitch: float
-    y_plate: float
-    h_sigma: float
-    bar_branch: float
-
-
 class Rocker(NamedTuple):
     """The four-bar of the horizontal chain in scaled lengths, spatial or planar."""
 
@@ -100,7 +72,7 @@ class Driven(NamedTuple):
 
 @inline
 def reduce_design(designs: Array, i: int) -> Reduced:
-    """Return constants of one design; ``valid`` is false for zero or negative lengths and for what is not finite."""
+    """Constants of one design; ``valid`` is false for zero or negative lengths and for what is not finite."""
     _, exponent = math.frexp(designs[i, 13].real)
     unit, per_unit = math.ldexp(1.0, exponent), math.ldexp(1.0, -exponent)
     a, b, c, e = designs[i, 0] * per_unit, designs[i, 1] * per_unit, designs[i, 2] * per_unit, designs[i, 3] * per_unit
@@ -130,7 +102,7 @@ def reduce_design(designs: Array, i: int) -> Reduced:
 
 @inline
 def rocker_angle(r: Rocker, u: Any, v: Any) -> tuple[Any, Any, Any, Any, int]:
-    """Return the cosine and sine of the rocker's angle, its first two derivatives by phi, and the status; (1)-(3)."""
+    """Cosine and sine of the rocker's angle, its first two derivatives by phi, and the status; (1)-(3)."""
     x, y, z = r.e - r.a * u, r.y0 + r.a * (r.ca * v), r.z0 + r.a * (r.sa * v)
     w = 0.5 * (r.links + (x * x + y * y + z * z)) / r.c
     rr = x * x + y * y
@@ -156,21 +128,21 @@ def rocker_angle(r: Rocker, u: Any, v: Any) -> tuple[Any, Any, Any, Any, int]:
 
 @inline
 def rocker_pin(r: Reduced, cos: Any, sin: Any, one: Any, two: Any) -> Driven:
-    """Return the pin H of the rocker's arm; (4)."""
+    """Pin H of the rocker's arm; (4)."""
     x, y = r.arm * (cos * r.cos_arm - sin * r.sin_arm), r.arm * (sin * r.cos_arm + cos * r.sin_arm)
     return Driven(r.rocker.e + x, y, -(one * y), one * x, -(two * y) - one * one * x, two * x - one * one * y)
 
 
 @inline
 def eccentric(x0: Any, y0: Any, radius: Any, cos: Any, sin: Any, u: Any, v: Any) -> Driven:
-    """Return the centre of an eccentric that stands ahead of the crank by the angle with that cosine and sine; (5)."""
+    """Centre of an eccentric that stands ahead of the crank by the angle with that cosine and sine; (5)."""
     x, y = radius * (u * cos - v * sin), radius * (v * cos + u * sin)
     return Driven(x0 + x, y0 + y, -y, x, -x, -y)
 
 
 @inline
 def bar_angle(r: Reduced, h: Driven, e: Driven) -> tuple[Any, Any, Any, Any, int]:
-    """Return the cosine and sine of the rack's angle chi, its first two derivatives by phi, and the status; (6)-(8)."""
+    """Cosine and sine of the rack's angle chi, its first two derivatives by phi, and the status; (6)-(8)."""
     wx, wy = h.x - e.x, h.y - e.y
     w, f = hypotenuse(wx, wy), hypotenuse(r.fx, r.fy)
     # Heron's product: the triangle of H, E, F without squares of its sides
@@ -204,5 +176,5 @@ def point_of_rack(h: Driven, cos: Any, sin: Any, one: Any, two: Any, x: Any, y: 
 
 @inline
 def angle_of(cos: Any, sin: Any) -> Any:
-    """Return the angle of a direction, in (-pi, pi]."""
+    """Angle of a direction, in (-pi, pi]."""
     return arctan2(sin, cos)

@@ -33,7 +33,7 @@ OUTPUTS = (
 def rack_at(
     r: Reduced, u: Any, v: Any
 ) -> tuple[tuple[Any, Any, Any, Any], tuple[Any, Any, Any, Any], Driven, Driven, int]:
-    """Return the rocker and rack as (cos, sin, first, second derivative), pins H and E, and the status of the pose."""
+    """Rocker and rack as (cos, sin, first, second derivative), pins H and E, and the status of the pose."""
     cos, sin, one, two, code = rocker_angle(r.rocker, u, v)
     h = rocker_pin(r, cos, sin, one, two)
     e = eccentric(r.x_ecc, r.y_ecc, r.r_ecc, r.cos_ecc, r.sin_ecc, u, v)
@@ -48,7 +48,7 @@ def rack_at(
 
 @inline
 def tooth_at(r: Reduced, u: Any, v: Any) -> tuple[Driven, int]:
-    """Return the path of the tooth and the status of the pose."""
+    """Path of the tooth and the status of the pose."""
     _, bar, h, _, code = rack_at(r, u, v)
     return point_of_rack(h, bar[0], bar[1], bar[2], bar[3], r.tx, r.ty), code
 
@@ -59,7 +59,7 @@ def poses(designs: Array, cos_phi: Array, sin_phi: Array, status: Status, output
 
     Parameters
     ----------
-    designs : (n, 23) columns of :class:`kernels.families.feed.Design`
+    designs : (n, 23) columns as `PARAMETERS` of sweep/families/feed.py
     cos_phi, sin_phi : (n, m), or (1, m) shared by all designs
     status : (n, m) out; OK, NOT_ASSEMBLED, DEAD_POINT, SINGULAR or INVALID_INPUT, of the rocker or of the rack
     outputs : (18, n, m) out in the order of :data:`OUTPUTS` [rad, length]
@@ -91,12 +91,11 @@ def poses(designs: Array, cos_phi: Array, sin_phi: Array, status: Status, output
 
 @kernel
 def differences(designs: Array, cos_phi: Array, sin_phi: Array, chi: Array, status: Status, dq: Array) -> None:
-    """Compute the weighted difference |F - E|^2 - q^2 of the lift coupler for a rack at prescribed angles;
-    (10) of docs/feed.md.
+    """Weighted difference |F - E|^2 - q^2 of the lift coupler for a rack at prescribed angles; (10) of docs/feed.md.
 
     Parameters
     ----------
-    designs : (n, 23) columns of :class:`kernels.families.feed.Design`
+    designs : (n, 23) columns as `PARAMETERS` of sweep/families/feed.py
     cos_phi, sin_phi : (n, m), or (1, m) shared by all designs
     chi : (n, m) prescribed angles of the rack [rad]
     status : (n, m) out, of the rocker alone;  dq : (n, m) out [length^2]; nan where the rocker is not assembled
@@ -127,7 +126,7 @@ def lift_rows(designs: Array, cos_phi: Array, sin_phi: Array, chi: Array, status
 
     Parameters
     ----------
-    designs : (n, 23) columns of :class:`kernels.families.feed.Design`; q sets the scale only, fx, fy are not used
+    designs : (n, 23) columns as `PARAMETERS` of sweep/families/feed.py; q sets the scale only, fx, fy are not used
     cos_phi, sin_phi : (n, m), or (1, m) shared by all designs
     chi : (n, m) prescribed angles of the rack [rad]
     status : (n, m) out, of the rocker alone;  rows : (5, n, m) out [length, length, length^2] and the pin H (x, y)
@@ -166,7 +165,7 @@ EVENTS = (
 
 @inline
 def _height(r: Reduced, phi: float, order: int) -> float:
-    """Return the height of the tooth above the plate (order 0), or its first derivative by phi (order 1)."""
+    """Height of the tooth above the plate (order 0), or its first derivative by phi (order 1)."""
     tooth, _ = tooth_at(r, math.cos(phi), math.sin(phi))
     value: float = tooth.y - r.plate if order == 0 else tooth.y1
     return value
@@ -174,8 +173,7 @@ def _height(r: Reduced, phi: float, order: int) -> float:
 
 @inline
 def _passage(r: Reduced, low: float, high: float, f_low: float, f_high: float, order: int) -> float:
-    """Find by false position where the height (or its derivative) passes zero between two crank angles
-    of opposite signs.
+    """Find by false position where the height, or its derivative, passes zero between angles of opposite signs.
 
     The end that stays is given half its value (Illinois), so that both ends close in.
     """
@@ -202,7 +200,7 @@ def _passage(r: Reduced, low: float, high: float, f_low: float, f_high: float, o
 
 @inline
 def _between(r: Reduced, entry: float, leave: float) -> tuple[float, float]:
-    """Return the greatest height between two crank angles, and the area under the path there."""
+    """Greatest height between two crank angles, and the area under the path there."""
     rise, area = 0.0, 0.0
     width = (leave - entry) / _PANELS
     for k in range(_PANELS):
@@ -234,7 +232,7 @@ def feeding(designs: Array, status: Status, outputs: Array) -> None:
 
     Parameters
     ----------
-    designs : (n, 23) columns of :class:`kernels.families.feed.Design`
+    designs : (n, 23) columns as `PARAMETERS` of sweep/families/feed.py
     status : (n,) out; OK, NO_EVENT (the tooth never passes the plate), that of the first pose that is not assembled
     outputs : (9, n) out in the order of :data:`EVENTS` [rad, length, length per rad]; nan where the status is not OK
 

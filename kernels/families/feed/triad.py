@@ -12,7 +12,7 @@ on which depends on the rounding of the lengths.
 from __future__ import annotations
 
 import math
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 
@@ -31,47 +31,12 @@ _MOST_IN_ALL, _MOST_OF_STAGE, _CLOSE, _LEAST_SHARE = 60, 12, 1e-3, 2.0**-8
 OUTPUTS = ("x_t", "y_t", "chi", "dx_t", "dy_t", "dchi", "d2x_t", "d2y_t", "d2chi", "determinant")
 
 
-class TriadDesign(NamedTuple):
-    """Columns of the design matrix: lengths in one unit, angles in radians, assembly mode of the rocker +1 or -1."""
-
-    h_a: float
-    h_b: float
-    h_c: float
-    h_e: float
-    h_f: float
-    h_g: float
-    h_alpha: float
-    rh: float
-    dh: float
-    xE2: float
-    yE2: float
-    rE2: float
-    dE2: float
-    xE3: float
-    yE3: float
-    rE3: float
-    dE3: float
-    f1x: float
-    f1y: float
-    f2x: float
-    f2y: float
-    f3x: float
-    f3y: float
-    q1: float
-    q2: float
-    q3: float
-    x0: float
-    y0: float
-    chi0: float
-    h_sigma: float
-
-
 _LENGTHS = (0, 1, 2, 3, 4, 5, 7, 9, 10, 11, 13, 14, 15, 17, 18, 19, 20, 21, 22, 23, 24, 25, 26, 27)
 
 
 @inline
 def _scaled(designs: Array, i: int, d: Array) -> tuple[float, bool]:
-    """Return columns of one design in units of a power of two near its greatest length; the unit, and whether valid.
+    """Columns of one design in units of a power of two near its greatest length; the unit, and whether valid.
 
     Newton's steps are measured against 1, so the greatest length sets the scale, not some link that may be tiny.
     """
@@ -96,7 +61,7 @@ def _scaled(designs: Array, i: int, d: Array) -> tuple[float, bool]:
 
 @inline
 def _leads(d: Array, u: Any, v: Any) -> tuple[Driven, Driven, Driven, int]:
-    """Return the three driven points with their derivatives, and the status of the rocker."""
+    """Three driven points with their derivatives, and the status of the rocker."""
     sa, ca = np.sin(d[6]), np.cos(d[6])
     rocker = Rocker(
         d[0], d[2], d[3], d[4] * sa, d[5] - d[4] * ca, ca, sa, (d[2] - d[1]) * (d[2] + d[1]),
@@ -113,7 +78,7 @@ def _leads(d: Array, u: Any, v: Any) -> tuple[Driven, Driven, Driven, int]:
 
 @inline
 def _solved(m: Any, a: Any, b: Any, c: Any) -> tuple[Any, Any, Any, Any]:
-    """Return the solution of a 3 x 3 system by Cramer's rule, and its determinant; m holds the rows."""
+    """Solution of a 3 x 3 system by Cramer's rule, and its determinant; m holds the rows."""
     m0, m1, m2, m3, m4, m5, m6, m7, m8 = m
     c0, c1, c2 = m4 * m8 - m5 * m7, m5 * m6 - m3 * m8, m3 * m7 - m4 * m6
     det = m0 * c0 + m1 * c1 + m2 * c2
@@ -125,7 +90,7 @@ def _solved(m: Any, a: Any, b: Any, c: Any) -> tuple[Any, Any, Any, Any]:
 
 @inline
 def _links(d: Array, leads: tuple[Driven, Driven, Driven], x: Any, y: Any, chi: Any) -> tuple[Any, Any, Any]:
-    """Return rows of the Jacobian, closures |link|^2 - q^2 (halved) and arms on the rack at (x, y, chi)."""
+    """Rows of the Jacobian, closures |link|^2 - q^2 (halved) and arms on the rack at (x, y, chi)."""
     one, two, three = leads
     cos, sin = np.cos(chi), np.sin(chi)
     g1x, g1y = cos * d[17] - sin * d[18], sin * d[17] + cos * d[18]
@@ -146,7 +111,7 @@ def _links(d: Array, leads: tuple[Driven, Driven, Driven], x: Any, y: Any, chi: 
 
 @inline
 def _newton(d: Array, u: float, v: float, x: float, y: float, chi: float) -> tuple[float, float, float, float, int]:
-    """Return the tooth, rack angle and determinant at one crank angle, from a start nearby."""
+    """Tooth, rack angle and determinant at one crank angle, from a start nearby."""
     one, two, three, code = _leads(d, u, v)
     det = math.nan
     if code != st.OK:
@@ -169,7 +134,7 @@ def _newton(d: Array, u: float, v: float, x: float, y: float, chi: float) -> tup
 
 @inline
 def _begun(d: Array, x: float, y: float, chi: float) -> tuple[float, float, float, int]:
-    """Return tooth and rack angle near the assembly at phi = 0 that a guess chooses.
+    """Tooth and rack angle near the assembly at phi = 0 that a guess chooses.
 
     Half the squares of the links' lengths go from those of the guess to their own in stages as long as Newton's steps
     keep halving; a good guess takes one.  NOT_CONVERGED where the leads lock on the way.
@@ -207,7 +172,7 @@ def _begun(d: Array, x: float, y: float, chi: float) -> tuple[float, float, floa
 
 @inline
 def _rates(d: Array, leads: tuple[Driven, Driven, Driven], x: Any, y: Any, chi: Any) -> Any:
-    """Return the first and second derivatives of tooth and rack angle by phi, and the determinant; (16), (17)."""
+    """First and second derivatives of tooth and rack angle by phi, and the determinant; (16), (17)."""
     rows, _, arms = _links(d, leads, x, y, chi)
     one, two, three = leads
     first = (
@@ -245,12 +210,11 @@ def _round(d: Array, nodes: Array) -> int:
 
 @kernel
 def triad_poses(designs: Array, phi: Array, status: Status, outputs: Array) -> None:
-    """Compute the path of the tooth and angle of a rack on three leads, with two derivatives;
-    (15)-(17) of docs/feed.md.
+    """Path of the tooth and angle of a rack on three leads, with two derivatives; (15)-(17) of docs/feed.md.
 
     Parameters
     ----------
-    designs : (n, 30) columns of :class:`TriadDesign`
+    designs : (n, 30) columns as `TRIAD_PARAMETERS` of sweep/families/feed.py
     phi : (n, m), or (1, m) shared by all designs [rad]
     status : (n, m) out; OK, NOT_ASSEMBLED or DEAD_POINT (rocker), SINGULAR (the leads lock here or before),
         NOT_CONVERGED (no assembly near the start) or INVALID_INPUT; where it is not OK all outputs are nan

@@ -5,7 +5,6 @@ evaluates poses, ``synthesis`` keeps the limit positions of a crank-rocker.
 With h = s2 = 0 it is the spatial crank-rocker, bit for bit.
 """
 
-from kernels.families.five_link.closure import Design as Design
 from kernels.families.five_link.closure import with_limits_of as with_limits_of
 from kernels.families.five_link.motion import Outputs as Outputs
 from kernels.families.five_link.motion import poses as poses

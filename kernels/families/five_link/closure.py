@@ -25,22 +25,6 @@ from kernels.linkage.crank_closure import Reduced, axial_terms, reduce_scaled, u
 from kernels.types import EPS, Array, Numbers, Status
 
 
-class Design(NamedTuple):
-    """Columns of the design matrix: lengths in one unit, alpha in radians, branch +1 or -1, mode 1, 2 or 3."""
-
-    a: float
-    b: float
-    c: float
-    e: float
-    f: float
-    g: float
-    alpha: float
-    h: float
-    s2: float
-    branch: float
-    mode: float
-
-
 class Joint(NamedTuple):
     """What the two revolutes in place of the driving ball add to the closure, in units of the crank.
 
@@ -74,7 +58,7 @@ class Slope(NamedTuple):
 
 @inline
 def reduce_design(designs: Numbers, i: int) -> tuple[Reduced, Joint]:
-    """Return constants of one design; ``valid`` is false for zero or negative lengths and for what is not finite."""
+    """Constants of one design; ``valid`` is false for zero or negative lengths and for what is not finite."""
     unit = unit_scale(designs[i, 2].real)
     a, b, c = designs[i, 0] * unit, designs[i, 1] * unit, designs[i, 2] * unit
     e, f, g = designs[i, 3] * unit, designs[i, 4] * unit, designs[i, 5] * unit
@@ -99,16 +83,14 @@ def reduce_design(designs: Numbers, i: int) -> tuple[Reduced, Joint]:
 
 @inline
 def axial_reach(joint: Joint, s: Any) -> tuple[Any, Any]:
-    """Return the axial distance z and rho^2 = b^2 - z^2, from the sine of the rocker angle."""
+    """Axial distance z and rho^2 = b^2 - z^2, from the sine of the rocker angle."""
     z = joint.sweep * s + joint.axial
     return z, (joint.coupler - z) * (joint.coupler + z)
 
 
 @inline
 def slope(joint: Joint, x: Any, y: Any, w: Any, c: Any, s: Any) -> Slope:
-    """Return G5, its first two derivatives and rho at the rocker angle of cosine c and sine s;
-    needs rho^2 > 0. (1), (2).
-    """
+    """G5, its first two derivatives and rho at the rocker angle of cosine c and sine s, where rho^2 > 0; (1), (2)."""
     z, square = axial_reach(joint, s)
     rho = np.sqrt(square)
     per_rho = 1.0 / divisor(rho)  # 0 at the very end of an arc
@@ -132,8 +114,7 @@ def residual_size(r: Reduced, joint: Joint, x: Any, y: Any) -> float:
 def with_limits_of(
     designs: Array, psi_ext: Array, psi_fold: Array, h: Array, status: Status, a: Array, b: Array
 ) -> None:
-    """Compute the crank and coupler of the five-links with s2 = 0
-    that have the limit positions of given crank-rockers.
+    """Crank and coupler of the five-links with s2 = 0 that have the limit positions of given crank-rockers.
 
     Parameters
     ----------

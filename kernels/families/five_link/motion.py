@@ -59,9 +59,7 @@ def _bends(joint: Joint, c: Any, s: Any) -> Bends:
 
 @inline
 def transfer(r: Reduced, joint: Joint, u: Any, v: Any, c: Any, s: Any, t: Any) -> tuple[Any, Any, Any]:
-    """Return the first three derivatives of the mirrored angle, from minus its cosine,
-    minus its sine and dG5/dpsi; (5).
-    """
+    """First three derivatives of the mirrored angle, from minus its cosine, minus its sine and dG5/dpsi; (5)."""
     bends = _bends(joint, -c, -s)
     hu, hv = r.ca * u, r.ca * v
     w1 = r.k2 * u - r.k1 * v
@@ -92,7 +90,7 @@ def _extreme(joint: Joint, x: Any, y: Any, w: Any, c: float, s: float) -> Any:
 
 @inline
 def _shortfall(r: Reduced, joint: Joint, u: Any, v: Any) -> Any:
-    """Return the negative number that says how far the links are from reaching; Delta of a crank-rocker; (7)."""
+    """Negative number that says how far the links are from reaching; Delta of a crank-rocker; (7)."""
     x, y, w = pose_terms(r, u, v)
     real = real_joint(joint)
     if joint.plain:
@@ -113,7 +111,7 @@ def _shortfall(r: Reduced, joint: Joint, u: Any, v: Any) -> Any:
 
 @inline
 def across(r: Reduced, joint: Joint, v: Any, w: Any, c: Any, s: Any) -> tuple[Any, Any]:
-    """Return the force through the rocker ball along the rocker and along its axis; dG5/dpsi is its third part; (6)."""
+    """Force through the rocker ball along the rocker and along its axis; dG5/dpsi is its third part; (6)."""
     _, square = axial_reach(joint, -s)
     rho = np.sqrt(square) if square.real > 0.0 else 0.0 * square
     close = w - joint.shift
@@ -160,14 +158,14 @@ def poses(
     out: Outputs,
     places: Numbers | None,
 ) -> None:
-    """Compute the position, transfer functions, discriminant,
-    pressure angle and joints of every design at its crank angles.
+    """Position, transfer functions, discriminant, pressure angle and joints of every design at its crank angles.
 
     Equations (1)-(8) of docs/five_link.md; joints in the fixed frame of its section 1.
 
     Parameters
     ----------
-    designs : (n, 11) columns of :class:`Design`; complex128 for gradients by the complex step
+    designs : (n, 11) columns as `PARAMETERS` of sweep/families/five_link.py; complex128 for gradients by the
+        complex step
     cos_phi, sin_phi : (n, m), or (1, m) shared by all designs; complex128 where they depend on the designs
     status : (n, m) out; OK, NOT_ASSEMBLED, DEAD_POINT, SINGULAR (the coupler is parallel to the crank axis) or
         INVALID_INPUT

@@ -152,9 +152,7 @@ def _extremes_of_arc(joint: Joint, x: float, y: float, w: float, centre: float, 
 
 @inline
 def arcs(joint: Joint) -> tuple[int, float, float, float, float]:
-    """Return the number of arcs on which rho^2 >= 0, and centre and half width of both;
-    half width pi is the whole circle.
-    """
+    """Count the arcs on which rho^2 >= 0, and give centre and half width of both; half width pi is the whole circle."""
     if joint.sweep == 0.0:
         reaches = abs(joint.axial) < joint.coupler
         return (1 if reaches else 0), 0.0, math.pi, 0.0, 0.0
@@ -176,8 +174,7 @@ def arcs(joint: Joint) -> tuple[int, float, float, float, float]:
 
 @kernel
 def all_roots(joint: Joint, x: float, y: float, w: float, noise: float, at: Array) -> int:
-    """Find the rocker angles (mirrored, in rad) of all solutions, write them into ``at`` (at least MOST numbers);
-    return their number.
+    """Write the mirrored rocker angles [rad] of all solutions into ``at``, at least MOST numbers; their number.
 
     A place where |G5| comes as near to zero as ``noise`` without crossing it counts as one.
     """
@@ -192,9 +189,7 @@ def all_roots(joint: Joint, x: float, y: float, w: float, noise: float, at: Arra
 
 @kernel
 def extremes(joint: Joint, x: float, y: float, w: float) -> tuple[Place, Place]:
-    """Find where G5 is smallest and largest, on the arc where their product is nearest to zero;
-    infinite without an arc.
-    """
+    """Find the extremes of G5 on the arc where their product is nearest to zero; infinite without an arc."""
     number, centre, half, centre2, half2 = arcs(joint)
     low, high = Place(0.0, math.inf), Place(0.0, -math.inf)
     if number > 0:
@@ -213,7 +208,7 @@ ONE, UNKNOWN, NONE = 1, 0, -1
 
 @inline
 def _reach_between(joint: Joint, s0: float, s1: float) -> tuple[float, float, float]:
-    """Return the smallest and largest rho and the largest |z| for sines between two values."""
+    """Smallest and largest rho and the largest |z| for sines between two values."""
     z0, z1 = joint.sweep * s0 + joint.axial, joint.sweep * s1 + joint.axial
     far = max(abs(z0), abs(z1)) + GUARD * joint.coupler
     near = 0.0 if z0 * z1 <= 0.0 else max(min(abs(z0), abs(z1)) - GUARD * joint.coupler, 0.0)
@@ -224,8 +219,9 @@ def _reach_between(joint: Joint, s0: float, s1: float) -> tuple[float, float, fl
 
 @kernel
 def solutions(joint: Joint, x: float, y: float, w: float) -> int:
-    """Return ONE for one solution at most for each sign of dG5/dpsi, NONE for no solution,
-    UNKNOWN where neither was proved.
+    """Tell how many solutions there can be for each sign of dG5/dpsi.
+
+    ONE is one at most, NONE no solution; UNKNOWN where neither was proved.
     """
     r = math.sqrt(x * x + y * y)
     if not r > 0.0:

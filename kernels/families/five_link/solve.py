@@ -29,7 +29,7 @@ def pose_terms(r: Reduced, u: Any, v: Any) -> tuple[Any, Any, Any]:
 
 @kernel
 def _newton(joint: Joint, x: float, y: float, w: float) -> tuple[bool, float, float]:
-    """Return whether Newton's method settled on a root with dG5/dpsi > 0, its cosine and sine; (3)."""
+    """Whether Newton's method settled on a root with dG5/dpsi > 0, its cosine and sine; (3)."""
     square = x * x + y * y
     c, s = 0.0, 0.0
     # Crank-rockers with the coupler that the last angle gives, from a quarter turn off the crank pin's direction on.
@@ -54,15 +54,14 @@ def _newton(joint: Joint, x: float, y: float, w: float) -> tuple[bool, float, fl
 
 @inline
 def reaches(joint: Joint, s: float) -> bool:
-    """Return whether rho is positive beyond rounding at the rocker angle of sine s."""
+    """Whether rho is positive beyond rounding at the rocker angle of sine s."""
     _, square = axial_reach(joint, s)
     return bool(square > 32.0 * EPS * joint.coupler * joint.coupler)
 
 
 @kernel
 def _scanned(joint: Joint, x: float, y: float, w: float, noise: float, at: Array) -> tuple[int, float, float]:
-    """Return the status, cosine and sine of the root that branch and mode name;
-    section "Assembly modes" of the page.
+    """Status, cosine and sine of the root that branch and mode name; section "Assembly modes" of the page.
 
     Of the roots with dG5/dpsi > 0 it is the one with the mode-th largest (C - B) . k'.  ``at`` has 2 MOST numbers.
     """
@@ -93,7 +92,7 @@ def _scanned(joint: Joint, x: float, y: float, w: float, noise: float, at: Array
 
 @inline
 def solve_plain(r: Reduced, joint: Joint, x: Any, y: Any, w: Any) -> tuple[int, Any, Any, Any]:
-    """Return the status, minus cosine, minus sine and dG5/dpsi of a crank-rocker's closure: (2*) of docs/rssr.md."""
+    """Status, minus cosine, minus sine and dG5/dpsi of a crank-rocker's closure: (2*) of docs/rssr.md."""
     square = x * x + y * y
     delta = square - w * w
     tolerance = discriminant_tolerance(r, x, y, w) + 16.0 * EPS * abs(w.real) * joint.size
@@ -144,8 +143,9 @@ def real_joint(joint: Joint) -> Joint:
 
 @inline
 def solve(r: Reduced, joint: Joint, u: Any, v: Any, at: Array) -> tuple[int, Any, Any, Any, Any]:
-    """Return the status, minus cosine and minus sine of the mirrored rocker angle,
-    dG5/dpsi and the W of a crank-rocker there.
+    """Solve the closure: status, minus cosine and minus sine of the mirrored rocker angle, and what they come from.
+
+    The last two are dG5/dpsi and the W of a crank-rocker there.
 
     ``at`` is room for the scan.
     """

@@ -6,6 +6,5 @@ Polukhin 1971, section 7, as worked out in docs/takeup.md; the equation numbers 
 from kernels.families.free_cam.friction import MarchOutputs as MarchOutputs
 from kernels.families.free_cam.friction import limit_points as limit_points
 from kernels.families.free_cam.friction import march as march
-from kernels.families.free_cam.motion import Design as Design
 from kernels.families.free_cam.motion import Outputs as Outputs
 from kernels.families.free_cam.motion import poses as poses

@@ -68,7 +68,7 @@ def turned_cam(designs: Array, i: int, u: float, v: float) -> Cam:
 
 @inline
 def straight(cam: Cam) -> Line:
-    """Return the line between the guides at the plane of the cam."""
+    """Line between the guides at the plane of the cam."""
     share = cam.z1 / (cam.z1 - cam.z2)
     x, y = cam.x1 + share * (cam.x2 - cam.x1), cam.y1 + share * (cam.y2 - cam.y1)
     dx, dy, dz = cam.x2 - cam.x1, cam.y2 - cam.y1, cam.z2 - cam.z1
@@ -77,7 +77,7 @@ def straight(cam: Cam) -> Line:
 
 @inline
 def part(a: float, x: float, y: float, z: float, at: float) -> tuple[float, float, float]:
-    """Return the distance of the edge's point ``at`` from a guide and its first two derivatives along y; (19), (20)."""
+    """Distance of the edge's point ``at`` from a guide and its first two derivatives along y; (19), (20)."""
     dx, dy, tx = a * at * at - x, at - y, 2.0 * a * at
     square = dx * dx + dy * dy + z * z
     distance = np.sqrt(square)
@@ -88,7 +88,7 @@ def part(a: float, x: float, y: float, z: float, at: float) -> tuple[float, floa
 
 @inline
 def along_edge(cam: Cam, at: float) -> tuple[float, float, float]:
-    """Return the length of the thread over the point ``at`` and its first two derivatives along y; (19), (20)."""
+    """Length of the thread over the point ``at`` and its first two derivatives along y; (19), (20)."""
     first = part(cam.a, cam.x1, cam.y1, cam.z1, at)
     second = part(cam.a, cam.x2, cam.y2, cam.z2, at)
     return first[0] + second[0], first[1] + second[1], first[2] + second[2]
@@ -108,13 +108,13 @@ def _reach(a: float, x: float, y: float) -> float:
 
 @inline
 def _nearest(low: float, high: float, centre: float) -> float:
-    """Return the least distance of an interval from a point."""
+    """Least distance of an interval from a point."""
     return max(max(low - centre, centre - high), 0.0)
 
 
 @inline
 def least_distances(cam: Cam, low: float, high: float) -> tuple[float, float]:
-    """Return lower bounds of the distances of the guides from the edge between two of its points."""
+    """Lower bounds of the distances of the guides from the edge between two of its points."""
     a, far, near = cam.a.real, max(low * low, high * high), _nearest(low, high, 0.0)
     bottom, top = a * near * near, a * far
     dx, dy = _nearest(bottom, top, cam.x1.real), _nearest(low, high, cam.y1.real)
@@ -125,9 +125,7 @@ def least_distances(cam: Cam, low: float, high: float) -> tuple[float, float]:
 
 @inline
 def steepest_slope(cam: Cam, low: float, high: float) -> float:
-    """Return an upper bound of |L''| between two points of the edge,
-    from |turning| <= |tangent|^2 and the largest offsets.
-    """
+    """Bound |L''| between two points of the edge, from |turning| <= |tangent|^2 and the largest offsets."""
     a, far = cam.a.real, max(low * low, high * high)
     tangent = 1.0 + 4.0 * a * a * far
     first, second = least_distances(cam, low, high)
@@ -146,9 +144,7 @@ class Contact(NamedTuple):
 
 @inline
 def shortest(cam: Cam) -> Contact:
-    """Return the global minimum of the length over the edge;
-    of minima equally long to rounding it is the first along y.
-    """
+    """Global minimum of the length over the edge; of minima equally long to rounding it is the first along y."""
     # All extrema lie within reach; the margin keeps one that lies on its very end inside the walk.
     end = reach(cam) + 1e-3
     span = 0.25 * end

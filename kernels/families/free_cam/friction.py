@@ -70,9 +70,7 @@ def lean(cam: Cam, pull: Pull, at: float) -> tuple[float, float]:
 
 @inline
 def excess(cam: Cam, pull: Pull, side: float, at: float) -> float:
-    """Return T12 . tangent - side sin(rho) |T12|:
-    zero at the limit point of that side, falling along the edge far out.
-    """
+    """T12 . tangent - side sin(rho) |T12|: zero at the limit point of that side, falling along the edge far out."""
     along, whole = lean(cam, pull, at)
     return along - side * pull.sine * whole
 
@@ -93,7 +91,7 @@ def steepest_excess(cam: Cam, pull: Pull, low: float, high: float) -> float:
 
 @inline
 def next_limit(cam: Cam, pull: Pull, side: float, start: float, sense: float, most: float) -> float:
-    """Return the first limit point of one side from ``start`` along the edge, within ``most``; nan if there is none."""
+    """First limit point of one side from ``start`` along the edge, within ``most``; nan if there is none."""
     end = reach(cam) + 1e-3
     at, value = start, excess(cam, pull, side, start)
     # A start on a limit point is one: the walk looks for a change of sign and would step over it.
@@ -113,7 +111,7 @@ def next_limit(cam: Cam, pull: Pull, side: float, start: float, sense: float, mo
 
 @inline
 def _bisected(cam: Cam, pull: Pull, side: float, low: float, high: float, at_low: float) -> float:
-    """Return the zero of :func:`excess` between low and high by the Illinois method, at most HALVINGS steps."""
+    """Zero of :func:`excess` between low and high by the Illinois method, at most HALVINGS steps."""
     f_low, f_high = at_low, excess(cam, pull, side, high)
     for _ in range(HALVINGS):
         middle = high - f_high * (high - low) / (f_high - f_low)
@@ -133,7 +131,7 @@ def _bisected(cam: Cam, pull: Pull, side: float, low: float, high: float, at_low
 
 @inline
 def nearest_limit(cam: Cam, pull: Pull, side: float, centre: float) -> float:
-    """Return the limit point of one side nearest to ``centre``; nan if there is none within FAR."""
+    """Limit point of one side nearest to ``centre``; nan if there is none within FAR."""
     most = FAR * (reach(cam) + 1e-3)
     up = next_limit(cam, pull, side, centre, 1.0, most)
     # Downwards no farther than what was found upwards: beyond it nothing is nearer.
@@ -147,12 +145,11 @@ def nearest_limit(cam: Cam, pull: Pull, side: float, centre: float) -> float:
 def limit_points(
     designs: Array, friction: Array, cos_phi: Array, sin_phi: Array, status: Status, plus: Array, minus: Array
 ) -> None:
-    """Compute points of the edge where the thread begins to slide along it,
-    nearest to the frictionless contact; (25).
+    """Points of the edge where the thread begins to slide along it, nearest to the frictionless contact; (25).
 
     Parameters
     ----------
-    designs : (n, 8) columns of :class:`kernels.families.free_cam.motion.Design`
+    designs : (n, 8) columns as `PARAMETERS` of sweep/families/free_cam.py
     friction : (n, 3), tension ratio T2/T1; coefficients of friction along the thread and across it (along the edge)
     cos_phi, sin_phi : (n, m), or (1, m) shared by all designs
     status : (n, m) out; OK, INVALID_INPUT, or NOT_CONVERGED where a limit point lies far outside (friction near 1)
@@ -191,8 +188,7 @@ def slid(cam: Cam, pull: Pull, before: float) -> float:
 
 @inline
 def landed(designs: Array, i: int, u0: float, v0: float, u1: float, v1: float) -> float:
-    """Find by bisection where the thread first touches the edge,
-    between an angle at which it does not and one at which it does.
+    """Find by bisection between two angles where the thread first touches the edge.
 
     Taken at the pose before instead, the place would change with the steps of the march.
     """
@@ -226,15 +222,14 @@ def march(
     designs: Array, friction: Array, cos_phi: Array, sin_phi: Array, turns: int, status: Status,
     out: MarchOutputs,
 ) -> None:  # fmt: skip
-    """Compute the way of the thread over an edge with friction, in the order of the given angles;
-    docs/takeup.md, section 5.
+    """Follow the thread over an edge with friction, in the order of the given angles; docs/takeup.md, section 5.
 
     The thread starts where it lies without friction and is led through the angles ``turns`` times; what is given is
     the last time.
 
     Parameters
     ----------
-    designs : (n, 8) columns of :class:`kernels.families.free_cam.motion.Design`
+    designs : (n, 8) columns as `PARAMETERS` of sweep/families/free_cam.py
     friction : (n, 3), tension ratio T2/T1; coefficients of friction along the thread and across it (along the edge)
     cos_phi, sin_phi : (n, m) or (1, m), angles of one turn in their order
     turns : how often the angles are gone through

@@ -15,22 +15,9 @@ from kernels.linkage.thread_path import wrap_angle
 from kernels.types import Array, Status
 
 
-class Design(NamedTuple):
-    """Columns of the design matrix [length], a [1/length]."""
-
-    a: float
-    X1: float
-    Y1: float
-    Z1: float
-    X2: float
-    Y2: float
-    Z2: float
-    P_h: float
-
-
 @inline
 def by_angle(a: float, x: float, y: float, z: float, at: float) -> tuple[float, float, float]:
-    """Return the distance of a guide: first and second derivative by phi at a fixed y, and the mixed one; (21)."""
+    """Distance of a guide: first and second derivative by phi at a fixed y, and the mixed one; (21)."""
     cx, cy, tx = a * at * at, at, 2.0 * a * at
     dx, dy = cx - x, cy - y
     distance = np.sqrt(dx * dx + dy * dy + z * z)
@@ -44,7 +31,7 @@ def by_angle(a: float, x: float, y: float, z: float, at: float) -> tuple[float, 
 
 @inline
 def over_edge(cam: Cam, at: float) -> tuple[float, float]:
-    """Return the first and second derivative by phi of the shortest length; (22), (23)."""
+    """First and second derivative by phi of the shortest length; (22), (23)."""
     one = by_angle(cam.a, cam.x1, cam.y1, cam.z1, at)
     two = by_angle(cam.a, cam.x2, cam.y2, cam.z2, at)
     mixed = one[2] + two[2]
@@ -75,12 +62,11 @@ def poses(
     status: Status,
     out: Outputs,
 ) -> None:
-    """Compute the shortest thread over the edge of the cam, its derivatives, place and wrap;
-    (18) to (23) of docs/takeup.md.
+    """Shortest thread over the edge of the cam, its derivatives, place and wrap; (18) to (23) of docs/takeup.md.
 
     Parameters
     ----------
-    designs : (n, 8) columns of :class:`Design`; complex128 for gradients by the complex step
+    designs : (n, 8) columns as `PARAMETERS` of sweep/families/free_cam.py; complex128 for gradients by the complex step
     cos_phi, sin_phi : (n, m), or (1, m) shared by all designs
     status : (n, m) out; OK or INVALID_INPUT (also where both guides are on one side of the cam)
     P, dP, d2P, L : (n, m) out or None; L - P_h, its derivatives with respect to phi, thread length [length]
@@ -134,9 +120,7 @@ def poses(
 
 @inline
 def follow_minimum(cam: Cam, y: float) -> float:
-    """Return the minimum as a function of complex designs:
-    one step of Newton's method for the imaginary parts alone.
-    """
+    """Minimum as a function of complex designs: one step of Newton's method for the imaginary parts alone."""
     # The real part of the slope is the search's remaining error, which is below rounding: it is left out.
     _, slope, bend = along_edge(cam, y)
     return y + (slope.real - slope) / bend

@@ -8,11 +8,10 @@ Turning phi by pi together with (k, a) -> (-k, -a) turns z by pi.  So one set of
 around phi = 0, serves both halves of the turn; it loses no digits where the pin comes near the axis (a -> k - 2 at
 phi = 0, a -> k + 2 at phi = pi) nor at k -> 1.
 
-``closure`` reduces a design to its constants, ``motion`` evaluates poses, ``dense`` sweeps a grid of carrier angles,
-``maxima`` finds the largest derivatives of the turn and ``dwell`` the measures of the dwell.
+``motion`` reduces a design to its constants, evaluates poses and sweeps a grid of carrier angles, ``maxima`` finds the
+largest derivatives of the turn and the measures of the dwell.
 """
 
-from kernels.families.geared_dwell.closure import Design as Design
 from kernels.families.geared_dwell.maxima import dwell_measures as dwell_measures
 from kernels.families.geared_dwell.maxima import turn_maxima as turn_maxima
 from kernels.families.geared_dwell.motion import Outputs as Outputs

@@ -8,7 +8,7 @@ import numpy as np
 
 from kernels import status as st
 from kernels.curves.polynomials import roots_up_to, value_and_slope
-from kernels.families.geared_dwell.closure import Reduced, pin, reduce_design, velocity
+from kernels.families.geared_dwell.motion import Reduced, pin, reduce_design, velocity
 from kernels.jit import inline, kernel
 from kernels.types import Array, Status
 
@@ -17,8 +17,7 @@ from kernels.types import Array, Status
 def stretch(
     r: Reduced, k: float, a: float, number: int, s2: Array, q: Array, d: Array, lean: Array
 ) -> tuple[float, float]:
-    """Return the quadratics of a stretch of the half turn in its own variable tau >= 0,
-    its length and |dtau/dcos(phi)|.
+    """Quadratics of a stretch of the half turn in its own variable tau >= 0, its length and |dtau/dcos(phi)|.
 
     ``s2`` is sin^2(phi), ``q`` and ``d`` are Q and D.  The turn is cut at phi = pi/2 with tau = t (number 0) and
     tau = 1 + cos(phi) (number 1).  Where the pin passes nearest to the axis at cos(phi) = 1/k, near a = -k, it is cut
@@ -44,7 +43,7 @@ def stretch(
 
 @inline
 def angle_at(k: float, number: int, tau: float) -> float:
-    """Return the carrier angle in [0, pi] at a place of a stretch."""
+    """Carrier angle in [0, pi] at a place of a stretch."""
     if number == 1:
         return math.pi - 2.0 * math.asin(math.sqrt(0.5 * tau))
     t = tau if number == 0 else ((k - 1.0) + (tau if number == 2 else -tau)) / k
@@ -97,7 +96,7 @@ def turn_maxima(
 
     Parameters
     ----------
-    designs : (n, 2) columns of :class:`Design`
+    designs : (n, 2) columns as `PARAMETERS` of sweep/families/geared_dwell.py
     status : (n,) out; OK, SINGULAR (the pin passes through the output axis), NOT_CONVERGED or INVALID_INPUT
     max_abs_dpsi ... max_abs_d3psi : (n,) out, or None: not computed, not compiled
     phi_max_abs_d2psi : (n,) out, where |psi''| is largest, in [0, pi]; -phi is as good, psi'' being odd
@@ -167,9 +166,7 @@ def turn_maxima(
 
 @inline
 def rising_angle(r: Reduced, psi: float, extreme: float) -> float:
-    """Find where psi, rising from its extreme to pi at phi = pi, takes a value;
-    nan if the iteration does not settle.
-    """
+    """Find where psi, rising from its extreme to pi at phi = pi, takes a value; nan if the search does not settle."""
     low, high = extreme, math.pi
     phi, before = min(2.0 * extreme, 0.5 * (low + high)), math.inf  # twice the extreme is the root for k -> 1
     for _ in range(100):
@@ -205,7 +202,7 @@ def dwell_measures(
 
     Parameters
     ----------
-    designs : (n, 2) columns of :class:`Design`
+    designs : (n, 2) columns as `PARAMETERS` of sweep/families/geared_dwell.py
     status : (n,) out; OK, SINGULAR, NOT_CONVERGED, INVALID_INPUT, or where a dwell is wanted and the output does not
         turn once per turn of the carrier NO_DWELL
     turns ... dwell_band : (n,) out, or None: not computed, not compiled

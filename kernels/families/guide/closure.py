@@ -14,7 +14,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from kernels.arithmetic.bits import power_below
+from kernels.arithmetic.intrinsics import power_below
 from kernels.jit import inline
 from kernels.types import EPS, Array
 
@@ -72,8 +72,9 @@ def reduce_design(designs: Array, i: int) -> Reduced:
 
 @inline
 def reduce_along(d: Any, cl: Any, sl: Any) -> Reduced:
-    """As :func:`reduce_design`, from a :class:`Design` and the cosine and sine of its lam;
-    without a branch or a call, so that it vectorises.
+    """Constants as of :func:`reduce_design`, from a :class:`Design` and the cosine and sine of its lam.
+
+    Without a branch or a call, so that it vectorises.
     """
     half_unit = power_below(d.c.real)
     unit, per_unit = 2.0 * half_unit, 0.5 / half_unit
@@ -116,7 +117,7 @@ def place(r: Any, u: Any, v: Any) -> Place:
 
 @inline
 def discriminant_tolerance(r: Reduced, x: float, y: float, w: float) -> float:
-    """Return rounding error of X^2+Y^2-W^2: below it, whether the links reach cannot be decided in float64 (7)."""
+    """Return the rounding error of X^2+Y^2-W^2: below it, whether the links reach cannot be decided in float64 (7)."""
     t = 8.0 * EPS
     first = abs(x.real) * r.x_size + abs(y.real) * r.a.real + abs(w.real) * r.w_size
     return t * first + t * t * (r.x_size * r.x_size + r.a.real * r.a.real + r.w_size * r.w_size)
@@ -157,7 +158,7 @@ def jerk(at: Place, first: First, q: Any, t: Any, per_t: Any) -> Any:
 
 @inline
 def snap(r: Any, at: Place, first: First, q: Any, j: Any, t: Any, per_t: Any) -> Any:
-    """Return the fourth derivative of psi from psi'' = ``q``, psi''' = ``j`` and T."""
+    """Fourth derivative of psi from psi'' = ``q``, psi''' = ``j`` and T."""
     p, g_turn, g_near, w = first.p, first.g_turn, first.g_near, at.w
     by_p = p * (4.0 * g_near - p * (6.0 * g_near - p * (4.0 * g_near - w * p)))
     by_q = q * (6.0 * g_turn - p * (12.0 * g_turn + 6.0 * t * p) + 3.0 * w * q)

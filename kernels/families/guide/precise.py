@@ -77,8 +77,7 @@ def precise_poses(
     out: Outputs,
     joints: Array | None,
 ) -> None:
-    """Compute what :func:`kernels.families.guide.motion.poses` does, correct to a few roundings,
-    for float64 designs only.
+    """Poses as of the module ``motion``, correct to a few roundings, for float64 designs only.
 
     Notes
     -----

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from typing import Any, NamedTuple
 
-from kernels.arithmetic.max_min import largest
+from kernels.arithmetic.intrinsics import largest
 from kernels.chains.form import STRIDE, Form, Travel
 from kernels.families.guide.closure import Design, acceleration, jerk, place, reduce_along, snap, velocity
 from kernels.jit import inline

@@ -5,7 +5,6 @@ precision, ``margin`` decides rotatability and the largest pressure angle, ``lim
 ``joints`` and ``ellipse`` are what effects work from, ``stage`` what chains are fused by.
 """
 
-from kernels.families.rssp.closure import Design as Design
 from kernels.families.rssp.margin import limits as limits
 from kernels.families.rssp.margin import margin as margin
 from kernels.families.rssp.motion import Outputs as Outputs

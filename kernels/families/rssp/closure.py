@@ -7,7 +7,6 @@ bit.  Designs may be complex128 (exact gradients by the complex step); decisions
 from __future__ import annotations
 
 import math
-from typing import NamedTuple
 
 from kernels.jit import inline
 from kernels.linkage.slider_closure import Place as Place
@@ -20,20 +19,9 @@ from kernels.types import EPS as EPS
 from kernels.types import Array
 
 
-class Design(NamedTuple):
-    """Columns of the design matrix: lengths in one unit, alpha in radians, branch +1 or -1."""
-
-    a: float
-    b: float
-    e: float
-    f: float
-    alpha: float
-    branch: float
-
-
 @inline
 def reduce_design(designs: Array, i: int) -> Reduced:
-    """Return constants of one design; ``valid`` is false for zero or negative lengths and for what is not finite."""
+    """Constants of one design; ``valid`` is false for zero or negative lengths and for what is not finite."""
     _, exponent = math.frexp(designs[i, 1].real)
     unit, per_unit = math.ldexp(1.0, exponent), math.ldexp(1.0, -exponent)
     a, b, e, f = designs[i, 0] * per_unit, designs[i, 1] * per_unit, designs[i, 2] * per_unit, designs[i, 3] * per_unit

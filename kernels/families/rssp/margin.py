@@ -42,9 +42,7 @@ class LeastQ(NamedTuple):
 
 @inline
 def least_q(r: Reduced) -> LeastQ:
-    """Return the smallest Q over the turn;
-    ``tolerance`` bounds its rounding error (docs/rssp.md, section on rotatability).
-    """
+    """Smallest Q over the turn; ``tolerance`` bounds its rounding error (docs/rssp.md, section on rotatability)."""
     lowest = minimum(2.0 * r.a * r.e, 2.0 * r.n0 * r.na, -0.5 * r.ka * r.ka, 0.0)
     u, v = lowest.cos, lowest.sin
     # The coefficients only place the minimum; its value comes from m and n, and its slope there takes off what the
@@ -72,7 +70,7 @@ def margin(
 
     Parameters
     ----------
-    designs : (n, 6) columns of :class:`Design`
+    designs : (n, 6) columns as `PARAMETERS` of sweep/families/rssp.py
     status : (n,) out; OK, NOT_ROTATABLE, UNDECIDABLE (the least Q is zero within rounding) or INVALID_INPUT
     margin : (n,) out, least Q/b^2 = least cos^2(pressure angle) over the turn; negative if the crank does not turn
     rotatable : (n,) out, 1 or 0; nan where undecidable
@@ -116,7 +114,7 @@ def _excess(r: Reduced, crank: float, ca: float, sa: float, f: float, s: float) 
 
 @inline
 def _folded(r: Reduced, ca: float, sa: float, f: float) -> tuple[float, bool]:
-    """Return the outer root of the convex E_fold on the side of the branch, by Newton's method from outside."""
+    """Outer root of the convex E_fold on the side of the branch, by Newton's method from outside."""
     # A product instead of b^2 - (f cos alpha)^2, which would cancel where the two are nearly equal.
     far = (r.b - f * ca) * (r.b + f * ca)
     s = f * sa + r.branch * math.sqrt(max(far, 0.0))
@@ -134,9 +132,7 @@ def _folded(r: Reduced, ca: float, sa: float, f: float) -> tuple[float, bool]:
 
 @inline
 def _extended(r: Reduced, ca: float, sa: float, f: float, folded: float) -> tuple[float, bool]:
-    """Return the root of E_ext between the folded position and the reach of crank and coupler:
-    Newton kept in the bracket.
-    """
+    """Root of E_ext between the folded position and the reach of crank and coupler: Newton kept in the bracket."""
     inner, reach = folded, r.a + r.b
     outer = f * sa + r.branch * math.sqrt(max((reach - f * ca) * (reach + f * ca) - r.e * r.e, 0.0))
     s = outer
@@ -165,7 +161,7 @@ def _extended(r: Reduced, ca: float, sa: float, f: float, folded: float) -> tupl
 
 @inline
 def _turn(angle: float) -> float:
-    """Return the angle in [0, 2 pi)."""
+    """Angle in [0, 2 pi)."""
     return angle + TWO_PI if angle < 0.0 else angle
 
 
@@ -189,7 +185,7 @@ def limits(
 
     Parameters
     ----------
-    designs : (n, 6) columns of :class:`Design`
+    designs : (n, 6) columns as `PARAMETERS` of sweep/families/rssp.py
     status : (n,) out; OK, NOT_ROTATABLE, UNDECIDABLE, NOT_OSCILLATING (the slider stands still: e = 0, alpha = 90 deg),
         SINGULAR (the slider ball reaches the crank axis), NOT_CONVERGED or INVALID_INPUT
     s_ext, s_fold : (n,) out [length], slider at the extended and the folded position

@@ -18,8 +18,7 @@ from kernels.types import Array, Status
 
 @kernel
 def pressure_ellipse(designs: Array, ellipse: Array) -> None:
-    """Compute the ellipse that the coupler direction draws in the plane across the slide;
-    see kernels.effects.pressure_extrema.
+    """Ellipse that the coupler direction draws in the plane across the slide; see kernels.effects.pressure.
 
     ``designs`` (n, 6); ``ellipse`` (n, 7) out: (x_C - x_B)/b and (z_C - z_B)/b as constant, cosine, sine each, and the
     size of the terms that round.
@@ -93,15 +92,14 @@ def poses(
     out: Outputs,
     joints: Array | None,
 ) -> None:
-    """Compute the slider displacement, transfer functions,
-    discriminant and pressure angle of every design at its crank angles.
+    """Slider displacement, transfer functions, discriminant and pressure angle of every design at its crank angles.
 
     Equations (1)-(3), (5) and (6) of docs/rssp.md: Q = (b - m)(b + m) - n^2, s = y_B + branch sqrt(Q), cos(pressure
     angle) = sqrt(Q)/b, and the derivatives of Q in the factored form that stays accurate for tiny cranks.
 
     Parameters
     ----------
-    designs : (n, 6) columns of :class:`Design`
+    designs : (n, 6) columns as `PARAMETERS` of sweep/families/rssp.py
     cos_phi, sin_phi : (n, m), or (1, m) shared by all designs
     status : (n, m) out; OK, NOT_ASSEMBLED, DEAD_POINT or INVALID_INPUT
     s ... pressure_angle : (n, m) out [length; rad], or None: what is None is neither computed nor compiled

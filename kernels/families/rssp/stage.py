@@ -8,8 +8,7 @@ from __future__ import annotations
 import math
 from typing import Any, NamedTuple
 
-from kernels.arithmetic.bits import power_below
-from kernels.arithmetic.max_min import largest, smallest
+from kernels.arithmetic.intrinsics import largest, power_below, smallest
 from kernels.chains.form import STRIDE, Form, Travel
 from kernels.curves.trigonometric_polynomials import far_minimum, point
 from kernels.families.rssp.closure import EPS, place, reduce_design
@@ -164,7 +163,7 @@ def opening(designs: Array, status: Status, distance: Array) -> None:
 
     Parameters
     ----------
-    designs : (n, 6) columns of :class:`kernels.families.rssp.closure.Design`
+    designs : (n, 6) columns as `PARAMETERS` of sweep/families/rssp.py
     status : (n,) out; OK, NOT_ROTATABLE, UNDECIDABLE or INVALID_INPUT
     distance : (n,) out [rad], to leading order, of the nearest complex zero of Q from the real crank angles; there
         alone the motion is singular.  It means nothing where the status is not OK

@@ -2,16 +2,15 @@
 
 ``closure`` reduces a design to its constants, ``motion`` evaluates poses (``precise`` in twice the working precision),
 ``dense`` sweeps a grid of crank angles, ``margin`` decides rotatability, ``limits`` finds the limit positions,
-``maxima`` the true maxima over the turn, and ``certify`` proves them on the ``enclosure`` of the motion,
-``driven`` those of a guided point behind a chain of crank-rockers.
+``maxima`` the true maxima over the turn, and ``certify`` proves them, and those of a guided point that crank-rockers in
+series drive, on the enclosures of ``driven``.
 """
 
 from kernels.families.rssr.certify import certify_maxima as certify_maxima
-from kernels.families.rssr.certify import certify_point as certify_point
 from kernels.families.rssr.closure import Design as Design
 from kernels.families.rssr.dense import dense_maxima as dense_maxima
-from kernels.families.rssr.ellipse import pressure_ellipse as pressure_ellipse
 from kernels.families.rssr.joints import joints as joints
+from kernels.families.rssr.joints import pressure_ellipse as pressure_ellipse
 from kernels.families.rssr.limits import LIMIT_NAMES as LIMIT_NAMES
 from kernels.families.rssr.limits import limits as limits
 from kernels.families.rssr.margin import margin as margin

@@ -10,7 +10,7 @@ import math
 
 import numpy as np
 
-from kernels.arithmetic.max_min import largest, smallest
+from kernels.arithmetic.intrinsics import largest, smallest
 from kernels.curves.trigonometric_polynomials import approach, far_minimum, lowest_of_16, minimum, point, shortfall
 from kernels.families.rssr.closure import EPS, Array, closure_terms, reduce_scaled, unit_scale, within_unit_range
 from kernels.jit import inline
@@ -27,7 +27,7 @@ ROWS = 24
 
 @inline
 def new_block() -> Array:
-    """Return memory for one block."""
+    """Memory for one block."""
     return np.empty(ROWS * BLOCK)
 
 
@@ -115,8 +115,7 @@ def _evaluate(at: Array, k: int) -> None:
 
 @inline
 def singularity_distance(count: int, at: Array) -> None:
-    """Write the distance [rad] of the nearest singularity of the motion from the real axis, to leading order,
-    into ACROSS.
+    """Write into ACROSS, to leading order, how far [rad] the motion's nearest singularity is from the real axis.
 
     It sets how finely the motion must be sampled.  Singular are the complex zeros of Delta (its second minimum, where
     there is one, counts too) and those of R = X^2 + Y^2, where the crank pin would lie on the rocker axis: X + i Y = 0

@@ -13,7 +13,7 @@ SWING, PHI0, PHI1, E, F, G, ALPHA = range(7)
 
 
 def recorded() -> bt.Formulas:
-    """Return the formulas; the limited lengths are crank, rocker, coupler."""
+    """Record the formulas of the locus; the limited lengths are crank, rocker, coupler."""
     tape = Tape(bt.INPUTS)
     one = tape.one()
     e, f, g = tape.input(E), tape.input(F), tape.input(G)

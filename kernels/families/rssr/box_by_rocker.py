@@ -24,7 +24,7 @@ SWING, PHI0, PHI1, PSI_EXT, C, F, ALPHA = range(7)
 
 
 def recorded() -> bt.Formulas:
-    """Return the formulas; the limited lengths are crank, e, g, coupler. The angle alpha must not be 0."""
+    """Record the formulas of the locus, alpha not being 0; the limited lengths are crank, e, g, coupler."""
     tape = Tape(bt.INPUTS)
     one = tape.one()
     c, f, phi1, psi1 = tape.input(C), tape.input(F), tape.input(PHI1), tape.input(PSI_EXT)

@@ -20,9 +20,7 @@ STEP = 2.0 * math.pi / POSES
 
 @kernel
 def _centre_curve(p: Problem, f: Formulas, at: Array, height: Array, neck: Array) -> None:
-    """Compute the objective with its sign, and Delta/b^2, of the centre design at POSES crank angles;
-    for the choice of rows.
-    """
+    """Objective with its sign, and Delta/b^2, of the centre design at POSES crank angles; for the choice of rows."""
     place = f.slots[bt.CENTRES :]
     a, e, fs, aca = middle(at, place[0]), middle(at, place[1]), middle(at, place[2]), middle(at, place[3])
     k0, k1, k2, b2 = middle(at, place[4]), middle(at, place[5]), middle(at, place[6]), middle(at, place[7])
@@ -47,14 +45,14 @@ def _centre_curve(p: Problem, f: Formulas, at: Array, height: Array, neck: Array
 
 @inline
 def _summit(below: float, here: float, above: float) -> float:
-    """Return where a parabola through three values one apart has its summit, counted from the middle one."""
+    """Where a parabola through three values one apart has its summit, counted from the middle one."""
     bend = below - 2.0 * here + above
     return 0.5 * (below - above) / bend if bend < 0.0 else 0.0
 
 
 @inline
 def _next_peak(height: Array, sign: float, used: Flags) -> int:
-    """Return the highest local maximum of sign * height that was not used; -1 where there is none."""
+    """Highest local maximum of sign * height that was not used; -1 where there is none."""
     found = -1
     for i in range(POSES):
         here = sign * height[i]

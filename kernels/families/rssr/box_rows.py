@@ -2,8 +2,15 @@
 
 Rows of the objective are +-psi'' (or +-psi', or sin^2 of the pressure angle) at crank angles counted from the extended
 position; rows of limits are those of the acceptance tests of docs/synthesis.md, of the pressure angle and of the links,
-multiplied by what keeps them finite, and those that a design with the target keeps (``box_arrival``).  What costs
-little is tried first: most boxes fall by limits and arrival alone.
+multiplied by what keeps them finite, and those of the arrival.  What costs little is tried first: most boxes fall by
+limits and arrival alone.
+
+The rows of the arrival hold for designs whose acceleration reaches the target: the rocker is where it can be in time.
+Between its limits it goes from rest to rest, so its angle stays in a tube (:mod:`kernels.boxes.tube`).  Whether it does
+is told by the sign of F(phi, psi) on the tube's sides, without solving for psi: a polynomial, where psi'' is a quotient
+of roots.  So these rows decide boxes far larger than rows of psi'' do.  Where rho1 + rho2 may vanish the crank's length
+is not known from the limit positions.  There it is a further variable between its own limits: F is linear in it, and
+a (rho1 + rho2) = crank of the locus gives two more rows.
 """
 
 from __future__ import annotations
@@ -13,13 +20,98 @@ import math
 from kernels.boxes.branching import BOUND, EMPTY, OPEN, Flags, best_bound, halves, looseness, surely_negative
 from kernels.boxes.tape import run
 from kernels.boxes.taylor import VALUE, constant, least, sizes, up, variable
+from kernels.boxes.tube import COSINES, HIGH, LOW, THETA
 from kernels.families.rssr import box_turn as bt
-from kernels.families.rssr.box_arrival import arrival_rows, free_crank_rows
 from kernels.families.rssr.box_peaks import peak_rows
-from kernels.families.rssr.box_problem import AHEAD, Problem, Room, acceptance_rows, inputs, limit_rows
+from kernels.families.rssr.box_problem import (
+    AHEAD,
+    FREE_AHEAD,
+    FREE_LONG,
+    FREE_SHORT,
+    Problem,
+    Room,
+    acceptance_rows,
+    angle_inputs,
+    inputs,
+    limit_rows,
+    middle,
+    take,
+)
 from kernels.families.rssr.box_turn import Formulas
 from kernels.jit import inline, kernel
 from kernels.types import Array
+
+
+@kernel
+def _passed(start: Array, pose: Array, side: int, total: float, crank: float) -> float:
+    """Return F at a pose of the tube for the design at the centre, times ``total``; for the choice of rows."""
+    n1, x1, y1, e, fs, ca, u1, v1 = start[0], start[1], start[2], start[3], start[4], start[5], start[6], start[7]
+    c, s, turn_c, turn_s = pose[COSINES], pose[COSINES + 1], pose[COSINES + 2 * side], pose[COSINES + 2 * side + 1]
+    u, v = u1 * c - v1 * s, v1 * c + u1 * s
+    x, y = x1 * (turn_c - 1.0) - y1 * turn_s, y1 * (turn_c - 1.0) + x1 * turn_s
+    return float(total * (e * x - fs * y) - crank * (n1 * (c - 1.0) + u * x + v * ca * y))
+
+
+@kernel
+def _worst(p: Problem, start: Array, group: int, total: float, crank: float) -> int:
+    """Pose at which the centre design is farthest out of one side of the tube on one stroke; -1 for none."""
+    stroke, side = p.tube.shape[0] // 2, LOW + group % 2
+    sign = p.branch if side == HIGH else -p.branch
+    found, lowest = -1, math.inf
+    for i in range(stroke * (group // 2), stroke * (group // 2 + 1)):
+        if abs(p.tube[i, side]) < math.inf:
+            passed = sign * _passed(start, p.tube[i], side, total, crank)
+            if passed < lowest:
+                found, lowest = i, passed
+    return found
+
+
+@inline
+def _put(p: Problem, f: Formulas, rows: Room, count: int, i: int, side: int, part: int, slot: int, kind: int) -> int:
+    """Return the number of rows after one was added; ``kind`` is that of the side ahead, the next one that behind."""
+    angle_inputs(rows.at, bt.COS_THETA, p.tube[i, THETA])
+    angle_inputs(rows.at, bt.COS_TURN, p.tube[i, side])
+    run(f.operations, f.factors, f.ends, part, rows.at, rows.ones.shape[0])
+    ahead = side == HIGH
+    return int(take(rows, count, f.slots[slot], kind if ahead else kind + 1, p.tube[i, THETA], 1.0 if ahead else -1.0))
+
+
+@kernel
+def _centre(f: Formulas, rows: Room, start: Array) -> None:
+    """Compute n1, X1, Y1, e, f sa, ca, u1, v1 of the design at the centre."""
+    for k in range(8):
+        start[k] = middle(rows.at, f.slots[bt.STARTS + 2 + k])
+
+
+@kernel
+def arrival_rows(p: Problem, f: Formulas, rows: Room, count: int, start: Array) -> int:
+    """Return the number of rows with those that a design with the target keeps, one per stroke and side of the tube."""
+    _centre(f, rows, start)
+    total, crank = middle(rows.at, f.slots[bt.STARTS]), middle(rows.at, f.slots[bt.STARTS + 1])
+    for group in range(4):
+        found = _worst(p, start, group, total, crank)
+        if found >= 0:
+            count = _put(p, f, rows, count, found, LOW + group % 2, bt.ARRIVAL, bt.PASSED, AHEAD)
+    return count
+
+
+@kernel
+def free_crank_rows(p: Problem, f: Formulas, rows: Room, count: int, start: Array) -> int:
+    """Return the number of rows with those of the tube and of the locus for a crank whose length is a variable.
+
+    The poses are the worst of the centre design with its shortest, middle and longest crank.
+    """
+    _centre(f, rows, start)
+    shortest, longest = max(p.limits[0], 0.0), p.limits[1]
+    for group in range(4):
+        last = -1
+        for k in range(3):
+            found = _worst(p, start, group, 1.0, shortest + 0.5 * k * (longest - shortest))
+            if found >= 0 and found != last:
+                count = _put(p, f, rows, count, found, LOW + group % 2, bt.FREE, bt.FREE_PASSED, FREE_AHEAD)
+                last = found
+    count = take(rows, count, f.slots[bt.FREE_CRANK], FREE_LONG, 0.0, 1.0)
+    return int(take(rows, count, f.slots[bt.FREE_CRANK], FREE_SHORT, 0.0, -1.0))
 
 
 @inline
@@ -34,7 +126,7 @@ def _single(rows: Room, start: int, count: int) -> int:
 
 @inline
 def _doubtful(rows: Room, count: int, n: int) -> int:
-    """Return the row of limits that is nearest to being negative on the whole box, in units of its spread."""
+    """Row of limits that is nearest to being negative on the whole box, in units of its spread."""
     found, lowest = -1, math.inf
     for j in range(count):
         if not rows.objective[j]:
@@ -47,7 +139,7 @@ def _doubtful(rows: Room, count: int, n: int) -> int:
 
 @inline
 def _lengths(f: Formulas, rows: Room) -> bool:
-    """Return the lengths of the designs; false where a divisor may vanish, or the crank."""
+    """Lengths of the designs; false where a divisor may vanish, or the crank."""
     at, n = rows.at, rows.ones.shape[0]
     if f.slots[bt.SIGN] >= 0:
         sign = 1.0 if at[f.slots[bt.SIGNED], VALUE] > 0.0 else -1.0  # where it is not known, this part ends anyway
@@ -59,7 +151,7 @@ def _lengths(f: Formulas, rows: Room) -> bool:
 
 @inline
 def _by_target(rows: Room, count: int) -> bool:
-    """Return whether the multipliers use rows that only designs with the target keep."""
+    """Whether the multipliers use rows that only designs with the target keep."""
     found = False
     for j in range(count):
         found = found or (rows.kinds[j] >= AHEAD and rows.factors[j] != 0.0)
@@ -76,13 +168,13 @@ def _emptied(p: Problem, rows: Room, count: int) -> tuple[int, int, float]:
 
 @inline
 def crank_known(f: Formulas, rows: Room) -> bool:
-    """Return whether rho1 + rho2, by which the crank's length is divided, vanishes nowhere in the box."""
+    """Whether rho1 + rho2, by which the crank's length is divided, vanishes nowhere in the box."""
     return bool(least(rows.at[f.slots[bt.STARTS]], rows.ones.shape[0]) > 0.0)
 
 
 @kernel
 def _limits_alone(p: Problem, rows: Room, count: int) -> bool:
-    """Return whether the rows of limits contradict each other on the box; ``rows.factors`` tell how."""
+    """Whether the rows of limits contradict each other on the box; ``rows.factors`` tell how."""
     single = _single(rows, 0, count)
     if single >= 0:
         rows.factors[:] = 0.0

@@ -138,7 +138,7 @@ def sense(tape: Tape, total: Number, crank: Number, e: Number, fs: Number, ca: N
 
 
 def within(tape: Tape, number: int, value: Number, unit: Number, power: int = 1) -> tuple[Number, Number]:
-    """Return the rows value - least^power unit >= 0 and most^power unit - value >= 0 of a limited length."""
+    """Rows value - least^power unit >= 0 and most^power unit - value >= 0 of a limited length."""
     least, most = tape.input(LIMITS + 2 * number), tape.input(LIMITS + 2 * number + 1)
     if power == 2:
         least, most = least.square(), most.square()

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import math
 
-from kernels.arithmetic.max_min import largest
+from kernels.arithmetic.intrinsics import largest
 from kernels.families.rssr.closure import EPS, closure_terms
 from kernels.families.rssr.derivatives import follower, order_pair
 from kernels.jit import inline, kernel
@@ -33,8 +33,7 @@ def rounding(
     v: float,
     height: float,
 ) -> tuple[float, float]:
-    """Return the relative rounding errors of the transfer function of that order where it is ``height``,
-    and of its slope.
+    """Relative rounding errors of the transfer function of that order where it is ``height``, and of its slope.
 
     There are three sources of error.  First, the function is proportional to Delta^(1/2 - order), so a relative error
     of Delta becomes one of the function.  Second, the function is a sum of terms of the size 1, k1, k2 over T, and the
@@ -60,7 +59,7 @@ def rounding(
 
 @inline
 def _gap(phi: float, centre: float) -> float:
-    """Return the distance of two angles around the circle."""
+    """Distance of two angles around the circle."""
     d = abs(phi - centre) % TWO_PI
     return min(d, TWO_PI - d)
 
@@ -81,8 +80,7 @@ def careful_maximum(
     rho2: float,
     target: float,
 ) -> tuple[float, float, float, float, bool]:
-    """Return the largest |d^order psi / dphi^order|, its crank angle, errors of both,
-    and whether two marches agreed.
+    """Largest |d^order psi / dphi^order|, its crank angle, errors of both, and whether two marches agreed.
 
     Parameters
     ----------
@@ -147,9 +145,7 @@ def _bracketed(
     f_hi: float,
     target: float,
 ) -> tuple[float, float, float, float]:
-    """Refine by Illinois' regula falsi on the derivative, bisecting every third step:
-    |y|, phi, error bounds of both.
-    """
+    """Refine by Illinois' regula falsi, bisecting every third step; |y|, phi and bounds of their errors."""
     y, mid, bound = 0.0, lo, math.inf
     for step in range(120):
         # One bisection in three: regula falsi alone may creep towards one end of the bracket.

@@ -32,7 +32,7 @@ class Design(NamedTuple):
 
 @inline
 def reduce_design(designs: Numbers, i: int) -> Reduced:
-    """Return constants of one design; ``valid`` is false for zero or negative lengths and for what is not finite."""
+    """Constants of one design; ``valid`` is false for zero or negative lengths and for what is not finite."""
     d = Design(
         designs[i, 0], designs[i, 1], designs[i, 2], designs[i, 3], designs[i, 4], designs[i, 5], designs[i, 6],
         designs[i, 7],

@@ -8,7 +8,7 @@ from typing import TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
-from kernels.arithmetic.max_min import largest, smallest
+from kernels.arithmetic.intrinsics import largest, smallest
 from kernels.families.rssr.closure import Array, reduce_design
 from kernels.families.rssr.derivatives import (
     acceleration_fused,
@@ -34,8 +34,7 @@ def dense_maxima(
     at: Indices | None = None,
     values: Array | None = None,
 ) -> None:
-    """Compute the largest |psi'|, |psi''|, |psi'''| over a grid of crank angles, and the smallest Delta;
-    the sweep's hot loop.
+    """Largest |psi'|, |psi''|, |psi'''| over a grid of crank angles, and the smallest Delta; the sweep's hot loop.
 
     Parameters
     ----------

@@ -12,7 +12,7 @@ from __future__ import annotations
 import math
 from typing import Any, NamedTuple
 
-from kernels.arithmetic.max_min import largest
+from kernels.arithmetic.intrinsics import largest
 from kernels.families.rssr.closure import Place, place
 from kernels.jit import inline, inline_fused
 
@@ -44,7 +44,7 @@ class Second(NamedTuple):
 
 @inline
 def rocker(at: Place, t: Any, per: Any) -> Rocker:
-    """Return the rocker from T and ``per`` = 1/(R T): one division gives both reciprocals, 1/R and 1/T."""
+    """Rocker from T and ``per`` = 1/(R T): one division gives both reciprocals, 1/R and 1/T."""
     per_r, per_t = t * per, at.rr * per
     return Rocker((at.x * at.w + at.y * t) * per_r, (at.x * t - at.y * at.w) * per_r, t, per_t)
 
@@ -78,7 +78,7 @@ def jerk(to: Rocker, at: Place, first: First, second: Second) -> Any:
 
 @inline
 def snap(to: Rocker, at: Place, first: First, second: Second, j: Any) -> Any:
-    """Return the fourth transfer function, with its own sign, from the third, ``j``."""
+    """Fourth transfer function, with its own sign, from the third, ``j``."""
     p, q, t, w = -first.p, -second.q, to.t, at.w
     g_phphps, g_phpsps, g_phps = at.u * to.s - at.hv * to.c, first.w_ph - first.g_ph, second.g_phps
     by_p = p * (-4.0 * g_phps + p * (6.0 * (at.w1 - second.g_phph) - p * (4.0 * g_phps + w * p)))
@@ -115,7 +115,7 @@ def follower(
 
 @inline
 def order_pair(order: int, p: float, q: float, j: float, k: float) -> tuple[float, float]:
-    """Return the transfer function of that order and its derivative."""
+    """Transfer function of that order and its derivative."""
     if order == 1:
         return p, q
     if order == 2:

@@ -1,26 +1,153 @@
-"""Enclosure of what crank-rockers in series drive: a guided point along its line and across it, docs/guide.md.
+"""Enclosure of a crank-rocker's velocity, and of what crank-rockers in series drive: docs/rssr.md, docs/guide.md.
+
+What they drive is a guided point, along its line and across it.
 
 The planar four-bar of a guide is the crank-rocker with parallel axes and all links in one plane, so each stage of the
 chain is one, its crank driven by the enclosure of the rocker before it.  The closure of the first stage is a known
 trigonometric polynomial of the crank angle; that of the later ones is composed.  Several designs are enclosed side by
 side, each about its own crank angle.
+
+    psi' = (A + B/T)/R,   A = X' Y - X Y',   B = W R'/2 - R W',   T = sqrt(R - W^2)                              (3a)
+
+which is (3) of docs/rssr.md with cos psi and sin psi written out, so everything is made of trigonometric polynomials of
+phi, of degree 1 (X, Y, W, A), 2 (R, Delta) and 3 (B).  About phi they are polynomials in sin z and 1 - cos z.
 """
 
 from __future__ import annotations
 
 import math
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from kernels.arithmetic.sincos import sincos
 from kernels.certified.cells import CENTRE, REACH
-from kernels.certified.jets import WIDTH, combined, double_harmonic, get, harmonic, product, put, size_of, sum_of
-from kernels.certified.lanes import LANES, circle, inverse, root
-from kernels.families.rssr.closure import Array, reduce_design
-from kernels.families.rssr.enclosure import spread
+from kernels.certified.jets import (
+    GUARD,
+    LANES,
+    WIDTH,
+    Jet,
+    circle,
+    combined,
+    double_harmonic,
+    get,
+    harmonic,
+    inverse,
+    product,
+    put,
+    reciprocal,
+    root,
+    size_of,
+    sum_of,
+    triple_harmonic,
+)
+from kernels.families.rssr.closure import Array, closure_terms, reduce_design
 from kernels.jit import inline, kernel
 from kernels.types import EPS
+
+
+class Spread(NamedTuple):
+    """X, Y, W, R and Delta about one crank angle as series in s = sin z and m = 1 - cos z.
+
+    ``x0 + x1 s + x2 m`` is X, and Y and W alike; r0 ... r4 are the coefficients of 1, s, m, s m, m^2 in R, d0 ... d4
+    those in Delta.  ``x``, ``y``, ``w``, ``square`` bound sizes, ``ex``, ``ey``, ``ew``, ``e_square``, ``e_delta`` what
+    the functions are off by.
+    """
+
+    x0: Any
+    x1: Any
+    x2: Any
+    y0: Any
+    y1: Any
+    y2: Any
+    w0: Any
+    w1: Any
+    w2: Any
+    x: Any
+    y: Any
+    w: Any
+    ex: Any
+    ey: Any
+    ew: Any
+    square: Any
+    e_square: Any
+    e_delta: Any
+    r0: Any
+    r1: Any
+    r2: Any
+    r3: Any
+    r4: Any
+    d0: Any
+    d1: Any
+    d2: Any
+    d3: Any
+    d4: Any
+
+
+@inline
+def spread(
+    e: Any, y0: Any, ca: Any, k0: Any, k1: Any, k2: Any, w_size: Any, u: Any, v: Any, reach: Any
+) -> Spread:  # fmt: skip
+    """Write the closure on |z| <= reach <= 1 about (cos phi, sin phi) = (u, v) as series.
+
+    The exact motion of the given doubles is meant: X, Y, W are off by at most 5, 7, 18 eps of the magnitudes that
+    make them up (docs/rssr.md, section 4.2), their derivatives by less; the errors below are those times the sizes of
+    sin z and 1 - cos z.
+    """
+    x0, yy0, w0 = closure_terms(e, y0, ca, k0, k1, k2, u, v)
+    x1, x2 = v, u
+    y1, y2 = ca * u, -ca * v
+    w1, w2 = k1 * u + k2 * v, k2 * u - k1 * v
+    s, m = 1.18 * reach, 0.55 * reach * reach  # sizes of sin z and 1 - cos z
+    x, y, w = (
+        abs(x0) + s * abs(x1) + m * abs(x2),
+        abs(yy0) + s * abs(y1) + m * abs(y2),
+        abs(w0) + s * abs(w1) + m * abs(w2),
+    )
+    ex, ey, ew = 9.0 * EPS * (abs(e) + 1.0), 16.0 * EPS * (abs(y0) + abs(ca)), 40.0 * EPS * w_size
+    square = x * x + y * y
+    e_square = 2.0 * (x * ex + y * ey) + ex * ex + ey * ey + 12.0 * EPS * square
+    r0, r1, r2 = x0 * x0 + yy0 * yy0, 2.0 * (x0 * x1 + yy0 * y1), 2.0 * (x0 * x2 + yy0 * y2 + x1 * x1 + y1 * y1)
+    r3, r4 = 2.0 * (x1 * x2 + y1 * y2), (x2 - x1) * (x2 + x1) + (y2 - y1) * (y2 + y1)
+    return Spread(
+        x0, x1, x2, yy0, y1, y2, w0, w1, w2, x, y, w, ex, ey, ew, square, e_square,
+        e_square + 2.0 * w * ew + ew * ew + 12.0 * EPS * w * w, r0, r1, r2, r3, r4,
+        r0 - w0 * w0, r1 - 2.0 * w0 * w1, r2 - 2.0 * (w0 * w2 + w1 * w1), r3 - 2.0 * w1 * w2,
+        r4 - (w2 - w1) * (w2 + w1),
+    )  # fmt: skip
+
+
+@inline
+def velocity_terms(z: Spread, ca: Any, k1: Any, k2: Any, reach: Any) -> tuple[Jet, Jet]:
+    """Enclose A and B of the mirrored mechanism's velocity from :func:`spread` of its closure."""
+    x0, x1, x2, y0, y1, y2, w0, w1, w2 = z.x0, z.x1, z.x2, z.y0, z.y1, z.y2, z.w0, z.w1, z.w2
+    x, y, w, ex, ey, ew, square, e_square = z.x, z.y, z.w, z.ex, z.ey, z.ew, z.square, z.e_square
+    r0, r1, r2, r3, r4 = z.r0, z.r1, z.r2, z.r3, z.r4
+    # Sizes of the derivatives of X, Y, W, and what they are off by.
+    s, aca, turn = 1.18 * reach, abs(ca), abs(k1) + abs(k2)
+    dx, dy, dw = 1.55 * abs(x1) + s * abs(x2), 1.55 * abs(y1) + s * abs(y2), 1.55 * abs(w1) + s * abs(w2)
+    edx, edy, edw = 6.0 * EPS, 14.0 * EPS * aca, 26.0 * EPS * turn
+    half_slope = x * dx + y * dy  # of R'/2
+    e_slope = x * edx + dx * ex + ex * edx + y * edy + dy * ey + ey * edy + 12.0 * EPS * half_slope
+    # R'/2 = q0 + q1 s + q2 m + q3 s m + q4 m^2
+    q0, q1, q2, q3, q4 = 0.5 * r1, 0.5 * r2, 0.5 * (3.0 * r3 - r1), r4, -r3
+    error = square * edw + e_square * (dw + edw) + ew * (half_slope + e_slope) + w * e_slope
+    b = triple_harmonic(
+        w0 * q0 - r0 * w1,
+        w0 * q1 + w1 * q0 - r1 * w1 - r0 * w2,
+        w0 * q2 + 2.0 * w1 * q1 + w2 * q0 - (r2 - r0) * w1 - 2.0 * r1 * w2,
+        w0 * q3 + w1 * q2 + w2 * q1 - (r3 - r1) * w1 - r2 * w2,
+        w0 * q4 + w1 * (2.0 * q3 - q1) + w2 * q2 - (r4 - r2) * w1 - (2.0 * r3 - r1) * w2,
+        w1 * q4 + w2 * q3 + r3 * w1 - r4 * w2,
+        w2 * q4 - w1 * q3 + r4 * w1 + r3 * w2,
+        reach,
+        error + 48.0 * EPS * (square * (dw + turn) + w * half_slope),
+    )  # fmt: skip
+    a0 = x1 * y0 - x0 * y1
+    error = dx * ey + y * edx + edx * ey + x * edy + dy * ex + ex * edy + 12.0 * EPS * (dx * y + x * dy + aca)
+    return harmonic(a0, y0 * x2 - x0 * y2, ca - a0, reach, error * GUARD), b
+
 
 Stages = NDArray[np.float64]
 # Rows of the numbers of a design: of each stage those of its closure; then a, b and a', b' of what it hands on,
@@ -32,9 +159,9 @@ STAGE = 12 * LANES
 P1, P2, P_OFF, CONSTANT, CONSTANT_OFF = (k * LANES for k in range(5))
 SHARES = 5
 # Places of jets: the crank; the closure; 1/R, which stands where the discriminant was; the point along and across the
-# line, the last two.
-COS, SIN, X, Y, W, R, T, PER, ALONG, ACROSS = (k * WIDTH * LANES for k in range(10))
-JETS = 10 * WIDTH * LANES
+# line, and the velocity of the rocker.
+COS, SIN, X, Y, W, R, T, PER, ALONG, ACROSS, RATE = (k * WIDTH * LANES for k in range(11))
+JETS = 11 * WIDTH * LANES
 
 
 @inline
@@ -59,13 +186,19 @@ def load(lane: int, numbers: Array, stages: Stages, couplings: Array, shares: Ar
     numbers[row + CONSTANT], numbers[row + CONSTANT_OFF] = shares[i, 6], shares[i, 7]
 
 
+@inline
+def _spread(r: Array, walk: Array, i: int) -> Spread:
+    """Write the closure of the first stage of lane i on its cell as series."""
+    v, u = sincos(walk[CENTRE + i])
+    return spread(r[E + i], r[Y0 + i], r[CA + i], r[K0 + i], r[K1 + i], r[K2 + i], r[W_SIZE + i], u, v, walk[REACH + i])
+
+
 @kernel
 def _first(lanes: int, r: Array, walk: Array, jets: Array) -> None:
     """Enclose X, Y, W, R = X^2 + Y^2 and, in PER, the discriminant R - W^2 of the first stage."""
     for i in range(lanes):
         reach = walk[REACH + i]
-        v, u = sincos(walk[CENTRE + i])
-        z = spread(r[E + i], r[Y0 + i], r[CA + i], r[K0 + i], r[K1 + i], r[K2 + i], r[W_SIZE + i], u, v, reach)
+        z = _spread(r, walk, i)
         put(jets, X + i, LANES, harmonic(z.x0, z.x1, z.x2, reach, z.ex))
         put(jets, Y + i, LANES, harmonic(z.y0, z.y1, z.y2, reach, z.ey))
         put(jets, W + i, LANES, harmonic(z.w0, z.w1, z.w2, reach, z.ew))
@@ -130,23 +263,34 @@ def _point_across(lanes: int, r: Array, ends: Array, jets: Array) -> None:
 
 
 @kernel
-def enclose_point(
-    lanes: int, count: int, numbers: Array, jets: Array, walk: Array, along: bool, across: bool, good: Array
+def _velocity(lanes: int, r: Array, walk: Array, jets: Array, good: Array) -> None:
+    """Enclose the velocity of the mirrored first stage, (A + B/T)/R."""
+    for i in range(lanes):
+        a, b = velocity_terms(_spread(r, walk, i), r[CA + i], r[K1 + i], r[K2 + i], walk[REACH + i])
+        per_t, possible = reciprocal(get(jets, T + i, LANES))
+        put(jets, RATE + i, LANES, product(sum_of(a, product(b, per_t)), get(jets, PER + i, LANES)))
+        good[i] = good[i] if possible else 0.0
+
+
+@kernel
+def enclose_motion(
+    lanes: int, count: int, numbers: Array, jets: Array, walk: Array, rate: bool, along: bool, across: bool, good: Array
 ) -> None:
-    """Enclose the guided point at the end of ``count`` stages in the cells that a walk asks for, of all lanes.
+    """Enclose the first rocker and the guided point at the end of ``count`` stages in the cells that a walk asks for.
 
     Parameters
     ----------
     lanes, count : lanes in use, number of stages, the last one planar
     numbers : of :func:`load`
-    jets : (JETS,) out; ALONG is the travel along the line, without its constant, ACROSS the deviation from it
+    jets : (JETS,) out; RATE is the velocity of the first rocker with branch +1, ALONG the travel along the line,
+        without its constant, ACROSS the deviation from it
     walk : (WALK,) of :mod:`kernels.certified.cells`, with the CENTRE [rad] and REACH of each cell
-    along, across : whether that jet is wanted
+    rate, along, across : whether that jet is wanted
     good : (LANES,) out, 0 where the motion cannot be enclosed
     """
     for i in range(lanes):
         good[i] = 1.0
-    if count == 1:
+    if count == 1 and (along or across):
         circle(lanes, walk[CENTRE:], walk[REACH:], jets, COS, SIN)
     for k in range(count):
         r = numbers[k * STAGE : (k + 1) * STAGE]
@@ -157,6 +301,8 @@ def enclose_point(
         # No circle around zero may touch the discriminant or R, or root and reciprocal have no enclosure.
         root(lanes, jets, PER, T, good)
         inverse(lanes, jets, R, PER, good)
+        if k == 0 and rate:
+            _velocity(lanes, r, walk, jets, good)
         if k + 1 < count:
             _hand_on(lanes, r, jets)
             continue

@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from kernels import status as st
-from kernels.arithmetic.bits import lowest_bit
+from kernels.arithmetic.intrinsics import lowest_bit
 from kernels.curves.trigonometric_polynomials import minimum
 from kernels.families.rssr.block import (
     BLOCK,
@@ -52,7 +52,7 @@ _TINY_SWING = 0.25  # below, the half-swing identity is more accurate than the d
 
 @inline
 def _ball(at: Array, k: int, phi: float) -> tuple[float, float, float, float, float, float]:
-    """Return eta, xi, d eta/d phi along the motion, sin psi, cos psi and T at phi, in units of the crank."""
+    """Eta, xi, d eta/d phi along the motion, sin psi, cos psi and T at phi, in units of the crank."""
     e, y0, ca, k0, k1, k2, c = at[k + E], at[k + Y0], at[k + CA], at[k + K0], at[k + K1], at[k + K2], at[k + ROCKER]
     u, v = math.cos(phi), math.sin(phi)
     x, y, w = closure_terms(e, y0, ca, k0, k1, k2, u, v)
@@ -101,7 +101,7 @@ def _solve(at: Array, active: Counts, count: int, roots: Array) -> None:
 
 @inline
 def _rocker_turns(at: Array, k: int) -> bool:
-    """Return whether the closure is solvable for phi at every psi: then the rocker has no limit positions; (6*)."""
+    """Whether the closure is solvable for phi at every psi: then the rocker has no limit positions; (6*)."""
     e, y0, ca, k0, k1, k2 = at[k + E], at[k + Y0], at[k + CA], at[k + K0], at[k + K1], at[k + K2]
     m = minimum(2.0 * (k2 - e * k0), 2.0 * (y0 * k0 - k1 * ca), 0.5 * (1.0 - e * e - ca * ca + y0 * y0), e * y0)
     least: float = m.value + (k1 * k1 + k2 * k2 - k0 * k0) + 0.5 * (1.0 - e * e + ca * ca - y0 * y0)
@@ -156,14 +156,14 @@ def _unmark(marks: float, begin: Array) -> int:
 
 @inline
 def _wrapped(angle: float) -> float:
-    """Return the angle of an arctangent in [0, 2 pi)."""
+    """Angle of an arctangent in [0, 2 pi)."""
     turned = angle + TWO_PI if angle < 0.0 else 0.0 + angle
     return turned if turned < TWO_PI else 0.0
 
 
 @inline
 def _swing(at: Array, k: int, s1: float, c1: float, s2: float, c2: float, rho: float) -> tuple[float, float, float]:
-    """Return the signed swing of the mirrored mechanism, always negative, and two parts of its error.
+    """Signed swing of the mirrored mechanism, always negative, and two parts of its error.
 
     The second number is the factor by which errors of the two angles enter the swing, the third the rounding error of
     the swing's own formula.  ``rho`` is the sum of the two distances of the ball from the crank axis.  The half-swing

@@ -9,7 +9,7 @@ from __future__ import annotations
 import math
 
 from kernels import status as st
-from kernels.arithmetic.max_min import largest, smallest
+from kernels.arithmetic.intrinsics import largest, smallest
 from kernels.families.rssr.block import (
     BLOCK,
     COS,
@@ -35,7 +35,7 @@ from kernels.linkage.verdict import turning_status
 
 @inline
 def _ball(at: Array, k: int) -> tuple[float, float]:
-    """Return the squares of the cosine and the sine of the pressure angle at the least Delta, each times (b/a)^2."""
+    """Squares of the cosine and the sine of the pressure angle at the least Delta, each times (b/a)^2."""
     u, v = at[k + COS], at[k + SIN]
     radial = at[k + ROCKER] - (at[k + K0] + at[k + K1] * v - at[k + K2] * u)
     axial = at[k + Z0] - at[k + SA] * v

@@ -4,6 +4,8 @@ Per design: the exact margin; if it turns N >= 11/rho samples, rho being the dis
 then every local maximum of at least 60 % of the best is refined on the next derivative, vectorised over the maxima of
 a whole block of designs.  A maximum whose refinement fails its checks, or a design that would need more than 1024
 samples, goes to :mod:`kernels.families.rssr.careful`.
+
+The fused search of chains (:mod:`kernels.chains`) finds the same within 1e-11, in 1.4 to 1.7 times the time.
 """
 
 from __future__ import annotations
@@ -42,30 +44,28 @@ from kernels.families.rssr.block import (
 )
 from kernels.families.rssr.careful import careful_maximum
 from kernels.families.rssr.closure import Array, Status
-from kernels.families.rssr.peaks import (
+from kernels.families.rssr.sampling import (
     ERROR,
+    FEWEST,
+    GRID_SIZE,
     HEIGHT,
     LAST,
+    MARKS,
+    MOST,
     MOVED,
     REACH,
     ROUNDING,
     START,
     begin_at_vertex,
     finish,
-    new_list,
-    refine,
-    settle,
-)
-from kernels.families.rssr.sampling import (
-    FEWEST,
-    GRID_SIZE,
-    MARKS,
-    MOST,
     list_marked,
     list_peaks,
     mark_peaks,
+    new_list,
+    refine,
     sample,
     sample_block,
+    settle,
 )
 from kernels.jit import inline, kernel
 from kernels.linkage.verdict import turning_status
@@ -142,7 +142,7 @@ def _keep_what_turns(start: int, count: int, at: Array, who: Counts, status: Sta
 
 @inline
 def _highest(begin: int, end: int, m: Array) -> tuple[float, float, float, float]:
-    """Return the height, place and the errors of both of the highest refined maximum of a design."""
+    """Height, place and the errors of both of the highest refined maximum of a design."""
     # The first and the last without a loop: few designs have more, and the processor guesses that rightly.
     best, winner = max(m[begin + HEIGHT], 0.0), begin
     for peak in range(begin + 1, end - 1):
@@ -168,8 +168,7 @@ def true_maxima(
     max_abs_d2psi: Array | None,
     max_abs_d3psi: Array | None,
 ) -> None:
-    """Compute the largest magnitude of one transfer function over the whole turn, where it is,
-    and an estimate of its error.
+    """Largest magnitude of one transfer function over the whole turn, where it is, and an estimate of its error.
 
     Parameters
     ----------

@@ -42,8 +42,7 @@ def poses(
     pressure_angle: Numbers | None,
     joints: Joints | None,
 ) -> None:
-    """Compute the position, transfer functions, discriminant,
-    pressure angle and joints of every design at its crank angles.
+    """Position, transfer functions, discriminant, pressure angle and joints of every design at its crank angles.
 
     Equations (2*), (3)-(5) and (13) of docs/rssr.md; joints in the fixed frame of its section 1.
 

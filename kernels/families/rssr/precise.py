@@ -109,8 +109,7 @@ def precise_poses(
     pressure_angle: Array | None,
     joints: Joints | None,
 ) -> None:
-    """Compute what :func:`kernels.families.rssr.motion.poses` does, correct to a few roundings,
-    for float64 designs only.
+    """Poses as of the module ``motion``, correct to a few roundings, for float64 designs only.
 
     Parameters
     ----------

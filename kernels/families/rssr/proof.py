@@ -39,7 +39,7 @@ class Leaves(NamedTuple):
 def _record(
     leaves: Leaves, count: int, low: Array, high: Array, outcome: int, bound: float, rows: Room, used: int
 ) -> int:
-    """Return one more leaf, with the rows that prove it."""
+    """One more leaf, with the rows that prove it."""
     leaves.low[count], leaves.high[count] = low, high
     leaves.outcome[count], leaves.bound[count] = outcome, bound
     leaves.kinds[count], leaves.theta[count], leaves.factors[count] = -1, 0.0, 0.0
@@ -54,7 +54,7 @@ def _record(
 
 @inline
 def _to_halve(low: Array, high: Array, whole: Array, smallest: float, loose: Array) -> int:
-    """Return the variable whose width costs the bound most, of those that are not too narrow; -1 where all are.
+    """Variable whose width costs the bound most, of those that are not too narrow; -1 where all are.
 
     One that is far narrower than the widest is not halved, so that no row that stays undecided is followed for ever.
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from typing import Any, NamedTuple
 
-from kernels.arithmetic.max_min import largest
+from kernels.arithmetic.intrinsics import largest
 from kernels.chains.form import STRIDE, Form, Travel, Turned
 from kernels.families.rssr.block import (
     ACROSS,

@@ -4,7 +4,6 @@
 crank angle between the limit positions.
 """
 
-from kernels.families.slotted.closure import Design as Design
 from kernels.families.slotted.closure import crank_of_phi0 as crank_of_phi0
 from kernels.families.slotted.motion import Outputs as Outputs
 from kernels.families.slotted.motion import poses as poses

@@ -18,20 +18,6 @@ from kernels.jit import inline, kernel
 from kernels.types import Numbers, Status
 
 
-class Design(NamedTuple):
-    """Columns of the design matrix: lengths in one unit, alpha in radians, tau and branch +1 or -1."""
-
-    a: float
-    e: float
-    f: float
-    g: float
-    alpha: float
-    s: float
-    k: float
-    tau: float
-    branch: float
-
-
 class Reduced(NamedTuple):
     """Per-design numbers in units of ``unit``: x = a u - e, y = y0 + ka v, z = z0 - na v (ball from the point D)."""
 
@@ -55,7 +41,7 @@ class Reduced(NamedTuple):
 
 @inline
 def reduce_design(designs: Numbers, i: int) -> Reduced:
-    """Return constants of one design; ``valid`` is false for a crank of no length, k < 0 and what is not finite."""
+    """Constants of one design; ``valid`` is false for a crank of no length, k < 0 and what is not finite."""
     _, exponent = math.frexp(designs[i, 0].real)
     unit, per_unit = math.ldexp(1.0, exponent), math.ldexp(1.0, -exponent)
     a, e, f, g = designs[i, 0] * per_unit, designs[i, 1] * per_unit, designs[i, 2] * per_unit, designs[i, 3] * per_unit

@@ -48,7 +48,7 @@ class Ball(NamedTuple):
 
 @inline
 def _closure(r: Reduced, u: Any, v: Any, is_bar: bool) -> Ball:
-    """Return the ball, status and discriminants of both parts of the closure, (1), (2)."""
+    """Ball, status and discriminants of both parts of the closure, (1), (2)."""
     x, y, z = r.a * u - r.e, r.y0 + r.ka * v, r.z0 - r.na * v
     error = 8.0 * EPS
     code = st.OK if r.valid else st.INVALID_INPUT
@@ -101,14 +101,13 @@ def poses(
     out: Outputs,
     joints: Numbers | None,
 ) -> None:
-    """Compute the angle of the driven link, place of the ball along the slot, and derivatives,
-    of every design and crank angle.
+    """Angle of the driven link, place of the ball along the slot, and derivatives, of every design and crank angle.
 
     Equations (1)-(7) of docs/slotted.md.
 
     Parameters
     ----------
-    designs : (n, 9) columns of :class:`Design`; k = 0 is the fork slot, k > 0 the bar
+    designs : (n, 9) columns as `PARAMETERS` of sweep/families/slotted.py; k = 0 is the fork slot, k > 0 the bar
     cos_phi, sin_phi : (n, m), or (1, m) shared by all designs
     status : (n, m) out; OK, NOT_ASSEMBLED, DEAD_POINT, SINGULAR or INVALID_INPUT
     psi ... cos_psi : (n, m) out [rad; 1], or None: what is None is neither computed nor compiled
@@ -160,7 +159,7 @@ def poses(
 
 @inline
 def _both_parts(r: Reduced, ball: Ball, is_bar: bool) -> Any:
-    """Return the signed cos^2 of the pressure angle: negative where either part of the closure has no solution; (7)."""
+    """Signed cos^2 of the pressure angle: negative where either part of the closure has no solution; (7)."""
     part = ball.delta / ball.rr
     if is_bar:
         reach = (r.k - ball.z) * (r.k + ball.z) / (r.k * r.k)
@@ -171,8 +170,9 @@ def _both_parts(r: Reduced, ball: Ball, is_bar: bool) -> Any:
 
 @inline
 def _pressure_angle(r: Reduced, ball: Ball, p: Any, is_bar: bool) -> Any:
-    """Return the angle between force and velocity at the ball;
-    the force is normal to the slot, or along the arm of the bar.
+    """Angle between force and velocity at the ball.
+
+    The force is normal to the slot, or along the arm of the bar.
     """
     along = magnitude(p) * (magnitude(ball.arm) if is_bar else 1.0)
     across = hypotenuse(np.sqrt(ball.rr) * ball.z, ball.q * ball.arm) if is_bar else magnitude(r.s)
@@ -201,7 +201,7 @@ def _put_joints(
 def _derivatives(
     r: Reduced, ball: Ball, u: Any, v: Any, c: Any, s: Any, p: Any, is_bar: bool
 ) -> tuple[Any, Any, Any, Any, Any, Any]:
-    """Return the first three derivatives of psi, then of rho in units of the crank, (5), (6)."""
+    """First three derivatives of psi, then of rho in units of the crank, (5), (6)."""
     z, q = ball.z, ball.q
     # at a dead point (p = 0) the position stands and the derivatives do not exist
     per_p = 1.0 / p if ball.code == st.OK else math.nan * p

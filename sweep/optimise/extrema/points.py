@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sweep.families.base import Angles, Array
+from sweep.families.poses import differentiable
 from sweep.optimise.extrema.scanned import (
     CROSSING,
     EDGE,
@@ -35,7 +36,6 @@ from sweep.optimise.extrema.scanned import (
 )
 from sweep.optimise.problem.statement import Problem
 from sweep.quantities.measures import Series
-from sweep.reductions.differentiable import differentiable
 from sweep.reductions.sampling import on_closed_turn
 
 Index: TypeAlias = NDArray[np.intp]

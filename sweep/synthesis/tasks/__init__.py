@@ -1,18 +1,18 @@
 """The eight tasks of Polukhin's engineering method as problems behind one interface; docs/tasks.md."""
 
 from sweep.synthesis.tasks.engineering import EngineeringMethod as EngineeringMethod
+from sweep.synthesis.tasks.engineering import Task4 as Task4
 from sweep.synthesis.tasks.positions import Position as Position
+from sweep.synthesis.tasks.positions import Task1 as Task1
+from sweep.synthesis.tasks.positions import Task2 as Task2
 from sweep.synthesis.tasks.problem import Problem as Problem
 from sweep.synthesis.tasks.problem import Solution as Solution
+from sweep.synthesis.tasks.second_stage import Task6 as Task6
+from sweep.synthesis.tasks.second_stage import Task7 as Task7
 from sweep.synthesis.tasks.solver import solve as solve
-from sweep.synthesis.tasks.task1 import Task1 as Task1
-from sweep.synthesis.tasks.task2 import Task2 as Task2
 from sweep.synthesis.tasks.task3 import Setting as Setting
 from sweep.synthesis.tasks.task3 import Task3 as Task3
 from sweep.synthesis.tasks.task3 import adjustments as adjustments
-from sweep.synthesis.tasks.task4 import Task4 as Task4
 from sweep.synthesis.tasks.task5 import SlotPosition as SlotPosition
 from sweep.synthesis.tasks.task5 import Task5 as Task5
-from sweep.synthesis.tasks.task6 import Task6 as Task6
-from sweep.synthesis.tasks.task7 import Task7 as Task7
 from sweep.synthesis.tasks.task8 import Task8 as Task8

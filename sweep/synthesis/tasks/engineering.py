@@ -1,4 +1,7 @@
-"""The engineering method: of all crank-rockers with a given swing and phi0 the one with the least acceleration."""
+"""The engineering method: of all crank-rockers with a given swing and phi0 the one with the least acceleration.
+
+Task 4 is the same in the plane, the problem of Alt.
+"""
 
 from __future__ import annotations
 
@@ -10,6 +13,7 @@ import numpy as np
 
 from sweep.families.base import Array
 from sweep.synthesis.tasks.crank_rocker import (
+    check_given,
     designs_on_locus,
     least_cos2,
     motion,
@@ -19,7 +23,6 @@ from sweep.synthesis.tasks.crank_rocker import (
     size_names,
     turn,
 )
-from sweep.synthesis.tasks.given import check_given
 from sweep.synthesis.tasks.problem import Candidates, Unknown, stacked
 
 
@@ -84,3 +87,16 @@ class EngineeringMethod:
         else:
             curve = np.sqrt(1.0 - least_cos2(designs))[:, None]  # sine of the largest pressure angle
         return Candidates(np.empty((len(x), 0)), stacked(len(x), limits), curve, columns)
+
+
+@dataclass(frozen=True)
+class Task4(EngineeringMethod):
+    """The engineering method in the plane: alpha = 0, f = g; the only unknown is phi1.
+
+    Give swing, phi0 and the frame e; the objective "pressure_angle" is the classical question for the best
+    transmission, "acceleration" that for the smoothest motion.
+    """
+
+    g: float = field(default=0.0, init=False)
+    alpha: float = field(default=0.0, init=False)
+    f_range: tuple[float, float] = field(default=(0.0, 0.0), init=False)

@@ -53,7 +53,7 @@ class Problem(Protocol):
         """What is minimised, in words; it chooses among the mechanisms that meet equations and limits."""
 
     def evaluate(self, x: Array) -> Candidates:
-        """Return equations, limits, objective curve and mechanisms of candidates x (n, number of unknowns)."""
+        """Equations, limits, objective curve and mechanisms of candidates x (n, number of unknowns)."""
 
 
 @dataclass(frozen=True)
@@ -72,7 +72,7 @@ class Solution:
     limits: dict[str, float]
 
     def __str__(self) -> str:
-        """Return the answer in a few lines."""
+        """Answer in a few lines."""
         head = "feasible" if self.feasible else "infeasible"
         lines = [f"{head}, objective {self.objective:.6g}"]
         for title, entries in (
@@ -84,5 +84,5 @@ class Solution:
 
 
 def stacked(count: int, columns: list[Array]) -> Array:
-    """Return columns (n,) side by side as (n, k), also for k = 0."""
+    """Columns (n,) side by side as (n, k), also for k = 0."""
     return np.column_stack(columns) if columns else np.empty((count, 0))

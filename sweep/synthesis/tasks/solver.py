@@ -38,17 +38,17 @@ class _Scaled:
         self.periodic = np.array([u.periodic for u in problem.unknowns])
 
     def real(self, z: Array) -> Array:
-        """Return unknowns of points of the unit box."""
+        """Unknowns of points of the unit box."""
         x: Array = self.low + self.span * np.where(self.periodic, z % 1.0, z)
         return x
 
     def rows(self, z: Array) -> _Value:
-        """Return values of points (n, k)."""
+        """Values of points (n, k)."""
         found = self.problem.evaluate(self.real(np.atleast_2d(z)))
         return _Value(found.equations, found.limits, found.curve)
 
     def with_gradient(self, z: Array) -> tuple[_Value, _Value]:
-        """Return values at z and their derivatives, (k, ...) each; one-sided where a neighbour has no mechanism."""
+        """Values at z and their derivatives, (k, ...) each; one-sided where a neighbour has no mechanism."""
         k = z.size
         steps = STEP * np.eye(k)
         both = self.rows(np.vstack([z[None, :], z + steps, z - steps]))
@@ -64,7 +64,7 @@ class _Scaled:
 
 
 def solve(problem: Problem, *, candidates: int = 4096, starts: int = 6, seed: int = 0) -> list[Solution]:
-    """Return mechanisms that do a task, the best first.
+    """Mechanisms that do a task, the best first.
 
     Parameters
     ----------

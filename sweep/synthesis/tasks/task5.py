@@ -12,6 +12,7 @@ from sweep.errors import InputError
 from sweep.families import slotted
 from sweep.families.base import Angles, Array
 from sweep.synthesis.tasks.crank_rocker import (
+    check_given,
     designs_on_locus,
     motion,
     named,
@@ -20,7 +21,6 @@ from sweep.synthesis.tasks.crank_rocker import (
     size_names,
     turn,
 )
-from sweep.synthesis.tasks.given import check_given
 from sweep.synthesis.tasks.problem import Candidates, Unknown, stacked
 
 
@@ -40,8 +40,7 @@ class Slot(NamedTuple):
 
 
 def slot(a2: Array, e2: Array, t: Array) -> Slot:
-    """Return the planar slotted link: pin at radius a2 on the rocker, pivot at distance e2,
-    t the angle between them.
+    """Planar slotted link: pin at radius a2 on the rocker, pivot at distance e2, t the angle between them.
 
     Equation (17) of docs/tasks.md, which is the fork slot of docs/slotted.md.  ``a2``, ``e2`` : (n,), their signs are
     equal and without effect; ``t`` : (n, m).

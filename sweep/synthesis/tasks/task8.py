@@ -14,13 +14,13 @@ from sweep.families import family
 from sweep.families.base import Accuracy, Angles, Array
 from sweep.synthesis.tasks.crank_rocker import (
     RSSR,
+    check_given,
     designs_on_locus,
     named,
     pressure_limit,
     size_limits,
     size_names,
 )
-from sweep.synthesis.tasks.given import check_given
 from sweep.synthesis.tasks.problem import Candidates, Unknown, stacked
 from sweep.synthesis.tasks.second_stage import chain_motion, chain_of, second_pressure_limit
 
@@ -131,7 +131,7 @@ class Task8:
         return Candidates(np.empty((n, 0)), limits, np.asarray(motion["d2s"], np.float64), results)
 
     def _deviation(self, designs: Array, phi1: Array, psi1: Array, theta: Array, lengths: Array) -> Array:
-        """Return the largest distance from the dwell position during the dwell."""
+        """Largest distance from the dwell position during the dwell."""
         window = np.linspace(-0.5 * self.dwell, 0.5 * self.dwell, WINDOW)
         law = RSSR.poses(designs, Angles.of(phi1[:, None] + window), frozenset(("psi",)))
         turned = np.asarray(law["psi"], np.float64) - psi1[:, None]

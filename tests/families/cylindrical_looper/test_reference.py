@@ -19,7 +19,7 @@ from tests.support.family_checks import (
     factors,
 )
 
-NAMES = (*cylindrical_looper.Design._fields, *cylindrical_looper.Offset._fields)
+NAMES = family("cylindrical_looper").parameter_names
 ON_AXIS = {"d2": 0.0, "beta2": 0.0, "gamma2": 0.0, "mode": 1.0}
 SHAPES = [(4,), (2,), (4,), (2,), (3,), (3,), (3,), (3,), (3,), (6,)]
 ALL = [o.name for o in family("cylindrical_looper").pose_outputs]

@@ -24,7 +24,7 @@ from tests.reference import feed as naive
 
 ROWS = [r for r in json.loads((Path(__file__).parents[2] / "oracle" / "feed_open.json").read_text())["rows"]
         if r["kind"] == "rack"]  # fmt: skip
-FIELDS = feed.Design._fields
+FIELDS = family("feed").parameter_names
 RACK = {
     "h_a": 0.4, "h_b": 3.4, "h_c": 1.6, "h_e": 3.5, "h_f": 0.0, "h_g": 0.0, "h_alpha": 0.0, "rh": 1.2, "dh": -0.3,
     "xE": 5.6, "yE": 0.7, "rE": 0.18, "dE": 0.8, "q": 2.6, "fx": -1.7, "fy": 0.6, "tx": -0.3, "ty": 0.9, "tooth": 0.0,

@@ -20,7 +20,7 @@ from tests.reference import five_link as naive
 from tests.support.rssr_designs import random_designs
 
 ROWS = json.loads((Path(__file__).parents[2] / "oracle" / "fivelink_open.json").read_text())["rows"]
-NAMES = five_link.Design._fields
+NAMES = family("five_link").parameter_names
 GEOMETRY = NAMES[:9]
 ORDERS = {"psi": ("psi", 0), "dpsi": ("d1", 1), "d2psi": ("d2", 2), "d3psi": ("d3", 3)}
 CHOICES = [(branch, mode) for branch in (1.0, -1.0) for mode in (1.0, 2.0, 3.0)]

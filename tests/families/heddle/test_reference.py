@@ -14,10 +14,12 @@ from mpmath import mp, mpf
 
 from kernels import status as st
 from kernels.families import heddle
+from sweep.families import family
 from tests.reference import heddle as naive
 
 ROWS = json.loads((Path(__file__).parents[2] / "oracle" / "heddle_open.json").read_text())["rows"]
 CHAIN = [row for row in ROWS if row["kind"] == "chain"]
+FIELDS = family("heddle").parameter_names
 NAMES = ("chi", "dchi", "d2chi", "d3chi", "y", "dy", "d2y", "d3y")
 TABLED = ("chi", "dchi", "d2chi", "y", "dy", "d2y")
 # 8 roundings of each input: the closure adds a handful of roundings of the size of one in an input.
@@ -25,8 +27,8 @@ FACTOR = 8.0
 
 
 def design(**given_values):
-    values = dict.fromkeys(heddle.Design._fields, 0.0) | {"side_F": 1.0, "side_C": 1.0}
-    return tuple((values | given_values)[name] for name in heddle.Design._fields)
+    values = dict.fromkeys(FIELDS, 0.0) | {"side_F": 1.0, "side_C": 1.0}
+    return tuple((values | given_values)[name] for name in FIELDS)
 
 
 def moved(designs, theta, dtype=np.float64, plain=False):
@@ -42,7 +44,7 @@ def moved(designs, theta, dtype=np.float64, plain=False):
 
 
 def of_row(row):
-    given_values = {k: v for k, v in row["in"].items() if k in heddle.Design._fields}
+    given_values = {k: v for k, v in row["in"].items() if k in FIELDS}
     return design(**given_values), row["in"]["theta"]
 
 
@@ -120,7 +122,7 @@ SOURCE = design(O2B=192.5, BC=225.0, O3C=138.5, O2O3=160.0, O4E=138.5, chi_mid=m
 def test_heddle_equal_arms_and_link_as_long_as_the_frame_turn_the_levers_alike():
     theta = np.linspace(1.4, 1.7, 7)[None, :]
     parallel = moved([SOURCE], theta)
-    near = design(**(dict(zip(heddle.Design._fields, SOURCE, strict=True)) | {
+    near = design(**(dict(zip(FIELDS, SOURCE, strict=True)) | {
         "O3D": 138.5, "O4F": 138.5, "O3O4": 900.0, "DF": 900.0 * (1.0 + 2.0**-52)}))  # fmt: skip
     general = moved([near], theta)
     for name in NAMES:
@@ -132,13 +134,13 @@ def test_heddle_equal_arms_and_link_as_long_as_the_frame_turn_the_levers_alike()
 def test_heddle_long_rods_lift_like_none():
     theta = np.linspace(1.4, 1.7, 7)[None, :]
     plain = moved([SOURCE], theta)
-    long = moved([design(**(dict(zip(heddle.Design._fields, SOURCE, strict=True)) | {"EG": 1e9}))], theta)
+    long = moved([design(**(dict(zip(FIELDS, SOURCE, strict=True)) | {"EG": 1e9}))], theta)
     # the rod's tilt changes the lift by E's path across it, below 138.5^2/1e9 mm
     np.testing.assert_allclose(long["dy"], plain["dy"], rtol=0, atol=1e-4)
 
 
 def test_heddle_mirrors_in_the_line_of_axes():
-    p = dict(zip(heddle.Design._fields, SOURCE, strict=True))
+    p = dict(zip(FIELDS, SOURCE, strict=True))
     other = design(**(p | {"chi_mid": -p["chi_mid"], "side_C": -p["side_C"]}))
     one, two = moved([SOURCE], [[1.5]]), moved([other], [[-1.5]])
     for k, name in enumerate(NAMES):
@@ -148,7 +150,7 @@ def test_heddle_mirrors_in_the_line_of_axes():
 
 @pytest.mark.parametrize("exponent", [-330, -40, 40, 330])
 def test_heddle_scaled_by_a_power_of_two_keeps_every_bit(exponent):
-    lengths = [k for k, name in enumerate(heddle.Design._fields) if name not in ("chi_mid", "side_F", "side_C")]
+    lengths = [k for k, name in enumerate(FIELDS) if name not in ("chi_mid", "side_F", "side_C")]
     one = design(O2B=80.0, BC=220.0, O3C=130.0, O2O3=200.0, O4E=120.0, chi_mid=1.1, O3D=90.0, O4F=110.0,
                  O3O4=700.0, DF=701.0, EG=400.0, x_s=30.0)  # fmt: skip
     scaled = np.array(one)
@@ -174,7 +176,7 @@ def test_heddle_toggles_are_named_and_never_invented():
     assert codes == {"stretched": st.DEAD_POINT, "beyond": st.NOT_ASSEMBLED, "folded": st.DEAD_POINT, "free": st.OK}
     on_pivot = moved([design(O2B=300.0, BC=60.0, O3C=60.0, O2O3=300.0, O4E=1.0, chi_mid=0.0)], [[0.0]])
     assert on_pivot["status"][0, 0] == st.SINGULAR
-    short_rod = moved([design(**(dict(zip(heddle.Design._fields, SOURCE, strict=True)) | {"EG": 5.0}))], [[1.5]])
+    short_rod = moved([design(**(dict(zip(FIELDS, SOURCE, strict=True)) | {"EG": 5.0}))], [[1.5]])
     assert short_rod["status"][0, 0] == st.NOT_ASSEMBLED
     assert moved([design(**(base | {"O3C": -60.0, "BC": 200.0}))], [[0.0]])["status"][0, 0] == st.INVALID_INPUT
 

@@ -23,7 +23,7 @@ from tests.reference import rssp as naive
 from tests.support.turn_designs import slider_cranks
 
 RSSP = family("rssp")
-NAMES = rssp.Design._fields
+NAMES = family("rssp").parameter_names
 LENGTHS = ("s_ext", "s_fold", "stroke")
 ANGLES = ("phi_ext", "phi_fold", "phi0", "stroke_ratio")
 MARGINS = ("rotatable", "margin", "max_pressure_angle")

@@ -19,7 +19,7 @@ from sweep.families.base import Angles
 from tests.reference import rssp as naive
 
 WANT = ["s", "ds", "d2s", "d3s", "pressure_angle"]
-NAMES = rssp.Design._fields
+NAMES = family("rssp").parameter_names
 
 
 def by_construction(a, e, f, alpha, phi, reach, branch):

@@ -20,7 +20,7 @@ from tests.support.family_checks import (
     factors,
 )
 
-NAMES = slotted.Design._fields
+NAMES = family("slotted").parameter_names
 FORK = (1.0, 2.6, 0.7, -0.4, 0.6, 0.5, 0.0, 1.0, 1.0)
 BAR = (1.0, 2.6, 0.7, -0.4, 0.6, 0.5, 2.4, -1.0, -1.0)
 ALL = [o.name for o in family("slotted").pose_outputs]

@@ -20,7 +20,7 @@ from tests.support.family_checks import (
     factors,
 )
 
-NAMES = spherical_looper.Design._fields
+NAMES = family("spherical_looper").parameter_names
 SHAPES = [(4,), (2,), (4,), (2,), (3,), (3,), (3,), (3,), (3,), (12,)]
 ALL = [o.name for o in family("spherical_looper").pose_outputs]
 POINT = ["x_p", "y_p", "z_p"]

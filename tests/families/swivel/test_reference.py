@@ -19,7 +19,7 @@ from tests.support.family_checks import (
     factors,
 )
 
-NAMES = swivel.Design._fields
+NAMES = family("swivel").parameter_names
 DESIGN = (1.0, 2.6, 0.7, -0.4, 0.6, 5.0)
 ALL = [o.name for o in family("swivel").pose_outputs]
 POINT = ["x_p", "y_p", "z_p"]

@@ -16,10 +16,10 @@ from mpmath import mp
 
 import sweep
 from kernels import status as st
-from kernels.effects.wrap import guide_line, thread_over_point
+from kernels.effects.thread import guide_line, thread_over_point
 from kernels.families import eyelet, free_cam, guided_cam
+from kernels.families import guided_cam as cam_motion
 from kernels.families.free_cam import motion as free_motion
-from kernels.families.guided_cam import motion as cam_motion
 from sweep.families import family
 from sweep.families.base import Angles
 from tests.reference import thread as reference

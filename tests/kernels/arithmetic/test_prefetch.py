@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from kernels.arithmetic.prefetch import prefetch_rows
+from kernels.arithmetic.intrinsics import prefetch_rows
 from kernels.jit import kernel
 
 

@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from scipy.special import perm
 
 from kernels import status as st
 from kernels.certified import cells
-from kernels.certified import enclosure as en
-from kernels.certified.lanes import LANES
+from kernels.certified import jets as en
+from kernels.certified.jets import LANES
 from kernels.families import rssr
-from kernels.jit import kernel
+from kernels.types import EPS
 from sweep.families.base import Angles
 from sweep.quantities.kinds import Request
 from sweep.reductions.extrema import true_extrema
@@ -134,10 +135,10 @@ def test_a_proof_does_not_depend_on_the_designs_beside_it():
     together = [np.zeros((2, n), np.uint8), value.copy(), phi.copy(), np.full((2, n), np.nan), np.empty(n)]
     together[0][:, ::7] = st.NOT_ROTATABLE
     alone = [column.copy() for column in together]
-    rssr.certify_point(*parts(designs, rockers, couplings, last), which, 1e-8, 1000, *together)
+    rssr.certify_maxima(*parts(designs, rockers, couplings, last), which, 1e-8, 1000, *together)
     for i in range(n):
         one = [np.ascontiguousarray(column[..., i : i + 1]) for column in alone]
-        rssr.certify_point(*parts(designs[i : i + 1], rockers, couplings, last), which, 1e-8, 1000, *one)
+        rssr.certify_maxima(*parts(designs[i : i + 1], rockers, couplings, last), which, 1e-8, 1000, *one)
         for whole, part in zip(alone, one, strict=True):
             whole[..., i : i + 1] = part
     for beside, single in zip(together, alone, strict=True):
@@ -151,10 +152,12 @@ def row(at, which):
     return at[which : which + LANES]
 
 
-@kernel
-def of_one(jet, order, reach, share, y):
-    en.derivative(jet, 0, order, reach, y)
-    return en.remainders(jet, 0, order, reach, share)
+def of_one(jet, order, reach, share):
+    """Coefficients of a derivative of one jet, and bounds of its noise and tail on |x| <= share."""
+    k = np.arange(order, 2 * en.ORDER)
+    factors = perm(k, order) * share ** (k - order) / reach**order
+    derivative = np.polynomial.polynomial.polyder(jet[: en.ORDER + 1], order) / reach**order
+    return derivative, jet[en.NOISE] * factors.max(), jet[en.TAIL] * factors[k > en.ORDER].max()
 
 
 @pytest.mark.parametrize("order", [0, 1, 2, 3])
@@ -166,12 +169,11 @@ def test_derivatives_abreast_are_those_of_a_jet_alone(order):
     reach[:] = generator.uniform(0.01, 1.0, LANES)
     cells.weigh(LANES, walk, y, jets.reshape(-1), order)
     for lane in range(LANES):
-        expected = np.empty(en.ORDER + 1)
-        noise, tail = of_one(jets[:, lane].copy(), order, reach[lane], cells.SHARE_MOST, expected)
+        expected, noise, tail = of_one(jets[:, lane], order, reach[lane], cells.SHARE_MOST)
         count = en.ORDER + 1 - order
         found = y[cells.Y0 + lane : cells.Y0 + (en.ORDER + 1) * LANES : LANES]
         # A dozen roundings lie between the two ways to multiply.
-        np.testing.assert_allclose(found[:count], expected[:count], rtol=16 * en.EPS)
+        np.testing.assert_allclose(found[:count], expected, rtol=16 * EPS)
         assert (found[count:] == 0.0).all()
         bounds = [row(y, cells.OF_NOISE)[lane], row(y, cells.OF_TAIL)[lane]]
         np.testing.assert_allclose(bounds, [noise, tail], rtol=2.0**-40)  # GUARD enters once more
@@ -218,6 +220,6 @@ def test_compiled_equals_plain():
     curves = ("d2s", "dev")
     designs, value, phi, _ = rotating("rssr+guide", 30, 9, curves)
     compiled = certify("rssr+guide", designs, curves, value, phi)
-    plain = certify("rssr+guide", designs, curves, value, phi, function=rssr.certify_point.py_func)
+    plain = certify("rssr+guide", designs, curves, value, phi, function=rssr.certify_maxima.py_func)
     for name, values in compiled.items():
         np.testing.assert_array_equal(plain[name], values)

@@ -9,8 +9,8 @@ from mpmath import mp
 import sweep
 from kernels import status as st
 from kernels.certified import cells
-from kernels.certified import enclosure as en
-from kernels.certified.lanes import LANES
+from kernels.certified import jets as en
+from kernels.certified.jets import LANES
 from kernels.families.rssr import driven
 from kernels.jit import kernel
 from sweep.evaluation.summaries import design_outputs
@@ -27,7 +27,7 @@ USED = 5  # lanes; the design that is looked at has others beside it
 def enclose(stages, couplings, shares, i, lane, walk, numbers, jets, good):
     for k in range(USED):
         driven.load(k, numbers, stages, couplings, shares, (i + k - lane) % shares.shape[0])
-    driven.enclose_point(USED, stages.shape[0], numbers, jets, walk, True, True, good)
+    driven.enclose_motion(USED, stages.shape[0], numbers, jets, walk, False, True, True, good)
 
 
 def misses(name, narrow=1.0):

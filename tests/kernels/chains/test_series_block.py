@@ -9,7 +9,7 @@ import pytest
 
 from kernels import chains as chain_kernels
 from kernels import status as st
-from kernels.arithmetic.bits import power_below
+from kernels.arithmetic.intrinsics import power_below
 from kernels.chains.form import BLOCK
 from kernels.families import guide, rssr
 from kernels.jit import kernel

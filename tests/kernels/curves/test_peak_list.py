@@ -5,11 +5,21 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as some
 
-from kernels.arithmetic.bits import lowest_bit
+from kernels.arithmetic.intrinsics import lowest_bit
 from kernels.families.rssr import sampling_tables
 from kernels.families.rssr.block import BLOCK, ROWS
-from kernels.families.rssr.peaks import CAPACITY, MOST_PEAKS, START, new_list
-from kernels.families.rssr.sampling import FEWEST, GRID_SIZE, MARKS, list_marked, list_peaks, mark_peaks
+from kernels.families.rssr.sampling import (
+    CAPACITY,
+    FEWEST,
+    GRID_SIZE,
+    MARKS,
+    MOST_PEAKS,
+    START,
+    list_marked,
+    list_peaks,
+    mark_peaks,
+    new_list,
+)
 from kernels.jit import kernel
 from kernels.types import TWO_PI as TURN
 

@@ -1,0 +1,148 @@
+"""The verb ``warm``: kernels compiled before they are needed."""
+
+from __future__ import annotations
+
+import os
+import tempfile
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from functools import lru_cache
+from pathlib import Path
+from typing import NamedTuple
+
+import click
+import numpy as np
+
+from sweep.chunks.chunk import asked_outputs, few_designs
+from sweep.cli.families import main_outputs
+from sweep.engine.run import run
+from sweep.errors import Interrupted
+from sweep.evaluation.summaries import DEFAULT_TARGET, design_outputs, routes
+from sweep.families import family as find_family
+from sweep.families.base import Accuracy, Angles, Array, Family
+from sweep.families.chain import stages_of
+from sweep.families.domain import March, equal_steps
+from sweep.jobs.executors import executor, for_tasks
+from sweep.jobs.progress import Progress
+from sweep.jobs.signals import Stop, stop_on_signal
+from sweep.nights.studies import files_of
+from sweep.study import Study
+from sweep.study.load import load_study
+
+TINY = "smoke.toml"
+POSES = 8
+WHOLE_STROKE = (0.0, 1.0)
+
+
+class Part(NamedTuple):
+    """What one process compiles at a time: some outputs of a study or family; without any, all that is left of it."""
+
+    of: str
+    outputs: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True)
+class Compile:
+    """Compiles a part by its number, as a worker does it."""
+
+    parts: tuple[Part, ...]
+
+    def __call__(self, number: int, should_stop: Callable[[], bool]) -> str:
+        """Compile or load the kernels of the part, on a few designs; returns what it belongs to."""
+        part = self.parts[number]
+        if not Path(part.of).exists():
+            _compile_family(find_family(part.of), part.outputs)
+        elif part.outputs:
+            study = _study(part.of)
+            design_outputs(study.family, few_designs(study), part.outputs, study.accuracy, study.window)
+        else:
+            with tempfile.TemporaryDirectory(prefix="linksweep-") as folder:
+                run(part.of, Path(folder, "designs"), 1, smoke=True, force=True)
+        return part.of
+
+
+@lru_cache(maxsize=1)
+def _study(file: str) -> Study:
+    return load_study(file)
+
+
+def _compile_family(family: Family, outputs: Sequence[str]) -> None:
+    """Compile a family's design outputs, or its poses where none are named."""
+    designs = _example(family)
+    if outputs:
+        design_outputs(family, designs, outputs, _accuracy(family), WHOLE_STROKE)
+        return
+    angles = Angles.of(equal_steps(family.domain, designs, POSES)[None])
+    for one in (family, family.precise()):
+        one.poses(designs, angles, frozenset(family.pose_names))
+
+
+def _example(family: Family) -> Array:
+    """Return the example of a family, or of the stages of a chain, as a design matrix."""
+    given: dict[str, float] = dict(family.example)
+    if not given:
+        given = {f"{key}{stage.number}": x for stage in stages_of(family) for key, x in stage.family.example.items()}
+    values = [given.get(p.name, p.default) for p in family.parameters]
+    return np.array([values], np.float64)
+
+
+def _accuracy(family: Family) -> Accuracy:
+    return Accuracy(samples=POSES) if isinstance(family.domain, March) else Accuracy(target=DEFAULT_TARGET)
+
+
+def rounds(what: Sequence[str]) -> tuple[list[Part], list[Part]]:
+    """Return the parts of studies and families: those that processes share first, then what is left of each study.
+
+    What is left is found by running the tiny version: the optimiser, the front, the proof.
+
+    Raises
+    ------
+    InputError
+        for what is neither a study nor a family.
+    """
+    first: list[Part] = []
+    then: list[Part] = []
+    for name in what:
+        if not Path(name).exists():
+            family = find_family(name)
+            ways = routes(family, main_outputs(family), _accuracy(family))
+            first += [Part(name), *(Part(name, route.outputs) for route in ways)]
+            continue
+        for file in files_of(Path(name)):
+            study = load_study(file)
+            first += [Part(str(file), tuple(outputs)) for outputs in asked_outputs(study)]
+            if study.optimise is not None and (file.parent / TINY).exists():
+                then.append(Part(str(file)))
+    return list(dict.fromkeys(first)), list(dict.fromkeys(then))
+
+
+def compile_parts(parts: Sequence[Part], jobs: int, stop: Stop, advance: Callable[[int], None]) -> None:
+    """Compile parts in as many processes; ``advance`` is called with 1 as each is ready.
+
+    Raises
+    ------
+    Interrupted
+        if a signal came; what is compiled is kept.
+    """
+    place = for_tasks(executor("loky", jobs), len(parts))
+    for _ in place.outcomes(Compile(tuple(parts)), iter(range(len(parts))), jobs, stop):
+        advance(1)
+    if stop.signal_number is not None:
+        raise Interrupted(stop.signal_number, "stopped by a signal; what is compiled is kept, run again to continue")
+
+
+@click.command()
+@click.argument("what", metavar="[STUDY|FAMILY]...", nargs=-1)
+@click.option("--jobs", type=click.IntRange(min=1), help="Processes. Default: as many as there are cores.")
+def warm(what: tuple[str, ...], jobs: int | None) -> None:
+    """Compile what studies or families need, before they are run: for images, clusters and nights.
+
+    STUDY is a study file, a folder with one, or a folder of such folders; without any it is the folder studies.
+    FAMILY is a name from `sweep families`, or a chain such as rssr+guide.  A run compiles what it finds missing by
+    itself; afterwards it has nothing to wait for.
+    """
+    first, then = rounds(what or ("studies",))
+    workers = jobs or os.cpu_count() or 1
+    with stop_on_signal() as stop, Progress("compiling", len(first) + len(then), 0, True, unit="parts") as shown:
+        compile_parts(first, workers, stop, shown.advance)
+        compile_parts(then, workers, stop, shown.advance)
