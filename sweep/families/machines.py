@@ -15,10 +15,12 @@ from kernels.types import Array
 from sweep.families.base import Angles, Columns, Event, Family, Output, Parameter
 from sweep.families.capabilities import Assembly, Points
 from sweep.families.curve_features import of_members
+from sweep.families.frames import Frame
 from sweep.families.moments import Taking
 from sweep.families.parts import AXES, EYE, TIP, Member, coordinates, coupler_joints, velocity
 from sweep.families.passages import step_of
 from sweep.families.relations import Reading, Relation, Timing
+from sweep.families.shaking import Shaking
 from sweep.families.sites import coordinates as coordinates_of_site
 from sweep.families.sites import made_of
 
@@ -164,13 +166,23 @@ def _poses(machine: Machine, designs: Array, angles: Angles, wanted: frozenset[s
             columns = _member(m, designs, angles, own, found)
             np.copyto(status, columns.pop("status"), where=status == OK)
             found |= {f"{m.name}.{name}": values for name, values in columns.items()}
-    frames = {m.name: m.frame(designs) for m in machine.members} if relations else {}
+    frames = _frames(machine, designs) if any(isinstance(r, Shaking) for r in relations) else {}
     found["phi"] = angles.phi
     columns_of = machine.parameter_names
     found |= {p.name: designs[:, [columns_of.index(p.name)]] for r in relations for p in r.parameters}
     for relation in relations:
         found |= relation.compute(found, frames, wanted)
     return {name: _whole(found[name], shape) for name in wanted} | {"status": status}
+
+
+def _frames(machine: Machine, designs: Array) -> dict[str, Frame]:
+    """Return the frames of all stages by member and number, of a member alone by its name."""
+    found: dict[str, Frame] = {}
+    for m in machine.members:
+        numbers = [str(stage.number) for stage in getattr(m.family, "stages", ())] or [""]
+        placed = zip(numbers, m.frames(designs), strict=True)
+        found |= {f"{m.name}{number}": frame for number, frame in placed if frame is not None}
+    return found
 
 
 def _whole(values: Any, shape: tuple[int, int]) -> Any:

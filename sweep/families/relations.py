@@ -1,4 +1,4 @@
-"""What two or more members of a machine are to each other, pose by pose: distances, speeds, torques, shaking."""
+"""What two or more members of a machine are to each other, pose by pose: distances, speeds, torques."""
 
 from __future__ import annotations
 
@@ -97,7 +97,7 @@ class Distance:
         """Return the distance and components, (n, m)."""
         a, b = self.points
         parts = [found[f"{b}_{axis}"] - found[f"{a}_{axis}"] for axis in AXES]
-        return _vector(self.name, parts)
+        return with_size(self.name, parts)
 
 
 @dataclass(frozen=True)
@@ -168,67 +168,7 @@ class ShaftTorque:
         return {self.name: sum(ratio * found[name] for name, ratio in self.torques)}
 
 
-@dataclass(frozen=True)
-class Shaking:
-    """Resultant force and moment of the members on the frame of the machine; ``members`` by name and stage number.
-
-    The moment is about the origin of the machine's frame.  The frame of a chain's stage counts as that of the member.
-    """
-
-    name: str
-    members: tuple[tuple[str, str], ...]
-
-    @property
-    def outputs(self) -> tuple[Output, ...]:
-        """Magnitude and components in the machine's frame, of the force and of the moment."""
-        words = ", ".join(f"{member} {stage}".strip() for member, stage in self.members)
-        found = []
-        for name, unit, what in (
-            (self.name, "force", f"the force of {words} on the frame"),
-            (self._moment, "torque", f"the moment of {words} on the frame about the machine's origin"),
-        ):
-            found.append(Output(name, unit, f"magnitude of {what}", "ours"))
-            found += [Output(f"{name}_{x}", unit, f"{x} of {what}, machine's frame", "ours") for x in AXES]
-        return tuple(found)
-
-    @property
-    def parameters(self) -> tuple[Parameter, ...]:
-        """It has none of its own."""
-        return ()
-
-    @property
-    def _moment(self) -> str:
-        return f"{self.name}_moment"
-
-    def _turning(self, wanted: frozenset[str]) -> bool:
-        return not wanted.isdisjoint((self._moment, *(f"{self._moment}_{axis}" for axis in AXES)))
-
-    def needs(self, wanted: frozenset[str]) -> frozenset[str]:
-        """Name the frame's forces on crank and follower of every member, and moments where one is wanted."""
-        kinds = ["force_a{}_{}", "force_d{}_{}", *(["shaking_moment{}_{}"] if self._turning(wanted) else [])]
-        return frozenset(
-            f"{member}.{kind.format(stage, axis)}" for member, stage in self.members for kind in kinds for axis in AXES
-        )
-
-    def compute(self, found: Mapping[str, Any], frames: Mapping[str, Frame], wanted: frozenset[str]) -> dict[str, Any]:
-        """Return the force and moment on the frame, (n, m); the force is minus that of the frame."""
-        force: list[Any] = [0.0, 0.0, 0.0]
-        moment: list[Any] = [0.0, 0.0, 0.0]
-        for member, stage in self.members:
-            frame = frames[member]
-            own = frame.turned(
-                [-(found[f"{member}.force_a{stage}_{x}"] + found[f"{member}.force_d{stage}_{x}"]) for x in AXES]
-            )
-            force = [total + part for total, part in zip(force, own, strict=True)]
-            if self._turning(wanted):
-                about = frame.turned([found[f"{member}.shaking_moment{stage}_{x}"] for x in AXES])
-                x, y, z = (frame.at[:, [k]] for k in range(3))
-                arm = (y * own[2] - z * own[1], z * own[0] - x * own[2], x * own[1] - y * own[0])
-                moment = [total + a + b for total, a, b in zip(moment, about, arm, strict=True)]
-        return _vector(self.name, force) | (_vector(self._moment, moment) if self._turning(wanted) else {})
-
-
-def _vector(name: str, parts: list[Any]) -> dict[str, Any]:
+def with_size(name: str, parts: list[Any]) -> dict[str, Any]:
     """Return the magnitude and components."""
     columns = {f"{name}_{axis}": part for axis, part in zip(AXES, parts, strict=True)}
     return columns | {name: np.sqrt(parts[0] ** 2 + parts[1] ** 2 + parts[2] ** 2)}

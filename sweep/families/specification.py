@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -19,8 +19,9 @@ from sweep.families.gaps import Body, Gap
 from sweep.families.machines import Machine, assemble
 from sweep.families.moments import Taking
 from sweep.families.parts import Member, coupler_joints, is_planar, placement, vector
-from sweep.families.relations import Distance, Reading, Relation, ShaftTorque, Shaking, Speed, Timing
+from sweep.families.relations import Distance, Reading, Relation, ShaftTorque, Speed, Timing
 from sweep.families.shafts import MOUNT_KEYS, SHAFT_KEYS, Mount, Shaft, read_mount, read_shafts
+from sweep.families.shaking import Shaken, Shaking, shaken
 from sweep.families.thread_balance import thread_balance
 from sweep.families.tools import BLADE_KEYS, NEEDLE_KEYS, Blade, Needle, Tool, bodies, length, read_tools
 
@@ -267,10 +268,19 @@ def _relation(
         return ShaftTorque(
             name, tuple((f"{known[x][0]}.drive_torque{known[x][1]}", members[known[x][0]].ratio) for x in given)
         )
-    placed = [known[part] for part in given]
-    if len({member for member, _ in placed}) < len(placed):
-        raise InputError(kind, given, "each member once: the stages of a chain have different frames", where)
-    return Shaking(name, tuple(placed))
+    return Shaking(name, tuple(_shaken(members, [known[part] for part in given], where)))
+
+
+def _shaken(members: Mapping[str, Member], listed: list[tuple[str, str]], where: str) -> Iterator[Shaken]:
+    """Yield the stages whose shaking is asked, each once and in a frame that is known."""
+    for member, stage in listed:
+        m = members[member]
+        stages = getattr(m.family, "stages", ())
+        if listed.count((member, stage)) > 1 or (stages and not stages[-1].is_placed):
+            raise InputError(
+                "shaking", f"{member}{stage}", "stages each once, of chains that stand in one frame", where
+            )
+        yield shaken(member, stage, stages[int(stage) - 1].family if stage else m.family, listed)
 
 
 def _gap(name: str, table: dict[str, Any], known: Mapping[str, Body], where: str) -> Gap:

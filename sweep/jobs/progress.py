@@ -16,6 +16,7 @@ FIRST_SECONDS = 2.0  # of silence at the beginning
 LINE_SECONDS = 10.0
 TICK_SECONDS = 0.5
 TICKER = "linksweep: progress"
+AT_MOST = "at most"  # in what is counted: its total is a maximum, of which no share and no remaining time is known
 
 Say: TypeAlias = Callable[[str, int, int, str], None]
 """``say(label, done, total, unit)``: what is worked on, and how much of it is done; ``total`` as is known by now."""
@@ -52,6 +53,7 @@ class Progress:
         quiet: bool = False,
     ) -> None:
         self.label, self.total, self.done, self.unit, self.quiet = label, total, done, unit, quiet
+        self.at_most = AT_MOST in unit
         self.stream = sys.stderr if stream is None else stream
         self.show = show and self.stream is not None
         self.begin = time.monotonic()
@@ -134,9 +136,10 @@ class Progress:
         seconds = self.said - self.begin
         text = f"{self.label}: "
         if self.total:
-            text += f"{self.done} of {self.total} {self.unit} ({self.done / self.total:.0%}), "
+            share = "" if self.at_most else f" ({self.done / self.total:.0%})"
+            text += f"{self.done} of {self.total} {self.unit}{share}, "
         text += f"{seconds:.0f} s"
-        if self.first < self.done < self.total:
+        if self.first < self.done < self.total and not self.at_most:
             text += f", {seconds * (self.total - self.done) / (self.done - self.first):.0f} s left"
         self.stream.write(text + "\n")
         self.stream.flush()
@@ -163,6 +166,7 @@ class Phases:
             self.end()
             self.now = Progress(label, total, done, self.show, self.stream, unit, quiet=True).__enter__()
             return
+        self.now.unit = unit
         if total != self.now.total:
             self.now.expect(total)
         if done > self.now.done:

@@ -25,7 +25,7 @@ from sweep.jobs.progress import Say, unsaid
 from sweep.jobs.signals import Deadline
 from sweep.optimise.local.kkt import CAVEAT, Result
 from sweep.optimise.local.model import Model
-from sweep.optimise.manufacture.robust import robust, yields
+from sweep.optimise.manufacture.robust import better_made, robust, yields
 from sweep.optimise.manufacture.tolerance import sensitivities, tolerance_rows
 from sweep.optimise.multistart.discrete import listed, with_neighbours
 from sweep.optimise.multistart.multistart import explore
@@ -184,6 +184,8 @@ def optimise_study(
     if catalogue and found.ended not in CUT:
         say("neighbours in the catalogue", 0, 0, "steps")
         results = with_neighbours(problem, results, catalogue, settings, deadline, jobs)
+    if study.tolerance is not None and found.ended not in CUT:
+        results = better_made(problem, results, study.tolerance, settings.seed)
     nominal = results[0]
     if study.tolerance is not None and study.tolerance.robust is not None and found.ended not in CUT:
         whole, more = insensitive(study, settings, problem, deadline, jobs, say)

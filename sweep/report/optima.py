@@ -16,6 +16,7 @@ import numpy as np
 
 from kernels import status as codes
 from sweep.evaluation.summaries import design_outputs
+from sweep.optimise.local.kkt import AGREE
 from sweep.optimise.manufacture.tolerance import deviating
 from sweep.quantities.dimensions import sizes
 from sweep.quantities.limits import compared, meets
@@ -216,7 +217,9 @@ def optima_sentence(data: Dataset, found: list[Group]) -> str:
     shown = quantity(objective.output, data.units.get(objective.output, ""))
     value, best = (float(group.row[objective.output]) for group in (found[1], found[0]))
     difference = change(shown, value, best)
+    same = sum(abs(float(group.row[objective.output]) - best) <= AGREE * abs(best) for group in found)
     text = f"The search ended in {len(found)} structurally different optima"
+    text += f", {same} of them in the best basin, whose values agree" if same > 1 else ""
     row = found[1].row
     paper = row.get("role") == "nominal"
     text += f"; the {'best on paper' if paper else 'next'} has {shown.show(value)}"

@@ -164,9 +164,11 @@ def test_joint_records_stand_in_the_frame_of_the_family(name):
         np.testing.assert_allclose(poses[0, :, columns], rows, atol=1e-14 * size)
 
 
-def test_one_chain_gives_one_stage_and_a_driven_member_no_forces():
-    with pytest.raises(sweep.InputError, match="each member once"):
-        sweep.machine({"x": ["rssr", "rssr"]}, {"s": {"shaking": ["x1", "x2"]}})
+def test_a_stage_counts_once_and_a_driven_member_no_forces():
+    with pytest.raises(sweep.InputError, match="stages each once"):
+        sweep.machine({"x": ["rssr", "rssr"]}, {"s": {"shaking": ["x1", "x1"]}})
+    with pytest.raises(sweep.InputError, match="whose forces are known"):
+        sweep.machine({"x": "feed"}, {"s": {"shaking": ["x"]}})
     driven = sweep.machine({"x": "rssr", "y": {"family": "rssr", "driver": "x.psi"}}, {"s": {"shaking": ["y"]}})
     with pytest.raises(sweep.InputError, match="drives it unevenly"):
         sweep.evaluate(driven, {}, ["s"], phi=PHI)

@@ -12,6 +12,7 @@ import pytest
 from kernels import status as st
 from sweep.dataset.files import beside
 from sweep.engine.run import run
+from sweep.errors import InputError
 from sweep.evaluation.summaries import design_outputs
 from sweep.families import family
 from sweep.families.base import Accuracy
@@ -211,3 +212,18 @@ def test_study_on_a_locus_optimises_along_it_and_agrees_with_its_equations(tmp_p
     assert along.iloc[0].c <= 60.0 + 1e-6 and along.iloc[0].b <= 120.0 + 1e-6
     # The reference is no design of the locus: it stays itself, and how far it is off is told as ever.
     assert along.iloc[-1].a == 20.0 and along.iloc[-1].violation == raw.iloc[-1].violation > 0.01
+
+
+def test_equations_that_say_the_same_are_refused_by_name() -> None:
+    """A crank-rocker without quick return: phi0 = 180 deg and stroke_ratio = 1 are one equation, of which every start
+    would stall; beside the swing either of them is searched.
+    """
+    half, swing = Limit("phi0", np.pi, np.pi), Limit("swing", 0.8, 0.8)
+    once = replace(sized(), limits=(swing, half))
+    starts = from_sample(once, [{"branch": -1.0}], 2, 0)
+    assert len(starts) == 2 and minimise(once, starts, OptimiseSettings(looks=3))
+    twice = replace(once, limits=(swing, half, Limit("stroke_ratio", 1.0, 1.0)))
+    with pytest.raises(InputError, match="phi0 and stroke_ratio"):
+        minimise(twice, starts, OptimiseSettings(looks=3))
+    with pytest.raises(InputError, match="stroke_ratio"):  # what the locus holds by construction says it already
+        optimum(twice, [{"branch": -1.0}], OptimiseSettings(starts=2))

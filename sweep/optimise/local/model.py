@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 
+from sweep.errors import InputError
 from sweep.evaluation.summaries import design_outputs
 from sweep.families.base import Array
 from sweep.optimise.extrema.gradients import gradients, reading_gradient, scalar_gradient, stepped
@@ -16,11 +17,13 @@ from sweep.optimise.extrema.points import STEP, Curves, Points
 from sweep.optimise.local.kkt import ACTIVE, Multipliers, multipliers
 from sweep.optimise.problem.program import Program
 from sweep.optimise.problem.rows import Form
-from sweep.optimise.problem.statement import Problem
+from sweep.optimise.problem.statement import PLACE, Problem
 
 FEASIBLE = 1e-9  # largest scaled violation of a feasible design
 PRICE = 10.0  # of a unit of scaled violation when two designs are compared, until multipliers are known
 SAMPLES = 256  # poses per turn on which extrema are looked for
+INWARDS = 0.1  # of the way to the middle of the bounds, where equations are looked at beside a start
+DEPENDENT = 1e-7  # least singular value of equations' gradients, each of length one, and least length that counts
 NOT_TURNING = 1e6  # added to the violation of a design some of whose limits do not exist
 
 
@@ -185,3 +188,44 @@ class Model:
 
         columns = design_outputs(self.problem.family, designs, [name], self.problem.accuracy, self.problem.window)
         return np.asarray(columns[name], dtype=np.float64)
+
+
+def refuse_dependent(problem: Problem, program: Program, starts: Array) -> None:
+    """Refuse equations of which one follows from the others, or from what the coordinates hold by construction.
+
+    No multipliers belong to them, so every start would stall.  At a single design gradients may be parallel by
+    accident: they have to be at two of each start.
+
+    Raises
+    ------
+    InputError
+        naming these equations.
+    """
+    if not any(r.equal for r in program.requirements):
+        return
+    common: set[str] | None = None
+    for start in starts:
+        place = np.clip(problem.scaled(start[None, :])[0], 0.0, 1.0)
+        for fractions in (place, place + INWARDS * (0.5 - place)):
+            model = Model(problem, program, start, lambda: False)
+            state = model.uncounted(fractions)
+            if not state.form.complete:
+                continue
+            rows = model.jacobian(fractions, state.form, state.form.points)[state.form.equal]
+            if np.isfinite(rows).all():
+                names = [x.name for x, held in zip(state.form.labels, state.form.equal, strict=True) if held]
+                common = _dependent(rows, names) & (set(names) if common is None else common)
+    if common:
+        allowed = "equations of which none follows from the others or from what is held anyway: leave one out"
+        raise InputError("limits", " and ".join(sorted(common)), allowed, PLACE)
+
+
+def _dependent(rows: Array, names: list[str]) -> set[str]:
+    """Return the names of rows (k, n) that a vanishing sum of them takes in."""
+    length = np.linalg.norm(rows, axis=1)
+    if (length < DEPENDENT).any():
+        return {name for name, size in zip(names, length, strict=True) if size < DEPENDENT}
+    shares, sizes, _ = np.linalg.svd(rows / length[:, None])
+    if len(sizes) == len(names) and sizes[-1] > DEPENDENT:
+        return set()
+    return {name for name, share in zip(names, shares[:, -1], strict=True) if abs(share) > 1e-3}

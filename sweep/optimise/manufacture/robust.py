@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from sweep.evaluation.summaries import design_outputs
 from sweep.families.base import Array
-from sweep.optimise.local.kkt import Result
+from sweep.optimise.local.kkt import AGREE, Result
 from sweep.optimise.local.model import Model
 from sweep.optimise.local.start import search
 from sweep.optimise.manufacture.margins import Levels, bounded, excesses, keyed, prices, with_margins
@@ -28,10 +28,11 @@ from sweep.quantities.limits import compared, meets
 if TYPE_CHECKING:
     from sweep.study import OptimiseSettings, Tolerance
 
+SAME = 1e-8  # relative, of values of two optima that are equally good
 SAMPLES = 8192  # a power of two: the share of 95 % is good to 0.25 %
 BOTH = 4.0  # ways in which a design misses a limit that know little of each other, to begin with
 TRIED = 4  # basins of the search that are begun with
-ENDED = 3  # designs that go on after the first rounds
+ENDED, BEHIND = 3, 1.002  # designs that go on after the first rounds, and times the objective of the best of them
 HEAT = 400  # looks of each of the first rounds
 ROUNDS, CORRECTIONS = 4, 10  # of search with the room of the design before; of the number of standard deviations
 ONCE = 2  # looks that say how good a design is
@@ -99,6 +100,7 @@ def robust(
     Returns
     -------
     The best one that reaches the share, else the one with the largest share; None where there is nothing to begin with.
+    ``agree`` of the result is the number of searches that met its objective in the first rounds, within 1e-4.
     ``violation`` and ``relaxation`` of the result are about the limits as they are asked for.
     """
     heads: list[Result] = []
@@ -118,7 +120,10 @@ def robust(
     found = spread_over(near, list(range(len(begin))), asked, jobs, count)
     # The objective of designs that miss their limits still says little.
     order = sorted(found, key=lambda r: (r.violation > NEARLY, r.objective if r.violation <= NEARLY else r.violation))
-    ends = _different(problem, order)[:ENDED]
+    # Another share-out saves far less than what separates basins: what is further behind stays behind.
+    ends = [
+        r for r in _different(problem, order)[:ENDED] if r is order[0] or r.objective <= BEHIND * order[0].objective
+    ]
     if not ends:  # stopped before any of them was begun
         return None
     numbers = {r.start: k for k, r in enumerate(ends)}
@@ -129,6 +134,11 @@ def robust(
     ]
     good = [x for x in made if x.share >= (tolerance.robust or 0.0)]
     best = min(good, key=lambda x: x.result.objective) if good else max(made, key=lambda x: x.share)
+    head = next(r for r in ends if r.start == best.result.start)
+    met = [
+        r for r in found if r.violation <= NEARLY and abs(r.objective - head.objective) <= AGREE * abs(head.objective)
+    ]
+    best = replace(best, result=replace(best.result, agree=max(1, len(met))))
     return replace(best, cut=best.cut or any(x.cut for x in made) or len(made) < len(ends) or len(found) < len(begin))
 
 
@@ -210,7 +220,7 @@ class _Calibrate:
             values, share = self._made(design)
             better = share >= wanted and (best.share < wanted or result.objective < best.result.objective)
             if result.violation <= NEARLY and (better or (best.share < wanted and share > best.share)):
-                best = Robust(replace(result, agree=head.agree), share, result.ended in CUT)
+                best = Robust(result, share, result.ended in CUT)
             if corrected and share >= wanted and not better and result.ended == "looks":
                 break  # what the limits of a search cost that does not settle leads nowhere
             levels, saved = self._corrected(design, levels, values, reach)
@@ -292,3 +302,15 @@ def _share(problem: Problem, design: Array, tolerance: Tolerance, seed: int) -> 
 def yields(problem: Problem, designs: Array, tolerance: Tolerance, seed: int) -> list[float]:
     """Return the share of toleranced mechanisms about each design (k, P) that keep all limits on outputs."""
     return [_share(problem, design, tolerance, seed) for design in designs]
+
+
+def better_made(problem: Problem, results: list[Result], tolerance: Tolerance, seed: int) -> list[Result]:
+    """Return results with the one first that is made best, of those that have the value of the best."""
+    best = results[0]
+    equal = [r for r in results if r.feasible and abs(r.objective - best.objective) <= SAME * abs(best.objective)]
+    twins = _different(problem, equal)[:TRIED]
+    if len(twins) < 2:
+        return results
+    shares = yields(problem, np.array([r.design for r in twins]), tolerance, seed)
+    first = twins[int(np.argmax(shares))]
+    return [first, *(r for r in results if r is not first)]

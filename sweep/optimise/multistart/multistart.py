@@ -17,6 +17,7 @@ from sweep.errors import InputError
 from sweep.families.base import Array
 from sweep.jobs.signals import Stop, stop_on_signal
 from sweep.optimise.local.kkt import AGREE, Result
+from sweep.optimise.local.model import refuse_dependent
 from sweep.optimise.local.start import search
 from sweep.optimise.multistart.parallel import in_processes
 from sweep.optimise.multistart.survey import CUT, Survey, survey, with_basins
@@ -29,6 +30,7 @@ if TYPE_CHECKING:
     from sweep.study import OptimiseSettings
 
 BATCH = 6  # starts between two looks at whether more are needed: the same for any number of jobs
+LOOKED_AT = 3  # starts at which equations are looked at
 SERIAL_LOOKS = 800  # of a search before processes are worth their start, about a second
 Tell = Callable[[int, int], None]
 
@@ -88,7 +90,8 @@ def explore(
     starts = np.atleast_2d(np.asarray(starts, dtype=np.float64))
     if starts.size == 0 or starts.shape[1] != len(problem.family.parameters):
         raise InputError("starts", starts.shape, f"at least one row of {len(problem.family.parameters)} values", PLACE)
-    Program(problem)  # an unknown name is refused here, not in a worker
+    # Unknown names and equations that say the same are refused here, not in a worker.
+    refuse_dependent(problem, Program(problem), starts[:LOOKED_AT])
     end = math.inf if settings.time_budget is None else time.monotonic() + settings.time_budget
     with _signals() as own:
 

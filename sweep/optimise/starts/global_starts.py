@@ -28,7 +28,7 @@ if TYPE_CHECKING:
     from sweep.study import OptimiseSettings, Study, Tolerance
 
 SWEPT = 6  # of so many starts one comes from the sweep where there is a global search
-INSENSITIVE = 2  # of so many starts one is looked for by strategies that know the tolerances
+INSENSITIVE = 1  # of so many starts one is looked for by strategies that know the tolerances
 OTHER_SEED = 1000  # further on, for samples of their own
 ANOTHER = 1e-3  # share of a value by which that of another basin differs
 

@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sweep.families.base import Array
-from sweep.jobs.progress import Say, unsaid
+from sweep.jobs.progress import AT_MOST, Say, unsaid
 from sweep.optimise.local.kkt import AGREE
 from sweep.optimise.multistart.parallel import spread_over
 from sweep.optimise.samples import sobol
@@ -281,13 +281,24 @@ def bred(
     size : of each
     """
     task, ended, found = Population(linear, tuple(signs), seed, size), itertools.count(1), list[Bred]()
-    say("global search", 0, most, "populations")
+
+    def tell(done: int) -> None:
+        say("global search", done, most, f"populations {AT_MOST}{_best_so_far(found)}")
+
+    tell(0)
     while len(found) < most:
         numbers = list(range(len(found), min(len(found) + max(1, jobs), most)))
-        found += spread_over(task, numbers, stop, jobs, lambda: say("global search", next(ended), most, "populations"))
+        found += spread_over(task, numbers, stop, jobs, lambda: tell(next(ended)))
+        tell(len(found))
         if stop():
             break
         count = enough(found)
         if count is not None:
             return found[:count]
     return found
+
+
+def _best_so_far(found: Sequence[Bred]) -> str:
+    """Return the best value of populations, as their poses see it."""
+    best = min((float(one.worth[0]) for one in found if len(one.worth)), default=math.inf)
+    return f", the best {best:.5g}" if best < LOCKED else ""

@@ -1,0 +1,140 @@
+"""Shaking of a machine: force and moment of any stages of its members on the frame (machine-and-stitch, 2)."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+from sweep.errors import InputError
+from sweep.families.base import Family, Output, Parameter
+from sweep.families.capabilities import GuidedPoint, JointRecords, ToolPoint
+from sweep.families.frames import Frame
+from sweep.families.link_tree import LinkTree
+from sweep.families.relations import with_size
+from sweep.families.segments import cross
+from sweep.families.sites import AXES
+
+
+@dataclass(frozen=True)
+class Shaken:
+    """One stage of a member.
+
+    Parameters
+    ----------
+    member, stage : its names; the stage is empty where there is one only
+    forces : pose outputs whose sum with ``sign`` is the force on the frame, without axis and stage
+    sign : of those forces
+    rod : whether a tool runs along a line beside which its point may stand: the guides of the line bear the couple
+    driving : the stage before that drives it, if that is part of the machine's shaking too; "" for the shaft
+    """
+
+    member: str
+    stage: str
+    forces: tuple[str, ...]
+    sign: float
+    rod: bool
+    driving: str = ""
+
+    def named(self, output: str) -> str:
+        """Return the dotted name of an output of the stage."""
+        return f"{self.member}.{output}{self.stage}"
+
+    def vector(self, found: Mapping[str, Any], output: str) -> list[Any]:
+        """Return a vector in the frame of the stage."""
+        return [found[self.named(f"{output}_{axis}")] for axis in AXES]
+
+
+def shaken(member: str, stage: str, family: Family, listed: Sequence[tuple[str, str]]) -> Shaken:
+    """Return a stage of the given family; ``listed`` are all that are asked together.
+
+    Raises
+    ------
+    InputError
+        for a family without forces.
+    """
+    if family.find(LinkTree) is not None:
+        sign = 1.0
+        forces: tuple[str, ...] = ("shaking_force",)
+    elif family.find(JointRecords) is not None:
+        forces, sign = ("force_a", "force_d"), -1.0
+    else:
+        allowed = f"a mechanism whose forces are known; {family.name} has none"
+        raise InputError("shaking", f"{member}{stage}", allowed, "machine.relations")
+    tool = family.find(ToolPoint)
+    rod = tool is not None and tool.direction is not None and family.find(GuidedPoint) is not None
+    before = str(int(stage) - 1) if stage else ""
+    return Shaken(member, stage, forces, sign, rod, before if (member, before) in listed else "")
+
+
+@dataclass(frozen=True)
+class Shaking:
+    """Resultant force and moment of stages of members on the frame of the machine, about the origin of its frame."""
+
+    name: str
+    stages: tuple[Shaken, ...]
+
+    @property
+    def outputs(self) -> tuple[Output, ...]:
+        """Magnitude and components in the machine's frame, of the force and of the moment."""
+        words = ", ".join(f"{one.member} {one.stage}".strip() for one in self.stages)
+        found = []
+        for name, unit, what in (
+            (self.name, "force", f"the force of {words} on the frame"),
+            (self._moment, "torque", f"the moment of {words} on the frame about the machine's origin"),
+        ):
+            found.append(Output(name, unit, f"magnitude of {what}", "(5)"))
+            found += [Output(f"{name}_{x}", unit, f"{x} of {what}, machine's frame", "(5)") for x in AXES]
+        return tuple(found)
+
+    @property
+    def parameters(self) -> tuple[Parameter, ...]:
+        """It has none of its own."""
+        return ()
+
+    @property
+    def _moment(self) -> str:
+        return f"{self.name}_moment"
+
+    def _turning(self, wanted: frozenset[str]) -> bool:
+        return not wanted.isdisjoint((self._moment, *(f"{self._moment}_{axis}" for axis in AXES)))
+
+    def needs(self, wanted: frozenset[str]) -> frozenset[str]:
+        """Name the forces of the frame on every stage, and moments where one is wanted."""
+        names: set[str] = set()
+        for one in self.stages:
+            vectors = [*one.forces, *(["shaking_moment"] if self._turning(wanted) else [])]
+            names |= {one.named(f"{vector}_{axis}") for vector in vectors for axis in AXES}
+            if self._turning(wanted) and one.rod:
+                names |= {one.named("tool_load"), one.named("dev")}
+            if self._turning(wanted) and one.driving:
+                names |= {one.named("drive_torque"), *(f"{one.member}.a{one.stage}_axis_{axis}" for axis in AXES)}
+        return frozenset(names)
+
+    def compute(self, found: Mapping[str, Any], frames: Mapping[str, Frame], wanted: frozenset[str]) -> dict[str, Any]:
+        """Return the force and moment on the frame, (n, m)."""
+        force: list[Any] = [0.0, 0.0, 0.0]
+        moment: list[Any] = [0.0, 0.0, 0.0]
+        for one in self.stages:
+            frame = frames[f"{one.member}{one.stage}"]
+            parts = zip(*(one.vector(found, vector) for vector in one.forces), strict=True)
+            own = frame.turned([one.sign * sum(part) for part in parts])
+            force = [total + part for total, part in zip(force, own, strict=True)]
+            if self._turning(wanted):
+                about = frame.turned(self._about_own(one, found))
+                arm = cross([frame.at[:, [k]] for k in range(3)], own)
+                moment = [total + a + b for total, a, b in zip(moment, about, arm, strict=True)]
+                if one.driving:
+                    # The stage before turns its crank, not the frame: what its own moment counts in is inside.
+                    inside = [found[f"{one.member}.a{one.stage}_axis_{axis}"] for axis in AXES]
+                    torque = found[one.named("drive_torque")]
+                    moment = [total + torque * part for total, part in zip(moment, inside, strict=True)]
+        return with_size(self.name, force) | (with_size(self._moment, moment) if self._turning(wanted) else {})
+
+    def _about_own(self, one: Shaken, found: Mapping[str, Any]) -> list[Any]:
+        """Return the moment about the origin of the stage's frame, with the couple of the tool's guides."""
+        moment = one.vector(found, "shaking_moment")
+        if one.rod:
+            # The bar's force acts on its point, beside the line by dev; its guides take the couple up.
+            moment[2] = moment[2] - found[one.named("dev")] * found[one.named("tool_load")]
+        return moment
