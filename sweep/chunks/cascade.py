@@ -137,8 +137,9 @@ class Cascade:
         self.missed = Counter()
 
     def feed(self, index: NDArray[np.int64], designs: Array, status: NDArray[np.uint8]) -> None:
-        """Send designs in, with all parameters (k, P) or as many as the first level needs;
-        those that are not OK (k,) leave at once.
+        """Send designs in, with all parameters (k, P) or as many as the first level needs.
+
+        Those that are not OK (k,) leave at once.
         """
         self._sort(Batch(index, designs, {}, status), status == codes.OK, 0)
         self._work(0, whole=False)
@@ -266,9 +267,7 @@ class Recalled(Cascade):
 
 
 def levels(study: Study) -> tuple[Level, ...]:
-    """Return the levels of a study: its routes in the order of `Work`;
-    those that need fitted parameters come after [fit].
-    """
+    """Levels of a study: its routes in the order of `Work`; those that need fitted parameters come after [fit]."""
     found = [_level(study, route) for route in ordered_routes(study)]
     if study.fit is not None or study.parameter_limits:
         before = sum(_before_fit(study, level.route) for level in found if level.route is not None)
@@ -290,9 +289,7 @@ def ordered_routes(study: Study) -> tuple[Route, ...]:
 
 
 def _before_fit(study: Study, route: Route) -> bool:
-    """Return whether the route concerns only stages before the one that [fit] finishes,
-    and no load that it hands back.
-    """
+    """Whether the route concerns only stages before the one that [fit] finishes, and no load that it hands back."""
     if study.fit is None:
         return False
     last = len(stages_of(study.bare))

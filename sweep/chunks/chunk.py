@@ -36,8 +36,7 @@ class ChunkResult:
 
 
 def output_columns(study: Study) -> dict[str, str]:
-    """Return names and types of the result columns:
-    what the study wants, each number with its error estimate if there is one.
+    """Names and types of the result columns: what the study wants, each number with its error estimate, if any.
 
     An estimate is stored in float32 always, a proven bound is not; whether a crank turns is no number and has none.
     """

@@ -23,8 +23,7 @@ if TYPE_CHECKING:
 
 
 def parameter_matrix(study: Study, start: int, stop: int) -> tuple[Array, NDArray[np.uint8]]:
-    """Return the checked (n, P) design matrix of the designs start, ..., stop - 1 of the study's space,
-    and their status (n,).
+    """Check the designs start, ..., stop - 1 of the study's space: their matrix (n, P) and status (n,).
 
     The status is OK unless [locus] found no mechanism for a design; its links are nan then.
     """
@@ -66,8 +65,10 @@ class Parameters:
 
     @classmethod
     def of(cls, study: Study, needed: int | None) -> Parameters:
-        """Return what makes the first ``needed`` columns at first (None: all); all of them where rows are kept anyway,
-        where [locus] makes some from others, and where a value may be refused, with the place where it stands.
+        """Make the first ``needed`` columns at first (None: all).
+
+        All of them are made where rows are kept anyway, where [locus] makes some from others, and where a value may be
+        refused, with the place where it stands.
         """
         whole = len(study.family.parameters)
         early = needed is not None and study.output.keep != "all" and study.locus is None and _is_valid(study)

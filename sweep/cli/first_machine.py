@@ -99,9 +99,7 @@ def _members(members: Mapping[str, Family]) -> list[str]:
 
 
 def _relations(machine: Machine) -> tuple[list[str], list[str]]:
-    """Return lines of the table and the outputs that they give:
-    a distance where two neighbours have points, their timing.
-    """
+    """Lines of the table and the outputs that they give: a distance where two neighbours have points, their timing."""
     lines, outputs = [], []
     for one, other in pairwise(machine.members):
         points = [f"{m.name}.{m.points[-1]}" for m in (one, other) if m.points]
@@ -115,9 +113,7 @@ def _relations(machine: Machine) -> tuple[list[str], list[str]]:
 
 
 def _place(family: Family) -> str:
-    """Return a crank angle that the family has: where its output is largest;
-    of what turns on and on, its acceleration.
-    """
+    """Crank angle at which the family's output is largest; of what turns on and on, its acceleration."""
     turns = any(name.startswith("dwell_") for name in wanted_outputs(family))
     return f"phi_max_abs_d2{family.position}" if turns else f"phi_max_{family.position}"
 

@@ -110,9 +110,7 @@ def _example(family: Family) -> dict[str, float]:
 
 
 def wanted_outputs(family: Family) -> list[str]:
-    """Return what a designer asks first: size of the motion, pressure angle, greatest acceleration;
-    else what there is.
-    """
+    """List what a designer asks first: size of the motion, pressure angle, greatest acceleration; else any output."""
     # Of a chain first what it does as a whole, then the stages.
     offered = sorted((name for name in main_outputs(family) if not is_flag(name)), key=lambda name: parts(name).stage)
     dwells = [name for name in offered if parts(name).stem.startswith("dwell_")]

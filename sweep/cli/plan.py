@@ -146,9 +146,7 @@ def _computed(study: Study) -> list[str]:
 
 
 def _before_and_between(study: Study) -> list[str]:
-    """Return parameters that follow from others: made before the sweep's routes, or fitted between them;
-    and their limits.
-    """
+    """Parameters that follow from others, made before the sweep's routes or fitted between them; and their limits."""
     lines = []
     if study.locus is not None:
         made, given = ", ".join(study.locus.made), ", ".join(study.prescribed)

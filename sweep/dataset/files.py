@@ -46,9 +46,7 @@ PLAN_TYPES: Mapping[str, type] = {
 
 
 def located(folder: str | Path) -> Path:
-    """Return the folder of designs that a user means:
-    the given one, or the ``designs`` in it where it holds no chunks.
-    """
+    """Folder of designs that a user means: the given one, or the ``designs`` in it where it holds no chunks."""
     place = Path(folder)
     inner = place / DESIGNS
     return inner if inner.is_dir() and not any(place.glob("part-*.parquet")) else place

@@ -185,9 +185,7 @@ def check_columns(chunks: Sequence[Part]) -> None:
 
 
 def missing_chunks(folder: Path, chunks: list[Part]) -> list[int]:
-    """Return indices of the chunks that the folder's chunks, or its plan,
-    say there should be and that are not there.
-    """
+    """List the indices of the chunks that the folder's chunks, or its plan, announce and that are not there."""
     plan = read_plan(folder) or {}
     count = about(chunks[0]).get("chunks") if chunks else None
     return sorted(set(range(plan.get("chunks", 0) if count is None else count)) - {part.index for part in chunks})

@@ -71,8 +71,7 @@ def scan(folder: str | Path) -> ds.Dataset:
 
 
 def best(folder: str | Path, output: str, count: int = 10) -> pd.DataFrame:
-    """Return the designs within all limits whose output is smallest, best first;
-    signs of swing and stroke do not count.
+    """Designs within all limits whose output is smallest, best first; signs of swing and stroke do not count.
 
     Parameters
     ----------
@@ -101,8 +100,7 @@ def best(folder: str | Path, output: str, count: int = 10) -> pd.DataFrame:
 
 
 def pareto(folder: str | Path, first: str, second: str) -> pd.DataFrame:
-    """Return the designs within all limits that no other one beats in both outputs, ordered by the first;
-    smaller is better.
+    """Designs within all limits that no other one beats in both outputs, ordered by the first; smaller is better.
 
     Parameters
     ----------
@@ -191,8 +189,9 @@ def _ends(source: Any, output: str) -> tuple[float, float]:
 
 
 def _feasible(source: Any, names: Sequence[str]) -> Iterator[pd.DataFrame]:
-    """Yield the rows with status 0, batch by batch;
-    one file after the other, so that memory is that of a few batches.
+    """Yield the rows with status 0, batch by batch.
+
+    One file comes after the other, so that memory is that of a few batches.
     """
     import pyarrow.compute as pc
 
@@ -206,8 +205,9 @@ def _feasible(source: Any, names: Sequence[str]) -> Iterator[pd.DataFrame]:
 
 
 def _whole(source: Any, designs: NDArray[np.int64]) -> pd.DataFrame:
-    """Return all columns of some designs, in the order given;
-    of files without any of them only the statistics are read.
+    """Columns, all of them, of some designs, in the order given.
+
+    Of files without any of them only the statistics are read.
     """
     import pyarrow.compute as pc
 

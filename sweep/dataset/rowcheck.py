@@ -80,9 +80,7 @@ def _count_faults(status: np.ndarray[Any, Any], own: Mapping[str, Any]) -> list[
 
 
 def _parameter_faults(rows: pd.DataFrame, own: Mapping[str, Any], study: Study) -> list[str]:
-    """Return parameters that are not those of the design space;
-    what [fit] sets or scales is left to the recomputing.
-    """
+    """Parameters that are not those of the design space; what [fit] sets or scales is left to the recomputing."""
     matrix, _ = parameter_matrix(study, own["start"], own["stop"])
     at = rows["design"].to_numpy() - own["start"]
     fitted = () if study.fit is None else (*study.fit.parameters(study.family), *study.rescaled)

@@ -212,9 +212,7 @@ def foreign(folder: Path, found: str, plan: Plan) -> InputError:
 
 
 def totals(folder: Path) -> tuple[dict[str, int], dict[str, int]]:
-    """Return designs by the name of their status, and by the limit they miss, over all chunks,
-    from the chunks' metadata.
-    """
+    """Designs by the name of their status, and by the limit they miss, from the metadata of all chunks."""
     counts: Counter[str] = Counter()
     missed: Counter[str] = Counter()
     for part in parts(folder):
@@ -225,8 +223,7 @@ def totals(folder: Path) -> tuple[dict[str, int], dict[str, int]]:
 
 
 def is_complete(folder: str | Path) -> bool:
-    """Return whether every chunk of the dataset's plan is there and whole,
-    and the optimum too if the study asks for one.
+    """Whether every chunk of the dataset's plan is there and whole, and the optimum too if the study asks for one.
 
     Parameters
     ----------
@@ -260,9 +257,7 @@ def front_is_complete(path: Path) -> bool:
 
 
 def front_cut_short(path: Path) -> str | None:
-    """Return ``5 of 28`` steps of a front whose search time has cut short;
-    None for a whole one, or where there is none.
-    """
+    """Tell how much of a front its search time cut short, as ``5 of 28``; None for a whole one, or for none."""
     about = metadata(path)
     return None if about.get(b"complete") != b"false" else about.get(b"steps", b"").decode() or None
 

@@ -8,7 +8,6 @@ from functools import partial
 import numpy as np
 
 from kernels.effects.bearings import journal_pressures
-from sweep.effects import stops
 from sweep.effects.base import Bend, DesignResult, Effect
 from sweep.effects.bearing_life import BLOCK, Shaft, load_outputs, turn_outputs
 from sweep.effects.bearing_life import FORMULAS as LIFE_FORMULAS
@@ -16,7 +15,7 @@ from sweep.effects.bearing_life import bends as bends_of_shaft
 from sweep.effects.bearing_life import per_turn as turn_of_shaft
 from sweep.effects.bearings import CATALOGUE, REQUIRED_LIFE, permissible_load
 from sweep.effects.link_loads import SUPPORTED, friction_inputs, tree_of
-from sweep.effects.load_effects import friction_of, loads_of
+from sweep.effects.load_effects import friction_of, loads_of, tree_bends
 from sweep.effects.load_passing import FRICTION, LOADS, compute_friction
 from sweep.effects.loads import AXES, FRICTION_SUFFIX, FRICTION_TEXT
 from sweep.effects.scene import Scene, refuse, take_over
@@ -214,7 +213,7 @@ def sliding_of(name: str) -> Effect:
         takes_load=FRICTION,
         requires=LinkTree,
         tree=tree,
-        bends=stops.tree_bends(tree, tuple(o.name for _, _, out in found.values() for o in out)),
+        bends=tree_bends(tree, tuple(o.name for _, _, out in found.values() for o in out)),
     )
 
 

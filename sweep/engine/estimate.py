@@ -117,8 +117,7 @@ def other_accuracies(
 
 
 def neighbours(study: Study) -> tuple[tuple[str, Study], ...]:
-    """Return the same study with one digit less and one more, or with half and twice the samples;
-    in words, and the study.
+    """Return the same study with one digit less and one more, or half and twice the samples; in words, and the study.
 
     With a target also without the proof of its maxima, or with it where they have one.  An accuracy outside the range
     of `sweep.summarise` is left out.

@@ -37,9 +37,7 @@ def search(study: Study, folder: Path, jobs: int, backend: str, progress: bool) 
 
 
 def optimum_key(study: Study, note: Mapping[str, Any]) -> str:
-    """Return what an optimum or a front depends on:
-    the chunks by their plan's note, the study, the optimiser's sources.
-    """
+    """Name what an optimum or a front depends on: chunks by their plan's note, study, the optimiser's sources."""
     return f"{note['identity']}-{study.fingerprint[:12]}-{plans.optimiser_hash()}"
 
 

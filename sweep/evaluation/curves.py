@@ -36,9 +36,7 @@ def coordinate(name: str) -> Coordinate | None:
 
 
 def motion_curves(family: Family) -> tuple[str, ...]:
-    """Return the position and its derivatives, deviations, pressure angles;
-    of a machine those of its members, and relations.
-    """
+    """Position and its derivatives, deviations, pressure angles; of a machine those of its members, and relations."""
     if isinstance(family, Machine):
         members = [f"{m.name}.{name}" for m in family.members for name in _ladder(m.family, 2)]
         return (*members, *(r.outputs[0].name for r in family.relations))

@@ -151,9 +151,7 @@ def joints(mechanism: Mechanism, design: Table, phi: ArrayLike, *, angles: Angle
 
 
 def parts(mechanism: Mechanism, design: Table, phi: ArrayLike) -> list[Part]:
-    """Return the stages of a mechanism with their joints, in the order of members and stages;
-    arguments as of `joints`.
-    """
+    """Stages of a mechanism with their joints, in the order of members and stages; arguments as of `joints`."""
     family = find_family(mechanism).precise()
     matrix, _ = design_matrix(family, design)
     if len(matrix) != 1:

@@ -26,8 +26,7 @@ def meanings(codes: Iterable[int]) -> list[str]:
 
 
 def explained(columns: Columns, names: Iterable[str]) -> Columns:
-    """Return the columns with a status wherever one of these values is missing or has left float64,
-    and no error of it.
+    """Columns with a status wherever one of these values is missing or has left float64, and no error of it.
 
     The status of what no kernel has explained is INVALID_INPUT: the scale of its parameters is beyond float64.
     """

@@ -80,8 +80,9 @@ def carry(study: Study, earlier: Sequence[Path], target: Path) -> Carried | None
 
 
 def searched(study: Study, folder: Path) -> bool:
-    """Return whether optimum, proof and front in a folder, as far as the study asks for them,
-    are its own and of these sources.
+    """Whether optimum, proof and front in a folder are the study's own, made by these sources.
+
+    Those that the study does not ask for do not count.
 
     A search that time has cut short is made again.
     """

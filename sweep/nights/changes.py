@@ -40,8 +40,7 @@ class Changes:
 
 
 def figures(study: Study, folder: Path) -> tuple[dict[str, float], dict[str, str]]:
-    """Return headline figures of a complete dataset and their units:
-    designs, those within the limits, the best objective.
+    """Headline figures of a complete dataset and their units: designs, those within the limits, the best objective.
 
     The best objective is that of the optimum, or where the study has none that of the best design of the sweep.
     """

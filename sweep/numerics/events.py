@@ -87,7 +87,7 @@ def _zeros(functions: Functions, row: Index, which: Index, low: Array, high: Arr
 
 
 def _inverse(x1: Array, x2: Array, x3: Array, at1: Array, at2: Array, at3: Array) -> Array:
-    """Share of the way from x1 to x2 at which the inverse parabola through three points is zero; else a half.
+    """Share of the way from x1 to x2 at which the inverse parabola through three points is zero.
 
     It is a half where the parabola is not safe.
     """

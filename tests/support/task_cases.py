@@ -71,7 +71,7 @@ TASK8 = Case(Task8, swing=0.8, phi0=3.2, **SPACE, f_range=(-3.0, 3.0), stroke=1.
 
 def chain_columns(solution, second):
     names = sweep.families.family(["rssr", second]).parameter_names
-    return {name: [solution.mechanism[name]] for name in names}
+    return {name: [solution.mechanism[name]] for name in names if name in solution.mechanism}
 
 
 def rocker(solution):

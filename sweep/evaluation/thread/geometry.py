@@ -105,8 +105,7 @@ def wrap(table: Table) -> pd.DataFrame:
 
 
 def feed(table: Table) -> pd.DataFrame:
-    """Return the length of the thread over a point of any link, and its derivatives from those of the point;
-    (2) to (4).
+    """Length of the thread over a point of any link, and its derivatives from those of the point; (2) to (4).
 
     Parameters
     ----------
@@ -139,8 +138,7 @@ def feed(table: Table) -> pd.DataFrame:
 
 
 def eyelet(table: Table) -> pd.DataFrame:
-    """Return the eyelet on a crank against a wanted P: motion, thread, weighted difference (27) of the source;
-    (5) to (8).
+    """Eyelet on a crank against a wanted P: motion, thread, weighted difference (27) of the source; (5) to (8).
 
     Parameters
     ----------
@@ -179,8 +177,7 @@ def eyelet(table: Table) -> pd.DataFrame:
 
 
 def follower(table: Table) -> pd.DataFrame:
-    """Return the follower of a guided cam from the length of the thread, and the pressure angle at which it jams;
-    (10) to (14).
+    """Follower of a guided cam from the length of the thread, and the pressure angle at which it jams; (10) to (14).
 
     Parameters
     ----------
@@ -211,8 +208,7 @@ def follower(table: Table) -> pd.DataFrame:
 
 
 def free_cam(table: Table) -> pd.DataFrame:
-    """Return the thread over the bare edge of a turning cam:
-    where it lies without friction, and between which points it sticks.
+    """Thread over the bare edge of a turning cam: where it lies without friction, and between which points it sticks.
 
     Equations (18) to (25).
 

@@ -153,8 +153,7 @@ def path(T1: ArrayLike, contours: Table, theta_deg: ArrayLike | None = None) -> 
 
 
 def least_tension_radius(table: Table) -> pd.DataFrame:
-    """Return the radius of the contour behind which the tension is least,
-    whatever the wrap angle and the tension; (4).
+    """Radius of the contour behind which the tension is least, whatever the wrap angle and the tension; (4).
 
     Parameters
     ----------
@@ -186,8 +185,7 @@ def least_tension_radius(table: Table) -> pd.DataFrame:
 
 
 def speed(table: Table) -> pd.DataFrame:
-    """Return the tension behind the disc tensioner over its value at the reference speed,
-    for a speed of the thread; (7).
+    """Tension behind the disc tensioner over its value at the reference speed, for a speed of the thread; (7).
 
     Parameters
     ----------

@@ -13,6 +13,7 @@ import numpy as np
 
 from sweep.families.base import Array
 from sweep.synthesis.tasks.crank_rocker import (
+    check_given,
     designs_on_locus,
     least_cos2,
     motion,
@@ -22,7 +23,6 @@ from sweep.synthesis.tasks.crank_rocker import (
     size_names,
     turn,
 )
-from sweep.synthesis.tasks.given import check_given
 from sweep.synthesis.tasks.problem import Candidates, Unknown, stacked
 
 

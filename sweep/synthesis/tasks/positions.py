@@ -16,6 +16,7 @@ from sweep.errors import InputError
 from sweep.families.base import Array
 from sweep.synthesis.tasks.crank_rocker import (
     LocusPoint,
+    check_given,
     designs_on_locus,
     motion,
     named,
@@ -24,7 +25,6 @@ from sweep.synthesis.tasks.crank_rocker import (
     size_names,
     turn,
 )
-from sweep.synthesis.tasks.given import check_given
 from sweep.synthesis.tasks.problem import Candidates, Unknown, stacked
 
 PLANAR = 1e-12  # |sin(alpha)| below which f has no influence

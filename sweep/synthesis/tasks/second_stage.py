@@ -17,8 +17,7 @@ from sweep.evaluation.summaries import design_outputs
 from sweep.evaluation.tables import design_matrix
 from sweep.families import family
 from sweep.families.base import Accuracy, Angles, Array, Columns, Family
-from sweep.synthesis.tasks.crank_rocker import RSSR, size_limits, size_names, turn
-from sweep.synthesis.tasks.given import check_given
+from sweep.synthesis.tasks.crank_rocker import RSSR, check_given, size_limits, size_names, turn
 from sweep.synthesis.tasks.problem import Candidates, Unknown, stacked
 
 
@@ -59,7 +58,9 @@ def chain_of(second: str) -> Family:
 
 def chain_motion(chain: Family, columns: Mapping[str, Array], *wanted: str) -> Columns:
     """Pose outputs of chains over one turn, nan where there is no mechanism or a stage does not reach."""
-    rows = np.column_stack([columns[name] for name in chain.parameter_names])
+    # A stage stands where it does by default, as far as the task says nothing of its place.
+    defaults = {p.name: np.full_like(columns["a1"], p.default) for p in chain.parameters if p.default is not None}
+    rows = np.column_stack([(defaults | dict(columns))[name] for name in chain.parameter_names])
     return chain.poses(rows, turn(), frozenset(wanted))
 
 

@@ -16,6 +16,7 @@ from sweep.evaluation.tables import design_matrix
 from sweep.families.base import Accuracy, Array
 from sweep.synthesis.tasks.crank_rocker import (
     RSSR,
+    check_given,
     designs_on_locus,
     motion,
     named,
@@ -24,7 +25,6 @@ from sweep.synthesis.tasks.crank_rocker import (
     size_names,
     turn,
 )
-from sweep.synthesis.tasks.given import check_given
 from sweep.synthesis.tasks.problem import Candidates, Unknown, stacked
 
 if TYPE_CHECKING:

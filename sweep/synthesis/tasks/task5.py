@@ -12,6 +12,7 @@ from sweep.errors import InputError
 from sweep.families import slotted
 from sweep.families.base import Angles, Array
 from sweep.synthesis.tasks.crank_rocker import (
+    check_given,
     designs_on_locus,
     motion,
     named,
@@ -20,7 +21,6 @@ from sweep.synthesis.tasks.crank_rocker import (
     size_names,
     turn,
 )
-from sweep.synthesis.tasks.given import check_given
 from sweep.synthesis.tasks.problem import Candidates, Unknown, stacked
 
 

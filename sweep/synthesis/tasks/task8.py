@@ -14,13 +14,13 @@ from sweep.families import family
 from sweep.families.base import Accuracy, Angles, Array
 from sweep.synthesis.tasks.crank_rocker import (
     RSSR,
+    check_given,
     designs_on_locus,
     named,
     pressure_limit,
     size_limits,
     size_names,
 )
-from sweep.synthesis.tasks.given import check_given
 from sweep.synthesis.tasks.problem import Candidates, Unknown, stacked
 from sweep.synthesis.tasks.second_stage import chain_motion, chain_of, second_pressure_limit
 
