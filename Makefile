@@ -6,7 +6,7 @@ SWEEP := $(BIN)/sweep
 STUDIES := $(notdir $(patsubst %/study.toml,%,$(wildcard studies/*/study.toml)))
 
 .DEFAULT_GOAL := help
-.PHONY: test-versions bench-scale smoke-scale three test-browser test-faults bench-object-store site notebooks nightly smoke-nightly bench-estimates bench-enclosures bench-extrema bench-first-use bench-optimise bench-basins help setup test test-long lint types imports check smoke bench bench-scene bench-peers study-accuracy smoke-accuracy search-worse search-wrong docs frames clean $(STUDIES:%=study-%) $(STUDIES:%=smoke-%)
+.PHONY: test-versions bench-latency bench-scale smoke-scale three test-browser test-faults bench-object-store site notebooks nightly smoke-nightly bench-estimates bench-enclosures bench-extrema bench-first-use bench-optimise bench-basins help setup test test-long lint types imports check smoke bench bench-scene bench-peers study-accuracy smoke-accuracy search-worse search-wrong docs frames clean $(STUDIES:%=study-%) $(STUDIES:%=smoke-%)
 
 help:  ## list the targets
 	@grep -hE '^[a-z%-]+:.*##' $(MAKEFILE_LIST) | sed -E 's/:.*## /\t/' | expand -t 22
@@ -33,7 +33,7 @@ test-long: $(VENV)/dev  ## the tests that take minutes, thousands of hostile tab
 	$(BIN)/python -m pip install --constraint constraints.txt --editable '.[dev,peers]'
 	$(BIN)/python -m pytest -m 'long or hypothesis' --hypothesis-profile=random
 
-test-faults: $(VENV)/dev  ## kills, signals, full disks, damage: 150 kills and 170 other faults, a table; about 15 minutes
+test-faults: $(VENV)/dev  ## kills, signals, full disks, damage: 150 kills and 370 other faults, a table; about 25 minutes
 	$(BIN)/python -m tests.faults
 
 test-versions: $(VENV)/dev  ## oracle tables, bits and speed with the oldest and the newest dependencies allowed; about 40 minutes
@@ -87,6 +87,9 @@ bench-peers: $(VENV)/dev  ## next to pylinkage and Pinocchio, which get an envir
 	.venv-peers/bin/python -m tests.bench.peer_loads --out results/accuracy
 	$(BIN)/python -m tests.bench.loads --out results/accuracy
 	$(BIN)/python -m tests.bench.programs --out results/accuracy
+
+bench-latency: $(VENV)/dev  ## one design, one pose: next to a plain numba function, and to pylinkage where make bench-peers has been; a minute
+	$(if $(wildcard .venv-peers/bin/python),.venv-peers/bin/python,$(BIN)/python) -m tests.bench.latency
 
 bench-scale: $(VENV)/dev  ## 10^5 to 10^9 samples, to 10^8 designs, and reading them: writes docs/scale.md, about 10 minutes
 	$(BIN)/python -m tests.bench.scale --out docs/scale.md

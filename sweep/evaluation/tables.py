@@ -123,11 +123,10 @@ def kept_columns(table: Table, keep: bool | str | Sequence[str], made: Collectio
     InputError
         for a name that the table does not have or that the result needs itself, or a column of another length.
     """
+    if keep is False:
+        return {}
     keys = _column_names(table)
-    if isinstance(keep, bool):
-        chosen = [name for name in keys if name not in made] if keep else []
-    else:
-        chosen = wanted_names(keep, "keep")
+    chosen = [name for name in keys if name not in made] if keep is True else wanted_names(keep, "keep")
     columns: dict[str, Any] = {}
     for name in chosen:
         if name not in keys:

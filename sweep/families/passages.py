@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
@@ -73,17 +73,25 @@ def _cost(accuracy: Accuracy) -> float:
 
 @dataclass(frozen=True)
 class _Tip:
-    """The tip in the needle's frame, of several designs, at one angle of each."""
+    """The tip in the needle's frame, of several designs, at one angle of each: found quickly, read precisely."""
 
     taking: Taking
+    quick: Machine
     precise: Machine
     designs: Array
 
     def at(self, rows: Any, phi: Array, *what: str) -> list[Array]:
         """Return outputs of these designs at these angles."""
-        names = {one: f"{self.taking.name}_{one}" for one in what}
-        found = self.precise.poses(self.designs[rows], Angles.of(phi[:, None]), frozenset(names.values()))
-        return [np.asarray(found[name], np.float64)[:, 0] for name in names.values()]
+        return self._of(self.precise, rows, phi, what)
+
+    def near(self, rows: Any, phi: Array, what: str) -> Array:
+        """Return an output as the search for a root needs it."""
+        return self._of(self.quick, rows, phi, (what,))[0]
+
+    def _of(self, machine: Machine, rows: Any, phi: Array, what: Sequence[str]) -> list[Array]:
+        names = [f"{self.taking.name}_{one}" for one in what]
+        found = machine.poses(self.designs[rows], Angles.of(phi[:, None]), frozenset(names))
+        return [np.asarray(found[name], np.float64)[:, 0] for name in names]
 
     def turning(self, slope: Array, name: str) -> _Found:
         """Return where samples (n, m) of a derivative change their sign, as roots of the output of that name."""
@@ -91,7 +99,7 @@ class _Tip:
         row, column = np.nonzero((slope > 0.0) & (after <= 0.0) | (slope < 0.0) & (after >= 0.0))
         step = TWO_PI / slope.shape[1]
         ends = slope[row, column], after[row, column]
-        phi = _root(row, column * step, (column + 1) * step, *ends, lambda r, x: self.at(r, x, name)[0])
+        phi = _root(row, column * step, (column + 1) * step, *ends, lambda r, x: self.near(r, x, name))
         return _Found(row, phi)
 
     def beside(self, height: Array) -> NDArray[np.bool_]:
@@ -113,13 +121,13 @@ def passages(taking: Taking, machine: Machine, designs: Array, samples: int = SA
     opposite sign lies one passage.  A pair of extremes between two samples is missed.
     """
     name, sense, n = taking.name, float(taking.sense), len(designs)
-    tip = _Tip(taking, machine.precise(), designs)
+    tip = _Tip(taking, machine, machine.precise(), designs)
     status, dx, ddepth = _scan(taking, machine, designs, samples)
     good = status == st.OK
     low, extremes = tip.turning(ddepth, "ddepth"), tip.turning(dx, "dacross")
     (lows,), (across,) = tip.at(low.row, low.phi, "depth"), tip.at(extremes.row, extremes.phi, "across")
     deepest = _largest(low.row, lows, n)
-    roots = _roots(extremes, across, lambda rows, phi: tip.at(rows, phi, "across", "dacross"))
+    roots = _roots(extremes, across, tip)
     side, height, turned, depth, speed = tip.at(roots.row, roots.phi, "side", "height", "dacross", "depth", "speed")
     beside, right = tip.beside(height), sense * turned > 0.0
     count, ways = (np.bincount(roots.row, beside & one, n) for one in (right, ~right))
@@ -194,7 +202,7 @@ def _root(
     return phi
 
 
-def _roots(extremes: _Found, across: Array, function: Callable[[Any, Array], list[Array]]) -> _Found:
+def _roots(extremes: _Found, across: Array, tip: _Tip) -> _Found:
     """Return the passages between neighbouring extremes of opposite sign, of each design in order."""
     order = np.lexsort((extremes.phi, extremes.row))
     row, phi, value = extremes.row[order], extremes.phi[order], across[order]
@@ -205,8 +213,8 @@ def _roots(extremes: _Found, across: Array, function: Callable[[Any, Array], lis
     after = np.where(last, first[row], after) if row.size else after
     left, right = phi, phi[after] + np.where(last, TWO_PI, 0.0) if row.size else phi
     k = np.flatnonzero(value * value[after] < 0.0) if row.size else np.zeros(0, np.intp)
-    found = _root(row[k], left[k], right[k], value[k], value[after][k], lambda r, x: function(r, x)[0])
-    x, slope = function(row[k], found) if k.size else [np.zeros(0)] * 2
+    found = _root(row[k], left[k], right[k], value[k], value[after][k], lambda r, x: tip.near(r, x, "across"))
+    x, slope = tip.at(row[k], found, "across", "dacross") if k.size else [np.zeros(0)] * 2
     with np.errstate(divide="ignore", invalid="ignore"):
         polished = found - x / slope
     found = np.where((polished > left[k]) & (polished < right[k]), polished, found)

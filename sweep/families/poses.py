@@ -215,7 +215,9 @@ def step_of(
 
     def run(designs: Array, wanted: frozenset[str], accuracy: Accuracy) -> Columns:
         asked = frozenset(theirs(name) for name in wanted)
-        found = step.run(matrix(designs), asked, replace(accuracy, proven=tuple(map(theirs, accuracy.proven))))
+        if accuracy.proven:
+            accuracy = replace(accuracy, proven=tuple(map(theirs, accuracy.proven)))
+        found = step.run(matrix(designs), asked, accuracy)
         return {ours(name): values for name, values in found.items()}
 
     provides = tuple(replace(o, name=ours(o.name), equation="") for o in step.provides)

@@ -48,8 +48,7 @@ class Box:
 def boxes(family: Family) -> dict[str, Box]:
     """Boxes of a family by name: its own, of a chain every stage's, of a machine the whole and every member's.
 
-    The stages of a chain share an axis, but the angle between their frames is nobody's parameter: only a machine, whose
-    members are placed, has a box of several of them.
+    That of a chain is given stage by stage, in each stage's own frame; of a machine's chain the last stage counts.
     """
     if isinstance(family.domain, March):
         return {}

@@ -306,10 +306,7 @@ def _known(family: Family, name: str) -> str:
     if name in family.pose_names:
         near = f"; {name} is one of a single pose, ask `evaluate`"
     if name in BOXES and isinstance(family, Chain):
-        near = (
-            f"; {name} is one of a stage, as {name}1: the frames of several stages stand to each other in no known way"
-        )
-        near += ", of a machine's members they do"
+        near = f"; {name} is one of a stage, as {name}1; of a machine there is one of all its members"
     if of_effects:
         words += ", and those of effects (sweep effects)"
     return words + (elsewhere(family, name) or near)

@@ -74,7 +74,10 @@ def first_peaks(centre: Array, spacing: Array, around: Array) -> Peaks:
     widest = fourth.max(axis=1)
     error = RIPPLE * widest + 4.0 * EPS * np.abs(height) + _kink(around[:, 1:6], BENT)
     err_height = np.where(rival, np.inf, error)
-    err_phi = spacing * np.minimum(blur * widest / np.maximum(ripple, EPS * EPS), 2.0)
+    # A floor in proportion to the curve: lengths have any size, and scaling them by 2^k changes no bit.
+    least = np.maximum(ripple, EPS * EPS * widest)
+    blurred = np.divide(blur * widest, least, out=np.zeros(widest.size), where=least > 0.0)
+    err_phi = spacing * np.minimum(blurred, 2.0)
     return Peaks(centre + spacing * place, height, err_phi, err_height, height, spacing, SHRINK * spacing)
 
 

@@ -59,7 +59,6 @@ def answer(data: Dataset, found: Scan, further: Sequence[str] = ()) -> list[str]
     sentences.append(front_sentence(data))
     sentences += _against_reference(data)
     sentences += not_achieved(data, found)
-    sentences.append(_search(data, found, proven=bool(proven)))
     return [s for s in sentences if s]
 
 
@@ -179,13 +178,15 @@ def _residual(value: float) -> str:
     return "its KKT residual does not exist" if math.isnan(value) else f"KKT residual {number(value, 3)}"
 
 
-def _search(data: Dataset, found: Scan, *, proven: bool) -> str:
-    """How the optimum was searched, and that this proves nothing where there is no proof besides."""
+def search_sentence(data: Dataset, found: Scan) -> str:
+    """Say how the optimum was searched, and that this proves nothing where there is no proof besides."""
+    if data.result is None:
+        return ""
     if data.optimum is None:
         return f"{NO_PROOF}: no optimiser was run, and the best of the sweep is as fine as the spacing of its designs."
     starts, agree = data.starts, value_of(data.optimum, "agree")
     kind = "" if found.feasible else "random "
-    head = "The" if proven else f"{NO_PROOF}: the"
+    head = "The" if proof_sentence(data) else f"{NO_PROOF}: the"
     text = f"{head} optimiser started from {starts} {kind}design{'s' if starts != 1 else ''}"
     populations = 0 if data.survey is None else data.survey.populations
     text += f", ends of {populations} global searches and designs of the sweep" if populations else " of the sweep"

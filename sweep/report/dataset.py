@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Container, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
@@ -174,13 +174,23 @@ def read_dataset(folder: Path) -> Dataset:
         parts=parts,
         units={o.name: o.unit.replace("length", "mm") for o in study.family.pose_outputs} | units,
         definitions={o.name: o.text for o in study.family.pose_outputs} | definitions,
-        optima=store.read_table(optima) if optima.exists() else None,
+        optima=_with_defaults(study, store.read_table(optima)) if optima.exists() else None,
         curves=store.read_table(curves) if curves.exists() else None,
-        front=store.read_table(front) if front.exists() else None,
+        front=_with_defaults(study, store.read_table(front)) if front.exists() else None,
         runs=tuple(store.read_runs(folder)),
         survey=read_survey(optima),
         front_steps=store.front_cut_short(front),
     )
+
+
+def _with_defaults(study: Study, rows: pd.DataFrame) -> pd.DataFrame:
+    """Add the parameters that an earlier version did not have, at the values that stand for none of them."""
+    return rows.assign(**_absent(study, rows))
+
+
+def _absent(study: Study, known: Container[str]) -> dict[str, float]:
+    """Name the optional parameters that are not among the known ones, with their defaults."""
+    return {p.name: p.default for p in study.family.parameters if p.name not in known and p.default is not None}
 
 
 def study_of(plan: Mapping[str, Any], folder: Path) -> Study:
@@ -252,7 +262,7 @@ def _row(folder: Path, number: int) -> Chosen:
     rows = store.load(folder)
     if not 0 <= number < len(rows):
         raise InputError("design", number, f"a row from 0 to {len(rows) - 1}", str(folder))
-    row = rows.iloc[number]
+    row = _with_defaults(data.study, rows.iloc[[number]]).iloc[0]
     return _chosen(data, {name: float(row[name]) for name in data.study.family.parameter_names})
 
 
@@ -283,6 +293,7 @@ def gather(folder: Path) -> tuple[Dataset, Scan, list[Cells]]:
     objective = objective_of(data.study)
     larger = data.study.pareto is not None and data.study.pareto.at_least
     found = scan(data.parts, cells, objective, data.against if objective is not None else None, larger)
+    found.best_row |= _absent(data.study, found.best_row) if found.best_row else {}
     data = replace(data, best=found.best_row or None)
     if data.optima is None:
         data = replace(data, computed_reference=reference_row(data.study))

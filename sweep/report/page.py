@@ -158,6 +158,7 @@ def render(
         figures=figures,
         own_figures=own,
         sentences=answer.answer(data, found, more["further"]),
+        searched=answer.search_sentence(data, found),
         limits=tables.limit_states(data),
         outputs=tables.output_rows(data),
         parameters=tables.parameter_rows(data),

@@ -163,6 +163,41 @@ def test_scale_changes_no_bit(name, exponent):
             np.testing.assert_array_equal(np.ldexp(plain[output], power * exponent), big[output], err_msg=output)
 
 
+def test_extrema_of_a_tiny_swivel_are_those_of_a_large_one():
+    """Lengths of 1e-82: a floor of 2^-106 for what five samples differ by let the search end 4e-7 off with status 0."""
+    mechanism = family("swivel")
+    tiny = {"a": 1.2939833205967578e-82, "e": 3.850407171075017e-82, "f": -1.6751266098033278e-82,
+            "g": -2.1147597597616768e-82, "alpha": 1.0348884223107313, "Lw": 8.390614036491409e-82}  # fmt: skip
+    design = np.array([[tiny.get(p.name, p.default) for p in mechanism.parameters]], float)
+    found = design_outputs(mechanism, design, ["max_abs_d3x_p"], Accuracy(target=1e-9))
+    assert found["status"][0] == st.OK
+    assert found["max_abs_d3x_p"][0] / tiny["a"] == pytest.approx(4.44783510044, rel=1e-11)
+
+
+@pytest.mark.parametrize("exponent", [-199, 199])
+@pytest.mark.parametrize("name", LINKED)
+def test_scale_changes_no_bit_of_extrema_and_their_errors(name, exponent):
+    """The error that is allowed is a part of the curve's size, so no number of the search stands for itself."""
+    mechanism, design = built(name)
+    generator = np.random.default_rng(24)
+    powers = np.array([{"length": 1, "1/length": -1}.get(p.unit, 0) for p in mechanism.parameters])
+    steady = np.array([p.unit in ("length", "1/length", "angle") for p in mechanism.parameters])
+    designs = design * np.where(steady, generator.uniform(0.95, 1.05, (6, design.size)), 1.0)
+    units = {o.name: o.unit for o in mechanism.pose_outputs}
+    outputs = [n for n in ladder(mechanism)[:4] if units[n] in ("length", "rad", "1")]
+    names = [f"{kind}_{n}" for n in outputs for kind in ("max_abs", "min", "phi_max")]
+    accuracy = Accuracy(target=1e-9)
+    plain = design_outputs(mechanism, designs, names, accuracy)
+    big = design_outputs(mechanism, np.ldexp(designs, powers * exponent), names, accuracy)
+    np.testing.assert_array_equal(plain["status"], big["status"])
+    assert (plain["status"] == st.OK).any()
+    for n in outputs:
+        for kind in ("max_abs", "min", "phi_max"):
+            power = exponent if units[n] == "length" and kind != "phi_max" else 0
+            for key in (f"{kind}_{n}", f"err_{kind}_{n}"):
+                np.testing.assert_array_equal(np.ldexp(plain[key], power), big[key], err_msg=key)
+
+
 @pytest.mark.parametrize("exponent", [-1000, -332, 332, 1000])  # 1e-300, 1e-100, 1e100, 1e300
 @pytest.mark.parametrize("name", LINKED)
 def test_a_scale_that_leaves_float64_gives_the_same_numbers_or_a_status(name, exponent):

@@ -97,16 +97,16 @@ def damaged_note(name: str, damage: Damage, ground: Ground, folder: Path, moment
 
 
 DAMAGE = [
-    Kind("flipped chunk", 20, partial(damaged_chunk, flip)),
-    Kind("truncated chunk", 20, partial(damaged_chunk, cut)),
-    Kind("emptied chunk", 5, partial(damaged_chunk, empty)),
-    Kind("deleted chunk", 5, partial(damaged_chunk, delete)),
-    Kind("swapped chunks", 10, partial(damaged_chunk, swap)),
-    Kind("duplicated chunk", 10, partial(damaged_chunk, duplicate)),
-    Kind("flipped table", 10, partial(damaged_table, flip)),
-    Kind("truncated table", 10, partial(damaged_table, cut)),
-    Kind("deleted table", 5, partial(damaged_table, delete)),
-    Kind("truncated plan", 10, partial(damaged_note, PLAN, cut)),
-    Kind("truncated log", 5, partial(damaged_note, RUNS, cut)),
-    Kind("flipped plan", 10, partial(damaged_note, PLAN, flip)),
+    Kind("flipped chunk", 40, partial(damaged_chunk, flip)),
+    Kind("truncated chunk", 40, partial(damaged_chunk, cut)),
+    Kind("emptied chunk", 15, partial(damaged_chunk, empty)),
+    Kind("deleted chunk", 15, partial(damaged_chunk, delete)),
+    Kind("swapped chunks", 30, partial(damaged_chunk, swap)),
+    Kind("duplicated chunk", 30, partial(damaged_chunk, duplicate)),
+    Kind("flipped table", 30, partial(damaged_table, flip)),
+    Kind("truncated table", 30, partial(damaged_table, cut)),
+    Kind("deleted table", 15, partial(damaged_table, delete)),
+    Kind("truncated plan", 20, partial(damaged_note, PLAN, cut)),
+    Kind("truncated log", 15, partial(damaged_note, RUNS, cut)),
+    Kind("flipped plan", 20, partial(damaged_note, PLAN, flip)),
 ]

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from sweep.evaluation.summaries import design_outputs
 from sweep.families.base import Array
-from sweep.optimise.local.kkt import AGREE, Result
+from sweep.optimise.local.kkt import AGREE, WORDS, Result
 from sweep.optimise.local.model import Model
 from sweep.optimise.local.start import search
 from sweep.optimise.manufacture.margins import Levels, bounded, excesses, keyed, prices, with_margins
@@ -32,7 +32,7 @@ SAME = 1e-8  # relative, of values of two optima that are equally good
 SAMPLES = 8192  # a power of two: the share of 95 % is good to 0.25 %
 BOTH = 4.0  # ways in which a design misses a limit that know little of each other, to begin with
 TRIED = 4  # basins of the search that are begun with
-ENDED, BEHIND = 3, 1.002  # designs that go on after the first rounds, and times the objective of the best of them
+ENDED = 3  # designs that go on after the first rounds
 HEAT = 400  # looks of each of the first rounds
 ROUNDS, CORRECTIONS = 4, 10  # of search with the room of the design before; of the number of standard deviations
 ONCE = 2  # looks that say how good a design is
@@ -119,11 +119,11 @@ def robust(
     count = _Count(tell, len(begin) + min(ENDED, len(begin)))
     found = spread_over(near, list(range(len(begin))), asked, jobs, count)
     # The objective of designs that miss their limits still says little.
-    order = sorted(found, key=lambda r: (r.violation > NEARLY, r.objective if r.violation <= NEARLY else r.violation))
-    # Another share-out saves far less than what separates basins: what is further behind stays behind.
-    ends = [
-        r for r in _different(problem, order)[:ENDED] if r is order[0] or r.objective <= BEHIND * order[0].objective
-    ]
+    order = sorted(
+        found,
+        key=lambda r: (r.violation > NEARLY, _is_squeezed(r), r.objective if r.violation <= NEARLY else r.violation),
+    )
+    ends = _different(problem, order)[:ENDED]
     if not ends:  # stopped before any of them was begun
         return None
     numbers = {r.start: k for k, r in enumerate(ends)}
@@ -152,6 +152,11 @@ class _Count:
     def __call__(self) -> None:
         self.done += 1
         self.tell(self.done, self.total)
+
+
+def _is_squeezed(r: Result) -> bool:
+    """Return whether a band of the design is narrower than the room that it needs, so that it misses the share."""
+    return any(text.endswith(WORDS["equal"]) for text in r.active)
 
 
 def _never() -> bool:

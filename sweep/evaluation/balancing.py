@@ -1,0 +1,107 @@
+"""Balancing: orders of a shaking force, counterweights that leave the least of it (machine-and-stitch, 3).
+
+A counterweight is a mass times the vector from a shaft's axis to it, U = (along, across) the mark of the shaft.  Forces
+are linear in U, so the best of any number of them are linear least squares; the inertia that they add is not.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+
+from kernels.types import Array
+
+
+class Orders(NamedTuple):
+    """Mean, and amplitudes of cosine and sine, (n, ...), of the orders 1 to n of a turn."""
+
+    mean: Array
+    cos: Array
+    sin: Array
+
+
+@dataclass(frozen=True)
+class Place:
+    """Where a counterweight sits.
+
+    Parameters
+    ----------
+    at : centre of its circle
+    mark, across : unit vectors, square to the axis: its mark at angle 0, and where that is a quarter of a turn later
+    ratio, phase : the shaft turns by ratio phi + phase
+    """
+
+    at: tuple[float, float, float]
+    mark: tuple[float, float, float]
+    across: tuple[float, float, float]
+    ratio: float = 1.0
+    phase: float = 0.0
+
+    def forces(self, phi: Array, speed: float) -> Array:
+        """Return the forces on the frame of U = (1, 0) and of (0, 1), (m, 3, 2), at constant speed."""
+        angle = self.ratio * phi[:, None] + self.phase
+        mark, across = np.array([self.mark]), np.array([self.across])
+        along = np.cos(angle) * mark + np.sin(angle) * across
+        square = -np.sin(angle) * mark + np.cos(angle) * across
+        found: Array = (self.ratio * speed) ** 2 * np.stack([along, square], axis=2)
+        return found
+
+
+class Balanced(NamedTuple):
+    """Counterweights U, (k, 2), force and moment that are left, (m, 3)."""
+
+    weights: Array
+    force: Array
+    moment: Array
+
+
+def orders(values: Array, most: int) -> Orders:
+    """Return orders of samples (m, ...) at equal steps of a turn from 0: exact up to what m samples alias."""
+    m = len(values)
+    found = np.fft.rfft(values, axis=0) / m
+    return Orders(found[0].real, 2.0 * found[1 : most + 1].real, -2.0 * found[1 : most + 1].imag)
+
+
+def rms(values: Array) -> float:
+    """Return the root of the mean square of the size of a vector, (m, 3), over the turn."""
+    return float(np.sqrt((values**2).sum(axis=1).mean()))
+
+
+def best_counterweights(
+    phi: Array, force: Array, moment: Array, speed: float, places: Sequence[Place], length: float | None = None
+) -> Balanced:
+    """Return the counterweights that leave the least rms force, or of force and moment.
+
+    Parameters
+    ----------
+    phi : equal steps of a turn, (m,)
+    force, moment : on the frame, about the origin, (m, 3)
+    speed : of the main shaft, constant
+    places : where counterweights may sit
+    length : what a moment is divided by to count as a force; None leaves moments out
+    """
+    forces = [place.forces(phi, speed) for place in places]
+    moments = [np.cross(np.array(place.at), f, axisb=1, axisc=1) for place, f in zip(places, forces, strict=True)]
+    of_force, of_moment = (np.concatenate(parts, axis=2) for parts in (forces, moments))
+    rows, right = [of_force.reshape(-1, 2 * len(places))], [force.reshape(-1)]
+    if length is not None:
+        rows.append(of_moment.reshape(-1, 2 * len(places)) / length)
+        right.append(moment.reshape(-1) / length)
+    weights = np.linalg.lstsq(np.concatenate(rows), -np.concatenate(right), rcond=None)[0]
+    return Balanced(weights.reshape(-1, 2), force + of_force @ weights, moment + of_moment @ weights)
+
+
+def force_balance(lengths: tuple[float, float, float], masses: Array, centres: Array) -> tuple[complex, complex]:
+    """Return U of crank and rocker that remove the shaking force of a four-bar, Berkof and Lowen (8).
+
+    ``lengths`` are those of crank, coupler and rocker; ``masses`` (3,) and ``centres`` (3,), complex along and across
+    each link from its first joint, of crank, coupler and rocker.  So does a crank-rocker in space whose coupler has its
+    centre on the line of its joints; where it has not, a rest remains that no counterweight on the shafts removes.
+    """
+    a, b, c = lengths
+    crank = -(masses[0] * centres[0] + masses[1] * a * (1.0 - centres[1] / b))
+    rocker = -(masses[2] * centres[2] + masses[1] * (c / b) * centres[1])
+    return complex(crank), complex(rocker)

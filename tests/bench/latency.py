@@ -1,0 +1,145 @@
+"""A number at once, next to a plain numba function and pylinkage: ``make bench-latency``; a minute, writes no page.
+
+One design of the planar four-bar, position to acceleration of the rocker.  All are timed in one process, in turn, and
+the fastest of many short batches counts: what else the machine does lengthens some of them, not all.
+"""
+
+from __future__ import annotations
+
+import math
+import time
+from collections.abc import Callable, Mapping
+from importlib.metadata import PackageNotFoundError, version
+
+import numpy as np
+import pandas as pd
+from numba import njit
+
+import sweep
+from studies.accuracy.machine import description
+from sweep.families import family
+from sweep.families.base import Angles
+from tests.bench.peers import _pylinkage
+
+DESIGN = {"a": 10.0, "b": 40.0, "c": 30.0, "e": 45.0}
+POSES, OUTPUTS = ["psi", "dpsi", "d2psi"], ["swing", "max_abs_d2psi"]
+ANGLES = (1, 90, 360, 3600, 36000)
+BATCH, SECONDS = 3e-4, 1.0  # of one batch, and of all of one table for each of its calls
+
+FRAME = "DataFrame of ten columns"
+COMPILED = "compiled poses, from the angle"
+MARKS = {"evaluate, dict": 1.5, "evaluate, DataFrame": 3.0, "summarise, dict": 1.5, "summarise, DataFrame": 3.0}
+
+
+@njit(error_model="numpy")
+def plain(a: float, b: float, c: float, e: float, phi: np.ndarray, out: np.ndarray) -> None:
+    """The textbook's four-bar, as somebody writes it down who needs it once: psi, dpsi, d2psi."""
+    for i in range(phi.size):
+        x, y = a * math.cos(phi[i]) - e, a * math.sin(phi[i])
+        reach = x * x + y * y
+        cosine = (reach + c * c - b * b) / (2.0 * c * math.sqrt(reach))
+        psi = math.atan2(y, x) - math.acos(cosine)
+        u, v = e + c * math.cos(psi) - a * math.cos(phi[i]), c * math.sin(psi) - a * math.sin(phi[i])
+        theta = math.atan2(v, u)
+        rate = a * math.sin(phi[i] - theta) / (c * math.sin(psi - theta))
+        turning = a * math.sin(phi[i] - psi) / (b * math.sin(psi - theta))
+        bend = a * math.cos(phi[i] - theta) + b * turning * turning - c * rate * rate * math.cos(psi - theta)
+        out[0, i], out[1, i], out[2, i] = psi, rate, bend / (c * math.sin(psi - theta))
+
+
+def fastest(calls: Mapping[str, Callable[[], object]]) -> dict[str, float]:
+    """Return the least time of each call [s], of batches that take turns."""
+    counts = {}
+    for name, call in calls.items():
+        call()
+        begin = time.perf_counter()
+        call()
+        counts[name] = max(1, int(BATCH / (time.perf_counter() - begin)))
+    least = dict.fromkeys(calls, math.inf)
+    until = time.perf_counter() + SECONDS * len(calls)
+    while time.perf_counter() < until:
+        for name, call in calls.items():
+            begin = time.perf_counter()
+            for _ in range(counts[name]):
+                call()
+            least[name] = min(least[name], (time.perf_counter() - begin) / counts[name])
+    return least
+
+
+def tables() -> list[str]:
+    """Time one pose and one design from a dict and from a DataFrame, as ratios to making a DataFrame."""
+    pose, design = DESIGN | {"phi": 0.5}, DESIGN
+    ten = {f"c{k}": [1.0] for k in range(10)}
+    poses, designs, bound = pd.DataFrame([pose]), pd.DataFrame([design]), sweep.mechanism("four_bar", **DESIGN)
+    found = fastest(
+        {
+            FRAME: lambda: pd.DataFrame(ten),
+            "evaluate, dict": lambda: sweep.evaluate("four_bar", pose, POSES),
+            "evaluate, DataFrame": lambda: sweep.evaluate("four_bar", poses, POSES),
+            "summarise, dict": lambda: sweep.summarise("four_bar", design, OUTPUTS),
+            "summarise, DataFrame": lambda: sweep.summarise("four_bar", designs, OUTPUTS),
+            "mechanism, poses": lambda: bound.poses(0.5, POSES),
+            "mechanism, outputs": lambda: bound.outputs(OUTPUTS),
+            "mechanism, with_": lambda: bound.with_(a=10.5),
+        }
+    )
+    lines = [f"one design{'':22}   us    x {FRAME}"]
+    for name, seconds in found.items():
+        ratio = seconds / found[FRAME]
+        mark = "" if name not in MARKS else f"  {'holds' if ratio <= MARKS[name] else 'missed'}: {MARKS[name]:g}"
+        lines.append(f"{name:28}{1e6 * seconds:10.1f}{ratio:10.2f}{mark}")
+    return lines
+
+
+def turns() -> list[str]:
+    """Time a design over more and more angles, as ratios to its compiled poses."""
+    bound, precise = sweep.mechanism("four_bar", **DESIGN), family("four_bar").precise()
+    matrix = np.array([[DESIGN.get(p.name, p.default) for p in precise.parameters]], np.float64)
+    lines = [f"{COMPILED} [us], and others as ratios to it"]
+    for count in ANGLES:
+        phi = np.arange(count) * (2.0 * math.pi / count)
+        out = np.empty((3, count))
+        calls: dict[str, Callable[[], object]] = {
+            COMPILED: lambda phi=phi: precise.poses(matrix, Angles.of(phi[None]), frozenset(POSES)),
+            "mechanism": lambda phi=phi: bound.poses(phi, POSES),
+            "evaluate": lambda phi=phi: sweep.evaluate("four_bar", DESIGN, POSES, phi=phi),
+            "plain numba": lambda phi=phi, out=out: plain(*DESIGN.values(), phi, out),
+        }
+        if here("pylinkage") and count > 1:
+            calls["pylinkage"] = _pylinkage(matrix[0], count)
+        found = fastest(calls)
+        base = found.pop(COMPILED)
+        words = ", ".join(f"{name} {seconds / base:.2f}" for name, seconds in found.items())
+        lines.append(f"{count:6} angles{1e6 * base:10.1f} us   {words}")
+    if not here("pylinkage"):
+        lines.append("pylinkage is not in this environment; make bench-peers makes one that has it")
+    return lines
+
+
+def here(package: str) -> bool:
+    """Tell whether a package is installed."""
+    try:
+        return bool(version(package))
+    except PackageNotFoundError:
+        return False
+
+
+def main() -> None:
+    """Print both tables."""
+    phi, out = np.linspace(0.0, 6.0, 50), np.empty((3, 50))
+    plain(*DESIGN.values(), phi, out)
+    found = sweep.mechanism("four_bar", **DESIGN, branch=branch(out[0], phi)).poses(phi, POSES)
+    for values, name in zip(out, POSES, strict=True):
+        off = values - found[name]
+        np.testing.assert_allclose(off - 2.0 * math.pi * np.rint(off / (2.0 * math.pi)), 0.0, atol=1e-12)
+    print("\n".join([description(), "", *tables(), "", *turns()]))
+
+
+def branch(psi: np.ndarray, phi: np.ndarray) -> float:
+    """Return the assembly mode in which the rocker stands at these angles."""
+    tried = {sign: sweep.mechanism("four_bar", **DESIGN, branch=sign).poses(phi, "psi")["psi"] for sign in (1.0, -1.0)}
+    return min(tried, key=lambda sign: float(np.abs(np.exp(1j * tried[sign]) - np.exp(1j * psi)).max()))
+
+
+if __name__ == "__main__":
+    main()
