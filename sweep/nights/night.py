@@ -260,4 +260,6 @@ def _verdict(record: NightRecord) -> str:
     failed = [name for name, own in record.studies.items() if own.state == "failed"]
     parts = [("changed", changed), ("not ready", late), ("failed", failed)]
     words = "; ".join(f"{word}: {', '.join(names)}" for word, names in parts if names)
-    return f"{words or 'no change'} (exit code {record.exit_code}, {record.seconds:.3g} s)"
+    first = all(own.compared_with is None for own in record.studies.values())
+    quiet = "first night, nothing to compare with" if first else "no change"
+    return f"{words or quiet} (exit code {record.exit_code}, {record.seconds:.3g} s)"

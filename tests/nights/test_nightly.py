@@ -95,6 +95,7 @@ def test_a_changed_constant_in_a_kernel_is_found_with_rows_study_and_outputs(tmp
 
     first = command(sources, *line)
     assert (first.returncode, first.stderr) == (0, "")
+    assert "first night, nothing to compare with (exit code 0" in first.stdout and "no change" not in first.stdout
     good = (into / "latest").resolve()
     second = command(sources, *line)
     assert second.returncode == 0
