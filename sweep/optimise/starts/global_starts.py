@@ -28,7 +28,7 @@ if TYPE_CHECKING:
     from sweep.study import OptimiseSettings, Study, Tolerance
 
 SWEPT = 6  # of so many starts one comes from the sweep where there is a global search
-INSENSITIVE = 1  # of so many starts one is looked for by strategies that know the tolerances
+INSENSITIVE = 2  # designs that strategies with the tolerances look for, for each start: these basins are many and flat
 OTHER_SEED = 1000  # further on, for samples of their own
 ANOTHER = 1e-3  # share of a value by which that of another basin differs
 
@@ -132,8 +132,7 @@ def insensitive(
         return problem, np.empty((0, len(problem.family.parameters)))
     linear = _linear(study, problem, study.tolerance)
     signs = kinds(study, problem, np.empty((0, len(problem.family.parameters))))
-    count = -(-settings.starts // INSENSITIVE)
-    found = from_proportions(linear, signs, count, settings.seed + OTHER_SEED, stop, jobs, say)
+    found = from_proportions(linear, signs, INSENSITIVE * settings.starts, settings.seed + OTHER_SEED, stop, jobs, say)
     return holding(study, problem, found), found
 
 
