@@ -57,7 +57,7 @@ def test_mechanism_has_a_panel_for_each_frame_and_every_joint_in_it():
     assert axes.get_xlabel() == "x [mm]"
     guide = family("guide").example
     design = {f"{k}1": v for k, v in RSSR.items()} | {f"{k}2": v for k, v in guide.items()}
-    assert [a.get_title(loc="left") for a in sweep.plot.mechanism(["rssr", "guide"], design)] == ["stage 1", "stage 2"]
+    assert [a.get_title(loc="left") for a in sweep.plot.mechanism(["rssr", "guide"], design)] == ["stage 1, stage 2"]
     with pytest.raises(sweep.InputError, match="space, xy"):
         sweep.plot.mechanism("rssr", RSSR, view="front")
 

@@ -19,6 +19,7 @@ from kernels.families.feed.motion import OUTPUTS
 from sweep.errors import InputError
 from sweep.families import family
 from sweep.families.base import Angles
+from sweep.families.feed import TRIAD_PARAMETERS
 from sweep.synthesis import feed as refinement
 from tests.reference import feed as naive
 
@@ -242,7 +243,7 @@ def test_triad_equals_plain_root_finding():
     got = sweep.evaluate("feed_triad", TRIAD, names, phi=phi)
     assert (got.status == st.OK).all()
     with mp.workdps(60):
-        p = {name: mpf(TRIAD.get(name, 0.0)) for name in feed.TriadDesign._fields}
+        p = {name: mpf(TRIAD.get(name, 0.0)) for name in (p.name for p in TRIAD_PARAMETERS)}
         for k, angle in enumerate(phi):
             start = tuple(got.loc[k, ["x_t", "y_t", "chi"]])
             found = naive.triad(p, mpf(angle), start)
@@ -287,7 +288,7 @@ def test_triad_that_locks_or_has_no_assembly_says_so():
 
 
 def test_triad_jitted_equals_plain():
-    matrix = np.array([[TRIAD.get(name, 0.0) for name in feed.TriadDesign._fields]] * 2)
+    matrix = np.array([[TRIAD.get(name, 0.0) for name in (p.name for p in TRIAD_PARAMETERS)]] * 2)
     matrix[1, 24] = 0.01
     phi = np.array([[0.0, 2.0]])
     results = []
