@@ -214,19 +214,21 @@ class _Calibrate:
         head, wanted = self.results[number], self.tolerance.robust or 0.0
         levels: Levels = dict.fromkeys(keyed(self.problem).values(), self.level)
         best = Robust(head, _share(self.problem, head.design, self.tolerance, self.seed), True)
-        design, radius, reach = head.design, RADIUS, REACH
+        design, radius, reach, spent = head.design, RADIUS, REACH, 0
         for corrected in range(CORRECTIONS):
             if should_stop():
                 return replace(best, cut=True)
+            # A design whose rounds do not settle must not hold up the others: all corrections share the looks of one.
+            looks = max(HEAT, (self.looks - spent) // ROUNDS)
             result, radius, step = _approached(
-                self.problem, head.start, design, self.tolerance, levels, should_stop, ROUNDS, self.looks, radius
+                self.problem, head.start, design, self.tolerance, levels, should_stop, ROUNDS, looks, radius
             )
-            design = result.design
+            design, spent = result.design, spent + result.looks
             values, share = self._made(design)
             better = share >= wanted and (best.share < wanted or result.objective < best.result.objective)
             if result.violation <= NEARLY and (better or (best.share < wanted and share > best.share)):
                 best = Robust(result, share, result.ended in CUT)
-            if corrected and share >= wanted and not better and result.ended == "looks":
+            if spent >= self.looks or (corrected and share >= wanted and not better and result.ended == "looks"):
                 break  # what the limits of a search cost that does not settle leads nowhere
             levels, saved = self._corrected(design, levels, values, reach)
             if wanted <= share <= wanted + ENOUGH and step < STAYED and saved < SAVED:
