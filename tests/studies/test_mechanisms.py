@@ -34,7 +34,7 @@ def accepted(name):
 
 
 def design_of(study, row):
-    matrix, _ = design_matrix(study.family, {name: row[name] for name in study.family.parameter_names})
+    matrix, _ = design_matrix(study.family, {name: row[name] for name in study.family.parameter_names if name in row})
     return matrix
 
 

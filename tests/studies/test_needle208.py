@@ -122,7 +122,7 @@ def test_optimum_beats_the_marks_of_the_source():
     assert best["max_abs_d2s"] <= 0.85 * old["max_abs_d2s"]
     # The deviation counts as it is made: within the requirement for 95 % of the optimum, for 8 % of the reference.
     names = load_study(FOLDER).family.parameter_names
-    known = {"branch1": 1.0, "branch2": 1.0, "kappa2": 1.0} | load_study(FOLDER).reference
+    known = {"branch1": 1.0, "branch2": 1.0, "kappa2": 1.0, "shift2": 0.0, "turn2": 0.0} | load_study(FOLDER).reference
     reference = {name: float(known[name]) for name in names}
     assert share(reference, 2000, {"max_abs_dev": (0.0, 0.05)}) < 0.1
     # Rest to rest over S within |a| <= A takes at least 2 sqrt(S/A), twice per turn: A >= 4 S/pi^2.

@@ -75,7 +75,7 @@ def test_chain_stages_own_outputs_are_those_of_the_stages_alone():
     phi = np.linspace(0.0, 6.0, 7)
     own1 = [*PSI_OUTPUTS, "discriminant", "pressure_angle", "x_c", "z_b"]
     own2 = ["s", "dev", "discriminant", "pressure_angle", "x_m", "y_c"]
-    table = numbered(FIRST, GUIDE, kappa2=-1.0, offset2=2.9)
+    table = numbered(FIRST, GUIDE, kappa2=-1.0, offset2=2.9, shift2=0.0, turn2=0.0)
     wanted = [f"{n}1" for n in own1] + [f"{n}2" for n in own2] + own2
     frame = sweep.evaluate(["rssr", "guide"], table, wanted, phi)
     first = sweep.evaluate("rssr", FIRST, own1, phi)
@@ -89,7 +89,7 @@ def test_chain_stages_own_outputs_are_those_of_the_stages_alone():
 
 def random_designs(mechanism, count, seed):
     rng = np.random.default_rng(seed)
-    base = numbered(FIRST, GUIDE, kappa2=-1.0, offset2=2.9)
+    base = numbered(FIRST, GUIDE, kappa2=-1.0, offset2=2.9, shift2=0.0, turn2=0.0)
     designs = np.array([[base[name] for name in mechanism.parameter_names]] * count)
     lengths = [k for k, p in enumerate(mechanism.parameters) if p.unit == "length"]
     designs[:, lengths] *= rng.uniform(0.7, 1.4, (count, len(lengths)))
@@ -142,7 +142,7 @@ def test_chain_row_by_row_equals_grid():
 
 def test_chain_complex_step_gives_exact_gradients():
     mechanism, phi = family(["rssr", "guide"]), 2.1
-    table = numbered(FIRST, GUIDE, kappa2=-1.0, offset2=2.9)
+    table = numbered(FIRST, GUIDE, kappa2=-1.0, offset2=2.9, shift2=0.0, turn2=0.0)
     design = np.array([[table[name] for name in mechanism.parameter_names]])
     angles = Angles.of(np.array([[phi]]))
     wanted = frozenset({"s", "d2s", "dev", "psi1", "pressure_angle2"})
