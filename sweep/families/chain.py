@@ -194,7 +194,11 @@ def _numbered(families: tuple[Family, ...]) -> tuple[tuple[Stage, ...], tuple[Pa
             n, on = stage.number, f"on the output axis of stage {stage.number - 1}"
             parameters += [
                 Parameter(
-                    f"shift{n}", "length", f"place of the origin of stage {n} {on}, from z = 0 of it", default=0.0
+                    f"shift{n}",
+                    "length",
+                    f"place of the origin of stage {n} {on}, from z = 0 of it",
+                    default=0.0,
+                    places=True,
                 ),
                 Parameter(f"turn{n}", "angle", f"angle of x of stage {n} {on}, from x of that", default=0.0),
             ]

@@ -21,7 +21,7 @@ Unit = Literal[
 
 @dataclass(frozen=True)
 class Parameter:
-    """One column of the design matrix."""
+    """One column of the design matrix; ``places`` says that it tells where a part stands, not how large it is."""
 
     name: str
     unit: Unit
@@ -31,6 +31,7 @@ class Parameter:
     choices: tuple[float, ...] | None = None
     not_negative: bool = False
     not_zero: bool = False
+    places: bool = False
 
     @property
     def sign(self) -> str:

@@ -75,7 +75,7 @@ class Mount:
         on = f"shaft {self.shaft.name}"
         return (
             Parameter("key", "angle", f"angle of its crank on the {on}, from the mark", default=self.key),
-            Parameter("shift", "length", f"place of its origin along the {on}", default=self.shift),
+            Parameter("shift", "length", f"place of its origin along the {on}", default=self.shift, places=True),
             Parameter(
                 "turn", "angle", f"angle of its frame about the {on}, from the zero direction", default=self.turn
             ),

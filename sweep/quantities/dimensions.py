@@ -118,8 +118,8 @@ def dimension_step(family: Family) -> Step | None:
 
 
 def lengths(family: Family) -> tuple[str, ...]:
-    """Parameters that are lengths of the mechanism itself, not of bodies and bearings that effects ask for."""
-    others = set(input_names(family))
+    """Parameters that are lengths of the mechanism itself, not places, nor of bodies and bearings of effects."""
+    others = set(input_names(family)) | {p.name for p in family.parameters if p.places}
     if isinstance(family, Machine):
         others |= {p.name for relation in family.relations for p in relation.parameters}
     return tuple(p.name for p in family.parameters if p.unit == "length" and p.name not in others)

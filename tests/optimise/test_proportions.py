@@ -25,7 +25,8 @@ EXPECTED = json.loads((FOLDER / "expected.json").read_text())
 
 def accepted() -> np.ndarray:
     names = load_study(FOLDER).family.parameter_names
-    return np.array([[EXPECTED[role]["design"][name] for name in names] for role in ("optimum", "record")])
+    designs = [{"shift2": 0.0, "turn2": 0.0} | EXPECTED[role]["design"] for role in ("optimum", "record")]
+    return np.array([[design[name] for name in names] for design in designs])
 
 
 @pytest.fixture(scope="module")
@@ -130,5 +131,5 @@ def test_guides_that_the_program_shrinks_to_nothing_are_no_solution() -> None:
     designs, worth, solved = made.solve(spoiled)
     plain = elimination(problem_of(study, accepted()))
     assert plain is not None and solved.all() and worth[0] > plain.solve(spoiled)[1][0]
-    assert curve_derivatives(study.family, finished, made.sigma, ("dev",), np.zeros(1))["dev"].shape == (2, 16, 1)
+    assert curve_derivatives(study.family, finished, made.sigma, ("dev",), np.zeros(1))["dev"].shape == (2, 18, 1)
     assert np.isfinite(designs).all()
