@@ -8,6 +8,8 @@ import pytest
 
 import sweep
 from kernels import status as st
+from sweep.evaluation.tables import design_matrix
+from sweep.families import family
 from tests.effects.test_mujoco_loads import NEAR, Loop, bodies
 from tests.exchange.test_export import chain_design, solved
 
@@ -15,6 +17,13 @@ SPEED, CHANGE = 50.0, 300.0
 CHAIN = ["rssr", "guide"]
 GRAVITY = {"gravity_x": 900.0, "gravity_y": -9810.0, "gravity_z": 400.0}
 JOINTS = [f"force_{joint}_{axis}{k}" for k in (1, 2) for joint in "abcd" for axis in "xyz"]
+
+
+def turned(design):
+    """Axes of the frame of stage 2 in that of stage 1, which is the model's, as columns."""
+    chain = family(CHAIN)
+    matrix, _ = design_matrix(chain, {n: x for n, x in design.items() if n in chain.parameter_names})
+    return chain.frames(matrix)[1].rotation[0]
 
 
 class Stages(Loop):
@@ -77,6 +86,7 @@ def gaps(design, file, phis):
     ours = sweep.evaluate(CHAIN, design, [*JOINTS, "drive_torque1", "drive_torque2"], phi=phis)
     assert (ours["status"] == st.OK).all()
     stages, theirs = Stages(file), []
+    axes = {1: np.eye(3), 2: turned(design)}
     for phi in phis:
         forces, torque, coupling, rest = stages.at(phi)
         assert rest < 1e-10 * max(1.0, abs(torque))
@@ -87,7 +97,7 @@ def gaps(design, file, phis):
             # the coupler hangs on the crank, or on the rocker where that holds the finger
             closes_c = stages.model.equality(loop).name.startswith("C")
             joints |= {"b": on, "c": -force} if closes_c else {"b": -force, "c": -on}
-            row |= {f"force_{j}_{x}{k}": f[i] for j, f in joints.items() for i, x in enumerate("xyz")}
+            row |= {f"force_{j}_{x}{k}": (axes[k].T @ f)[i] for j, f in joints.items() for i, x in enumerate("xyz")}
         theirs.append(row)
     found = {}
     for names in ([n for n in JOINTS if n[-1] == "1"], [n for n in JOINTS if n[-1] == "2"], ["drive_torque1"],
@@ -102,6 +112,9 @@ def test_joint_loads_of_a_chain_agree_with_the_inverse_dynamics_of_the_exported_
     design = chain_design()
     for k in (1, 2):
         design |= {f"{key}{k}": x for key, x in (bodies("rocker") | GRAVITY | {"finger": finger}).items()}
+    # One field of gravity, in the frame of each stage.
+    pull = turned(design).T @ list(GRAVITY.values())
+    design |= {f"{name}2": x for name, x in zip(GRAVITY, pull.tolist(), strict=True)}
     file = sweep.export(CHAIN, design, tmp_path / "m.xml", phi=0.2)
     loads = design | {"speed1": SPEED, "speed_change1": CHANGE}
     phis = np.linspace(0.2, 6.4, 21)
