@@ -17,7 +17,8 @@ from hypothesis import strategies as st
 
 from sweep.errors import StudyError
 from sweep.families.base import Accuracy
-from sweep.study import Limit, Study, load_study, study_from_data, units, with_accuracy
+from sweep.quantities import units
+from sweep.study import Limit, Study, load_study, study_from_data, with_accuracy
 from sweep.study.load import merged
 
 NEEDLE = """

@@ -45,7 +45,7 @@ def planar_cranks(n, seed):
 
 
 def planar_chains(n, seed):
-    return np.column_stack([crank_rockers(n, seed), planar_cranks(n, seed + 1), driven_sliders(n, seed)[:, -2:]])
+    return np.column_stack([crank_rockers(n, seed), planar_cranks(n, seed + 1), driven_sliders(n, seed)[:, -4:]])
 
 
 def turning(of, n, seed):
@@ -76,6 +76,7 @@ def test_motion_at_single_poses_is_that_of_the_25_digit_table_within_its_estimat
     for row in rows:
         own = {f"{name}{k}": x for k in (1, 2) for name, x in row[f"stage{k}"].items()}
         own |= {"branch1": row["sigma1"], "branch2": row["sigma2"], "kappa2": row["kappa"], "offset2": row["theta0"]}
+        own |= {"shift2": 0.0, "turn2": 0.0}
         design = np.array([[float(own[p.name]) for p in DRIVEN_SLIDER.parameters]])
         c, u, v = chain.record.constants(design, 0), np.cos(row["phi"]), np.sin(row["phi"])
         m, blur = chain.travel(c, u, v)[0], chain.blur(c, u, v)
@@ -287,7 +288,7 @@ def test_another_coupling_would_be_noticed():
     """Negative control: the maxima of a chain whose crank is turned by a millionth are not these."""
     designs, request = CASES["rssr+rssp"][:100], Request("d2s", 0)
     other = designs.copy()
-    other[:, -1] += 1e-6
+    other[:, DRIVEN_SLIDER.parameter_names.index("offset2")] += 1e-6
     found, turned = (extrema.true_extrema(DRIVEN_SLIDER, d, [request], 1e-8)[0][request] for d in (designs, other))
     assert (np.abs(found.value - turned.value) > found.err + turned.err).mean() > 0.9
 
