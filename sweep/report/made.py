@@ -10,6 +10,7 @@ import numpy as np
 
 from sweep.evaluation.summaries import design_outputs
 from sweep.families.names import is_flag, judged_by
+from sweep.optimise.manufacture.robust import SAMPLES  # the same mechanisms, so the same share
 from sweep.optimise.manufacture.tolerance import deviating, touched
 from sweep.quantities import resolve
 from sweep.quantities.limits import compared, meets
@@ -25,7 +26,6 @@ if TYPE_CHECKING:
     from sweep.families.base import Array
     from sweep.study import Study
 
-SAMPLES = 8192  # as the optimiser's yield: the same mechanisms, the same share
 SINGLE = 1024  # for what each dimension costs
 BINS = 41
 FAR = 2.0  # spreads of what is made from which on a bound is not drawn: it would make one bar of them
