@@ -33,10 +33,10 @@ test-long: $(VENV)/dev  ## the tests that take minutes, thousands of hostile tab
 	$(BIN)/python -m pip install --constraint constraints.txt --editable '.[dev,peers]'
 	$(BIN)/python -m pytest -m 'long or hypothesis' --hypothesis-profile=random
 
-test-faults: $(VENV)/dev  ## kills, signals, full disks, damage: 150 kills and 370 other faults, a table; about 25 minutes
+test-faults: $(VENV)/dev  ## kills, signals, full disks, damage: 150 kills and 370 other faults, a table
 	$(BIN)/python -m tests.faults
 
-test-versions: $(VENV)/dev  ## oracle tables, bits and speed with the oldest and the newest dependencies allowed; about 40 minutes
+test-versions: $(VENV)/dev  ## oracle tables, bits and speed with the oldest and the newest dependencies allowed
 	$(BIN)/python -m tests.bench.versions
 
 test-browser: $(VENV)/dev  ## the report and exported models in headless Chromium, which has to be installed
