@@ -8,6 +8,7 @@ samples is off by 1 or 2 in 10 000 where links are short, by 1 in 100 000 elsewh
 from __future__ import annotations
 
 import math
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,6 +19,19 @@ from kernels.types import Array
 Index = NDArray[np.int64]
 
 EVERY, HIGHEST, LOWEST, RANGE = 0, 1, 2, 3  # where a limit holds: at all poses, at an end of the curve, for its range
+
+
+class Limits(NamedTuple):
+    """Limits on sampled curves, each array (l,): ``sign * curve <= bound`` in units of ``size``.
+
+    ``which`` is the number of the curve, ``at`` says where: a limit at every pose has m rows, the others one.
+    """
+
+    which: Index
+    at: Index
+    signs: Array
+    bounds: Array
+    sizes: Array
 
 
 @inline
@@ -41,70 +55,58 @@ def _end(y: Array, sign: float) -> tuple[int, int, int, float, float, float]:
     return before, at, after, first, middle, third
 
 
+@inline
+def _every(y: Array, of: Array, level: float, factor: float, values: Array, slopes: Array) -> None:
+    """Rows at every pose: ``level + factor y``, and their gradients where ``of`` has any."""
+    m = len(y)
+    for p in range(m):
+        values[p] = level + factor * y[p]
+    for q in range(of.shape[0]):
+        for p in range(m):
+            slopes[q, p] = factor * of[q, p]
+    for p in range(m):
+        before, after = p - 1 if p > 0 else m - 1, p + 1 if p < m - 1 else 0
+        low, here, high = factor * y[before], factor * y[p], factor * y[after]
+        if here <= low and here <= high and low - 2.0 * here + high > 0.0:
+            first, middle, third = _parabola(low, here, high)
+            values[p] = level + first * low + middle * here + third * high
+            for q in range(of.shape[0]):
+                slopes[q, p] = factor * (first * of[q, before] + middle * of[q, p] + third * of[q, after])
+
+
 @kernel
-def sampled_rows(
-    curves: Array,
-    moved: Array | None,
-    which: Index,
-    at: Index,
-    signs: Array,
-    bounds: Array,
-    sizes: Array,
-    values: Array,
-    slopes: Array | None,
-) -> None:
-    """Write the rows ``(bound - sign * curve) / size`` of some limits on sampled curves, and their gradients.
+def sampled_rows(curves: Array, moved: Array, limits: Limits, values: Array, slopes: Array) -> None:
+    """Write the rows ``(bound - sign * curve) / size`` of limits on sampled curves of one design, and their gradients.
 
     A value that is lowest among its neighbours is replaced by the least of the parabola there.  The place between the
     poses is where the parabola is lowest, so to first order its own motion changes nothing.
 
     Parameters
     ----------
-    curves : (c, k, m) of k designs at m poses of a turn
-    moved : (c, k, n, m) their derivatives, None where no gradients are asked for
-    which, at : (l,) curve of each limit, and where it holds: at every pose it has m rows, else one
-    signs, bounds, sizes : (l,)
-    values : (k, r) out, the first rows are written
-    slopes : (k, r, n) out, or None
+    curves : (c, m) at m poses of a turn
+    moved : (c, n, m) their derivatives; n is 0 where no gradients are asked for
+    limits : in the order of their rows
+    values : (r,) out, the first rows are written
+    slopes : (n, r) out
     """
-    m = curves.shape[2]
-    for i in range(curves.shape[1]):
-        r = 0
-        for j in range(len(which)):
-            y, factor = curves[which[j], i], -signs[j] / sizes[j]
-            level = bounds[j] / sizes[j]
-            if at[j] == EVERY:
-                for p in range(m):
-                    values[i, r + p] = level + factor * y[p]
-                for p in range(m):
-                    before, after = p - 1 if p > 0 else m - 1, p + 1 if p < m - 1 else 0
-                    low, here, high = factor * y[before], factor * y[p], factor * y[after]
-                    lowest = here <= low and here <= high and low - 2.0 * here + high > 0.0
-                    first, middle, third = _parabola(low, here, high)
-                    if lowest:
-                        values[i, r + p] = level + first * low + middle * here + third * high
-                    if slopes is not None and moved is not None:
-                        of = moved[which[j], i]
-                        for q in range(of.shape[0]):
-                            if lowest:
-                                along = first * of[q, before] + middle * of[q, p] + third * of[q, after]
-                                slopes[i, r + p, q] = factor * along
-                            else:
-                                slopes[i, r + p, q] = factor * of[q, p]
-                r += m
+    m, r = curves.shape[1], 0
+    for j in range(len(limits.which)):
+        y, of, factor = curves[limits.which[j]], moved[limits.which[j]], -limits.signs[j] / limits.sizes[j]
+        level = limits.bounds[j] / limits.sizes[j]
+        if limits.at[j] == EVERY:
+            _every(y, of, level, factor, values[r : r + m], slopes[:, r : r + m])
+            r += m
+            continue
+        values[r] = level
+        for q in range(slopes.shape[0]):
+            slopes[q, r] = 0.0
+        for sign in (1.0, -1.0):
+            if limits.at[j] == (LOWEST if sign > 0.0 else HIGHEST):
                 continue
-            values[i, r] = level
-            if slopes is not None:
-                slopes[i, r, :] = 0.0
-            for sign in (1.0, -1.0):
-                if at[j] == (LOWEST if sign > 0.0 else HIGHEST):
-                    continue
-                before, here_at, after, first, middle, third = _end(y, sign)
-                share = -factor if at[j] == RANGE and sign < 0.0 else factor
-                values[i, r] += share * (first * y[before] + middle * y[here_at] + third * y[after])
-                if slopes is not None and moved is not None:
-                    of = moved[which[j], i]
-                    for q in range(of.shape[0]):
-                        along = first * of[q, before] + middle * of[q, here_at] + third * of[q, after]
-                        slopes[i, r, q] += share * along
-            r += 1
+            before, here_at, after, first, middle, third = _end(y, sign)
+            share = -factor if limits.at[j] == RANGE and sign < 0.0 else factor
+            values[r] += share * (first * y[before] + middle * y[here_at] + third * y[after])
+            for q in range(of.shape[0]):
+                along = first * of[q, before] + middle * of[q, here_at] + third * of[q, after]
+                slopes[q, r] += share * along
+        r += 1

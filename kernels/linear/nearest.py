@@ -14,13 +14,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from kernels import status as st
-from kernels.jit import inline, kernel
+from kernels.jit import inline, kernel, part
 from kernels.types import Array
 
 Index = NDArray[np.int64]
 
 STEPS = 20  # per unknown after which it is given up
 DEPENDENT = 1e-20  # square of what is left of a row across those that hold, relative to its own, that is rounding
+INDEPENDENT = 1e-12  # the same of a row that held before and may hold again
 
 
 class Held(NamedTuple):
@@ -214,6 +215,56 @@ def nearest(rows: Array, needs: Array, centre: Array, tolerance: float, y: Array
 
 
 @inline
+def _place_of(place: Index, count: int, number: int) -> int:
+    """Place of a number that is among the first ``count``."""
+    for k in range(count):
+        if place[k] == number:
+            return k
+    return -1
+
+
+@part
+def _resumed(rows: Array, needs: Array, size: Array, begin: Index, centre: Array, y: Array, h: Held) -> int:
+    """Let rows hold that held before, but for those with a negative weight; how many do.
+
+    The nearest point that keeps rows as equations is where the method may go on from, as long as no weight is negative.
+    """
+    n, count = rows.shape[0], 0
+    for k in range(begin[0]):
+        p = begin[1 + k]
+        square = _shares(rows, p, count, h)
+        if count < n and square > INDEPENDENT * size[p] * size[p]:
+            _taken_in(p, count, square, h)
+            count += 1
+    while count > 0:
+        # With the rows N = Q R the point is centre + Q z with R' z = needs - N' centre, the weights solve R w = z.
+        for k in range(count):
+            value = needs[h.numbers[k]]
+            for i in range(n):
+                value -= rows[i, h.numbers[k]] * centre[i]
+            for j in range(k):
+                value -= h.r[j, k] * h.z[j]
+            h.z[k] = value / h.r[k, k]
+        worst, least = -1, 0.0
+        for k in range(count - 1, -1, -1):
+            value = h.z[k]
+            for j in range(k + 1, count):
+                value -= h.r[k, j] * h.weights[j]
+            h.weights[k] = value / h.r[k, k]
+            if h.weights[k] < least:
+                worst, least = k, h.weights[k]
+        if worst < 0:
+            break
+        _dropped(worst, count, h)
+        count -= 1
+    for i in range(n):
+        y[i] = centre[i]
+        for k in range(count):
+            y[i] += h.q[i, k] * h.z[k]
+    return count
+
+
+@inline
 def _peaks(values: Array, below: float, turns: Index, lowest: Index, found: Index) -> None:
     """Mark the values below a bound that are the lowest among their neighbours along a turn, or stand beside such one.
 
@@ -248,6 +299,7 @@ def nearest_of_many(
     step: Array,
     there: Array,
     weights: Array,
+    begin: Index,
 ) -> int:
     """Step of a quadratic program with hundreds of rows along turns, of which few matter.
 
@@ -266,6 +318,8 @@ def nearest_of_many(
     rounds : of joining at most
     tolerance : see :func:`nearest`
     step, there, weights : (n,), (r,) and (r,) out: the step, the rows after it, and their weights, none negative
+    begin : (n + 1,) rows that held in a program like this one, and their count first, from which it goes on: those of
+        the box count backwards from -1.  Written: those that hold in this one
 
     Returns
     -------
@@ -287,7 +341,10 @@ def nearest_of_many(
     for i in range(n):
         y[i] = centre[i]
     _peaks(values, near, turns, lowest, more)
-    total, held, status = boxes, 0, int(st.OK)
+    for k in range(begin[0]):
+        if begin[1 + k] >= 0:
+            more[begin[1 + k]] = 1
+    total, held, status = boxes, -1, int(st.OK)
     for _ in range(rounds):
         for j in range(count):
             if more[j] == 1 and joined[j] == 0:
@@ -301,6 +358,11 @@ def nearest_of_many(
                     square += value * value
                 size[total] = math.sqrt(square)
                 total += 1
+        if held < 0:
+            for k in range(begin[0]):
+                number = begin[1 + k]
+                begin[1 + k] = -1 - number if number < 0 else boxes + _place_of(place, total - boxes, number)
+            held = _resumed(rows, needs, size, begin, centre, y, h)
         held, status = _pursued(rows, needs, size, total, tolerance, y, h, held)
         for j in range(count):
             there[j] = values[j]
@@ -318,7 +380,10 @@ def nearest_of_many(
             break
     for j in range(count):
         weights[j] = 0.0
+    begin[0] = held
     for k in range(held):
-        if h.numbers[k] >= boxes:
-            weights[place[h.numbers[k] - boxes]] = h.weights[k]
+        own = h.numbers[k] >= boxes
+        begin[1 + k] = place[h.numbers[k] - boxes] if own else -1 - h.numbers[k]
+        if own:
+            weights[begin[1 + k]] = h.weights[k]
     return status

@@ -91,10 +91,10 @@ def robust(
     Parameters
     ----------
     problem : with the limits as they are asked for
-    results : of the search, best first; the best of up to four basins are begun with
+    results : of the search, best first; the best of up to four basins are begun with where there is no ``more``
     tolerance : with ``robust``, the share
     settings, stop, jobs : as for ``minimise``
-    more : (k, P) designs that a search for insensitive ones has found, to begin with as well
+    more : (k, P) designs that a search for insensitive ones has found, to begin with instead
     tell : called with how many searches are done, and how many there are at most
 
     Returns
@@ -107,7 +107,8 @@ def robust(
     for result in results:
         if result.feasible and result.ended not in CUT and result.basin not in [h.basin for h in heads]:
             heads.append(result)
-    heads = heads[:TRIED]
+    # Designs that were looked for with room in their limits are far better starts than the best drawings.
+    heads = heads[: TRIED if more is None or not len(more) else 0]
     number = 1 + max((r.start for r in results), default=-1)
     begin = [h.design for h in heads] + list(np.empty((0, 0)) if more is None else more)
     starts = [h.start for h in heads] + list(range(number, number + len(begin) - len(heads)))

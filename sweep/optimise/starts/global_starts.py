@@ -19,7 +19,6 @@ from sweep.optimise.multistart.survey import wanted
 from sweep.optimise.problem.statement import Problem
 from sweep.optimise.starts.candidates import ALIKE, diverse
 from sweep.optimise.starts.dataset import kinds
-from sweep.optimise.starts.evolution import from_proportions
 from sweep.optimise.starts.linear import NEEDED, Elimination, elimination
 from sweep.optimise.starts.populations import Bred, bred
 from sweep.optimise.starts.proportions import widened
@@ -28,7 +27,7 @@ if TYPE_CHECKING:
     from sweep.study import OptimiseSettings, Study, Tolerance
 
 SWEPT = 6  # of so many starts one comes from the sweep where there is a global search
-INSENSITIVE = 2  # designs that strategies with the tolerances look for, for each start: these basins are many and flat
+MADE, BEGUN = 3, 4  # populations with room for tolerances, and ends of them that the robust search begins with
 OTHER_SEED = 1000  # further on, for samples of their own
 ANOTHER = 1e-3  # share of a value by which that of another basin differs
 
@@ -127,12 +126,25 @@ def searched(
 def insensitive(
     study: Study, settings: OptimiseSettings, problem: Problem, stop: Callable[[], bool], jobs: int, say: Say = unsaid
 ) -> tuple[Problem, Array]:
-    """Look for designs that keep stroke and straightness when they are made, with a problem whose bounds hold them."""
+    """Look for designs that are good when they are made: ends of populations whose descents leave room for tolerances.
+
+    Returns
+    -------
+    The problem with bounds that hold the designs, and these (k, P), the best first; none without a global search.
+    """
     if settings.globally != "proportions":
         return problem, np.empty((0, len(problem.family.parameters)))
     linear = _linear(study, problem, study.tolerance)
     signs = kinds(study, problem, np.empty((0, len(problem.family.parameters))))
-    found = from_proportions(linear, signs, INSENSITIVE * settings.starts, settings.seed + OTHER_SEED, stop, jobs, say)
+    populations = bred(linear, signs, MADE, settings.seed + OTHER_SEED, stop, jobs, say, what="tolerances")
+    ends = sorted(
+        (float(worth), k, row) for k, found in enumerate(populations) for row, worth in enumerate(found.worth)
+    )
+    chosen: list[tuple[float, Array]] = []
+    for worth, k, row in ends:
+        if len(chosen) < BEGUN and all(abs(worth - value) > ANOTHER * abs(value) for value, _ in chosen):
+            chosen.append((worth, populations[k].designs[row]))
+    found = np.array([design for _, design in chosen]).reshape(-1, len(problem.family.parameters))
     return holding(study, problem, found), found
 
 

@@ -6,28 +6,25 @@ mechanism at random.  Populations know nothing of each other: where several end 
 
 from __future__ import annotations
 
-import itertools
 import math
 from collections import Counter
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
+from kernels.descent.descents import LOCKED
 from sweep.families.base import Array
 from sweep.jobs.progress import AT_MOST, Say, unsaid
 from sweep.optimise.local.kkt import AGREE
-from sweep.optimise.multistart.parallel import spread_over
 from sweep.optimise.samples import sobol
-from sweep.optimise.starts.batched_sqp import BatchedSqp
 from sweep.optimise.starts.candidates import spread
 from sweep.optimise.starts.linear import Elimination
-from sweep.optimise.starts.pose_rows import LOCKED, PoseRows
+from sweep.optimise.starts.pose_rows import Descents, PoseRows
 from sweep.optimise.starts.proportions import Index, turned_into
 
-BLOCK = 1 << 13  # proportions that are looked at together
 PARENTS = 40  # best ends, no two of them alike, from which a generation is made: as many of all signs
 TRIES, STRANGERS = 64, 256  # of every child, the best of which descends; of one half of which is at random
 DRIVERS = 4  # among the tries of a child
@@ -75,12 +72,13 @@ class _End(NamedTuple):
 
 @dataclass(frozen=True)
 class Population:
-    """Generations from one seed: a task for processes."""
+    """Generations from one seed, each descended from in ``jobs`` threads."""
 
     linear: Elimination
     signs: tuple[dict[str, float], ...]
     seed: int
     size: Size = FULL
+    jobs: int = 1
 
     def __call__(self, number: int, should_stop: Callable[[], bool]) -> Bred:
         """Return the ends of the population of that number."""
@@ -95,11 +93,11 @@ class Population:
             if generation and not parents:
                 break
             if generation == 0:
-                places, kinds, classes = _sampled(rows, rng, self.size)
+                places, kinds, classes = _sampled(rows, rng, self.size, self.jobs)
             else:
-                places, kinds = _children(rows, parents, rng, -(-self.size.later // len(self.signs)))
+                places, kinds = _children(rows, parents, rng, -(-self.size.later // len(self.signs)), self.jobs)
                 classes = _Classes.between(np.array([p.swing for p in parents]))
-            found, spent = _descended(rows, places, kinds, classes, self.size, should_stop)
+            found, spent = _descended(rows, places, kinds, classes, self.size, should_stop, self.jobs)
             ends, looks = ends + found, looks + spent
         best = _parents(ends, PARENTS, ~rows.driving)[:PARENTS]
         names = self.linear.problem.family.parameter_names
@@ -107,12 +105,12 @@ class Population:
         return Bred(turned_into(self.linear.problem, designs), np.array([end.worth for end in best]), looks)
 
 
-def _sampled(rows: PoseRows, rng: np.random.Generator, size: Size) -> tuple[Array, Index, _Classes]:
+def _sampled(rows: PoseRows, rng: np.random.Generator, size: Size, jobs: int) -> tuple[Array, Index, _Classes]:
     """Places of a Sobol sample of each kind that turn, the best of every class of swings that are not alike."""
     number = len(rows.own.bases)
     place = np.concatenate([sobol(len(rows.own.columns), rng).random(size.sampled) for _ in range(number)])
     kinds = np.repeat(np.arange(number), size.sampled)
-    worth = np.concatenate([_tried(rows, *some) for some in _blocks(place, kinds)])
+    worth = _tried(rows, place, kinds, jobs)
     order = np.argsort(worth, kind="stable")
     order = order[worth[order] < LOCKED]
     place, kinds = place[order], kinds[order]
@@ -126,17 +124,14 @@ def _sampled(rows: PoseRows, rng: np.random.Generator, size: Size) -> tuple[Arra
     return place[chosen], kinds[chosen], classes
 
 
-def _blocks(place: Array, kinds: Index) -> Iterator[tuple[Array, Index]]:
-    for first in range(0, len(place), BLOCK):
-        yield place[first : first + BLOCK], kinds[first : first + BLOCK]
-
-
-def _tried(rows: PoseRows, places: Array, kinds: Index) -> Array:
+def _tried(rows: PoseRows, places: Array, kinds: Index, jobs: int) -> Array:
     """Return what places with the middle of the guide's input angles are worth (k,) before any descent."""
-    return rows.begun(rows.without_middle(places, kinds), kinds)[1]
+    return rows.begun(rows.without_middle(places, kinds), kinds, jobs)[1]
 
 
-def _children(rows: PoseRows, parents: Sequence[_End], rng: np.random.Generator, count: int) -> tuple[Array, Index]:
+def _children(
+    rows: PoseRows, parents: Sequence[_End], rng: np.random.Generator, count: int, jobs: int
+) -> tuple[Array, Index]:
     """Places and kinds of children, so many of each kind: the best of many tries for each.
 
     Most of them are stage 1 of one parent and the guide of another, slightly varied, a sixth is stage 1 of a parent
@@ -147,11 +142,11 @@ def _children(rows: PoseRows, parents: Sequence[_End], rng: np.random.Generator,
         own = [p for p in parents if p.kind == kind]
         drivers = np.array([p.place for p in parents])[rng.integers(0, len(parents), few)]
         guides = np.array([p.place for p in own])[rng.integers(0, len(own), few)]
-        places.append(_best(rows, _mixed(rows, own, parents, rng, count - 2 * few), kind))
+        places.append(_best(rows, _mixed(rows, own, parents, rng, count - 2 * few), kind, jobs))
         for kept, part in ((drivers, ~rows.driving), (guides, rows.driving)):
             tries = np.repeat(kept[:, None], STRANGERS, axis=1)
             tries[:, :, part] = rng.random((few, STRANGERS, int(part.sum())))
-            places.append(_best(rows, tries, kind))
+            places.append(_best(rows, tries, kind, jobs))
         kinds += [kind] * count
     return np.concatenate(places), np.array(kinds, np.intp)
 
@@ -176,21 +171,21 @@ def _mixed(rows: PoseRows, own: Sequence[_End], parents: Sequence[_End], rng: np
     return places + spread_by[:, :, None] * rng.standard_normal(places.shape)
 
 
-def _best(rows: PoseRows, tries: Array, kind: int) -> Array:
+def _best(rows: PoseRows, tries: Array, kind: int, jobs: int) -> Array:
     """Return the best try of each child: places (count, n) of (count, tries, n)."""
     places = rows.wrapped(tries.reshape(-1, tries.shape[2]))
-    worth = _tried(rows, places, np.full(len(places), kind)).reshape(tries.shape[:2])
+    worth = _tried(rows, places, np.full(len(places), kind), jobs).reshape(tries.shape[:2])
     return np.asarray(places.reshape(tries.shape)[np.arange(len(tries)), np.argmin(worth, axis=1)], np.float64)
 
 
 def _descended(
-    rows: PoseRows, places: Array, kinds: Index, classes: _Classes, size: Size, stop: Callable[[], bool]
+    rows: PoseRows, places: Array, kinds: Index, classes: _Classes, size: Size, stop: Callable[[], bool], jobs: int
 ) -> tuple[list[_End], int]:
     """Where descents from some places end, the worse half given up after a heat; and how many looks that took.
 
     Each class of swings of each kind has its own worse half.
     """
-    many = BatchedSqp(rows, rows.without_middle(places, kinds), kinds)
+    many = Descents(rows, rows.without_middle(places, kinds), kinds, jobs)
     many.advance(size.heat, stop)
     own = kinds * CLASSES + classes.of(rows.own.swings(rows.own.placed(many.places, kinds)))
     order = np.argsort(many.worth, kind="stable")
@@ -198,8 +193,8 @@ def _descended(
     many.keep(np.sort(np.concatenate(better)))
     many.advance(size.steps - size.heat, stop)
     there = rows.with_middle(many.places, many.kinds)
-    ratios = rows.own.placed(many.places, many.kinds)
-    designs, swings = rows.linear.finished(ratios, many.x), rows.own.swings(ratios)
+    designs = rows.finished(many.places, many.kinds, many.x)
+    swings = rows.own.swings(rows.own.placed(many.places, many.kinds))
     known = np.flatnonzero(many.worth < LOCKED).tolist()
     ends = [_End(float(many.worth[k]), int(many.kinds[k]), there[k], designs[k], float(swings[k])) for k in known]
     return ends, many.looks
@@ -265,8 +260,9 @@ def bred(
     say: Say = unsaid,
     enough: Callable[[list[Bred]], int | None] = lambda found: None,
     size: Size = FULL,
+    what: str = "global search",
 ) -> list[Bred]:
-    """Breed populations that know nothing of each other, as many at a time as there are workers.
+    """Breed populations that know nothing of each other, one after the other.
 
     Parameters
     ----------
@@ -275,26 +271,20 @@ def bred(
     most : populations at most; each takes some 14 000 looks
     seed : of samples and children
     stop : true ends the populations where they are
-    jobs : processes; the ends do not depend on it
-    say : called with how many populations have ended, and how many there are at most
-    enough : says how many of those that are there tell enough, None where more are to be made; the others are left out
+    jobs : threads; the ends do not depend on it
+    say : called with ``what`` is done, how many populations have ended, and how many there are at most
+    enough : says how many of those that are there tell enough, None where more are to be made
     size : of each
     """
-    task, ended, found = Population(linear, tuple(signs), seed, size), itertools.count(1), list[Bred]()
-
-    def tell(done: int) -> None:
-        say("global search", done, most, f"populations {AT_MOST}{_best_so_far(found)}")
-
-    tell(0)
+    task, found = Population(linear, tuple(signs), seed, size, jobs), list[Bred]()
     while len(found) < most:
-        numbers = list(range(len(found), min(len(found) + max(1, jobs), most)))
-        found += spread_over(task, numbers, stop, jobs, lambda: tell(next(ended)))
-        tell(len(found))
+        say(what, len(found), most, f"populations {AT_MOST}{_best_so_far(found)}")
         if stop():
             break
-        count = enough(found)
-        if count is not None:
-            return found[:count]
+        found.append(task(len(found), stop))
+        if stop() or enough(found):
+            break
+    say(what, len(found), most, f"populations {AT_MOST}{_best_so_far(found)}")
     return found
 
 

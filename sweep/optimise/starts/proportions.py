@@ -5,21 +5,15 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import replace
-from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
 from sweep.evaluation.summaries import design_outputs
 from sweep.families.base import Accuracy, Array
-from sweep.families.chain import Chain, stages_of
-from sweep.families.names import stem
+from sweep.families.chain import stages_of
 from sweep.optimise.problem.statement import Problem
-from sweep.optimise.starts.linear import POSES, Elimination
-from sweep.quantities.limits import compared
-
-if TYPE_CHECKING:
-    from sweep.study import Limit
+from sweep.optimise.starts.linear import Elimination
 
 Index = NDArray[np.intp]
 
@@ -30,8 +24,8 @@ MIDDLE = Accuracy(target=1e-3)
 class Proportions:
     """Places between 0 and 1 for what is not linear, and the designs that belong to them.
 
-    Lengths of the guide stand on a logarithmic scale against its crank, which is the unit.  With ``grown`` the lengths
-    of stage 1 that cannot vanish stand on such a scale too.
+    Lengths of the guide stand on a logarithmic scale against its crank, which is the unit, and lengths of stage 1 that
+    cannot vanish on a logarithmic scale too.
 
     Parameters
     ----------
@@ -39,7 +33,7 @@ class Proportions:
     signs : combinations of the parameters that are not varied; each design has the number of one of them, its kind
     """
 
-    def __init__(self, linear: Elimination, signs: Sequence[dict[str, float]], grown: bool = False) -> None:
+    def __init__(self, linear: Elimination, signs: Sequence[dict[str, float]]) -> None:
         problem = linear.problem
         self.linear, names = linear, problem.family.parameter_names
         number = linear.last
@@ -59,7 +53,7 @@ class Proportions:
                 self.low[k] = shortest / problem.upper[unit]
                 self.high[k] /= max(problem.lower[unit], problem.upper[unit] * SHORT)
                 self.log[k] = True
-            elif grown and units[name].unit == "length" and self.low[k] > 0.0:
+            elif units[name].unit == "length" and self.low[k] > 0.0:
                 self.log[k] = True
         self.wide = np.zeros(len(linear.free))
         self.wide[self.log] = [math.log(x) for x in self.high[self.log] / self.low[self.log]]
@@ -68,19 +62,8 @@ class Proportions:
         self.offset = names.index(f"offset{number}") if f"offset{number}" in linear.free else -1
         self.driver = stages_of(problem.family)[0].family
 
-    def designs(self, places: Array, kinds: Index) -> Array:
-        """Designs (k, P) at places (k, n), of kinds (k,), with the point, line and scale still to be found.
-
-        Instead of the offset between the stages the middle of the guide's input angles is at its place, so that it
-        stays while stage 1 changes.
-        """
-        designs = self.placed(places, kinds)
-        if self.offset >= 0:
-            designs[:, self.offset] -= self.middles(designs)
-        return designs
-
     def placed(self, places: Array, kinds: Index) -> Array:
-        """Return the same with the offset between the stages itself at its place."""
+        """Return designs (k, P) at places (k, n), of kinds (k,), with the point, line and scale still to be found."""
         values: Array = self.low + places * (self.high - self.low)
         # numpy's exponential depends on the processor, that of the C library does not
         grown = [math.exp(x) for x in (places[:, self.log] * self.wide[self.log]).ravel().tolist()]
@@ -128,63 +111,3 @@ def widened(problem: Problem, designs: Array, names: Sequence[str]) -> Problem:
             lower[k] = min(lower[k], float((values - reach).min()))
             upper[k] = max(upper[k], float((values + reach).max()))
     return replace(problem, lower=lower, upper=upper)
-
-
-ACCURACY = Accuracy(samples=POSES)  # of what is not linear: pressure angles, the box of the coupler point
-BEFORE = ("max_pressure_angle", "swing", "margin")  # of a stage: they do not change with point, line and scale
-WEIGHT = 3.0  # price of a limit missed by its own size, in strokes
-STUCK = 1e6  # above every objective: does not turn
-
-
-def merit(linear: Elimination, designs: Array) -> tuple[Array, Array]:
-    """Return finished designs (n, P), and the objective plus what missed limits cost (n,), the smaller the better.
-
-    Designs that do not turn are not finished (nan) and rank by their margin behind all that do.
-    """
-    problem = linear.problem
-    family, names = problem.family, problem.family.parameter_names
-    limits = [x for x in problem.limits if not x.output.startswith(("rotatable", "stroke", "max_abs_dev"))]
-    margins = [f"margin{stage.number}" for stage in family.stages] if isinstance(family, Chain) else []
-    first = [x for x in limits if stem(x.output) in BEFORE]
-    wanted = list(dict.fromkeys([*margins, *(x.output for x in first)]))
-    columns = design_outputs(family, designs, wanted, ACCURACY, problem.window)
-    margin = np.min([np.nan_to_num(columns[name], nan=-1e3) for name in margins], axis=0)
-    worth = STUCK * (2.0 - margin)
-    turns = np.flatnonzero(margin > 0.0)
-    missed = np.zeros(len(designs))
-    for limit in first:
-        missed += _missed(limit, compared(limit.output, np.asarray(columns[limit.output], np.float64)))
-    finished, least, solved = linear.solve(designs[turns])
-    own = missed[turns]
-    rest = [x for x in limits if x not in first]
-    columns = {n: finished[:, k] for k, n in enumerate(names)}
-    outputs = [x.output for x in rest if x.output not in names]
-    if outputs:
-        columns |= design_outputs(family, finished, outputs, ACCURACY, problem.window)
-    for limit in rest:
-        own = own + _missed(limit, compared(limit.output, np.asarray(columns[limit.output], np.float64)))
-    out = np.full(designs.shape, np.nan)
-    out[turns] = finished
-    own = own + _outside(linear, finished)
-    worth[turns] = np.where(solved, np.nan_to_num(least) + WEIGHT * linear.stroke * own, STUCK)
-    return out, worth
-
-
-def _outside(linear: Elimination, designs: Array) -> Array:
-    """Return how far lengths of the guide lie outside their bounds, relative to them (n,)."""
-    missed = np.zeros(len(designs))
-    problem = linear.problem
-    for name in linear.links:
-        if name in problem.variables:
-            k = problem.variables.index(name)
-            values, high = designs[:, problem.family.parameter_names.index(name)], problem.upper[k]
-            missed += np.maximum(values - high, 0.0) / abs(high)
-            missed += np.maximum(problem.lower[k] - values, 0.0) / max(abs(problem.lower[k]), 1e-9)
-    return missed
-
-
-def _missed(limit: Limit, value: Array) -> Array:
-    size = max(abs(limit.minimum or 0.0), abs(limit.maximum or 0.0)) or 1.0
-    low = -math.inf if limit.minimum is None else limit.minimum
-    high = math.inf if limit.maximum is None else limit.maximum
-    return np.nan_to_num(np.maximum(np.maximum(low - value, value - high), 0.0) / size, nan=1e3)

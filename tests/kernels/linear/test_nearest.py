@@ -81,26 +81,31 @@ def curves(rng: np.random.Generator, n: int) -> tuple[np.ndarray, np.ndarray, np
     return values, np.concatenate([slopes, rng.standard_normal((n, 4))], axis=1), turns
 
 
-def stepped(seed: int, function: object = nearest_of_many, near: float = 0.2) -> tuple[np.ndarray, ...]:
-    """The step among few of the rows, that among all of them, the rows after it and their weights."""
+def stepped(
+    seed: int, function: object = nearest_of_many, near: float = 0.2, begin: np.ndarray | None = None
+) -> tuple[np.ndarray, ...]:
+    """The step among few of the rows, that among all of them, the rows after it, their weights, and what holds."""
     rng = np.random.default_rng(seed)
+    held = np.zeros(6, np.int64) if begin is None else begin.copy()
     n = 5
     values, slopes, turns = curves(rng, n)
     slopes[-1] = 1.0  # one unknown mends them all, so that some step keeps every row
     back = np.linalg.qr(rng.standard_normal((n, n)))[0] * (1.0 + rng.random(n))
     centre, low, high = rng.standard_normal(n), np.full(n, -3.0), np.full(n - 1, 3.0)
     step, there, weights = np.empty(n), np.empty(len(values)), np.empty(len(values))
-    status = function(values, slopes, back, centre, low, high, turns, near, 1e-9, 20, 1e-13, step, there, weights)  # type: ignore[operator]
+    status = function(values, slopes, back, centre, low, high, turns, near, 1e-9, 20, 1e-13, step, there, weights, held)  # type: ignore[operator]
     box = np.concatenate([back, -back[: n - 1]])
     rows = np.concatenate([back.T @ slopes, box.T], axis=1)
     whole, _, told = solved(rows, np.concatenate([-values, low, -high]), centre)
     assert status == told == st.OK
-    return step, back @ whole, there, weights, values + step @ slopes
+    return step, back @ whole, there, weights, values + step @ slopes, held
 
 
 @pytest.mark.parametrize("seed", range(20))
 def test_step_among_the_rows_that_matter_is_that_among_all_rows(seed: int) -> None:
-    step, whole, there, weights, after = stepped(seed)
+    step, whole, there, weights, after, held = stepped(seed)
+    rows = held[1 : 1 + held[0]]
+    assert set(np.flatnonzero(weights)) <= set(rows[rows >= 0].tolist())
     # What is missed joins until nothing is missed by more than 1e-9.
     np.testing.assert_allclose(step, whole, atol=1e-7)
     np.testing.assert_allclose(there, after, atol=1e-12)
@@ -114,3 +119,15 @@ def test_rows_that_join_later_go_on_from_the_point_reached() -> None:
         np.testing.assert_allclose(first[0], later[0], atol=1e-7)
     for ours, plain in zip(stepped(3), stepped(3, nearest_of_many.py_func), strict=True):
         np.testing.assert_array_equal(ours, plain)
+
+
+@pytest.mark.parametrize("seed", range(20))
+def test_rows_that_held_elsewhere_lead_to_the_same_step(seed: int) -> None:
+    """Those of the same program, of another one, and any five: box ends, dependent rows, rows that are far away."""
+    first = stepped(seed)
+    others = [np.concatenate([[5], np.random.default_rng(k).integers(-9, 100, 5)]) for k in range(5)]
+    for begin in (first[5], stepped(seed + 1)[5], *others):
+        again = stepped(seed, begin=begin)
+        np.testing.assert_allclose(again[0], first[0], atol=1e-7)
+        np.testing.assert_allclose(again[3], first[3], atol=1e-5 * (1.0 + np.abs(first[3]).max()))
+        assert set(again[5][1 : 1 + again[5][0]]) == set(first[5][1 : 1 + first[5][0]])

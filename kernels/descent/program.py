@@ -1,0 +1,156 @@
+"""The quadratic program of one step of a descent: its curvature as learnt, its box, its solution."""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+
+from kernels.descent.motion import Index
+from kernels.descent.rows import Task, row_count
+from kernels.jit import kernel, part
+from kernels.linear.minimax import UNKNOWNS
+from kernels.linear.nearest import nearest_of_many
+from kernels.types import Array
+
+EXACT = 1e-11  # distance by which the point nearest to the centre may miss a row
+NEAR = 0.15  # rows further from their bound join the quadratic program only where its step would miss them
+JOINED, MISSED = 6, 1e-6  # times that they may, and what is no miss
+SOFT, LINEAR = 1.0, 1e-2  # curvature to begin with, of the places and of the linear unknowns
+REACH = 10.0  # of the linear unknowns in one step, in units of their size and of the radius
+DAMPED = 0.2  # least curvature along a step, as a share of what was believed (Powell 1978)
+FLAT = 1e-6  # smallest curvature: the objective is about 1, the places run from 0 to 1
+LENT = 1e-4  # curvature lent to t and to the violation, which have none
+
+
+class Program(NamedTuple):
+    """A quadratic program in the step, in t and in the violation; ``held`` are the rows that held last, for the next.
+
+    ``rows`` (n, r) are its rows, ``back`` leads from where its objective is the distance from ``centre`` to the step.
+    ``size`` are the units of the step.
+    """
+
+    rows: Array
+    back: Array
+    centre: Array
+    low: Array
+    high: Array
+    size: Array
+    right: Array
+    there: Array
+    held: Index
+
+
+@part
+def no_program(task: Task) -> Program:
+    """Room for a program."""
+    n, r = len(task.columns) + UNKNOWNS + 2, row_count(task)
+    return Program(
+        np.empty((n, r)), np.zeros((n, n)), np.empty(n), np.empty(n), np.empty(n - 2), np.empty(n - 2), np.empty(r),
+        np.empty(r), np.zeros(n + 1, np.int64),
+    )  # fmt: skip
+
+
+@part
+def units(place: Array, x: Array, size: Array) -> None:
+    """Units of what is varied: 1 for places, their own size for the unknowns."""
+    n = len(place)
+    for k in range(n):
+        size[k] = 1.0
+    size[n] = size[n + 1] = max(abs(x[0]), abs(x[1]))
+    size[n + 2] = size[n + 3] = max(abs(x[2]), abs(x[3]))
+    size[n + 4] = max(abs(x[4]), 1.0)
+
+
+@part
+def prepare(task: Task, slopes: Array, curvature: Array, q: Program) -> None:
+    """Write what stays of a program while a descent stands where it is."""
+    n, objective = len(q.size), 2 * len(task.cos)
+    for k in range(n):
+        for j in range(slopes.shape[1]):
+            q.rows[k, j] = slopes[k, j] * q.size[k] / (task.unit if j < objective else 1.0)
+    for j in range(slopes.shape[1]):
+        q.rows[n, j], q.rows[n + 1, j] = (1.0, 0.0) if j < objective else (0.0, 1.0)
+    # G = L L', and the objective is the distance in y = L' step: back is the inverse of L'.
+    lower = np.zeros((n, n))
+    for k in range(n):
+        for i in range(k, n):
+            value = curvature[i, k]
+            for j in range(k):
+                value -= lower[i, j] * lower[k, j]
+            lower[i, k] = math.sqrt(max(value, FLAT)) if i == k else value / lower[k, k]
+    for k in range(n):
+        for i in range(k, -1, -1):
+            value = 1.0 if i == k else 0.0
+            for j in range(i + 1, k + 1):
+                value -= lower[j, i] * q.back[j, k]
+            q.back[i, k] = value / lower[i, i]
+    q.back[n, n] = q.back[n + 1, n + 1] = 1.0 / math.sqrt(LENT)
+    for k in range(n):
+        q.centre[k] = 0.0
+    q.centre[n], q.centre[n + 1] = -q.back[n, n], -q.back[n, n] * task.price / task.unit
+
+
+@part
+def solve(task: Task, t: float, worth: float, q: Program, step: Array, weights: Array) -> float:
+    """Step (n + 5,) and multipliers of the rows (r,) for ``q.right``, the rows for t = 0; the gain it promises."""
+    n, objective = len(q.size), 2 * len(task.cos)
+    for j in range(objective):
+        q.right[j] = (q.right[j] + t) / task.unit
+    whole = np.empty(n + 2)
+    nearest_of_many(
+        q.right, q.rows, q.back, q.centre, q.low, q.high, task.turns, NEAR, MISSED, JOINED, EXACT, whole, q.there,
+        weights, q.held,
+    )  # fmt: skip
+    missed = 0.0
+    for j in range(objective, len(weights)):
+        missed = max(missed, whole[n + 1] - q.there[j])
+    for j in range(objective):
+        weights[j] /= task.unit
+    for k in range(n):
+        step[k] = whole[k] * q.size[k]
+    promised: float = worth - (t + task.unit * whole[n] + task.price * missed)
+    return promised
+
+
+@part
+def box(place: Array, t: float, unit: float, radius: float, q: Program) -> None:
+    """Write the ends of the box about a design."""
+    n = len(place)
+    for k in range(len(q.size)):
+        reach = radius if k < n else REACH * radius
+        q.low[k] = max(-reach, -place[k]) if k < n else -reach
+        q.high[k] = min(reach, 1.0 - place[k]) if k < n else reach
+    q.low[len(q.size)], q.low[len(q.size) + 1] = -t / unit, 0.0
+
+
+@part
+def learn(curvature: Array, moved: Array, change: Array) -> None:
+    """BFGS update, damped so that the curvature stays positive."""
+    along = np.zeros(len(moved))
+    for i in range(len(moved)):
+        for j in range(len(moved)):
+            along[i] += curvature[i, j] * moved[j]
+    known, seen = 0.0, 0.0
+    for i in range(len(moved)):
+        known += moved[i] * along[i]
+        seen += moved[i] * change[i]
+    if not known > 1e-300:
+        return
+    share = (1.0 - DAMPED) * known / (known - seen) if seen < DAMPED * known else 1.0
+    seen = max(seen, DAMPED * known)
+    for i in range(len(moved)):
+        change[i] = share * change[i] + (1.0 - share) * along[i]
+    for i in range(len(moved)):
+        for j in range(len(moved)):
+            curvature[i, j] += change[i] * change[j] / seen - along[i] * along[j] / known
+
+
+@kernel
+def begin(curvature: Array) -> None:
+    """Write the curvature to begin with."""
+    for k in range(len(curvature)):
+        for i in range(len(curvature)):
+            curvature[k, i] = 0.0
+        curvature[k, k] = SOFT if k < len(curvature) - UNKNOWNS else LINEAR
