@@ -13,10 +13,14 @@ import pytest
 import sweep
 import sweep.optimise.study
 from sweep.errors import SearchCutShort, StudyError
+from sweep.families import family
 from sweep.jobs.signals import Deadline
 from sweep.optimise import Problem, explore
+from sweep.optimise.local.model import Model
+from sweep.optimise.manufacture.margins import with_margins
+from sweep.optimise.problem.program import Program
 from sweep.optimise.study import read_survey
-from sweep.study import Limit, OptimiseSettings, load_study, study_from_data
+from sweep.study import Limit, OptimiseSettings, Tolerance, load_study, study_from_data
 from tests.optimise.test_study import STUDY
 
 STUDIES = Path(__file__).parents[2] / "studies"
@@ -64,6 +68,24 @@ def test_robust_design_pays_as_little_as_it_can(result: pd.DataFrame) -> None:
     # The share is not much larger than asked: room that nobody needs would cost acceleration.
     assert best["yield"] <= 0.965
     assert best["status"] == 0 and best["kkt_residual"] <= 1e-6
+
+
+def test_band_narrower_than_its_room_is_missed_and_no_equation() -> None:
+    """Were its middle asked for, designs would look good that hardly any mechanism keeps."""
+    names = ("a", "b", "c", "e", "f", "g", "alpha")
+    design = np.array([0.5, 2.0, 1.5, 2.0, 0.1, 0.1, 0.1])
+    given = [{"branch": 1.0} | dict(zip(names, design.tolist(), strict=True))]
+    swing = float(sweep.summarise("rssr", pd.DataFrame(given), ["swing"])["swing"].abs()[0])
+    band = Limit("swing", swing - 1e-3, swing + 1e-3)
+    problem = Problem(family("rssr"), names, design - 0.2, design + 0.2, {"branch": 1.0}, "max_abs_d2psi", (band,))
+    start = problem.rows(design)[0]
+    for lengths, missed in ((1e-4, False), (0.02, True)):
+        drawn_in = with_margins(problem, start, Tolerance(lengths, 1e-3 * lengths, 0.95), {"swing": 2.0}, None)
+        low, high = drawn_in.limits[0].minimum, drawn_in.limits[0].maximum
+        assert low is not None and high is not None and (low > high) == missed
+        model = Model(drawn_in, Program(drawn_in), start, lambda: False)
+        state = model.state(drawn_in.scaled(start[None, :])[0])
+        assert (state.violation > 1e-4) == missed and not any(state.form.equal)
 
 
 def test_band_of_an_equation_is_two_bounds() -> None:

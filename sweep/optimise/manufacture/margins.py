@@ -173,8 +173,7 @@ def _spreads(problem: Problem, design: Array, sigma: Array, names: Sequence[str]
 
 
 def _drawn_in(limit: Limit, room: float) -> Limit:
+    """Return a limit that gives up room; a band narrower than that is missed until the design needs less."""
     low = None if limit.minimum is None else limit.minimum + room
     high = None if limit.maximum is None else limit.maximum - room
-    if low is not None and high is not None and low > high:  # the band is narrower than what the tolerances need
-        low = high = 0.5 * (low + high)
     return replace(limit, minimum=low, maximum=high)

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from sweep.evaluation.summaries import design_outputs
 from sweep.families.base import Array
-from sweep.optimise.local.kkt import AGREE, WORDS, Result
+from sweep.optimise.local.kkt import AGREE, Result
 from sweep.optimise.local.model import Model
 from sweep.optimise.local.start import search
 from sweep.optimise.manufacture.margins import Levels, bounded, excesses, keyed, prices, with_margins
@@ -120,10 +120,7 @@ def robust(
     count = _Count(tell, len(begin) + min(ENDED, len(begin)))
     found = spread_over(near, list(range(len(begin))), asked, jobs, count)
     # The objective of designs that miss their limits still says little.
-    order = sorted(
-        found,
-        key=lambda r: (r.violation > NEARLY, _is_squeezed(r), r.objective if r.violation <= NEARLY else r.violation),
-    )
+    order = sorted(found, key=lambda r: (r.violation > NEARLY, r.objective if r.violation <= NEARLY else r.violation))
     ends = _different(problem, order)[:ENDED]
     if not ends:  # stopped before any of them was begun
         return None
@@ -153,11 +150,6 @@ class _Count:
     def __call__(self) -> None:
         self.done += 1
         self.tell(self.done, self.total)
-
-
-def _is_squeezed(r: Result) -> bool:
-    """Return whether a band of the design is narrower than the room that it needs, so that it misses the share."""
-    return any(text.endswith(WORDS["equal"]) for text in r.active)
 
 
 def _never() -> bool:

@@ -42,6 +42,7 @@ BLOCK = 256  # places that a thread looks at in one go
 UNIT = 4.0 / math.pi**2  # of the objective, in strokes: no motion there and back has less acceleration
 PRICE = 6.0  # of a limit missed by its own size, in such units
 DEVIATION = 1.0 / 30.0  # the same for the deviation, as a share: a straightness twice as coarse gains little
+NARROW = 0.1  # the same for the range of the position with room for tolerances, which its band may not hold
 FREE = 1e3  # strokes that a deviation without a limit may be
 
 
@@ -98,6 +99,8 @@ class PoseRows:
                 for bound, upper in ((limit.minimum, False), (limit.maximum, True)):
                     if bound is not None:
                         curves += _rows_of(found, found.to_inner(float(bound)), upper, off)
+        if linear.sigma is not None:
+            curves = [c._replace(size=NARROW * c.size) if c.output == linear.position else c for c in curves]
         return [curve for curve in curves if curve.output in codes]
 
     def _task(self, curves: Sequence[_Curve]) -> Task:
