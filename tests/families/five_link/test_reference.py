@@ -371,6 +371,6 @@ def test_five_link_errors_of_ordinary_links_stay_small():
     links[:, 0] *= 0.3
     found = sweep.summarise("five_link", dict(zip(GEOMETRY, links.T, strict=True)), ["max_abs_d2psi"], accuracy=1e-12)
     good = found[found.status == st.OK]
-    # half of them within 300 roundings
-    assert len(good) > 20
-    assert (good.err_max_abs_d2psi / good.max_abs_d2psi).median() < 300.0 * 2.0**-53
+    # half of them within 384 roundings, as many as without a look at the rounding of the inputs
+    assert len(good) > 100
+    assert (good.err_max_abs_d2psi / good.max_abs_d2psi).median() < 400.0 * 2.0**-53
