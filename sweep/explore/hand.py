@@ -4,25 +4,20 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import cached_property, lru_cache
 from pathlib import Path
 from typing import Any
 
-from kernels import status as codes
 from sweep.chunks.plan import PARAMETER_UNITS
 from sweep.errors import InputError, nearest
-from sweep.evaluation.statuses import meaning
-from sweep.evaluation.summaries import design_outputs
 from sweep.evaluation.tables import design_matrix
 from sweep.families.base import Array, Family, Parameter
 from sweep.families.names import is_flag
 from sweep.optimise.starts.dataset import drawn
 from sweep.report.dataset import Dataset, Row, chosen, read_dataset, without_rows
-from sweep.report.live import moving
-from sweep.report.optima import Shown
+from sweep.report.judged import judged, row_of
 from sweep.report.quantities import quantity
-from sweep.report.tables import limit_states, output_rows
 from sweep.study import Study
 from sweep.study.load import study_from_data
 from sweep.study.written import design_entries, toml
@@ -109,32 +104,10 @@ class Hand:
 
     def answer(self, designs: Sequence[Mapping[str, object]], names: Sequence[str]) -> dict[str, Any]:
         """Return all the page shows of a design and of those that are pinned beside it, as JSON takes it."""
-        rows = [self._row(tuple(self.design(one).items())) for one in designs]
-        seen = [replace(self.data, best=row, optima=None, computed_reference=None) for row in rows]
-        roles = ["result", *(f"pin pin-{k}" for k in range(1, len(rows)))]
-        shown = [Shown(name, role, _words(row), row) for name, role, row in zip(names, roles, rows, strict=True)]
-        outputs, limits = [output_rows(one) for one in seen], [limit_states(one) for one in seen]
-        return {
-            "status": [_words(row) for row in rows],
-            "motion": moving(self.data, shown),
-            "outputs": [
-                {"name": same[0].name, "symbol": same[0].symbol, "text": same[0].text,
-                 "values": [one.value for one in same], "fast": [one.fast for one in same]}
-                for same in zip(*outputs, strict=True)
-            ],
-            "limits": [
-                {"name": same[0].shown.name, "symbol": same[0].shown.symbol, "bound": same[0].bound,
-                 "values": [one.value for one in same], "states": [one.state for one in same],
-                 "slack": [one.slack for one in same]}
-                for same in zip(*limits, strict=True)
-            ],
-        }  # fmt: skip
+        return judged(self.data, [self._row(tuple(self.design(one).items())) for one in designs], names)
 
     def _computed(self, design: tuple[tuple[str, float], ...]) -> Row:
-        matrix, _ = design_matrix(self.family, dict(design))
-        study = self.study
-        found = design_outputs(self.family, matrix, study.want, study.accuracy, study.window)
-        return dict(design) | {name: float(values[0]) for name, values in found.items()}
+        return row_of(self.study, dict(design))
 
     def page(self) -> dict[str, Any]:
         """Return what the page knows from the beginning."""
@@ -185,11 +158,6 @@ class Hand:
     def reference(self, given: Mapping[str, object]) -> str:
         """Return the table [reference.design] of a study."""
         return toml({"reference": {"design": design_entries(self.study.bare, self.design(given))}})
-
-
-def _words(row: Row) -> str:
-    code = int(row.get("status", codes.OK))
-    return "" if code == codes.OK else meaning(code)
 
 
 def of_study(study: Study) -> Hand:

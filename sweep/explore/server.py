@@ -230,6 +230,8 @@ def page_text(hand: Hand) -> str:
     return environment.get_template("explore.html").render(
         page=hand.page(),
         formats=list(FORMATS),
+        live_designs=[],
+        axis="angle",
         style=[(TEMPLATES / "report.css").read_text("utf-8"), (LIVE / "live.css").read_text("utf-8"),
                (LIVE / "explore.css").read_text("utf-8")],
         scripts=[(LIVE / name).read_text("utf-8") for name in scripts],

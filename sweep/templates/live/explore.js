@@ -42,7 +42,6 @@ async function renew() {
 function show(answer) {
   const motion = answer.motion;
   if (motion) {
-    motion.ghosts = pins.map((_, k) => k + 1);
     motion.steady = steady;
     if (moving) moving.replace(motion);
     else moving = new Moving(by("live"), motion);
