@@ -64,7 +64,25 @@ _OF_TREES = {
     "speed_fluctuation_friction": ("speed", "rubbing_tree"),
 }
 _TREES = ("five_link", "slotted", "swivel", "spherical_looper", "cylindrical_looper")
-_MADE = {f"{tree}_{kind}": (tree, *made) for kind, made in _OF_TREES.items() for tree in _TREES}
+# Families whose joints are not dimensioned here: forces and speed, no friction and no bearings.
+_PLAIN_TREES = (
+    "inverted_slider_crank",
+    "geared_dwell",
+    "epicyclic_dwell",
+    "cam",
+    "cam_lever",
+    "eyelet",
+    "guided_cam",
+    "free_cam",
+    "heddle",
+    "feed",
+    "feed_triad",
+)
+_MADE = {
+    f"{tree}_{kind}": (tree, *made)
+    for kind, made in _OF_TREES.items()
+    for tree in (*_TREES, *(_PLAIN_TREES if kind in ("loads", "speed_fluctuation") else ()))
+}
 NAMES = (*_ENTRIES, *_MADE)
 
 # In the stages behind the first, speed and acceleration are those of the first stage's crank.
