@@ -20,6 +20,7 @@ from sweep.errors import InputError
 from sweep.families.base import Accuracy, Family, Output, Parameter, Step, Work, of_family
 from sweep.families.chain import Chain
 from sweep.families.machines import Machine
+from sweep.families.main_shaft import ShaftTorque
 from sweep.families.names import stem
 from sweep.families.reduction import reduced
 from sweep.families.relations import Reading
@@ -258,7 +259,8 @@ def _asked(machine: Machine, wanted: Iterable[str]) -> set[str]:
     names |= {about for name in places for about in reduced(name, machine.domain)}
     names |= {timing.of.name for timing in asked if isinstance(timing, Reading)}
     for relation in machine.relations:
-        if not names.isdisjoint(o.name for o in relation.outputs):
+        numbers = relation.numbers if isinstance(relation, ShaftTorque) else ()
+        if not names.isdisjoint(o.name for o in (*relation.outputs, *numbers)):
             names |= relation.needs(frozenset(names))
     return names
 

@@ -320,8 +320,8 @@ TRIAD = Family(
         Points({"t": ("x_t", "y_t", None)}),
         Skeleton(
             {
-                "a": crank_axis(TRIAD_PARAMETERS, "h_f", "h_alpha"), "d": standing(TRIAD_PARAMETERS, "h_e"), "l2": standing(TRIAD_PARAMETERS, "xE2", "yE2"),
-                "l3": standing(TRIAD_PARAMETERS, "xE3", "yE3"),
+                "a": crank_axis(TRIAD_PARAMETERS, "h_f", "h_alpha"), "d": standing(TRIAD_PARAMETERS, "h_e"),
+                "l2": standing(TRIAD_PARAMETERS, "xE2", "yE2"), "l3": standing(TRIAD_PARAMETERS, "xE3", "yE3"),
             },
             (
                 *CHAIN_LINKS, Link("eccentric 2", ("l2", "e2")), Link("eccentric 3", ("l3", "e3")),

@@ -110,6 +110,7 @@ def two_leads(parameters: Parameters) -> LinkTree:
         ends=(*_ENDS, (4, 5), (4, 5)),
         needs=("chi", "dchi", "d2chi"),
         fill=fill,
+        rubs=False,
         carrier=5,
         tip=at_tooth,
     )
@@ -163,6 +164,7 @@ def three_leads(parameters: Parameters) -> LinkTree:
         ends=(*_ENDS, (6, rack), (6, rack), (7, rack), (7, rack)),
         needs=("x_t", "y_t", "dx_t", "dy_t", "d2x_t", "d2y_t", "chi", "dchi", "d2chi"),
         fill=fill,
+        rubs=False,
         carrier=rack,
         tip=_at_origin,
     )

@@ -66,6 +66,7 @@ class LinkTree:
     carrier : number of the body that a tool hangs on
     tip : place of the tool in the axes of that body, (n, 3); None where it is an input
     output : number of the freedom that is the family's position, on which a load acts; -1 where no load does
+    rubs : whether its joints have dimensions for friction and bearings
     """
 
     bodies: tuple[LinkBody, ...]
@@ -78,6 +79,7 @@ class LinkTree:
     carrier: int
     tip: DesignMap | None = None
     output: int = -1
+    rubs: bool = True
 
 
 def filled_by(kernel: Callable[..., object], needs: tuple[str, ...], stacked: tuple[str, ...] = ()) -> LinkFill:

@@ -41,8 +41,7 @@ def _bearing(text: str) -> LinkJoint:
 
 def _put_cam(angles: Angles, links: Links, at: Path) -> None:
     """Write a cam on the driven shaft, at the angle of that."""
-    n, m = links.bodies.shape[:2]
-    poses.put_about(links, 0, at, poses.crank_angle(angles, n))
+    poses.put_about(links, 0, at, poses.crank_angle(angles, len(links.bodies)))
     poses.turn_about_z(links, 0)
 
 
@@ -79,6 +78,7 @@ def slotted_rocker(parameters: Parameters) -> LinkTree:
         ends=((2, 0),) * 2,
         needs=_PSI,
         fill=fill,
+        rubs=False,
         carrier=1,
         output=1,
     )
@@ -127,6 +127,7 @@ def rolling_planet(parameters: Parameters) -> LinkTree:
         ends=((1, FRAME), (1, 2)),
         needs=_PSI,
         fill=fill,
+        rubs=False,
         carrier=2,
         output=2,
     )
@@ -146,6 +147,7 @@ def _cam_and(follower: LinkBody, joint: LinkJoint, kind: int, needs: tuple[str, 
         ends=((1, 0),),
         needs=needs,
         fill=fill,
+        rubs=False,
         carrier=1,
         tip=_tip_at_origin if kind == SLIDE else None,
         output=1,
@@ -213,7 +215,9 @@ def turning_cam(needs: tuple[str, ...]) -> LinkTree:
     def fill(designs: Array, angles: Angles, motion: Columns, links: Links) -> None:
         _put_cam(angles, links, poses.standing_at((len(designs), links.bodies.shape[1]), 0.0, 0.0, 0.0))
 
-    return LinkTree((_cam_body(),), (_bearing("cam"),), (FRAME,), ((0, DRIVEN),), (), needs, fill, carrier=0)
+    return LinkTree(
+        (_cam_body(),), (_bearing("cam"),), (FRAME,), ((0, DRIVEN),), (), needs, fill, carrier=0, rubs=False
+    )
 
 
 def eyelet_crank(parameters: Parameters) -> LinkTree:
@@ -228,7 +232,7 @@ def eyelet_crank(parameters: Parameters) -> LinkTree:
 
     body = LinkBody("crank", "along the crank, tangential, along its axis, from A")
     tip = partial(_on_crank, parameters)
-    return LinkTree((body,), (_bearing("crank"),), (FRAME,), ((0, DRIVEN),), (), ("P",), fill, 0, tip)
+    return LinkTree((body,), (_bearing("crank"),), (FRAME,), ((0, DRIVEN),), (), ("P",), fill, 0, tip, rubs=False)
 
 
 def _on_crank(parameters: Parameters, designs: Array) -> Array:
@@ -287,6 +291,7 @@ def heddle_shaft(parameters: Parameters, line: Callable[[Array], tuple[Array, Ar
         ends=((2, 1), (2, 1), (3, 2), (4, 3)),
         needs=(*_CHI, "lam", "y", "dy", "d2y"),
         fill=fill,
+        rubs=False,
         carrier=4,
         tip=_tip_at_origin,
         output=4,

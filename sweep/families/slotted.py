@@ -19,9 +19,9 @@ from sweep.families.base import Angles, Columns, Family, Output, Parameter
 from sweep.families.capabilities import Assembly, Dimensions, Link, Made, OutputLink, Points, Skeleton
 from sweep.families.curve_features import Singular
 from sweep.families.link_tree import LinkBody, LinkJoint, LinkTree, filled_by
-from sweep.families.planar_trees import slotted_rocker
 from sweep.families.outputs import angle_outputs, joint_outputs, ladders, place_outputs, point_outputs
 from sweep.families.parts import AXES
+from sweep.families.planar_trees import slotted_rocker
 from sweep.families.poses import filled_blocks, filled_with_places
 from sweep.families.skeletons import CRANK, ORIGIN, crank_axis, links, parameter, standing
 

@@ -88,7 +88,7 @@ def poses_of(scene):
         return [(bodies[:, k, :3], bodies[:, k, 15:24].reshape(-1, 3, 3)) for k in range(bodies.shape[1])]
     poses, design = scene.records[0][0], scene.records[1][0]
     b, c, turns = poses[:, 0:3], poses[:, 3:6], design[16] == 1.0
-    u, k = design[0:3], design[3:6]
+    u = design[0:3]
     rho = poses[:, 15:18]
     follower = np.stack([rho, poses[:, 18:21], np.cross(rho, poses[:, 18:21])], axis=1)
     frames = triads(b, c, u, (poses[:, 9:12], poses[:, 12:15]), follower, design[15], True)
