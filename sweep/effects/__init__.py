@@ -79,11 +79,14 @@ _PLAIN_TREES = (
     "feed",
     "feed_triad",
 )
+_SLOTS = ("slotted", "inverted_slider_crank", "geared_dwell", "epicyclic_dwell", "feed")
 _MADE = {
     f"{tree}_{kind}": (tree, *made)
     for kind, made in _OF_TREES.items()
     for tree in (*_TREES, *(_PLAIN_TREES if kind in ("loads", "speed_fluctuation") else ()))
 }
+_MADE |= {f"{name}_contact": (name, "contact", "contact_of") for name in _SLOTS}
+_MADE |= {f"{name}_roller": (name, "cam_roller", "roller_of") for name in ("cam", "cam_lever")}
 NAMES = (*_ENTRIES, *_MADE)
 
 # In the stages behind the first, speed and acceleration are those of the first stage's crank.

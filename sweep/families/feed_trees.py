@@ -101,7 +101,15 @@ def two_leads(parameters: Parameters) -> LinkTree:
         joints=(
             *_JOINTS,
             joint,
-            LinkJoint("e", "strap of the lift coupler", "shaft", "eccentric on the lift coupler", body=4, freedom=5),
+            LinkJoint(
+                "e",
+                "strap of the lift coupler",
+                "shaft",
+                "eccentric on the lift coupler",
+                body=4,
+                freedom=5,
+                touch="strap",
+            ),
             LinkJoint("f", "pin of the lift coupler", "ball", "rack on the lift coupler", lines=(3, 2)),
             LinkJoint("h", "pin of the rack on the rocker", "shaft", "rocker on the rack", body=5, freedom=6),
         ),

@@ -40,6 +40,7 @@ class LinkJoint:
     acts : which body's force on which it is, in words
     body, freedom : of a shaft, a sleeve, a hinge the body; the number of the freedom whose axis is its own
     lines : of a ball, a contact the first of the lines that make it, and how many
+    touch : where its surfaces press without fitting: a ball or a pin in a straight slot, a strap on an eccentric
     """
 
     name: str
@@ -49,6 +50,7 @@ class LinkJoint:
     body: int = -1
     freedom: int = -1
     lines: tuple[int, int] = (-1, 0)
+    touch: Literal["", "ball", "line", "strap"] = ""
 
 
 LinkFill: TypeAlias = "Callable[[Array, Angles, Columns, Links], None]"

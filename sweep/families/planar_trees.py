@@ -70,7 +70,7 @@ def slotted_rocker(parameters: Parameters) -> LinkTree:
         joints=(
             _bearing("crank"),
             LinkJoint("b", "crank pin", "ball", "crank on the block", lines=(0, 2)),
-            LinkJoint("c", "slot", "sleeve", "rocker on the block", body=2, freedom=2),
+            LinkJoint("c", "slot", "sleeve", "rocker on the block", body=2, freedom=2, touch="line"),
             LinkJoint("d", "rocker bearing", "shaft", "frame on the rocker", body=1, freedom=1),
         ),
         parents=(FRAME, FRAME, 1),
@@ -119,7 +119,7 @@ def rolling_planet(parameters: Parameters) -> LinkTree:
             _bearing("carrier"),
             LinkJoint("o", "bearing of the planet", "shaft", "carrier on the planet", body=1, freedom=1),
             LinkJoint("teeth", "teeth of the fixed gear", "contact", "fixed gear on the planet", lines=(0, 1)),
-            LinkJoint("b", "pin in the slot", "contact", "slotted link on the planet", lines=(1, 1)),
+            LinkJoint("b", "pin in the slot", "contact", "slotted link on the planet", lines=(1, 1), touch="line"),
             LinkJoint("d", "bearing of the slotted link", "shaft", "frame on the slotted link", body=2, freedom=2),
         ),
         parents=(FRAME, 0, FRAME),

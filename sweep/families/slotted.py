@@ -92,7 +92,7 @@ LINKS = LinkTree(
         LinkJoint("a", "crank bearing", "shaft", "frame on the crank", body=0, freedom=0),
         LinkJoint("b", "ball of the crank", "ball", "crank on the arm, or on the block of the fork", lines=(0, 3)),
         LinkJoint("c", "guide of the driven link", "sleeve", "driven link on the arm, or on the block", body=2,
-                  freedom=2),
+                  freedom=2, touch="ball"),
         LinkJoint("d", "bearing of the driven link", "shaft", "frame on the driven link", body=1, freedom=1),
     ),
     parents=(FRAME, FRAME, 1),
