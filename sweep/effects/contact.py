@@ -106,7 +106,8 @@ def compute(scene: Scene, wanted: frozenset[str], tree: LinkTree) -> Columns:
     """Wanted outputs of the joints that touch."""
     joints = [joint for joint in touching(tree) if not wanted.isdisjoint(o.name for o in _outputs(joint))]
     loads = compute_loads(scene, frozenset(f"force_{joint.name}" for joint in joints))
-    status, columns = scene.status(), {}
+    status = scene.status()
+    columns: dict[str, Array] = {}
     take_over(status, loads["status"])
     for joint in joints:
         force = np.asarray(loads[f"force_{joint.name}"], np.float64)

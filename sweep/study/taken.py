@@ -10,6 +10,7 @@ from typing import Any
 
 from sweep.families.base import Family
 from sweep.quantities.units import internal_unit
+from sweep.study.design import ReferenceSection
 from sweep.study.file import Key, StudyFile
 
 FROM, HASH = "from", "hash"
@@ -53,8 +54,15 @@ def take(file: StudyFile, family: Family, elsewhere: Collection[str]) -> None:
             left_out = {x for x in elsewhere if not x.startswith("lam")} if key == ("design",) else set()
             _fill(file, table, (*key, name), member, design, family, left_out)
             notes.append(f"{'.'.join((*key, member.rstrip('.'))).rstrip('.')}: {source} {own}")
-    if notes and isinstance(file.data.get("study"), dict):
-        file.data["study"] = {**file.data["study"], "taken": notes}
+    about = _table(file.data, ("study",))
+    if notes and about is not None:
+        about["taken"] = notes
+
+
+def taken_reference(file: StudyFile, section: ReferenceSection) -> ReferenceSection:
+    """Return the section with what was taken into its table."""
+    table = _table(file.data, ("reference", "design"))
+    return section if section.design is None else section.model_copy(update={"design": table})
 
 
 def _table(data: Mapping[str, Any], key: tuple[str, ...]) -> dict[str, Any] | None:
