@@ -16,8 +16,10 @@ from sweep.exchange.export import FORMATS
 from sweep.exchange.export import export as write
 from sweep.exchange.points import TOLERANCE, from_points, read_points, reader_of
 from sweep.report.dataset import chosen
+from sweep.report.sheet import write_sheet
 from sweep.report.workbook import write_workbook
 
+OF_DATASETS = ("xlsx", "pdf", "svg", "dxf")  # what takes more than a design: its study
 FILE = click.argument("file", type=click.Path(exists=True, dir_okay=False, path_type=Path))
 
 
@@ -52,7 +54,7 @@ def points(family: str, file: Path, part: str, tolerance: float | None, out: Pat
 @click.command()
 @FOLDER
 @DESIGN
-@click.option("--format", "kind", required=True, type=click.Choice([*FORMATS, "xlsx"]))
+@click.option("--format", "kind", required=True, type=click.Choice([*dict.fromkeys([*FORMATS, *OF_DATASETS])]))
 @click.option(
     "--out", type=click.Path(dir_okay=False, path_type=Path), help="Default: export/DESIGN.ending beside FOLDER."
 )
@@ -61,8 +63,11 @@ def points(family: str, file: Path, part: str, tolerance: float | None, out: Pat
 def export(folder: Path, design: str | None, kind: str, out: Path | None, phi: float, poses: int) -> None:
     """Write one design of a dataset to a file that other programs read.
 
-    csv: hardpoints and axes.  glb: an animated model that a browser opens.  dxf: a drawing.  mjcf: a model for MuJoCo.
-    law: the motion over one turn with units, .csv or .parquet.  dxf needs `pip install 'linksweep[cad]'`.
+    csv: hardpoints and axes.  glb: an animated model that a browser opens.  mjcf: a model for MuJoCo.  law: the motion
+    over one turn with units, .csv or .parquet.
+
+    pdf, svg, dxf: a sheet with three views, dimensions and tolerances, hardpoints and limits.  dxf needs `pip install
+    'linksweep[cad]'`.
 
     xlsx: the whole dataset as a workbook, best designs first, with optimum, curves and definitions; it needs
     `pip install 'linksweep[excel]'`.
@@ -71,6 +76,10 @@ def export(folder: Path, design: str | None, kind: str, out: Path | None, phi: f
         click.echo(f"xlsx: {write_workbook(folder, out or _place(folder, 'results.xlsx'))}")
         return
     grid_in_radians("phi", "rad", phi, None)  # --phi is in rad, whatever the design is
+    if kind in OF_DATASETS:
+        target = out or _place(folder, f"{design or 'result'}.{kind}")
+        click.echo(f"{kind}: {write_sheet(folder, design, target, phi)}")
+        return
     found = chosen(folder, design)
     if out is None:
         name = f"{design or 'result'}{'-law' if kind == 'law' else ''}{FORMATS[kind][0]}"

@@ -21,7 +21,7 @@ from sweep.families.machines import Machine, assemble
 from sweep.families.main_shaft import Driven, ShaftTorque
 from sweep.families.moments import Taking
 from sweep.families.parts import Member, coupler_joints, is_planar, placement, vector
-from sweep.families.relations import Distance, Reading, Relation, Speed, Timing
+from sweep.families.relations import Distance, EventValue, Relation, Speed, Timing
 from sweep.families.shafts import MOUNT_KEYS, SHAFT_KEYS, Mount, Shaft, read_mount, read_shafts
 from sweep.families.shaking import Shaken, Shaking, shaken
 from sweep.families.thread_balance import thread_balance
@@ -206,7 +206,7 @@ def _outputs(members: Mapping[str, Member], others: tuple[Any, ...]) -> Mapping[
     return assemble("", tuple(members.values()), relations).pose_output
 
 
-def _reading(name: str, table: dict[str, Any], outputs: Mapping[str, Output]) -> Reading:
+def _reading(name: str, table: dict[str, Any], outputs: Mapping[str, Output]) -> EventValue:
     """Value of a pose output at a crank angle."""
     where, given = f"machine.relations.{name}", table["value"]
     if len(table) != 1:
@@ -216,7 +216,7 @@ def _reading(name: str, table: dict[str, Any], outputs: Mapping[str, Output]) ->
     of, place = given
     if of not in outputs:
         raise InputError("value", of, f"a pose output of the machine{nearest(of, outputs)}", where)
-    return Reading(name, outputs[of], (place,))
+    return EventValue(name, outputs[of], (place,))
 
 
 def _event(name: str, table: dict[str, Any], outputs: Mapping[str, Output]) -> Event:
