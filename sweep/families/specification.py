@@ -17,16 +17,42 @@ from sweep.families.domain import Turn, reads_as_degrees
 from sweep.families.frames import crank_axis
 from sweep.families.gaps import Body, Gap
 from sweep.families.machines import Machine, assemble
-from sweep.families.moments import Taking
+from sweep.families.moments import RiseWindow, Taking
 from sweep.families.parts import Member, coupler_joints, is_planar, placement, vector
 from sweep.families.relations import Distance, Reading, Relation, ShaftTorque, Speed, Timing
 from sweep.families.shafts import MOUNT_KEYS, SHAFT_KEYS, Mount, Shaft, read_mount, read_shafts
 from sweep.families.shaking import Shaken, Shaking, shaken
 from sweep.families.thread_balance import thread_balance
-from sweep.families.tools import BLADE_KEYS, NEEDLE_KEYS, Blade, Needle, Tool, bodies, length, read_tools
+from sweep.families.tools import (
+    BLADE_KEYS,
+    NEEDLE_KEYS,
+    SEAM_KEYS,
+    Blade,
+    Needle,
+    Seam,
+    Spot,
+    Tool,
+    bodies,
+    length,
+    number,
+    read_tools,
+)
+from sweep.families.triangles import Entering
 
 MEMBER_KEYS = ("family", "chain", "ratio", "offset", "driver", "place", "tip", "eye", *MOUNT_KEYS)
-RELATION_KINDS = ("distance", "speed", "timing", "event", "value", "torque", "shaking", "thread", "gap", "take")
+RELATION_KINDS = (
+    "distance",
+    "speed",
+    "timing",
+    "event",
+    "value",
+    "torque",
+    "shaking",
+    "thread",
+    "gap",
+    "take",
+    "enter",
+)
 EVENT_KEYS = ("event", "level", "rising")
 _WORD = re.compile(r"[A-Za-z][A-Za-z0-9_]*")
 _ENDS_IN_DIGIT = re.compile(r".*\d")
@@ -70,7 +96,9 @@ def specification(
         found.append((name, _frozen(table)))
     between = tuple((name, _frozen(r)) for name, r in (relations or {}).items())
     turning = tuple((name, _frozen(s, "shaft", SHAFT_KEYS)) for name, s in (shafts or {}).items())
-    working = tuple((name, _frozen(t, "tool", (*NEEDLE_KEYS, *BLADE_KEYS))) for name, t in (tools or {}).items())
+    working = tuple(
+        (name, _frozen(t, "tool", (*NEEDLE_KEYS, *BLADE_KEYS, *SEAM_KEYS))) for name, t in (tools or {}).items()
+    )
     return Specification(tuple(found), between, turning, working)
 
 
@@ -242,6 +270,8 @@ def _relation(
         return _gap(name, table, bodies(members, tools), where)
     if "take" in table:
         return _taking(name, table, tools, where)
+    if "enter" in table:
+        return _entering(name, table, tools, where)
     if "thread" in table:
         return thread_balance(name, table, members)
     if len(table) != 1 or next(iter(table)) not in RELATION_KINDS:
@@ -296,14 +326,58 @@ def _gap(name: str, table: dict[str, Any], known: Mapping[str, Body], where: str
 
 def _taking(name: str, table: dict[str, Any], tools: Mapping[str, Tool], where: str) -> Taking:
     for key in table:
-        if key not in ("take", "sense"):
-            raise InputError(key, table[key], "take, sense", where)
+        if key not in ("take", "sense", "fields"):
+            raise InputError(key, table[key], "take, sense, fields", where)
     needle, blade = (tools[one] for one in _two(table["take"], list(tools), "tools", where))
     if not isinstance(needle, Needle) or not isinstance(blade, Blade):
         raise InputError("take", table["take"], "a needle, then a blade", where)
-    if table.get("sense", 1) not in (1, -1):
-        raise InputError("sense", table["sense"], "1 or -1: the tip passes along n x w or against it", where)
-    return Taking(name, needle, blade, int(table.get("sense", 1)))
+    window = _rise_window(table["fields"], where) if "fields" in table else None
+    return Taking(name, needle, blade, _sense(table, "the tip passes along n x w or against it", where), window)
+
+
+def _rise_window(given: tuple[tuple[str, Any], ...], where: str) -> RiseWindow:
+    """Read what rise each field of work permits; refuse fields that leave none in common."""
+    fields = []
+    for name, ends in given:
+        if not isinstance(ends, tuple) or len(ends) != 2:
+            raise InputError("fields", ends, "of each field the least and the most rise", where)
+        least, most = (length(name, end, where) for end in ends)
+        fields.append((name, least, most))
+    if not fields:
+        raise InputError("fields", {}, "at least one field with the least and the most rise", where)
+    window = RiseWindow(tuple(fields))
+    if window.least > window.most:
+        raise InputError("fields", dict(given), f"fields that leave a window in common, {window.words}: none is", where)
+    return window
+
+
+def _entering(name: str, table: dict[str, Any], tools: Mapping[str, Tool], where: str) -> Entering:
+    for key in table:
+        if key not in ("enter", "sense", "window"):
+            raise InputError(key, table[key], "enter, sense, window", where)
+    if len(table["enter"]) != 3:
+        raise InputError("enter", table["enter"], "three tools: what passes, a blade, the seam", where)
+    entering, blade, seam = (tools[one] for one in _each(table["enter"], list(tools), "tools", where))
+    if not isinstance(entering, Needle | Blade) or not isinstance(blade, Blade) or not isinstance(seam, Seam):
+        raise InputError("enter", table["enter"], "a needle or blade, a blade, a seam", where)
+    if not (blade.eye and blade.hold):
+        raise InputError("enter", blade.name, "a blade with eye and hold", where)
+    window = None
+    if "window" in table:
+        if not isinstance(table["window"], tuple) or len(table["window"]) != 2:
+            raise InputError("window", table["window"], "two crank angles, from and to", where)
+        start, end = (number("window", one, where) for one in table["window"])
+        window = (start, end)
+    corners = (Spot(blade.eye), Spot(blade.hold), Spot(at=seam.at))
+    sense = _sense(table, "the tip passes along the normal of eye, hold, seam, or against it", where)
+    return Entering(name, entering.working, corners, entering.radius, sense, window)
+
+
+def _sense(table: Mapping[str, Any], words: str, where: str) -> int:
+    sense = table.get("sense", 1)
+    if sense not in (1, -1) or isinstance(sense, bool):
+        raise InputError("sense", sense, f"1 or -1: {words}", where)
+    return int(sense)
 
 
 def _stages(family: Family) -> list[str]:
