@@ -128,15 +128,17 @@ class Poses:
 
         if not row.size:
             return np.zeros(0)
-        grid = start[:, None] + np.linspace(0.0, 1.0, samples) * (end - start)[:, None]
+        step = 1.0 / (samples - 1)  # one sample beyond either end, so that a dip next to an end has neighbours
+        grid = start[:, None] + np.linspace(-step, 1.0 + step, samples + 2) * (end - start)[:, None]
         values = self.at(row, grid, name)[0]
-        least: Array = values.min(axis=1)
+        least: Array = values[:, 1:-1].min(axis=1)
         k, j = np.nonzero((values[:, 1:-1] <= values[:, :-2]) & (values[:, 1:-1] <= values[:, 2:]))
         if k.size:
             of: Any = lambda phi, rows: self.near(rows.astype(np.intp), phi, name)  # noqa: E731
             args: Any = (row[k],)
             found = find_minimum(of, (grid[k, j], grid[k, j + 1], grid[k, j + 2]), args=args)
-            np.minimum.at(least, k, self.at(row[k], np.asarray(found.x, np.float64), name)[0])
+            phi = np.clip(np.asarray(found.x, np.float64), start[k], end[k])
+            np.minimum.at(least, k, self.at(row[k], phi, name)[0])
         return least
 
 

@@ -101,6 +101,7 @@ class RelationSection(Section):
     window: Annotated[list[str], Field(min_length=2, max_length=2)] | None = Field(
         None, description='of an enter, from and to, as ["200 deg", "300 deg"]'
     )
+    settings: str | None = Field(None, description='of a take, a real machine whose settings are limits: "juki-mo-104d"')
     torque: Names | None = Field(None, description='members, as ["needle", "looper"]')
     shaking: Names | None = Field(None, description='members, as ["needle", "looper"]')
 
@@ -201,7 +202,7 @@ def _machine(
     relations = {}
     for name, raw in _tables(data, "relations", faults).items():
         section = read_section(RelationSection, raw, ("relations", name), faults)
-        relations[name] = section.model_dump(exclude_none=True)
+        relations[name] = section.model_dump(exclude_none=True, exclude={"settings"})
         if section.radii is not None:
             relations[name]["radii"] = _lengths(section.radii, ("relations", name, "radii"), faults)
         for field, ends in (section.fields or {}).items():
