@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from kernels import status as st
 from kernels.types import EPS, TWO_PI, Array
-from sweep.families.base import Accuracy, Angles, Columns, Output, Step, Work
+from sweep.families.base import Accuracy, Angles, Columns, Family, Output, Step, Work
 
 if TYPE_CHECKING:
     from sweep.families.machines import Machine
@@ -58,8 +58,8 @@ def step_of(name: str, provides: Sequence[Output], machine: Machine, passages: P
 class Poses:
     """Pose outputs of several designs, at one angle of each or some: found quickly, read precisely."""
 
-    quick: Machine
-    precise: Machine
+    quick: Family
+    precise: Family
     designs: Array
 
     def at(self, rows: Any, phi: Array, *names: str) -> list[Array]:
@@ -70,9 +70,9 @@ class Poses:
         """Return an output as the search for a root needs it."""
         return self._of(self.quick, rows, phi, (name,))[0]
 
-    def _of(self, machine: Machine, rows: Any, phi: Array, names: Sequence[str]) -> list[Array]:
+    def _of(self, family: Family, rows: Any, phi: Array, names: Sequence[str]) -> list[Array]:
         angles = Angles.of(phi if phi.ndim == 2 else phi[:, None])
-        found = machine.poses(self.designs[rows], angles, frozenset(names))
+        found = family.poses(self.designs[rows], angles, frozenset(names))
         return [np.asarray(found[name], np.float64).reshape(phi.shape) for name in names]
 
     def samples(self, names: Sequence[str], count: int) -> tuple[NDArray[np.uint8], list[Array]]:

@@ -101,7 +101,9 @@ class RelationSection(Section):
     window: Annotated[list[str], Field(min_length=2, max_length=2)] | None = Field(
         None, description='of an enter, from and to, as ["200 deg", "300 deg"]'
     )
-    settings: str | None = Field(None, description='of a take, a real machine whose settings are limits: "juki-mo-104d"')
+    settings: str | None = Field(
+        None, description='of a take, a real machine whose settings are limits: "juki-mo-104d"'
+    )
     torque: Names | None = Field(None, description='members, as ["needle", "looper"]')
     shaking: Names | None = Field(None, description='members, as ["needle", "looper"]')
 
