@@ -100,7 +100,7 @@ def _strokes(poses: Poses, family: Family, member: str, name: str, dwell: float)
 
         def off(phi: float, level: float = exact[k]) -> float:
             away = poses.at(np.zeros(1, np.intp), np.array([phi]), name)[0][0] - level
-            return abs(away - TWO_PI * round(away / TWO_PI) if wraps else away) - band
+            return float(abs(away - TWO_PI * round(away / TWO_PI) if wraps else away)) - band
 
         start, end = (_left(off, float(ends[k]), way) for way in (-1.0, 1.0))
         yield member, "dwell", word, start % TWO_PI, end % TWO_PI, band

@@ -17,27 +17,13 @@ from sweep.families.domain import Turn, reads_as_degrees
 from sweep.families.frames import crank_axis
 from sweep.families.gaps import Body, Gap
 from sweep.families.machines import Machine, assemble
-from sweep.families.moments import RiseWindow, Taking
 from sweep.families.parts import Member, coupler_joints, is_planar, placement, vector
-from sweep.families.relations import Distance, Reading, Relation, ShaftTorque, Speed, Timing
+from sweep.families.relations import Distance, Reading, Relation, ShaftTorque, Speed, Timing, each, two
 from sweep.families.shafts import MOUNT_KEYS, SHAFT_KEYS, Mount, Shaft, read_mount, read_shafts
 from sweep.families.shaking import Shaken, Shaking, shaken
+from sweep.families.stitching import read_entering, read_taking
 from sweep.families.thread_balance import thread_balance
-from sweep.families.tools import (
-    BLADE_KEYS,
-    NEEDLE_KEYS,
-    SEAM_KEYS,
-    Blade,
-    Needle,
-    Seam,
-    Spot,
-    Tool,
-    bodies,
-    length,
-    number,
-    read_tools,
-)
-from sweep.families.triangles import Entering
+from sweep.families.tools import BLADE_KEYS, NEEDLE_KEYS, SEAM_KEYS, Tool, bodies, length, read_tools
 
 MEMBER_KEYS = ("family", "chain", "ratio", "offset", "driver", "place", "tip", "eye", *MOUNT_KEYS)
 RELATION_KINDS = (
@@ -269,9 +255,9 @@ def _relation(
     if "gap" in table:
         return _gap(name, table, bodies(members, tools), where)
     if "take" in table:
-        return _taking(name, table, tools, where)
+        return read_taking(name, table, tools, where)
     if "enter" in table:
-        return _entering(name, table, tools, where)
+        return read_entering(name, table, tools, where)
     if "thread" in table:
         return thread_balance(name, table, members)
     if len(table) != 1 or next(iter(table)) not in RELATION_KINDS:
@@ -281,14 +267,14 @@ def _relation(
         raise InputError(kind, given, "a list of names", where)
     if kind == "distance":
         points = [f"{m.name}.{point}" for m in members.values() for point in m.points]
-        return Distance(name, _two(given, points, "points", where))
+        return Distance(name, two(given, points, "points", where))
     if kind == "speed":
         moving = [f"{m.name}.{point}" for m in members.values() for point in m.moving]
         if len(given) == 1:
-            return Speed(name, _each(given, moving, "points whose velocity is known", where))
-        return Speed(name, _two(given, moving, "points whose velocity is known", where))
+            return Speed(name, each(given, moving, "points whose velocity is known", where))
+        return Speed(name, two(given, moving, "points whose velocity is known", where))
     if kind == "timing":
-        return Timing(name, _two(given, None, "crank angles", where))
+        return Timing(name, two(given, None, "crank angles", where))
     known = {f"{m.name}{number}": (m.name, number) for m in members.values() for number in _stages(m.family)}
     known |= {m.name: (m.name, _stages(m.family)[0]) for m in members.values()}
     for part in given:
@@ -317,83 +303,13 @@ def _gap(name: str, table: dict[str, Any], known: Mapping[str, Body], where: str
     for key in table:
         if key not in ("gap", "radii"):
             raise InputError(key, table[key], "gap, radii", where)
-    first, second = (known[one] for one in _two(table["gap"], list(known), "bodies", where))
+    first, second = (known[one] for one in two(table["gap"], list(known), "bodies", where))
     if "radii" in table:
         a, b = (length("radii", radius, where) for radius in table["radii"])
         first, second = replace(first, radius=a), replace(second, radius=b)
     return Gap(name, (first, second))
 
 
-def _taking(name: str, table: dict[str, Any], tools: Mapping[str, Tool], where: str) -> Taking:
-    for key in table:
-        if key not in ("take", "sense", "fields"):
-            raise InputError(key, table[key], "take, sense, fields", where)
-    needle, blade = (tools[one] for one in _two(table["take"], list(tools), "tools", where))
-    if not isinstance(needle, Needle) or not isinstance(blade, Blade):
-        raise InputError("take", table["take"], "a needle, then a blade", where)
-    window = _rise_window(table["fields"], where) if "fields" in table else None
-    return Taking(name, needle, blade, _sense(table, "the tip passes along n x w or against it", where), window)
-
-
-def _rise_window(given: tuple[tuple[str, Any], ...], where: str) -> RiseWindow:
-    """Read what rise each field of work permits; refuse fields that leave none in common."""
-    fields = []
-    for name, ends in given:
-        if not isinstance(ends, tuple) or len(ends) != 2:
-            raise InputError("fields", ends, "of each field the least and the most rise", where)
-        least, most = (length(name, end, where) for end in ends)
-        fields.append((name, least, most))
-    if not fields:
-        raise InputError("fields", {}, "at least one field with the least and the most rise", where)
-    window = RiseWindow(tuple(fields))
-    if window.least > window.most:
-        raise InputError("fields", dict(given), f"fields that leave a window in common, {window.words}: none is", where)
-    return window
-
-
-def _entering(name: str, table: dict[str, Any], tools: Mapping[str, Tool], where: str) -> Entering:
-    for key in table:
-        if key not in ("enter", "sense", "window"):
-            raise InputError(key, table[key], "enter, sense, window", where)
-    if len(table["enter"]) != 3:
-        raise InputError("enter", table["enter"], "three tools: what passes, a blade, the seam", where)
-    entering, blade, seam = (tools[one] for one in _each(table["enter"], list(tools), "tools", where))
-    if not isinstance(entering, Needle | Blade) or not isinstance(blade, Blade) or not isinstance(seam, Seam):
-        raise InputError("enter", table["enter"], "a needle or blade, a blade, a seam", where)
-    if not (blade.eye and blade.hold):
-        raise InputError("enter", blade.name, "a blade with eye and hold", where)
-    window = None
-    if "window" in table:
-        if not isinstance(table["window"], tuple) or len(table["window"]) != 2:
-            raise InputError("window", table["window"], "two crank angles, from and to", where)
-        start, end = (number("window", one, where) for one in table["window"])
-        window = (start, end)
-    corners = (Spot(blade.eye), Spot(blade.hold), Spot(at=seam.at))
-    sense = _sense(table, "the tip passes along the normal of eye, hold, seam, or against it", where)
-    return Entering(name, entering.working, corners, entering.radius, sense, window)
-
-
-def _sense(table: Mapping[str, Any], words: str, where: str) -> int:
-    sense = table.get("sense", 1)
-    if sense not in (1, -1) or isinstance(sense, bool):
-        raise InputError("sense", sense, f"1 or -1: {words}", where)
-    return int(sense)
-
-
 def _stages(family: Family) -> list[str]:
     stages = getattr(family, "stages", ())
     return [str(stage.number) for stage in stages] or [""]
-
-
-def _two(given: tuple[str, ...], known: Sequence[str] | None, what: str, where: str) -> tuple[str, str]:
-    if len(given) != 2:
-        raise InputError(what, given, f"two {what}", where)
-    first, second = given if known is None else _each(given, known, what, where)
-    return first, second
-
-
-def _each(given: tuple[str, ...], known: Sequence[str], what: str, where: str) -> tuple[str, ...]:
-    for part in given:
-        if part not in known:
-            raise InputError(what, part, f"{what}: {choices(part, known)}", where)
-    return given
