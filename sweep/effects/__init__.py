@@ -22,7 +22,7 @@ from sweep.families.chain import Chain
 from sweep.families.machines import Machine
 from sweep.families.names import stem
 from sweep.families.reduction import reduced
-from sweep.families.relations import Reading
+from sweep.families.relations import EventValue
 from sweep.numerics.curves import Curve
 
 # Name of each effect's entry: module and constant.  A new effect is a kernel file, an entry file and its line here.
@@ -238,7 +238,7 @@ def _asked(machine: Machine, wanted: Iterable[str]) -> set[str]:
     asked = [timing for timing in machine.timings if timing.name in names]
     places = [place for timing in asked for place in timing.places]
     names |= {about for name in places for about in reduced(name, machine.domain)}
-    names |= {timing.of.name for timing in asked if isinstance(timing, Reading)}
+    names |= {timing.of.name for timing in asked if isinstance(timing, EventValue)}
     for relation in machine.relations:
         if not names.isdisjoint(o.name for o in relation.outputs):
             names |= relation.needs(frozenset(names))

@@ -17,7 +17,7 @@ from sweep.exchange.dxf import NAMED, ezdxf_or_refuse
 from sweep.families import NAMES
 from sweep.families import family as find_family
 from sweep.families.base import Array, Family
-from sweep.families.capabilities import Hardpoints, Reading
+from sweep.families.capabilities import FittedPose, Hardpoints
 from sweep.families.hardpoints import size
 from sweep.families.parts import Placement, vector
 
@@ -145,7 +145,7 @@ def _checked(reader: Hardpoints, points: Mapping[str, Sequence[float] | Array]) 
     return given
 
 
-def _joints(family: Family, reading: Reading, given: Mapping[str, Array]) -> dict[str, Array]:
+def _joints(family: Family, reading: FittedPose, given: Mapping[str, Array]) -> dict[str, Array]:
     """Return the places, in the drawing's frame, of the joints that have a given point."""
     (part,) = parts(family, reading.parameters, reading.phi)
     z, x = reading.z, reading.x

@@ -19,7 +19,7 @@ from sweep.families.frames import Frame
 from sweep.families.moments import Taking
 from sweep.families.parts import AXES, EYE, TIP, Member, coordinates, coupler_joints, velocity
 from sweep.families.passages import taking_step
-from sweep.families.relations import Reading, Relation, Timing
+from sweep.families.relations import EventValue, Relation, Timing
 from sweep.families.shaking import Shaking
 from sweep.families.sites import coordinates as coordinates_of_site
 from sweep.families.sites import made_of
@@ -37,7 +37,7 @@ class Machine(Family):
 
     members: tuple[Member, ...] = ()
     relations: tuple[Relation, ...] = ()
-    timings: tuple[Timing | Reading, ...] = ()
+    timings: tuple[Timing | EventValue, ...] = ()
 
     def member(self, name: str) -> Member:
         """Return the member of that name."""
@@ -69,12 +69,12 @@ class Machine(Family):
 
 
 def assemble(
-    name: str, members: tuple[Member, ...], relations: tuple[Relation | Timing | Reading | Event, ...]
+    name: str, members: tuple[Member, ...], relations: tuple[Relation | Timing | EventValue | Event, ...]
 ) -> Machine:
     """Return the machine of these members; each may be driven by one that stands before it."""
-    timings = tuple(r for r in relations if isinstance(r, Timing | Reading))
+    timings = tuple(r for r in relations if isinstance(r, Timing | EventValue))
     events = tuple(r for r in relations if isinstance(r, Event))
-    others = tuple(r for r in relations if not isinstance(r, Timing | Reading | Event))
+    others = tuple(r for r in relations if not isinstance(r, Timing | EventValue | Event))
     bare = Machine(name, "", (), "", (), _no_poses, relations=others, timings=timings, events=events)
     return _built(bare, members)
 

@@ -51,7 +51,7 @@ class Timing:
 
 
 @dataclass(frozen=True)
-class Reading:
+class EventValue:
     """Value of a pose output where something happens, such as the speed of a tip where it arrives.
 
     ``of`` is the pose output as the machine has it; ``places`` holds one design output that is a crank angle of the

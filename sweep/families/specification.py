@@ -18,7 +18,7 @@ from sweep.families.frames import crank_axis
 from sweep.families.gaps import Body, Gap
 from sweep.families.machines import Machine, assemble
 from sweep.families.parts import Member, coupler_joints, is_planar, placement, vector
-from sweep.families.relations import Distance, Reading, Relation, ShaftTorque, Speed, Timing, each, two
+from sweep.families.relations import Distance, EventValue, Relation, ShaftTorque, Speed, Timing, each, two
 from sweep.families.shafts import MOUNT_KEYS, SHAFT_KEYS, Mount, Shaft, read_mount, read_shafts
 from sweep.families.shaking import Shaken, Shaking, shaken
 from sweep.families.stitching import read_entering, read_taking
@@ -27,18 +27,8 @@ from sweep.families.tools import BLADE_KEYS, NEEDLE_KEYS, SEAM_KEYS, Tool, bodie
 
 MEMBER_KEYS = ("family", "chain", "ratio", "offset", "driver", "place", "tip", "eye", *MOUNT_KEYS)
 RELATION_KINDS = (
-    "distance",
-    "speed",
-    "timing",
-    "event",
-    "value",
-    "torque",
-    "shaking",
-    "thread",
-    "gap",
-    "take",
-    "enter",
-)
+    "distance", "speed", "timing", "event", "value", "torque", "shaking", "thread", "gap", "take", "enter",
+)  # fmt: skip
 EVENT_KEYS = ("event", "level", "rising")
 _WORD = re.compile(r"[A-Za-z][A-Za-z0-9_]*")
 _ENDS_IN_DIGIT = re.compile(r".*\d")
@@ -218,7 +208,7 @@ def _outputs(members: Mapping[str, Member], others: tuple[Any, ...]) -> Mapping[
     return assemble("", tuple(members.values()), relations).pose_output
 
 
-def _reading(name: str, table: dict[str, Any], outputs: Mapping[str, Output]) -> Reading:
+def _reading(name: str, table: dict[str, Any], outputs: Mapping[str, Output]) -> EventValue:
     """Value of a pose output at a crank angle."""
     where, given = f"machine.relations.{name}", table["value"]
     if len(table) != 1:
@@ -228,7 +218,7 @@ def _reading(name: str, table: dict[str, Any], outputs: Mapping[str, Output]) ->
     of, place = given
     if of not in outputs:
         raise InputError("value", of, f"a pose output of the machine{nearest(of, outputs)}", where)
-    return Reading(name, outputs[of], (place,))
+    return EventValue(name, outputs[of], (place,))
 
 
 def _event(name: str, table: dict[str, Any], outputs: Mapping[str, Output]) -> Event:

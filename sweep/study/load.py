@@ -42,7 +42,7 @@ from sweep.study.task import check_task, read_study_task
 from sweep.study.thread import read_threads
 from sweep.study.tolerance import check_tolerance, read_tolerance
 from sweep.study.toml import key_lines, read_toml, toml_text
-from sweep.synthesis.tasks.problem import Problem
+from sweep.synthesis.tasks.problem import SynthesisTask
 
 
 def load_study(path: str | Path, smoke: bool = False) -> Study:
@@ -140,7 +140,7 @@ class _Alone:
     optimise: OptimiseSettings | None
     tolerance: Tolerance | None
     front_time: float | None
-    task: Problem | None
+    task: SynthesisTask | None
     budget: Budget
 
 
