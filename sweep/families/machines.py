@@ -16,6 +16,7 @@ from sweep.families.base import Angles, Columns, Event, Family, Output, Paramete
 from sweep.families.capabilities import Assembly, Points
 from sweep.families.curve_features import of_members
 from sweep.families.frames import Frame
+from sweep.families.main_shaft import ShaftTorque, speed_of
 from sweep.families.moments import Taking
 from sweep.families.parts import AXES, EYE, TIP, Member, coordinates, coupler_joints, velocity
 from sweep.families.passages import taking_step
@@ -136,6 +137,7 @@ def _built(machine: Machine, members: tuple[Member, ...]) -> Machine:
     found = replace(found, poses=poses, precise_poses=precise)
     steps = [taking_step(r, found) for r in machine.relations if isinstance(r, Taking)]
     steps += [entering_step(r, found) for r in machine.relations if isinstance(r, Entering)]
+    steps += [speed_of(r, found) for r in machine.relations if isinstance(r, ShaftTorque)]
     return replace(found, steps=tuple(steps))
 
 
@@ -157,7 +159,10 @@ def _precise_poses(machine: Machine, designs: Array, angles: Angles, wanted: fro
 def _poses(machine: Machine, designs: Array, angles: Angles, wanted: frozenset[str]) -> Columns:
     """Compute the wanted outputs of members and relations, and the first status that is not OK."""
     relations = [r for r in machine.relations if not wanted.isdisjoint(o.name for o in r.outputs)]
+    columns_of = machine.parameter_names
     needed = set(wanted).union(*(r.needs(wanted) for r in relations))
+    inputs = needed.intersection(columns_of) | {p.name for r in relations for p in r.parameters}
+    needed -= inputs
     for m in reversed(machine.members):
         needed |= _driving(m, needed)
     shape = (len(designs), angles.cos.shape[1])
@@ -171,8 +176,7 @@ def _poses(machine: Machine, designs: Array, angles: Angles, wanted: frozenset[s
             found |= {f"{m.name}.{name}": values for name, values in columns.items()}
     frames = _frames(machine, designs) if any(isinstance(r, Shaking) for r in relations) else {}
     found["phi"] = angles.phi
-    columns_of = machine.parameter_names
-    found |= {p.name: designs[:, [columns_of.index(p.name)]] for r in relations for p in r.parameters}
+    found |= {name: designs[:, [columns_of.index(name)]] for name in inputs}
     for relation in relations:
         found |= relation.compute(found, frames, wanted)
     return {name: _whole(found[name], shape) for name in wanted} | {"status": status}

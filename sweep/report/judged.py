@@ -30,7 +30,7 @@ def row_of(study: Study, design: Mapping[str, float]) -> Row:
 
 def judged(data: Dataset, rows: Sequence[Row], names: Sequence[str]) -> dict[str, Any]:
     """Return what a page shows of designs under their names; the first one is in hand, the others beside it."""
-    seen = [_as_result(data, row) for row in rows]
+    seen = [as_result(data, row) for row in rows]
     roles = ["result", *(f"pin pin-{k}" for k in range(1, len(rows)))]
     shown = [Shown(name, role, status_words(row), row) for name, role, row in zip(names, roles, rows, strict=True)]
     outputs, limits = [output_rows(one) for one in seen], [limit_states(one) for one in seen]
@@ -52,7 +52,8 @@ def judged(data: Dataset, rows: Sequence[Row], names: Sequence[str]) -> dict[str
     }  # fmt: skip
 
 
-def _as_result(data: Dataset, row: Row) -> Dataset:
+def as_result(data: Dataset, row: Row) -> Dataset:
+    """Return a study with a design in the place of its result."""
     return replace(data, best=row, optima=None, computed_reference=None)
 
 
@@ -86,7 +87,7 @@ def write_comparison(folders: Sequence[Path], out: Path) -> Path:
     first = found[0].design
     rows = [row_of(data.study, first | {name: one.design[name] for name in own}) for one in found]
     compared = judged(data, rows, names)
-    lines = [parameter_rows(_as_result(data, row)) for row in rows]
+    lines = [parameter_rows(as_result(data, row)) for row in rows]
     from jinja2 import Environment, FileSystemLoader, StrictUndefined
 
     environment = Environment(loader=FileSystemLoader(TEMPLATES), autoescape=True, undefined=StrictUndefined)

@@ -254,13 +254,19 @@ class MechanismView {
   draw() {
     this.renderer.render(this.scene, this.camera);
     const { clientWidth: width, clientHeight: height } = this.host;
+    const taken = [];
     for (const { label, group, at } of this.points) {
       const place = at(this.share).clone().applyMatrix4(group.matrixWorld).project(this.camera);
       const shown = this.named && Number.isFinite(place.x);
       label.style.display = shown ? "" : "none";
-      if (shown) {
-        label.style.transform = `translate(${((place.x + 1) * width) / 2}px, ${((1 - place.y) * height) / 2}px)`;
-      }
+      if (!shown) continue;
+      const x = ((place.x + 1) * width) / 2, wide = 7 * label.textContent.length + 4;
+      let y = ((1 - place.y) * height) / 2;
+      // A name that would cover another one stands above it.
+      const covers = (other) => Math.abs(other.y - y) < 13 && x < other.x + other.wide && other.x < x + wide;
+      while (taken.some(covers)) y -= 13;
+      taken.push({ x, y, wide });
+      label.style.transform = `translate(${x}px, ${y}px)`;
     }
   }
 }
