@@ -15,6 +15,7 @@ from sweep.families.capabilities import JointRecords
 
 FRICTION_SUFFIX, FRICTION_TEXT = "_friction", ", friction included"
 AXES = "xyz"
+GRAM = "; a gram is 1e-6"  # kilograms are what one types
 
 Named: TypeAlias = dict[str, tuple[str, str]]
 """Unit and meaning by name."""
@@ -42,7 +43,7 @@ def body_inputs(body: str, frame: str, default: float | None = None) -> tuple[Pa
         )
         for x, y in ("xx", "xy", "xz", "yy", "yz", "zz")
     )
-    mass = Parameter(f"m_{body}", "mass", f"mass of the {body}", default=default, not_negative=True)
+    mass = Parameter(f"m_{body}", "mass", f"mass of the {body}{GRAM}", default=default, not_negative=True)
     return mass, *centre, *moments
 
 
@@ -50,10 +51,19 @@ def _body(body: str) -> tuple[Parameter, ...]:
     return body_inputs(body, _FRAMES[body])
 
 
+def slender(body: str) -> Parameter:
+    """Whether a body is a slender rod as far as nothing is said of its centre and inertia."""
+    own = f"rod_{body}"
+    others = tuple((own, p.name) for p in _body(body) if not p.name.startswith("m_"))
+    text = f"1: the mass of the {body} is that of a slender rod between its joints, centre halfway, inertia m l^2/12"
+    words = f"{text}; 0 where its centre or inertia is given, else"
+    return Parameter(own, "choice", words, default=1.0, choices=(0.0, 1.0), unless=others)
+
+
 def rod_inputs(body: str, frame: str) -> tuple[Parameter, ...]:
     """Mass, centre of mass and inertia of a slender rod."""
     return (
-        Parameter(f"m_{body}", "mass", f"mass of {body}", default=0.0, not_negative=True),
+        Parameter(f"m_{body}", "mass", f"mass of {body}{GRAM}", default=0.0, not_negative=True),
         Parameter(f"com_{body}_x", "length", f"centre of mass of {body} ({frame})", default=0.0),
         Parameter(f"j_{body}", "inertia", f"inertia of {body} across it about its centre of mass", default=0.0,
                   not_negative=True),
@@ -86,9 +96,9 @@ FREE_TOOL = (
         for axis in "xyz"
     ),
 )
+_ALONG = {"x": "the output link", "y": "its tangent", "z": "its axis, from z = 0 of the frame"}
 TIP = tuple(
-    Parameter(f"tip_{axis}", "length", f"place of the tool along {axis} of the output link's axes", default=0.0)
-    for axis in "xyz"
+    Parameter(f"tool_{axis}", "length", f"place of the tool along {way}", default=0.0) for axis, way in _ALONG.items()
 )
 # Of families with a point of the coupler that a tool hangs on: one that moves along a line, one that moves freely; and
 # of families whose rocker can carry a tool at its tip.
@@ -108,13 +118,15 @@ class Follower(NamedTuple):
     prefix: str  # of the names of its effects
     load: Parameter
     bodies: tuple[str, ...]  # columns of kernels.effects.kinetostatics in order
+    rods: tuple[str, ...]  # of those that may be slender rods, in the order of the bodies
     parameters: tuple[Parameter, ...]
 
 
 def _follower(name: str, prefix: str, load: Parameter) -> Follower:
     bodies = (*_body("crank"), *_body("coupler"), *_body(name), *GRAVITY)
-    parameters = (*bodies, load, SPEED, CHANGE, CONSTRUCTION)
-    return Follower(name, prefix, load, tuple(p.name for p in bodies), parameters)
+    rods = tuple(slender(body) for body in ("crank", "coupler", name) if body != "slider")
+    parameters = (*bodies, *rods, load, SPEED, CHANGE, CONSTRUCTION)
+    return Follower(name, prefix, load, tuple(p.name for p in bodies), tuple(p.name for p in rods), parameters)
 
 
 LINK_TORQUE = Parameter(
@@ -177,6 +189,16 @@ def magnitude(vectors: Array) -> Array:
     x, y, z = vectors[:, :, 0], vectors[:, :, 1], vectors[:, :, 2]
     length: Array = np.sqrt(x * x + y * y + z * z)
     return length
+
+
+def tip_from(scene: Scene, heights: Array) -> Array:
+    """Place of a tool at the tip of the output link, (n, 3), from the point of its axis at these heights, (n,).
+
+    Inputs count from the point with z = 0, as tips of a machine do; bodies and loads count from D.
+    """
+    place = scene.table(tuple(p.name for p in TIP))
+    place[:, 2] -= heights
+    return place
 
 
 def together(scene: Scene, shaft: str) -> NDArray[np.bool_]:

@@ -25,7 +25,7 @@ from sweep.families.domain import Interval, March
 from sweep.families.machines import Machine
 from sweep.families.names import error_of, is_place
 from sweep.families.parts import Member, Stage
-from sweep.families.relations import Reading
+from sweep.families.relations import EventValue
 from sweep.quantities.kinds import Extent, Group, Margin, Negative, Quantity, TimingOf, group_of
 from sweep.quantities.resolve import resolve
 from sweep.reductions.margins import NAMES as MARGINS
@@ -38,6 +38,7 @@ from sweep.reductions.turn import margin_group
 PARTIAL = (
     st.OK, st.NOT_OSCILLATING, st.NOT_CONVERGED, st.NO_DWELL, st.JAMMED, st.NOT_LINEAR, st.SINGULAR, st.INVALID_INPUT,
     st.NO_EVENT, st.NEVER, st.TWICE, st.TANGENT, st.WRONG_SIDE, st.WRONG_WAY, st.NO_FRAME,
+    st.NO_TRIANGLE,
 )  # fmt: skip
 GOES_ON = np.isin(np.arange(256), PARTIAL)
 
@@ -192,7 +193,7 @@ def _composed(family: Family, asked: Negative | Extent | TimingOf, accuracy: Acc
         case TimingOf(timing=timing):
             of = timing.places
             order = max(route.order for route in routes(family, of, accuracy))
-            if isinstance(timing, Reading):
+            if isinstance(timing, EventValue):
                 assert isinstance(family, Machine)
                 title, compose = f"value {name}", partial(composed.value_at, family, timing)
             else:

@@ -16,13 +16,15 @@ from sweep.families.base import Angles, Columns, Event, Family, Output, Paramete
 from sweep.families.capabilities import Assembly, Points
 from sweep.families.curve_features import of_members
 from sweep.families.frames import Frame
+from sweep.families.main_shaft import ShaftTorque, speed_of
 from sweep.families.moments import Taking
 from sweep.families.parts import AXES, EYE, TIP, Member, coordinates, coupler_joints, velocity
-from sweep.families.passages import step_of
-from sweep.families.relations import Reading, Relation, Timing
+from sweep.families.passages import taking_step
+from sweep.families.relations import EventValue, Relation, Timing
 from sweep.families.shaking import Shaking
 from sweep.families.sites import coordinates as coordinates_of_site
 from sweep.families.sites import made_of
+from sweep.families.triangles import Entering, entering_step
 
 
 @dataclass(frozen=True)
@@ -36,7 +38,7 @@ class Machine(Family):
 
     members: tuple[Member, ...] = ()
     relations: tuple[Relation, ...] = ()
-    timings: tuple[Timing | Reading, ...] = ()
+    timings: tuple[Timing | EventValue, ...] = ()
 
     def member(self, name: str) -> Member:
         """Return the member of that name."""
@@ -68,12 +70,12 @@ class Machine(Family):
 
 
 def assemble(
-    name: str, members: tuple[Member, ...], relations: tuple[Relation | Timing | Reading | Event, ...]
+    name: str, members: tuple[Member, ...], relations: tuple[Relation | Timing | EventValue | Event, ...]
 ) -> Machine:
     """Return the machine of these members; each may be driven by one that stands before it."""
-    timings = tuple(r for r in relations if isinstance(r, Timing | Reading))
+    timings = tuple(r for r in relations if isinstance(r, Timing | EventValue))
     events = tuple(r for r in relations if isinstance(r, Event))
-    others = tuple(r for r in relations if not isinstance(r, Timing | Reading | Event))
+    others = tuple(r for r in relations if not isinstance(r, Timing | EventValue | Event))
     bare = Machine(name, "", (), "", (), _no_poses, relations=others, timings=timings, events=events)
     return _built(bare, members)
 
@@ -115,7 +117,7 @@ def _built(machine: Machine, members: tuple[Member, ...]) -> Machine:
         f"{m.name}.{name}": f"{m.name}.{of}" for m in placed for name, of in m.family.derivative_of.items()
     }
     outputs += [o for relation in machine.relations for o in relation.outputs]
-    derivative_of |= {k: v for r in machine.relations if isinstance(r, Taking) for k, v in r.rates.items()}
+    derivative_of |= {k: v for r in machine.relations if isinstance(r, Taking | Entering) for k, v in r.rates.items()}
     loops = tuple(_loop(m, loop) for m in placed for loop in m.family.every(Assembly))
     found = replace(
         machine,
@@ -133,7 +135,10 @@ def _built(machine: Machine, members: tuple[Member, ...]) -> Machine:
     poses = partial(_poses, found)
     precise = partial(_precise_poses, found) if any(m.family.precise_poses for m in placed) else None
     found = replace(found, poses=poses, precise_poses=precise)
-    return replace(found, steps=tuple(step_of(r, found) for r in machine.relations if isinstance(r, Taking)))
+    steps = [taking_step(r, found) for r in machine.relations if isinstance(r, Taking)]
+    steps += [entering_step(r, found) for r in machine.relations if isinstance(r, Entering)]
+    steps += [speed_of(r, found) for r in machine.relations if isinstance(r, ShaftTorque)]
+    return replace(found, steps=tuple(steps))
 
 
 def _loop(member: Member, loop: Assembly) -> Assembly:
@@ -154,7 +159,10 @@ def _precise_poses(machine: Machine, designs: Array, angles: Angles, wanted: fro
 def _poses(machine: Machine, designs: Array, angles: Angles, wanted: frozenset[str]) -> Columns:
     """Compute the wanted outputs of members and relations, and the first status that is not OK."""
     relations = [r for r in machine.relations if not wanted.isdisjoint(o.name for o in r.outputs)]
+    columns_of = machine.parameter_names
     needed = set(wanted).union(*(r.needs(wanted) for r in relations))
+    inputs = needed.intersection(columns_of) | {p.name for r in relations for p in r.parameters}
+    needed -= inputs
     for m in reversed(machine.members):
         needed |= _driving(m, needed)
     shape = (len(designs), angles.cos.shape[1])
@@ -168,8 +176,7 @@ def _poses(machine: Machine, designs: Array, angles: Angles, wanted: frozenset[s
             found |= {f"{m.name}.{name}": values for name, values in columns.items()}
     frames = _frames(machine, designs) if any(isinstance(r, Shaking) for r in relations) else {}
     found["phi"] = angles.phi
-    columns_of = machine.parameter_names
-    found |= {p.name: designs[:, [columns_of.index(p.name)]] for r in relations for p in r.parameters}
+    found |= {name: designs[:, [columns_of.index(name)]] for name in inputs}
     for relation in relations:
         found |= relation.compute(found, frames, wanted)
     return {name: _whole(found[name], shape) for name in wanted} | {"status": status}
@@ -217,13 +224,15 @@ def _member(m: Member, designs: Array, angles: Angles, own: set[str], found: Map
     turned = _turned(m, phase, angles, found)
     result: dict[str, Any] = dict(m.family.poses(own_designs, turned, frozenset(motion)))
     _with_respect_to_shaft(m, result, found)
+    placed = [p for p in m.points if any(f"{p}_{axis}" in own for axis in AXES)]
+    moving = [p for p in (*m.points, *dict(m.carried)) if any(f"d{p}_{axis}" in own for axis in AXES)]
+    frames = m.frames(designs) if sites or placed or moving else []
     for site in sites:
-        result |= coordinates_of_site(m, site, designs, result)
-    for point in (*m.points, *dict(m.carried)):
-        if point in m.points and any(f"{point}_{axis}" in own for axis in AXES):
-            result |= coordinates(m, point, designs, own_designs, result)
-        if any(f"d{point}_{axis}" in own for axis in AXES):
-            result |= velocity(m, point, designs, result)
+        result |= coordinates_of_site(m, site, frames, designs, result)
+    for point in placed:
+        result |= coordinates(m, point, frames[-1], designs, own_designs, result)
+    for point in moving:
+        result |= velocity(m, point, frames[-1], designs, result)
     return {name: result[name] for name in (*own, "status")}
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from functools import cache
 
 from kernels.families.rssr import box_by_axes, box_by_rocker, proof
-from kernels.families.rssr.box_problem import Problem
+from kernels.families.rssr.box_problem import BoxQuestion
 from kernels.families.rssr.box_turn import Formulas
 from kernels.types import Numbers
 from sweep.families.capabilities import ProvableLocus, Searched
@@ -17,7 +17,7 @@ _by_rocker = cache(box_by_rocker.recorded)
 def _explored(formulas: Formulas, searched: Searched, leaves: tuple[Numbers, ...]) -> tuple[int, int]:
     """Leaves filled and boxes judged by :func:`kernels.families.rssr.proof.explore`."""
     s = searched
-    problem = Problem(s.branch, s.objective, s.cos2, s.links, s.target, s.tube)
+    problem = BoxQuestion(s.branch, s.objective, s.cos2, s.links, s.target, s.tube)
     found = proof.explore(
         problem, formulas, s.starts, s.whole, s.free, s.given, s.smallest, s.most, proof.Leaves(*leaves)
     )

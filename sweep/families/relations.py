@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, Protocol
 
 import numpy as np
 
+from sweep.errors import InputError, choices
 from sweep.families.base import Output, Parameter
 from sweep.families.frames import Frame
 from sweep.families.parts import AXES
@@ -50,7 +51,7 @@ class Timing:
 
 
 @dataclass(frozen=True)
-class Reading:
+class EventValue:
     """Value of a pose output where something happens, such as the speed of a tip where it arrives.
 
     ``of`` is the pose output as the machine has it; ``places`` holds one design output that is a crank angle of the
@@ -138,37 +139,23 @@ def _velocities(point: str) -> tuple[str, ...]:
     return tuple(f"{member}.d{own}_{axis}" for axis in AXES)
 
 
-@dataclass(frozen=True)
-class ShaftTorque:
-    """Torque that the main shaft has to give: drive torques of members, times their ratios.
-
-    ``torques`` are the dotted outputs with their ratios.
-    """
-
-    name: str
-    torques: tuple[tuple[str, int], ...]
-
-    @property
-    def outputs(self) -> tuple[Output, ...]:
-        """The torque."""
-        words = ", ".join(name for name, _ in self.torques)
-        return (Output(self.name, "torque", f"torque on the main shaft that drives {words}", "ours"),)
-
-    @property
-    def parameters(self) -> tuple[Parameter, ...]:
-        """It has none of its own."""
-        return ()
-
-    def needs(self, wanted: frozenset[str]) -> frozenset[str]:
-        """Return the drive torques."""
-        return frozenset(name for name, _ in self.torques)
-
-    def compute(self, found: Mapping[str, Any], frames: Mapping[str, Frame], wanted: frozenset[str]) -> dict[str, Any]:
-        """Return the torque, (n, m): equal power on both sides of every gear."""
-        return {self.name: sum(ratio * found[name] for name, ratio in self.torques)}
-
-
 def with_size(name: str, parts: list[Any]) -> dict[str, Any]:
     """Return the magnitude and components."""
     columns = {f"{name}_{axis}": part for axis, part in zip(AXES, parts, strict=True)}
     return columns | {name: np.sqrt(parts[0] ** 2 + parts[1] ** 2 + parts[2] ** 2)}
+
+
+def two(given: tuple[str, ...], known: Sequence[str] | None, what: str, where: str) -> tuple[str, str]:
+    """Return two names out of what a user gives, of those that are known if any are."""
+    if len(given) != 2:
+        raise InputError(what, given, f"two {what}", where)
+    first, second = given if known is None else each(given, known, what, where)
+    return first, second
+
+
+def each(given: tuple[str, ...], known: Sequence[str], what: str, where: str) -> tuple[str, ...]:
+    """Return names out of what a user gives; refuse one that is not known."""
+    for part in given:
+        if part not in known:
+            raise InputError(what, part, f"{what}: {choices(part, known)}", where)
+    return given

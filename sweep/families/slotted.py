@@ -21,6 +21,7 @@ from sweep.families.curve_features import Singular
 from sweep.families.link_tree import LinkBody, LinkJoint, LinkTree, filled_by
 from sweep.families.outputs import angle_outputs, joint_outputs, ladders, place_outputs, point_outputs
 from sweep.families.parts import AXES
+from sweep.families.planar_trees import slotted_rocker
 from sweep.families.poses import filled_blocks, filled_with_places
 from sweep.families.skeletons import CRANK, ORIGIN, crank_axis, links, parameter, standing
 
@@ -91,7 +92,7 @@ LINKS = LinkTree(
         LinkJoint("a", "crank bearing", "shaft", "frame on the crank", body=0, freedom=0),
         LinkJoint("b", "ball of the crank", "ball", "crank on the arm, or on the block of the fork", lines=(0, 3)),
         LinkJoint("c", "guide of the driven link", "sleeve", "driven link on the arm, or on the block", body=2,
-                  freedom=2),
+                  freedom=2, touch="ball"),
         LinkJoint("d", "bearing of the driven link", "shaft", "frame on the driven link", body=1, freedom=1),
     ),
     parents=(FRAME, FRAME, 1),
@@ -187,6 +188,7 @@ PLANAR = Family(
         Assembly("discriminant", "pressure_angle", unit),
         Points({"b": ("x_b", "y_b", None)}),
         OutputLink(driven_origin),
+        slotted_rocker(PLANAR_PARAMETERS),
         Skeleton(
             {"a": ORIGIN, "d": standing(PLANAR_PARAMETERS, "e")},
             (CRANK, Link("rocker", ("d", "c", "b"))),
@@ -225,7 +227,7 @@ def pin_distance_squared(designs: Array, angles: Angles, found: Columns) -> Arra
     return np.square(np.asarray(found["rho"], np.float64))
 
 
-_ROD_RATES, _DIRECTION = ("rho", "drho", "d2rho"), ("x_n", "y_n", "z_n")
+_ROD_RATES, _DIRECTION = ("rho", "drho"), ("x_n", "y_n", "z_n")
 SWIVEL_LINKS = LinkTree(
     bodies=(
         LinkBody("crank", "along the crank, tangential, along its axis, from A"),

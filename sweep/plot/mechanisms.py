@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from sweep.errors import InputError
 from sweep.evaluation.angles import AngleUnit, grid_in_radians, in_radians
 from sweep.evaluation.curves import motion_curves
+from sweep.evaluation.cyclogram import cyclogram as table
 from sweep.evaluation.joints import parts
 from sweep.evaluation.poses import evaluate, pose_wants
 from sweep.exchange.scene import over, shown_name
@@ -19,6 +20,7 @@ from sweep.families import Mechanism
 from sweep.families import family as find_family
 from sweep.families.domain import Interval
 from sweep.report.curves import motion_figure
+from sweep.report.cyclogram import cyclogram_figure
 from sweep.report.figures import OPTIMUM, house_style, new_figure
 from sweep.report.mechanisms import VIEWS, exists, mechanism_figure
 
@@ -28,6 +30,7 @@ if TYPE_CHECKING:
     from sweep.evaluation.tables import Table
 
 POSES = 720
+MOST_LINES = 20  # in one panel
 
 
 def motion(
@@ -38,17 +41,20 @@ def motion(
     unit: str = "mm",
     speed: float | None = None,
     angles: AngleUnit | None = None,
+    axes: Sequence[Axes] | Axes | None = None,
 ) -> NDArray[Any]:
     """Show curves over one turn, one panel for each.
 
     Parameters
     ----------
-    mechanism, design : as of :func:`sweep.joints`
+    mechanism : as of :func:`sweep.joints`
+    design : one design, or several as rows of a table: one line each, called by the table's index
     want : pose outputs, as a list or in one string between commas; if left out position and derivatives, deviations
         and pressure angles
     unit : the length unit of the design, for the axes
     speed : of the driving shaft [rad/s]: adds scales of velocity, acceleration and jerk in time
     angles : the unit of the angles of ``design``, "rad" or "deg", as of :func:`sweep.evaluate`
+    axes : of a figure of yours to draw into, one for each curve
 
     Returns
     -------
@@ -74,13 +80,42 @@ def motion(
     phi = np.arange(POSES) * (2.0 * math.pi / POSES)
     design = in_radians(family, design, angles)
     found = evaluate(mechanism, design, list(dict.fromkeys([*names, family.position])), phi=phi, angles="rad")
-    if found["design"].iloc[-1] != 0:
-        raise InputError("design", "several rows", "the parameters of one design", f"table of {family.name}")
-    curves = pd.DataFrame(found.assign(role="design"))
+    known = design.index if isinstance(design, pd.DataFrame) else range(int(found["design"].iloc[-1]) + 1)
+    if not 1 <= len(known) <= MOST_LINES:
+        raise InputError("design", f"{len(known)} rows", f"1 to {MOST_LINES} designs", f"table of {family.name}")
+    given = None if axes is None else list(np.atleast_1d(np.array(axes, dtype=object)).ravel())
+    if given is not None and len(given) != len(names):
+        raise InputError("axes", len(given), f"{len(names)}, one for each of {', '.join(names)}", "plot")
+    names_of = [str(name) if isinstance(name, str) else f"design {name}" for name in known]
+    curves = pd.DataFrame(found.assign(role=[names_of[k] for k in found["design"]]))
     units = {o.name: o.unit.replace("length", unit) for o in family.pose_outputs}
     with house_style():
-        figure = motion_figure(curves, units, family.position, speed, (), None, names)
-    return np.array(figure.axes[: len(names)], dtype=object)
+        panels = motion_figure(curves, units, family.position, speed, (), None, names, given)
+    return np.array(panels, dtype=object)
+
+
+def cyclogram(mechanism: Mechanism, design: Table, *, dwell: float = 0.02, angles: AngleUnit | None = None) -> Axes:
+    """Show what all members of a machine do over one turn: strokes, dwells and events; :func:`sweep.cyclogram`.
+
+    Parameters
+    ----------
+    mechanism, design, dwell, angles : as of :func:`sweep.cyclogram`
+
+    Returns
+    -------
+    Axes
+        a row of bars for each member: rising strokes dark, falling ones light, dwells beneath, events as lines
+
+    Examples
+    --------
+    >>> import sweep
+    >>> axes = sweep.plot.cyclogram("slider_crank", {"a": 20.0, "b": 70.0, "e": 5.0})
+    >>> axes.get_xlabel()
+    'angle of the main shaft [°]'
+    """
+    rows = table(mechanism, design, dwell=dwell, angles=angles)
+    with house_style():
+        return cyclogram_figure(rows).axes[0]
 
 
 def mechanism(

@@ -10,10 +10,12 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from kernels import status as codes
+from sweep.chunks.plan import PARAMETER_UNITS
 from sweep.dataset import store
 from sweep.dataset.files import check_tables
 from sweep.errors import InputError
 from sweep.evaluation.statuses import meaning
+from sweep.evaluation.summaries import output
 from sweep.families.base import Family
 from sweep.families.names import is_largest, is_place, stem
 from sweep.optimise import Survey, read_survey
@@ -183,6 +185,25 @@ def read_dataset(folder: Path) -> Dataset:
     )
 
 
+def without_rows(study: Study) -> Dataset:
+    """Return what the report needs of a study that has not been run."""
+    family = study.family
+    outputs = [*family.pose_outputs, *(output(family, name) for name in study.want)]
+    return Dataset(
+        folder=study.path.parent,
+        plan={},
+        study=study,
+        parts=(),
+        units={p.name: PARAMETER_UNITS[p.unit] for p in family.parameters}
+        | {o.name: o.unit.replace("length", "mm") for o in outputs},
+        definitions={o.name: o.text for o in outputs},
+        optima=None,
+        curves=None,
+        front=None,
+        runs=(),
+    )
+
+
 def _with_defaults(study: Study, rows: pd.DataFrame) -> pd.DataFrame:
     """Add the parameters that an earlier version did not have, at the values that stand for none of them."""
     return rows.assign(**_absent(study, rows))
@@ -190,7 +211,9 @@ def _with_defaults(study: Study, rows: pd.DataFrame) -> pd.DataFrame:
 
 def _absent(study: Study, known: Container[str]) -> dict[str, float]:
     """Name the optional parameters that are not among the known ones, with their defaults."""
-    return {p.name: p.default for p in study.family.parameters if p.name not in known and p.default is not None}
+    # A dataset without a choice that later versions have is one in which it was not taken.
+    defaults = {p.name: 0.0 if p.unless else p.default for p in study.family.parameters if p.name not in known}
+    return {name: value for name, value in defaults.items() if value is not None}
 
 
 def study_of(plan: Mapping[str, Any], folder: Path) -> Study:

@@ -12,11 +12,13 @@ from sweep.effects import input_names
 from sweep.families import NAMES, family
 from sweep.families.base import Family, Parameter
 from sweep.quantities.units import example, internal_unit
+from sweep.study.cyclogram import StrokeSection
 from sweep.study.design import SampleTable
 from sweep.study.limits import LimitEntry
 from sweep.study.parameter import FixedEntry, ListEntry, RangeEntry
 from sweep.study.section import Section
 from sweep.study.tables import REQUIRED_TABLES, TABLES
+from sweep.study.taken import FROM, HASH
 
 Schema: TypeAlias = dict[str, Any]
 
@@ -39,6 +41,8 @@ def study_schema() -> Schema:
     tables["loads"] = _each({"anyOf": [*load["anyOf"], _each(load)]})
     limit = {"anyOf": [{"const": True}, {"type": "string"}, _model(LimitEntry, definitions)]}
     tables["limits"] = _each({"anyOf": [*limit["anyOf"], _each(limit)]})
+    window = {"type": "array", "items": {"type": "string"}, "minItems": 2, "maxItems": 2}
+    tables["cyclogram"] = _each({"anyOf": [window, _model(StrokeSection, definitions)]})
     tables["pareto"]["properties"] |= dict.fromkeys(("at_most", "at_least"), ENTRY)
     names = tables["mechanism"]["properties"]
     names["family"]["enum"] = list(NAMES)
@@ -71,7 +75,7 @@ def _entry() -> Schema:
 def _of_family(entry: Family) -> Schema:
     """Return what [design] may hold where the mechanism is this family alone."""
     own = {p.name: {"description": _described(p), "allOf": [ENTRY]} for p in entry.parameters}
-    known = [*own, *sorted(input_names(entry) - own.keys()), "sample"]
+    known = [*own, *sorted(input_names(entry) - own.keys()), "sample", FROM, HASH]
     design = {"properties": own, "propertyNames": {"enum": known}}
     this = {"properties": {"family": {"const": entry.name}}, "required": ["family"]}
     return {

@@ -19,7 +19,6 @@ from kernels.descent.descents import LOCKED
 from sweep.families.base import Array
 from sweep.jobs.progress import AT_MOST, Say, unsaid
 from sweep.optimise.local.kkt import AGREE
-from sweep.optimise.samples import sobol
 from sweep.optimise.starts.candidates import spread
 from sweep.optimise.starts.linear import Elimination
 from sweep.optimise.starts.pose_rows import Descents, PoseRows
@@ -107,8 +106,10 @@ class Population:
 
 def _sampled(rows: PoseRows, rng: np.random.Generator, size: Size, jobs: int) -> tuple[Array, Index, _Classes]:
     """Places of a Sobol sample of each kind that turn, the best of every class of swings that are not alike."""
+    from scipy.stats import qmc
+
     number = len(rows.own.bases)
-    place = np.concatenate([sobol(len(rows.own.columns), rng).random(size.sampled) for _ in range(number)])
+    place = np.concatenate([qmc.Sobol(len(rows.own.columns), seed=rng).random(size.sampled) for _ in range(number)])
     kinds = np.repeat(np.arange(number), size.sampled)
     worth = _tried(rows, place, kinds, jobs)
     order = np.argsort(worth, kind="stable")
