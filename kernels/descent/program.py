@@ -11,7 +11,7 @@ from kernels.descent.motion import Index
 from kernels.descent.rows import Task, row_count
 from kernels.jit import kernel, part
 from kernels.linear.minimax import UNKNOWNS
-from kernels.linear.nearest import nearest_of_many
+from kernels.linear.nearest_of_many import nearest_of_many
 from kernels.types import Array
 
 EXACT = 1e-11  # distance by which the point nearest to the centre may miss a row
@@ -100,7 +100,7 @@ def solve(task: Task, t: float, worth: float, q: Program, step: Array, weights: 
         q.right[j] = (q.right[j] + t) / task.unit
     whole = np.empty(n + 2)
     nearest_of_many(
-        q.right, q.rows, q.back, q.centre, q.low, q.high, task.turns, NEAR, MISSED, JOINED, EXACT, whole, q.there,
+        q.right, q.rows, q.back, q.centre, q.low, q.high, task.turns, (NEAR, MISSED), JOINED, EXACT, whole, q.there,
         weights, q.held,
     )  # fmt: skip
     missed = 0.0

@@ -7,7 +7,8 @@ import pytest
 from scipy.optimize import nnls
 
 from kernels import status as st
-from kernels.linear.nearest import nearest, nearest_of_many
+from kernels.linear.nearest import nearest
+from kernels.linear.nearest_of_many import nearest_of_many
 
 
 def solved(rows: np.ndarray, needs: np.ndarray, centre: np.ndarray) -> tuple[np.ndarray, np.ndarray, int]:
@@ -93,7 +94,9 @@ def stepped(
     back = np.linalg.qr(rng.standard_normal((n, n)))[0] * (1.0 + rng.random(n))
     centre, low, high = rng.standard_normal(n), np.full(n, -3.0), np.full(n - 1, 3.0)
     step, there, weights = np.empty(n), np.empty(len(values)), np.empty(len(values))
-    status = function(values, slopes, back, centre, low, high, turns, near, 1e-9, 20, 1e-13, step, there, weights, held)  # type: ignore[operator]
+    status = function(
+        values, slopes, back, centre, low, high, turns, (near, 1e-9), 20, 1e-13, step, there, weights, held
+    )  # type: ignore[operator]
     box = np.concatenate([back, -back[: n - 1]])
     rows = np.concatenate([back.T @ slopes, box.T], axis=1)
     whole, _, told = solved(rows, np.concatenate([-values, low, -high]), centre)

@@ -1,0 +1,190 @@
+"""The nearest point among hundreds of rows along turns, of which few matter: these join one after the other.
+
+A program like the one before begins with the rows that held there.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from kernels import status as st
+from kernels.jit import inline, kernel, part
+from kernels.linear.nearest import Held, Index, dropped, nothing_held, pursued, shares, taken_in
+from kernels.types import Array
+
+INDEPENDENT = 1e-12  # square of what is left of a row that held before, across the others, that may hold again
+
+
+@inline
+def _place_of(place: Index, count: int, number: int) -> int:
+    """Place of a number that is among the first ``count``."""
+    for k in range(count):
+        if place[k] == number:
+            return k
+    return -1
+
+
+@part
+def _resumed(rows: Array, needs: Array, size: Array, begin: Index, centre: Array, y: Array, h: Held) -> int:
+    """Let rows hold that held before, but for those with a negative weight; how many do.
+
+    The nearest point that keeps rows as equations is where the method may go on from, as long as no weight is negative.
+    """
+    n, count = rows.shape[0], 0
+    for k in range(begin[0]):
+        p = begin[1 + k]
+        square = shares(rows, p, count, h)
+        if count < n and square > INDEPENDENT * size[p] * size[p]:
+            taken_in(p, count, square, h)
+            count += 1
+    while count > 0:
+        # With the rows N = Q R the point is centre + Q z with R' z = needs - N' centre, the weights solve R w = z.
+        for k in range(count):
+            value = needs[h.numbers[k]]
+            for i in range(n):
+                value -= rows[i, h.numbers[k]] * centre[i]
+            for j in range(k):
+                value -= h.r[j, k] * h.z[j]
+            h.z[k] = value / h.r[k, k]
+        worst, least = -1, 0.0
+        for k in range(count - 1, -1, -1):
+            value = h.z[k]
+            for j in range(k + 1, count):
+                value -= h.r[k, j] * h.weights[j]
+            h.weights[k] = value / h.r[k, k]
+            if h.weights[k] < least:
+                worst, least = k, h.weights[k]
+        if worst < 0:
+            break
+        dropped(worst, count, h)
+        count -= 1
+    for i in range(n):
+        y[i] = centre[i]
+        for k in range(count):
+            y[i] += h.q[i, k] * h.z[k]
+    return count
+
+
+@inline
+def _peaks(values: Array, below: float, turns: Index, lowest: Index, found: Index) -> None:
+    """Mark the values below a bound that are the lowest among their neighbours along a turn, or stand beside such one.
+
+    Those of no turn are marked wherever they are below.
+    """
+    last = turns.shape[1] - 1
+    for j in range(len(values)):
+        found[j] = 1 if values[j] < below else 0
+    for t in range(turns.shape[0]):
+        for p in range(last + 1):
+            before, after = turns[t, p - 1 if p > 0 else last], turns[t, p + 1 if p < last else 0]
+            here = values[turns[t, p]]
+            lowest[p] = 1 if here <= values[before] and here <= values[after] else 0
+        for p in range(last + 1):
+            if lowest[p] + lowest[p - 1 if p > 0 else last] + lowest[p + 1 if p < last else 0] == 0:
+                found[turns[t, p]] = 0
+
+
+@kernel
+def nearest_of_many(
+    values: Array,
+    slopes: Array,
+    back: Array,
+    centre: Array,
+    low: Array,
+    high: Array,
+    turns: Index,
+    near: tuple[float, float],
+    rounds: int,
+    tolerance: float,
+    step: Array,
+    there: Array,
+    weights: Array,
+    begin: Index,
+) -> int:
+    """Step of a quadratic program with hundreds of rows along turns, of which few matter.
+
+    The step is ``back y`` with y nearest to a centre.  Rows join where they are near their bound and lowest among their
+    neighbours along a turn, and later where the step found would miss them.
+
+    Parameters
+    ----------
+    values, slopes : (r,) and (n, r) of the rows, ``values + step slopes >= 0``
+    back : (n, n) the step's axes
+    centre : (n,)
+    low, high : (n,) and (h,) bounds of the step, of its first h elements from above
+    turns : (T, m) numbers of the rows that are one curve around its turn
+    near : values from which on rows do not join at first, and by how much a row has to be missed to join later
+    rounds : of joining at most
+    tolerance : see :func:`kernels.linear.nearest.nearest`
+    step, there, weights : (n,), (r,) and (r,) out: the step, the rows after it, and their weights, none negative
+    begin : (n + 1,) rows that held in a program like this one, and their count first, from which it goes on: those of
+        the box count backwards from -1.  Written: those that hold in this one
+
+    Returns
+    -------
+    Status of the last round, as of :func:`kernels.linear.nearest.nearest`.
+    """
+    n, count = slopes.shape
+    boxes = n + len(high)
+    rows, needs, size = np.empty((n, count + boxes)), np.empty(count + boxes), np.empty(count + boxes)
+    more, joined, lowest = np.empty(count, np.int64), np.zeros(count, np.int64), np.empty(turns.shape[1], np.int64)
+    place, y, h = np.empty(count, np.int64), np.empty(n), nothing_held(n, count + boxes)
+    for k in range(boxes):
+        sign, i = (1.0, k) if k < n else (-1.0, k - n)
+        needs[k] = low[i] if k < n else -high[i]
+        square = 0.0
+        for a in range(n):
+            rows[a, k] = sign * back[i, a]
+            square += back[i, a] * back[i, a]
+        size[k] = math.sqrt(square)
+    for i in range(n):
+        y[i] = centre[i]
+    _peaks(values, near[0], turns, lowest, more)
+    for k in range(begin[0]):
+        if begin[1 + k] >= 0:
+            more[begin[1 + k]] = 1
+    total, held, status = boxes, -1, int(st.OK)
+    for _ in range(rounds):
+        for j in range(count):
+            if more[j] == 1 and joined[j] == 0:
+                joined[j], place[total - boxes], needs[total] = 1, j, -values[j]
+                square = 0.0
+                for a in range(n):
+                    value = 0.0
+                    for i in range(n):
+                        value += back[i, a] * slopes[i, j]
+                    rows[a, total] = value
+                    square += value * value
+                size[total] = math.sqrt(square)
+                total += 1
+        if held < 0:
+            for k in range(begin[0]):
+                number = begin[1 + k]
+                begin[1 + k] = -1 - number if number < 0 else boxes + _place_of(place, total - boxes, number)
+            held = _resumed(rows, needs, size, begin, centre, y, h)
+        held, status = pursued(rows, needs, size, total, tolerance, y, h, held)
+        for j in range(count):
+            there[j] = values[j]
+        for i in range(n):
+            step[i] = 0.0
+            for a in range(n):
+                step[i] += back[i, a] * y[a]
+            for j in range(count):
+                there[j] += step[i] * slopes[i, j]
+        _peaks(there, -near[1], turns, lowest, more)
+        new = 0
+        for j in range(count):
+            new += more[j] * (1 - joined[j])
+        if new == 0 or status != st.OK:
+            break
+    for j in range(count):
+        weights[j] = 0.0
+    begin[0] = held
+    for k in range(held):
+        own = h.numbers[k] >= boxes
+        begin[1 + k] = place[h.numbers[k] - boxes] if own else -1 - h.numbers[k]
+        if own:
+            weights[begin[1 + k]] = h.weights[k]
+    return status
