@@ -276,7 +276,9 @@ def test_verb_reads_one_stage_of_an_exported_chain(kind, tmp_path):
     for name, part in (("rssr", "stage 1"), ("guide", "stage 2")):
         done = CliRunner().invoke(main, ["points", name, str(file), "--part", part])
         assert done.exit_code == 0, done.output
-        assert float(tomllib.loads(done.output)["design"]["a"].removesuffix(" mm")) == pytest.approx(scaled(name)["a"], abs=1e-4)
+        assert float(tomllib.loads(done.output)["design"]["a"].removesuffix(" mm")) == pytest.approx(
+            scaled(name)["a"], abs=1e-4
+        )
     done = CliRunner().invoke(main, ["points", "rssr", str(file)])
     assert done.exit_code == 2 and "one of stage 1, stage 2" in done.output
     done = CliRunner().invoke(main, ["points", "rssr", str(file), "--part", "stage 3"])
