@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import tomllib
 
 import numpy as np
 import pytest
@@ -66,7 +67,7 @@ def test_dxf_holds_the_tables_and_still_reads_back(folder, tmp_path):
     assert {"Dimensions", "Hardpoints [mm]", "Limits", "± 0.02 mm", "at least 30°"} <= words
     said = CliRunner().invoke(main, ["points", "rssr", str(target)])
     assert said.exit_code == 0, said.output
-    assert float(said.output.splitlines()[1].split()[1]) == pytest.approx(40.0, abs=1e-9)
+    assert float(tomllib.loads(said.output)["design"]["b"].split()[0]) == pytest.approx(40.0, abs=1e-9)
 
 
 def test_same_data_same_bytes(folder, tmp_path):
