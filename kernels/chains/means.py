@@ -1,9 +1,9 @@
 """Root mean square over the turn of a curve of a chain: the trapezoid rule on samples that resolve it, generated.
 
 The rule errs by the amplitude of the harmonic whose number is that of the samples.  Amplitudes fall from one to the
-next by the factor exp(-rho), rho being the distance of the nearest singularity, and grow with a power of the number that
-the order of the singularity sets.  Those of a quarter and an eighth of the number show in the samples, whatever their
-phase, and say whether they really fall so fast.  Where the error is not below the target twice as many samples are taken.
+next by the factor exp(-rho), rho being the distance of the nearest singularity, and grow with a power of the number
+that the order of the singularity sets.  Those of a quarter and an eighth of the number show in the samples, whatever
+their phase, and say whether they really fall so fast.  Where the error is above the target, samples are doubled.
 """
 
 from __future__ import annotations
@@ -119,7 +119,7 @@ def _trapezoid(n: int, values: Array, rho: float, power: float, sums: Array) -> 
 
 
 def _blur(of: Curve) -> Helper:
-    """Make the function that estimates the sum that rounding may add to the mean square, half of it: the mean over some samples."""
+    """Make the function that estimates half of what rounding adds to the mean square, by some of the samples."""
     rounding = of.rounding
 
     def blur(k: Any, a: float, b: float, n: int, cos: Array, sin: Array, values: Array, thin: Array) -> float:

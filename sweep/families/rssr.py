@@ -218,6 +218,8 @@ def certified_maxima(designs: Array, wanted: frozenset[str], accuracy: Accuracy)
 
     The place of a maximum is one where its value is taken; how far it is from the exact place stays an estimate.
     """
+    from kernels.families.rssr.certify import certify_maxima  # here: only proofs wait for its import
+
     assert accuracy.target is not None
     n = len(designs)
     columns: Columns = {"status": np.zeros(n, np.uint8)}
@@ -229,7 +231,7 @@ def certified_maxima(designs: Array, wanted: frozenset[str], accuracy: Accuracy)
         status = searched["status"].astype(np.uint8)
         value, place = (np.array(searched[key], np.float64) for key in (most, phi))
         error, far = np.full(n, np.nan), np.asarray(searched[f"err_{phi}"], np.float64)
-        rssr.certify_maxima(
+        certify_maxima(
             np.ascontiguousarray(designs)[None], np.empty((0, n, 2)), np.zeros((n, 8)), np.array([(2, order)]),
             accuracy.target, MOST_CELLS, status[None], value[None], place[None], error[None], np.empty(n),
         )  # fmt: skip

@@ -239,7 +239,7 @@ def dense_maxima(
                 if max_abs_d2psi is not None or max_abs_d3psi is not None:
                     q = h.q0 + t * (h.q1 + r.ak4 * t)
                     if max_abs_d2psi is not None:
-                        # One division instead of three products with a reciprocal: what is asked for most is this alone.
+                        # One division, not three products with a reciprocal: mostly this is asked for alone.
                         m2 = largest(m2, abs(s * q) / (square * square))
                     if max_abs_d3psi is not None:
                         q_t, d_t = h.q1 + 2.0 * r.ak4 * t, h.d1 - 2.0 * r.ak4 * t

@@ -112,7 +112,7 @@ def _unsettled(at: Array, who: Counts, active: Counts, count: int, roots: Array)
     """List the roots that :func:`_approach` has not settled, at the middles of their brackets; returns how many."""
     left = 0
     for i in range(count):
-        if not roots[i + _BEFORE] == roots[i + _BEFORE]:
+        if math.isnan(roots[i + _BEFORE]):
             lo, hi = roots[i + _LO], roots[i + _HI]
             roots[i + _PHI], roots[i + _BEFORE] = 0.5 * (lo + hi), hi - lo
             rises = _ball(at, who[i >> 1], roots[i - (i & 1) + _LO])[0] <= 0.0
@@ -126,8 +126,8 @@ def _unsettled(at: Array, who: Counts, active: Counts, count: int, roots: Array)
 def _solve(at: Array, who: Counts, active: Counts, count: int, roots: Array) -> None:
     """Find the zeros of eta in their brackets: Newton, bisection where it would leave the bracket or does not gain.
 
-    Every round takes one step of all roots that are left, numbers ``active[:count]``; root i is of design ``who[i // 2]``.  The
-    steps of different roots do not wait for each other, so a round costs far less than its steps one after the other.
+    Every round takes one step of all roots that are left, numbers ``active[:count]``; root i is of design
+    ``who[i // 2]``.  The steps of different roots do not wait for each other, so a round costs far less than its steps one after the other.
     """
     for _ in range(100):
         left = 0
