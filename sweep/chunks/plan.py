@@ -64,12 +64,15 @@ class Column:
 class Pilot(NamedTuple):
     """Estimates from a few designs: time of one design on one core [s], and the share of designs within every limit.
 
-    ``reached`` are the outputs of every level of the cascade, and the share of designs that reach it.
+    ``reached`` are the outputs of every level of the cascade, and the share of designs that reach it; ``kept`` those of
+    the ``tried`` designs that are within every limit, (n, P).
     """
 
     seconds_per_design: float
     feasible: float
     reached: tuple[tuple[tuple[str, ...], float], ...]
+    kept: Array
+    tried: int
 
 
 @dataclass(frozen=True)
@@ -176,19 +179,20 @@ def pilot(study: Study, tell: Callable[[int, int], None] = lambda _, __: None) -
     blocks = [parameter_matrix(study, start, start + length) for start in starts]
     length = -(-len(blocks) // PILOT_PARTS)
     parts = [blocks[k : k + length] for k in range(0, len(blocks), length)]
-    reached, feasible, total = np.zeros(len(levels(study))), 0, 0
+    reached, feasible, total, kept = np.zeros(len(levels(study))), 0, 0, []
     for k, part in enumerate(parts):
         tell(k, len(parts))
         designs, status = (np.concatenate(columns) for columns in zip(*part, strict=True))
-        cascade = Cascade(study)
+        cascade = Cascade(study, keep=False)
         cascade.feed(np.arange(len(designs)), designs, status)
-        cascade.end(())
+        kept.append(cascade.end(()).designs)
         reached += cascade.reached
         feasible += int(cascade.counts[OK])
         total += len(designs)
     shares = [float(share) for share in reached / total]
     outputs = tuple(level.outputs for level in levels(study))
-    return Pilot(_seconds(study, shares), feasible / total, tuple(zip(outputs, shares, strict=True)))
+    seconds, sent = _seconds(study, shares), tuple(zip(outputs, shares, strict=True))
+    return Pilot(seconds, feasible / total, sent, np.concatenate(kept), total)
 
 
 def pilot_at(study: Study, known: Pilot) -> Pilot:
@@ -239,8 +243,13 @@ def feasible_designs(study: Study, number: int) -> tuple[Array, int]:
         kept, tried = cascade.end(()).designs, len(designs)
         if len(kept) or tried == count:
             break
-    some = np.unique(np.linspace(0, len(kept) - 1, min(number, len(kept))).astype(int))
-    return kept[some], tried
+    return spread_rows(kept, number), tried
+
+
+def spread_rows(designs: Array, number: int) -> Array:
+    """Return so many of the designs, or all if they are fewer, spread evenly over them."""
+    some = np.unique(np.linspace(0, len(designs) - 1, min(number, len(designs))).astype(int))
+    return designs[some]
 
 
 def row_bytes(study: Study) -> int:

@@ -8,7 +8,7 @@ import click
 
 from sweep.cli.options import FOLDER
 from sweep.jobs.progress import Phases
-from sweep.report import write_report
+from sweep.report.page import write_report
 
 
 @click.command()

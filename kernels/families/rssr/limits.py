@@ -127,7 +127,8 @@ def _solve(at: Array, who: Counts, active: Counts, count: int, roots: Array) -> 
     """Find the zeros of eta in their brackets: Newton, bisection where it would leave the bracket or does not gain.
 
     Every round takes one step of all roots that are left, numbers ``active[:count]``; root i is of design
-    ``who[i // 2]``.  The steps of different roots do not wait for each other, so a round costs far less than its steps one after the other.
+    ``who[i // 2]``.  The steps of different roots do not wait for each other, so a round costs far less than its steps
+    one after the other.
     """
     for _ in range(100):
         left = 0
