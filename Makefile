@@ -6,7 +6,7 @@ SWEEP := $(BIN)/sweep
 STUDIES := $(notdir $(patsubst %/study.toml,%,$(wildcard studies/*/study.toml)))
 
 .DEFAULT_GOAL := help
-.PHONY: test-versions bench-latency bench-scale smoke-scale three test-browser test-faults bench-object-store site notebooks nightly smoke-nightly bench-estimates bench-enclosures bench-extrema bench-first-use bench-optimise bench-basins help setup test test-long lint types imports check smoke bench bench-scene bench-peers study-accuracy smoke-accuracy search-worse search-wrong docs frames clean $(STUDIES:%=study-%) $(STUDIES:%=smoke-%)
+.PHONY: dist-test test-versions bench-latency bench-scale smoke-scale three test-browser test-faults bench-object-store site notebooks nightly smoke-nightly bench-estimates bench-enclosures bench-extrema bench-first-use bench-optimise bench-basins help setup test test-long lint types imports check smoke bench bench-scene bench-peers study-accuracy smoke-accuracy search-worse search-wrong docs frames clean $(STUDIES:%=study-%) $(STUDIES:%=smoke-%)
 
 help:  ## list the targets
 	@grep -hE '^[a-z%-]+:.*##' $(MAKEFILE_LIST) | sed -E 's/:.*## /\t/' | expand -t 22
@@ -122,6 +122,15 @@ docs: $(VENV)/dev  ## make docs/effects.md and docs/study.schema.json from the r
 site: $(VENV)/dev  ## the docs as a site, into build/site; no network
 	NO_MKDOCS_2_WARNING=1 $(BIN)/mkdocs build
 	$(BIN)/python docs/site/links.py build/site
+
+DIST := build/dist
+dist-test:  ## wheel and sdist, built and installed in an environment of their own: run, report, explore, read with pandas
+	rm -rf $(DIST) && mkdir -p $(DIST)
+	$(PYTHON) -m venv $(DIST)/venv
+	$(DIST)/venv/bin/python -m pip install --quiet build
+	$(DIST)/venv/bin/python -m build --outdir $(DIST) .
+	$(DIST)/venv/bin/python -m pip install --quiet --constraint constraints.txt "$$(echo $(DIST)/*.whl)[cad,excel,explore]"
+	$(DIST)/venv/bin/python -P tests/dist.py $(DIST)
 
 notebooks: $(VENV)/dev  ## run the notebooks of docs/notebooks in place
 	$(BIN)/python docs/site/notebooks.py

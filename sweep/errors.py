@@ -177,8 +177,7 @@ class MeasuredRangeWarning(LinksweepWarning):
 
 _SPACE = re.compile("[ -]")
 
-# Of a misspelt word at most this share of its letters is wrong.
-SLIPS = 0.45
+ALIKE = 0.65  # likeness by difflib, from 0 to 1, of a slip
 
 # What people call things, and our names for them; the first one that is known where the word stands is meant.
 SYNONYMS = {
@@ -215,29 +214,15 @@ def closest(word: str, known: Iterable[str]) -> str | None:
     matches = matches or [name for name in SYNONYMS.get(_SPACE.sub("_", word.casefold()), ()) if name in choices]
     if not matches:
         alike = difflib.get_close_matches(word, choices, n=8, cutoff=0.5)
-        # Letters in common are not enough: a slip changes few of them.
-        near = sorted((edits(word, name), -alike.index(name), name) for name in alike)
-        matches = [n for count, _, n in near if count <= max(1.0, SLIPS * len(word)) or _begins(word, n)]
+        near = difflib.get_close_matches(word, alike, n=8, cutoff=ALIKE)
+        # Slips are rare in the first letter: psy is psi, and not eps_y.
+        matches = sorted((n for n in alike if n in near or _begins(word, n)), key=lambda name: name[:1] != word[:1])
     return matches[0] if matches else None
 
 
 def _begins(word: str, name: str) -> bool:
     """Return whether one is the beginning of the other, and not only a letter or two of it."""
     return min(len(word), len(name)) > 3 and (name.startswith(word) or word.startswith(name))
-
-
-def edits(one: str, other: str) -> int:
-    """Count the letters to change, leave out, put in or exchange with their neighbour to make one word the other."""
-    before: list[int] = []
-    row = list(range(len(other) + 1))
-    for i, a in enumerate(one, 1):
-        last, before, row = before, row, [i]
-        for j, b in enumerate(other, 1):
-            count = min(before[j] + 1, row[j - 1] + 1, before[j - 1] + (a != b))
-            if i > 1 and j > 1 and a == other[j - 2] and one[i - 2] == b:
-                count = min(count, last[j - 2] + 1)
-            row.append(count)
-    return row[-1]
 
 
 def nearest(word: str, known: Iterable[str]) -> str:

@@ -42,7 +42,7 @@ LINE = 8  # numbers in a line of the cache
 ABREAST = MOST + LINE  # where the samples of a block begin, behind those of one design
 
 
-class Room(NamedTuple):
+class Scratch(NamedTuple):
     """Memory of the search.
 
     Samples of one design and of a block, discriminants of one and of the other, what a first look says; the designs of
@@ -67,10 +67,10 @@ def aligned(numbers: int) -> Array:
 
 
 @inline
-def new_room(guarded: int, wide: int) -> Room:
+def new_room(guarded: int, wide: int) -> Scratch:
     """Memory for a curve that so many later stages enter, and for designs of so many columns."""
     stages = max(guarded, 1)
-    return Room(
+    return Scratch(
         aligned(ABREAST + SAMPLES), aligned(stages * GUARD_ROW), aligned(stages * DIPS), aligned(LOW + stages * BLOCK),
         aligned(wide * BLOCK), aligned(HANDED), np.zeros(BLOCK, np.int64),
     )  # fmt: skip
@@ -91,7 +91,7 @@ def enlister(chain: Chained, of: Curve) -> Helper:
     # One function without a return half way: with more the references to each array are counted, which takes time.
     def enlist(
         designs: Array, begin: int, end: int, near: Array, cos: Array, sin: Array, made_of: Array, mode: int, m: Array,
-        span: Counts, status: Status, room: Room,
+        span: Counts, status: Status, room: Scratch,
     ) -> int:  # fmt: skip
         # A magnitude is the curve times its own sign, a least value the largest of the negative curve.
         up, down = 1.0 if mode >= 0 else -1.0, 1.0 if mode > 0 else -1.0

@@ -49,7 +49,7 @@ def reduce_along(a: Any, b: Any, e: Any, f: Any, alpha: Any, ca: Any, sa: Any, b
     return Reduced(a, b, e, f * sa, a * ca, f * ca, a * sa, m_size, n_size, branch, unit, valid)
 
 
-class Place(NamedTuple):
+class ClosurePose(NamedTuple):
     """The coupler across the slide line at one crank angle: m and n, and the discriminant Q = b^2 - m^2 - n^2."""
 
     m: Any
@@ -58,15 +58,15 @@ class Place(NamedTuple):
 
 
 @inline
-def place(r: Any, u: Any, v: Any) -> Place:
+def place(r: Any, u: Any, v: Any) -> ClosurePose:
     """Evaluate the closure at (cos phi, sin phi) = (u, v); (1), (2).  ``r`` has a, b, e, n0, na of :class:`Reduced`."""
     m, n = r.e - r.a * u, r.n0 - r.na * v
     # As a product: b^2 - m^2 would lose the digits of a small difference.
-    return Place(m, n, (r.b - m) * (r.b + m) - n * n)
+    return ClosurePose(m, n, (r.b - m) * (r.b + m) - n * n)
 
 
 @inline
-def tolerance(r: Reduced, at: Place) -> float:
+def tolerance(r: Reduced, at: ClosurePose) -> float:
     """Return the rounding error of Q: below it, whether the links reach cannot be decided in float64."""
     error = 8.0 * EPS
     first = error * (abs(at.m.real) * r.m_size + abs(at.n.real) * r.n_size)

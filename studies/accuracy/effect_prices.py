@@ -67,7 +67,7 @@ def loaded(bare: Family, full: Family, designs: int) -> Array:
     bodies = [name for name in inert if name.startswith("m_")]
     length = float(np.median([abs(x) for x, p in zip(matrix[0], bare.parameters, strict=False) if p.unit == "length"]))
     for name, k in still.items():
-        if name == "tip_x" and not inert:
+        if name == "tool_x" and not inert:
             matrix[:, k] = ARM * length
         elif all(body in still for body in bodies):
             if name.startswith("m_"):

@@ -1,4 +1,4 @@
-"""What needle bar, piercing and friction add, load by load, to the light optimum and to the design of least torque.
+"""What needle bar, piercing and friction add, load by load, to the drive to be built and to the design of least torque.
 
 ``python studies/needle208-loads/figure.py FOLDER`` reads the optimum in FOLDER and writes FOLDER/loads.parquet (one row
 per design and case) and FOLDER/figures/loads.svg.
@@ -81,7 +81,7 @@ def chart(table: pd.DataFrame, torques: dict[str, Array]) -> Figure:
     above.set_xlabel("crank [°]")
     above.set_ylabel("driving torque [N m]")
     above.set_xticks(np.arange(0, 361, 60))
-    above.set_title("light optimum at 7000 per minute")
+    above.set_title("drive to be built at 7000 per minute")
     above.legend(fontsize="small")
     designs, width = list(table["design"].unique()), 0.38
     for d, (design, colour) in enumerate(zip(designs, (REFERENCE, OPTIMUM), strict=False)):
@@ -109,7 +109,7 @@ def main() -> None:
     best = pd.read_parquet(folder / "_optimum.parquet").iloc[0]
     own = study.bare.parameter_names
     designs = {
-        "light optimum": {name: study.reference[name] for name in own},
+        "drive to be built": {name: study.reference[name] for name in own},
         "least torque": {name: float(best[name]) for name in own},
     }
     table, torques = cases(study, designs)

@@ -10,6 +10,7 @@ from sweep.families.base import Family, Parameter
 from sweep.families.chain import Chain, stages_of
 from sweep.families.domain import March
 from sweep.families.names import is_flag, parts, stem
+from sweep.study.written import design_entries, toml
 
 # Units of the examples by unit word.  Those with forces or masses are in SI, the others in any length unit.
 SI = {
@@ -28,8 +29,11 @@ FEWEST_WANTED, MOST_WANTED = 3, 5
 WIDTH = 56  # column of the explanations
 
 
-def study_text(name: str, family: Family, schema: str) -> str:
-    """Return a study.toml that passes `sweep check`; ``schema`` is where its JSON schema lies, seen from the file."""
+def study_text(name: str, family: Family, schema: str, drawn: Mapping[str, float] | None = None) -> str:
+    """Return a study.toml that passes `sweep check`; ``schema`` is where its JSON schema lies, seen from the file.
+
+    With the design of a drawing [mm, rad] it is about that design, and the design is its reference.
+    """
     wanted = wanted_outputs(family)
     goal = next((w for w in wanted if w.startswith("max_abs_d2")), wanted[-1])
     lines = [
@@ -55,7 +59,7 @@ def study_text(name: str, family: Family, schema: str) -> str:
         "",
         "# One value as a text with its unit; several as { values = [...], unit = ... } or { from, to, count, unit }.",
         "[design]",
-        *design_lines(family, swept_names(family)),
+        *design_lines(family, swept_names(family), drawn),
         "",
         "# Designs beyond a limit are counted and dropped: { min = ..., max = ..., unit = ... }, or true.",
         "[limits]",
@@ -79,7 +83,8 @@ def study_text(name: str, family: Family, schema: str) -> str:
         "# [tolerance]",
         '# lengths = "0.02 mm"',
     ]
-    return "\n".join(lines) + "\n"
+    reference = {} if drawn is None else {"reference": {"design": design_entries(family, drawn)}}
+    return "\n".join([*lines, "", toml(reference)] if reference else [*lines, ""])
 
 
 def smoke_text(family: Family) -> str:
@@ -130,13 +135,16 @@ def swept_names(family: Family) -> list[str]:
     return (lengths or [p.name for p in usable if p.unit in ("ratio", "none")] or [p.name for p in usable])[:SWEPT]
 
 
-def design_lines(family: Family, swept: list[str]) -> Iterator[str]:
-    """Yield every parameter with its meaning: ``swept`` ones as ranges, those with a default as comments."""
-    example = _example(family)
+def design_lines(family: Family, swept: list[str], drawn: Mapping[str, float] | None = None) -> Iterator[str]:
+    """Yield every parameter with its meaning: ``swept`` ones as ranges, those with a default as comments.
+
+    Values are those of the example, or of a design that was ``drawn`` [mm, rad].
+    """
+    example = _example(family) if drawn is None else drawn
     given = {p.unit for p in family.parameters}
     si = bool(given & {"mass", "force", "stiffness", "torque"})
     units = OTHERS | (SI if si else LENGTHS)
-    scale = 1.0 if si else _scale(family, example)
+    scale = 1.0 if si or drawn is not None else _scale(family, example)
     for p in family.parameters:
         value = example.get(p.name, p.default)
         assert value is not None  # an example has every parameter that must be given

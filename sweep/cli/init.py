@@ -14,6 +14,7 @@ from sweep.cli.families import complete_families, family_names
 from sweep.cli.first_machine import machine_smoke_text, machine_text
 from sweep.cli.first_study import smoke_text, study_text
 from sweep.errors import InputError, StoreError
+from sweep.exchange.points import drawn
 from sweep.families import family as find_family
 from sweep.families.machines import Machine
 from sweep.study.schema import study_schema
@@ -32,21 +33,30 @@ NAME = re.compile(r"[a-z0-9][a-z0-9-]{0,63}")
     help="Of a machine, once for each: NAME=FAMILY, such as needle=rssr+guide.",
 )
 @click.option(
+    "--points",
+    type=click.Path(exists=True, dir_okay=False, path_type=Path),
+    help="Of --family: the points of a drawing, as of `sweep points`; the study is about that design.",
+)
+@click.option("--unit", default="mm", show_default=True, help="Of the coordinates in --points.")
+@click.option(
     "--into",
     type=click.Path(file_okay=False, path_type=Path),
     default=Path(),
     help="Where the folder NAME is made; default: here.",
 )
-def init(name: str, family: str | None, members: tuple[str, ...], into: Path) -> None:
+def init(name: str, family: str | None, members: tuple[str, ...], points: Path | None, unit: str, into: Path) -> None:
     """Write a first study of a mechanism or a machine: NAME/study.toml, every line explained, and its tiny version.
 
     It holds the example of the family, or of every --member, with two dimensions swept, passes `sweep check` and runs
-    as it is.  Its first line names the JSON schema by which an editor completes and checks it; the schema lies beside.
+    as it is.  With --points it holds the design of a drawing instead, which is its reference.  Its first line names the
+    JSON schema by which an editor completes and checks it; the schema lies beside.
     """
     if (family is None) == (not members):
         raise InputError("--family", family, "either --family, or --member once for each member", "command line")
     if NAME.fullmatch(name) is None:
         raise InputError("NAME", name, "a plain word of a-z, 0-9 and '-'", "command line")
+    if points is not None and family is None:
+        raise InputError("--points", str(points), "with --family: the points of one mechanism", "command line")
     machine = _machine(members)
     folder = into / name
     if folder.exists():
@@ -58,7 +68,8 @@ def init(name: str, family: str | None, members: tuple[str, ...], into: Path) ->
     else:
         assert family is not None
         mechanism = find_family(family_names(family))
-        files = {"study.toml": study_text(name, mechanism, seen), "smoke.toml": smoke_text(mechanism)}
+        design = None if points is None else drawn(family, points, unit=unit).parameters
+        files = {"study.toml": study_text(name, mechanism, seen, design), "smoke.toml": smoke_text(mechanism)}
     if shared is None:
         files[SCHEMA] = _current_schema()
     try:

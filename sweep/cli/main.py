@@ -37,6 +37,10 @@ VERBS = {
     "draw": ("draw:draw", "Draw one picture."),
     "effects": ("effects:effects", "List the effects a scene can call for, or explain one."),
     "eval": ("tables:evaluate_table", "Compute pose outputs of the designs in TABLE, one row per pose."),
+    "explore": (
+        "explore:explore",
+        "Take a design in hand: sliders for its dimensions; mechanism, curves, outputs and limits follow.",
+    ),
     "export": ("points:export", "Write one design of a dataset to a file that other programs read."),
     "families": ("families:families", "List the mechanism families, or the parameters and outputs of one."),
     "init": ("init:init", "Write a first study of a mechanism or a machine."),

@@ -14,10 +14,14 @@ from sweep.dataset.store import beside, located
 from sweep.evaluation.angles import grid_in_radians
 from sweep.exchange.export import FORMATS
 from sweep.exchange.export import export as write
-from sweep.exchange.points import TOLERANCE, from_points, read_points, reader_of
+from sweep.exchange.points import TOLERANCE, drawn
+from sweep.families import family as find_family
 from sweep.report.dataset import chosen
+from sweep.report.sheet import write_sheet
 from sweep.report.workbook import write_workbook
+from sweep.study.written import design_entries, toml
 
+OF_DATASETS = ("xlsx", "pdf", "svg", "dxf")  # what takes more than a design: its study
 FILE = click.argument("file", type=click.Path(exists=True, dir_okay=False, path_type=Path))
 
 
@@ -25,34 +29,36 @@ FILE = click.argument("file", type=click.Path(exists=True, dir_okay=False, path_
 @click.argument("family", shell_complete=complete_families)
 @FILE
 @click.option("--part", default="", help="Of a file with several: `stage 1`, the member's name, or both.")
+@click.option("--unit", default="mm", show_default=True, help="Of the coordinates; a heading `x [inch]` says it, too.")
 @click.option("--tolerance", type=float, help="Largest residual as a part of the drawing's size; default 1e-4.")
 @click.option("--out", type=click.Path(dir_okay=False, path_type=Path), help="A table for `sweep eval`: one design.")
-def points(family: str, file: Path, part: str, tolerance: float | None, out: Path | None) -> None:
+def points(family: str, file: Path, part: str, unit: str, tolerance: float | None, out: Path | None) -> None:
     """Find the dimensions of FAMILY from the points of a drawing: FILE.csv with the columns name, x, y, z.
 
     FILE may also be a .csv, .dxf or .glb that `sweep export` wrote; of several stages or members --part names one.
 
     Names are A (centre of the crank circle), axis_A (crank axis), B (crank pin), C, D, axis_D and so on: see
-    docs/frames.md.  Printed are the parameters, the crank angle of the drawn position, where the family's frame stands
-    in the drawing, and the residual: how far a point lies from its joint at most.  --out writes the parameters and phi
-    as a table.
+    docs/frames.md.  Printed is TOML: the table [design] of a study file, and [drawing]: the crank angle of the drawn
+    position, where the family's frame stands in the drawing [mm], and the residual: how far a point lies from its joint
+    at most.  --out writes the parameters and phi as a table [mm, rad].
     """
     out = checked_format(out)
-    given = read_points(file, reader_of(family), part=part)
-    found = from_points(family, tolerance=TOLERANCE if tolerance is None else tolerance, **given)
+    found = drawn(family, file, part, unit, TOLERANCE if tolerance is None else tolerance)
     if out is not None:
         write_table(pd.DataFrame([found.parameters | {"phi": found.phi}]), out)
-    for name, value in (*found.parameters.items(), ("phi", found.phi)):
-        click.echo(f"{name:10} {value:.17g}")
-    for name, vector in (("at", found.place.at), ("axis", found.place.axis), ("zero", found.place.zero)):
-        click.echo(f"{name:10} {' '.join(f'{x:.17g}' for x in vector)}")
-    click.echo(f"{'residual':10} {found.residual:.3g}")
+    place = found.place
+    drawing = {"phi": f"{found.phi!r} rad", "at": list(place.at), "axis": list(place.axis), "zero": list(place.zero)}
+    tables = {
+        "design": design_entries(find_family(family), found.parameters),
+        "drawing": drawing | {"residual": found.residual},
+    }
+    click.echo(toml(tables), nl=False)
 
 
 @click.command()
 @FOLDER
 @DESIGN
-@click.option("--format", "kind", required=True, type=click.Choice([*FORMATS, "xlsx"]))
+@click.option("--format", "kind", required=True, type=click.Choice([*dict.fromkeys([*FORMATS, *OF_DATASETS])]))
 @click.option(
     "--out", type=click.Path(dir_okay=False, path_type=Path), help="Default: export/DESIGN.ending beside FOLDER."
 )
@@ -61,8 +67,11 @@ def points(family: str, file: Path, part: str, tolerance: float | None, out: Pat
 def export(folder: Path, design: str | None, kind: str, out: Path | None, phi: float, poses: int) -> None:
     """Write one design of a dataset to a file that other programs read.
 
-    csv: hardpoints and axes.  glb: an animated model that a browser opens.  dxf: a drawing.  mjcf: a model for MuJoCo.
-    law: the motion over one turn with units, .csv or .parquet.  dxf needs `pip install 'linksweep[cad]'`.
+    csv: hardpoints and axes.  glb: an animated model that a browser opens.  mjcf: a model for MuJoCo.  law: the motion
+    over one turn with units, .csv or .parquet.
+
+    pdf, svg, dxf: a sheet with three views, dimensions and tolerances, hardpoints and limits.  dxf needs `pip install
+    'linksweep[cad]'`.
 
     xlsx: the whole dataset as a workbook, best designs first, with optimum, curves and definitions; it needs
     `pip install 'linksweep[excel]'`.
@@ -71,6 +80,10 @@ def export(folder: Path, design: str | None, kind: str, out: Path | None, phi: f
         click.echo(f"xlsx: {write_workbook(folder, out or _place(folder, 'results.xlsx'))}")
         return
     grid_in_radians("phi", "rad", phi, None)  # --phi is in rad, whatever the design is
+    if kind in OF_DATASETS:
+        target = out or _place(folder, f"{design or 'result'}.{kind}")
+        click.echo(f"{kind}: {write_sheet(folder, design, target, phi)}")
+        return
     found = chosen(folder, design)
     if out is None:
         name = f"{design or 'result'}{'-law' if kind == 'law' else ''}{FORMATS[kind][0]}"

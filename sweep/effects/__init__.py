@@ -20,9 +20,10 @@ from sweep.errors import InputError
 from sweep.families.base import Accuracy, Family, Output, Parameter, Step, Work, of_family
 from sweep.families.chain import Chain
 from sweep.families.machines import Machine
+from sweep.families.main_shaft import ShaftTorque
 from sweep.families.names import stem
 from sweep.families.reduction import reduced
-from sweep.families.relations import Reading
+from sweep.families.relations import EventValue
 from sweep.numerics.curves import Curve
 
 # Name of each effect's entry: module and constant.  A new effect is a kernel file, an entry file and its line here.
@@ -64,7 +65,28 @@ _OF_TREES = {
     "speed_fluctuation_friction": ("speed", "rubbing_tree"),
 }
 _TREES = ("five_link", "slotted", "swivel", "spherical_looper", "cylindrical_looper")
-_MADE = {f"{tree}_{kind}": (tree, *made) for kind, made in _OF_TREES.items() for tree in _TREES}
+# Families whose joints are not dimensioned here: forces and speed, no friction and no bearings.
+_PLAIN_TREES = (
+    "inverted_slider_crank",
+    "geared_dwell",
+    "epicyclic_dwell",
+    "cam",
+    "cam_lever",
+    "eyelet",
+    "guided_cam",
+    "free_cam",
+    "heddle",
+    "feed",
+    "feed_triad",
+)
+_SLOTS = ("slotted", "inverted_slider_crank", "geared_dwell", "epicyclic_dwell", "feed")
+_MADE = {
+    f"{tree}_{kind}": (tree, *made)
+    for kind, made in _OF_TREES.items()
+    for tree in (*_TREES, *(_PLAIN_TREES if kind in ("loads", "speed_fluctuation") else ()))
+}
+_MADE |= {f"{name}_contact": (name, "contact", "contact_of") for name in _SLOTS}
+_MADE |= {f"{name}_roller": (name, "cam_roller", "roller_of") for name in ("cam", "cam_lever")}
 NAMES = (*_ENTRIES, *_MADE)
 
 # In the stages behind the first, speed and acceleration are those of the first stage's crank.
@@ -246,9 +268,10 @@ def _asked(machine: Machine, wanted: Iterable[str]) -> set[str]:
     asked = [timing for timing in machine.timings if timing.name in names]
     places = [place for timing in asked for place in timing.places]
     names |= {about for name in places for about in reduced(name, machine.domain)}
-    names |= {timing.of.name for timing in asked if isinstance(timing, Reading)}
+    names |= {timing.of.name for timing in asked if isinstance(timing, EventValue)}
     for relation in machine.relations:
-        if not names.isdisjoint(o.name for o in relation.outputs):
+        numbers = relation.numbers if isinstance(relation, ShaftTorque) else ()
+        if not names.isdisjoint(o.name for o in (*relation.outputs, *numbers)):
             names |= relation.needs(frozenset(names))
     return names
 

@@ -14,9 +14,10 @@ from sweep.effects.driven import DrivenSide, driven_side, drives_something
 from sweep.effects.load_passing import LOADS, behind
 from sweep.effects.loads import SPEED
 from sweep.effects.scene import Scene, take_over
-from sweep.effects.turn import at_poses, backwards, on_finer_grids, per_turn, reduction_outputs
+from sweep.effects.turn import at_poses, on_finer_grids, per_turn, reduction_outputs
 from sweep.families.base import Accuracy, Array, Columns, Output, Parameter
 from sweep.families.poses import optional_outputs
+from sweep.numerics.steady_speed import backwards
 
 EQUATION = "E1 (1), (2), (5), E2 (3)-(5)"
 FORMULAS = (

@@ -158,7 +158,9 @@ def _bodies(scene: Scene) -> Array:
 def _tool(scene: Scene) -> Array:
     """Mass of the tool and its place in the axes of the body that carries it, (n, 4)."""
     tree = tree_of(scene)
-    tip = scene.table(tuple(p.name for p in loads.TIP)) if tree.tip is None else tree.tip(scene.designs)
+    # the output link turns about an axis along z, so the height of its origin is that of every pose
+    of_design = scene.links.bodies[:, 0, tree.carrier, 2]
+    tip = loads.tip_from(scene, of_design) if tree.tip is None else tree.tip(scene.designs)
     return np.column_stack([scene.inputs["m_tool"], tip])
 
 

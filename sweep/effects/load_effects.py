@@ -48,7 +48,7 @@ def reversals(scene: Scene) -> Array:
     """Compute the turning of each shaft in its bearings, (n, m, q)."""
     rates = []
     for joint in _shafts(tree_of(scene)):
-        turn, _ = _relative(scene, joint)
+        turn, _ = relative(scene, joint)
         rates.append((turn * scene.links.axes[:, :, joint.freedom]).sum(axis=2))
     return np.stack(rates, axis=2)
 
@@ -57,7 +57,7 @@ def slowness(scene: Scene) -> Array:
     """Squares of the turning, and of the sliding, of all other joints, (n, m, q)."""
     squares = []
     for joint in _others(tree_of(scene)):
-        turn, slip = _relative(scene, joint)
+        turn, slip = relative(scene, joint)
         if joint.kind == "sleeve":
             axis = scene.links.axes[:, :, joint.freedom]
             radius = scene.inputs[f"radius_{joint.name}"][:, None]
@@ -77,7 +77,7 @@ def _others(tree: LinkTree) -> list[LinkJoint]:
     return [j for j in tree.joints if j.kind != "shaft"]
 
 
-def _relative(scene: Scene, joint: LinkJoint) -> tuple[Array, Array]:
+def relative(scene: Scene, joint: LinkJoint) -> tuple[Array, Array]:
     """Compute turning and sliding of one body of a joint against the other, (n, m, 3), as friction sees them.
 
     A rod is free about its own axis, a contact slides across its lines.

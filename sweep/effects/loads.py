@@ -86,9 +86,9 @@ FREE_TOOL = (
         for axis in "xyz"
     ),
 )
+_ALONG = {"x": "the output link", "y": "its tangent", "z": "its axis, from z = 0 of the frame"}
 TIP = tuple(
-    Parameter(f"tip_{axis}", "length", f"place of the tool along {axis} of the output link's axes", default=0.0)
-    for axis in "xyz"
+    Parameter(f"tool_{axis}", "length", f"place of the tool along {way}", default=0.0) for axis, way in _ALONG.items()
 )
 # Of families with a point of the coupler that a tool hangs on: one that moves along a line, one that moves freely; and
 # of families whose rocker can carry a tool at its tip.
@@ -177,6 +177,16 @@ def magnitude(vectors: Array) -> Array:
     x, y, z = vectors[:, :, 0], vectors[:, :, 1], vectors[:, :, 2]
     length: Array = np.sqrt(x * x + y * y + z * z)
     return length
+
+
+def tip_from(scene: Scene, heights: Array) -> Array:
+    """Place of a tool at the tip of the output link, (n, 3), from the point of its axis at these heights, (n,).
+
+    Inputs count from the point with z = 0, as tips of a machine do; bodies and loads count from D.
+    """
+    place = scene.table(tuple(p.name for p in TIP))
+    place[:, 2] -= heights
+    return place
 
 
 def together(scene: Scene, shaft: str) -> NDArray[np.bool_]:

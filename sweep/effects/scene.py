@@ -91,7 +91,8 @@ class Scene:
         n, every = len(self.designs), (len(tree.bodies), len(tree.freedoms), len(tree.ends))
         bodies, axes, lines = (np.empty((*self.shape, k, per)) for k, per in zip(every, _PER_LINK, strict=True))
         parents = np.array(tree.parents, np.int64)
-        freedoms, ends = (np.tile(np.array(given, np.int64), (n, 1, 1)) for given in (tree.freedoms, tree.ends))
+        pairs = (np.array(given, np.int64).reshape(-1, 2) for given in (tree.freedoms, tree.ends))
+        freedoms, ends = (np.tile(pair, (n, 1, 1)) for pair in pairs)
         found = Links(parents, freedoms, ends, bodies, axes, lines)
         tree.fill(self.designs, self.angles, self.motion, found)
         return found

@@ -8,16 +8,17 @@ import numpy as np
 from numpy.typing import NDArray
 
 from kernels import status as st
-from kernels.effects.speed_fluctuation import RESOLVED, speed_fluctuation
+from kernels.effects.speed_fluctuation import RESOLVED
 from kernels.types import Status
 from sweep.effects import load_effects, loads
 from sweep.effects.base import Advice, DesignResult, Effect
 from sweep.effects.load_passing import FRICTION, LOADS, compute_friction, compute_loads
 from sweep.effects.loads import FRICTION_SUFFIX, FRICTION_TEXT
 from sweep.effects.scene import Scene, take_over
-from sweep.effects.turn import at_poses, backwards, on_finer_grids, per_turn, reduction_outputs
+from sweep.effects.turn import at_poses, on_finer_grids, per_turn, reduction_outputs
 from sweep.families import family
 from sweep.families.base import Accuracy, Array, Columns, Output, Parameter
+from sweep.numerics.steady_speed import ERROR, FINER, GRIDS, LEFT, PER_LEFT, steady
 
 EQUATION = "D4 (1)-(4)"
 FORMULAS = (
@@ -40,15 +41,8 @@ MOTOR = Parameter(
     not_negative=True,
 )  # fmt: skip
 
-# Odd grids: the next one is tried for designs that the one before does not resolve.
-GRIDS = (65, 129, 257)
-# Loads that jump or have kinks: no grid resolves all of them, the error says what the last one misses.
-FINER = (513, 2049)
 RUBBING = (129, *FINER[1:])  # friction has kinks where the follower turns back: few designs end on the first grid
-LEFT = 1e-3  # share of J omega^2 that the last of these may miss of the torque
 LEFT_OF_CURVE = 1e-4  # and of a curve: more than this is a jump, beside which a series overshoots
-PER_LEFT = 5.0  # a jump h leaves h/(pi K) in harmonic K and shifts the energy by h pi/N at most, N = 2 K + 1
-ERROR = 1e-9
 SUFFIX = ("", FRICTION_SUFFIX)  # of the outputs, by whether the joints rub
 _NEEDED_NAMES = ("reduced_inertia", "dreduced_inertia", "drive_torque")
 _NEEDED = frozenset(_NEEDED_NAMES)
@@ -86,46 +80,6 @@ def _solve(rubs: bool, finest: int, grid: Scene, phi: Array, last: bool) -> tupl
     coarsest = LEFT if last and finest > GRIDS[-1] else RESOLVED
     found, status = steady(inertia, excess, grid.inputs["speed"], motor, phi, coarsest)
     np.copyto(status, jammed, where=jammed != st.OK)
-    return found, status
-
-
-def steady(
-    inertia: Array, excess: Array, speed: Array, slope: Array | None, phi: Array, coarsest: float
-) -> tuple[dict[str, Array], Status]:
-    """Kernel's numbers, (n,), and curves at phi, (n, m), without a suffix, and the status.
-
-    Numbers are of the magnitude of the speed.  A crank that turns backwards is one that turns forwards in -phi, where
-    the torque that is left over acts the other way.
-    """
-    if (speed < 0.0).any():
-        return _of_both_senses(inertia, excess, speed, slope, phi, coarsest)
-    n = len(inertia)
-    unevenness, fastest, slowest, energy, missed = (np.empty(n) for _ in range(5))
-    crank_speed, acceleration = (np.empty((n, phi.shape[1])) for _ in range(2))
-    status = np.empty(n, np.uint8)
-    speed_fluctuation(
-        inertia, excess, speed, phi, status, unevenness, fastest, slowest, energy, crank_speed, acceleration, coarsest,
-        missed, slope,
-    )  # fmt: skip
-    found = {"unevenness": unevenness, "fastest": fastest, "slowest": slowest, "missed": missed}
-    return found | {"crank_speed": crank_speed, "crank_acceleration": acceleration}, status
-
-
-def _of_both_senses(
-    inertia: Array, excess: Array, speed: Array, slope: Array | None, phi: Array, coarsest: float
-) -> tuple[dict[str, Array], Status]:
-    """Do the same where some cranks turn backwards."""
-    found: dict[str, Array] = {}
-    status = np.empty(len(speed), np.uint8)
-    for rows, sense in ((np.flatnonzero(speed > 0.0), 1.0), (np.flatnonzero(speed < 0.0), -1.0)):
-        at, stored, left = phi[rows] if len(phi) > 1 else phi, inertia[rows], excess[rows]
-        if sense < 0.0:
-            at, (stored, left) = backwards(at, stored, -left)
-        given = None if slope is None else slope[rows]
-        part, status[rows] = steady(stored, left, sense * speed[rows], given, np.ascontiguousarray(at), coarsest)
-        for name, values in part.items():
-            turned = sense if name in ("crank_speed", "crank_acceleration") else 1.0
-            found.setdefault(name, np.empty((len(speed), *values.shape[1:])))[rows] = turned * values
     return found, status
 
 

@@ -56,7 +56,7 @@ def _data(scene: Scene) -> tuple[Array, Array]:
 def _free_data(scene: Scene) -> tuple[Array, Array]:
     """Columns of the kernel of a tool that moves freely, and the working force, (n, m or 1, 3)."""
     place = scene.family.find(ToolPoint)
-    tip = scene.table(tuple(p.name for p in loads.TIP)) if place is None else place.point(scene.designs)
+    tip = loads.tip_from(scene, scene.records[1][:, 11]) if place is None else place.point(scene.designs)
     gravity = scene.table(tuple(p.name for p in loads.GRAVITY))
     data = np.column_stack([scene.inputs["m_tool"], tip, gravity])
     return data, np.stack(np.broadcast_arrays(*(scene.load(name) for name in _FORCES)), axis=2)

@@ -23,15 +23,6 @@ Solver: TypeAlias = Callable[[Scene, Array, bool], tuple[dict[str, Array], Statu
 """``solve(scene, phi, last)``: numbers (n,) and curves (n, m) at phi from a scene on a grid, and status (n,)."""
 
 
-def backwards(phi: Array, *curves: Array) -> tuple[Array, list[Array]]:
-    """Crank angles and curves on an even grid of a turn as a crank sees them that turns the other way.
-
-    A turn backwards in phi is one forwards in -phi, (n, N) curves are its samples at the same grid.  Done twice it
-    gives what was there before.
-    """
-    return -phi, [np.ascontiguousarray(np.roll(y[:, ::-1], 1, axis=1)) for y in curves]
-
-
 def on_finer_grids(scene: Scene, phi: Array, grids: Sequence[int], solve: Solver) -> tuple[dict[str, Array], Status]:
     """Solve every design on the first of the ``grids`` that resolves it.
 

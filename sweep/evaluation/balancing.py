@@ -24,7 +24,7 @@ class Orders(NamedTuple):
 
 
 @dataclass(frozen=True)
-class Place:
+class CorrectionPlane:
     """Where a counterweight sits.
 
     Parameters
@@ -71,7 +71,12 @@ def rms(values: Array) -> float:
 
 
 def best_counterweights(
-    phi: Array, force: Array, moment: Array, speed: float, places: Sequence[Place], length: float | None = None
+    phi: Array,
+    force: Array,
+    moment: Array,
+    speed: float,
+    places: Sequence[CorrectionPlane],
+    length: float | None = None,
 ) -> Balanced:
     """Return the counterweights that leave the least rms force, or of force and moment.
 

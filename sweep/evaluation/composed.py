@@ -9,7 +9,7 @@ from kernels.types import TWO_PI
 from sweep.families.base import Accuracy, Array, Columns
 from sweep.families.machines import Machine
 from sweep.families.names import by_magnitude, error_of
-from sweep.families.relations import Reading, Timing
+from sweep.families.relations import EventValue, Timing
 from sweep.quantities.box import ROUNDING, Box
 from sweep.reductions.sampling import pose_columns
 
@@ -54,7 +54,7 @@ def difference(timing: Timing, designs: Array, found: Columns, accuracy: Accurac
     return columns
 
 
-def value_at(machine: Machine, reading: Reading, designs: Array, found: Columns, accuracy: Accuracy) -> Columns:
+def value_at(machine: Machine, reading: EventValue, designs: Array, found: Columns, accuracy: Accuracy) -> Columns:
     """Give a pose output at a crank angle of each design; its error is that of the angle, by the slope there."""
     place = reading.places[0]
     phi = np.asarray(found[place], np.float64)

@@ -25,7 +25,7 @@ from sweep.families.domain import Interval, March
 from sweep.families.machines import Machine
 from sweep.families.names import error_of, is_place
 from sweep.families.parts import Member, Stage
-from sweep.families.relations import Reading
+from sweep.families.relations import EventValue
 from sweep.quantities.kinds import Extent, Group, Margin, Negative, Quantity, TimingOf, group_of
 from sweep.quantities.resolve import resolve
 from sweep.reductions.margins import NAMES as MARGINS
@@ -192,7 +192,7 @@ def _composed(family: Family, asked: Negative | Extent | TimingOf, accuracy: Acc
         case TimingOf(timing=timing):
             of = timing.places
             order = max(route.order for route in routes(family, of, accuracy))
-            if isinstance(timing, Reading):
+            if isinstance(timing, EventValue):
                 assert isinstance(family, Machine)
                 title, compose = f"value {name}", partial(composed.value_at, family, timing)
             else:

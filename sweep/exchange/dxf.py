@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -32,6 +33,7 @@ def ezdxf_or_refuse() -> Any:
     """
     try:
         import ezdxf
+        import ezdxf.bbox
     except ImportError as error:
         raise InputError("format", "dxf", "the package ezdxf: pip install 'linksweep[cad]'", "export") from error
     return ezdxf
@@ -75,6 +77,28 @@ def write_dxf(placed: list[Placed], path: Path, unit: str) -> None:
             title = f"{', '.join(part.label for part in same)}: {view}" if spatial else same[0].label
             low = np.array([float(flat[:, 0].min()), float(flat[:, 1].min()) - 0.15 * size]) + shift
             _text(space, title, low, 0.04 * size)
+    document.saveas(path)
+
+
+def add_tables(path: Path, tables: Sequence[tuple[str, Sequence[str], Sequence[Sequence[str]]]]) -> None:
+    """Write tables, as title, heads and lines, below the views of a drawing of `write_dxf`."""
+    ezdxf = ezdxf_or_refuse()
+    document: Any = ezdxf.readfile(path)
+    space = document.modelspace()
+    found = ezdxf.bbox.extents(space)
+    size = float(max(found.size.x, found.size.y))
+    height, down = 0.012 * size, float(found.extmin.y) - 0.05 * size
+    for title, heads, lines in tables:
+        rows = [(title,), tuple(heads), *lines]
+        widths = [max(len(row[k]) for row in rows[1:]) for k in range(len(heads))]
+        for row in rows:
+            right = float(found.extmin.x)
+            for words, width in zip(row, widths, strict=False):
+                if words:
+                    _text(space, words, np.array([right, down]), height)
+                right += (width + 2) * height
+            down -= 1.6 * height
+        down -= 1.6 * height
     document.saveas(path)
 
 

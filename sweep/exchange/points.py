@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 import struct
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
@@ -17,9 +18,10 @@ from sweep.exchange.dxf import NAMED, ezdxf_or_refuse
 from sweep.families import NAMES
 from sweep.families import family as find_family
 from sweep.families.base import Array, Family
-from sweep.families.capabilities import Hardpoints, Reading
+from sweep.families.capabilities import FittedPose, Hardpoints
 from sweep.families.hardpoints import size
 from sweep.families.parts import Placement, vector
+from sweep.quantities.units import UnitFault, factor
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -107,6 +109,23 @@ def from_points(family: str, *, tolerance: float = TOLERANCE, **points: Sequence
     return PlacedDesign(found.name, reading.parameters, reading.phi, place, max(off.values()))
 
 
+def drawn(family: str, file: Path, part: str = "", unit: str = "mm", tolerance: float = TOLERANCE) -> PlacedDesign:
+    """Mechanism of a file of points, as `from_points` finds it, in mm; coordinates are in ``unit``.
+
+    Raises
+    ------
+    InputError
+        as `read_points` and `from_points`; for an unknown unit.
+    """
+    try:
+        scale = factor(unit, "mm")
+    except UnitFault as fault:
+        raise InputError("--unit", unit, str(fault), str(file)) from None
+    found = read_points(file, reader_of(family), part=part)
+    given = {name: at if name.startswith("axis_") else [scale * x for x in at] for name, at in found.items()}
+    return from_points(family, tolerance=tolerance, **given)
+
+
 def reader_of(family: str) -> Hardpoints:
     """Return what reads the points of a family.
 
@@ -145,7 +164,7 @@ def _checked(reader: Hardpoints, points: Mapping[str, Sequence[float] | Array]) 
     return given
 
 
-def _joints(family: Family, reading: Reading, given: Mapping[str, Array]) -> dict[str, Array]:
+def _joints(family: Family, reading: FittedPose, given: Mapping[str, Array]) -> dict[str, Array]:
     """Return the places, in the drawing's frame, of the joints that have a given point."""
     (part,) = parts(family, reading.parameters, reading.phi)
     z, x = reading.z, reading.x
@@ -180,7 +199,8 @@ def read_points(file: Path, reader: Hardpoints | None = None, *, part: str = "")
 
     Parameters
     ----------
-    file : .csv with the columns name, x, y, z (others are not looked at); or .csv, .dxf, .glb of ``sweep export``
+    file : .csv with the columns name, x, y, z, or `x [inch]` and so on, which are brought to mm (others are not looked
+        at); or .csv, .dxf, .glb of ``sweep export``
     reader : what of an exported file is wanted; everything if left out.  A table written by hand is not filtered, so
         that a wrong name is found
     part : "stage 2", "needle", "needle stage 1"; may be left out where the file has one part only
@@ -209,7 +229,7 @@ def _of_csv(file: Path) -> tuple[Groups, bool]:
         table: pd.DataFrame = pd.read_csv(file, comment="#", skipinitialspace=True, dtype={"stage": str, "member": str})
     except (ValueError, OSError) as error:
         raise InputError("file", file.name, f"a CSV table ({error})", str(file)) from error
-    table.columns = [str(name).strip() for name in table.columns]
+    table = _in_mm(table.rename(columns=str.strip), file)
     for column in ("name", "x", "y", "z"):
         if column not in table:
             raise InputError("column", column, "the columns name, x, y, z", str(file))
@@ -225,6 +245,22 @@ def _of_csv(file: Path) -> tuple[Groups, bool]:
     if not groups:
         raise InputError("rows", 0, "a row for each point", str(file))
     return groups, exported
+
+
+_HEADED = re.compile(r"([xyz])\s*\[(.+)\]")
+
+
+def _in_mm(table: pd.DataFrame, file: Path) -> pd.DataFrame:
+    """Bring coordinates whose headings name a unit, as `x [inch]`, to mm; others keep the unit they are in."""
+    for heading in list(table.columns):
+        found = _HEADED.fullmatch(heading)
+        if found is None:
+            continue
+        try:
+            table[found[1]] = table.pop(heading) * factor(found[2].strip(), "mm")
+        except UnitFault as fault:
+            raise InputError("column", heading, str(fault), str(file)) from None
+    return table
 
 
 def _parts(table: pd.DataFrame) -> list[tuple[str, str]]:

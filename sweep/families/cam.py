@@ -14,6 +14,7 @@ from sweep.families.base import Angles, Columns, Family, Output, Parameter
 from sweep.families.capabilities import Dimensions, Link, Made, OutputLink, Points, Skeleton
 from sweep.families.curve_features import Switches
 from sweep.families.outputs import angle_outputs, ladders, place_outputs
+from sweep.families.planar_trees import sliding_follower, swinging_follower
 from sweep.families.poses import filled
 from sweep.families.skeletons import ORIGIN, X, line, links, parameter, standing
 
@@ -108,6 +109,7 @@ FAMILY = Family(
     derivative_of=ladders("s"),
     capabilities=(
         Switches(phase_ends),
+        sliding_follower(PARAMETERS),
         Points({"r": ("x_r", "y_r", None)}),
         Skeleton({"a": ORIGIN, "d": line(follower_line)}, (Link("cam", ("a",)), Link("follower", ("r",)))),
     ),
@@ -165,6 +167,7 @@ LEVER = Family(
         Switches(phase_ends),
         Dimensions(links("c")),
         OutputLink(lever_origin),
+        swinging_follower(LEVER_PARAMETERS),
         Skeleton(
             {"a": ORIGIN, "d": standing(LEVER_PARAMETERS, "e")},
             (Link("cam", ("a",)), Link("lever", ("d", "r"))),

@@ -324,11 +324,11 @@ class Hardpoints:
 
     needs: tuple[str, ...]
     may: tuple[str, ...]
-    fit: Callable[[Mapping[str, Array]], Reading]
+    fit: Callable[[Mapping[str, Array]], FittedPose]
 
 
 @dataclass(frozen=True)
-class Reading:
+class FittedPose:
     """Parameters, crank angle [rad], and origin, z and x of the family's frame in the drawing's."""
 
     parameters: dict[str, float]

@@ -11,6 +11,7 @@ from kernels.types import Array
 from sweep.families.base import Angles, Columns, Family, Output, Parameter
 from sweep.families.capabilities import Fixed, Link, Points, Skeleton, ThreadPath
 from sweep.families.curve_features import Singular
+from sweep.families.planar_trees import eyelet_crank
 from sweep.families.poses import poses_of
 from sweep.families.skeletons import crank_axis, parameter
 
@@ -78,6 +79,7 @@ FAMILY = Family(
     capabilities=(
         *(Singular(partial(thread_squared, number), EYELET) for number in (1, 2)),
         Points({"eyelet": EYELET}),
+        eyelet_crank(PARAMETERS),
         ThreadPath("wrap", "dP", "d2P"),
         Skeleton(
             {"a": crank_axis(PARAMETERS, "f", "alpha"), "n1": guide(1), "n2": guide(2)},

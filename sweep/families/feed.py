@@ -5,6 +5,8 @@ The three leads are the pin of the rocker and two eccentrics, each with a link t
 
 from __future__ import annotations
 
+from functools import partial
+
 import numpy as np
 
 from kernels.families import feed
@@ -15,8 +17,9 @@ from kernels.types import EPS, Array
 from sweep.families.base import Accuracy, Angles, Columns, Family, Output, Parameter, Step, Work
 from sweep.families.capabilities import Arm, Dimensions, Link, Made, Points, Skeleton
 from sweep.families.curve_features import Singular
+from sweep.families.feed_trees import three_leads, two_leads
 from sweep.families.rssr import FAMILY as CRANK_ROCKER
-from sweep.families.skeletons import links, parameter, standing
+from sweep.families.skeletons import COUPLER, CRANK, crank_axis, links, parameter, standing
 
 ROCKER = (
     Parameter("h_a", "length", "horizontal chain: crank", positive=True),
@@ -107,6 +110,20 @@ def horizontal_chain(designs: Array, parameters: tuple[Parameter, ...] = PARAMET
     return np.column_stack([designs[:, [0, 1, 2, 3, 4, 5, 6]], parameter(parameters, SIGMA.name, designs)])
 
 
+def chain_joints(parameters: tuple[Parameter, ...]) -> dict[str, Made]:
+    """Return crank pin and rocker ball of the horizontal chain."""
+
+    def joint(name: str, designs: Array, angles: Angles, found: Columns) -> Array:
+        names = [f"{axis}_{name}" for axis in "xyz"]
+        at = CRANK_ROCKER.poses(horizontal_chain(designs, parameters), angles, frozenset(names))
+        return np.stack([np.asarray(at[one], np.float64) for one in names], axis=-1)
+
+    return {name: Made((), partial(joint, name)) for name in "bc"}
+
+
+CHAIN_LINKS = (CRANK, COUPLER, Link("rocker", ("d", "c", "h")))
+
+
 def lift_loop(designs: Array, angles: Angles, found: Columns) -> Array:
     """Return Heron's product of the triangle H, E, F, (n, m): 16 times its squared area."""
     x_h, y_h, x_e, y_e = (np.asarray(found[name], np.float64) for name in ("x_h", "y_h", "x_e", "y_e"))
@@ -144,11 +161,15 @@ EXAMPLE = {
 
 
 SKELETON = Skeleton(
-    {"d": standing(PARAMETERS, "h_e"), "l": standing(PARAMETERS, "xE", "yE")},
+    {
+        "a": crank_axis(PARAMETERS, "h_f", "h_alpha"), "d": standing(PARAMETERS, "h_e"),
+        "l": standing(PARAMETERS, "xE", "yE"),
+    },
     (
-        Link("rocker", ("d", "h")), Link("eccentric", ("l", "e")),
+        *CHAIN_LINKS, Link("eccentric", ("l", "e")),
         Link("lift coupler", ("e", "f")), Link("rack", ("h", "f", "t")),
     ),
+    chain_joints(PARAMETERS),
 )  # fmt: skip
 _RACK = ("fx", "fy")
 SIZES = Dimensions((*links("h_a h_b h_c rh q"), _RACK), optional=("rE",), arms=(Arm(("tx", "ty"), _RACK),))
@@ -171,6 +192,7 @@ FAMILY = Family(
         Singular(rocker_loop),
         Singular(lift_loop, ("x_h", "y_h", "x_e", "y_e")),
         SIZES,
+        two_leads(PARAMETERS),
         Points({k: (f"x_{k}", f"y_{k}", None) for k in ("h", "e", "f", "t")}),
         SKELETON,
     ),
@@ -294,18 +316,19 @@ TRIAD = Family(
         Singular(triad_loop),
         Singular(determinant_squared, ("determinant",)),
         Dimensions(links("h_a h_b h_c rh q1 q2 q3"), optional=("rE2", "rE3")),
+        three_leads(TRIAD_PARAMETERS),
         Points({"t": ("x_t", "y_t", None)}),
         Skeleton(
             {
-                "d": standing(TRIAD_PARAMETERS, "h_e"), "l2": standing(TRIAD_PARAMETERS, "xE2", "yE2"),
-                "l3": standing(TRIAD_PARAMETERS, "xE3", "yE3"),
+                "a": crank_axis(TRIAD_PARAMETERS, "h_f", "h_alpha"), "d": standing(TRIAD_PARAMETERS, "h_e"),
+                "l2": standing(TRIAD_PARAMETERS, "xE2", "yE2"), "l3": standing(TRIAD_PARAMETERS, "xE3", "yE3"),
             },
             (
-                Link("rocker", ("d", "h")), Link("eccentric 2", ("l2", "e2")), Link("eccentric 3", ("l3", "e3")),
+                *CHAIN_LINKS, Link("eccentric 2", ("l2", "e2")), Link("eccentric 3", ("l3", "e3")),
                 Link("link 1", ("h", "f1")), Link("link 2", ("e2", "f2")), Link("link 3", ("e3", "f3")),
                 Link("rack", ("f1", "f2", "f3", "t")),
             ),
-            {
+            chain_joints(TRIAD_PARAMETERS) | {
                 "h": Made((), rocker_pin), "e2": eccentric(2), "e3": eccentric(3),
                 "f1": rack_joint(1), "f2": rack_joint(2), "f3": rack_joint(3),
             },

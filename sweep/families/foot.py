@@ -314,7 +314,9 @@ ON_FEED = Family(
         Skeleton(
             dict(feed.SKELETON.fixed) | {"plate": Fixed(plate, standing(FEED_PARAMETERS, axis=UPWARDS).axis, "slide")},
             (*feed.SKELETON.links, Link("foot", ("p",))),
-            {joint: of_rack(joint) for joint in ("h", "e", "f", "t")} | {"p": Made(("y_foot",), feed_foot_place)},
+            feed.chain_joints(FEED_PARAMETERS)
+            | {joint: of_rack(joint) for joint in ("h", "e", "f", "t")}
+            | {"p": Made(("y_foot",), feed_foot_place)},
         ),
     ),
 )

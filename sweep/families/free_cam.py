@@ -11,6 +11,7 @@ from kernels.types import Array
 from sweep.families.base import Angles, Columns, Family, Output, Parameter
 from sweep.families.capabilities import Link, Made, Points, Skeleton, ThreadPath
 from sweep.families.domain import March
+from sweep.families.planar_trees import turning_cam
 from sweep.families.poses import filled, poses_of
 from sweep.families.skeletons import ORIGIN, parameter, standing
 
@@ -89,6 +90,7 @@ FAMILY = Family(
     example={"a": 0.4, "X1": 0.83, "Y1": -2.08, "Z1": -3.56, "X2": 3.3, "Y2": -0.85, "Z2": 3.7},
     capabilities=(
         Points({"contact": ("X", "Y", None)}),
+        turning_cam(("P",)),
         ThreadPath("wrap", "dP", "d2P"),
         Skeleton(SKELETON_FIXED, LINKS, EDGE_POINTS),
     ),

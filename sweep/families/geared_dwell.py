@@ -12,6 +12,7 @@ from sweep.families.base import Accuracy, Angles, Columns, Family, Output, Param
 from sweep.families.capabilities import Link, Made, OutputLink, Points, Skeleton, constant
 from sweep.families.curve_features import Singular, Waves
 from sweep.families.outputs import angle_outputs, ladders
+from sweep.families.planar_trees import rolling_planet
 from sweep.families.poses import filled, optional_outputs, poses_of
 from sweep.families.skeletons import ORIGIN, parameter, standing
 
@@ -157,6 +158,7 @@ FAMILY = Family(
         Singular(pin_distance_squared, ("x_b", "y_b")),
         Points({"b": ("x_b", "y_b", None)}),
         OutputLink(constant(0.0, 0.0, 0.0)),
+        rolling_planet(PARAMETERS),
         Skeleton(
             {"a": standing(PARAMETERS, "a"), "d": ORIGIN},
             (Link("carrier", ("a", "o")), Link("planet", ("o", "b")), Link("slotted link", ("d", "b"))),
@@ -234,6 +236,7 @@ EPICYCLIC = Family(
         Waves(planet_turns),
         Points({"b": ("x_b", "y_b", None)}),
         OutputLink(constant(0.0, 0.0, 0.0)),
+        rolling_planet(EPICYCLIC_PARAMETERS),
         Skeleton(
             {"a": standing(EPICYCLIC_PARAMETERS, "a"), "d": ORIGIN},
             (Link("carrier", ("a", "o")), Link("planet", ("o", "b")), Link("slotted link", ("d", "b"))),

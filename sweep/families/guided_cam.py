@@ -9,6 +9,7 @@ from kernels.types import EPS, Array
 from sweep.families.base import Accuracy, Angles, Columns, Family, Output, Parameter, Step, Work
 from sweep.families.capabilities import Fixed, Link, Made, Points, Skeleton, ThreadPath
 from sweep.families.curve_features import Singular
+from sweep.families.planar_trees import thread_follower
 from sweep.families.poses import filled_with_places
 from sweep.families.skeletons import Y, line, parameter, standing
 
@@ -128,6 +129,7 @@ FAMILY = Family(
     capabilities=(
         Singular(displacement_squared, ("S",)),
         Points({"profile": ("X_P", "Y_P", None)}),
+        thread_follower(PARAMETERS, cam_axis),
         ThreadPath(WRAP.name, "dP", "d2P"),
         Skeleton(
             {

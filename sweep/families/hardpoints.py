@@ -13,14 +13,14 @@ import numpy as np
 
 from kernels.types import Array
 from sweep.errors import InputError
-from sweep.families.capabilities import Hardpoints, Reading
+from sweep.families.capabilities import FittedPose, Hardpoints
 
 PARALLEL = 1e-9  # sine of the angle below which two directions are read as one
 NOTHING = 1e-12  # part of the size of a drawing that is a rounding error of its coordinates
 PLACE = "points"
 
 
-def crank_rocker(points: Mapping[str, Array]) -> Reading:
+def crank_rocker(points: Mapping[str, Array]) -> FittedPose:
     """Dimensions of a spatial crank-rocker from A, axis_A, B, C, D, axis_D."""
     a, b, c, d, u, z = (points[name] for name in ("A", "B", "C", "D", "axis_A", "axis_D"))
     small = NOTHING * size(points)
@@ -47,10 +47,10 @@ def crank_rocker(points: Mapping[str, Array]) -> Reading:
     }
     branch = _sign(float(coupler @ (np.cos(psi) * y - np.sin(psi) * x)), small, "C")
     offsets = {"e": e, "f": f, "g": float((d - a) @ z) + f * cos, "alpha": math.atan2(sin, cos), "branch": branch}
-    return Reading(lengths | offsets, phi, a - f * u, z, x)
+    return FittedPose(lengths | offsets, phi, a - f * u, z, x)
 
 
-def slider_crank(points: Mapping[str, Array]) -> Reading:
+def slider_crank(points: Mapping[str, Array]) -> FittedPose:
     """Read a spatial slider-crank off A, axis_A, B, C, axis_D and, if the line is given by a point, D."""
     a, b, c, u, y = (points[name] for name in ("A", "B", "C", "axis_A", "axis_D"))
     d = points.get("D", c)
@@ -74,15 +74,15 @@ def slider_crank(points: Mapping[str, Array]) -> Reading:
     alpha = math.atan2(float(u @ y), float(u @ z) if cosine > PARALLEL else 0.0)
     offsets = {"e": 0.0 if abs(e) <= small else e, "f": f, "alpha": alpha}
     phi = math.atan2(float(crank @ np.cross(u, x)), float(crank @ x))
-    return Reading(lengths | offsets | {"branch": _sign(float(coupler @ y), small, "C")}, phi, a - f * u, z, x)
+    return FittedPose(lengths | offsets | {"branch": _sign(float(coupler @ y), small, "C")}, phi, a - f * u, z, x)
 
 
-def four_bar(points: Mapping[str, Array]) -> Reading:
+def four_bar(points: Mapping[str, Array]) -> FittedPose:
     """Read a planar four-bar off A, B, C, D and, if wanted, axis_A (else z) and the coupler point M."""
     return _planar(points, points.get("M"))
 
 
-def guide(points: Mapping[str, Array]) -> Reading:
+def guide(points: Mapping[str, Array]) -> FittedPose:
     """Read what :func:`four_bar` does, the coupler ``point``, and ``axis_line`` and ``line`` of a line.
 
     Without ``line`` the guiding line runs through the coupler point, which then is where it deviates by 0.
@@ -93,10 +93,10 @@ def guide(points: Mapping[str, Array]) -> Reading:
     lam = math.atan2(float(along @ y), float(along @ found.x))
     left = np.cos(lam) * y - np.sin(lam) * found.x
     h = float((points.get("line", points["point"]) - found.at) @ left)
-    return Reading(found.parameters | {"lam": lam, "h": h}, found.phi, found.at, found.z, found.x)
+    return FittedPose(found.parameters | {"lam": lam, "h": h}, found.phi, found.at, found.z, found.x)
 
 
-def planar_slider_crank(points: Mapping[str, Array]) -> Reading:
+def planar_slider_crank(points: Mapping[str, Array]) -> FittedPose:
     """Dimensions of a planar slider-crank from A, B, C, axis_D and, if wanted, D and axis_A (else z)."""
     a, b, c = (points[name] for name in ("A", "B", "C"))
     z, small = points.get("axis_A", np.array([0.0, 0.0, 1.0])), NOTHING * size(points)
@@ -112,10 +112,10 @@ def planar_slider_crank(points: Mapping[str, Array]) -> Reading:
         "e": float((points.get("D", c) - a) @ y),
         "branch": _sign(float(rod @ x), small, "C"),
     }
-    return Reading(parameters, math.atan2(float(crank @ y), float(crank @ x)), a, z, x)
+    return FittedPose(parameters, math.atan2(float(crank @ y), float(crank @ x)), a, z, x)
 
 
-def _planar(points: Mapping[str, Array], point: Array | None) -> Reading:
+def _planar(points: Mapping[str, Array], point: Array | None) -> FittedPose:
     a, b, c, d = (points[name] for name in ("A", "B", "C", "D"))
     z, small = points.get("axis_A", np.array([0.0, 0.0, 1.0])), NOTHING * size(points)
     x = _square(d - a, z, small)
@@ -132,7 +132,7 @@ def _planar(points: Mapping[str, Array], point: Array | None) -> Reading:
     if point is not None:
         along = coupler / parameters["b"]
         parameters |= {"xi": float((point - b) @ along), "eta": float((point - b) @ np.cross(z, along))}
-    return Reading(parameters, math.atan2(float(crank @ y), float(crank @ x)), a, z, x)
+    return FittedPose(parameters, math.atan2(float(crank @ y), float(crank @ x)), a, z, x)
 
 
 def size(points: Mapping[str, Array]) -> float:

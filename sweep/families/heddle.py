@@ -9,6 +9,7 @@ from kernels.types import Array
 from sweep.families.base import Angles, Columns, Family, Output, Parameter
 from sweep.families.capabilities import Assembly, Dimensions, Fixed, Link, Made, Points, Skeleton
 from sweep.families.outputs import ladders
+from sweep.families.planar_trees import heddle_shaft
 from sweep.families.poses import filled_with_places
 from sweep.families.skeletons import ORIGIN, Y, Z, line, links, parameter, standing
 
@@ -132,6 +133,7 @@ FAMILY = Family(
     capabilities=(
         Dimensions(links("O2B BC O3C O4E"), optional=("O3D", "O4F", "DF", "EG")),
         Assembly("discriminant", "pressure_angle", rod_square),
+        heddle_shaft(PARAMETERS, shaft_line),
         Points({"b": ("x_b", "y_b", None), "c": ("x_c", "y_c", None)}),
         Skeleton(
             {

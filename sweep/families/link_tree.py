@@ -40,6 +40,7 @@ class LinkJoint:
     acts : which body's force on which it is, in words
     body, freedom : of a shaft, a sleeve, a hinge the body; the number of the freedom whose axis is its own
     lines : of a ball, a contact the first of the lines that make it, and how many
+    touch : where its surfaces press without fitting: a ball or a pin in a straight slot, a strap on an eccentric
     """
 
     name: str
@@ -49,6 +50,7 @@ class LinkJoint:
     body: int = -1
     freedom: int = -1
     lines: tuple[int, int] = (-1, 0)
+    touch: Literal["", "ball", "line", "strap"] = ""
 
 
 LinkFill: TypeAlias = "Callable[[Array, Angles, Columns, Links], None]"
@@ -66,6 +68,7 @@ class LinkTree:
     carrier : number of the body that a tool hangs on
     tip : place of the tool in the axes of that body, (n, 3); None where it is an input
     output : number of the freedom that is the family's position, on which a load acts; -1 where no load does
+    rubs : whether its joints have dimensions for friction and bearings
     """
 
     bodies: tuple[LinkBody, ...]
@@ -78,6 +81,7 @@ class LinkTree:
     carrier: int
     tip: DesignMap | None = None
     output: int = -1
+    rubs: bool = True
 
 
 def filled_by(kernel: Callable[..., object], needs: tuple[str, ...], stacked: tuple[str, ...] = ()) -> LinkFill:

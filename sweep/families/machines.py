@@ -16,10 +16,11 @@ from sweep.families.base import Angles, Columns, Event, Family, Output, Paramete
 from sweep.families.capabilities import Assembly, Points
 from sweep.families.curve_features import of_members
 from sweep.families.frames import Frame
+from sweep.families.main_shaft import ShaftTorque, speed_of
 from sweep.families.moments import Taking
 from sweep.families.parts import AXES, EYE, TIP, Member, coordinates, coupler_joints, velocity
 from sweep.families.passages import step_of
-from sweep.families.relations import Reading, Relation, Timing
+from sweep.families.relations import EventValue, Relation, Timing
 from sweep.families.shaking import Shaking
 from sweep.families.sites import coordinates as coordinates_of_site
 from sweep.families.sites import made_of
@@ -36,7 +37,7 @@ class Machine(Family):
 
     members: tuple[Member, ...] = ()
     relations: tuple[Relation, ...] = ()
-    timings: tuple[Timing | Reading, ...] = ()
+    timings: tuple[Timing | EventValue, ...] = ()
 
     def member(self, name: str) -> Member:
         """Return the member of that name."""
@@ -68,12 +69,12 @@ class Machine(Family):
 
 
 def assemble(
-    name: str, members: tuple[Member, ...], relations: tuple[Relation | Timing | Reading | Event, ...]
+    name: str, members: tuple[Member, ...], relations: tuple[Relation | Timing | EventValue | Event, ...]
 ) -> Machine:
     """Return the machine of these members; each may be driven by one that stands before it."""
-    timings = tuple(r for r in relations if isinstance(r, Timing | Reading))
+    timings = tuple(r for r in relations if isinstance(r, Timing | EventValue))
     events = tuple(r for r in relations if isinstance(r, Event))
-    others = tuple(r for r in relations if not isinstance(r, Timing | Reading | Event))
+    others = tuple(r for r in relations if not isinstance(r, Timing | EventValue | Event))
     bare = Machine(name, "", (), "", (), _no_poses, relations=others, timings=timings, events=events)
     return _built(bare, members)
 
@@ -133,7 +134,9 @@ def _built(machine: Machine, members: tuple[Member, ...]) -> Machine:
     poses = partial(_poses, found)
     precise = partial(_precise_poses, found) if any(m.family.precise_poses for m in placed) else None
     found = replace(found, poses=poses, precise_poses=precise)
-    return replace(found, steps=tuple(step_of(r, found) for r in machine.relations if isinstance(r, Taking)))
+    passing = (step_of(r, found) for r in machine.relations if isinstance(r, Taking))
+    turning = (speed_of(r, found) for r in machine.relations if isinstance(r, ShaftTorque))
+    return replace(found, steps=(*passing, *turning))
 
 
 def _loop(member: Member, loop: Assembly) -> Assembly:
@@ -154,7 +157,10 @@ def _precise_poses(machine: Machine, designs: Array, angles: Angles, wanted: fro
 def _poses(machine: Machine, designs: Array, angles: Angles, wanted: frozenset[str]) -> Columns:
     """Compute the wanted outputs of members and relations, and the first status that is not OK."""
     relations = [r for r in machine.relations if not wanted.isdisjoint(o.name for o in r.outputs)]
+    columns_of = machine.parameter_names
     needed = set(wanted).union(*(r.needs(wanted) for r in relations))
+    inputs = needed.intersection(columns_of) | {p.name for r in relations for p in r.parameters}
+    needed -= inputs
     for m in reversed(machine.members):
         needed |= _driving(m, needed)
     shape = (len(designs), angles.cos.shape[1])
@@ -168,8 +174,7 @@ def _poses(machine: Machine, designs: Array, angles: Angles, wanted: frozenset[s
             found |= {f"{m.name}.{name}": values for name, values in columns.items()}
     frames = _frames(machine, designs) if any(isinstance(r, Shaking) for r in relations) else {}
     found["phi"] = angles.phi
-    columns_of = machine.parameter_names
-    found |= {p.name: designs[:, [columns_of.index(p.name)]] for r in relations for p in r.parameters}
+    found |= {name: designs[:, [columns_of.index(name)]] for name in inputs}
     for relation in relations:
         found |= relation.compute(found, frames, wanted)
     return {name: _whole(found[name], shape) for name in wanted} | {"status": status}

@@ -25,10 +25,10 @@ def _recorded(coordinates: str) -> Formulas:
 def _explored(formulas: Formulas, searched: Searched, leaves: tuple[Numbers, ...]) -> tuple[int, int]:
     """Leaves filled and boxes judged by :func:`kernels.families.rssr.proof.explore`."""
     from kernels.families.rssr import proof
-    from kernels.families.rssr.box_problem import Problem
+    from kernels.families.rssr.box_problem import BoxQuestion
 
     s = searched
-    problem = Problem(s.branch, s.objective, s.cos2, s.links, s.target, s.tube)
+    problem = BoxQuestion(s.branch, s.objective, s.cos2, s.links, s.target, s.tube)
     found = proof.explore(
         problem, formulas, s.starts, s.whole, s.free, s.given, s.smallest, s.most, proof.Leaves(*leaves)
     )

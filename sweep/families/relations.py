@@ -50,7 +50,7 @@ class Timing:
 
 
 @dataclass(frozen=True)
-class Reading:
+class EventValue:
     """Value of a pose output where something happens, such as the speed of a tip where it arrives.
 
     ``of`` is the pose output as the machine has it; ``places`` holds one design output that is a crank angle of the
@@ -136,36 +136,6 @@ class Speed:
 def _velocities(point: str) -> tuple[str, ...]:
     member, _, own = point.partition(".")
     return tuple(f"{member}.d{own}_{axis}" for axis in AXES)
-
-
-@dataclass(frozen=True)
-class ShaftTorque:
-    """Torque that the main shaft has to give: drive torques of members, times their ratios.
-
-    ``torques`` are the dotted outputs with their ratios.
-    """
-
-    name: str
-    torques: tuple[tuple[str, int], ...]
-
-    @property
-    def outputs(self) -> tuple[Output, ...]:
-        """The torque."""
-        words = ", ".join(name for name, _ in self.torques)
-        return (Output(self.name, "torque", f"torque on the main shaft that drives {words}", "ours"),)
-
-    @property
-    def parameters(self) -> tuple[Parameter, ...]:
-        """It has none of its own."""
-        return ()
-
-    def needs(self, wanted: frozenset[str]) -> frozenset[str]:
-        """Return the drive torques."""
-        return frozenset(name for name, _ in self.torques)
-
-    def compute(self, found: Mapping[str, Any], frames: Mapping[str, Frame], wanted: frozenset[str]) -> dict[str, Any]:
-        """Return the torque, (n, m): equal power on both sides of every gear."""
-        return {self.name: sum(ratio * found[name] for name, ratio in self.torques)}
 
 
 def with_size(name: str, parts: list[Any]) -> dict[str, Any]:

@@ -8,8 +8,8 @@ from typing import Any
 
 from sweep.errors import InputError
 from sweep.families.base import Family, Output, Parameter
-from sweep.families.capabilities import GuidedPoint, JointRecords, ToolPoint
-from sweep.families.frames import Frame
+from sweep.families.capabilities import GuidedPoint, JointRecords, Skeleton, ToolPoint
+from sweep.families.frames import CRANKS, Frame
 from sweep.families.link_tree import LinkTree
 from sweep.families.relations import with_size
 from sweep.families.segments import cross
@@ -27,6 +27,7 @@ class Shaken:
     sign : of those forces
     rod : whether a tool runs along a line beside which its point may stand: the guides of the line bear the couple
     driving : the stage before that drives it, if that is part of the machine's shaking too; "" for the shaft
+    crank : its joint on the crank axis
     """
 
     member: str
@@ -35,10 +36,16 @@ class Shaken:
     sign: float
     rod: bool
     driving: str = ""
+    crank: str = "a"
 
     def named(self, output: str) -> str:
         """Return the dotted name of an output of the stage."""
         return f"{self.member}.{output}{self.stage}"
+
+    @property
+    def axis(self) -> list[str]:
+        """Names of the components of its crank axis in the machine's frame."""
+        return [f"{self.member}.{self.crank}{self.stage}_axis_{axis}" for axis in AXES]
 
     def vector(self, found: Mapping[str, Any], output: str) -> list[Any]:
         """Return a vector in the frame of the stage."""
@@ -64,7 +71,9 @@ def shaken(member: str, stage: str, family: Family, listed: Sequence[tuple[str, 
     tool = family.find(ToolPoint)
     rod = tool is not None and tool.direction is not None and family.find(GuidedPoint) is not None
     before = str(int(stage) - 1) if stage else ""
-    return Shaken(member, stage, forces, sign, rod, before if (member, before) in listed else "")
+    skeleton = family.find(Skeleton)
+    crank = next((name for name in CRANKS if skeleton and name in skeleton.fixed), "")
+    return Shaken(member, stage, forces, sign, rod, before if (member, before) in listed else "", crank)
 
 
 @dataclass(frozen=True)
@@ -108,7 +117,7 @@ class Shaking:
             if self._turning(wanted) and one.rod:
                 names |= {one.named("tool_load"), one.named("dev")}
             if self._turning(wanted) and one.driving:
-                names |= {one.named("drive_torque"), *(f"{one.member}.a{one.stage}_axis_{axis}" for axis in AXES)}
+                names |= {one.named("drive_torque"), *one.axis}
         return frozenset(names)
 
     def compute(self, found: Mapping[str, Any], frames: Mapping[str, Frame], wanted: frozenset[str]) -> dict[str, Any]:
@@ -126,7 +135,7 @@ class Shaking:
                 moment = [total + a + b for total, a, b in zip(moment, about, arm, strict=True)]
                 if one.driving:
                     # The stage before turns its crank, not the frame: what its own moment counts in is inside.
-                    inside = [found[f"{one.member}.a{one.stage}_axis_{axis}"] for axis in AXES]
+                    inside = [found[name] for name in one.axis]
                     torque = found[one.named("drive_torque")]
                     moment = [total + torque * part for total, part in zip(moment, inside, strict=True)]
         return with_size(self.name, force) | (with_size(self._moment, moment) if self._turning(wanted) else {})

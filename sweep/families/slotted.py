@@ -21,6 +21,7 @@ from sweep.families.curve_features import Singular
 from sweep.families.link_tree import LinkBody, LinkJoint, LinkTree, filled_by
 from sweep.families.outputs import angle_outputs, joint_outputs, ladders, place_outputs, point_outputs
 from sweep.families.parts import AXES
+from sweep.families.planar_trees import slotted_rocker
 from sweep.families.poses import filled_blocks, filled_with_places
 from sweep.families.skeletons import CRANK, ORIGIN, crank_axis, links, parameter, standing
 
@@ -91,7 +92,7 @@ LINKS = LinkTree(
         LinkJoint("a", "crank bearing", "shaft", "frame on the crank", body=0, freedom=0),
         LinkJoint("b", "ball of the crank", "ball", "crank on the arm, or on the block of the fork", lines=(0, 3)),
         LinkJoint("c", "guide of the driven link", "sleeve", "driven link on the arm, or on the block", body=2,
-                  freedom=2),
+                  freedom=2, touch="ball"),
         LinkJoint("d", "bearing of the driven link", "shaft", "frame on the driven link", body=1, freedom=1),
     ),
     parents=(FRAME, FRAME, 1),
@@ -187,6 +188,7 @@ PLANAR = Family(
         Assembly("discriminant", "pressure_angle", unit),
         Points({"b": ("x_b", "y_b", None)}),
         OutputLink(driven_origin),
+        slotted_rocker(PLANAR_PARAMETERS),
         Skeleton(
             {"a": ORIGIN, "d": standing(PLANAR_PARAMETERS, "e")},
             (CRANK, Link("rocker", ("d", "c", "b"))),

@@ -16,10 +16,12 @@ from sweep.families.capabilities import OutputLink
 from sweep.families.domain import Turn, reads_as_degrees
 from sweep.families.frames import crank_axis
 from sweep.families.gaps import Body, Gap
+from sweep.families.link_tree import LinkTree
 from sweep.families.machines import Machine, assemble
+from sweep.families.main_shaft import Driven, ShaftTorque
 from sweep.families.moments import Taking
 from sweep.families.parts import Member, coupler_joints, is_planar, placement, vector
-from sweep.families.relations import Distance, Reading, Relation, ShaftTorque, Speed, Timing
+from sweep.families.relations import Distance, EventValue, Relation, Speed, Timing
 from sweep.families.shafts import MOUNT_KEYS, SHAFT_KEYS, Mount, Shaft, read_mount, read_shafts
 from sweep.families.shaking import Shaken, Shaking, shaken
 from sweep.families.thread_balance import thread_balance
@@ -204,7 +206,7 @@ def _outputs(members: Mapping[str, Member], others: tuple[Any, ...]) -> Mapping[
     return assemble("", tuple(members.values()), relations).pose_output
 
 
-def _reading(name: str, table: dict[str, Any], outputs: Mapping[str, Output]) -> Reading:
+def _reading(name: str, table: dict[str, Any], outputs: Mapping[str, Output]) -> EventValue:
     """Value of a pose output at a crank angle."""
     where, given = f"machine.relations.{name}", table["value"]
     if len(table) != 1:
@@ -214,7 +216,7 @@ def _reading(name: str, table: dict[str, Any], outputs: Mapping[str, Output]) ->
     of, place = given
     if of not in outputs:
         raise InputError("value", of, f"a pose output of the machine{nearest(of, outputs)}", where)
-    return Reading(name, outputs[of], (place,))
+    return EventValue(name, outputs[of], (place,))
 
 
 def _event(name: str, table: dict[str, Any], outputs: Mapping[str, Output]) -> Event:
@@ -265,10 +267,21 @@ def _relation(
         if part not in known:
             raise InputError(kind, part, f"members: {choices(part, known)}", where)
     if kind == "torque":
-        return ShaftTorque(
-            name, tuple((f"{known[x][0]}.drive_torque{known[x][1]}", members[known[x][0]].ratio) for x in given)
-        )
+        return _shaft_torque(name, [known[part] for part in given], members, where)
     return Shaking(name, tuple(_shaken(members, [known[part] for part in given], where)))
+
+
+def _shaft_torque(name: str, listed: list[tuple[str, str]], members: Mapping[str, Member], where: str) -> ShaftTorque:
+    """Return what the first stages of members need of the main shaft: that of a later one is handed on to the first."""
+    for member, stage in listed:
+        if stage not in ("", "1") or listed.count((member, stage)) > 1:
+            raise InputError("torque", f"{member}{stage}", "members each once: a chain takes torque at stage 1", where)
+    rubs = all(
+        (tree := stage.find(LinkTree)) is None or tree.rubs
+        for member, _ in listed
+        for stage in ([s.family for s in getattr(members[member].family, "stages", ())] or [members[member].family])
+    )
+    return ShaftTorque(name, tuple(Driven(member, stage, members[member].ratio) for member, stage in listed), rubs)
 
 
 def _shaken(members: Mapping[str, Member], listed: list[tuple[str, str]], where: str) -> Iterator[Shaken]:

@@ -28,6 +28,7 @@ if TYPE_CHECKING:
     from sweep.evaluation.tables import Table
 
 POSES = 720
+MOST_LINES = 20  # in one panel
 
 
 def motion(
@@ -38,17 +39,20 @@ def motion(
     unit: str = "mm",
     speed: float | None = None,
     angles: AngleUnit | None = None,
+    axes: Sequence[Axes] | Axes | None = None,
 ) -> NDArray[Any]:
     """Show curves over one turn, one panel for each.
 
     Parameters
     ----------
-    mechanism, design : as of :func:`sweep.joints`
+    mechanism : as of :func:`sweep.joints`
+    design : one design, or several as rows of a table: one line each, called by the table's index
     want : pose outputs, as a list or in one string between commas; if left out position and derivatives, deviations
         and pressure angles
     unit : the length unit of the design, for the axes
     speed : of the driving shaft [rad/s]: adds scales of velocity, acceleration and jerk in time
     angles : the unit of the angles of ``design``, "rad" or "deg", as of :func:`sweep.evaluate`
+    axes : of a figure of yours to draw into, one for each curve
 
     Returns
     -------
@@ -74,13 +78,18 @@ def motion(
     phi = np.arange(POSES) * (2.0 * math.pi / POSES)
     design = in_radians(family, design, angles)
     found = evaluate(mechanism, design, list(dict.fromkeys([*names, family.position])), phi=phi, angles="rad")
-    if found["design"].iloc[-1] != 0:
-        raise InputError("design", "several rows", "the parameters of one design", f"table of {family.name}")
-    curves = pd.DataFrame(found.assign(role="design"))
+    known = design.index if isinstance(design, pd.DataFrame) else range(int(found["design"].iloc[-1]) + 1)
+    if not 1 <= len(known) <= MOST_LINES:
+        raise InputError("design", f"{len(known)} rows", f"1 to {MOST_LINES} designs", f"table of {family.name}")
+    given = None if axes is None else list(np.atleast_1d(np.array(axes, dtype=object)).ravel())
+    if given is not None and len(given) != len(names):
+        raise InputError("axes", len(given), f"{len(names)}, one for each of {', '.join(names)}", "plot")
+    names_of = [str(name) if isinstance(name, str) else f"design {name}" for name in known]
+    curves = pd.DataFrame(found.assign(role=[names_of[k] for k in found["design"]]))
     units = {o.name: o.unit.replace("length", unit) for o in family.pose_outputs}
     with house_style():
-        figure = motion_figure(curves, units, family.position, speed, (), None, names)
-    return np.array(figure.axes[: len(names)], dtype=object)
+        panels = motion_figure(curves, units, family.position, speed, (), None, names, given)
+    return np.array(panels, dtype=object)
 
 
 def mechanism(

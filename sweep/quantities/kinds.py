@@ -7,7 +7,7 @@ from typing import Literal, NamedTuple, TypeAlias
 
 from sweep.families.base import Event, Family, Output
 from sweep.families.reduction import Mode, Reduction
-from sweep.families.relations import Reading, Timing
+from sweep.families.relations import EventValue, Timing
 from sweep.quantities.box import Box
 from sweep.quantities.dimensions import Size
 
@@ -115,7 +115,7 @@ class LargestLength(_Meaning):
 class TimingOf(_Meaning):
     """What a machine's timing gives: the difference of two crank angles, or the value of a pose output at one."""
 
-    timing: Timing | Reading
+    timing: Timing | EventValue
 
 
 @dataclass(frozen=True)

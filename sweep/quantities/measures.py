@@ -16,7 +16,7 @@ from sweep.families.base import Family
 from sweep.families.capabilities import Assembly
 from sweep.families.domain import Turn
 from sweep.families.names import parts, stem, without_minus
-from sweep.families.relations import Reading, Timing
+from sweep.families.relations import EventValue, Timing
 from sweep.quantities.dimensions import Piece
 from sweep.quantities.kinds import (
     Dimension,
@@ -205,9 +205,9 @@ def _measure(family: Family, name: str, asked: Quantity, window: tuple[float, fl
             return Measure(name, "scalar", (), numbers=(name,))
 
 
-def _of_timing(family: Family, timing: Timing | Reading, window: tuple[float, float] | None) -> Measure:
+def _of_timing(family: Family, timing: Timing | EventValue, window: tuple[float, float] | None) -> Measure:
     ends = tuple(measure(family, place, window) for place in timing.places)
-    if isinstance(timing, Reading):
+    if isinstance(timing, EventValue):
         # The angle of a passage has an exact slope; that of an extremum no better one than differences have.
         at = ends if ends[0].kind == "phi_event" else ()
         series = ends[0].series if at else ()

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -31,9 +31,14 @@ FAR_LIMIT = 2.5  # limits farther out than so many times the curves are not draw
 NOT_CURVES = ("role", "phi", "status")
 
 
-def style_of(role: str) -> dict[str, Any]:
-    """Style of a line: the reference is dashed, the result solid."""
-    return {"color": REFERENCE, "linestyle": (0, (4, 2))} if role == "reference" else {"color": OPTIMUM}
+OTHERS = (OPTIMUM, "#2f8f5b", "#7a4fa3", "#14808f", "#8c6d1f")
+
+
+def styles_of(roles: Iterable[str]) -> dict[str, dict[str, Any]]:
+    """Return styles of lines: the reference is dashed, the others are solid and differ in colour."""
+    others = [role for role in roles if role != "reference"]
+    found: dict[str, dict[str, Any]] = {role: {"color": OTHERS[k % len(OTHERS)]} for k, role in enumerate(others)}
+    return found | {"reference": {"color": REFERENCE, "linestyle": (0, (4, 2))}}
 
 
 def shown_curves(columns: list[str], position: str) -> list[str]:
@@ -49,21 +54,22 @@ def motion_figure(
     limits: tuple[Limit, ...],
     window: tuple[float, float] | None,
     names: list[str] | None = None,
-) -> Figure:
+    given: Sequence[Any] | None = None,
+) -> Sequence[Any]:
     """Panels over the crank angle from the lowest position, so that two mechanisms can be laid over each other.
 
-    ``names`` are the curves that get a panel, all that are none of coordinates if left out.
+    ``names`` are the curves that get a panel, all that are none of coordinates if left out; ``given`` the axes they are
+    drawn into, those of a new figure if left out.
     """
     names = shown_curves(list(curves.columns), position) if names is None else names
     turns = {str(role): turn for role, turn in curves.groupby("role", sort=False)}
     label = "crank angle [°]" if turning(curves, position) else "crank angle from the lowest position [°]"
-    figure = new_figure(WIDTH, 2.1 * -(-len(names) // 2) + 0.5)
-    panels = np.atleast_1d(figure.subplots(-(-len(names) // 2), 2, sharex=True)).ravel()
+    panels, styles = _panels(len(names)) if given is None else given, styles_of(turns)
     for axes, name in zip(panels, names, strict=False):
         shown = quantity(name, units.get(name, ""))
         for role, turn in turns.items():
             angle, values = aligned_turn(turn, name, position)
-            axes.plot(np.degrees(angle), values * shown.factor, label=role, zorder=3, **style_of(role))
+            axes.plot(np.degrees(angle), values * shown.factor, label=role, zorder=3, **styles[role])
         _limit_lines(axes, name, shown, limits)
         axes.set_title(shown.title)
         if name == "dev" and window is not None:
@@ -74,17 +80,25 @@ def motion_figure(
             twin = axes.secondary_yaxis("right", functions=(lambda v, k=scale: v * k, lambda v, k=scale: v / k))
             twin.set_ylabel(shown.speed_unit)
         crank_axis(axes, "")
-    for axes in panels[len(names) :]:
-        axes.set_axis_off()
-    for column in range(2):
-        used = [k for k in range(len(names)) if k % 2 == column]
-        if used:
-            panels[used[-1]].set_xlabel(label)
-            panels[used[-1]].tick_params(labelbottom=True)
-    if len(turns) > 1:
+    lowest = panels if given is not None else panels[max(0, len(names) - 2) :]
+    for axes in lowest:
+        axes.set_xlabel(label)
+        axes.tick_params(labelbottom=True)
+    if len(turns) > 1 and given is not None:
+        panels[0].legend()
+    elif len(turns) > 1:
         handles, labels = panels[0].get_legend_handles_labels()
-        figure.legend(handles, labels, loc="outside upper right", ncols=2)
-    return figure
+        panels[0].get_figure(root=True).legend(handles, labels, loc="outside upper right", ncols=min(len(turns), 6))
+    return panels
+
+
+def _panels(count: int) -> list[Any]:
+    """Return axes of a new figure, two in a row."""
+    figure = new_figure(WIDTH, 2.1 * -(-count // 2) + 0.5)
+    panels = np.atleast_1d(figure.subplots(-(-count // 2), 2, sharex=True)).ravel().tolist()
+    for axes in panels[count:]:
+        axes.set_axis_off()
+    return list(panels[:count])
 
 
 def _show_window(
@@ -92,6 +106,7 @@ def _show_window(
 ) -> None:
     """Shade the part of the turn in which the deviation counts, and scale the axis to what happens there."""
     sizes = [bound]
+    styles = styles_of(turns)
     for role, turn in turns.items():
         angle, path = aligned_turn(turn, position, position)
         _, dev = aligned_turn(turn, "dev", position)
@@ -99,7 +114,7 @@ def _show_window(
         sizes.append(float(np.nanmax(np.abs(dev[inside]))) * factor)
         axes.fill_between(
             np.degrees(angle), 0, 1, where=inside, transform=axes.get_xaxis_transform(),
-            color=style_of(role)["color"], alpha=0.08, linewidth=0, zorder=1,
+            color=styles[role]["color"], alpha=0.08, linewidth=0, zorder=1,
         )  # fmt: skip
     top = 1.25 * max(sizes)
     if np.isfinite(top) and top > 0.0:
@@ -223,4 +238,6 @@ def motion(data: Dataset) -> Figure | None:
     if data.curves is None or not len(data.curves):
         return None
     study = data.study
-    return motion_figure(data.curves, data.units, study.family.position, study.speed, study.limits, study.window)
+    panels = motion_figure(data.curves, data.units, study.family.position, study.speed, study.limits, study.window)
+    figure: Figure = panels[0].get_figure(root=True)
+    return figure

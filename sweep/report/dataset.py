@@ -10,10 +10,12 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from kernels import status as codes
+from sweep.chunks.plan import PARAMETER_UNITS
 from sweep.dataset import store
 from sweep.dataset.files import check_tables
 from sweep.errors import InputError
 from sweep.evaluation.statuses import meaning
+from sweep.evaluation.summaries import output
 from sweep.families.base import Family
 from sweep.families.names import is_largest, is_place, stem
 from sweep.optimise import Survey, read_survey
@@ -180,6 +182,25 @@ def read_dataset(folder: Path) -> Dataset:
         runs=tuple(store.read_runs(folder)),
         survey=read_survey(optima),
         front_steps=store.front_cut_short(front),
+    )
+
+
+def without_rows(study: Study) -> Dataset:
+    """Return what the report needs of a study that has not been run."""
+    family = study.family
+    outputs = [*family.pose_outputs, *(output(family, name) for name in study.want)]
+    return Dataset(
+        folder=study.path.parent,
+        plan={},
+        study=study,
+        parts=(),
+        units={p.name: PARAMETER_UNITS[p.unit] for p in family.parameters}
+        | {o.name: o.unit.replace("length", "mm") for o in outputs},
+        definitions={o.name: o.text for o in outputs},
+        optima=None,
+        curves=None,
+        front=None,
+        runs=(),
     )
 
 

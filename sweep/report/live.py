@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import base64
 import json
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -44,16 +44,15 @@ def live(data: Dataset, cells: Sequence[Cells], different: Sequence[Group]) -> d
     shown = shown_designs(data, different)
     motion = moving(data, shown)
     lines = parallel(data, cells, shown)
-    spatial = motion is not None and motion["size"] > 0.0
-    scripts = [*(SPATIAL if spatial else ()), *PLANE]
     return {
         "shown": shown,
-        "motion_data": "" if motion is None else _json(motion),
+        "live_designs": [(one.name, one.role) for one in shown],
+        "motion_data": "" if motion is None else embedded(motion),
         "axis": "" if motion is None else motion["axis"],
         "sides": motion is not None and len({tuple(part["shift"]) for part in motion["designs"][0]["parts"]}) > 1,
-        "lines_data": "" if lines is None else _json(lines),
+        "lines_data": "" if lines is None else embedded(lines),
         "lines_axes": [] if lines is None else [_head(axis) for axis in lines["axes"]],
-        "scripts": [(LIVE / name).read_text(encoding="utf-8") for name in scripts] if motion or lines else [],
+        "scripts": scripts_of(motion) if motion or lines else [],
         "live_style": (LIVE / "live.css").read_text(encoding="utf-8"),
     }
 
@@ -62,7 +61,13 @@ def _head(axis: dict[str, str]) -> str:
     return f"{axis['symbol']} [{axis['unit']}]" if axis["unit"] else axis["symbol"]
 
 
-def _json(values: dict[str, Any]) -> str:
+def scripts_of(motion: Mapping[str, Any] | None) -> list[str]:
+    """Return the scripts that a page needs, the heavy one only where something stands in space."""
+    spatial = motion is not None and motion["size"] > 0.0
+    return [(LIVE / name).read_text(encoding="utf-8") for name in (*(SPATIAL if spatial else ()), *PLANE)]
+
+
+def embedded(values: dict[str, Any]) -> str:
     """Return JSON as it may stand within a script element: no character of it can end the element."""
     return json.dumps(values, ensure_ascii=False, allow_nan=False, separators=(",", ":")).replace("<", "\\u003c")
 

@@ -149,6 +149,7 @@ def _same_scale(column: Sequence[Axes]) -> None:
 
 COLOURS = (OPTIMUM, "#2f8f5b", "#c8551b", "#7a4fa3", "#14808f", "#8c6d1f")
 FRAME = "#14181f"
+CLOSE = 0.04  # of the mechanism's size: joints so near to each other share a line of names
 VIEWS = {"xy": (0, 1), "zy": (2, 1), "xz": (0, 2)}
 ELEVATION, AZIMUTH = math.radians(24.0), math.radians(-55.0)
 TURN = np.linspace(-0.75 * np.pi, 0.75 * np.pi, 25)
@@ -180,17 +181,30 @@ def draw_frame(axes: Axes, parts: Sequence[Part], seen: Array, *, pose: int = 0,
             axes.scatter(1.15 * end[0], 1.15 * end[1], s=0)  # arrows alone do not widen the limits
             axes.annotate("", end, (0.0, 0.0), arrowprops=arrow, zorder=7)
             axes.annotate(letter, end * 1.12, ha="center", va="center", color=FRAME, style="italic", zorder=7)
+    names: list[tuple[Array, str]] = []
     for part in parts:
         for name, axis in part.axes.items():
             _axis(axes, part.joints[name][0], axis, part.kinds[name], seen, 0.22 * size)
         draw_links(axes, part, seen, pose)
         for name, path in part.joints.items():
             _joint(axes, path, seen, pose, fixed=name in part.kinds)
-            if labels:
-                at = seen @ path[pose]
-                axes.annotate(name.upper() if len(name) < 3 else name, at, (6, 5), textcoords="offset points", zorder=8)
+            names.append((seen @ path[pose], name.upper() if len(name) < 3 else name))
+    for at, words in _joined(names, CLOSE * size) if labels else ():
+        axes.annotate(words, (float(at[0]), float(at[1])), (6, 5), textcoords="offset points", zorder=8)
     axes.set_aspect("equal", adjustable="datalim")
     axes.grid(False)
+
+
+def _joined(names: Sequence[tuple[Array, str]], near: float) -> list[tuple[Array, str]]:
+    """Write the names of what lies in one place behind each other, not above each other."""
+    found: list[tuple[Array, list[str]]] = []
+    for at, name in names:
+        same = next((words for place, words in found if np.linalg.norm(at - place) <= near), None)
+        if same is None:
+            found.append((at, [name]))
+        elif name not in same:
+            same.append(name)
+    return [(at, ", ".join(words)) for at, words in found]
 
 
 def draw_links(axes: Axes, part: Part, seen: Array, pose: int, *, faint: bool = False) -> None:

@@ -38,11 +38,12 @@ from sweep.study.study import (
     Tolerance,
 )
 from sweep.study.tables import Sections, read_sections
+from sweep.study.taken import take, taken_reference
 from sweep.study.task import check_task, read_study_task
 from sweep.study.thread import read_threads
 from sweep.study.tolerance import check_tolerance, read_tolerance
 from sweep.study.toml import key_lines, read_toml, toml_text
-from sweep.synthesis.tasks.problem import Problem
+from sweep.synthesis.tasks.problem import SynthesisTask
 
 
 def load_study(path: str | Path, smoke: bool = False) -> Study:
@@ -140,7 +141,7 @@ class _Alone:
     optimise: OptimiseSettings | None
     tolerance: Tolerance | None
     front_time: float | None
-    task: Problem | None
+    task: SynthesisTask | None
     budget: Budget
 
 
@@ -165,9 +166,10 @@ def _study(
     file: StudyFile, sections: Sections, alone: _Alone, mechanism: tuple[str, ...] | Specification, bare: Family
 ) -> Study:
     faults, objective, goal = file.faults, sections.objective, sections.objective.goal
-    inputs = read_inputs(file, bare)
     named = [*(file.free_table("limits") or ()), *(x for x in (goal, sections.pareto.output) if x)]
-    family = with_effects(file, bare, named, inputs.curves)
+    family = with_effects(file, bare, named, (inputs := read_inputs(file, bare)).curves)
+    fit = read_fit(sections.fit, file, family)
+    take(file, bare, fitted := () if fit is None else fit.parameters(family))
     locus, prescribed = read_locus(file, bare)
     limits = read_limits(file, family, prescribed)
     check_search(sections.optimise, file, bare)
@@ -176,9 +178,8 @@ def _study(
     if alone.task is not None:
         check_task(file, mechanism)
     front = read_pareto(sections.pareto, file, family, objective, sections.optimise, alone.front_time)
-    fit = read_fit(sections.fit, file, family)
     other = Elsewhere(
-        () if fit is None else fit.parameters(family),
+        fitted,
         speeds(family, alone.speed),
         () if locus is None else locus.made,
         prescribed,
@@ -189,10 +190,10 @@ def _study(
     if space is not None and fit is None and (locus is None or sections.optimise.variables != "parameters"):
         check_varied(file, family, space, inputs.raw)
     check_tolerance(alone.tolerance, family, limits, faults)
-    reference = read_reference(sections.reference, bare, family, faults, other, space)
+    reference = read_reference(taken_reference(file, sections.reference), bare, family, faults, other, space)
     check_report(sections.report, file, family, prescribed)
-    ratios = [name for name in file.free_table("locus") or () if name.startswith(RATIOS)]
-    want = _computed(family, [*expanded(bare, sections.scene.want), *prescribed, *ratios], limits, goal, front)
+    asked = [*prescribed, *(name for name in file.free_table("locus") or () if name.startswith(RATIOS))]
+    want = _computed(family, [*expanded(bare, sections.scene.want), *asked], limits, goal, front)
     check_proofs(alone.accuracy, family, want, window=alone.window is not None, faults=faults)
     file.raise_faults()
     assert space is not None  # without it there are faults

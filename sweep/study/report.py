@@ -23,6 +23,7 @@ class StudySection(Section):
     )
     title: str = Field("", description="a text")
     question: str = Field("", description="a text")
+    taken: list[str] = Field([], description="filled in: which designs come from other studies, with their hash")
 
 
 class CurveTable(Section):

@@ -17,6 +17,7 @@ from sweep.study.limits import LimitEntry
 from sweep.study.parameter import FixedEntry, ListEntry, RangeEntry
 from sweep.study.section import Section
 from sweep.study.tables import REQUIRED_TABLES, TABLES
+from sweep.study.taken import FROM, HASH
 
 Schema: TypeAlias = dict[str, Any]
 
@@ -71,7 +72,7 @@ def _entry() -> Schema:
 def _of_family(entry: Family) -> Schema:
     """Return what [design] may hold where the mechanism is this family alone."""
     own = {p.name: {"description": _described(p), "allOf": [ENTRY]} for p in entry.parameters}
-    known = [*own, *sorted(input_names(entry) - own.keys()), "sample"]
+    known = [*own, *sorted(input_names(entry) - own.keys()), "sample", FROM, HASH]
     design = {"properties": own, "propertyNames": {"enum": known}}
     this = {"properties": {"family": {"const": entry.name}}, "required": ["family"]}
     return {

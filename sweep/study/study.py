@@ -22,7 +22,7 @@ from sweep.study.space import DesignSpace
 if TYPE_CHECKING:
     from sweep.synthesis.fit import LineFit
     from sweep.synthesis.prescription import OnLocus
-    from sweep.synthesis.tasks.problem import Problem
+    from sweep.synthesis.tasks.problem import SynthesisTask
 
 
 @dataclass(frozen=True)
@@ -153,7 +153,7 @@ class Study:
     pareto: ParetoSettings | None
     tolerance: Tolerance | None
     reference: dict[str, float] | None
-    task: Problem | None
+    task: SynthesisTask | None
     output: OutputSettings
     budget: Budget
     data: dict[str, Any]

@@ -14,7 +14,7 @@ from sweep.study.file import Faults, Key, StudyFile
 from sweep.study.toml import key_lines, read_toml, toml_text
 from sweep.synthesis import tasks
 from sweep.synthesis.tasks.positions import Position
-from sweep.synthesis.tasks.problem import Problem
+from sweep.synthesis.tasks.problem import SynthesisTask
 from sweep.synthesis.tasks.task3 import Setting
 from sweep.synthesis.tasks.task5 import SlotPosition
 
@@ -35,7 +35,7 @@ RATIOS = ("ratio", "coupler", "offset", "f2_ratio", "size")
 WORDS = ("objective", "adjusted", "limit", "kappa", "branch")
 
 
-def load_task(path: str | Path) -> Problem:
+def load_task(path: str | Path) -> SynthesisTask:
     """Read the problem of a file's [task] table.
 
     Parameters
@@ -63,7 +63,7 @@ def load_task(path: str | Path) -> Problem:
     return problem
 
 
-def read_task(raw: object, faults: Faults) -> Problem | None:
+def read_task(raw: object, faults: Faults) -> SynthesisTask | None:
     """Read the problem of a table [task], or None with its faults."""
     before = len(faults.lines)
     if not isinstance(raw, dict):
@@ -88,14 +88,14 @@ def read_task(raw: object, faults: Faults) -> Problem | None:
     if len(faults.lines) > before:
         return None
     try:
-        problem: Problem = KINDS[kind](**given)
+        problem: SynthesisTask = KINDS[kind](**given)
     except InputError as error:
         faults.value(("task", error.name), error.value, error.allowed)
         return None
     return problem
 
 
-def read_study_task(file: StudyFile) -> Problem | None:
+def read_study_task(file: StudyFile) -> SynthesisTask | None:
     """Read the task of a study, which asks for the search that begins at the task's mechanisms."""
     if "task" not in file:
         return None

@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 import subprocess
 import sys
+import tomllib
 from pathlib import Path
 
 import sweep
@@ -53,3 +54,21 @@ def test_make_targets_and_pages_exist():
         assert known or (ROOT / "studies" / study / "study.toml").exists(), target
     for page in re.findall(r"docs/[\w-]+\.(?:md|svg|png)", TEXT):
         assert (ROOT / page).exists(), page
+
+
+def test_what_make_does_for_a_user_stands_on_the_page_without_make() -> None:
+    """Every call of the program in a recipe that is no bench and no test."""
+    recipes = (ROOT / "Makefile").read_text(encoding="utf-8")
+    page = (ROOT / "docs" / "command-line.md").read_text(encoding="utf-8")
+    calls = re.findall(r"^\t\$\(SWEEP\) (.*)$", recipes, flags=re.MULTILINE)
+    assert len(calls) >= 6
+    for call in calls:
+        words = call.replace("$*", "NAME").replace("$(NIGHTS)", "nights")
+        assert f"sweep {words}" in page, words
+
+
+def test_version_is_the_same_everywhere() -> None:
+    """A release is named once in each place."""
+    version = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]["version"]
+    assert f"\nversion: {version}\n" in (ROOT / "CITATION.cff").read_text(encoding="utf-8")
+    assert f"\n## {version}" in (ROOT / "CHANGELOG.md").read_text(encoding="utf-8")

@@ -116,7 +116,7 @@ def test_elastic_coupler_solves_its_equation_backwards_too_and_stays_stable(behi
     n = 241
     phi = 2.0 * np.pi * np.arange(n) / n
     elastic = {"driven_inertia": 0.6, "stiffness": 2e4, "damping": 3.0, "load_torque": -900.0, "speed": -OMEGA}
-    tip = {"m_tool": 2e-5, "tip_x": 70.0} if behind else {}
+    tip = {"m_tool": 2e-5, "tool_x": 70.0} if behind else {}
     poses = sweep.evaluate("rssr", LINKS | elastic | tip, ["lag_dynamic", "t_tau", "d2psi"], phi=phi)
     assert (poses["status"] == st.OK).all()
     eta, p = poses["lag_dynamic"].to_numpy(), poses["t_tau"].to_numpy() * LINKS["c"]

@@ -104,7 +104,7 @@ MASSLESS = {f"m_{body}": 0.0 for body in ("crank", "coupler", "rocker")}
 
 def mechanism(kind):
     if kind == "tip":
-        tool = {"m_tool": MASS, "tip_x": TIP[0], "tip_y": TIP[1], "tool_force_x": 30.0, "tool_force_y": -20.0}
+        tool = {"m_tool": MASS, "tool_x": TIP[0], "tool_y": TIP[1], "tool_force_x": 30.0, "tool_force_y": -20.0}
         return "rssr", RSSR | ELASTIC | tool | {"gravity_x": WEIGHT[0], "gravity_y": WEIGHT[1], "speed": OMEGA}, ""
     table = {f"{n}1": x for n, x in (RSSR | ELASTIC).items()} | {f"{n}2": x for n, x in (GUIDE | MASSLESS).items()}
     table |= {"m_tool2": MASS, "tool_force2": FORCE, "gravity_x2": WEIGHT[0], "gravity_y2": WEIGHT[1]}

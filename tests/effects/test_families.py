@@ -181,7 +181,7 @@ def test_a_chain_asks_for_the_bodies_of_the_later_stages():
 
 def test_an_effect_that_a_family_lacks_names_the_families_that_have_it():
     with pytest.raises(InputError, match=r"speed_fluctuation \(rssr, guide.*\), slider_speed_fluctuation \(rssp.*\)"):
-        sweep.summarise("geared_dwell", {"k": 2.0, "a": 0.2}, ["unevenness"])
+        sweep.summarise("backrest", {"k": 2.0, "a": 0.2}, ["unevenness"])
     with pytest.raises(InputError, match=r"journal_load1.*sliding_bearings \(rssr, guide.*\)"):
         sweep.evaluate("rssp", RSSP, ["journal_load1"], phi=0.3)
     with pytest.raises(InputError, match=r"lag2.*first stage.*elasticity \(rssr, guide.*\)"):

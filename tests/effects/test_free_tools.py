@@ -28,8 +28,9 @@ BODIES = loads(("crank", "coupler", "rocker"))
 RSSR = {"a": 20.0, "b": 95.0, "c": 60.0, "e": 70.0, "f": 12.0, "g": 8.0, "alpha": 1.2}
 FOUR_BAR = {"a": 20.0, "b": 50.0, "c": 45.0, "e": 40.0, "xi": 70.0, "eta": 9.0}
 MASS = 1e-4
-TIP = np.array([75.0, -12.0, 8.0])
-TOOL = {"m_tool": MASS, "tip_x": TIP[0], "tip_y": TIP[1], "tip_z": TIP[2]}
+TIP = np.array([75.0, -12.0, 8.0])  # from D, as centres of mass; inputs count from z = 0
+AT = {"tool_x": TIP[0], "tool_y": TIP[1], "tool_z": TIP[2] + RSSR["g"]}
+TOOL = {"m_tool": MASS} | AT
 FORCE = {"tool_force_x": -30.0, "tool_force_y": 50.0, "tool_force_z": 9.0}
 
 
@@ -80,7 +81,7 @@ def test_a_tool_without_a_force_loads_the_joints_like_a_point_mass_of_its_link(n
 
 @pytest.mark.parametrize(("name", "design"), [("rssr", RSSR), ("four_bar", FOUR_BAR)])
 def test_the_driving_torque_of_a_force_is_its_virtual_work(name, design):
-    tool = FORCE | ({f"tip_{x}": TIP[k] for k, x in enumerate("xyz")} if name == "rssr" else {})
+    tool = FORCE | (AT if name == "rssr" else {})
     massless = {f"m_{body}": 0.0 for body in ("crank", "coupler", "rocker")}
     own = "tip" if name == "rssr" else "tool"
     wanted = ["drive_torque", f"{own}_torque", f"{own}_load", "psi", *([] if name == "rssr" else ["x_m", "y_m"])]
@@ -140,3 +141,20 @@ def test_compiled_free_tool_equals_plain_python_bit_for_bit(on_rocker):
         results.append([status, *out])
     for compiled, plain in zip(*results, strict=True):
         np.testing.assert_array_equal(compiled, plain)
+
+
+def test_mass_and_tip_stand_at_one_point():
+    """A machine's tip and a mass at the same numbers move as one: the mass's momentum is that of the tip."""
+    member = {"family": "rssr", "tip": [75.0, -12.0, 4.0]}
+    machine = sweep.machine({"x": member}, {"f": {"shaking": ["x"]}})
+    massless = {f"m_{body}": 0.0 for body in ("crank", "coupler", "rocker")} | {"speed": OMEGA, "m_tool": MASS}
+    design = {"a": 20.0, "b": 95.0, "c": 60.0, "e": 70.0, "f": 12.0, "g": -3.0, "alpha": 1.2}
+    design |= massless | {"tool_x": 75.0, "tool_y": -12.0, "tool_z": 4.0}
+    names = [f"{what}_{x}" for what in ("x.tip", "f", "f_moment") for x in "xyz"]
+    found = sweep.evaluate(machine, {f"x.{key}": x for key, x in design.items()}, names, phi=PHI)
+    tip, force, moment = (found[[f"{what}_{x}" for x in "xyz"]].to_numpy() for what in ("x.tip", "f", "f_moment"))
+    rate = -MASS * OMEGA**2 * derivative(derivative(tip))
+    # 256 samples differentiated twice by the Fourier transform: measured 3e-12
+    assert np.abs(force - rate).max() < 1e-10 * np.abs(rate).max()
+    turning = np.cross(tip, rate)
+    assert np.abs(moment - turning).max() < 1e-10 * np.abs(turning).max()

@@ -23,9 +23,9 @@ GRAVITY = np.array([900.0, -9810.0, 400.0])
 FORCE = np.array([3000.0, -5000.0, 2000.0])
 NEAR = 1e-9  # of the largest force; seen 4e-12
 DESIGNS = {
-    "five_link": {"tip_x": 3.0, "tip_y": 0.7, "tip_z": -0.4},
-    "slotted fork": {"g": 0.3, "tip_x": 3.0, "tip_y": 0.7, "tip_z": -0.4},
-    "slotted bar": {"k": 1.8, "tau": -1.0, "tip_x": 3.0, "tip_y": 0.7, "tip_z": -0.4},
+    "five_link": {"tool_x": 3.0, "tool_y": 0.7, "tool_z": -0.4},
+    "slotted fork": {"g": 0.3, "tool_x": 3.0, "tool_y": 0.7, "tool_z": -0.4},
+    "slotted bar": {"k": 1.8, "tau": -1.0, "tool_x": 3.0, "tool_y": 0.7, "tool_z": -0.4},
     "swivel": {},
     "spherical_looper": {},
     "cylindrical_looper sliding": {},
@@ -83,12 +83,17 @@ def vector(poses, name):
     return poses[[f"{name}_{x}" for x in "xyz"]].to_numpy()
 
 
+def tool_from_axis(name, d):
+    """Place of the tool in the axes of its body; inputs of the output link count from z = 0, that body from z = g."""
+    return np.array(TIPS[name](d) if name in TIPS else [d["tool_x"], d["tool_y"], d["tool_z"] - d["g"]])
+
+
 def needed(case, poses, d, load=0.0):
     """What each body needs of its joints: force, moment about the origin; and the power that all need together."""
     name = case.split()[0]
     bodies, joints, carrier, axes = READERS[name](d, poses)
     _, given = masses(name)
-    tip = np.array(TIPS[name](d) if name in TIPS else [d[f"tip_{x}"] for x in "xyz"])
+    tip = tool_from_axis(name, d)
     found, power = {}, 0.0
     for body, (origin, triad) in bodies.items():
         origin = np.broadcast_to(origin, (N, 3))
@@ -151,7 +156,7 @@ def test_reduced_inertia_is_the_kinetic_energy_and_the_tool_does_its_work(case):
     name, d, poses = turn(case, None, wanted)
     bodies, _, carrier, _ = READERS[name](d, poses)
     given = masses(name)[1]
-    tip = np.array(TIPS[name](d) if name in TIPS else [d[f"tip_{x}"] for x in "xyz"])
+    tip = tool_from_axis(name, d)
     energy = 0.0
     for body, (origin, triad) in bodies.items():
         origin = np.broadcast_to(origin, (N, 3))

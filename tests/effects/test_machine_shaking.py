@@ -6,6 +6,8 @@ come from the Fourier transform of 512 samples.  Tolerance 1e-8 of the largest v
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -14,6 +16,7 @@ from sweep.effects.scene import Scene
 from sweep.families import NAMES, family
 from sweep.families.base import Angles
 from sweep.families.capabilities import JointRecords, Skeleton
+from sweep.families.shaking import shaken
 from sweep.optimise.manufacture.tolerance import sensitivities
 from tests.effects.test_balance import CENTRES, GRAVITY, MASSES, OMEGA, PHI, RSSP, RSSR, TENSORS, N, full, loads
 from tests.reference.momentum import balance, body_momentum, triads
@@ -167,8 +170,9 @@ def test_joint_records_stand_in_the_frame_of_the_family(name):
 def test_a_stage_counts_once_and_a_driven_member_no_forces():
     with pytest.raises(sweep.InputError, match="stages each once"):
         sweep.machine({"x": ["rssr", "rssr"]}, {"s": {"shaking": ["x1", "x1"]}})
-    with pytest.raises(sweep.InputError, match="whose forces are known"):
-        sweep.machine({"x": "feed"}, {"s": {"shaking": ["x"]}})
+    bare = replace(family("feed"), capabilities=())
+    with pytest.raises(sweep.InputError, match="whose forces are known; feed has none"):
+        shaken("x", "", bare, [])
     driven = sweep.machine({"x": "rssr", "y": {"family": "rssr", "driver": "x.psi"}}, {"s": {"shaking": ["y"]}})
     with pytest.raises(sweep.InputError, match="drives it unevenly"):
         sweep.evaluate(driven, {}, ["s"], phi=PHI)

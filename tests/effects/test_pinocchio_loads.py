@@ -146,7 +146,8 @@ def test_joints_of_a_linkage_bear_what_pinocchio_finds(name, tool, finger):
     if tool and name == "guide":
         more |= {"m_tool": 2e-4, "tool_force": -30.0}
     elif tool:
-        more |= {"m_tool": 2e-4, "tip_x": 40.0, "tip_y": -9.0, "tip_z": 5.0, "tool_force_x": 20.0, "tool_force_z": -9.0}
+        more |= {"m_tool": 2e-4, "tool_x": 40.0, "tool_y": -9.0, "tool_z": 5.0 + d["g"]}
+        more |= {"tool_force_x": 20.0, "tool_force_z": -9.0}
     ours = sweep.evaluate(name, d | table | more, [*WANTED, "drive_torque"], phi=TURNS)
     assert (ours["status"] == st.OK).all()
     (part,) = parts(name, d, [0.0])

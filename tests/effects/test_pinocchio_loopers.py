@@ -11,7 +11,7 @@ from kernels import status as st
 from sweep.evaluation.joints import parts
 from sweep.families import family
 from sweep.study import load_study
-from tests.effects.test_link_loads import DESIGNS, FORCE, GRAVITY, TIPS, TOOL, WEIGHT, design, masses, vectors
+from tests.effects.test_link_loads import DESIGNS, FORCE, GRAVITY, TOOL, WEIGHT, design, masses, tool_from_axis, vectors
 from tests.effects.test_pinocchio_loads import (
     CHANGE,
     NEAR,
@@ -95,7 +95,7 @@ def looper(name, d, first, given, tool):
         held += [] if d["slides"] else [(model.coordinate["shaft", 1], 1.0)]
         model.couple(held)
     if tool:
-        tip = np.array(TIPS[name](d) if name in TIPS else [d[f"tip_{x}"] for x in "xyz"])
+        tip = tool_from_axis(name, d)
         place = origin[carrier] + tip @ triad[carrier]
         own = model.ids[carrier]
         point = model.pin.Inertia(0.8, place - model.origin[own], np.zeros((3, 3)))
@@ -156,7 +156,7 @@ def test_members_of_the_machine_stitch208_bear_what_pinocchio_finds():
     looper_ = {p.name: p.default for p in family("slotted").parameters if p.default is not None} | looper_
     table, given = bodies("rocker")
     of_link, link_given = masses("slotted")
-    tip = {"tip_x": 30.0, "tip_y": 0.0, "tip_z": 0.0}
+    tip = {"tool_x": 30.0, "tool_y": 0.0, "tool_z": 0.0}
     loads = {f"needle.{key}{k}": x for k in (1, 2) for key, x in (table | WEIGHT).items()}
     loads |= {
         "needle.speed1": SPEED,

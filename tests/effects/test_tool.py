@@ -179,13 +179,13 @@ def test_piercing_force_acts_from_entry_to_the_turning_point_and_not_on_the_way_
 def test_only_families_that_carry_a_tool_take_one():
     taken = {name: {p.name for p in extended(family(name), ["force_b"]).parameters}
              for name in ("kim_dison", "guide", "four_bar", "rssr")}  # fmt: skip
-    assert taken["kim_dison"].isdisjoint([*TOOL, "pierce_force", "tip_x"])
+    assert taken["kim_dison"].isdisjoint([*TOOL, "pierce_force", "tool_x"])
     assert {"m_tool", "tool_force", "pierce_force"} <= taken["guide"] and "tool_force_x" not in taken["guide"]
-    assert {"m_tool", "tool_force_x"} <= taken["four_bar"] and taken["four_bar"].isdisjoint({"tool_force", "tip_x"})
-    assert {"m_tool", "tool_force_x", "tip_x"} <= taken["rssr"] and "pierce_force" not in taken["rssr"]
+    assert {"m_tool", "tool_force_x"} <= taken["four_bar"] and taken["four_bar"].isdisjoint({"tool_force", "tool_x"})
+    assert {"m_tool", "tool_force_x", "tool_x"} <= taken["rssr"] and "pierce_force" not in taken["rssr"]
     chain = {p.name for p in extended(family(["rssr", "guide"]), ["force_b1"]).parameters}
-    assert {"m_tool2", "tool_force2", "m_tool1", "tip_x1"} <= chain
-    assert chain.isdisjoint({"tool_force1", "tip_x2"})
+    assert {"m_tool2", "tool_force2", "m_tool1", "tool_x1"} <= chain
+    assert chain.isdisjoint({"tool_force1", "tool_x2"})
 
 
 def test_tool_of_no_mass_and_force_changes_no_bit():

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 import sweep
-from sweep.evaluation.balancing import Place, best_counterweights, force_balance, orders, rms
+from sweep.evaluation.balancing import CorrectionPlane, best_counterweights, force_balance, orders, rms
 
 TABLE = json.loads((Path(__file__).parents[1] / "oracle" / "machine_open.json").read_text())["rows"]
 ROWS = [row for row in TABLE if row["kind"] == "balance"]
@@ -82,7 +82,7 @@ def test_orders_and_the_best_counterweight_are_those_of_the_table():
             assert abs(rms(values) - numbers(row, f"rms_{name}")[0]) < FACTOR * UNIT * scale[name]
         across = (0.0, float(np.cos(design["alpha"])), -float(np.sin(design["alpha"])))
         best = best_counterweights(
-            phi, force, moment, given["omega"], [Place((0.0, 0.0, 0.0), (1.0, 0.0, 0.0), across)]
+            phi, force, moment, given["omega"], [CorrectionPlane((0.0, 0.0, 0.0), (1.0, 0.0, 0.0), across)]
         )
         # a least-squares solution is as good as the force it is made of
         allowed = FACTOR * UNIT * max(scale["best_counterweight"], scale["force"] / given["omega"] ** 2)
@@ -94,7 +94,8 @@ def test_two_shafts_remove_what_one_leaves_and_a_moment_counts_by_its_length():
     phi = np.arange(256) * (2.0 * np.pi / 256)
     force = np.stack([np.cos(phi), np.zeros(256), np.zeros(256)], axis=1)  # half of it turns backwards
     ahead, back = (
-        Place((0.0, 0.0, z), (1.0, 0.0, 0.0), (0.0, 1.0, 0.0), ratio) for z, ratio in ((0.0, 1.0), (2.0, -1.0))
+        CorrectionPlane((0.0, 0.0, z), (1.0, 0.0, 0.0), (0.0, 1.0, 0.0), ratio)
+        for z, ratio in ((0.0, 1.0), (2.0, -1.0))
     )
     one = best_counterweights(phi, force, 0.0 * force, 3.0, [ahead])
     assert rms(one.force) == pytest.approx(rms(force) / np.sqrt(2.0))

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import tomllib
 
 import ezdxf
 import mujoco
@@ -275,8 +276,8 @@ def test_verb_reads_one_stage_of_an_exported_chain(kind, tmp_path):
     for name, part in (("rssr", "stage 1"), ("guide", "stage 2")):
         done = CliRunner().invoke(main, ["points", name, str(file), "--part", part])
         assert done.exit_code == 0, done.output
-        said = dict(line.split(maxsplit=1) for line in done.output.splitlines())
-        assert float(said["a"]) == pytest.approx(scaled(name)["a"], abs=1e-4)
+        said = tomllib.loads(done.output)["design"]
+        assert float(said["a"].removesuffix(" mm")) == pytest.approx(scaled(name)["a"], abs=1e-4)
     done = CliRunner().invoke(main, ["points", "rssr", str(file)])
     assert done.exit_code == 2 and "one of stage 1, stage 2" in done.output
     done = CliRunner().invoke(main, ["points", "rssr", str(file), "--part", "stage 3"])

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import tomllib
 
 import numpy as np
 import pytest
@@ -15,6 +16,7 @@ from sweep.cli import main
 from sweep.evaluation.joints import parts
 from sweep.families import family
 from sweep.families.capabilities import Hardpoints
+from sweep.study import load_study
 
 HARDPOINTS = {
     "A": [0.0, 0.0, 0.0], "axis_A": [1.0, 0.0, 0.0], "B": [0.0, 0.0, 200.0], "C": [-750.0, -850.0, 650.0],
@@ -187,15 +189,39 @@ def test_planar_points_off_their_plane_and_dead_points_are_refused():
     refused("four_bar", "dead point", **points | {"B": [1, 0, 0], "C": [2, 0, 0]})
 
 
+def test_a_study_begins_with_the_points_of_a_drawing(tmp_path):
+    file = tmp_path / "drawing.csv"
+    rows = [f"{name},{x!r},{y!r},{z!r}" for name, (x, y, z) in HARDPOINTS.items()]
+    file.write_text("\n".join(["name,x [mm],y [mm],z [mm]", *rows]) + "\n")
+    words = ["init", "drawn", "--family", "rssr", "--points", str(file), "--into", str(tmp_path)]
+    done = CliRunner().invoke(main, words)
+    assert done.exit_code == 0, done.output
+    study = load_study(tmp_path / "drawn")
+    found = sweep.from_points("rssr", **HARDPOINTS).parameters
+    assert {name: study.reference[name] for name in found} == found
+    assert study.space.bounds["a"] == pytest.approx((190.0, 210.0)) and study.space.fixed["branch"] == found["branch"]
+    done = CliRunner().invoke(main, ["check", str(tmp_path / "drawn")])
+    assert done.exit_code == 0 and "25 designs" in done.output, done.output
+
+
 def test_verb_reads_a_table_of_points_and_writes_a_design(tmp_path):
     file, out = tmp_path / "drawing.csv", tmp_path / "design.csv"
     rows = [f"{name},{x!r},{y!r},{z!r}" for name, (x, y, z) in HARDPOINTS.items()]
     file.write_text("\n".join(["name, x, y, z", *rows]) + "\n")
     done = CliRunner().invoke(main, ["points", "rssr", str(file), "--out", str(out)])
     assert done.exit_code == 0, done.output
-    assert "residual" in done.output and "branch     -1" in done.output
+    said = tomllib.loads(done.output)
+    assert said["design"]["branch"] == -1 and said["design"]["a"] == "200 mm" and said["drawing"]["residual"] < 1e-9
     done = CliRunner().invoke(main, ["eval", "rssr", str(out), "--want", "psi"])
     assert float(done.output.splitlines()[1].split(",")[0]) == pytest.approx(math.radians(151.69924423), abs=1e-9)
+    inches = [f"{name},{x / 25.4!r},{y / 25.4!r},{z / 25.4!r}" for name, (x, y, z) in HARDPOINTS.items()]
+    for head, options in (("name,x,y,z", ["--unit", "inch"]), ("name,x [inch],y [inch],z [inch]", [])):
+        file.write_text("\n".join([head, *inches]) + "\n")
+        again = tomllib.loads(CliRunner().invoke(main, ["points", "rssr", str(file), *options]).output)["design"]
+        b = float(again["b"].removesuffix(" mm"))
+        assert b == pytest.approx(1219.6310917650, abs=1e-9) and again["alpha"] == "-90 deg"
+    done = CliRunner().invoke(main, ["points", "rssr", str(file), "--unit", "kg"])
+    assert done.exit_code == 2 and "a length, in mm" in done.output
     file.write_text("name,x,y\nA,0,0\n")
     done = CliRunner().invoke(main, ["points", "rssr", str(file)])
     assert done.exit_code == 2 and "the columns name, x, y, z" in done.output

@@ -44,8 +44,29 @@ def test_motion_has_a_panel_for_each_curve_and_draws_it():
     assert len(sweep.plot.motion("rssr", RSSR)) == 5  # psi, three derivatives, pressure angle
     with pytest.raises(sweep.InputError, match="did you mean 'd2psi'"):
         sweep.plot.motion("rssr", RSSR, ["d2psy"])
-    with pytest.raises(sweep.InputError, match="one design"):
-        sweep.plot.motion("rssr", RSSR | {"a": [1.0, 1.1]})
+    with pytest.raises(sweep.InputError, match="1 to 20 designs"):
+        sweep.plot.motion("rssr", pd.DataFrame(RSSR, index=range(21)))
+
+
+def test_motion_of_several_designs_in_axes_of_ones_own():
+    from matplotlib.figure import Figure
+
+    table = pd.DataFrame([RSSR, RSSR | {"a": 0.9 * RSSR["a"]}], index=["long", "short"])
+    own = Figure().subplots(1, 2)
+    axes = sweep.plot.motion("rssr", table, "dpsi, d2psi", axes=own)
+    assert list(axes) == list(own)
+    assert [line.get_label() for line in own[0].lines] == ["long", "short"]
+    assert len({line.get_color() for line in own[0].lines}) == 2
+    phi = np.arange(720) * (2.0 * math.pi / 720)
+    found = sweep.evaluate("rssr", table.iloc[[1]], "dpsi", phi=phi)["dpsi"]
+    assert own[0].lines[1].get_ydata().max() == pytest.approx(found.max(), abs=1e-12)
+    assert [text.get_text() for text in own[0].get_legend().get_texts()] == ["long", "short"]
+    with pytest.raises(sweep.InputError, match="axes = 2; allowed: 1"):
+        sweep.plot.motion("rssr", table, "dpsi", axes=own)
+    assert [line.get_label() for line in sweep.plot.motion("rssr", RSSR | {"a": [1.0, 1.1]})[0].lines] == [
+        "design 0",
+        "design 1",
+    ]
 
 
 def test_mechanism_has_a_panel_for_each_frame_and_every_joint_in_it():

@@ -14,7 +14,7 @@ from kernels.boxes.taylor import width
 from kernels.boxes.tube import HIGH, LOW, POSES, THETA, least_acceleration, tube
 from kernels.families.rssr import box_by_rocker
 from kernels.families.rssr import box_turn as bt
-from kernels.families.rssr.box_problem import Problem, angle_inputs, inputs, middle
+from kernels.families.rssr.box_problem import BoxQuestion, angle_inputs, inputs, middle
 from sweep.proof.question import question_of
 from sweep.study.load import load_study
 
@@ -77,7 +77,7 @@ def test_sign_of_the_row_tells_whether_the_rocker_has_passed_an_angle(swing):
     formulas = box_by_rocker.recorded()
     recorded = (formulas.operations, formulas.factors, formulas.ends)
     branch = -1.0 if swing > 0.0 else 1.0
-    problem = Problem(branch, 2, 0.5, np.full(8, np.inf), 1.0, np.zeros((0, 9)))
+    problem = BoxQuestion(branch, 2, 0.5, np.full(8, np.inf), 1.0, np.zeros((0, 9)))
     checked = 0
     for one in mechanisms(swing):
         if one["alpha"] == 0.0:

@@ -28,7 +28,7 @@ TURNING = {
     "mu_d": 0.05664647, "radius_a": 12.86511, "radius_b": 3.837004, "radius_c": 3.409199, "radius_d": 4.427434,
     "thrust_radius_a": 2.07764, "thrust_radius_d": 3.809953, "support_a1": -46.65249, "support_a2": -63.51164,
     "support_d1": -26.88519, "support_d2": 33.41417, "tool_force_x": -4.574364, "tool_force_y": -17.06723,
-    "tool_force_z": 11.00836, "tip_x": -8.507539, "tip_y": -1.117881, "tip_z": 17.53622,
+    "tool_force_z": 11.00836, "tool_x": -8.507539, "tool_y": -1.117881, "tool_z": 31.47364,
 }  # fmt: skip
 STOPPING = {
     "a": 21.65005, "b": 80.82652, "c": 50.38731, "e": 72.43282, "f": 12.45254, "g": 12.42197, "alpha": 0.00968711,
@@ -41,7 +41,7 @@ STOPPING = {
     "mu_c": 0.09749701, "mu_d": 0.0362672, "radius_a": 6.560649, "radius_b": 3.087184, "radius_c": 6.27146,
     "radius_d": 7.635804, "thrust_radius_a": 1.381532, "thrust_radius_d": 3.407623, "support_a1": -34.06866,
     "support_a2": -60.82598, "support_d1": -17.6982, "support_d2": 27.87848, "tool_force_x": -5.952646,
-    "tool_force_y": -23.0001, "tool_force_z": 7.108292, "tip_x": 2.071885, "tip_y": -9.636151, "tip_z": -2.988996,
+    "tool_force_y": -23.0001, "tool_force_z": 7.108292, "tool_x": 2.071885, "tool_y": -9.636151, "tool_z": 9.432974,
 }  # fmt: skip
 # The moment on the frame passes close to zero in the middle of a panel.
 PASSING = {

@@ -59,7 +59,7 @@ def test_means_are_those_of_many_samples_within_their_errors(make, pose, target)
 def test_kernel_decides_nearly_all_and_fewer_samples_would_not_do() -> None:
     mechanism, designs = crank_rockers()
     curve = curve_of(mechanism, Request("d2psi", 0), False)
-    value, error, status, undecided = curve.mean(designs, 1e-8)
+    value, _, status, undecided = curve.mean(designs, 1e-8)
     assert undecided.mean() < 0.01 and (status[~undecided] == 0).all()
     # Negative control: sixteen samples err by more than is asked for.
     angles = Angles.of((np.arange(16) * (2.0 * np.pi / 16))[None])

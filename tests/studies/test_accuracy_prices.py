@@ -171,7 +171,7 @@ def test_no_effect_is_priced_where_it_has_nothing_to_do(name):
     assert np.isfinite(given.designs).all()
     assert not bodies or given.designs[:, own:][:, bodies].any()
     if not any(p.unit in ("mass", "inertia") and p.name != "m_tool" for p in given_inputs):
-        assert all(given.given(p.name).all() for p in given_inputs if p.name == "tip_x")
+        assert all(given.given(p.name).all() for p in given_inputs if p.name == "tool_x")
 
 
 JUDGED = ["speed_fluctuation", "dynamic_elasticity", "bearing_life", "slider_elasticity"]

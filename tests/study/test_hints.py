@@ -9,7 +9,7 @@ import pandas as pd
 import pytest
 
 from sweep.cli.tables import write_table
-from sweep.errors import StoreError, closest, edits
+from sweep.errors import StoreError, closest
 from sweep.families import NAMES
 from sweep.quantities.units import SYMBOLS
 
@@ -44,14 +44,6 @@ PARAMETERS = ["a", "b", "c", "e", "f", "g", "alpha", "branch"]
 )
 def test_hint_is_what_is_meant_or_nothing(word: str, known: list[str], meant: str | None) -> None:
     assert closest(word, known) == meant
-
-
-@pytest.mark.parametrize(
-    ("one", "other", "count"),
-    [("", "", 0), ("abc", "abc", 0), ("abc", "", 3), ("abc", "acb", 1), ("psy", "psi", 1), ("kitten", "sitting", 3)],
-)
-def test_edits_are_counted_both_ways(one: str, other: str, count: int) -> None:
-    assert edits(one, other) == edits(other, one) == count
 
 
 def test_a_disk_that_can_only_be_read_is_an_error_of_its_own(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

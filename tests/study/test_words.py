@@ -131,7 +131,7 @@ def test_other_names_of_units_are_those_units(tmp_path) -> None:
     assert factor("µm", "mm") == factor("μm", "mm") == factor("um", "mm")
     with pytest.raises(UnitFault, match="in mm, um, cm, m or inch"):
         factor("°", "mm")
-    with pytest.raises(UnitFault, match="did you mean 'in'"):
+    with pytest.raises(UnitFault, match="did you mean 'inch'"):
         factor("inc", "mm")
     written = study_of(tmp_path, STUDY)
     other = study_of(tmp_path, STUDY.replace('"1.2 inch"', '"1.2 in"').replace("20°", "20 deg"))

@@ -68,7 +68,7 @@ STIFFNESS = 17
 ANGLES = (7, 14, 21, 24, 25, 29, 30)
 
 
-class Place(NamedTuple):
+class BracketPose(NamedTuple):
     """Geometry at one bracket angle; ``reach1``, ``reach2`` are squares of lengths, below zero where there is none."""
 
     sin_d: Any  # of psi - phi
@@ -117,7 +117,7 @@ def scaled(designs: Array, i: int, row: Array) -> tuple[float, bool]:
 
 
 @inline
-def place(d: Array, phi: Any, rho: Any) -> Place:
+def place(d: Array, phi: Any, rho: Any) -> BracketPose:
     """Axis of the back-rest, yarn branches and wrap angle; (1)-(5).
 
     ``defined`` is false where a length is not real.
@@ -135,10 +135,10 @@ def place(d: Array, phi: Any, rho: Any) -> Place:
     defined = sin_d.real != 0.0 and reach1.real > 0.0 and reach2.real > 0.0
     if not defined:
         none = math.nan * arm
-        return Place(sin_d, cos_d, numerator, arm, x, y, reach1, reach2, none, none, none, False)
+        return BracketPose(sin_d, cos_d, numerator, arm, x, y, reach1, reach2, none, none, none, False)
     theta = arctan2(excess, np.sqrt(reach1)) + arctan2(x, y)
     gamma = arctan2(d[5], np.sqrt(reach2)) - arctan2(d[1] - y, d[0] - x)
-    return Place(
+    return BracketPose(
         sin_d, cos_d, numerator, arm, x, y, reach1, reach2, theta, gamma, 0.5 * math.pi - theta + gamma, True
     )  # fmt: skip
 
@@ -155,7 +155,7 @@ def spring(d: Array, phi: Any) -> tuple[Any, Any, Any]:
 
 
 @inline
-def directions(d: Array, phi: Any, at: Place, s1: Any, s2: Any) -> tuple[Any, Any, Any, Any, Any, Any, Any, Any]:
+def directions(d: Array, phi: Any, at: BracketPose, s1: Any, s2: Any) -> tuple[Any, Any, Any, Any, Any, Any, Any, Any]:
     """Projections of both reactions on the yarn's resultant and across it; (8).
 
     A, S, Q2, k1, k2, sin v, cos v and twice the sine of half the wrap angle, in the words of the page.
@@ -172,7 +172,7 @@ def directions(d: Array, phi: Any, at: Place, s1: Any, s2: Any) -> tuple[Any, An
 
 
 @inline
-def forces(d: Array, phi: Any, at: Place, moment: Any, s1: Any, s2: Any) -> Forces:
+def forces(d: Array, phi: Any, at: BracketPose, moment: Any, s1: Any, s2: Any) -> Forces:
     """Yarn tension and reactions of guide and bracket; (9), and (10), (11) with the slider's couple."""
     a, s, q2, k1, k2, sin_v, cos_v, both = directions(d, phi, at, s1, s2)
     weight = d[11]

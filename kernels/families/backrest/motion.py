@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from kernels import status as st
-from kernels.families.backrest.closure import Mode, Place, forces, place, residual, scaled, spring
+from kernels.families.backrest.closure import BracketPose, Mode, forces, place, residual, scaled, spring
 from kernels.jit import inline, kernel
 from kernels.types import EPS, Array, Status
 
@@ -167,7 +167,7 @@ def _by_root(d: Array, plain: Array, rho: Any, mode: int, roots: Array) -> tuple
 
 
 @inline
-def _code(valid: bool, at: Place, code: int) -> int:
+def _code(valid: bool, at: BracketPose, code: int) -> int:
     if not valid:
         return st.INVALID_INPUT
     if code != st.OK:

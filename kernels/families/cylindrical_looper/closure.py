@@ -83,7 +83,7 @@ class Loops(NamedTuple):
     slides: float
 
 
-class Place(NamedTuple):
+class ShaftClosure(NamedTuple):
     """H(psi), its derivative, the shaft's place s there, and what is left of the second coupler's square."""
 
     value: Any
@@ -93,7 +93,7 @@ class Place(NamedTuple):
 
 
 @inline
-def place(k: Loops, cos: Any, sin: Any) -> Place:
+def place(k: Loops, cos: Any, sin: Any) -> ShaftClosure:
     """Return H and its derivative at one angle of the shaft; (6), (7)."""
     # second ball across the shaft, and from the pin of crank 2
     bx, by = k.d * (cos * k.cos_beta - sin * k.sin_beta), k.d * (sin * k.cos_beta + cos * k.sin_beta)
@@ -109,7 +109,7 @@ def place(k: Loops, cos: Any, sin: Any) -> Place:
     slope = k.x1 * sin - k.y1 * cos
     if k.slides != 0.0 and w.real != 0.0:
         slope = slope - k.slides * height * turn / (w * k.c1)
-    return Place(value, slope, s, q)
+    return ShaftClosure(value, slope, s, q)
 
 
 @inline

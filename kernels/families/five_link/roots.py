@@ -26,7 +26,7 @@ SAMPLES = 32  # cells per arc
 MOST = 8  # roots that are kept; G5 has at most four, and rounding at a double root may show it as a few
 
 
-class Place(NamedTuple):
+class ClosureValue(NamedTuple):
     """A rocker angle and G5 there."""
 
     psi: float
@@ -125,13 +125,15 @@ def _scan_arc(
 
 
 @kernel
-def _extremes_of_arc(joint: Joint, x: float, y: float, w: float, centre: float, half: float) -> tuple[Place, Place]:
+def _extremes_of_arc(
+    joint: Joint, x: float, y: float, w: float, centre: float, half: float
+) -> tuple[ClosureValue, ClosureValue]:
     """Find the places of the smallest and the largest G5 on one arc."""
     whole = half >= math.pi
     begin, width = (-math.pi, 2.0 * math.pi) if whole else (0.0, math.pi)
     step = width / SAMPLES
     least, most, at_least, at_most = math.inf, -math.inf, 0, 0
-    low, high = Place(0.0, math.inf), Place(0.0, -math.inf)
+    low, high = ClosureValue(0.0, math.inf), ClosureValue(0.0, -math.inf)
     for k in range(SAMPLES + 1):
         f = _closure(joint, x, y, w, _angle(centre, half, begin + step * k))
         if f < least:
@@ -144,9 +146,9 @@ def _extremes_of_arc(joint: Joint, x: float, y: float, w: float, centre: float, 
             lo, hi = max(lo, 0.0), min(hi, math.pi)
         tau, f = _dip(joint, x, y, w, centre, half, lo, hi, sign)
         if sign > 0.0 and f < low.value:
-            low = Place(_angle(centre, half, tau), f)
+            low = ClosureValue(_angle(centre, half, tau), f)
         if sign < 0.0 and -f > high.value:
-            high = Place(_angle(centre, half, tau), -f)
+            high = ClosureValue(_angle(centre, half, tau), -f)
     return low, high
 
 
@@ -188,10 +190,10 @@ def all_roots(joint: Joint, x: float, y: float, w: float, noise: float, at: Arra
 
 
 @kernel
-def extremes(joint: Joint, x: float, y: float, w: float) -> tuple[Place, Place]:
+def extremes(joint: Joint, x: float, y: float, w: float) -> tuple[ClosureValue, ClosureValue]:
     """Find the extremes of G5 on the arc where their product is nearest to zero; infinite without an arc."""
     number, centre, half, centre2, half2 = arcs(joint)
-    low, high = Place(0.0, math.inf), Place(0.0, -math.inf)
+    low, high = ClosureValue(0.0, math.inf), ClosureValue(0.0, -math.inf)
     if number > 0:
         low, high = _extremes_of_arc(joint, x, y, w, centre, half)
     if number > 1:

@@ -95,7 +95,7 @@ def reduce_along(d: Any, cl: Any, sl: Any) -> Reduced:
     )  # fmt: skip
 
 
-class Place(NamedTuple):
+class ClosurePose(NamedTuple):
     """The closure at one crank angle, in units of ``Reduced.unit``."""
 
     u: Any  # cos phi
@@ -108,11 +108,11 @@ class Place(NamedTuple):
 
 
 @inline
-def place(r: Any, u: Any, v: Any) -> Place:
+def place(r: Any, u: Any, v: Any) -> ClosurePose:
     """Evaluate the closure at (cos phi, sin phi) = (u, v); (1), (2).  ``r`` has a, e, k0, k2 of :class:`Reduced`."""
     x, y, w = r.e - r.a * u, r.a * v, r.k0 - r.k2 * u
     rr = x * x + y * y
-    return Place(u, v, x, y, w, rr, rr - w * w)
+    return ClosurePose(u, v, x, y, w, rr, rr - w * w)
 
 
 @inline
@@ -133,7 +133,7 @@ class First(NamedTuple):
 
 
 @inline
-def velocity(r: Any, at: Place, cos_psi: Any, sin_psi: Any, per_t: Any) -> First:
+def velocity(r: Any, at: ClosurePose, cos_psi: Any, sin_psi: Any, per_t: Any) -> First:
     """psi'; ``r`` has the fields a and k2 of :class:`kernels.families.guide.closure.Reduced`, ``per_t`` is 1/T."""
     u, v = at.u, at.v
     g_turn, g_near = r.a * (v * cos_psi - u * sin_psi), r.a * (u * cos_psi + v * sin_psi)
@@ -142,14 +142,14 @@ def velocity(r: Any, at: Place, cos_psi: Any, sin_psi: Any, per_t: Any) -> First
 
 
 @inline
-def acceleration(r: Any, at: Place, first: First, per_t: Any) -> Any:
+def acceleration(r: Any, at: ClosurePose, first: First, per_t: Any) -> Any:
     """Psi''."""
     p = first.p
     return -(first.g_near + r.k2 * at.u + p * (at.w * p - 2.0 * first.g_near)) * per_t
 
 
 @inline
-def jerk(at: Place, first: First, q: Any, t: Any, per_t: Any) -> Any:
+def jerk(at: ClosurePose, first: First, q: Any, t: Any, per_t: Any) -> Any:
     """Psi''' from psi'' = ``q`` and T."""
     p, g_turn = first.p, first.g_turn
     linear = first.g_ph - p * (3.0 * g_turn - p * (3.0 * g_turn + t * p))
@@ -157,7 +157,7 @@ def jerk(at: Place, first: First, q: Any, t: Any, per_t: Any) -> Any:
 
 
 @inline
-def snap(r: Any, at: Place, first: First, q: Any, j: Any, t: Any, per_t: Any) -> Any:
+def snap(r: Any, at: ClosurePose, first: First, q: Any, j: Any, t: Any, per_t: Any) -> Any:
     """Fourth derivative of psi from psi'' = ``q``, psi''' = ``j`` and T."""
     p, g_turn, g_near, w = first.p, first.g_turn, first.g_near, at.w
     by_p = p * (4.0 * g_near - p * (6.0 * g_near - p * (4.0 * g_near - w * p)))

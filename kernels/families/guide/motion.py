@@ -14,7 +14,7 @@ import numpy as np
 from kernels import status as st
 from kernels.arithmetic.complex_step import arctan2, magnitude
 from kernels.families.guide.closure import (
-    Place,
+    ClosurePose,
     Reduced,
     acceleration,
     discriminant_tolerance,
@@ -125,7 +125,7 @@ def poses(
 @inline
 def _put_derivatives(
     out: Outputs, i: int, j: int,
-    r: Reduced, at: Place, point: Point, regular: bool,
+    r: Reduced, at: ClosurePose, point: Point, regular: bool,
 ) -> None:  # fmt: skip
     """Write the wanted derivatives up to the highest of them; (5)."""
     b_along, b_across, c_along, c_across, cos_psi, sin_psi, t = point

@@ -9,7 +9,7 @@ from __future__ import annotations
 import math
 
 from kernels.jit import inline
-from kernels.linkage.slider_closure import Place as Place
+from kernels.linkage.slider_closure import ClosurePose as ClosurePose
 from kernels.linkage.slider_closure import Reduced as Reduced
 from kernels.linkage.slider_closure import derivatives as derivatives
 from kernels.linkage.slider_closure import place as place

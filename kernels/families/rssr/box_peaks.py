@@ -8,7 +8,16 @@ from kernels.arithmetic.sincos import sincos
 from kernels.boxes.branching import Flags
 from kernels.boxes.tape import run
 from kernels.families.rssr import box_turn as bt
-from kernels.families.rssr.box_problem import ABOVE, BELOW, PRESSURE, Problem, Room, angle_inputs, middle, take
+from kernels.families.rssr.box_problem import (
+    ABOVE,
+    BELOW,
+    PRESSURE,
+    BoxQuestion,
+    BoxScratch,
+    angle_inputs,
+    middle,
+    take,
+)
 from kernels.families.rssr.box_turn import Formulas
 from kernels.jit import inline, kernel
 from kernels.types import Array
@@ -19,7 +28,7 @@ STEP = 2.0 * math.pi / POSES
 
 
 @kernel
-def _centre_curve(p: Problem, f: Formulas, at: Array, height: Array, neck: Array) -> None:
+def _centre_curve(p: BoxQuestion, f: Formulas, at: Array, height: Array, neck: Array) -> None:
     """Objective with its sign, and Delta/b^2, of the centre design at POSES crank angles; for the choice of rows."""
     place = f.slots[bt.CENTRES :]
     a, e, fs, aca = middle(at, place[0]), middle(at, place[1]), middle(at, place[2]), middle(at, place[3])
@@ -71,14 +80,16 @@ def _place_of(height: Array, sign: float, i: int) -> float:
 
 
 @inline
-def _at_angle(f: Formulas, rows: Room, theta: float) -> None:
+def _at_angle(f: Formulas, rows: BoxScratch, theta: float) -> None:
     """Compute the closure at a crank angle after the extended position."""
     angle_inputs(rows.at, bt.COS_THETA, theta)
     run(f.operations, f.factors, f.ends, bt.CLOSURE, rows.at, rows.ones.shape[0])
 
 
 @kernel
-def peak_rows(p: Problem, f: Formulas, rows: Room, count: int, height: Array, neck: Array, used: Flags) -> int:
+def peak_rows(
+    p: BoxQuestion, f: Formulas, rows: BoxScratch, count: int, height: Array, neck: Array, used: Flags
+) -> int:
     """Return the number of rows with those of pressure angle and objective, at the peaks of the centre design."""
     _centre_curve(p, f, rows.at, height, neck)
     used[:] = 0

@@ -23,7 +23,7 @@ FREE_AHEAD, FREE_BEHIND, FREE_LONG, FREE_SHORT = 20, 21, 22, 23
 LARGE = 1e30
 
 
-class Problem(NamedTuple):
+class BoxQuestion(NamedTuple):
     """What is asked of a design on the locus."""
 
     branch: float
@@ -34,7 +34,7 @@ class Problem(NamedTuple):
     tube: Array  # (2 m, 9) of kernels.boxes.tube, for the target; may be empty
 
 
-class Room(NamedTuple):
+class BoxScratch(NamedTuple):
     """The forms of a box, its rows, and the scratch of its linear program."""
 
     at: Array  # (forms, width) of the formulas
@@ -53,9 +53,9 @@ class Room(NamedTuple):
 
 
 @kernel
-def room(forms: int, n: int) -> Room:
+def room(forms: int, n: int) -> BoxScratch:
     """Return the room for boxes of ``n`` variables."""
-    return Room(
+    return BoxScratch(
         np.zeros((forms, width(n))), np.zeros((MOST_ROWS, width(n))), np.zeros(MOST_ROWS, np.int64),
         np.zeros(MOST_ROWS), np.zeros(MOST_ROWS, np.uint8), np.zeros(MOST_ROWS), np.zeros((n + 6, n + 1)),
         np.zeros(n + 1, np.int64), np.zeros((MOST_ROWS, n + 1)), np.zeros(MOST_ROWS), np.zeros(n), np.ones(n),
@@ -64,7 +64,7 @@ def room(forms: int, n: int) -> Room:
 
 
 @kernel
-def inputs(p: Problem, centre: Array, half: Array, varied: Array, given: Array, at: Array) -> None:
+def inputs(p: BoxQuestion, centre: Array, half: Array, varied: Array, given: Array, at: Array) -> None:
     """Compute the inputs of the formulas: coordinates number ``varied[k]`` vary, the others are given."""
     for j in range(bt.COORDINATES):
         constant(at, j, given[j], given[j])
@@ -78,7 +78,7 @@ def inputs(p: Problem, centre: Array, half: Array, varied: Array, given: Array, 
 
 
 @kernel
-def take(rows: Room, count: int, form: int, kind: int, theta: float, sign: float) -> int:
+def take(rows: BoxScratch, count: int, form: int, kind: int, theta: float, sign: float) -> int:
     """Return the number of rows after a form, or its negative, was copied to them."""
     last = rows.at.shape[1] - 1
     for j in range(last):
@@ -107,7 +107,7 @@ def middle(at: Array, form: int) -> float:
 
 
 @kernel
-def acceptance_rows(p: Problem, f: Formulas, rows: Room) -> int:
+def acceptance_rows(p: BoxQuestion, f: Formulas, rows: BoxScratch) -> int:
     """Return the number of the first rows: acceptance tests, and limits that are known without a division."""
     count = 0
     for kind in range(LIMITED):
@@ -116,7 +116,7 @@ def acceptance_rows(p: Problem, f: Formulas, rows: Room) -> int:
 
 
 @kernel
-def limit_rows(p: Problem, f: Formulas, rows: Room, count: int, first: int, last: int) -> int:
+def limit_rows(p: BoxQuestion, f: Formulas, rows: BoxScratch, count: int, first: int, last: int) -> int:
     """Return the number of rows with the limits number ``first`` to ``last`` - 1, where there are such."""
     for k in range(2 * first, min(2 * last, p.limits.shape[0])):
         if abs(p.limits[k]) < math.inf:

@@ -28,8 +28,8 @@ from kernels.families.rssr.box_problem import (
     FREE_AHEAD,
     FREE_LONG,
     FREE_SHORT,
-    Problem,
-    Room,
+    BoxQuestion,
+    BoxScratch,
     acceptance_rows,
     angle_inputs,
     inputs,
@@ -53,7 +53,7 @@ def _passed(start: Array, pose: Array, side: int, total: float, crank: float) ->
 
 
 @kernel
-def _worst(p: Problem, start: Array, group: int, total: float, crank: float) -> int:
+def _worst(p: BoxQuestion, start: Array, group: int, total: float, crank: float) -> int:
     """Pose at which the centre design is farthest out of one side of the tube on one stroke; -1 for none."""
     stroke, side = p.tube.shape[0] // 2, LOW + group % 2
     sign = p.branch if side == HIGH else -p.branch
@@ -67,7 +67,9 @@ def _worst(p: Problem, start: Array, group: int, total: float, crank: float) -> 
 
 
 @inline
-def _put(p: Problem, f: Formulas, rows: Room, count: int, i: int, side: int, part: int, slot: int, kind: int) -> int:
+def _put(
+    p: BoxQuestion, f: Formulas, rows: BoxScratch, count: int, i: int, side: int, part: int, slot: int, kind: int
+) -> int:
     """Return the number of rows after one was added; ``kind`` is that of the side ahead, the next one that behind."""
     angle_inputs(rows.at, bt.COS_THETA, p.tube[i, THETA])
     angle_inputs(rows.at, bt.COS_TURN, p.tube[i, side])
@@ -77,14 +79,14 @@ def _put(p: Problem, f: Formulas, rows: Room, count: int, i: int, side: int, par
 
 
 @kernel
-def _centre(f: Formulas, rows: Room, start: Array) -> None:
+def _centre(f: Formulas, rows: BoxScratch, start: Array) -> None:
     """Compute n1, X1, Y1, e, f sa, ca, u1, v1 of the design at the centre."""
     for k in range(8):
         start[k] = middle(rows.at, f.slots[bt.STARTS + 2 + k])
 
 
 @kernel
-def arrival_rows(p: Problem, f: Formulas, rows: Room, count: int, start: Array) -> int:
+def arrival_rows(p: BoxQuestion, f: Formulas, rows: BoxScratch, count: int, start: Array) -> int:
     """Return the number of rows with those that a design with the target keeps, one per stroke and side of the tube."""
     _centre(f, rows, start)
     total, crank = middle(rows.at, f.slots[bt.STARTS]), middle(rows.at, f.slots[bt.STARTS + 1])
@@ -96,7 +98,7 @@ def arrival_rows(p: Problem, f: Formulas, rows: Room, count: int, start: Array) 
 
 
 @kernel
-def free_crank_rows(p: Problem, f: Formulas, rows: Room, count: int, start: Array) -> int:
+def free_crank_rows(p: BoxQuestion, f: Formulas, rows: BoxScratch, count: int, start: Array) -> int:
     """Return the number of rows with those of the tube and of the locus for a crank whose length is a variable.
 
     The poses are the worst of the centre design with its shortest, middle and longest crank.
@@ -115,7 +117,7 @@ def free_crank_rows(p: Problem, f: Formulas, rows: Room, count: int, start: Arra
 
 
 @inline
-def _single(rows: Room, start: int, count: int) -> int:
+def _single(rows: BoxScratch, start: int, count: int) -> int:
     """Return a row of limits from ``start`` on that is negative on the whole box; -1 where there is none."""
     found = -1
     for j in range(start, count):
@@ -125,7 +127,7 @@ def _single(rows: Room, start: int, count: int) -> int:
 
 
 @inline
-def _doubtful(rows: Room, count: int, n: int) -> int:
+def _doubtful(rows: BoxScratch, count: int, n: int) -> int:
     """Row of limits that is nearest to being negative on the whole box, in units of its spread."""
     found, lowest = -1, math.inf
     for j in range(count):
@@ -138,7 +140,7 @@ def _doubtful(rows: Room, count: int, n: int) -> int:
 
 
 @inline
-def _lengths(f: Formulas, rows: Room) -> bool:
+def _lengths(f: Formulas, rows: BoxScratch) -> bool:
     """Lengths of the designs; false where a divisor may vanish, or the crank."""
     at, n = rows.at, rows.ones.shape[0]
     if f.slots[bt.SIGN] >= 0:
@@ -150,7 +152,7 @@ def _lengths(f: Formulas, rows: Room) -> bool:
 
 
 @inline
-def _by_target(rows: Room, count: int) -> bool:
+def _by_target(rows: BoxScratch, count: int) -> bool:
     """Whether the multipliers use rows that only designs with the target keep."""
     found = False
     for j in range(count):
@@ -159,7 +161,7 @@ def _by_target(rows: Room, count: int) -> bool:
 
 
 @inline
-def _emptied(p: Problem, rows: Room, count: int) -> tuple[int, int, float]:
+def _emptied(p: BoxQuestion, rows: BoxScratch, count: int) -> tuple[int, int, float]:
     """Return what contradicting limits prove: no feasible design, or none with the target."""
     if _by_target(rows, count):
         return BOUND, count, p.target
@@ -167,13 +169,13 @@ def _emptied(p: Problem, rows: Room, count: int) -> tuple[int, int, float]:
 
 
 @inline
-def crank_known(f: Formulas, rows: Room) -> bool:
+def crank_known(f: Formulas, rows: BoxScratch) -> bool:
     """Whether rho1 + rho2, by which the crank's length is divided, vanishes nowhere in the box."""
     return bool(least(rows.at[f.slots[bt.STARTS]], rows.ones.shape[0]) > 0.0)
 
 
 @kernel
-def _limits_alone(p: Problem, rows: Room, count: int) -> bool:
+def _limits_alone(p: BoxQuestion, rows: BoxScratch, count: int) -> bool:
     """Whether the rows of limits contradict each other on the box; ``rows.factors`` tell how."""
     single = _single(rows, 0, count)
     if single >= 0:
@@ -185,7 +187,7 @@ def _limits_alone(p: Problem, rows: Room, count: int) -> bool:
 
 
 @inline
-def _best(rows: Room, count: int) -> tuple[float, bool]:
+def _best(rows: BoxScratch, count: int) -> tuple[float, bool]:
     return best_bound(
         rows.forms, count, rows.objective, rows.ones, rows.work, rows.basis, rows.linear, rows.sizes, rows.factors,
         rows.total,
@@ -193,7 +195,7 @@ def _best(rows: Room, count: int) -> tuple[float, bool]:
 
 
 @inline
-def _undecided(rows: Room, count: int) -> None:
+def _undecided(rows: BoxScratch, count: int) -> None:
     """Compute what each variable's width costs the row of limits that is nearest to a decision."""
     rows.factors[:] = 0.0
     rows.factors[_doubtful(rows, count, rows.ones.shape[0])] = 1.0
@@ -202,7 +204,7 @@ def _undecided(rows: Room, count: int) -> None:
 
 @kernel
 def judge(
-    p: Problem, f: Formulas, low: Array, high: Array, varied: Array, given: Array, rows: Room, scratch: Array,
+    p: BoxQuestion, f: Formulas, low: Array, high: Array, varied: Array, given: Array, rows: BoxScratch, scratch: Array,
     used: Flags,
 ) -> tuple[int, int, float]:  # fmt: skip
     """Return what can be said of one box: outcome, number of rows, and the bound of the objective.
@@ -258,7 +260,7 @@ def judge(
 
 @kernel
 def judge_any_crank(
-    p: Problem, f: Formulas, low: Array, high: Array, varied: Array, given: Array, rows: Room, scratch: Array
+    p: BoxQuestion, f: Formulas, low: Array, high: Array, varied: Array, given: Array, rows: BoxScratch, scratch: Array
 ) -> tuple[int, int, float]:
     """Return what can be said of a box where the crank's length does not follow from the place, as :func:`judge`.
 

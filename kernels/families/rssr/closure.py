@@ -48,7 +48,7 @@ def reduce_one(d: Any) -> Reduced:
     return reduce_scaled(a, b, c, e, f, g, d.alpha, d.branch.real)
 
 
-class Place(NamedTuple):
+class ClosurePose(NamedTuple):
     """The closure at one crank angle; ``hu``, ``hv`` are cos(phi), sin(phi) times the cosine of the axes' angle."""
 
     u: Any  # cos phi
@@ -64,7 +64,7 @@ class Place(NamedTuple):
 
 
 @inline
-def place(e: Any, y0: Any, ca: Any, k0: Any, k1: Any, k2: Any, u: Any, v: Any) -> Place:
+def place(e: Any, y0: Any, ca: Any, k0: Any, k1: Any, k2: Any, u: Any, v: Any) -> ClosurePose:
     """Evaluate the closure of a reduced design at (cos phi, sin phi) = (u, v); (2).
 
     It takes float32, float64 and complex128 alike, so no literal number may stand in it.
@@ -73,7 +73,7 @@ def place(e: Any, y0: Any, ca: Any, k0: Any, k1: Any, k2: Any, u: Any, v: Any) -
     x, y, w1 = e - u, y0 + hv, k2 * u - k1 * v
     w = k0 - w1
     rr = x * x + y * y
-    return Place(u, v, hu, hv, x, y, w1, w, rr, rr - w * w)
+    return ClosurePose(u, v, hu, hv, x, y, w1, w, rr, rr - w * w)
 
 
 @inline

@@ -13,7 +13,7 @@ import math
 from typing import Any, NamedTuple
 
 from kernels.arithmetic.intrinsics import largest
-from kernels.families.rssr.closure import Place, place
+from kernels.families.rssr.closure import ClosurePose, place
 from kernels.jit import inline, inline_fused
 
 
@@ -43,14 +43,14 @@ class Second(NamedTuple):
 
 
 @inline
-def rocker(at: Place, t: Any, per: Any) -> Rocker:
+def rocker(at: ClosurePose, t: Any, per: Any) -> Rocker:
     """Rocker from T and ``per`` = 1/(R T): one division gives both reciprocals, 1/R and 1/T."""
     per_r, per_t = t * per, at.rr * per
     return Rocker((at.x * at.w + at.y * t) * per_r, (at.x * t - at.y * at.w) * per_r, t, per_t)
 
 
 @inline
-def velocity(k1: Any, k2: Any, to: Rocker, at: Place) -> First:
+def velocity(k1: Any, k2: Any, to: Rocker, at: ClosurePose) -> First:
     """Equation (3)."""
     w_ph = k1 * at.u + k2 * at.v
     g_ph = w_ph - (at.v * to.c - at.hu * to.s)
@@ -58,7 +58,7 @@ def velocity(k1: Any, k2: Any, to: Rocker, at: Place) -> First:
 
 
 @inline
-def acceleration(to: Rocker, at: Place, first: First) -> Second:
+def acceleration(to: Rocker, at: ClosurePose, first: First) -> Second:
     """Equation (4)."""
     g_phps = at.v * to.s + at.hu * to.c
     g_phph = at.w1 - (at.u * to.c + at.hv * to.s)
@@ -68,7 +68,7 @@ def acceleration(to: Rocker, at: Place, first: First) -> Second:
 
 
 @inline
-def jerk(to: Rocker, at: Place, first: First, second: Second) -> Any:
+def jerk(to: Rocker, at: ClosurePose, first: First, second: Second) -> Any:
     """Equation (5): psi''' with its own sign."""
     p, q = first.p, second.q
     g_phphps, g_phpsps = at.u * to.s - at.hv * to.c, first.w_ph - first.g_ph
@@ -77,7 +77,7 @@ def jerk(to: Rocker, at: Place, first: First, second: Second) -> Any:
 
 
 @inline
-def snap(to: Rocker, at: Place, first: First, second: Second, j: Any) -> Any:
+def snap(to: Rocker, at: ClosurePose, first: First, second: Second, j: Any) -> Any:
     """Fourth transfer function, with its own sign, from the third, ``j``."""
     p, q, t, w = -first.p, -second.q, to.t, at.w
     g_phphps, g_phpsps, g_phps = at.u * to.s - at.hv * to.c, first.w_ph - first.g_ph, second.g_phps

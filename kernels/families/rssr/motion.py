@@ -9,7 +9,15 @@ import numpy as np
 
 from kernels import status as st
 from kernels.arithmetic.complex_step import arctan2, hypotenuse
-from kernels.families.rssr.closure import Numbers, Place, Reduced, Status, discriminant_tolerance, place, reduce_design
+from kernels.families.rssr.closure import (
+    ClosurePose,
+    Numbers,
+    Reduced,
+    Status,
+    discriminant_tolerance,
+    place,
+    reduce_design,
+)
 from kernels.families.rssr.derivatives import Rocker, acceleration, jerk, velocity
 from kernels.jit import inline, kernel
 from kernels.linkage.verdict import pose_status
@@ -106,7 +114,7 @@ def put(out: Numbers | None, i: int, j: int, value: Any) -> None:
 
 @inline
 def _put_joints(
-    joints: Joints, designs: Numbers, i: int, j: int, r: Reduced, at: Place, c: Any, s: Any, has_angle: bool
+    joints: Joints, designs: Numbers, i: int, j: int, r: Reduced, at: ClosurePose, c: Any, s: Any, has_angle: bool
 ) -> None:
     """Write the wanted coordinates; c and s are minus cosine and minus sine of the mirrored rocker angle."""
     if joints.x_b is not None:
@@ -133,7 +141,7 @@ def _put_derivatives(
     i: int,
     j: int,
     r: Reduced,
-    at: Place,
+    at: ClosurePose,
     to: Rocker,
 ) -> None:
     """Write the wanted transfer functions up to the highest of them, mirrored back to the branch."""

@@ -14,7 +14,7 @@ import numpy as np
 from kernels.boxes.branching import COMBINED, OPEN, TOO_SMALL, Flags, Indices, pop, push
 from kernels.families.rssr import box_turn as bt
 from kernels.families.rssr.box_peaks import POSES
-from kernels.families.rssr.box_problem import Problem, Room, room
+from kernels.families.rssr.box_problem import BoxQuestion, BoxScratch, room
 from kernels.families.rssr.box_rows import crank_known, judge, judge_any_crank
 from kernels.families.rssr.box_turn import Formulas
 from kernels.jit import inline, kernel
@@ -37,7 +37,7 @@ class Leaves(NamedTuple):
 
 @kernel
 def _record(
-    leaves: Leaves, count: int, low: Array, high: Array, outcome: int, bound: float, rows: Room, used: int
+    leaves: Leaves, count: int, low: Array, high: Array, outcome: int, bound: float, rows: BoxScratch, used: int
 ) -> int:
     """One more leaf, with the rows that prove it."""
     leaves.low[count], leaves.high[count] = low, high
@@ -76,7 +76,7 @@ def _to_halve(low: Array, high: Array, whole: Array, smallest: float, loose: Arr
 
 @kernel
 def explore(
-    p: Problem, f: Formulas, starts: tuple[Array, Array, Array], whole: Array, varied: Array, given: Array,
+    p: BoxQuestion, f: Formulas, starts: tuple[Array, Array, Array], whole: Array, varied: Array, given: Array,
     smallest: float, most: int, leaves: Leaves,
 ) -> tuple[int, int]:  # fmt: skip
     """Halve boxes until every part is proven not to reach the target, or so many parts were judged; worst parts first.

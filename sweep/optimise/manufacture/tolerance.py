@@ -14,7 +14,6 @@ from sweep.families.names import is_flag
 from sweep.optimise.local.model import Model
 from sweep.optimise.problem.program import Program
 from sweep.optimise.problem.statement import Problem
-from sweep.optimise.samples import sobol
 from sweep.quantities.limits import meets
 from sweep.quantities.measures import Measure
 from sweep.quantities.resolve import output as described
@@ -130,10 +129,11 @@ def deviating(family: Family, design: Array, tolerance: Tolerance, seed: int, sa
     samples : a power of two
     """
     from scipy.special import ndtri
+    from scipy.stats import qmc
 
     sigma = touched(family, tolerance) / SIGMAS
     varied = np.flatnonzero(sigma)
-    uniform = sobol(len(varied), seed).random(samples)
+    uniform = qmc.Sobol(len(varied), seed=seed).random(samples)
     designs = np.repeat(design[None, :], samples, axis=0)
     # A sample at 0 would be infinitely far away.
     designs[:, varied] += sigma[varied] * ndtri(np.maximum(uniform, 0.5 / samples))

@@ -16,7 +16,6 @@ from sweep.families.base import Accuracy, Array
 from sweep.families.names import is_flag, stem
 from sweep.optimise.problem.program import measured_in
 from sweep.optimise.problem.statement import Problem
-from sweep.optimise.samples import sobol
 from sweep.quantities.limits import compared
 from sweep.quantities.measures import ROTATABLE_MARGIN, margins
 
@@ -76,6 +75,8 @@ def sample(problem: Problem, signs: Sequence[dict[str, float]], count: int, seed
     count : how many designs at most
     number : of the sample
     """
+    from scipy.stats import qmc
+
     centre = problem.lower + 0.5 * problem.span
     bases = [problem.rows(centre, **choice)[0] for choice in signs]
     block = BLOCK
@@ -83,7 +84,7 @@ def sample(problem: Problem, signs: Sequence[dict[str, float]], count: int, seed
         block //= 2
     blocks = max(-(-SAMPLED * count // block), len(bases))
     rng = np.random.default_rng((seed, number))
-    points = sobol(len(problem.variables), rng)
+    points = qmc.Sobol(len(problem.variables), seed=rng)
     place, kind, merit = np.empty((0, len(problem.variables))), np.empty(0, np.intp), np.empty(0)
     for k in range(blocks):
         fractions, own = _brought_in(problem, points.random(block)), k % len(bases)

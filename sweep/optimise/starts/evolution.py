@@ -16,7 +16,6 @@ import numpy as np
 from sweep.families.base import Array
 from sweep.jobs.progress import Say, unsaid
 from sweep.optimise.multistart.parallel import spread_over
-from sweep.optimise.samples import sobol
 from sweep.optimise.starts.candidates import spread
 from sweep.optimise.starts.linear import Elimination
 from sweep.optimise.starts.proportions import STUCK, Proportions, merit, turned_into
@@ -142,12 +141,14 @@ class _Group:
 
     def __call__(self, number: int, should_stop: Callable[[], bool]) -> tuple[Array, Array]:
         """Return designs (k, P) and their merits, the best first."""
+        from scipy.stats import qmc
+
         own = Proportions(self.linear, [self.signs[number % len(self.signs)]])
 
         def worth_of(places: Array) -> Array:
             return merit(self.linear, own.designs(places, np.zeros(len(places), np.intp)))[1]
 
-        place = sobol(len(own.columns), self.seed + number).random(SAMPLED)
+        place = qmc.Sobol(len(own.columns), seed=self.seed + number).random(SAMPLED)
         worth = np.concatenate([worth_of(block) for block in np.split(place, max(1, SAMPLED // BLOCK))])
         order = np.argsort(worth, kind="stable")
         order = order[worth[order] < STUCK]

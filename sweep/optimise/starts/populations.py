@@ -20,7 +20,6 @@ from sweep.families.base import Array
 from sweep.jobs.progress import AT_MOST, Say, unsaid
 from sweep.optimise.local.kkt import AGREE
 from sweep.optimise.multistart.parallel import spread_over
-from sweep.optimise.samples import sobol
 from sweep.optimise.starts.batched_sqp import BatchedSqp
 from sweep.optimise.starts.candidates import spread
 from sweep.optimise.starts.linear import Elimination
@@ -109,8 +108,10 @@ class Population:
 
 def _sampled(rows: PoseRows, rng: np.random.Generator, size: Size) -> tuple[Array, Index, _Classes]:
     """Places of a Sobol sample of each kind that turn, the best of every class of swings that are not alike."""
+    from scipy.stats import qmc
+
     number = len(rows.own.bases)
-    place = np.concatenate([sobol(len(rows.own.columns), rng).random(size.sampled) for _ in range(number)])
+    place = np.concatenate([qmc.Sobol(len(rows.own.columns), seed=rng).random(size.sampled) for _ in range(number)])
     kinds = np.repeat(np.arange(number), size.sampled)
     worth = np.concatenate([_tried(rows, *some) for some in _blocks(place, kinds)])
     order = np.argsort(worth, kind="stable")

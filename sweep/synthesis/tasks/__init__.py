@@ -5,8 +5,8 @@ from sweep.synthesis.tasks.engineering import Task4 as Task4
 from sweep.synthesis.tasks.positions import Position as Position
 from sweep.synthesis.tasks.positions import Task1 as Task1
 from sweep.synthesis.tasks.positions import Task2 as Task2
-from sweep.synthesis.tasks.problem import Problem as Problem
 from sweep.synthesis.tasks.problem import Solution as Solution
+from sweep.synthesis.tasks.problem import SynthesisTask as SynthesisTask
 from sweep.synthesis.tasks.second_stage import Task6 as Task6
 from sweep.synthesis.tasks.second_stage import Task7 as Task7
 from sweep.synthesis.tasks.solver import solve as solve

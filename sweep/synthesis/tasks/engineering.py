@@ -74,7 +74,7 @@ class EngineeringMethod:
         return ("pressure angle", *size_names(self.bounds))
 
     def evaluate(self, x: Array) -> Candidates:
-        """See `Problem`."""
+        """See `SynthesisTask`."""
         f = x[:, 1] if x.shape[1] > 1 else np.full(len(x), self.f_range[0])
         swing, phi0 = np.full(len(x), self.swing), np.full(len(x), self.phi0)
         e, g, alpha = (np.full(len(x), value) for value in (self.e, self.g, self.alpha))

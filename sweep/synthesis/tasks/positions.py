@@ -149,7 +149,7 @@ class Task1:
         return ("pressure angle", *branches, *size_names(self.bounds))
 
     def evaluate(self, x: Array) -> Candidates:
-        """See `Problem`."""
+        """See `SynthesisTask`."""
         n = len(x)
         found = through_positions(
             np.full(n, self.swing), np.full(n, self.phi0), x[:, 0], self.e, self.g, self.alpha, self.positions, self.f
@@ -226,7 +226,7 @@ class Task2:
         return ("pressure angle", "branch at position 1", "branch at position 2", *size_names(self.bounds))
 
     def evaluate(self, x: Array) -> Candidates:
-        """See `Problem`."""
+        """See `SynthesisTask`."""
         values = dict(zip((u.name for u in self.unknowns), x.T, strict=True))
         g, alpha = values.get("g", self.g), values.get("alpha", self.alpha)
         found = through_positions(x[:, 0], x[:, 1], x[:, 2], self.e, g, alpha, self.positions, 0.0)

@@ -33,7 +33,7 @@ class Candidates(NamedTuple):
     results: dict[str, Array]
 
 
-class Problem(Protocol):
+class SynthesisTask(Protocol):
     """One of the tasks with its numbers: what `solve` takes."""
 
     @property

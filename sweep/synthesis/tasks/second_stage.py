@@ -125,7 +125,7 @@ class Task6:
         return ("sense at the start", "sense at the end", "pressure angle 2", *size_names(self.bounds))
 
     def evaluate(self, x: Array) -> Candidates:
-        """See `Problem`."""
+        """See `SynthesisTask`."""
         n, first = len(x), self._first
         ones = np.ones(n)
         theta = x[:, 5]
@@ -242,7 +242,7 @@ class Task7:
         return ("pressure angle 2", *size_names(self.bounds))
 
     def evaluate(self, x: Array) -> Candidates:
-        """See `Problem`."""
+        """See `SynthesisTask`."""
         n, first = len(x), self._first
         ones, theta = np.ones(n), x[:, 3]
         columns = first.columns(n) | {

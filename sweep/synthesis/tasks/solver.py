@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sweep.families.base import Array
-from sweep.synthesis.tasks.problem import Problem, Solution
+from sweep.synthesis.tasks.problem import Solution, SynthesisTask
 
 BLOCK = 1024
 STEP = 3e-6  # of a central difference, in units of the box
@@ -31,7 +31,7 @@ class _Value(NamedTuple):
 class _Scaled:
     """A problem in the unit box; remembers its last point and gradient."""
 
-    def __init__(self, problem: Problem) -> None:
+    def __init__(self, problem: SynthesisTask) -> None:
         self.problem = problem
         self.low = np.array([u.low for u in problem.unknowns])
         self.span = np.array([u.high for u in problem.unknowns]) - self.low
@@ -63,7 +63,7 @@ class _Scaled:
         return _Value(*here), _Value(*slopes)
 
 
-def solve(problem: Problem, *, candidates: int = 4096, starts: int = 6, seed: int = 0) -> list[Solution]:
+def solve(problem: SynthesisTask, *, candidates: int = 4096, starts: int = 6, seed: int = 0) -> list[Solution]:
     """Mechanisms that do a task, the best first.
 
     Parameters
@@ -244,7 +244,7 @@ def _distinct(scaled: _Scaled, points: list[Array]) -> list[Array]:
     return kept
 
 
-def _solution(problem: Problem, scaled: _Scaled, z: Array) -> Solution:
+def _solution(problem: SynthesisTask, scaled: _Scaled, z: Array) -> Solution:
     x = scaled.real(z)
     found = problem.evaluate(x[None, :])
     value = _Value(found.equations, found.limits, found.curve)

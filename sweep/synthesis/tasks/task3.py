@@ -121,7 +121,7 @@ class Task3:
         return tuple(f"{self.adjusted} of setting {k}" for k in range(2, len(self.settings) + 2))
 
     def evaluate(self, x: Array) -> Candidates:
-        """See `Problem`."""
+        """See `SynthesisTask`."""
         ones = np.ones(len(x))
         found = dict(zip((u.name for u in self.unknowns), x.T, strict=True))
         first, _ = designs_on_locus(

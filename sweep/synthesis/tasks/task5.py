@@ -109,7 +109,7 @@ class Task5:
         return ("pressure angle", "a2 positive", "no return of the pin", *size_names(self.bounds))
 
     def evaluate(self, x: Array) -> Candidates:
-        """See `Problem`."""
+        """See `SynthesisTask`."""
         ones = np.ones(len(x))
         phi1, t1, ratio = x[:, 0], x[:, 2], x[:, 3]
         fixed = (self.swing * ones, self.phi0 * ones, phi1, self.e * ones, x[:, 1])

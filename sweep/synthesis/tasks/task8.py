@@ -94,7 +94,7 @@ class Task8:
         return (*own, *size_names(self.bounds))
 
     def evaluate(self, x: Array) -> Candidates:
-        """See `Problem`."""
+        """See `SynthesisTask`."""
         n, ones = len(x), np.ones(len(x))
         phi1, coupler, offset = x[:, 0], x[:, 2], x[:, 3]
         fixed = (self.swing * ones, self.phi0 * ones, phi1, self.e * ones, x[:, 1])

@@ -12,79 +12,97 @@ function hasWebGL() {
   return document.createElement("canvas").getContext("webgl2") !== null;
 }
 
-function startMotion(data) {
-  const host = document.getElementById("live");
-  const find = (name) => host.querySelector(name);
-  for (const design of data.designs) {
-    design.phi = numbersOf(design.phi);
-    design.values = Object.fromEntries(Object.entries(design.curves).map(([name, text]) => [name, numbersOf(text)]));
+// One mechanism with its curves; later data may take the place of the first, and the angle stays.
+class Moving {
+  constructor(host, data) {
+    this.host = host;
+    [this.share, this.index, this.turning, this.back, this.before] = [0, 0, false, false, null];
+    // The mechanism rests where the reader asks for little motion, and while it is out of sight.
+    this.wanted = !matchMedia("(prefers-reduced-motion: reduce)").matches;
+    host.hidden = false;
+    document.body.classList.add("alive");
+    [this.slider, this.said, this.button] = ["input[type=range]", ".angle", ".play"].map((name) => this.find(name));
+    if (data.size > 0 && hasWebGL()) {
+      document.body.classList.add("spatial");
+      this.view = host.view = new MechanismView(this.find(".view"), data); // of the host for whoever looks in
+    }
+    this.find(".designs")?.addEventListener("change", (event) => this.choose(Number(event.target.value)));
+    this.slider.addEventListener("input", () => { this.rest(); this.set(Number(this.slider.value)); });
+    this.button.addEventListener("click", () => { this.wanted = !this.turning; this.turn(this.wanted); });
+    this.find(".names input").addEventListener("change", (event) => {
+      this.view.named = event.target.checked;
+      this.view.draw();
+    });
+    for (const look of host.querySelectorAll("[data-look]")) {
+      look.addEventListener("click", () => this.view.look(look.dataset.look));
+    }
+    this.replace(data);
+    new IntersectionObserver(([seen]) => this.turn(this.wanted && seen.isIntersecting)).observe(this.find(".stage"));
   }
-  data.ends = data.closed ? [0, 360] : [data.designs[0].phi[0], data.designs[0].phi[data.designs[0].phi.length - 1]];
-  host.hidden = false;
-  document.body.classList.add("alive");
-  const slider = find("input[type=range]"), said = find(".angle"), button = find(".play");
-  // The mechanism rests where the reader asks for little motion, and while it is out of sight.
-  let wanted = !matchMedia("(prefers-reduced-motion: reduce)").matches;
-  let share = 0, index = 0, turning = false, back = false, before = null, view = null;
 
-  const set = (to) => {
-    share = to;
-    slider.value = share;
-    const phi = data.designs[index].phi, here = data.ends[0] + share * (data.ends[1] - data.ends[0]);
-    const own = data.closed ? (((phi[0] + 360 * share) % 360) + 360) % 360 : between(phi, share, false);
-    said.textContent = data.closed ? `${here.toFixed(1)}° (φ = ${own.toFixed(1)}°)` : `${short(own)} ${data.unit}`;
-    if (view) view.pose(share);
-    for (const panel of panels) panel.pose(share);
-  };
-  const panels = data.curves.map((curve) => new Panel(find(".panels"), curve, data, (to) => { rest(); set(to); }));
-  const choose = (to) => {
-    index = to;
-    find(".note").textContent = data.designs[index].note;
-    if (view) view.show(index);
-    for (const panel of panels) panel.show(index);
-    set(share);
-  };
-  const step = (now) => {
-    if (!turning) return;
-    const past = before === null ? 0 : Math.min((now - before) / 1000 / TURN_SECONDS, 0.1);
-    before = now;
-    let to = share + (back ? -past : past);
-    if (data.closed) to %= 1;
-    else if (to > 1 || to < 0) [back, to] = [to > 1, Math.min(Math.max(to, 0), 1)];
-    set(to);
-    requestAnimationFrame(step);
-  };
-  const turn = (on) => {
-    if (turning === on) return;
-    turning = on;
-    before = null;
-    button.textContent = on ? "pause" : "turn";
-    button.setAttribute("aria-pressed", on);
-    if (on) requestAnimationFrame(step);
-  };
-  const rest = () => {
-    wanted = false;
-    turn(false);
-  };
+  find(name) { return this.host.querySelector(name); }
 
-  if (data.size > 0 && hasWebGL()) {
-    document.body.classList.add("spatial");
-    view = new MechanismView(find(".view"), data);
-    host.view = view; // for whoever looks in from the console
+  replace(data) {
+    this.data = data;
+    for (const design of data.designs) {
+      design.phi = numbersOf(design.phi);
+      design.values = Object.fromEntries(Object.entries(design.curves).map(([name, text]) => [name, numbersOf(text)]));
+    }
+    data.ends = data.closed ? [0, 360] : [data.designs[0].phi[0], data.designs[0].phi[data.designs[0].phi.length - 1]];
+    this.find(".panels").replaceChildren();
+    this.panels = data.curves.map((curve) => {
+      return new Panel(this.find(".panels"), curve, data, (to) => { this.rest(); this.set(to); });
+    });
+    if (this.view) this.view.data = data;
+    this.choose(Math.min(this.index, data.designs.length - 1));
   }
-  find(".designs").addEventListener("change", (event) => choose(Number(event.target.value)));
-  slider.addEventListener("input", () => { rest(); set(Number(slider.value)); });
-  button.addEventListener("click", () => { wanted = !turning; turn(wanted); });
-  find(".names input").addEventListener("change", (event) => { view.named = event.target.checked; view.draw(); });
-  for (const look of host.querySelectorAll("[data-look]")) {
-    look.addEventListener("click", () => view.look(look.dataset.look));
+
+  set(to) {
+    this.share = to;
+    this.slider.value = to;
+    const { data } = this, phi = data.designs[this.index].phi, here = data.ends[0] + to * (data.ends[1] - data.ends[0]);
+    const own = data.closed ? (((phi[0] + 360 * to) % 360) + 360) % 360 : between(phi, to, false);
+    this.said.textContent = data.closed ? `${here.toFixed(1)}° (φ = ${own.toFixed(1)}°)` : `${short(own)} ${data.unit}`;
+    if (this.view) this.view.pose(to);
+    for (const panel of this.panels) panel.pose(to);
   }
-  choose(0);
-  new IntersectionObserver(([seen]) => turn(wanted && seen.isIntersecting)).observe(find(".stage"));
+
+  choose(to) {
+    this.index = to;
+    this.find(".note").textContent = this.data.designs[to].note;
+    if (this.view) this.view.show(to);
+    for (const panel of this.panels) panel.show(to);
+    this.set(this.share);
+  }
+
+  step(now) {
+    if (!this.turning) return;
+    const past = this.before === null ? 0 : Math.min((now - this.before) / 1000 / TURN_SECONDS, 0.1);
+    this.before = now;
+    let to = this.share + (this.back ? -past : past);
+    if (this.data.closed) to %= 1;
+    else if (to > 1 || to < 0) [this.back, to] = [to > 1, Math.min(Math.max(to, 0), 1)];
+    this.set(to);
+    requestAnimationFrame((later) => this.step(later));
+  }
+
+  turn(on) {
+    if (this.turning === on) return;
+    this.turning = on;
+    this.before = null;
+    this.button.textContent = on ? "pause" : "turn";
+    this.button.setAttribute("aria-pressed", on);
+    if (on) requestAnimationFrame((now) => this.step(now));
+  }
+
+  rest() {
+    this.wanted = false;
+    this.turn(false);
+  }
 }
 
 const motion = jsonOf("motion-data"), lines = jsonOf("lines-data");
-if (motion) startMotion(motion);
+if (motion) new Moving(document.getElementById("live"), motion);
 if (lines) {
   document.getElementById("lines").hidden = false;
   new Lines(document.getElementById("lines"), lines);

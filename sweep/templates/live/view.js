@@ -43,6 +43,7 @@ class MechanismView {
   show(index) {
     const first = this.index === undefined;
     this.index = index;
+    this.scene?.traverse((old) => old.geometry?.dispose()); // programs of materials are kept: they take long to compile
     this.scene = new THREE.Scene();
     this.scene.add(new THREE.HemisphereLight(0xffffff, 0x8090a0, 2.2));
     const sun = new THREE.DirectionalLight(0xffffff, 1.8);
@@ -54,8 +55,10 @@ class MechanismView {
     this.size = this.data.designs[index].size;
     this.thick = 0.012 * this.size;
     for (const part of this.data.designs[index].parts) this.addPart(part);
+    for (const other of this.data.ghosts ?? []) for (const part of this.data.designs[other].parts) this.addGhost(part);
     if (first) this.look("space");
-    else this.fit(this.camera.position.clone().sub(this.controls.target));
+    // The eye stays where it is while a dimension changes, and the caller sets the angle.
+    else if (!this.data.steady) this.fit(this.camera.position.clone().sub(this.controls.target));
   }
 
   addPart(part) {
@@ -80,6 +83,28 @@ class MechanismView {
       }
       low.y -= 0.08 * this.size;
       this.addLabel(part.label, group, () => low, "frame");
+    }
+  }
+
+  // A design that is seen together with another one: thin lines in its own colour.
+  addGhost(part) {
+    const group = new THREE.Group();
+    group.position.set(...part.shift);
+    this.scene.add(group);
+    const paths = Object.fromEntries(Object.entries(part.joints).map(([name, text]) => [name, numbersOf(text)]));
+    const material = new THREE.LineBasicMaterial({ color: colourOf("--orange") });
+    for (const link of part.links) {
+      const shape = new THREE.BufferGeometry(), ends = link.joints.map((name) => paths[name]);
+      const place = new THREE.Float32BufferAttribute(new Float32Array(3 * ends.length), 3);
+      shape.setAttribute("position", place);
+      const line = new THREE.LineLoop(shape, material);
+      line.frustumCulled = false;
+      group.add(line);
+      const point = new THREE.Vector3();
+      this.movers.push((share) => {
+        ends.forEach((path, i) => place.setXYZ(i, ...jointAt(path, share, this.data.closed, point)));
+        place.needsUpdate = true;
+      });
     }
   }
 
@@ -191,7 +216,8 @@ class MechanismView {
     const right = new THREE.Vector3(0, 1, 0).cross(towards).normalize(), up = towards.clone().cross(right);
     const sides = [right, up, towards], low = [Infinity, Infinity, Infinity], high = [-Infinity, -Infinity, -Infinity];
     const place = new THREE.Vector3();
-    for (const part of this.data.designs[this.index].parts) {
+    const seen = [this.index, ...(this.data.ghosts ?? [])].flatMap((k) => this.data.designs[k].parts);
+    for (const part of seen) {
       for (const path of Object.values(part.joints).map(numbersOf)) {
         for (let i = 0; i < path.length; i += 3) {
           place.set(path[i] + part.shift[0], path[i + 1] + part.shift[1], path[i + 2] + part.shift[2]);
@@ -228,13 +254,19 @@ class MechanismView {
   draw() {
     this.renderer.render(this.scene, this.camera);
     const { clientWidth: width, clientHeight: height } = this.host;
+    const taken = [];
     for (const { label, group, at } of this.points) {
       const place = at(this.share).clone().applyMatrix4(group.matrixWorld).project(this.camera);
       const shown = this.named && Number.isFinite(place.x);
       label.style.display = shown ? "" : "none";
-      if (shown) {
-        label.style.transform = `translate(${((place.x + 1) * width) / 2}px, ${((1 - place.y) * height) / 2}px)`;
-      }
+      if (!shown) continue;
+      const x = ((place.x + 1) * width) / 2, wide = 7 * label.textContent.length + 4;
+      let y = ((1 - place.y) * height) / 2;
+      // A name that would cover another one stands above it.
+      const covers = (other) => Math.abs(other.y - y) < 13 && x < other.x + other.wide && other.x < x + wide;
+      while (taken.some(covers)) y -= 13;
+      taken.push({ x, y, wide });
+      label.style.transform = `translate(${x}px, ${y}px)`;
     }
   }
 }

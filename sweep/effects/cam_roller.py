@@ -1,0 +1,91 @@
+"""Roller on a cam: whether the profile is undercut, its curvature, and the stress of the line of contact."""
+
+from __future__ import annotations
+
+from functools import lru_cache, partial
+
+import numpy as np
+
+from kernels import status as st
+from kernels.types import Array
+from sweep.effects.base import Effect, largest
+from sweep.effects.contact import MODULUS, line_stress
+from sweep.effects.load_effects import loads_of
+from sweep.effects.load_passing import LOADS, compute_loads
+from sweep.effects.scene import Scene, take_over
+from sweep.families import family
+from sweep.families.base import Columns, Output, Parameter
+from sweep.families.link_tree import LinkTree
+
+EQUATION = "docs/cam.md (12)-(14)"
+FORMULAS = (
+    "(12) pitch curve z = R e^{-i phi}, R the roller's centre: kappa = -Im(conj z' z'')/|z'|^3, > 0 if convex",
+    "(13) undercut = kappa r, r the roller: the profile has no corner while it is below 1",
+    "    profile_curvature = kappa/(1 - kappa r): its largest value is 1 over the least radius of the profile",
+    "(14) stress_r = sqrt(F E* (profile_curvature + 1/r)/(pi l))",
+)
+ROLLER = Parameter("roller", "length", "radius of the roller", positive=True)
+LENGTH = Parameter("contact_length_r", "length", "length of the roller on the cam", positive=True)
+OUTPUTS = (
+    Output("undercut", "1", "curvature of the pitch curve times the roller; from 1 on it is undercut", EQUATION),
+    Output("profile_curvature", "1/length", "curvature of the cam's profile, positive where it is convex", EQUATION),
+    Output("stress_r", "pressure", "largest pressure between roller and cam (Hertz)", EQUATION),
+)
+
+
+def pitch_curvature(scene: Scene) -> Array:
+    """Curvature of the path of the roller's centre in the cam's frame, (12), (n, m)."""
+    body, centre, at = scene.links.bodies[:, :, 1], scene.links.bodies[:, :, 0, :3], scene.links.lines[:, :, 0, :3]
+    omega, arm = body[:, :, 9:12], at - body[:, :, :3]
+    v = body[:, :, 3:6] + np.cross(omega, arm)
+    a = body[:, :, 6:9] + np.cross(body[:, :, 12:15], arm) + np.cross(omega, np.cross(omega, arm))
+    place, first, second = (x[:, :, 0] + 1j * x[:, :, 1] for x in (at - centre, v, a))
+    first, second = first - 1j * place, second - 2j * first - place
+    found: Array = -(np.conj(first) * second).imag / np.abs(first) ** 3
+    return found
+
+
+def compute(scene: Scene, wanted: frozenset[str]) -> Columns:
+    """Wanted outputs; a profile that is undercut has no curvature and no contact of its own."""
+    status, kappa = scene.status(), pitch_curvature(scene)
+    columns: Columns = {"undercut": kappa * scene.inputs[ROLLER.name][:, None]} if "undercut" in wanted else {}
+    if wanted <= {"undercut"}:
+        return columns | {"status": status}
+    radius = scene.inputs[ROLLER.name][:, None]
+    with np.errstate(divide="ignore", invalid="ignore"):
+        profile = kappa / (1.0 - kappa * radius)
+    good = kappa * radius < 1.0
+    if "stress_r" in wanted:
+        loads = compute_loads(scene, frozenset({"force_r"}))
+        take_over(status, loads["status"])
+        together = np.where(good, profile + 1.0 / radius, np.nan)
+        length, modulus = (scene.inputs[p.name][:, None] for p in (LENGTH, MODULUS))
+        columns["stress_r"] = line_stress(np.asarray(loads["force_r"]), modulus, 1.0 / together, length)
+    if "profile_curvature" in wanted:
+        columns["profile_curvature"] = np.where(good, profile, np.nan)
+    np.copyto(status, st.NOT_ADMISSIBLE, where=~good & (status == st.OK))
+    return {name: np.where(status == st.OK, x, np.nan) for name, x in columns.items()} | {"status": status}
+
+
+@lru_cache
+def roller_of(name: str) -> Effect:
+    """Entry of the roller of a cam."""
+    bare = loads_of(name)
+    return Effect(
+        key="C2",
+        name=f"{name}_roller",
+        title=f"undercutting, least radius and stress of the roller: {family(name).title}",
+        equation=EQUATION,
+        formulas=FORMULAS,
+        needs=(bare.name,),
+        inputs=(*bare.inputs, ROLLER, LENGTH, MODULUS),
+        only_for={LENGTH.name: ("stress_r",)},
+        outputs=OUTPUTS,
+        compute=compute,
+        called_for="a cam that can be made, wear of the roller",
+        negligible="a pitch curve whose least radius is far above the roller's",
+        takes_load=LOADS,
+        requires=LinkTree,
+        tree=bare.tree,
+        advise=partial(largest, compute=compute, name="undercut", quantity="largest undercut", threshold=0.3),
+    )

@@ -1,0 +1,147 @@
+"""Contact of balls and pins in slots and of straps on eccentrics: sliding speed, Hertz stress, p v."""
+
+from __future__ import annotations
+
+from functools import lru_cache, partial
+
+import numpy as np
+
+from kernels import status as st
+from kernels.linkage.bodies import TURN
+from kernels.types import Array, Status
+from sweep.effects.base import Effect, largest
+from sweep.effects.load_effects import loads_of, relative
+from sweep.effects.load_passing import LOADS, compute_loads
+from sweep.effects.loads import magnitude
+from sweep.effects.scene import Scene, refuse, take_over
+from sweep.families import family
+from sweep.families.base import Columns, Output, Parameter
+from sweep.families.link_tree import LinkJoint, LinkTree
+
+EQUATION = "docs/links.md (10)-(12)"
+FORMULAS = (
+    "(10) ball of radius R in a straight slot: p0 = (6 F E*^2/(pi^3 R^2))^(1/3), mean pressure p = 2 p0/3",
+    "(11) line contact of length l: p0 = sqrt(F E*/(pi l R)), p = pi p0/4; pin in a straight slot R = R1,",
+    "    strap on an eccentric 1/R = 1/R1 - 1/R2; p = F/(2 R1 l), and p0 where b = sqrt(4 F R/(pi l E*)) < R1/3",
+    "(12) p v: v the sliding speed, of a strap |omega relative| R1",
+)
+# Steel on steel; from both moduli 1/E* = (1 - nu1^2)/E1 + (1 - nu2^2)/E2.
+MODULUS = Parameter("contact_modulus", "pressure", "E* of both surfaces: 1/E* = sum of (1 - nu^2)/E", default=115e3,
+                    positive=True)  # fmt: skip
+NARROW = 3.0  # R1 over half the width of a strap's contact, from which on it counts as narrow
+
+
+def ball_stress(force: Array, modulus: Array, radius: Array) -> Array:
+    """Largest pressure of a ball on a flat wall, (10)."""
+    found: Array = np.cbrt(6.0 * force * modulus**2 / (np.pi**3 * radius**2))
+    return found
+
+
+def line_stress(force: Array, modulus: Array, radius: Array, length: Array) -> Array:
+    """Largest pressure of a contact along a line, (11)."""
+    found: Array = np.sqrt(force * modulus / (np.pi * length * radius))
+    return found
+
+
+def half_width(force: Array, modulus: Array, radius: Array, length: Array) -> Array:
+    """Half the width of a contact along a line, (11)."""
+    found: Array = np.sqrt(4.0 * force * radius / (np.pi * length * modulus))
+    return found
+
+
+def touching(tree: LinkTree) -> tuple[LinkJoint, ...]:
+    """Joints of a tree that touch in a point, in a line, or as a strap."""
+    return tuple(joint for joint in tree.joints if joint.touch)
+
+
+def _inputs(joint: LinkJoint) -> tuple[Parameter, ...]:
+    name, text = joint.name, joint.text
+    found = [Parameter(f"contact_radius_{name}", "length", f"radius of ball, pin or eccentric: {text}", positive=True)]
+    if joint.touch != "ball":
+        found.append(Parameter(f"contact_length_{name}", "length", f"length of the contact: {text}", positive=True))
+    if joint.touch == "strap":
+        found.append(Parameter(f"bore_radius_{name}", "length", f"radius of the strap's bore: {text}", positive=True))
+    return tuple(found)
+
+
+def _outputs(joint: LinkJoint) -> tuple[Output, ...]:
+    name, text = joint.name, joint.text
+    return (
+        Output(f"sliding_{name}", "length/time", f"sliding speed: {text}", EQUATION),
+        Output(f"stress_{name}", "pressure", f"largest pressure of the contact (Hertz): {text}", EQUATION),
+        Output(f"pv_{name}", "pressure*length/time", f"mean pressure times sliding speed: {text}", EQUATION),
+    )
+
+
+def _of_joint(scene: Scene, joint: LinkJoint, force: Array, status: Status) -> list[Array]:
+    """Sliding speed, largest pressure, mean pressure times speed, (n, m)."""
+    given = {p.name.removesuffix(f"_{joint.name}"): scene.inputs[p.name][:, None] for p in _inputs(joint)}
+    modulus, radius = scene.inputs[MODULUS.name][:, None], given["contact_radius"]
+    speed = np.abs(scene.crank()[0])
+    turn, slip = relative(scene, joint)
+    if joint.touch == "ball":
+        # a block that also turns is an arm on a bar
+        kinds = scene.links.freedoms
+        refuse(status, np.any((kinds[:, :, 0] == joint.body) & (kinds[:, :, 1] == TURN), axis=1))
+        stress = ball_stress(force, modulus, radius)
+        mean, sliding = 2.0 / 3.0 * stress, magnitude(slip) * speed
+    elif joint.touch == "line":
+        stress = line_stress(force, modulus, radius, given["contact_length"])
+        mean, sliding = 0.25 * np.pi * stress, magnitude(slip) * speed
+    else:
+        length, bore = given["contact_length"], given["bore_radius"]
+        refuse(status, (bore <= radius)[:, 0])
+        with np.errstate(divide="ignore", invalid="ignore"):
+            both = 1.0 / (1.0 / radius - 1.0 / bore)
+            stress = line_stress(force, modulus, both, length)
+            narrow = half_width(force, modulus, both, length) * NARROW < radius
+        np.copyto(status, st.NOT_LINEAR, where=~narrow & (status == st.OK))
+        mean = force / (2.0 * radius * length)
+        axis = scene.links.axes[:, :, joint.freedom]
+        sliding = np.abs((turn * axis).sum(axis=2)) * radius * speed
+    return [sliding, stress, mean * sliding]
+
+
+def compute(scene: Scene, wanted: frozenset[str], tree: LinkTree) -> Columns:
+    """Wanted outputs of the joints that touch."""
+    joints = [joint for joint in touching(tree) if not wanted.isdisjoint(o.name for o in _outputs(joint))]
+    loads = compute_loads(scene, frozenset(f"force_{joint.name}" for joint in joints))
+    status = scene.status()
+    columns: dict[str, Array] = {}
+    take_over(status, loads["status"])
+    for joint in joints:
+        force = np.asarray(loads[f"force_{joint.name}"], np.float64)
+        found = _of_joint(scene, joint, force, status)
+        columns |= {o.name: x for o, x in zip(_outputs(joint), found, strict=True) if o.name in wanted}
+    good = status == st.OK
+    found_columns: Columns = {name: np.where(good, x, np.nan) for name, x in columns.items()}
+    return found_columns | {"status": status}
+
+
+@lru_cache
+def contact_of(name: str) -> Effect:
+    """Entry of the contacts of a family with a tree of links."""
+    bare = loads_of(name)
+    tree = bare.tree
+    assert tree is not None
+    joints = touching(tree)
+    run = partial(compute, tree=tree)
+    return Effect(
+        key="C1",
+        name=f"{name}_contact",
+        title=f"sliding speed, Hertz stress and p v of slots and straps: {family(name).title}",
+        equation=EQUATION,
+        formulas=FORMULAS,
+        needs=(bare.name,),
+        inputs=(*bare.inputs, MODULUS, *(p for joint in joints for p in _inputs(joint))),
+        only_for={p.name: tuple(o.name for o in _outputs(joint)) for joint in joints for p in _inputs(joint)},
+        outputs=tuple(o for joint in joints for o in _outputs(joint)),
+        compute=run,
+        called_for="wear and stress of slots, eccentrics, balls",
+        negligible="largest pressure below 100 MPa",
+        takes_load=LOADS,
+        requires=LinkTree,
+        tree=tree,
+        advise=partial(largest, compute=run, name=f"stress_{joints[0].name}", quantity="largest pressure [MPa]",
+                       threshold=100.0),
+    )  # fmt: skip

@@ -1,0 +1,199 @@
+"""What the page is about: a study, its dimensions with their ranges, and what any design of it is and does."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from functools import cached_property, lru_cache
+from pathlib import Path
+from typing import Any
+
+from sweep.chunks.plan import PARAMETER_UNITS
+from sweep.errors import InputError, nearest
+from sweep.evaluation.tables import design_matrix
+from sweep.families.base import Array, Family, Parameter
+from sweep.families.names import is_flag
+from sweep.optimise.starts.dataset import drawn
+from sweep.report.dataset import Dataset, Row, chosen, read_dataset, without_rows
+from sweep.report.judged import judged, row_of
+from sweep.report.quantities import quantity
+from sweep.study import Study
+from sweep.study.load import study_from_data
+from sweep.study.written import design_entries, toml
+
+Design = Mapping[str, float]
+"""Dimensions in internal units by name; inputs of effects that are left out are those of the study."""
+
+REACH = 0.5  # of a dimension that no study sweeps, to either side; of an angle in rad
+KEPT = 256  # designs whose outputs are remembered: pins and what is undone
+COUNT, SAMPLE = 25, 65_536  # of a saved study: values of each of two axes, designs over more of them
+TABLES = ("fit", "locus", "task", "pareto", "reference", "report")  # that a saved study of plain dimensions has not
+STARTS = 12
+PINS = 3
+
+
+@dataclass(frozen=True)
+class Range:
+    """A dimension of the page; ``factor`` turns the stored value into ``unit``, ``swept`` says that the study does."""
+
+    name: str
+    text: str
+    unit: str
+    factor: float
+    low: float
+    high: float
+    choices: tuple[float, ...]
+    swept: bool
+    positive: bool
+
+
+class Hand:
+    """A study with a first design, ready to answer for any other design of the same mechanism."""
+
+    def __init__(self, data: Dataset, folder: Path | None, first: Design, pins: Mapping[str, Design]) -> None:
+        self.data, self.folder, self.first, self.pins = data, folder, first, pins
+        self._row = lru_cache(KEPT)(self._computed)
+
+    @property
+    def study(self) -> Study:
+        """What the designs are judged by."""
+        return self.data.study
+
+    @property
+    def family(self) -> Family:
+        """The mechanism with the effects that the study asks for."""
+        return self.study.family
+
+    @cached_property
+    def ranges(self) -> list[Range]:
+        """Dimensions of the mechanism, and inputs of effects that the study gives."""
+        given = {*self.study.bare.parameter_names, *self.study.written} - {*self.study.curves}
+        return [self._range(p) for p in self.family.parameters if p.name in given]
+
+    def _range(self, p: Parameter) -> Range:
+        shown = quantity(p.name, self.data.units.get(p.name, PARAMETER_UNITS[p.unit]))
+        value, swept = self.first[p.name], p.name in self.study.space.bounds
+        reach = REACH * (abs(value) or 1.0) if p.unit != "angle" else math.pi
+        ends = (0.0 if p.positive else value - reach, value + reach)
+        low, high = self.study.space.bounds.get(p.name, ends)
+        low, high = (min(low, value), max(high, value)) if low < high else ends
+        low = value * (1.0 - REACH) if p.positive and low <= 0.0 else low
+        return Range(
+            p.name, p.text, shown.unit, shown.factor, low, high, tuple(p.choices or ()),
+            swept and low < high, p.positive,
+        )  # fmt: skip
+
+    def design(self, given: Mapping[str, object]) -> dict[str, float]:
+        """Return the whole design of what a page sends: dimensions in internal units.
+
+        Raises
+        ------
+        InputError
+            for a name that is no dimension, or a value that is no number or out of range.
+        """
+        for name, value in given.items():
+            if name not in self.first:
+                allowed = f"{', '.join(self.first)}{nearest(name, self.first)}"
+                raise InputError("dimension", name, allowed, "explore")
+            if isinstance(value, bool) or not isinstance(value, int | float) or not math.isfinite(value):
+                raise InputError(name, value, "a finite number", "explore")
+        design = {**self.first, **{name: float(value) for name, value in given.items()}}  # type: ignore[arg-type]
+        design_matrix(self.family, design)
+        return design
+
+    def answer(self, designs: Sequence[Mapping[str, object]], names: Sequence[str]) -> dict[str, Any]:
+        """Return all the page shows of a design and of those that are pinned beside it, as JSON takes it."""
+        return judged(self.data, [self._row(tuple(self.design(one).items())) for one in designs], names)
+
+    def _computed(self, design: tuple[tuple[str, float], ...]) -> Row:
+        return row_of(self.study, dict(design))
+
+    def page(self) -> dict[str, Any]:
+        """Return what the page knows from the beginning."""
+        stored = [] if self.folder is None else [axis.name for axis in self.study.space.axes if axis.varies]
+        outputs = [] if self.folder is None else [name for name in self.study.want if not is_flag(name)]
+        return {
+            "title": self.study.title or self.study.name,
+            "ranges": [vars(one) for one in self.ranges],
+            "first": dict(self.first),
+            "pins": [{"name": name, "design": dict(design)} for name, design in self.pins.items()][:PINS],
+            "most": PINS,
+            "columns": [*outputs, *stored],
+            "objective": None if self.study.objective is None else self.study.objective.output,
+        }
+
+    def saved(self, given: Mapping[str, object], swept: Mapping[str, Sequence[float]]) -> str:
+        """Return a study around a design: ``swept`` dimensions between two ends, all others as they are in hand.
+
+        Raises
+        ------
+        StudyError
+            where what the study asks does not go with plain dimensions.
+        """
+        design = self.design(given)
+        entries: dict[str, Any] = dict(design_entries(self.family, design))
+        axes = [p for p in self.family.parameters if p.name in swept and p.choices is None]
+        for p in axes:
+            low, high = swept[p.name]
+            entries[p.name] = {"from": low, "to": high, "unit": PARAMETER_UNITS[p.unit]}
+            entries[p.name] |= {"count": COUNT} if len(axes) <= 2 else {}
+        old, own = self.study.data, self.study.bare.parameter_names
+        data: dict[str, Any] = {name: table for name, table in old.items() if name not in TABLES}
+        for table in ("bodies", "loads", "design"):
+            kept = {name: entry for name, entry in old.get(table, {}).items() if name != "sample"}
+            data |= {table: {name: self._entry(entries, name, entry) for name, entry in kept.items()}} if kept else {}
+        data["design"] = {name: entries[name] for name in own} | data["design"]
+        if len(axes) > 2:
+            data["design"]["sample"] = {"kind": "sobol", "n": SAMPLE}
+        data["limits"] = {name: limit for name, limit in old.get("limits", {}).items() if name not in own}
+        data["reference"] = {"design": design_entries(self.study.bare, design)}
+        data |= {"optimise": {"starts": STARTS}} if "optimise" in old else {}
+        study_from_data(data, "study.toml")
+        return toml(data)
+
+    def _entry(self, entries: Mapping[str, Any], name: str, entry: Any) -> Any:
+        return entry if name in self.study.curves else entries.get(name, entry)
+
+    def reference(self, given: Mapping[str, object]) -> str:
+        """Return the table [reference.design] of a study."""
+        return toml({"reference": {"design": design_entries(self.study.bare, self.design(given))}})
+
+
+def of_study(study: Study) -> Hand:
+    """Return a study in hand before it has been run: its reference design, else one from its space.
+
+    Raises
+    ------
+    InputError
+        where [locus] or [fit] make no design.
+    """
+    names, space = study.family.parameter_names, study.space
+    if pins := _reference(study):
+        return Hand(without_rows(study), None, pins["reference"], pins)
+    if study.made:
+        found = drawn(study, 1, 0)
+        if not len(found):
+            allowed = "one with a design that [locus] and [fit] can make"
+            raise InputError("design space", space.count, allowed, "explore")
+        return Hand(without_rows(study), None, dict(zip(names, found[0].tolist(), strict=True)), {})
+    middle = {axis.name: _middle(axis.values, axis.low, axis.high) for axis in space.axes}
+    return Hand(without_rows(study), None, {name: {**space.fixed, **middle}[name] for name in names}, {})
+
+
+def _middle(values: Array | None, low: float, high: float) -> float:
+    return 0.5 * (low + high) if values is None else float(values[len(values) // 2])
+
+
+def of_results(folder: Path) -> Hand:
+    """Return the result of a dataset in hand, its reference design pinned."""
+    data = read_dataset(folder)
+    return Hand(data, data.folder, chosen(folder).design, _reference(data.study))
+
+
+def _reference(study: Study) -> dict[str, Design]:
+    """Return the study's reference design under its name, where it has one."""
+    if study.reference is None:
+        return {}
+    matrix, _ = design_matrix(study.family, study.reference)
+    return {"reference": dict(zip(study.family.parameter_names, matrix[0].tolist(), strict=True))}

@@ -1,0 +1,58 @@
+"""Improve a design from where it is: one local search between the ends of the sliders that are ticked."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from typing import Any
+
+import numpy as np
+
+from sweep.errors import InputError
+from sweep.explore.hand import Hand
+from sweep.optimise.local.start import search
+from sweep.optimise.problem.statement import Problem
+
+LOOKS = 20_000  # at designs, as one start of a study has
+
+
+def problem_in_hand(hand: Hand, design: Mapping[str, float], free: Mapping[str, Sequence[float]]) -> Problem:
+    """Return the study's problem with other variables: ``free`` dimensions between two ends, the others as they are.
+
+    Raises
+    ------
+    InputError
+        where the study has no objective, or nothing may change.
+    """
+    study = hand.study
+    if study.objective is None:
+        raise InputError("objective", None, "a study that says what to minimise: [objective]", "explore")
+    bounds = {}
+    for p in study.family.parameters:
+        if p.name not in free or p.choices is not None:
+            continue
+        own = [limit for limit in study.parameter_limits if limit.output == p.name]
+        low, high = sorted(map(float, free[p.name]))
+        low = max([low, *(x.minimum for x in own if x.minimum is not None)])
+        high = min([high, *(x.maximum for x in own if x.maximum is not None)])
+        bounds[p.name] = (min(low, design[p.name]), max(high, design[p.name]))
+    if not bounds:
+        raise InputError("dimensions", "none", "at least one ticked dimension that changes steadily", "explore")
+    ends = np.array(list(bounds.values()))
+    fixed = {name: value for name, value in design.items() if name not in bounds}
+    return Problem(
+        study.family, tuple(bounds), ends[:, 0], ends[:, 1], fixed, study.objective.output, study.output_limits,
+        study.window, study.accuracy,
+    )  # fmt: skip
+
+
+def improve(problem: Problem, design: Mapping[str, float], asked: Callable[[], bool]) -> dict[str, Any]:
+    """Search from a design until it settles, or ``asked`` answers true; the best so far is the answer either way."""
+    start = np.array([design[name] for name in problem.family.parameter_names])
+    found = search(0, problem, start, asked, LOOKS)
+    return {
+        "design": dict(zip(problem.family.parameter_names, found.design.tolist(), strict=True)),
+        "ended": found.ended,
+        "feasible": found.feasible,
+        "active": list(found.active),
+        "looks": found.looks,
+    }

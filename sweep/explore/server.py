@@ -1,0 +1,238 @@
+"""The page's server, on this machine alone: a token in every address, no answer to pages from elsewhere.
+
+It keeps nothing of its visitors: a request says which designs it asks about, so any number may look at once.
+"""
+
+from __future__ import annotations
+
+import json
+import secrets
+import socket
+import tempfile
+import threading
+import time
+from collections.abc import AsyncIterator, Callable
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from sweep.errors import InputError, LinksweepError
+from sweep.exchange.export import FORMATS, export
+from sweep.explore.cells import cells, design_of
+from sweep.explore.hand import Hand
+from sweep.explore.improve import improve, problem_in_hand
+from sweep.report.figures import TEMPLATES
+from sweep.report.live import LIVE, PLANE, SPATIAL
+
+if TYPE_CHECKING:
+    from starlette.requests import Request
+    from starlette.responses import Response
+
+HOST = "127.0.0.1"
+TOKEN_BYTES = 24
+MOST_BYTES = 100_000  # of a request
+PULSE = 0.2  # seconds between two words about a search
+WORDS = {
+    "Cache-Control": "no-store",
+    "Content-Security-Policy": "default-src 'none'; img-src data:; style-src 'unsafe-inline'; "
+    "script-src 'unsafe-inline'; connect-src 'self'; frame-ancestors 'none'; base-uri 'none'; form-action 'none'",
+    "Cross-Origin-Resource-Policy": "same-origin",
+    "Referrer-Policy": "no-referrer",
+    "X-Content-Type-Options": "nosniff",
+}
+HEADERS = [(name.lower().encode(), words.encode()) for name, words in WORDS.items()]
+
+
+class Server:
+    """A hand under an address of its own: ``address`` holds port and token; ``run`` serves until Ctrl-C."""
+
+    def __init__(self, hand: Hand, port: int = 0) -> None:
+        _needed()
+        self.hand, self.token = hand, secrets.token_urlsafe(TOKEN_BYTES)
+        self.socket = socket.socket()
+        self.socket.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+        try:
+            self.socket.bind((HOST, port))
+            self.socket.listen()  # who is early waits
+        except OSError as error:
+            self.socket.close()
+            raise InputError("--port", port, f"a port that is free; {error.strerror}", "explore") from error
+        self.origin = f"http://{HOST}:{self.socket.getsockname()[1]}"
+        self.address = f"{self.origin}/{self.token}/"
+
+    def run(self) -> None:
+        """Serve until the process is interrupted."""
+        import uvicorn
+
+        settings = uvicorn.Config(self.app(), log_level="warning", timeout_graceful_shutdown=1)
+        uvicorn.Server(settings).run(sockets=[self.socket])
+
+    def app(self) -> Callable[..., Any]:
+        """Return the application: the page, and what it asks for."""
+        from starlette.applications import Starlette
+        from starlette.requests import Request
+        from starlette.responses import HTMLResponse, PlainTextResponse
+        from starlette.routing import Route
+
+        def page(_: Request) -> Response:
+            return HTMLResponse(page_text(self.hand))
+
+        async def checked(scope: Any, receive: Any, send: Any) -> None:
+            async def sent(message: Any) -> None:
+                if message["type"] == "http.response.start":
+                    message["headers"] = [*message["headers"], *HEADERS]
+                await send(message)
+
+            ours = scope["type"] != "http" or self._is_ours(Request(scope))
+            await (routed if ours else PlainTextResponse("not for you\n", 403))(scope, receive, sent)
+
+        place = f"/{self.token}"
+        asked = {"answer": self._answer, "cells": self._cells, "design": self._design, "save": self._save}
+        routes = [Route(f"{place}/", page)]
+        routes += [Route(f"{place}/{name}", _json(what), methods=["POST"]) for name, what in asked.items()]
+        routes += [Route(f"{place}/{name}", what, methods=["POST"]) for name, what in self._others().items()]
+        routed = Starlette(routes=routes)
+        return checked
+
+    def _others(self) -> dict[str, Callable[..., Any]]:
+        return {"improve": self._improve, "export": self._export}
+
+    def _is_ours(self, request: Request) -> bool:
+        """Whether a request knows the token, names this server, and comes from its own page or from no page at all.
+
+        A browser that was talked into another name for this machine says so in Host; a page in another tab in Origin.
+        """
+        given = request.url.path.split("/")[1].encode()
+        known = secrets.compare_digest(given, self.token.encode())
+        host, origin = request.headers.get("host", ""), request.headers.get("origin")
+        return known and f"http://{host}" == self.origin and origin in (None, self.origin)
+
+    def _answer(self, asked: dict[str, Any]) -> dict[str, Any]:
+        begun = time.perf_counter()
+        found = self.hand.answer(asked["designs"], asked["names"])
+        return found | {"milliseconds": 1e3 * (time.perf_counter() - begun)}
+
+    def _cells(self, asked: dict[str, Any]) -> dict[str, Any]:
+        return cells(self.hand, asked["x"], asked["y"])
+
+    def _design(self, asked: dict[str, Any]) -> dict[str, Any]:
+        return {"design": design_of(self.hand, int(asked["number"]))}
+
+    def _save(self, asked: dict[str, Any]) -> dict[str, Any]:
+        if asked["as"] == "reference":
+            return {"text": self.hand.reference(asked["design"])}
+        return {"text": self.hand.saved(asked["design"], asked["free"])}
+
+    async def _improve(self, request: Request) -> Response:
+        """Search while the page listens; who goes away, or says stop by going away, ends this search alone."""
+        from starlette.responses import StreamingResponse
+
+        try:
+            asked = await _asked(request)
+            design = self.hand.design(asked["design"])
+            problem = problem_in_hand(self.hand, design, asked["free"])
+        except (LinksweepError, KeyError, TypeError, ValueError) as error:
+            return _refused(error)
+        stop, counted = threading.Event(), [0]
+
+        def is_over() -> bool:
+            counted[0] += 1
+            return stop.is_set()
+
+        async def words() -> AsyncIterator[str]:
+            import anyio
+
+            begun, result = time.monotonic(), {}
+
+            async def work() -> None:
+                try:
+                    result.update(await anyio.to_thread.run_sync(improve, problem, design, is_over))
+                except LinksweepError as error:
+                    result["error"] = str(error)
+
+            try:
+                async with anyio.create_task_group() as group:
+                    group.start_soon(work)
+                    while not result:
+                        yield json.dumps({"looks": counted[0], "seconds": time.monotonic() - begun}) + "\n"
+                        await anyio.sleep(PULSE)
+                yield json.dumps(result) + "\n"
+            finally:
+                stop.set()
+
+        return StreamingResponse(words(), media_type="application/x-ndjson")
+
+    async def _export(self, request: Request) -> Response:
+        """Return a file of the design, in one of the formats of `sweep export`."""
+        from starlette.concurrency import run_in_threadpool
+        from starlette.responses import Response
+
+        try:
+            asked = await _asked(request)
+            design, kind = self.hand.design(asked["design"]), str(asked["format"])
+            content = await run_in_threadpool(self._file, design, kind)
+        except (LinksweepError, KeyError, TypeError, ValueError) as error:
+            return _refused(error)
+        return Response(content, media_type="application/octet-stream")
+
+    def _file(self, design: dict[str, float], kind: str) -> bytes:
+        if kind not in FORMATS:
+            raise InputError("format", kind, ", ".join(FORMATS), "explore")
+        with tempfile.TemporaryDirectory() as folder:
+            target = Path(folder, f"design{FORMATS[kind][0]}")
+            export(self.hand.family, design, target, kind, speed=self.hand.study.speed, angles="rad")
+            return target.read_bytes()
+
+
+def _needed() -> None:
+    try:
+        import starlette  # noqa: F401
+        import uvicorn  # noqa: F401
+    except ImportError as error:
+        needed = f"the package {error.name}: pip install 'linksweep[explore]'"
+        raise InputError("explore", "a page", needed, "explore") from error
+
+
+async def _asked(request: Request) -> dict[str, Any]:
+    body = await request.body()
+    found = json.loads(body) if len(body) <= MOST_BYTES else None
+    if not isinstance(found, dict):
+        raise ValueError(f"a JSON object of at most {MOST_BYTES} bytes")
+    return found
+
+
+def _json(answer: Callable[[dict[str, Any]], dict[str, Any]]) -> Callable[[Request], Any]:
+    """Return an endpoint that answers JSON by JSON, in a thread; what is wrong with a request is said."""
+    from starlette.concurrency import run_in_threadpool
+    from starlette.responses import JSONResponse
+
+    async def endpoint(request: Request) -> Response:
+        try:
+            return JSONResponse(await run_in_threadpool(answer, await _asked(request)))
+        except (LinksweepError, KeyError, TypeError, ValueError) as error:
+            return _refused(error)
+
+    return endpoint
+
+
+def _refused(error: Exception) -> Response:
+    from starlette.responses import JSONResponse
+
+    words = f"{error} is missing" if isinstance(error, KeyError) else str(error)
+    return JSONResponse({"error": words}, 422)
+
+
+def page_text(hand: Hand) -> str:
+    """Return the page with its first answer, its style and its scripts; it needs nothing from anywhere else."""
+    from jinja2 import Environment, FileSystemLoader, StrictUndefined
+
+    environment = Environment(loader=FileSystemLoader(TEMPLATES), autoescape=True, undefined=StrictUndefined)
+    scripts = [*SPATIAL, *PLANE, "explore.js"]
+    return environment.get_template("explore.html").render(
+        page=hand.page(),
+        formats=list(FORMATS),
+        live_designs=[],
+        axis="angle",
+        style=[(TEMPLATES / "report.css").read_text("utf-8"), (LIVE / "live.css").read_text("utf-8"),
+               (LIVE / "explore.css").read_text("utf-8")],
+        scripts=[(LIVE / name).read_text("utf-8") for name in scripts],
+    )  # fmt: skip

@@ -1,0 +1,187 @@
+"""Trees of links of feed racks: the crank-rocker that moves them to and fro, the eccentrics that lift them."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from kernels.linkage.bodies import DRIVEN, FRAME, TURN, Links
+from kernels.types import Array
+from sweep.families import link_poses as poses
+from sweep.families.base import Angles, Columns, Parameter
+from sweep.families.link_poses import Path
+from sweep.families.link_tree import LinkBody, LinkJoint, LinkTree
+from sweep.families.rssr import FAMILY as CRANK_ROCKER
+from sweep.families.skeletons import parameter
+
+Parameters = tuple[Parameter, ...]
+_SPIN = ("psi", "dpsi", "d2psi")
+CRANK, COUPLER, ROCKER, ECCENTRIC = range(4)  # bodies of the horizontal chain, then the first eccentric
+_BODIES = (
+    LinkBody("crank", "along the crank, tangential, along its axis, from the centre of its circle"),
+    LinkBody("coupler", "along the coupler of the horizontal chain, from the crank pin", slender=True),
+    LinkBody("rocker", "along the rocker of the horizontal chain, tangential, along its axis, from D"),
+)
+_JOINTS = (
+    LinkJoint("a", "bearing of the crank", "shaft", "frame on the crank", body=CRANK, freedom=0),
+    LinkJoint("b", "ball at the crank pin", "hinge", "crank on the coupler", body=COUPLER),
+    LinkJoint("c", "ball of the rocker", "ball", "rocker on the coupler", lines=(0, 3)),
+    LinkJoint("d", "bearing of the rocker", "shaft", "frame on the rocker", body=ROCKER, freedom=3),
+)
+_FREEDOMS = ((CRANK, DRIVEN), (COUPLER, TURN), (COUPLER, TURN), (ROCKER, TURN))
+_ENDS = ((COUPLER, ROCKER),) * 3
+
+
+def _get(parameters: Parameters, designs: Array, *names: str) -> list[Array]:
+    return [parameter(parameters, name, designs)[:, None] for name in names]
+
+
+def _horizontal(parameters: Parameters, designs: Array, angles: Angles, links: Links) -> Path:
+    """Write crank, coupler and rocker; return the pin H of the rack on the rocker's arm."""
+    shape = (len(designs), links.bodies.shape[1])
+    a, c, e, f, g, alpha, arm, ahead, sigma = _get(
+        parameters, designs, "h_a", "h_c", "h_e", "h_f", "h_g", "h_alpha", "rh", "dh", "h_sigma"
+    )
+    chain = np.column_stack([designs[:, :7], sigma[:, 0]])
+    psi = poses.turning(CRANK_ROCKER.poses(chain, angles, frozenset(_SPIN)), *_SPIN)
+    centre = poses.standing_at(shape, 0.0, f * np.sin(alpha), f * np.cos(alpha))
+    crank = Path(*(np.broadcast_to(x, (*shape, 3)) for x in poses.crank_arm(angles, alpha, a)))
+    poses.put_crank(links, CRANK, 0, centre, crank)
+    pivot = poses.standing_at(shape, e, 0.0, g)
+    ball = pivot.plus(psi.arm(c))
+    poses.put_between(links, COUPLER, centre.plus(crank), ball)
+    links.axes[:, :, 1:3] = links.bodies[:, :, COUPLER, 18:24].reshape(*shape, 2, 3)
+    poses.put_about(links, ROCKER, pivot, psi)
+    poses.turn_about_z(links, 3)
+    poses.put_ball(links, 0, ball.at)
+    return poses.standing_at(shape, e, 0.0, 0.0).plus(psi.arm(arm * np.cos(ahead), arm * np.sin(ahead)))
+
+
+def _eccentric(parameters: Parameters, designs: Array, angles: Angles, links: Links, body: int, which: str) -> Path:
+    """Write an eccentric, whose freedom has the number after that of the body; return its centre."""
+    x, y, radius, ahead = _get(parameters, designs, *(f"{name}{which}" for name in ("xE", "yE", "rE", "dE")))
+    turned = poses.crank_angle(angles, len(designs), ahead=ahead)
+    centre = poses.standing_at((len(designs), links.bodies.shape[1]), x, y, 0.0)
+    poses.put_about(links, body, centre, turned)
+    poses.turn_about_z(links, body + 1)
+    return centre.plus(turned.arm(radius))
+
+
+def _eccentric_parts(which: str, body: int) -> tuple[LinkBody, LinkJoint]:
+    text = f"eccentric{which}"
+    axes = f"along the eccentricity of {text}, tangential, along its axis, from its axis"
+    found = LinkJoint(f"l{which}", f"bearing of {text}", "shaft", f"frame on {text}", body=body, freedom=body + 1)
+    return LinkBody(text, axes), found
+
+
+def two_leads(parameters: Parameters) -> LinkTree:
+    """Rack on the pin of the rocker and the coupler of the lift eccentric; a tool stands at the tooth."""
+
+    def at_tooth(designs: Array) -> Array:
+        tx, ty, number, pitch = _get(parameters, designs, "tx", "ty", "tooth", "pitch")
+        return np.column_stack([tx + number * pitch, ty, 0.0 * ty])
+
+    def fill(designs: Array, angles: Angles, motion: Columns, links: Links) -> None:
+        h = _horizontal(parameters, designs, angles, links)
+        e = _eccentric(parameters, designs, angles, links, ECCENTRIC, "")
+        chi = poses.turning(motion, "chi", "dchi", "d2chi")
+        f = h.plus(chi.arm(*_get(parameters, designs, "fx", "fy")))
+        poses.put_between(links, 4, e, f)
+        poses.put_about(links, 5, h, chi)
+        poses.turn_about_z(links, 5, 6)
+        poses.put_pin(links, 3, f.at)
+
+    body, joint = _eccentric_parts("", ECCENTRIC)
+    return LinkTree(
+        bodies=(
+            *_BODIES,
+            body,
+            LinkBody("lift", "along the lift coupler, across it, along the axes, from E"),
+            LinkBody("rack", "along the rack, across it, along the axes, from H"),
+        ),
+        joints=(
+            *_JOINTS,
+            joint,
+            LinkJoint(
+                "e",
+                "strap of the lift coupler",
+                "shaft",
+                "eccentric on the lift coupler",
+                body=4,
+                freedom=5,
+                touch="strap",
+            ),
+            LinkJoint("f", "pin of the lift coupler", "ball", "rack on the lift coupler", lines=(3, 2)),
+            LinkJoint("h", "pin of the rack on the rocker", "shaft", "rocker on the rack", body=5, freedom=6),
+        ),
+        parents=(FRAME, CRANK, FRAME, FRAME, ECCENTRIC, ROCKER),
+        freedoms=(*_FREEDOMS, (ECCENTRIC, DRIVEN), (4, TURN), (5, TURN)),
+        ends=(*_ENDS, (4, 5), (4, 5)),
+        needs=("chi", "dchi", "d2chi"),
+        fill=fill,
+        rubs=False,
+        carrier=5,
+        tip=at_tooth,
+    )
+
+
+def three_leads(parameters: Parameters) -> LinkTree:
+    """Rack on links of the rocker and of two eccentrics; a tool stands at the tooth."""
+    links_from = 5  # bodies: horizontal chain, two eccentrics, links 1 to 3, rack
+    rack = links_from + 3
+
+    def fill(designs: Array, angles: Angles, motion: Columns, links: Links) -> None:
+        starts = [_horizontal(parameters, designs, angles, links)]
+        starts += [_eccentric(parameters, designs, angles, links, ECCENTRIC + k, str(2 + k)) for k in (0, 1)]
+        tooth = _tooth(motion)
+        chi = poses.turning(motion, "chi", "dchi", "d2chi")
+        ends = [tooth.plus(chi.arm(*_get(parameters, designs, f"f{k}x", f"f{k}y"))) for k in (1, 2, 3)]
+        for k in (0, 1, 2):
+            poses.put_between(links, links_from + k, starts[k], ends[k])
+        # the rack hangs on link 1, its tooth is the origin of its axes
+        poses.put_about(links, rack, tooth, chi)
+        links.bodies[:, :, rack, 24:] = ends[0].at
+        poses.turn_about_z(links, *range(links_from + 1, rack + 2))
+        for k in (1, 2):
+            poses.put_pin(links, 3 + 2 * (k - 1), ends[k].at)
+
+    parts = [_eccentric_parts(str(2 + k), ECCENTRIC + k) for k in (0, 1)]
+    leads = ("rocker", "eccentric 2", "eccentric 3")
+    pins = [
+        LinkJoint(f"q{k}", f"pin of link {k} on the {lead}", "shaft", f"{lead} on link {k}", body=4 + k, freedom=5 + k)
+        for k, lead in enumerate(leads, start=1)
+    ]
+    return LinkTree(
+        bodies=(
+            *_BODIES,
+            *(body for body, _ in parts),
+            *(LinkBody(f"link{k}", f"along link {k}, across it, along the axes, from its lead") for k in (1, 2, 3)),
+            LinkBody("rack", "along the rack, across it, along the axes, from the tooth"),
+        ),
+        joints=(
+            *_JOINTS,
+            *(joint for _, joint in parts),
+            *pins,
+            LinkJoint("f1", "pin of link 1 on the rack", "shaft", "link 1 on the rack", body=rack, freedom=rack + 1),
+            *(
+                LinkJoint(f"f{k}", f"pin of link {k} on the rack", "ball", f"rack on link {k}", lines=(2 * k - 1, 2))
+                for k in (2, 3)
+            ),
+        ),
+        parents=(FRAME, CRANK, FRAME, FRAME, FRAME, ROCKER, ECCENTRIC, ECCENTRIC + 1, links_from),
+        freedoms=(*_FREEDOMS, (3, DRIVEN), (4, DRIVEN), (5, TURN), (6, TURN), (7, TURN), (8, TURN)),
+        ends=(*_ENDS, (6, rack), (6, rack), (7, rack), (7, rack)),
+        needs=("x_t", "y_t", "dx_t", "dy_t", "d2x_t", "d2y_t", "chi", "dchi", "d2chi"),
+        fill=fill,
+        rubs=False,
+        carrier=rack,
+        tip=_at_origin,
+    )
+
+
+def _tooth(motion: Columns) -> Path:
+    rows = [[np.asarray(motion[f"{order}{x}_t"], np.float64) for x in "xy"] for order in ("", "d", "d2")]
+    return Path(*(np.stack([x, y, 0.0 * x], axis=-1) for x, y in rows))
+
+
+def _at_origin(designs: Array) -> Array:
+    return np.zeros((len(designs), 3))

@@ -1,0 +1,328 @@
+"""Trees of links of planar families and of thread take-ups: which bodies move how, from their pose outputs alone.
+
+A body that hangs on another by a pin in the plane bears there what acts across the plane too; pins and contacts that
+close a loop bear forces in the plane.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from functools import partial
+
+import numpy as np
+
+from kernels.linkage.bodies import DRIVEN, FRAME, SLIDE, TURN, Links
+from kernels.types import Array
+from sweep.families import link_poses as poses
+from sweep.families.base import Angles, Columns, Parameter
+from sweep.families.link_poses import Path, Turning
+from sweep.families.link_tree import LinkBody, LinkFill, LinkJoint, LinkTree
+from sweep.families.skeletons import X, Y, Z, parameter
+
+Parameters = tuple[Parameter, ...]
+_PSI, _CHI = ("psi", "dpsi", "d2psi"), ("chi", "dchi", "d2chi")
+
+
+def _tip_at_origin(designs: Array) -> Array:
+    return np.zeros((len(designs), 3))
+
+
+def _column(parameters: Parameters, designs: Array, name: str) -> Array:
+    return parameter(parameters, name, designs)[:, None]
+
+
+def _cam_body(text: str = "cam") -> LinkBody:
+    return LinkBody(text, f"fixed to the {text}, along x and y at phi = 0, along its axis, from its axis")
+
+
+def _bearing(text: str) -> LinkJoint:
+    return LinkJoint("a", f"bearing of the {text}", "shaft", f"frame on the {text}", body=0, freedom=0)
+
+
+def _put_cam(angles: Angles, links: Links, at: Path) -> None:
+    """Write a cam on the driven shaft, at the angle of that."""
+    poses.put_about(links, 0, at, poses.crank_angle(angles, len(links.bodies)))
+    poses.turn_about_z(links, 0)
+
+
+def slotted_rocker(parameters: Parameters) -> LinkTree:
+    """Crank, rocker with a slot, and the block in it that turns on the crank pin."""
+
+    def fill(designs: Array, angles: Angles, motion: Columns, links: Links) -> None:
+        shape = (len(designs), links.bodies.shape[1])
+        a, e, h = (_column(parameters, designs, name) for name in ("a", "e", "h"))
+        turned = poses.turning(motion, *_PSI)
+        crank = poses.crank_angle(angles, shape[0])
+        poses.put_about(links, 0, poses.standing_at(shape, 0.0, 0.0, 0.0), crank)
+        poses.put_about(links, 1, poses.standing_at(shape, e, 0.0, 0.0), turned)
+        pin = crank.arm(a)
+        poses.put_about(links, 2, pin, turned)
+        poses.turn_about_z(links, 0, 1)
+        links.axes[:, :, 2] = turned.arm(np.ones_like(h)).at
+        poses.put_pin(links, 0, pin.at)
+
+    return LinkTree(
+        bodies=(
+            LinkBody("crank", "along the crank, tangential, along its axis, from A"),
+            LinkBody("rocker", "along the slot, across it, along its axis, from D"),
+            LinkBody("block", "along the slot, across it, along the axes, from B"),
+        ),
+        joints=(
+            _bearing("crank"),
+            LinkJoint("b", "crank pin", "ball", "crank on the block", lines=(0, 2)),
+            LinkJoint("c", "slot", "sleeve", "rocker on the block", body=2, freedom=2, touch="line"),
+            LinkJoint("d", "rocker bearing", "shaft", "frame on the rocker", body=1, freedom=1),
+        ),
+        parents=(FRAME, FRAME, 1),
+        freedoms=((0, DRIVEN), (1, TURN), (2, SLIDE)),
+        ends=((2, 0),) * 2,
+        needs=_PSI,
+        fill=fill,
+        rubs=False,
+        carrier=1,
+        output=1,
+    )
+
+
+def rolling_planet(parameters: Parameters) -> LinkTree:
+    """Carrier, planet that rolls on a fixed gear, and the slotted link in which its pin slides.
+
+    Teeth press along the tangent of the pitch circles, ours: a pressure angle of the teeth adds a radial force that the
+    carrier bears.  Where ``parameters`` name no fixed gear, it is of one size with the planet.
+    """
+    whole = "n" in [p.name for p in parameters]
+
+    def fill(designs: Array, angles: Angles, motion: Columns, links: Links) -> None:
+        shape = (len(designs), links.bodies.shape[1])
+        k, a = (_column(parameters, designs, name) for name in ("k", "a"))
+        n, mesh = (_column(parameters, designs, name) if whole else np.ones_like(k) for name in ("n", "mesh"))
+        turned, carrier = poses.turning(motion, *_PSI), poses.crank_angle(angles, shape[0])
+        axis = poses.standing_at(shape, a, 0.0, 0.0)
+        poses.put_about(links, 0, axis, carrier)
+        centre = axis.plus(carrier.arm(n + mesh))
+        planet = poses.crank_angle(angles, shape[0], mesh * (n + mesh), np.where(mesh > 0.0, np.pi, 0.0))
+        poses.put_about(links, 1, centre, planet)
+        poses.put_about(links, 2, poses.standing_at(shape, 0.0, 0.0, 0.0), turned)
+        poses.turn_about_z(links, 0, 1, 2)
+        ray = carrier.arm(np.ones_like(a)).at
+        poses.put_line(links, 0, axis.at + n[..., None] * ray, np.cross(Z, ray))
+        pin = centre.plus(planet.arm(k)).at
+        poses.put_line(links, 1, pin, np.cross(Z, turned.arm(np.ones_like(a)).at))
+
+    return LinkTree(
+        bodies=(
+            LinkBody("carrier", "along the carrier, tangential, along its axis, from A"),
+            LinkBody("planet", "along the arm of the pin, across it, along its axis, from O"),
+            LinkBody("link", "along the slot, across it, along its axis, from D"),
+        ),
+        joints=(
+            _bearing("carrier"),
+            LinkJoint("o", "bearing of the planet", "shaft", "carrier on the planet", body=1, freedom=1),
+            LinkJoint("teeth", "teeth of the fixed gear", "contact", "fixed gear on the planet", lines=(0, 1)),
+            LinkJoint("b", "pin in the slot", "contact", "slotted link on the planet", lines=(1, 1), touch="line"),
+            LinkJoint("d", "bearing of the slotted link", "shaft", "frame on the slotted link", body=2, freedom=2),
+        ),
+        parents=(FRAME, 0, FRAME),
+        freedoms=((0, DRIVEN), (1, TURN), (2, TURN)),
+        ends=((1, FRAME), (1, 2)),
+        needs=_PSI,
+        fill=fill,
+        rubs=False,
+        carrier=2,
+        output=2,
+    )
+
+
+def _cam_and(follower: LinkBody, joint: LinkJoint, kind: int, needs: tuple[str, ...], fill: LinkFill) -> LinkTree:
+    """Cam on the driven shaft and a follower that touches it along one line."""
+    return LinkTree(
+        bodies=(_cam_body(), follower),
+        joints=(
+            _bearing("cam"),
+            LinkJoint("r", "roller on the cam", "contact", f"cam on the {follower.name}", lines=(0, 1)),
+            joint,
+        ),
+        parents=(FRAME, FRAME),
+        freedoms=((0, DRIVEN), (1, kind)),
+        ends=((1, 0),),
+        needs=needs,
+        fill=fill,
+        rubs=False,
+        carrier=1,
+        tip=_tip_at_origin if kind == SLIDE else None,
+        output=1,
+    )
+
+
+def sliding_follower(parameters: Parameters) -> LinkTree:
+    """Cam and the follower that its roller lifts along x."""
+
+    def fill(designs: Array, angles: Angles, motion: Columns, links: Links) -> None:
+        shape = (len(designs), links.bodies.shape[1])
+        r0, e = (_column(parameters, designs, name) for name in ("r0", "e"))
+        foot = poses.standing_at(shape, np.sqrt(r0 * r0 - e * e), -e, 0.0)
+        roller = foot.plus(poses.sliding(motion, ("s", "ds", "d2s"), X))
+        _put_cam(angles, links, poses.standing_at(shape, 0.0, 0.0, 0.0))
+        poses.put_shifted(links, 1, roller)
+        links.axes[:, :, 1] = X
+        poses.put_line(links, 0, roller.at, np.cross(Z, roller.v - np.cross(Z, roller.at)))
+
+    follower = LinkBody("follower", "along the lift, to the left of it, along the cam's axis, from the roller")
+    guide = LinkJoint("d", "guide of the follower", "sleeve", "frame on the follower", body=1, freedom=1)
+    return _cam_and(follower, guide, SLIDE, ("s", "ds", "d2s"), fill)
+
+
+def swinging_follower(parameters: Parameters) -> LinkTree:
+    """Cam and the lever that its roller swings."""
+
+    def fill(designs: Array, angles: Angles, motion: Columns, links: Links) -> None:
+        shape = (len(designs), links.bodies.shape[1])
+        c, e = (_column(parameters, designs, name) for name in ("c", "e"))
+        turned, pivot = poses.turning(motion, *_PSI), poses.standing_at(shape, e, 0.0, 0.0)
+        roller = pivot.plus(turned.arm(c))
+        _put_cam(angles, links, poses.standing_at(shape, 0.0, 0.0, 0.0))
+        poses.put_about(links, 1, pivot, turned)
+        poses.turn_about_z(links, 1)
+        poses.put_line(links, 0, roller.at, np.cross(Z, roller.v - np.cross(Z, roller.at)))
+
+    lever = LinkBody("lever", "along the lever, tangential, along its axis, from D")
+    pivot = LinkJoint("d", "bearing of the lever", "shaft", "frame on the lever", body=1, freedom=1)
+    return _cam_and(lever, pivot, TURN, _PSI, fill)
+
+
+def thread_follower(parameters: Parameters, cam_axis: Callable[[Array], Array]) -> LinkTree:
+    """Cam of a thread take-up and the follower that it pushes along y into the thread; that pulls as a tool's force."""
+
+    def fill(designs: Array, angles: Angles, motion: Columns, links: Links) -> None:
+        shape = (len(designs), links.bodies.shape[1])
+        axis = cam_axis(designs)
+        centre = poses.standing_at(shape, axis[:, [0]], axis[:, [1]], axis[:, [2]])
+        foot = poses.standing_at(shape, _column(parameters, designs, "e"), 0.0, 0.0)
+        end = foot.plus(poses.sliding(motion, ("S", "dS", "d2S"), Y))
+        _put_cam(angles, links, centre)
+        poses.put_shifted(links, 1, end)
+        links.axes[:, :, 1] = Y
+        poses.put_line(links, 0, end.at, np.cross(Z, end.v - np.cross(Z, end.at - centre.at)))
+
+    follower = LinkBody("follower", "along x, along its way, along the cam's axis, from its end")
+    guide = LinkJoint("d", "guide of the follower", "sleeve", "frame on the follower", body=1, freedom=1)
+    return _cam_and(follower, guide, SLIDE, ("S", "dS", "d2S"), fill)
+
+
+def turning_cam(needs: tuple[str, ...]) -> LinkTree:
+    """Cam alone, whose bare edge carries a thread."""
+
+    def fill(designs: Array, angles: Angles, motion: Columns, links: Links) -> None:
+        _put_cam(angles, links, poses.standing_at((len(designs), links.bodies.shape[1]), 0.0, 0.0, 0.0))
+
+    return LinkTree(
+        (_cam_body(),), (_bearing("cam"),), (FRAME,), ((0, DRIVEN),), (), needs, fill, carrier=0, rubs=False
+    )
+
+
+def eyelet_crank(parameters: Parameters) -> LinkTree:
+    """Crank with an eyelet at its end, in which the thread pulls as a tool's force."""
+
+    def fill(designs: Array, angles: Angles, motion: Columns, links: Links) -> None:
+        shape = (len(designs), links.bodies.shape[1])
+        a, f, alpha = (_column(parameters, designs, name) for name in ("a", "f", "alpha"))
+        centre = poses.standing_at(shape, 0.0, f * np.sin(alpha), f * np.cos(alpha))
+        arm = poses.crank_arm(angles, alpha, a)
+        poses.put_crank(links, 0, 0, centre, Path(*(np.broadcast_to(x, (*shape, 3)) for x in arm)))
+
+    body = LinkBody("crank", "along the crank, tangential, along its axis, from A")
+    tip = partial(_on_crank, parameters)
+    return LinkTree((body,), (_bearing("crank"),), (FRAME,), ((0, DRIVEN),), (), ("P",), fill, 0, tip, rubs=False)
+
+
+def _on_crank(parameters: Parameters, designs: Array) -> Array:
+    return np.column_stack([parameter(parameters, "a", designs), np.zeros((len(designs), 2))])
+
+
+def heddle_shaft(parameters: Parameters, line: Callable[[Array], tuple[Array, Array]]) -> LinkTree:
+    """Cam lever, rod, bell crank, shaft lever and shaft of a heddle drive.
+
+    The link between both levers and the heddle rod bear force along themselves and have no mass: give halves of it to
+    what they join.  Levers of the parallel linkage without dimensions have the arm O4E to it.
+    """
+
+    def fill(designs: Array, angles: Angles, motion: Columns, links: Links) -> None:
+        shape = (len(designs), links.bodies.shape[1])
+        get = partial(_column, parameters, designs)
+        lever, bell = poses.crank_angle(angles, shape[0]), poses.turning(motion, *_CHI)
+        o2, o3 = poses.standing_at(shape, 0.0, 0.0, 0.0), poses.standing_at(shape, get("O2O3"), 0.0, 0.0)
+        o4 = poses.standing_at(shape, get("O2O3") + get("O3O4"), 0.0, 0.0)
+        b, c = lever.arm(get("O2B")), o3.plus(bell.arm(get("O3C")))
+        lam = _shaft_lever(parameters, designs, motion)
+        at = line(designs)[0]
+        shaft = poses.standing_at(shape, at[:, [0]], 0.0, 0.0).plus(poses.sliding(motion, ("y", "dy", "d2y"), Y))
+        poses.put_about(links, 0, o2, lever)
+        poses.put_between(links, 1, b, c)
+        poses.put_about(links, 2, o3, bell)
+        poses.put_about(links, 3, o4, lam)
+        poses.put_shifted(links, 4, shaft)
+        poses.turn_about_z(links, 0, 1, 2, 3)
+        links.axes[:, :, 4] = Y
+        poses.put_pin(links, 0, c.at)
+        end = o4.plus(lam.arm(get("O4E"))).at
+        _put_link(parameters, designs, links, (o3.at, o4.at), (bell.angle - get("chi_mid"), lam.angle))
+        poses.put_line(links, 3, end, np.where((get("EG") > 0.0)[..., None], end - shaft.at, np.array(Y)))
+
+    return LinkTree(
+        bodies=(
+            LinkBody("lever", "along O2B, across it, along its axis, from O2"),
+            LinkBody("rod", "along the rod, across it, along the axes, from B"),
+            LinkBody("bell", "along O3C, across it, along its axis, from O3"),
+            LinkBody("back", "along O4E, across it, along its axis, from O4"),
+            LinkBody("shaft", "along O2O3, along the lift, along the axes, from its rod's end"),
+        ),
+        joints=(
+            LinkJoint("a", "bearing of the cam lever", "shaft", "frame on the cam lever", body=0, freedom=0),
+            LinkJoint("b", "pin of the rod on the cam lever", "shaft", "cam lever on the rod", body=1, freedom=1),
+            LinkJoint("c", "pin of the rod on the bell crank", "ball", "rod on the bell crank", lines=(0, 2)),
+            LinkJoint("o3", "bearing of the bell crank", "shaft", "frame on the bell crank", body=2, freedom=2),
+            LinkJoint("o4", "bearing of the shaft lever", "shaft", "frame on the shaft lever", body=3, freedom=3),
+            LinkJoint("f", "link between the levers", "contact", "link on the shaft lever", lines=(2, 1)),
+            LinkJoint("e", "heddle rod", "contact", "heddle rod on the shaft", lines=(3, 1)),
+            LinkJoint("g", "guide of the shaft", "sleeve", "frame on the shaft", body=4, freedom=4),
+        ),
+        parents=(FRAME, 0, FRAME, FRAME, FRAME),
+        freedoms=((0, DRIVEN), (1, TURN), (2, TURN), (3, TURN), (4, SLIDE)),
+        ends=((2, 1), (2, 1), (3, 2), (4, 3)),
+        needs=(*_CHI, "lam", "y", "dy", "d2y"),
+        fill=fill,
+        rubs=False,
+        carrier=4,
+        tip=_tip_at_origin,
+        output=4,
+    )
+
+
+def _shaft_lever(parameters: Parameters, designs: Array, motion: Columns) -> Turning:
+    """Return the turning of the shaft lever: of its rates the family gives those of the shaft, (7)."""
+    arm, heddle, slide = (_column(parameters, designs, name) for name in ("O4E", "EG", "x_s"))
+    lam, first, second = (np.asarray(motion[name], np.float64) for name in ("lam", "dy", "d2y"))
+    x, y = arm * np.cos(lam), arm * np.sin(lam)
+    z = np.where(heddle > 0.0, x - slide, 0.0)
+    height = np.where(heddle > 0.0, np.sqrt((heddle - z) * (heddle + z)), 1.0)
+    tilt = z / height
+    per = x + tilt * y
+    bend = -y + np.where(heddle > 0.0, tilt * x - y * y * (1.0 + tilt * tilt) / height, 0.0)
+    rate = first / per
+    return Turning(lam, rate, (second - bend * rate * rate) / per)
+
+
+def _put_link(
+    parameters: Parameters, designs: Array, links: Links, pivots: tuple[Array, Array], angles: tuple[Array, Array]
+) -> None:
+    """Write the line of the link between bell crank and shaft lever, at their angles from mid-stroke."""
+    first, second, frame, arm, side = (
+        _column(parameters, designs, name) for name in ("O3D", "O4F", "O3O4", "O4E", "side_F")
+    )
+    bare = (first == 0.0) & (second == 0.0)
+    ends = []
+    for pivot, length, angle in zip(pivots, (first, second), angles, strict=True):
+        along = side * np.where(bare, arm, length)
+        ends.append(pivot + np.stack([-along * np.sin(angle), along * np.cos(angle), 0.0 * angle], axis=-1))
+    way = np.where((bare & (frame == 0.0))[..., None], np.array(X), ends[1] - ends[0])
+    poses.put_line(links, 2, ends[1], way)

@@ -1,0 +1,57 @@
+"""What `sweep explore` takes in hand: a family's example, a study, the result of a run."""
+
+from __future__ import annotations
+
+import builtins
+import tomllib
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import sweep
+from sweep.cli.explore import in_hand
+from sweep.errors import InputError
+from sweep.explore.server import Server
+from sweep.study import study_from_data
+
+STUDIES = Path(__file__).parents[2] / "studies"
+
+
+@pytest.mark.parametrize("source", ["slider_crank", "rssr+guide", "geared_dwell", "backrest"])
+def test_family_is_explored_as_its_example(source):
+    hand = in_hand(source)
+    found = hand.answer([hand.first], ["in hand"])
+    assert found["status"] == [""] and found["motion"]["designs"][0]["name"] == "in hand"
+    assert all(one.low < one.high for one in hand.ranges if not one.choices)
+
+
+@pytest.mark.parametrize("name", ["needle208", "needle208-loads", "stitch208", "looper-sphere"])
+def test_studies_are_taken_as_they_are(name):
+    hand = in_hand(str(STUDIES / name))
+    found = hand.answer([hand.first], ["in hand"])
+    assert [row["name"] for row in found["limits"]] == [limit.output for limit in hand.study.limits]
+    text = hand.saved(hand.first, {one.name: (one.low, one.high) for one in hand.ranges if one.swept})
+    saved = study_from_data(tomllib.loads(text), "study.toml")
+    own = hand.study.bare.parameter_names
+    np.testing.assert_array_equal([saved.reference[n] for n in own], [hand.first[n] for n in own])
+
+
+def test_result_of_a_run_is_in_hand_and_its_reference_pinned(folder):
+    hand = in_hand(str(folder))
+    best = sweep.load(folder).query("status == 0").sort_values("max_abs_d2psi").iloc[0]
+    assert hand.first["a"] == best["a"] and hand.pins["reference"]["a"] == 10.0
+    assert hand.page()["columns"][:1] == ["max_abs_d2psi"]
+
+
+def test_without_the_packages_the_extra_is_named(monkeypatch, folder):
+    real = builtins.__import__
+
+    def missing(name, *rest, **options):
+        if name == "starlette":
+            raise ImportError(name=name)
+        return real(name, *rest, **options)
+
+    monkeypatch.setattr(builtins, "__import__", missing)
+    with pytest.raises(InputError, match=r"pip install 'linksweep\[explore\]'"):
+        Server(in_hand(str(folder)))

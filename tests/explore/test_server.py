@@ -1,0 +1,155 @@
+"""The server of `sweep explore` from outside: what it answers, and whom it refuses."""
+
+from __future__ import annotations
+
+import http.client
+import json
+import tomllib
+from urllib.error import HTTPError
+from urllib.parse import urlparse
+from urllib.request import Request, urlopen
+
+import numpy as np
+import pytest
+
+import sweep
+from sweep.report.quantities import quantity
+from sweep.study import study_from_data
+from tests.support.explorer import asked
+
+DESIGN = {"a": 9.5, "b": 36.25, "c": 31.0, "e": 32.0, "xi": 20.0, "eta": 5.0}
+FREE = {"a": [8.0, 12.0], "b": [30.0, 40.0]}
+
+
+def refused(address, what="", content=None, **headers):
+    data = None if content is None else json.dumps(content).encode()
+    with pytest.raises(HTTPError) as found:
+        urlopen(Request(address + what, data, headers))
+    return found.value.code, found.value.read().decode()
+
+
+def test_numbers_are_those_of_summarise(address, study):
+    found = asked(address, "answer", {"designs": [DESIGN], "names": ["in hand"]})
+    true = sweep.summarise("four_bar", {n: [x] for n, x in DESIGN.items()}, list(study.want), accuracy=1e-6)
+    units = {"max_abs_d2psi": "1", "max_pressure_angle": "rad", "swing": "rad"}
+    shown = {row["name"]: row["values"][0] for row in found["outputs"]}
+    assert shown == {name: quantity(name, unit).show(float(true[name].iloc[0])) for name, unit in units.items()}
+    limits = {row["name"]: (row["states"][0], row["slack"][0]) for row in found["limits"]}
+    missing = np.radians(35.0) - abs(float(true["swing"].iloc[0]))
+    by = quantity("swing", "rad").show(abs(missing), 3)
+    assert limits["swing"] == ("missed" if missing > 0 else "met", by)
+
+
+def test_pins_come_along_and_a_mechanism_that_does_not_turn_has_no_invented_values(address):
+    found = asked(address, "answer", {"designs": [DESIGN, {}, DESIGN | {"a": 90.0}], "names": ["in hand", "A", "B"]})
+    assert [one["name"] for one in found["motion"]["designs"]] == ["in hand", "A", "B"]
+    assert found["status"][:2] == ["", ""] and "turn fully" in found["status"][2]
+    assert [row["values"][2] for row in found["outputs"]] == ["–", "–", "–"]
+
+
+@pytest.mark.parametrize(
+    ("content", "words"),
+    [
+        ({"designs": [{"z": 1.0}], "names": ["x"]}, "z"),
+        ({"designs": [{"a": -1.0}], "names": ["x"]}, "positive"),
+        ({"designs": [{"a": "9"}], "names": ["x"]}, "finite number"),
+        ({"names": ["x"]}, "designs"),
+        ([1], "JSON object"),
+    ],
+)
+def test_bad_questions_are_told_what_is_wrong(address, content, words):
+    code, text = refused(address, "answer", content)
+    assert code == 422 and words in json.loads(text)["error"]
+
+
+def test_strangers_get_nothing(address):
+    question = {"designs": [DESIGN], "names": ["x"]}
+    own = urlparse(address)
+    origin = f"http://{own.netloc}"
+    assert asked(address, "answer", question, Origin=origin)["status"] == [""]
+    for stranger in (
+        "https://evil.example",
+        "null",
+        f"http://localhost:{own.port}",
+        f"http://127.0.0.1:{own.port + 1}",
+    ):
+        assert refused(address, "answer", question, Origin=stranger) == (403, "not for you\n")
+    assert refused(address, "", None, Origin="https://evil.example")[0] == 403
+    assert refused(address, "answer", question, Host=f"rebound.example:{own.port}")[0] == 403
+    guessed = f"{origin}/{'A' * 32}/"
+    for there in (origin + "/", guessed, guessed + "answer", address[:-2] + "/"):
+        assert refused(there, "", question)[0] == 403
+    with urlopen(address) as page:
+        policy = page.headers["Content-Security-Policy"]
+        assert "default-src 'none'" in policy and "frame-ancestors 'none'" in policy
+        assert page.headers["Referrer-Policy"] == "no-referrer" and page.headers["Cache-Control"] == "no-store"
+
+
+def test_it_listens_on_this_machine_only(address):
+    assert urlparse(address).hostname == "127.0.0.1"
+
+
+def improved(address, **content):
+    request = Request(address + "improve", json.dumps({"design": DESIGN, "free": FREE} | content).encode())
+    with urlopen(request, timeout=120) as reply:
+        return [json.loads(line) for line in reply]
+
+
+def test_improves_within_the_sliders_and_tells_how_far_it_is(address):
+    *progress, last = improved(address)
+    assert progress and {"looks", "seconds"} <= progress[0].keys()
+    assert last["feasible"] and last["ended"] == "converged"
+    for name, (low, high) in FREE.items():
+        assert low <= last["design"][name] <= high
+    assert all(last["design"][name] == DESIGN[name] for name in ("c", "e", "xi", "eta"))
+    before, after = (
+        float(sweep.summarise("four_bar", {n: [d[n]] for n in DESIGN}, ["max_abs_d2psi"], accuracy=1e-6).iloc[0, 0])
+        for d in (DESIGN | {"a": 12.0}, last["design"])
+    )
+    assert after < before
+    best = sweep.mechanism("four_bar", **{n: last["design"][n] for n in DESIGN}).outputs("swing")["swing"]
+    assert abs(best) >= np.radians(35.0) * (1.0 - 1e-6)  # as near as a limit is called active
+
+
+def test_nothing_to_vary_is_said(address):
+    assert "ticked" in refused(address, "improve", {"design": DESIGN, "free": {}})[1]
+
+
+def test_who_goes_away_ends_his_own_search_alone(address):
+    own = urlparse(address)
+    connection = http.client.HTTPConnection(own.hostname, own.port)
+    connection.request("POST", own.path + "improve", json.dumps({"design": DESIGN, "free": FREE}))
+    connection.sock.close()
+    assert improved(address)[-1]["feasible"]
+    assert asked(address, "answer", {"designs": [DESIGN], "names": ["x"]})["status"] == [""]
+
+
+def test_cells_hold_every_feasible_design_and_give_their_best(address, folder, study):
+    rows = sweep.load(folder)
+    rows = rows[rows["status"] == 0]
+    found = asked(address, "cells", {"x": "a", "y": "swing"})
+    assert found["of"] == len(rows) == sum(cell[2] for cell in found["cells"])
+    best = int(rows.loc[rows["max_abs_d2psi"].idxmin(), "design"])
+    assert best in [cell[3] for cell in found["cells"]]
+    design = asked(address, "design", {"number": best})["design"]
+    assert design["a"] == rows.loc[rows["design"] == best, "a"].item()
+    assert "allowed: design" in refused(address, "cells", {"x": "nothing", "y": "a"})[1]
+    assert refused(address, "design", {"number": 10**9})[0] == 422
+
+
+def test_saved_study_reads_back_around_the_design(address):
+    text = asked(address, "save", {"as": "study", "design": DESIGN, "free": FREE})["text"]
+    study = study_from_data(tomllib.loads(text), "study.toml")
+    assert {axis.name: (axis.low, axis.high) for axis in study.space.axes} == {n: tuple(e) for n, e in FREE.items()}
+    assert study.space.fixed["c"] == DESIGN["c"] and study.reference["b"] == DESIGN["b"]
+    assert [limit.output for limit in study.limits] == ["max_pressure_angle", "swing"]
+    reference = tomllib.loads(asked(address, "save", {"as": "reference", "design": DESIGN})["text"])
+    assert reference["reference"]["design"]["a"] == "9.5 mm"
+
+
+def test_file_of_the_design(address):
+    request = Request(address + "export", json.dumps({"design": DESIGN, "format": "csv"}).encode())
+    with urlopen(request) as reply:
+        lines = reply.read().decode().splitlines()
+    assert lines[0].startswith("member,") or "x" in lines[0]
+    assert "formats" not in refused(address, "export", {"design": DESIGN, "format": "step"})[1]

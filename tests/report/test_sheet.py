@@ -1,0 +1,78 @@
+"""The sheet for the shop: its tables are the design's numbers, its files open."""
+
+from __future__ import annotations
+
+import math
+import tomllib
+
+import numpy as np
+import pytest
+from click.testing import CliRunner
+
+import sweep
+from sweep.cli import main
+from sweep.exchange.scene import pose
+from sweep.report.dataset import chosen, read_dataset
+from sweep.report.judged import as_result, row_of
+from sweep.report.sheet import tables_of, write_sheet
+from sweep.study import study_from_data
+
+STUDY = {
+    "study": {"name": "drive", "title": "A drive"},
+    "mechanism": {"family": "rssr"},
+    "scene": {"want": ["max_abs_d2psi", "swing"], "speed": "600 rpm"},
+    "design": {"a": {"from": 10.0, "to": 12.0, "count": 3, "unit": "mm"}, "alpha": "60 deg"}
+    | {name: f"{value} mm" for name, value in {"b": 40, "c": 25, "e": 35, "f": 5, "g": -3}.items()},
+    "limits": {"swing": {"min": 30.0, "unit": "deg"}},
+    "objective": {"minimise": "max_abs_d2psi"},
+    "optimise": {"starts": 2},
+    "tolerance": {"lengths": "0.02 mm", "angles": "0.05 deg"},
+}
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory):
+    study = study_from_data(STUDY, "study.toml")
+    return sweep.run(study, out=tmp_path_factory.mktemp("drive") / "designs", jobs=1)
+
+
+def test_tables_hold_dimensions_tolerances_joints_and_limits(folder):
+    data, found = read_dataset(folder), chosen(folder)
+    row = row_of(data.study, found.design)
+    dimensions, joints, limits = tables_of(as_result(data, row), pose(found.family, found.design, 0.3))
+    by_name = {line[0]: line[1:] for line in dimensions.lines}
+    assert by_name["b"][:2] == ("40 mm", "± 0.02 mm") and by_name["alpha"][:2] == ("60°", "± 0.05°")
+    assert by_name["branch"][1] == ""
+    true = sweep.joints("rssr", found.design, 0.3).set_index("joint")[["x", "y", "z"]]
+    for name, *at in joints.lines:
+        np.testing.assert_allclose([float(x.replace("−", "-")) for x in at], true.loc[name.lower()], atol=5e-5)
+    ((_, required, value, state),) = limits.lines
+    assert required == "at least 30°" and state in ("met", "active")
+    assert float(value.replace("−", "-").rstrip("°")) == pytest.approx(math.degrees(row["swing"]), abs=5e-4)
+
+
+@pytest.mark.parametrize("kind", ["pdf", "svg", "dxf"])
+def test_verb_writes_the_sheet(folder, kind):
+    said = CliRunner().invoke(main, ["export", str(folder), "--format", kind])
+    assert said.exit_code == 0, said.output
+    content = (folder.parent / "export" / f"result.{kind}").read_bytes()
+    assert content.startswith({"pdf": b"%PDF", "svg": b"<?xml", "dxf": b"  0"}[kind])
+
+
+def test_dxf_holds_the_tables_and_still_reads_back(folder, tmp_path):
+    import ezdxf
+
+    target = write_sheet(folder, None, tmp_path / "drive.dxf")
+    words = {text.dxf.text for text in ezdxf.readfile(target).modelspace().query("TEXT")}
+    assert {"Dimensions", "Hardpoints [mm]", "Limits", "± 0.02 mm", "at least 30°"} <= words
+    said = CliRunner().invoke(main, ["points", "rssr", str(target)])
+    assert said.exit_code == 0, said.output
+    assert float(tomllib.loads(said.output)["design"]["b"].split()[0]) == pytest.approx(40.0, abs=1e-9)
+
+
+def test_same_data_same_bytes(folder, tmp_path):
+    for kind in ("svg", "pdf"):
+        one, other = (write_sheet(folder, "optimum", tmp_path / f"{k}.{kind}").read_bytes() for k in (1, 2))
+        assert one == other
+    with pytest.raises(sweep.InputError, match=r"ending in \.pdf"):
+        write_sheet(folder, None, tmp_path / "drive.png")
