@@ -265,7 +265,8 @@ def feasible_designs(study: Study, number: int) -> tuple[Array, int]:
 def spread_rows(designs: Array, number: int) -> Array:
     """Return so many of the designs, or all if they are fewer, spread evenly over them."""
     some = np.unique(np.linspace(0, len(designs) - 1, min(number, len(designs))).astype(int))
-    return designs[some]
+    chosen: Array = designs[some]
+    return chosen
 
 
 def row_bytes(study: Study) -> int:
