@@ -28,6 +28,7 @@ TANGENT = 18
 WRONG_SIDE = 19
 WRONG_WAY = 20
 NO_FRAME = 21
+NO_TRIANGLE = 22
 
 MEANING: dict[int, str] = {
     OK: "ok",
@@ -48,10 +49,11 @@ MEANING: dict[int, str] = {
     NO_ROOT: "the equation that fixes the position has no root in its interval, or fewer than asked for",
     NO_EVENT: "the event does not happen within the turn, or within the interval",
     NOT_ADMISSIBLE: "the point of the locus gives no mechanism that meets the requirement",
-    NEVER: "the looper's tip never passes beside the needle",
-    TWICE: "the looper's tip passes the needle more than once in the stated sense, beside it",
-    TANGENT: "the looper's tip touches the needle's line within rounding: whether it passes cannot be decided",
-    WRONG_SIDE: "the looper's tip passes the needle on the side away from the scarf",
-    WRONG_WAY: "the looper's tip passes the needle against the stated sense only",
+    NEVER: "the tip never passes where it is to take the loop",
+    TWICE: "the tip passes where it is to take the loop more than once in the stated sense",
+    TANGENT: "the tip touches what it is to pass within rounding: whether it passes cannot be decided",
+    WRONG_SIDE: "the looper's tip passes the needle on the side away from the scarf, or outside the thread's triangle",
+    WRONG_WAY: "the tip passes against the stated sense only",
     NO_FRAME: "the needle has no frame: its scarf points along it",
+    NO_TRIANGLE: "blade, thread and seam lie in one line: they span no triangle",
 }

@@ -15,6 +15,7 @@ if TYPE_CHECKING:
     from sweep.dataset.verification import verify
     from sweep.engine.run import run
     from sweep.evaluation import thread
+    from sweep.evaluation.cyclogram import cyclogram
     from sweep.evaluation.joints import joints
     from sweep.evaluation.mechanism import mechanism
     from sweep.evaluation.poses import evaluate
@@ -31,6 +32,7 @@ __all__ = [
     "LinksweepWarning",
     "StudyError",
     "compare",
+    "cyclogram",
     "evaluate",
     "export",
     "from_points",
@@ -53,6 +55,7 @@ check_kernels()
 # Imported when first used, so that the command line answers at once: numba alone takes a quarter of a second.
 _HOMES = {
     "compare": "sweep.dataset.comparison",
+    "cyclogram": "sweep.evaluation.cyclogram",
     "evaluate": "sweep.evaluation.poses",
     "export": "sweep.exchange.export",
     "from_points": "sweep.exchange.points",

@@ -9,12 +9,12 @@ bit.  Designs may be complex128 (exact gradients by the complex step); decisions
 from __future__ import annotations
 
 import math
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from kernels import status as st
-from kernels.arithmetic.vectors import add, cross, dot, mix, scale
+from kernels.arithmetic.vectors import Vector, add, cross, dot, mix, scale
 from kernels.jit import inline, kernel
 from kernels.linkage.bodies import (
     Links,
@@ -33,7 +33,7 @@ from kernels.types import EPS, Array, Numbers, Status
 
 
 class Reduced(NamedTuple):
-    """Per-design numbers in units of ``unit``: B = (a u, y0 + ka v, lift - na v), Q = (e, 0, g)."""
+    """Per-design numbers in units of ``unit``: B = (a u, y0 + ka v, lift - na v), Q = (e, 0, g); (5)."""
 
     a: float
     e: float
@@ -42,6 +42,11 @@ class Reduced(NamedTuple):
     lift: float
     na: float
     g: float
+    sa: float
+    ca: float
+    side: float  # p2, of Q in the frame of the crank
+    rise: float  # p3
+    power: float  # D
     length: float  # Lw
     size: float  # sum of the magnitudes whose rounding errors make up the vector from B to Q
     unit: float
@@ -59,7 +64,42 @@ def reduce_design(designs: Numbers, i: int) -> Reduced:
     size = abs(e.real) + abs(f.real) + abs(g.real) + a.real
     valid = 0.0 < a.real <= 1.0 and size < 1e140 and abs(length.real) < 1e140
     valid = valid and abs(alpha.real) < 1e5 and unit < math.inf
-    return Reduced(a, e, f * sa, a * ca, f * ca, a * sa, g, length, size, unit, valid)
+    side, rise = -g * sa, g * ca - f
+    power = (e - a) * (e + a) + side * side + rise * rise
+    return Reduced(
+        a, e, f * sa, a * ca, f * ca, a * sa, g, sa, ca, side, rise, power, length, size, unit, valid
+    )  # fmt: skip
+
+
+@inline
+def _along(r: Reduced, u: Any, v: Any) -> Any:
+    """Distance e - a u from crank pin to block along x; near the block's centre u has rounded it away."""
+    if u.real > 0.0:
+        return (r.e - r.a) + r.a * v * v / (1.0 + u)
+    return (r.e + r.a) - r.a * v * v / (1.0 - u)
+
+
+@inline
+def _turning(
+    r: Reduced, u: Any, v: Any, length: Any, per: Any, h1: Any
+) -> tuple[tuple[Any, Any, Any, Any], Any, Vector, Vector, Vector]:
+    """Length of the rod with its derivatives, w.w, and the angular velocity w of the rod with its derivatives; (5)-(7).
+
+    No difference of large terms is left in them but those that the design itself has.
+    """
+    square = per * per
+    m, lean, pull = h1 * per, r.a * square * r.rise, r.power * square
+    k = 0.5 * (pull - 1.0)
+    if not abs(pull.real) < 1.0:
+        k = r.a * square * (r.e * u + r.side * v - r.a)
+    fast = lean * lean + k * k
+    bend = fast + k
+    spoke, tangent, axis = (u, r.ca * v, -r.sa * v), (-v, r.ca * u, -r.sa * u), (0.0, r.sa, r.ca)
+    w = mix(lean, spoke, -k, axis)
+    w1 = mix(1.0, mix(-2.0 * m * lean, spoke, lean, tangent), m * pull, axis)
+    w2 = mix(lean * (6.0 * m * m - 1.0 - 2.0 * bend), spoke, -4.0 * m * lean, tangent)
+    w2 = mix(1.0, w2, pull * (bend - 3.0 * m * m), axis)
+    return (length, h1, length * bend, -h1 * (1.0 + 3.0 * bend)), fast, w, w1, w2
 
 
 class Outputs(NamedTuple):
@@ -83,7 +123,7 @@ def poses(
 ) -> None:
     """Rod between crank pin and block, and the working point, with derivatives, of every design and crank angle.
 
-    Equations (1)-(4) of docs/swivel.md.
+    Equations (1)-(7) of docs/swivel.md.
 
     Parameters
     ----------
@@ -105,7 +145,7 @@ def poses(
         for j in range(cos_phi.shape[1]):
             u, v = cos_phi[row, j], sin_phi[row, j]
             pin = (r.a * u, r.y0 + r.ka * v, r.lift - r.na * v)
-            reach = (r.e - pin[0], -pin[1], r.g - pin[2])
+            reach = (_along(r, u, v), -pin[1], r.g - pin[2])
             reach1, reach2 = (r.a * v, -r.ka * u, r.na * u), (r.a * u, r.ka * v, -r.na * v)
             square = dot(reach, reach)
             tolerance = 4.0 * EPS * r.size
@@ -118,18 +158,15 @@ def poses(
             length = np.sqrt(square) if code == st.OK else square * math.nan
             per = 1.0 / length if code == st.OK else length
             n = scale(per, reach)
-            # rho rho' = E.E', and so on; then n = E/rho
-            h1 = dot(n, reach1)
-            n1 = scale(per, mix(1.0, reach1, -h1, n))
-            h2 = dot(n1, reach1) + dot(n, reach2)
-            n2 = scale(per, mix(1.0, mix(1.0, reach2, -h2, n), -2.0 * h1, n1))
-            h3 = dot(n2, reach1) + 2.0 * dot(n1, reach2) - h1  # the third derivative of the rod is minus the first
-            put_block(out.rod, i, j, (length, h1, h2, h3), r.unit)
+            rod, fast, w, w1, w2 = _turning(r, u, v, length, per, dot(n, reach1))
+            put_block(out.rod, i, j, rod, r.unit)
+            n1 = cross(w, n)
+            n2 = mix(1.0, cross(w1, n), -fast, n)
+            n3 = mix(1.0, mix(1.0, cross(w2, n), -3.0 * dot(w, w1), n), -fast, n1)
             put_block(out.point, i, j, mix(1.0, pin, r.length, n), r.unit)
             put_block(out.velocity, i, j, mix(r.length, n1, -1.0, reach1), r.unit)
             put_block(out.acceleration, i, j, mix(r.length, n2, -1.0, reach2), r.unit)
-            n3 = mix(1.0, mix(-1.0, reach1, -h3, n), -3.0, mix(h2, n1, h1, n2))
-            put_block(out.jerk, i, j, mix(r.length, scale(per, n3), 1.0, reach1), r.unit)
+            put_block(out.jerk, i, j, mix(r.length, n3, 1.0, reach1), r.unit)
             if joints is not None:
                 for k in range(3):
                     joints[k, i, j] = pin[k] * r.unit if code == st.OK else math.nan
@@ -143,7 +180,6 @@ def links(
     sin_phi: Array,
     rho: Array,
     drho: Array,
-    d2rho: Array,
     direction: Array,
     out: Links,
 ) -> None:
@@ -152,7 +188,7 @@ def links(
     Parameters
     ----------
     designs : (n, 6);  cos_phi, sin_phi : (n, m) or (1, m)
-    rho, drho, d2rho : (n, m), outputs of ``poses``;  direction : (3, n, m), the rod's
+    rho, drho : (n, m), outputs of ``poses``;  direction : (3, n, m), the rod's
     out : two bodies, three freedoms, two lines: the block's forces on the rod across it
     """
     for i in range(designs.shape[0]):
@@ -167,11 +203,9 @@ def links(
             pin = add(centre, scale(d[0], mix(cos_phi[row, j], first, sin_phi[row, j], e2)))
             n = (direction[0, i, j], direction[1, i, j], direction[2, i, j])
             v, a = velocity_at(crank, pin), acceleration_at(crank, pin)
-            per = 1.0 / rho[i, j]
-            # (3): rho n' = E' - rho' n and rho n'' = E'' - rho'' n - 2 rho' n', with E' = -B'
-            n1 = scale(-per, mix(1.0, v, drho[i, j], n))
-            n2 = scale(-per, mix(1.0, mix(1.0, a, d2rho[i, j], n), 2.0 * drho[i, j], n1))
-            rod = Moving(pin, v, a, cross(n, n1), cross(n, n2))
+            # n x n' and n x n'' of (3), with E' = -B'
+            w = scale(-1.0 / rho[i, j], cross(n, v))
+            rod = Moving(pin, v, a, w, scale(-1.0 / rho[i, j], mix(1.0, cross(n, a), 2.0 * drho[i, j], w)))
             y = across(n)
             z = cross(n, y)
             put_body(bodies[1], rod, n, y, z, pin)

@@ -13,10 +13,12 @@ from sweep.cli.options import ANGLES
 from sweep.cli.tables import read_table
 from sweep.errors import InputError
 from sweep.evaluation.angles import AngleUnit, grid_in_radians
+from sweep.evaluation.cyclogram import cyclogram
+from sweep.report.cyclogram import table_in_degrees
 from sweep.report.dataset import chosen
 
 OF_DATASETS = ("map", "front", "tolerance", "sensitivity")
-OF_DESIGNS = ("motion", "mechanism", "polar_load")
+OF_DESIGNS = ("motion", "mechanism", "polar_load", "cyclogram")
 ENDINGS = (".svg", ".png", ".pdf")
 
 
@@ -38,7 +40,10 @@ class Options(TypedDict):
 @click.argument("source")
 @click.argument("table", required=False, type=click.Path(exists=True, dir_okay=False, path_type=Path))
 @click.option(
-    "--out", required=True, type=click.Path(dir_okay=False, path_type=Path), help="A .svg, .png or .pdf file."
+    "--out",
+    required=True,
+    type=click.Path(dir_okay=False, path_type=Path),
+    help="A .svg, .png or .pdf file; of cyclogram also a .csv table.",
 )
 @click.option("--design", help="Of a dataset: optimum, reference, best, or the number of a row.")
 @click.option("--row", type=click.IntRange(min=0), default=0, show_default=True, help="Of TABLE.")
@@ -55,8 +60,11 @@ def draw(what: str, source: str, table: Path | None, out: Path, **options: Unpac
 
     SOURCE is a FOLDER that `sweep run` left behind, or FAMILY with a TABLE of designs (.parquet or .csv, angles in rad
     unless --angles or a header such as `alpha [deg]` says otherwise), of which --row is drawn.  map, front, tolerance
-    and sensitivity are pictures of a folder; motion, mechanism and polar_load of one design.
+    and sensitivity are pictures of a folder; motion, mechanism, polar_load and cyclogram of one design.
     """
+    if what == "cyclogram" and out.suffix.lower() == ".csv":
+        _table(source, table, out, options)
+        return
     if out.suffix.lower() not in ENDINGS:
         raise InputError("--out", str(out), f"a file name ending in {' or '.join(ENDINGS)}", "command line")
     if what in OF_DATASETS:
@@ -65,10 +73,19 @@ def draw(what: str, source: str, table: Path | None, out: Path, **options: Unpac
         drawn: Any = getattr(plot, what)(source, **({"output": options["output"]} if what == "tolerance" else {}))
     else:
         drawn = _of_one(what, source, table, options)
-    axes = drawn if what in ("front", "tolerance", "sensitivity", "polar_load") else drawn[0]
+    axes = drawn if what in ("front", "tolerance", "sensitivity", "polar_load", "cyclogram") else drawn[0]
     out.parent.mkdir(parents=True, exist_ok=True)
     axes.figure.savefig(out)
     click.echo(f"{what}: {out}")
+
+
+def _table(source: str, table: Path | None, out: Path, options: Options) -> None:
+    """Write the cyclogram of one design as a table."""
+    mechanism, design = _design(source, table, options["design"], options["row"])
+    rows = cyclogram(mechanism, design, angles="rad" if table is None else options["angles"])
+    out.parent.mkdir(parents=True, exist_ok=True)
+    table_in_degrees(rows).to_csv(out, index=False, float_format="%.4f")
+    click.echo(f"cyclogram: {out}")
 
 
 def _of_one(what: str, source: str, table: Path | None, options: Options) -> Any:

@@ -227,6 +227,9 @@ def _effects(study: Study, sent: Pilot) -> list[str]:
     if not len(looked_at):
         looked_at = spread_designs(study, ADVISED)
         which = f"by {len(looked_at)} designs spread over the space: none of {tried} tried keeps all limits"
+    rods = [p.name for p in study.family.parameters if p.unless and study.space.fixed.get(p.name) == 1.0]
+    if rods:
+        lines += ["", "bodies without centre and inertia are slender rods between their joints", f"  {', '.join(rods)}"]
     found = findings(bare, study.family, looked_at, study.want)
     if found:
         lines += [

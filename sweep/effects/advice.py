@@ -107,9 +107,9 @@ def findings(bare: Family, full: Family, designs: Array, wanted: Iterable[str]) 
     angles = Angles.of(2.0 * np.pi * np.arange(SAMPLES)[None] / SAMPLES)
     computed = {f"{e.name}{placed.number}" for placed in called_for(bare, wanted) for e in closure([placed.entry])}
     needs = {placed.name: inputs(bare, [placed]) for placed in applicable(bare)}
-    defaults = {p.name: p.default for some in needs.values() for p in some if p.default is not None}
+    defaults = {p.name: p.left_out(columns) for some in needs.values() for p in some}
     # A rule may look at more than its effect's own inputs, so it gets all that is known of the scene.
-    given = {name: np.full(len(designs), x) for name, x in defaults.items()} | columns
+    given = {name: np.full(len(designs), x) for name, x in defaults.items() if x is not None} | columns
     found = []
     for placed in applicable(bare):
         if placed.entry.advise is None or any(p.default is None and p.name not in columns for p in needs[placed.name]):

@@ -80,8 +80,9 @@ def _value(full: Family, p: Parameter) -> float | None:
         if p.name in known:
             return known[p.name]
     kind = next((value for start, value in KINDS.items() if p.name.startswith(start)), None) if linked else None
-    if kind is not None or p.default is not None:
-        return p.default if kind is None else kind
+    default = 0.0 if p.unless else p.default  # centres and inertias are given
+    if kind is not None or default is not None:
+        return default if kind is None else kind
     return -0.5 if p.name.endswith("1") else 0.6  # places of supports
 
 

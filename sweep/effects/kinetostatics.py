@@ -9,7 +9,7 @@ from __future__ import annotations
 import numpy as np
 
 from kernels.effects.friction import friction_loads
-from kernels.effects.kinetostatics import kinetostatics
+from kernels.effects.kinetostatics import BODY, kinetostatics
 from kernels.types import Status
 from sweep.effects import loads
 from sweep.effects.loads import FRICTION_SUFFIX, FRICTION_TEXT, Named, together
@@ -32,6 +32,7 @@ COUPLES_WITH_FRICTION = {
     f"drive_torque{FRICTION_SUFFIX}": ("torque", "torque that drives the crank" + FRICTION_TEXT),
 }
 CONTRACTION = "friction_contraction"
+ACROSS = (7, 9)  # of a body's mass, centre x y z and moments xx xy xz yy yz zz
 PASSES = "friction_passes"
 
 
@@ -130,7 +131,14 @@ def _drive(scene: Scene, load: Array) -> Array:
 
 def _bodies(scene: Scene) -> Array:
     """Masses, centres, inertias and gravity in the order of the kernels."""
-    return scene.table(loads.follower(scene).bodies)
+    follower = loads.follower(scene)
+    found, lengths = scene.table(follower.bodies), scene.records[1][:, 12:15]
+    for k, name in enumerate(follower.rods):
+        body, rod, length = found[:, BODY * k : BODY * (k + 1)], scene.inputs[name], lengths[:, k]
+        body[:, 1] += rod * 0.5 * length
+        for moment in ACROSS:
+            body[:, moment] += rod * body[:, 0] * length**2 / 12.0
+    return found
 
 
 def frictionless(scene: Scene, load: Array, wanted: frozenset[str], status: Status) -> Columns:

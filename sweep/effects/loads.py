@@ -15,6 +15,7 @@ from sweep.families.capabilities import JointRecords
 
 FRICTION_SUFFIX, FRICTION_TEXT = "_friction", ", friction included"
 AXES = "xyz"
+GRAM = "; a gram is 1e-6"  # kilograms are what one types
 
 Named: TypeAlias = dict[str, tuple[str, str]]
 """Unit and meaning by name."""
@@ -42,7 +43,7 @@ def body_inputs(body: str, frame: str, default: float | None = None) -> tuple[Pa
         )
         for x, y in ("xx", "xy", "xz", "yy", "yz", "zz")
     )
-    mass = Parameter(f"m_{body}", "mass", f"mass of the {body}", default=default, not_negative=True)
+    mass = Parameter(f"m_{body}", "mass", f"mass of the {body}{GRAM}", default=default, not_negative=True)
     return mass, *centre, *moments
 
 
@@ -50,10 +51,19 @@ def _body(body: str) -> tuple[Parameter, ...]:
     return body_inputs(body, _FRAMES[body])
 
 
+def slender(body: str) -> Parameter:
+    """Whether a body is a slender rod as far as nothing is said of its centre and inertia."""
+    own = f"rod_{body}"
+    others = tuple((own, p.name) for p in _body(body) if not p.name.startswith("m_"))
+    text = f"1: the mass of the {body} is that of a slender rod between its joints, centre halfway, inertia m l^2/12"
+    words = f"{text}; 0 where its centre or inertia is given, else"
+    return Parameter(own, "choice", words, default=1.0, choices=(0.0, 1.0), unless=others)
+
+
 def rod_inputs(body: str, frame: str) -> tuple[Parameter, ...]:
     """Mass, centre of mass and inertia of a slender rod."""
     return (
-        Parameter(f"m_{body}", "mass", f"mass of {body}", default=0.0, not_negative=True),
+        Parameter(f"m_{body}", "mass", f"mass of {body}{GRAM}", default=0.0, not_negative=True),
         Parameter(f"com_{body}_x", "length", f"centre of mass of {body} ({frame})", default=0.0),
         Parameter(f"j_{body}", "inertia", f"inertia of {body} across it about its centre of mass", default=0.0,
                   not_negative=True),
@@ -108,13 +118,15 @@ class Follower(NamedTuple):
     prefix: str  # of the names of its effects
     load: Parameter
     bodies: tuple[str, ...]  # columns of kernels.effects.kinetostatics in order
+    rods: tuple[str, ...]  # of those that may be slender rods, in the order of the bodies
     parameters: tuple[Parameter, ...]
 
 
 def _follower(name: str, prefix: str, load: Parameter) -> Follower:
     bodies = (*_body("crank"), *_body("coupler"), *_body(name), *GRAVITY)
-    parameters = (*bodies, load, SPEED, CHANGE, CONSTRUCTION)
-    return Follower(name, prefix, load, tuple(p.name for p in bodies), parameters)
+    rods = tuple(slender(body) for body in ("crank", "coupler", name) if body != "slider")
+    parameters = (*bodies, *rods, load, SPEED, CHANGE, CONSTRUCTION)
+    return Follower(name, prefix, load, tuple(p.name for p in bodies), tuple(p.name for p in rods), parameters)
 
 
 LINK_TORQUE = Parameter(

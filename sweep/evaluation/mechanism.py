@@ -109,7 +109,7 @@ class BoundDesign:
         """Give the design matrix of one row of the family, which effects may have extended by inputs."""
         row = self._rows.get(family.parameter_names)
         if row is None:
-            given = [self.dimensions.get(p.name, p.default) for p in family.parameters]
+            given = [self.dimensions.get(p.name, p.left_out(self.dimensions)) for p in family.parameters]
             for p, value in zip(family.parameters, given, strict=True):
                 if value is None:
                     present = ", ".join(self.dimensions) or "nothing"

@@ -163,8 +163,9 @@ def _checked_column(
 ) -> Array | float:
     """Return the column of a parameter, one number where it is that for all rows, or its default."""
     if p.name not in columns:
-        if p.default is not None:
-            return p.default
+        default = p.left_out(columns)
+        if default is not None:
+            return default
         guess = nearest(p.name, [n for n in keys if n not in family.parameter_names])
         present = ", ".join(keys) or "none"
         raise MissingInput(p.name, f"a column with the {p.text}; found {present}{guess}", f"table of {family.name}")

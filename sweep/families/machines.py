@@ -19,11 +19,12 @@ from sweep.families.frames import Frame
 from sweep.families.main_shaft import ShaftTorque, speed_of
 from sweep.families.moments import Taking
 from sweep.families.parts import AXES, EYE, TIP, Member, coordinates, coupler_joints, velocity
-from sweep.families.passages import step_of
+from sweep.families.passages import taking_step
 from sweep.families.relations import EventValue, Relation, Timing
 from sweep.families.shaking import Shaking
 from sweep.families.sites import coordinates as coordinates_of_site
 from sweep.families.sites import made_of
+from sweep.families.triangles import Entering, entering_step
 
 
 @dataclass(frozen=True)
@@ -116,7 +117,7 @@ def _built(machine: Machine, members: tuple[Member, ...]) -> Machine:
         f"{m.name}.{name}": f"{m.name}.{of}" for m in placed for name, of in m.family.derivative_of.items()
     }
     outputs += [o for relation in machine.relations for o in relation.outputs]
-    derivative_of |= {k: v for r in machine.relations if isinstance(r, Taking) for k, v in r.rates.items()}
+    derivative_of |= {k: v for r in machine.relations if isinstance(r, Taking | Entering) for k, v in r.rates.items()}
     loops = tuple(_loop(m, loop) for m in placed for loop in m.family.every(Assembly))
     found = replace(
         machine,
@@ -134,9 +135,10 @@ def _built(machine: Machine, members: tuple[Member, ...]) -> Machine:
     poses = partial(_poses, found)
     precise = partial(_precise_poses, found) if any(m.family.precise_poses for m in placed) else None
     found = replace(found, poses=poses, precise_poses=precise)
-    passing = (step_of(r, found) for r in machine.relations if isinstance(r, Taking))
-    turning = (speed_of(r, found) for r in machine.relations if isinstance(r, ShaftTorque))
-    return replace(found, steps=(*passing, *turning))
+    steps = [taking_step(r, found) for r in machine.relations if isinstance(r, Taking)]
+    steps += [entering_step(r, found) for r in machine.relations if isinstance(r, Entering)]
+    steps += [speed_of(r, found) for r in machine.relations if isinstance(r, ShaftTorque)]
+    return replace(found, steps=tuple(steps))
 
 
 def _loop(member: Member, loop: Assembly) -> Assembly:
@@ -222,13 +224,15 @@ def _member(m: Member, designs: Array, angles: Angles, own: set[str], found: Map
     turned = _turned(m, phase, angles, found)
     result: dict[str, Any] = dict(m.family.poses(own_designs, turned, frozenset(motion)))
     _with_respect_to_shaft(m, result, found)
+    placed = [p for p in m.points if any(f"{p}_{axis}" in own for axis in AXES)]
+    moving = [p for p in (*m.points, *dict(m.carried)) if any(f"d{p}_{axis}" in own for axis in AXES)]
+    frames = m.frames(designs) if sites or placed or moving else []
     for site in sites:
-        result |= coordinates_of_site(m, site, designs, result)
-    for point in (*m.points, *dict(m.carried)):
-        if point in m.points and any(f"{point}_{axis}" in own for axis in AXES):
-            result |= coordinates(m, point, designs, own_designs, result)
-        if any(f"d{point}_{axis}" in own for axis in AXES):
-            result |= velocity(m, point, designs, result)
+        result |= coordinates_of_site(m, site, frames, designs, result)
+    for point in placed:
+        result |= coordinates(m, point, frames[-1], designs, own_designs, result)
+    for point in moving:
+        result |= velocity(m, point, frames[-1], designs, result)
     return {name: result[name] for name in (*own, "status")}
 
 

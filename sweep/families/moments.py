@@ -14,24 +14,71 @@ import numpy as np
 
 from sweep.families.base import Output, Parameter
 from sweep.families.frames import Frame
+from sweep.families.gaps import Gap
 from sweep.families.segments import cross, dot, minus
 from sweep.families.sites import AXES
-from sweep.families.tools import Blade, Needle
+from sweep.families.tools import Blade, Needle, rate_of
 
 PARALLEL = 1e-6  # of the scarf's size: what is square to the needle says no direction below
+
+
+@dataclass(frozen=True)
+class RiseWindow:
+    """Where the rise of the needle at A may lie: what two or more fields of work permit in common, 5.4.
+
+    ``fields`` are their names with the least and the most rise that each permits.
+    """
+
+    fields: tuple[tuple[str, float, float], ...]
+
+    @property
+    def least(self) -> float:
+        """The largest of the fields' least rises."""
+        return self._low[1]
+
+    @property
+    def most(self) -> float:
+        """The smallest of the fields' largest rises."""
+        return self._high[2]
+
+    @property
+    def words(self) -> str:
+        """What is left to the rise, with the fields that bind."""
+        return (
+            f"how far the rise lies inside its window: at least {self.least:g} for {self._low[0]}, "
+            f"at most {self.most:g} for {self._high[0]}"
+        )
+
+    @property
+    def _low(self) -> tuple[str, float, float]:
+        return max(self.fields, key=lambda field: field[1])
+
+    @property
+    def _high(self) -> tuple[str, float, float]:
+        return min(self.fields, key=lambda field: field[2])
 
 
 @dataclass(frozen=True)
 class Taking:
     """A blade's tip in the frame of a needle, pose by pose; :mod:`sweep.families.passages` finds where it passes.
 
-    ``sense`` is +1 or -1: the tip passes towards u or against it.
+    ``sense`` is +1 or -1: the tip passes towards u or against it; ``window`` is where the rise may lie.
     """
 
     name: str
     needle: Needle
     blade: Blade
     sense: int
+    window: RiseWindow | None = None
+
+    @property
+    def gap(self) -> Gap:
+        """Of needle and blade as capsules."""
+        return Gap(f"{self.name}_gap", (self.needle.body, self.blade.body))
+
+    def beside(self, height: Any) -> Any:
+        """Tell whether a height is one of the needle's."""
+        return (height > self.needle.top) & (height < self.needle.point)
 
     @property
     def rates(self) -> Mapping[str, str]:
@@ -55,7 +102,8 @@ class Taking:
             for what in texts
         ]
         speed = "speed of the tip relative to the needle, per radian of the main shaft"
-        return (*found, Output(f"{self.name}_speed", "length", speed, "(12)"))
+        gap = Output(self.gap.name, "length", "gap between needle and blade, less their radii", "(9)", kinks=True)
+        return (*found, Output(f"{self.name}_speed", "length", speed, "(12)"), gap)
 
     @property
     def parameters(self) -> tuple[Parameter, ...]:
@@ -65,8 +113,11 @@ class Taking:
     def needs(self, wanted: frozenset[str]) -> frozenset[str]:
         """Return coordinates of both points and the line, and velocities where they are wanted."""
         names = [self.needle.on, self.blade.tip, self.needle.line]
-        if any(name not in self.rates for name in wanted if name.startswith(f"{self.name}_")):
-            names += [_rate(self.needle.on), _rate(self.blade.tip)]
+        moving = {*self.rates.values(), f"{self.name}_speed"}
+        if not moving.isdisjoint(wanted):
+            names += [rate_of(self.needle.on), rate_of(self.blade.tip)]
+        if self.gap.name in wanted:
+            names.append(self.blade.back)
         return frozenset(f"{name}_{axis}" for name in names for axis in AXES)
 
     def compute(self, found: Mapping[str, Any], frames: Mapping[str, Frame], wanted: frozenset[str]) -> dict[str, Any]:
@@ -81,13 +132,13 @@ class Taking:
         w = [x / size for x in w]
         u = cross(n, w)
         own = {name for name in wanted if name.startswith(f"{self.name}_")}
-        columns: dict[str, Any] = {}
+        columns = self.gap.compute(found, frames, frozenset()) if self.gap.name in wanted else {}
         for moving, d in ((False, ""), (True, "d")):
             names = {what: f"{self.name}_{d}{what}" for what in ("across", "side", "height", "depth", "speed")}
             if own.isdisjoint(names.values()) and not (moving and f"{self.name}_speed" in own):
                 continue
             if moving:
-                point, tip = _vector(found, _rate(self.needle.on)), _vector(found, _rate(self.blade.tip))
+                point, tip = _vector(found, rate_of(self.needle.on)), _vector(found, rate_of(self.blade.tip))
             r = minus(tip, point)
             for what, value in (
                 ("across", dot(r, u)),
@@ -99,11 +150,6 @@ class Taking:
             if moving:
                 columns[f"{self.name}_speed"] = np.sqrt(dot(r, r))
         return columns
-
-
-def _rate(name: str) -> str:
-    member, _, own = name.partition(".")
-    return f"{member}.d{own}"
 
 
 def _vector(found: Mapping[str, Any], name: str) -> list[Any]:

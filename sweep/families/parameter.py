@@ -6,6 +6,7 @@ Internal units are mm, t, s and rad and what follows from them.  A word may be a
 from __future__ import annotations
 
 import re
+from collections.abc import Container
 from dataclasses import dataclass
 from typing import Literal
 
@@ -21,7 +22,12 @@ Unit = Literal[
 
 @dataclass(frozen=True)
 class Parameter:
-    """One column of the design matrix; ``places`` says that it tells where a part stands, not how large it is."""
+    """One column of the design matrix.
+
+    ``places`` says that it tells where a part stands, not how large it is.  ``unless`` are names that put 0 in place of
+    its default where one of them is given: pairs of a part of its own name and of what stands there in the other name,
+    so that they hold under the name of a stage or a member too.
+    """
 
     name: str
     unit: Unit
@@ -32,6 +38,11 @@ class Parameter:
     not_negative: bool = False
     not_zero: bool = False
     places: bool = False
+    unless: tuple[tuple[str, str], ...] = ()
+
+    def left_out(self, given: Container[str]) -> float | None:
+        """Value where it is left out beside the given names; None where it must not be."""
+        return 0.0 if any(self.name.replace(*pair) in given for pair in self.unless) else self.default
 
     @property
     def sign(self) -> str:

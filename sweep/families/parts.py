@@ -261,8 +261,11 @@ class Member:
         return found
 
 
-def coordinates(m: Member, point: str, designs: Array, own_designs: Array, result: Mapping[str, Any]) -> dict[str, Any]:
-    """Coordinates of a point in the machine's frame, (n, m)."""
+def coordinates(
+    m: Member, point: str, frame: Frame | None, designs: Array, own_designs: Array, result: Mapping[str, Any]
+) -> dict[str, Any]:
+    """Coordinates of a point in the machine's frame, (n, m), from those in the frame of the family."""
+    assert frame is not None
     if point == TIP:
         link = m.family.find(OutputLink)
         assert link is not None
@@ -275,7 +278,7 @@ def coordinates(m: Member, point: str, designs: Array, own_designs: Array, resul
         local = _on_coupler(m, result, eye)
     else:
         local = _local(m, point, result)
-    placed = m.frame(designs).placed(local)
+    placed = frame.placed(local)
     return {f"{point}_{axis}": part for axis, part in zip(AXES, placed, strict=True)}
 
 
@@ -307,8 +310,9 @@ def _on_coupler(m: Member, result: Mapping[str, Any], eye: list[Any]) -> list[An
     return [point[0] - eye[1] / length * along[1], point[1] + eye[1] / length * along[0], point[2] + eye[2]]
 
 
-def velocity(m: Member, point: str, designs: Array, result: Mapping[str, Any]) -> dict[str, Any]:
+def velocity(m: Member, point: str, frame: Frame | None, designs: Array, result: Mapping[str, Any]) -> dict[str, Any]:
     """Velocity analogue of a point in the machine's frame, (n, m): the frame of a member does not move."""
+    assert frame is not None
     carried = dict(m.carried)
     if point == TIP or point in carried:
         x, y = (
@@ -321,5 +325,5 @@ def velocity(m: Member, point: str, designs: Array, result: Mapping[str, Any]) -
         local = [rate * (-x * sin - y * cos), rate * (x * cos - y * sin), 0.0 * rate]
     else:
         local = [result[name] if name else 0.0 for name in m.moving[point]]
-    turned = m.frame(designs).turned(local)
+    turned = frame.turned(local)
     return {f"d{point}_{axis}": part for axis, part in zip(AXES, turned, strict=True)}

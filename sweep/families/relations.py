@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, Protocol
 
 import numpy as np
 
+from sweep.errors import InputError, choices
 from sweep.families.base import Output, Parameter
 from sweep.families.frames import Frame
 from sweep.families.parts import AXES
@@ -142,3 +143,19 @@ def with_size(name: str, parts: list[Any]) -> dict[str, Any]:
     """Return the magnitude and components."""
     columns = {f"{name}_{axis}": part for axis, part in zip(AXES, parts, strict=True)}
     return columns | {name: np.sqrt(parts[0] ** 2 + parts[1] ** 2 + parts[2] ** 2)}
+
+
+def two(given: tuple[str, ...], known: Sequence[str] | None, what: str, where: str) -> tuple[str, str]:
+    """Return two names out of what a user gives, of those that are known if any are."""
+    if len(given) != 2:
+        raise InputError(what, given, f"two {what}", where)
+    first, second = given if known is None else each(given, known, what, where)
+    return first, second
+
+
+def each(given: tuple[str, ...], known: Sequence[str], what: str, where: str) -> tuple[str, ...]:
+    """Return names out of what a user gives; refuse one that is not known."""
+    for part in given:
+        if part not in known:
+            raise InputError(what, part, f"{what}: {choices(part, known)}", where)
+    return given

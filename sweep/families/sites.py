@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
@@ -11,6 +11,7 @@ from kernels.types import Array
 from sweep.families.capabilities import Coordinates, DesignMap, OutputLink, Points, Skeleton
 
 if TYPE_CHECKING:
+    from sweep.families.frames import Frame
     from sweep.families.parts import Member, Stage
 
 AXES = "xyz"
@@ -77,10 +78,12 @@ def made_of(member: Member, site: Site) -> set[str]:
     return {name for name in site.moving or () if name}
 
 
-def coordinates(member: Member, name: str, designs: Array, result: Mapping[str, Any]) -> dict[str, Any]:
+def coordinates(
+    member: Member, name: str, frames: Sequence[Frame | None], designs: Array, result: Mapping[str, Any]
+) -> dict[str, Any]:
     """Return coordinates or components of a site in the machine's frame, (n, m) or (n, 1)."""
     site = member.sites[name]
-    frame = member.frames(designs)[site.stage]
+    frame = frames[site.stage]
     assert frame is not None
     own = member.designs(designs)
     stages: tuple[Stage, ...] = getattr(member.family, "stages", ())

@@ -227,7 +227,7 @@ def pin_distance_squared(designs: Array, angles: Angles, found: Columns) -> Arra
     return np.square(np.asarray(found["rho"], np.float64))
 
 
-_ROD_RATES, _DIRECTION = ("rho", "drho", "d2rho"), ("x_n", "y_n", "z_n")
+_ROD_RATES, _DIRECTION = ("rho", "drho"), ("x_n", "y_n", "z_n")
 SWIVEL_LINKS = LinkTree(
     bodies=(
         LinkBody("crank", "along the crank, tangential, along its axis, from A"),

@@ -19,16 +19,18 @@ from sweep.families.gaps import Body, Gap
 from sweep.families.link_tree import LinkTree
 from sweep.families.machines import Machine, assemble
 from sweep.families.main_shaft import Driven, ShaftTorque
-from sweep.families.moments import Taking
 from sweep.families.parts import Member, coupler_joints, is_planar, placement, vector
-from sweep.families.relations import Distance, EventValue, Relation, Speed, Timing
+from sweep.families.relations import Distance, EventValue, Relation, Speed, Timing, each, two
 from sweep.families.shafts import MOUNT_KEYS, SHAFT_KEYS, Mount, Shaft, read_mount, read_shafts
 from sweep.families.shaking import Shaken, Shaking, shaken
+from sweep.families.stitching import read_entering, read_taking
 from sweep.families.thread_balance import thread_balance
-from sweep.families.tools import BLADE_KEYS, NEEDLE_KEYS, Blade, Needle, Tool, bodies, length, read_tools
+from sweep.families.tools import BLADE_KEYS, NEEDLE_KEYS, SEAM_KEYS, Tool, bodies, length, read_tools
 
 MEMBER_KEYS = ("family", "chain", "ratio", "offset", "driver", "place", "tip", "eye", *MOUNT_KEYS)
-RELATION_KINDS = ("distance", "speed", "timing", "event", "value", "torque", "shaking", "thread", "gap", "take")
+RELATION_KINDS = (
+    "distance", "speed", "timing", "event", "value", "torque", "shaking", "thread", "gap", "take", "enter",
+)  # fmt: skip
 EVENT_KEYS = ("event", "level", "rising")
 _WORD = re.compile(r"[A-Za-z][A-Za-z0-9_]*")
 _ENDS_IN_DIGIT = re.compile(r".*\d")
@@ -72,7 +74,9 @@ def specification(
         found.append((name, _frozen(table)))
     between = tuple((name, _frozen(r)) for name, r in (relations or {}).items())
     turning = tuple((name, _frozen(s, "shaft", SHAFT_KEYS)) for name, s in (shafts or {}).items())
-    working = tuple((name, _frozen(t, "tool", (*NEEDLE_KEYS, *BLADE_KEYS))) for name, t in (tools or {}).items())
+    working = tuple(
+        (name, _frozen(t, "tool", (*NEEDLE_KEYS, *BLADE_KEYS, *SEAM_KEYS))) for name, t in (tools or {}).items()
+    )
     return Specification(tuple(found), between, turning, working)
 
 
@@ -243,7 +247,9 @@ def _relation(
     if "gap" in table:
         return _gap(name, table, bodies(members, tools), where)
     if "take" in table:
-        return _taking(name, table, tools, where)
+        return read_taking(name, table, tools, where)
+    if "enter" in table:
+        return read_entering(name, table, tools, where)
     if "thread" in table:
         return thread_balance(name, table, members)
     if len(table) != 1 or next(iter(table)) not in RELATION_KINDS:
@@ -253,14 +259,14 @@ def _relation(
         raise InputError(kind, given, "a list of names", where)
     if kind == "distance":
         points = [f"{m.name}.{point}" for m in members.values() for point in m.points]
-        return Distance(name, _two(given, points, "points", where))
+        return Distance(name, two(given, points, "points", where))
     if kind == "speed":
         moving = [f"{m.name}.{point}" for m in members.values() for point in m.moving]
         if len(given) == 1:
-            return Speed(name, _each(given, moving, "points whose velocity is known", where))
-        return Speed(name, _two(given, moving, "points whose velocity is known", where))
+            return Speed(name, each(given, moving, "points whose velocity is known", where))
+        return Speed(name, two(given, moving, "points whose velocity is known", where))
     if kind == "timing":
-        return Timing(name, _two(given, None, "crank angles", where))
+        return Timing(name, two(given, None, "crank angles", where))
     known = {f"{m.name}{number}": (m.name, number) for m in members.values() for number in _stages(m.family)}
     known |= {m.name: (m.name, _stages(m.family)[0]) for m in members.values()}
     for part in given:
@@ -300,39 +306,13 @@ def _gap(name: str, table: dict[str, Any], known: Mapping[str, Body], where: str
     for key in table:
         if key not in ("gap", "radii"):
             raise InputError(key, table[key], "gap, radii", where)
-    first, second = (known[one] for one in _two(table["gap"], list(known), "bodies", where))
+    first, second = (known[one] for one in two(table["gap"], list(known), "bodies", where))
     if "radii" in table:
         a, b = (length("radii", radius, where) for radius in table["radii"])
         first, second = replace(first, radius=a), replace(second, radius=b)
     return Gap(name, (first, second))
 
 
-def _taking(name: str, table: dict[str, Any], tools: Mapping[str, Tool], where: str) -> Taking:
-    for key in table:
-        if key not in ("take", "sense"):
-            raise InputError(key, table[key], "take, sense", where)
-    needle, blade = (tools[one] for one in _two(table["take"], list(tools), "tools", where))
-    if not isinstance(needle, Needle) or not isinstance(blade, Blade):
-        raise InputError("take", table["take"], "a needle, then a blade", where)
-    if table.get("sense", 1) not in (1, -1):
-        raise InputError("sense", table["sense"], "1 or -1: the tip passes along n x w or against it", where)
-    return Taking(name, needle, blade, int(table.get("sense", 1)))
-
-
 def _stages(family: Family) -> list[str]:
     stages = getattr(family, "stages", ())
     return [str(stage.number) for stage in stages] or [""]
-
-
-def _two(given: tuple[str, ...], known: Sequence[str] | None, what: str, where: str) -> tuple[str, str]:
-    if len(given) != 2:
-        raise InputError(what, given, f"two {what}", where)
-    first, second = given if known is None else _each(given, known, what, where)
-    return first, second
-
-
-def _each(given: tuple[str, ...], known: Sequence[str], what: str, where: str) -> tuple[str, ...]:
-    for part in given:
-        if part not in known:
-            raise InputError(what, part, f"{what}: {choices(part, known)}", where)
-    return given

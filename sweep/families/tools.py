@@ -1,4 +1,4 @@
-"""Tools of a machine: needles that a guided point carries along its line, blades fixed to an output link."""
+"""Tools of a machine: needles that a guided point carries along its line, blades of an output link, the seam."""
 
 from __future__ import annotations
 
@@ -12,11 +12,54 @@ from sweep.errors import InputError, choices
 from sweep.families.capabilities import OutputLink
 from sweep.families.gaps import Body
 from sweep.families.parts import Member, vector
-from sweep.families.sites import links_of
+from sweep.families.sites import AXES, links_of
 
 NEEDLE_KEYS = ("on", "line", "sense", "scarf", "diameter", "floor", "top", "scarf_end", "eye", "point")
-BLADE_KEYS = ("on", "tip", "back", "radius")
-NEEDED = {"needle": ("on", "line", "scarf", "diameter", "eye", "point"), "blade": ("on", "tip", "back")}
+BLADE_KEYS = ("on", "tip", "back", "eye", "hold", "radius")
+SEAM_KEYS = ("at",)
+PLACES = ("tip", "back", "eye", "hold")  # of a blade, as a member's tip
+NEEDED = {
+    "needle": ("on", "line", "scarf", "diameter", "eye", "point"),
+    "blade": ("on", "tip", "back"),
+    "seam": ("at",),
+}
+
+
+@dataclass(frozen=True)
+class Spot:
+    """A point of a tool: one that a member carries, or one ``far`` along a line from it; without any it stands still.
+
+    ``on`` and ``line`` are dotted names of the point and of the direction.
+    """
+
+    on: str = ""
+    line: str = ""
+    far: float = 0.0
+    at: tuple[float, float, float] = (0.0, 0.0, 0.0)
+
+    def needs(self, moving: bool) -> set[str]:
+        """Return the coordinates that it is made of, and velocities where it is ``moving``."""
+        names = [name for name in (self.on, self.line, rate_of(self.on) if moving else "") if name]
+        return {f"{name}_{axis}" for name in names for axis in AXES}
+
+    def position(self, found: Mapping[str, Any]) -> list[Any]:
+        """Return its coordinates, (n, m)."""
+        if not self.on:
+            return list(self.at)
+        start = [found[f"{self.on}_{axis}"] for axis in AXES]
+        if not self.line:
+            return start
+        return [x + self.far * found[f"{self.line}_{axis}"] for x, axis in zip(start, AXES, strict=True)]
+
+    def velocity(self, found: Mapping[str, Any]) -> list[Any]:
+        """Return its velocity by the angle of the main shaft, (n, m): a needle keeps its direction."""
+        return [found[f"{rate_of(self.on)}_{axis}"] for axis in AXES] if self.on else [0.0, 0.0, 0.0]
+
+
+def rate_of(name: str) -> str:
+    """Return the name of the velocity of a point, both dotted; "" for none."""
+    member, dot, own = name.partition(".")
+    return f"{member}.d{own}" if dot else ""
 
 
 @dataclass(frozen=True)
@@ -53,23 +96,51 @@ class Needle:
         reach = (self.sense * self.top, self.sense * self.point)
         return Body(self.name, (self.on, self.line), reach, 0.5 * self.diameter)
 
+    @property
+    def working(self) -> Spot:
+        """Its point."""
+        return Spot(self.on, self.line, self.sense * self.point)
+
+    @property
+    def radius(self) -> float:
+        """Of the capsule."""
+        return 0.5 * self.diameter
+
 
 @dataclass(frozen=True)
 class Blade:
-    """A blade that an output link carries: its tip, the back end, and its radius."""
+    """A blade that an output link carries: its tip, the back end, its radius; points by their dotted names.
+
+    ``eye`` is where its thread leaves it and ``hold`` where it holds a loop or meets the seam's plane; "" unknown.
+    """
 
     name: str
     tip: str
     back: str
     radius: float
+    eye: str = ""
+    hold: str = ""
 
     @property
     def body(self) -> Body:
         """The blade from its tip to its back."""
         return Body(self.name, (self.tip, self.back), None, self.radius)
 
+    @property
+    def working(self) -> Spot:
+        """Its tip."""
+        return Spot(self.tip)
 
-Tool: TypeAlias = Needle | Blade
+
+@dataclass(frozen=True)
+class Seam:
+    """The last stitch, a point that stands still."""
+
+    name: str
+    at: tuple[float, float, float]
+
+
+Tool: TypeAlias = Needle | Blade | Seam
 
 
 def read_tools(given: Mapping[str, Mapping[str, Any]], members: dict[str, Member]) -> dict[str, Tool]:
@@ -83,18 +154,22 @@ def read_tools(given: Mapping[str, Mapping[str, Any]], members: dict[str, Member
     found: dict[str, Tool] = {}
     for name, table in given.items():
         where = f"machine.tools.{name}"
-        kind, keys = ("blade", BLADE_KEYS) if "back" in table else ("needle", NEEDLE_KEYS)
+        kind = "blade" if "back" in table else "seam" if "at" in table else "needle"
+        keys = {"blade": BLADE_KEYS, "seam": SEAM_KEYS, "needle": NEEDLE_KEYS}[kind]
         for key in table:
             if key not in keys:
                 raise InputError(key, table[key], f"for a {kind}, {choices(key, keys)}", where)
         for key in NEEDED[kind]:
             if key not in table:
                 raise InputError(key, None, f"what a {kind} needs: {', '.join(NEEDED[kind])}", where)
-        found[name] = _blade(name, table, members, where) if kind == "blade" else _needle(name, table, members, where)
+        if kind == "seam":
+            found[name] = Seam(name, vector(table["at"], f"{where}.at"))
+        else:
+            found[name] = (_blade if kind == "blade" else _needle)(name, table, members, where)
     return found
 
 
-def _needle(name: str, table: Mapping[str, Any], members: Mapping[str, Member], where: str) -> Needle:
+def _needle(name: str, table: Mapping[str, Any], members: dict[str, Member], where: str) -> Tool:
     points = [f"{m.name}.{point}" for m in members.values() for point in m.moving]
     if table["on"] not in points:
         raise InputError("on", table["on"], f"a moving point: {choices(str(table['on']), points)}", where)
@@ -126,17 +201,18 @@ def _needle(name: str, table: Mapping[str, Any], members: Mapping[str, Member], 
     )
 
 
-def _blade(name: str, table: Mapping[str, Any], members: dict[str, Member], where: str) -> Blade:
+def _blade(name: str, table: Mapping[str, Any], members: dict[str, Member], where: str) -> Tool:
     carriers = [m.name for m in members.values() if m.family.find(OutputLink) is not None]
     owner = table["on"]
     if owner not in carriers:
         allowed = f"a member whose output link turns: {choices(str(owner), carriers)}"
         raise InputError("on", owner, allowed, where)
-    ends = tuple((f"{name}_{end}", vector(table[end], f"{where}.{end}")) for end in ("tip", "back"))
+    ends = tuple((f"{name}_{end}", vector(table[end], f"{where}.{end}")) for end in PLACES if end in table)
     member = members[owner]
     members[owner] = replace(member, carried=(*member.carried, *ends))
     radius = length("radius", table["radius"], where) if "radius" in table else 0.0
-    return Blade(name, f"{owner}.{name}_tip", f"{owner}.{name}_back", radius)
+    tip, back, eye, hold = (f"{owner}.{name}_{end}" if end in table else "" for end in PLACES)
+    return Blade(name, tip, back, radius, eye, hold)
 
 
 def length(key: str, value: object, where: str) -> float:
@@ -156,7 +232,7 @@ def number(key: str, value: object, where: str) -> float:
 
 def bodies(members: Mapping[str, Member], tools: Mapping[str, Tool]) -> dict[str, Body]:
     """Return what gaps can be between: tools by their name, links by member and name."""
-    found = {name: tool.body for name, tool in tools.items()}
+    found = {name: tool.body for name, tool in tools.items() if not isinstance(tool, Seam)}
     for m in members.values():
         for link, (first, second) in links_of(m).items():
             found[f"{m.name}.{link}"] = Body(f"{m.name}.{link}", (f"{m.name}.{first}", f"{m.name}.{second}"))

@@ -8,6 +8,7 @@ parent dies, is the affair of its executor.
 from __future__ import annotations
 
 import os
+import sys
 import tempfile
 import threading
 from collections.abc import Callable, Iterator
@@ -88,9 +89,8 @@ class Processes:
     def outcomes(self, task: Task[T], numbers: Iterator[int], jobs: int, stop: Stop) -> Iterator[T]:
         """See `Executor`."""
         from joblib import delayed
-        from joblib.externals.loky.backend import resource_tracker
 
-        resource_tracker.ensure_running()  # begun later it would unblock signals in the middle
+        _begin_tracker()
         with tempfile.TemporaryDirectory(prefix="linksweep-", ignore_cleanup_errors=True) as folder:
             flag = Path(folder, "stop")
             calls = (delayed(_until_flag)(task, number, flag) for number in _until(stop, numbers))
@@ -154,6 +154,21 @@ def _watched(stop: Stop, give_up: Callable[[], None] | None = None) -> Iterator[
     finally:
         over.set()
         watcher.join()
+
+
+def _begin_tracker() -> None:
+    """Begin the process that clears away what joblib's workers leave; begun later it would unblock signals.
+
+    Of a program that had to leave at once it would say, after the last line, how many semaphores it found.
+    """
+    from joblib.externals.loky.backend import resource_tracker
+
+    before = sys.warnoptions[:]
+    sys.warnoptions.append("ignore:resource_tracker:UserWarning")  # its command line takes the options of this process
+    try:
+        resource_tracker.ensure_running()
+    finally:
+        sys.warnoptions[:] = before
 
 
 def _kill_workers() -> None:

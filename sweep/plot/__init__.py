@@ -7,6 +7,6 @@ them.  Nothing opens a window.
 from __future__ import annotations
 
 from sweep.plot.datasets import front, map, sensitivity, tolerance
-from sweep.plot.mechanisms import mechanism, motion, polar_load
+from sweep.plot.mechanisms import cyclogram, mechanism, motion, polar_load
 
-__all__ = ["front", "map", "mechanism", "motion", "polar_load", "sensitivity", "tolerance"]
+__all__ = ["cyclogram", "front", "map", "mechanism", "motion", "polar_load", "sensitivity", "tolerance"]

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from sweep.errors import InputError
 from sweep.evaluation.angles import AngleUnit, grid_in_radians, in_radians
 from sweep.evaluation.curves import motion_curves
+from sweep.evaluation.cyclogram import cyclogram as table
 from sweep.evaluation.joints import parts
 from sweep.evaluation.poses import evaluate, pose_wants
 from sweep.exchange.scene import over, shown_name
@@ -19,6 +20,7 @@ from sweep.families import Mechanism
 from sweep.families import family as find_family
 from sweep.families.domain import Interval
 from sweep.report.curves import motion_figure
+from sweep.report.cyclogram import cyclogram_figure
 from sweep.report.figures import OPTIMUM, house_style, new_figure
 from sweep.report.mechanisms import VIEWS, exists, mechanism_figure
 
@@ -90,6 +92,30 @@ def motion(
     with house_style():
         panels = motion_figure(curves, units, family.position, speed, (), None, names, given)
     return np.array(panels, dtype=object)
+
+
+def cyclogram(mechanism: Mechanism, design: Table, *, dwell: float = 0.02, angles: AngleUnit | None = None) -> Axes:
+    """Show what all members of a machine do over one turn: strokes, dwells and events; :func:`sweep.cyclogram`.
+
+    Parameters
+    ----------
+    mechanism, design, dwell, angles : as of :func:`sweep.cyclogram`
+
+    Returns
+    -------
+    Axes
+        a row of bars for each member: rising strokes dark, falling ones light, dwells beneath, events as lines
+
+    Examples
+    --------
+    >>> import sweep
+    >>> axes = sweep.plot.cyclogram("slider_crank", {"a": 20.0, "b": 70.0, "e": 5.0})
+    >>> axes.get_xlabel()
+    'angle of the main shaft [°]'
+    """
+    rows = table(mechanism, design, dwell=dwell, angles=angles)
+    with house_style():
+        return cyclogram_figure(rows).axes[0]
 
 
 def mechanism(

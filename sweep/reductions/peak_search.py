@@ -317,11 +317,12 @@ class Search:
         chosen = which[has]
         found.value[rows[has]] = peaks.height[chosen] * (-1.0 if request.mode == -1 else 1.0)
         err = peaks.err_height[chosen]
-        if self.near is not None and self.family.precise_poses is None:
-            close = np.flatnonzero(self.near.only(rows[has]).distance(peaks.phi[chosen]) < CLOSE)
-            if close.size:
-                designs, phi = self.designs[rows[has][close]], peaks.phi[chosen[close]]
-                err[close] += VARIES * shaken(self.family, designs, phi, request.pose)
+        if self.family.precise_poses is None and chosen.size:
+            # Badly scaled designs lose digits before any discriminant is formed of them.
+            off = shaken(self.family, self.designs[rows[has]], peaks.phi[chosen], request.pose)
+            err = np.maximum(err, off)
+            if self.near is not None:
+                err += np.where(self.near.only(rows[has]).distance(peaks.phi[chosen]) < CLOSE, VARIES * off, 0.0)
         found.err[rows[has]] = err
         moved = np.zeros(rows.size)
         moved[has] = np.abs(peaks.height[chosen] - peaks.guess[chosen])

@@ -211,7 +211,9 @@ def _with_defaults(study: Study, rows: pd.DataFrame) -> pd.DataFrame:
 
 def _absent(study: Study, known: Container[str]) -> dict[str, float]:
     """Name the optional parameters that are not among the known ones, with their defaults."""
-    return {p.name: p.default for p in study.family.parameters if p.name not in known and p.default is not None}
+    # A dataset without a choice that later versions have is one in which it was not taken.
+    defaults = {p.name: 0.0 if p.unless else p.default for p in study.family.parameters if p.name not in known}
+    return {name: value for name, value in defaults.items() if value is not None}
 
 
 def study_of(plan: Mapping[str, Any], folder: Path) -> Study:

@@ -14,6 +14,7 @@ from sweep.errors import StoreError
 from sweep.jobs.progress import Say, unsaid
 from sweep.report import answer, front, maps, mechanisms, robust, tables
 from sweep.report.curves import motion, motion_caption
+from sweep.report.cyclogram import cyclogram_figure, of_dataset, table_in_degrees
 from sweep.report.dataset import Dataset, gather
 from sweep.report.figures import TEMPLATES, Saved, drawn_before, house_style, save
 from sweep.report.live import live
@@ -71,6 +72,8 @@ def _write(folder: Path, out: Path, say: Say) -> Path:
         say("report", 3, STEPS, "steps")
         copy_tables(folder, out)
         write_survivors(data.parts, out / "survivors.parquet")
+        if (rows := of_dataset(data)) is not None:
+            table_in_degrees(rows).to_csv(out / "cyclogram.csv", index=False, float_format="%.4f")
         target = out / "report.html"
         partial = out / "_tmp-report.html"
         own = own_figures(data.study, out / "figures")
@@ -100,6 +103,7 @@ def draw(
         "trade_off": maps.trade_off(data, found),
         "motion": motion(data),
         "mechanism": mechanisms.mechanism(parts),
+        "cyclogram": None if (rows := of_dataset(data)) is None else cyclogram_figure(rows),
         "tolerance": robust.tolerance(data),
         "sensitivity": robust.sensitivity(data),
     }

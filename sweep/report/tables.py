@@ -188,7 +188,7 @@ def parameter_rows(data: Dataset) -> list[ParameterRow]:
     links = () if study.locus is None else study.locus.made
     own = study.bare.parameter_names
     for p in study.family.parameters:
-        if p.name not in own and study.space.fixed.get(p.name) == p.default:
+        if p.name not in own and study.space.fixed.get(p.name) == (0.0 if p.unless else p.default):
             continue  # an input of an effect that the study left out
         shown = quantity(p.name, data.units.get(p.name, {"length": "mm", "angle": "rad"}.get(p.unit, "1")))
         value, other = _number(data.result, p.name), _number(data.reference, p.name)

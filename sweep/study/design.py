@@ -72,7 +72,8 @@ def read_space(file: StudyFile, family: Family, other: Elsewhere) -> DesignSpace
             found[name] = entry
     axes = tuple(entry for entry in found.values() if isinstance(entry, Axis))
     own = [p for p in family.parameters if p.name not in other.made]
-    fixed = {p.name: p.default for p in own if p.default is not None and p.name not in found}
+    left_out = {p.name: p.left_out(found) for p in own if p.name not in found}
+    fixed = {name: value for name, value in left_out.items() if value is not None}
     fixed |= {name: 0.0 for name in other.fitted if name not in found} | dict(other.given)
     fixed |= {name: entry for name, entry in found.items() if not isinstance(entry, Axis)}
     if sample is None and (count := math.prod(axis.count for axis in axes)) > MOST_DESIGNS:
@@ -117,7 +118,8 @@ def read_reference(
     fixed = {} if space is None else space.fixed
     given = {**other.given, **{name: value for name, value in fixed.items() if name not in own}}
     _check_names(family, raw, key, faults, tuple(given))
-    values = {p.name: p.default for p in family.parameters if p.default is not None} | given
+    defaults = {p.name: p.left_out(raw) for p in family.parameters}
+    values = {name: value for name, value in defaults.items() if value is not None} | given
     for parameter in family.parameters:
         if parameter.name in raw:
             place = (*key, parameter.name)

@@ -15,10 +15,12 @@ from sweep.families.names import is_flag
 from sweep.quantities import units
 from sweep.quantities.limits import Limit
 from sweep.quantities.resolve import output as design_output
+from sweep.study.cyclogram import limits_of_cyclogram
 from sweep.study.file import Faults, Key, StudyFile
 from sweep.study.locus import prescribed_limits
 from sweep.study.parameter import Entry
 from sweep.study.section import Number, Section, read_section
+from sweep.study.settings import limits_of_settings
 
 _SIDES = ("<", ">", "=", "\u2264", "\u2265")
 _SIDE = re.compile("([<>=\u2264\u2265]+)\\s*(.*)", re.DOTALL)
@@ -45,9 +47,14 @@ def read_output_name(family: Family, name: str, key: Key, faults: Faults) -> Out
 
 
 def read_limits(file: StudyFile, family: Family, prescribed: Mapping[str, Entry]) -> tuple[Limit, ...]:
-    """Read the limits in internal units: those of prescribed outputs, then those of the table in its order."""
+    """Read the limits in internal units: of prescribed outputs, a machine's settings and cyclogram, then the table's.
+
+    What the table bounds itself, settings do not.
+    """
     raw, faults = file.free_table("limits") or {}, file.faults
     found = list(prescribed_limits(prescribed))
+    found += [limit for limit in limits_of_settings(file) if limit.output not in raw]
+    found += limits_of_cyclogram(file, family)
     held = {limit.output: limit for limit in found}
     for name, entry in raw.items():
         key: Key = ("limits", name)

@@ -88,7 +88,22 @@ class RelationSection(Section):
         None, description='of a gap, the radius of each body, as ["4 mm", "3 mm"]'
     )
     take: Names | None = Field(None, description='a needle and a blade of [tools], as ["thin", "blade"]')
-    sense: int | None = Field(None, description="of a take, 1 or -1: along n x w of the needle or against it")
+    enter: Names | None = Field(
+        None, description='what passes, a blade and the seam of [tools], as ["thin", "upper", "seam"]'
+    )
+    sense: int | None = Field(
+        None,
+        description="1 or -1: of a take along n x w of the needle or against it, of an enter the triangle's normal",
+    )
+    fields: dict[str, Annotated[list[str], Field(min_length=2, max_length=2)]] | None = Field(
+        None, description='of a take, the least and most rise of each field of work, { slow = ["1.5 mm", "3 mm"] }'
+    )
+    window: Annotated[list[str], Field(min_length=2, max_length=2)] | None = Field(
+        None, description='of an enter, from and to, as ["200 deg", "300 deg"]'
+    )
+    settings: str | None = Field(
+        None, description='of a take, a real machine whose settings are limits: "juki-mo-104d"'
+    )
     torque: Names | None = Field(None, description='members, as ["needle", "looper"]')
     shaking: Names | None = Field(None, description='members, as ["needle", "looper"]')
 
@@ -189,9 +204,16 @@ def _machine(
     relations = {}
     for name, raw in _tables(data, "relations", faults).items():
         section = read_section(RelationSection, raw, ("relations", name), faults)
-        relations[name] = section.model_dump(exclude_none=True)
+        relations[name] = section.model_dump(exclude_none=True, exclude={"settings"})
         if section.radii is not None:
             relations[name]["radii"] = _lengths(section.radii, ("relations", name, "radii"), faults)
+        for field, ends in (section.fields or {}).items():
+            relations[name]["fields"][field] = _lengths(ends, ("relations", name, "fields", field), faults)
+        if section.window is not None:
+            key: Key = ("relations", name, "window")
+            relations[name]["window"] = [
+                faults.number(text, "rad", (*key, k)) or 0.0 for k, text in enumerate(section.window)
+            ]
     shafts = {name: _shaft(name, raw, faults) for name, raw in _tables(data, "shafts", faults).items()}
     tools = {name: read_tool(name, raw, faults) for name, raw in _tables(data, "tools", faults).items()}
     for name, thread in (threads or {}).items():
@@ -220,7 +242,7 @@ def _machine(
         if place[:1] in (("shafts",), ("tools",)):
             faults.value(place if place[-1] == error.name else (*place, error.name), error.value, error.allowed)
             return None
-        key: Key = place if place[:1] == ("relations",) else ("machine", *place)
+        key = place if place[:1] == ("relations",) else ("machine", *place)
         faults.value(key if place[:1] == ("relations",) else (*key, error.name), error.value, error.allowed)
         return None
 

@@ -12,6 +12,7 @@ from sweep.effects import input_names
 from sweep.families import NAMES, family
 from sweep.families.base import Family, Parameter
 from sweep.quantities.units import example, internal_unit
+from sweep.study.cyclogram import StrokeSection
 from sweep.study.design import SampleTable
 from sweep.study.limits import LimitEntry
 from sweep.study.parameter import FixedEntry, ListEntry, RangeEntry
@@ -40,6 +41,8 @@ def study_schema() -> Schema:
     tables["loads"] = _each({"anyOf": [*load["anyOf"], _each(load)]})
     limit = {"anyOf": [{"const": True}, {"type": "string"}, _model(LimitEntry, definitions)]}
     tables["limits"] = _each({"anyOf": [*limit["anyOf"], _each(limit)]})
+    window = {"type": "array", "items": {"type": "string"}, "minItems": 2, "maxItems": 2}
+    tables["cyclogram"] = _each({"anyOf": [window, _model(StrokeSection, definitions)]})
     tables["pareto"]["properties"] |= dict.fromkeys(("at_most", "at_least"), ENTRY)
     names = tables["mechanism"]["properties"]
     names["family"]["enum"] = list(NAMES)

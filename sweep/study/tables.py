@@ -58,6 +58,7 @@ TABLES: Mapping[str, Table] = {
     "locus": Table("Limit positions of the first stage, from which its links follow."),
     "fit": Table("The line that a guided point is fitted to.", FitSection),
     "limits": Table("Bounds of design outputs and of parameters."),
+    "cyclogram": Table("When events of a machine happen and its members stroke: limits of crank angles."),
     "objective": Table("The design output to be made small, or large.", ObjectiveSection),
     "accuracy": Table(
         "A relative error of the extrema, or a grid of crank angles; and what is to be proven.", AccuracySection
@@ -100,7 +101,7 @@ def read_sections(file: StudyFile) -> Sections:
     for name in REQUIRED_TABLES:
         if name not in file:
             file.faults.missing((name,), f"a table [{name}]")
-    for name in ("design", "bodies", "loads", "locus", "limits"):
+    for name in ("design", "bodies", "loads", "locus", "limits", "cyclogram"):
         file.free_table(name)
     read: dict[str, Any] = {
         name: read_table(table.model, name, file) for name, table in TABLES.items() if table.model is not None

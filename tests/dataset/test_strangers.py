@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import ctypes
 import errno
 import io
 import json
@@ -14,6 +15,7 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
+import pyarrow as pa
 import pyarrow.parquet as pq
 import pytest
 from click.testing import CliRunner
@@ -252,3 +254,46 @@ def test_a_file_system_without_locks_is_said_and_used(
             warnings.simplefilter("ignore")
             with pytest.raises(LockedError), locked(place):
                 pass
+
+
+def test_a_row_that_is_there_twice_under_a_right_hash_is_found(whole: tuple[Path, Path], dataset: Path) -> None:
+    part = store.parts(dataset)[1]
+    table, buffer = pq.read_table(part.path), io.BytesIO()
+    pq.write_table(pa.concat_tables([table, table.slice(0, 1)]), buffer)
+    part.path.unlink()
+    name = part.path.name.rpartition("-")[0] + f"-{content_hash(buffer.getvalue())}.parquet"
+    (dataset / name).write_bytes(buffer.getvalue())
+    assert sweep.verify(dataset, designs=0).exit_code == 74
+    with pytest.raises(StoreError, match="not in their order, or there twice"):
+        sweep.compare(whole[1], dataset)
+
+
+def without_rights() -> None:
+    """Take from a superuser what opens closed folders to it, by Linux's capabilities."""
+    for capability in (1, 2):  # CAP_DAC_OVERRIDE, CAP_DAC_READ_SEARCH
+        ctypes.CDLL(None).prctl(24, capability, 0, 0, 0)  # PR_CAPBSET_DROP
+
+
+@pytest.mark.parametrize("verb", ["verify", "report", "run"])
+def test_a_folder_closed_to_the_user_is_said(whole: tuple[Path, Path], dataset: Path, verb: str) -> None:
+    place = ("run", str(whole[0]), "--out", str(dataset)) if verb == "run" else (verb, str(dataset))
+    dataset.chmod(0)
+    try:
+        done = subprocess.run(
+            [sys.executable, "-m", "sweep", *place], capture_output=True, text=True, cwd=ROOT, timeout=120,
+            check=False, preexec_fn=without_rights if os.getuid() == 0 else None,
+        )  # fmt: skip
+    finally:
+        dataset.chmod(0o755)
+    assert done.returncode == 2 and "Traceback" not in done.stderr and "not readable" in done.stderr
+
+
+def test_little_memory_ends_with_70_or_suffices(whole: tuple[Path, Path], tmp_path: Path) -> None:
+    limited = "import resource, sys; resource.setrlimit(resource.RLIMIT_AS, (8 * 10**8, 8 * 10**8)); "
+    program = f"{limited}sys.argv = ['sweep', *sys.argv[1:]]; from sweep.__main__ import main; main()"
+    done = subprocess.run(
+        [sys.executable, "-c", program, "run", str(whole[0]), "--out", str(tmp_path / "designs")],
+        capture_output=True, text=True, cwd=ROOT, timeout=240, check=False,
+    )  # fmt: skip
+    assert "Traceback" not in done.stderr
+    assert done.returncode == 0 or (done.returncode == 70 and "the memory it may use is full" in done.stderr)

@@ -65,7 +65,7 @@ def test_the_search_by_samples_is_wrong_about_the_same_designs(monkeypatch):
     wanted = ("max_abs_load_support_d2",)
     monkeypatch.setattr(panels, "has_kinks", lambda family, request, jumps: False)
     faults = exceeded(found(full, designs, wanted), dense(full, designs, wanted, 20_000), wanted)
-    assert {k for _, k in faults} >= {12, 19}
+    assert len({k for _, k in faults}) > 2
 
 
 @pytest.mark.parametrize("target", [1e-3, 1e-9])

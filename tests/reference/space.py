@@ -55,14 +55,14 @@ def root(function, slope, near=None, samples=240):
     return None
 
 
-def derivatives(outputs, phi, count=3):
+def derivatives(outputs, phi, count=3, step="1e-10"):
     """``outputs(phi, near)`` gives a dict of numbers; each with its derivatives by phi, prefixed d, d2, d3."""
     start = outputs(phi, None)
     if start is None:
         return None
-    step = mp.mpf(10) ** -10
+    step = mp.mpf(step)
     stencil = {k: outputs(phi + k * step, start) for k in range(-4, 5)}
-    # central differences of eighth order: what is left out is below 1e-40
+    # central differences of eighth order: what is left out is below 1e-40 where nothing changes within 1e-5 rad
     weights = {
         1: {1: mp.mpf(4) / 5, 2: -mp.mpf(1) / 5, 3: mp.mpf(4) / 105, 4: -mp.mpf(1) / 280},
         2: {0: -mp.mpf(205) / 72, 1: mp.mpf(8) / 5, 2: -mp.mpf(1) / 5, 3: mp.mpf(8) / 315, 4: -mp.mpf(1) / 560},

@@ -133,3 +133,18 @@ def test_a_number_of_workers_that_makes_no_sense_is_refused(jobs: int) -> None:
 def test_an_address_where_none_belongs_is_refused(name: str) -> None:
     with pytest.raises(InputError, match="an address after dask= only"):
         executor(name, 2)
+
+
+def test_a_program_that_leaves_at_once_has_the_last_word() -> None:
+    """What clears away after it says nothing of what it finds."""
+    program = (
+        "import os\n"
+        "from sweep.jobs.executors import _begin_tracker\n"
+        "_begin_tracker()\n"
+        "from joblib.externals.loky.backend.synchronize import Lock\n"
+        "lock = Lock()\n"
+        "os.write(2, b'run again')\n"
+        "os._exit(143)\n"
+    )
+    ended = subprocess.run([sys.executable, "-c", program], cwd=ROOT, capture_output=True, timeout=120, check=False)
+    assert (ended.returncode, ended.stderr) == (143, b"run again")

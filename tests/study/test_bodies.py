@@ -6,6 +6,7 @@ import numpy as np
 import pandas as pd
 import pytest
 
+from sweep.cli.plan import _effects
 from sweep.errors import StudyError
 from sweep.study import load_study, study_from_data
 from sweep.study.load import merged
@@ -66,6 +67,16 @@ def test_bodies_in_a_table_of_their_own_make_the_same_study_as_in_design(tmp_pat
     for name, values in columns.items():
         np.testing.assert_array_equal(values, others[name])
     assert study_from_data(new.data, new.path).fingerprint == new.fingerprint
+
+
+def test_bodies_of_which_only_the_mass_is_given_are_slender_rods_and_the_plan_says_so(tmp_path):
+    bare = load(tmp_path, HEAD + "[bodies]\n" + BODIES)
+    more = load(tmp_path, HEAD + "[bodies]\n" + BODIES + "com_rocker_x2 = '0 mm'\n")
+    names = [f"rod_{body}2" for body in ("crank", "coupler", "rocker")]
+    assert [bare.space.fixed[name] for name in names] == [1.0, 1.0, 1.0]
+    assert [more.space.fixed[name] for name in names] == [1.0, 1.0, 0.0]
+    at = (lines := _effects(more)).index("bodies without centre and inertia are slender rods between their joints")
+    assert lines[at + 1].split(", ") == ["  rod_crank2", "rod_coupler2"]
 
 
 def test_what_nothing_wanted_takes_describes_the_machine_and_changes_no_study(tmp_path):

@@ -51,7 +51,8 @@ def factors(name, design, phi, expected, got):
         size = mp.mpf(1) if mechanism.pose_output[output].unit == "rad" else mp.mpf(0)
         for one in ladder(mechanism, output):
             size = max(size, mp.mpf(cond[one]), abs(expected[one]))
-            found[one] = float(abs(mp.mpf(float(got[one])) - expected[one]) / (EPS * size))
+            error = abs(mp.mpf(float(got[one])) - expected[one])
+            found[one] = float(error / (EPS * size)) if error else 0.0
     return found
 
 

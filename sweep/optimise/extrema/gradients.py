@@ -118,8 +118,12 @@ def scalar_gradient(function: Any, fractions: Array) -> Array:
 
     Parameters
     ----------
-    function : takes (k, n) scaled variables, returns (k,)
+    function : takes (k, n) scaled variables, returns (k,), or (k, m) for m functions at once
     fractions : (n,) where
+
+    Returns
+    -------
+    (n,), or (n, m)
     """
     n, step = len(fractions), 1e-3
     samples, weights = [], []
@@ -130,5 +134,7 @@ def scalar_gradient(function: Any, fractions: Array) -> Array:
         moved = np.repeat(fractions[None, :], 5, axis=0)
         moved[:, j] += nodes * step
         samples.append(moved)
-    values = np.reshape(function(np.concatenate(samples)), (n, 5))
-    return np.asarray(np.sum(values * np.array(weights), axis=1), np.float64)
+    values = np.asarray(function(np.concatenate(samples)), np.float64)
+    by_variable = values.reshape(n, 5, *values.shape[1:])
+    weight = np.array(weights).reshape(n, 5, *(1,) * (values.ndim - 1))
+    return np.asarray(np.sum(by_variable * weight, axis=1), np.float64)

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections import defaultdict
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -18,6 +19,7 @@ from sweep.optimise.local.kkt import ACTIVE, Multipliers, multipliers
 from sweep.optimise.problem.program import Program
 from sweep.optimise.problem.rows import Form
 from sweep.optimise.problem.statement import PLACE, Problem
+from sweep.reductions.steps import applying_step
 
 FEASIBLE = 1e-9  # largest scaled violation of a feasible design
 PRICE = 10.0  # of a unit of scaled violation when two designs are compared, until multipliers are known
@@ -123,8 +125,8 @@ class Model:
 
     def atoms(self, design: Array, form: Form, points: Points) -> Array:
         """Return what the form's rows are made of: curves at the points, their angles, plain numbers."""
-        scalars = [self._scalar(name, design[None, :])[0] for name in form.scalars]
-        return np.concatenate([points.value, points.phi, scalars])
+        found = self._scalars(form.scalars, design[None, :])
+        return np.concatenate([points.value, points.phi, [found[name][0] for name in form.scalars]])
 
     def moved(self, fractions: Array, form: Form, points: Points) -> tuple[Points, Array]:
         """Return the points followed to another design, and the atoms there."""
@@ -137,8 +139,8 @@ class Model:
         """Return gradients (R, n) of the form's rows by the scaled variables, at followed points."""
         designs = stepped(self.problem, self.base, fractions)
         values, moves = gradients(self.curves, designs, points, self.program.places)
-        scalars = [self._scalar_gradient(name, fractions, designs, points, moves)[None, :] for name in form.scalars]
-        jacobian = np.concatenate([values, moves, *scalars])
+        scalars = self._scalar_gradients(form.scalars, fractions, designs, points, moves)
+        jacobian = np.concatenate([values, moves, *(scalars[name][None, :] for name in form.scalars)])
         # What has no derivative, as the angle of a vanishing extremum, spoils the rows that ask for it and no others.
         lost = ~np.isfinite(jacobian).all(axis=1)
         jacobian[lost] = 0.0
@@ -170,24 +172,42 @@ class Model:
         self.price = max(2.0 * float(sum(limits)), 0.5 * self.price, 1.0)
         return found.residual
 
-    def _scalar_gradient(self, name: str, fractions: Array, designs: Any, points: Points, moves: Array) -> Array:
-        if name in self.problem.family.parameter_names or name in self.program.pieces:
-            return np.asarray(self._scalar(name, designs).imag / STEP, np.float64)
-        if name in self.program.readings:
-            k, of = self.program.place(name, self.curves, designs[0].real, points), self.program.readings[name].of
-            none = np.full(len(fractions), math.nan)
-            return none if k < 0 else reading_gradient(self.curves, designs, of, points.phi[k], moves[k])
-        return scalar_gradient(lambda f: self._scalar(name, self.problem.placed(self.base, f)), fractions)
+    def _scalar_gradients(
+        self, names: Sequence[str], fractions: Array, designs: Any, points: Points, moves: Array
+    ) -> dict[str, Array]:
+        found: dict[str, Array] = {}
+        for name in names:
+            if name in self.problem.family.parameter_names or name in self.program.pieces:
+                found[name] = np.asarray(self._scalars((name,), designs)[name].imag / STEP, np.float64)
+            elif name in self.program.readings:
+                k, of = self.program.place(name, self.curves, designs[0].real, points), self.program.readings[name].of
+                none = np.full(len(fractions), math.nan)
+                found[name] = none if k < 0 else reading_gradient(self.curves, designs, of, points.phi[k], moves[k])
+        rest = [name for name in names if name not in found]
+        if rest:
 
-    def _scalar(self, name: str, designs: Any) -> Any:
-        names = self.problem.family.parameter_names
-        if name in names:
-            return designs[:, names.index(name)]
-        if name in self.program.pieces:
-            return self.program.pieces[name](designs)
+            def values(at: Array) -> Array:
+                numbers = self._scalars(rest, self.problem.placed(self.base, at))
+                return np.stack([numbers[name] for name in rest], axis=1)
 
-        columns = design_outputs(self.problem.family, designs, [name], self.problem.accuracy, self.problem.window)
-        return np.asarray(columns[name], dtype=np.float64)
+            found |= dict(zip(rest, scalar_gradient(values, fractions).T, strict=True))
+        return found
+
+    def _scalars(self, names: Sequence[str], designs: Any) -> dict[str, Any]:
+        """Return plain numbers of designs, each (k,); those that one step of the family gives are asked together."""
+        problem, found, steps = self.problem, {}, defaultdict(list)
+        for name in names:
+            if name in problem.family.parameter_names:
+                found[name] = designs[:, problem.family.parameter_names.index(name)]
+            elif name in self.program.pieces:
+                found[name] = self.program.pieces[name](designs)
+            else:
+                step = applying_step(problem.family, name, problem.accuracy)
+                steps[name if step is None else step[0].name].append(name)
+        for together in steps.values():
+            columns = design_outputs(problem.family, designs, together, problem.accuracy, problem.window)
+            found |= {name: np.asarray(columns[name], dtype=np.float64) for name in together}
+        return found
 
 
 def refuse_dependent(problem: Problem, program: Program, starts: Array) -> None:

@@ -40,6 +40,46 @@ def test_swivel_equals_point_geometry():
         assert max(found.values()) <= 16.0, (design, phi, found)
 
 
+def passing(generator):
+    """A design whose pin passes within 1e-7 to 1 crank of the block's centre, half of them in the plane of x and u."""
+    phi, alpha, f = generator.uniform(-3.0, 3.0), generator.uniform(-3.0, 3.0), 0.0
+    off = 10.0 ** -generator.uniform(0.0, 7.0) * generator.uniform(-1.0, 1.0, 3) * generator.choice([0.0, 1e-3, 1.0], 3)
+    if generator.random() < 0.5:
+        phi = generator.choice([0.0, math.pi]) + 10.0 ** -generator.uniform(1.0, 7.0)
+    else:
+        f = (off[0] - math.cos(alpha) * math.sin(phi)) / math.sin(alpha)
+    height = f * math.cos(alpha) - math.sin(alpha) * math.sin(phi)
+    e, g = math.cos(phi) + off[1], height + off[2]
+    if generator.random() < 0.3:
+        e, g = float(np.rint(e)), generator.choice([0.0, off[2]])
+    return (1.0, e, f, g, alpha, generator.uniform(-3.0, 3.0)), phi + generator.choice([0.0, 1e-7, 1e-5, 1e-2])
+
+
+def test_swivel_keeps_its_digits_where_the_pin_passes_near_the_centre_of_the_block():
+    # What differences of E' and rho' n had lost was a factor of 1e6 in the third derivatives.  Left is the rounding of
+    # E, which moves rho and n together but enters here apart: 64 are asked, 52 measured (docs/promises.md).  Very
+    # near the centre the second order of that rounding shows, which a condition number leaves out.
+    generator, near = np.random.default_rng(2), 0
+    for _ in range(200):
+        design, phi = passing(generator)
+        row = evaluated(design, phi, ALL).iloc[0]
+        if row.status != st.OK or row.rho < 1e-7:
+            continue
+        near += row.rho < 1e-2
+        found = factors("swivel", design, phi, naive.outputs(design, phi), row)
+        assert max(found.values()) <= 64.0 + 16.0 * 2.0**-53 / row.rho**4, (design, phi, found)
+    assert near > 80
+
+
+def test_swivel_pose_that_had_lost_four_digits():
+    design, phi = (1.0, 1.0, 0.0, 2.7797018893692724e-05, -1.0559955243299006, -2.3083237632277065), 1e-9
+    assert evaluated(design, phi, ["dz_p"]).dz_p[0] == pytest.approx(1.59467534827335219, rel=2.0**-51)
+    assert (
+        max(factors("swivel", design, phi, naive.outputs(design, phi), evaluated(design, phi, ALL).iloc[0]).values())
+        < 16.0
+    )
+
+
 def test_swivel_point_stays_on_the_rod_through_the_block():
     frame = evaluated(DESIGN, np.linspace(0.0, 6.0, 25), ALL)
     pin, point, n = (frame[[f"{x}_{name}" for x in "xyz"]].to_numpy() for name in ("b", "p", "n"))

@@ -1,0 +1,129 @@
+"""What all members of a machine do over one turn: strokes, dwells at their ends, and events; machine-and-stitch, 8."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from kernels.types import TWO_PI, Array
+from sweep.errors import InputError
+from sweep.evaluation.angles import AngleUnit, in_radians
+from sweep.evaluation.summaries import design_outputs
+from sweep.evaluation.tables import design_matrix
+from sweep.families import Mechanism
+from sweep.families import family as find_family
+from sweep.families.base import Accuracy, Family
+from sweep.families.crossings import SAMPLES, Poses
+from sweep.families.machines import Machine
+from sweep.families.moments import Taking
+from sweep.families.triangles import Entering
+from sweep.quantities.resolve import event_names
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+    from sweep.evaluation.tables import Table
+
+Row = tuple[str, str, str, float, float, float]
+COLUMNS = ("member", "kind", "name", "start", "end", "size")
+
+
+def cyclogram(
+    mechanism: Mechanism, design: Table, *, dwell: float = 0.02, angles: AngleUnit | None = None
+) -> pd.DataFrame:
+    """Return what happens over one turn of the main shaft, in its order.
+
+    Parameters
+    ----------
+    mechanism, design : as of :func:`sweep.joints`
+    dwell : share of the largest stroke within which a member counts as standing at an end of it
+    angles : the unit of the angles of ``design``, "rad" or "deg", as of :func:`sweep.evaluate`
+
+    Returns
+    -------
+    DataFrame
+        ``member`` ("" for what belongs to several), ``kind`` (stroke, dwell, event), ``name``, ``start`` and ``end``
+        (crank angles of the main shaft [rad]; an end below its start lies in the next turn), ``size`` (the way of the
+        follower with its sign; of a dwell its band; nan of an event).  A member that turns fully has no strokes
+
+    Examples
+    --------
+    >>> import sweep
+    >>> sweep.cyclogram("slider_crank", {"a": 20.0, "b": 70.0, "e": 0.0})[["kind", "name", "size"]].values.tolist()
+    [['stroke', 'falls', -40.0], ['dwell', 'low', 0.8], ['stroke', 'rises', 40.0], ['dwell', 'high', 0.8]]
+    """
+    import pandas as pd
+
+    family = find_family(mechanism)
+    designs = design_matrix(family, in_radians(family, design, angles))[0]
+    if len(designs) != 1:
+        raise InputError("design", "several rows", "the parameters of one design", f"table of {family.name}")
+    if not 0.0 < dwell < 0.5:
+        raise InputError("dwell", dwell, "a share of the stroke between 0 and 0.5", "cyclogram")
+    poses = Poses(family, family.precise(), designs)
+    rows = [row for member, name in _positions(family) for row in _strokes(poses, family, member, name, dwell)]
+    rows += _events(family, designs)
+    found = pd.DataFrame(rows, columns=list(COLUMNS))
+    return found.sort_values(["start", "kind"], kind="stable", ignore_index=True)
+
+
+def _positions(family: Family) -> Iterator[tuple[str, str]]:
+    """Yield each member with the position of its follower, whose derivative is known."""
+    if isinstance(family, Machine):
+        pairs = [(m.name, f"{m.name}.{m.family.position}") for m in family.members]
+    else:
+        pairs = [("", family.position)]
+    yield from ((member, name) for member, name in pairs if name in family.derivative_of)
+
+
+def _strokes(poses: Poses, family: Family, member: str, name: str, dwell: float) -> Iterator[Row]:
+    """Yield the strokes between neighbouring extremes, and the dwells at both ends of the largest."""
+    rate = family.derivative_of[name]
+    status, (slope, values) = poses.samples([rate, name], SAMPLES)
+    wraps = family.pose_output[name].wraps
+    whole = np.unwrap(values[0]) if wraps else values[0]
+    if status[0] or (wraps and abs(whole[-1] - whole[0]) > np.pi):
+        return
+    ends = np.sort(poses.turning(slope, rate).phi % TWO_PI)
+    if ends.size < 2:
+        return
+    exact = poses.at(np.zeros(ends.size, np.intp), ends, name)[0]
+    if wraps:  # the turn that the samples are in
+        grid = np.arange(SAMPLES + 1) * TWO_PI / SAMPLES
+        exact = exact + TWO_PI * np.round((np.interp(ends, grid, np.append(whole, whole[0])) - exact) / TWO_PI)
+    for k, size in enumerate(np.roll(exact, -1) - exact):
+        yield member, "stroke", "rises" if size > 0.0 else "falls", ends[k], ends[(k + 1) % ends.size], size
+    band = dwell * float(np.ptp(exact))
+    for word, k in (("low", int(exact.argmin())), ("high", int(exact.argmax()))):
+
+        def off(phi: float, level: float = exact[k]) -> float:
+            away = poses.at(np.zeros(1, np.intp), np.array([phi]), name)[0][0] - level
+            return float(abs(away - TWO_PI * round(away / TWO_PI) if wraps else away)) - band
+
+        start, end = (_left(off, float(ends[k]), way) for way in (-1.0, 1.0))
+        yield member, "dwell", word, start % TWO_PI, end % TWO_PI, band
+
+
+def _left(off: Callable[[float], float], phi: float, way: float) -> float:
+    """Return where a band about an extreme is left, going one way from it."""
+    from scipy.optimize import brentq
+
+    step = way * TWO_PI / SAMPLES
+    inside = phi
+    while off(inside + step) < 0.0 and abs(inside - phi) < TWO_PI:
+        inside += step
+    return float(brentq(off, inside, inside + step)) if abs(inside - phi) < TWO_PI else inside
+
+
+def _events(family: Family, designs: Array) -> Iterator[Row]:
+    """Yield the moments and events of the machine that happen."""
+    names = [(event.name, event_names(family, event)[0]) for event in family.events]
+    relations: tuple[Any, ...] = getattr(family, "relations", ())
+    names += [(r.name, f"phi_{r.name}") for r in relations if isinstance(r, Taking | Entering)]
+    for name, place in names:
+        found = design_outputs(family, designs, [place], Accuracy(target=1e-9))
+        phi = float(np.asarray(found[place], np.float64)[0])
+        if np.isfinite(phi):
+            yield "", "event", name, phi, phi, float("nan")

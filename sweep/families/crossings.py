@@ -1,0 +1,175 @@
+"""Zeros of pose outputs of many designs at once: extremes first, then one root between neighbours of opposite sign."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from kernels import status as st
+from kernels.types import EPS, TWO_PI, Array
+from sweep.families.base import Accuracy, Angles, Columns, Family, Output, Step, Work
+
+if TYPE_CHECKING:
+    from sweep.families.machines import Machine
+
+SAMPLES = 512
+BLOCK = 256  # designs at once: their samples stay in the caches
+TANGENT = 64.0 * 2.0**-53  # of the coordinates that a distance is a difference of
+ROUNDING: Any = {"xatol": 4.0 * EPS * TWO_PI, "xrtol": 0.0}  # of a root that is closed
+
+Passages = Callable[["Poses", int, frozenset[str]], Columns]
+
+
+@dataclass
+class Found:
+    """Angles of several designs in one row: the design of each, and the angle."""
+
+    row: NDArray[np.intp]
+    phi: Array
+
+    def take(self, which: NDArray[Any]) -> Found:
+        """Return some of them."""
+        return Found(self.row[which], self.phi[which])
+
+
+def step_of(name: str, provides: Sequence[Output], machine: Machine, passages: Passages) -> Step:
+    """Return the machine's own route to what ``passages`` finds of its poses."""
+
+    def run(designs: Array, wanted: frozenset[str], accuracy: Accuracy) -> Columns:
+        samples, precise = accuracy.samples or SAMPLES, machine.precise()
+        blocks = [designs[k : k + BLOCK] for k in range(0, max(len(designs), 1), BLOCK)]
+        parts = [passages(Poses(machine, precise, block), samples, wanted) for block in blocks]
+        found: Columns = {key: np.concatenate([part[key] for part in parts]) for key in parts[0]}
+        if accuracy.target is not None:
+            found |= {f"err_{key}": np.abs(np.asarray(found[key], np.float64)) * accuracy.target for key in wanted}
+        return found
+
+    def cost(accuracy: Accuracy) -> float:
+        return 2000.0 * (accuracy.samples or SAMPLES)
+
+    return Step(f"passage {name}", tuple(provides), run, work=Work.SEARCH, cost=cost)
+
+
+@dataclass(frozen=True)
+class Poses:
+    """Pose outputs of several designs, at one angle of each or some: found quickly, read precisely."""
+
+    quick: Family
+    precise: Family
+    designs: Array
+
+    def at(self, rows: Any, phi: Array, *names: str) -> list[Array]:
+        """Return outputs of these designs at these angles, (k,) or (k, m) as the angles are."""
+        return self._of(self.precise, rows, phi, names)
+
+    def near(self, rows: Any, phi: Array, name: str) -> Array:
+        """Return an output as the search for a root needs it."""
+        return self._of(self.quick, rows, phi, (name,))[0]
+
+    def _of(self, family: Family, rows: Any, phi: Array, names: Sequence[str]) -> list[Array]:
+        angles = Angles.of(phi if phi.ndim == 2 else phi[:, None])
+        found = family.poses(self.designs[rows], angles, frozenset(names))
+        return [np.asarray(found[name], np.float64).reshape(phi.shape) for name in names]
+
+    def samples(self, names: Sequence[str], count: int) -> tuple[NDArray[np.uint8], list[Array]]:
+        """Return status (n,), and samples (n, count) of outputs over the turn; nan without status 0."""
+        grid: Array = np.arange(count) * np.float64(TWO_PI / count)
+        found = self.quick.poses(self.designs, Angles.of(grid[None, :]), frozenset(names))
+        status = np.asarray(found["status"], np.uint8).max(axis=1, initial=0)
+        status[status == st.NOT_ASSEMBLED] = st.NOT_ROTATABLE
+        good = (status == st.OK)[:, None]
+        return status, [np.where(good, np.asarray(found[name], np.float64), np.nan) for name in names]
+
+    def turning(self, slope: Array, name: str) -> Found:
+        """Return where samples (n, m) of a derivative change their sign, as roots of the output of that name."""
+        after = np.roll(slope, -1, axis=1)
+        row, column = np.nonzero((slope > 0.0) & (after <= 0.0) | (slope < 0.0) & (after >= 0.0))
+        step = TWO_PI / slope.shape[1]
+        return Found(row, self._root(row, column * step, (column + 1) * step, name))
+
+    def roots(self, extremes: Found, values: Array, name: str, rate: str) -> Found:
+        """Return the zeros between neighbouring extremes of opposite sign, of each design in order.
+
+        Each is closed to rounding, and polished by a step of Newton on precise poses.
+        """
+        order = np.lexsort((extremes.phi, extremes.row))
+        ordered, value = extremes.take(order), values[order]
+        left, right, after = _neighbours(ordered)
+        k = np.flatnonzero(value * value[after] < 0.0)
+        row = ordered.row[k]
+        found = self._root(row, left[k], right[k], name)
+        x, slope = self.at(row, found, name, rate)
+        with np.errstate(divide="ignore", invalid="ignore"):
+            polished = found - x / slope
+        found = np.mod(np.where((polished > left[k]) & (polished < right[k]), polished, found), TWO_PI)
+        return Found(row, found).take(np.lexsort((found, row)))
+
+    def _root(self, row: NDArray[np.intp], left: Array, right: Array, name: str) -> Array:
+        """Return a root in each bracket."""
+        from scipy.optimize.elementwise import find_root
+
+        if not row.size:
+            return np.zeros(0)
+        of: Any = lambda phi, rows: self.near(rows.astype(np.intp), phi, name)  # noqa: E731
+        args: Any = (row,)
+        ends = np.asarray(left, np.float64), np.asarray(right, np.float64)
+        found = find_root(of, ends, args=args, tolerances=ROUNDING)
+        # A root within rounding of an end of its bracket may leave no change of sign: that end is the root then.
+        (first, last), (low, high) = found.bracket, found.f_bracket
+        return np.asarray(np.where(found.success, found.x, np.where(np.abs(low) < np.abs(high), first, last)))
+
+    def least(self, row: NDArray[np.intp], start: Array, end: Array, name: str, samples: int = 64) -> Array:
+        """Return the least value of an output between two angles of each of these designs, (k,)."""
+        from scipy.optimize.elementwise import find_minimum
+
+        if not row.size:
+            return np.zeros(0)
+        step = 1.0 / (samples - 1)  # one sample beyond either end, so that a dip next to an end has neighbours
+        grid = start[:, None] + np.linspace(-step, 1.0 + step, samples + 2) * (end - start)[:, None]
+        values = self.at(row, grid, name)[0]
+        least: Array = values[:, 1:-1].min(axis=1)
+        k, j = np.nonzero((values[:, 1:-1] <= values[:, :-2]) & (values[:, 1:-1] <= values[:, 2:]))
+        if k.size:
+            of: Any = lambda phi, rows: self.near(rows.astype(np.intp), phi, name)  # noqa: E731
+            args: Any = (row[k],)
+            found = find_minimum(of, (grid[k, j], grid[k, j + 1], grid[k, j + 2]), args=args)
+            phi = np.clip(np.asarray(found.x, np.float64), start[k], end[k])
+            np.minimum.at(least, k, self.at(row[k], phi, name)[0])
+        return least
+
+
+def _neighbours(ordered: Found) -> tuple[Array, Array, NDArray[np.intp]]:
+    """Return of each angle, sorted by design, itself, the next one of its design around the turn, and where that is."""
+    row, phi = ordered.row, ordered.phi
+    first = np.searchsorted(row, row)
+    last = np.append(row[1:] != row[:-1], True)[: row.size]
+    after = np.where(last, first, np.arange(row.size) + 1)
+    return phi, phi[after] + np.where(last, TWO_PI, 0.0), after
+
+
+def largest(row: NDArray[np.intp], values: Array, n: int) -> Array:
+    """Return the largest value of each design; nan where there is none."""
+    most = np.full(n, -np.inf)
+    np.maximum.at(most, row, values)
+    return np.where(np.isfinite(most), most, np.nan)
+
+
+def whole(n: int, row: NDArray[np.intp], values: Array) -> Array:
+    """Lay values of some designs out over all; nan in the others."""
+    column = np.full(n, np.nan)
+    column[row] = values
+    return column
+
+
+def verdict(
+    status: NDArray[np.uint8], touching: NDArray[np.bool_], right: NDArray[Any], wrong: NDArray[Any]
+) -> NDArray[np.uint8]:
+    """Return the status of designs with so many passages in the stated sense and against it."""
+    return np.select(
+        [status != st.OK, touching, right > 1, (right == 0) & (wrong > 0), right == 0],
+        [status.astype(np.int64), st.TANGENT, st.TWICE, st.WRONG_WAY, st.NEVER], st.OK,
+    ).astype(np.uint8)  # fmt: skip

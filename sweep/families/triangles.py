@@ -1,0 +1,149 @@
+"""The moments B and C, where a tip enters the triangle of a blade, its thread and the seam: machine-and-stitch, 5.3.
+
+B: the upper looper takes the lower looper's thread.  C: the needle takes that of the upper looper.  Corners are the eye
+P1 of the blade, the place P2 where it holds a loop or meets the plane of the seam, and the seam P3.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from kernels import status as st
+from kernels.types import TWO_PI
+from sweep.families.base import Columns, Output, Parameter, Step
+from sweep.families.crossings import TANGENT, Poses, step_of, verdict, whole
+from sweep.families.frames import Frame
+from sweep.families.segments import cross, dot, minus
+from sweep.families.tools import Spot
+
+if TYPE_CHECKING:
+    from sweep.families.machines import Machine
+
+FLAT = 1e-6  # sine of the angle between two sides: what is flatter has no plane
+SIDES = {"seam": (1, 2), "thread": (2, 0), "blade": (0, 1)}  # the two corners of each, in the order around
+TEXTS = {
+    "from_blade": "from the side eye - hold, positive inside the triangle",
+    "from_thread": "from the side seam - eye, positive inside the triangle",
+    "from_seam": "from the side hold - seam, positive inside the triangle",
+    "margin": "least distance of the tip from a side of the triangle, less its radius; negative: outside",
+    "pace": "speed of the tip through the plane of the triangle, per radian of the main shaft",
+}
+
+
+@dataclass(frozen=True)
+class Entering:
+    """A tip and the plane of a triangle, pose by pose; :func:`entering_step` finds where the tip passes it.
+
+    Parameters
+    ----------
+    name : of the relation
+    tip : what passes;  corners : eye and hold of the blade, seam
+    radius : of what passes
+    sense : +1 or -1: it passes along the normal (P2 - P1) x (P3 - P1), or against it
+    window : from, to: crank angles of the main shaft between which it is looked for, modulo a turn; the whole turn
+    """
+
+    name: str
+    tip: Spot
+    corners: tuple[Spot, Spot, Spot]
+    radius: float
+    sense: int
+    window: tuple[float, float] | None = None
+
+    @property
+    def rates(self) -> Mapping[str, str]:
+        """Of each pose output its derivative by the angle of the main shaft."""
+        return {f"{self.name}_above": f"{self.name}_dabove"}
+
+    @property
+    def outputs(self) -> tuple[Output, ...]:
+        """The tip above the plane, its derivative, and its distances from the sides."""
+        of = "of the tip above the plane of the triangle"
+        return (
+            Output(f"{self.name}_above", "length", f"height {of}", "(13)"),
+            Output(f"{self.name}_dabove", "length", f"derivative of the height {of} by phi of the main shaft", "(13)"),
+            *(Output(f"{self.name}_to_{side}", "length", TEXTS[f"from_{side}"], "(13)") for side in SIDES),
+        )
+
+    @property
+    def parameters(self) -> tuple[Parameter, ...]:
+        """It has none of its own."""
+        return ()
+
+    def needs(self, wanted: frozenset[str]) -> frozenset[str]:
+        """Return coordinates of tip and corners, and velocities where the derivative is wanted."""
+        moving = f"{self.name}_dabove" in wanted
+        return frozenset().union(*(spot.needs(moving) for spot in (self.tip, *self.corners)))
+
+    def compute(self, found: Mapping[str, Any], frames: Mapping[str, Frame], wanted: frozenset[str]) -> dict[str, Any]:
+        """Return the wanted outputs, (n, m); nan where the corners lie in one line."""
+        tip, *corners = (spot.position(found) for spot in (self.tip, *self.corners))
+        first, second, reach = (minus(point, corners[0]) for point in (corners[1], corners[2], tip))
+        normal = cross(first, second)
+        size = np.sqrt(dot(normal, normal))
+        flat = FLAT * np.sqrt(np.real(dot(first, first)) * np.real(dot(second, second)))
+        size = np.where(np.real(size) > flat, size, np.nan)
+        above = dot(reach, normal) / size
+        columns = {f"{self.name}_above": above}
+        for side, (j, k) in SIDES.items():
+            along, from_j = minus(corners[k], corners[j]), minus(tip, corners[j])
+            columns[f"{self.name}_to_{side}"] = dot(normal, cross(along, from_j)) / (size * np.sqrt(dot(along, along)))
+        if f"{self.name}_dabove" in wanted:
+            dtip, *moves = (spot.velocity(found) for spot in (self.tip, *self.corners))
+            dfirst, dsecond, dreach = (minus(rate, moves[0]) for rate in (moves[1], moves[2], dtip))
+            turning = [x + y for x, y in zip(cross(dfirst, second), cross(first, dsecond), strict=True)]
+            slope = dot(dreach, normal) + dot(reach, turning) - above * dot(normal, turning) / size
+            columns[f"{self.name}_dabove"] = slope / size
+        return columns
+
+
+def entering_step(entering: Entering, machine: Machine) -> Step:
+    """Return the machine's own route to where and how the tip enters the triangle."""
+    name = entering.name
+    place = Output(f"phi_{name}", "rad", "crank angle at which the tip passes the plane of the triangle", "(13)")
+    count = Output(f"count_{name}", "1", "passages of the plane in the stated sense and window", "(13)", jumps=True)
+    provides = (place, count, *(Output(f"{name}_{key}", "length", text, "(13)") for key, text in TEXTS.items()))
+    return step_of(name, provides, machine, lambda *asked: entries(entering, *asked))
+
+
+def entries(entering: Entering, poses: Poses, samples: int, wanted: frozenset[str]) -> Columns:
+    """Return all outputs of the entry, each (n,), and status; found as the passage of a needle is."""
+    name, sense, n = entering.name, float(entering.sense), len(poses.designs)
+    above, dabove = f"{name}_above", f"{name}_dabove"
+    status, (slope,) = poses.samples([dabove], samples)
+    status[(status == st.OK) & np.isnan(slope).any(axis=1)] = st.NO_TRIANGLE
+    slope = np.where((status == st.OK)[:, None], slope, np.nan)
+    extremes = poses.turning(slope, dabove)
+    (heights,) = poses.at(extremes.row, extremes.phi, above)
+    roots = poses.roots(extremes, heights, above, dabove)
+    reads = [dabove, *(f"{name}_to_{side}" for side in ("blade", "thread", "seam"))]
+    turned, *distances = poses.at(roots.row, roots.phi, *reads)
+    inside, right = _within(entering, roots.phi), sense * turned > 0.0
+    count, ways = (np.bincount(roots.row, inside & one, n) for one in (right, ~right))
+    size = np.abs(poses.designs[extremes.row]).max(axis=1, initial=0.0)
+    near = _within(entering, extremes.phi) & (np.abs(heights) <= TANGENT * size)
+    found = verdict(status, np.bincount(extremes.row, near, n) > 0, count, ways)
+    taken = np.flatnonzero(inside & right & (found[roots.row] == st.OK))
+    row = roots.row[taken]
+    least = np.minimum.reduce(distances)[taken] - entering.radius
+    values = dict(zip(("from_blade", "from_thread", "from_seam"), (one[taken] for one in distances), strict=True))
+    values |= {"margin": least, "pace": sense * turned[taken]}
+    columns: Columns = {f"phi_{name}": whole(n, row, roots.phi[taken])}
+    columns[f"count_{name}"] = np.where(status == st.OK, count, np.nan)
+    columns |= {f"{name}_{key}": whole(n, row, value) for key, value in values.items()}
+    flat = row[np.isnan(least)]
+    found[row[least <= -entering.radius]] = st.WRONG_SIDE
+    found[flat] = st.NO_TRIANGLE
+    return columns | {"status": found}
+
+
+def _within(entering: Entering, phi: Any) -> Any:
+    """Tell which angles lie in the window asked for, modulo a turn."""
+    if entering.window is None:
+        return np.ones(np.shape(phi), np.bool_)
+    start, end = entering.window
+    return np.mod(phi - start, TWO_PI) <= np.mod(end - start, TWO_PI)

@@ -1,0 +1,70 @@
+"""Bodies of which only the mass is given: slender rods between their joints; an explicit zero stays one."""
+
+from __future__ import annotations
+
+import numpy as np
+
+import sweep
+
+LINKS = {"a": 30.0, "b": 90.0, "c": 60.0, "e": 85.0, "f": 5.0, "g": -4.0, "alpha": 0.4}
+MASSES = {"m_crank": 2e-4, "m_coupler": 1e-4, "m_rocker": 3e-4}
+LENGTHS = {"crank": 30.0, "coupler": 90.0, "rocker": 60.0}
+PHI = np.linspace(0.0, 6.0, 13)
+WANT = ["drive_torque", "reduced_inertia", "force_b", "shaking_moment"]
+
+
+def loads(family, links, **given):
+    return sweep.evaluate(family, links | {"speed": 500.0, **given}, WANT, phi=PHI)[WANT]
+
+
+def rod(body, mass):
+    length = LENGTHS[body]
+    moments = {f"j_{body}_{axis}": mass * length**2 / 12.0 for axis in ("yy", "zz")}
+    return {f"m_{body}": mass, f"com_{body}_x": 0.5 * length} | moments
+
+
+def rods():
+    return {name: value for body, mass in MASSES.items() for name, value in rod(body[2:], mass).items()}
+
+
+def test_masses_alone_are_slender_rods():
+    found = loads("rssr", LINKS, **MASSES)
+    # the same operations but for the order of two products
+    np.testing.assert_allclose(found, loads("rssr", LINKS, **rods()), rtol=1e-12, atol=1e-9)
+    assert found.drive_torque.abs().max() > 1000.0  # N mm; it was 2e-13
+
+
+def test_an_explicit_zero_is_a_mass_in_its_pivot():
+    zeros = {f"com_{body}_x": 0.0 for body in LENGTHS}
+    assert loads("rssr", LINKS, **MASSES, **zeros).drive_torque.abs().max() > 0.0
+    in_pivots = {"m_crank": 2e-4, "m_rocker": 3e-4, "m_coupler": 0.0, "com_crank_z": 0.0, "j_rocker_xy": 0.0}
+    assert loads("rssr", LINKS, **in_pivots).drive_torque.abs().max() < 1e-9
+    both = [loads("rssr", LINKS, **MASSES, **zeros, **{f"rod_{body}": one for body in LENGTHS}) for one in (0.0, 1.0)]
+    np.testing.assert_array_equal(both[0], loads("rssr", LINKS, **MASSES, **zeros))
+    np.testing.assert_array_equal(both[1], loads("rssr", LINKS, **MASSES))
+
+
+def test_each_body_is_judged_by_itself_and_a_slider_stays_a_point():
+    mixed = rods() | {"m_crank": 2e-4}
+    for name in ("com_crank_x", "j_crank_yy", "j_crank_zz"):
+        del mixed[name]
+    np.testing.assert_allclose(loads("rssr", LINKS, **mixed), loads("rssr", LINKS, **rods()), rtol=1e-12, atol=1e-9)
+    crank = {"a": 30.0, "b": 90.0, "e": 5.0, "f": 2.0, "alpha": 1.2, "m_slider": 3e-4}
+    alone = loads("rssp", crank, m_crank=2e-4, m_coupler=1e-4)
+    np.testing.assert_allclose(
+        alone, loads("rssp", crank, **rod("crank", 2e-4), **rod("coupler", 1e-4)), rtol=1e-12, atol=1e-9
+    )
+
+
+def test_stages_of_a_chain_and_a_bound_design_have_their_own_rods():
+    chain = {f"{name}1": value for name, value in LINKS.items()} | {
+        "a2": 20.0, "b2": 80.0, "c2": 50.0, "e2": 75.0, "f2": 3.0, "g2": 2.0, "alpha2": 0.2,
+    }  # fmt: skip
+    table = chain | {f"{name}{k}": x for name, x in MASSES.items() for k in (1, 2)} | {"speed1": 300.0}
+    first = sweep.evaluate(["rssr", "rssr"], table, ["drive_torque1"], phi=PHI)
+    given = {f"com_rocker_x{2}": 25.0, "j_rocker_yy2": 3e-4 * 2500.0 / 12.0, "j_rocker_zz2": 3e-4 * 2500.0 / 12.0}
+    second = sweep.evaluate(["rssr", "rssr"], table | given, ["drive_torque1"], phi=PHI)
+    np.testing.assert_allclose(first.drive_torque1, second.drive_torque1, rtol=1e-11)
+    bound = sweep.mechanism("rssr", **LINKS, **MASSES, speed=500.0)
+    one = bound.poses(PHI, ["drive_torque"])
+    np.testing.assert_allclose(one["drive_torque"], loads("rssr", LINKS, **MASSES).drive_torque, rtol=1e-12)
