@@ -208,11 +208,12 @@ def _list_both(
 
 @inline
 def _maxima_of(
-    order: int, start: int, block: int, at: Array, who: Counts, m: Array, first_peak: Counts, target: float,
+    start: int, block: int, at: Array, who: Counts, m: Array, first_peak: Counts, target: float,
     status: Status, phi: Array | None, error: Array | None, phi_error: Array | None, max_abs_dpsi: Array | None,
     max_abs_d2psi: Array | None, max_abs_d3psi: Array | None,
 ) -> None:  # fmt: skip
     """Refine the listed maxima of one transfer function of a block; exactly one of the last is given."""
+    order = 1 if max_abs_dpsi is not None else (2 if max_abs_d2psi is not None else 3)
     # The parabola at the end is one more; the one maximum in hundreds that is not settled then gets another three.
     rounds = (2 if order == 1 else 3) - (1 if target > 1e-4 else 0)
     padded = (first_peak[block] + 7) & ~7  # whole vectors; what stands in the surplus is never read
@@ -287,10 +288,10 @@ def true_maxima(
             mark_peaks(padded, grid_q)
             _list_both(block, at, cos, sin, grid, grid_q, size, spare, m, m_q, first_peak, first_q)
             _maxima_of(
-                2, start, block, at, who, m_q, first_q, target, status, phi, error, phi_error, None, max_abs_d2psi, None
+                start, block, at, who, m_q, first_q, target, status, phi, error, phi_error, None, max_abs_d2psi, None
             )
             _maxima_of(
-                1, start, block, at, who, m, first_peak, target, status, phi, error, phi_error, max_abs_dpsi, None, None
+                start, block, at, who, m, first_peak, target, status, phi, error, phi_error, max_abs_dpsi, None, None
             )
         elif max_abs_dpsi is not None or max_abs_d2psi is not None:
             sample_block(padded, at, cos, sin, grid, max_abs_dpsi, max_abs_d2psi)
@@ -299,7 +300,7 @@ def true_maxima(
                 block, at, cos, sin, grid, size, m, first_peak, PER_RHO, max_abs_dpsi, max_abs_d2psi
             )  # fmt: skip
             _maxima_of(
-                1 if max_abs_dpsi is not None else 2, start, block, at, who, m, first_peak, target, status, phi, error,
+                start, block, at, who, m, first_peak, target, status, phi, error,
                 phi_error, max_abs_dpsi, max_abs_d2psi, None,
             )  # fmt: skip
         if max_abs_d3psi is not None:
@@ -307,6 +308,6 @@ def true_maxima(
             mark_peaks(padded, grid)
             _list_maxima(block, at, cos, sin, grid, size, m, first_peak, PER_RHO_JERK, None, None)
             _maxima_of(
-                3, start, block, at, who, m, first_peak, target, status, phi, error, phi_error, None, None,
+                start, block, at, who, m, first_peak, target, status, phi, error, phi_error, None, None,
                 max_abs_d3psi,
             )  # fmt: skip
