@@ -13,6 +13,7 @@ from kernels.types import TWO_PI, Array
 from sweep.effects import inputs_beside
 from sweep.errors import InputError, MissingInput, nearest
 from sweep.evaluation.angles import TURNING, grid_in_radians, is_plausible
+from sweep.evaluation.given_units import plain
 from sweep.evaluation.poses import asked_of_poses, check_march, values_of_the_variable
 from sweep.evaluation.routes import design_outputs
 from sweep.evaluation.statuses import explained
@@ -185,6 +186,8 @@ def _value(name: str, p: Parameter, given: object, place: str) -> float:
             value = number * factor(unit, internal)
         except UnitFault as fault:
             raise InputError(name, given, str(fault), place) from None
+    elif (said := plain(given, internal, name, place)) is not given and _is_number(said):
+        value = float(said)
     elif _is_number(given):
         value = float(given)
         if p.unit == "angle" and not is_plausible(abs(value), stem(name) in TURNING):

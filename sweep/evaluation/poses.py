@@ -44,7 +44,8 @@ def evaluate(
     Parameters
     ----------
     family : "rssr", "guide", ..., a list of them for a chain, or a table of members by name for a machine
-    table : DataFrame or mapping with a column per parameter [one length unit, rad]; missing ``branch`` means +1
+    table : DataFrame or mapping with a column per parameter [one length unit, rad]; missing ``branch`` means +1; units
+        as of :func:`sweep.summarise`
     want : names of pose outputs (see ``sweep families``), in a list or in one text between commas; the name of an
         effect stands for all of its own
     phi : crank angles [rad], one or a plain list of them, for every design; without it the table must have a column

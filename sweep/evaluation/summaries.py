@@ -60,7 +60,8 @@ def summarise(
     ----------
     family : "rssr", "guide", ..., a list of them for a chain, or a table of members by name for a machine
     table : DataFrame or mapping with a column per parameter [one length unit, rad], and per input of the effects that
-        ``want`` calls for; missing ``branch`` means +1
+        ``want`` calls for; missing ``branch`` means +1.  A text such as "20 g", a quantity of pint or a heading such as
+        ``m_crank [g]`` says its unit: it is brought to mm, t, s, N, and bare numbers beside it are taken in these
     want : names of design outputs: ``rotatable``, ``margin``, ``stroke``, ``max_abs_d2s`` ... (see ``sweep families``),
         ``max_force_d``, ``rms_drive_torque``, ``unevenness`` ... (see ``sweep effects``); a list, or one text between
         commas; the name of an effect, as ``friction``, stands for its outputs

@@ -61,7 +61,7 @@ POSE_OUTPUTS = (
 
 MARGIN_OUTPUTS = (
     Output("rotatable", "1", "whether the crank turns fully; exact", "(14)"),
-    Output("margin", "1", "smallest cos^2(pressure angle) over the turn; negative if the crank does not turn", "(14)"),
+    Output("margin", "1", "cos^2 of the worst pressure angle over the turn; below 0 the linkage jams", "(14)"),
     Output("max_pressure_angle", "rad", "largest pressure angle over the turn", "(13), (14)"),
 )
 

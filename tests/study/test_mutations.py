@@ -23,7 +23,7 @@ from sweep.errors import LinksweepError
 from sweep.report.dataset import gather
 from sweep.report.page import write_report
 from sweep.study import load_study
-from tests.support.mutated_studies import DWELL, EDGES, LOCUS, NEEDLE, ROCKER, mutated
+from tests.support.mutated_studies import DWELL, EDGES, LOCUS, NAMES_OF_FAMILIES, NEEDLE, ROCKER, mutated, plain
 
 SECONDS = 20
 COMPILING = 200
@@ -120,3 +120,11 @@ def test_many_mutated_study_files_are_answered_or_refused(tmp_path: Path) -> Non
     found, ends = wrong(range(1000, 3500), tmp_path)
     assert not found, "\n".join(found)
     assert ends["answered"] > 100 and ends["refused"] > 1000, ends
+
+
+def test_studies_of_every_family_are_mutated_and_sound(tmp_path: Path) -> None:
+    for name in NAMES_OF_FAMILIES:
+        (tmp_path / f"{name}.toml").write_text(plain(name))
+        assert load_study(tmp_path / f"{name}.toml").family.name == name
+    found = "".join(mutated(seed) for seed in range(0, 25 * len(NAMES_OF_FAMILIES), 5))
+    assert [name for name in NAMES_OF_FAMILIES if f'family = "{name}"' not in found] == []

@@ -6,6 +6,24 @@ import random
 import re
 from collections.abc import Callable
 
+from sweep.families import NAMES as NAMES_OF_FAMILIES
+from sweep.families import family
+from sweep.families.parameter import spelt_out
+
+FAMILY = """
+[study]
+name = "plain"
+[mechanism]
+family = "{name}"
+[scene]
+want = ["{want}"]
+[design]
+{design}
+[accuracy]
+target = 1e-6
+[output]
+keep = "all"
+"""
 ROCKER = """
 [study]
 name = "rocker"
@@ -267,10 +285,24 @@ WILD = [
 ]
 
 
+def plain(name: str) -> str:
+    """A study of any family: its example in mm, one size swept, the largest position."""
+    one, lines = family(name), []
+    for p in one.parameters:
+        x = float(one.example.get(p.name, p.default or 0.0))
+        unit = "" if p.unit in ("ratio", "sign", "count", "none", "choice") else spelt_out(p.unit)
+        fixed = f'"{x!r} {unit}"' if unit else f"{int(x) if p.choices or p.unit == 'count' else x!r}"
+        swept = f'{{ from = {x!r}, to = {1.02 * x!r}, count = 3, unit = "{unit}" }}'
+        lines.append(f"{p.name} = {swept if p.unit == 'length' and not any('from' in at for at in lines) else fixed}")
+    want = f"max_{one.position}"
+    return FAMILY.format(name=name, want=want, design="\n".join(lines))
+
+
 def mutated(seed: int) -> str:
-    """The study file of that seed: one to four changes of a sound one, gentle or wild."""
+    """The study file of that seed: one to four changes of a sound one, gentle or wild; each fifth of some family."""
     chance = random.Random(seed)
     text = chance.choice([ROCKER, ROCKER, DWELL, LOCUS, NEEDLE])
+    text = plain(NAMES_OF_FAMILIES[seed // 5 % len(NAMES_OF_FAMILIES)]) if seed % 5 == 0 else text
     kind = chance.choice([GENTLE, GENTLE, WILD])
     for _ in range(chance.choice([1, 1, 2, 3, 4])):
         text = chance.choice(kind)(chance, text)
