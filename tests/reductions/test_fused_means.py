@@ -58,7 +58,7 @@ def test_means_are_those_of_many_samples_within_their_errors(make, pose, target)
 
 def test_kernel_decides_nearly_all_and_fewer_samples_would_not_do() -> None:
     mechanism, designs = crank_rockers()
-    curve = curve_of(mechanism, Request("d2psi", 0), False)
+    curve = curve_of(mechanism, Request("d2psi", 0), False, mean=True)
     value, _, status, undecided = curve.mean(designs, 1e-8)
     assert undecided.mean() < 0.01 and (status[~undecided] == 0).all()
     # Negative control: sixteen samples err by more than is asked for.
@@ -71,7 +71,7 @@ def test_kernel_decides_nearly_all_and_fewer_samples_would_not_do() -> None:
 def test_families_with_the_loop_of_a_crank_rocker_share_its_kernel(name, pose) -> None:
     mechanism = family(name)
     row = np.array([[mechanism.example.get(p.name, p.default) for p in mechanism.parameters]], np.float64)
-    curve = curve_of(mechanism, Request(pose, 0), False)
+    curve = curve_of(mechanism, Request(pose, 0), False, mean=True)
     assert curve is not None and curve.forms[0].matrix is not None
     value, error, _, undecided = curve.mean(row, 1e-10)
     exact, resolved = by_samples(mechanism, row, pose)

@@ -306,7 +306,7 @@ def test_requests_without_a_fused_curve_go_to_poses():
     assert fused.curve_of(of, Request("psi1", 1), False) is None
     assert fused.curve_of(of, Request("discriminant1", -1), True) is None  # the first stage has its own margin
     assert fused.curve_of(of.precise(), Request("d2s", 0), False) is None
-    assert fused.curve_of(family("rssr"), Request("d2psi", 1), False) is not None  # of magnitudes it has a step
+    assert fused.curve_of(family("rssr"), Request("d2psi", 0), False) is None  # it has a search of its own
     alone = replace(of.stages[1].family, capabilities=())
     assert fused.curve_of(replace(of, stages=(of.stages[0], replace(of.stages[1], family=alone))),
                           Request("d2s", 0), False) is None  # fmt: skip
