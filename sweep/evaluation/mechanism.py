@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from kernels.types import TWO_PI, Array
-from sweep.effects import all_inputs
+from sweep.effects import inputs_beside
 from sweep.errors import InputError, MissingInput, nearest
 from sweep.evaluation.angles import TURNING, grid_in_radians, is_plausible
 from sweep.evaluation.given_units import plain
@@ -20,7 +20,7 @@ from sweep.evaluation.statuses import explained
 from sweep.evaluation.summaries import asked_of_designs, chosen_accuracy
 from sweep.families import Mechanism
 from sweep.families import family as find_family
-from sweep.families.base import Angles, Family, Parameter, of_family
+from sweep.families.base import Angles, Family, Parameter
 from sweep.families.domain import Domain, Turn
 from sweep.families.names import stem
 from sweep.quantities.units import LARGEST, UnitFault, factor, internal_unit, split
@@ -161,7 +161,7 @@ def _place(family: Family) -> str:
 
 def _in_internal_units(family: Family, dimensions: Mapping[str, Number]) -> dict[str, float]:
     """Read dimensions as `mechanism` takes them."""
-    known = _known(family)
+    known = dict(inputs_beside(family, dimensions)) | {p.name: p for p in family.parameters}
     for name in dimensions:
         if name not in known:
             allowed = f"{', '.join(family.parameter_names)}{nearest(name, known)}"
@@ -175,12 +175,6 @@ def _is_number(given: object) -> TypeGuard[float]:
         return False
     number: Any = given
     return bool(abs(number) <= LARGEST)
-
-
-@of_family
-def _known(family: Family) -> Mapping[str, Parameter]:
-    """Collect all that may be given: parameters, and inputs of effects."""
-    return dict(all_inputs(family)) | {p.name: p for p in family.parameters}
 
 
 def _value(name: str, p: Parameter, given: object, place: str) -> float:

@@ -8,10 +8,10 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from sweep.effects import all_inputs, extended
+from sweep.effects import extended, inputs_beside
 from sweep.effects.wanted import expanded
 from sweep.errors import InputError
-from sweep.evaluation.angles import AngleUnit, in_radians
+from sweep.evaluation.angles import AngleUnit, in_radians, plain_names
 from sweep.evaluation.loads import Loads, curves_of
 from sweep.evaluation.poses import Question, questions
 from sweep.evaluation.route import Route
@@ -114,8 +114,10 @@ def summarise(
     if certify:
         check_certifiable(mechanism, wanted, chosen, window is not None)
     given = table
-    table = in_radians(mechanism, plain_columns(table), angles, all_inputs(bare))
-    matrix, _ = design_matrix(mechanism, table, unused=all_inputs(bare))
+    table = plain_columns(table)
+    others = inputs_beside(bare, plain_names(table))
+    table = in_radians(mechanism, table, angles, others)
+    matrix, _ = design_matrix(mechanism, table, unused=others)
     columns = design_outputs(mechanism, matrix, wanted, chosen, window)
     made: dict[str, Any] = {name: columns[name] for name in (*with_errors(wanted, chosen), "status")}
     if status_text:
