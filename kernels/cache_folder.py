@@ -128,11 +128,15 @@ class _Imported:
 
     def __init__(self) -> None:
         self.known: set[str] = set()
+        self.seen: tuple[int, str] = (0, "")
         self.unchanged = True
 
     def as_hashed(self) -> bool:
         """Whether every module imported so far is the one that was hashed."""
-        prefix = f"{PACKAGE}."
+        now = len(sys.modules), next(reversed(sys.modules))
+        if now == self.seen:  # nothing was imported since; each of several hundred functions asks
+            return self.unchanged
+        self.seen, prefix = now, f"{PACKAGE}."
         for name in [name for name in sys.modules if name.startswith(prefix) and name not in self.known]:
             self.known.add(name)
             self.unchanged = self.unchanged and _is_as_hashed(sys.modules[name])

@@ -59,7 +59,7 @@ def _spread(n: int, values: Array) -> tuple[float, float, float]:
 
 
 @inline
-def _dips(n: int, guards: Array, begin: int) -> tuple[float, float]:
+def dips(n: int, guards: Array, begin: int) -> tuple[float, float]:
     """Least of n discriminants, and squared distance [samples] of their nearest complex zero, by parabolas."""
     low, nearest = 1e300, 1e300
     before, at, after = guards[begin : begin + n], guards[begin + 1 : begin + n + 1], guards[begin + 2 : begin + n + 2]
@@ -95,7 +95,7 @@ def looker(curve: Curve) -> Helper:
     least, and a status: OK; NOT_ROTATABLE, where a later stage does not reach; OPEN.  The samples stand in
     values[2 ... n + 1], closed periodically.
     """
-    guarded, samples, take = curve.guarded, curve.samples, _taker(curve)
+    guarded, samples, take = curve.guarded, curve.samples, taker(curve)
 
     def look(
         k: Any, a: float, b: float, c: float, n: int, cos: Array, sin: Array, mode: int, doubts: Any, values: Array,
@@ -107,7 +107,7 @@ def looker(curve: Curve) -> Helper:
             take(k, a, b, c, n, cos, sin, values, guards, handed)
             needed = n
             for s in range(guarded):
-                low, nearest = _dips(n, guards, s * GUARD_ROW)
+                low, nearest = dips(n, guards, s * GUARD_ROW)
                 if code == LOOKING and not low > doubts[s + 1]:
                     code = st.NOT_ROTATABLE if low < -doubts[s + 1] else OPEN
                 needed = samples_for(samples, n, nearest, needed)
@@ -127,8 +127,8 @@ def looker(curve: Curve) -> Helper:
     return generated_inline(f"look_{curve.name}", look)
 
 
-def _taker(curve: Curve) -> Helper:
-    """Fill ``values`` and ``guards`` with n samples, closed periodically."""
+def taker(curve: Curve) -> Helper:
+    """Make the function that fills ``values`` and ``guards`` with n samples, closed periodically as `looker` says."""
     guarded, drive, sample, hand, get = curve.guarded, curve.drive, curve.sample, curve.hand, curve.take
     guard_rows, keep, keep_last = keepers(curve)
 

@@ -18,7 +18,7 @@ from sweep.chunks.cascade import BLOCK, CALL_SECONDS, Cascade, levels
 from sweep.chunks.chunk import output_columns
 from sweep.chunks.parameters import parameter_matrix, parameter_ns
 from sweep.evaluation.summaries import output
-from sweep.families.base import Array, Unit
+from sweep.families.base import Array, Unit, Work
 from sweep.families.names import is_error, without_error
 from sweep.quantities.units import internal_unit
 from sweep.reductions.steps import is_proven
@@ -64,12 +64,15 @@ class Column:
 class Pilot(NamedTuple):
     """Estimates from a few designs: time of one design on one core [s], and the share of designs within every limit.
 
-    ``reached`` are the outputs of every level of the cascade, and the share of designs that reach it.
+    ``reached`` are the outputs of every level of the cascade, and the share of designs that reach it; ``kept`` those of
+    the ``tried`` designs that are within every limit, (n, P).
     """
 
     seconds_per_design: float
     feasible: float
     reached: tuple[tuple[tuple[str, ...], float], ...]
+    kept: Array
+    tried: int
 
 
 @dataclass(frozen=True)
@@ -166,8 +169,8 @@ def pilot(study: Study, tell: Callable[[int, int], None] = lambda _, __: None) -
 
     ``tell`` is called with how many parts of them are done, and how many there are.
 
-    The time counts parameters, and each route as often as designs reached it, by their own cost figures, so it is the
-    same on every machine.
+    Effects behind the last limit are priced, not computed.  The time counts parameters, and each route as often as
+    designs reached it, by their own cost figures, so it is the same on every machine.
     """
     count = study.space.count
     length = min(PILOT_LENGTH, count)
@@ -176,19 +179,36 @@ def pilot(study: Study, tell: Callable[[int, int], None] = lambda _, __: None) -
     blocks = [parameter_matrix(study, start, start + length) for start in starts]
     length = -(-len(blocks) // PILOT_PARTS)
     parts = [blocks[k : k + length] for k in range(0, len(blocks), length)]
-    reached, feasible, total = np.zeros(len(levels(study))), 0, 0
+    asked = _telling(study)
+    reached, feasible, total, kept = np.zeros(len(levels(study))), 0, 0, []
     for k, part in enumerate(parts):
         tell(k, len(parts))
         designs, status = (np.concatenate(columns) for columns in zip(*part, strict=True))
-        cascade = Cascade(study)
+        cascade = Cascade(study, keep=False)
+        cascade.levels = cascade.levels[:asked]
         cascade.feed(np.arange(len(designs)), designs, status)
-        cascade.end(())
-        reached += cascade.reached
-        feasible += int(cascade.counts[OK])
+        kept.append(cascade.end(()).designs)
+        through = int(cascade.counts[OK])
+        reached += [*cascade.reached[:asked], *[through] * (len(reached) - asked)]
+        feasible += through
         total += len(designs)
     shares = [float(share) for share in reached / total]
     outputs = tuple(level.outputs for level in levels(study))
-    return Pilot(_seconds(study, shares), feasible / total, tuple(zip(outputs, shares, strict=True)))
+    seconds, sent = _seconds(study, shares), tuple(zip(outputs, shares, strict=True))
+    return Pilot(seconds, feasible / total, sent, np.concatenate(kept), total)
+
+
+def _telling(study: Study) -> int:
+    """Return how many levels a pilot works on: behind them are effects without a limit, which few designs miss."""
+    limited = {limit.output for limit in study.tested_limits}
+    count = len(levels(study))
+    if study.bare is study.family:
+        return count
+    for level in reversed(levels(study)):
+        if level.route is None or level.route.order[0] < Work.EFFECT or limited.intersection(level.outputs):
+            break
+        count -= 1
+    return count
 
 
 def pilot_at(study: Study, known: Pilot) -> Pilot:
@@ -239,8 +259,14 @@ def feasible_designs(study: Study, number: int) -> tuple[Array, int]:
         kept, tried = cascade.end(()).designs, len(designs)
         if len(kept) or tried == count:
             break
-    some = np.unique(np.linspace(0, len(kept) - 1, min(number, len(kept))).astype(int))
-    return kept[some], tried
+    return spread_rows(kept, number), tried
+
+
+def spread_rows(designs: Array, number: int) -> Array:
+    """Return so many of the designs, or all if they are fewer, spread evenly over them."""
+    some = np.unique(np.linspace(0, len(designs) - 1, min(number, len(designs))).astype(int))
+    chosen: Array = designs[some]
+    return chosen
 
 
 def row_bytes(study: Study) -> int:

@@ -9,20 +9,16 @@ from pathlib import Path
 import click
 
 from sweep.chunks.cascade import ordered_routes
-from sweep.chunks.plan import PARAMETER_UNITS, feasible_designs, pilot, spread_designs
+from sweep.chunks.plan import PARAMETER_UNITS, Pilot, feasible_designs, pilot, spread_designs, spread_rows
 from sweep.cli.families import aligned, main_outputs
 from sweep.cli.options import SMOKE, STUDY
 from sweep.effects.advice import findings, left_out, tree
 from sweep.engine.estimate import LEAST_KEPT, Estimate, check_budget, estimate, other_accuracies
-from sweep.engine.searches import refuse_unprovable
 from sweep.evaluation.summaries import output
 from sweep.families.base import Family
 from sweep.families.machines import Machine
 from sweep.families.names import without_minus
 from sweep.jobs.progress import Phases
-from sweep.optimise.front.pareto import searches
-from sweep.optimise.multistart.survey import MET, wanted
-from sweep.proof.question import question_of
 from sweep.report.quantities import number, quantity
 from sweep.report.tables import bound_words
 from sweep.study import Study, load_study
@@ -45,19 +41,23 @@ def check(study: Path, jobs: int, smoke: bool) -> None:
     A study over its budget ends with exit code 3.
     """
     model = load_study(study, smoke=smoke)
-    refuse_unprovable(model)
+    if model.optimise is not None and model.optimise.prove is not None:
+        # What searches and proves is imported where a study asks for it: scipy's minimisers take as long as numpy.
+        from sweep.proof.question import question_of
+
+        question_of(model)  # refuses what cannot be proven
     with Phases(show=True) as phases:
         sent = pilot(model, lambda done, of: phases.say("planning", done, of))
         cost = estimate(model, jobs, known=sent)
         others = other_accuracies(model, jobs, lambda done, of: phases.say("other accuracies", done, of), sent)
         phases.say("what matters")
-        lines = plan_lines(model, cost, others)
+        lines = plan_lines(model, cost, others, sent)
     for line in lines:
         click.echo(line)
     check_budget(model, cost)
 
 
-def plan_lines(study: Study, cost: Estimate, others: Sequence[tuple[str, float]]) -> list[str]:
+def plan_lines(study: Study, cost: Estimate, others: Sequence[tuple[str, float]], sent: Pilot) -> list[str]:
     """Return the plan of a study, line by line.
 
     Parameters
@@ -65,6 +65,7 @@ def plan_lines(study: Study, cost: Estimate, others: Sequence[tuple[str, float]]
     study : checked study
     cost : its estimate
     others : what other accuracies would take [s], in words
+    sent : the pilot that was sent for both
     """
     lines = [f"{study.name}: {study.title}" if study.title else study.name]
     lines += _mechanism(study.family)
@@ -76,12 +77,14 @@ def plan_lines(study: Study, cost: Estimate, others: Sequence[tuple[str, float]]
 
     lines += _computed(study)
     lines += _before_and_between(study)
-    lines += _effects(study)
+    lines += _effects(study, sent)
     lines += _left_out(study)
     if study.objective is not None:
         large = without_minus(study.objective.output)
         lines += ["", f"to be made large: {large}" if large else f"to be made small: {study.objective.output}"]
     if study.optimise is not None:
+        from sweep.optimise.multistart.survey import MET, wanted
+
         settings = study.optimise
         brake = "" if settings.time_budget is None else f"; emergency brake after {duration(settings.time_budget)}"
         populations = settings.globally != "none"
@@ -175,6 +178,8 @@ def _front(study: Study) -> list[str]:
     """Return the front of [pareto]: what is set against what, from where to where, and how much searching that is."""
     if study.pareto is None:
         return []
+    from sweep.optimise.front.pareto import searches
+
     name, bounds = study.pareto.output, study.pareto.bounds
     shown = quantity(name, output(study.family, name).unit)
     ends = f"{number(min(bounds) * shown.factor)} to {shown.show(max(bounds))}"
@@ -191,6 +196,8 @@ def _proof(study: Study) -> list[str]:
     """Return what is to be proven of which space, and with which budget."""
     if study.optimise is None or study.optimise.prove is None:
         return []
+    from sweep.proof.question import question_of
+
     asked, question = study.optimise.prove, question_of(study)
     brake = "" if asked.seconds is None else f"; emergency brake after {duration(asked.seconds)}"
     unused = f"; no use is made of the limits on {', '.join(question.left_out)}" if question.left_out else ""
@@ -201,7 +208,7 @@ def _proof(study: Study) -> list[str]:
     ]
 
 
-def _effects(study: Study) -> list[str]:
+def _effects(study: Study, sent: Pilot) -> list[str]:
     """Return the effects of the scene: what is computed, what is not, and which rules of negligibility hold."""
     bare = study.bare
     out = left_out(bare, study.want)
@@ -212,7 +219,9 @@ def _effects(study: Study) -> list[str]:
         lines += ["", "effects, with their share of the cost at equal numbers of poses"]
         lines += aligned(tree(bare, study.want, POSES))
     lines += ["", "effects not computed, because nothing asks for them", f"  {', '.join(out)}"]
-    looked_at, tried = feasible_designs(study, ADVISED)
+    looked_at, tried = spread_rows(sent.kept, ADVISED), sent.tried
+    if not len(looked_at):
+        looked_at, tried = feasible_designs(study, ADVISED)
     number = "1 design" if len(looked_at) == 1 else f"{len(looked_at)} designs"
     which = f"by {number} within all limits, of {tried} tried"
     if not len(looked_at):

@@ -9,8 +9,8 @@ import click
 from sweep.cli.options import FOLDER
 from sweep.dataset.files import beside, located
 from sweep.jobs.progress import Phases
-from sweep.report import write_report
 from sweep.report.judged import write_comparison
+from sweep.report.page import write_report
 
 
 @click.command()

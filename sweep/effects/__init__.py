@@ -140,8 +140,11 @@ def applicable(family: Family) -> tuple[Placed, ...]:
 
 def called_for(family: Family, wanted: Iterable[str]) -> tuple[Placed, ...]:
     """Effects that some wanted output or reduction belongs to, in the order of the register."""
-    names = {about for name in wanted for about in reduced(name, family.domain)}  # max_abs_force_d asks for force_d
-    if names.isdisjoint(_effect_names(family)):
+    # max_abs_force_d asks for force_d; what the family has itself asks for no effect, so that none is imported.
+    asked = (reduced(name, family.domain) for name in wanted)
+    names = {about for abouts in asked if family.pose_output.keys().isdisjoint(abouts) for about in abouts}
+    names -= {o.name for step in family.steps for o in step.provides}
+    if not names or names.isdisjoint(_effect_names(family)):
         return ()
     found = (p for p in applicable(family) if not names.isdisjoint(o.name for o in p.outputs))
     return tuple(p.narrowed(names) for p in found)
@@ -184,6 +187,11 @@ def all_inputs(family: Family) -> Mapping[str, Parameter]:
 def input_names(family: Family) -> frozenset[str]:
     """Collect the names of the inputs of all effects that can be asked of a family, or of the stages of a chain."""
     return frozenset(all_inputs(family))
+
+
+def inputs_beside(family: Family, given: Iterable[str]) -> Mapping[str, Parameter]:
+    """Return :func:`all_inputs` if one of the given names is not the family's own; effects need no import otherwise."""
+    return {} if {*family.parameter_names, family.domain.name}.issuperset(given) else all_inputs(family)
 
 
 def curved_inputs(family: Family) -> tuple[str, ...]:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 import re
 from collections.abc import Iterable, Mapping
+from types import MappingProxyType
 from typing import TYPE_CHECKING, Any, Literal, TypeAlias
 
 import numpy as np
@@ -12,10 +13,12 @@ from numpy.typing import ArrayLike
 
 from kernels.types import TWO_PI
 from sweep.errors import InputError
+from sweep.evaluation.given_units import heading_factor, plain
 from sweep.evaluation.tables import Parametrised, numbers
-from sweep.families.base import Array
+from sweep.families.base import Array, Parameter
 from sweep.families.domain import Domain, reads_as_degrees
 from sweep.families.names import stem
+from sweep.quantities.units import internal_unit
 
 if TYPE_CHECKING:
     from sweep.evaluation.tables import Table
@@ -38,17 +41,18 @@ def in_radians(
     family: Parametrised,
     table: Table,
     angles: AngleUnit | None = None,
-    others: Iterable[str] = (),
+    others: Mapping[str, Parameter] = MappingProxyType({}),
     domain: Domain | None = None,
 ) -> Table:
-    """Return the table with its angles in rad, under the plain names of their columns.
+    """Return the table with its angles in rad, what says its unit in mm, t, s ..., under the plain names of columns.
 
     Parameters
     ----------
     family : whose parameters are looked for
-    table : as the user gave it; a header such as ``alpha [deg]`` says the unit of its column
+    table : as the user gave it; a header such as ``alpha [deg]`` or ``m_crank [g]`` says the unit of its column, a text
+        such as "20 g" or a quantity of pint that of one value
     angles : the unit of all angles without one in their header; None for rad that must be plausible
-    others : names of further inputs, none of them an angle
+    others : further inputs by name, none of them an angle
     domain : whose variable may be a column too
 
     Returns
@@ -63,7 +67,7 @@ def in_radians(
         degrees while nothing says what they are.
     """
     _check_unit(angles)
-    known = {p.name: p.unit == "angle" for p in family.parameters} | dict.fromkeys(others, False)
+    known = dict.fromkeys(others, False) | {p.name: p.unit == "angle" for p in family.parameters}
     variable = "" if domain is None else domain.name
     if domain is not None:
         known[variable] = domain.unit == "rad"
@@ -74,19 +78,39 @@ def in_radians(
     for key in columns:
         found = _HEADER.fullmatch(str(key))
         name, unit = (found[1], found[2]) if found is not None and found[1] in known else (str(key), None)
+        values = columns[key]
         if unit is not None:
-            renamed[key] = _plain_name(name, unit, known[name], table)
-        if not known.get(name):
+            renamed[key] = _plain_name(name, unit, table)
+            scale = heading_factor(name, unit, _internal(name, family, others, domain))
+            if scale != 1.0:
+                changed[name] = numbers(values, name, f"column {key}, row") * scale
             continue
-        if (unit or angles) == "deg":
-            changed[name] = numbers(columns[key], name, f"column {key}, row") * FACTORS["deg"]
-        elif unit is None and angles is None:
-            _check_plausible(name, columns[key], name == variable or stem(name) in TURNING)
+        if name not in known:
+            continue
+        if not isinstance(values, np.ndarray | float | int) or getattr(values, "dtype", "") == np.object_:
+            said = plain(values, _internal(name, family, others, domain), name, f"column {name}")
+            if said is not values:
+                changed[name] = said
+                continue
+        if not known[name]:
+            continue
+        if angles == "deg":
+            changed[name] = numbers(values, name, f"column {key}, row") * FACTORS["deg"]
+        elif angles is None:
+            _check_plausible(name, values, name == variable or stem(name) in TURNING)
     if not renamed and not changed:
         return table
     if isinstance(table, Mapping):
         return {renamed.get(key, key): changed.get(str(renamed.get(key, key)), columns[key]) for key in columns}
     return table.rename(columns=renamed).assign(**changed)
+
+
+def _internal(name: str, family: Parametrised, others: Mapping[str, Parameter], domain: Domain | None) -> str:
+    """Return the unit in which the kernels take a column."""
+    if domain is not None and name == domain.name:
+        return internal_unit(domain.unit)
+    p = next((p for p in family.parameters if p.name == name), None) or others[name]
+    return internal_unit(p.unit)
 
 
 def plain_names(table: Iterable[Any]) -> tuple[str, ...]:
@@ -97,6 +121,9 @@ def plain_names(table: Iterable[Any]) -> tuple[str, ...]:
 def grid_in_radians(name: str, unit: str, phi: ArrayLike, angles: AngleUnit | None) -> ArrayLike:
     """Return the argument ``phi=`` in rad where the variable is an angle; as it is where it is not."""
     _check_unit(angles)
+    said: ArrayLike = plain(phi, internal_unit(unit), name)
+    if said is not phi:
+        return np.asarray(said, np.float64)
     if unit != "rad":
         return phi
     if angles == "deg":
@@ -111,16 +138,10 @@ def _check_unit(angles: object) -> None:
         raise InputError("angles", angles, '"rad" or "deg"', "angles")
 
 
-def _plain_name(name: str, unit: str, is_angle: bool, table: Iterable[Any]) -> str:
-    """Return the name without its unit; only angles have one, since lengths may be of any unit."""
-    place = f"column {name} [{unit}]"
-    if not is_angle:
-        allowed = f"the column {name}: a table has one length unit throughout, only angles say theirs, as alpha [deg]"
-        raise InputError("column", f"{name} [{unit}]", allowed, place)
-    if unit not in FACTORS:
-        raise InputError("unit", unit, "rad or deg", place)
+def _plain_name(name: str, unit: str, table: Iterable[Any]) -> str:
+    """Return the name without its unit."""
     if name in map(str, table):
-        raise InputError("column", name, f"either {name} or {name} [{unit}], not both", place)
+        raise InputError("column", name, f"either {name} or {name} [{unit}], not both", f"column {name} [{unit}]")
     return name
 
 

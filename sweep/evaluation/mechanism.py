@@ -10,16 +10,17 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from kernels.types import TWO_PI, Array
-from sweep.effects import all_inputs
+from sweep.effects import inputs_beside
 from sweep.errors import InputError, MissingInput, nearest
 from sweep.evaluation.angles import TURNING, grid_in_radians, is_plausible
+from sweep.evaluation.given_units import plain
 from sweep.evaluation.poses import asked_of_poses, check_march, values_of_the_variable
 from sweep.evaluation.routes import design_outputs
 from sweep.evaluation.statuses import explained
 from sweep.evaluation.summaries import asked_of_designs, chosen_accuracy
 from sweep.families import Mechanism
 from sweep.families import family as find_family
-from sweep.families.base import Angles, Family, Parameter, of_family
+from sweep.families.base import Angles, Family, Parameter
 from sweep.families.domain import Domain, Turn
 from sweep.families.names import stem
 from sweep.quantities.units import LARGEST, UnitFault, factor, internal_unit, split
@@ -160,7 +161,7 @@ def _place(family: Family) -> str:
 
 def _in_internal_units(family: Family, dimensions: Mapping[str, Number]) -> dict[str, float]:
     """Read dimensions as `mechanism` takes them."""
-    known = _known(family)
+    known = dict(inputs_beside(family, dimensions)) | {p.name: p for p in family.parameters}
     for name in dimensions:
         if name not in known:
             allowed = f"{', '.join(family.parameter_names)}{nearest(name, known)}"
@@ -176,12 +177,6 @@ def _is_number(given: object) -> TypeGuard[float]:
     return bool(abs(number) <= LARGEST)
 
 
-@of_family
-def _known(family: Family) -> Mapping[str, Parameter]:
-    """Collect all that may be given: parameters, and inputs of effects."""
-    return dict(all_inputs(family)) | {p.name: p for p in family.parameters}
-
-
 def _value(name: str, p: Parameter, given: object, place: str) -> float:
     """Read one dimension, and check it as a table's column is checked."""
     internal = internal_unit(p.unit)
@@ -191,6 +186,8 @@ def _value(name: str, p: Parameter, given: object, place: str) -> float:
             value = number * factor(unit, internal)
         except UnitFault as fault:
             raise InputError(name, given, str(fault), place) from None
+    elif (said := plain(given, internal, name, place)) is not given and _is_number(said):
+        value = float(said)
     elif _is_number(given):
         value = float(given)
         if p.unit == "angle" and not is_plausible(abs(value), stem(name) in TURNING):

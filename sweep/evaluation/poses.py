@@ -9,10 +9,10 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from kernels.types import TWO_PI
-from sweep.effects import elsewhere, extended, input_names, offered
+from sweep.effects import elsewhere, extended, inputs_beside, offered
 from sweep.effects.wanted import expanded
 from sweep.errors import InputError, nearest
-from sweep.evaluation.angles import AngleUnit, grid_in_radians, in_radians
+from sweep.evaluation.angles import AngleUnit, grid_in_radians, in_radians, plain_names
 from sweep.evaluation.loads import Loads, curves_of
 from sweep.evaluation.statuses import explained, meanings
 from sweep.evaluation.tables import design_matrix, kept_columns, numbers, plain_columns, wanted_names
@@ -44,7 +44,8 @@ def evaluate(
     Parameters
     ----------
     family : "rssr", "guide", ..., a list of them for a chain, or a table of members by name for a machine
-    table : DataFrame or mapping with a column per parameter [one length unit, rad]; missing ``branch`` means +1
+    table : DataFrame or mapping with a column per parameter [one length unit, rad]; missing ``branch`` means +1; units
+        as of :func:`sweep.summarise`
     want : names of pose outputs (see ``sweep families``), in a list or in one text between commas; the name of an
         effect stands for all of its own
     phi : crank angles [rad], one or a plain list of them, for every design; without it the table must have a column
@@ -86,11 +87,13 @@ def evaluate(
     bare = find_family(family).precise()
     mechanism, wanted, units = asked_of_poses(bare, want, loads)
     given = table
-    table = in_radians(mechanism, plain_columns(table), angles, input_names(bare), mechanism.domain)
+    table = plain_columns(table)
+    others = inputs_beside(bare, plain_names(table))
+    table = in_radians(mechanism, table, angles, others, mechanism.domain)
     phi = None if phi is None else grid_in_radians(mechanism.domain.name, mechanism.domain.unit, phi, angles)
     variable = mechanism.domain.name
     extra = () if phi is not None else (variable,)
-    matrix, extras = design_matrix(mechanism, table, extra, unused=input_names(bare))
+    matrix, extras = design_matrix(mechanism, table, extra, unused=others)
     index = given.index if isinstance(given, pd.DataFrame) else None
     if phi is None:
         _check_column(mechanism, extras)

@@ -8,10 +8,10 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from sweep.effects import extended, input_names
+from sweep.effects import extended, inputs_beside
 from sweep.effects.wanted import expanded
 from sweep.errors import InputError
-from sweep.evaluation.angles import AngleUnit, in_radians
+from sweep.evaluation.angles import AngleUnit, in_radians, plain_names
 from sweep.evaluation.loads import Loads, curves_of
 from sweep.evaluation.poses import Question, questions
 from sweep.evaluation.route import Route
@@ -60,7 +60,8 @@ def summarise(
     ----------
     family : "rssr", "guide", ..., a list of them for a chain, or a table of members by name for a machine
     table : DataFrame or mapping with a column per parameter [one length unit, rad], and per input of the effects that
-        ``want`` calls for; missing ``branch`` means +1
+        ``want`` calls for; missing ``branch`` means +1.  A text such as "20 g", a quantity of pint or a heading such as
+        ``m_crank [g]`` says its unit: it is brought to mm, t, s, N, and bare numbers beside it are taken in these
     want : names of design outputs: ``rotatable``, ``margin``, ``stroke``, ``max_abs_d2s`` ... (see ``sweep families``),
         ``max_force_d``, ``rms_drive_torque``, ``unevenness`` ... (see ``sweep effects``); a list, or one text between
         commas; the name of an effect, as ``friction``, stands for its outputs
@@ -113,8 +114,10 @@ def summarise(
     if certify:
         check_certifiable(mechanism, wanted, chosen, window is not None)
     given = table
-    table = in_radians(mechanism, plain_columns(table), angles, input_names(bare))
-    matrix, _ = design_matrix(mechanism, table, unused=input_names(bare))
+    table = plain_columns(table)
+    others = inputs_beside(bare, plain_names(table))
+    table = in_radians(mechanism, table, angles, others)
+    matrix, _ = design_matrix(mechanism, table, unused=others)
     columns = design_outputs(mechanism, matrix, wanted, chosen, window)
     made: dict[str, Any] = {name: columns[name] for name in (*with_errors(wanted, chosen), "status")}
     if status_text:

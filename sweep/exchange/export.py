@@ -17,6 +17,7 @@ import numpy as np
 from sweep.errors import InputError, StoreError
 from sweep.evaluation.angles import AngleUnit, grid_in_radians, in_radians
 from sweep.evaluation.curves import motion_curves
+from sweep.evaluation.given_units import speed_given
 from sweep.evaluation.poses import evaluate
 from sweep.evaluation.tables import design_matrix
 from sweep.exchange.dxf import write_dxf
@@ -115,7 +116,7 @@ def export(
     phi: float = 0.0,
     poses: int = 120,
     unit: str = "mm",
-    speed: float | None = None,
+    speed: float | str | None = None,
     angles: AngleUnit | None = None,
 ) -> Path:
     """Write one design to a file that other programs read.
@@ -133,7 +134,8 @@ def export(
     phi : angle of the driving shaft in the drawn position, where a turn begins [rad]
     poses : steps of a turn
     unit : what a length of the design is, "mm" or "m"
-    speed : of the driving shaft [rad/s]: gives the law a column of time and the animation its duration
+    speed : of the driving shaft [rad/s], or a text such as "7000 rpm": gives the law a column of time and the animation
+        its duration
     angles : the unit of the angles of ``design`` and ``phi``, "rad" or "deg", as of :func:`sweep.evaluate`
 
     Returns
@@ -163,6 +165,7 @@ def export(
         raise InputError("unit", unit, "mm or m", "export")
     if poses < 3:
         raise InputError("poses", poses, "at least 3", "export")
+    speed = speed_given(speed)
     if speed is not None and not (math.isfinite(speed) and speed > 0.0):
         raise InputError("speed", speed, "a positive number of rad/s", "export")
     design = in_radians(find_family(mechanism), design, angles)

@@ -30,6 +30,7 @@ KEPT = 256  # designs whose outputs are remembered: pins and what is undone
 COUNT, SAMPLE = 25, 65_536  # of a saved study: values of each of two axes, designs over more of them
 TABLES = ("fit", "locus", "task", "pareto", "reference", "report")  # that a saved study of plain dimensions has not
 STARTS = 12
+MOST_LETTERS = 64  # of a study's name
 PINS = 3
 
 
@@ -147,6 +148,7 @@ class Hand:
         if len(axes) > 2:
             data["design"]["sample"] = {"kind": "sobol", "n": SAMPLE}
         data["limits"] = {name: limit for name, limit in old.get("limits", {}).items() if name not in own}
+        data["study"] = {**old["study"], "name": f"{self.study.name}-in-hand"[:MOST_LETTERS]}
         data["reference"] = {"design": design_entries(self.study.bare, design)}
         data |= {"optimise": {"starts": STARTS}} if "optimise" in old else {}
         study_from_data(data, "study.toml")

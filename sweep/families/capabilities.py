@@ -88,12 +88,14 @@ class InSeries:
     components : of those pose outputs that a grid has at once, the component: "x1", "x2", "x3", "y0", "y1", "y2"
     opening : of a family that can be the first stage, ``opening(designs, status, distance)``: does it turn, and how
         far is its nearest singularity
+    matrix : of a family that moves as another one, the designs of that; then it is fused by itself alone
     """
 
     form: Form
     curves: Mapping[str, Curve]
     components: Mapping[str, str]
     opening: Callable[[Array, NDArray[np.uint8], Array], None] | None = None
+    matrix: DesignMap | None = None
 
 
 @dataclass(frozen=True)

@@ -5,6 +5,8 @@ The rocker is the crank-rocker's with alpha = f = g = 0; the coupler point is th
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 
 from kernels import status as st
@@ -131,6 +133,7 @@ FAMILY = Family(
         JointRecords(joint_records, crank_rocker.JOINT_NEEDS, "rocker"),
         PressureEllipse(of_matrix(crank_rocker.ellipse, as_crank_rocker)),
         CrankRockerLoop(as_crank_rocker),
+        replace(crank_rocker.SERIES, matrix=as_crank_rocker),
         Points({name: (f"x_{name}", f"y_{name}", None) for name in ("b", "c", "m")}),
         OutputLink(crank_rocker.rocker_origin),
         ToolPoint(guide.tool_point),

@@ -6,6 +6,8 @@ alpha = 90 deg, branch = -branch; psi is its alpha.
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 
 from kernels import status as st
@@ -188,6 +190,11 @@ FAMILY = Family(
         JointRecords(joint_records, (), "rocker"),
         PressureEllipse(of_matrix(crank_rocker.ellipse, as_crank_rocker)),
         CrankRockerLoop(as_crank_rocker),
+        replace(
+            crank_rocker.SERIES,
+            curves={_ours(name): known for name, known in crank_rocker.CURVES.items()},
+            matrix=as_crank_rocker,
+        ),
         Points({"b": ("x_b", "y_b", "z_b"), "c": ("x_c", "y_c", "z_c")}),
         Skeleton(
             {

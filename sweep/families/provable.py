@@ -1,21 +1,32 @@
-"""Loci of limit positions over whose boxes bounds can be proven."""
+"""Loci of limit positions over whose boxes bounds can be proven.
+
+The kernels of the proof are imported by it alone: whoever asks a crank-rocker for a number would wait for them.
+"""
 
 from __future__ import annotations
 
 from functools import cache
+from importlib import import_module
+from typing import TYPE_CHECKING
 
-from kernels.families.rssr import box_by_axes, box_by_rocker, proof
-from kernels.families.rssr.box_problem import BoxQuestion
-from kernels.families.rssr.box_turn import Formulas
 from kernels.types import Numbers
 from sweep.families.capabilities import ProvableLocus, Searched
 
-_by_axes = cache(box_by_axes.recorded)
-_by_rocker = cache(box_by_rocker.recorded)
+if TYPE_CHECKING:
+    from kernels.families.rssr.box_turn import Formulas
+
+
+@cache
+def _recorded(coordinates: str) -> Formulas:
+    formulas: Formulas = import_module(f"kernels.families.rssr.box_{coordinates}").recorded()
+    return formulas
 
 
 def _explored(formulas: Formulas, searched: Searched, leaves: tuple[Numbers, ...]) -> tuple[int, int]:
     """Leaves filled and boxes judged by :func:`kernels.families.rssr.proof.explore`."""
+    from kernels.families.rssr import proof
+    from kernels.families.rssr.box_problem import BoxQuestion
+
     s = searched
     problem = BoxQuestion(s.branch, s.objective, s.cos2, s.links, s.target, s.tube)
     found = proof.explore(
@@ -25,11 +36,11 @@ def _explored(formulas: Formulas, searched: Searched, leaves: tuple[Numbers, ...
 
 
 def _explored_by_axes(searched: Searched, leaves: tuple[Numbers, ...]) -> tuple[int, int]:
-    return _explored(_by_axes(), searched, leaves)
+    return _explored(_recorded("by_axes"), searched, leaves)
 
 
 def _explored_by_rocker(searched: Searched, leaves: tuple[Numbers, ...]) -> tuple[int, int]:
-    return _explored(_by_rocker(), searched, leaves)
+    return _explored(_recorded("by_rocker"), searched, leaves)
 
 
 def _tests(lengths: tuple[str, ...]) -> tuple[str, ...]:

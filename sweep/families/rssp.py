@@ -56,7 +56,7 @@ JOINT_OUTPUTS = (
 
 MARGIN_OUTPUTS = (
     Output("rotatable", "1", "whether the links reach over the whole turn", "(4)"),
-    Output("margin", "1", "smallest cos^2(pressure angle) over the turn; negative if the crank does not turn", "(4)"),
+    Output("margin", "1", "cos^2 of the worst pressure angle over the turn; below 0 the linkage jams", "(4)"),
     Output("max_pressure_angle", "rad", "largest pressure angle over one turn", "(3)"),
 )
 

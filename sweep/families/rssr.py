@@ -61,7 +61,7 @@ POSE_OUTPUTS = (
 
 MARGIN_OUTPUTS = (
     Output("rotatable", "1", "whether the crank turns fully; exact", "(14)"),
-    Output("margin", "1", "smallest cos^2(pressure angle) over the turn; negative if the crank does not turn", "(14)"),
+    Output("margin", "1", "cos^2 of the worst pressure angle over the turn; below 0 the linkage jams", "(14)"),
     Output("max_pressure_angle", "rad", "largest pressure angle over the turn", "(13), (14)"),
 )
 
@@ -200,19 +200,16 @@ def limits(designs: Array, wanted: frozenset[str], accuracy: Accuracy) -> Column
 def true_maxima(designs: Array, wanted: frozenset[str], accuracy: Accuracy) -> Columns:
     """Maxima over the turn refined between samples to ``accuracy.target``, with error estimates."""
     assert accuracy.target is not None
-    n = len(designs)
-    columns: Columns = {"status": np.zeros(n, np.uint8)}
-    for order, name in enumerate(("dpsi", "d2psi", "d3psi")):
-        if not wanted & {f"max_abs_{name}", f"phi_max_abs_{name}"}:
-            continue
-        status, most, phi, error, phi_error = np.empty(n, np.uint8), *(np.empty(n) for _ in range(4))
-        outputs: list[Array | None] = [None, None, None]
-        outputs[order] = most
-        rssr.true_maxima(designs, *sampling_tables(), accuracy.target, status, phi, error, phi_error, *outputs)
-        for key, value, err in ((f"max_abs_{name}", most, error), (f"phi_max_abs_{name}", phi, phi_error)):
-            if key in wanted:
-                columns |= {key: value, f"err_{key}": err}
-        columns["status"] = np.where(columns["status"] == st.OK, status, columns["status"])
+    n, names = len(designs), ("dpsi", "d2psi", "d3psi")
+    status, phi, error, phi_error = np.empty(n, np.uint8), *(np.empty((3, n)) for _ in range(3))
+    most = [np.empty(n) if wanted & {f"max_abs_{x}", f"phi_max_abs_{x}"} else None for x in names]
+    rssr.true_maxima(designs, *sampling_tables(), accuracy.target, status, phi, error, phi_error, *most)
+    columns: Columns = {"status": status}
+    for order, name in enumerate(names):
+        pairs = ((f"max_abs_{name}", most[order], error), (f"phi_max_abs_{name}", phi[order], phi_error))
+        for key, values, err in pairs:
+            if key in wanted and values is not None:
+                columns |= {key: values, f"err_{key}": err[order]}
     return columns
 
 
@@ -221,6 +218,8 @@ def certified_maxima(designs: Array, wanted: frozenset[str], accuracy: Accuracy)
 
     The place of a maximum is one where its value is taken; how far it is from the exact place stays an estimate.
     """
+    from kernels.families.rssr.certify import certify_maxima  # here: only proofs wait for its import
+
     assert accuracy.target is not None
     n = len(designs)
     columns: Columns = {"status": np.zeros(n, np.uint8)}
@@ -232,7 +231,7 @@ def certified_maxima(designs: Array, wanted: frozenset[str], accuracy: Accuracy)
         status = searched["status"].astype(np.uint8)
         value, place = (np.array(searched[key], np.float64) for key in (most, phi))
         error, far = np.full(n, np.nan), np.asarray(searched[f"err_{phi}"], np.float64)
-        rssr.certify_maxima(
+        certify_maxima(
             np.ascontiguousarray(designs)[None], np.empty((0, n, 2)), np.zeros((n, 8)), np.array([(2, order)]),
             accuracy.target, MOST_CELLS, status[None], value[None], place[None], error[None], np.empty(n),
         )  # fmt: skip
@@ -300,6 +299,7 @@ def _sampled(accuracy: Accuracy) -> bool:
 
 
 CURVES = {name: Curve(order, constant(1.0, 0.0, 0.0)) for order, name in enumerate(("dpsi", "d2psi", "d3psi"), start=1)}
+SERIES = InSeries(rssr.FORM, CURVES, {"dpsi": "x1", "d2psi": "x2", "d3psi": "x3"}, rssr.opening)
 
 FAMILY = Family(
     name="rssr",
@@ -321,7 +321,7 @@ FAMILY = Family(
     capabilities=(
         CRANK_ROCKER_SIZES,
         Assembly("discriminant", "pressure_angle", discriminant_scale),
-        InSeries(rssr.FORM, CURVES, {"dpsi": "x1", "d2psi": "x2", "d3psi": "x3"}, rssr.opening),
+        SERIES,
         JointRecords(joint_records, JOINT_NEEDS, "rocker"),
         PressureEllipse(ellipse),
         CrankRockerLoop(np.ascontiguousarray),

@@ -13,6 +13,7 @@ from sweep.errors import InputError
 from sweep.evaluation.angles import AngleUnit, grid_in_radians, in_radians
 from sweep.evaluation.curves import motion_curves
 from sweep.evaluation.cyclogram import cyclogram as table
+from sweep.evaluation.given_units import speed_given
 from sweep.evaluation.joints import parts
 from sweep.evaluation.poses import evaluate, pose_wants
 from sweep.exchange.scene import over, shown_name
@@ -39,7 +40,7 @@ def motion(
     want: str | Sequence[str] | None = None,
     *,
     unit: str = "mm",
-    speed: float | None = None,
+    speed: float | str | None = None,
     angles: AngleUnit | None = None,
     axes: Sequence[Axes] | Axes | None = None,
 ) -> NDArray[Any]:
@@ -52,7 +53,8 @@ def motion(
     want : pose outputs, as a list or in one string between commas; if left out position and derivatives, deviations
         and pressure angles
     unit : the length unit of the design, for the axes
-    speed : of the driving shaft [rad/s]: adds scales of velocity, acceleration and jerk in time
+    speed : of the driving shaft [rad/s], or a text such as "7000 rpm": adds scales of velocity, acceleration and jerk
+        in time
     angles : the unit of the angles of ``design``, "rad" or "deg", as of :func:`sweep.evaluate`
     axes : of a figure of yours to draw into, one for each curve
 
@@ -90,7 +92,7 @@ def motion(
     curves = pd.DataFrame(found.assign(role=[names_of[k] for k in found["design"]]))
     units = {o.name: o.unit.replace("length", unit) for o in family.pose_outputs}
     with house_style():
-        panels = motion_figure(curves, units, family.position, speed, (), None, names, given)
+        panels = motion_figure(curves, units, family.position, speed_given(speed), (), None, names, given)
     return np.array(panels, dtype=object)
 
 

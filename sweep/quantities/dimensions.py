@@ -127,13 +127,11 @@ def lengths(family: Family) -> tuple[str, ...]:
 
 def size_step(family: Family) -> Step | None:
     """Route to ``size``; None where a family has ratios of lengths only."""
-    names = lengths(family)
-    if not names:
+    if not any(p.unit == "length" and not p.places for p in family.parameters):
         return None
-    columns = [family.parameter_names.index(name) for name in names]
 
     def run(designs: Array, wanted: frozenset[str], accuracy: Accuracy) -> Columns:
-        n = len(designs)
+        n, columns = len(designs), [family.parameter_names.index(name) for name in lengths(family)]
         found: Columns = {name: np.abs(designs[:, columns]).max(axis=1) for name in wanted & {SIZE.name}}
         return found | {f"err_{SIZE.name}": np.zeros(n), "status": np.zeros(n, np.uint8)}
 

@@ -36,7 +36,7 @@ from sweep.quantities.kinds import (
 
 MARGIN_TEXTS = {
     "rotatable": ("1", "whether the links reach over the whole turn"),
-    "margin": ("1", "smallest cos^2(pressure angle) over one turn; negative if the crank does not turn fully"),
+    "margin": ("1", "cos^2 of the worst pressure angle over one turn; below 0 the linkage jams"),
     "max_pressure_angle": ("rad", "largest pressure angle over one turn"),
     "least_transmission_angle": ("rad", "least transmission angle over one turn: 90 degrees less the pressure angle"),
 }

@@ -59,19 +59,12 @@ class FusedCurve:
         status : (n,) OK or NOT_ROTATABLE
         undecided : (n,) where a slower search is to be asked
         """
-        n, designs = len(designs), np.ascontiguousarray(designs)
-        opening, distance = np.empty(n, np.uint8), np.empty(n)
-        opens, stage = self.forms[0].opening, stages_of(self.family)[len(self.forms) - 1]
-        assert opens is not None
-        opens(designs, opening, distance)
-        made_of = np.ascontiguousarray(self.made_of(designs[:, stage.columns]))
+        n, (given, made_of, along) = len(designs), self._given(designs)
         # Which of several is the highest decides on the place.
         tie = TIE if self.request.place else -1.0
         status, found = np.empty(n, np.uint8), np.empty((6, n))
-        # Positions along and across a line are often asked for together: they share a kernel, which has to be compiled.
-        along = self.order >= 1 and not made_of[:, 1].any()
         chains.find_extrema(_chained(self.forms), self.order, along)(
-            designs, opening, distance, *sampling_tables(), made_of, self.request.mode, target, tie, status, found
+            *given, *sampling_tables(), made_of, self.request.mode, target, tie, status, found
         )
         value, phi, err, err_phi, scale, spacing = found
         if self.scale is not None:
@@ -91,6 +84,29 @@ class FusedCurve:
         if self.order == MARGIN:
             undecided |= status == st.NOT_ROTATABLE
         return extremum, np.where(undecided | (status == chains.ROUNDED), st.OK, status).astype(np.uint8), undecided
+
+    def mean(self, designs: Array, target: float) -> tuple[Array, Array, Status, Mask]:
+        """Return root mean squares over the turn, their errors, the status and what is undecided, as `extremum`."""
+        n, (given, made_of, along) = len(designs), self._given(designs)
+        status, found = np.empty(n, np.uint8), np.empty((2, n))
+        chains.mean_squares(_chained(self.forms), self.order, along)(
+            *given, *sampling_tables(), made_of, target, status, found
+        )
+        undecided = status == chains.OPEN
+        return found[0], found[1], np.where(undecided, st.OK, status).astype(np.uint8), undecided
+
+    def _given(self, designs: Array) -> tuple[tuple[Array, Status, Array], Array, bool]:
+        """Designs, whether and how they open, what the curve is made of, and whether it needs nothing across."""
+        n, designs = len(designs), np.ascontiguousarray(designs)
+        opening, distance = np.empty(n, np.uint8), np.empty(n)
+        opens, stage = self.forms[0].opening, stages_of(self.family)[len(self.forms) - 1]
+        assert opens is not None
+        made_of = np.ascontiguousarray(self.made_of(designs[:, stage.columns]))
+        if (matrix := self.forms[0].matrix) is not None:
+            designs = matrix(designs)
+        opens(designs, opening, distance)
+        # Positions along and across a line are often asked for together: they share a kernel, which has to be compiled.
+        return (designs, opening, distance), made_of, self.order >= 1 and not made_of[:, 1].any()
 
     def _confirm(self, designs: Array, found: Extremum, rows: Index, tolerance: Array, spacing: Array) -> None:
         """Replace extrema that rounding may have moved too far by what precise poses say, in place."""
@@ -133,13 +149,14 @@ class FusedCurve:
         return 4.0 * EPS * amplified
 
 
-def curve_of(family: Family, request: Request, anywhere: bool) -> FusedCurve | None:
+def curve_of(family: Family, request: Request, anywhere: bool, mean: bool = False) -> FusedCurve | None:
     """Fused curve of what is requested; None where there is none.
 
     ``anywhere`` as of `sweep.reductions.extrema.true_extrema`: then the least discriminant of a later stage.
     """
     forms = _forms(family)
-    if forms is None:
+    # What can drive another stage has steps of its own for its extrema, none for a ``mean``.
+    if forms is None or (len(forms) == 1 and forms[0].form.turn is not None and not mean):
         return None
     if anywhere:
         return _least_discriminant(family, forms, request)
@@ -205,9 +222,10 @@ def _forms(family: Family) -> tuple[InSeries, ...] | None:
     forms = [stage.family.find(InSeries) for stage in stages_of(family)]
     known = tuple(form for form in forms if form is not None)
     fits = len(known) == len(forms) and known[0].opening is not None
-    if len(forms) == 1:  # what can drive another stage has steps of its own
-        return known if fits and known[0].form.turn is None else None
-    return known if fits and all(form.form.turn is not None for form in known[:-1]) else None
+    if len(forms) == 1:
+        return known if fits else None
+    drives = all(form.form.turn is not None for form in known[:-1]) and all(form.matrix is None for form in known)
+    return known if fits and drives else None
 
 
 def _chained(forms: tuple[InSeries, ...]) -> chains.Chained:

@@ -19,6 +19,8 @@ from sweep.families.curve_features import Singular, Switches, crossed, singular_
 from sweep.numerics.events import with_events
 from sweep.numerics.quadrature import integrate
 from sweep.numerics.singularities import Singularities, crowded, steps, turn_edges
+from sweep.quantities.kinds import Request
+from sweep.reductions.fused import curve_of
 from sweep.reductions.peak_search import LIMIT, START
 from sweep.reductions.resolution import denser, ends, nearest
 from sweep.reductions.sampling import DESIGN_STATUS, Index, blocks, discriminants, pose_columns, sample_turn
@@ -59,10 +61,25 @@ def mean_squares(family: Family, designs: Array, names: Sequence[str], accuracy:
     status = np.zeros(n, np.uint8)
     for name, pose in zip(names, poses, strict=True):
         # Each by itself, so that no bit of it depends on what is wanted beside it.
-        found, err, now = _refined(family, designs, [pose], accuracy.target)
-        columns |= {name: found[:, 0], f"err_{name}": err[:, 0]}
+        found, err, now = _of_one(family, designs, pose, accuracy.target)
+        columns |= {name: found, f"err_{name}": err}
         status = np.where(status == st.OK, now, status)
     return columns | {"status": status}
+
+
+def _of_one(family: Family, designs: Array, pose: str, target: float) -> tuple[Array, Array, Status]:
+    """Means of one pose output and their errors (n,), and the status: of a fused chain by its kernel, else by poses."""
+    known = family.pose_output[pose]
+    curve = None if known.kinks or known.jumps else curve_of(family, Request(pose, 0), False, mean=True)
+    if curve is None:
+        found, errors, status = _refined(family, designs, [pose], target)
+        return found[:, 0], errors[:, 0], status
+    mean, err, status, undecided = curve.mean(designs, target)
+    rows = np.flatnonzero(undecided | crossed(family, designs))
+    if rows.size:
+        found, errors, status[rows] = _refined(family, designs[rows], [pose], target)
+        mean[rows], err[rows] = found[:, 0], errors[:, 0]
+    return mean, err, status
 
 
 def _refined(family: Family, designs: Array, poses: Sequence[str], target: float) -> tuple[Array, Array, Status]:

@@ -7,7 +7,6 @@ from functools import partial
 import numpy as np
 
 from kernels import status as st
-from kernels.families import rssr
 from sweep.costs import nanoseconds
 from sweep.families.base import Accuracy, Array, Columns, Family, Output, Step, Work
 from sweep.families.capabilities import CrankRockerLoop, GuidedPoint
@@ -67,6 +66,8 @@ def _proven(
     wanted: frozenset[str],
     accuracy: Accuracy,
 ) -> Columns:
+    from kernels.families.rssr.certify import certify_maxima  # here: only proofs wait for its import
+
     assert accuracy.target is not None
     n = len(designs)
     loops = [_loop(stage, designs) for stage in stages]
@@ -81,7 +82,7 @@ def _proven(
     value = np.stack([found[request].value for request in requests])
     phi = np.stack([found[request].phi for request in requests])
     status, error = np.tile(searched, (len(names), 1)), np.full(value.shape, np.nan)
-    rssr.certify_maxima(
+    certify_maxima(
         np.stack(loops), joined, shares, np.array([known[name] for name in names], np.int64), accuracy.target,
         MOST_CELLS, status, value, phi, error, np.empty(n),
     )  # fmt: skip

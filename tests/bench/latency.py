@@ -1,12 +1,16 @@
-"""A number at once, next to a plain numba function and pylinkage: ``make bench-latency``; a minute, writes no page.
+"""A number at once, next to a plain numba function and pylinkage: ``make bench-latency``; two minutes, writes no page.
 
-One design of the planar four-bar, position to acceleration of the rocker.  All are timed in one process, in turn, and
+One design of the planar four-bar, position to acceleration of the rocker; what outputs of many designs take next to the
+largest acceleration; what commands take next to the import of numpy and pandas.  All of a table are timed in turn, and
 the fastest of many short batches counts: what else the machine does lengthens some of them, not all.
 """
 
 from __future__ import annotations
 
 import math
+import resource
+import subprocess
+import sys
 import time
 from collections.abc import Callable, Mapping
 from importlib.metadata import PackageNotFoundError, version
@@ -17,9 +21,12 @@ from numba import njit
 
 import sweep
 from studies.accuracy.machine import description
+from sweep.evaluation.summaries import design_outputs
 from sweep.families import family
-from sweep.families.base import Angles
+from sweep.families.base import Accuracy, Angles, Family
 from tests.bench.peers import _pylinkage
+from tests.support.rssr_designs import random_designs
+from tests.support.turn_designs import NEEDLE, needle_drives
 
 DESIGN = {"a": 10.0, "b": 40.0, "c": 30.0, "e": 45.0}
 POSES, OUTPUTS = ["psi", "dpsi", "d2psi"], ["swing", "max_abs_d2psi"]
@@ -29,6 +36,24 @@ BATCH, SECONDS = 3e-4, 1.0  # of one batch, and of all of one table for each of 
 FRAME = "DataFrame of ten columns"
 COMPILED = "compiled poses, from the angle"
 MARKS = {"evaluate, dict": 1.5, "evaluate, DataFrame": 3.0, "summarise, dict": 1.5, "summarise, DataFrame": 3.0}
+
+# Design outputs in bulk, as ratios to the largest acceleration of the same mechanisms, of random designs that turn.
+BULK, FINE = 4096, Accuracy(target=1e-8)
+SLOWEST, BOTH = 3.0, 1.4
+SLOW = ("swing", "phi0", "max_pressure_angle", "max_abs_dpsi", "max_abs_d3psi", "rms_dpsi", "rms_d2psi")
+SLOW_NEEDLE = ("stroke", "max_abs_ds", "max_pressure_angle1", "rms_ds", "rms_d2s")
+
+# Commands from a full cache: a new process, its processor time.
+LIBRARIES = "import numpy, pandas"
+NUMBER = "import sweep; m = sweep.mechanism('rssr', a=10, b=40, c=25, e=35, f=5, g=-3, alpha='60 deg'); "
+COMMANDS = {
+    "first number, sweep.mechanism": ("-c", NUMBER + "m.outputs(['max_abs_d2psi'])"),
+    "first number, sweep.summarise": ("-c", NUMBER + "sweep.summarise('rssr', m.dimensions, ['max_abs_d2psi'])"),
+    "sweep check studies/joint-loads": ("-m", "sweep", "check", "studies/joint-loads"),
+}
+AT_MOST = {"first number, sweep.mechanism": 0.7, "first number, sweep.summarise": 0.7}  # s
+TIMES = {"sweep check studies/joint-loads": 3.0}  # of the import
+STARTS = 5
 
 
 @njit(error_model="numpy")
@@ -116,6 +141,66 @@ def turns() -> list[str]:
     return lines
 
 
+def outputs(
+    mechanism: Family, designs: np.ndarray, base: str, names: tuple[str, ...], both: tuple[str, str]
+) -> list[str]:
+    """Time design outputs of many designs, as ratios to the largest acceleration, and two of one motion together."""
+
+    def asked(*wanted: str) -> Callable[[], object]:
+        return lambda: design_outputs(mechanism, designs, wanted, FINE)
+
+    together = " and ".join(both)
+    found = fastest({base: asked(base), **{name: asked(name) for name in names}, together: asked(*both)})
+    lines = [f"{mechanism.name}, {len(designs)} designs{'':10}  ns    x {base}"]
+    dearer = max(found[name] for name in both)
+    for name, seconds in found.items():
+        if name == together:
+            ratio, most, of = seconds / dearer, BOTH, f" x {max(both, key=lambda one: found[one])}"
+        else:
+            ratio, most, of = seconds / found[base], SLOWEST, ""
+        mark = "" if name == base else f"  {'holds' if ratio <= most else 'missed'}: {most:g}"
+        lines.append(f"{name:36}{1e9 * seconds / len(designs):8.0f}{ratio:8.2f}{of}{mark}")
+    return lines
+
+
+def bulk() -> list[str]:
+    """Time the outputs of crank-rockers and of needle drives."""
+    rockers, needles = random_designs(BULK, 1, rotatable=True), needle_drives(8 * BULK, 1)
+    swings = design_outputs(family("rssr"), rockers, ["swing"], FINE)["status"] == 0
+    turns = design_outputs(NEEDLE, needles, ["margin"], FINE)["status"] == 0
+    both = ("max_abs_dpsi", "max_abs_d2psi")
+    lines = outputs(family("rssr"), np.ascontiguousarray(rockers[swings]), both[1], SLOW, both)
+    needle = ("max_abs_ds", "max_abs_d2s")
+    return [*lines, "", *outputs(NEEDLE, np.ascontiguousarray(needles[turns][:BULK]), needle[1], SLOW_NEEDLE, needle)]
+
+
+def commands() -> list[str]:
+    """Time new processes, with what they have imported and compiled before on disk."""
+    calls = {LIBRARIES: ("-c", LIBRARIES), **COMMANDS}
+    least = dict.fromkeys(calls, math.inf)
+    for _ in range(STARTS):
+        for name, arguments in calls.items():
+            least[name] = min(least[name], _processor_seconds(arguments))
+    lines = [f"a new process{'':24}s    x {LIBRARIES}"]
+    for name, seconds in least.items():
+        ratio = seconds / least[LIBRARIES]
+        mark = ""
+        if name in AT_MOST:
+            mark = f"  {'holds' if seconds <= AT_MOST[name] else 'missed'}: {AT_MOST[name]:g} s"
+        elif name in TIMES:
+            mark = f"  {'holds' if ratio <= TIMES[name] else 'missed'}: {TIMES[name]:g}"
+        lines.append(f"{name:34}{seconds:8.2f}{ratio:8.2f}{mark}")
+    return lines
+
+
+def _processor_seconds(arguments: tuple[str, ...]) -> float:
+    """Run Python to its end and return the processor time that it took."""
+    before = resource.getrusage(resource.RUSAGE_CHILDREN)
+    subprocess.run([sys.executable, *arguments], check=True, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
+    after = resource.getrusage(resource.RUSAGE_CHILDREN)
+    return (after.ru_utime + after.ru_stime) - (before.ru_utime + before.ru_stime)
+
+
 def here(package: str) -> bool:
     """Tell whether a package is installed."""
     try:
@@ -125,14 +210,14 @@ def here(package: str) -> bool:
 
 
 def main() -> None:
-    """Print both tables."""
+    """Print the tables, with every mark and whether it holds."""
     phi, out = np.linspace(0.0, 6.0, 50), np.empty((3, 50))
     plain(*DESIGN.values(), phi, out)
     found = sweep.mechanism("four_bar", **DESIGN, branch=branch(out[0], phi)).poses(phi, POSES)
     for values, name in zip(out, POSES, strict=True):
         off = values - found[name]
         np.testing.assert_allclose(off - 2.0 * math.pi * np.rint(off / (2.0 * math.pi)), 0.0, atol=1e-12)
-    print("\n".join([description(), "", *tables(), "", *turns()]))
+    print("\n".join([description(), "", *tables(), "", *turns(), "", *bulk(), "", *commands()]))
 
 
 def branch(psi: np.ndarray, phi: np.ndarray) -> float:

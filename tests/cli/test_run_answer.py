@@ -10,7 +10,7 @@ import pytest
 from click.testing import CliRunner
 
 from sweep.cli import main
-from sweep.report import write_report
+from sweep.report.page import write_report
 from sweep.report.terminal import held_back
 from tests.optimise.test_study import STUDY
 

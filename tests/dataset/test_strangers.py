@@ -28,7 +28,7 @@ from sweep.dataset import store
 from sweep.dataset.lock import locked
 from sweep.dataset.parts import content_hash
 from sweep.errors import InputError, LinksweepError, LinksweepWarning, LockedError, StoreError, WorkerDied
-from sweep.report import write_report
+from sweep.report.page import write_report
 from tests.support.engine_study import ROOT, SMALL_CHUNKS, chunk_bytes, write_study
 
 

@@ -13,7 +13,8 @@ from sweep.cli import main
 
 ROOT = Path(__file__).parents[2]
 TEXT = (ROOT / "docs" / "tutorial.md").read_text(encoding="utf-8")
-LINES = [line[4:] for line in TEXT.splitlines() if line.startswith("    ")]
+PRESS, LOOPER = TEXT.split("## 7. Your own looper")
+LINES = [line[4:] for line in PRESS.splitlines() if line.startswith("    ")]
 COMMANDS = [line for line in LINES if line.startswith("sweep ")]
 ANSWERS = [line for line in LINES if not line.startswith("sweep ")]
 
@@ -50,3 +51,38 @@ def test_tutorial_gives_the_answers_it_shows(tmp_path, monkeypatch):
     said += typed(check).output
     for line in ANSWERS:
         assert line in said or line == limit, line
+
+
+@pytest.mark.browser
+def test_looper_gets_from_an_empty_folder_to_the_drawing(tmp_path, monkeypatch):
+    from tests.support.browser import DRAWS, launcher
+    from tests.support.explorer import explored
+
+    monkeypatch.chdir(tmp_path)
+    commands = [line[4:] for line in LOOPER.splitlines() if line.startswith("    sweep ")]
+    init, run, explore, again, *others = commands
+    assert typed(init).exit_code == 0
+    study = tmp_path / "looper" / "study.toml"
+    text = study.read_text(encoding="utf-8")
+    study.write_text(text.replace("\n# [optimise]", "\n[optimise]").replace("\n# starts", "\nstarts"), encoding="utf-8")
+    assert typed(run).exit_code == 0
+    assert explore == "sweep explore results/looper"
+    with launcher() as launch, explored(tmp_path / "results" / "looper") as address:
+        page = launch(*DRAWS).new_page()
+        page.goto(address)
+        page.get_by_label("c1 may vary").check()
+        page.click("#pin")
+        page.click("#improve")
+        page.get_by_text("looks").filter(has_text="after").wait_for(timeout=120_000)
+        assert page.evaluate("design.c1") != page.evaluate("page.first.c1")
+        with page.expect_download() as found:
+            page.select_option("#save", "study")
+        found.value.save_as(tmp_path / "looper" / "better.toml")
+    assert typed(again).exit_code == 0
+    for command in others:
+        done = typed(command)
+        assert done.exit_code == 0, done.output
+    compared = (tmp_path / "results" / "looper" / "comparison.html").read_text(encoding="utf-8")
+    assert "looper and looper-in-hand" in compared
+    exported = {path.suffix for path in (tmp_path / "results" / "looper-in-hand" / "export").iterdir()}
+    assert exported == {".pdf", ".dxf", ".xlsx"}

@@ -86,8 +86,9 @@ def test_a_whole_turn_is_no_parameter_too_large():
 
 @pytest.mark.parametrize("table, words", [
     (HEADED | {"alpha": 1.0}, "either alpha or alpha"),
-    (DESIGN | {"alpha [grad]": 60.0}, "rad or deg"),
-    (RADIANS | {"a [mm]": 10.0}, "one length unit throughout"),
+    (DESIGN | {"alpha [grad]": 60.0}, "an angle, in deg"),
+    (RADIANS | {"a [mm]": 10.0}, "either a or a"),
+    ({name: x for name, x in RADIANS.items() if name != "a"} | {"a [kg]": 10.0}, "a length, in mm"),
     (DESIGN | {"alpha [deg]": "sixty"}, r"column alpha \[deg\], row 0"),
 ])  # fmt: skip
 def test_header_that_cannot_be_is_refused(table, words):

@@ -39,7 +39,7 @@ def test_crank_angles(phi: Any, words: str) -> None:
 @pytest.mark.parametrize(
     ("column", "words"),
     [
-        ([1, "1 mm"], "column a, row 1: a = '1 mm'; allowed: a number"),
+        ([1, "one"], "column a, row 1: a = 'one'; allowed: a number"),
         (1 + 1j, "column a, row 0: a = (1+1j); allowed: a number"),
         (pd.to_datetime(["2020-01-01"]), "column a, row 0: a = Timestamp('2020-01-01 00:00:00'); allowed: a number"),
         (pd.to_timedelta(["1s"]), "column a, row 0: a = Timedelta('0 days 00:00:01'); allowed: a number"),

@@ -18,7 +18,7 @@ import sweep.engine.searches
 import sweep.engine.worker
 import sweep.optimise.multistart.multistart
 import sweep.optimise.study
-import sweep.report
+import sweep.report.page
 from sweep.__main__ import main
 from tests.support.engine_study import SMALL_CHUNKS
 
@@ -75,7 +75,7 @@ if __name__ == "__main__":
     marked(sweep.engine.searches, "_optimise", "optimiser", place)
     marked(sweep.engine.searches, "_front", "front", place)
     marked(sweep.optimise.study, "robust", "tolerance", place)
-    marked(sweep.report, "write_report", "report", place)
+    marked(sweep.report.page, "write_report", "report", place)
     vars(sweep.chunks.plan).update(SMALL_CHUNKS)
     sweep.optimise.multistart.multistart.SERIAL_LOOKS = 0  # every start goes to a process
     FAULTS[sys.argv[2]]()

@@ -22,9 +22,9 @@ from sweep.engine.run import run
 from sweep.errors import Interrupted, StudyError
 from sweep.optimise import front_study
 from sweep.optimise.front.study import saved, within
-from sweep.report import write_report
 from sweep.report.dataset import read_dataset
 from sweep.report.front import front_note
+from sweep.report.page import write_report
 from sweep.study import ParetoSettings, Study, load_study
 from tests.optimise.test_study import STUDY
 

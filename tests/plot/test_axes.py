@@ -14,8 +14,8 @@ import sweep
 from sweep.cli import main
 from sweep.dataset import store
 from sweep.families import family
-from sweep.report import write_report
 from sweep.report.figures import house_style, save
+from sweep.report.page import write_report
 from tests.support.report_dataset import study_data, write_dataset, write_table
 
 RSSR = dict(family("rssr").example)

@@ -18,7 +18,7 @@ from sweep.jobs.signals import Stop
 from sweep.nights.carry import carry, searched
 from sweep.proof import known_proof, prove_study, read_proof
 from sweep.proof.rounds import Cores
-from sweep.report import write_report
+from sweep.report.page import write_report
 from sweep.study import load_study
 
 # A rocker that swings 60 degrees, the crank angle of the extended position and phi0 free.

@@ -11,8 +11,8 @@ import pandas as pd
 import pytest
 
 import sweep
-from sweep.report import write_report
 from sweep.report.dataset import chosen
+from sweep.report.page import write_report
 from tests.support.browser import DRAWS, FLAT, launcher, opened, pixels
 
 pytestmark = pytest.mark.browser

@@ -12,10 +12,10 @@ import pandas as pd
 import pytest
 
 import sweep
-from sweep.report import write_report
 from sweep.report.dataset import gather
 from sweep.report.live import BEST, POSES, SPREAD, live, moving, parallel, runs
 from sweep.report.optima import Shown, groups, shown_designs
+from sweep.report.page import write_report
 from tests.support.report_dataset import study_data, write_dataset
 
 FOUR_BAR = {"a": 10.0, "b": 35.0, "c": 30.0, "e": 32.0, "xi": 20.0, "eta": 5.0}

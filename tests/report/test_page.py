@@ -17,12 +17,12 @@ import sweep
 from sweep import run
 from sweep.dataset import store
 from sweep.errors import InputError, StoreError
-from sweep.report import write_report
 from sweep.report.answer import answer
 from sweep.report.curves import aligned_turn, in_window, rotates
 from sweep.report.dataset import divided_axes, gather
 from sweep.report.figures import house_style
 from sweep.report.maps import map_figure, overlays
+from sweep.report.page import write_report
 from sweep.report.quantities import quantity
 from sweep.report.scan import Cells, Grid
 from sweep.report.tables import parameter_rows

@@ -10,10 +10,10 @@ import pandas as pd
 import pytest
 
 from kernels import status as codes
-from sweep.report import write_report
 from sweep.report.dataset import gather
 from sweep.report.front import front_rows
 from sweep.report.maps import trade_off
+from sweep.report.page import write_report
 from sweep.report.quantities import quantity
 from sweep.report.scan import scan
 from sweep.study import study_from_data

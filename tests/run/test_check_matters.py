@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from sweep.chunks.plan import feasible_designs, spread_designs
+from sweep.chunks.plan import feasible_designs, pilot, spread_designs
 from sweep.cli.plan import plan_lines
 from sweep.engine.estimate import estimate
 from sweep.evaluation.summaries import design_outputs
@@ -19,7 +19,8 @@ STUDY = load_study(Path(__file__).parents[2] / "studies" / "joint-loads", smoke=
 
 
 def lines_of(study):
-    return plan_lines(study, estimate(study, 1), [])
+    sent = pilot(study)
+    return plan_lines(study, estimate(study, 1, known=sent), [], sent)
 
 
 def number(lines, effect):

@@ -19,7 +19,7 @@ from sweep.jobs.progress import Phases, Progress
 from sweep.jobs.signals import Stop
 from sweep.proof.question import question_of
 from sweep.proof.rounds import Cores, explored
-from sweep.report import write_report
+from sweep.report.page import write_report
 from sweep.study import load_study
 from tests.study.test_words import STUDY
 

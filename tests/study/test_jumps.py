@@ -8,7 +8,7 @@ import pytest
 from sweep.dataset.files import OPTIMUM, SENSITIVITY, beside
 from sweep.engine.run import run
 from sweep.errors import StudyError
-from sweep.report import write_report
+from sweep.report.page import write_report
 from sweep.study import load_study
 
 STUDY = """

@@ -17,7 +17,11 @@ TAKEUP = (Path(__file__).parents[2] / "studies" / "takeup" / "study.toml").read_
 @pytest.mark.parametrize(
     ("old", "new", "words"),
     [
-        ('"79.01 mm", "0 mm"]]', '"79.01 mm", "0 kg"]]', "thread.upper.path[3][2] = '0 kg'; allowed: a length, in mm"),
+        (
+            '"-13.43 mm", "0 mm"]]',
+            '"-13.43 mm", "0 kg"]]',
+            "thread.upper.path[3][2] = '0 kg'; allowed: a length, in mm",
+        ),
         ('tension = "20 gf"', 'tensoin = "20 gf"', "thread.upper.tensoin: unknown key"),
     ],
 )

@@ -20,8 +20,8 @@ import sweep
 from sweep.engine.estimate import check_budget, estimate
 from sweep.engine.run import run
 from sweep.errors import LinksweepError
-from sweep.report import write_report
 from sweep.report.dataset import gather
+from sweep.report.page import write_report
 from sweep.study import load_study
 from tests.support.mutated_studies import DWELL, EDGES, LOCUS, NAMES_OF_FAMILIES, NEEDLE, ROCKER, mutated, plain
 

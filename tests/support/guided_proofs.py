@@ -6,7 +6,8 @@ import numpy as np
 from mpmath import mp
 
 from kernels import status as st
-from kernels.families import guide, rssr
+from kernels.families import guide
+from kernels.families.rssr.certify import certify_maxima
 from sweep.families import family
 from sweep.families.guide import as_crank_rocker
 from sweep.quantities.kinds import Request
@@ -55,7 +56,7 @@ def rotating(name, n, seed, curves=("d2s",)):
     return designs[good], *map(np.array, columns)
 
 
-def certify(name, designs, curves, value, phi, target=1e-8, most=1000, function=rssr.certify_maxima):
+def certify(name, designs, curves, value, phi, target=1e-8, most=1000, function=certify_maxima):
     """Maxima, places, errors, status and number of enclosures, from claimed maxima."""
     _, _, rockers, couplings, last = MAKERS[name]
     which = np.array([CURVES[curve] for curve in curves], np.int64)

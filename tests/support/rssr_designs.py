@@ -70,11 +70,11 @@ def limits(designs, *, function=rssr.limits):
 def maxima(designs, order, target=1e-8, *, function=rssr.true_maxima):
     """True maximum of the transfer function of that order, its phi, both errors and the status."""
     n = len(designs)
-    out = {name: np.empty(n) for name in ("phi", "error", "phi_error")}
+    out = {name: np.empty((3, n)) for name in ("phi", "error", "phi_error")}
     most, status = np.empty(n), np.empty(n, np.uint8)
     wanted = [most if k == order else None for k in (1, 2, 3)]
     function(designs, *rssr.sampling_tables(), target, status, *out.values(), *wanted)
-    return out | {"max": most, "status": status}
+    return {name: rows[order - 1] for name, rows in out.items()} | {"max": most, "status": status}
 
 
 def dense(designs, order, samples):

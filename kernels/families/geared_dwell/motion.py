@@ -232,15 +232,18 @@ def dense_maxima(
                 square = x * x + y * y
                 least = smallest(least, square)
                 # A clamp instead of a branch; ``least`` tells that it was used.
-                per = 1.0 / largest(square, 1e-100)
+                square = largest(square, 1e-100)
+                per = 1.0 / square
                 if max_abs_dpsi is not None:
                     m1 = largest(m1, abs(1.0 - h.total * (h.e - 2.0 * t) * per))
                 if max_abs_d2psi is not None or max_abs_d3psi is not None:
-                    q = (h.q0 + t * (h.q1 + r.ak4 * t)) * per
+                    q = h.q0 + t * (h.q1 + r.ak4 * t)
                     if max_abs_d2psi is not None:
-                        m2 = largest(m2, abs(s * q) * per)
+                        # One division, not three products with a reciprocal: mostly this is asked for alone.
+                        m2 = largest(m2, abs(s * q) / (square * square))
                     if max_abs_d3psi is not None:
                         q_t, d_t = h.q1 + 2.0 * r.ak4 * t, h.d1 - 2.0 * r.ak4 * t
+                        q = q * per
                         bend = (1.0 - t) * q + ss * (q_t - 2.0 * q * d_t) * per
                         m3 = largest(m3, abs(bend) * per)
         code = st.OK

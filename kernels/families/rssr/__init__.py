@@ -6,7 +6,6 @@
 series drive, on the enclosures of ``driven``.
 """
 
-from kernels.families.rssr.certify import certify_maxima as certify_maxima
 from kernels.families.rssr.closure import Design as Design
 from kernels.families.rssr.dense import dense_maxima as dense_maxima
 from kernels.families.rssr.joints import joints as joints

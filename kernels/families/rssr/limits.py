@@ -15,8 +15,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from kernels import status as st
-from kernels.arithmetic.intrinsics import lowest_bit
-from kernels.curves.trigonometric_polynomials import minimum
+from kernels.arithmetic.intrinsics import largest, lowest_bit, smallest
+from kernels.arithmetic.sincos import sincos
+from kernels.curves.trigonometric_polynomials import minimum, rotate
 from kernels.families.rssr.block import (
     BLOCK,
     BRANCH,
@@ -43,10 +44,13 @@ from kernels.types import TWO_PI
 
 LIMIT_NAMES = ("psi_ext", "psi_fold", "phi_ext", "phi_fold", "swing", "phi0", "stroke_ratio")
 FEWEST, MOST = 32, 8192  # samples of the sign of eta
+ROUNDS = 5  # steps of Newton's method, side by side
+SETTLED = 1e-7  # a last step below this share of T leaves an error of the crank angle below 2^-46 T
 Counts = NDArray[np.int64]
-# Of a root: its bracket, where it is so far, the length of the last step, the sign of eta's slope.
-_LO, _HI, _PHI, _BEFORE, _RISING = (k * 2 * BLOCK for k in range(5))
-_ROOT_ROWS = 5
+# Of a root: its bracket, where it is so far, the length of the last step, the sign of eta's slope; then what the steps
+# side by side need: cosine and sine there, and the closure of its design.
+_LO, _HI, _PHI, _BEFORE, _RISING, _U, _V, _E, _Y0, _CA, _K0, _K1, _K2, _C = (k * 2 * BLOCK for k in range(14))
+_ROOT_ROWS = 14
 _TINY_SWING = 0.25  # below, the half-swing identity is more accurate than the difference of two angles
 
 
@@ -54,10 +58,17 @@ _TINY_SWING = 0.25  # below, the half-swing identity is more accurate than the d
 def _ball(at: Array, k: int, phi: float) -> tuple[float, float, float, float, float, float]:
     """Eta, xi, d eta/d phi along the motion, sin psi, cos psi and T at phi, in units of the crank."""
     e, y0, ca, k0, k1, k2, c = at[k + E], at[k + Y0], at[k + CA], at[k + K0], at[k + K1], at[k + K2], at[k + ROCKER]
-    u, v = math.cos(phi), math.sin(phi)
+    return _ball_at(e, y0, ca, k0, k1, k2, c, math.cos(phi), math.sin(phi))
+
+
+@inline
+def _ball_at(
+    e: float, y0: float, ca: float, k0: float, k1: float, k2: float, c: float, u: float, v: float
+) -> tuple[float, float, float, float, float, float]:
+    """As :func:`_ball`, at (cos phi, sin phi) = (u, v)."""
     x, y, w = closure_terms(e, y0, ca, k0, k1, k2, u, v)
     rr = x * x + y * y
-    t = math.sqrt(max(rr - w * w, 0.0))
+    t = math.sqrt(largest(rr - w * w, 0.0))
     cos, sin = -(x * w + y * t) / rr, (y * w - x * t) / rr
     xc, yc = e + c * cos, c * (ca * sin - k1)
     xi, eta = u * xc + v * yc, u * yc - v * xc
@@ -65,25 +76,66 @@ def _ball(at: Array, k: int, phi: float) -> tuple[float, float, float, float, fl
 
 
 @inline
-def _list_root(begin: float, width: float, roots: Array, i: int) -> None:
-    """Put the zero of eta between the samples ``begin`` and ``begin`` + 1 at place i of ``roots``."""
+def _list_root(at: Array, k: int, begin: float, width: float, roots: Array, i: int) -> None:
+    """Put the zero of eta of design k between the samples ``begin`` and ``begin`` + 1 at place i of ``roots``."""
     lo, hi = begin * width, (begin + 1.0) * width
     roots[i + _LO], roots[i + _HI], roots[i + _PHI], roots[i + _BEFORE] = lo, hi, 0.5 * (lo + hi), hi - lo
+    roots[i + _E], roots[i + _Y0], roots[i + _CA], roots[i + _C] = at[k + E], at[k + Y0], at[k + CA], at[k + ROCKER]
+    roots[i + _K0], roots[i + _K1], roots[i + _K2] = at[k + K0], at[k + K1], at[k + K2]
 
 
 @inline
-def _solve(at: Array, active: Counts, count: int, roots: Array) -> None:
+def _approach(count: int, roots: Array) -> None:
+    """Take steps of Newton's method from the middles of the brackets, all roots side by side.
+
+    The number of steps is fixed and none calls a trigonometric function, so the loop over the roots is vector code.
+    Where the last step was not tiny, or has left the bracket, BEFORE is nan.
+    """
+    for i in range(count):
+        roots[i + _V], roots[i + _U] = sincos(roots[i + _PHI])
+    for _ in range(ROUNDS):
+        for i in range(count):
+            u, v, half = roots[i + _U], roots[i + _V], 0.5 * (roots[i + _HI] - roots[i + _LO])
+            eta, _, slope, _, _, t = _ball_at(
+                roots[i + _E], roots[i + _Y0], roots[i + _CA], roots[i + _K0], roots[i + _K1], roots[i + _K2],
+                roots[i + _C], u, v,
+            )  # fmt: skip
+            step = smallest(largest(-eta / slope, -half), half)
+            roots[i + _PHI] += step
+            roots[i + _U], roots[i + _V] = rotate(u, v, step)
+            inside = (roots[i + _LO] <= roots[i + _PHI]) & (roots[i + _PHI] <= roots[i + _HI])
+            roots[i + _BEFORE] = step if inside & (abs(step) <= SETTLED * t) else math.nan
+
+
+@inline
+def _unsettled(at: Array, who: Counts, active: Counts, count: int, roots: Array) -> int:
+    """List the roots that :func:`_approach` has not settled, at the middles of their brackets; returns how many."""
+    left = 0
+    for i in range(count):
+        if math.isnan(roots[i + _BEFORE]):
+            lo, hi = roots[i + _LO], roots[i + _HI]
+            roots[i + _PHI], roots[i + _BEFORE] = 0.5 * (lo + hi), hi - lo
+            rises = _ball(at, who[i >> 1], roots[i - (i & 1) + _LO])[0] <= 0.0
+            roots[i + _RISING] = 1.0 if rises == ((i & 1) == 0) else -1.0
+            active[left] = i
+            left += 1
+    return left
+
+
+@inline
+def _solve(at: Array, who: Counts, active: Counts, count: int, roots: Array) -> None:
     """Find the zeros of eta in their brackets: Newton, bisection where it would leave the bracket or does not gain.
 
-    Every round takes one step of all roots that are left, numbers ``active[:count]``; root i is of design i // 2.  The
-    steps of different roots do not wait for each other, so a round costs far less than its steps one after the other.
+    Every round takes one step of all roots that are left, numbers ``active[:count]``; root i is of design
+    ``who[i // 2]``.  The steps of different roots do not wait for each other, so a round costs far less than its steps
+    one after the other.
     """
     for _ in range(100):
         left = 0
         for j in range(count):
             i = active[j]
             lo, hi, phi, before = roots[i + _LO], roots[i + _HI], roots[i + _PHI], roots[i + _BEFORE]
-            eta, _, slope, _, _, _ = _ball(at, i >> 1, phi)
+            eta, _, slope, _, _, _ = _ball(at, who[i >> 1], phi)
             above = (eta > 0.0) == (roots[i + _RISING] > 0.0)
             lo, hi = (lo if above else phi), (phi if above else hi)
             # A step that leaves the bracket, or is not clearly shorter than the one before, is replaced by bisection.
@@ -233,19 +285,15 @@ def limits(designs: Array, status: Status, out: Array, error: Array | None) -> N
             if found != 2:
                 status[i] = st.NOT_CONVERGED
                 continue
-            _list_root(begin[0], TWO_PI / n, roots, 2 * k)
-            _list_root(begin[1], TWO_PI / n, roots, 2 * k + 1)
+            _list_root(at, k, begin[0], TWO_PI / n, roots, 2 * listed)
+            _list_root(at, k, begin[1], TWO_PI / n, roots, 2 * listed + 1)
             who[listed] = k
             listed += 1
-        for j in range(listed):
-            i = 2 * who[j]
-            rises = _ball(at, who[j], roots[i + _LO])[0] <= 0.0
-            roots[i + _RISING], roots[i + 1 + _RISING] = (1.0, -1.0) if rises else (-1.0, 1.0)
-            active[2 * j], active[2 * j + 1] = i, i + 1
-        _solve(at, active, 2 * listed, roots)
+        _approach(2 * listed, roots)
+        _solve(at, who, active, _unsettled(at, who, active, 2 * listed, roots), roots)
         for j in range(listed):
             k, i = who[j], start + who[j]
-            phi1, phi2 = roots[2 * k + _PHI], roots[2 * k + 1 + _PHI]
+            phi1, phi2 = roots[2 * j + _PHI], roots[2 * j + 1 + _PHI]
             if not _fill(at, k, phi1, phi2, out[i], error[i] if error is not None else None):
                 status[i] = st.NOT_CONVERGED
 

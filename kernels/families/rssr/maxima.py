@@ -65,6 +65,8 @@ from kernels.families.rssr.sampling import (
     refine,
     sample,
     sample_block,
+    sample_block_both,
+    sample_both,
     settle,
 )
 from kernels.jit import inline, kernel
@@ -72,6 +74,7 @@ from kernels.linkage.verdict import turning_status
 from kernels.types import TWO_PI as TURN
 
 Counts = NDArray[np.int64]
+PER_RHO, PER_RHO_JERK = 11.0, 18.0  # samples per distance of the nearest singularity, at least
 _NONE = (math.nan, math.nan, math.nan, math.nan)
 _NEEDED = (E, Y0, CA, K0, K1, K2, W_SIZE, SA, C1, S1, C2, S2, COS, SIN, DELTA)  # what the search needs of a design
 
@@ -97,6 +100,7 @@ def _careful(at: Array, k: int, order: int, target: float) -> tuple[tuple[float,
 @inline
 def _put(
     i: int,
+    order: int,
     result: tuple[float, float, float, float],
     phi: Array | None,
     error: Array | None,
@@ -105,14 +109,14 @@ def _put(
     max_abs_d2psi: Array | None,
     max_abs_d3psi: Array | None,
 ) -> None:
-    """Write height, place and the errors of both of design i."""
+    """Write height, place and the errors of both of design i, of the one order whose heights are given."""
     best, place, bound, reach = result
     if phi is not None:
-        phi[i] = place - TURN * np.floor(place / TURN)  # math.floor makes an integer, which nan is not
+        phi[order - 1, i] = place - TURN * np.floor(place / TURN)  # math.floor makes an integer, which nan is not
     if error is not None:
-        error[i] = bound
+        error[order - 1, i] = bound
     if phi_error is not None:
-        phi_error[i] = reach
+        phi_error[order - 1, i] = reach
     if max_abs_dpsi is not None:
         max_abs_dpsi[i] = best
     if max_abs_d2psi is not None:
@@ -154,6 +158,84 @@ def _highest(begin: int, end: int, m: Array) -> tuple[float, float, float, float
     return best, place, m[winner + ERROR] + best * m[winner + ROUNDING], m[winner + REACH]
 
 
+@inline
+def _list_maxima(
+    block: int, at: Array, cos: Array, sin: Array, grid: Array, size: Array, m: Array, first_peak: Counts,
+    per_rho: float, first: Array | None, second: Array | None,
+) -> None:  # fmt: skip
+    """List the local maxima of a block among its samples, or more where they are needed; those of one order."""
+    count = 0
+    for i in range(block):
+        first_peak[i] = count
+        if at[i + ACROSS] * MOST < per_rho:
+            continue
+        n = FEWEST
+        while n * at[i + ACROSS] < per_rho:
+            n *= 2
+        if n == FEWEST:
+            marks = int(grid[MARKS + i])
+            count = list_marked(marks, at, i, cos, sin, grid, i, BLOCK, n, 0, m, count)
+        else:
+            sample(at, i, cos, sin, n, size, first, second)
+            count = list_peaks(at, i, cos, sin, n, size, m, count)
+    first_peak[block] = count
+
+
+@inline
+def _list_both(
+    block: int, at: Array, cos: Array, sin: Array, grid_p: Array, grid_q: Array, of_p: Array, of_q: Array, m_p: Array,
+    m_q: Array, first_p: Counts, first_q: Counts,
+) -> None:  # fmt: skip
+    """As :func:`_list_maxima`, of the first and the second order, which share their samples."""
+    count_p, count_q = 0, 0
+    for i in range(block):
+        first_p[i], first_q[i] = count_p, count_q
+        if at[i + ACROSS] * MOST < PER_RHO:
+            continue
+        n = FEWEST
+        while n * at[i + ACROSS] < PER_RHO:
+            n *= 2
+        if n == FEWEST:
+            marks_p, marks_q = int(grid_p[MARKS + i]), int(grid_q[MARKS + i])
+            count_p = list_marked(marks_p, at, i, cos, sin, grid_p, i, BLOCK, n, 0, m_p, count_p)
+            count_q = list_marked(marks_q, at, i, cos, sin, grid_q, i, BLOCK, n, 0, m_q, count_q)
+        else:
+            sample_both(at, i, cos, sin, n, of_p, of_q)
+            count_p = list_peaks(at, i, cos, sin, n, of_p, m_p, count_p)
+            count_q = list_peaks(at, i, cos, sin, n, of_q, m_q, count_q)
+    first_p[block], first_q[block] = count_p, count_q
+
+
+@inline
+def _maxima_of(
+    start: int, block: int, at: Array, who: Counts, m: Array, first_peak: Counts, target: float,
+    status: Status, phi: Array | None, error: Array | None, phi_error: Array | None, max_abs_dpsi: Array | None,
+    max_abs_d2psi: Array | None, max_abs_d3psi: Array | None,
+) -> None:  # fmt: skip
+    """Refine the listed maxima of one transfer function of a block; exactly one of the last is given."""
+    order = 1 if max_abs_dpsi is not None else (2 if max_abs_d2psi is not None else 3)
+    # The parabola at the end is one more; the one maximum in hundreds that is not settled then gets another three.
+    rounds = (2 if order == 1 else 3) - (1 if target > 1e-4 else 0)
+    padded = (first_peak[block] + 7) & ~7  # whole vectors; what stands in the surplus is never read
+    begin_at_vertex(padded, m)
+    refine(0, padded, m, rounds, max_abs_dpsi, max_abs_d2psi)
+    finish(0, padded, m, order, target, max_abs_dpsi, max_abs_d2psi, error, phi_error)
+    for i in range(block):
+        begin, end = first_peak[i], first_peak[i + 1]
+        worst = max(m[begin + ERROR], m[end - 1 + ERROR]) if end > begin else math.inf
+        for peak in range(begin + 1, end - 1):
+            worst = max(worst, m[peak + ERROR])
+        if end > begin and not worst < math.inf:
+            worst = settle(begin, end, m, order, target, max_abs_dpsi, max_abs_d2psi, error, phi_error)
+        if worst < math.inf:
+            result = _highest(begin, end, m)
+        else:
+            result, agreed = _careful(at, i, order, target)
+            if not agreed:
+                status[start + who[i]] = st.NOT_CONVERGED
+        _put(start + who[i], order, result, phi, error, phi_error, max_abs_dpsi, max_abs_d2psi, max_abs_d3psi)
+
+
 @kernel
 def true_maxima(
     designs: Array,
@@ -168,7 +250,7 @@ def true_maxima(
     max_abs_d2psi: Array | None,
     max_abs_d3psi: Array | None,
 ) -> None:
-    """Largest magnitude of one transfer function over the whole turn, where it is, and an estimate of its error.
+    """Largest magnitudes of transfer functions over the whole turn, where they are, and estimates of their errors.
 
     Parameters
     ----------
@@ -176,62 +258,56 @@ def true_maxima(
     cos, sin : :func:`sampling_tables`
     target : relative error wanted, 1e-3 ... 1e-12
     status : (n,) out; OK, NOT_ROTATABLE, UNDECIDABLE, NOT_CONVERGED or INVALID_INPUT
-    phi : (n,) out, or None [rad], crank angle in [0, 2 pi) of the maximum
-    error, phi_error : (n,) out, or None: estimates of the absolute errors of the maximum and of phi
-    max_abs_dpsi, max_abs_d2psi, max_abs_d3psi : (n,) out; exactly one of them, the others None
+    phi : (3, n) out, or None [rad], crank angles in [0, 2 pi) of the maxima, of order 1, 2 and 3
+    error, phi_error : (3, n) out, or None: estimates of the absolute errors of the maxima and of phi
+    max_abs_dpsi, max_abs_d2psi, max_abs_d3psi : (n,) out, or None: not wanted, the rows of the others mean nothing
 
     Notes
     -----
-    Where the status is not OK the outputs are nan.  The search is statistical, not proven; docs/rssr.md gives the
-    number of random designs it was measured on.
+    Where the status is not OK the outputs are nan, with NOT_CONVERGED those that were not found.  What is wanted
+    together shares reduction and samples, and has the bits that it has by itself.  The search is statistical, not
+    proven; docs/rssr.md gives the number of random designs it was measured on.
     """
-    order = 1 if max_abs_dpsi is not None else (2 if max_abs_d2psi is not None else 3)
-    per_rho = 11.0 if order < 3 else 18.0
-    # The parabola at the end is one more; the one maximum in hundreds that is not settled then gets another three.
-    rounds = (2 if order == 1 else 3) - (1 if target > 1e-4 else 0)
-    at, who = new_block(), np.empty(BLOCK, np.int64)
-    m, size, grid = new_list(), np.empty(MOST + 2), np.empty(GRID_SIZE)
-    first_peak = np.empty(BLOCK + 1, np.int64)
+    at, who, size, spare = new_block(), np.empty(BLOCK, np.int64), np.empty(MOST + 2), np.empty(MOST + 2)
+    grid, m, first_peak = np.empty(GRID_SIZE), new_list(), np.empty(BLOCK + 1, np.int64)
+    grid_q, m_q, first_q = np.empty(GRID_SIZE), new_list(), np.empty(BLOCK + 1, np.int64)
     for start in range(0, designs.shape[0], BLOCK):
         count = min(BLOCK, designs.shape[0] - start)
         load_block(designs, start, count, at)
         least_delta(count, at)
         block = _keep_what_turns(start, count, at, who, status)
         for i in range(start, start + count if block < count else start):
-            _put(i, _NONE, phi, error, phi_error, max_abs_dpsi, max_abs_d2psi, max_abs_d3psi)
+            _put(i, 1, _NONE, phi, error, phi_error, max_abs_dpsi, None, None)
+            _put(i, 2, _NONE, phi, error, phi_error, None, max_abs_d2psi, None)
+            _put(i, 3, _NONE, phi, error, phi_error, None, None, max_abs_d3psi)
         padded = (block + 7) & ~7  # whole vectors; what stands in the surplus is never read
         singularity_distance(padded, at)
-        sample_block(padded, at, cos, sin, grid, max_abs_dpsi, max_abs_d2psi)
-        mark_peaks(padded, grid)
-        count = 0
-        for i in range(block):
-            first_peak[i] = count
-            if at[i + ACROSS] * MOST < per_rho:
-                continue
-            n = FEWEST
-            while n * at[i + ACROSS] < per_rho:
-                n *= 2
-            if n == FEWEST:
-                marks = int(grid[MARKS + i])
-                count = list_marked(marks, at, i, cos, sin, grid, i, BLOCK, n, 0, m, count)
-            else:
-                sample(at, i, cos, sin, n, size, max_abs_dpsi, max_abs_d2psi)
-                count = list_peaks(at, i, cos, sin, n, size, m, count)
-        first_peak[block] = count
-        padded = (count + 7) & ~7
-        begin_at_vertex(padded, m)
-        refine(0, padded, m, rounds, max_abs_dpsi, max_abs_d2psi)
-        finish(0, padded, m, order, target, max_abs_dpsi, max_abs_d2psi, error, phi_error)
-        for i in range(block):
-            begin, end = first_peak[i], first_peak[i + 1]
-            worst = max(m[begin + ERROR], m[end - 1 + ERROR]) if end > begin else math.inf
-            for peak in range(begin + 1, end - 1):
-                worst = max(worst, m[peak + ERROR])
-            if end > begin and not worst < math.inf:
-                worst = settle(begin, end, m, order, target, max_abs_dpsi, max_abs_d2psi, error, phi_error)
-            if worst < math.inf:
-                result = _highest(begin, end, m)
-            else:
-                result, agreed = _careful(at, i, order, target)
-                status[start + who[i]] = st.OK if agreed else st.NOT_CONVERGED
-            _put(start + who[i], result, phi, error, phi_error, max_abs_dpsi, max_abs_d2psi, max_abs_d3psi)
+        if max_abs_dpsi is not None and max_abs_d2psi is not None:
+            sample_block_both(padded, at, cos, sin, grid, grid_q)
+            mark_peaks(padded, grid)
+            mark_peaks(padded, grid_q)
+            _list_both(block, at, cos, sin, grid, grid_q, size, spare, m, m_q, first_peak, first_q)
+            _maxima_of(
+                start, block, at, who, m_q, first_q, target, status, phi, error, phi_error, None, max_abs_d2psi, None
+            )
+            _maxima_of(
+                start, block, at, who, m, first_peak, target, status, phi, error, phi_error, max_abs_dpsi, None, None
+            )
+        elif max_abs_dpsi is not None or max_abs_d2psi is not None:
+            sample_block(padded, at, cos, sin, grid, max_abs_dpsi, max_abs_d2psi)
+            mark_peaks(padded, grid)
+            _list_maxima(
+                block, at, cos, sin, grid, size, m, first_peak, PER_RHO, max_abs_dpsi, max_abs_d2psi
+            )  # fmt: skip
+            _maxima_of(
+                start, block, at, who, m, first_peak, target, status, phi, error,
+                phi_error, max_abs_dpsi, max_abs_d2psi, None,
+            )  # fmt: skip
+        if max_abs_d3psi is not None:
+            sample_block(padded, at, cos, sin, grid, None, None)
+            mark_peaks(padded, grid)
+            _list_maxima(block, at, cos, sin, grid, size, m, first_peak, PER_RHO_JERK, None, None)
+            _maxima_of(
+                start, block, at, who, m, first_peak, target, status, phi, error, phi_error, None, None,
+                max_abs_d3psi,
+            )  # fmt: skip

@@ -1,7 +1,7 @@
 "use strict";
 // Curves over the turn as small panels with one cursor. Pointing into a panel moves the cursor.
 
-const WIDE = 340, HIGH = 160, LEFT = 46, RIGHT = 14, TOP = 8, BOTTOM = 22;
+const WIDE = 340, HIGH = 172, LEFT = 46, RIGHT = 14, TOP = 8, BOTTOM = 34;
 
 // Numbers that Python has packed as base64 of float32.
 function numbersOf(text) {
@@ -30,13 +30,14 @@ function withUnit(text, unit) {
   return unit === "°" ? text + unit : `${text} ${unit}`;
 }
 
-// Round numbers between two ends, three to six of them.
+// Round numbers between two ends, three to seven of them: the widest step of 1, 2, 5 that has three.
 function ticksBetween(low, high) {
-  const rough = (high - low) / 4, power = 10 ** Math.floor(Math.log10(rough));
-  const step = [1, 2, 5, 10].map((x) => x * power).find((x) => x >= rough);
-  const found = [];
-  for (let value = Math.ceil(low / step) * step; value <= high + 1e-9 * step; value += step) found.push(value);
-  return found;
+  const power = 10 ** Math.floor(Math.log10(high - low));
+  for (const step of [5, 2, 1, 0.5, 0.2].map((x) => x * power)) {
+    const first = Math.ceil(low / step - 1e-9), last = Math.floor(high / step + 1e-9);
+    if (last - first >= 2) return Array.from({ length: last - first + 1 }, (_, k) => (first + k) * step);
+  }
+  return [low, high];
 }
 
 class Panel {
@@ -47,7 +48,7 @@ class Panel {
     box.className = "panel";
     const head = box.appendChild(document.createElement("figcaption"));
     head.innerHTML = "<b></b> <output></output>";
-    head.firstChild.textContent = curve.title;
+    head.firstChild.textContent = curve.unit ? `${curve.title} [${curve.unit}]` : curve.title;
     this.value = head.querySelector("output");
     this.frame = svg("svg", { viewBox: `0 0 ${WIDE} ${HIGH}`, role: "img", "aria-label": curve.title }, box);
     let [low, high] = curve.range;
@@ -89,8 +90,10 @@ class Panel {
     for (const mark of marks) {
       const x = this.x((mark - ends[0]) / (ends[1] - ends[0]));
       svg("line", { class: "grid", x1: x, x2: x, y1: TOP, y2: HIGH - BOTTOM }, this.frame);
-      svg("text", { x, y: HIGH - 7, "text-anchor": "middle" }, this.frame).textContent = short(mark);
+      svg("text", { x, y: HIGH - BOTTOM + 14, "text-anchor": "middle" }, this.frame).textContent = short(mark);
     }
+    const below = { x: (LEFT + WIDE - RIGHT) / 2, y: HIGH - 4, "text-anchor": "middle" };
+    svg("text", below, this.frame).textContent = `${this.data.axis} [${this.data.unit}]`;
   }
 
   path(design) {

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from kernels import status as st
-from kernels.families import rssr
+from kernels.families.rssr.certify import certify_maxima
 from studies.accuracy.regions import regions
 from tests.kernels.certified.test_enclosure import exact_velocity
 from tests.reference.rssr import Linkage
@@ -22,7 +22,7 @@ def alone(designs):
     return np.ascontiguousarray(designs)[None], np.empty((0, n, 2)), np.zeros((n, 8))
 
 
-def certify(designs, order, place, value, target=1e-8, most=CELLS, function=rssr.certify_maxima):
+def certify(designs, order, place, value, target=1e-8, most=CELLS, function=certify_maxima):
     """Maximum, place, error, status and number of enclosures, from a claimed maximum."""
     n = len(designs)
     out = {"status": np.zeros(n, np.uint8), "max": np.array(value, float), "phi": np.array(place, float)}
@@ -133,7 +133,7 @@ def test_designs_that_are_not_ok_are_left_alone():
     designs = random_designs(3, 47, rotatable=True)
     status = np.array([[st.NOT_ROTATABLE, st.UNDECIDABLE, st.INVALID_INPUT]], np.uint8)
     before, value = status.copy(), np.full((1, 3), np.nan)
-    rssr.certify_maxima(*alone(designs), np.array([(2, 1)]), 1e-8, CELLS, status, value, value, value, np.empty(3))
+    certify_maxima(*alone(designs), np.array([(2, 1)]), 1e-8, CELLS, status, value, value, value, np.empty(3))
     assert (status == before).all()
     assert np.isnan(value).all()
 
@@ -174,6 +174,6 @@ def test_compiled_equals_plain():
     designs = random_designs(5, 59, rotatable=True)
     right = maxima(designs, 2)
     compiled = certify(designs, 2, right["phi"], right["max"])
-    plain = certify(designs, 2, right["phi"], right["max"], function=rssr.certify_maxima.py_func)
+    plain = certify(designs, 2, right["phi"], right["max"], function=certify_maxima.py_func)
     for name, values in compiled.items():
         np.testing.assert_array_equal(plain[name], values)

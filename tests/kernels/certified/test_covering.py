@@ -10,7 +10,7 @@ from kernels import status as st
 from kernels.certified import cells
 from kernels.certified import jets as en
 from kernels.certified.jets import LANES
-from kernels.families import rssr
+from kernels.families.rssr.certify import certify_maxima
 from kernels.types import EPS
 from sweep.families.base import Angles
 from sweep.quantities.kinds import Request
@@ -135,10 +135,10 @@ def test_a_proof_does_not_depend_on_the_designs_beside_it():
     together = [np.zeros((2, n), np.uint8), value.copy(), phi.copy(), np.full((2, n), np.nan), np.empty(n)]
     together[0][:, ::7] = st.NOT_ROTATABLE
     alone = [column.copy() for column in together]
-    rssr.certify_maxima(*parts(designs, rockers, couplings, last), which, 1e-8, 1000, *together)
+    certify_maxima(*parts(designs, rockers, couplings, last), which, 1e-8, 1000, *together)
     for i in range(n):
         one = [np.ascontiguousarray(column[..., i : i + 1]) for column in alone]
-        rssr.certify_maxima(*parts(designs[i : i + 1], rockers, couplings, last), which, 1e-8, 1000, *one)
+        certify_maxima(*parts(designs[i : i + 1], rockers, couplings, last), which, 1e-8, 1000, *one)
         for whole, part in zip(alone, one, strict=True):
             whole[..., i : i + 1] = part
     for beside, single in zip(together, alone, strict=True):
@@ -220,6 +220,6 @@ def test_compiled_equals_plain():
     curves = ("d2s", "dev")
     designs, value, phi, _ = rotating("rssr+guide", 30, 9, curves)
     compiled = certify("rssr+guide", designs, curves, value, phi)
-    plain = certify("rssr+guide", designs, curves, value, phi, function=rssr.certify_maxima.py_func)
+    plain = certify("rssr+guide", designs, curves, value, phi, function=certify_maxima.py_func)
     for name, values in compiled.items():
         np.testing.assert_array_equal(plain[name], values)
