@@ -65,7 +65,8 @@ def loaded(bare: Family, full: Family, designs: int) -> Array:
     still = {p.name: k for k, p in enumerate(full.parameters) if k >= own and not matrix[:, k].any()}
     inert = [p.name for p in full.parameters[own:] if p.unit in ("mass", "inertia") and p.name != "m_tool"]
     bodies = [name for name in inert if name.startswith("m_")]
-    length = float(np.median([abs(x) for x, p in zip(matrix[0], bare.parameters, strict=False) if p.unit == "length"]))
+    lengths = [abs(x) for x, p in zip(matrix[0], bare.parameters, strict=False) if p.unit == "length"]
+    length = float(np.median(lengths)) if lengths else 1.0  # proportions alone have the unit length
     for name, k in still.items():
         if name == "tool_x" and not inert:
             matrix[:, k] = ARM * length

@@ -28,6 +28,7 @@ if TYPE_CHECKING:
 
 Row = tuple[str, str, str, float, float, float]
 COLUMNS = ("member", "kind", "name", "start", "end", "size")
+UNITS = {"start": "rad", "end": "rad", "size": "length, or rad of a follower that turns"}
 
 
 def cyclogram(
@@ -46,7 +47,8 @@ def cyclogram(
     DataFrame
         ``member`` ("" for what belongs to several), ``kind`` (stroke, dwell, event), ``name``, ``start`` and ``end``
         (crank angles of the main shaft [rad]; an end below its start lies in the next turn), ``size`` (the way of the
-        follower with its sign; of a dwell its band; nan of an event).  A member that turns fully has no strokes
+        follower with its sign; of a dwell its band; nan of an event).  A member that turns fully has no strokes.
+        ``attrs["units"]`` names the units
 
     Examples
     --------
@@ -66,7 +68,9 @@ def cyclogram(
     rows = [row for member, name in _positions(family) for row in _strokes(poses, family, member, name, dwell)]
     rows += _events(family, designs)
     found = pd.DataFrame(rows, columns=list(COLUMNS))
-    return found.sort_values(["start", "kind"], kind="stable", ignore_index=True)
+    found = found.sort_values(["start", "kind"], kind="stable", ignore_index=True)
+    found.attrs["units"] = dict(UNITS)
+    return found
 
 
 def _positions(family: Family) -> Iterator[tuple[str, str]]:

@@ -192,7 +192,8 @@ def _composed(family: Family, asked: Negative | Extent | TimingOf, accuracy: Acc
             of, title, compose = box.asked, f"box {name}", partial(composed.extent, box)
         case TimingOf(timing=timing):
             of = timing.places
-            order = max(route.order for route in routes(family, of, accuracy))
+            # each of its places is a search by itself, and a value there a search of all of its passage
+            order = max((Work.LONG, 0), *(route.order for route in routes(family, of, accuracy)))
             if isinstance(timing, EventValue):
                 assert isinstance(family, Machine)
                 title, compose = f"value {name}", partial(composed.value_at, family, timing)

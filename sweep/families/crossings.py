@@ -51,7 +51,7 @@ def step_of(name: str, provides: Sequence[Output], machine: Machine, passages: P
     def cost(accuracy: Accuracy) -> float:
         return 2000.0 * (accuracy.samples or SAMPLES)
 
-    return Step(f"passage {name}", tuple(provides), run, work=Work.SEARCH, cost=cost)
+    return Step(f"passage {name}", tuple(provides), run, work=Work.LONG, cost=cost)
 
 
 @dataclass(frozen=True)

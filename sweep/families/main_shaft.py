@@ -129,7 +129,7 @@ def speed_of(shaft: ShaftTorque, machine: Machine) -> Step:
         columns |= {f"err_{shaft.name}_{key}": known * found["fastest"] / size[key] for key in found}
         return {name: x for name, x in columns.items() if name.removeprefix("err_") in wanted} | {"status": status}
 
-    return Step(f"speed of {shaft.name}", shaft.numbers, run, work=Work.SEARCH, cost=_cost)
+    return Step(f"speed of {shaft.name}", shaft.numbers, run, work=Work.LONG, cost=_cost)
 
 
 def _cost(accuracy: Accuracy) -> float:

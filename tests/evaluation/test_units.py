@@ -75,6 +75,7 @@ TABLES = {
     sweep.summarise: lambda folder: sweep.summarise("rssr", RSSR, "swing, margin"),
     sweep.joints: lambda folder: sweep.joints("rssr", RSSR, 0.0),
     sweep.load: sweep.load,
+    sweep.cyclogram: lambda folder: sweep.cyclogram("rssr", RSSR),
     reading.best: lambda folder: reading.best(folder, "stroke"),
     reading.pareto: lambda folder: reading.pareto(folder, "stroke", "max_abs_dev"),
     sweep.synthesise: lambda folder: sweep.synthesise("rssr", LOCUS),
@@ -99,7 +100,7 @@ TABLES = {
     sweep.thread.capstan: lambda folder: sweep.thread.capstan({"T1": 5.0, "wrap": 1.0, "mu": 0.2}),
 }
 COUNTED = {"design", "status", "failed", "adjusts"}
-PLACES = {"member", "stage", "frame", "joint", "kind"}
+PLACES = {"member", "stage", "frame", "joint", "kind", "name"}
 
 
 def public_tables():

@@ -10,6 +10,7 @@ import time
 from dataclasses import replace
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from sweep.chunks.plan import pilot
@@ -92,7 +93,8 @@ def test_pilot_of_planning_is_told_part_by_part() -> None:
     study = load_study(Path(__file__).parents[2] / "studies" / "geared-dwell", smoke=True)
     whole = pilot(study, lambda *t: told.append(t))
     assert told == [(0, 4), (1, 4), (2, 4), (3, 4)]
-    assert whole == pilot(study)
+    again = pilot(study)
+    assert np.array_equal(whole.kept, again.kept) and whole._replace(kept=again.kept) == again
 
 
 def test_every_part_of_a_run_is_told(tmp_path, quick, monkeypatch, capsys) -> None:

@@ -6,6 +6,7 @@ import numpy as np
 import pandas as pd
 import pytest
 
+from sweep.chunks.plan import pilot
 from sweep.cli.plan import _effects
 from sweep.errors import StudyError
 from sweep.study import load_study, study_from_data
@@ -75,7 +76,9 @@ def test_bodies_of_which_only_the_mass_is_given_are_slender_rods_and_the_plan_sa
     names = [f"rod_{body}2" for body in ("crank", "coupler", "rocker")]
     assert [bare.space.fixed[name] for name in names] == [1.0, 1.0, 1.0]
     assert [more.space.fixed[name] for name in names] == [1.0, 1.0, 0.0]
-    at = (lines := _effects(more)).index("bodies without centre and inertia are slender rods between their joints")
+    at = (lines := _effects(more, pilot(more))).index(
+        "bodies without centre and inertia are slender rods between their joints"
+    )
     assert lines[at + 1].split(", ") == ["  rod_crank2", "rod_coupler2"]
 
 
