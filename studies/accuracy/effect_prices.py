@@ -11,6 +11,7 @@ import numpy as np
 from kernels import status as st
 from studies.accuracy.effect_witness import Effected, known_of
 from studies.accuracy.scenes import SCENES
+from studies.accuracy.subjects import moves
 from studies.accuracy.timing import per_design
 from studies.accuracy.witness import Known
 from sweep.effects import NAMES, effect, extended
@@ -30,6 +31,7 @@ GRID, REFINED = "grid", "accuracy="
 DEAR, DEAR_POSE, DEAREST = 5e6, 1e3, 5e7  # ns per design and per pose; per design
 MASS, ARM, MIXED = 1e-4, 0.4, ("xy", "xz", "yz")  # of bodies without inputs [t]; share of an ordinary length
 MANY, FEW = 8, 2
+SPARE = 4  # ordinary designs for one that is measured: not all of them turn
 ROUNDING = 1e-14  # what two ways to one number may differ by beyond what they say of themselves
 
 
@@ -60,8 +62,8 @@ def loaded(bare: Family, full: Family, designs: int) -> Array:
 
     Where a tool at a tip is all there is, the tip lies off the axis of its link for the same reason.
     """
-    matrix = ordinary(full, designs)
-    own = len(bare.parameters)
+    own, some = len(bare.parameters), ordinary(full, SPARE * designs)
+    matrix = some[moves(bare, some[:, :own])][:designs]
     still = {p.name: k for k, p in enumerate(full.parameters) if k >= own and not matrix[:, k].any()}
     inert = [p.name for p in full.parameters[own:] if p.unit in ("mass", "inertia") and p.name != "m_tool"]
     bodies = [name for name in inert if name.startswith("m_")]

@@ -41,10 +41,11 @@ INPUTS = {
 }  # fmt: skip
 
 # Of linkages of a few units of length, by the beginning of an input's name.
-SMALL = {"k": 1.8, "tau": -1.0, "speed": 520.0, "m_tool": 2.5e-5, "tool_x": 2.0, "tool_force_y": -5.0}
+SMALL = {"k": 1.8, "tau": -1.0, "speed": 520.0, "flywheel": 1e-2, "m_tool": 2.5e-5, "tool_x": 2.0, "tool_force_y": -5.0}
 KINDS = {
     "mu_": 0.05, "radius_": 0.1, "m_": 1e-5, "radial_factor_": 0.56, "axial_factor_": 1.5, "e_limit_": 0.3,
     "dynamic_capacity_": 6000.0, "required_life_": 2e7, "journal_": 0.2, "collar_": 0.4, "permissible_": 1.0,
+    "contact_radius_": 0.5, "contact_length_": 0.5, "bore_radius_": 0.55,
 }  # fmt: skip
 
 
@@ -76,6 +77,8 @@ def _value(full: Family, p: Parameter) -> float | None:
         at_tip = "tip_load" in full.pose_names
         if p.name in ("m_tool", "tool_x"):
             return (INPUTS | {"tool_x": 75.0})[p.name] if at_tip else 0.0
+    if p.name == "k" and "sliding_c" in full.pose_names:
+        return 0.0  # the ball slides in a fork; on a bar it does not touch
     for known in (full.example, SMALL) if linked else (CENTRE, INPUTS):
         if p.name in known:
             return known[p.name]
