@@ -98,13 +98,14 @@ def chart(table: pd.DataFrame, mechanisms: pd.DataFrame) -> Figure:
     figure = new_figure(WIDTH, 3.8)
     axes = figure.subplots()
     kept = table[table["kept"]]
-    axes.plot(kept["deviation"], kept["acceleration"], "o-", color=OPTIMUM, label="least for 95 % of what is made")
+    front_of = "least where 95 % of what is made keep this and all other limits"
+    axes.plot(kept["deviation"], kept["acceleration"], "o-", color=OPTIMUM, label=front_of)
     for row in mechanisms[mechanisms["mechanism"] != "reference"].itertuples():
         axes.plot(row[4], row[2], "s", color=REFERENCE)
         words = {"optimum": "to be built", "nominal": "best drawing"}.get(str(row.mechanism), str(row.mechanism))
-        axes.annotate(words, (row[4], row[2]), xytext=(0, 8), textcoords="offset points", ha="center")
-    axes.margins(0.1)
-    axes.set_xlabel("deviation that 95 % of what is made keep [mm]")
+        axes.annotate(words, (row[4], row[2]), xytext=(0, -16), textcoords="offset points", ha="center")
+    axes.margins(0.15)
+    axes.set_xlabel("deviation [mm]: limit of the front; of a mechanism what 95 % of those made keep")
     axes.set_ylabel("max |s″| [mm/rad²]")
     axes.legend()
     return figure
