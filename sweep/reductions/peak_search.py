@@ -28,7 +28,15 @@ from sweep.reductions.refine import (
     sharpen,
 )
 from sweep.reductions.resolution import MATTERS, broken, denser, nearest
-from sweep.reductions.rounding import measure_constants, order_of, rounding_share, shaken, singular_share, tells
+from sweep.reductions.rounding import (
+    measure_constants,
+    order_of,
+    rounding_alone,
+    rounding_share,
+    shaken,
+    singular_share,
+    tells,
+)
 from sweep.reductions.sampling import DESIGN_STATUS, Extremum, Index, Mask, discriminants, pose_columns, sample_turn
 from sweep.reductions.window import Window, edges
 
@@ -118,7 +126,7 @@ class Search:
         if not rows.size:
             return
         looked = (self.undone[:, rows] > 0) & (self.undone[:, rows] <= samples)
-        candidates, scales, needed, breaks = self._candidates(rows, columns, samples)
+        candidates, scales, needed, breaks, alone = self._candidates(rows, columns, samples)
         needed = np.maximum(needed, self._samples_by_singularity(columns, samples, rows.size))
         resolved = looked & ((needed <= samples) | (samples == LIMIT))
         candidates = candidates.only(resolved[candidates.request, candidates.row])
@@ -133,7 +141,7 @@ class Search:
                 between = breaks[request] & resolved[number][:, None]
                 row, found = self._beside_jumps(rows, samples, request, row, found, between, floor)
             moved = self._keep_best(rows, request, row, found) > DISAGREEMENT * scales[request]
-            again = moved & resolved[number]
+            again = moved & resolved[number] & ~alone[number]
             needed[number, again] = np.maximum(needed[number, again], 2 * samples)
         # Everything is looked at with LIMIT samples before it is given up.
         needed = np.minimum(needed, LIMIT if samples < LIMIT else 2 * LIMIT)
@@ -142,9 +150,10 @@ class Search:
 
     def _candidates(
         self, rows: Index, columns: dict[str, Array], samples: int
-    ) -> tuple[Candidates, dict[Request, Array], Index, dict[Request, Mask]]:
-        """Candidates of all requests, sizes and jumps of their curves, samples needed by the look of the curves."""
+    ) -> tuple[Candidates, dict[Request, Array], Index, dict[Request, Mask], Mask]:
+        """Candidates of all requests, sizes and jumps of their curves, samples needed, and what is rounding alone."""
         needed, pieces, scales, breaks = np.full((len(self.requests), rows.size), START), [], {}, {}
+        alone = np.zeros(needed.shape, np.bool_)
         for number, request in enumerate(self.requests):
             values = columns[request.pose]
             allowed = None
@@ -157,6 +166,9 @@ class Search:
             row, column = row[:count], column[:count]
             if request.mode != 0:
                 measure_constants(values, scale, rough)
+            elif samples >= BREAKING and self.family.precise_poses is None:
+                alone[number] = rounding_alone(self.family, self.designs[rows], request.pose, values, rough > ROUGH)
+                rough[alone[number]] = 0.0
             if samples >= BREAKING and allowed is None and (rough > ROUGH).any():
                 between, smooth = jumps(values, scale, ROUGH)
                 between[~smooth] = False
@@ -169,7 +181,7 @@ class Search:
             scales[request] = scale
             needed[number, rough > ROUGH] = 2 * samples
         joined = [np.concatenate(parts) for parts in zip(*pieces, strict=True)]
-        return Candidates(*joined), scales, needed, breaks
+        return Candidates(*joined), scales, needed, breaks, alone
 
     def _samples_by_singularity(self, columns: dict[str, Array], samples: int, count: int) -> Index:
         distance = np.full(count, np.inf)

@@ -15,6 +15,7 @@ from sweep.reductions.resolution import nearest
 from sweep.reductions.sampling import Index, Mask, blocks, pose_columns
 
 TRIES = 3
+ALONE = 0.1  # change of a curve's highest sample, against itself, by rounding the inputs: nothing is known of it then
 CONSTANT = 64.0 * EPS  # of its size: a curve that varies by no more tells nothing but rounding
 
 
@@ -96,6 +97,27 @@ def shaken(family: Family, designs: Array, phi: Array, name: str) -> Array:
     if family.pose_output[name].wraps:
         off -= TWO_PI * np.rint(off / TWO_PI)
     found: Array = np.where(known[1:], np.abs(off), 0.0).max(axis=0)
+    return found
+
+
+def rounding_alone(family: Family, designs: Array, pose: str, values: Array, rough: Mask) -> Mask:
+    """Return which of the rough curves are rounding alone, such as the moment in a pin whose forces lie in one plane.
+
+    No denser samples resolve them.  Where the inputs are rounded otherwise they are other curves: the error of their
+    largest magnitude is as large as itself.
+
+    Parameters
+    ----------
+    family, designs, pose : the (n, P) design matrix, and the pose output
+    values : (n, m) samples of one turn
+    rough : (n,) which of them the samples do not resolve
+    """
+    found = np.zeros(len(designs), np.bool_)
+    which = np.flatnonzero(rough)
+    if which.size:
+        top = np.abs(values[which]).argmax(axis=1)
+        off = shaken(family, designs[which], top * (TWO_PI / values.shape[1]), pose)
+        found[which] = off >= ALONE * np.abs(values[which, top])
     return found
 
 

@@ -1,0 +1,31 @@
+"""Curves that are rounding alone: the moment in a pin whose forces lie in one plane is zero but for its last digits."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from kernels import status as st
+from sweep.effects import extended
+from sweep.effects.costs import designs as ordinary
+from sweep.effects.wanted import expanded
+from sweep.evaluation.summaries import design_outputs
+from sweep.families import family
+from sweep.families.base import Accuracy
+
+TARGET = 1e-9
+NOTHING = 1e-9  # moments of these small machines are 0.1 to 10: below is rounding, 1e-14 to 1e-11
+
+
+@pytest.mark.parametrize("name", ["cam", "inverted_slider_crank", "epicyclic_dwell", "heddle", "feed_triad"])
+def test_moments_that_are_rounding_alone_end_the_search_with_an_error_of_their_own_size(name):
+    """Without this every design with such a pin was NOT_CONVERGED, after 32768 samples."""
+    bare = family(name)
+    full = extended(bare, wanted := expanded(bare, [f"{name}_loads"]))
+    found = design_outputs(full, ordinary(full, 2), wanted, Accuracy(target=TARGET))
+    assert (found["status"] == st.OK).all()
+    zero = {o for o in wanted if o.startswith("max_abs_moment") and (found[o] < NOTHING).all()}
+    assert zero
+    for output in wanted:
+        size, err = np.abs(found[output]), found[f"err_{output}"]
+        assert (err >= 0.1 * size).all() if output in zero else (err <= 10.0 * TARGET * size).all(), output
