@@ -15,12 +15,14 @@ from kernels.types import TWO_PI
 from studies.accuracy.witness import Known, extreme
 from sweep.effects import NAMES, effect, extended
 from sweep.families.base import Array, Family
+from sweep.reductions.rounding import rounding_alone
 from sweep.reductions.sampling import pose_columns
 
 SAMPLES, MANY = 8192, 131_072
 # The same with a half and a third of the poses; a reference may be off by twice what these differ from it.
 COARSER, DOUBT = (2, 3), 2.0
 PASSES, HALVINGS = 12, 200
+LOOKED_AT = 360  # poses that show what is rounding alone
 EXTREMA = {"max_abs_": 0, "max_": 1, "min_": -1}
 
 
@@ -92,9 +94,16 @@ def of_samples(given: Effected, wanted: tuple[str, ...]) -> dict[str, Known]:
         for prefix, sign in EXTREMA.items():
             pose = name.removeprefix(prefix)
             if name.startswith(prefix) and pose in given.full.pose_names:
-                found[name] = extreme(given.full.precise(), given.designs, pose, sign)
+                if not _is_nothing(given, pose):
+                    found[name] = extreme(given.full.precise(), given.designs, pose, sign)
                 break
     return found
+
+
+def _is_nothing(given: Effected, pose: str) -> bool:
+    """Whether a pose output is rounding alone, as the moment in a pin of a plane mechanism: no digit of it is right."""
+    (values,) = given.poses((pose,), LOOKED_AT)
+    return bool(rounding_alone(given.full, given.designs, pose, values, np.ones(len(values), np.bool_)).any())
 
 
 def pressure(given: Effected, samples: int) -> dict[str, Array]:
