@@ -64,14 +64,19 @@ def _compiled(function: F, **options: Any) -> F:
 class Helper:
     """A function that kernels call: it has machine code for its callers alone, which takes a third less time to make.
 
-    Python may call it all the same, as tests do; for that it is compiled once more at the first call.
+    Python may call it all the same, as tests do; for that it is compiled once more at the first call.  A kernel that is
+    loaded from disk asks none of its helpers, and hundreds of them would take a tenth of a second to be made.
     """
 
     def __init__(self, function: Callable[..., Any], **options: Any) -> None:
         update_wrapper(self, function)
         self.py_func = function
         self.targetoptions = OPTIONS | options
-        self.for_kernels = _compiled(function, no_cpython_wrapper=True, **options)
+
+    @cached_property
+    def for_kernels(self) -> Any:
+        """The dispatcher that a kernel names."""
+        return _compiled(self.py_func, no_cpython_wrapper=True, **self.targetoptions)
 
     @cached_property
     def _for_python(self) -> Callable[..., Any]:

@@ -2,18 +2,35 @@
 
 from __future__ import annotations
 
+import atexit
 import gc
 import os
+import signal
 import sys
+from types import FrameType
 
 from sweep.cli import main as command_line
+from sweep.jobs.signals import SIGNALS
 
 SIGNALLED = (130, 143)
 NEW_OBJECTS = 10_000  # after which Python looks for garbage among them; its own 700 took a tenth of a short run
 
 
+def _leave(number: int, frame: FrameType | None) -> None:
+    os._exit(128 + number)
+
+
+def _finish() -> None:
+    for number in SIGNALS:
+        signal.signal(number, signal.SIG_IGN)
+
+
 def main() -> None:
     """Run the command line."""
+    # A verb obeys signals itself.  Before and after it there is nothing to tidy, and at the very end nothing to stop.
+    for number in SIGNALS:
+        signal.signal(number, _leave)
+    atexit.register(_finish)  # the first to be registered is the last to be called
     # Compiling and reading make many objects that live until the end; looking through them early is a waste.
     gc.set_threshold(NEW_OBJECTS)
     try:

@@ -8,9 +8,10 @@ import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from types import TracebackType
-from typing import Never, TextIO, TypeAlias
+from typing import TYPE_CHECKING, Never, TextIO, TypeAlias
 
-from tqdm import TMonitor, tqdm
+if TYPE_CHECKING:
+    from tqdm import tqdm
 
 FIRST_SECONDS = 2.0  # of silence at the beginning
 LINE_SECONDS = 10.0
@@ -63,6 +64,8 @@ class Progress:
         self.lock, self.over = threading.RLock(), threading.Event()
         self.ticker: threading.Thread | None = None
         if self.show and self.stream.isatty():
+            from tqdm import tqdm
+
             self.bar = tqdm(
                 desc=label, total=total or None, initial=done, unit=f" {unit}", unit_scale=True, file=self.stream,
                 delay=FIRST_SECONDS if quiet else 0.0, leave=not quiet,
@@ -89,7 +92,7 @@ class Progress:
     @staticmethod
     def owns(thread: threading.Thread) -> bool:
         """Whether a thread only shows progress."""
-        return thread.name == TICKER or isinstance(thread, TMonitor)
+        return thread.name == TICKER or type(thread).__name__ == "TMonitor"  # that of tqdm
 
     def advance(self, designs: int) -> None:
         """Count so many more designs as finished."""

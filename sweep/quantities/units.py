@@ -8,45 +8,37 @@ from __future__ import annotations
 
 import math
 import re
+from collections import Counter
 from functools import lru_cache
-from typing import TYPE_CHECKING
 
 from sweep.errors import nearest
 from sweep.families.parameter import spelt_out
 
-if TYPE_CHECKING:
-    import pint
-
-# The registry is built from these lines alone: pint's own file makes an angle a pure number, so 45 would pass for
-# 45 rad, and it takes 50 times as long to load.
-_DEFINITIONS = (
-    "millimetre = [length] = mm",
-    "micrometre = 1e-3 * millimetre = um",
-    "centimetre = 10 * millimetre = cm",
-    "metre = 1000 * millimetre = m",
-    "inch = 25.4 * millimetre = in",
-    "radian = [angle] = rad",
-    "milliradian = 1e-3 * radian = mrad",
-    f"degree = {math.pi / 180!r} * radian = deg",
-    f"revolution = {2 * math.pi!r} * radian = rev",
-    "second = [time] = s",
-    "millisecond = 1e-3 * second = ms",
-    "minute = 60 * second = min",
-    "hour = 3600 * second = h",
-    "tonne = [mass] = t",
-    "kilogram = 1e-3 * tonne = kg",
-    "gram = 1e-6 * tonne = g",
-    "newton = tonne * millimetre / second ** 2 = N",
-    "kilonewton = 1e3 * newton = kN",
-    "gram_force = 9.80665e-3 * newton = gf",
-    "megapascal = newton / millimetre ** 2 = MPa",
-    "revolution_per_minute = revolution / minute = rpm",
-    "byte = [information] = B",
-    "megabyte = 1e6 * byte = MB",
-    "gigabyte = 1e9 * byte = GB",
-    "percent = 1e-2 = %",
-)
-SYMBOLS = tuple(line.rsplit(" = ", 1)[1] for line in _DEFINITIONS)
+# Base units, then what each other one is of them, with its power; an angle is a dimension, so 45 is not 45 rad.
+_BASE = ("mm", "rad", "s", "t", "B")
+_DERIVED = {
+    "um": (1e-3, "mm"),
+    "cm": (10.0, "mm"),
+    "m": (1000.0, "mm"),
+    "in": (25.4, "mm"),
+    "mrad": (1e-3, "rad"),
+    "deg": (math.pi / 180, "rad"),
+    "rev": (2 * math.pi, "rad"),
+    "ms": (1e-3, "s"),
+    "min": (60.0, "s"),
+    "h": (3600.0, "s"),
+    "kg": (1e-3, "t"),
+    "g": (1e-6, "t"),
+    "N": (1.0, "t*mm/s^2"),
+    "kN": (1e3, "t*mm/s^2"),
+    "gf": (9.80665e-3, "t*mm/s^2"),
+    "MPa": (1.0, "t/mm/s^2"),
+    "rpm": (2 * math.pi / 60, "rad/s"),
+    "MB": (1e6, "B"),
+    "GB": (1e9, "B"),
+    "%": (1e-2, "1"),
+}
+SYMBOLS = (*_BASE, *_DERIVED)
 # Other ways to write a symbol: "90°", "2 inch", both code points of the micro sign.
 _ALIASES = {"°": "deg", "inch": "in", "\u00b5m": "um", "\u03bcm": "um"}
 
@@ -102,15 +94,16 @@ def factor(unit: str, internal: str) -> float:
     UnitFault
         if the unit is unknown or measures something else.
     """
-    ours = _parse(internal)
+    ours, own = _parsed(internal)
     try:
-        theirs = _parse(unit)
+        theirs, powers = _parsed(unit)
     except UnitFault as fault:
         raise UnitFault(f"{example(internal)}{fault}") from None
-    if _dimensions(theirs, ours) != _dimensions(ours, ours):
+    # Angles in a denominator count only if the wanted unit has angles alone.
+    free = own["rad"] <= 0 and powers["rad"] <= 0
+    if any(own[base] != powers[base] for base in _BASE if not (free and base == "rad")):
         raise UnitFault(example(internal))
-    bridge = ours * _parse("rad") ** (_power(theirs, "[angle]") - _power(ours, "[angle]"))
-    return float(_registry().Quantity(1.0, theirs).to(bridge).magnitude)
+    return theirs / ours
 
 
 def split(text: str, internal: str) -> tuple[float, str]:
@@ -131,43 +124,19 @@ def split(text: str, internal: str) -> tuple[float, str]:
     return float(match[1]), match[2]
 
 
-def _power(unit: pint.Unit, dimension: str) -> int:
-    return _powers(unit).get(dimension, 0)
-
-
-def _powers(unit: pint.Unit) -> dict[str, int]:
-    return {str(name): round(float(str(power))) for name, power in unit.dimensionality.items()}
-
-
-def _dimensions(unit: pint.Unit, wanted: pint.Unit) -> dict[str, int]:
-    """Give the exponents of the base units; angles in a denominator count only if the wanted unit has angles alone."""
-    powers = _powers(unit)
-    free = _power(wanted, "[angle]") <= 0 and powers.get("[angle]", 0) <= 0
-    return {name: power for name, power in powers.items() if not (free and name == "[angle]")}
-
-
-def _parse(text: str) -> pint.Unit:
-    """Return a product of known symbols with small whole exponents; nothing else reaches pint's parser."""
+def _parsed(text: str) -> tuple[float, Counter[str]]:
+    """Return a product of known symbols with small whole exponents: its size in base units, and their powers."""
     parts = re.split(r"\s*([*/])\s*", text.strip())
-    for part in parts[::2]:
-        match = _TERM.fullmatch(part)
-        if match is None or (match[1] not in SYMBOLS and match[1] not in _ALIASES and match[1] != "1"):
-            symbol = part if match is None else match[1]
-            raise UnitFault(nearest(symbol, (*SYMBOLS, *_ALIASES)))
-    unit = _registry().Unit("")
+    size, powers = 1.0, Counter[str]()
     for operator, part in zip(["*", *parts[1::2]], parts[::2], strict=True):
-        symbol, _, exponent = part.partition("^")
-        known = _ALIASES.get(symbol, symbol)
-        term = _registry().Unit("" if known == "1" else known) ** int(exponent or 1)
-        unit = unit * term if operator == "*" else unit / term
-    return unit
-
-
-@lru_cache
-def _registry() -> pint.UnitRegistry[float]:
-    import pint
-
-    registry: pint.UnitRegistry[float] = pint.UnitRegistry(None)
-    for line in _DEFINITIONS:
-        registry.define(line)
-    return registry
+        match = _TERM.fullmatch(part)
+        symbol = part if match is None else _ALIASES.get(match[1], match[1])
+        if match is None or symbol not in (*SYMBOLS, "1"):
+            raise UnitFault(nearest(symbol, (*SYMBOLS, *_ALIASES)))
+        own, of = _DERIVED.get(symbol, (1.0, symbol))
+        known = Counter() if of == "1" else Counter([of]) if of in _BASE else _parsed(of)[1]
+        exponent = int(match[2] or 1)
+        size = size * own**exponent if operator == "*" else size / own**exponent
+        for base, power in known.items():
+            powers[base] += (exponent if operator == "*" else -exponent) * power
+    return size, powers

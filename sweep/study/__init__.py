@@ -39,7 +39,7 @@ __all__ = [
 
 
 def __getattr__(name: str) -> Any:
-    # Reading a file takes pydantic and pint; a worker that gets a finished study needs neither.
+    # Reading a file takes pydantic, which a worker that gets a finished study does not need.
     if name in ("load_study", "study_from_data", "with_accuracy"):
         from sweep.study import load
 

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-HEAVY = ("numpy", "numba", "pandas", "scipy", "pyarrow", "matplotlib", "pydantic", "pint", "jinja2", "joblib")
+HEAVY = ("numpy", "numba", "pandas", "scipy", "pyarrow", "matplotlib", "pydantic", "jinja2", "joblib")
 
 
 def shell(*arguments: str, cwd: Path) -> subprocess.CompletedProcess[str]:

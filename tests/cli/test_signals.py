@@ -88,6 +88,25 @@ def test_it_leaves_while_it_optimises_with_the_best_so_far(tmp_path: Path, numbe
     assert best["role"].iloc[0] == "optimum" and best["max_abs_d2psi"].iloc[0] > 0.0
 
 
+@pytest.mark.parametrize(("number", "code"), [(signal.SIGINT, 130), (signal.SIGTERM, 143)])
+def test_a_signal_behind_the_work_is_told_as_one(number: int, code: int) -> None:
+    """What a process does at its very end, such as closing pools, is interrupted at once, with the code of a signal."""
+    program = """
+import atexit, time
+import sweep.__main__ as program
+def ending():
+    print("over", flush=True)
+    time.sleep(30.0)
+program.command_line = lambda: atexit.register(ending)
+program.main()
+"""
+    process = subprocess.Popen([sys.executable, "-c", program], cwd=ROOT, stdout=subprocess.PIPE, text=True)
+    assert process.stdout is not None and process.stdout.readline() == "over\n"
+    process.send_signal(number)
+    process.communicate(timeout=20)
+    assert process.returncode == code
+
+
 def test_a_folder_that_is_not_there_any_more_is_said(tmp_path: Path) -> None:
     (tmp_path / "gone").mkdir()
     program = "import os; os.rmdir(os.getcwd()); from sweep.__main__ import main; main()"

@@ -6,11 +6,13 @@ import contextlib
 import json
 import math
 import pickle
+import re
 import subprocess
 import sys
 from pathlib import Path
 
 import numpy as np
+import pint
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
@@ -300,7 +302,29 @@ def test_any_text_is_a_unit_or_a_fault(text: str) -> None:
         assert units.factor(text, "mm") > 0.0
 
 
-def test_a_finished_study_needs_neither_pydantic_nor_pint() -> None:
-    code = "import sys, sweep.study; print(*({'pydantic', 'pint'} & sys.modules.keys()))"
+@pytest.mark.parametrize(
+    ("internal", "written"),
+    [
+        ("mm", "um cm m in inch"), ("rad", "deg mrad rev"), ("rad/s", "rpm deg/s rev/h"), ("s", "ms min h"),
+        ("t", "kg g"), ("N", "kN gf kg*m/s^2"), ("N*mm", "N*m kN*cm"), ("t*mm^2", "kg*m^2 g*cm^2"), ("B", "MB GB"),
+        ("MPa", "N/m^2 kN/cm^2"), ("N/mm", "N/m gf/in"), ("N*mm*s", "N*m/rpm*rev"), ("mm/s^2", "m/min^2"),
+    ],
+)  # fmt: skip
+def test_factors_are_those_of_pint(internal: str, written: str) -> None:
+    registry = pint.UnitRegistry()
+    registry.define("gf = 9.80665e-3 newton")
+    translated = {"in": "inch", "rev": "revolution", "min": "minute", "h": "hour", "B": "byte", "MB": "megabyte"}
+    translated |= {"GB": "gigabyte", "t": "metric_ton", "g": "gram"}
+
+    def of(unit: str) -> pint.Quantity[float]:
+        return registry.Quantity(1.0, re.sub(r"[A-Za-z]+", lambda m: translated.get(m[0], m[0]), unit))
+
+    for unit in written.split():
+        # A few roundings: factors are products of at most four numbers.
+        assert units.factor(unit, internal) == pytest.approx(of(unit).to(of(internal).units).magnitude, rel=1e-15)
+
+
+def test_a_finished_study_needs_no_pydantic() -> None:
+    code = "import sys, sweep.study; print(*({'pydantic'} & sys.modules.keys()))"
     result = subprocess.run([sys.executable, "-c", code], check=True, capture_output=True, text=True)
     assert result.stdout == "\n"
