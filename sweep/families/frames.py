@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 
 from kernels.types import Array
-from sweep.families.base import Family
+from sweep.families.base import Family, Parameter
 from sweep.families.capabilities import OutputLink, Skeleton
 
 if TYPE_CHECKING:
@@ -56,6 +56,31 @@ class Axis(NamedTuple):
 
 
 WHOLE = Frame(np.eye(3)[None], np.zeros((1, 3)))
+
+
+def tilted(rotation: Array, tilts: Array) -> Array:
+    """Return a rotation (1, 3, 3) turned by angles (n, 3) about x, y, z of the outer frame, one after another."""
+    if not tilts.any():
+        return rotation
+    rows = np.broadcast_to(rotation, (len(tilts), 3, 3)).astype(tilts.dtype)
+    for k, (i, j) in enumerate(((1, 2), (2, 0), (0, 1))):
+        cos, sin = np.cos(tilts[:, [k]]), np.sin(tilts[:, [k]])
+        rows[:, i], rows[:, j] = cos * rows[:, i] - sin * rows[:, j], sin * rows[:, i] + cos * rows[:, j]
+    return rows
+
+
+def place_parameters(what: str, at: Sequence[float]) -> tuple[Parameter, ...]:
+    """Return where something stands in the machine's frame, and how it is tilted there: what tolerances are about."""
+    return (
+        *(
+            Parameter(f"{axis}_at", "length", f"{axis} of {what} in the machine's frame", default=x)
+            for axis, x in zip("xyz", at, strict=True)
+        ),
+        *(
+            Parameter(f"{axis}_tilt", "angle", f"turn of {what} about {axis} of the machine's frame", default=0.0)
+            for axis in "xyz"
+        ),
+    )
 
 
 def _times(matrix: Array, vector: Array) -> Array:

@@ -89,11 +89,18 @@ def _built(machine: Machine, members: tuple[Member, ...]) -> Machine:
     placed = []
     for m in members:
         start = len(parameters)
-        own = [replace(p, name=f"{m.name}.{p.name}", text=f"{m.name}: {p.text}") for p in m.family.parameters]
-        parameters += own
-        placed.append(replace(m, columns=slice(start, start + len(own))))
-        parameters += [replace(p, name=f"{m.name}.{p.name}", text=f"{m.name}: {p.text}") for p in m.added]
+        mine = (*m.family.parameters, *m.added)
+        parameters += [replace(p, name=f"{m.name}.{p.name}", text=f"{m.name}: {p.text}") for p in mine]
+        placed.append(replace(m, columns=slice(start, start + len(m.family.parameters))))
     parameters += [p for relation in machine.relations for p in relation.parameters]
+    for shaft in dict.fromkeys(m.mount.shaft for m in members if m.mount):
+        own = shaft.parameters
+        columns = slice(len(parameters), len(parameters) + len(own))
+        parameters += own
+        placed = [
+            replace(m, mount=replace(m.mount, columns=columns)) if m.mount and m.mount.shaft == shaft else m
+            for m in placed
+        ]
     outputs = [
         replace(o, name=f"{m.name}.{o.name}", own=f"{m.name}.{o.base}") for m in placed for o in m.family.pose_outputs
     ]

@@ -13,7 +13,7 @@ from kernels.types import Array
 from sweep.errors import InputError
 from sweep.families.base import Family, Parameter
 from sweep.families.capabilities import Coordinates, OutputLink, Points
-from sweep.families.frames import WHOLE, Frame, crank_axis, stage_frames
+from sweep.families.frames import WHOLE, Frame, crank_axis, place_parameters, stage_frames, tilted
 from sweep.families.shafts import Mount
 from sweep.families.sites import Site, sites_of
 
@@ -167,7 +167,7 @@ class Member:
         """Crank angle where the driving angle is 0, (n,)."""
         if self.mount is None:
             return self.column(designs, "offset")
-        return self.mount.phase(self.column(designs, "turn"), self.column(designs, "key"))
+        return self.mount.phase(designs, self.column(designs, "turn"), self.column(designs, "key"))
 
     def frame(self, designs: Array) -> Frame:
         """Frame of its family, of a chain that of the last stage, in the machine's."""
@@ -179,8 +179,8 @@ class Member:
 
     def _given(self, designs: Array) -> Frame:
         """Frame that ``place`` gives, of the stage that it is about."""
-        at = np.stack([self.column(designs, f"{axis}_at") for axis in AXES], axis=1)
-        return Frame(self.place.rotation[None], at)
+        at, tilts = (np.stack([self.column(designs, f"{x}_{of}") for x in AXES], axis=1) for of in ("at", "tilt"))
+        return Frame(tilted(self.place.rotation[None], tilts), at)
 
     def frames(self, designs: Array) -> list[Frame | None]:
         """Frames of all stages in the machine's; None where a chain does not say how they stand to each other."""
@@ -192,7 +192,7 @@ class Member:
             family = stages[0].family if stages else self.family
             crank = crank_axis(family, stages[0].designs(own) if stages else own)
             assert crank is not None
-            first = self.mount.frame(crank, self.column(designs, "shift"), self.column(designs, "turn"))
+            first = self.mount.frame(designs, crank, self.column(designs, "shift"), self.column(designs, "turn"))
         elif self.place.stage:
             first = self._given(designs)
         else:
@@ -211,10 +211,7 @@ class Member:
         """Its parameters beside those of its family: phase and place, tip, eye."""
         place = [
             Parameter("offset", "angle", "crank angle where the driving angle is 0", default=self.offset),
-            *(
-                Parameter(f"{axis}_at", "length", f"{axis} of the member's origin in the machine's frame", default=x)
-                for axis, x in zip(AXES, self.place.at, strict=True)
-            ),
+            *place_parameters("the member", self.place.at),
         ]
         tip = [
             Parameter(f"{axis}_tip", "length", f"tip {way} the output link", default=x)

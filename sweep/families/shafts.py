@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
@@ -11,7 +11,7 @@ import numpy as np
 from kernels.types import Array
 from sweep.errors import InputError, choices
 from sweep.families.base import Parameter
-from sweep.families.frames import Axis, Frame, mounted
+from sweep.families.frames import Axis, Frame, mounted, place_parameters, tilted
 
 SHAFT_KEYS = ("at", "axis", "zero", "ratio", "phase")
 MOUNT_KEYS = ("shaft", "sense", "shift", "turn", "key")
@@ -29,7 +29,7 @@ class Shaft:
     along : its direction, a unit vector
     zero : unit vector square to it, to its mark at angle 0
     ratio : whole turns for one of the main shaft, with the sense
-    phase : its angle where that of the main shaft is 0 [rad]
+    phase : its angle where that of the main shaft is 0 [rad]; the default of its parameter
     """
 
     name: str
@@ -40,9 +40,18 @@ class Shaft:
     phase: float = 0.0
 
     @property
-    def axis(self) -> Axis:
-        """The axis with one row, for all designs."""
-        return Axis(*(np.array([x]) for x in (self.at, self.along, self.zero)))
+    def parameters(self) -> tuple[Parameter, ...]:
+        """Parameters of the machine: place and tilt of the shaft, and its phase if it is geared to the main shaft."""
+        own = place_parameters(f"shaft {self.name}", self.at)
+        text = f"angle of shaft {self.name} where that of the main shaft is 0"
+        phase = () if self.name == MAIN else (Parameter("phase", "angle", text, default=self.phase),)
+        return tuple(replace(p, name=f"{self.name}_{p.name}") for p in (*own, *phase))
+
+    def axis(self, given: Array) -> Axis:
+        """Return the axis of designs, from the columns of its parameters."""
+        zero, along = np.array(self.zero), np.array(self.along)
+        rotation = tilted(np.stack([zero, np.cross(along, zero), along], axis=1)[None], given[:, 3:6])
+        return Axis(given[:, :3], rotation[:, :, 2], rotation[:, :, 0])
 
 
 @dataclass(frozen=True)
@@ -56,6 +65,7 @@ class Mount:
     shift : place of its origin along the shaft; the default of the parameter ``shift``
     turn : angle about the shaft, from its zero direction, to the direction that its crank has at phi = 0
     key : angle of its crank on the shaft, from the shaft's mark
+    columns : where the parameters of the shaft stand in the machine's design matrix
     """
 
     shaft: Shaft
@@ -63,6 +73,7 @@ class Mount:
     shift: float = 0.0
     turn: float = 0.0
     key: float = 0.0
+    columns: slice = field(default_factory=lambda: slice(0, 0))
 
     @property
     def ratio(self) -> int:
@@ -81,13 +92,14 @@ class Mount:
             ),
         )
 
-    def phase(self, turn: Array, key: Array) -> Array:
+    def phase(self, designs: Array, turn: Array, key: Array) -> Array:
         """Return the member's crank angle where that of the main shaft is 0, (4)."""
-        return self.sense * (self.shaft.phase + key - turn)
+        phase = 0.0 if self.shaft.name == MAIN else designs[:, self.columns.stop - 1]
+        return self.sense * (phase + key - turn)
 
-    def frame(self, crank: Axis, shift: Array, turn: Array) -> Frame:
+    def frame(self, designs: Array, crank: Axis, shift: Array, turn: Array) -> Frame:
         """Return the frame of the member's first stage in the machine's."""
-        return mounted(self.shaft.axis, crank, float(self.sense), shift, turn)
+        return mounted(self.shaft.axis(designs[:, self.columns]), crank, float(self.sense), shift, turn)
 
 
 def read_shafts(
@@ -137,7 +149,8 @@ def read_mount(table: Mapping[str, Any], shafts: Mapping[str, Shaft], where: str
     sense = table.get("sense", 1)
     if sense not in (1, -1) or isinstance(sense, bool):
         raise InputError("sense", sense, "1 or -1: the crank axis along the shaft or against it", where)
-    return Mount(shafts[name], int(sense), *(_number(key, table, where) for key in MOUNT_KEYS[2:]))
+    shift, turn, angle = (_number(each, table, where) for each in MOUNT_KEYS[2:])
+    return Mount(shafts[name], int(sense), shift, turn, angle)
 
 
 def _number(key: str, table: Mapping[str, Any], where: str) -> float:

@@ -10,7 +10,6 @@ import numpy as np
 
 from sweep.evaluation.summaries import design_outputs
 from sweep.families.names import is_flag, judged_by
-from sweep.optimise.manufacture.robust import SAMPLES  # the same mechanisms, so the same share
 from sweep.optimise.manufacture.tolerance import deviating, touched
 from sweep.quantities import resolve
 from sweep.quantities.limits import compared, meets
@@ -27,6 +26,7 @@ if TYPE_CHECKING:
     from sweep.study import Study
 
 SINGLE = 1024  # for what each dimension costs
+COSTS = 8  # dimensions that are tried exact: those that the scatter of the worst limit goes with most
 BINS = 41
 FAR = 2.0  # spreads of what is made from which on a bound is not drawn: it would make one bar of them
 TELLING = 0.002  # a share of mechanisms below which a dimension costs nothing that 1024 of them could tell
@@ -89,7 +89,7 @@ def made(data: Dataset) -> Made | None:
     design = np.array([float(row[name]) for name in study.family.parameter_names])
     if not np.isfinite(design).all():
         return None
-    designs = deviating(study.family, design, study.tolerance, study.optimise.seed, SAMPLES)
+    designs = deviating(study.family, design, study.tolerance, study.optimise.seed, study.tolerance.samples)
     columns, kept = _kept(study, limits, designs)
     worst = min(limits, key=lambda limit: float(meets(limit, columns[limit.output]).mean()))
     histogram = _histogram(data, worst, compared(worst.output, np.asarray(columns[worst.output], np.float64)))
@@ -116,7 +116,7 @@ def histogram(data: Dataset, output: str) -> Histogram | None:
         return None
     resolve.output(study.family, output)  # refuses a name that is none
     design = np.array([float(row[name]) for name in study.family.parameter_names])
-    designs = deviating(study.family, design, study.tolerance, study.optimise.seed, SAMPLES)
+    designs = deviating(study.family, design, study.tolerance, study.optimise.seed, study.tolerance.samples)
     values = design_outputs(study.family, designs, [output], study.accuracy, study.window)[output]
     limits = [x for x in study.output_limits if x.output == output]
     limit = limits[-1] if limits else Limit(output, None, None)  # of two the band around what [locus] prescribes
@@ -143,7 +143,12 @@ def _costs(study: Study, limits: list[Limit], worst: Limit, design: Array) -> li
     columns, kept = _kept(study, limits, designs)
     scatter, before = _variance(columns, worst), float(kept.mean())
     found = []
-    for k in np.flatnonzero(touched(study.family, study.tolerance)):
+    own = np.flatnonzero(touched(study.family, design, study.tolerance))
+    values = compared(worst.output, np.asarray(columns[worst.output], np.float64))
+    known = np.isfinite(values)
+    off, away = designs[known][:, own] - design[own], values[known] - values[known].mean()
+    along = (away @ off) ** 2 / (off**2).sum(axis=0)
+    for k in own[np.argsort(-along, kind="stable")[:COSTS]]:
         exact = designs.copy()
         exact[:, k] = design[k]
         parameter = study.family.parameters[k]

@@ -252,6 +252,8 @@ def _sizes(data: Dataset, row: dict[str, Any]) -> tuple[tuple[str, str], ...]:
         value = float(row[p.name])
         if abs(value) < ROUNDING * (longest if p.unit == "length" else 1.0):
             value = 0.0
+        if p.name.endswith("_tilt") and value == 0.0:
+            continue  # only what is made is tilted
         text = f"{value:+g}" if p.choices is not None else with_unit(number(value * shown.factor, 4), shown.unit)
         found.append((p.name, text))
     return tuple(found)

@@ -18,7 +18,7 @@ from sweep.report.cyclogram import cyclogram_figure, of_dataset, table_in_degree
 from sweep.report.dataset import Dataset, gather
 from sweep.report.figures import TEMPLATES, Saved, drawn_before, house_style, save
 from sweep.report.live import live
-from sweep.report.made import TELLING, histogram_figure, made, made_sentence
+from sweep.report.made import COSTS, TELLING, histogram_figure, made, made_sentence
 from sweep.report.optima import CARDS, Group, groups, optima, optima_sentence
 from sweep.report.robust import tolerance_words
 from sweep.report.scan import Cells, Scan, most_telling
@@ -211,9 +211,6 @@ def write_survivors(parts: Sequence[Path], target: Path) -> None:
                 for batch in source.iter_batches():
                     writer.write_batch(batch.filter(pc.equal(batch["status"], 0)).cast(schema))
     partial.replace(target)
-
-
-COSTS = 8  # dimensions that are shown
 
 
 def buildable(data: Dataset, several: list[Group], folder: Path) -> dict[str, Any]:

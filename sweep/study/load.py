@@ -35,7 +35,6 @@ from sweep.study.study import (
     OutputSettings,
     ParetoSettings,
     Study,
-    Tolerance,
 )
 from sweep.study.tables import Sections, read_sections
 from sweep.study.taken import take, taken_reference
@@ -139,7 +138,6 @@ class _Alone:
     window: tuple[float, float] | None
     accuracy: Accuracy
     optimise: OptimiseSettings | None
-    tolerance: Tolerance | None
     front_time: float | None
     task: SynthesisTask | None
     budget: Budget
@@ -151,7 +149,6 @@ def _read_alone(file: StudyFile, sections: Sections) -> _Alone:
         read_window(sections.scene.window, file.faults),
         read_accuracy(sections.accuracy, file.faults),
         read_optimise(sections.optimise, file),
-        read_tolerance(sections.tolerance, file),
         read_front_time(sections.pareto, file),
         read_study_task(file),
         read_budget(sections.budget, file),
@@ -189,7 +186,8 @@ def _study(
     space = read_space(file, family, other)
     if space is not None and fit is None and (locus is None or sections.optimise.variables != "parameters"):
         check_varied(file, family, space, inputs.raw)
-    check_tolerance(alone.tolerance, family, limits, faults)
+    tolerance = read_tolerance(sections.tolerance, file, family)
+    check_tolerance(tolerance, family, limits, faults)
     reference = read_reference(taken_reference(file, sections.reference), bare, family, faults, other, space)
     check_report(sections.report, file, family, prescribed)
     asked = [*prescribed, *(name for name in file.free_table("locus") or () if name.startswith(RATIOS))]
@@ -215,7 +213,7 @@ def _study(
         window=alone.window,
         optimise=alone.optimise,
         pareto=front,
-        tolerance=alone.tolerance,
+        tolerance=tolerance,
         reference=reference,
         task=alone.task,
         output=OutputSettings(**sections.output.model_dump()),

@@ -100,11 +100,14 @@ class Tolerance:
     """Manufacturing tolerances: +- of every length [mm] and of every angle [rad]; zero is exact.
 
     ``robust`` is the share of mechanisms within them that have to keep the limits; None asks it of the drawing alone.
+    ``own`` are those of single parameters, by name; ``samples`` is how many mechanisms say the share.
     """
 
     lengths: float = 0.0
     angles: float = 0.0
     robust: float | None = None
+    own: tuple[tuple[str, float], ...] = ()
+    samples: int = 1 << 16  # the share of 95 % is good to 0.05 %; of 8192 it was 0.2 % off
 
 
 @dataclass(frozen=True)

@@ -2,13 +2,19 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+from fnmatch import fnmatchcase
+
 from pydantic import Field
 
+from sweep.errors import nearest
 from sweep.families.base import Family
 from sweep.quantities.limits import Limit
 from sweep.study.file import Faults, StudyFile
 from sweep.study.section import Section
 from sweep.study.study import Tolerance
+
+UNITS = {"length": "mm", "angle": "rad"}
 
 
 class ToleranceSection(Section):
@@ -17,21 +23,47 @@ class ToleranceSection(Section):
     lengths: str | None = Field(None, description='a length as a text, as "0.02 mm"')
     angles: str | None = Field(None, description='an angle as a text, as "0.05 deg"')
     robust: str | None = Field(None, description='a share as a text, as "95 %"')
+    samples: int | None = Field(None, description="a power of two: mechanisms that say the share")
+    own: dict[str, str] = Field(
+        {}, description='of what a pattern names, as { "*.key" = "0.1 deg", "*_tilt" = "0 deg" }'
+    )
 
 
-def read_tolerance(section: ToleranceSection, file: StudyFile) -> Tolerance | None:
-    """Read the tolerances of the mechanisms that are made; None where the file gives none."""
+def read_tolerance(section: ToleranceSection, file: StudyFile, family: Family) -> Tolerance | None:
+    """Read the tolerances of the mechanisms of a family that are made; None where the file gives none."""
     if "tolerance" not in file:
         return None
     if "optimise" not in file:
         file.faults.missing(("optimise",), "a table [optimise], as [tolerance] is about the optimum")
-    if section.lengths is None and section.angles is None:
+    if section.lengths is None and section.angles is None and not section.own:
         needed = 'a length as "0.02 mm"; or angles, as "0.05 deg"'
         file.faults.missing(("tolerance", "lengths"), needed, instead="angles")
     lengths = file.quantity(section.lengths, "mm", ("tolerance", "lengths"))
     angles = file.quantity(section.angles, "rad", ("tolerance", "angles"))
     share = None if section.robust is None else file.share(section.robust, ("tolerance", "robust"))
-    return Tolerance(lengths or 0.0, angles or 0.0, share)
+    samples = Tolerance.samples if section.samples is None else section.samples
+    if samples < 2 or samples & (samples - 1):
+        file.faults.value(("tolerance", "samples"), samples, "a power of two: a Sobol sample keeps its balance only so")
+    return Tolerance(lengths or 0.0, angles or 0.0, share, tuple(_own(section.own, file, family).items()), samples)
+
+
+def _own(given: Mapping[str, str], file: StudyFile, family: Family) -> dict[str, float]:
+    """Return tolerances of single parameters; of several patterns that name one the last holds."""
+    found: dict[str, float] = {}
+    for pattern, text in given.items():
+        named = [p for p in family.parameters if fnmatchcase(p.name, pattern) and p.unit in UNITS and p.choices is None]
+        key = ("tolerance", "own", pattern)
+        if not named or len({p.unit for p in named}) > 1:
+            words = "a pattern of names of lengths, or one of angles, as *.key" + nearest(
+                pattern, family.parameter_names
+            )
+            file.faults.value(key, text, words)
+            continue
+        width = file.faults.number(text, UNITS[named[0].unit], key)
+        if width is not None and not width >= 0.0:
+            file.faults.value(key, text, "a tolerance, 0 for what is exact")
+        found |= dict.fromkeys((p.name for p in named), width or 0.0)
+    return found
 
 
 def check_tolerance(tolerance: Tolerance | None, family: Family, limits: tuple[Limit, ...], faults: Faults) -> None:

@@ -22,8 +22,8 @@ DECIDED = (st.OK, st.WRONG_SIDE)
 PLACE = ("at", "axis", "zero")
 
 
-def machine_of(given, relations):
-    """Return the machine of a needle and two loopers, and its design."""
+def machine_of(given, relations, tips=()):
+    """Return the machine of a needle and two loopers, and its design; members in ``tips`` have their tip as a point."""
     needle = given["needle"]
     members = {
         "needle": {
@@ -39,6 +39,7 @@ def machine_of(given, relations):
         one = given[name]
         place = {k: one[k] for k in PLACE}
         members[name] = {"family": "rssr", "ratio": one["ratio"], "offset": one["offset"], "place": place}
+        members[name] |= {"tip": one["tip"]} if name in tips else {}
         design |= {f"{name}.{k}": v for k, v in one["p"].items()}
     thin = {key: needle[key] for key in ("sense", "scarf", "diameter", "scarf_end", "eye", "point")}
     tools = {

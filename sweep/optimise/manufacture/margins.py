@@ -57,7 +57,7 @@ def with_margins(
     levels : standard deviations that each limit gives up
     radius : of the box about the design in scaled variables; None for the bounds of the problem
     """
-    sigma, keys = touched(problem.family, tolerance) / SIGMAS, keyed(problem)
+    sigma, keys = touched(problem.family, design, tolerance) / SIGMAS, keyed(problem)
     along = {key: levels[key] for name, key in keys.items() if key != name}
     curves = curve_margins(problem, design, sigma, along)
     others = [name for name, key in keys.items() if key not in curves]
@@ -96,7 +96,7 @@ def prices(problem: Problem, design: Array, tolerance: Tolerance, levels: Levels
     The multipliers of the rows that hold tell it: a bound that moves by a standard deviation moves its rows, and the
     objective by their multipliers times that.
     """
-    sigma, keys = touched(problem.family, tolerance) / SIGMAS, keyed(problem)
+    sigma, keys = touched(problem.family, design, tolerance) / SIGMAS, keyed(problem)
     whole = with_margins(problem, design, tolerance, levels, None)
     units = curve_margins(problem, design, sigma, dict.fromkeys(whole.curve_margins, 1.0))
     spreads = _spreads(problem, design, sigma, [name for name, key in keys.items() if key not in units])

@@ -29,7 +29,6 @@ if TYPE_CHECKING:
     from sweep.study import OptimiseSettings, Tolerance
 
 SAME = 1e-8  # relative, of values of two optima that are equally good
-SAMPLES = 1 << 16  # the share of 95 % is good to 0.05 %; of 8192 it was 0.2 % off
 BOTH = 4.0  # ways in which a design misses a limit that know little of each other, to begin with
 TRIED = 4  # basins of the search that are begun with
 ENDED = 3  # designs that go on after the first rounds
@@ -253,7 +252,7 @@ class _Calibrate:
 
     def _made(self, design: Array) -> tuple[dict[str, Array], float]:
         """Return limited outputs of a design and of mechanisms about it, and the share of these that keeps limits."""
-        about = deviating(self.problem.family, design, self.tolerance, self.seed, SAMPLES)
+        about = deviating(self.problem.family, design, self.tolerance, self.seed, self.tolerance.samples)
         values, good = kept(self.problem, np.concatenate([design[None, :], about]))
         return values, float(good[1:].mean())
 
@@ -296,7 +295,7 @@ def _approached(
 
 
 def _share(problem: Problem, design: Array, tolerance: Tolerance, seed: int) -> float:
-    return float(kept(problem, deviating(problem.family, design, tolerance, seed, SAMPLES))[1].mean())
+    return float(kept(problem, deviating(problem.family, design, tolerance, seed, tolerance.samples))[1].mean())
 
 
 def yields(problem: Problem, designs: Array, tolerance: Tolerance, seed: int) -> list[float]:

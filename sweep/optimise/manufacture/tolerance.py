@@ -111,10 +111,17 @@ SIGMAS = 3.0  # a tolerance of +-t is three standard deviations
 BAND = (2.5, 97.5)  # percent
 
 
-def touched(family: Family, tolerance: Tolerance) -> Array:
-    """Return the tolerance (P,) of every parameter: that of lengths, of angles, zero for all others."""
-    widths = {"length": tolerance.lengths, "angle": tolerance.angles}
-    return np.array([widths.get(p.unit, 0.0) if p.choices is None else 0.0 for p in family.parameters])
+def touched(family: Family, design: Array, tolerance: Tolerance) -> Array:
+    """Return the tolerance (P,) of every parameter: its own, else that of lengths, of angles, zero for all others.
+
+    What may not be negative and is 0 in the design (P,), as the arm of a fork slot, is a part that is not there.
+    """
+    widths, own = {"length": tolerance.lengths, "angle": tolerance.angles}, dict(tolerance.own)
+    absent = [
+        p.choices is not None or (p.not_negative and x == 0.0) for p, x in zip(family.parameters, design, strict=True)
+    ]
+    wide = [own.get(p.name, widths.get(p.unit, 0.0)) for p in family.parameters]
+    return np.where(absent, 0.0, wide)
 
 
 def deviating(family: Family, design: Array, tolerance: Tolerance, seed: int, samples: int = SAMPLES) -> Array:
@@ -131,7 +138,7 @@ def deviating(family: Family, design: Array, tolerance: Tolerance, seed: int, sa
     from scipy.special import ndtri
     from scipy.stats import qmc
 
-    sigma = touched(family, tolerance) / SIGMAS
+    sigma = touched(family, design, tolerance) / SIGMAS
     varied = np.flatnonzero(sigma)
     uniform = qmc.Sobol(len(varied), seed=seed).random(samples)
     designs = np.repeat(design[None, :], samples, axis=0)

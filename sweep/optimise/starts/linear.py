@@ -128,7 +128,9 @@ def elimination(problem: Problem, tolerance: Tolerance | None = None) -> Elimina
     share = None if tolerance is None else tolerance.robust
     sigma, level = None, 0.0
     if tolerance is not None and share is not None:
-        sigma, level = touched(problem.family, tolerance) / SIGMAS, NormalDist().inv_cdf(1.0 - (1.0 - share) / BOTH)
+        design = np.array([problem.fixed.get(name, math.nan) for name in problem.family.parameter_names])
+        sigma = touched(problem.family, design, tolerance) / SIGMAS
+        level = NormalDist().inv_cdf(1.0 - (1.0 - share) / BOTH)
     driver = f"{before.family.position}{before.number}"
     return Elimination(
         problem, guide, last, driver, small[problem.objective], problem.objective == f"max_abs_{off}", bound,
