@@ -21,6 +21,7 @@ from sweep.families.moments import Taking
 from sweep.families.parts import AXES, EYE, TIP, Member, coordinates, coupler_joints, velocity
 from sweep.families.passages import taking_step
 from sweep.families.relations import EventValue, Relation, Timing
+from sweep.families.sewing import Sewing, sewing_step
 from sweep.families.shaking import Shaking
 from sweep.families.sites import coordinates as coordinates_of_site
 from sweep.families.sites import made_of
@@ -144,6 +145,7 @@ def _built(machine: Machine, members: tuple[Member, ...]) -> Machine:
     found = replace(found, poses=poses, precise_poses=precise)
     steps = [taking_step(r, found) for r in machine.relations if isinstance(r, Taking)]
     steps += [entering_step(r, found) for r in machine.relations if isinstance(r, Entering)]
+    steps += [sewing_step(r, found) for r in machine.relations if isinstance(r, Sewing)]
     steps += [speed_of(r, found) for r in machine.relations if isinstance(r, ShaftTorque)]
     return replace(found, steps=tuple(steps))
 

@@ -23,13 +23,13 @@ from sweep.families.parts import Member, coupler_joints, is_planar, placement, v
 from sweep.families.relations import Distance, EventValue, Relation, Speed, Timing, each, two
 from sweep.families.shafts import MOUNT_KEYS, SHAFT_KEYS, Mount, Shaft, read_mount, read_shafts
 from sweep.families.shaking import Shaken, Shaking, shaken
-from sweep.families.stitching import read_entering, read_taking
+from sweep.families.stitching import read_entering, read_sewing, read_taking
 from sweep.families.thread_balance import thread_balance
 from sweep.families.tools import BLADE_KEYS, NEEDLE_KEYS, SEAM_KEYS, Tool, bodies, length, read_tools
 
 MEMBER_KEYS = ("family", "chain", "ratio", "offset", "driver", "place", "tip", "eye", *MOUNT_KEYS)
 RELATION_KINDS = (
-    "distance", "speed", "timing", "event", "value", "torque", "shaking", "thread", "gap", "take", "enter",
+    "distance", "speed", "timing", "event", "value", "torque", "shaking", "thread", "gap", "take", "enter", "sew",
 )  # fmt: skip
 EVENT_KEYS = ("event", "level", "rising")
 _WORD = re.compile(r"[A-Za-z][A-Za-z0-9_]*")
@@ -113,7 +113,10 @@ def built(given: Specification, find: FindFamily) -> Machine:
         members[name] = _member(name, dict(table), members, shafts, find)
     tools = read_tools({name: dict(table) for name, table in given.tools}, members)
     plain = {name: dict(table) for name, table in given.relations if not {"event", "value"} & set(dict(table))}
-    known = {name: _relation(name, table, members, tools) for name, table in plain.items()}
+    known: dict[str, Any] = {
+        name: _relation(name, table, members, tools) for name, table in plain.items() if "sew" not in table
+    }
+    known |= {name: read_sewing(name, table, known) for name, table in plain.items() if "sew" in table}
     outputs = _outputs(members, tuple(known.values()))
     events = {
         name: _event(name, dict(table), outputs) if "event" in dict(table) else _reading(name, dict(table), outputs)

@@ -3,11 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from itertools import pairwise
 from typing import Any
 
-from sweep.errors import InputError
+from sweep.errors import InputError, choices
+from sweep.families.main_shaft import ShaftTorque
 from sweep.families.moments import RiseWindow, Taking
 from sweep.families.relations import each, two
+from sweep.families.sewing import Sewing
 from sweep.families.tools import Blade, Needle, Seam, Spot, Tool, length, number
 from sweep.families.triangles import Entering
 
@@ -61,6 +64,31 @@ def read_entering(name: str, table: dict[str, Any], tools: Mapping[str, Tool], w
     corners = (Spot(blade.eye), Spot(blade.hold), Spot(at=seam.at))
     sense = _sense(table, "the tip passes along the normal of eye, hold, seam, or against it", where)
     return Entering(name, entering.working, corners, entering.radius, sense, window)
+
+
+def read_sewing(name: str, table: dict[str, Any], known: Mapping[str, Any]) -> Sewing:
+    """Read a relation ``sew``: the moments, speeds, the clearance that takes a loop, the torque of the main shaft."""
+    where = f"machine.relations.{name}"
+    for key in table:
+        if key not in ("sew", "speeds", "clearance", "shaft"):
+            raise InputError(key, table[key], "sew, speeds, clearance, shaft", where)
+    moments = list(each(table["sew"], list(known), "relations", where))
+    taking = [known[one] for one in moments if isinstance(known[one], Taking) and known[one].window]
+    entering = tuple(known[one] for one in moments if isinstance(known[one], Entering))
+    if len(taking) != 1 or len(entering) + 1 != len(moments):
+        raise InputError("sew", table["sew"], "one moment A with fields of work (take), any of B and C (enter)", where)
+    speeds = tuple(length("speeds", speed, where) for speed in table.get("speeds", ()))
+    if len(speeds) < 2 or any(b <= a for a, b in pairwise(speeds)):
+        raise InputError("speeds", table.get("speeds"), "speeds of the main shaft, growing, at least two", where)
+    given = table.get("clearance", (0.0, 0.1))
+    if not isinstance(given, tuple) or len(given) != 2 or not given[0] <= given[1]:
+        raise InputError("clearance", given, "the least and the largest clearance at A", where)
+    shaft = known.get(table["shaft"]) if "shaft" in table else None
+    if "shaft" in table and not isinstance(shaft, ShaftTorque):
+        names = [one for one, relation in known.items() if isinstance(relation, ShaftTorque)]
+        raise InputError("shaft", table["shaft"], f"a relation torque: {choices(str(table['shaft']), names)}", where)
+    low, high = (number("clearance", end, where) for end in given)
+    return Sewing(name, taking[0], entering, speeds, (low, high), shaft)
 
 
 def _sense(table: Mapping[str, Any], words: str, where: str) -> int:

@@ -22,6 +22,7 @@ from sweep.report.made import COSTS, TELLING, histogram_figure, made, made_sente
 from sweep.report.optima import CARDS, Group, groups, optima, optima_sentence
 from sweep.report.robust import tolerance_words
 from sweep.report.scan import Cells, Scan, most_telling
+from sweep.report.sewing import sewn, sewn_figure
 
 if TYPE_CHECKING:
     from sweep.evaluation.joints import Part
@@ -215,7 +216,7 @@ def write_survivors(parts: Sequence[Path], target: Path) -> None:
 
 def buildable(data: Dataset, several: list[Group], folder: Path) -> dict[str, Any]:
     """Names of the template with what they stand for; pictures are saved in ``folder``, in the style in force."""
-    make, within = made(data), tolerance_words(data)
+    make, within, sews = made(data), tolerance_words(data), sewn(data)
     costs = (
         ()
         if make is None
@@ -228,6 +229,8 @@ def buildable(data: Dataset, several: list[Group], folder: Path) -> dict[str, An
         "made_words": made_sentence(make, within),
         "made_histogram": "" if make is None else save(histogram_figure(make.histogram), folder / "yield.svg").uri,
         "made_costs": costs,
+        "sewn": sews,
+        "sewn_curve": "" if sews is None else save(sewn_figure(sews), folder / "sewing.svg").uri,
         "further": [text for text in (optima_sentence(data, several), made_sentence(make, within)) if text],
     }
 

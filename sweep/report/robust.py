@@ -74,6 +74,7 @@ def tolerance_words(data: Dataset) -> str:
         return ""
     parts = [f"lengths ±{number(tolerance.lengths)}\u00a0mm"] if tolerance.lengths else []
     parts += [f"angles ±{number(math.degrees(tolerance.angles))}°"] if tolerance.angles else []
+    parts += ["tolerances of their own of some dimensions"] if tolerance.own else []
     return " and ".join(parts)
 
 

@@ -106,6 +106,12 @@ class RelationSection(Section):
     )
     torque: Names | None = Field(None, description='members, as ["needle", "looper"]')
     shaking: Names | None = Field(None, description='members, as ["needle", "looper"]')
+    sew: Names | None = Field(None, description='a moment A, and any of B and C, as ["a", "b", "c"]')
+    speeds: Names | None = Field(None, description='of a sew, as ["500 rpm", "8500 rpm"], growing')
+    clearance: Annotated[list[str], Field(min_length=2, max_length=2)] | None = Field(
+        None, description='of a sew, between which the tip takes the loop, as ["0 mm", "0.1 mm"]'
+    )
+    shaft: str | None = Field(None, description="of a sew, a relation torque whose unevenness counts")
 
 
 def flattened(data: Mapping[str, Any], members: object) -> dict[str, Any]:
@@ -207,10 +213,17 @@ def _machine(
         relations[name] = section.model_dump(exclude_none=True, exclude={"settings"})
         if section.radii is not None:
             relations[name]["radii"] = _lengths(section.radii, ("relations", name, "radii"), faults)
+        if section.clearance is not None:
+            relations[name]["clearance"] = _lengths(section.clearance, ("relations", name, "clearance"), faults)
+        if section.speeds is not None:
+            key: Key = ("relations", name, "speeds")
+            relations[name]["speeds"] = [
+                faults.number(text, "rad/s", (*key, k)) or 0.0 for k, text in enumerate(section.speeds)
+            ]
         for field, ends in (section.fields or {}).items():
             relations[name]["fields"][field] = _lengths(ends, ("relations", name, "fields", field), faults)
         if section.window is not None:
-            key: Key = ("relations", name, "window")
+            key = ("relations", name, "window")
             relations[name]["window"] = [
                 faults.number(text, "rad", (*key, k)) or 0.0 for k, text in enumerate(section.window)
             ]

@@ -21,6 +21,7 @@ from tests.reference import stitch
 
 LENGTHS, ANGLES, TILTS, PHASE = 0.03, 1e-3, 5e-4, 4e-3
 MADE, POSES = 1024, 720
+SPEEDS = [50.0, 300.0, 900.0]
 NAMES = ("a_clearance", "a_rise", "phi_a", "min_apart")
 # The standard deviation of a share p of n mechanisms is sqrt(p (1 - p)/n); both samples have one, of 1024 each.
 SHARE = 4.0 * np.sqrt(2.0 * 0.25 / MADE)
@@ -82,6 +83,8 @@ def outputs(p, phase, sense):
         "a_clearance": there["side"][:, 0] - 0.5 * p["needle.diameter"][:, 0],
         "a_rise": parabola(found["depth"]) - there["depth"][:, 0],
         "phi_a": left[:, 0],
+        "above_eye": p["needle.eye"][:, 0] - there["height"][:, 0],
+        "below_scarf_end": there["height"][:, 0] - p["needle.scarf_end"][:, 0],
         "min_apart": -parabola(-apart),
     }
     return {name: np.where(one, x, np.nan).reshape(n) for name, x in columns.items()}
@@ -96,12 +99,15 @@ def parabola(values):
 
 @pytest.mark.parametrize("row", [0, 2])
 def test_shares_and_scatter_of_relations_are_those_of_an_independent_sample(row):
-    given = json.loads(json.dumps(ROWS[row]))
+    given, sense = json.loads(json.dumps(ROWS[row])), 0
     given["upper"], given["seam"] = given["looper"] | {"back": [0.0, 0.0, 0.0]}, [0.0, 0.0, 0.0]
     for name in ("eye", "hold"):
         given["looper"].setdefault(name, [1.0, 2.0, 3.0])
-    relations = {"a": {"take": ["thin", "blade"], "sense": 1}, "apart": {"distance": ["needle.point", "looper.tip"]}}
-    nominal, sense = None, 0
+    relations = {
+        "a": {"take": ["thin", "blade"], "fields": {"slow": [0.0, 1e3], "fast": [0.0, 1e3]}},
+        "apart": {"distance": ["needle.point", "looper.tip"]},
+    }
+    nominal = None
     for sense in (1, -1):
         relations["a"]["sense"] = sense
         machine, design = machine_of(given, relations, tips=("looper",))
@@ -110,27 +116,66 @@ def test_shares_and_scatter_of_relations_are_those_of_an_independent_sample(row)
             break
     assert nominal is not None and nominal["status"] == 0
     whole = family(machine)
-    exact = {f"upper.{p.name}" for p in next(m for m in whole.members if m.name == "upper").family.parameters}
-    own = {
-        name: 0.0 for name in whole.parameter_names if name.startswith("upper.") or name.endswith("_tip")
-    } | dict.fromkeys(exact, 0.0)
-    own |= {name: TILTS for name in whole.parameter_names if name.endswith("_tilt") and not name.startswith("upper.")}
-    own["looper.offset"] = PHASE
+    own = {name: TILTS for name in whole.parameter_names if name.endswith("_tilt")} | {"looper.offset": PHASE}
+    own |= {name: 0.0 for name in whole.parameter_names if name.startswith("upper.") or name.endswith("_tip")}
     tolerance = Tolerance(LENGTHS, ANGLES, own=tuple(own.items()))
     designs = deviating(whole, design_matrix(whole, design)[0][0], tolerance, 7, MADE)
     ours = design_outputs(whole, designs, list(NAMES), Accuracy(target=1e-8))
     theirs = outputs(*made(given, np.random.default_rng(8), MADE), sense)
-    kept = [np.ones(MADE, np.bool_), np.ones(MADE, np.bool_)]
+    both, spread = np.ones((2, MADE), np.bool_), {}
     for name in NAMES:
         a, b = np.asarray(ours[name], float), theirs[name]
-        spread = np.nanstd(b)
+        spread[name] = np.nanstd(b)
         # standard errors of a mean and of a standard deviation, of both samples
-        assert np.nanmean(a) == pytest.approx(np.nanmean(b), abs=4.0 * spread * np.sqrt(2.0 / MADE)), name
-        assert np.nanstd(a) == pytest.approx(spread, rel=4.0 / np.sqrt(MADE)), name
-        assert np.nanmean(b) == pytest.approx(nominal[name], abs=spread), name
-        limit = Limit(name, float(nominal[name] - 0.8 * spread), float(nominal[name] + 1.5 * spread))
-        own_kept = [meets(limit, values) for values in (a, b)]
-        assert own_kept[0].mean() == pytest.approx(own_kept[1].mean(), abs=SHARE), name
-        kept = [x & y for x, y in zip(kept, own_kept, strict=True)]
-    assert 0.2 < kept[1].mean() < 0.8
-    assert kept[0].mean() == pytest.approx(kept[1].mean(), abs=SHARE)
+        assert np.nanmean(a) == pytest.approx(np.nanmean(b), abs=4.0 * spread[name] * np.sqrt(2.0 / MADE)), name
+        assert np.nanstd(a) == pytest.approx(spread[name], rel=4.0 / np.sqrt(MADE)), name
+        assert np.nanmean(b) == pytest.approx(nominal[name], abs=spread[name]), name
+        limit = Limit(name, float(nominal[name] - 0.8 * spread[name]), float(nominal[name] + 1.5 * spread[name]))
+        kept = np.array([meets(limit, values) for values in (a, b)])
+        assert kept[0].mean() == pytest.approx(kept[1].mean(), abs=SHARE), name
+        both &= kept
+    assert 0.2 < both[1].mean() < 0.8
+    assert both[0].mean() == pytest.approx(both[1].mean(), abs=SHARE)
+    # At every speed the window of the rise is another one, and the clearance has to take the loop.
+    rise, room = float(nominal["a_rise"]), float(nominal["a_clearance"])
+    slow, fast = (rise - spread["a_rise"], rise + 9.0 * spread["a_rise"]), (rise - spread["a_rise"], rise)
+    take = [room - spread["a_clearance"], room + 2.0 * spread["a_clearance"]]
+    relations["a"]["fields"] = {"slow": list(slow), "fast": list(fast)}
+    relations["sews"] = {"sew": ["a"], "speeds": SPEEDS, "clearance": take}
+    sewing, _ = machine_of(given, relations, tips=("looper",))
+    names = [f"sews_at_{60.0 * speed / (2.0 * np.pi):.6g}" for speed in SPEEDS]
+    found = design_outputs(family(sewing), designs, names, Accuracy(target=1e-8))
+    shares = []
+    for speed, name in zip(SPEEDS, names, strict=True):
+        part = (speed - SPEEDS[0]) / (SPEEDS[-1] - SPEEDS[0])
+        low, high = (x + part * (y - x) for x, y in zip(slow, fast, strict=True))
+        inside = (theirs["a_rise"] >= low) & (theirs["a_rise"] <= high)
+        inside &= (theirs["above_eye"] >= 0.0) & (theirs["below_scarf_end"] >= 0.0)
+        inside &= (theirs["a_clearance"] >= take[0]) & (theirs["a_clearance"] <= take[1])
+        shares.append(inside.mean())
+        assert (found[name] >= 0.0).mean() == pytest.approx(shares[-1], abs=SHARE), name
+    assert shares[0] > shares[-1] + 0.1
+
+
+def test_a_looper_that_lags_stands_where_its_lag_puts_it():
+    given = json.loads(json.dumps(ROWS[0]))
+    given["upper"], given["seam"] = given["looper"] | {"back": [0.0, 0.0, 0.0]}, [0.0, 0.0, 0.0]
+    given["looper"] |= {"eye": [1.0, 2.0, 3.0], "hold": [3.0, 2.0, 1.0]}
+    fields = {"slow": [0.0, 1e3], "fast": [0.0, 1e3]}
+    relations = {"a": {"take": ["thin", "blade"], "fields": fields}}
+    relations["sews"] = {"sew": ["a"], "speeds": SPEEDS, "clearance": [0.0, 1e3]}
+    machine, design = machine_of(given, relations)
+    design |= {"looper.speed": SPEEDS[0], "looper.driven_inertia": 2e-3, "looper.stiffness": 1e4}
+    names = [f"sews_at_{60.0 * speed / (2.0 * np.pi):.6g}" for speed in SPEEDS]
+    found = sweep.summarise(machine, design, [*names, "looper.max_abs_lag", "phi_a"], accuracy=1e-9).iloc[0]
+    assert found["status"] == 0
+    ratio = given["looper"]["ratio"]
+    for speed, name in zip(SPEEDS, names, strict=True):
+        fast = design | {"looper.speed": speed * ratio}
+        bent = sweep.evaluate(machine, fast, ["looper.lag", "looper.dpsi"], phi=[found["phi_a"]]).iloc[0]
+        ahead = bent["looper.lag"] / bent["looper.dpsi"]
+        moved = design | {"looper.offset": given["looper"]["offset"] + ratio * ahead}
+        keys = ["a_clearance", "a_above_eye", "a_below_scarf_end"]
+        there = sweep.summarise(machine, moved, keys, accuracy=1e-9).iloc[0]
+        assert found[name] == pytest.approx(there[keys].min(), abs=1e-9), name
+    assert abs(ahead) > 1e-4

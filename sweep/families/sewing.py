@@ -1,0 +1,174 @@
+"""Whether a machine sews at every speed: room that the moments A, B and C leave while the window of the loop moves.
+
+Each field of work permits a rise of the needle at A (machine-and-stitch, 5.4).  The first field is that of the least
+speed, the last one that of the greatest; between them the window runs linearly with the speed, which is ours.  The
+shaft's own unevenness makes the needle pass faster or slower than the mean: the rise has to suit both.  Where a member
+that carries the looper's blade has an elastic lag, its tip is late by that, which grows with the square of the speed.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from kernels import status as st
+from kernels.types import Array, Status
+from sweep.families.base import Accuracy, Angles, Columns, Output, Parameter, Step, Work
+from sweep.families.frames import Frame
+from sweep.families.main_shaft import ShaftTorque, speed_of
+from sweep.families.moments import Taking
+from sweep.families.passages import taking_step
+from sweep.families.triangles import Entering, entering_step
+
+if TYPE_CHECKING:
+    from sweep.families.machines import Machine
+
+RPM = 2.0 * np.pi / 60.0
+
+
+@dataclass(frozen=True)
+class Sewing:
+    """Moments that a machine has to keep at several speeds.
+
+    Parameters
+    ----------
+    name : of the relation
+    taking : moment A, with at least one field of work
+    entering : moments B and C, or one of them
+    speeds : of the main shaft, growing [rad/s]; the fields of A belong to the first and to the last
+    clearance : least and largest distance of tip and needle at A that takes the loop
+    shaft : torque of the main shaft whose unevenness counts; None for an even one
+    """
+
+    name: str
+    taking: Taking
+    entering: tuple[Entering, ...]
+    speeds: tuple[float, ...]
+    clearance: tuple[float, float]
+    shaft: ShaftTorque | None = None
+
+    outputs: tuple[Output, ...] = ()
+    parameters: tuple[Parameter, ...] = ()
+
+    @property
+    def numbers(self) -> Mapping[str, int]:
+        """Design outputs, one of each speed: names with the place of the speed."""
+        return {f"{self.name}_at_{speed / RPM:.6g}": k for k, speed in enumerate(self.speeds)}
+
+    def needs(self, wanted: frozenset[str]) -> frozenset[str]:
+        """Poses give nothing of it."""
+        return frozenset()
+
+    def compute(self, found: Mapping[str, Any], frames: Mapping[str, Frame], wanted: frozenset[str]) -> dict[str, Any]:
+        """Poses give nothing of it."""
+        return {}
+
+    def window(self, speeds: Array) -> tuple[Array, Array]:
+        """Return the least and the most rise that are permitted at some speeds, each as ``speeds``."""
+        assert self.taking.window is not None
+        (_, low, high), *_, (_, to_low, to_high) = (*self.taking.window.fields, self.taking.window.fields[-1])
+        first, last = self.speeds[0], self.speeds[-1]
+        part = (speeds - first) / (last - first)
+        return low + part * (to_low - low), high + part * (to_high - high)
+
+    def rooms(
+        self, machine: Machine, designs: Array, speeds: Array, accuracy: Accuracy
+    ) -> tuple[dict[str, Array], Status]:
+        """Return what each moment has to spare at each speed, (n, S) by the name of its relation, and status (n,).
+
+        Of A the least of what rise, clearance, scarf and eye leave, of B and C the margin of the triangle; nan where
+        there is no such moment.  Negative: the stitch is missed.
+        """
+        lag = self._lag(machine)
+        slow, fast, status = self._unevenness(machine, designs, accuracy)
+        if lag is None:
+            found = self._moments(machine, designs, accuracy, status)
+            parts = {name: [values] * len(speeds) for name, values in found.items()}
+        else:
+            moved = [self._moved(machine, lag, designs, float(speed), accuracy) for speed in speeds]
+            each = [self._moments(machine, one, accuracy, status) for one in moved]
+            parts = {name: [one[name] for one in each] for name in each[0]}
+        rooms = {name: np.stack(values, axis=1) for name, values in parts.items()}
+        rise = rooms.pop("rise")
+        for share in (slow, fast):
+            low, high = self.window(speeds[None, :] * share[:, None])
+            room = np.minimum(rise - low, high - rise)
+            rooms[self.taking.name] = np.minimum(rooms[self.taking.name], room)
+        return rooms, status
+
+    def _moments(self, machine: Machine, designs: Array, accuracy: Accuracy, status: Status) -> dict[str, Array]:
+        """Return rise and room of A without its window, margins of B and C, (n,); the status is written on."""
+        name, (least, most) = self.taking.name, self.clearance
+        names = [f"{name}_{key}" for key in ("rise", "clearance", "above_eye", "below_scarf_end")]
+        a = taking_step(self.taking, machine).run(designs, frozenset(names), accuracy)
+        rise, clearance, above, below = (np.asarray(a[key], np.float64) for key in names)
+        found = {"rise": rise, name: np.minimum.reduce([clearance - least, most - clearance, above, below])}
+        for one in self.entering:
+            margin = f"{one.name}_margin"
+            part = entering_step(one, machine).run(designs, frozenset({margin}), accuracy)
+            found[one.name] = np.asarray(part[margin], np.float64)
+        return found
+
+    def _unevenness(self, machine: Machine, designs: Array, accuracy: Accuracy) -> tuple[Array, Array, Status]:
+        """Return slowest and fastest speed as shares of the mean, (n,), at the speed of the scene, and the status."""
+        if self.shaft is None:
+            return np.ones(len(designs)), np.ones(len(designs)), np.zeros(len(designs), np.uint8)
+        names = [f"{self.shaft.name}_{key}" for key in ("slowest", "fastest")]
+        found = speed_of(self.shaft, machine).run(designs, frozenset(names), accuracy)
+        column = machine.parameter_names.index(self.shaft.driven[0].named("speed"))
+        mean = np.abs(designs[:, column]) / abs(self.shaft.driven[0].ratio)
+        slow, fast = (np.asarray(found[key], np.float64) / mean for key in names)
+        return slow, fast, np.asarray(found["status"], np.uint8)
+
+    def _lag(self, machine: Machine) -> tuple[str, str, int, int] | None:
+        """Return lag and rate of the output of A's looper, and the columns of its phase and speed; None without lag."""
+        member = machine.member(self.taking.blade.tip.partition(".")[0])
+        lag, names = f"{member.name}.lag", machine.parameter_names
+        rate = member.family.derivative_of.get(member.family.position, "")
+        if lag not in machine.pose_output or member.driver is not None or not rate:
+            return None
+        phase = names.index(f"{member.name}.{'key' if member.mount else 'offset'}")
+        return lag, f"{member.name}.{rate}", phase, names.index(f"{member.name}.speed")
+
+    def _moved(
+        self, machine: Machine, lag: tuple[str, str, int, int], designs: Array, speed: float, accuracy: Accuracy
+    ) -> Array:
+        """Return designs whose looper stands where its lag at A puts it at a speed: its crank is moved instead."""
+        bent, rate, phase, own = lag
+        member = machine.member(bent.partition(".")[0])
+        moved = designs.copy()
+        moved[:, own] = speed * member.ratio
+        phi = f"phi_{self.taking.name}"
+        at = np.asarray(taking_step(self.taking, machine).run(designs, frozenset({phi}), accuracy)[phi], np.float64)
+        poses = machine.poses(moved, Angles.of(at[:, None]), frozenset((bent, rate)))
+        # by the angle of the main shaft: sense and ratio of the crank turn it into one of the key or offset
+        ahead = np.asarray(poses[bent], np.float64)[:, 0] / np.asarray(poses[rate], np.float64)[:, 0]
+        sign = member.ratio if member.mount is None else member.ratio * member.mount.sense
+        moved = designs.copy()
+        moved[:, phase] += ahead * sign
+        return moved
+
+
+def sewing_step(sewing: Sewing, machine: Machine) -> Step:
+    """Return the machine's route to the least room of all moments at each speed."""
+    text = "least room of moments {} at {:.6g} rpm; negative: it does not sew"
+    moments = ", ".join((sewing.taking.name, *(one.name for one in sewing.entering)))
+    provides = tuple(
+        Output(name, "length", text.format(moments, sewing.speeds[k] / RPM), "5.4")
+        for name, k in sewing.numbers.items()
+    )
+
+    def run(designs: Array, wanted: frozenset[str], accuracy: Accuracy) -> Columns:
+        rooms, status = sewing.rooms(machine, designs, np.array(sewing.speeds), accuracy)
+        least = np.minimum.reduce(list(rooms.values()))
+        status = np.where((status == st.OK) & np.isnan(least).any(axis=1), st.NEVER, status).astype(np.uint8)
+        most = float(sewing.window(np.array(sewing.speeds))[1].max())  # lengths that the rooms are differences of
+        columns: Columns = {}
+        for name, k in sewing.numbers.items():
+            columns |= {name: least[:, k], f"err_{name}": (np.abs(least[:, k]) + most) * (accuracy.target or 0.0)}
+        return columns | {"status": status}
+
+    return Step(f"sewing {sewing.name}", provides, run, work=Work.LONG, cost=lambda accuracy: 3e6)
