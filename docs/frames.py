@@ -5,10 +5,10 @@ from __future__ import annotations
 import math
 from pathlib import Path
 
-from sweep.exchange.scene import over
+from sweep.exchange.scene import is_spatial, over, projection
 from sweep.families import NAMES, family
+from sweep.plot.drawing import draw_frame
 from sweep.report.figures import house_style, new_figure, save
-from sweep.report.mechanisms import draw_frame, is_spatial, projection
 
 FOLDER = Path(__file__).parent / "figures"
 FIRST = math.radians(50.0)  # a crank angle at which no two joints lie on each other

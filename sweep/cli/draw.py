@@ -13,8 +13,7 @@ from sweep.cli.options import ANGLES
 from sweep.cli.tables import read_table
 from sweep.errors import InputError
 from sweep.evaluation.angles import AngleUnit, grid_in_radians
-from sweep.evaluation.cyclogram import cyclogram
-from sweep.report.cyclogram import table_in_degrees
+from sweep.evaluation.cyclogram import cyclogram, table_in_degrees
 from sweep.report.dataset import chosen
 
 OF_DATASETS = ("map", "front", "tolerance", "sensitivity")

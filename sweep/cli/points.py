@@ -16,8 +16,8 @@ from sweep.exchange.export import FORMATS
 from sweep.exchange.export import export as write
 from sweep.exchange.points import TOLERANCE, drawn
 from sweep.families import family as find_family
+from sweep.plot.sheet import write_sheet
 from sweep.report.dataset import chosen
-from sweep.report.sheet import write_sheet
 from sweep.report.workbook import write_workbook
 from sweep.study.written import design_entries, toml
 

@@ -73,6 +73,13 @@ def cyclogram(
     return found
 
 
+def table_in_degrees(rows: pd.DataFrame) -> pd.DataFrame:
+    """Return the table for people and files: crank angles in degrees, and how long each takes."""
+    start, end = (np.degrees(rows[name].to_numpy(np.float64)) for name in ("start", "end"))
+    columns = {"member": rows["member"], "kind": rows["kind"], "name": rows["name"]}
+    return rows[[]].assign(**columns, **{"from [deg]": start, "to [deg]": end, "lasts [deg]": (end - start) % 360.0})
+
+
 def _positions(family: Family) -> Iterator[tuple[str, str]]:
     """Yield each member with the position of its follower, whose derivative is known."""
     if isinstance(family, Machine):

@@ -132,3 +132,40 @@ def extent(found: Sequence[Part]) -> float:
 def shown_name(joint: str) -> str:
     """Return a joint as the docs write it: A, B, C1, but point and line."""
     return joint.upper() if len(joint) < 3 else joint
+
+
+VIEWS = {"xy": (0, 1), "zy": (2, 1), "xz": (0, 2)}
+ELEVATION, AZIMUTH = math.radians(24.0), math.radians(-55.0)
+
+
+def first_pose(parts: Sequence[Part]) -> int:
+    """First pose in which every joint exists; 0 where there is none."""
+    whole = np.logical_and.reduce([np.isfinite(path).all(axis=1) for part in parts for path in part.joints.values()])
+    return int(np.argmax(whole))
+
+
+def exists(parts: Sequence[Part]) -> bool:
+    """Whether there are joints, and a pose in which all of them exist."""
+    found: list[Array] = [path for part in parts for path in part.joints.values()]
+    return bool(found) and bool(np.logical_and.reduce([np.isfinite(path).all(axis=1) for path in found]).any())
+
+
+def projection(view: str) -> Array:
+    """Return the (2, 3) matrix of a view: "xy", "zy", "xz" square to a plane, "space" from a corner with z upwards."""
+    if view in VIEWS:
+        return np.eye(3)[list(VIEWS[view])]
+    (se, ce), (sa, ca) = ((math.sin(x), math.cos(x)) for x in (ELEVATION, AZIMUTH))
+    return np.array([[-sa, ca, 0.0], [-se * ca, -se * sa, ce]])
+
+
+def is_spatial(parts: Sequence[Part]) -> bool:
+    """Whether joints leave the plane z = 0, or an axis is not square to it."""
+    points = np.vstack([path for part in parts for path in part.joints.values()])
+    turned = [axis for part in parts for name, axis in part.axes.items() if part.kinds[name] == "axis"]
+    lean = any(abs(axis[0]) + abs(axis[1]) > 1e-9 for axis in turned)
+    return lean or float(np.nanmax(np.abs(points[:, 2]))) > 1e-9 * float(np.nanmax(np.abs(points)))
+
+
+def frames_of(parts: Sequence[Part]) -> dict[str, list[Part]]:
+    """Parts by the frame that they stand in, in their order."""
+    return {frame: [part for part in parts if part.frame == frame] for frame in dict.fromkeys(p.frame for p in parts)}

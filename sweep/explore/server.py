@@ -20,8 +20,8 @@ from sweep.exchange.export import FORMATS, export
 from sweep.explore.cells import cells, design_of
 from sweep.explore.hand import Hand
 from sweep.explore.improve import improve, problem_in_hand
-from sweep.report.figures import TEMPLATES
-from sweep.report.live import LIVE, PLANE, SPATIAL
+from sweep.report.figures import rendered
+from sweep.report.live import PLANE, SPATIAL
 
 if TYPE_CHECKING:
     from starlette.requests import Request
@@ -223,16 +223,7 @@ def _refused(error: Exception) -> Response:
 
 def page_text(hand: Hand) -> str:
     """Return the page with its first answer, its style and its scripts; it needs nothing from anywhere else."""
-    from jinja2 import Environment, FileSystemLoader, StrictUndefined
-
-    environment = Environment(loader=FileSystemLoader(TEMPLATES), autoescape=True, undefined=StrictUndefined)
-    scripts = [*SPATIAL, *PLANE, "explore.js"]
-    return environment.get_template("explore.html").render(
-        page=hand.page(),
-        formats=list(FORMATS),
-        live_designs=[],
-        axis="angle",
-        style=[(TEMPLATES / "report.css").read_text("utf-8"), (LIVE / "live.css").read_text("utf-8"),
-               (LIVE / "explore.css").read_text("utf-8")],
-        scripts=[(LIVE / name).read_text("utf-8") for name in scripts],
-    )  # fmt: skip
+    scripts = [*SPATIAL, *PLANE, "live/explore.js"]
+    return rendered(
+        "explore.html", page=hand.page(), formats=list(FORMATS), live_designs=[], axis="angle", scripts=scripts
+    )

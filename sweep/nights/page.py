@@ -6,13 +6,11 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from jinja2 import Environment, FileSystemLoader, StrictUndefined
-
 from sweep.dataset.comparison import SLOWER
 from sweep.dataset.files import write_atomically
 from sweep.nights.changes import YIELD
 from sweep.nights.records import WORDS, NightRecord, StudyRecord, read_history
-from sweep.report.figures import TEMPLATES
+from sweep.report.figures import rendered
 from sweep.report.quantities import number, quantity
 
 INDEX = "index.html"
@@ -79,16 +77,9 @@ class NightRow:
 def write_page(into: Path) -> Path:
     """Write ``index.html`` from the history, as a whole; it needs no network."""
     nights = read_history(into)[-SHOWN:]
-    environment = Environment(
-        loader=FileSystemLoader(TEMPLATES),
-        autoescape=True,
-        undefined=StrictUndefined,
-        trim_blocks=True,
-        lstrip_blocks=True,
-    )
     names = sorted({name for night in nights for name in night.studies})
-    text = environment.get_template("nights.html").render(
-        style=(TEMPLATES / "report.css").read_text(encoding="utf-8"),
+    text = rendered(
+        "nights.html",
         studies=[study_rows(name, nights, into) for name in names],
         nights=[_night_row(night, into) for night in reversed(nights)],
         width=WIDTH,

@@ -9,15 +9,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sweep.errors import InputError
-from sweep.report import maps, robust
-from sweep.report.dataset import gather, read_dataset
-from sweep.report.figures import house_style
-from sweep.report.made import histogram, histogram_figure
-from sweep.report.robust import tolerance_words
+from sweep.report import maps
+from sweep.report.dataset import gather, read_dataset, shown_objective
+from sweep.report.figures import LIMIT, NARROW, OPTIMUM, QUIET, REFERENCE, house_style, new_figure
+from sweep.report.made import Histogram, histogram, slopes, spreads, tolerance_words
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
+
+SEEN = 0.005  # of the longest bar: shorter ones are no wider than a line
 
 
 def map(folder: str | Path, x: str | None = None, y: str | None = None) -> NDArray[Any]:
@@ -118,14 +119,37 @@ def tolerance(folder: str | Path, output: str | None = None) -> Axes:
     'change from the nominal value [%]'
     """
     data = read_dataset(Path(folder))
-    allowed = "a dataset with an optimum and [tolerance]"
-    if output is None:
-        with house_style():
-            return _drawn(robust.tolerance(data), folder, allowed).axes[0]
-    found = histogram(data, output)
+    found = histogram(data, output) if output is not None else None
+    changes = [(one.shown.symbol, one.changes) for one in spreads(data) if one.changes is not None]
+    if found is None and (output is not None or not changes):
+        raise InputError("folder", str(folder), "a dataset with an optimum and [tolerance]", "plot")
     with house_style():
-        figure = None if found is None else histogram_figure(found, tolerance_words(data))
-    return _drawn(figure, folder, allowed).axes[0]
+        axes = new_figure(NARROW, 0.27 * len(changes) + 1.1 if found is None else 1.9).subplots()
+        axes.set_title(tolerance_words(data))
+        if found is not None:
+            return draw_histogram(axes, found)
+        for k, (_, (low, mean, high)) in enumerate(changes):
+            axes.plot([low, high], [k, k], color=OPTIMUM, linewidth=5.0, solid_capstyle="butt", alpha=0.5)
+            axes.plot(mean, k, "o", color=OPTIMUM, markersize=4.5)
+        axes.axvline(0.0, color=QUIET, linewidth=0.8)
+        axes.set_yticks(range(len(changes)), [symbol for symbol, _ in changes])
+        axes.invert_yaxis()
+        axes.set_xlabel("change from the nominal value [%]")
+    return axes
+
+
+def draw_histogram(axes: Axes, found: Histogram) -> Axes:
+    """Draw an output over what is made; what misses its limit has another colour, lines are the limit."""
+    colours = np.where(found.missing, LIMIT, OPTIMUM)
+    axes.bar(
+        found.edges[:-1], 100.0 * found.shares, 0.92 * np.diff(found.edges), align="edge", color=colours, alpha=0.75
+    )
+    for bound in (found.low, found.high):
+        if bound is not None:
+            axes.axvline(bound, color=LIMIT, linewidth=1.2)
+    axes.set_xlabel(found.shown.title)
+    axes.set_ylabel("of what is made [%]")
+    return axes
 
 
 def sensitivity(folder: str | Path) -> Axes:
@@ -153,9 +177,23 @@ def sensitivity(folder: str | Path) -> Axes:
     3
     """
     data = read_dataset(Path(folder))
+    ranked, objective = slopes(data), shown_objective(data)
+    ranked = [slope for slope in ranked if slope.largest > SEEN * ranked[0].largest]
+    if not ranked or objective is None:
+        raise InputError("folder", str(folder), "a dataset with an optimum and its sensitivities", "plot")
     with house_style():
-        figure = robust.sensitivity(data)
-    return _drawn(figure, folder, "a dataset with an optimum and its sensitivities").axes[0]
+        axes = new_figure(NARROW, 0.28 * len(ranked) + 1.1).subplots()
+        for offset, values, colour, label in (
+            (-0.2, [s.growing for s in ranked], OPTIMUM, "larger"),
+            (0.2, [s.shrinking for s in ranked], REFERENCE, "smaller"),
+        ):
+            axes.barh(np.arange(len(ranked)) + offset, values, 0.38, color=colour, label=label)
+        axes.axvline(0.0, color=QUIET, linewidth=0.8)
+        axes.set_yticks(range(len(ranked)), [f"{s.name}, by {s.step}" for s in ranked])
+        axes.invert_yaxis()
+        axes.set_xlabel(f"change of the {objective.words} [%]")
+        axes.legend()
+    return axes
 
 
 def _drawn(figure: Figure | None, folder: str | Path, allowed: str) -> Figure:

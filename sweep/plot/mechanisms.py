@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
+from itertools import cycle
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -16,16 +17,19 @@ from sweep.evaluation.cyclogram import cyclogram as table
 from sweep.evaluation.given_units import speed_given
 from sweep.evaluation.joints import parts
 from sweep.evaluation.poses import evaluate, pose_wants
-from sweep.exchange.scene import over, shown_name
+from sweep.exchange.scene import VIEWS, exists, over, shown_name
 from sweep.families import Mechanism
 from sweep.families import family as find_family
+from sweep.families.base import Array, Family
 from sweep.families.domain import Interval
-from sweep.report.curves import motion_figure
-from sweep.report.cyclogram import cyclogram_figure
-from sweep.report.figures import OPTIMUM, house_style, new_figure
-from sweep.report.mechanisms import VIEWS, exists, mechanism_figure
+from sweep.plot.cyclogram import cyclogram_figure
+from sweep.plot.drawing import COLOURS, mechanism_figure
+from sweep.report.figures import OPTIMUM, WIDTH, crank_axis, house_style, new_figure
+from sweep.report.live import is_angle, turns_fully
+from sweep.report.quantities import quantity
 
 if TYPE_CHECKING:
+    import pandas as pd
     from matplotlib.axes import Axes
 
     from sweep.evaluation.tables import Table
@@ -89,11 +93,61 @@ def motion(
     if given is not None and len(given) != len(names):
         raise InputError("axes", len(given), f"{len(names)}, one for each of {', '.join(names)}", "plot")
     names_of = [str(name) if isinstance(name, str) else f"design {name}" for name in known]
-    curves = pd.DataFrame(found.assign(role=[names_of[k] for k in found["design"]]))
-    units = {o.name: o.unit.replace("length", unit) for o in family.pose_outputs}
     with house_style():
-        panels = motion_figure(curves, units, family.position, speed_given(speed), (), None, names, given)
-    return np.array(panels, dtype=object)
+        return _panels(family, names, dict(zip(names_of, (turn for _, turn in found.groupby("design")), strict=True)),
+                       unit, speed_given(speed), given)  # fmt: skip
+
+
+def _panels(
+    family: Family, names: list[str], turns: Mapping[str, pd.DataFrame], unit: str, speed: float | None,
+    given: list[Any] | None,
+) -> NDArray[Any]:  # fmt: skip
+    """Draw over the crank angle from the lowest position, so that several designs can be laid over each other."""
+    if given is None:
+        figure = new_figure(WIDTH, 2.1 * -(-len(names) // 2) + 0.5)
+        every = np.atleast_1d(figure.subplots(-(-len(names) // 2), 2)).ravel().tolist()
+        for axes in every[len(names) :]:
+            axes.set_axis_off()
+        given = every[: len(names)]
+    lowest = "" if any(rotates(turn, family.position) for turn in turns.values()) else " from the lowest position"
+    for axes, name in zip(given, names, strict=True):
+        shown = quantity(name, family.pose_output[name].unit.replace("length", unit))
+        for (design, turn), colour in zip(turns.items(), cycle(COLOURS)):
+            angle, values = aligned_turn(turn, name, family.position)
+            axes.plot(np.degrees(angle), values * shown.factor, label=design, color=colour, zorder=3)
+        axes.set_title(shown.title)
+        if speed is not None and shown.order:
+            scale = shown.speed_scale * speed**shown.order / shown.factor
+            twin = axes.secondary_yaxis("right", functions=(lambda v, k=scale: v * k, lambda v, k=scale: v / k))
+            twin.set_ylabel(shown.speed_unit)
+        crank_axis(axes, f"crank angle{lowest} [°]")
+    if len(turns) > 1:
+        given[0].legend()
+    return np.array(given, dtype=object)
+
+
+def aligned_turn(turn: pd.DataFrame, name: str, position: str) -> tuple[Array, Array]:
+    """One closed turn that starts where the position is smallest; the position itself counts from there."""
+    phi, values = turn["phi"].to_numpy(float), turn[name].to_numpy(float)
+    path = turn[position].to_numpy(float)
+    if is_angle(position):
+        path = np.unwrap(path)
+    if name == position:
+        values = path
+    if rotates(turn, position):
+        full = np.copysign(2.0 * np.pi, path[-1] - path[0]) if name == position else 0.0
+        return np.append(phi, 2.0 * np.pi), np.append(values, values[0] + full)
+    start = int(np.nanargmin(path)) if np.isfinite(path).any() else 0
+    order = np.r_[start : phi.size, 0:start]
+    values = values[order] - (values[start] if name == position else 0.0)
+    return np.append(np.mod(phi[order] - phi[start], 2.0 * np.pi), 2.0 * np.pi), np.append(values, values[0])
+
+
+def rotates(turn: pd.DataFrame, position: str) -> bool:
+    """Whether the follower itself turns fully, so that it has no lowest position."""
+    if not is_angle(position):
+        return False
+    return turns_fully(np.unwrap(turn[position].to_numpy(float)))
 
 
 def cyclogram(mechanism: Mechanism, design: Table, *, dwell: float = 0.02, angles: AngleUnit | None = None) -> Axes:
@@ -161,7 +215,7 @@ def mechanism(
     if not exists(found):
         raise InputError("design", dict(found[0].parameters), "one with a pose in which all its joints exist", "plot")
     with house_style():
-        figure = mechanism_figure({"": found}, unit, None if view is None else (view,), positions)
+        figure = mechanism_figure(found, unit, view, positions)
     return np.array(figure.axes, dtype=object)
 
 

@@ -14,7 +14,7 @@ from sweep.proof.study import EVENT, proof_words
 from sweep.quantities.limits import compared
 from sweep.report.dataset import Dataset, Row
 from sweep.report.front import front_sentence
-from sweep.report.quantities import Quantity, change, number, quantity
+from sweep.report.quantities import Quantity, change, number, quantity, rpm
 from sweep.report.tables import LimitState, fates, limit_state, limit_states, limited, parameter_rows, value_of
 
 if TYPE_CHECKING:
@@ -89,11 +89,6 @@ def _with_speed(data: Dataset, shown: Quantity, value: float) -> str:
     return f"{shown.show(value)} ({fast} at {rpm(data.study.speed)})" if fast else shown.show(value)
 
 
-def rpm(speed: float | None) -> str:
-    """Return a speed in turns per minute."""
-    return "" if speed is None else f"{number(speed * 30.0 / math.pi, 5)} rpm"
-
-
 def _limit_sentences(states: list[LimitState]) -> list[str]:
     active = [f"{s.shown.words} ({s.bound})" for s in states if s.state == "active"]
     met = sorted((s for s in states if s.state == "met" and s.slack), key=lambda s: s.room)
@@ -122,8 +117,8 @@ def not_achieved(data: Dataset, found: Scan) -> list[str]:
     if data.optimum is not None:
         residual = value_of(data.optimum, "kkt_residual")
         if not residual <= KKT:
-            what = "had no time left to settle" if data.optimum.get("ended") == "time" else "did not settle"
-            faults.append(f"the optimiser {what} ({_residual(residual)}, {number(KKT)} is wanted)")
+            late = data.optimum.get("ended") == "time"
+            faults.append(f"the optimiser {'had no time left to settle' if late else 'did not settle'}")
         if objective is not None and found.best_row:
             best, value = found.best_row[objective.output], value_of(data.optimum, objective.output)
             if not compared(objective.output, value) <= compared(objective.output, best) + 1e-6 * abs(best):
@@ -166,12 +161,21 @@ def _sweep_sentences(data: Dataset, found: Scan) -> list[str]:
 
 
 def search_warnings(data: Dataset) -> list[str]:
-    """Return what a reader has to know before trusting the optimum: time that ran out, fewer starts than asked."""
-    found = (
-        [] if data.survey is None else [f"{text[0].upper()}{text[1:]}." for text in survey_warnings(data, data.survey)]
-    )
-    front = data.front_steps
-    return found if front is None else [*found, f"Time ran out: {front} steps of the front."]
+    """Return what a reader has to know before trusting the optimum; the optimiser's own words are in `searched`."""
+    found, front = data.survey, data.front_steps
+    words = [] if found is None else [*_unconfirmed(data), *found.shortcomings]
+    if found is not None and found.doubts and not _is_proven(data):
+        of = "population" if found.populations else "start"
+        rare = {1: f"only one {of} reached this optimum", 2: f"only two {of}s reached this optimum"}.get(found.best)
+        words.append(f"{rare}; run more" if rare else f"a better optimum may be left; run more {of}s")
+    words += [] if front is None else [f"time ran out: {front} steps of the front"]
+    return [f"{text[0].upper()}{text[1:]}." for text in words]
+
+
+def searched(data: Dataset, found: Scan) -> list[str]:
+    """Say how the optimum was searched, in the optimiser's own words, and what they leave open."""
+    doubts = () if data.survey is None or _is_proven(data) else data.survey.doubts
+    return [text for text in (search_sentence(data, found), *(f"{x[0].upper()}{x[1:]}." for x in doubts)) if text]
 
 
 def _residual(value: float) -> str:
@@ -196,7 +200,8 @@ def search_sentence(data: Dataset, found: Scan) -> str:
         # What comes from one valley is one meeting, so the survey may count fewer than ended at the value.
         text += f"; {'' if populations else 'counting distinct valleys, '}{search_words(data, data.survey)}"
     residual, violation = value_of(data.optimum, "kkt_residual"), value_of(data.optimum, "violation")
-    words = "" if math.isnan(residual) else f"{_residual(residual)}, "
+    wanted = "" if residual <= KKT else f" where {number(KKT)} is wanted"
+    words = "" if math.isnan(residual) and proof_sentence(data) else f"{_residual(residual)}{wanted}, "
     return f"{text}. {words}{'l' if words else 'L'}argest violation of a limit {number(violation, 3)}."
 
 

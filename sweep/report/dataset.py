@@ -15,11 +15,11 @@ from sweep.dataset import store
 from sweep.dataset.files import check_tables
 from sweep.errors import InputError
 from sweep.evaluation.statuses import meaning
-from sweep.evaluation.summaries import output
+from sweep.evaluation.summaries import design_outputs, output
+from sweep.evaluation.tables import design_matrix
 from sweep.families.base import Family
 from sweep.families.names import is_largest, is_place, stem
 from sweep.optimise import Survey, read_survey
-from sweep.report.curves import curves, reference_row
 from sweep.report.quantities import Quantity, quantity
 from sweep.report.scan import Cells, Scan, scan
 from sweep.study.load import study_from_data
@@ -318,11 +318,18 @@ def gather(folder: Path) -> tuple[Dataset, Scan, list[Cells]]:
     found = scan(data.parts, cells, objective, data.against if objective is not None else None, larger)
     found.best_row |= _absent(data.study, found.best_row) if found.best_row else {}
     data = replace(data, best=found.best_row or None)
-    if data.optima is None:
-        data = replace(data, computed_reference=reference_row(data.study))
-    if data.curves is None and data.study.output.curves != "none":
-        data = replace(data, curves=curves(data.study, marked(data)))
+    if data.optima is None and data.study.reference is not None:
+        matrix, _ = design_matrix(data.study.family, data.study.reference)
+        own = dict(zip(data.study.family.parameter_names, matrix[0].tolist(), strict=True))
+        data = replace(data, computed_reference=row_of(data.study, own))
     return data, found, cells
+
+
+def row_of(study: Study, design: Mapping[str, float]) -> Row:
+    """Return a design with the outputs that a study wants, computed as its sweep computes them."""
+    matrix, _ = design_matrix(study.family, design)
+    found = design_outputs(study.family, matrix, study.want, study.accuracy, study.window)
+    return dict(design) | {name: float(values[0]) for name, values in found.items()}
 
 
 def divided_axes(study: Study, feasible: int) -> list[Cells]:

@@ -2,30 +2,20 @@
 
 from __future__ import annotations
 
-import shutil
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 from kernels import status as codes
+from sweep.dataset.files import write_atomically
 from sweep.errors import InputError, StoreError
 from sweep.evaluation.statuses import meaning
-from sweep.evaluation.summaries import design_outputs
-from sweep.evaluation.tables import design_matrix
-from sweep.report.dataset import Dataset, Row, chosen, read_dataset
-from sweep.report.figures import TEMPLATES
-from sweep.report.live import LIVE, embedded, moving, scripts_of
+from sweep.report.dataset import Dataset, Row, chosen, read_dataset, row_of
+from sweep.report.figures import rendered
+from sweep.report.live import embedded, moving, scripts_of
 from sweep.report.optima import Shown
 from sweep.report.tables import ParameterRow, limit_states, output_rows, parameter_rows
-from sweep.study import Study
-
-
-def row_of(study: Study, design: Mapping[str, float]) -> Row:
-    """Return a design with the outputs that a study wants, computed as its sweep computes them."""
-    matrix, _ = design_matrix(study.family, design)
-    found = design_outputs(study.family, matrix, study.want, study.accuracy, study.window)
-    return dict(design) | {name: float(values[0]) for name, values in found.items()}
 
 
 def judged(data: Dataset, rows: Sequence[Row], names: Sequence[str]) -> dict[str, Any]:
@@ -88,11 +78,8 @@ def write_comparison(folders: Sequence[Path], out: Path) -> Path:
     rows = [row_of(data.study, first | {name: one.design[name] for name in own}) for one in found]
     compared = judged(data, rows, names)
     lines = [parameter_rows(as_result(data, row)) for row in rows]
-    from jinja2 import Environment, FileSystemLoader, StrictUndefined
-
-    environment = Environment(loader=FileSystemLoader(TEMPLATES), autoescape=True, undefined=StrictUndefined)
-    text = environment.get_template(PAGE).render(
-        style=[(TEMPLATES / "report.css").read_text("utf-8"), (LIVE / "live.css").read_text("utf-8")],
+    text = rendered(
+        PAGE,
         names=names,
         folders=[str(folder) for folder in folders],
         study=data.study,
@@ -104,11 +91,9 @@ def write_comparison(folders: Sequence[Path], out: Path) -> Path:
     )
     try:
         out.mkdir(parents=True, exist_ok=True)
-        partial = out / f"_tmp-{PAGE}"
-        partial.write_text(text, encoding="utf-8")
-        shutil.move(partial, out / PAGE)
     except OSError as error:
         raise StoreError(f"report {out}: cannot be written: {error}") from error
+    write_atomically(out / PAGE, text.encode())
     return out / PAGE
 
 

@@ -16,15 +16,13 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from sweep.errors import InputError
-from sweep.evaluation.curves import motion_curves
+from sweep.evaluation.curves import coordinate, motion_curves
 from sweep.evaluation.joints import Part, parts
 from sweep.exchange.scene import Placed, extent, shown_name, side_by_side
 from sweep.families.base import Angles, Array, Family
 from sweep.families.domain import Interval, equal_steps
-from sweep.families.names import is_flag
+from sweep.families.names import is_flag, is_largest, reduced, stem
 from sweep.quantities.limits import compared
-from sweep.report.curves import FAR_LIMIT, in_window, is_angle, limit_values, shown_curves, turns_fully
-from sweep.report.figures import TEMPLATES
 from sweep.report.optima import shown_designs
 from sweep.report.quantities import Quantity, quantity
 from sweep.report.tables import limited
@@ -33,10 +31,10 @@ if TYPE_CHECKING:
     from sweep.report.dataset import Dataset
     from sweep.report.optima import Group, Shown
     from sweep.report.scan import Cells
+    from sweep.study import Limit
 
 
-LIVE = TEMPLATES / "live"
-SPATIAL, PLANE = ("three.min.js", "view.js"), ("charts.js", "lines.js", "page.js")
+SPATIAL, PLANE = ("live/three.min.js", "live/view.js"), ("live/charts.js", "live/lines.js", "live/page.js")
 
 
 def live(data: Dataset, cells: Sequence[Cells], different: Sequence[Group]) -> dict[str, Any]:
@@ -53,7 +51,6 @@ def live(data: Dataset, cells: Sequence[Cells], different: Sequence[Group]) -> d
         "lines_data": "" if lines is None else embedded(lines),
         "lines_axes": [] if lines is None else [_head(axis) for axis in lines["axes"]],
         "scripts": scripts_of(motion) if motion or lines else [],
-        "live_style": (LIVE / "live.css").read_text(encoding="utf-8"),
     }
 
 
@@ -64,12 +61,47 @@ def _head(axis: dict[str, str]) -> str:
 def scripts_of(motion: Mapping[str, Any] | None) -> list[str]:
     """Return the scripts that a page needs, the heavy one only where something stands in space."""
     spatial = motion is not None and motion["size"] > 0.0
-    return [(LIVE / name).read_text(encoding="utf-8") for name in (*(SPATIAL if spatial else ()), *PLANE)]
+    return [*(SPATIAL if spatial else ()), *PLANE]
 
 
 def embedded(values: dict[str, Any]) -> str:
     """Return JSON as it may stand within a script element: no character of it can end the element."""
     return json.dumps(values, ensure_ascii=False, allow_nan=False, separators=(",", ":")).replace("<", "\\u003c")
+
+
+FAR_LIMIT = 2.5  # limits farther out than so many times the curves are not drawn: the curves would be flat
+
+
+def in_window(path: Array, window: tuple[float, float]) -> NDArray[np.bool_]:
+    """Return poses whose position lies between two fractions of the stroke, counted from its smallest value."""
+    low, high = np.nanmin(path), np.nanmax(path)
+    fraction = (path - low) / (high - low) if high > low else np.zeros_like(path)
+    return (fraction >= window[0]) & (fraction <= window[1])
+
+
+def is_angle(position: str) -> bool:
+    """Whether a position is a follower's angle, known up to full turns."""
+    return stem(position) == "psi"
+
+
+def turns_fully(path: Array) -> bool:
+    """Whether an unwrapped angle over one turn of the crank makes a turn itself."""
+    return bool(abs(path[-1] - path[0]) > 0.9 * 2.0 * np.pi)
+
+
+def limit_values(name: str, limits: tuple[Limit, ...]) -> list[float]:
+    """Ordinates, in stored units, that the limits set to a curve itself; both signs where its size is limited."""
+    found = []
+    for limit in limits:
+        for value, outputs in (
+            (limit.maximum, (reduced("max_abs", name), reduced("max", name))),
+            (limit.minimum, (reduced("min", name),)),
+        ):
+            if value is None or limit.output not in outputs:
+                continue
+            both = is_largest(limit.output, magnitude=True) and stem(name) != "pressure_angle"
+            found += [value, -value] if both else [value]
+    return found
 
 
 POSES = 240
@@ -103,7 +135,7 @@ def moving(data: Dataset, shown: Sequence[Shown]) -> dict[str, Any] | None:
     if not shown or data.study.output.curves == "none":
         return None
     family = data.study.family
-    names = shown_curves(list(motion_curves(family)), family.position)
+    names = [x for x in dict.fromkeys(motion_curves(family)) if x == family.position or coordinate(x) is None]
     motions = [_motion(data, one, names) for one in shown]
     interval = isinstance(family.domain, Interval)
     phase = "" if interval or any(motion.free for motion in motions) else " from the lowest position"

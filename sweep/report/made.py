@@ -1,25 +1,24 @@
-"""What manufacture makes of the optimum: the yield, how the limit that costs most is missed, and by which dimension."""
+"""The optimum as it is made: its yield, what tolerances cost, the spread of outputs, slopes of the objective."""
 
 from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
+from sweep.dataset import store
 from sweep.evaluation.summaries import design_outputs
-from sweep.families.names import is_flag, judged_by
+from sweep.families.names import is_flag, judged_by, without_minus
 from sweep.optimise.manufacture.tolerance import deviating, touched
 from sweep.quantities import resolve
 from sweep.quantities.limits import compared, meets
 from sweep.report.dataset import Dataset
-from sweep.report.figures import LIMIT, NARROW, OPTIMUM, new_figure
 from sweep.report.quantities import Quantity, number, quantity
 from sweep.study import Limit
 
 if TYPE_CHECKING:
-    from matplotlib.figure import Figure
     from numpy.typing import NDArray
 
     from sweep.families.base import Array
@@ -30,10 +29,10 @@ COSTS = 8  # dimensions that are tried exact: those that the scatter of the wors
 BINS = 41
 FAR = 2.0  # spreads of what is made from which on a bound is not drawn: it would make one bar of them
 TELLING = 0.002  # a share of mechanisms below which a dimension costs nothing that 1024 of them could tell
+STEPS = {"length": (0.1, "0.1\u00a0mm"), "angle": (math.radians(0.1), "0.1°")}
 
 
-@dataclass(frozen=True)
-class Cost:
+class Cost(NamedTuple):
     """What one dimension's tolerance costs, found by making the same mechanisms with it exact.
 
     ``spread`` is its share in the variance of the output whose limit is missed most, ``gain`` the share of mechanisms
@@ -44,16 +43,6 @@ class Cost:
     text: str
     spread: float
     gain: float
-
-    @property
-    def spread_words(self) -> str:
-        """The share of the scatter in percent."""
-        return f"{number(100.0 * self.spread, 2)}\u00a0%"
-
-    @property
-    def gain_words(self) -> str:
-        """The gain in points."""
-        return f"{number(100.0 * self.gain, 2)} points" if self.gain >= TELLING else "–"
 
 
 @dataclass(frozen=True)
@@ -70,9 +59,16 @@ class Histogram:
     high: float | None
     within: float
 
+    @property
+    def missing(self) -> NDArray[np.bool_]:
+        """Whether what falls into a bin misses the limit."""
+        middle = 0.5 * (self.edges[:-1] + self.edges[1:])
+        low, high = (-math.inf if self.low is None else self.low), (math.inf if self.high is None else self.high)
+        missed: NDArray[np.bool_] = (middle < low) | (middle > high)
+        return missed
 
-@dataclass(frozen=True)
-class Made:
+
+class Made(NamedTuple):
     """Yield of the result, the limit that most of what is made misses, and what its dimensions cost."""
 
     share: float
@@ -92,7 +88,7 @@ def made(data: Dataset) -> Made | None:
     designs = deviating(study.family, design, study.tolerance, study.optimise.seed, study.tolerance.samples)
     columns, kept = _kept(study, limits, designs)
     worst = min(limits, key=lambda limit: float(meets(limit, columns[limit.output]).mean()))
-    histogram = _histogram(data, worst, compared(worst.output, np.asarray(columns[worst.output], np.float64)))
+    histogram = _histogram(data, worst, columns[worst.output])
     return Made(float(kept.mean()), histogram, tuple(_costs(study, limits, worst, design)))
 
 
@@ -104,9 +100,13 @@ def made_sentence(found: Made | None, tolerance: str) -> str:
     most = next(iter(found.costs), None)
     if most is None or found.share == 1.0:
         return f"{text}."
-    text += f"; the dimension that costs most is {most.name}, with {most.spread_words} of the scatter"
-    missed = f"{text} of the {found.histogram.shown.words}"
-    return f"{missed}: were it exact, {most.gain_words} more would." if most.gain >= TELLING else f"{missed}."
+    text += f"; the dimension that costs most is {most.name}, with {number(100.0 * most.spread, 2)}\u00a0% of the"
+    text += f" scatter of the {found.histogram.shown.words}"
+    return (
+        f"{text}: were it exact, {number(100.0 * most.gain, 2)} points more would."
+        if most.gain >= TELLING
+        else f"{text}."
+    )
 
 
 def histogram(data: Dataset, output: str) -> Histogram | None:
@@ -119,8 +119,8 @@ def histogram(data: Dataset, output: str) -> Histogram | None:
     designs = deviating(study.family, design, study.tolerance, study.optimise.seed, study.tolerance.samples)
     values = design_outputs(study.family, designs, [output], study.accuracy, study.window)[output]
     limits = [x for x in study.output_limits if x.output == output]
-    limit = limits[-1] if limits else Limit(output, None, None)  # of two the band around what [locus] prescribes
-    return _histogram(data, limit, compared(output, np.asarray(values, np.float64)))
+    # Of two limits the last one: the band around what [locus] prescribes.
+    return _histogram(data, limits[-1] if limits else Limit(output, None, None), values)
 
 
 def _scattering(limit: Limit) -> Limit:
@@ -164,7 +164,8 @@ def _variance(columns: dict[str, NDArray[np.generic]], limit: Limit) -> float:
     return float(known.var()) if known.size else 0.0
 
 
-def _histogram(data: Dataset, limit: Limit, values: Array) -> Histogram:
+def _histogram(data: Dataset, limit: Limit, column: NDArray[np.generic]) -> Histogram:
+    values = compared(limit.output, np.asarray(column, np.float64))
     shown = quantity(limit.output, resolve.output(data.study.family, limit.output).unit)
     known = values[np.isfinite(values)] * shown.factor
     low, high = np.percentile(known, (0.1, 99.9)) if known.size else (0.0, 1.0)
@@ -185,18 +186,90 @@ def _histogram(data: Dataset, limit: Limit, values: Array) -> Histogram:
     return Histogram(shown, edges, shares, bounds[0], bounds[1], float(meets(limit, values).mean()))
 
 
-def histogram_figure(found: Histogram, title: str = "") -> Figure:
-    """Return an output over what is made; what misses its limit has another colour, lines are the limit."""
-    figure = new_figure(NARROW, 1.9)
-    axes = figure.subplots()
-    middle = 0.5 * (found.edges[:-1] + found.edges[1:])
-    bounds = [x for x in (found.low, found.high) if x is not None]
-    low, high = (-np.inf if found.low is None else found.low), (np.inf if found.high is None else found.high)
-    colours = np.where((middle >= low) & (middle <= high), OPTIMUM, LIMIT)
-    axes.bar(middle, 100.0 * found.shares, 0.92 * np.diff(found.edges), color=colours, alpha=0.75)
-    for bound in bounds:
-        axes.axvline(bound, color=LIMIT, linewidth=1.2)
-    axes.set_xlabel(found.shown.title)
-    axes.set_ylabel("of what is made [%]")
-    axes.set_title(title)
-    return figure
+class Spread(NamedTuple):
+    """An output of the optimum as it is made, stored; ``within`` is the share that keeps its limit, nan without one."""
+
+    shown: Quantity
+    nominal: float
+    low: float
+    mean: float
+    high: float
+    within: float
+
+    @property
+    def changes(self) -> tuple[float, float, float] | None:
+        """Low end, mean and high end against the nominal value in percent; None where that is zero or unknown."""
+        if not abs(self.nominal) > 0.0:
+            return None
+        low, mean, high = (100.0 * (x / self.nominal - 1.0) for x in (self.low, self.mean, self.high))
+        return low, mean, high
+
+
+def spreads(data: Dataset) -> list[Spread]:
+    """Distributions of the outputs of the optimum; empty where the study names no tolerances."""
+    return [
+        Spread(quantity(str(row["output"]), data.units.get(str(row["output"]), "")),
+               *(float(row[key]) for key in ("nominal", "low", "mean", "high", "within")))
+        for row in _optimum_rows(data, store.TOLERANCE)
+        if row["output"] != "all limits" and not is_flag(str(row["output"]))
+    ]  # fmt: skip
+
+
+def share_made(data: Dataset) -> float:
+    """Share of what is made that keeps all limits, of as many mechanisms as it is known from; nan where it is not."""
+    few = [float(row["within"]) for row in _optimum_rows(data, store.TOLERANCE) if row["output"] == "all limits"]
+    known = float((data.optimum or {}).get("yield", math.nan))
+    return known if math.isfinite(known) else next(iter(few), math.nan)
+
+
+def tolerance_words(data: Dataset) -> str:
+    """Tolerances as they are meant."""
+    tolerance = data.study.tolerance
+    if tolerance is None:
+        return ""
+    parts = [f"lengths ±{number(tolerance.lengths)}\u00a0mm"] if tolerance.lengths else []
+    parts += [f"angles ±{number(math.degrees(tolerance.angles))}°"] if tolerance.angles else []
+    parts += ["tolerances of their own of some dimensions"] if tolerance.own else []
+    return " and ".join(parts)
+
+
+class Slope(NamedTuple):
+    """Change of the objective in percent where a dimension grows, and where it shrinks, by ``step`` (in words)."""
+
+    name: str
+    text: str
+    step: str
+    growing: float
+    shrinking: float
+
+    @property
+    def largest(self) -> float:
+        """The larger of both changes, by magnitude."""
+        return max(abs(self.growing), abs(self.shrinking))
+
+
+def slopes(data: Dataset) -> list[Slope]:
+    """Dimensions by how much they change the objective, the most telling first."""
+    if data.study.objective is None:
+        return []
+    known = {p.name: p for p in data.study.family.parameters}
+    ranked = []
+    for row in _optimum_rows(data, store.SENSITIVITY):
+        name, value = str(row["parameter"]), abs(float(row["value"]))
+        if row["output"] != data.study.objective.output or not value > 0.0 or math.isnan(row["growing"]):
+            continue
+        step, words = STEPS.get(known[name].unit if name in known else "", (0.1, "0.1"))
+        share = 100.0 * step / value
+        share = -share if without_minus(data.study.objective.output) else share  # shown as what is made large
+        text = known[name].text if name in known else ""
+        ranked.append(Slope(name, text, words, share * row["growing"], -share * row["shrinking"]))
+    return sorted(ranked, key=lambda slope: -slope.largest)
+
+
+def _optimum_rows(data: Dataset, file: str) -> list[dict[str, Any]]:
+    """Rows of the optimum in a table beside the dataset; none where there is no such table."""
+    path = store.beside(data.folder) / file
+    if not path.exists():
+        return []
+    frame = store.read_table(path)
+    return [{str(k): v for k, v in row.items()} for row in frame[frame["role"] == "optimum"].to_dict("records")]

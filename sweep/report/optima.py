@@ -9,23 +9,25 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
-from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from kernels import status as codes
 from sweep.evaluation.summaries import design_outputs
+from sweep.exchange.scene import extent
 from sweep.optimise.local.kkt import AGREE
 from sweep.optimise.manufacture.tolerance import deviating
 from sweep.quantities.dimensions import sizes
 from sweep.quantities.limits import compared, meets
 from sweep.report.dataset import Dataset, Row
-from sweep.report.figures import save
-from sweep.report.mechanisms import parts_over_turn, small_figures
-from sweep.report.quantities import change, number, quantity, with_unit
+from sweep.report.quantities import change, number, quantity
+from sweep.report.sketch import drawn_parts, sketch
+from sweep.report.tables import parameter_rows
 
 if TYPE_CHECKING:
+    from markupsafe import Markup
+
     from sweep.families.base import Array
 
 
@@ -156,7 +158,6 @@ def _objective(data: Dataset, row: Row) -> str:
 
 
 CARDS = 6  # are shown
-ROUNDING = 1e-9  # of the largest length: what is smaller is 0
 SAMPLES = 2048  # made mechanisms of each: a share good to 1 %
 EXTRAS = ("least_link", "arm_ratio")
 
@@ -175,35 +176,37 @@ class Optimum:
     starts: int
     mirrored: int
     made: str
-    sizes: tuple[tuple[str, str], ...]
-    extras: tuple[tuple[str, str], ...]
-    picture: str
+    sizes: list[tuple[str, str]]
+    extras: list[tuple[str, str]]
+    picture: Markup | None
 
 
-def optima(data: Dataset, found: list[Group], folder: Path) -> list[Optimum]:
-    """Cards of the first few, with their pictures saved in ``folder``; none where there is only one."""
-    objective = data.study.objective
+def optima(data: Dataset, found: list[Group]) -> list[Optimum]:
+    """Cards of the first few, with pictures to one scale; none where there is only one."""
+    objective, own = data.study.objective, data.study.bare
     if len(found) < 2 or objective is None:
         return []
     found = found[:CARDS]
-    drawn = small_figures(parts_over_turn(data.study, {str(k): group.row for k, group in enumerate(found)}), "mm")
-    pictures = {key: save(figure, folder / f"optimum-{int(key) + 1}.svg").uri for key, figure in drawn.items()}
+    drawn = [drawn_parts(data.study.family, group.row) for group in found]
+    span = max((extent([one.part for one in placed]) for placed in drawn if placed), default=0.0)
     shown = quantity(objective.output, data.units.get(objective.output, ""))
     best = float(found[0].row[objective.output])
     cards = []
-    for k, group in enumerate(found):
+    for k, (group, placed) in enumerate(zip(found, drawn, strict=True)):
         value = float(group.row[objective.output])
+        lines = parameter_rows(data, group.row, 4)
+        title = group.title(k)
         cards.append(
             Optimum(
-                group.title(k),
+                title,
                 f"{shown.words} {shown.show(value)}",
                 "" if k == 0 else change(shown, value, best),
                 group.starts,
                 group.mirrored,
                 _made(data, group.row),
-                _sizes(data, group.row),
+                [(line.name, line.value) for line in lines if line.name in own.parameter_names],
                 _extras(data, group.row),
-                pictures.get(str(k), ""),
+                sketch(placed, f"{title}: positions over one turn", names=False, span=span) if placed else None,
             )
         )
     return cards
@@ -242,24 +245,7 @@ def _made(data: Dataset, row: dict[str, Any]) -> str:
     return f"{number(100.0 * known, 3)}\u00a0% of what is made keeps all limits"
 
 
-def _sizes(data: Dataset, row: dict[str, Any]) -> tuple[tuple[str, str], ...]:
-    """Return what can be measured on the drawing: lengths, angles, ratios and signs of the bare mechanism."""
-    found = []
-    own = data.study.bare.parameters
-    longest = max((abs(float(row[p.name])) for p in own if p.unit == "length"), default=0.0)
-    for p in own:
-        shown = quantity(p.name, {"length": "mm", "angle": "rad"}.get(p.unit, "1"))
-        value = float(row[p.name])
-        if abs(value) < ROUNDING * (longest if p.unit == "length" else 1.0):
-            value = 0.0
-        if p.name.endswith("_tilt") and value == 0.0:
-            continue  # only what is made is tilted
-        text = f"{value:+g}" if p.choices is not None else with_unit(number(value * shown.factor, 4), shown.unit)
-        found.append((p.name, text))
-    return tuple(found)
-
-
-def _extras(data: Dataset, row: dict[str, Any]) -> tuple[tuple[str, str], ...]:
+def _extras(data: Dataset, row: dict[str, Any]) -> list[tuple[str, str]]:
     """Return the outputs of the dimensions alone that tell whether one would build it."""
     family = data.study.bare
     design = np.array([[float(row[name]) for name in family.parameter_names]])
@@ -269,4 +255,4 @@ def _extras(data: Dataset, row: dict[str, Any]) -> tuple[tuple[str, str], ...]:
         if one is not None:
             shown = quantity(name, one.output.unit)
             found.append((shown.words, shown.show(float(one.values(family, design)[0]), 4)))
-    return tuple(found)
+    return found

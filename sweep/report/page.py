@@ -4,32 +4,35 @@ from __future__ import annotations
 
 import shutil
 from collections.abc import Sequence
-from dataclasses import dataclass
 from datetime import date
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from sweep.dataset.files import beside, is_older, located
+from sweep.dataset.files import beside, is_older, located, write_atomically
 from sweep.errors import StoreError
+from sweep.evaluation.cyclogram import cyclogram, table_in_degrees
+from sweep.families.machines import Machine
 from sweep.jobs.progress import Say, unsaid
-from sweep.report import answer, front, maps, mechanisms, robust, tables
-from sweep.report.curves import motion, motion_caption
-from sweep.report.cyclogram import cyclogram_figure, of_dataset, table_in_degrees
+from sweep.report import answer, front, maps, tables
 from sweep.report.dataset import Dataset, gather
-from sweep.report.figures import TEMPLATES, Saved, drawn_before, house_style, save
+from sweep.report.figures import drawn_before, house_style, rendered, save
 from sweep.report.live import live
-from sweep.report.made import COSTS, TELLING, histogram_figure, made, made_sentence
-from sweep.report.optima import CARDS, Group, groups, optima, optima_sentence
-from sweep.report.robust import tolerance_words
+from sweep.report.made import COSTS, TELLING, made, made_sentence, share_made, slopes, spreads, tolerance_words
+from sweep.report.optima import CARDS, groups, optima, optima_sentence
+from sweep.report.quantities import number, rpm
 from sweep.report.scan import Cells, Scan, most_telling
-from sweep.report.sewing import sewn, sewn_figure
+from sweep.report.sewing import sewn
+from sweep.report.sketch import dimensioned, drawn_parts, sketch
 
 if TYPE_CHECKING:
-    from sweep.evaluation.joints import Part
+    import pandas as pd
+    from markupsafe import Markup
+
     from sweep.study import Study
 
 
 STEPS = 4  # of a report: rows, figures, optima and yield, page
+MOST_VALUES = 9  # dimensions that stand in the sketch with their values; of more only the names
 
 
 def write_report(folder: str | Path, out: str | Path | None = None, say: Say = unsaid) -> Path:
@@ -62,129 +65,106 @@ def _write(folder: Path, out: Path, say: Say) -> Path:
     """Write everything the report consists of into ``out``."""
     say("report", 0, STEPS, "steps")
     data, found, cells = gather(folder)
-    several, parts = groups(data), mechanisms.drawn_parts(data)
+    several = groups(data)
     try:
         out.mkdir(parents=True, exist_ok=True)
-        with house_style():
-            say("report", 1, STEPS, "steps")
-            figures = draw(data, found, cells, parts, out / "figures")
-            say("report", 2, STEPS, "steps")
-            more = buildable(data, several, out / "figures")
+        say("report", 1, STEPS, "steps")
+        figures = draw(data, found, cells, out / "figures")
+        say("report", 2, STEPS, "steps")
+        told = made(data)
+        strokes = _cyclogram(data)
         say("report", 3, STEPS, "steps")
         copy_tables(folder, out)
         write_survivors(data.parts, out / "survivors.parquet")
-        if (rows := of_dataset(data)) is not None:
-            table_in_degrees(rows).to_csv(out / "cyclogram.csv", index=False, float_format="%.4f")
-        target = out / "report.html"
-        partial = out / "_tmp-report.html"
-        own = own_figures(data.study, out / "figures")
-        partial.write_text(
-            render(
-                data,
-                found,
-                cells,
-                figures,
-                own,
-                more | live(data, cells, several) | {"mechanism": mechanisms.mechanism_caption(parts)},
-            ),
-            encoding="utf-8",
+        if strokes is not None:
+            strokes.to_csv(out / "cyclogram.csv", index=False, float_format="%.4f")
+        within = tolerance_words(data)
+        further = [text for text in (optima_sentence(data, several), made_sentence(told, within)) if text]
+        text = rendered(
+            "report.html",
+            study=data.study,
+            data=data,
+            title=data.study.title or data.study.name,
+            sketch=answer_sketch(data),
+            figures=figures,
+            own_figures=own_figures(data.study, out / "figures"),
+            sentences=answer.answer(data, found, further),
+            searched=answer.searched(data, found),
+            limits=tables.limit_states(data),
+            outputs=tables.output_rows(data),
+            parameters=tables.parameter_rows(data),
+            fates=tables.fates(data, found),
+            errors=tables.error_rows(data, found),
+            provenance=tables.provenance(data),
+            front=front.front_rows(data),
+            front_names=front.front_names(data),
+            front_note=front.front_note(data),
+            optima=optima(data, several),
+            optima_left=max(len(several) - CARDS, 0),
+            made=told,
+            made_words=made_sentence(told, within),
+            costs=[x for x in told.costs if max(x.spread, x.gain) >= TELLING][:COSTS] if told else [],
+            sewn=sewn(data),
+            tolerance=within,
+            spreads=spreads(data),
+            share_made=share_made(data),
+            slopes=slopes(data),
+            cyclogram=[] if strokes is None else [tuple(row) for row in strokes.itertuples(index=False)],
+            number=number,
+            pair=most_telling(found) or (cells[0].name,) if cells else (),
+            axes=len(cells),
+            speed=rpm(data.study.speed),
+            today=date.today().isoformat(),
+            **live(data, cells, several),
         )
-        partial.replace(target)
+        write_atomically(out / "report.html", text.encode())
     except OSError as error:
         raise StoreError(f"report {out}: cannot be written: {error}") from error
-    return target
+    return out / "report.html"
 
 
-def draw(
-    data: Dataset, found: Scan, cells: list[Cells], parts: dict[str, list[Part]], folder: Path
-) -> dict[str, Saved]:
-    """Every figure the data allow, saved; keys are the names the template knows."""
-    made = {
-        "map": maps.design_map(data, found, cells),
-        "trade_off": maps.trade_off(data, found),
-        "motion": motion(data),
-        "mechanism": mechanisms.mechanism(parts),
-        "cyclogram": None if (rows := of_dataset(data)) is None else cyclogram_figure(rows),
-        "tolerance": robust.tolerance(data),
-        "sensitivity": robust.sensitivity(data),
-    }
-    files = {"trade_off": "trade-off"}
-    return {
-        name: save(figure, folder / f"{files.get(name, name)}.svg")
-        for name, figure in made.items()
-        if figure is not None
-    }
+def draw(data: Dataset, found: Scan, cells: list[Cells], folder: Path) -> dict[str, str]:
+    """Return the figures of the design space that the data allow as data URIs, saved; keys are the template's names."""
+    if not (len(cells) and found.feasible) and data.front is None:
+        return {}
+    with house_style():
+        every = {"map": maps.design_map(data, found, cells), "trade-off": maps.trade_off(data, found)}
+        return {
+            name.replace("-", "_"): save(figure, folder / f"{name}.svg").uri
+            for name, figure in every.items()
+            if figure is not None
+        }
 
 
-@dataclass(frozen=True)
-class OwnFigure:
-    """A picture the study draws itself; ``uri`` is None where it has not been drawn."""
+def answer_sketch(data: Dataset) -> Markup | None:
+    """Draw the result with its dimensions in place; None where the study wants no curves, or there are no joints."""
+    row = data.result
+    placed = [] if row is None or data.study.output.curves == "none" else drawn_parts(data.study.family, row)
+    if row is None or not placed:
+        return None
+    found = dimensioned(data.study.family, row, placed)
+    rows = tables.parameter_rows(data)
+    free = [r for r in rows if r.space != "fixed"] or rows
+    shown = {r.name: r.value for r in free if r.name in found}
+    words = {k if len(shown) > MOST_VALUES else f"{k} = {value}": found[k] for k, value in shown.items()}
+    return sketch(placed, f"{data.result_name} with its dimensions", words)
 
-    title: str
-    caption: str
-    file: str
-    uri: str | None
+
+def _cyclogram(data: Dataset) -> pd.DataFrame | None:
+    """Return the cyclogram of the result of a machine; None of anything else."""
+    row, family = data.result, data.study.family
+    if row is None or not isinstance(family, Machine):
+        return None
+    return table_in_degrees(cyclogram(family, {name: row[name] for name in family.parameter_names}, angles="rad"))
 
 
-def own_figures(study: Study, folder: Path) -> list[OwnFigure]:
-    """Pictures that ``[report] figures`` names, as far as they lie in the folder."""
+def own_figures(study: Study, folder: Path) -> list[dict[str, Any]]:
+    """Pictures that ``[report] figures`` names; ``uri`` is None of what has not been drawn."""
     found = []
     for entry in study.data.get("report", {}).get("figures", []):
         path = folder / entry["file"]
-        uri = drawn_before(path).uri if path.exists() else None
-        found.append(OwnFigure(entry["title"], entry["caption"], entry["file"], uri))
+        found.append({**entry, "uri": drawn_before(path).uri if path.exists() else None})
     return found
-
-
-def render(
-    data: Dataset,
-    found: Scan,
-    cells: list[Cells],
-    figures: dict[str, Saved],
-    own: list[OwnFigure],
-    more: dict[str, Any],
-) -> str:
-    """Return the HTML text; ``more`` are the sections about what can be built, and what moves."""
-    from jinja2 import Environment, FileSystemLoader, StrictUndefined
-
-    environment = Environment(
-        loader=FileSystemLoader(TEMPLATES),
-        autoescape=True,
-        undefined=StrictUndefined,
-        trim_blocks=True,
-        lstrip_blocks=True,
-    )
-    pair = most_telling(found)
-    return environment.get_template("report.html").render(
-        style="".join((TEMPLATES / name).read_text(encoding="utf-8") for name in ("report.css", "optima.css")),
-        study=data.study,
-        data=data,
-        title=data.study.title or data.study.name,
-        figures=figures,
-        own_figures=own,
-        sentences=answer.answer(data, found, more["further"]),
-        searched=answer.search_sentence(data, found),
-        limits=tables.limit_states(data),
-        outputs=tables.output_rows(data),
-        parameters=tables.parameter_rows(data),
-        fates=tables.fates(data, found),
-        errors=tables.error_rows(data, found),
-        provenance=tables.provenance(data),
-        front=front.front_rows(data),
-        front_names=front.front_names(data),
-        front_note=front.front_note(data),
-        tolerances=robust.tolerance_rows(data),
-        tolerance=tolerance_words(data),
-        slopes=robust.slope_rows(data),
-        motion=""
-        if data.curves is None
-        else motion_caption(data.curves, data.study.family.position, answer.rpm(data.study.speed), data.study.window),
-        pair=pair or (cells[0].name,) if cells else (),
-        axes=len(cells),
-        speed=answer.rpm(data.study.speed),
-        today=date.today().isoformat(),
-        **more,
-    )
 
 
 def copy_tables(folder: Path, out: Path) -> None:
@@ -212,27 +192,6 @@ def write_survivors(parts: Sequence[Path], target: Path) -> None:
                 for batch in source.iter_batches():
                     writer.write_batch(batch.filter(pc.equal(batch["status"], 0)).cast(schema))
     partial.replace(target)
-
-
-def buildable(data: Dataset, several: list[Group], folder: Path) -> dict[str, Any]:
-    """Names of the template with what they stand for; pictures are saved in ``folder``, in the style in force."""
-    make, within, sews = made(data), tolerance_words(data), sewn(data)
-    costs = (
-        ()
-        if make is None
-        else tuple(cost for cost in make.costs if cost.spread >= TELLING or cost.gain >= TELLING)[:COSTS]
-    )
-    return {
-        "optima": optima(data, several, folder),
-        "optima_left": max(len(several) - CARDS, 0),
-        "made": make,
-        "made_words": made_sentence(make, within),
-        "made_histogram": "" if make is None else save(histogram_figure(make.histogram), folder / "yield.svg").uri,
-        "made_costs": costs,
-        "sewn": sews,
-        "sewn_curve": "" if sews is None else save(sewn_figure(sews), folder / "sewing.svg").uri,
-        "further": [text for text in (optima_sentence(data, several), made_sentence(make, within)) if text],
-    }
 
 
 def _default(folder: Path) -> Path:

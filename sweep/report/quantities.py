@@ -189,3 +189,8 @@ def percent_change(new: float, old: float) -> str:
     if abs(change) < 0.005:
         return "the same"
     return f"{number(abs(change), 3)}\u00a0% {'less' if change < 0.0 else 'more'}"
+
+
+def rpm(speed: float | None) -> str:
+    """Return a speed in turns per minute."""
+    return "" if speed is None else f"{number(speed * 30.0 / math.pi, 5)} rpm"

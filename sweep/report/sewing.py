@@ -11,11 +11,9 @@ from sweep.families.machines import Machine
 from sweep.families.sewing import RPM, Sewing
 from sweep.optimise.manufacture.tolerance import deviating
 from sweep.report.dataset import Dataset
-from sweep.report.figures import NARROW, OPTIMUM, QUIET, new_figure
 from sweep.report.quantities import number
 
 if TYPE_CHECKING:
-    from matplotlib.figure import Figure
     from numpy.typing import NDArray
 
     from kernels.types import Array
@@ -82,15 +80,3 @@ def _row(sewing: Sewing, kept: dict[str, Mask], every: Mask, k: int, speed: floa
 
 def _percent(share: float) -> str:
     return f"{number(100.0 * share, 3)}\u00a0%"
-
-
-def sewn_figure(found: Sewn) -> Figure:
-    """Draw the share of what is made that sews over the speed of the main shaft."""
-    figure = new_figure(NARROW, 1.9)
-    axes = figure.subplots()
-    axes.plot(found.speeds, 100.0 * found.shares, color=OPTIMUM)
-    axes.axhline(100.0, color=QUIET, linewidth=0.8)
-    axes.set_ylim(0.0, 103.0)
-    axes.set_xlabel("speed of the main shaft [1/min]")
-    axes.set_ylabel("of what is made sews [%]")
-    return figure

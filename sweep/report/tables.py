@@ -52,7 +52,7 @@ def limit_state(
 ) -> LimitState:
     """Whether a design keeps a limit, and with how much room."""
     value, other = value_of(row, limit.output), value_of(reference, limit.output)
-    if _is_flag(limit.output):
+    if is_flag(limit.output):
         words = {1.0: "yes", 0.0: "no"}
         state = "unknown" if math.isnan(value) else "met" if meets(limit, np.array([value]))[0] else "missed"
         return LimitState(shown, bound_words(limit, shown), words.get(value, "–"), words.get(other, "–"), "", state)
@@ -89,7 +89,7 @@ def limit_state(
 
 def bound_words(limit: Limit, shown: Quantity) -> str:
     """Return ``at most 45°``, ``24.4 to 24.6 mm``."""
-    if _is_flag(limit.output):
+    if is_flag(limit.output):
         return "must turn fully"
     if limit.minimum is not None and limit.maximum is not None:
         if limit.minimum == limit.maximum:
@@ -113,13 +113,10 @@ def value_of(row: Row | None, name: str) -> float:
     return math.nan if value is None else float(value)
 
 
-def _is_flag(name: str) -> bool:
-    return is_flag(name)
-
-
 FEW = 3
 # What is this small beside the ends of its axis is the rounding of zero.
 ROUNDING = 1e-12
+NOTHING = 1e-9  # of the longest length: what is shorter is none
 
 
 @dataclass(frozen=True)
@@ -165,7 +162,7 @@ def output_rows(data: Dataset) -> list[OutputRow]:
     rows = []
     for name in dict.fromkeys([*objective, *study.want]):
         shown = quantity(name, data.units.get(name, ""))
-        value, other = _number(data.result, name), _number(data.reference, name)
+        value, other = value_of(data.result, name), value_of(data.reference, name)
         flag = is_flag(name)
         rows.append(
             OutputRow(
@@ -182,19 +179,21 @@ def output_rows(data: Dataset) -> list[OutputRow]:
     return rows
 
 
-def parameter_rows(data: Dataset) -> list[ParameterRow]:
-    """All parameters of the mechanism with what was searched."""
+def parameter_rows(data: Dataset, row: Row | None = None, digits: int = 6) -> list[ParameterRow]:
+    """All parameters of the mechanism with what was searched, of the result or another design."""
     study, rows = data.study, []
+    row = data.result if row is None else row
     links = () if study.locus is None else study.locus.made
     own = study.bare.parameter_names
+    size = max((abs(value_of(row, p.name)) for p in study.bare.parameters if p.unit == "length"), default=0.0)
     for p in study.family.parameters:
         if p.name not in own and study.space.fixed.get(p.name) == (0.0 if p.unless else p.default):
             continue  # an input of an effect that the study left out
         shown = quantity(p.name, data.units.get(p.name, {"length": "mm", "angle": "rad"}.get(p.unit, "1")))
-        value, other = _number(data.result, p.name), _number(data.reference, p.name)
+        value, other = value_of(row, p.name), value_of(data.reference, p.name)
         space, edge = "fixed", ""
         low, high = study.space.bounds.get(p.name, (math.nan, math.nan))
-        if abs(value) < ROUNDING * max(abs(low), abs(high)):
+        if abs(value) < max(ROUNDING * np.nanmax([abs(low), abs(high), 0.0]), NOTHING * size * (p.unit == "length")):
             value = 0.0
         if p.name in study.made:
             space = "follows from the limit positions" if p.name in links else "fitted"
@@ -208,7 +207,11 @@ def parameter_rows(data: Dataset) -> list[ParameterRow]:
             if p.name not in study.rescaled:
                 edge = "lower edge" if value - low <= near else "upper edge" if high - value <= near else ""
         space += ", then scaled" if p.name in study.rescaled else ""
-        rows.append(ParameterRow(p.name, p.text, shown.show(value, 6), shown.show(other, 6), space, edge))
+        words = [
+            f"{x:+g}".replace("-", "−") if p.choices and math.isfinite(x) else shown.show(x, digits)
+            for x in (value, other)
+        ]
+        rows.append(ParameterRow(p.name, p.text, words[0], words[1], space, edge))
     return rows
 
 
@@ -254,14 +257,14 @@ def error_rows(data: Dataset, found: Scan) -> list[tuple[str, str, str, str]]:
         error = f"err_{name}"
         if is_place(name) or is_flag(name):
             continue  # an error relative to an angle's zero, or of a yes, says nothing
-        if error not in found.errors and math.isnan(_number(data.result, error)):
+        if error not in found.errors and math.isnan(value_of(data.result, error)):
             continue
         shown = quantity(error, data.units.get(error, data.units.get(name, "")))
         largest, relative = found.errors.get(error, (math.nan, math.nan))
         rows.append(
             (
                 quantity(name, "").symbol,
-                shown.show(_number(data.result, error), 2),
+                shown.show(value_of(data.result, error), 2),
                 shown.show(largest, 2),
                 number(relative, 2),
             )
@@ -298,11 +301,6 @@ def run_rows(runs: tuple[dict[str, Any], ...]) -> list[tuple[str, str]]:
     seconds = sum(run.get("seconds", 0.0) for run in runs)
     rows.append(("time taken", f"{number(seconds, 3)} s in {len(starts)} run{'s' if len(starts) > 1 else ''}"))
     return rows
-
-
-def _number(row: Any, name: str) -> float:
-    value = None if row is None else row.get(name)
-    return math.nan if value is None else float(value)
 
 
 def _yes(value: float) -> str:

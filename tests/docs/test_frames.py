@@ -10,10 +10,10 @@ import numpy as np
 import pytest
 
 import sweep
-from sweep.exchange.scene import over
+from sweep.exchange.scene import is_spatial, over, projection
 from sweep.families import NAMES, family
+from sweep.plot.drawing import draw_frame
 from sweep.report.figures import new_figure
-from sweep.report.mechanisms import draw_frame, is_spatial, projection
 
 DOCS = Path(__file__).parents[2] / "docs"
 PHI = np.linspace(0.0, 2.0 * math.pi, 12, endpoint=False)

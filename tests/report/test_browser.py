@@ -176,26 +176,25 @@ def test_dark_mode_is_dark_and_paper_is_white(address, browser):
         assert pixels(page, full_page=True).mean() > 0.8
 
 
-def test_paper_has_still_figures_and_nothing_folded(address, browser):
+def test_paper_has_still_curves_and_nothing_folded(address, browser):
     with opened(browser, address) as page:
         page.emulate_media(media="print")
-        assert page.locator("#live").is_hidden()
-        assert page.locator(".still img").count() == 2
-        assert all(image.is_visible() for image in page.locator(".still img").all())
+        assert page.locator("#live .drive").is_hidden() and page.locator("#live .stage").is_hidden()
+        assert page.locator("#answer .sketch").is_visible()
+        assert all(panel.is_visible() for panel in page.locator(".panel svg").all())
         page.evaluate("window.dispatchEvent(new Event('beforeprint'))")
         assert page.locator("#provenance table").is_visible()
         assert page.pdf()[:5] == b"%PDF-"
         page.evaluate("window.dispatchEvent(new Event('afterprint'))")
         page.emulate_media(media="screen")
-        assert page.locator("#live").is_visible()
+        assert page.locator("#live .drive").is_visible()
         assert page.locator("#provenance table").is_hidden()
-        assert not any(image.is_visible() for image in page.locator(".still img").all())
 
 
-def test_without_webgl_the_curves_move_beside_a_still_picture(address, launch):
+def test_without_webgl_the_curves_move_below_a_still_picture(address, launch):
     with launch(*FLAT) as flat, opened(flat, address) as page:
         assert page.locator(".view").is_hidden()
-        assert page.locator(".still.picture img").is_visible()
+        assert page.locator("#answer .sketch").is_visible()
         before = page.locator(".cursor").first.get_attribute("x1")
         page.evaluate(SET, 0.3)
         assert page.locator(".cursor").first.get_attribute("x1") != before
@@ -214,11 +213,12 @@ def test_reports_of_a_march_of_an_interval_and_without_curves_open(study, spatia
             assert page.evaluate(BALLS) != first
 
 
-def test_without_scripts_the_figures_stand_still(address, browser):
+def test_without_scripts_the_answer_is_whole(address, browser):
     with opened(browser, address, java_script_enabled=False) as page:
         assert page.locator("#live").is_hidden()
-        assert all(image.is_visible() for image in page.locator(".still img").all())
-        assert page.locator("#answer .lead").is_visible()
+        assert page.locator("#answer .sketch").is_visible() and page.locator("#answer .dimensions").is_visible()
+        assert page.locator("#answer .lead").is_visible() and page.locator("#result table").first.is_visible()
+        assert all(image.is_visible() for image in page.locator("#map img, #trade-off img").all())
 
 
 def test_designs_offered_are_the_optimum_one_of_each_other_basin_and_the_reference(folder, address, browser):

@@ -12,9 +12,9 @@ from click.testing import CliRunner
 import sweep
 from sweep.cli import main
 from sweep.exchange.scene import pose
+from sweep.plot.sheet import tables_of, write_sheet
 from sweep.report.dataset import chosen, read_dataset
 from sweep.report.judged import as_result, row_of
-from sweep.report.sheet import tables_of, write_sheet
 from sweep.study import study_from_data
 
 STUDY = {

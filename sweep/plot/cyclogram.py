@@ -5,10 +5,6 @@ from __future__ import annotations
 import math
 from typing import TYPE_CHECKING, Any
 
-import numpy as np
-
-from sweep.evaluation.cyclogram import cyclogram
-from sweep.families.machines import Machine
 from sweep.report.figures import LIMIT, OPTIMUM, QUIET, WIDTH, crank_axis, new_figure
 
 if TYPE_CHECKING:
@@ -16,25 +12,8 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-    from sweep.report.dataset import Dataset
-
 TURN = 360.0
 BAR, THIN = 0.5, 0.16  # heights of strokes and dwells, a row being 1
-
-
-def of_dataset(data: Dataset) -> pd.DataFrame | None:
-    """Return the cyclogram of the optimum of a machine; None where the study has none."""
-    row, family = data.result, data.study.family
-    if row is None or not isinstance(family, Machine):
-        return None
-    return cyclogram(family, {name: row[name] for name in family.parameter_names}, angles="rad")
-
-
-def table_in_degrees(rows: pd.DataFrame) -> pd.DataFrame:
-    """Return the table for people and files: crank angles in degrees, and how long each takes."""
-    start, end = (np.degrees(rows[name].to_numpy(np.float64)) for name in ("start", "end"))
-    columns = {"member": rows["member"], "kind": rows["kind"], "name": rows["name"]}
-    return rows[[]].assign(**columns, **{"from [deg]": start, "to [deg]": end, "lasts [deg]": (end - start) % TURN})
 
 
 def cyclogram_figure(rows: pd.DataFrame) -> Figure:

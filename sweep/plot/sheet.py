@@ -11,13 +11,12 @@ import numpy as np
 from sweep.errors import InputError, StoreError
 from sweep.exchange.dxf import add_tables
 from sweep.exchange.export import export
-from sweep.exchange.scene import over, pose, shown_name
-from sweep.report.answer import rpm
-from sweep.report.dataset import Dataset, chosen, read_dataset
+from sweep.exchange.scene import exists, frames_of, is_spatial, over, pose, shown_name
+from sweep.plot.drawing import draw
+from sweep.report.dataset import Dataset, chosen, read_dataset, row_of
 from sweep.report.figures import house_style, new_figure
-from sweep.report.judged import as_result, row_of
-from sweep.report.mechanisms import WORDS, draw, exists, frames_of, is_spatial
-from sweep.report.quantities import number, quantity
+from sweep.report.judged import as_result
+from sweep.report.quantities import number, quantity, rpm
 from sweep.report.tables import limit_states, parameter_rows
 
 if TYPE_CHECKING:
@@ -27,6 +26,7 @@ if TYPE_CHECKING:
 
 A3 = (16.54, 11.69)  # inches, lying
 POSES = 180  # of the paths of joints
+WORDS = {"xy": "front", "zy": "side", "xz": "top"}
 DIGITS = 6  # of coordinates: a micrometre in half a metre
 ENDINGS = (".pdf", ".svg", ".dxf")
 

@@ -1,0 +1,160 @@
+"""The mechanism as a sketch in the page: one position in full, others faint, paths, joints, and dimensions in place."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+from itertools import combinations
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from sweep.errors import InputError
+from sweep.evaluation.joints import Part
+from sweep.exchange.scene import (
+    Placed,
+    exists,
+    extent,
+    first_pose,
+    is_spatial,
+    over,
+    projection,
+    shown_name,
+    side_by_side,
+)
+from sweep.families.base import Array, Family
+from sweep.report.figures import rendered
+
+if TYPE_CHECKING:
+    from markupsafe import Markup
+
+POSES, FAINT = 180, 7  # of paths; of the mechanism in other positions
+WIDE, ROOM = 540.0, 36.0  # of the picture and of its border, in pixels
+LETTER, LINE = 6.6, 12.0  # what a letter takes of a line, and its height
+AROUND = [(9, -8), (9, 14), (-9, -8), (-9, 14), (0, -16), (0, 24), (22, 3), (-22, 3), (30, -22), (-30, -22), (30, 30)]
+NEAR = 1e-7  # of the mechanism's size: a distance that is a dimension
+TELLING = 1e-3  # by which dimensions are changed to tell those of one value apart
+
+
+def drawn_parts(family: Family, design: Mapping[str, float]) -> list[Placed]:
+    """Joints and links of a design over one turn, its frames side by side; empty for what has no joints or no pose."""
+    try:
+        found = over(family, {name: float(design[name]) for name in family.parameter_names}, 0.0, POSES)
+    except InputError:  # a mechanism without joints has curves only
+        return []
+    return side_by_side(found) if exists(found) else []
+
+
+def dimensioned(family: Family, design: Mapping[str, float], placed: Sequence[Placed]) -> dict[str, Array]:
+    """Return the ends, (2, 3), of the lengths that are seen in a position as the distance of two points.
+
+    A length is the distance that follows it: all lengths are changed a little, each by a part of its own.
+    """
+    pose = first_pose([one.part for one in placed])
+    own = [p.name for p in family.parameters if p.unit == "length" and abs(float(design[p.name])) > 0.0]
+    changed = {name: float(design[name]) * (1.0 + TELLING * (k + 1) / len(own)) for k, name in enumerate(own)}
+    other = drawn_parts(family, {**design, **changed})
+    if len(other) != len(placed):
+        return {}
+    near = NEAR * extent([one.part for one in placed])
+    found: dict[str, Array] = {}
+    for one, two in zip(placed, other, strict=True):
+        points, moved = _points(one.part, pose), _points(two.part, pose)
+        # The links first: a length of the frame may be that of a link in some position.
+        linked = [pair for link in one.part.links for pair in combinations(link.joints, 2)]
+        for p, q in [*linked, *combinations(points, 2)]:
+            if p not in moved or q not in moved:
+                continue
+            size, after = (float(np.linalg.norm(at[p] - at[q])) for at in (points, moved))
+            for name in own:
+                same = abs(size - abs(float(design[name]))) < near and abs(after - abs(changed[name])) < near
+                if same and name not in found:
+                    found[name] = np.array([points[p], points[q]]) + one.shift
+    return found
+
+
+def _points(part: Part, pose: int) -> dict[str, Array]:
+    """Joints in a pose, feet of the common perpendicular of two axes, and of a plate's third point on its base."""
+    points = {name: path[pose] for name, path in part.joints.items()}
+    for p, q in combinations(part.axes, 2):
+        u, v, across = part.axes[p], part.axes[q], points[q] - points[p]
+        slopes, *_ = np.linalg.lstsq(np.column_stack([u, -v]), across, rcond=1e-9)
+        points |= {f"{p} on {q}": points[p] + slopes[0] * u, f"{q} on {p}": points[q] + slopes[1] * v}
+    for link in (link for link in part.links if len(link.joints) == 3):
+        a, b, c = (points[name] for name in link.joints)
+        points[f"foot of {link.name}"] = a + (c - a) @ (b - a) / max((b - a) @ (b - a), 1e-300) * (b - a)
+    return points
+
+
+def sketch(
+    placed: Sequence[Placed], title: str, dimensions: Mapping[str, Array] | None = None, *, names: bool = True,
+    span: float = 0.0,
+) -> Markup:  # fmt: skip
+    """Draw a mechanism as SVG in the colours of the page, seen from a corner where it is spatial, else from the front.
+
+    ``dimensions`` are lengths by what is written at them, (2, 3) each; ``span`` is what the picture is wide at least.
+    """
+    parts = [
+        replace(one.part, joints={name: path + one.shift for name, path in one.part.joints.items()}) for one in placed
+    ]
+    flat = np.vstack([path for part in parts for path in part.joints.values()])
+    seen = projection("space" if is_spatial([one.part for one in placed]) else "xy")
+    flat = flat[np.isfinite(flat).all(axis=1)] @ seen.T
+    low, wide = flat.min(axis=0), np.ptp(flat, axis=0)
+    scale = (WIDE - 2.0 * ROOM) / max(float(wide[0]), float(wide[1]) / 0.8, span, 1e-300)
+
+    def at(points: Array) -> Array:
+        x, y = ((points @ seen.T - low) * scale).T
+        return np.column_stack([x + ROOM, float(wide[1]) * scale + ROOM - y])
+
+    pose, steps = first_pose(parts), parts[0].phi.size - 1
+    turned = [(pose + round(k * steps / (FAINT + 1))) % steps for k in range(FAINT, -1, -1)]
+    lines: list[tuple[str, str]] = []
+    marks: list[tuple[str, float, float]] = []
+    taken: list[tuple[float, float, str, str]] = []
+    for part in parts:
+        for name, path in part.joints.items():
+            if name not in part.kinds:
+                lines.append(("path", _line(at(path))))
+        reach = 0.12 * extent(parts)
+        for name, axis in part.axes.items():
+            lines.append(("axis", _line(at(part.joints[name][pose] + np.outer([-reach, reach], axis)))))
+    for k in turned:
+        for part in parts:
+            for n, link in enumerate(part.links):
+                corners = at(np.array([part.joints[name][k] for name in link.joints]))
+                if np.isfinite(corners).all() and len(corners) > 1:
+                    closed = np.vstack([corners, corners[:1]]) if len(corners) > 2 else corners
+                    lines.append((f"{'' if k == pose else 'faint '}link link-{n % 6}", _line(closed)))
+    for words, ends in (dimensions or {}).items():
+        first, second = at(ends).tolist()
+        lines.append(("measure", _line(at(ends))))
+        _write(taken, 0.5 * (first[0] + second[0]), 0.5 * (first[1] + second[1]), words, "dimension")
+    for part in parts:
+        for name, path in part.joints.items():
+            ((x, y),) = at(path[[pose]]).tolist()
+            marks.append(("pivot" if name in part.kinds else "joint", x, y))
+            if names:
+                _write(taken, x, y, f"{shown_name(name)}{part.stage}", "name")
+    size = (WIDE, float(wide[1]) * scale + 2.0 * ROOM)
+    return rendered("sketch.svg", title=title, size=size, lines=lines, marks=marks, labels=taken)
+
+
+def _line(points: Array) -> str:
+    known = points[np.isfinite(points).all(axis=1)]
+    return " ".join(f"{x:.1f},{y:.1f}" for x, y in known.tolist())
+
+
+def _write(taken: list[tuple[float, float, str, str]], x: float, y: float, words: str, kind: str) -> None:
+    """Write words near a place where they cover no others; what finds none, or stands there already, is left out."""
+    half = 0.5 * LETTER * len(words)
+    if any(math.hypot(x - a, y - b) < 3 * LINE and words == other for a, b, other, _ in taken):
+        return
+    for dx, dy in AROUND:
+        here = min(max(x + dx + math.copysign(half, dx) * (dx != 0), half), WIDE - half), y + dy
+        if all(
+            abs(here[0] - a) > half + 0.5 * LETTER * len(other) or abs(here[1] - b) > LINE for a, b, other, _ in taken
+        ):
+            taken.append((*here, words, kind))
+            return
