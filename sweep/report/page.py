@@ -143,7 +143,7 @@ def answer_sketch(data: Dataset) -> Markup | None:
     if row is None or not placed:
         return None
     found = dimensioned(data.study.family, row, placed)
-    rows = tables.parameter_rows(data)
+    rows = tables.parameter_rows(data, digits=5)
     free = [r for r in rows if r.space != "fixed"] or rows
     shown = {r.name: r.value for r in free if r.name in found}
     words = {k if len(shown) > MOST_VALUES else f"{k} = {value}": found[k] for k, value in shown.items()}
