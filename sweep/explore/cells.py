@@ -1,12 +1,15 @@
-"""Feasible designs of a dataset over two of its columns, counted in cells: a page shows any number of rows so."""
+"""Feasible designs of a dataset over pairs of its columns, counted in cells: a page shows any number of rows so."""
 
 from __future__ import annotations
 
+from collections.abc import Mapping, Sequence
 from functools import lru_cache
+from itertools import chain
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from sweep.dataset.reading import scan
 from sweep.errors import InputError
@@ -15,57 +18,99 @@ from sweep.families.base import Array
 from sweep.quantities.limits import compared
 from sweep.report.quantities import quantity
 
-ACROSS, UP = 48, 32
+MOST_BINS = 64
 
 
-def cells(hand: Hand, x: str, y: str) -> dict[str, Any]:
-    """Return counts of feasible designs in cells, each with the number of the design that is best in it.
+class Column(NamedTuple):
+    """A column of the feasible designs, the best first, with its ends."""
+
+    values: Array
+    low: float
+    high: float
+
+    def bins(self, count: int) -> NDArray[np.intp]:
+        """Return the number of the cell of every value, -1 where there is none."""
+        share = (self.values - self.low) / (self.high - self.low)
+        return np.where(np.isfinite(share), np.minimum(np.nan_to_num(share) * count, count - 1), -1).astype(np.intp)
+
+
+def cells(
+    hand: Hand, pairs: Sequence[Sequence[str]], ranges: Mapping[str, Sequence[float]], bins: int
+) -> dict[str, Any]:
+    """Return counts of feasible designs in the cells of pairs of columns, each with the best design in it.
+
+    ``ranges`` are ends of columns in the units that are shown: only designs within all of them are counted.
 
     Raises
     ------
     InputError
-        where nothing was run, or for a column that the dataset has not.
+        where nothing was run, for a column that the dataset has not, or for too many cells.
     """
     if hand.folder is None:
         raise InputError("designs", "none", "the folder of a run: sweep explore results/NAME/designs", "explore")
+    if not 1 <= bins <= MOST_BINS:
+        raise InputError("bins", bins, f"1 to {MOST_BINS}", "explore")
     objective = hand.study.objective
-    found = _columns(hand.folder, x, y, objective.output if objective is not None else x)
-    axes, places = [], []
-    for name, values, bins in ((x, found[x], ACROSS), (y, found[y], UP)):
-        shown = quantity(name, hand.data.units.get(name, ""))
-        low, high = (float(values.min()), float(values.max())) if values.size else (0.0, 1.0)
-        wide = (high - low) or abs(high) or 1.0
-        places.append(np.minimum(((values - low) / wide * bins).astype(np.int64), bins - 1))
-        ends = sorted([low * shown.factor, (low + wide) * shown.factor])
-        axes.append({"name": name, "title": shown.title, "ends": ends, "turned": shown.factor < 0.0, "bins": bins})
-    cell = places[1] * ACROSS + places[0]
-    order = np.lexsort((found["merit"], cell))
-    filled, first, count = np.unique(cell[order], return_index=True, return_counts=True)
-    best = found["design"][order][first]
+    merit = objective.output if objective is not None else "design"
+    names = dict.fromkeys([*chain.from_iterable(pairs), *ranges])
+    shown = {name: quantity(name, hand.data.units.get(name, "")) for name in names}
+    columns = {name: _column(hand.folder, merit, name) for name in shown}
+    design = _column(hand.folder, merit, "design").values
+    kept = np.ones(design.size, np.bool_)
+    for name, ends in ranges.items():
+        low, high = sorted(float(end) / shown[name].factor for end in ends)
+        room = 1e-9 * (columns[name].high - columns[name].low)
+        kept &= (columns[name].values >= low - room) & (columns[name].values <= high + room)
+    rows = np.flatnonzero(kept)
+    places = {name: column.bins(bins)[rows] for name, column in columns.items()}
     return {
-        "axes": axes,
-        "cells": [
-            [int(c % ACROSS), int(c // ACROSS), int(n), int(d)] for c, n, d in zip(filled, count, best, strict=True)
-        ],
-        "of": int(cell.size),
+        "axes": {
+            name: {
+                "title": of.title,
+                "symbol": of.symbol,
+                "ends": sorted([columns[name].low * of.factor, columns[name].high * of.factor]),
+                "turned": of.factor < 0.0,
+            }
+            for name, of in shown.items()
+        },
+        "pairs": [_counted(places[x], places[y], bins, design[rows]) for x, y in pairs],
+        "kept": int(rows.size),
+        "of": int(design.size),
     }
 
 
-@lru_cache(8)
-def _columns(folder: Path, x: str, y: str, merit: str) -> dict[str, Array]:
-    """Read what feasible designs have in two columns, and how good they are; rows without a value are left out."""
+def _counted(x: NDArray[np.intp], y: NDArray[np.intp], bins: int, design: Array) -> list[list[int]]:
+    """Return the filled cells as place, count and the first design, which is the best."""
+    known = np.flatnonzero((x >= 0) & (y >= 0))
+    cell = y[known] * bins + x[known]
+    count = np.bincount(cell, minlength=bins * bins)
+    first = np.zeros(bins * bins, np.intp)
+    first[cell[::-1]] = known[::-1]  # of several the last one written stays: the first one
+    return [[int(c % bins), int(c // bins), int(count[c]), int(design[first[c]])] for c in np.flatnonzero(count)]
+
+
+@lru_cache(64)
+def _column(folder: Path, merit: str, name: str) -> Column:
+    """Read a column of the feasible designs, the best first."""
+    values = _read(folder, name)[_order(folder, merit)]
+    known = values[np.isfinite(values)]
+    low, high = (float(known.min()), float(known.max())) if known.size else (0.0, 1.0)
+    return Column(values, low, high if high > low else low + (abs(low) or 1.0))
+
+
+@lru_cache(2)
+def _order(folder: Path, merit: str) -> NDArray[np.intp]:
+    return np.argsort(compared(merit, _read(folder, merit)), kind="stable")
+
+
+def _read(folder: Path, name: str) -> Array:
     import pyarrow.compute as pc
 
     source = scan(folder)
-    for name in (x, y, merit):
-        if name not in source.schema.names:
-            raise InputError("column", name, ", ".join(source.schema.names), "explore")
-    names = list(dict.fromkeys([x, y, merit, "design"]))
-    table = source.to_table(columns=names, filter=pc.field("status") == 0)
-    columns = {name: table.column(name).to_numpy() for name in names}
-    columns["merit"] = compared(merit, np.asarray(columns[merit], np.float64))
-    known = np.isfinite(columns[x]) & np.isfinite(columns[y])
-    return {name: values[known] for name, values in columns.items()}
+    if name not in source.schema.names:
+        raise InputError("column", name, ", ".join(source.schema.names), "explore")
+    found = source.to_table(columns=[name], filter=pc.field("status") == 0).column(name)
+    return np.asarray(found.to_numpy(), np.float64)
 
 
 def design_of(hand: Hand, number: int) -> dict[str, float]:

@@ -121,6 +121,7 @@ class Hand:
             "pins": [{"name": name, "design": dict(design)} for name, design in self.pins.items()][:PINS],
             "most": PINS,
             "columns": [*outputs, *stored],
+            "swept": stored,
             "objective": None if self.study.objective is None else self.study.objective.output,
         }
 

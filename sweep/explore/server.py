@@ -18,6 +18,7 @@ from typing import TYPE_CHECKING, Any
 from sweep.errors import InputError, LinksweepError
 from sweep.exchange.export import FORMATS, export
 from sweep.explore.cells import cells, design_of
+from sweep.explore.drag import dragged
 from sweep.explore.hand import Hand
 from sweep.explore.improve import improve, problem_in_hand
 from sweep.report.figures import rendered
@@ -86,11 +87,15 @@ class Server:
             await (routed if ours else PlainTextResponse("not for you\n", 403))(scope, receive, sent)
 
         place = f"/{self.token}"
-        asked = {"answer": self._answer, "cells": self._cells, "design": self._design, "save": self._save}
+        asked = {
+            "answer": self._answer, "cells": self._cells, "design": self._design, "drag": self._drag,
+            "save": self._save,
+        }  # fmt: skip
         routes = [Route(f"{place}/", page)]
         routes += [Route(f"{place}/{name}", _json(what), methods=["POST"]) for name, what in asked.items()]
         routes += [Route(f"{place}/{name}", what, methods=["POST"]) for name, what in self._others().items()]
-        routed = Starlette(routes=routes)
+        wrong = dict.fromkeys((LinksweepError, KeyError, TypeError, ValueError), _refused)
+        routed = Starlette(routes=routes, exception_handlers=wrong)
         return checked
 
     def _others(self) -> dict[str, Callable[..., Any]]:
@@ -112,7 +117,12 @@ class Server:
         return found | {"milliseconds": 1e3 * (time.perf_counter() - begun)}
 
     def _cells(self, asked: dict[str, Any]) -> dict[str, Any]:
-        return cells(self.hand, asked["x"], asked["y"])
+        return cells(self.hand, asked["pairs"], asked.get("ranges", {}), int(asked["bins"]))
+
+    def _drag(self, asked: dict[str, Any]) -> dict[str, Any]:
+        design, place = self.hand.design(asked["design"]), (str(asked["part"]), str(asked["joint"]))
+        moved, phi = dragged(self.hand, design, float(asked["phi"]), place, [float(x) for x in asked["to"]])
+        return {"design": moved, "phi": phi}
 
     def _design(self, asked: dict[str, Any]) -> dict[str, Any]:
         return {"design": design_of(self.hand, int(asked["number"]))}
@@ -126,12 +136,9 @@ class Server:
         """Search while the page listens; who goes away, or says stop by going away, ends this search alone."""
         from starlette.responses import StreamingResponse
 
-        try:
-            asked = await _asked(request)
-            design = self.hand.design(asked["design"])
-            problem = problem_in_hand(self.hand, design, asked["free"])
-        except (LinksweepError, KeyError, TypeError, ValueError) as error:
-            return _refused(error)
+        asked = await _asked(request)
+        design = self.hand.design(asked["design"])
+        problem = problem_in_hand(self.hand, design, asked["free"])
         stop, counted = threading.Event(), [0]
 
         def is_over() -> bool:
@@ -166,12 +173,9 @@ class Server:
         from starlette.concurrency import run_in_threadpool
         from starlette.responses import Response
 
-        try:
-            asked = await _asked(request)
-            design, kind = self.hand.design(asked["design"]), str(asked["format"])
-            content = await run_in_threadpool(self._file, design, kind)
-        except (LinksweepError, KeyError, TypeError, ValueError) as error:
-            return _refused(error)
+        asked = await _asked(request)
+        design, kind = self.hand.design(asked["design"]), str(asked["format"])
+        content = await run_in_threadpool(self._file, design, kind)
         return Response(content, media_type="application/octet-stream")
 
     def _file(self, design: dict[str, float], kind: str) -> bytes:
@@ -201,20 +205,18 @@ async def _asked(request: Request) -> dict[str, Any]:
 
 
 def _json(answer: Callable[[dict[str, Any]], dict[str, Any]]) -> Callable[[Request], Any]:
-    """Return an endpoint that answers JSON by JSON, in a thread; what is wrong with a request is said."""
+    """Return an endpoint that answers JSON by JSON, in a thread."""
     from starlette.concurrency import run_in_threadpool
     from starlette.responses import JSONResponse
 
     async def endpoint(request: Request) -> Response:
-        try:
-            return JSONResponse(await run_in_threadpool(answer, await _asked(request)))
-        except (LinksweepError, KeyError, TypeError, ValueError) as error:
-            return _refused(error)
+        return JSONResponse(await run_in_threadpool(answer, await _asked(request)))
 
     return endpoint
 
 
-def _refused(error: Exception) -> Response:
+def _refused(_: Request, error: Exception) -> Response:
+    """Say what is wrong with a request."""
     from starlette.responses import JSONResponse
 
     words = f"{error} is missing" if isinstance(error, KeyError) else str(error)

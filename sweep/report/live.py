@@ -18,7 +18,7 @@ from numpy.typing import ArrayLike, NDArray
 from sweep.errors import InputError
 from sweep.evaluation.curves import coordinate, motion_curves
 from sweep.evaluation.joints import Part, parts
-from sweep.exchange.scene import Placed, extent, shown_name, side_by_side
+from sweep.exchange.scene import Placed, extent, is_spatial, shown_name, side_by_side
 from sweep.families.base import Angles, Array, Family
 from sweep.families.domain import Interval, equal_steps
 from sweep.families.names import is_flag, is_largest, reduced, stem
@@ -146,6 +146,7 @@ def moving(data: Dataset, shown: Sequence[Shown]) -> dict[str, Any] | None:
         "axis": f"{family.domain.text}{phase}",
         "unit": variable.unit,
         "size": extent(joints) if joints else 0.0,
+        "plane": bool(joints) and not is_spatial(joints),
         "curves": [_panel(data, name, motions) for name in names],
         "designs": [_design(data, motion, variable.factor) for motion in motions],
     }

@@ -197,3 +197,61 @@ def test_page_of_somebody_else_gets_nothing(browser, address, tmp_path):
     )
     assert tries == ["nothing", "nothing"]
     page.close()
+
+
+def test_range_on_an_axis_narrows_both_pictures_by_mouse_and_by_keys(opened, folder):
+    page = opened()
+    until(lambda: page.locator("#rails .hit").count() > 2)
+    every = page.inner_text("#count")
+    hit = page.locator("#rails .hit[data-axis=a]")
+    hit.scroll_into_view_if_needed()
+    box = hit.bounding_box()
+    x = box["x"] + box["width"] / 2
+    page.mouse.move(x, box["y"] + box["height"] / 2)
+    page.mouse.down()
+    page.mouse.move(x, box["y"] + box["height"], steps=4)
+    page.mouse.up()
+    until(lambda: " of " in page.inner_text("#count") and not page.evaluate("picture.asking"))
+    rows = sweep.load(folder).query("status == 0")
+    low, high = page.evaluate("picture.ranges.a")
+    assert int(page.inner_text("#count").split()[0]) == rows["a"].between(low, high).sum() < len(rows)
+    numbers = page.locator("#cells rect").evaluate_all("all => all.map((e) => Number(e.dataset.design))")
+    assert set(numbers) <= set(rows[rows["a"].between(low, high)]["design"])
+    page.keyboard.press("Delete")
+    until(lambda: page.inner_text("#count") == every)
+    page.keyboard.press("ArrowUp")
+    until(lambda: " of " in page.inner_text("#count"))
+
+
+def test_click_on_a_band_takes_its_best_design_in_hand(opened, folder):
+    page = opened()
+    until(lambda: page.locator("#rails path").count() > 0)
+    page.locator("#rails").scroll_into_view_if_needed()
+    box = page.locator("#rails").bounding_box()
+    page.mouse.click(box["x"] + 0.35 * box["width"], box["y"] + 0.5 * box["height"])
+    until(lambda: "in hand" in page.inner_text("#said") or page.evaluate("past.length") >= 1)
+    own = page.evaluate("design")
+    rows = sweep.load(folder).query("status == 0")
+    assert ((rows["a"] == own["a"]) & (rows["b"] == own["b"])).any()
+
+
+def test_dragged_joint_changes_the_dimensions(opened):
+    page = opened()
+    before = page.evaluate("design")
+    place = """() => {
+        const view = moving.view, point = view.points.find((p) => p.label.textContent === 'C');
+        const at = point.at(view.share).clone().applyMatrix4(point.group.matrixWorld).project(view.camera);
+        const box = view.renderer.domElement.getBoundingClientRect();
+        return [box.left + ((at.x + 1) * box.width) / 2, box.top + ((1 - at.y) * box.height) / 2];
+    }"""
+    page.locator(".stage").scroll_into_view_if_needed()
+    page.get_by_role("button", name="front").click()
+    x, y = page.evaluate(place)
+    page.mouse.move(x, y)
+    page.mouse.down()
+    page.mouse.move(x + 12.0, y - 9.0, steps=3)
+    page.mouse.up()
+    until(lambda: not page.evaluate("pulling || asking") and page.evaluate("design.c") != before["c"])
+    assert page.evaluate(place) == pytest.approx([x + 12.0, y - 9.0], abs=2.5)  # pixels
+    page.click("#undo")
+    until(lambda: page.evaluate("design") == before)

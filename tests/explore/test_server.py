@@ -127,13 +127,22 @@ def test_who_goes_away_ends_his_own_search_alone(address):
 def test_cells_hold_every_feasible_design_and_give_their_best(address, folder, study):
     rows = sweep.load(folder)
     rows = rows[rows["status"] == 0]
-    found = asked(address, "cells", {"x": "a", "y": "swing"})
-    assert found["of"] == len(rows) == sum(cell[2] for cell in found["cells"])
+    question = {"pairs": [["a", "swing"], ["swing", "b"]], "bins": 20}
+    found = asked(address, "cells", question)
+    for pair in found["pairs"]:
+        assert found["of"] == found["kept"] == len(rows) == sum(cell[2] for cell in pair)
     best = int(rows.loc[rows["max_abs_d2psi"].idxmin(), "design"])
-    assert best in [cell[3] for cell in found["cells"]]
+    assert all(best in [cell[3] for cell in pair] for pair in found["pairs"])
+    # A range of one column, in the unit shown, holds for all pairs.
+    low, high = rows["a"].quantile([0.2, 0.6])
+    within = rows[rows["a"].between(low, high)]
+    some = asked(address, "cells", question | {"ranges": {"a": [low, high]}})
+    assert some["kept"] == len(within) < len(rows) and some["of"] == len(rows)
+    firsts = {cell[3] for pair in some["pairs"] for cell in pair}
+    assert firsts <= set(within["design"]) and int(within.loc[within["max_abs_d2psi"].idxmin(), "design"]) in firsts
     design = asked(address, "design", {"number": best})["design"]
     assert design["a"] == rows.loc[rows["design"] == best, "a"].item()
-    assert "allowed: design" in refused(address, "cells", {"x": "nothing", "y": "a"})[1]
+    assert "allowed: design" in refused(address, "cells", {"pairs": [["nothing", "a"]], "bins": 20})[1]
     assert refused(address, "design", {"number": 10**9})[0] == 422
 
 
@@ -153,3 +162,17 @@ def test_file_of_the_design(address):
         lines = reply.read().decode().splitlines()
     assert lines[0].startswith("member,") or "x" in lines[0]
     assert "formats" not in refused(address, "export", {"design": DESIGN, "format": "step"})[1]
+
+
+def test_dragged_joint_comes_where_it_is_drawn_and_the_others_stay(address):
+    names = list(DESIGN)
+    before = sweep.joints("four_bar", DESIGN, 0.7).set_index("joint")[["x", "y"]]
+    to = before.loc["c"].to_numpy() + np.array([0.8, -0.5])
+    question = {"design": DESIGN, "phi": 0.7, "part": "", "joint": "C", "to": to.tolist()}
+    found = asked(address, "drag", question)
+    after = sweep.joints("four_bar", {n: found["design"].get(n, DESIGN[n]) for n in names}, found["phi"])
+    after = after.set_index("joint")[["x", "y"]]
+    np.testing.assert_allclose(after.loc["c"], to, atol=0.01)  # mm: little changes are asked for besides
+    np.testing.assert_allclose(after.loc[["a", "b", "d"]], before.loc[["a", "b", "d"]], atol=0.05)
+    assert found["design"]["b"] != DESIGN["b"] and found["design"]["c"] != DESIGN["c"]
+    assert "A, " in refused(address, "drag", question | {"joint": "Z"})[1]

@@ -39,12 +39,36 @@ async function renew() {
   asking = false;
 }
 
+// A joint that is dragged: the server finds the dimensions that bring it there; the last place asked for is reached.
+let place = null, pulling = false;
+async function pull(to) {
+  if (to === null) { keep(); moving.rest(); return; }
+  place = to;
+  if (pulling) return;
+  pulling = true;
+  while (place) {
+    const asked = { design, phi: moving.phi, ...place };
+    place = null;
+    try {
+      const reply = await (await ask("drag", asked)).json();
+      design = { ...design, ...reply.design };
+      for (const range of page.ranges) put(range);
+      await renew();
+      moving.phi = reply.phi;
+    } catch (error) { say(error.message, true); }
+  }
+  pulling = false;
+}
+
 function show(answer) {
   const motion = answer.motion;
   if (motion) {
     motion.steady = steady;
     if (moving) moving.replace(motion);
-    else moving = new Moving(by("live"), motion);
+    else {
+      moving = new Moving(by("live"), motion);
+      moving.view?.grab(pull);
+    }
   }
   steady = true;
   const heads = ["in hand", ...pins.map((p) => p.name)];
@@ -217,37 +241,61 @@ async function save(kind) {
   } catch (error) { say(error.message, true); }
 }
 
-const PLOT = { wide: 400, high: 280, left: 52, bottom: 34, top: 8, right: 8 };
+const PLOT = { wide: 400, high: 280, left: 52, bottom: 34, top: 8, right: 8 }, FIELD = 48;
+const RAILS = { wide: 400, high: 230, side: 24, top: 30, bottom: 20, bins: 24, most: 8, shades: 5 };
+
+// Feasible designs, counted by the server: one pair of columns as cells, several beside each other as bands between
+// axes. A range on an axis holds for both.
 class Cells {
   constructor() {
     for (const [id, chosen] of [["across", page.columns.at(-1)], ["up", page.objective ?? page.columns[0]]]) {
       for (const name of page.columns) made("option", by(id), { textContent: name, selected: name === chosen });
       by(id).addEventListener("change", () => this.load());
     }
+    const first = page.objective ? [page.objective] : [];
+    this.rails = [...new Set([...page.swept, ...first, ...page.columns])].slice(0, RAILS.most);
+    this.ranges = {};
     this.frame = by("cells");
     this.frame.setAttribute("viewBox", `0 0 ${PLOT.wide} ${PLOT.high}`);
     this.frame.addEventListener("keydown", (event) => this.key(event));
+    by("rails").setAttribute("viewBox", `0 0 ${RAILS.wide} ${RAILS.high}`);
+    by("rails").addEventListener("click", (event) => this.pick(event));
     this.load();
   }
 
+  // Questions while one is under way become one.
   async load() {
-    try {
-      this.data = await (await ask("cells", { x: by("across").value, y: by("up").value })).json();
-      this.draw();
-    } catch (error) { say(error.message, true); }
+    if (this.asking) { this.again = true; return; }
+    this.asking = true;
+    do {
+      this.again = false;
+      try {
+        const { ranges, rails } = this, between = rails.slice(1).map((name, k) => [rails[k], name]);
+        const pair = { pairs: [[by("across").value, by("up").value]], ranges, bins: FIELD };
+        const [field, bands] = await Promise.all([pair, { pairs: between, ranges, bins: RAILS.bins }].map(
+          async (what) => (await ask("cells", what)).json(),
+        ));
+        this.data = { ...field, axes: pair.pairs[0].map((name) => field.axes[name]), cells: field.pairs[0] };
+        this.bands = bands;
+        this.draw();
+        this.drawRails();
+      } catch (error) { say(error.message, true); }
+    } while (this.again);
+    this.asking = false;
   }
 
   box(across, up) {
-    const [x, y] = this.data.axes, wide = (PLOT.wide - PLOT.left - PLOT.right) / x.bins;
-    const high = (PLOT.high - PLOT.top - PLOT.bottom) / y.bins;
-    const i = x.turned ? x.bins - 1 - across : across, j = y.turned ? y.bins - 1 - up : up;
+    const [x, y] = this.data.axes, wide = (PLOT.wide - PLOT.left - PLOT.right) / FIELD;
+    const high = (PLOT.high - PLOT.top - PLOT.bottom) / FIELD;
+    const i = x.turned ? FIELD - 1 - across : across, j = y.turned ? FIELD - 1 - up : up;
     return { x: PLOT.left + i * wide, y: PLOT.high - PLOT.bottom - (j + 1) * high, width: wide, height: high };
   }
 
   draw() {
     this.frame.replaceChildren();
     this.here = null;
-    by("count").textContent = `${this.data.of} designs`;
+    const { kept, of } = this.data;
+    by("count").textContent = kept === of ? `${of} designs` : `${kept} of ${of} designs`;
     const most = Math.log1p(Math.max(1, ...this.data.cells.map((cell) => cell[2])));
     const [x, y] = this.data.axes, foot = PLOT.high - PLOT.bottom;
     for (const value of ticksBetween(...x.ends)) {
@@ -267,6 +315,95 @@ class Cells {
       rect.addEventListener("click", () => this.take(cell));
       return rect;
     });
+  }
+
+  // Places of the axes: a share of one, from its lower end, is a height.
+  railAt(k) { return RAILS.side + ((RAILS.wide - 2 * RAILS.side) * k) / (this.rails.length - 1); }
+
+  height(share) { return RAILS.high - RAILS.bottom - share * (RAILS.high - RAILS.top - RAILS.bottom); }
+
+  middle(k, bin) {
+    const share = (bin + 0.5) / RAILS.bins;
+    return this.height(this.bands.axes[this.rails[k]].turned ? 1 - share : share);
+  }
+
+  drawRails() {
+    const host = by("rails");
+    host.replaceChildren();
+    for (const [k, band] of this.bands.pairs.entries()) {
+      const most = Math.log1p(Math.max(1, ...band.map((cell) => cell[2]))), texts = Array(RAILS.shades).fill("");
+      for (const [i, j, count] of band) {
+        const shade = Math.min(RAILS.shades - 1, Math.floor((RAILS.shades * Math.log1p(count)) / most));
+        texts[shade] += `M${this.railAt(k).toFixed(1)} ${this.middle(k, i).toFixed(1)}L${this.railAt(k + 1).toFixed(1)} ${this.middle(k + 1, j).toFixed(1)}`;
+      }
+      texts.forEach((d, shade) => { if (d) svg("path", { d, opacity: (shade + 1) / RAILS.shades }, host); });
+    }
+    this.rails.forEach((name, k) => {
+      const { symbol, ends } = this.bands.axes[name], x = this.railAt(k), range = this.ranges[name], top = k % 2 ? 22 : 10;
+      svg("line", { class: "axis", x1: x, x2: x, y1: RAILS.top, y2: RAILS.high - RAILS.bottom }, host);
+      svg("text", { x, y: top, "text-anchor": "middle" }, host).textContent = symbol.length > 12 ? `${symbol.slice(0, 11)}…` : symbol;
+      svg("text", { x, y: RAILS.high - 6, "text-anchor": "middle" }, host).textContent = short(ends[0], 3);
+      if (range) {
+        const [low, high] = range.map((value) => this.height((value - ends[0]) / (ends[1] - ends[0])));
+        svg("rect", { class: "range", x: x - 6, width: 12, y: high, height: Math.max(low - high, 2) }, host);
+      }
+      const words = `${name}, ${short(ends[0])} to ${short(ends[1])}; arrows narrow the range, Delete clears it`;
+      const hit = svg("rect", { class: "hit", x: x - 12, width: 24, y: RAILS.top - 4, height: RAILS.high - RAILS.top - RAILS.bottom + 8,
+        tabindex: 0, role: "slider", "aria-label": words, "aria-valuetext": String(range ?? "all"), "data-axis": name }, host);
+      hit.addEventListener("pointerdown", (event) => this.brush(event, name, hit));
+      hit.addEventListener("keydown", (event) => this.narrow(event, name));
+      if (this.focused === name) hit.focus({ preventScroll: true });
+    });
+  }
+
+  // Draw along an axis to keep a range; a click on it clears it.
+  brush(event, name, hit) {
+    const { ends } = this.bands.axes[name], box = by("rails").getBoundingClientRect();
+    const valueAt = (at) => {
+      const y = ((at.clientY - box.top) / box.height) * RAILS.high, room = RAILS.high - RAILS.top - RAILS.bottom;
+      return ends[0] + Math.min(Math.max((RAILS.high - RAILS.bottom - y) / room, 0), 1) * (ends[1] - ends[0]);
+    };
+    const from = valueAt(event);
+    this.focused = name;
+    delete this.ranges[name];
+    const moved = (at) => {
+      const to = valueAt(at);
+      if (Math.abs(to - from) < 0.02 * (ends[1] - ends[0])) return;
+      this.ranges[name] = [Math.min(from, to), Math.max(from, to)];
+      this.load();
+    };
+    const ended = () => {
+      window.removeEventListener("pointermove", moved);
+      window.removeEventListener("pointerup", ended);
+      this.load();
+    };
+    window.addEventListener("pointermove", moved);
+    window.addEventListener("pointerup", ended);
+    event.preventDefault();
+  }
+
+  narrow(event, name) {
+    const { ends } = this.bands.axes[name], step = (ends[1] - ends[0]) / 10, [low, high] = this.ranges[name] ?? ends;
+    const next = { ArrowUp: [low + step, high], ArrowDown: [low, high - step], Delete: null, Backspace: null }[event.key];
+    if (next === undefined || (next && next[0] >= next[1])) return;
+    event.preventDefault();
+    this.focused = name;
+    if (next) this.ranges[name] = next;
+    else delete this.ranges[name];
+    this.load();
+  }
+
+  // A click between two axes takes the best design of the nearest band.
+  pick(event) {
+    if (event.target.classList.contains("hit")) return;
+    const box = by("rails").getBoundingClientRect();
+    const x = ((event.clientX - box.left) / box.width) * RAILS.wide, y = ((event.clientY - box.top) / box.height) * RAILS.high;
+    const k = this.rails.findIndex((_, n) => n > 0 && x < this.railAt(n)) - 1;
+    if (k < 0) return;
+    const share = (x - this.railAt(k)) / (this.railAt(k + 1) - this.railAt(k));
+    const far = ([i, j]) => Math.abs((1 - share) * this.middle(k, i) + share * this.middle(k + 1, j) - y);
+    const [best] = [...this.bands.pairs[k]].sort((a, b) => far(a) - far(b));
+    if (best) this.take(best);
   }
 
   async take(cell) {
@@ -312,4 +449,4 @@ by("improve")?.addEventListener("click", improve);
 by("save").addEventListener("change", (event) => { if (event.target.value) save(event.target.value); event.target.value = ""; });
 showPins();
 renew();
-if (page.columns.length) new Cells();
+const picture = page.columns.length ? new Cells() : null;

@@ -67,6 +67,14 @@ class Moving {
     for (const panel of this.panels) panel.pose(to);
   }
 
+  // Crank angle of the chosen design in the picture [rad]; the picture is turned to one.
+  get phi() { return (this.data.designs[this.index].phi[0] * Math.PI) / 180 + 2 * Math.PI * this.share; }
+
+  set phi(angle) {
+    const share = (angle - (this.data.designs[this.index].phi[0] * Math.PI) / 180) / (2 * Math.PI);
+    this.set(share - Math.floor(share));
+  }
+
   choose(to) {
     this.index = to;
     this.find(".note").textContent = this.data.designs[to].note;

@@ -39,10 +39,24 @@ class MechanismView {
     matchMedia("(prefers-color-scheme: dark)").addEventListener("change", () => this.show(this.index));
   }
 
-  // Build the design of a number; a later one is seen from where the camera is.
+  // Build the design of a number; a later one is seen from where the camera is. Another design of the same parts moves
+  // what stands there already.
   show(index) {
-    const first = this.index === undefined;
+    const first = this.index === undefined, seen = [index, ...(this.data.ghosts ?? [])];
+    const own = seen.flatMap((k) => this.data.designs[k].parts);
+    const shape = JSON.stringify(own.map((part) => [part.label, part.links, part.kinds, Object.keys(part.joints)]));
     this.index = index;
+    if (this.data.steady && shape === this.shape) {
+      this.sources.forEach((source, k) => {
+        source.group.position.set(...own[k].shift);
+        for (const [name, text] of Object.entries(own[k].joints)) source.paths[name] = numbersOf(text);
+        Object.assign(source.axes, own[k].axes);
+      });
+      for (const renew of this.renewals) renew();
+      return;
+    }
+    this.shape = shape;
+    [this.sources, this.renewals] = [[], []];
     this.scene?.traverse((old) => old.geometry?.dispose()); // programs of materials are kept: they take long to compile
     this.scene = new THREE.Scene();
     this.scene.add(new THREE.HemisphereLight(0xffffff, 0x8090a0, 2.2));
@@ -61,18 +75,25 @@ class MechanismView {
     else if (!this.data.steady) this.fit(this.camera.position.clone().sub(this.controls.target));
   }
 
-  addPart(part) {
-    const group = new THREE.Group();
+  // Paths and axes of a part, which change where the dimensions do.
+  source(part, group) {
     group.position.set(...part.shift);
     this.scene.add(group);
     const paths = Object.fromEntries(Object.entries(part.joints).map(([name, text]) => [name, numbersOf(text)]));
+    this.sources.push({ group, paths, axes: { ...part.axes } });
+    return this.sources[this.sources.length - 1];
+  }
+
+  addPart(part) {
+    const group = new THREE.Group();
+    const { paths, axes } = this.source(part, group);
     const at = (name) => (share) => jointAt(paths[name], share, this.data.closed, new THREE.Vector3());
     part.links.forEach((link, k) => this.addLink(group, part, link, colourOf(`--link-${k % 6}`), at));
     for (const name of Object.keys(paths)) {
-      this.addJoint(group, name, name in part.kinds, at(name));
-      if (!(name in part.kinds)) this.addPath(group, paths[name]);
+      this.addJoint(group, name, name in part.kinds, at(name), part.label);
+      if (!(name in part.kinds)) this.addPath(group, () => paths[name]);
     }
-    for (const [name, axis] of Object.entries(part.axes)) this.addAxis(group, new THREE.Vector3(...axis), at(name)(0));
+    for (const name of Object.keys(axes)) this.addAxis(group, () => new THREE.Vector3(...axes[name]), at(name));
     if (part.label) {
       const low = new THREE.Vector3(Infinity, Infinity, 0);
       for (const path of Object.values(paths)) {
@@ -89,12 +110,10 @@ class MechanismView {
   // A design that is seen together with another one: thin lines in its own colour.
   addGhost(part) {
     const group = new THREE.Group();
-    group.position.set(...part.shift);
-    this.scene.add(group);
-    const paths = Object.fromEntries(Object.entries(part.joints).map(([name, text]) => [name, numbersOf(text)]));
+    const { paths } = this.source(part, group);
     const material = new THREE.LineBasicMaterial({ color: colourOf("--orange") });
     for (const link of part.links) {
-      const shape = new THREE.BufferGeometry(), ends = link.joints.map((name) => paths[name]);
+      const shape = new THREE.BufferGeometry(), ends = link.joints;
       const place = new THREE.Float32BufferAttribute(new Float32Array(3 * ends.length), 3);
       shape.setAttribute("position", place);
       const line = new THREE.LineLoop(shape, material);
@@ -102,7 +121,7 @@ class MechanismView {
       group.add(line);
       const point = new THREE.Vector3();
       this.movers.push((share) => {
-        ends.forEach((path, i) => place.setXYZ(i, ...jointAt(path, share, this.data.closed, point)));
+        ends.forEach((name, i) => place.setXYZ(i, ...jointAt(paths[name], share, this.data.closed, point)));
         place.needsUpdate = true;
       });
     }
@@ -156,12 +175,53 @@ class MechanismView {
     const slide = Object.keys(part.kinds).find((name) => part.kinds[name] === "slide");
     const block = new THREE.Mesh(new THREE.BoxGeometry(4, 4, 8), material);
     block.scale.setScalar(this.thick);
-    if (slide !== undefined) block.quaternion.setFromUnitVectors(UP, new THREE.Vector3(...part.axes[slide]));
+    const { axes } = this.sources[this.sources.length - 1];
+    const stand = () => { if (slide !== undefined) block.quaternion.setFromUnitVectors(UP, new THREE.Vector3(...axes[slide])); };
+    stand();
+    this.renewals.push(stand);
     group.add(block);
     this.movers.push((share) => block.position.copy(at(share)));
   }
 
-  addJoint(group, name, fixed, at) {
+  // Let joints be dragged in the plane: told are label, joint, place in the part's frame, and whether it is the first.
+  grab(told) {
+    const canvas = this.renderer.domElement;
+    let held = null;
+    const near = (event) => {
+      if (!this.data.plane) return null;
+      const box = canvas.getBoundingClientRect();
+      const far = (point) => {
+        const place = point.at(this.share).clone().applyMatrix4(point.group.matrixWorld).project(this.camera);
+        return Math.hypot(((place.x + 1) * box.width) / 2 - event.clientX + box.left, ((1 - place.y) * box.height) / 2 - event.clientY + box.top);
+      };
+      const [best] = this.points.filter((point) => point.part !== undefined).sort((a, b) => far(a) - far(b));
+      return best && far(best) < 16 ? best : null;
+    };
+    const under = (event) => {
+      const box = canvas.getBoundingClientRect(), eye = this.camera.position;
+      const x = ((event.clientX - box.left) / box.width) * 2 - 1, y = 1 - ((event.clientY - box.top) / box.height) * 2;
+      const along = new THREE.Vector3(x, y, 0.5).unproject(this.camera).sub(eye), far = -eye.z / along.z;
+      if (!(far > 0)) return null; // the plane is seen from its edge
+      return [eye.x + far * along.x - held.group.position.x, eye.y + far * along.y - held.group.position.y];
+    };
+    canvas.addEventListener("pointerdown", (event) => {
+      held = near(event);
+      if (!held) return;
+      this.controls.enabled = false;
+      canvas.setPointerCapture(event.pointerId);
+      told(null);
+    }, { capture: true });
+    canvas.addEventListener("pointermove", (event) => {
+      canvas.style.cursor = held || near(event) ? "move" : "";
+      const to = held && under(event);
+      if (to) told({ part: held.part, joint: held.label.textContent, to });
+    });
+    for (const end of ["pointerup", "pointercancel"]) {
+      canvas.addEventListener(end, () => { held = null; this.controls.enabled = true; });
+    }
+  }
+
+  addJoint(group, name, fixed, at, part) {
     const material = new THREE.MeshStandardMaterial({ color: colourOf(fixed ? "--pivot" : "--joint"), roughness: 0.4 });
     const ball = new THREE.Mesh(new THREE.SphereGeometry((fixed ? 2 : 1.6) * this.thick, 24, 16), material);
     ball.name = name;
@@ -171,14 +231,18 @@ class MechanismView {
       ball.visible = Number.isFinite(place.x + place.y + place.z);
       if (ball.visible) ball.position.copy(place);
     });
-    this.addLabel(name, group, at, "joint");
+    this.addLabel(name, group, at, "joint", part);
   }
 
   addPath(group, path) {
-    const shape = new THREE.BufferGeometry();
-    shape.setAttribute("position", new THREE.Float32BufferAttribute(path.map((x) => (Number.isFinite(x) ? x : 0)), 3));
+    const shape = new THREE.BufferGeometry(), known = () => path().map((x) => (Number.isFinite(x) ? x : 0));
+    const place = new THREE.Float32BufferAttribute(known(), 3);
+    shape.setAttribute("position", place);
+    this.renewals.push(() => { place.copyArray(known()); place.needsUpdate = true; });
     const material = new THREE.LineBasicMaterial({ color: colourOf("--path") });
-    group.add(this.data.closed ? new THREE.LineLoop(shape, material) : new THREE.Line(shape, material));
+    const line = this.data.closed ? new THREE.LineLoop(shape, material) : new THREE.Line(shape, material);
+    line.frustumCulled = false;
+    group.add(line);
   }
 
   addAxis(group, axis, at) {
@@ -186,16 +250,17 @@ class MechanismView {
     const reach = 0.12 * this.size;
     const shape = new THREE.CylinderGeometry(0.35 * this.thick, 0.35 * this.thick, 2 * reach, 12).rotateX(Math.PI / 2);
     const rod = new THREE.Mesh(shape, material);
-    rod.position.copy(at);
-    rod.quaternion.setFromUnitVectors(UP, axis);
     group.add(rod);
+    const stand = () => { rod.position.copy(at(0)); rod.quaternion.setFromUnitVectors(UP, axis()); };
+    stand();
+    this.renewals.push(stand);
   }
 
-  addLabel(text, group, at, kind) {
+  addLabel(text, group, at, kind, part) {
     const label = this.labels.appendChild(document.createElement("span"));
     label.textContent = text;
     label.className = kind;
-    this.points.push({ label, group, at });
+    this.points.push({ label, group, at, part });
   }
 
   // Move everything to a share of the turn, 0 to 1.

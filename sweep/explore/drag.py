@@ -1,0 +1,82 @@
+"""A joint of a plane mechanism is dragged: dimensions and crank angle follow so that the other joints stay."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+
+from sweep.errors import InputError
+from sweep.evaluation.joints import Part, parts
+from sweep.exchange.scene import is_spatial, shown_name
+from sweep.explore.hand import Hand
+from sweep.families.base import Array
+from sweep.families.domain import Turn
+
+STEP = 1e-6  # of differences: a part of the mechanism's size, or rad
+ROUNDS, HALVINGS = 3, 5
+STAY = 0.05  # weight of the joints that should stay beside the one that is dragged
+LITTLE = 1e-4  # weight of a change of a dimension by the mechanism's size
+
+
+def dragged(
+    hand: Hand, design: Mapping[str, float], phi: float, place: tuple[str, str], to: Sequence[float]
+) -> tuple[dict[str, float], float]:
+    """Return the design and the crank angle that bring a joint to a point, and others as little as possible.
+
+    Parameters
+    ----------
+    phi : crank angle of the picture [rad]
+    place : label of the part, and the joint as the page calls it
+    to : x and y of the point in the frame of the part [mm]
+
+    Raises
+    ------
+    InputError
+        for a spatial mechanism, one that does not turn, or a joint that there is not.
+    """
+    ranges = [r for r in hand.ranges if not r.choices]
+    free, positive = [r.name for r in ranges], np.array([*(r.positive for r in ranges), False])
+
+    def joints(x: Array) -> list[Part]:
+        return parts(hand.family, {**design, **dict(zip(free, x[:-1].tolist(), strict=True))}, float(x[-1]))
+
+    x = np.array([*(design[name] for name in free), phi])
+    found = joints(x)
+    if is_spatial(found) or not isinstance(hand.family.domain, Turn):
+        raise InputError("mechanism", hand.family.name, "a plane one that turns: its joints can be dragged", "explore")
+    names = [
+        (part.label if part.member or part.stage else "", f"{shown_name(name)}{part.stage}")
+        for part in found
+        for name in part.joints
+    ]
+    if place not in names:
+        raise InputError("joint", place[1], ", ".join(name for _, name in names), "explore")
+    flat = _flat(found)
+    size = float(np.ptp(flat, axis=0).max())
+    scale = np.array([*(size if r.unit == "mm" else 1.0 for r in ranges), 1.0])
+    weight = np.full(len(names), STAY)
+    weight[names.index(place)] = 1.0
+    goal = flat.copy()
+    goal[names.index(place)] = to
+
+    def off(x: Array) -> Array:
+        return (weight[:, None] * (_flat(joints(x)) - goal) / size).ravel()
+
+    here = off(x)
+    for _ in range(ROUNDS):
+        slopes = np.column_stack([(off(x + STEP * scale * e) - here) / STEP for e in np.eye(x.size)])
+        table = np.vstack([slopes, LITTLE * np.eye(x.size)])
+        step = np.linalg.lstsq(table, np.append(-here, np.zeros(x.size)), rcond=None)[0] * scale
+        for half in range(HALVINGS):
+            tried = x + 0.5**half * step
+            if (tried[positive] > 0.0).all() and np.linalg.norm(after := off(tried)) < np.linalg.norm(here):
+                x, here = tried, after
+                break
+        else:
+            break
+    return dict(zip(free, x[:-1].tolist(), strict=True)), float(x[-1])
+
+
+def _flat(found: Sequence[Part]) -> Array:
+    return np.array([path[0, :2] for part in found for path in part.joints.values()])
