@@ -183,7 +183,8 @@ class Optimum:
 
 def optima(data: Dataset, found: list[Group]) -> list[Optimum]:
     """Cards of the first few, with pictures to one scale; none where there is only one."""
-    objective, own = data.study.objective, data.study.bare
+    objective, own = data.study.objective, data.study.bare.parameter_names
+    tilts = {name for name in own if name.endswith("_tilt")}  # only what is made is tilted
     if len(found) < 2 or objective is None:
         return []
     found = found[:CARDS]
@@ -204,7 +205,7 @@ def optima(data: Dataset, found: list[Group]) -> list[Optimum]:
                 group.starts,
                 group.mirrored,
                 _made(data, group.row),
-                [(line.name, line.value) for line in lines if line.name in own.parameter_names],
+                [(x.name, x.value) for x in lines if x.name in own and (group.row[x.name] or x.name not in tilts)],
                 _extras(data, group.row),
                 sketch(placed, f"{title}: positions over one turn", names=False, span=span) if placed else None,
             )
