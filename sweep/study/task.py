@@ -13,10 +13,10 @@ from sweep.quantities import units
 from sweep.study.file import Faults, Key, StudyFile
 from sweep.study.toml import key_lines, read_toml, toml_text
 from sweep.synthesis import tasks
+from sweep.synthesis.tasks.driven import SlotPosition
 from sweep.synthesis.tasks.positions import Position
 from sweep.synthesis.tasks.problem import SynthesisTask
 from sweep.synthesis.tasks.task3 import Setting
-from sweep.synthesis.tasks.task5 import SlotPosition
 
 KINDS: Mapping[str, Any] = {"engineering": tasks.EngineeringMethod} | {
     f"task{number}": getattr(tasks, f"Task{number}") for number in range(1, 9)

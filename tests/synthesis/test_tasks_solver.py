@@ -78,7 +78,7 @@ def test_what_cannot_be_met_is_infeasible_with_the_smallest_miss():
     solution = solve(OnACircle(lowest=1.5))[0]
     assert not solution.feasible
     assert solution.limits["half plane"] < -0.1
-    assert solve(EngineeringMethod(0.9, 3.3, 1.0, 1.0, 1.3, (-3.0, 3.0), 0.3))[0].feasible is False
+    assert solve(EngineeringMethod(0.9, 3.3, 1.0, 1.0, 1.3, (-3.0, 3.0), max_pressure_angle=0.3))[0].feasible is False
 
 
 def test_same_seed_same_answer():

@@ -1,86 +1,24 @@
-"""The first stage of every task: crank-rockers on their locus, their motion over a turn and at single positions.
+"""Crank-rockers on their locus, the first stage of every task, and the engineering method, which asks for the best.
 
-What tasks are given is checked when a task is made: every number in its range, every choice among its words.
+Task 4 is the same in the plane, the problem of Alt.
 """
 
 from __future__ import annotations
 
-import math
-from collections.abc import Callable, Mapping
-from dataclasses import dataclass, fields
+from collections.abc import Mapping
+from dataclasses import dataclass, field
 from functools import lru_cache
-from typing import TYPE_CHECKING, Any, TypeAlias
+from typing import Literal, TypeAlias
 
 import numpy as np
 
 from kernels import synthesis as kernels
-from kernels.types import TWO_PI
-from sweep.errors import InputError, choices
 from sweep.evaluation.summaries import design_outputs
 from sweep.families import family
-from sweep.families.base import Accuracy, Angles, Array, Columns
+from sweep.families.base import Accuracy, Angles, Array
+from sweep.synthesis.tasks.problem import Found, Task, Unknown, turning
 
-if TYPE_CHECKING:
-    from _typeshed import DataclassInstance
-
-Rule: TypeAlias = tuple[str, Callable[[Any], bool]]
-
-_NUMBER: Rule = ("a finite number", math.isfinite)
-_SIGN: Rule = ("+1 or -1", lambda x: x in (1, -1))
-_POSITIVE: Rule = ("a positive number", lambda x: 0.0 < x < math.inf)
-_TURN: Rule = ("an angle between 0 and 2 pi", lambda x: 0.0 < x < TWO_PI)
-_PLACES: Rule = ("finite numbers", lambda x: bool(np.isfinite(np.asarray(x, np.float64)).all()))
-_RANGE: Rule = ("two finite numbers, the lower one first", lambda x: -math.inf < x[0] <= x[1] < math.inf)
-_LENGTHS: Rule = ("two positive numbers, the lower one first", lambda x: 0.0 < x[0] <= x[1] < math.inf)
-RULES: dict[str, Rule] = {
-    "swing": ("an angle between 0 and 2 pi, or its negative", lambda x: 0.0 < abs(x) < TWO_PI),
-    "phi0": _TURN,
-    "max_pressure_angle": ("an angle between 0 and pi/2", lambda x: 0.0 < x <= 0.5 * math.pi),
-    "objective": ("acceleration or pressure_angle", lambda x: x in ("acceleration", "pressure_angle")),
-    "limit": ("extended or folded", lambda x: x in ("extended", "folded")),
-    "adjusted": ("a, b, c, e, f or g", lambda x: x in tuple("abcefg")),
-    "swing_range": (
-        "two angles of one sign below 2 pi, the lower one first",
-        lambda x: -TWO_PI < x[0] <= x[1] < TWO_PI and x[0] * x[1] > 0.0,
-    ),
-    "phi0_range": ("two angles between 0 and 2 pi, the lower one first", lambda x: 0.0 < x[0] <= x[1] < TWO_PI),
-    "ratio_range": (
-        "two positive numbers on one side of 1, the lower one first",
-        lambda x: 0.0 < x[0] <= x[1] < math.inf and (x[0] - 1.0) * (x[1] - 1.0) > 0.0,
-    ),
-    "rho0": ("a length, positive or negative, not zero", lambda x: 0.0 < abs(x) < math.inf),
-    "dwell": _TURN,
-    "tolerance": _POSITIVE,
-    "bounds": (
-        "two finite numbers for every name, the lower one first",
-        lambda x: all(-math.inf < low < high < math.inf for low, high in x.values()),
-    ),
-    **dict.fromkeys(("e", "f", "g", "alpha", "f2", "alpha2", "f2_ratio", "stroke"), _NUMBER),
-    **dict.fromkeys(("start_acceleration", "end_acceleration", "start_direction", "end_direction"), _NUMBER),
-    **dict.fromkeys(("kappa", "branch"), _SIGN),
-    **dict.fromkeys(("f_range", "g_range", "alpha_range", "adjusted_range", "offset_range"), _RANGE),
-    **dict.fromkeys(("size_range", "coupler_range"), _LENGTHS),
-    **dict.fromkeys(("positions", "start", "end"), _PLACES),
-}
-
-
-def check_given(task: DataclassInstance) -> None:
-    """Check every field of a task that is given and has a rule; None is "not given".
-
-    Raises
-    ------
-    InputError
-        for the first field out of its range.
-    """
-    for entry in fields(task):
-        value = getattr(task, entry.name) if entry.init and entry.name in RULES else None
-        if value is None:
-            continue
-        allowed, holds = RULES[entry.name]
-        if not holds(value):
-            shown = dict(value) if isinstance(value, Mapping) else value
-            raise InputError(entry.name, shown, allowed, type(task).__name__)
-
+Number: TypeAlias = Array | float
 
 POSES = 180
 RSSR = family("rssr")
@@ -94,12 +32,16 @@ def turn(poses: int = POSES) -> Angles:
     return Angles.of(phi)
 
 
+def _rows(*columns: Array | float) -> Array:
+    """Return columns, or numbers that stand for whole columns, side by side."""
+    return np.column_stack(np.broadcast_arrays(*columns)).astype(np.float64)
+
+
 def designs_on_locus(
-    swing: Array, phi0: Array, phi1: Array, e: Array, f: Array, g: Array, alpha: Array
+    swing: Number, phi0: Number, phi1: Array, e: Number, f: Number, g: Number, alpha: Number
 ) -> tuple[Array, Array]:
     """Design matrix (n, 8) and rocker angle psi1 (n,) of the extended position; nan where a test (i)-(iii) fails."""
-    columns = np.broadcast_arrays(swing, phi0, phi1, e, f, g, alpha)
-    requirements = np.column_stack(columns).astype(np.float64)
+    requirements = _rows(swing, phi0, phi1, e, f, g, alpha)
     n = len(requirements)
     designs, psi1 = np.empty((n, 8)), np.empty(n)
     kernels.rssr_on_locus(requirements, np.empty(n, np.uint8), np.empty(n, np.uint8), designs, psi1)
@@ -116,23 +58,28 @@ class LocusPoint:
     rho2: Array
 
     @classmethod
-    def of(cls, swing: Array, phi0: Array, phi1: Array, e: float, g: float | Array, alpha: float | Array) -> LocusPoint:
+    def of(cls, swing: Number, phi0: Number, phi1: Array, e: float, g: Number, alpha: Number) -> LocusPoint:
         """Return the points at crank angles phi1."""
-        columns = np.broadcast_arrays(swing, phi0, phi1, e, 0.0, g, alpha)
-        requirements = np.column_stack(columns).astype(np.float64)
+        requirements = _rows(swing, phi0, phi1, e, 0.0, g, alpha)
         points = np.empty((len(requirements), 4))
         kernels.rssr_points(requirements, points)
         return cls(*points.T)
 
-    def turned(self, angle: Array) -> tuple[Array, Array]:
+    def turned(self, angle: Number) -> tuple[Array, Array]:
         """Return X, Y after the rocker has turned by the angle."""
         c, s = np.cos(angle), np.sin(angle)
         return self.x * c - self.y * s, self.x * s + self.y * c
 
 
-def motion(designs: Array, angles: Angles, *wanted: str) -> Columns:
-    """Pose outputs of crank-rockers, nan where there is no mechanism."""
-    return RSSR.poses(designs, angles, frozenset(wanted))
+def motion(designs: Array, angles: Angles, *wanted: str) -> list[Array]:
+    """Pose outputs of crank-rockers, (n, m) each, nan where there is no mechanism."""
+    found = RSSR.poses(designs, angles, frozenset(wanted))
+    return [np.asarray(found[name], np.float64) for name in wanted]
+
+
+def acceleration(designs: Array) -> Array:
+    """Acceleration analogue of the rocker over a turn, (n, POSES)."""
+    return motion(designs, turn(), "d2psi")[0]
 
 
 def least_cos2(designs: Array) -> Array:
@@ -155,25 +102,64 @@ def named(designs: Array, suffix: str = "") -> dict[str, Array]:
     return {f"{name}{suffix}": column for name, column in zip(RSSR.parameter_names, designs.T, strict=True)}
 
 
-Bounds = Mapping[str, tuple[float, float]]
+@dataclass(frozen=True)
+class OnLocus(Task):
+    """A task about a crank-rocker with a given limit motion: its members are those of `EngineeringMethod`."""
+
+    swing: float
+    phi0: float
+    e: float
+    g: float
+    alpha: float
+
+    def drive(self, phi1: Array, f: Number) -> tuple[Array, Array]:
+        """Return designs (n, 8) at places phi1 of the locus with offset f; psi1 (n,) of the extended position."""
+        return designs_on_locus(self.swing, self.phi0, phi1, self.e, f, self.g, self.alpha)
 
 
-def size_limits(columns: Mapping[str, Array], bounds: Bounds) -> list[Array]:
-    """Slacks of the bounds on lengths, lower then upper each, in units of the range.
+@dataclass(frozen=True)
+class EngineeringMethod(OnLocus):
+    """Swing, phi0, e, g, alpha are given; the place phi1 on the locus and the offset f of the crank plane are unknown.
 
-    Raises
-    ------
-    InputError
-        for a name that is not among what is found.
+    Parameters
+    ----------
+    swing, phi0 : rocker angle (signed) and crank angle from the extended to the folded position [rad]
+    e, g, alpha : position of the rocker axis and of the rocker's plane on it [length, rad]
+    f_range : where f is looked for [length]; two equal numbers fix it.  With alpha = 0 only f - g matters.
+    objective : "acceleration", max |d2psi|, or "pressure_angle", the largest over the turn
+    bounds : of what is found, by name: the lengths a, b, c, and the place x_ext, y_ext of the rocker ball at the
+        extended position, from the rocker axis: a box for the joint C1
     """
-    slacks = []
-    for name, (low, high) in bounds.items():
-        if name not in columns:
-            raise InputError("bounds", name, choices(name, columns), "task")
-        slacks += [(columns[name] - low) / (high - low), (high - columns[name]) / (high - low)]
-    return slacks
+
+    f_range: tuple[float, float]
+    objective: Literal["acceleration", "pressure_angle"] = "acceleration"
+
+    @property
+    def unknowns(self) -> tuple[Unknown, ...]:
+        """phi1, and f where it is free."""
+        low, high = self.f_range
+        return (turning("phi1"),) if low == high else (turning("phi1"), Unknown("f", low, high))
+
+    def found(self, x: Mapping[str, Array]) -> Found:
+        """See `Task`."""
+        designs, psi1 = self.drive(x["phi1"], x.get("f", self.f_range[0]))
+        columns = named(designs)
+        columns |= {"x_ext": columns["c"] * np.cos(psi1), "y_ext": columns["c"] * np.sin(psi1)}
+        if self.objective == "acceleration":
+            curve = acceleration(designs)
+        else:
+            curve = np.sqrt(1.0 - least_cos2(designs))[:, None]  # sine of the largest pressure angle
+        return Found({}, {"pressure angle": pressure_limit(designs, self.max_pressure_angle)}, curve, columns)
 
 
-def size_names(bounds: Bounds) -> tuple[str, ...]:
-    """Return names of the limits of `size_limits`."""
-    return tuple(f"{name} {side}" for name in bounds for side in ("not below", "not above"))
+@dataclass(frozen=True)
+class Task4(EngineeringMethod):
+    """The engineering method in the plane: alpha = 0, f = g; the only unknown is phi1.
+
+    Give swing, phi0 and the frame e; the objective "pressure_angle" is the classical question for the best
+    transmission, "acceleration" that for the smoothest motion.
+    """
+
+    g: float = field(default=0.0, init=False)
+    alpha: float = field(default=0.0, init=False)
+    f_range: tuple[float, float] = field(default=(0.0, 0.0), init=False)

@@ -7,7 +7,7 @@ free within ranges.
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
@@ -16,16 +16,14 @@ from sweep.errors import InputError
 from sweep.families.base import Array
 from sweep.synthesis.tasks.crank_rocker import (
     LocusPoint,
-    check_given,
+    Number,
+    OnLocus,
+    acceleration,
     designs_on_locus,
-    motion,
     named,
     pressure_limit,
-    size_limits,
-    size_names,
-    turn,
 )
-from sweep.synthesis.tasks.problem import Candidates, Unknown, stacked
+from sweep.synthesis.tasks.problem import Found, Task, Unknown, ranges, turning
 
 PLANAR = 1e-12  # |sin(alpha)| below which f has no influence
 
@@ -37,29 +35,23 @@ class Position(NamedTuple):
     dpsi: float
 
 
-def equation_names(alpha: float, count: int) -> tuple[str, ...]:
-    """Which positions remain as equations: f takes the first one, unless sin(alpha) = 0."""
-    first = 2 if abs(np.sin(alpha)) > PLANAR else 1
-    return tuple(f"position {k}" for k in range(first, count + 1))
-
-
 class Through(NamedTuple):
-    """Crank-rockers (n, 8) through positions: residuals (n, k) of their closure and slacks (n, k) of their branch."""
+    """Crank-rockers (n, 8) through positions: residuals of their closure and slacks of their branch by name, (n,)."""
 
     designs: Array
-    residuals: Array
-    slacks: Array
+    residuals: dict[str, Array]
+    slacks: dict[str, Array]
 
 
 def through_positions(
-    swing: Array,
-    phi0: Array,
+    swing: Number,
+    phi0: Number,
     phi1: Array,
     e: float,
-    g: float | Array,
-    alpha: float | Array,
+    g: Number,
+    alpha: Number,
     positions: tuple[Position, ...],
-    f: float,
+    f: float = 0.0,
 ) -> Through:
     """Crank-rockers on the locus whose f makes them pass the first position exactly, and how they miss the others.
 
@@ -75,7 +67,7 @@ def through_positions(
     a0, a1 = e * (point.x - x2) / both, -sa * (point.y - y2) / both
     moved = []
     for position in positions:
-        x, y = point.turned(np.full(len(phi1), position.dpsi))
+        x, y = point.turned(position.dpsi)
         angle = phi1 + position.dphi
         ahead = np.cos(angle) * (e + x) + np.sin(angle) * (ca * y - h) - point.rho1
         moved.append((e * (x - point.x) - a0 * ahead, sa * (y - point.y) + a1 * ahead))
@@ -83,11 +75,13 @@ def through_positions(
     with np.errstate(divide="ignore", invalid="ignore"):
         offset = moved[0][0] / moved[0][1] if free else np.full(len(phi1), f)
     offset = np.where(np.abs(offset) < 1e100, offset, np.nan)
-    ones = np.ones(len(phi1))
-    designs, psi1 = designs_on_locus(swing, phi0, phi1, e * ones, offset, g * ones, alpha * ones)
+    designs, psi1 = designs_on_locus(swing, phi0, phi1, e, offset, g, alpha)
     scale = (0.5 * both) ** 2
-    residuals = stacked(len(phi1), [(p - offset * q) / scale for p, q in moved[1 if free else 0 :]])
-    slacks = np.column_stack([_branch_slack(designs, psi1 + p.dpsi, phi1 + p.dphi) for p in positions])
+    residuals = {f"position {k}": (p - offset * q) / scale for k, (p, q) in enumerate(moved, 1) if k > free}
+    slacks = {
+        f"branch at position {k}": _branch_slack(designs, psi1 + p.dpsi, phi1 + p.dphi)
+        for k, p in enumerate(positions, 1)
+    }
     return Through(designs, residuals, slacks)
 
 
@@ -99,8 +93,13 @@ def _branch_slack(designs: Array, psi: Array, phi: Array) -> Array:
     return slack
 
 
+def _passing(task: Task, through: Through) -> Found:
+    limits = {"pressure angle": pressure_limit(through.designs, task.max_pressure_angle)} | through.slacks
+    return Found(through.residuals, limits, acceleration(through.designs), named(through.designs))
+
+
 @dataclass(frozen=True)
-class Task1:
+class Task1(OnLocus):
     """The unknowns are phi1 and f.  The first position gives f, in which it is linear, a second an equation for phi1.
 
     Parameters
@@ -109,8 +108,6 @@ class Task1:
     positions : one or two intermediate positions, from the extended one on; planar mechanisms (alpha = 0) have room
         for one, and it fixes phi1
     f : offset of the crank plane where alpha = 0, elsewhere it is found
-    max_pressure_angle : limit over the whole turn [rad]; pi/2 asks for a full turn only
-    bounds : of the lengths found, by name (a, b, c, f)
 
     Raises
     ------
@@ -118,51 +115,28 @@ class Task1:
         for no position, or more than the mechanism has room for.
     """
 
-    swing: float
-    phi0: float
-    e: float
-    g: float
-    alpha: float
     positions: tuple[Position, ...]
     f: float = 0.0
-    max_pressure_angle: float = 0.5 * np.pi
-    bounds: Mapping[str, tuple[float, float]] = field(default_factory=dict)
-
-    unknowns: tuple[Unknown, ...] = field(default=(Unknown("phi1", 0.0, 2.0 * np.pi, periodic=True),), init=False)
-    objective: str = field(default="largest |d2psi|", init=False)
 
     def __post_init__(self) -> None:
-        check_given(self)
+        super().__post_init__()
         room = 2 if abs(np.sin(self.alpha)) > PLANAR else 1
         if not 1 <= len(self.positions) <= room:
             raise InputError("positions", len(self.positions), f"1 to {room}", "Task1")
 
     @property
-    def equations(self) -> tuple[str, ...]:
-        """The positions that f does not take."""
-        return equation_names(self.alpha, len(self.positions))
+    def unknowns(self) -> tuple[Unknown, ...]:
+        """The place on the locus."""
+        return (turning("phi1"),)
 
-    @property
-    def limits(self) -> tuple[str, ...]:
-        """Pressure angle, the branch at every position, bounds of the lengths."""
-        branches = tuple(f"branch at position {k + 1}" for k in range(len(self.positions)))
-        return ("pressure angle", *branches, *size_names(self.bounds))
-
-    def evaluate(self, x: Array) -> Candidates:
-        """See `SynthesisTask`."""
-        n = len(x)
-        found = through_positions(
-            np.full(n, self.swing), np.full(n, self.phi0), x[:, 0], self.e, self.g, self.alpha, self.positions, self.f
-        )
-        columns = named(found.designs)
-        sizes = size_limits(columns, self.bounds)
-        limits = stacked(n, [pressure_limit(found.designs, self.max_pressure_angle), *found.slacks.T, *sizes])
-        curve = np.asarray(motion(found.designs, turn(), "d2psi")["d2psi"], np.float64)
-        return Candidates(found.residuals, limits, curve, columns)
+    def found(self, x: Mapping[str, Array]) -> Found:
+        """See `Task`."""
+        given = (self.swing, self.phi0, x["phi1"], self.e, self.g, self.alpha)
+        return _passing(self, through_positions(*given, self.positions, self.f))
 
 
 @dataclass(frozen=True)
-class Task2:
+class Task2(Task):
     """The unknowns are swing, phi0, phi1 and f; closure at the two positions and at both limits are the equations.
 
     The limits hold by the locus, the first position by f, the second one is left as an equation; the two degrees of
@@ -174,8 +148,6 @@ class Task2:
     e, g, alpha : position of the rocker axis and of the rocker's plane on it [length, rad]; sin(alpha) not 0
     positions : two intermediate positions, from the extended one on
     g_range, alpha_range : where g and alpha are looked for, if they are to be found as well
-    max_pressure_angle : limit over the whole turn [rad]; pi/2 asks for a full turn only
-    bounds : of the lengths found, by name (a, b, c, f)
 
     Raises
     ------
@@ -191,13 +163,9 @@ class Task2:
     positions: tuple[Position, Position]
     g_range: tuple[float, float] | None = None
     alpha_range: tuple[float, float] | None = None
-    max_pressure_angle: float = 0.5 * np.pi
-    bounds: Mapping[str, tuple[float, float]] = field(default_factory=dict)
-
-    objective: str = field(default="largest |d2psi|", init=False)
 
     def __post_init__(self) -> None:
-        check_given(self)
+        super().__post_init__()
         alphas = (self.alpha,) if self.alpha_range is None else self.alpha_range
         if min(abs(np.sin(alpha)) for alpha in alphas) <= PLANAR or np.ptp(np.sign(np.sin(alphas))):
             raise InputError("alpha", alphas, "angles whose sines are not 0", "Task2")
@@ -207,31 +175,9 @@ class Task2:
     @property
     def unknowns(self) -> tuple[Unknown, ...]:
         """Swing, phi0 and phi1, g and alpha where they are free."""
-        free = {"g": self.g_range, "alpha": self.alpha_range}
-        return (
-            Unknown("swing", *self.swing_range),
-            Unknown("phi0", *self.phi0_range),
-            Unknown("phi1", 0.0, 2.0 * np.pi, periodic=True),
-            *(Unknown(name, *ends) for name, ends in free.items() if ends is not None),
-        )
+        return (*ranges(self, "swing", "phi0"), turning("phi1"), *ranges(self, "g", "alpha"))
 
-    @property
-    def equations(self) -> tuple[str, ...]:
-        """The second position; f takes the first."""
-        return ("position 2",)
-
-    @property
-    def limits(self) -> tuple[str, ...]:
-        """Pressure angle, the branch at both positions, bounds of the lengths."""
-        return ("pressure angle", "branch at position 1", "branch at position 2", *size_names(self.bounds))
-
-    def evaluate(self, x: Array) -> Candidates:
-        """See `SynthesisTask`."""
-        values = dict(zip((u.name for u in self.unknowns), x.T, strict=True))
-        g, alpha = values.get("g", self.g), values.get("alpha", self.alpha)
-        found = through_positions(x[:, 0], x[:, 1], x[:, 2], self.e, g, alpha, self.positions, 0.0)
-        columns = named(found.designs)
-        sizes = size_limits(columns, self.bounds)
-        limits = stacked(len(x), [pressure_limit(found.designs, self.max_pressure_angle), *found.slacks.T, *sizes])
-        curve = np.asarray(motion(found.designs, turn(), "d2psi")["d2psi"], np.float64)
-        return Candidates(found.residuals, limits, curve, columns)
+    def found(self, x: Mapping[str, Array]) -> Found:
+        """See `Task`."""
+        g, alpha = x.get("g", self.g), x.get("alpha", self.alpha)
+        return _passing(self, through_positions(x["swing"], x["phi0"], x["phi1"], self.e, g, alpha, self.positions))

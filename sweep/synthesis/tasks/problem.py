@@ -1,13 +1,84 @@
-"""What a task is to the solver: unknowns in a box, equations, limits, a curve whose largest magnitude is minimised."""
+"""What a task is to the solver: unknowns in a box, equations, limits, a curve whose largest magnitude is minimised.
+
+What tasks are given is checked when a task is made: every number in its range, every choice among its words.
+"""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from typing import NamedTuple, Protocol
+import math
+from abc import ABC, abstractmethod
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field, fields
+from functools import cached_property
+from typing import TYPE_CHECKING, Any, NamedTuple, Protocol, TypeAlias
 
 import numpy as np
 
+from kernels.types import TWO_PI
+from sweep.errors import InputError, choices
 from sweep.families.base import Array
+
+if TYPE_CHECKING:
+    from _typeshed import DataclassInstance
+
+Bounds: TypeAlias = Mapping[str, tuple[float, float]]
+Rule: TypeAlias = tuple[str, Callable[[Any], bool]]
+
+_NUMBER: Rule = ("a finite number", math.isfinite)
+_SIGN: Rule = ("+1 or -1", lambda x: x in (1, -1))
+_POSITIVE: Rule = ("a positive number", lambda x: 0.0 < x < math.inf)
+_TURN: Rule = ("an angle between 0 and 2 pi", lambda x: 0.0 < x < TWO_PI)
+_PLACES: Rule = ("finite numbers", lambda x: bool(np.isfinite(np.asarray(x, np.float64)).all()))
+_RANGE: Rule = ("two finite numbers, the lower one first", lambda x: -math.inf < x[0] <= x[1] < math.inf)
+_LENGTHS: Rule = ("two positive numbers, the lower one first", lambda x: 0.0 < x[0] <= x[1] < math.inf)
+RULES: dict[str, Rule] = {
+    "swing": ("an angle between 0 and 2 pi, or its negative", lambda x: 0.0 < abs(x) < TWO_PI),
+    "phi0": _TURN,
+    "max_pressure_angle": ("an angle between 0 and pi/2", lambda x: 0.0 < x <= 0.5 * math.pi),
+    "objective": ("acceleration or pressure_angle", lambda x: x in ("acceleration", "pressure_angle")),
+    "limit": ("extended or folded", lambda x: x in ("extended", "folded")),
+    "adjusted": ("a, b, c, e, f or g", lambda x: x in tuple("abcefg")),
+    "swing_range": (
+        "two angles of one sign below 2 pi, the lower one first",
+        lambda x: -TWO_PI < x[0] <= x[1] < TWO_PI and x[0] * x[1] > 0.0,
+    ),
+    "phi0_range": ("two angles between 0 and 2 pi, the lower one first", lambda x: 0.0 < x[0] <= x[1] < TWO_PI),
+    "ratio_range": (
+        "two positive numbers on one side of 1, the lower one first",
+        lambda x: 0.0 < x[0] <= x[1] < math.inf and (x[0] - 1.0) * (x[1] - 1.0) > 0.0,
+    ),
+    "rho0": ("a length, positive or negative, not zero", lambda x: 0.0 < abs(x) < math.inf),
+    "dwell": _TURN,
+    "tolerance": _POSITIVE,
+    "bounds": (
+        "two finite numbers for every name, the lower one first",
+        lambda x: all(-math.inf < low < high < math.inf for low, high in x.values()),
+    ),
+    **dict.fromkeys(("e", "f", "g", "alpha", "f2", "alpha2", "f2_ratio", "stroke"), _NUMBER),
+    **dict.fromkeys(("start_acceleration", "end_acceleration", "start_direction", "end_direction"), _NUMBER),
+    **dict.fromkeys(("kappa", "branch"), _SIGN),
+    **dict.fromkeys(("f_range", "g_range", "alpha_range", "adjusted_range", "offset_range"), _RANGE),
+    **dict.fromkeys(("size_range", "coupler_range"), _LENGTHS),
+    **dict.fromkeys(("positions", "start", "end"), _PLACES),
+}
+
+
+def check_given(task: DataclassInstance) -> None:
+    """Check every field of a task that is given and has a rule; None is "not given".
+
+    Raises
+    ------
+    InputError
+        for the first field out of its range.
+    """
+    for entry in fields(task):
+        value = getattr(task, entry.name) if entry.init and entry.name in RULES else None
+        if value is None:
+            continue
+        allowed, holds = RULES[entry.name]
+        if not holds(value):
+            shown = dict(value) if isinstance(value, Mapping) else value
+            raise InputError(entry.name, shown, allowed, type(task).__name__)
 
 
 class Unknown(NamedTuple):
@@ -48,10 +119,6 @@ class SynthesisTask(Protocol):
     def limits(self) -> tuple[str, ...]:
         """Names of the limits."""
 
-    @property
-    def objective(self) -> str:
-        """What is minimised, in words; it chooses among the mechanisms that meet equations and limits."""
-
     def evaluate(self, x: Array) -> Candidates:
         """Equations, limits, objective curve and mechanisms of candidates x (n, number of unknowns)."""
 
@@ -83,6 +150,91 @@ class Solution:
         return "\n".join(lines)
 
 
-def stacked(count: int, columns: list[Array]) -> Array:
+class Found(NamedTuple):
+    """`Candidates` of a task by name: equations and limits (n,) each, the curve (n, m), the mechanisms."""
+
+    equations: Mapping[str, Array]
+    limits: Mapping[str, Array]
+    curve: Array
+    results: Mapping[str, Any]
+
+
+@dataclass(frozen=True)
+class Task(ABC):
+    """A task of the engineering method: what all have in common.
+
+    Parameters
+    ----------
+    max_pressure_angle : limit over the whole turn [rad]; pi/2 asks for a full turn only
+    bounds : of what is found, by name
+
+    Raises
+    ------
+    InputError
+        for a number out of its range or a word that is none of those allowed.
+    """
+
+    max_pressure_angle: float = field(default=0.5 * np.pi, kw_only=True)
+    bounds: Bounds = field(default_factory=dict, kw_only=True)
+
+    def __post_init__(self) -> None:
+        check_given(self)
+
+    @property
+    @abstractmethod
+    def unknowns(self) -> tuple[Unknown, ...]:
+        """What is to be found."""
+
+    @abstractmethod
+    def found(self, x: Mapping[str, Array]) -> Found:
+        """Compute what candidates are worth from their unknowns by name, (n,) each."""
+
+    @cached_property
+    def _named(self) -> Found:
+        return self._bounded(np.array([[0.5 * (u.low + u.high) for u in self.unknowns]]))
+
+    @property
+    def equations(self) -> tuple[str, ...]:
+        """Names of the equations."""
+        return tuple(self._named.equations)
+
+    @property
+    def limits(self) -> tuple[str, ...]:
+        """Names of the limits."""
+        return tuple(self._named.limits)
+
+    def evaluate(self, x: Array) -> Candidates:
+        """See `SynthesisTask`."""
+        n, found = len(x), self._bounded(x)
+        columns = {name: np.broadcast_to(np.asarray(values, np.float64), n) for name, values in found.results.items()}
+        return Candidates(_stacked(n, found.equations), _stacked(n, found.limits), found.curve, columns)
+
+    def _bounded(self, x: Array) -> Found:
+        """Return what candidates x (n, unknowns) are worth, with slacks of the bounds in units of their range."""
+        found = self.found(dict(zip((u.name for u in self.unknowns), x.T, strict=True)))
+        limits = dict(found.limits)
+        for name, (low, high) in self.bounds.items():
+            if name not in found.results:
+                raise InputError("bounds", name, choices(name, found.results), "task")
+            value = found.results[name]
+            limits[f"{name} not below"], limits[f"{name} not above"] = (
+                (value - low) / (high - low),
+                (high - value) / (high - low),
+            )
+        return found._replace(limits=limits)
+
+
+def _stacked(count: int, columns: Mapping[str, Array]) -> Array:
     """Columns (n,) side by side as (n, k), also for k = 0."""
-    return np.column_stack(columns) if columns else np.empty((count, 0))
+    return np.column_stack(list(columns.values())) if columns else np.empty((count, 0))
+
+
+def turning(name: str) -> Unknown:
+    """Return an angle that is looked for all around."""
+    return Unknown(name, 0.0, TWO_PI, periodic=True)
+
+
+def ranges(task: object, *names: str) -> list[Unknown]:
+    """Return the unknowns among these names: those whose range, ``name_range``, a task gives."""
+    found = ((name, getattr(task, f"{name}_range")) for name in names)
+    return [Unknown(name, *ends) for name, ends in found if ends is not None]

@@ -16,9 +16,11 @@ from sweep.errors import InputError
 from sweep.evaluation.summaries import design_outputs
 from sweep.evaluation.tables import design_matrix
 from sweep.families import family
-from sweep.families.base import Accuracy, Angles, Array, Columns, Family
-from sweep.synthesis.tasks.crank_rocker import RSSR, check_given, size_limits, size_names, turn
-from sweep.synthesis.tasks.problem import Candidates, Unknown, stacked
+from sweep.families.base import Accuracy, Angles, Array
+from sweep.synthesis.tasks.crank_rocker import RSSR, motion, named, turn
+from sweep.synthesis.tasks.problem import Found, Task, Unknown, turning
+
+GUIDE, RSSP = family("guide"), family("rssp")
 
 
 class Drive(NamedTuple):
@@ -48,34 +50,27 @@ class Drive(NamedTuple):
 
     def columns(self, count: int) -> dict[str, Array]:
         """Its parameters as columns of stage 1."""
-        return {f"{name}1": np.full(count, value) for name, value in zip(RSSR.parameter_names, self.row, strict=True)}
+        return named(np.tile(self.row, (count, 1)), "1")
 
 
-def chain_of(second: str) -> Family:
-    """Return a crank-rocker and what it drives."""
-    return family(["rssr", second])
-
-
-def chain_motion(chain: Family, columns: Mapping[str, Array], *wanted: str) -> Columns:
-    """Pose outputs of chains over one turn, nan where there is no mechanism or a stage does not reach."""
+def chain_motion(second: str, columns: Mapping[str, Array], *wanted: str) -> list[Array]:
+    """Pose outputs of crank-rockers and what they drive over one turn, nan where there is no mechanism."""
+    chain = family(["rssr", second])
     # A stage stands where it does by default, as far as the task says nothing of its place.
     defaults = {p.name: np.full_like(columns["a1"], p.default) for p in chain.parameters if p.default is not None}
     rows = np.column_stack([(defaults | dict(columns))[name] for name in chain.parameter_names])
-    return chain.poses(rows, turn(), frozenset(wanted))
+    found = chain.poses(rows, turn(), frozenset(wanted))
+    return [np.asarray(found[name], np.float64) for name in wanted]
 
 
-def second_pressure_limit(motion: Columns, largest: float) -> Array:
+def second_pressure_limit(angle: Array, largest: float) -> Array:
     """Slack of the limit on the pressure angle of stage 2 over the poses of a turn, cos^2 - cos^2[largest]."""
-    angle = np.asarray(motion["pressure_angle2"], np.float64)
     slack: Array = (np.cos(angle) ** 2).min(axis=1) - np.cos(largest) ** 2
     return slack
 
 
-GUIDE = family("guide")
-
-
 @dataclass(frozen=True)
-class Task6:
+class Task6(Task):
     """The unknowns are shape and place of a guiding four-bar whose coupler point goes from J1 to J2 on given tangents.
 
     Size, direction and place of the four-bar follow from J1 and J2 (they are similarity transformations), so the
@@ -88,7 +83,6 @@ class Task6:
     start_direction, end_direction : of the path there, in the sense of going from J1 to J2 [rad]
     kappa, branch : sense of the connection of the stages, assembly mode of the four-bar
     max_pressure_angle : limit of the four-bar over the whole motion [rad]; below pi/2 keeps dead points away
-    bounds : of what is found, by name (a2, b2, c2, e2, xi2, eta2)
     """
 
     drive: Mapping[str, float]
@@ -98,38 +92,34 @@ class Task6:
     end_direction: float
     kappa: int = 1
     branch: int = 1
-    max_pressure_angle: float = np.radians(60.0)
-    bounds: Mapping[str, tuple[float, float]] = field(default_factory=dict)
+    max_pressure_angle: float = field(default=np.radians(60.0), kw_only=True)
 
-    unknowns: tuple[Unknown, ...] = field(
-        default=(
-            Unknown("coupler", 0.5, 5.0), Unknown("rocker", 0.5, 5.0), Unknown("frame", 0.5, 5.0),
-            Unknown("along", -4.0, 6.0), Unknown("across", -4.0, 4.0),
-            Unknown("theta1", 0.0, 2.0 * np.pi, periodic=True),
-        ),
-        init=False,
-    )  # fmt: skip
-    equations: tuple[str, ...] = field(default=("tangent at the start", "tangent at the end"), init=False)
-    objective: str = field(default="largest |d2s/dphi2| along the line from J1 to J2", init=False)
     _first: Drive = field(init=False, repr=False)
 
     def __post_init__(self) -> None:
-        check_given(self)
+        super().__post_init__()
         if tuple(self.start) == tuple(self.end):
             raise InputError("end", self.end, "another place than the start", "Task6")
         object.__setattr__(self, "_first", Drive.of(self.drive, "Task6"))
 
     @property
-    def limits(self) -> tuple[str, ...]:
-        """Senses of the tangents, pressure angle of the four-bar, bounds."""
-        return ("sense at the start", "sense at the end", "pressure angle 2", *size_names(self.bounds))
+    def unknowns(self) -> tuple[Unknown, ...]:
+        """Proportions of the four-bar in cranks, and the crank angle at J1."""
+        shape = {
+            "coupler": (0.5, 5.0),
+            "rocker": (0.5, 5.0),
+            "frame": (0.5, 5.0),
+            "along": (-4.0, 6.0),
+            "across": (-4.0, 4.0),
+        }
+        return (*(Unknown(name, *ends) for name, ends in shape.items()), turning("theta1"))
 
-    def evaluate(self, x: Array) -> Candidates:
-        """See `SynthesisTask`."""
-        n, first = len(x), self._first
+    def found(self, x: Mapping[str, Array]) -> Found:
+        """See `Task`."""
+        *shape, theta = x.values()
+        n, first = len(theta), self._first
         ones = np.ones(n)
-        theta = x[:, 5]
-        four_bar = np.column_stack([ones, *x[:, :5].T, 0.0 * ones, 0.0 * ones, self.branch * ones])
+        four_bar = np.column_stack([ones, *shape, 0.0 * ones, 0.0 * ones, self.branch * ones])
         angles = Angles.of(np.column_stack([theta, theta + self.kappa * first.swing]))
         path = GUIDE.poses(four_bar, angles, frozenset(("s", "dev", "ds", "ddev")))
         s, dev, ds, ddev = (np.asarray(path[name], np.float64) for name in ("s", "dev", "ds", "ddev"))
@@ -145,29 +135,23 @@ class Task6:
         origin = complex(*self.start) - similarity * point[:, 0]
         columns = first.columns(n) | {
             "a2": size,
-            "b2": size * x[:, 0],
-            "c2": size * x[:, 1],
-            "e2": size * x[:, 2],
-            "xi2": size * x[:, 3],
-            "eta2": size * x[:, 4],
+            **{f"{name}2": size * part for name, part in zip(("b", "c", "e", "xi", "eta"), shape, strict=True)},
             "lam2": np.angle(chord) - beta,
             "h2": 0.0 * ones,
             "branch2": self.branch * ones,
             "kappa2": self.kappa * ones,
             "offset2": theta - self.kappa * first.psi_ext,
         }
-        motion = chain_motion(chain_of("guide"), columns, "d2s", "pressure_angle2")
-        slacks = [*turned.real.T, second_pressure_limit(motion, self.max_pressure_angle)]
-        limits = stacked(n, [*slacks, *size_limits(columns, self.bounds)])
-        placing = {"x0": origin.real, "y0": origin.imag, "beta0": beta}
-        return Candidates(turned.imag, limits, np.asarray(motion["d2s"], np.float64), columns | placing)
-
-
-RSSP = family("rssp")
+        d2s, angle = chain_motion("guide", columns, "d2s", "pressure_angle2")
+        ends = ("start", "end")
+        limits = {f"sense at the {end}": part for end, part in zip(ends, turned.real.T, strict=True)}
+        limits["pressure angle 2"] = second_pressure_limit(angle, self.max_pressure_angle)
+        equations = {f"tangent at the {end}": part for end, part in zip(ends, turned.imag.T, strict=True)}
+        return Found(equations, limits, d2s, columns | {"x0": origin.real, "y0": origin.imag, "beta0": beta})
 
 
 @dataclass(frozen=True)
-class Task7:
+class Task7(Task):
     """The unknowns are a2, b2, e2 and the angle of the second crank; stroke and both accelerations are the equations.
 
     At a limit of stage 1 its velocity vanishes, so the output's acceleration there is psi'' S', and S' = w/psi''.
@@ -184,7 +168,6 @@ class Task7:
     max_pressure_angle : limit of the slider-crank over the whole motion [rad]
     objective : what the surplus of unknowns goes to: "acceleration", max |d2s| over the turn, or "pressure_angle", the
         largest of the slider-crank
-    bounds : of what is found, by name (a2, b2, e2)
 
     Raises
     ------
@@ -201,54 +184,38 @@ class Task7:
     kappa: int = 1
     branch: int = 1
     size_range: tuple[float, float] = (0.3, 6.0)
-    max_pressure_angle: float = np.radians(45.0)
+    max_pressure_angle: float = field(default=np.radians(45.0), kw_only=True)
     objective: Literal["acceleration", "pressure_angle"] = "acceleration"
-    bounds: Mapping[str, tuple[float, float]] = field(default_factory=dict)
 
-    equations: tuple[str, ...] = field(
-        default=("stroke", "acceleration at the start", "acceleration at the end"), init=False
-    )
     _first: Drive = field(init=False, repr=False)
     _second_derivatives: tuple[float, float] = field(init=False, repr=False)
 
     def __post_init__(self) -> None:
-        check_given(self)
+        super().__post_init__()
         for name, value, sign in (
             ("start_acceleration", self.start_acceleration, 1.0), ("end_acceleration", self.end_acceleration, -1.0),
         ):  # fmt: skip
             if not value * sign * self.stroke > 0.0:
                 raise InputError(name, value, "the sign with which the slider turns round there", "Task7")
         first = Drive.of(self.drive, "Task7")
-        law = RSSR.poses(
-            first.row[None, :], Angles.of(np.array([[first.phi_ext, first.phi_fold]])), frozenset(("d2psi",))
-        )
+        ends = Angles.of(np.array([[first.phi_ext, first.phi_fold]]))
         object.__setattr__(self, "_first", first)
-        object.__setattr__(self, "_second_derivatives", tuple(np.asarray(law["d2psi"], np.float64)[0].tolist()))
+        object.__setattr__(self, "_second_derivatives", tuple(motion(first.row[None, :], ends, "d2psi")[0][0].tolist()))
 
     @property
     def unknowns(self) -> tuple[Unknown, ...]:
         """Crank, coupler, offset and crank angle of the slider-crank."""
         low, high = (limit * abs(self.stroke) for limit in self.size_range)
-        return (
-            Unknown("a2", low, high),
-            Unknown("b2", low, high),
-            Unknown("e2", -high, high),
-            Unknown("theta1", 0.0, 2.0 * np.pi, periodic=True),
-        )
+        return Unknown("a2", low, high), Unknown("b2", low, high), Unknown("e2", -high, high), turning("theta1")
 
-    @property
-    def limits(self) -> tuple[str, ...]:
-        """Pressure angle of the slider-crank, bounds."""
-        return ("pressure angle 2", *size_names(self.bounds))
-
-    def evaluate(self, x: Array) -> Candidates:
-        """See `SynthesisTask`."""
-        n, first = len(x), self._first
-        ones, theta = np.ones(n), x[:, 3]
-        columns = first.columns(n) | {
-            "a2": x[:, 0],
-            "b2": x[:, 1],
-            "e2": x[:, 2],
+    def found(self, x: Mapping[str, Array]) -> Found:
+        """See `Task`."""
+        theta, first = x["theta1"], self._first
+        ones = np.ones(len(theta))
+        columns = first.columns(len(theta)) | {
+            "a2": x["a2"],
+            "b2": x["b2"],
+            "e2": x["e2"],
             "f2": self.f2 * ones,
             "alpha2": self.alpha2 * ones,
             "branch2": self.branch * ones,
@@ -256,18 +223,13 @@ class Task7:
             "offset2": theta - self.kappa * first.psi_ext,
         }
         stage = np.column_stack([columns[f"{name}2"] for name in RSSP.parameter_names])
-        ends = RSSP.poses(
-            stage, Angles.of(np.column_stack([theta, theta + self.kappa * first.swing])), frozenset(("s", "ds"))
-        )
-        s, ds = (np.asarray(ends[name], np.float64) for name in ("s", "ds"))
-        wanted = (self.start_acceleration, self.end_acceleration)
-        residuals = [(s[:, 1] - s[:, 0] - self.stroke) / abs(self.stroke)]
-        for k, second in enumerate(self._second_derivatives):
-            residuals.append(self.kappa * second * ds[:, k] / wanted[k] - 1.0)
-        motion = chain_motion(chain_of("rssp"), columns, "d2s", "pressure_angle2")
-        slacks = [second_pressure_limit(motion, self.max_pressure_angle), *size_limits(columns, self.bounds)]
-        if self.objective == "acceleration":
-            curve = np.asarray(motion["d2s"], np.float64)
-        else:
-            curve = np.sin(np.asarray(motion["pressure_angle2"], np.float64))
-        return Candidates(stacked(n, residuals), stacked(n, slacks), curve, columns)
+        ends = Angles.of(np.column_stack([theta, theta + self.kappa * first.swing]))
+        at = RSSP.poses(stage, ends, frozenset(("s", "ds")))
+        s, ds = (np.asarray(at[name], np.float64) for name in ("s", "ds"))
+        wanted = {"start": self.start_acceleration, "end": self.end_acceleration}
+        equations = {"stroke": (s[:, 1] - s[:, 0] - self.stroke) / abs(self.stroke)}
+        for k, ((end, value), second) in enumerate(zip(wanted.items(), self._second_derivatives, strict=True)):
+            equations[f"acceleration at the {end}"] = self.kappa * second * ds[:, k] / value - 1.0
+        d2s, angle = chain_motion("rssp", columns, "d2s", "pressure_angle2")
+        limits = {"pressure angle 2": second_pressure_limit(angle, self.max_pressure_angle)}
+        return Found(equations, limits, d2s if self.objective == "acceleration" else np.sin(angle), columns)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from typing import TYPE_CHECKING, Literal, NamedTuple
 
 import numpy as np
@@ -14,18 +14,8 @@ from sweep.errors import InputError
 from sweep.evaluation.summaries import design_outputs
 from sweep.evaluation.tables import design_matrix
 from sweep.families.base import Accuracy, Array
-from sweep.synthesis.tasks.crank_rocker import (
-    RSSR,
-    check_given,
-    designs_on_locus,
-    motion,
-    named,
-    pressure_limit,
-    size_limits,
-    size_names,
-    turn,
-)
-from sweep.synthesis.tasks.problem import Candidates, Unknown, stacked
+from sweep.synthesis.tasks.crank_rocker import RSSR, acceleration, designs_on_locus, named, pressure_limit
+from sweep.synthesis.tasks.problem import Found, Task, Unknown, ranges, turning
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -47,7 +37,7 @@ class Setting(NamedTuple):
 
 
 @dataclass(frozen=True)
-class Task3:
+class Task3(Task):
     """The unknowns are phi1, f, and for every further setting the value of the one dimension that differs.
 
     Parameters
@@ -58,8 +48,6 @@ class Task3:
     e, g, alpha : as `EngineeringMethod`; the first setting, if e or g is the dimension adjusted
     f_range : where f is looked for
     g_range, alpha_range : where g and alpha are looked for, if they are to be found as well
-    max_pressure_angle : limit over the whole turn in every setting [rad]
-    bounds : of the lengths found, by name (a, b, c)
 
     Raises
     ------
@@ -78,80 +66,56 @@ class Task3:
     f_range: tuple[float, float]
     g_range: tuple[float, float] | None = None
     alpha_range: tuple[float, float] | None = None
-    max_pressure_angle: float = 0.5 * np.pi
-    bounds: Mapping[str, tuple[float, float]] = field(default_factory=dict)
-
-    objective: str = field(default="largest |d2psi| of all settings", init=False)
 
     def __post_init__(self) -> None:
-        check_given(self)
+        super().__post_init__()
         if not self.settings:
             raise InputError("settings", self.settings, "at least one besides the first", "Task3")
         first = {"swing": self.swing, "phi0": self.phi0}
         for setting in self.settings:
             if all(first[name] == value for name, value in setting.asked.items()):
                 raise InputError("settings", setting, "another swing or phi0 than the first", "Task3")
-        if len(self.equations) > len(self.unknowns):
+        asked = sum(len(setting.asked) for setting in self.settings)
+        if asked > len(self.unknowns):
             allowed = f"at most {len(self.unknowns)} swings and phi0 in all, or g_range, alpha_range"
-            raise InputError("settings", len(self.equations), allowed, "Task3")
+            raise InputError("settings", asked, allowed, "Task3")
 
     @property
     def unknowns(self) -> tuple[Unknown, ...]:
         """phi1, f, what else is free, and the further values of the adjusted dimension."""
-        free = {"f": self.f_range, "g": self.g_range, "alpha": self.alpha_range}
-        return (
-            Unknown("phi1", 0.0, 2.0 * np.pi, periodic=True),
-            *(Unknown(name, *ends) for name, ends in free.items() if ends is not None),
-            *(Unknown(name, *self.adjusted_range) for name in self._values),
-        )
+        values = (Unknown(self._value(k), *self.adjusted_range) for k in range(2, len(self.settings) + 2))
+        return (turning("phi1"), *ranges(self, "f", "g", "alpha"), *values)
 
-    @property
-    def equations(self) -> tuple[str, ...]:
-        """What the further settings have to do."""
-        return tuple(f"{name} of setting {k}" for k, setting in enumerate(self.settings, 2) for name in setting.asked)
+    def _value(self, k: int) -> str:
+        return f"{self.adjusted} of setting {k}"
 
-    @property
-    def limits(self) -> tuple[str, ...]:
-        """Pressure angles of all settings, bounds of the lengths."""
-        pressure = tuple(f"pressure angle of setting {k}" for k in range(1, len(self.settings) + 2))
-        return (*pressure, *size_names(self.bounds))
-
-    @property
-    def _values(self) -> tuple[str, ...]:
-        return tuple(f"{self.adjusted} of setting {k}" for k in range(2, len(self.settings) + 2))
-
-    def evaluate(self, x: Array) -> Candidates:
-        """See `SynthesisTask`."""
-        ones = np.ones(len(x))
-        found = dict(zip((u.name for u in self.unknowns), x.T, strict=True))
-        first, _ = designs_on_locus(
-            self.swing * ones, self.phi0 * ones, found["phi1"], self.e * ones, found["f"],
-            found.get("g", self.g * ones), found.get("alpha", self.alpha * ones),
-        )  # fmt: skip
-        designs, equations = [first], []
-        for name, setting in zip(self._values, self.settings, strict=True):
+    def found(self, x: Mapping[str, Array]) -> Found:
+        """See `Task`."""
+        own = (x["phi1"], self.e, x["f"], x.get("g", self.g), x.get("alpha", self.alpha))
+        first, _ = designs_on_locus(self.swing, self.phi0, *own)
+        results, equations, designs = dict(named(first)), dict[str, Array](), [first]
+        for k, setting in enumerate(self.settings, 2):
             design = first.copy()
-            design[:, RSSR.parameter_names.index(self.adjusted)] = found[name]
+            results[self._value(k)] = design[:, RSSR.parameter_names.index(self.adjusted)] = x[self._value(k)]
             design[np.isnan(first).any(axis=1) | (design[:, :3] <= 0.0).any(axis=1)] = np.nan
             designs.append(design)
-            equations += _missed(design, setting)
-        slacks = [pressure_limit(design, self.max_pressure_angle) for design in designs]
-        curves = [np.asarray(motion(design, turn(), "d2psi")["d2psi"], np.float64) for design in designs]
-        columns = named(first)
-        limits = stacked(len(x), [*slacks, *size_limits(columns, self.bounds)])
-        results = columns | {name: found[name] for name in self._values}
-        return Candidates(stacked(len(x), equations), limits, np.hstack(curves), results)
+            equations |= {f"{name} of setting {k}": missed for name, missed in _missed(design, setting).items()}
+        limits = {
+            f"pressure angle of setting {k}": pressure_limit(design, self.max_pressure_angle)
+            for k, design in enumerate(designs, 1)
+        }
+        return Found(equations, limits, np.hstack([acceleration(design) for design in designs]), results)
 
 
-def _missed(designs: Array, setting: Setting) -> list[Array]:
+def _missed(designs: Array, setting: Setting) -> dict[str, Array]:
     """Return by how much designs miss what a setting asks for; nan where there is no mechanism."""
     alive = np.flatnonzero(np.isfinite(designs).all(axis=1))
     found = design_outputs(RSSR, designs[alive], list(setting.asked), _EXACT)
-    missed = []
+    missed = {}
     for name, value in setting.asked.items():
         column = np.full(len(designs), np.nan)
         column[alive] = np.asarray(found[name], np.float64) - value
-        missed.append(column)
+        missed[name] = column
     return missed
 
 

@@ -8,7 +8,7 @@ import pytest
 import sweep
 from sweep.errors import InputError
 from sweep.families import family
-from sweep.synthesis.tasks.task5 import Task5
+from sweep.synthesis.tasks import Task5
 
 RSSR = ("a", "b", "c", "e", "f", "g", "alpha", "branch")
 
