@@ -39,7 +39,7 @@ def motion_curves(family: Family) -> tuple[str, ...]:
     """Position and its derivatives, deviations, pressure angles; of a machine those of its members, and relations."""
     if isinstance(family, Machine):
         members = [f"{m.name}.{name}" for m in family.members for name in _ladder(m.family, 2)]
-        return (*members, *(r.outputs[0].name for r in family.relations))
+        return (*members, *(o.name for r in family.relations for o in r.outputs[:1]))
     deviations = [o.name for o in family.pose_outputs if o.windowed and not o.stage]
     loops = [loop.pressure_angle for loop in family.every(Assembly)]
     return (*_ladder(family, 3), *deviations, *loops)

@@ -9,6 +9,7 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 import sweep
+from sweep.evaluation.curves import motion_curves
 from sweep.evaluation.summaries import design_outputs
 from sweep.evaluation.tables import design_matrix
 from sweep.families import family
@@ -179,3 +180,4 @@ def test_a_looper_that_lags_stands_where_its_lag_puts_it():
         there = sweep.summarise(machine, moved, keys, accuracy=1e-9).iloc[0]
         assert found[name] == pytest.approx(there[keys].min(), abs=1e-9), name
     assert abs(ahead) > 1e-4
+    assert not [name for name in motion_curves(family(machine)) if name.startswith("sews")]  # it has no poses
