@@ -108,13 +108,23 @@ class Poses:
         found = np.mod(np.where((polished > left[k]) & (polished < right[k]), polished, found), TWO_PI)
         return Found(row, found).take(np.lexsort((found, row)))
 
-    def _root(self, row: NDArray[np.intp], left: Array, right: Array, name: str) -> Array:
-        """Return a root in each bracket."""
+    def first(self, name: str, level: float, sense: float) -> tuple[NDArray[np.uint8], Array]:
+        """Return status and where an output first passes a level in a sense, each (n,); nan where it does not."""
+        status, (values,) = self.samples([name], SAMPLES)
+        off = sense * (values - level)
+        passes = (off < 0.0) & (np.roll(off, -1, axis=1) >= 0.0)
+        row = np.flatnonzero(passes.any(axis=1))
+        start = passes[row].argmax(axis=1) * (TWO_PI / SAMPLES)
+        found = whole(len(off), row, self._root(row, start, start + TWO_PI / SAMPLES, name, level))
+        return np.where((status == st.OK) & np.isnan(found), st.NO_EVENT, status).astype(np.uint8), found
+
+    def _root(self, row: NDArray[np.intp], left: Array, right: Array, name: str, level: float = 0.0) -> Array:
+        """Return a place in each bracket where an output passes a level."""
         from scipy.optimize.elementwise import find_root
 
         if not row.size:
             return np.zeros(0)
-        of: Any = lambda phi, rows: self.near(rows.astype(np.intp), phi, name)  # noqa: E731
+        of: Any = lambda phi, rows: self.near(rows.astype(np.intp), phi, name) - level  # noqa: E731
         args: Any = (row,)
         ends = np.asarray(left, np.float64), np.asarray(right, np.float64)
         found = find_root(of, ends, args=args, tolerances=ROUNDING)

@@ -16,6 +16,7 @@ from sweep.families.base import Angles, Columns, Event, Family, Output, Paramete
 from sweep.families.capabilities import Assembly, Points
 from sweep.families.curve_features import of_members
 from sweep.families.frames import Frame
+from sweep.families.happenings import event_angles, switches_of_events
 from sweep.families.main_shaft import ShaftTorque, speed_of
 from sweep.families.moments import Taking
 from sweep.families.parts import AXES, EYE, TIP, Member, coordinates, coupler_joints, velocity
@@ -25,6 +26,7 @@ from sweep.families.sewing import Sewing, sewing_step
 from sweep.families.shaking import Shaking
 from sweep.families.sites import coordinates as coordinates_of_site
 from sweep.families.sites import made_of
+from sweep.families.thread_balance import ThreadBalance
 from sweep.families.triangles import Entering, entering_step
 
 
@@ -63,6 +65,10 @@ class Machine(Family):
 
     def precise(self) -> Machine:
         """Return the machine with the most accurate poses its members have."""
+        return self._exact
+
+    @cached_property
+    def _exact(self) -> Machine:
         return _built(self, tuple(replace(m, family=m.family.precise()) for m in self.members))
 
     def with_families(self, families: Mapping[str, Family]) -> Machine:
@@ -125,7 +131,8 @@ def _built(machine: Machine, members: tuple[Member, ...]) -> Machine:
         f"{m.name}.{name}": f"{m.name}.{of}" for m in placed for name, of in m.family.derivative_of.items()
     }
     outputs += [o for relation in machine.relations for o in relation.outputs]
-    derivative_of |= {k: v for r in machine.relations if isinstance(r, Taking | Entering) for k, v in r.rates.items()}
+    moving = [r for r in machine.relations if isinstance(r, Taking | Entering | ThreadBalance)]
+    derivative_of |= {name: rate for r in moving for name, rate in r.rates.items()}
     loops = tuple(_loop(m, loop) for m in placed for loop in m.family.every(Assembly))
     found = replace(
         machine,
@@ -140,9 +147,11 @@ def _built(machine: Machine, members: tuple[Member, ...]) -> Machine:
         dear={f"{m.name}.{k}": (f"{m.name}.{what}", ns) for m in placed for k, (what, ns) in m.family.dear.items()},
         members=tuple(placed),
     )
+    found = replace(found, poses=partial(_poses, found))  # events of a thread are looked for on poses of the others
     poses = partial(_poses, found)
     precise = partial(_precise_poses, found) if any(m.family.precise_poses for m in placed) else None
-    found = replace(found, poses=poses, precise_poses=precise)
+    capabilities = (*found.capabilities, *switches_of_events(found))
+    found = replace(found, poses=poses, precise_poses=precise, capabilities=capabilities)
     steps = [taking_step(r, found) for r in machine.relations if isinstance(r, Taking)]
     steps += [entering_step(r, found) for r in machine.relations if isinstance(r, Entering)]
     steps += [sewing_step(r, found) for r in machine.relations if isinstance(r, Sewing)]
@@ -172,6 +181,8 @@ def _poses(machine: Machine, designs: Array, angles: Angles, wanted: frozenset[s
     needed = set(wanted).union(*(r.needs(wanted) for r in relations))
     inputs = needed.intersection(columns_of) | {p.name for r in relations for p in r.parameters}
     needed -= inputs
+    changes = {name for name in needed if name.startswith("phi_")}
+    needed -= changes
     for m in reversed(machine.members):
         needed |= _driving(m, needed)
     shape = (len(designs), angles.cos.shape[1])
@@ -185,6 +196,10 @@ def _poses(machine: Machine, designs: Array, angles: Angles, wanted: frozenset[s
             found |= {f"{m.name}.{name}": values for name, values in columns.items()}
     frames = _frames(machine, designs) if any(isinstance(r, Shaking) for r in relations) else {}
     found["phi"] = angles.phi
+    if changes:
+        events, code = event_angles(machine, designs)
+        np.copyto(status, code[:, None], where=status == OK)
+        found |= events
     found |= {name: designs[:, [columns_of.index(name)]] for name in inputs}
     for relation in relations:
         found |= relation.compute(found, frames, wanted)

@@ -16,6 +16,7 @@ from sweep.families.capabilities import OutputLink
 from sweep.families.domain import Turn, reads_as_degrees
 from sweep.families.frames import crank_axis
 from sweep.families.gaps import Body, Gap
+from sweep.families.happenings import check_happenings
 from sweep.families.link_tree import LinkTree
 from sweep.families.machines import Machine, assemble
 from sweep.families.main_shaft import Driven, ShaftTorque
@@ -23,8 +24,7 @@ from sweep.families.parts import Member, coupler_joints, is_planar, placement, v
 from sweep.families.relations import Distance, EventValue, Relation, Speed, Timing, each, two
 from sweep.families.shafts import MOUNT_KEYS, SHAFT_KEYS, Mount, Shaft, read_mount, read_shafts
 from sweep.families.shaking import Shaken, Shaking, shaken
-from sweep.families.stitching import read_entering, read_sewing, read_taking
-from sweep.families.thread_balance import thread_balance
+from sweep.families.stitching import read_entering, read_sewing, read_taking, read_thread
 from sweep.families.tools import BLADE_KEYS, NEEDLE_KEYS, SEAM_KEYS, Tool, bodies, length, read_tools
 
 MEMBER_KEYS = ("family", "chain", "ratio", "offset", "driver", "place", "tip", "eye", *MOUNT_KEYS)
@@ -129,7 +129,9 @@ def built(given: Specification, find: FindFamily) -> Machine:
             allowed = "a plain word without a digit at its end that is no member"
             raise InputError("relation", relation.name, allowed, "machine.relations")
     title = ", ".join(f"{m.name}: {m.family.name}" for m in members.values())
-    return assemble(f"machine ({title})", tuple(members.values()), relations)
+    machine = assemble(f"machine ({title})", tuple(members.values()), relations)
+    check_happenings(machine)
+    return machine
 
 
 def _member(
@@ -254,7 +256,7 @@ def _relation(
     if "enter" in table:
         return read_entering(name, table, tools, where)
     if "thread" in table:
-        return thread_balance(name, table, members)
+        return read_thread(name, table, members, tools)
     if len(table) != 1 or next(iter(table)) not in RELATION_KINDS:
         raise InputError(name, dict(table), f"one of {', '.join(RELATION_KINDS)}", where)
     kind, given = next(iter(table.items()))

@@ -1,18 +1,29 @@
-"""The moments of the stitch from what a user writes: machine-and-stitch, 5."""
+"""The moments of the stitch and its threads from what a user writes: machine-and-stitch, 5 and 7."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from itertools import pairwise
 from typing import Any
 
+import numpy as np
+
 from sweep.errors import InputError, choices
+from sweep.families.capabilities import ThreadPath
 from sweep.families.main_shaft import ShaftTorque
 from sweep.families.moments import RiseWindow, Taking
+from sweep.families.parts import Member, vector
 from sweep.families.relations import each, two
 from sweep.families.sewing import Sewing
+from sweep.families.thread_balance import Edge, TakeUp, ThreadBalance, Waypoint, spots
 from sweep.families.tools import Blade, Needle, Seam, Spot, Tool, length, number
 from sweep.families.triangles import Entering
+from sweep.numerics.curves import TableCurve, table_curve
+
+THREAD_KEYS = (
+    "thread", "stock", "tension", "stiffness", "radius", "allowed", "sewn", "feeding", "drawing",
+)  # fmt: skip
+PLACE_KEYS = ("on", "held", "wrap", "fixed")
 
 
 def read_taking(name: str, table: dict[str, Any], tools: Mapping[str, Tool], where: str) -> Taking:
@@ -96,3 +107,113 @@ def _sense(table: Mapping[str, Any], words: str, where: str) -> int:
     if sense not in (1, -1) or isinstance(sense, bool):
         raise InputError("sense", sense, f"1 or -1: {words}", where)
     return int(sense)
+
+
+def read_thread(
+    name: str, table: Mapping[str, Any], members: Mapping[str, Member], tools: Mapping[str, Tool]
+) -> ThreadBalance:
+    """Read a relation ``thread``: its path, tension and stock, and when it is sewn in and drawn.
+
+    Raises
+    ------
+    InputError
+        for an unknown key, point or member, fewer than two places, a number that is none, radii that are not as many as
+        bends.
+    """
+    where = f"machine.relations.{name}"
+    for key in table:
+        if key not in THREAD_KEYS:
+            raise InputError(key, table[key], choices(key, THREAD_KEYS), where)
+    path = tuple(_place(given, members, tools, where) for given in table["thread"])
+    bends = _bends(path)
+    if bends is None:
+        allowed = "points and take-ups in order, two points at least in a row; each row begins and ends with a point"
+        raise InputError("thread", table["thread"], f"{allowed} over which it always runs, as between blades", where)
+    tension, stiffness, sewn = (length(key, table.get(key, 0.0), where) for key in ("tension", "stiffness", "sewn"))
+    given = table.get("radius", 1.0)
+    radii = tuple(length("radius", x, where) for x in (given if isinstance(given, tuple) else (given,) * bends))
+    if len(radii) != bends:
+        raise InputError("radius", given, f"one number, or one for each of the {bends} bends", where)
+    feeding, drawing = (_events(key, table.get(key, ()), where) for key in ("feeding", "drawing"))
+    if bool(feeding) != bool(drawing) or bool(feeding) != ("sewn" in table):
+        raise InputError("sewn", table.get("sewn"), "sewn, feeding and drawing together, or none of them", where)
+    known = {f"{m.name}.{point}" for m in members.values() for point in m.moving}
+    return ThreadBalance(
+        name,
+        path,
+        number("stock", table.get("stock", 0.0), where),
+        tension,
+        stiffness,
+        radii,
+        _allowed(table.get("allowed"), where),
+        sewn,
+        feeding,
+        drawing,
+        all(not spot.on or spot.on in known for place in path for spot in spots(place)),
+    )
+
+
+def _bends(path: Sequence[Waypoint]) -> int | None:
+    """Count the bends along a path, take-ups and what lies between two points; None if no piece is straight."""
+    bends, pieces = 0, 0
+    ends = [-1, *(k for k, place in enumerate(path) if isinstance(place.on, TakeUp)), len(path)]
+    for first, last in pairwise(ends):
+        run = path[first + 1 : last]
+        sure = [
+            "p" if isinstance(place.on, Spot) and not place.held else "b" * isinstance(place.on, Edge) for place in run
+        ]
+        if run and (sure[0] != "p" or sure[-1] != "p" or "bb" in "".join(sure)):
+            return None
+        bends, pieces = bends + max(len(run) - 2, 0), pieces + len(run) // 2
+    return bends + len(ends) - 2 if pieces else None
+
+
+def _place(given: Any, members: Mapping[str, Member], tools: Mapping[str, Tool], where: str) -> Waypoint:
+    """Read a place of a path: a name, coordinates, or a table with either and with when it counts."""
+    table = dict(given) if isinstance(given, tuple) and given and isinstance(given[0], tuple) else {"on": given}
+    for key in table:
+        if key not in PLACE_KEYS:
+            raise InputError(key, table[key], choices(key, PLACE_KEYS), f"{where}.thread")
+    held, fixed = (_events(key, table.get(key, ()), f"{where}.thread") for key in ("held", "fixed"))
+    wrap = length("wrap", table.get("wrap", 0.0), f"{where}.thread")
+    return Waypoint(_on(table.get("on"), members, tools, where), held, wrap, fixed)
+
+
+def _on(given: Any, members: Mapping[str, Member], tools: Mapping[str, Tool], where: str) -> Spot | Edge | TakeUp:
+    """Read what a thread runs over: a point of the frame or of a member, a take-up, a tool or the eye of a blade."""
+    if not isinstance(given, str):
+        return Spot(at=vector(given, f"{where}.thread"))
+    known: dict[str, Spot | Edge | TakeUp] = {}
+    for name, tool in tools.items():
+        if isinstance(tool, Needle):
+            known[name] = Spot(tool.on, tool.line, tool.sense * tool.eye)
+        elif isinstance(tool, Seam):
+            known[name] = Spot(at=tool.at)
+        else:
+            known[name] = Edge(Spot(tool.tip), Spot(tool.back))
+            known |= {f"{name}.eye": Spot(tool.eye)} if tool.eye else {}
+    for m in members.values():
+        known |= {f"{m.name}.{point}": Spot(f"{m.name}.{point}") for point in m.points}
+        if (path := m.family.find(ThreadPath)) is not None:
+            known[m.name] = TakeUp(f"{m.name}.{path.taken}", f"{m.name}.{path.wrap}")
+    if given not in known:
+        raise InputError("thread", given, f"points, take-ups: {choices(given, list(known))}", where)
+    return known[given]
+
+
+def _events(key: str, given: Any, where: str) -> tuple[str, ...]:
+    if not isinstance(given, tuple) or len(given) not in (0, 2) or not all(isinstance(end, str) for end in given):
+        raise InputError(key, given, "two events or moments by name, from and to", where)
+    return given
+
+
+def _allowed(given: Any, where: str) -> TableCurve | None:
+    if given is None:
+        return None
+    table = dict(given) if isinstance(given, tuple) else {}
+    if set(table) != {"phi", "values"}:
+        raise InputError("allowed", given, "phi [rad] and values: the most surplus over the turn", where)
+    try:
+        return table_curve(np.array(table["phi"], np.float64), np.array(table["values"], np.float64))
+    except (TypeError, ValueError) as error:
+        raise InputError("allowed", given, str(error), where) from None

@@ -1,17 +1,19 @@
 """Thread of a machine: how much the stitch needs, how much the take-ups give, what is left over, and how it pulls.
 
-The thread runs over points of the machine in order, from the tensioner to the stitch.  Between two points it is
-straight.  A take-up among them (an eyelet, a cam) takes up P more thread than at its zero.  With the length needed by
-all straight pieces and the stock, the thread between tensioner and stitch that nothing has taken up,
+The thread runs over places of the machine in order, from the tensioner to the stitch, straight from one to the next.
+Over some of them it runs between two events only: from where a blade takes its loop to where it lets it go.  A take-up
+among them (an eyelet, a cam) takes up P more thread than at its zero.  With the length needed by all straight pieces,
+what is sewn in since the turn began, what is drawn from the bobbin since then, and the stock, the thread between
+tensioner and stitch that nothing has taken up,
 
-    given = stock - sum of P,     surplus = given - needed                                              (10), (11)
+    demand = needed + sewn - drawn,     given = stock - sum of P,     surplus = given - demand          (10), (11)
 
 A negative surplus means that the thread has to come through the tensioner, or stretches.  The tension at the tensioner,
 
-    T1 = tension - stiffness surplus, not below 0                                                        (12)
+    T1 = tension - stiffness surplus, not below 0, times what the thread's speed makes of it             (12)
 
-grows over every bend by the law of contours, docs/thread.md (3).  All outputs are analytic but for these kinks, so
-optimisers get exact gradients.
+grows over every bend at which the thread slides by the law of contours, docs/thread.md (3).  All outputs are analytic
+but for these kinks and where the path changes, so optimisers get exact gradients.
 """
 
 from __future__ import annotations
@@ -22,19 +24,17 @@ from typing import Any, NamedTuple, TypeAlias
 
 import numpy as np
 
-from sweep.errors import InputError, choices
+from kernels.types import TWO_PI
 from sweep.families.base import Output, Parameter
-from sweep.families.capabilities import ThreadPath
 from sweep.families.frames import Frame
-from sweep.families.parts import AXES, Member, vector
-from sweep.numerics.curves import TableCurve, table_curve
+from sweep.families.segments import Point, dot, minus
+from sweep.families.tools import Spot
+from sweep.numerics.curves import TableCurve
 
-KEYS = ("thread", "stock", "tension", "stiffness", "radius", "allowed")
 GF = 9.80665e-3  # N
-EQUATION = "docs/thread.md (9)-(13)"
+MM_PER_M = 1e3
+EQUATION = "docs/thread.md (9)-(15)"
 PHI = "phi"
-
-Vector: TypeAlias = tuple[Any, Any, Any]
 
 
 class Range(NamedTuple):
@@ -68,12 +68,45 @@ MEASURED_SPEED = Range("v", "m/s", 0.08, 7.4)
 class TakeUp:
     """A take-up in the path: the dotted pose outputs of the thread it takes up and of its wrap angle."""
 
-    member: str
     taken: str
     wrap: str
 
 
-Waypoint: TypeAlias = tuple[float, float, float] | str | TakeUp
+@dataclass(frozen=True)
+class Edge:
+    """A blade over which the thread slides without friction: it lies where the way over it is shortest."""
+
+    tip: Spot
+    back: Spot
+
+
+@dataclass(frozen=True)
+class Waypoint:
+    """What a thread runs over.
+
+    Parameters
+    ----------
+    on : a point, a blade, a take-up
+    held : two events, from and to: between them the thread runs over it; () for the whole turn
+    wrap : by which it is bent there beside the bend of its path, as in a needle's eye [rad]
+    fixed : two events: between them it does not slide there, which leaves the bend out of the tension; () for never
+    """
+
+    on: Spot | Edge | TakeUp
+    held: tuple[str, ...] = ()
+    wrap: float = 0.0
+    fixed: tuple[str, ...] = ()
+
+
+class _Piece(NamedTuple):
+    """A place as it stands: coordinates, velocity, and where over the turn the thread runs over it; None is always."""
+
+    at: Point
+    rate: Point
+    on: Any
+
+
+Run: TypeAlias = tuple[Waypoint, ...]
 
 
 @dataclass(frozen=True)
@@ -83,96 +116,253 @@ class ThreadBalance:
     Parameters
     ----------
     name : stands before the names of the outputs
-    path : from tensioner to stitch: fixed points in the machine's frame, dotted names of moving points, take-ups
+    path : from tensioner to stitch
     stock : thread between tensioner and stitch when nothing is taken up; the default of the parameter ``NAME_stock``
     tension : at the tensioner, while the thread is just tight [force]
     stiffness : force per length by which the thread is slack or stretched
     radii : of the contour at each bend, in the order of the path [mm]
     allowed : most surplus over the turn, None for none
+    sewn : thread that a stitch takes; the default of the parameter ``NAME_sewn``
+    feeding, drawing : two events each: between them it is sewn in, and comes from the bobbin
+    moves : whether the velocities of all its points are known
     """
 
     name: str
-    path: tuple[Waypoint, ...]
+    path: Run
     stock: float = 0.0
     tension: float = 0.0
     stiffness: float = 0.0
     radii: tuple[float, ...] = ()
     allowed: TableCurve | None = None
+    sewn: float = 0.0
+    feeding: tuple[str, ...] = ()
+    drawing: tuple[str, ...] = ()
+    moves: bool = False
 
     @property
     def outputs(self) -> tuple[Output, ...]:
         """The balance, and the tension."""
-        who = self.name
-        over = Output(f"{who}_excess", "length", f"surplus of thread {who} beyond what is allowed", EQUATION)
-        return (
-            Output(f"{who}_needed", "length", f"thread {who} along the straight pieces of its path", EQUATION),
-            Output(f"{who}_given", "length", f"thread {who} that the take-ups leave: stock - sum of P", EQUATION),
-            Output(f"{who}_surplus", "length", f"thread {who} given minus needed; negative: it is pulled", EQUATION),
-            *((over,) if self.allowed is not None else ()),
-            Output(f"{who}_wrap", "rad", f"sum of the angles by which thread {who} is bent", EQUATION),
-            Output(f"{who}_tension", "force", f"tension of thread {who} at the stitch", EQUATION),
-        )
+        who, speed = self.name, "its speed, the length that it gains per time"
+        found = [
+            ("needed", "length", f"thread {who} along the straight pieces of its path"),
+            ("demand", "length", f"thread {who} needed and sewn in, less what is drawn: what the take-ups follow"),
+            ("given", "length", f"thread {who} that the take-ups leave: stock - sum of P"),
+            ("surplus", "length", f"thread {who} given minus demanded; negative: it is pulled"),
+            ("wrap", "rad", f"sum of the angles by which thread {who} is bent"),
+            ("tension", "force", f"tension of thread {who} at the stitch"),
+        ]
+        if self.moves:
+            found += [
+                ("rate", "length", f"derivative of the demand of thread {who} between events"),
+                ("velocity", "length/s", f"of thread {who}: {speed}"),
+            ]
+        if self.allowed is not None:
+            found.append(("excess", "length", f"surplus of thread {who} beyond what is allowed"))
+        bends = bool(self.happens)
+        return tuple(Output(f"{who}_{key}", unit, text, EQUATION, kinks=bends) for key, unit, text in found)
 
     @property
     def parameters(self) -> tuple[Parameter, ...]:
-        """The stock, which a study can vary."""
+        """Stock and stitch, which a study can vary, and the speed."""
         text = f"thread {self.name} between tensioner and stitch when nothing is taken up"
-        return (Parameter(f"{self.name}_stock", "length", text, default=self.stock),)
+        found = [Parameter(f"{self.name}_stock", "length", text, default=self.stock)]
+        if self.feeding:
+            text = f"thread {self.name} that a stitch takes"
+            found.append(Parameter(f"{self.name}_sewn", "length", text, default=self.sewn, not_negative=True))
+        if self.moves:
+            text = f"of the main shaft, for what it makes of the tension of thread {self.name}; 0: nothing"
+            found.append(Parameter(f"{self.name}_speed", "speed", text, default=0.0))
+        return tuple(found)
+
+    @property
+    def happens(self) -> tuple[str, ...]:
+        """Events at which something of it changes."""
+        ends = [end for place in self.path for end in (*place.held, *place.fixed)]
+        return tuple(dict.fromkeys((*ends, *self.feeding, *self.drawing)))
+
+    @property
+    def rates(self) -> Mapping[str, str]:
+        """Of the demand its derivative, where all velocities are known and the path does not change."""
+        return {f"{self.name}_demand": f"{self.name}_rate"} if self.moves and not self.happens else {}
 
     def needs(self, wanted: frozenset[str]) -> frozenset[str]:
-        """Name coordinates of the moving points, what the take-ups give, and their bends if wanted."""
-        names = [f"{place}_{axis}" for place in self.path if isinstance(place, str) for axis in AXES]
-        taken = [place.taken for place in self.path if isinstance(place, TakeUp)]
-        wraps = [place.wrap for place in self.path if isinstance(place, TakeUp) and self._bent(wanted)]
-        return frozenset((*names, *taken, *wraps))
+        """Name coordinates of the moving points, what the take-ups give, their bends and velocities if wanted."""
+        moving, bent = self._asked(wanted)
+        names = {name for place in self.path for spot in spots(place) for name in spot.needs(moving)}
+        ups = [place.on for place in self.path if isinstance(place.on, TakeUp)]
+        names.update(f"phi_{event}" for event in self.happens)
+        return frozenset(names.union((up.taken for up in ups), (up.wrap for up in ups if bent)))
 
-    def _bent(self, wanted: frozenset[str]) -> bool:
-        return not wanted.isdisjoint((f"{self.name}_wrap", f"{self.name}_tension"))
+    def _asked(self, wanted: frozenset[str]) -> tuple[bool, bool]:
+        """Tell whether velocities and bends are needed."""
+        own = {name.removeprefix(f"{self.name}_") for name in wanted}
+        pulls = "tension" in own
+        return self.moves and (pulls or not own.isdisjoint(("rate", "velocity"))), pulls or "wrap" in own
 
     def compute(self, found: Mapping[str, Any], frames: Mapping[str, Frame], wanted: frozenset[str]) -> dict[str, Any]:
-        """Return the outputs, (n, m); ``found`` has the main shaft's angle as "phi", and the stock."""
-        needed: Any = 0.0 * found[PHI]
-        taken: Any = 0.0 * found[PHI]
-        wraps: list[Any] = []
-        before: Any = None  # point before, direction of the piece before
-        along: Any = None
-        for place in self.path:
-            if isinstance(place, TakeUp):
-                taken, before, along = taken + found[place.taken], None, None
-                wraps += [found[place.wrap]] if self._bent(wanted) else []
+        """Return the outputs, (n, m); ``found`` has the main shaft's angle and events as "phi...", and parameters."""
+        phi, (moving, bent) = found[PHI], self._asked(wanted)
+        needed, rate, taken, wraps, run = 0.0 * phi, 0.0 * phi, 0.0 * phi, [], []
+        for place in (*self.path, None):
+            if place is not None and not isinstance(place.on, TakeUp):
+                run.append(place)
                 continue
-            point = _point(place, found)
-            if before is not None:
-                length, direction = _piece(before, point)
-                needed = needed + length
-                if along is not None and self._bent(wanted):
-                    wraps.append(bend(along, direction))
-                along = direction
-            before = point
-        given = found[f"{self.name}_stock"] - taken
-        surplus = given - needed
-        columns = {"needed": needed, "given": given, "surplus": surplus}
-        columns["wrap"] = sum(wraps, 0.0 * needed)
+            if run:
+                pieces = _laid(run, found, moving)
+                length, change, bends = _followed(pieces, moving, bent)
+                needed, rate = needed + length, rate + change
+                wraps += zip(run[1:-1], bends, pieces[1:-1], strict=True) if bent else ()
+            if place is not None:
+                taken = taken + found[place.on.taken]
+                wraps += [(place, found[place.on.wrap], _Piece((), (), None))] if bent else []
+            run = []
+        sewn, sewing = self._passed("feeding", found)
+        drawn, drawing = self._passed("drawing", found)
+        given, demand = found[f"{self.name}_stock"] - taken, needed + sewn - drawn
+        rate = rate + sewing - drawing
+        columns = {"needed": needed, "demand": demand, "given": given, "surplus": given - demand}
         if self.allowed is not None:
-            columns["excess"] = surplus - _over(self.allowed, found[PHI])
-        if f"{self.name}_tension" in wanted:
-            columns["tension"] = self._tension(surplus, wraps)
+            columns["excess"] = columns["surplus"] - _over(self.allowed, phi)
+        if moving:
+            columns |= {"rate": rate, "velocity": rate * found[f"{self.name}_speed"]}
+        if bent:
+            angles = [(p, _only(piece.on, angle + p.wrap)) for p, angle, piece in wraps]
+            columns["wrap"] = sum((angle for _, angle in angles), 0.0 * needed)
+            sliding = [_only(_outside(p.fixed, found), angle) for p, angle in angles]
+            pull = self.tension - self.stiffness * columns["surplus"]
+            columns["tension"] = self._tension(pull * self._hurried(columns, found), sliding)
         return {f"{self.name}_{key}": values for key, values in columns.items()}
 
-    def _tension(self, surplus: Any, wraps: Sequence[Any]) -> Any:
+    def _passed(self, when: str, found: Mapping[str, Any]) -> tuple[Any, Any]:
+        """Return the thread that has passed since the turn began, of ``NAME_sewn`` each turn, and its derivative."""
+        ends: tuple[str, ...] = getattr(self, when)
+        if not ends:
+            return 0.0, 0.0
+        first, last = (found[f"phi_{end}"] for end in ends)
+        since, lasts = found[PHI] - first, turned(last - first)
+        share = turned(since) / lasts
+        share = np.where(np.real(share) < 1.0, share, 1.0)
+        # a cycloid: thread begins to pass and ends without a jump of its speed
+        passed = share - np.sin(TWO_PI * share) / TWO_PI + np.floor(np.real(since) / TWO_PI)
+        whole = found[f"{self.name}_sewn"]
+        return whole * passed, whole * (1.0 - np.cos(TWO_PI * share)) / lasts
+
+    def _hurried(self, columns: Mapping[str, Any], found: Mapping[str, Any]) -> Any:
+        """Return what the speed makes of the tension, (7), within the measured range; 1 where none is known."""
+        if "velocity" not in columns:
+            return 1.0
+        reference, share, exponent = (float(p.default or 0.0) for p in SPEED_CONSTANTS)
+        square = (columns["velocity"] / MM_PER_M) ** 2
+        low, high = MEASURED_SPEED.low**2, MEASURED_SPEED.high**2
+        square = np.where(np.real(square) < low, low, np.where(np.real(square) > high, high, square))
+        ratio = 1.0 + share * ((square / reference**2) ** (0.5 * exponent) - 1.0)
+        return np.where(found[f"{self.name}_speed"] == 0.0, 1.0, ratio)
+
+    def _tension(self, pull: Any, wraps: Sequence[Any]) -> Any:
         """Tension behind the last bend by the law of contours, with the reported constants of the thread."""
-        pull = (self.tension - self.stiffness * surplus) / GF
-        pull = np.where(np.real(pull) > 0.0, pull, 0.0)
-        alpha, beta, bending, count, density = (float(p.default or 0.0) for p in (ALPHA, BETA, BENDING, COUNT, DENSITY))
+        pull = np.where(np.real(pull) > 0.0, pull, 0.0) / GF
+        alpha, beta, bending, count, density = (float(p.default or 0.0) for p in CONTOUR_CONSTANTS)
         own = 1.0 / np.sqrt(np.pi * density * count)
         for radius, wrap in zip(self.radii, wraps, strict=True):
-            theta = np.degrees(np.real(wrap)) + (1j * np.degrees(np.imag(wrap)) if np.iscomplexobj(wrap) else 0.0)
-            grown = np.expm1(beta * theta)
+            grown = np.expm1(beta * 180.0 / np.pi * wrap)
             pull = pull * (1.0 + grown) + (bending / (radius + own) ** 2 + alpha * radius / beta) * grown
         return GF * pull
 
 
-def bend(before: Vector, after: Vector) -> Any:
+def spots(place: Waypoint) -> tuple[Spot, ...]:
+    """Return the points that a place of a path is made of."""
+    if isinstance(place.on, TakeUp):
+        return ()
+    return (place.on,) if isinstance(place.on, Spot) else (place.on.tip, place.on.back)
+
+
+def turned(angle: Any) -> Any:
+    """Return an angle within one turn from 0; complex ones by their real part."""
+    return angle - TWO_PI * np.floor(np.real(angle) / TWO_PI)
+
+
+def _outside(ends: tuple[str, ...], found: Mapping[str, Any], inside: bool = False) -> Any:
+    """Tell where over the turn two events are not between, or are; None for the whole turn."""
+    if not ends:
+        return None
+    start, end = (np.real(found[f"phi_{name}"]) for name in ends)
+    return (turned(np.real(found[PHI]) - start) < turned(end - start)) == inside
+
+
+def _only(where: Any, values: Any, others: Any = 0.0) -> Any:
+    return values if where is None else np.where(where, values, others)
+
+
+def _chosen(where: Any, a: Point, b: Point) -> Point:
+    return [np.where(where, x, y) for x, y in zip(a, b, strict=True)]
+
+
+def _laid(run: Sequence[Waypoint], found: Mapping[str, Any], moving: bool) -> list[_Piece]:
+    """Place the points of a run, those on blades last: each lies between two that do not depend on it."""
+    pieces: list[_Piece] = []
+    for place in run:
+        spot = place.on.tip if isinstance(place.on, Edge) else place.on
+        assert isinstance(spot, Spot)
+        rate = spot.velocity(found) if moving else ()
+        pieces.append(_Piece(spot.position(found), rate, _outside(place.held, found, inside=True)))
+    for k, place in enumerate(run):
+        if isinstance(place.on, Edge):
+            tip, back = pieces[k], place.on.back.position(found)
+            t = nearest_way(beside(pieces, k, -1).at, beside(pieces, k, 1).at, tip.at, back)
+            on = [a + t * (b - a) for a, b in zip(tip.at, back, strict=True)]
+            # of a shortest way the place on the blade does not count in its derivative, the blade's own motion does
+            ends = zip(tip.rate, place.on.back.velocity(found), strict=True) if moving else ()
+            pieces[k] = tip._replace(at=on, rate=[a + t * (b - a) for a, b in ends])
+    return pieces
+
+
+def beside(pieces: Sequence[_Piece], k: int, step: int) -> _Piece:
+    """Return the place before or after one, of those that the thread runs over; the ends it always does."""
+    piece = pieces[k + step]
+    if piece.on is None:
+        return piece
+    other = beside(pieces, k + step, step)
+    return _Piece(_chosen(piece.on, piece.at, other.at), _chosen(piece.on, piece.rate, other.rate), None)
+
+
+def _followed(pieces: Sequence[_Piece], moving: bool, bent: bool) -> tuple[Any, Any, list[Any]]:
+    """Return the length of a run, its derivative, and the bends at all places but its ends."""
+    length: Any = 0.0
+    change: Any = 0.0
+    bends = []
+    for k, piece in enumerate(pieces):
+        if k == 0:
+            continue
+        before = beside(pieces, k, -1)
+        size, along = _piece(before.at, piece.at)
+        length = length + _only(piece.on, size)
+        if moving:
+            change = change + _only(piece.on, dot(along, minus(piece.rate, before.rate)))
+        if bent and k + 1 < len(pieces):
+            bends.append(bend(along, _piece(piece.at, beside(pieces, k, 1).at)[1]))
+    return length, change, bends
+
+
+def nearest_way(p: Point, q: Point, start: Point, end: Point) -> Any:
+    """Return where along a segment, 0 to 1, the way from p over it to q is shortest, (14).
+
+    Turned about the segment's line into one plane, on either side of it, p and q see each other straight across it.
+    The length is convex along the line, so beyond an end the end is nearest.
+    """
+    d = minus(end, start)
+    square = dot(d, d)
+    feet = [dot(minus(x, start), d) / square for x in (p, q)]
+    away = []
+    for x, foot in zip((p, q), feet, strict=True):
+        off = [u - foot * v for u, v in zip(minus(x, start), d, strict=True)]
+        away.append(np.sqrt(dot(off, off)))
+    both = away[0] + away[1]
+    t = np.where(both == 0.0, 0.5 * (feet[0] + feet[1]), 0.0)
+    t = t + (feet[0] * away[1] + feet[1] * away[0]) / np.where(both == 0.0, 1.0, both)
+    return np.where(np.real(t) < 0.0, 0.0, np.where(np.real(t) > 1.0, 1.0, t))
+
+
+def bend(before: Point, after: Point) -> Any:
     """Measure the angle between unit vectors of a thread, (13): 2 arctan(|e1 - e2|/|e1 + e2|), exact near 0, pi."""
     off, both = (_size([a + sign * b for a, b in zip(before, after, strict=True)]) for sign in (-1.0, 1.0))
     with np.errstate(divide="ignore", invalid="ignore"):  # folded back upon itself: arctan of infinity, half a turn
@@ -180,24 +370,16 @@ def bend(before: Vector, after: Vector) -> Any:
         return np.where(folded, np.pi, 2.0 * np.arctan(off / np.where(folded, 1.0, both)))
 
 
-def _size(parts: Sequence[Any]) -> Any:
-    return np.sqrt(parts[0] ** 2 + parts[1] ** 2 + parts[2] ** 2)
+def _size(parts: Point) -> Any:
+    return np.sqrt(dot(parts, parts))
 
 
-def _piece(start: Vector, end: Vector) -> tuple[Any, Vector]:
+def _piece(start: Point, end: Point) -> tuple[Any, Point]:
     """Length and direction of a straight piece; a piece of no length has no direction (nan)."""
-    parts = [b - a for a, b in zip(start, end, strict=True)]
+    parts = minus(end, start)
     length = _size(parts)
     with np.errstate(divide="ignore", invalid="ignore"):
-        x, y, z = (part / length for part in parts)
-    return length, (x, y, z)
-
-
-def _point(place: Any, found: Mapping[str, Any]) -> Vector:
-    if isinstance(place, str):
-        x, y, z = (found[f"{place}_{axis}"] for axis in AXES)
-        return x, y, z
-    return tuple(np.float64(x) for x in place)  # type: ignore[return-value]
+        return length, [part / length for part in parts]
 
 
 def _over(curve: TableCurve, phi: Any) -> Any:
@@ -205,72 +387,3 @@ def _over(curve: TableCurve, phi: Any) -> Any:
     if not np.iscomplexobj(phi):
         return curve(phi)
     return curve(phi.real) + 1j * phi.imag * curve.slope(phi.real)
-
-
-def thread_balance(name: str, table: Mapping[str, Any], members: Mapping[str, Member]) -> ThreadBalance:
-    """Relation of a user's table, checked.
-
-    Raises
-    ------
-    InputError
-        for an unknown key, point or member, fewer than two places, a number that is none, radii that are not as many as
-        bends.
-    """
-    where = f"machine.relations.{name}"
-    for key in table:
-        if key not in KEYS:
-            raise InputError(key, table[key], choices(key, KEYS), where)
-    path = tuple(_place(given, members, where) for given in table["thread"])
-    bends = _bends(path)
-    if bends is None:
-        raise InputError("thread", table["thread"], "points and take-ups in order, two points at least in a row", where)
-    stock, tension, stiffness = (_number(key, table.get(key, 0.0), where, key == "stock") for key in KEYS[1:4])
-    given = table.get("radius", 1.0)
-    radii = tuple(_number("radius", x, where) for x in (given if isinstance(given, tuple) else (given,) * bends))
-    if len(radii) != bends:
-        raise InputError("radius", given, f"one number, or one for each of the {bends} bends", where)
-    return ThreadBalance(name, path, stock, tension, stiffness, radii, _allowed(table.get("allowed"), where))
-
-
-def _bends(path: Sequence[Waypoint]) -> int | None:
-    """Count the bends along a path, take-ups and points between two others; None if no piece is straight."""
-    bends, row, pieces = 0, 0, 0
-    for place in path:
-        row = 0 if isinstance(place, TakeUp) else row + 1
-        bends += isinstance(place, TakeUp) or row > 2
-        pieces += row > 1
-    return bends if pieces else None
-
-
-def _place(given: Any, members: Mapping[str, Member], where: str) -> Waypoint:
-    if not isinstance(given, str):
-        return vector(given, f"{where}.thread")
-    if given in members:
-        path = members[given].family.find(ThreadPath)
-        if path is not None:
-            return TakeUp(given, f"{given}.{path.taken}", f"{given}.{path.wrap}")
-    points = [f"{m.name}.{point}" for m in members.values() for point in m.points]
-    if given not in points:
-        known = [*points, *(m.name for m in members.values() if m.family.find(ThreadPath) is not None)]
-        raise InputError("thread", given, f"points, take-ups: {choices(given, known)}", where)
-    return given
-
-
-def _number(key: str, given: Any, where: str, signed: bool = False) -> float:
-    if isinstance(given, bool) or not isinstance(given, int | float) or not np.isfinite(given):
-        raise InputError(key, given, "a finite number", where)
-    if given < 0.0 and not signed:
-        raise InputError(key, given, "a number that is not negative", where)
-    return float(given)
-
-
-def _allowed(given: Any, where: str) -> TableCurve | None:
-    if given is None:
-        return None
-    table = dict(given) if isinstance(given, tuple) else {}
-    if set(table) != {"phi", "values"}:
-        raise InputError("allowed", given, "phi [rad] and values: the most surplus over the turn", where)
-    try:
-        return table_curve(np.array(table["phi"], np.float64), np.array(table["values"], np.float64))
-    except (TypeError, ValueError) as error:
-        raise InputError("allowed", given, str(error), where) from None

@@ -236,7 +236,7 @@ def _machine(
     if threads is None or len(faults.lines) > before:
         return None
     try:
-        plain = {name: table for name, table in relations.items() if not {"event", "value"} & set(table)}
+        plain = {name: table for name, table in relations.items() if not _hangs_on_events(table)}
         outputs = (
             find_family(specification(members, plain, shafts, tools)).pose_output if len(plain) < len(relations) else {}
         )
@@ -263,6 +263,11 @@ def _machine(
 def _key_of_thread(error: InputError) -> str:
     """Report a fault of the path as one of its key in the file."""
     return "path" if error.name == "thread" or error.place.endswith(".thread") else error.name
+
+
+def _hangs_on_events(table: Mapping[str, Any]) -> bool:
+    """Tell whether a relation is one at an event, or a thread whose path changes at some."""
+    return bool({"event", "value", "feeding"} & set(table)) or any(isinstance(x, dict) for x in table.get("thread", ()))
 
 
 def _level(given: str | float, internal: str, name: str, faults: Faults) -> float:

@@ -74,5 +74,6 @@ def speeds(family: Family, speed: float | None) -> dict[str, float]:
         return {}
     if isinstance(family, Machine):
         ratios = {m.name: m.ratio for m in family.members}
-        return {p: speed * ratios[parts(p).member] for p in asking}
+        threads = [p.name for r in family.relations for p in r.parameters if p.unit == "speed"]
+        return {p: speed * ratios[parts(p).member] for p in asking} | dict.fromkeys(threads, speed)
     return dict.fromkeys(asking, speed)

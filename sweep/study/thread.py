@@ -11,11 +11,12 @@ from pydantic import Field, PlainValidator
 from sweep.study.file import Faults, Key, StudyFile
 from sweep.study.section import Number, Section, missing_keys, read_section
 
-PLACES = 'a list of places, as ["lever", ["10 mm", "0 mm", "40 mm"], "needle.point"]'
+PLACES = 'a list of places, as ["lever", ["10 mm", "0 mm", "40 mm"], "needle.point", { on = "low", held = ["a", "b"] }]'
+Events = Annotated[list[str], Field(min_length=2, max_length=2)]
 
 
-def _places(value: object) -> object:
-    if isinstance(value, list) and all(isinstance(x, str) or _is_point(x) for x in value):
+def _places(value: Any) -> Any:
+    if isinstance(value, list) and all(isinstance(x, str | dict) or _is_point(x) for x in value):
         return value
     raise ValueError("no places")
 
@@ -44,6 +45,18 @@ class AllowedTable(Section):
     unit: str | None = Field(None, description='a unit as a text, as "mm"')
 
 
+class PlaceTable(Section):
+    """A place of ``thread.<name>.path`` that counts between two events only, or has a bend of its own."""
+
+    required = ("on",)
+    on: Annotated[Any, PlainValidator(lambda value: _places([value])[0])] | None = Field(
+        None, description='a name or three lengths, as "low" or ["10 mm", "0 mm", "40 mm"]'
+    )
+    held: Events | None = Field(None, description='two events, as ["a", "cast"]: the thread runs over it between them')
+    wrap: str | None = Field(None, description='an angle by which it is bent there besides, as "152.2 deg"')
+    fixed: Events | None = Field(None, description="two events between which the thread does not slide there")
+
+
 class ThreadSection(Section):
     """Table ``thread.<name>``."""
 
@@ -56,6 +69,9 @@ class ThreadSection(Section):
         None, description='a length as a text, as "0.5 mm", or a list of one for each bend'
     )
     allowed: AllowedTable | None = Field(None, description='{ phi = [...], values = [...], unit = "mm" }')
+    sewn: str | None = Field(None, description='what a stitch takes, a length as a text, as "6 mm"')
+    feeding: Events | None = Field(None, description='two events, as ["feeds", "rests"]: it is sewn in between them')
+    drawing: Events | None = Field(None, description="two events between which it comes from the bobbin")
 
 
 def read_threads(file: StudyFile) -> dict[str, dict[str, Any]] | None:
@@ -76,7 +92,8 @@ def read_threads(file: StudyFile) -> dict[str, dict[str, Any]] | None:
 
 def _relation(section: ThreadSection, key: Key, faults: Faults) -> dict[str, Any]:
     found: dict[str, Any] = {"thread": [_place(x, (*key, "path", k), faults) for k, x in enumerate(section.path or [])]}
-    for name, internal in (("stock", "mm"), ("tension", "N"), ("stiffness", "N/mm")):
+    found |= section.model_dump(exclude_none=True, include={"feeding", "drawing"})
+    for name, internal in (("stock", "mm"), ("tension", "N"), ("stiffness", "N/mm"), ("sewn", "mm")):
         text = getattr(section, name)
         if text is not None:
             found[name] = faults.number(text, internal, (*key, name)) or 0.0
@@ -99,7 +116,13 @@ def _allowed(table: AllowedTable, key: Key, faults: Faults) -> dict[str, list[fl
     return columns
 
 
-def _place(given: str | Sequence[str], key: Key, faults: Faults) -> str | list[float]:
+def _place(given: str | Sequence[str] | dict[str, Any], key: Key, faults: Faults) -> str | list[float] | dict[str, Any]:
     if isinstance(given, str):
         return given
+    if isinstance(given, dict):
+        section = read_section(PlaceTable, given, key, faults)
+        found: dict[str, Any] = section.model_dump(exclude_none=True)
+        if section.wrap is not None:
+            found["wrap"] = faults.number(section.wrap, "rad", (*key, "wrap")) or 0.0
+        return found | {"on": _place(section.on or "", (*key, "on"), faults)}
     return [faults.number(text, "mm", (*key, k)) or 0.0 for k, text in enumerate(given)]

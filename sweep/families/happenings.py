@@ -1,0 +1,134 @@
+"""When events of a machine happen, as its pose outputs need it: the path of a thread changes there."""
+
+from __future__ import annotations
+
+from functools import partial
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from kernels.status import OK
+from kernels.types import Array
+from sweep.errors import InputError, choices
+from sweep.families.base import Angles, Event, of_family
+from sweep.families.crossings import SAMPLES, Poses
+from sweep.families.curve_features import Switches
+from sweep.families.moments import Taking
+from sweep.families.passages import passages
+from sweep.families.thread_balance import ThreadBalance
+from sweep.families.triangles import Entering, entries
+
+if TYPE_CHECKING:
+    from sweep.families.machines import Machine
+
+MOST = 65536  # designs whose events are remembered
+
+Happening = Event | Taking | Entering
+
+
+def happenings(machine: Machine) -> dict[str, Happening]:
+    """Return the events and moments at which paths of threads change, by name."""
+    every = _every(machine)
+    threads = [r for r in machine.relations if isinstance(r, ThreadBalance)]
+    return {name: every[name] for thread in threads for name in thread.happens if name in every}
+
+
+def check_happenings(machine: Machine) -> None:
+    """Refuse a thread whose path changes at something that is no event of the machine.
+
+    Raises
+    ------
+    InputError
+        that names the thread and the nearest right name.
+    """
+    every = _every(machine)
+    for thread in (r for r in machine.relations if isinstance(r, ThreadBalance)):
+        for name in thread.happens:
+            if name not in every:
+                place = f"machine.relations.{thread.name}"
+                raise InputError("thread", name, f"events and moments: {choices(name, every)}", place)
+
+
+def _every(machine: Machine) -> dict[str, Happening]:
+    found: dict[str, Happening] = {r.name: r for r in machine.relations if isinstance(r, Taking | Entering)}
+    return found | {event.name: event for event in machine.events}
+
+
+def event_angles(machine: Machine, designs: Array) -> tuple[dict[str, Any], NDArray[np.uint8]]:
+    """Return crank angles of the events by ``phi_NAME``, (n, 1), and status (n,); complex ones for complex designs.
+
+    Each design's are found once: a search asks for its poses many times.
+    """
+    known, events = _known(machine), happenings(machine)
+    columns = _columns(machine)
+    rows = [row.tobytes() for row in np.ascontiguousarray(designs[:, columns].real)]
+    new = {row: k for k, row in enumerate(rows) if row not in known}
+    if new:
+        if len(known) + len(new) > MOST:
+            known.clear()
+            new = {row: k for k, row in enumerate(rows)}
+        angles = _search(machine, events, np.ascontiguousarray(designs[list(new.values())].real))
+        known.update(zip(new, angles, strict=True))
+    table = np.array([known[row] for row in rows]).reshape(len(rows), len(events) + 1)
+    found: dict[str, Any] = {}
+    for k, (name, event) in enumerate(events.items()):
+        phi = table[:, [k]]
+        found[f"phi_{name}"] = phi if designs.dtype == np.float64 else phi + _shift(machine, event, designs, phi)
+    return found, table[:, -1].astype(np.uint8)
+
+
+def switches_of_events(machine: Machine) -> list[Switches]:
+    """Return where curves of threads have kinks and jumps."""
+    return [Switches(partial(_switches, machine))] if happenings(machine) else []
+
+
+def _switches(machine: Machine, designs: Array) -> Array:
+    found: Array = np.concatenate(list(event_angles(machine, designs)[0].values()), axis=1)
+    return found
+
+
+@of_family
+def _known(machine: Any) -> dict[bytes, Array]:
+    return {}
+
+
+@of_family
+def _columns(machine: Any) -> NDArray[np.intp]:
+    """Return the columns of the members that the events depend on."""
+    needs: set[str] = set()
+    for event in happenings(machine).values():
+        needs |= {event.of} if isinstance(event, Event) else event.needs(frozenset())
+        for relation in machine.relations if isinstance(event, Event) else ():
+            if event.of in {o.name for o in relation.outputs}:
+                needs |= relation.needs(frozenset())
+    names = {name.partition(".")[0] for name in needs}
+    for m in reversed(machine.members):
+        if m.name in names and m.driver is not None:
+            names.add(m.driver[0])
+    return np.flatnonzero([name.partition(".")[0] in names for name in machine.parameter_names])
+
+
+def _search(machine: Machine, events: dict[str, Happening], designs: Array) -> Array:
+    """Return the angles of each design, and the first status that is not OK, (n, k + 1)."""
+    poses = Poses(machine, machine.precise(), designs)
+    found, status = [], np.zeros(len(designs), np.uint8)
+    for name, event in events.items():
+        if isinstance(event, Event):
+            now, phi = poses.first(event.of, event.level, 1.0 if event.rising else -1.0)
+        else:
+            find: Any = passages if isinstance(event, Taking) else entries
+            columns = find(event, poses, SAMPLES, frozenset())
+            now, phi = columns["status"], columns[f"phi_{name}"]
+        status = np.where(status == OK, now, status)
+        found.append(phi)
+    return np.column_stack([*found, status])
+
+
+def _shift(machine: Machine, event: Happening, designs: Array, phi: Array) -> Any:
+    """Return by how much complex designs move a root, in the imaginary direction: -f_p/f' (implicit function)."""
+    name = event.of if isinstance(event, Event) else next(iter(event.rates))
+    step = 1e-100
+    slope = machine.poses(designs.real, Angles.of(phi + 1j * step), frozenset({name}))[name].imag / step
+    across = machine.poses(designs, Angles.of(phi), frozenset({name}))[name].imag
+    return -1j * across / slope

@@ -1,0 +1,216 @@
+"""A take-up for the thread that a stitch demands: the smoothest law within the slack, and the edge of a cam for it.
+
+The equation numbers are those of docs/takeup.md, section 9.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from kernels.types import Array
+from sweep.errors import InputError
+from sweep.evaluation.tables import numbers
+
+if TYPE_CHECKING:
+    import pandas as pd
+    from numpy.typing import ArrayLike
+
+DIRECTIONS = 720  # around the straight thread, in which the edge is looked for
+ROUNDS = 20  # of Newton's method from there
+TIGHT = 1e-9  # of the slack: below it a law counts as one within
+
+
+@dataclass(frozen=True)
+class ThreadLaw:
+    """What a take-up takes up, P = sum of cos[k - 1] cos(k phi) + sin[k - 1] sin(k phi), and the stock beside it.
+
+    ``largest`` is the largest magnitude of P''; ``spare`` the least distance of the surplus from its two bounds.
+    """
+
+    cos: Array
+    sin: Array
+    stock: float
+    largest: float
+    spare: float
+
+    def __call__(self, phi: ArrayLike, order: int = 0) -> Array:
+        """Return P or a derivative of it."""
+        found: Array = _waves(np.asarray(phi, np.float64), len(self.cos), order) @ np.concatenate([self.cos, self.sin])
+        return found
+
+    @property
+    def coefficients(self) -> dict[str, float]:
+        """The same for the family `guided_cam`."""
+        pairs = (("A", self.cos), ("B", self.sin))
+        return {f"{letter}{k}": float(x) for letter, values in pairs for k, x in enumerate(values, start=1)}
+
+
+def smoothest_law(phi: ArrayLike, demand: ArrayLike, allowed: ArrayLike, harmonics: int = 6) -> ThreadLaw:
+    """Find the law with the least acceleration whose surplus stays between 0 and what is allowed; a linear program.
+
+    Parameters
+    ----------
+    phi : (n,) angles of the main shaft [rad]; where the demand jumps one just before and one just behind
+    demand : (n,) thread that the stitch demands there
+    allowed : most surplus, (n,) or one number
+    harmonics : of the law
+
+    Returns
+    -------
+    ThreadLaw
+        given = stock - P lies between demand and demand + allowed at every angle
+
+    Raises
+    ------
+    InputError
+        if no law of so many harmonics does: it says by how much the slack is too small.
+    """
+    from scipy.optimize import linprog
+
+    at, need = numbers(phi, "phi", "phi").ravel(), numbers(demand, "demand", "demand").ravel()
+    slack = np.broadcast_to(numbers(allowed, "allowed", "allowed"), need.shape)
+    if at.shape != need.shape:
+        raise InputError("demand", f"{need.size} values", f"as many as phi, {at.size}", "thread law")
+    waves, curving = _waves(at, harmonics, 0), _waves(at, harmonics, 2)
+    one, none = np.ones((at.size, 1)), np.zeros((at.size, 1))
+    # unknowns: the coefficients, the stock, the largest |P''|, and by how much the slack is exceeded
+    rows = np.block(
+        [
+            [waves, -one, none, none],
+            [-waves, one, none, -one],
+            [curving, none, -one, none],
+            [-curving, none, -one, none],
+        ]
+    )
+    right = np.concatenate([-need, need + slack, np.zeros(2 * at.size)])
+    free = 2 * harmonics + 1
+    for goal, most in ((free + 1, None), (free, 0.0)):
+        cost = np.zeros(free + 2)
+        cost[goal] = 1.0
+        found = linprog(cost, rows, right, bounds=[(None, None)] * free + [(0.0, None), (0.0, most)])
+        if most is None and found.x[-1] > TIGHT * max(float(slack.max()), 1e-3):
+            words = f"{found.x[-1]:.4g} more, or more than {harmonics} harmonics"
+            raise InputError("allowed", float(slack.min()), words, "thread law")
+    x = found.x
+    surplus = x[free - 1] - waves @ x[: free - 1] - need
+    spare = float(np.minimum(surplus, slack - surplus).min())
+    return ThreadLaw(x[:harmonics], x[harmonics : 2 * harmonics], float(x[free - 1]), float(x[free]), spare)
+
+
+def cam_edge(law: ThreadLaw, guides: ArrayLike, P_h: float, count: int = 360) -> pd.DataFrame:
+    """Find the bare edge of a cam, turning with the main shaft, over which a thread between two guides follows a law.
+
+    The edge is the envelope of the ovals on which the thread is as long as it has to be, (30): it touches each where
+    the thread lies then.
+
+    Parameters
+    ----------
+    law : what is to be taken up
+    guides : (2, 3), on either side of the plane z = 0 of the cam, whose axis is z [length]
+    P_h : length of the thread at P = 0
+    count : of points, at even angles of the cam
+
+    Returns
+    -------
+    DataFrame
+        ``phi``, ``x``, ``y`` of the edge in the axes of the cam, its outward normal ``nx``, ``ny``, ``curvature``
+        (positive where it is convex), and ``clear``: by how much the thread would be longer over any other point of
+        the edge that is at least a hundredth of a turn away.  ``attrs["units"]`` names the units
+
+    Raises
+    ------
+    InputError
+        where the thread is too short, no edge gives the law, or the edge would cut into itself, with the angle.
+    """
+    import pandas as pd
+
+    ends = numbers(guides, "guides", "guides").reshape(2, 3)
+    if not ends[0, 2] * ends[1, 2] < 0.0:
+        raise InputError("guides", ends[:, 2].tolist(), "one on either side of the plane z = 0 of the cam", "cam edge")
+    phi = np.arange(count) * (2.0 * np.pi / count)
+    length, rate, bend = P_h + law(phi), law(phi, 1), law(phi, 2)
+    q = _touched(ends, length, rate, phi)
+    _, g, h = _way(ends, q)
+    swept = np.stack([-q[:, 1], q[:, 0]], axis=1)  # a point of the cam moves so
+    across = np.einsum("nij,nj->ni", h, swept) + np.stack([g[:, 1], -g[:, 0]], axis=1)
+    moves = np.linalg.solve(np.stack([g, across], axis=1), np.stack([rate, bend], axis=1)[..., None])[..., 0]
+    size = np.hypot(g[:, 0], g[:, 1])
+    normal = g / size[:, None]
+    along = normal[:, 0] * (moves - swept)[:, 1] - normal[:, 1] * (moves - swept)[:, 0]
+    turning = np.einsum("ni,nij,nj->n", np.stack([-g[:, 1], g[:, 0]], axis=1), h, moves) / size**2 - 1.0
+    _refuse(along >= 0.0, phi, "a law, guides or P_h for which the edge does not cut into itself")
+    cos, sin = np.cos(phi), np.sin(phi)
+    x, y = q[:, 0] * cos + q[:, 1] * sin, q[:, 1] * cos - q[:, 0] * sin
+    nx, ny = normal[:, 0] * cos + normal[:, 1] * sin, normal[:, 1] * cos - normal[:, 0] * sin
+    # over each point of the edge at each angle; a hundredth of a turn aside it has to be longer
+    placed = np.stack([np.outer(cos, x) - np.outer(sin, y), np.outer(sin, x) + np.outer(cos, y)], axis=2)
+    longer = _way(ends, placed.reshape(-1, 2))[0].reshape(count, count) - length[:, None]
+    apart = np.abs((np.arange(count) - np.arange(count)[:, None] + count // 2) % count - count // 2)
+    clear = np.where(apart * 100 >= count, longer, np.inf).min(axis=1)
+    _refuse(clear < 0.0, phi, "an edge that touches the thread at one place alone")
+    found = pd.DataFrame({"phi": phi, "x": x, "y": y, "nx": nx, "ny": ny, "curvature": turning / along, "clear": clear})
+    found.attrs["units"] = {"phi": "rad", "curvature": "1/length"} | dict.fromkeys(("x", "y", "clear"), "length")
+    return found
+
+
+def _waves(phi: Array, harmonics: int, order: int) -> Array:
+    """Return cos(k phi), then sin(k phi), or their derivatives, (..., 2 harmonics)."""
+    k = np.arange(1, harmonics + 1)
+    angle = phi[..., None] * k + 0.5 * np.pi * order
+    found: Array = np.concatenate([np.cos(angle), np.sin(angle)], axis=-1) * np.tile(k.astype(np.float64), 2) ** order
+    return found
+
+
+def _way(ends: Array, q: Array) -> tuple[Array, Array, Array]:
+    """Return the length over points (n, 2) of the cam's plane, its gradient (n, 2) and second derivatives (n, 2, 2)."""
+    length, g, h = np.zeros(len(q)), np.zeros((len(q), 2)), np.zeros((len(q), 2, 2))
+    for end in ends:
+        d = q - end[:2]
+        r = np.sqrt((d**2).sum(axis=1) + end[2] ** 2)
+        u = d / r[:, None]
+        length, g = length + r, g + u
+        h += (np.eye(2) - u[:, :, None] * u[:, None, :]) / r[:, None, None]
+    return length, g, h
+
+
+def _touched(ends: Array, length: Array, rate: Array, phi: Array) -> Array:
+    """Return where the edge touches each oval, (n, 2): of all such places the farthest from the axis of the cam.
+
+    A first guess is looked for around where the straight thread passes the plane, then closed by Newton's method.
+    """
+    share = ends[0, 2] / (ends[0, 2] - ends[1, 2])
+    centre = ends[0] + share * (ends[1] - ends[0])
+    _refuse(
+        length <= np.linalg.norm(ends[1] - ends[0]), phi, "a P_h for which the thread is longer than a straight one"
+    )
+    t = np.arange(DIRECTIONS) * (2.0 * np.pi / DIRECTIONS)
+    e = np.stack([np.cos(t), np.sin(t), 0.0 * t], axis=1)
+    # on the ray from the centre c: |p - n1|^2 = ((L^2 + |p - n1|^2 - |p - n2|^2)/(2 L))^2, a quadratic equation
+    off = centre - ends[0]
+    squares = (ends[1] @ ends[1] - ends[0] @ ends[0]) * -0.5 + centre @ (ends[1] - ends[0])
+    base = (length**2 + 2.0 * squares) / (2.0 * length)
+    slope = (e @ (ends[1] - ends[0]))[None] / length[:, None]
+    a, b = 1.0 - slope**2, e @ off - base[:, None] * slope
+    reach = (np.sqrt(b * b - a * (off @ off - base**2)[:, None]) - b) / a
+    q = centre[:2] + reach[..., None] * e[:, :2]
+    g = _way(ends, q.reshape(-1, 2))[1].reshape(q.shape)
+    left = g[..., 1] * q[..., 0] - g[..., 0] * q[..., 1] - rate[:, None]
+    changes = left * np.roll(left, -1, axis=1) <= 0.0
+    _refuse(~changes.any(axis=1), phi, "a law that an edge can give: P changes too fast for these guides")
+    far = np.where(changes, np.hypot(q[..., 0], q[..., 1]), -np.inf).argmax(axis=1)
+    found: Array = q[np.arange(len(q)), far]
+    for _ in range(ROUNDS):
+        total, g, h = _way(ends, found)
+        swept = np.stack([-found[:, 1], found[:, 0]], axis=1)
+        across = np.einsum("nij,nj->ni", h, swept) + np.stack([g[:, 1], -g[:, 0]], axis=1)
+        errors = np.stack([total - length, (g * swept).sum(axis=1) - rate], axis=1)
+        found = found - np.linalg.solve(np.stack([g, across], axis=1), errors[..., None])[..., 0]
+    return found
+
+
+def _refuse(where: Array, phi: Array, allowed: str) -> None:
+    if where.any():
+        raise InputError("phi", float(phi[where.argmax()]), allowed, "cam edge")
