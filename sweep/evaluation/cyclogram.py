@@ -97,7 +97,7 @@ def _strokes(poses: Poses, family: Family, member: str, name: str, dwell: float)
     whole = np.unwrap(values[0]) if wraps else values[0]
     if status[0] or (wraps and abs(whole[-1] - whole[0]) > np.pi):
         return
-    ends = np.sort(poses.turning(slope, rate).phi % TWO_PI)
+    ends = np.sort(poses.turning(rate, slope).phi % TWO_PI)
     if ends.size < 2:
         return
     exact = poses.at(np.zeros(ends.size, np.intp), ends, name)[0]

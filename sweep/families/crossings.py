@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -20,6 +20,9 @@ SAMPLES = 512
 BLOCK = 256  # designs at once: their samples stay in the caches
 TANGENT = 64.0 * 2.0**-53  # of the coordinates that a distance is a difference of
 ROUNDING: Any = {"xatol": 4.0 * EPS * TWO_PI, "xrtol": 0.0}  # of a root that is closed
+
+NEAR = 1e-3  # of a sample's step: a polynomial that is so near is trusted in its slope
+LAGRANGE = np.array([-120.0, 24.0, -12.0, 12.0, -24.0, 120.0])  # products of the differences of -2 ... 3
 
 Passages = Callable[["Poses", int, frozenset[str]], Columns]
 
@@ -61,6 +64,7 @@ class Poses:
     quick: Family
     precise: Family
     designs: Array
+    sampled: dict[tuple[str, int], tuple[NDArray[np.uint8], Array]] = field(default_factory=dict)
 
     def at(self, rows: Any, phi: Array, *names: str) -> list[Array]:
         """Return outputs of these designs at these angles, (k,) or (k, m) as the angles are."""
@@ -77,31 +81,42 @@ class Poses:
 
     def samples(self, names: Sequence[str], count: int) -> tuple[NDArray[np.uint8], list[Array]]:
         """Return status (n,), and samples (n, count) of outputs over the turn; nan without status 0."""
-        grid: Array = np.arange(count) * np.float64(TWO_PI / count)
-        found = self.quick.poses(self.designs, Angles.of(grid[None, :]), frozenset(names))
-        status = np.asarray(found["status"], np.uint8).max(axis=1, initial=0)
-        status[status == st.NOT_ASSEMBLED] = st.NOT_ROTATABLE
-        good = (status == st.OK)[:, None]
-        return status, [np.where(good, np.asarray(found[name], np.float64), np.nan) for name in names]
+        new = [name for name in names if (name, count) not in self.sampled]
+        if new:
+            grid: Array = np.arange(count) * np.float64(TWO_PI / count)
+            found = self.quick.poses(self.designs, Angles.of(grid[None, :]), frozenset(new))
+            status = np.asarray(found["status"], np.uint8).max(axis=1, initial=0)
+            status[status == st.NOT_ASSEMBLED] = st.NOT_ROTATABLE
+            good = (status == st.OK)[:, None]
+            for name in new:
+                self.sampled[name, count] = status, np.where(good, np.asarray(found[name], np.float64), np.nan)
+        kept = [self.sampled[name, count] for name in names]
+        return np.maximum.reduce([status for status, _ in kept]), [values for _, values in kept]
 
-    def turning(self, slope: Array, name: str) -> Found:
-        """Return where samples (n, m) of a derivative change their sign, as roots of the output of that name."""
+    def turning(self, rate: str, slope: Array) -> Found:
+        """Return where samples (n, m) of an output, a derivative, change their sign, closed to its roots."""
         after = np.roll(slope, -1, axis=1)
         row, column = np.nonzero((slope > 0.0) & (after <= 0.0) | (slope < 0.0) & (after >= 0.0))
         step = TWO_PI / slope.shape[1]
-        return Found(row, self._root(row, column * step, (column + 1) * step, name))
+        return Found(row, self._root(row, column * step, (column + 1) * step, rate, slope))
 
-    def roots(self, extremes: Found, values: Array, name: str, rate: str) -> Found:
-        """Return the zeros between neighbouring extremes of opposite sign, of each design in order.
+    def roots(self, extremes: Found, at_extremes: Array, name: str, rate: str, values: Array) -> Found:
+        """Return the zeros of an output, of each design in order: between neighbours of opposite sign.
 
-        Each is closed to rounding, and polished by a step of Newton on precise poses.
+        Neighbours are samples (n, m) and extremes: two zeros between samples have an extreme between them.  Each is
+        closed to rounding, and polished by a step of Newton on precise poses.
         """
-        order = np.lexsort((extremes.phi, extremes.row))
-        ordered, value = extremes.take(order), values[order]
-        left, right, after = _neighbours(ordered)
-        k = np.flatnonzero(value * value[after] < 0.0)
-        row = ordered.row[k]
-        found = self._root(row, left[k], right[k], name)
+        n, count = values.shape
+        grid = np.arange(count) * (TWO_PI / count)
+        row = np.concatenate([np.repeat(np.arange(n), count), extremes.row])
+        phi = np.concatenate([np.tile(grid, n), extremes.phi])
+        height = np.concatenate([values.ravel(), at_extremes])
+        order = np.lexsort((phi, row))
+        nodes, height = Found(row, phi).take(order), height[order]
+        left, right, after = _neighbours(nodes)
+        k = np.flatnonzero((height < 0.0) & (height[after] >= 0.0) | (height > 0.0) & (height[after] <= 0.0))
+        row = nodes.row[k]
+        found = self._root(row, left[k], right[k], name, values)
         x, slope = self.at(row, found, name, rate)
         with np.errstate(divide="ignore", invalid="ignore"):
             polished = found - x / slope
@@ -115,22 +130,35 @@ class Poses:
         passes = (off < 0.0) & (np.roll(off, -1, axis=1) >= 0.0)
         row = np.flatnonzero(passes.any(axis=1))
         start = passes[row].argmax(axis=1) * (TWO_PI / SAMPLES)
-        found = whole(len(off), row, self._root(row, start, start + TWO_PI / SAMPLES, name, level))
+        found = whole(len(off), row, self._root(row, start, start + TWO_PI / SAMPLES, name, values, level))
         return np.where((status == st.OK) & np.isnan(found), st.NO_EVENT, status).astype(np.uint8), found
 
-    def _root(self, row: NDArray[np.intp], left: Array, right: Array, name: str, level: float = 0.0) -> Array:
-        """Return a place in each bracket where an output passes a level."""
-        from scipy.optimize.elementwise import find_root
+    def _root(
+        self, row: NDArray[np.intp], left: Array, right: Array, name: str, values: Array, level: float = 0.0
+    ) -> Array:
+        """Return a place in each bracket where an output passes a level.
 
+        It is found on polynomials through samples (n, m), then closed by one step on poses; where that step is not
+        small the curve is no such polynomial, and poses alone tell.
+        """
         if not row.size:
             return np.zeros(0)
-        of: Any = lambda phi, rows: self.near(rows.astype(np.intp), phi, name) - level  # noqa: E731
-        args: Any = (row,)
-        ends = np.asarray(left, np.float64), np.asarray(right, np.float64)
-        found = find_root(of, ends, args=args, tolerances=ROUNDING)
-        # A root within rounding of an end of its bracket may leave no change of sign: that end is the root then.
-        (first, last), (low, high) = found.bracket, found.f_bracket
-        return np.asarray(np.where(found.success, found.x, np.where(np.abs(low) < np.abs(high), first, last)))
+        step = TWO_PI / values.shape[1]
+        local = _local(values, row, np.floor((0.5 * (left + right)) / step).astype(np.intp)) - level
+        cell = np.floor(0.5 * (left + right) / step) * step
+        on_samples: Any = lambda phi, k: _polynomial(local[k.astype(np.intp)], (phi - cell[k.astype(np.intp)]) / step)  # noqa: E731
+        every: Any = np.arange(row.size)
+        guess = _bracketed(on_samples, left, right, every)
+        height = self.near(row, guess, name) - level
+        slope = _polynomial(local, (guess - cell) / step + 1e-4) - _polynomial(local, (guess - cell) / step - 1e-4)
+        with np.errstate(divide="ignore", invalid="ignore"):
+            better = guess - height * (2e-4 * step) / slope
+        close = (np.abs(better - guess) <= NEAR * step) & (better >= left) & (better <= right)
+        rest = np.flatnonzero(~close)
+        if rest.size:
+            of: Any = lambda phi, rows: self.near(rows.astype(np.intp), phi, name) - level  # noqa: E731
+            better[rest] = _bracketed(of, left[rest], right[rest], row[rest])
+        return np.asarray(better, np.float64)
 
     def least(self, row: NDArray[np.intp], start: Array, end: Array, name: str, samples: int = 64) -> Array:
         """Return the least value of an output between two angles of each of these designs, (k,)."""
@@ -150,6 +178,31 @@ class Poses:
             phi = np.clip(np.asarray(found.x, np.float64), start[k], end[k])
             np.minimum.at(least, k, self.at(row[k], phi, name)[0])
         return least
+
+
+def _bracketed(of: Any, left: Array, right: Array, which: NDArray[np.intp]) -> Array:
+    """Return a root of a function of angles and rows in each bracket, to rounding."""
+    from scipy.optimize.elementwise import find_root
+
+    args: Any = (which,)
+    found = find_root(of, (np.asarray(left, np.float64), np.asarray(right, np.float64)), args=args, tolerances=ROUNDING)
+    # A root within rounding of an end of its bracket may leave no change of sign: that end is the root then.
+    (first, last), (low, high) = found.bracket, found.f_bracket
+    return np.asarray(np.where(found.success, found.x, np.where(np.abs(low) < np.abs(high), first, last)))
+
+
+def _local(values: Array, row: NDArray[np.intp], column: NDArray[np.intp]) -> Array:
+    """Return the six samples about each cell, (k, 6)."""
+    found: Array = values[row[:, None], (column[:, None] + np.arange(-2, 4)) % values.shape[1]]
+    return found
+
+
+def _polynomial(samples: Array, t: Array) -> Array:
+    """Evaluate the polynomials of degree five through samples (k, 6) at -2 ... 3 (Lagrange)."""
+    away = t[:, None] - np.arange(-2, 4)
+    others = [np.delete(away, k, axis=1).prod(axis=1) for k in range(6)]
+    found: Array = (np.stack(others, axis=1) / LAGRANGE * samples).sum(axis=1)
+    return found
 
 
 def _neighbours(ordered: Found) -> tuple[Array, Array, NDArray[np.intp]]:

@@ -98,10 +98,9 @@ def _columns(machine: Any) -> NDArray[np.intp]:
     """Return the columns of the members that the events depend on."""
     needs: set[str] = set()
     for event in happenings(machine).values():
-        needs |= {event.of} if isinstance(event, Event) else event.needs(frozenset())
-        for relation in machine.relations if isinstance(event, Event) else ():
-            if event.of in {o.name for o in relation.outputs}:
-                needs |= relation.needs(frozenset())
+        of = {event.of} if isinstance(event, Event) else set(event.rates)
+        made = [r.needs(frozenset(of)) for r in machine.relations if not of.isdisjoint(o.name for o in r.outputs)]
+        needs |= of.union(*made)
     names = {name.partition(".")[0] for name in needs}
     for m in reversed(machine.members):
         if m.name in names and m.driver is not None:
@@ -113,6 +112,10 @@ def _search(machine: Machine, events: dict[str, Happening], designs: Array) -> A
     """Return the angles of each design, and the first status that is not OK, (n, k + 1)."""
     poses = Poses(machine, machine.precise(), designs)
     found, status = [], np.zeros(len(designs), np.uint8)
+    names = [
+        {event.of} if isinstance(event, Event) else {*event.rates, *event.rates.values()} for event in events.values()
+    ]
+    poses.samples(sorted(set().union(*names)), SAMPLES)  # at once
     for name, event in events.items():
         if isinstance(event, Event):
             now, phi = poses.first(event.of, event.level, 1.0 if event.rising else -1.0)
@@ -129,6 +132,7 @@ def _shift(machine: Machine, event: Happening, designs: Array, phi: Array) -> An
     """Return by how much complex designs move a root, in the imaginary direction: -f_p/f' (implicit function)."""
     name = event.of if isinstance(event, Event) else next(iter(event.rates))
     step = 1e-100
-    slope = machine.poses(designs.real, Angles.of(phi + 1j * step), frozenset({name}))[name].imag / step
+    ahead: Any = phi + 1j * step
+    slope = machine.poses(designs.real, Angles.of(ahead), frozenset({name}))[name].imag / step
     across = machine.poses(designs, Angles.of(phi), frozenset({name}))[name].imag
     return -1j * across / slope

@@ -206,7 +206,7 @@ class Member:
         prefix = f"{self.name}."
         return name.removeprefix(prefix) if name.startswith(prefix) else ""
 
-    @property
+    @cached_property
     def added(self) -> tuple[Parameter, ...]:
         """Its parameters beside those of its family: phase and place, tip, eye."""
         place = [

@@ -52,14 +52,15 @@ def passages(taking: Taking, poses: Poses, samples: int, wanted: frozenset[str])
     """
     name, sense, n = taking.name, float(taking.sense), len(poses.designs)
     at = _Tip(taking, poses)
-    status, (dx, ddepth) = poses.samples([f"{name}_dacross", f"{name}_ddepth"], samples)
+    names = [f"{name}_{what}" for what in ("across", "dacross", "ddepth")]
+    status, (x, dx, ddepth) = poses.samples(names, samples)
     status[(status == st.OK) & np.isnan(dx).any(axis=1)] = st.NO_FRAME
-    dx, ddepth = (np.where((status == st.OK)[:, None], slope, np.nan) for slope in (dx, ddepth))
+    x, dx, ddepth = (np.where((status == st.OK)[:, None], values, np.nan) for values in (x, dx, ddepth))
     good = status == st.OK
-    stops, extremes = poses.turning(ddepth, f"{name}_ddepth"), poses.turning(dx, f"{name}_dacross")
+    stops, extremes = poses.turning(names[2], ddepth), poses.turning(names[1], dx)
     (depths,), (across,) = at(stops, "depth"), at(extremes, "across")
     deepest = largest(stops.row, depths, n)
-    roots = poses.roots(extremes, across, f"{name}_across", f"{name}_dacross")
+    roots = poses.roots(extremes, across, names[0], names[1], x)
     side, height, turned, depth, speed = at(roots, "side", "height", "dacross", "depth", "speed")
     beside, right = taking.beside(height), sense * turned > 0.0
     count, ways = (np.bincount(roots.row, beside & one, n) for one in (right, ~right))

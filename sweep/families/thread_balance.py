@@ -202,7 +202,9 @@ class ThreadBalance:
     def compute(self, found: Mapping[str, Any], frames: Mapping[str, Frame], wanted: frozenset[str]) -> dict[str, Any]:
         """Return the outputs, (n, m); ``found`` has the main shaft's angle and events as "phi...", and parameters."""
         phi, (moving, bent) = found[PHI], self._asked(wanted)
-        needed, rate, taken, wraps, run = 0.0 * phi, 0.0 * phi, 0.0 * phi, [], []
+        needed, rate, taken = 0.0 * phi, 0.0 * phi, 0.0 * phi
+        wraps: list[tuple[Waypoint, Any, _Piece]] = []
+        run: list[Waypoint] = []
         for place in (*self.path, None):
             if place is not None and not isinstance(place.on, TakeUp):
                 run.append(place)
@@ -212,7 +214,7 @@ class ThreadBalance:
                 length, change, bends = _followed(pieces, moving, bent)
                 needed, rate = needed + length, rate + change
                 wraps += zip(run[1:-1], bends, pieces[1:-1], strict=True) if bent else ()
-            if place is not None:
+            if place is not None and isinstance(place.on, TakeUp):
                 taken = taken + found[place.on.taken]
                 wraps += [(place, found[place.on.wrap], _Piece((), (), None))] if bent else []
             run = []

@@ -114,12 +114,12 @@ def entries(entering: Entering, poses: Poses, samples: int, wanted: frozenset[st
     """Return all outputs of the entry, each (n,), and status; found as the passage of a needle is."""
     name, sense, n = entering.name, float(entering.sense), len(poses.designs)
     above, dabove = f"{name}_above", f"{name}_dabove"
-    status, (slope,) = poses.samples([dabove], samples)
+    status, (x, slope) = poses.samples([above, dabove], samples)
     status[(status == st.OK) & np.isnan(slope).any(axis=1)] = st.NO_TRIANGLE
-    slope = np.where((status == st.OK)[:, None], slope, np.nan)
-    extremes = poses.turning(slope, dabove)
+    x, slope = (np.where((status == st.OK)[:, None], values, np.nan) for values in (x, slope))
+    extremes = poses.turning(dabove, slope)
     (heights,) = poses.at(extremes.row, extremes.phi, above)
-    roots = poses.roots(extremes, heights, above, dabove)
+    roots = poses.roots(extremes, heights, above, dabove, x)
     reads = [dabove, *(f"{name}_to_{side}" for side in ("blade", "thread", "seam"))]
     turned, *distances = poses.at(roots.row, roots.phi, *reads)
     inside, right = _within(entering, roots.phi), sense * turned > 0.0

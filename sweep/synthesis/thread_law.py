@@ -6,7 +6,7 @@ The equation numbers are those of docs/takeup.md, section 9.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -16,7 +16,7 @@ from sweep.evaluation.tables import numbers
 
 if TYPE_CHECKING:
     import pandas as pd
-    from numpy.typing import ArrayLike
+    from numpy.typing import ArrayLike, NDArray
 
 DIRECTIONS = 720  # around the straight thread, in which the edge is looked for
 ROUNDS = 20  # of Newton's method from there
@@ -90,7 +90,7 @@ def smoothest_law(phi: ArrayLike, demand: ArrayLike, allowed: ArrayLike, harmoni
     for goal, most in ((free + 1, None), (free, 0.0)):
         cost = np.zeros(free + 2)
         cost[goal] = 1.0
-        found = linprog(cost, rows, right, bounds=[(None, None)] * free + [(0.0, None), (0.0, most)])
+        found: Any = linprog(cost, rows, right, bounds=[(None, None)] * free + [(0.0, None), (0.0, most)])
         if most is None and found.x[-1] > TIGHT * max(float(slack.max()), 1e-3):
             words = f"{found.x[-1]:.4g} more, or more than {harmonics} harmonics"
             raise InputError("allowed", float(slack.min()), words, "thread law")
@@ -130,7 +130,7 @@ def cam_edge(law: ThreadLaw, guides: ArrayLike, P_h: float, count: int = 360) ->
     ends = numbers(guides, "guides", "guides").reshape(2, 3)
     if not ends[0, 2] * ends[1, 2] < 0.0:
         raise InputError("guides", ends[:, 2].tolist(), "one on either side of the plane z = 0 of the cam", "cam edge")
-    phi = np.arange(count) * (2.0 * np.pi / count)
+    phi: Array = np.arange(count) * np.float64(2.0 * np.pi / count)
     length, rate, bend = P_h + law(phi), law(phi, 1), law(phi, 2)
     q = _touched(ends, length, rate, phi)
     _, g, h = _way(ends, q)
@@ -211,6 +211,6 @@ def _touched(ends: Array, length: Array, rate: Array, phi: Array) -> Array:
     return found
 
 
-def _refuse(where: Array, phi: Array, allowed: str) -> None:
+def _refuse(where: NDArray[np.bool_], phi: Array, allowed: str) -> None:
     if where.any():
         raise InputError("phi", float(phi[where.argmax()]), allowed, "cam edge")

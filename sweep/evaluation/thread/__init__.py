@@ -9,6 +9,7 @@ numbers).  A missing or misspelt column, a value that is no number, or a sign th
 """
 
 from sweep.errors import MeasuredRangeWarning as MeasuredRangeWarning
+from sweep.evaluation.thread.diagram import diagram as diagram
 from sweep.evaluation.thread.geometry import eyelet as eyelet
 from sweep.evaluation.thread.geometry import feed as feed
 from sweep.evaluation.thread.geometry import follower as follower
@@ -21,6 +22,6 @@ from sweep.evaluation.thread.tension import path as path
 from sweep.evaluation.thread.tension import speed as speed
 
 __all__ = [
-    "MeasuredRangeWarning", "capstan", "contour", "eyelet", "feed", "follower", "free_cam", "least_tension_radius",
-    "path", "speed", "wrap",
+    "MeasuredRangeWarning", "capstan", "contour", "diagram", "eyelet", "feed", "follower", "free_cam",
+    "least_tension_radius", "path", "speed", "wrap",
 ]  # fmt: skip

@@ -1,0 +1,77 @@
+"""The diagram P(phi) of every thread of a machine over one turn, and their sum; docs/thread.md, section 7."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from kernels.types import TWO_PI
+from sweep.errors import InputError
+from sweep.evaluation.angles import AngleUnit, in_radians
+from sweep.evaluation.poses import evaluate
+from sweep.evaluation.tables import design_matrix
+from sweep.evaluation.thread.rows import warn_outside
+from sweep.families import Mechanism
+from sweep.families import family as find_family
+from sweep.families.curve_features import switches
+from sweep.families.thread_balance import MEASURED_SPEED, MM_PER_M, ThreadBalance
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+    from sweep.evaluation.tables import Table
+
+BESIDE = 1e-9  # rad, from an event to the angles just before and behind it
+COLUMNS = ("demand", "given", "surplus", "tension", "velocity")
+
+
+def diagram(
+    mechanism: Mechanism, design: Table, *, samples: int = 720, angles: AngleUnit | None = None
+) -> pd.DataFrame:
+    """Return what every thread demands over one turn, what it is given, and how it pulls.
+
+    Parameters
+    ----------
+    mechanism, design : a machine with threads, and one design of it
+    samples : even angles of the turn, beside those just before and behind every event of a thread
+    angles : the unit of the angles of ``design``, "rad" or "deg", as of :func:`sweep.evaluate`
+
+    Returns
+    -------
+    DataFrame
+        ``phi`` [rad]; of each thread ``NAME_demand``, ``NAME_given``, ``NAME_surplus`` [length], ``NAME_tension``
+        [force] and, where the velocities of all its points are known, ``NAME_velocity`` [length/s]; ``demand``, the
+        sum of all; ``status``
+
+    Raises
+    ------
+    InputError
+        for a mechanism without threads, or several designs.
+
+    Warns
+    -----
+    MeasuredRangeWarning
+        where a thread is faster than the 7.4 m/s up to which the law of speed was measured (lengths in mm)
+    """
+    family = find_family(mechanism)
+    threads = [r for r in getattr(family, "relations", ()) if isinstance(r, ThreadBalance)]
+    if not threads:
+        raise InputError("mechanism", family.name, "a machine with threads", "thread diagram")
+    given = in_radians(family, design, angles)
+    matrix = design_matrix(family, given)[0]
+    if len(matrix) != 1:
+        raise InputError("design", "several rows", "the parameters of one design", f"table of {family.name}")
+    events = switches(family, matrix)[0]
+    turn = np.arange(samples) * (TWO_PI / samples)
+    phi = np.unique(np.mod(np.concatenate([turn, events - BESIDE, events + BESIDE]), TWO_PI))
+    known = {o.name for thread in threads for o in thread.outputs}
+    wanted = [name for t in threads for name in (f"{t.name}_{key}" for key in COLUMNS) if name in known]
+    found = evaluate(family, given, wanted, phi=phi).drop(columns="design")
+    found["demand"] = sum(found[f"{t.name}_demand"] for t in threads)
+    for name in (name for name in wanted if name.endswith("_velocity")):
+        speeds = np.abs(found[name].to_numpy(np.float64)) / MM_PER_M
+        warn_outside(
+            speeds, MEASURED_SPEED._replace(low=0.0, name=f"speed of {name.removesuffix('_velocity')}"), (), {}
+        )
+    return found
