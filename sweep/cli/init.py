@@ -17,7 +17,10 @@ from sweep.errors import InputError, StoreError
 from sweep.exchange.points import drawn
 from sweep.families import family as find_family
 from sweep.families.machines import Machine
+from sweep.study.by_member import studies_of_members
+from sweep.study.load import load_study
 from sweep.study.schema import study_schema
+from sweep.study.written import toml
 
 SCHEMA = "study.schema.json"
 NAME = re.compile(r"[a-z0-9][a-z0-9-]{0,63}")
@@ -39,28 +42,49 @@ NAME = re.compile(r"[a-z0-9][a-z0-9-]{0,63}")
 )
 @click.option("--unit", default="mm", show_default=True, help="Of the coordinates in --points.")
 @click.option(
+    "--from-cyclogram",
+    "cyclogram",
+    type=click.Path(exists=True, path_type=Path),
+    help="A study of a machine with [cyclogram]: studies NAME-MEMBER of its members, in the order of design.",
+)
+@click.option(
     "--into",
     type=click.Path(file_okay=False, path_type=Path),
     default=Path(),
     help="Where the folder NAME is made; default: here.",
 )
-def init(name: str, family: str | None, members: tuple[str, ...], points: Path | None, unit: str, into: Path) -> None:
+def init(
+    name: str, family: str | None, members: tuple[str, ...], points: Path | None, unit: str, cyclogram: Path | None,
+    into: Path,
+) -> None:  # fmt: skip
     """Write a first study of a mechanism or a machine: NAME/study.toml, every line explained, and its tiny version.
 
     It holds the example of the family, or of every --member, with two dimensions swept, passes `sweep check` and runs
     as it is.  With --points it holds the design of a drawing instead, which is its reference.  Its first line names the
     JSON schema by which an editor completes and checks it; the schema lies beside.
+
+    With --from-cyclogram it writes a study for every member of a machine instead: needle, lower looper, upper looper,
+    feed, thread supply.  What [cyclogram] and [limits] ask of a member are its limits, and each takes the members
+    before it from the accepted optimum of the study before.
     """
-    if (family is None) == (not members):
-        raise InputError("--family", family, "either --family, or --member once for each member", "command line")
+    if sum((family is not None, bool(members), cyclogram is not None)) != 1:
+        allowed = "either --family, or --member once for each member, or --from-cyclogram"
+        raise InputError("--family", family, allowed, "command line")
     if NAME.fullmatch(name) is None:
         raise InputError("NAME", name, "a plain word of a-z, 0-9 and '-'", "command line")
     if points is not None and family is None:
         raise InputError("--points", str(points), "with --family: the points of one mechanism", "command line")
+    if cyclogram is not None:
+        tables = studies_of_members(load_study(cyclogram), name)
+        for one, data in tables.items():
+            _write(into / one, {"study.toml": toml(data)})
+        click.echo("\n".join(f"study: {into / one / 'study.toml'}" for one in tables))
+        click.echo(
+            f"next: sweep run {into / next(iter(tables))}, then its optimum as expected.json for the study behind it"
+        )
+        return
     machine = _machine(members)
     folder = into / name
-    if folder.exists():
-        raise InputError("NAME", name, f"a folder that is not there yet; {folder} is", "command line")
     shared = _shared_schema(into)
     seen = _seen_from(folder, shared)
     if machine is not None:
@@ -72,13 +96,20 @@ def init(name: str, family: str | None, members: tuple[str, ...], points: Path |
         files = {"study.toml": study_text(name, mechanism, seen, design), "smoke.toml": smoke_text(mechanism)}
     if shared is None:
         files[SCHEMA] = _current_schema()
+    _write(folder, files)
+    click.echo(f"study: {folder / 'study.toml'}\nnext: sweep check {folder}")
+
+
+def _write(folder: Path, files: dict[str, str]) -> None:
+    """Make a folder, which must not be there yet, with files."""
+    if folder.exists():
+        raise InputError("NAME", folder.name, f"a folder that is not there yet; {folder} is", "command line")
     try:
         folder.mkdir(parents=True)
         for file, text in files.items():
             (folder / file).write_text(text, encoding="utf-8")
     except OSError as error:
         raise StoreError(f"{folder}: cannot be written: {error.strerror}") from error
-    click.echo(f"study: {folder / 'study.toml'}\nnext: sweep check {folder}")
 
 
 def _machine(members: tuple[str, ...]) -> Machine | None:

@@ -1,0 +1,145 @@
+"""A study of a machine as studies of its members, one after the other, each with those before it fixed.
+
+The order is that of the source, I.7: the needle, the looper that takes its loop, the other blades, what moves the
+fabric, the thread supply.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import Any
+
+from sweep.errors import InputError
+from sweep.families import family as find_family
+from sweep.families.base import Family
+from sweep.families.capabilities import ThreadPath
+from sweep.families.machines import Machine
+from sweep.families.specification import Specification
+from sweep.quantities.resolve import output
+from sweep.study.study import Study
+
+RELATIONS = ("relations", "thread")
+BY_NAME = ("machine", "tools", *RELATIONS, "cyclogram")
+
+
+def studies_of_members(study: Study, name: str) -> dict[str, dict[str, Any]]:
+    """Return the tables of a study for every member by the study's name, in the order in which they are searched.
+
+    Raises
+    ------
+    InputError
+        for a study of no machine, or one without [cyclogram].
+    """
+    spec, machine = study.mechanism, study.bare
+    if not isinstance(spec, Specification) or not isinstance(machine, Machine) or "cyclogram" not in study.data:
+        raise InputError(
+            "--from-cyclogram", study.name, "a study of a machine with a table [cyclogram]", "command line"
+        )
+    found: dict[str, dict[str, Any]] = {}
+    kept: list[str] = []
+    before: Family | None = None
+    for member in order_of_design(spec, machine):
+        last = f"{name}-{kept[-1]}" if kept else None
+        kept.append(member)
+        part, known = _within(spec, kept)
+        found[f"{name}-{member}"] = _tables(study, known, part, before, f"{name}-{member}", last)
+        before = part
+    return found
+
+
+def order_of_design(spec: Specification, machine: Machine) -> list[str]:
+    """Return the members in the order of design: each decides what those behind it have to do."""
+    tools = {name: dict(table) for name, table in spec.tools}
+    carriers = {name: str(table["on"]).partition(".")[0] for name, table in tools.items() if "on" in table}
+    taking = {tool for _, table in spec.relations for tool in dict(table).get("take", ())}
+
+    def rank(member: str) -> int:
+        own = [name for name, carrier in carriers.items() if carrier == member]
+        if own:
+            return 0 if any("line" in tools[one] for one in own) else 1 if taking.intersection(own) else 2
+        return 3 if machine.member(member).family.find(ThreadPath) is None else 4
+
+    return sorted((m.name for m in machine.members), key=rank)
+
+
+def _within(spec: Specification, kept: list[str]) -> tuple[Family, set[str]]:
+    """Return the machine of some members with all relations that they allow, and the names of all that is in it."""
+    members = tuple((name, table) for name, table in spec.members if name in kept)
+    tools = tuple((n, t) for n, t in spec.tools if str(dict(t).get("on", kept[0])).partition(".")[0] in kept)
+    part = replace(spec, members=members, tools=tools, relations=())
+    machine = find_family(part)
+    # an event may be about a relation, a thread about events: again until nothing more fits
+    left = list(spec.relations)
+    while True:
+        now = [one for one in left if (more := _fits(part, one)) is not None and (part := more)]
+        if not now:
+            break
+        left = [one for one in left if one not in now]
+        machine = find_family(part)
+    return machine, {name for names in (members, tools, part.relations) for name, _ in names}
+
+
+def _fits(part: Specification, relation: tuple[str, Any]) -> Specification | None:
+    more = replace(part, relations=(*part.relations, relation))
+    try:
+        machine = find_family(more)
+    except InputError:
+        return None
+    places = [place for timing in getattr(machine, "timings", ()) for place in timing.places]
+    return more if all(_has(machine, place) for place in places) else None
+
+
+def _tables(
+    study: Study, known: set[str], part: Family, before: Family | None, name: str, last: str | None
+) -> dict[str, Any]:
+    """Return the study of the last member that ``known`` has: its dimensions, and the limits that come with it."""
+    data, member = study.data, name.rpartition("-")[2]
+
+    def new(output_name: str) -> bool:
+        return _has(part, output_name) and not (before is not None and _has(before, output_name))
+
+    found: dict[str, Any] = {"study": {"name": name, "title": f"{study.title}: {member}"}}
+    for table in BY_NAME:
+        entries = {key: entry for key, entry in data.get(table, {}).items() if key in known}
+        if table == "relations":  # settings of a real machine were asked of the member that came last then
+            old = {r.name for r in getattr(before, "relations", ())}
+            entries = {k: {x: y for x, y in e.items() if x != "settings" or k not in old} for k, e in entries.items()}
+        if table == "cyclogram":
+            entries = {k: entry for k, entry in entries.items() if k == member or new(f"phi_{k}")}
+        found |= {table: entries} if entries else {}
+    own = {key: x for key, x in data["design"].items() if key == "sample" or key in part.parameter_names}
+    if before is not None:
+        own = {"from": last} | {key: x for key, x in own.items() if key not in before.parameter_names}
+    goal = study.objective.output if study.objective is not None else ""
+    if not new(goal) and isinstance(part, Machine):
+        position = f"{member}.{part.member(member).family.position}"
+        goal = f"{member}.max_abs_{part.derivative_of[part.derivative_of[position]].partition('.')[2]}"
+    varied = any(isinstance(x, dict) and "value" not in x for key, x in own.items() if key != "sample")
+    if not varied:  # its dimensions stand: what they give is computed
+        own.pop("sample", None)
+    wanted = [x for x in data.get("scene", {}).get("want", ()) if new(x)]
+    found["scene"] = data.get("scene", {}) | {"want": wanted if varied else [*wanted, goal]}
+    found["design"] = _by_member(own, member)
+    limits = {key: x for key, x in data.get("limits", {}).items() if new(key)}
+    found |= {"limits": _by_member(limits, member)} if limits else {}
+    found |= {"objective": {"minimise": goal}} if varied else {}
+    kept = ("accuracy", "optimise") if varied else ("accuracy",)
+    return found | {key: data[key] for key in kept if key in data}
+
+
+def _by_member(entries: dict[str, Any], member: str) -> dict[str, Any]:
+    """Put dotted names of a member into a table of its own."""
+    own = {key.removeprefix(f"{member}."): x for key, x in entries.items() if key.startswith(f"{member}.")}
+    others = {key: x for key, x in entries.items() if not key.startswith(f"{member}.")}
+    return others | ({member: own} if own else {})
+
+
+def _has(family: Family, name: str) -> bool:
+    """Tell whether a machine has a design output: of a member it has, or of what its members are to each other."""
+    if "." in name and isinstance(family, Machine) and family.split(name) is None:
+        return False
+    try:
+        output(family, name)
+    except InputError:
+        return False
+    return True
