@@ -23,6 +23,7 @@ from sweep.report.quantities import number, rpm
 from sweep.report.scan import Cells, Scan, most_telling
 from sweep.report.sewing import sewn
 from sweep.report.sketch import dimensioned, drawn_parts, sketch
+from sweep.report.threads import diagram_of_dataset, threads_figure
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -78,6 +79,10 @@ def _write(folder: Path, out: Path, say: Say) -> Path:
         write_survivors(data.parts, out / "survivors.parquet")
         if strokes is not None:
             strokes.to_csv(out / "cyclogram.csv", index=False, float_format="%.4f")
+        if (turn := diagram_of_dataset(data)) is not None:
+            turn.to_csv(out / "threads.csv", index=False, float_format="%.6g")
+            with house_style():
+                figures["threads"] = save(threads_figure(turn), out / "figures" / "threads.svg").uri
         within = tolerance_words(data)
         further = [text for text in (optima_sentence(data, several), made_sentence(told, within)) if text]
         text = rendered(

@@ -146,7 +146,7 @@ def test_joints_of_a_looper_bear_what_pinocchio_finds(case, tool):
 
 def test_members_of_the_machine_stitch208_bear_what_pinocchio_finds():
     """The needle's chain with its bar and the slotted looper with a tool at its tip, on one shaft."""
-    study = load_study(ROOT / "studies" / "stitch208")
+    study = load_study(ROOT / "tests" / "studies" / "earlier" / "stitch208")
     values = {k: float(x[0]) for k, x in study.space.columns(0, 1).items()} | dict(study.space.fixed)
     geometry = {k: v for k, v in values.items() if k in study.family.parameter_names}
     needle = {k.removeprefix("needle."): v for k, v in geometry.items() if k.startswith("needle.")}

@@ -26,7 +26,7 @@ def test_family_is_explored_as_its_example(source):
     assert all(one.low < one.high for one in hand.ranges if not one.choices)
 
 
-@pytest.mark.parametrize("name", ["needle208", "needle208-loads", "stitch208", "looper-sphere"])
+@pytest.mark.parametrize("name", ["needle208", "needle208-loads", "head208", "looper-sphere"])
 def test_studies_are_taken_as_they_are(name):
     hand = in_hand(str(STUDIES / name))
     found = hand.answer([hand.first], ["in hand"])

@@ -85,10 +85,10 @@ def slower(table: dict[str, dict[str, float]], factor: float, every: int) -> dic
 
 
 @pytest.mark.parametrize(("factor", "every"), [(10.0, 2), (10.0, 1), (0.01, 3)])
-@pytest.mark.parametrize("name", ["geared-dwell", "needle208", "stitch208"])
-def test_rows_and_identity_of_a_dataset_do_not_depend_on_measured_times(name, factor, every, monkeypatch):
+@pytest.mark.parametrize("where", ["studies/geared-dwell", "studies/needle208", "tests/studies/earlier/stitch208"])
+def test_rows_and_identity_of_a_dataset_do_not_depend_on_measured_times(where, factor, every, monkeypatch):
     def sweep_now():
-        study = replace(load_study(ROOT / "studies" / name, smoke=True), output=OutputSettings("all"))
+        study = replace(load_study(ROOT / where, smoke=True), output=OutputSettings("all"))
         stop = min(study.space.count, 1500)
         done = compute_chunk(study, 0, stop)
         order = [(level.route.name, level.route.outputs) if level.route else "fit" for level in levels(study)]

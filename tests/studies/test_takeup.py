@@ -1,23 +1,22 @@
-"""The study takeup: accepted figures recomputed, and what its README says of them."""
+"""An accepted cam take-up, optimum of an earlier study with one path and no speed: figures recomputed, four peaks."""
 
 from __future__ import annotations
 
 import json
-from pathlib import Path
 
 import numpy as np
 import pytest
 
 import sweep
-from sweep.study import load_study
+from tests.support.studies import EARLIER, beside_needle208
 
-FOLDER = Path(__file__).parents[2] / "studies" / "takeup"
 GRAM_FORCE = 9.80665e-3
 
 
 @pytest.fixture(scope="module")
-def accepted():
-    return load_study(FOLDER), json.loads((FOLDER / "expected.json").read_text())
+def accepted(tmp_path_factory):
+    study = beside_needle208("takeup", tmp_path_factory.mktemp("takeup"))
+    return study, json.loads((EARLIER / "takeup" / "expected.json").read_text())
 
 
 def test_accepted_cam_has_its_accepted_figures_and_keeps_the_limits(accepted):

@@ -11,7 +11,7 @@ from sweep.errors import MOST_FAULTS, MOST_NAMES, InputError, choices
 from sweep.study import load_study
 from tests.study.test_faults import RIGHT, faults_of
 
-TAKEUP = (Path(__file__).parents[2] / "studies" / "takeup" / "study.toml").read_text()
+TAKEUP = (Path(__file__).parents[1] / "studies" / "earlier" / "takeup" / "study.toml").read_text()
 
 
 @pytest.mark.parametrize(

@@ -11,6 +11,7 @@ import sweep
 from sweep.errors import StudyError
 from sweep.study import load_study, study_from_data
 from sweep.study.taken import fingerprint
+from tests.support.studies import beside_needle208
 
 STUDIES = Path(sweep.__file__).parents[1] / "studies"
 NEEDLE = json.loads((STUDIES / "needle208" / "expected.json").read_text())["optimum"]["design"]
@@ -49,8 +50,8 @@ def test_what_a_dataset_keeps_needs_the_other_study_no_more(tmp_path):
     assert again.space.fixed == study.space.fixed and again.data == study.data
 
 
-def test_members_and_the_reference_of_a_machine_take_theirs():
-    study = load_study(STUDIES / "takeup")
+def test_members_and_the_reference_of_a_machine_take_theirs(tmp_path):
+    study = beside_needle208("takeup", tmp_path)
     own = {name.removeprefix("needle."): x for name, x in study.reference.items() if name.startswith("needle.")}
     assert own.items() >= NEEDLE.items()
     assert {name.removeprefix("needle."): x for name, x in study.space.fixed.items()}.items() >= NEEDLE.items()

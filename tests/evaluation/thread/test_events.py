@@ -13,6 +13,7 @@ import sweep
 from sweep.errors import InputError
 from sweep.families.base import Angles
 from sweep.families.thread_balance import GF
+from sweep.report.threads import threads_figure
 from tests.families.test_hand_made_stitches import ARM, AT, CRANK, DESIGN, PHI, SHARE, across, machine_of
 
 GUIDE, HOLE, SEAM = np.array([40.0, 3.0, 4.0]), np.array([-20.0, -4.0, 0.0]), np.array([-20.0, -5.0, 2.0])
@@ -175,3 +176,9 @@ def test_fast_thread_is_warned_of():
 def test_what_is_no_thread_by_events_is_named(changes, words):
     with pytest.raises(InputError, match=words):
         machine(**changes)
+
+
+def test_figure_has_demand_surplus_and_speed_of_every_thread():
+    figure = threads_figure(sweep.thread.diagram(machine(), DESIGN))
+    assert [axes.get_ylabel() for axes in figure.axes] == ["P, from its mean [mm]", "surplus [mm]", "speed [m/s]"]
+    assert [len(axes.lines) for axes in figure.axes] == [2, 2, 3]
