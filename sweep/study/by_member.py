@@ -14,6 +14,8 @@ from sweep.families import family as find_family
 from sweep.families.base import Family
 from sweep.families.capabilities import ThreadPath
 from sweep.families.machines import Machine
+from sweep.families.main_shaft import ShaftTorque
+from sweep.families.shaking import Shaking
 from sweep.families.specification import Specification
 from sweep.quantities.resolve import output
 from sweep.study.study import Study
@@ -123,6 +125,11 @@ def _tables(
     limits = {key: x for key, x in data.get("limits", {}).items() if new(key)}
     found |= {"limits": _by_member(limits, member)} if limits else {}
     found |= {"objective": {"minimise": goal}} if varied else {}
+    if isinstance(part, Machine) and any(isinstance(r, Shaking | ShaftTorque) for r in part.relations):
+        bodies = data.get("bodies", {})
+        for m in part.members:
+            bodies = _by_member(bodies, m.name)
+        found["bodies"] = {name: entries for name, entries in bodies.items() if name in known}
     kept = ("accuracy", "optimise") if varied else ("accuracy",)
     return found | {key: data[key] for key in kept if key in data}
 
