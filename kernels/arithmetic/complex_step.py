@@ -92,3 +92,10 @@ def _hypotenuse_typed(x: Any, y: Any) -> Any:
     if isinstance(x, types.Complex) or isinstance(y, types.Complex):
         return _hypotenuse_complex
     return _hypotenuse_real
+
+
+@inline
+def unit_near(size: Any) -> tuple[float, float]:
+    """Power of two near a number and one over it, by which lengths are brought to the unit range without rounding."""
+    _, exponent = math.frexp(size.real)
+    return math.ldexp(1.0, exponent), math.ldexp(1.0, -exponent)

@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 
-from kernels.arithmetic.rounded_sincos import rounded_sincos
+from kernels.arithmetic.sincos import rounded_sincos
 from kernels.chains.form import BLOCK, STRIDE, Form, Helper, Travel, Turned
 from kernels.chains.links import NUMBERS, Input, blurred_through, enter, get_link, link_of, put_link, through
 from kernels.jit import generated_inline

@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 
 from kernels.families.guide import closure as guide
 from kernels.families.rssr import closure as rssr
-from kernels.families.rssr.derivatives import acceleration, rocker, velocity
+from kernels.families.rssr.closure import acceleration, rocker, velocity
 from kernels.jit import inline, kernel, part
 from kernels.types import Array
 
@@ -101,16 +101,15 @@ def _pin_of(r: Any, u: float, v: float) -> tuple[Any, ...]:
 @inline
 def first_stage(row: Any) -> Any:
     """Constants of the crank-rocker."""
-    return rssr.reduce_one(rssr.Design(row[0], row[1], row[2], row[3], row[4], row[5], row[6], row[7]))
+    return rssr.reduce_one((row[0], row[1], row[2], row[3], row[4], row[5], row[6], row[7]))
 
 
 @inline
 def second_stage(row: Any) -> Any:
     """Constants of the guiding four-bar, whose point and line do not matter here."""
     k, none = GUIDE, 0.0 * row[GUIDE]
-    return guide.reduce_along(
-        guide.Design(row[k], row[k + 1], row[k + 2], row[k + 3], none, none, none, none, row[k + 8]), 1.0 + none, none
-    )
+    d = (row[k], row[k + 1], row[k + 2], row[k + 3], none, none, none, none, row[k + 8])
+    return guide.reduce_along(d, 1.0 + none, none)
 
 
 @part

@@ -8,7 +8,8 @@ decisions look at the real part.
 from __future__ import annotations
 
 import math
-from typing import Any, NamedTuple
+from collections import namedtuple
+from typing import Any
 
 import numpy as np
 
@@ -33,27 +34,12 @@ def power(u: Any, v: Any, times: int) -> tuple[Any, Any]:
     return c, s
 
 
-class Outputs(NamedTuple):
-    """Pose outputs, each (n, m), or None: what is None is not computed."""
-
-    psi: Numbers | None
-    dpsi: Numbers | None
-    d2psi: Numbers | None
-    d3psi: Numbers | None
-    sin_psi: Numbers | None
-    cos_psi: Numbers | None
-    x_b: Numbers | None
-    y_b: Numbers | None
+# Pose outputs, each (n, m), or None: what is None is not computed.
+Outputs = namedtuple("Outputs", "psi dpsi d2psi d3psi sin_psi cos_psi x_b y_b")
 
 
 @kernel
-def poses(
-    designs: Numbers,
-    cos_phi: Numbers,
-    sin_phi: Numbers,
-    status: Status,
-    out: Outputs,
-) -> None:
+def poses(designs: Numbers, cos_phi: Numbers, sin_phi: Numbers, status: Status, out: Outputs) -> None:
     """Compute the output angle, its derivatives and the pin of every design at its carrier angles; (1)-(4).
 
     Parameters

@@ -6,11 +6,13 @@ Polukhin 1971, section 7, as worked out in docs/takeup.md; the equation numbers 
 from __future__ import annotations
 
 import math
+from collections import namedtuple
 from typing import NamedTuple
 
 import numpy as np
 
 from kernels import status as st
+from kernels.arithmetic.complex_step import unit_near
 from kernels.arithmetic.vectors import Vector, dot, norm, scale, sub
 from kernels.jit import inline, kernel
 from kernels.linkage.outputs import write
@@ -41,10 +43,8 @@ def reduce_design(designs: Array, i: int) -> Reduced:
     size += abs(designs[i, 4].real) + abs(designs[i, 5].real) + abs(designs[i, 7].real)
     offsets = abs(designs[i, 8].real) + abs(designs[i, 9].real) + abs(designs[i, 10].real) + abs(designs[i, 11].real)
     turned = abs(designs[i, 3].real) + abs(designs[i, 6].real)
-    _, exponent = math.frexp(size)
     valid = size + offsets < 1e140 and size > 1e-140 and turned < 1e5 and designs[i, 0].real > 1e-140 * size
-    exponent = exponent if valid else 0
-    unit, per_unit = math.ldexp(1.0, exponent), math.ldexp(1.0, -exponent)
+    unit, per_unit = unit_near(size if valid else 0.5)
     a, e, f = designs[i, 0] * per_unit, designs[i, 1] * per_unit, designs[i, 2] * per_unit
     ca, sa = np.cos(designs[i, 3]), np.sin(designs[i, 3])
     n1 = (e + designs[i, 8] * per_unit, designs[i, 9] * per_unit, designs[i, 4] * per_unit)
@@ -71,27 +71,12 @@ def eyelet(r: Reduced, u: float, v: float) -> tuple[Vector, Vector, Vector]:
     return place, on_circle(r, -s, c), (-x, -y, -z)
 
 
-class Outputs(NamedTuple):
-    """Pose outputs, each (n, m), or None: what is None is not computed."""
-
-    P: Array | None
-    dP: Array | None
-    d2P: Array | None
-    L: Array | None
-    wrap: Array | None
-    X_E: Array | None
-    Y_E: Array | None
-    Z_E: Array | None
+# Pose outputs, each (n, m), or None: what is None is not computed.
+Outputs = namedtuple("Outputs", "P dP d2P L wrap X_E Y_E Z_E")
 
 
 @kernel
-def poses(
-    designs: Array,
-    cos_phi: Array,
-    sin_phi: Array,
-    status: Status,
-    out: Outputs,
-) -> None:
+def poses(designs: Array, cos_phi: Array, sin_phi: Array, status: Status, out: Outputs) -> None:
     """Thread taken up, its derivatives, wrap angle and place of the eyelet; (1) to (6) of docs/takeup.md.
 
     Parameters

@@ -8,14 +8,15 @@ which it jams in its guide, and the least radius at which nothing jams follow fr
 from __future__ import annotations
 
 import math
+from collections import namedtuple
 from typing import NamedTuple
 
 import numpy as np
 
 from kernels import status as st
-from kernels.arithmetic.complex_step import arctan2, magnitude
+from kernels.arithmetic.complex_step import arctan2, magnitude, unit_near
 from kernels.jit import inline, kernel
-from kernels.linkage.outputs import write
+from kernels.linkage.outputs import put_block, write
 from kernels.linkage.verdict import pose_status
 from kernels.types import EPS, Array, Status
 
@@ -164,8 +165,7 @@ def reduce_design(designs: Array, i: int) -> Reduced:
     valid = valid and 0.0 <= designs[i, 5].real < 1e100 and 0.0 <= designs[i, 6].real < 1e100
     # a store this small against the rest would have squares below float64 after scaling
     valid = valid and designs[i, 0].real > 1e-140 * size
-    _, exponent = math.frexp(size if valid else 1.0)
-    unit, per_unit = math.ldexp(1.0, exponent), math.ldexp(1.0, -exponent)
+    unit, per_unit = unit_near(size if valid else 1.0)
     u, v = lowest(designs, i)
     thread = (designs[i, 0] + law(designs, i, u, v)[0]) * per_unit
     across_z, across_x = designs[i, 2] * per_unit, (designs[i, 3] - designs[i, 1]) * per_unit
@@ -176,29 +176,12 @@ def reduce_design(designs: Array, i: int) -> Reduced:
     )  # fmt: skip
 
 
-class Outputs(NamedTuple):
-    """Pose outputs, each (n, m), or None: what is None is not computed."""
-
-    P: Array | None
-    dP: Array | None
-    d2P: Array | None
-    L: Array | None
-    S: Array | None
-    dS: Array | None
-    d2S: Array | None
-    pressure_angle: Array | None
-    curvature: Array | None
+# Pose outputs, each (n, m), and profile (2, n, m); what is None is not computed.
+Outputs = namedtuple("Outputs", "P dP d2P L S dS d2S pressure_angle curvature profile")
 
 
 @kernel
-def poses(
-    designs: Array,
-    cos_phi: Array,
-    sin_phi: Array,
-    status: Status,
-    out: Outputs,
-    profile: Array | None,
-) -> None:
+def poses(designs: Array, cos_phi: Array, sin_phi: Array, status: Status, out: Outputs) -> None:
     """Compute the thread law, follower and profile of the cam; (9) to (17) of docs/takeup.md.
 
     Parameters
@@ -218,7 +201,7 @@ def poses(
         r = reduce_design(designs, i)
         row = i if cos_phi.shape[0] > 1 else 0
         # the radius is counted from the least displacement, so these need the thread to reach all over the turn
-        whole = out.pressure_angle is not None or out.curvature is not None or profile is not None
+        whole = out.pressure_angle is not None or out.curvature is not None or out.profile is not None
         for j in range(cos_phi.shape[1]):
             u, v = cos_phi[row, j], sin_phi[row, j]
             value, first, second = law(designs, i, u, v)
@@ -243,9 +226,8 @@ def poses(
             if whole:
                 reach = r.radius + (s - r.least)
                 write(out.pressure_angle, i, j, arctan2(magnitude(ds), reach))
-                if profile is not None:
-                    # The cam turns by phi against the follower: its profile is passed backwards.
-                    profile[0, i, j], profile[1, i, j] = reach * u * r.unit, -reach * v * r.unit
+                # The cam turns by phi against the follower: its profile is passed backwards.
+                put_block(out.profile, i, j, (reach * u, -reach * v), r.unit)
                 if out.curvature is not None:
                     way = reach * reach + ds * ds
                     write(out.curvature, i, j, (way + ds * ds - reach * d2s) / (way * np.sqrt(way)) / r.unit)

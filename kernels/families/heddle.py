@@ -7,14 +7,15 @@ so no scale of the drawing costs a bit.  Designs may be complex128 (exact gradie
 from __future__ import annotations
 
 import math
+from collections import namedtuple
 from typing import Any, NamedTuple
 
 import numpy as np
 
 from kernels import status as st
-from kernels.arithmetic.complex_step import arctan2, divisor, magnitude
+from kernels.arithmetic.complex_step import arctan2, divisor, magnitude, unit_near
 from kernels.jit import inline, kernel
-from kernels.linkage.outputs import write
+from kernels.linkage.outputs import put_block, write
 from kernels.linkage.verdict import pose_status
 from kernels.types import EPS, Array, Status
 
@@ -70,8 +71,7 @@ def four_bar(a: Any, b: Any, c: Any, e: Any, side: float) -> FourBar:
 @inline
 def reduce_design(designs: Array, i: int) -> Reduced:
     """Constants of one design; ``valid`` is false for zero or negative lengths and for what is not finite."""
-    _, exponent = math.frexp(designs[i, 1].real)
-    unit, per_unit = math.ldexp(1.0, exponent), math.ldexp(1.0, -exponent)
+    unit, per_unit = unit_near(designs[i, 1])
     a, b, c, e = designs[i, 0] * per_unit, designs[i, 1] * per_unit, designs[i, 2] * per_unit, designs[i, 3] * per_unit
     arm, chi_mid = designs[i, 4] * per_unit, designs[i, 5]
     d, f, o, link = (
@@ -181,29 +181,12 @@ def _lift(r: Reduced, cos: Any, sin: Any, rates: tuple[Any, Any, Any]) -> tuple[
     return y + h, y1 + h1, y2 + h2, y3 + h3, True
 
 
-class Outputs(NamedTuple):
-    """Pose outputs, each (n, m), or None: what is None is not computed."""
-
-    chi: Array | None
-    dchi: Array | None
-    d2chi: Array | None
-    d3chi: Array | None
-    y: Array | None
-    dy: Array | None
-    d2y: Array | None
-    d3y: Array | None
-    discriminant: Array | None
+# Pose outputs, each (n, m), and places (7, n, m); what is None is not computed.
+Outputs = namedtuple("Outputs", "chi dchi d2chi d3chi y dy d2y d3y discriminant places")
 
 
 @kernel
-def poses(
-    designs: Array,
-    cos_phi: Array,
-    sin_phi: Array,
-    status: Status,
-    out: Outputs,
-    places: Array | None,
-) -> None:
+def poses(designs: Array, cos_phi: Array, sin_phi: Array, status: Status, out: Outputs) -> None:
     """Bell-crank angle, lift of the shaft and their derivatives with respect to the angle of the cam lever.
 
     Equations (3)-(9) of docs/heddle.md.
@@ -252,15 +235,13 @@ def poses(
             write(out.d3y, i, j, lift3 * r.unit)
             # one factor after the other: the square of the unit leaves float64 before the discriminant does
             write(out.discriminant, i, j, (delta * r.unit) * r.unit if r.valid else math.nan)
-            if places is not None:
-                _put_places(places, i, j, r, (u, v), (cos, sin, t), (lever_cos, lever_sin))
+            if out.places is not None:  # its arctangents are not dropped where nobody wants them
+                places = _places(r, (u, v), (cos, sin, t), (lever_cos, lever_sin))
+                put_block(out.places, i, j, places, 1.0)
 
 
 @inline
-def _put_angle(
-    out: Outputs,
-    i: int, j: int, cos: Any, sin: Any, turns: tuple[Any, Any, Any],
-) -> None:  # fmt: skip
+def _put_angle(out: Outputs, i: int, j: int, cos: Any, sin: Any, turns: tuple[Any, Any, Any]) -> None:
     """Write the bell-crank angle [rad] and its derivatives where they are wanted."""
     write(out.chi, i, j, arctan2(sin, cos))
     write(out.dchi, i, j, turns[0])
@@ -269,16 +250,12 @@ def _put_angle(
 
 
 @inline
-def _put_places(
-    places: Array, i: int, j: int, r: Reduced, cam: tuple[Any, Any], bell: tuple[Any, Any, Any], lever: tuple[Any, Any]
-) -> None:
-    """Write transmission and pressure angle of the rod, angle of the shaft lever, and B and C."""
+def _places(r: Reduced, cam: tuple[Any, Any], bell: tuple[Any, Any, Any], lever: tuple[Any, Any]) -> tuple[Any, ...]:
+    """Transmission and pressure angle of the rod, angle of the shaft lever, and B and C."""
     u, v = cam
     cos, sin, t = bell
     bar = r.first
-    places[0, i, j] = -t / r.rod
     # atan2, not acos: acos loses half the digits near zero.
-    places[1, i, j] = arctan2(magnitude(bar.c - (bar.k0 - bar.k2 * u)), magnitude(t))
-    places[2, i, j] = arctan2(lever[1], lever[0])
-    places[3, i, j], places[4, i, j] = bar.a * u * r.unit, bar.a * v * r.unit
-    places[5, i, j], places[6, i, j] = (bar.e + bar.c * cos) * r.unit, bar.c * sin * r.unit
+    pressure = arctan2(magnitude(bar.c - (bar.k0 - bar.k2 * u)), magnitude(t))
+    b, c = (bar.a * u * r.unit, bar.a * v * r.unit), ((bar.e + bar.c * cos) * r.unit, bar.c * sin * r.unit)
+    return (-t / r.rod, pressure, arctan2(lever[1], lever[0]), *b, *c)

@@ -7,41 +7,23 @@ gradients by the complex step); decisions look at the real part.
 from __future__ import annotations
 
 import math
-from typing import Any, NamedTuple
+from collections import namedtuple
 
 import numpy as np
 
 from kernels import status as st
-from kernels.arithmetic.complex_step import arctan2, magnitude
-from kernels.jit import inline, kernel
-from kernels.linkage.outputs import write
+from kernels.arithmetic.complex_step import arctan2, magnitude, unit_near
+from kernels.jit import kernel
+from kernels.linkage.outputs import put_block, write
 from kernels.linkage.verdict import follower_status
 from kernels.types import EPS, Numbers, Status
 
-
-class Outputs(NamedTuple):
-    """Pose outputs, each (n, m), or None: what is None is not computed."""
-
-    psi: Numbers | None
-    dpsi: Numbers | None
-    d2psi: Numbers | None
-    d3psi: Numbers | None
-    s: Numbers | None
-    ds: Numbers | None
-    d2s: Numbers | None
-    discriminant: Numbers | None
-    pressure_angle: Numbers | None
+# Pose outputs, each (n, m), and joints (2, n, m); what is None is not computed.
+Outputs = namedtuple("Outputs", "psi dpsi d2psi d3psi s ds d2s discriminant pressure_angle joints")
 
 
 @kernel
-def poses(
-    designs: Numbers,
-    cos_phi: Numbers,
-    sin_phi: Numbers,
-    status: Status,
-    out: Outputs,
-    joints: Numbers | None,
-) -> None:
+def poses(designs: Numbers, cos_phi: Numbers, sin_phi: Numbers, status: Status, out: Outputs) -> None:
     """Rocker angle, place of the pin on the rocker and derivatives of every design at its crank angles; (1)-(5).
 
     Parameters
@@ -58,8 +40,7 @@ def poses(
     given wherever the crank pin is off the rocker axis.
     """
     for i in range(designs.shape[0]):
-        _, exponent = math.frexp(designs[i, 0].real)
-        unit, per_unit = math.ldexp(1.0, exponent), math.ldexp(1.0, -exponent)
+        unit, per_unit = unit_near(designs[i, 0])
         a, e, h = designs[i, 0] * per_unit, designs[i, 1] * per_unit, designs[i, 2] * per_unit
         branch = designs[i, 3].real
         valid = 0.0 < a.real < 1e140 and abs(e.real) < 1e140 and abs(h.real) < 1e140 and branch * branch == 1.0
@@ -88,42 +69,18 @@ def poses(
                 write(out.discriminant, i, j, delta * per_square if known else math.nan * delta)
             # arctangent, not acos: acos loses half the digits near zero.
             write(out.pressure_angle, i, j, arctan2(magnitude(h), root) if assembled else math.nan * delta)
-            if joints is not None:
-                joints[0, i, j], joints[1, i, j] = designs[i, 0] * u, designs[i, 0] * v
-            if (
-                out.dpsi is not None
-                or out.d2psi is not None
-                or out.d3psi is not None
-                or out.ds is not None
-                or out.d2s is not None
-            ):
-                # at a dead point (w = 0) the position stands and the derivatives do not exist
-                per_w = 1.0 / w if code == st.OK else math.nan * w
-                along, aside = a * (u * c + v * sine), a * (v * c - u * sine)
-                pin = (along, aside, h, per_w)
-                _put_derivatives(out, i, j, pin, unit)
-
-
-@inline
-def _put_derivatives(
-    out: Outputs,
-    i: int,
-    j: int,
-    pin: tuple[Any, Any, Any, Any],
-    unit: float,
-) -> None:
-    """Write the wanted derivatives of the angle and of the place along the slot; (4), (5).
-
-    ``pin`` holds the crank in the rocker's axes, along the slot and across it, the slot's offset, and 1/w.
-    """
-    along, aside, h, per_w = pin
-    p = along * per_w
-    slide = p * h - aside
-    q = (aside * (2.0 * p - 1.0) - p * p * h) * per_w
-    write(out.dpsi, i, j, p)
-    write(out.ds, i, j, slide * unit)
-    write(out.d2psi, i, j, q)
-    write(out.d2s, i, j, (q * h - along * (1.0 - p)) * unit)
-    if out.d3psi is not None:
-        turn = along * (1.0 - p) * (2.0 * p - 1.0) + 2.0 * q * (aside - p * h)
-        write(out.d3psi, i, j, (turn - q * slide) * per_w)
+            put_block(out.joints, i, j, (u, v), designs[i, 0])
+            # at a dead point (w = 0) the position stands and the derivatives, (4) and (5), do not exist
+            per_w = 1.0 / w if code == st.OK else math.nan * w
+            # the crank in the rocker's axes, along the slot and across it
+            along, aside = a * (u * c + v * sine), a * (v * c - u * sine)
+            p = along * per_w
+            slide = p * h - aside
+            q = (aside * (2.0 * p - 1.0) - p * p * h) * per_w
+            write(out.dpsi, i, j, p)
+            write(out.ds, i, j, slide * unit)
+            write(out.d2psi, i, j, q)
+            write(out.d2s, i, j, (q * h - along * (1.0 - p)) * unit)
+            if out.d3psi is not None:
+                turn = along * (1.0 - p) * (2.0 * p - 1.0) + 2.0 * q * (aside - p * h)
+                write(out.d3psi, i, j, (turn - q * slide) * per_w)

@@ -7,28 +7,18 @@ bit.  Designs may be complex128 (exact gradients by the complex step); decisions
 from __future__ import annotations
 
 import math
+from collections import namedtuple
 from typing import Any, NamedTuple
 
 import numpy as np
 
 from kernels import status as st
-from kernels.arithmetic.complex_step import magnitude
+from kernels.arithmetic.complex_step import magnitude, unit_near
 from kernels.arithmetic.vectors import Vector, add, cross, dot, mix, scale, turned
 from kernels.jit import inline, kernel
-from kernels.linkage.bodies import (
-    Links,
-    Moving,
-    put,
-    put_ball,
-    put_body,
-    put_crank,
-    put_rod,
-    put_turning,
-    shaft,
-    turned_about,
-)
+from kernels.linkage import bodies as tree
 from kernels.linkage.driven_ball import Crank, Path, Swung, pin_path, reduce_crank, rotated, swing
-from kernels.linkage.outputs import has_point, put_angle, put_loop, put_point
+from kernels.linkage.outputs import has_point, put_angle, put_block, put_loop, put_point
 from kernels.types import Array, Numbers, Status
 
 
@@ -60,8 +50,7 @@ class Reduced(NamedTuple):
 def reduce_design(designs: Numbers, i: int) -> Reduced:
     """Constants of one design; ``valid`` is false for links of no length and for what is not finite."""
     d = designs[i]
-    _, exponent = math.frexp(d[0].real)
-    unit, per = math.ldexp(1.0, exponent), math.ldexp(1.0, -exponent)
+    unit, per = unit_near(d[0])
     swings = reduce_crank(d, per)
     o = d[8] * per
     sd, cd, sg, cg = np.sin(d[9]), np.cos(d[9]), np.sin(d[10]), np.cos(d[10])
@@ -135,29 +124,14 @@ def _carried(r: Reduced, carrier: Swung, looper: Swung, fixed: Vector) -> Path:
     return rotated(carrier.cos, carrier.sin, carrier.first, carrier.second, carrier.third, path)
 
 
-class Outputs(NamedTuple):
-    """Blocks (k, n, m) of outputs, or None: what is None is not computed."""
-
-    carrier: Numbers | None
-    carrier_loop: Numbers | None
-    looper: Numbers | None
-    looper_loop: Numbers | None
-    point: Numbers | None
-    velocity: Numbers | None
-    acceleration: Numbers | None
-    jerk: Numbers | None
-    magnitudes: Numbers | None
+# Blocks (k, n, m) of outputs, or None: what is None is not computed.
+Outputs = namedtuple(
+    "Outputs", "carrier carrier_loop looper looper_loop point velocity acceleration jerk magnitudes joints"
+)
 
 
 @kernel
-def poses(
-    designs: Numbers,
-    cos_phi: Numbers,
-    sin_phi: Numbers,
-    status: Status,
-    out: Outputs,
-    joints: Numbers | None,
-) -> None:
+def poses(designs: Numbers, cos_phi: Numbers, sin_phi: Numbers, status: Status, out: Outputs) -> None:
     """Compute the carrier, looper and working point with derivatives, of every design at its crank angles.
 
     Equations (1)-(6) of docs/spherical_looper.md.
@@ -190,7 +164,7 @@ def poses(
             one = swing(first, drive.size, drive.b, drive.c, drive.branch)
             two = swing(_seen_from_carrier(r, one, second), r.size2, r.b2, r.c2, r.branch2)
             code = one.status if r.valid else st.INVALID_INPUT
-            if out.looper is not None or out.looper_loop is not None or has_point(out) or joints is not None:
+            if out.looper is not None or out.looper_loop is not None or has_point(out) or out.joints is not None:
                 code = two.status if code == st.OK else code
             status[i, j] = code
             undefined = 0.0 if r.valid else math.nan
@@ -202,53 +176,35 @@ def poses(
             scale = r.unit + undefined
             path = _carried(r, one, two, r.point)
             put_point(out, i, j, centre, path, scale)
-            if joints is not None:
-                _put_joints(joints, i, j, r, first, second, one, two, v, scale)
+            put_block(out.joints, i, j, _joints(r, first, second, one, two, v), scale)
 
 
 @inline
-def _put_joints(
-    joints: Numbers, i: int, j: int, r: Reduced, first: Path, second: Path, one: Swung, two: Swung, v: float, scale: Any
-) -> None:
-    """Write x y z of crank pin 1, carrier's ball, crank pin 2 and looper's ball [length]."""
+def _joints(r: Reduced, first: Path, second: Path, one: Swung, two: Swung, v: float) -> tuple[Any, ...]:
+    """Give x y z of crank pin 1, carrier's ball, crank pin 2 and looper's ball."""
     drive = r.swings
     centre = (drive.e, 0.0 * drive.e, r.o)
     ball, _, _, _ = _carried(r, one, two, (r.c2, 0.0 * r.c2, r.along))
     rocker = (drive.e + drive.c * one.cos, drive.c * one.sin, drive.g)
     # the height anew: the path's own is taken from the rocker's plane, and adding that again would round twice
     pin = (first[0][0] + drive.e, first[0][1], drive.lift - drive.a * (drive.sa * v))
-    for k in range(3):
-        joints[k, i, j] = pin[k] * scale
-        joints[3 + k, i, j] = rocker[k] * scale
-        joints[6 + k, i, j] = (centre[k] + second[0][k]) * scale
-        joints[9 + k, i, j] = (centre[k] + ball[k]) * scale
+    return (*pin, *rocker, *add(centre, second[0]), *add(centre, ball))
 
 
 @kernel
-def links(
-    designs: Array,
-    cos_phi: Array,
-    sin_phi: Array,
-    psi: Array,
-    dpsi: Array,
-    d2psi: Array,
-    chi: Array,
-    dchi: Array,
-    d2chi: Array,
-    out: Links,
-) -> None:
+def links(designs: Array, cos_phi: Array, sin_phi: Array, motion: Array, out: tree.Links) -> None:
     """Fill the bodies, freedoms and closing lines of every pose; symbols are those of docs/spherical_looper.md.
 
     Parameters
     ----------
     designs : (n, 26);  cos_phi, sin_phi : (n, m) or (1, m)
-    psi, dpsi, d2psi, chi, dchi, d2chi : (n, m), outputs of ``poses``
+    motion : (6, n, m), outputs psi, dpsi, d2psi, chi, dchi, d2chi of ``poses``
     out : crank 1, crank 2, carrier, looper, coupler 1, coupler 2; the axes of the looper are x, y, z at psi = chi = 0.
         Eight freedoms; six lines, of the carrier's and the looper's ball, whose forces act on them
     """
     for i in range(designs.shape[0]):
         d = designs[i]
-        u1, e2 = shaft(d[6])
+        u1, e2 = tree.shaft(d[6])
         first, k = (1.0, 0.0, 0.0), (0.0, 0.0, 1.0)
         centre1, foot, os = scale(d[4], u1), (d[3], 0.0, d[5]), (d[3], 0.0, d[8])
         still = (math.sin(d[9]) * math.cos(d[10]), math.sin(d[9]) * math.sin(d[10]), math.cos(d[9]))
@@ -256,31 +212,33 @@ def links(
         u2, g1, g2 = (st * cb, st * sb, ct), (ct * cb, ct * sb, -st), (-sb, cb, 0.0)
         centre2, co, so = (d[19], d[20], d[21]), math.cos(d[24]), math.sin(d[24])
         row = i if cos_phi.shape[0] > 1 else 0
-        for j in range(psi.shape[1]):
+        for j in range(motion.shape[2]):
+            psi, dpsi, d2psi = motion[0, i, j], motion[1, i, j], motion[2, i, j]
+            chi, dchi, d2chi = motion[3, i, j], motion[4, i, j], motion[5, i, j]
             bodies, axes, lines = out.bodies[i, j], out.axes[i, j], out.lines[i, j]
             u, v = cos_phi[row, j], sin_phi[row, j]
             w, x = u * co - v * so, v * co + u * so
-            crank1 = put_crank(bodies[0], axes[0], centre1, u1, first, e2, u, v)
-            crank2 = put_crank(bodies[1], axes[1], centre2, u2, g1, g2, w, x)
+            crank1 = tree.put_crank(bodies[0], axes[0], centre1, u1, first, e2, u, v)
+            crank2 = tree.put_crank(bodies[1], axes[1], centre2, u2, g1, g2, w, x)
             pin1 = add(centre1, scale(d[0], mix(u, first, v, e2)))
             pin2 = add(centre2, scale(d[17], mix(w, g1, x, g2)))
-            cp, sp = math.cos(psi[i, j]), math.sin(psi[i, j])
+            cp, sp = math.cos(psi), math.sin(psi)
             rho = (cp, sp, 0.0)
-            carrier = put_turning(bodies[2], foot, k, rho, dpsi[i, j], d2psi[i, j])
-            put(axes[2], k)
-            n2 = turned_about(k, cp, sp, still)
-            cc, sc = math.cos(chi[i, j]), math.sin(chi[i, j])
-            gyro = scale(dpsi[i, j] * dchi[i, j], cross(k, n2))
-            eps = add(mix(d2psi[i, j], k, d2chi[i, j], n2), gyro)
+            carrier = tree.put_turning(bodies[2], foot, k, rho, dpsi, d2psi)
+            tree.put(axes[2], k)
+            n2 = tree.turned_about(k, cp, sp, still)
+            cc, sc = math.cos(chi), math.sin(chi)
+            gyro = scale(dpsi * dchi, cross(k, n2))
+            eps = add(mix(d2psi, k, d2chi, n2), gyro)
             none = (0.0, 0.0, 0.0)
-            looper = Moving(os, none, none, mix(dpsi[i, j], k, dchi[i, j], n2), eps)
-            bx = turned_about(k, cp, sp, turned_about(still, cc, sc, first))
-            by = turned_about(k, cp, sp, turned_about(still, cc, sc, (0.0, 1.0, 0.0)))
-            put_body(bodies[3], looper, bx, by, cross(bx, by), os)
-            put(axes[3], n2)
+            looper = tree.Moving(os, none, none, mix(dpsi, k, dchi, n2), eps)
+            bx = tree.turned_about(k, cp, sp, tree.turned_about(still, cc, sc, first))
+            by = tree.turned_about(k, cp, sp, tree.turned_about(still, cc, sc, (0.0, 1.0, 0.0)))
+            tree.put_body(bodies[3], looper, bx, by, cross(bx, by), os)
+            tree.put(axes[3], n2)
             ball1 = add(foot, scale(d[2], rho))
             ball2 = add(os, add(mix(d[11], bx, d[12], by), scale(d[13], cross(bx, by))))
-            put_rod(bodies[4], axes[4:], crank1, pin1, carrier, ball1)
-            put_rod(bodies[5], axes[6:], crank2, pin2, looper, ball2)
-            put_ball(lines, ball1)
-            put_ball(lines[3:], ball2)
+            tree.put_rod(bodies[4], axes[4:], crank1, pin1, carrier, ball1)
+            tree.put_rod(bodies[5], axes[6:], crank2, pin2, looper, ball2)
+            tree.put_ball(lines, ball1)
+            tree.put_ball(lines[3:], ball2)

@@ -9,25 +9,16 @@ bit.  Designs may be complex128 (exact gradients by the complex step); decisions
 from __future__ import annotations
 
 import math
+from collections import namedtuple
 from typing import Any, NamedTuple
 
 import numpy as np
 
 from kernels import status as st
+from kernels.arithmetic.complex_step import unit_near
 from kernels.arithmetic.vectors import Vector, add, cross, dot, mix, scale
 from kernels.jit import inline, kernel
-from kernels.linkage.bodies import (
-    Links,
-    Moving,
-    acceleration_at,
-    across,
-    put,
-    put_body,
-    put_crank,
-    put_line,
-    shaft,
-    velocity_at,
-)
+from kernels.linkage import bodies as tree
 from kernels.linkage.outputs import put_block
 from kernels.types import EPS, Array, Numbers, Status
 
@@ -56,8 +47,7 @@ class Reduced(NamedTuple):
 @inline
 def reduce_design(designs: Numbers, i: int) -> Reduced:
     """Constants of one design; ``valid`` is false for a crank of no length and for what is not finite."""
-    _, exponent = math.frexp(designs[i, 0].real)
-    unit, per_unit = math.ldexp(1.0, exponent), math.ldexp(1.0, -exponent)
+    unit, per_unit = unit_near(designs[i, 0])
     a, e, f, g = designs[i, 0] * per_unit, designs[i, 1] * per_unit, designs[i, 2] * per_unit, designs[i, 3] * per_unit
     alpha, length = designs[i, 4], designs[i, 5] * per_unit
     sa, ca = np.sin(alpha), np.cos(alpha)
@@ -102,25 +92,12 @@ def _turning(
     return (length, h1, length * bend, -h1 * (1.0 + 3.0 * bend)), fast, w, w1, w2
 
 
-class Outputs(NamedTuple):
-    """Blocks (k, n, m) of outputs, or None: what is None is not computed."""
-
-    rod: Numbers | None
-    point: Numbers | None
-    velocity: Numbers | None
-    acceleration: Numbers | None
-    jerk: Numbers | None
+# Blocks (k, n, m) of outputs, or None: what is None is not computed.
+Outputs = namedtuple("Outputs", "rod point velocity acceleration jerk joints")
 
 
 @kernel
-def poses(
-    designs: Numbers,
-    cos_phi: Numbers,
-    sin_phi: Numbers,
-    status: Status,
-    out: Outputs,
-    joints: Numbers | None,
-) -> None:
+def poses(designs: Numbers, cos_phi: Numbers, sin_phi: Numbers, status: Status, out: Outputs) -> None:
     """Rod between crank pin and block, and the working point, with derivatives, of every design and crank angle.
 
     Equations (1)-(7) of docs/swivel.md.
@@ -167,49 +144,40 @@ def poses(
             put_block(out.velocity, i, j, mix(r.length, n1, -1.0, reach1), r.unit)
             put_block(out.acceleration, i, j, mix(r.length, n2, -1.0, reach2), r.unit)
             put_block(out.jerk, i, j, mix(r.length, n3, 1.0, reach1), r.unit)
-            if joints is not None:
-                for k in range(3):
-                    joints[k, i, j] = pin[k] * r.unit if code == st.OK else math.nan
-                    joints[3 + k, i, j] = n[k]
+            placed = scale(r.unit if code == st.OK else math.nan, pin)
+            put_block(out.joints, i, j, placed + n, 1.0)
 
 
 @kernel
-def links(
-    designs: Array,
-    cos_phi: Array,
-    sin_phi: Array,
-    rho: Array,
-    drho: Array,
-    direction: Array,
-    out: Links,
-) -> None:
+def links(designs: Array, cos_phi: Array, sin_phi: Array, motion: Array, out: tree.Links) -> None:
     """Fill the bodies, freedoms and closing lines of every pose; equation numbers are of docs/swivel.md.
 
     Parameters
     ----------
     designs : (n, 6);  cos_phi, sin_phi : (n, m) or (1, m)
-    rho, drho : (n, m), outputs of ``poses``;  direction : (3, n, m), the rod's
+    motion : (5, n, m), outputs rho, drho and x y z of the rod's direction of ``poses``
     out : two bodies, three freedoms, two lines: the block's forces on the rod across it
     """
     for i in range(designs.shape[0]):
         d = designs[i]
-        u, e2 = shaft(d[4])
+        u, e2 = tree.shaft(d[4])
         centre, block = scale(d[2], u), (d[1], 0.0, d[3])
         row = i if cos_phi.shape[0] > 1 else 0
-        for j in range(rho.shape[1]):
+        for j in range(motion.shape[2]):
             bodies, axes = out.bodies[i, j], out.axes[i, j]
             first = (1.0, 0.0, 0.0)
-            crank = put_crank(bodies[0], axes[0], centre, u, first, e2, cos_phi[row, j], sin_phi[row, j])
+            crank = tree.put_crank(bodies[0], axes[0], centre, u, first, e2, cos_phi[row, j], sin_phi[row, j])
             pin = add(centre, scale(d[0], mix(cos_phi[row, j], first, sin_phi[row, j], e2)))
-            n = (direction[0, i, j], direction[1, i, j], direction[2, i, j])
-            v, a = velocity_at(crank, pin), acceleration_at(crank, pin)
+            rho, drho = motion[0, i, j], motion[1, i, j]
+            n = (motion[2, i, j], motion[3, i, j], motion[4, i, j])
+            v, a = tree.velocity_at(crank, pin), tree.acceleration_at(crank, pin)
             # n x n' and n x n'' of (3), with E' = -B'
-            w = scale(-1.0 / rho[i, j], cross(n, v))
-            rod = Moving(pin, v, a, w, scale(-1.0 / rho[i, j], mix(1.0, cross(n, a), 2.0 * drho[i, j], w)))
-            y = across(n)
+            w = scale(-1.0 / rho, cross(n, v))
+            rod = tree.Moving(pin, v, a, w, scale(-1.0 / rho, mix(1.0, cross(n, a), 2.0 * drho, w)))
+            y = tree.across(n)
             z = cross(n, y)
-            put_body(bodies[1], rod, n, y, z, pin)
-            put(axes[1], y)
-            put(axes[2], z)
-            put_line(out.lines[i, j, 0], block, y)
-            put_line(out.lines[i, j, 1], block, z)
+            tree.put_body(bodies[1], rod, n, y, z, pin)
+            tree.put(axes[1], y)
+            tree.put(axes[2], z)
+            tree.put_line(out.lines[i, j, 0], block, y)
+            tree.put_line(out.lines[i, j, 1], block, z)

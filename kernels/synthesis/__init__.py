@@ -4,8 +4,9 @@
 ``acceptance`` numbers the tests.
 """
 
-from kernels.synthesis.arcs import rssp_arc_ends as rssp_arc_ends
-from kernels.synthesis.arcs import rssr_arc_ends as rssr_arc_ends
+from kernels.synthesis.acceptance import limit_sensitivities as limit_sensitivities
+from kernels.synthesis.acceptance import rssp_arc_ends as rssp_arc_ends
+from kernels.synthesis.acceptance import rssr_arc_ends as rssr_arc_ends
 from kernels.synthesis.rssp_locus import rssp_at_offset as rssp_at_offset
 from kernels.synthesis.rssp_locus import rssp_at_place as rssp_at_place
 from kernels.synthesis.rssp_locus import rssp_on_locus as rssp_on_locus
@@ -13,4 +14,3 @@ from kernels.synthesis.rssr_locus import rssr_at_direction as rssr_at_direction
 from kernels.synthesis.rssr_locus import rssr_of_size as rssr_of_size
 from kernels.synthesis.rssr_locus import rssr_on_locus as rssr_on_locus
 from kernels.synthesis.rssr_locus import rssr_points as rssr_points
-from kernels.synthesis.sensitivity import limit_sensitivities as limit_sensitivities

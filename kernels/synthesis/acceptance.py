@@ -1,13 +1,17 @@
-"""The acceptance tests of a synthesised mechanism, in the order in which they are made; docs/synthesis.md, section 3.
+"""What a synthesised mechanism must pass, where the admissible arcs of its locus end, and how its limits move.
 
-The locus equation knows tan(phi0) only and its square roots are taken without asking for the assembly mode, so a point
-of the locus may belong to a mechanism that does something else: tests 1 to 5 find out.
+The acceptance tests are made in the order of docs/synthesis.md, section 3; the arcs end at crank angles phi1 at which
+the side condition changes; the limit positions of a crank-rocker move with its dimensions by equation (16) there.
 """
 
 from __future__ import annotations
 
+import math
+
 from kernels import status as st
-from kernels.jit import inline
+from kernels.arithmetic.sincos import sine_cosine
+from kernels.jit import inline, kernel
+from kernels.types import TWO_PI, Array
 
 PASSED = 0
 NO_POINT = 1
@@ -58,3 +62,120 @@ def design_status(valid: bool, failed: int) -> int:
     if not valid:
         return st.INVALID_INPUT
     return st.OK if failed == PASSED else st.NOT_ADMISSIBLE
+
+
+@kernel
+def rssr_arc_ends(requirements: Array, ends: Array) -> None:
+    """Compute crank angles phi1 at which the rocker ball would lie on the crank axis or at infinity.
+
+    Equation (4) of docs/synthesis.md: the zeros of rho1, rho2 and of the determinant.
+
+    Parameters
+    ----------
+    requirements : (n, 7) columns of :func:`kernels.synthesis.rssr_on_locus`; phi1 and f are not used
+    ends : (n, 8) out [rad] in [0, 2 pi), ascending; nan last, where there are fewer
+    """
+    for i in range(requirements.shape[0]):
+        phi0, e, g = requirements[i, 1], requirements[i, 3], requirements[i, 5]
+        sh, ch = sine_cosine(0.5 * requirements[i, 0])
+        s0, c0 = sine_cosine(phi0)
+        sa, ca = sine_cosine(requirements[i, 6])
+        h, ss, q = g * sa, 2.0 * sh * ch, 2.0 * sh * sh
+        first = math.atan2(ca * (h * q + e * ca * ss), h * ss - e * ca * q) - phi0
+        second = math.atan2(-ca * (h * q - e * ca * ss), h * ss + e * ca * q)
+        # det = 0: cos(2 phi1 + phi0) = level/size
+        size, level = ss * (sa * sa), (1.0 + ca * ca) * c0 * ss - 2.0 * ca * (1.0 - q) * s0
+        inner = (size - level) * (size + level)
+        infinite = math.nan
+        if inner >= 0.0 and size != 0.0:
+            infinite = math.atan2(math.sqrt(inner), math.copysign(level, level * size))
+        ends[i, 0], ends[i, 1] = first, first + math.pi
+        ends[i, 2], ends[i, 3] = second, second + math.pi
+        ends[i, 4], ends[i, 5] = 0.5 * (infinite - phi0), 0.5 * (infinite - phi0) + math.pi
+        ends[i, 6], ends[i, 7] = 0.5 * (-infinite - phi0), 0.5 * (-infinite - phi0) + math.pi
+        for k in range(8):
+            turned = ends[i, k] % TWO_PI
+            place = k
+            while place > 0 and not (ends[i, place - 1] <= turned) and turned == turned:
+                ends[i, place] = ends[i, place - 1]
+                place -= 1
+            ends[i, place] = turned
+
+
+@kernel
+def rssp_arc_ends(requirements: Array, ends: Array) -> None:
+    """Crank angles phi1 at which the slider ball would lie on the crank axis; equation (10) of docs/synthesis.md.
+
+    Parameters
+    ----------
+    requirements : (n, 5) columns of :func:`kernels.synthesis.rssp_on_locus`; phi1, f and alpha are not used
+    ends : (n, 4) out [rad] in [0, 2 pi), ascending
+    """
+    for i in range(requirements.shape[0]):
+        phi0 = requirements[i, 1]
+        ends[i, 0], ends[i, 1] = 0.5 * math.pi, 1.5 * math.pi
+        for k in range(2, 4):
+            turned = (0.5 * math.pi - phi0 + (k - 2) * math.pi) % TWO_PI
+            place = k
+            while place > 0 and ends[i, place - 1] > turned:
+                ends[i, place] = ends[i, place - 1]
+                place -= 1
+            ends[i, place] = turned
+
+
+PARAMETERS = ("a", "b", "c", "e", "f", "g", "alpha")
+
+
+@inline
+def _at_limit(designs: Array, i: int, psi: float, phi: float, rates: Array, place: int) -> None:
+    """Write dpsi/dp into rates[i, :, place] and dphi/dp into rates[i, :, place + 1], for the seven parameters p."""
+    a, b, c, e = designs[i, 0], designs[i, 1], designs[i, 2], designs[i, 3]
+    f, g = designs[i, 4], designs[i, 5]
+    sa, ca = sine_cosine(designs[i, 6])
+    s, co = sine_cosine(psi)
+    v, u = sine_cosine(phi)
+    # ball in the crank frame; coupler d = C - B; c T = dF/dpsi/2
+    xc, yc, ze = e + c * co, c * ca * s - g * sa, c * sa * s + g * ca
+    dx, dy, dz = xc - a * u, c * s - (f * sa + a * ca * v), g - (f * ca - a * sa * v)
+    ct = c * (dy * co - dx * s)
+    rho2 = xc * xc + yc * yc
+    h = (
+        a - (u * xc + v * yc),
+        -b,
+        dx * co + dy * s,
+        dx,
+        f - ze,
+        dz,
+        dz * (f * sa + a * ca * v) - dy * (f * ca - a * sa * v),
+    )
+    direct_x = (0.0, 0.0, co, 1.0, 0.0, 0.0, 0.0)
+    direct_y = (0.0, 0.0, ca * s, 0.0, 0.0, -sa, -ze)
+    for p in range(7):
+        dpsi = -h[p] / ct
+        rates[i, p, place] = dpsi
+        rates[i, p, place + 1] = (
+            xc * (direct_y[p] + c * ca * co * dpsi) - yc * (direct_x[p] - c * s * dpsi)
+        ) / rho2  # fmt: skip
+
+
+@kernel
+def limit_sensitivities(
+    designs: Array, psi_ext: Array, phi_ext: Array, psi_fold: Array, phi_fold: Array, rates: Array
+) -> None:
+    """Compute derivatives of both limit positions with respect to every dimension.
+
+    At a limit dpsi/dphi = 0, so the limit angle of the rocker moves as the rocker does at that crank angle held fixed.
+
+    Parameters
+    ----------
+    designs : (n, 8) a, b, c, e, f, g, alpha, branch
+    psi_ext, phi_ext, psi_fold, phi_fold : (n,) the limit positions [rad]
+    rates : (n, 7, 4) out: per dimension of PARAMETERS the derivatives of psi_ext, phi_ext, psi_fold, phi_fold
+        [rad/length, 1 for alpha]; nan goes through
+    """
+    for i in range(designs.shape[0]):
+        if math.isnan(psi_ext[i]):
+            rates[i] = math.nan
+        else:
+            _at_limit(designs, i, psi_ext[i], phi_ext[i], rates, 0)
+            _at_limit(designs, i, psi_fold[i], phi_fold[i], rates, 2)

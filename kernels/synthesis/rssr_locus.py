@@ -87,10 +87,10 @@ def _point(r: _Requirement, u1: float, v1: float) -> _Point:
 
 @inline
 def _finish(
-    r: _Requirement, point: bool, x1: float, y1: float, ahead: float, back: float, u1: float, v1: float,
-    i: int, status: Status, failed: Status, designs: Array,
-) -> None:  # fmt: skip
+    r: _Requirement, p: _Point, u1: float, v1: float, i: int, status: Status, failed: Status, designs: Array
+) -> None:
     """Compute crank and coupler by (6), (7), make the tests (i)-(iii), and write the row of the design matrix."""
+    x1, y1, ahead, back = p.x, p.y, p.ahead, p.back
     c = np.sqrt(x1 * x1 + y1 * y1)
     x_mid, y_mid = x1 * r.cos_half - y1 * r.sin_half, y1 * r.cos_half + x1 * r.sin_half
     a = 2.0 * r.sin_half * (r.e * y_mid + r.f * r.sa * x_mid) / (ahead - back)
@@ -101,7 +101,7 @@ def _finish(
     u2, v2 = u1 * r.cos_phi0 - v1 * r.sin_phi0, v1 * r.cos_phi0 + u1 * r.sin_phi0
     t1 = -(r.e - a * u1) * y1 - (r.f * r.sa + a * r.ca * v1) * x1
     t2 = -(r.e - a * u2) * y2 - (r.f * r.sa + a * r.ca * v2) * x2
-    finite = point and 0.0 < c.real < math.inf and 0.0 < b.real < math.inf
+    finite = p.exists and 0.0 < c.real < math.inf and 0.0 < b.real < math.inf
     test = first_failure(finite, ahead.real, back.real, a.real, t1.real, t2.real, r.branch)
     failed[i] = test
     status[i] = design_status(r.valid, test)
@@ -137,7 +137,7 @@ def rssr_on_locus(requirements: Array, status: Status, failed: Status, designs: 
         r = _read(requirements, i)
         v1, u1 = sine_cosine(requirements[i, 2])
         p = _point(r, u1, v1)
-        _finish(r, p.exists, p.x, p.y, p.ahead, p.back, u1, v1, i, status, failed, designs)
+        _finish(r, p, u1, v1, i, status, failed, designs)
         if psi1 is not None:
             psi1[i] = arctan2(p.y, p.x) if status[i] == 0 else math.nan
 
@@ -172,12 +172,12 @@ def rssr_of_size(requirements: Array, status: Status, failed: Status, designs: A
             e * size, one.f, g * size, one.alpha, one.h * size, one.sa, one.ca, one.sin_half, one.cos_half,
             one.sin_swing, one.versed, one.sin_phi0, one.cos_phi0, one.branch, one.valid,
         )  # fmt: skip
-        x, y, ahead, back = p.x * size, p.y * size, p.ahead * size, p.back * size
-        _finish(r, exists, x, y, ahead, back, u1, v1, i, status, failed, designs)
+        ball = _Point(p.x * size, p.y * size, p.ahead * size, p.back * size, exists)
+        _finish(r, ball, u1, v1, i, status, failed, designs)
         if status[i] != 0:
             designs[i, 3], designs[i, 5] = math.nan, math.nan
         if psi1 is not None:
-            psi1[i] = arctan2(y, x) if status[i] == 0 else math.nan
+            psi1[i] = arctan2(ball.y, ball.x) if status[i] == 0 else math.nan
 
 
 @kernel
@@ -254,6 +254,6 @@ def rssr_at_direction(
         near = abs(p2) > 8.0 * EPS * (abs(ca * r.sin_swing * c0) + abs(s0)) or root[i] < 0.0  # else at infinity
         point = near and inner >= 0.0 and c > 0.0 and rho1 > 0.0
         back = -rho2 if side < 0.0 else rho2
-        _finish(r, point, x1, y1, rho1, back, u1, v1, i, status, failed, designs)
+        _finish(r, _Point(x1, y1, rho1, back, point), u1, v1, i, status, failed, designs)
         if phi1 is not None:
             phi1[i] = math.atan2(v1, u1) if status[i] == 0 else math.nan

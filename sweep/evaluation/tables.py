@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Collection, Container, Iterable, Mapping, Sequence
+from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, Protocol, TypeAlias
 
 import numpy as np
@@ -30,6 +31,19 @@ class Parametrised(Protocol):
     def parameters(self) -> tuple[Parameter, ...]: ...  # noqa: D102
     @property
     def parameter_names(self) -> tuple[str, ...]: ...  # noqa: D102
+
+
+@dataclass(frozen=True)
+class Sheet:
+    """The columns that one function reads."""
+
+    name: str
+    parameters: tuple[Parameter, ...]
+
+    @property
+    def parameter_names(self) -> tuple[str, ...]:
+        """Names of the columns in order."""
+        return tuple(p.name for p in self.parameters)
 
 
 def design_matrix(

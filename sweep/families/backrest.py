@@ -111,7 +111,6 @@ HELD = (
     Parameter("couple", "choice", "1: the slider bears a couple; 0: its reaction acts at the axis of the back-rest",
               default=1.0, choices=(0.0, 1.0)),
 )  # fmt: skip
-
 _COLUMNS = backrest.Design._fields
 
 

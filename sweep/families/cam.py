@@ -2,20 +2,19 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import replace
 from typing import Any
 
 import numpy as np
 
-from kernels.families.cam import law, swinging, translating
+from kernels.families import cam
 from kernels.types import Array
 from sweep.families.base import Angles, Columns, Family, Output, Parameter
 from sweep.families.capabilities import Dimensions, Link, Made, OutputLink, Points, Skeleton
 from sweep.families.curve_features import Switches
-from sweep.families.outputs import angle_outputs, ladders, place_outputs
+from sweep.families.outputs import coordinate_outputs, ladders
 from sweep.families.planar_trees import sliding_follower, swinging_follower
-from sweep.families.poses import filled
+from sweep.families.poses import poses_of
 from sweep.families.skeletons import ORIGIN, X, line, links, parameter, standing
 
 PHASES = (
@@ -32,7 +31,7 @@ PHASES = (
 TABLE = tuple(
     Parameter(f"{letter}{k}", "ratio", f"{function}({k} phi) of the Fourier table, in lifts", default=0.0)
     for letter, function in (("c", "cos"), ("s", "sin"))
-    for k in range(1, law.HARMONICS + 1)
+    for k in range(1, cam.HARMONICS + 1)
 )
 
 PARAMETERS = (
@@ -44,7 +43,7 @@ PARAMETERS = (
 )
 
 PROFILE_OUTPUTS = (
-    *place_outputs("s", "displacement of the follower from its rest", "(1)", "(1)"),
+    *coordinate_outputs("s", "length", "displacement of the follower from its rest", "(1)", "(1)"),
     Output("pressure_angle", "rad", "between the normal of the cam and the direction of the follower", "(7)"),
     Output("x_p", "length", "pitch curve in the frame of the cam, along the direction of lift at phi = 0", "(8)"),
     Output("y_p", "length", "pitch curve in the frame of the cam, to the left of it", "(8)"),
@@ -66,22 +65,16 @@ def phase_ends(designs: Array) -> Array:
     rise, dwell, fall, start, kind = (parameter(PARAMETERS, name, designs)[:, None] for name in _LAW)
     shares = np.array([0.0, 0.125, 0.875, 1.0])
     ends = np.concatenate([start + rise * shares, start + rise + dwell + fall * shares], axis=1)
-    return np.where(kind == law.FOURIER, 0.0, ends)
+    return np.where(kind == cam.FOURIER, 0.0, ends)
 
 
-def cam_poses(
-    kernel: Callable[..., object], outputs: Any, designs: Array, angles: Angles, wanted: frozenset[str]
-) -> Columns:
-    """Compute the wanted pose outputs and status of a cam's kernel, each (n, m)."""
-    status = np.empty((len(designs), angles.phi.shape[1]), np.uint8)
-    dtype = np.result_type(designs, angles.phi)
-    return filled(kernel, (designs, angles.phi), outputs, wanted, status, dtype)
+_profile = poses_of(cam.poses, cam.Outputs, angles="phi")
 
 
 def poses(designs: Array, angles: Angles, wanted: frozenset[str]) -> Columns:
     """Compute the wanted pose outputs and status of every design at its cam angles, each (n, m)."""
     of_roller = wanted & {o.name for o in ROLLER_OUTPUTS}
-    found = cam_poses(translating.poses, translating.Outputs, designs, angles, wanted | ({"s"} if of_roller else set()))
+    found = _profile(designs, angles, wanted | ({"s"} if of_roller else set()))
     if of_roller:
         s: Any = found["s"] if "s" in wanted else found.pop("s")
         r0, e = (parameter(PARAMETERS, name, designs)[:, None] for name in ("r0", "e"))
@@ -128,23 +121,14 @@ LEVER_PARAMETERS = (
 )  # fmt: skip
 
 LEVER_OUTPUTS = (
-    *angle_outputs("psi", "lever angle in (-pi, pi), 0 away from the cam", "(9)", "(9)"),
+    *coordinate_outputs("psi", "rad", "lever angle in (-pi, pi), 0 away from the cam", "(9)", "(9)"),
     Output("pressure_angle", "rad", "between the normal of the cam and the velocity of the roller's centre", "(10)"),
     Output("x_p", "length", "pitch curve in the frame of the cam, towards the lever's axis at phi = 0", "(11)"),
     Output("y_p", "length", "pitch curve in the frame of the cam, to the left of it", "(11)"),
 )
 
 
-def lever_poses(designs: Array, angles: Angles, wanted: frozenset[str]) -> Columns:
-    """Compute the wanted pose outputs and status of every design at its cam angles, each (n, m)."""
-    return cam_poses(swinging.poses, swinging.Outputs, designs, angles, wanted)
-
-
-def lever_origin(designs: Array) -> Array:
-    """Axis of the lever, (n, 3)."""
-    origin = np.zeros((len(designs), 3), designs.dtype)
-    origin[:, 0] = parameter(LEVER_PARAMETERS, "e", designs)
-    return origin
+lever_poses = poses_of(cam.lever_poses, cam.LeverOutputs, angles="phi")
 
 
 def roller(designs: Array, angles: Angles, motion: Columns) -> Array:
@@ -166,7 +150,7 @@ LEVER = Family(
     capabilities=(
         Switches(phase_ends),
         Dimensions(links("c")),
-        OutputLink(lever_origin),
+        OutputLink(standing(LEVER_PARAMETERS, "e").at),
         swinging_follower(LEVER_PARAMETERS),
         Skeleton(
             {"a": ORIGIN, "d": standing(LEVER_PARAMETERS, "e")},

@@ -45,6 +45,15 @@ class Singular:
     curve: Callable[[Array, Angles, Columns], Array]
     needs: tuple[str, ...] = ()
 
+    @classmethod
+    def where_small(cls, *names: str) -> Singular:
+        """Make the sum of the squares of pose outputs: where they nearly vanish something turns or moves at once."""
+
+        def curve(designs: Array, angles: Angles, found: Columns) -> Array:
+            return sum(np.square(np.asarray(found[name], np.float64)) for name in names)  # type: ignore[return-value]
+
+        return cls(curve, names)
+
 
 @dataclass(frozen=True)
 class Switches:

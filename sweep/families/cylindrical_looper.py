@@ -13,16 +13,9 @@ from kernels.types import Array
 from sweep.families.base import Angles, Columns, Family, Output, Parameter
 from sweep.families.capabilities import Assembly, Dimensions, Link, Made, Points, Skeleton
 from sweep.families.link_tree import LinkBody, LinkJoint, LinkTree, filled_by
-from sweep.families.outputs import (
-    angle_outputs,
-    joint_outputs,
-    ladders,
-    magnitude_outputs,
-    place_outputs,
-    point_outputs,
-)
-from sweep.families.poses import filled_blocks
-from sweep.families.skeletons import crank_axis, links, parameter, standing
+from sweep.families.outputs import coordinate_outputs, joint_outputs, ladders, magnitude_outputs, point_outputs
+from sweep.families.poses import poses_of
+from sweep.families.skeletons import crank_axis, links, parameter, squared, standing
 
 PARAMETERS = (
     Parameter("a1", "length", "crank that swings the shaft", positive=True),
@@ -54,8 +47,8 @@ PARAMETERS = (
 
 _D2 = [p.name for p in PARAMETERS].index("d2")
 
-SHAFT_OUTPUTS = angle_outputs("psi", "angle of the shaft", "(3)", "(3)")
-SLIDE_OUTPUTS = place_outputs("s", "place of the shaft along its axis", "(1)", "(1)", of_name=True)
+SHAFT_OUTPUTS = coordinate_outputs("psi", "rad", "angle of the shaft", "(3)", "(3)")
+SLIDE_OUTPUTS = coordinate_outputs("s", "length", "place of the shaft along its axis", "(1)", "(1)", of_name=True)
 SHAFT_LOOP_OUTPUTS = (
     Output("discriminant1", "length^2", "b1^2 cos^2(pressure_angle1); negative where the links do not reach", "(3)"),
     Output("pressure_angle1", "rad", "between the force of coupler 1 and the turning velocity of the rocker's ball",
@@ -67,12 +60,15 @@ SLIDE_LOOP_OUTPUTS = (
 )
 POINT_OUTPUTS = point_outputs("(4)")
 MAGNITUDE_OUTPUTS = magnitude_outputs("(5)")
-JOINT_OUTPUTS = joint_outputs((("b1", "pin of crank 1"), ("c1", "rocker's ball")), "(2)")
+JOINT_OUTPUTS = joint_outputs({"b1": "pin of crank 1", "c1": "rocker's ball"}, "(2)")
 
 _BLOCKS = (
     SHAFT_OUTPUTS, SHAFT_LOOP_OUTPUTS, SLIDE_OUTPUTS, SLIDE_LOOP_OUTPUTS,
     *POINT_OUTPUTS, MAGNITUDE_OUTPUTS, JOINT_OUTPUTS,
 )  # fmt: skip
+_BY_FIELD = dict(zip(cylindrical_looper.Outputs._fields, _BLOCKS, strict=True))
+_on_axis = poses_of(cylindrical_looper.poses, cylindrical_looper.Outputs, _BY_FIELD)
+_beside = poses_of(cylindrical_looper.coupled_poses, cylindrical_looper.Outputs, _BY_FIELD)
 
 
 def poses(designs: Array, angles: Angles, wanted: frozenset[str]) -> Columns:
@@ -81,8 +77,7 @@ def poses(designs: Array, angles: Angles, wanted: frozenset[str]) -> Columns:
     beside = (designs[:, _D2] != 0.0) | ~np.isfinite(designs[:, _D2:]).all(axis=1)
     if beside.any() and not beside.all():
         return _of_both(designs, angles, wanted, beside)
-    kernel = cylindrical_looper.coupled_poses if beside.any() else cylindrical_looper.poses
-    return filled_blocks(kernel, cylindrical_looper.Outputs, designs, angles, _BLOCKS, wanted)
+    return (_beside if beside.any() else _on_axis)(designs, angles, wanted)
 
 
 def _of_both(designs: Array, angles: Angles, wanted: frozenset[str], beside: np.ndarray) -> Columns:
@@ -95,18 +90,6 @@ def _of_both(designs: Array, angles: Angles, wanted: frozenset[str], beside: np.
                 found[name] = np.empty((len(designs), values.shape[1]), values.dtype)
             found[name][rows] = values
     return found
-
-
-def first_coupler_square(designs: Array) -> Array:
-    """Return b1^2 of every design."""
-    square: Array = designs[:, 1] * designs[:, 1]
-    return square
-
-
-def second_coupler_square(designs: Array) -> Array:
-    """Return b2^2 of every design."""
-    square: Array = designs[:, 9] * designs[:, 9]
-    return square
 
 
 def rocker_foot(designs: Array, angles: Angles, motion: Columns) -> Array:
@@ -176,8 +159,8 @@ FAMILY = Family(
     capabilities=(
         Dimensions(links("a1 b1 c1 a2 b2")),
         LINKS,
-        Assembly("discriminant1", "pressure_angle1", first_coupler_square, "1"),
-        Assembly("discriminant2", "pressure_angle2", second_coupler_square, "2"),
+        Assembly("discriminant1", "pressure_angle1", squared(PARAMETERS, "b1"), "1"),
+        Assembly("discriminant2", "pressure_angle2", squared(PARAMETERS, "b2"), "2"),
         Points({name: (f"x_{name}", f"y_{name}", f"z_{name}") for name in ("b1", "c1", "p")}),
         Skeleton(
             {"a1": crank_axis(PARAMETERS, "f1", "alpha1"), "d1": standing(PARAMETERS, "e1", None, "g1")},

@@ -18,6 +18,7 @@ from sweep.families.base import Accuracy, Angles, Columns, Family, Output, Param
 from sweep.families.capabilities import Arm, Dimensions, Link, Made, Points, Skeleton
 from sweep.families.curve_features import Singular
 from sweep.families.feed_trees import three_leads, two_leads
+from sweep.families.outputs import joint_outputs
 from sweep.families.rssr import FAMILY as CRANK_ROCKER
 from sweep.families.skeletons import COUPLER, CRANK, crank_axis, links, parameter, standing
 
@@ -54,6 +55,20 @@ PARAMETERS = (
               default=1.0, choices=(-1.0, 1.0)),
 )  # fmt: skip
 
+_WAYS = ("along the feed", "upwards")
+
+
+def _place_of_tooth(equation: str) -> tuple[Output, ...]:
+    return joint_outputs({"t": "tooth"}, equation, _WAYS)
+
+
+def _rates_of_tooth(order: str, kind: str, equation: str) -> tuple[Output, ...]:
+    return tuple(
+        Output(f"{order}{axis}_t", "length", f"{kind} analogue of the tooth {way}", equation)
+        for axis, way in zip("xy", _WAYS, strict=True)
+    )
+
+
 POSE_OUTPUTS = (
     Output("psi_plus_dh", "rad", "direction of the arm to H", "(3)", wraps=True),
     Output("dpsi", "1", "its first derivative by phi", "(3)"),
@@ -61,18 +76,12 @@ POSE_OUTPUTS = (
     Output("chi", "rad", "angle of the rack", "(7)", wraps=True),
     Output("dchi", "1", "its first derivative by phi", "(8)"),
     Output("d2chi", "1", "its second derivative", "(8)"),
-    Output("x_h", "length", "pin H of the rack, along x", "(4)"),
-    Output("y_h", "length", "pin H of the rack, along y", "(4)"),
-    Output("x_e", "length", "centre E of the lift eccentric, along x", "(5)"),
-    Output("y_e", "length", "centre E of the lift eccentric, along y", "(5)"),
-    Output("x_f", "length", "joint F of the lift coupler, along x", "(9)"),
-    Output("y_f", "length", "joint F of the lift coupler, along y", "(9)"),
-    Output("x_t", "length", "tooth, along the feed", "(9)"),
-    Output("y_t", "length", "tooth, upwards", "(9)"),
-    Output("dx_t", "length", "velocity analogue of the tooth along the feed", "(9)"),
-    Output("dy_t", "length", "velocity analogue of the tooth upwards", "(9)"),
-    Output("d2x_t", "length", "acceleration analogue of the tooth along the feed", "(9)"),
-    Output("d2y_t", "length", "acceleration analogue of the tooth upwards", "(9)"),
+    *joint_outputs({"h": "pin H of the rack"}, "(4)", ("along x", "along y")),
+    *joint_outputs({"e": "centre E of the lift eccentric"}, "(5)", ("along x", "along y")),
+    *joint_outputs({"f": "joint F of the lift coupler"}, "(9)", ("along x", "along y")),
+    *_place_of_tooth("(9)"),
+    *_rates_of_tooth("d", "velocity", "(9)"),
+    *_rates_of_tooth("d2", "acceleration", "(9)"),
 )
 
 FEEDING_OUTPUTS = (
@@ -225,14 +234,11 @@ TRIAD_PARAMETERS = (
 )
 
 TRIAD_OUTPUTS = (
-    Output("x_t", "length", "tooth, along the feed", "(15)"),
-    Output("y_t", "length", "tooth, upwards", "(15)"),
+    *_place_of_tooth("(15)"),
     Output("chi", "rad", "angle of the rack", "(15)", wraps=True),
-    Output("dx_t", "length", "velocity analogue of the tooth along the feed", "(16)"),
-    Output("dy_t", "length", "velocity analogue of the tooth upwards", "(16)"),
+    *_rates_of_tooth("d", "velocity", "(16)"),
     Output("dchi", "1", "first derivative of chi by phi", "(16)"),
-    Output("d2x_t", "length", "acceleration analogue of the tooth along the feed", "(17)"),
-    Output("d2y_t", "length", "acceleration analogue of the tooth upwards", "(17)"),
+    *_rates_of_tooth("d2", "acceleration", "(17)"),
     Output("d2chi", "1", "second derivative of chi", "(17)"),
     Output("determinant", "length^4", "of the closures: zero where the three leads lock", "(16)"),
 )
@@ -251,11 +257,6 @@ def triad_loop(designs: Array, angles: Angles, found: Columns) -> Array:
     """Compute the discriminant of the horizontal chain of a rack on three leads, (n, m)."""
     chain = horizontal_chain(designs, TRIAD_PARAMETERS)
     return np.asarray(CRANK_ROCKER.poses(chain, angles, _DELTA)["discriminant"], np.float64)
-
-
-def determinant_squared(designs: Array, angles: Angles, found: Columns) -> Array:
-    """Square of the determinant of the closures, (n, m): it falls like a root where the leads lock."""
-    return np.square(np.asarray(found["determinant"], np.float64))
 
 
 def _columns(designs: Array, *names: str) -> list[Array]:
@@ -314,7 +315,7 @@ TRIAD = Family(
     },
     capabilities=(
         Singular(triad_loop),
-        Singular(determinant_squared, ("determinant",)),
+        Singular.where_small("determinant"),
         Dimensions(links("h_a h_b h_c rh q1 q2 q3"), optional=("rE2", "rE3")),
         three_leads(TRIAD_PARAMETERS),
         Points({"t": ("x_t", "y_t", None)}),

@@ -6,10 +6,9 @@ import numpy as np
 
 from kernels.linkage.bodies import DRIVEN, FRAME, TURN, Links
 from kernels.types import Array
-from sweep.families import link_poses as poses
+from sweep.families import link_tree as poses
 from sweep.families.base import Angles, Columns, Parameter
-from sweep.families.link_poses import Path
-from sweep.families.link_tree import LinkBody, LinkJoint, LinkTree
+from sweep.families.link_tree import LinkBody, LinkJoint, LinkTree, Path
 from sweep.families.rssr import FAMILY as CRANK_ROCKER
 from sweep.families.skeletons import parameter
 

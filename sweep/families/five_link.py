@@ -5,33 +5,26 @@ from __future__ import annotations
 from kernels.families import five_link
 from kernels.families.five_link.motion import links as fill_links
 from kernels.linkage.bodies import DRIVEN, FRAME, TURN
-from kernels.types import Array
 from sweep.families import rssr as crank_rocker
-from sweep.families.base import Angles, Columns, Family, Output, Parameter
+from sweep.families.base import Family, Output, Parameter
 from sweep.families.capabilities import Assembly, Link, OutputLink, Points, Skeleton
 from sweep.families.link_tree import LinkBody, LinkJoint, LinkTree, filled_by
-from sweep.families.outputs import angle_outputs, ladders
-from sweep.families.poses import filled_with_places
+from sweep.families.outputs import coordinate_outputs, joint_outputs, ladders
+from sweep.families.poses import poses_of
 from sweep.families.skeletons import CRANK, CRANK_ROCKER_SIZES, ROCKER, crank_axis, standing
 
 PARAMETERS = (
-    Parameter("a", "length", "crank", positive=True),
+    crank_rocker.PARAMETERS[0],
     Parameter("b", "length", "coupler, from the second revolute's axis to the rocker ball", positive=True),
-    Parameter("c", "length", "rocker", positive=True),
-    Parameter("e", "length", "common perpendicular of the two axes, from crank axis to rocker axis"),
-    Parameter("f", "length", "offset of the crank plane along the crank axis"),
-    Parameter("g", "length", "offset of the rocker plane along the rocker axis"),
-    Parameter("alpha", "angle", "angle between the axes"),
+    *crank_rocker.PARAMETERS[2:-1],  # c e f g alpha
     Parameter("h", "length", "common perpendicular of the two revolutes, from the crank pin towards the coupler"),
     Parameter("s2", "length", "offset along the second revolute's axis", default=0.0),
-    Parameter("branch", "sign", "assembly mode: sign of dF/dpsi", default=1.0, choices=(-1.0, 1.0)),
+    crank_rocker.PARAMETERS[-1],
     Parameter("mode", "choice", "which of several solutions of that sign", default=1.0, choices=(1.0, 2.0, 3.0)),
 )
 
 VALUE_OUTPUTS = (
-    *angle_outputs("psi", "rocker angle in (-pi, pi]", "(1)", "(5)"),
-    Output("sin_psi", "1", "sine of the rocker angle", "(1)"),
-    Output("cos_psi", "1", "cosine of the rocker angle", "(1)"),
+    *coordinate_outputs("psi", "rad", "rocker angle in (-pi, pi]", "(1)", "(5)", circle="the rocker angle"),
     Output("discriminant", "length^4", "(2 b c)^2 cos^2(pressure angle); negative where the links do not reach", "(7)"),
     Output("pressure_angle", "rad", "between the force through the rocker ball and its velocity", "(6)"),
 )
@@ -40,23 +33,10 @@ PLACE_OUTPUTS = (
     Output("theta", "rad", "angle of the coupler's plane about the crank pin, from the common perpendicular", "(8)",
            wraps=True),
     Output("beta", "rad", "angle of the coupler against the crank plane, in (-pi/2, pi/2)", "(8)"),
-    Output("x_b", "length", "crank pin, along the common perpendicular of the axes", "(9)"),
-    Output("y_b", "length", "crank pin, across it and the rocker axis", "(9)"),
-    Output("z_b", "length", "crank pin, along the rocker axis", "(9)"),
-    Output("x_h", "length", "second revolute, along the common perpendicular of the axes", "(9)"),
-    Output("y_h", "length", "second revolute, across it and the rocker axis", "(9)"),
-    Output("z_h", "length", "second revolute, along the rocker axis", "(9)"),
-    Output("x_c", "length", "rocker ball, along the common perpendicular of the axes", "(9)"),
-    Output("y_c", "length", "rocker ball, across it and the rocker axis", "(9)"),
-    Output("z_c", "length", "rocker ball, along the rocker axis", "(9)"),
+    *joint_outputs({"b": "crank pin", "h": "second revolute", "c": "rocker ball"}, "(9)", crank_rocker.WAYS),
 )  # fmt: skip
 
-_PLACES = tuple(o.name for o in PLACE_OUTPUTS)
-
-
-def poses(designs: Array, angles: Angles, wanted: frozenset[str]) -> Columns:
-    """Compute the wanted pose outputs and status of every design at its crank angles, each (n, m)."""
-    return filled_with_places(five_link.poses, designs, angles, five_link.Outputs, _PLACES, wanted)
+poses = poses_of(five_link.poses, five_link.Outputs, {"places": PLACE_OUTPUTS})
 
 
 _RATES = ("psi", "dpsi", "d2psi", "theta", "beta")
@@ -98,7 +78,7 @@ FAMILY = Family(
         CRANK_ROCKER_SIZES,
         Assembly("discriminant", "pressure_angle", crank_rocker.discriminant_scale),
         Points({name: (f"x_{name}", f"y_{name}", f"z_{name}") for name in ("b", "h", "c")}),
-        OutputLink(crank_rocker.rocker_origin),
+        OutputLink(standing(PARAMETERS, "e").at),
         LINKS,
         Skeleton(
             {"a": crank_axis(PARAMETERS, "f", "alpha"), "d": standing(PARAMETERS, "e", None, "g")},

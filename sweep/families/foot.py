@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from functools import partial
+
 import numpy as np
 
 from kernels.effects.foot import OUTPUTS as _EVENTS
@@ -127,12 +130,26 @@ def path_of(designs: Array, nodes: int) -> Array:
     return path
 
 
-def poses(designs: Array, angles: Angles, wanted: frozenset[str]) -> Columns:
-    """Compute the wanted pose outputs and status of every design over one turn in equal steps from 0, each (n, m)."""
-    nodes, apart = nodes_for(angles.phi.shape[1])
+Marched = tuple[Columns, Array, Array, Array]
+
+
+def on_rack(designs: Array, nodes: int) -> Marched:
+    """Events with the status, the path of a harmonic rack, and the heights and forces at so many nodes."""
     path = path_of(designs, nodes)
     columns, heights, forces = marched(path, designs[:, FEET])
-    found: Columns = {"y_rack": path[:, 0, ::apart], "y_foot": heights[:, ::apart], "force": forces[:, ::apart]}
+    return columns, path, heights, forces
+
+
+def _poses(run: Callable[[Array, int], Marched], designs: Array, angles: Angles, wanted: frozenset[str]) -> Columns:
+    """Compute the wanted pose outputs and status of every design over one turn in equal steps from 0, each (n, m)."""
+    nodes, apart = nodes_for(angles.phi.shape[1])
+    columns, path, heights, forces = run(designs, nodes)
+    found: Columns = {
+        "y_rack": path[:, 0, ::apart],
+        "x_rack": path[:, 3, ::apart],
+        "y_foot": heights[:, ::apart],
+        "force": forces[:, ::apart],
+    }
     status = np.repeat(np.asarray(columns["status"], np.uint8)[:, None], angles.phi.shape[1], axis=1)
     return {name: x for name, x in found.items() if name in wanted} | {"status": status}
 
@@ -145,10 +162,11 @@ def closed(designs: Array, wanted: frozenset[str], accuracy: Accuracy) -> Column
     return chosen(columns | {"status": status}, wanted)
 
 
-def events(designs: Array, wanted: frozenset[str], accuracy: Accuracy) -> Columns:
-    """Loss of contact, landing, impacts and what they cost, of the last turn marched."""
-    columns, _, _ = marched(path_of(designs, NODES), designs[:, FEET])
-    return chosen(columns, wanted)
+def _events(
+    run: Callable[[Array, int], Marched], designs: Array, wanted: frozenset[str], accuracy: Accuracy
+) -> Columns:
+    """Find loss of contact, landing, impacts and what they cost, of the last turn marched."""
+    return chosen(run(designs, NODES)[0], wanted)
 
 
 def foot_place(designs: Array, angles: Angles, found: Columns) -> Array:
@@ -172,11 +190,11 @@ FAMILY = Family(
     parameters=PARAMETERS,
     position="y_foot",
     pose_outputs=POSE_OUTPUTS,
-    poses=guarded(poses),
+    poses=guarded(partial(_poses, on_rack)),
     domain=March(turns=TURNS),
     steps=(
         Step("closed forms", CLOSED_OUTPUTS, closed, work=Work.LONG),
-        Step("march", EVENT_OUTPUTS, events, work=Work.LONG),
+        Step("march", EVENT_OUTPUTS, partial(_events, on_rack), work=Work.LONG),
     ),
     example=EXAMPLE,
     analytic=False,
@@ -210,29 +228,13 @@ def feed_path(designs: Array, nodes: int) -> tuple[Array, np.ndarray]:
     return path, worst
 
 
-def _on_feed(designs: Array, nodes: int) -> tuple[Columns, Array, Array, Array]:
+def on_feed(designs: Array, nodes: int) -> Marched:
+    """As :func:`on_rack`, on the rack of a feed mechanism."""
     path, linkage = feed_path(designs, nodes)
     columns, heights, forces = marched(path, designs[:, _FEET])
     # A rack that is not assembled has no path: the linkage's status stands for what the march found invalid.
     columns["status"] = np.where(linkage != 0, linkage, columns["status"]).astype(np.uint8)
     return columns, path, heights, forces
-
-
-def feed_poses(designs: Array, angles: Angles, wanted: frozenset[str]) -> Columns:
-    """Compute the wanted pose outputs and status of every design over one turn in equal steps from 0, each (n, m)."""
-    nodes, apart = nodes_for(angles.phi.shape[1])
-    columns, path, heights, forces = _on_feed(designs, nodes)
-    found: Columns = {
-        "y_rack": path[:, 0, ::apart], "x_rack": path[:, 3, ::apart], "y_foot": heights[:, ::apart],
-        "force": forces[:, ::apart],
-    }  # fmt: skip
-    status = np.repeat(np.asarray(columns["status"], np.uint8)[:, None], angles.phi.shape[1], axis=1)
-    return {name: x for name, x in found.items() if name in wanted} | {"status": status}
-
-
-def feed_events(designs: Array, wanted: frozenset[str], accuracy: Accuracy) -> Columns:
-    """Loss of contact, landing, impacts and what they cost, of the last turn marched."""
-    return chosen(_on_feed(designs, NODES)[0], wanted)
 
 
 def contact(designs: Array, wanted: frozenset[str], accuracy: Accuracy) -> Columns:
@@ -300,12 +302,12 @@ ON_FEED = Family(
     parameters=FEED_PARAMETERS,
     position="y_foot",
     pose_outputs=(*POSE_OUTPUTS, Output("x_rack", "length", "tooth, along the feed", "(11)")),
-    poses=guarded(feed_poses),
+    poses=guarded(partial(_poses, on_feed)),
     domain=March(turns=TURNS),
     steps=(
         Step("feeding", feed.FEEDING_OUTPUTS, feeding, work=Work.LONG),
         Step("contact", CONTACT_OUTPUTS, contact, work=Work.LONG),
-        Step("march", EVENT_OUTPUTS, feed_events, work=Work.LONG),
+        Step("march", EVENT_OUTPUTS, partial(_events, on_feed), work=Work.LONG),
     ),
     example=FEED_EXAMPLE,
     analytic=False,

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from functools import partial
 
 import numpy as np
 
@@ -12,7 +13,7 @@ from sweep.families.base import Angles, Columns, Family, Output, Parameter
 from sweep.families.capabilities import Link, Made, Points, Skeleton, ThreadPath
 from sweep.families.domain import March
 from sweep.families.planar_trees import turning_cam
-from sweep.families.poses import filled, poses_of
+from sweep.families.poses import poses_of
 from sweep.families.skeletons import ORIGIN, parameter, standing
 
 PARAMETERS = (
@@ -124,9 +125,8 @@ def sliding_poses(designs: Array, angles: Angles, wanted: frozenset[str]) -> Col
     needed = wanted | {"L"} if "P" in wanted else wanted
     own = np.ascontiguousarray(designs[:, :_FRICTIONLESS])
     friction = np.ascontiguousarray(designs[:, [_FRICTIONLESS + 1, _FRICTIONLESS + 2, _FRICTIONLESS]])
-    arguments = own, friction, angles.cos, angles.sin, DOMAIN.turns
-    status = np.empty((len(designs), angles.cos.shape[1]), np.uint8)
-    found = filled(free_cam.march, arguments, free_cam.MarchOutputs, needed, status)
+    kernel = partial(free_cam.march, friction, DOMAIN.turns)
+    found = poses_of(kernel, free_cam.MarchOutputs)(own, angles, needed)
     if "P" in wanted:
         found["P"] = np.asarray(found["L"], np.float64) - designs[:, _FRICTIONLESS - 1 : _FRICTIONLESS]
     return {name: found[name] for name in (*wanted, "status")}

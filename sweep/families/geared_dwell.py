@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from functools import lru_cache
 
 import numpy as np
@@ -11,9 +12,9 @@ from kernels.types import EPS, Array
 from sweep.families.base import Accuracy, Angles, Columns, Family, Output, Parameter, Step, Work
 from sweep.families.capabilities import Link, Made, OutputLink, Points, Skeleton, constant
 from sweep.families.curve_features import Singular, Waves
-from sweep.families.outputs import angle_outputs, ladders
+from sweep.families.outputs import coordinate_outputs, ladders
 from sweep.families.planar_trees import rolling_planet
-from sweep.families.poses import filled, optional_outputs, poses_of
+from sweep.families.poses import filled_each, poses_of
 from sweep.families.skeletons import ORIGIN, parameter, standing
 
 PARAMETERS = (
@@ -21,22 +22,34 @@ PARAMETERS = (
     Parameter("a", "ratio", "offset of the output axis from the carrier axis, in planet radii"),
 )
 
+
+def _pin_outputs(place: str) -> tuple[Output, ...]:
+    return (
+        Output("sin_psi", "1", "sine of the output angle", "(2)"),
+        Output("cos_psi", "1", "cosine of the output angle", "(2)"),
+        Output("x_b", "1", "pin from the output axis towards phi = 0, in planet radii", place),
+        Output("y_b", "1", "pin from the output axis across it, in planet radii", place),
+    )
+
+
+def _dwell_outputs(angle: str, deviation: str, band: str) -> tuple[Output, ...]:
+    return (
+        Output("dwell_angle", "rad", "return dwell: carrier angle between first and third passage of mid-dwell", angle),
+        Output("dwell_deviation", "rad", "largest deviation of psi from mid-dwell, half the peak to peak", deviation),
+        Output("dwell_band", "rad", "carrier angle during which psi stays within +-dwell_deviation", band),
+    )
+
+
 POSE_OUTPUTS = (
-    Output("psi", "rad", "output angle, continuous over all turns; 0 or pi at phi = 0", "(3)", wraps=True),
-    Output("dpsi", "1", "velocity analogue dpsi/dphi", "(4)"),
-    Output("d2psi", "1", "acceleration analogue", "(5)"),
-    Output("d3psi", "1", "jerk analogue", "(6)"),
-    Output("sin_psi", "1", "sine of the output angle", "(2)"),
-    Output("cos_psi", "1", "cosine of the output angle", "(2)"),
-    Output("x_b", "1", "pin from the output axis towards phi = 0, in planet radii", "(2)"),
-    Output("y_b", "1", "pin from the output axis across it, in planet radii", "(2)"),
+    *coordinate_outputs(
+        "psi", "rad", "output angle, continuous over all turns; 0 or pi at phi = 0", "(3)", "(4)", "(5)", "(6)"
+    ),
+    *_pin_outputs("(2)"),
 )
 
 DWELL_OUTPUTS = (
     Output("turns", "1", "turns of the output per turn of the carrier, 0, 1 or 2", "section 2", jumps=True),
-    Output("dwell_angle", "rad", "return dwell: carrier angle between first and third passage of mid-dwell", "(10)"),
-    Output("dwell_deviation", "rad", "largest deviation of psi from mid-dwell, half the peak to peak", "(11)"),
-    Output("dwell_band", "rad", "carrier angle during which psi stays within +-dwell_deviation", "(12)"),
+    *_dwell_outputs("(10)", "(11)", "(12)"),
 )
 
 MAX_OUTPUTS = (
@@ -49,17 +62,7 @@ MAX_OUTPUTS = (
 _SAMPLED_OUTPUTS = tuple(o for o in MAX_OUTPUTS if o.name.startswith("max"))
 
 
-def poses(designs: Array, angles: Angles, wanted: frozenset[str]) -> Columns:
-    """Compute the wanted pose outputs and status of every design at its carrier angles, each (n, m)."""
-    status = np.empty((len(designs), angles.cos.shape[1]), np.uint8)
-    dtype = np.result_type(designs, angles.cos)
-    return filled(geared_dwell.poses, (designs, *angles), geared_dwell.Outputs, wanted, status, dtype)
-
-
-def pin_distance_squared(designs: Array, angles: Angles, found: Columns) -> Array:
-    """Squared distance of the pin from the output axis, (n, m): near the axis the output turns at once."""
-    x, y = (np.asarray(found[name], np.float64) for name in ("x_b", "y_b"))
-    return x * x + y * y
+poses = poses_of(geared_dwell.poses, geared_dwell.Outputs, angles="phi cos sin")
 
 
 def dwell(designs: Array, wanted: frozenset[str], accuracy: Accuracy) -> Columns:
@@ -67,12 +70,10 @@ def dwell(designs: Array, wanted: frozenset[str], accuracy: Accuracy) -> Columns
 
     The errors are bounds of those measured: below 8 roundings on the oracle table.
     """
-    status, outputs = _empty(DWELL_OUTPUTS, wanted, len(designs))
-    geared_dwell.dwell_measures(designs, status, *outputs.values())
-    columns = _columns(outputs, status)
-    for name, value in outputs.items():
-        if value is not None and accuracy.target is not None:
-            columns[f"err_{name}"] = 0.0 * value if name == "turns" else 32.0 * EPS * abs(value)
+    columns = _computed(geared_dwell.dwell_measures, (designs,), DWELL_OUTPUTS, wanted)
+    for name in wanted & set(columns) if accuracy.target is not None else ():
+        value = np.asarray(columns[name], np.float64)
+        columns[f"err_{name}"] = 0.0 * value if name == "turns" else 32.0 * EPS * abs(value)
     return columns
 
 
@@ -83,23 +84,19 @@ def exact_maxima(designs: Array, wanted: frozenset[str], accuracy: Accuracy) -> 
     k = 1, a = -1, where three singularities meet, as the distance to the power -5/4.  They are relative for a maximum,
     absolute for its place.
     """
-    status, outputs = _empty(MAX_OUTPUTS, wanted, len(designs))
-    geared_dwell.turn_maxima(designs, status, *outputs.values())
-    columns = _columns(outputs, status)
+    columns = _computed(geared_dwell.turn_maxima, (designs,), MAX_OUTPUTS, wanted)
     with np.errstate(all="ignore"):  # what is no number has its status
         growth = 128.0 * EPS * (1.0 + np.hypot(designs[:, 0] - 1.0, designs[:, 1] + 1.0) ** -1.25)
-    for name, value in outputs.items():
-        if value is not None:
-            columns[f"err_{name}"] = growth * (1.0 + 0.0 * value if name.startswith("phi") else abs(value))
+    for name in wanted & set(columns):
+        value = np.asarray(columns[name], np.float64)
+        columns[f"err_{name}"] = growth * (1.0 + 0.0 * value if name.startswith("phi") else abs(value))
     return columns
 
 
 def sampled_maxima(designs: Array, wanted: frozenset[str], accuracy: Accuracy) -> Columns:
     """Maxima over ``accuracy.samples`` equidistant carrier angles, the first at phi = 0."""
     assert accuracy.samples is not None
-    status, outputs = _empty(_SAMPLED_OUTPUTS, wanted, len(designs))
-    geared_dwell.dense_maxima(designs, *half_turn(accuracy.samples), status, *outputs.values())
-    return _columns(outputs, status)
+    return _computed(geared_dwell.dense_maxima, (designs, *half_turn(accuracy.samples)), _SAMPLED_OUTPUTS, wanted)
 
 
 @lru_cache(maxsize=32)
@@ -122,17 +119,10 @@ def _table(quarters: np.ndarray[tuple[int], np.dtype[np.int64]], samples: int) -
     return table
 
 
-def _empty(
-    provided: tuple[Output, ...], wanted: frozenset[str], count: int
-) -> tuple[np.ndarray[tuple[int], np.dtype[np.uint8]], dict[str, Array | None]]:
-    names = tuple(o.name for o in provided)
-    outputs = optional_outputs(names, wanted, (count,))
-    return np.empty(count, np.uint8), dict(zip(names, outputs, strict=True))
-
-
-def _columns(outputs: dict[str, Array | None], status: np.ndarray[tuple[int], np.dtype[np.uint8]]) -> Columns:
-    columns: Columns = {name: out for name, out in outputs.items() if out is not None}
-    return columns | {"status": status}
+def _computed(
+    kernel: Callable[..., object], given: tuple[Array, ...], provided: tuple[Output, ...], wanted: frozenset[str]
+) -> Columns:
+    return filled_each(kernel, given, tuple(o.name for o in provided), wanted, np.empty(len(given[0]), np.uint8))
 
 
 def planet_centre(designs: Array, angles: Angles, motion: Columns) -> Array:
@@ -155,7 +145,7 @@ FAMILY = Family(
     ),
     derivative_of=ladders("psi"),
     capabilities=(
-        Singular(pin_distance_squared, ("x_b", "y_b")),
+        Singular.where_small("x_b", "y_b"),
         Points({"b": ("x_b", "y_b", None)}),
         OutputLink(constant(0.0, 0.0, 0.0)),
         rolling_planet(PARAMETERS),
@@ -170,8 +160,7 @@ FAMILY = Family(
 
 
 EPICYCLIC_PARAMETERS = (
-    Parameter("k", "ratio", "distance of the pin from the planet centre, in planet radii", positive=True),
-    Parameter("a", "ratio", "offset of the output axis from the carrier axis, in planet radii"),
+    *PARAMETERS,
     Parameter(
         "n", "count", "radius of the fixed gear in planet radii, a whole number", positive=True, default=1.0,
         choices=tuple(float(n) for n in range(1, epicyclic_dwell.MOST_TEETH + 1)),
@@ -180,18 +169,11 @@ EPICYCLIC_PARAMETERS = (
 )  # fmt: skip
 
 EPICYCLIC_OUTPUTS = (
-    *angle_outputs("psi", "output angle in (-pi, pi]", "(2)", "(3)"),
-    Output("sin_psi", "1", "sine of the output angle", "(2)"),
-    Output("cos_psi", "1", "cosine of the output angle", "(2)"),
-    Output("x_b", "1", "pin from the output axis towards phi = 0, in planet radii", "(1)"),
-    Output("y_b", "1", "pin from the output axis across it, in planet radii", "(1)"),
+    *coordinate_outputs("psi", "rad", "output angle in (-pi, pi]", "(2)", "(3)"),
+    *_pin_outputs("(1)"),
 )
 
-EPICYCLIC_DWELL = (
-    Output("dwell_angle", "rad", "return dwell: carrier angle between first and third passage of mid-dwell", "(5)"),
-    Output("dwell_deviation", "rad", "largest deviation of psi from mid-dwell, half the peak to peak", "(6)"),
-    Output("dwell_band", "rad", "carrier angle during which psi stays within +-dwell_deviation", "(7)"),
-)
+EPICYCLIC_DWELL = _dwell_outputs("(5)", "(6)", "(7)")
 
 # Wanted pose outputs and status of every design at its angles, each (n, m).
 epicyclic_poses = poses_of(epicyclic_dwell.poses, epicyclic_dwell.Outputs)
@@ -232,7 +214,7 @@ EPICYCLIC = Family(
     derivative_of=ladders("psi"),
     uses_phi=False,
     capabilities=(
-        Singular(pin_distance_squared, ("x_b", "y_b")),
+        Singular.where_small("x_b", "y_b"),
         Waves(planet_turns),
         Points({"b": ("x_b", "y_b", None)}),
         OutputLink(constant(0.0, 0.0, 0.0)),

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -11,27 +12,12 @@ from kernels import status as st
 from kernels.families import guide
 from kernels.families import rssr as rssr_kernels
 from kernels.types import Array
+from sweep.families import capabilities as can
 from sweep.families import rssr as crank_rocker
 from sweep.families.base import Angles, Columns, Family, Output, Parameter, PoseFunction
-from sweep.families.capabilities import (
-    Arm,
-    Assembly,
-    CrankRockerLoop,
-    Curve,
-    Dimensions,
-    GuidedPoint,
-    InSeries,
-    JointRecords,
-    Link,
-    Points,
-    PressureEllipse,
-    Skeleton,
-    ToolPoint,
-    constant,
-)
 from sweep.families.hardpoints import GUIDE_POINTS
-from sweep.families.outputs import ladders, place_outputs
-from sweep.families.poses import filled_with_places, of_matrix, together
+from sweep.families.outputs import ALONG_FRAME, coordinate_outputs, joint_outputs, ladders
+from sweep.families.poses import of_matrix, poses_of, together
 from sweep.families.skeletons import CRANK, ORIGIN, ROCKER, Z, line, links, parameter, standing
 
 PARAMETERS = (
@@ -47,7 +33,7 @@ PARAMETERS = (
 )
 
 VALUE_OUTPUTS = (
-    *place_outputs("s", "coupler point along the line, from the foot of the crank pivot", "(4)", "(5)"),
+    *coordinate_outputs("s", "length", "coupler point along the line, from the foot of the crank pivot", "(4)", "(5)"),
     Output("dev", "length", "deviation of the coupler point from the line, to its left", "(4)", windowed=True),
     Output("ddev", "length", "first derivative of the deviation with respect to phi", "(5)"),
     Output("d2dev", "length", "second derivative of the deviation", "(5)"),
@@ -55,44 +41,25 @@ VALUE_OUTPUTS = (
     Output("pressure_angle", "rad", "between the coupler force and the velocity of the rocker pin", "(3)"),
 )
 
-JOINT_OUTPUTS = (
-    Output("x_b", "length", "crank pin, along the frame", "(6)"),
-    Output("y_b", "length", "crank pin, across the frame", "(6)"),
-    Output("x_c", "length", "rocker pin, along the frame", "(6)"),
-    Output("y_c", "length", "rocker pin, across the frame", "(6)"),
-    Output("x_m", "length", "coupler point, along the frame", "(6)"),
-    Output("y_m", "length", "coupler point, across the frame", "(6)"),
+JOINT_OUTPUTS = joint_outputs({"b": "crank pin", "c": "rocker pin", "m": "coupler point"}, "(6)", ALONG_FRAME)
+
+POINT_OUTPUTS = tuple(
+    Output(f"{order}{axis}_m", "length", f"{kind} analogue of the coupler point {way}", "(6)")
+    for order, kind in (("d", "velocity"), ("d2", "acceleration"))
+    for axis, way in zip("xy", ALONG_FRAME, strict=True)
 )
 
-POINT_OUTPUTS = (
-    Output("dx_m", "length", "velocity analogue of the coupler point along the frame", "(6)"),
-    Output("dy_m", "length", "velocity analogue of the coupler point across the frame", "(6)"),
-    Output("d2x_m", "length", "acceleration analogue of the coupler point along the frame", "(6)"),
-    Output("d2y_m", "length", "acceleration analogue of the coupler point across the frame", "(6)"),
-)
-
-_JOINTS = tuple(o.name for o in JOINT_OUTPUTS)
 _POINT = {"dx_m": ("ds", "ddev"), "dy_m": ("ds", "ddev"), "d2x_m": ("d2s", "d2dev"), "d2y_m": ("d2s", "d2dev")}
 _LAM = [p.name for p in PARAMETERS].index("lam")
 
 
-@together(*guide.Outputs._fields, *_JOINTS)
+_kernel_poses = poses_of(guide.poses, guide.Outputs, {"joints": JOINT_OUTPUTS})
+_precise_motion = poses_of(guide.precise_poses, guide.Outputs, {"joints": JOINT_OUTPUTS})
+
+
+@together(*(o.name for o in VALUE_OUTPUTS + JOINT_OUTPUTS))
 def _motion(designs: Array, angles: Angles, wanted: frozenset[str]) -> Columns:
-    return filled_with_places(guide.poses, designs, angles, guide.Outputs, _JOINTS, wanted)
-
-
-def _precise_motion(designs: Array, angles: Angles, wanted: frozenset[str]) -> Columns:
-    return filled_with_places(guide.precise_poses, designs, angles, guide.Outputs, _JOINTS, wanted)
-
-
-def poses(designs: Array, angles: Angles, wanted: frozenset[str]) -> Columns:
-    """Wanted pose outputs and status of every design at its crank angles, each (n, m)."""
-    return _with_point(_motion, designs, angles, wanted)
-
-
-def precise_poses(designs: Array, angles: Angles, wanted: frozenset[str]) -> Columns:
-    """As :func:`poses`, in twice the working precision; for float64 only."""
-    return _with_point(_precise_motion, designs, angles, wanted)
+    return _kernel_poses(designs, angles, wanted)
 
 
 def _with_point(motion: PoseFunction, designs: Array, angles: Angles, wanted: frozenset[str]) -> Columns:
@@ -107,6 +74,10 @@ def _with_point(motion: PoseFunction, designs: Array, angles: Angles, wanted: fr
         along, across = (found[part] for part in _POINT[name])
         found[name] = along * cos - across * sin if "x" in name else along * sin + across * cos
     return {name: found[name] for name in (*wanted, "status")}
+
+
+# Wanted pose outputs and status of every design at its crank angles, each (n, m); also in twice the working precision.
+poses, precise_poses = partial(_with_point, _motion), partial(_with_point, _precise_motion)
 
 
 def as_crank_rocker(designs: Array) -> Array:
@@ -165,7 +136,7 @@ def y_of_point(designs: Array) -> Array:
     return _in_frame(designs, np.sin(lam), np.cos(lam))
 
 
-_ALONG, _ACROSS = constant(1.0, 0.0, 0.0), constant(0.0, 1.0, 0.0)
+_ALONG, _ACROSS = can.constant(1.0, 0.0, 0.0), can.constant(0.0, 1.0, 0.0)
 
 
 def opening(designs: Array, status: NDArray[np.uint8], distance: Array) -> None:
@@ -176,12 +147,12 @@ def opening(designs: Array, status: NDArray[np.uint8], distance: Array) -> None:
     status[~known] = st.INVALID_INPUT
 
 
-IN_SERIES = InSeries(
+IN_SERIES = can.InSeries(
     guide.FORM,
     {
-        "s": Curve(0, _ALONG), "ds": Curve(1, _ALONG), "d2s": Curve(2, _ALONG), "d3s": Curve(3, _ALONG),
-        "dev": Curve(0, _ACROSS), "ddev": Curve(1, _ACROSS), "d2dev": Curve(2, _ACROSS),
-        "x_m": Curve(0, x_of_point), "y_m": Curve(0, y_of_point),
+        "s": can.Curve(0, _ALONG), "ds": can.Curve(1, _ALONG), "d2s": can.Curve(2, _ALONG), "d3s": can.Curve(3, _ALONG),
+        "dev": can.Curve(0, _ACROSS), "ddev": can.Curve(1, _ACROSS), "d2dev": can.Curve(2, _ACROSS),
+        "x_m": can.Curve(0, x_of_point), "y_m": can.Curve(0, y_of_point),
     },
     {"ds": "x1", "d2s": "x2", "d3s": "x3", "dev": "y0", "ddev": "y1", "d2dev": "y2"},
     opening,
@@ -199,13 +170,13 @@ FAMILY = Family(
     outward="branch",
     uses_phi=False,
     capabilities=(
-        Dimensions(links("a b c"), arms=(Arm(("xi", "eta"), ("b",)),)),
-        Assembly("discriminant", "pressure_angle", crank_rocker.discriminant_scale),
+        can.Dimensions(links("a b c"), arms=(can.Arm(("xi", "eta"), ("b",)),)),
+        can.Assembly("discriminant", "pressure_angle", crank_rocker.discriminant_scale),
         IN_SERIES,
-        JointRecords(joint_records, (), "rocker"),
-        PressureEllipse(of_matrix(crank_rocker.ellipse, as_crank_rocker)),
-        CrankRockerLoop(as_crank_rocker),
-        GuidedPoint(
+        can.JointRecords(joint_records, (), "rocker"),
+        can.PressureEllipse(of_matrix(crank_rocker.ellipse, as_crank_rocker)),
+        can.CrankRockerLoop(as_crank_rocker),
+        can.GuidedPoint(
             point_shares,
             fitted=("xi", "eta", "lam", "h"),
             scaled=("a", "b", "c", "e", "xi", "eta", "h"),
@@ -215,12 +186,12 @@ FAMILY = Family(
             offset="h",
             across={"s": "dev", "ds": "ddev", "d2s": "d2dev"},
         ),
-        ToolPoint(tool_point, tool_direction),
-        Points({"b": ("x_b", "y_b", None), "c": ("x_c", "y_c", None), "point": ("x_m", "y_m", None)}),
+        can.ToolPoint(tool_point, tool_direction),
+        can.Points({"b": ("x_b", "y_b", None), "c": ("x_c", "y_c", None), "point": ("x_m", "y_m", None)}),
         GUIDE_POINTS,
-        Skeleton(
+        can.Skeleton(
             {"a": ORIGIN, "d": standing(PARAMETERS, "e"), "line": line(guiding_line)},
-            (CRANK, Link("coupler", ("b", "c", "point")), ROCKER),
+            (CRANK, can.Link("coupler", ("b", "c", "point")), ROCKER),
         ),
     ),
     precise_poses=precise_poses,

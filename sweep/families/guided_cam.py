@@ -10,7 +10,7 @@ from sweep.families.base import Accuracy, Angles, Columns, Family, Output, Param
 from sweep.families.capabilities import Fixed, Link, Made, Points, Skeleton, ThreadPath
 from sweep.families.curve_features import Singular
 from sweep.families.planar_trees import thread_follower
-from sweep.families.poses import filled_with_places
+from sweep.families.poses import poses_of
 from sweep.families.skeletons import Y, line, parameter, standing
 
 _ORDERS = range(1, guided_cam.HARMONICS + 1)
@@ -50,18 +50,13 @@ DESIGN_OUTPUTS = (
     Output("jam_angle", "rad", "pressure angle at which the follower jams", "(13)"),
     Output("least_displacement", "length", "least displacement of the follower over the turn", "(10)"),
 )
-_PROFILE = tuple(o.name for o in PROFILE_OUTPUTS)
-
-
-def displacement_squared(designs: Array, angles: Angles, found: Columns) -> Array:
-    """Square of the follower's displacement, (n, m): where it nearly vanishes its speed is large."""
-    return np.square(np.asarray(found["S"], np.float64))
+_poses = poses_of(guided_cam.poses, guided_cam.Outputs, {"profile": PROFILE_OUTPUTS})
 
 
 def poses(designs: Array, angles: Angles, wanted: frozenset[str]) -> Columns:
     """Compute the wanted pose outputs and status of every design at its cam angles, each (n, m)."""
     asked = wanted | {"S"} if WRAP.name in wanted else wanted
-    columns = filled_with_places(guided_cam.poses, designs, angles, guided_cam.Outputs, _PROFILE, asked)
+    columns = _poses(designs, angles, asked)
     if WRAP.name in wanted:
         x1, z1, e = (designs[:, [k]] for k in (1, 2, 3))
         # The guides stand symmetrically, so the thread makes the same angle with their line on both sides.
@@ -127,7 +122,7 @@ FAMILY = Family(
     uses_phi=False,
     example={"P_h": 60.0, "X1": 3.0, "Z1": 12.0, "e": 5.0, "R0": 30.0, "A1": 10.0, "B2": 3.0},
     capabilities=(
-        Singular(displacement_squared, ("S",)),
+        Singular.where_small("S"),
         Points({"profile": ("X_P", "Y_P", None)}),
         thread_follower(PARAMETERS, cam_axis),
         ThreadPath(WRAP.name, "dP", "d2P"),

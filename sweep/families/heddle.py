@@ -8,10 +8,10 @@ from kernels.families import heddle
 from kernels.types import Array
 from sweep.families.base import Angles, Columns, Family, Output, Parameter
 from sweep.families.capabilities import Assembly, Dimensions, Fixed, Link, Made, Points, Skeleton
-from sweep.families.outputs import ladders
+from sweep.families.outputs import joint_outputs, ladders
 from sweep.families.planar_trees import heddle_shaft
-from sweep.families.poses import filled_with_places
-from sweep.families.skeletons import ORIGIN, Y, Z, line, links, parameter, standing
+from sweep.families.poses import poses_of
+from sweep.families.skeletons import ORIGIN, Y, Z, line, links, parameter, squared, standing
 
 PARAMETERS = (
     Parameter("O2B", "length", "arm of the cam lever", positive=True),
@@ -49,24 +49,11 @@ PLACE_OUTPUTS = (
     Output("sin_transmission", "1", "sine of the angle from the rod BC to the arm O3C", "(4)"),
     Output("pressure_angle", "rad", "between the rod's force and the velocity of C", "(4)"),
     Output("lam", "rad", "angle of the shaft lever from mid-stroke", "(6)", wraps=True),
-    Output("x_b", "length", "end of the cam lever, along O2O3 from O2", "(3)"),
-    Output("y_b", "length", "end of the cam lever, across O2O3", "(3)"),
-    Output("x_c", "length", "upper end of the bell crank, along O2O3 from O2", "(4)"),
-    Output("y_c", "length", "upper end of the bell crank, across O2O3", "(4)"),
+    *joint_outputs({"b": "end of the cam lever"}, "(3)", ("along O2O3 from O2", "across O2O3")),
+    *joint_outputs({"c": "upper end of the bell crank"}, "(4)", ("along O2O3 from O2", "across O2O3")),
 )
 
-_PLACES = tuple(o.name for o in PLACE_OUTPUTS)
-
-
-def poses(designs: Array, angles: Angles, wanted: frozenset[str]) -> Columns:
-    """Compute the wanted pose outputs and status of every design at its cam-lever angles, each (n, m)."""
-    return filled_with_places(heddle.poses, designs, angles, heddle.Outputs, _PLACES, wanted)
-
-
-def rod_square(designs: Array) -> Array:
-    """Return BC^2 of every design: the discriminant over it is the squared cosine of the pressure angle."""
-    square: Array = np.square(designs[:, 1])
-    return square
+poses = poses_of(heddle.poses, heddle.Outputs, {"places": PLACE_OUTPUTS})
 
 
 def _column(name: str, designs: Array) -> Array:
@@ -132,7 +119,7 @@ FAMILY = Family(
     uses_phi=False,
     capabilities=(
         Dimensions(links("O2B BC O3C O4E"), optional=("O3D", "O4F", "DF", "EG")),
-        Assembly("discriminant", "pressure_angle", rod_square),
+        Assembly("discriminant", "pressure_angle", squared(PARAMETERS, "BC")),
         heddle_shaft(PARAMETERS, shaft_line),
         Points({"b": ("x_b", "y_b", None), "c": ("x_c", "y_c", None)}),
         Skeleton(

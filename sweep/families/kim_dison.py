@@ -7,24 +7,17 @@ alpha = 90 deg, branch = -branch; psi is its alpha.
 from __future__ import annotations
 
 from dataclasses import replace
+from functools import partial
 
 import numpy as np
 
 from kernels import status as st
 from kernels.families import rssr
 from kernels.types import Array
+from sweep.families import capabilities as can
 from sweep.families import rssr as crank_rocker
 from sweep.families.base import Accuracy, Angles, Columns, Family, Output, Parameter, PoseFunction, Step
-from sweep.families.capabilities import (
-    Assembly,
-    CrankRockerLoop,
-    Dimensions,
-    JointRecords,
-    Points,
-    PressureEllipse,
-    Skeleton,
-)
-from sweep.families.outputs import angle_outputs, ladders
+from sweep.families.outputs import coordinate_outputs, joint_outputs, ladders
 from sweep.families.poses import move_records, of_matrix, step_of
 from sweep.families.skeletons import CRANK_ROCKER, Y, links, standing
 
@@ -43,9 +36,7 @@ PARAMETERS = (
 _FROM_CRANK_ROCKER = np.array([[0.0, 0.0, -1.0], [1.0, 0.0, 0.0], [0.0, -1.0, 0.0]])
 
 MOTION_OUTPUTS = (
-    *angle_outputs("alpha", "rocker angle in (-pi, pi]", "(4)", "(5)"),
-    Output("sin_alpha", "1", "sine of the rocker angle", "(4)"),
-    Output("cos_alpha", "1", "cosine of the rocker angle", "(4)"),
+    *coordinate_outputs("alpha", "rad", "rocker angle in (-pi, pi]", "(4)", "(5)", circle="the rocker angle"),
     Output("discriminant", "length^4", "4 h^2 times the square of the ball's distance from a dead point; negative out "
            "of reach", "(3)"),
     Output("pressure_angle", "rad", "between the coupler force and the velocity of the rocker ball", "(6)"),
@@ -55,12 +46,11 @@ OWN_OUTPUTS = (
     Output("omega3", "rad/s", "angular velocity of the rocker", "(7)"),
     Output("epsilon3", "rad/s^2", "angular acceleration of the rocker", "(7)"),
     Output("sin_transmission", "1", "coupler direction along the velocity of the rocker ball, signed", "(6)"),
-    Output("x_b", "length", "crank pin, normal to the plane of the rocker", "(1)"),
-    Output("y_b", "length", "crank pin, from the crank axis towards the rocker axis", "(1)"),
-    Output("z_b", "length", "crank pin, along the crank axis", "(1)"),
-    Output("x_c", "length", "rocker ball, normal to the plane of the rocker", "(1)"),
-    Output("y_c", "length", "rocker ball, from the crank axis towards the rocker axis", "(1)"),
-    Output("z_c", "length", "rocker ball, along the crank axis", "(1)"),
+    *joint_outputs(
+        {"b": "crank pin", "c": "rocker ball"},
+        "(1)",
+        ("normal to the plane of the rocker", "from the crank axis towards the rocker axis", "along the crank axis"),
+    ),
 )
 
 SWING_OUTPUTS = (
@@ -123,16 +113,6 @@ def _poses(run: PoseFunction, designs: Array, angles: Angles, wanted: frozenset[
     return columns
 
 
-def poses(designs: Array, angles: Angles, wanted: frozenset[str]) -> Columns:
-    """Compute the wanted pose outputs and status of every design at its crank angles, each (n, m)."""
-    return _poses(crank_rocker.poses, designs, angles, wanted)
-
-
-def precise_poses(designs: Array, angles: Angles, wanted: frozenset[str]) -> Columns:
-    """Compute what :func:`poses` does, in twice the working precision; for float64 only."""
-    return _poses(crank_rocker.precise_poses, designs, angles, wanted)
-
-
 def swing(designs: Array, wanted: frozenset[str], accuracy: Accuracy) -> Columns:
     """Both limit positions, where the crank is in the plane of the rocker, and the angle between them, to rounding."""
     n = len(designs)
@@ -172,7 +152,7 @@ FAMILY = Family(
     parameters=PARAMETERS,
     position="alpha",
     pose_outputs=MOTION_OUTPUTS + OWN_OUTPUTS,
-    poses=poses,
+    poses=partial(_poses, crank_rocker.poses),
     example={"r": 1.0, "l": 6.0, "h": 3.2, "a": 2.9, "b": 4.0, "branch": -1.0},
     steps=(
         Step("swing", SWING_OUTPUTS, swing),
@@ -185,18 +165,18 @@ FAMILY = Family(
     derivative_of=ladders("alpha"),
     uses_phi=False,
     capabilities=(
-        Dimensions(links("r l h")),
-        Assembly("discriminant", "pressure_angle", crank_rocker.discriminant_scale),
-        JointRecords(joint_records, (), "rocker"),
-        PressureEllipse(of_matrix(crank_rocker.ellipse, as_crank_rocker)),
-        CrankRockerLoop(as_crank_rocker),
+        can.Dimensions(links("r l h")),
+        can.Assembly("discriminant", "pressure_angle", crank_rocker.discriminant_scale),
+        can.JointRecords(joint_records, (), "rocker"),
+        can.PressureEllipse(of_matrix(crank_rocker.ellipse, as_crank_rocker)),
+        can.CrankRockerLoop(as_crank_rocker),
         replace(
             crank_rocker.SERIES,
             curves={_ours(name): known for name, known in crank_rocker.CURVES.items()},
             matrix=as_crank_rocker,
         ),
-        Points({"b": ("x_b", "y_b", "z_b"), "c": ("x_c", "y_c", "z_c")}),
-        Skeleton(
+        can.Points({"b": ("x_b", "y_b", "z_b"), "c": ("x_c", "y_c", "z_c")}),
+        can.Skeleton(
             {
                 "a": standing(PARAMETERS, axis=(0.0, 0.0, -1.0), zero=Y),
                 "d": standing(PARAMETERS, None, "a", "b", axis=(-1.0, 0.0, 0.0)),
@@ -204,5 +184,5 @@ FAMILY = Family(
             CRANK_ROCKER,
         ),
     ),
-    precise_poses=precise_poses,
+    precise_poses=partial(_poses, crank_rocker.precise_poses),
 )

@@ -2,39 +2,42 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from itertools import pairwise
 
 from sweep.families.base import Output
+from sweep.families.parameter import of_derivative
 from sweep.families.parts import AXES
 
 _KINDS = ("", "velocity analogue of the ", "acceleration analogue of the ", "jerk analogue of the ")
 _ORDERS = ("", "d", "d2", "d3")
+_CIRCLE = (("sin", "sine"), ("cos", "cosine"))
+ALONG_FRAME = ("along the frame", "across the frame")  # of planar families
 
 
-def angle_outputs(
-    name: str, text: str, equation: str, rates: str, *, of_name: bool = False
-) -> tuple[Output, Output, Output, Output]:
-    """Define an angle and its first three derivatives by phi; ``of_name`` repeats its name in the words of those."""
-    of = f" of {name}" if of_name else ""
-    return (
-        Output(name, "rad", text, equation, wraps=True),
-        Output(f"d{name}", "1", f"velocity analogue d{name}/dphi", rates),
-        Output(f"d2{name}", "1", f"acceleration analogue{of}", rates),
-        Output(f"d3{name}", "1", f"jerk analogue{of}", rates),
-    )
-
-
-def place_outputs(
-    name: str, text: str, equation: str, rates: str, kind: str = "", *, of_name: bool = False
+def coordinate_outputs(
+    name: str, unit: str, text: str, *equations: str, kind: str = "", of_name: bool = False, circle: str = ""
 ) -> tuple[Output, ...]:
-    """Define a place along something and its first three derivatives by phi; ``kind`` is "sliding" where it slides."""
-    kind, of = kind and f"{kind} ", f" of {name}" if of_name else ""
+    """Define an angle or a place along something and its first three derivatives by phi.
+
+    Parameters
+    ----------
+    name, unit, text : of the coordinate; "rad" makes it an angle
+    equations : of the coordinate, and of its derivatives together or each
+    kind : what stands before the words of the derivatives, such as "sliding "
+    of_name : whether its name is repeated in them
+    circle : of an angle that comes with its sine and cosine, what they are of
+    """
+    own, rates = equations[0], equations[1:] * (3 if len(equations) == 2 else 1)
+    of = f" of {name}" if of_name else ""
+    words = (f"velocity analogue d{name}/dphi", f"acceleration analogue{of}", f"jerk analogue{of}")
     return (
-        Output(name, "length", text, equation),
-        Output(f"d{name}", "length", f"{kind}velocity analogue d{name}/dphi", rates),
-        Output(f"d2{name}", "length", f"{kind}acceleration analogue{of}", rates),
-        Output(f"d3{name}", "length", f"{kind}jerk analogue{of}", rates),
+        Output(name, unit, text, own, wraps=unit == "rad"),
+        *(
+            Output(f"{order}{name}", of_derivative(unit, "rad"), f"{kind}{word}", equation)
+            for order, word, equation in zip(_ORDERS[1:], words, rates, strict=True)
+        ),
+        *(Output(f"{short}_{name}", "1", f"{word} of {circle}", own) for short, word in _CIRCLE if circle),
     )
 
 
@@ -55,10 +58,14 @@ def magnitude_outputs(equation: str) -> tuple[Output, ...]:
     )
 
 
-def joint_outputs(joints: Sequence[tuple[str, str]], equation: str) -> tuple[Output, ...]:
-    """Coordinates of joints, given as (suffix of the name, what it is)."""
+def joint_outputs(
+    joints: Mapping[str, str], equation: str, ways: Sequence[str] = ("along x", "along y", "along z")
+) -> tuple[Output, ...]:
+    """Coordinates of joints, from what each is by the end of their names, along two or three ways."""
     return tuple(
-        Output(f"{axis}_{name}", "length", f"{text}, along {axis}", equation) for name, text in joints for axis in AXES
+        Output(f"{axis}_{name}", "length", f"{text}, {way}", equation)
+        for name, text in joints.items()
+        for axis, way in zip(AXES, ways, strict=False)
     )
 
 

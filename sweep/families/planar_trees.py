@@ -13,10 +13,9 @@ import numpy as np
 
 from kernels.linkage.bodies import DRIVEN, FRAME, SLIDE, TURN, Links
 from kernels.types import Array
-from sweep.families import link_poses as poses
+from sweep.families import link_tree as poses
 from sweep.families.base import Angles, Columns, Parameter
-from sweep.families.link_poses import Path, Turning
-from sweep.families.link_tree import LinkBody, LinkFill, LinkJoint, LinkTree
+from sweep.families.link_tree import LinkBody, LinkFill, LinkJoint, LinkTree, Path, Turning
 from sweep.families.skeletons import X, Y, Z, parameter
 
 Parameters = tuple[Parameter, ...]

@@ -13,7 +13,7 @@ that have the kernels of another one, with other symbols or in another frame, ca
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from contextvars import ContextVar
 from dataclasses import replace
@@ -51,23 +51,6 @@ def guarded(poses: PoseFunction) -> PoseFunction:
     return safe
 
 
-def filled(
-    kernel: Callable[..., object],
-    arguments: Sequence[object],
-    outputs: Any,
-    wanted: frozenset[str],
-    status: Status,
-    dtype: DTypeLike = np.float64,
-) -> Columns:
-    """Call ``kernel(*arguments, status, out)``; the wanted outputs, shaped like ``status``, and ``status``.
-
-    ``outputs`` is the kernel's NamedTuple of arrays, or None, by the names of the outputs.
-    """
-    out = outputs(*optional_outputs(outputs._fields, wanted, status.shape, dtype))
-    kernel(*arguments, status, out)
-    return {name: values for name, values in out._asdict().items() if values is not None} | {"status": status}
-
-
 def filled_each(
     kernel: Callable[..., object], arguments: Sequence[object], names: tuple[str, ...], wanted: frozenset[str],
     status: Status,
@@ -79,33 +62,41 @@ def filled_each(
     return columns | {"status": status}
 
 
-def poses_of(kernel: Callable[..., object], outputs: Any) -> PoseFunction:
-    """Make poses of a kernel(designs, cos, sin, status, out) and its NamedTuple of outputs."""
+def poses_of(
+    kernel: Callable[..., object],
+    outputs: Any,
+    blocks: Mapping[str, Sequence[Output]] | None = None,
+    *,
+    angles: str = "cos sin",
+) -> PoseFunction:
+    """Make poses of a ``kernel(designs, *angles, status, out)``, each output (n, m).
+
+    Parameters
+    ----------
+    outputs : the kernel's namedtuple of arrays or None; a field is an output, or one of the ``blocks``
+    blocks : fields that are several outputs in one array (k, n, m), computed where one of them is wanted
+    angles : which of phi, cos and sin the kernel takes
+    """
+    of_block = {field: [o.name for o in block] for field, block in (blocks or {}).items()}
+    names = {field: of_block.get(field, [field]) for field in outputs._fields}
+    taken = angles.split()
 
     def poses(designs: Array, angles: Angles, wanted: frozenset[str]) -> Columns:
-        status = np.empty((len(designs), angles.cos.shape[1]), np.uint8)
-        dtype = np.result_type(designs, angles.cos)
-        return filled(kernel, (designs, angles.cos, angles.sin), outputs, wanted, status, dtype)
+        shape, dtype = (len(designs), angles.cos.shape[1]), np.result_type(designs, angles.cos)
+        status = np.empty(shape, np.uint8)
+        rooms: list[Array | None] = []
+        columns: Columns = {}
+        for field, group in names.items():
+            if wanted.isdisjoint(group):
+                rooms.append(None)
+                continue
+            room = np.empty((len(group), *shape), dtype)
+            rooms.append(room if field in of_block else room[0])
+            columns |= {name: values for name, values in zip(group, room, strict=True) if name in wanted}
+        kernel(designs, *(getattr(angles, name) for name in taken), status, outputs(*rooms))
+        return columns | {"status": status}
 
     return poses
-
-
-def filled_with_places(
-    kernel: Callable[..., object], designs: Array, angles: Angles, outputs: Any, places: tuple[str, ...],
-    wanted: frozenset[str],
-) -> Columns:  # fmt: skip
-    """Call a kernel of poses that takes, behind ``out``, one array (k, n, m) of all joint coordinates or None."""
-    shape, dtype = (len(designs), angles.cos.shape[1]), np.result_type(designs, angles.cos)
-    room = None if wanted.isdisjoint(places) else np.empty((len(places), *shape), dtype)
-
-    def with_places(*given: object) -> None:
-        kernel(*given, room)
-
-    status = np.empty(shape, np.uint8)
-    columns = filled(with_places, (designs, angles.cos, angles.sin), outputs, wanted, status, dtype)
-    if room is not None:
-        columns |= {name: x for name, x in zip(places, room, strict=True) if name in wanted}
-    return columns
 
 
 def optional_outputs(
@@ -116,31 +107,6 @@ def optional_outputs(
     ``dtype`` is complex128 where the designs or angles are (exact gradients by the complex step).
     """
     return [np.empty(shape, dtype) if name in wanted else None for name in names]
-
-
-def filled_blocks(
-    kernel: Callable[..., None], outputs: Any, designs: Array, angles: Angles, blocks: Sequence[Sequence[Output]],
-    wanted: frozenset[str],
-) -> Columns:  # fmt: skip
-    """Call a kernel of poses whose outputs are arrays (k, n, m), one per block of outputs, or None.
-
-    A block is computed when one of its outputs is wanted.  The last one, of joints, is no part of ``outputs``, the
-    kernel's NamedTuple of the others.
-    """
-    shape, dtype = (len(designs), angles.cos.shape[1]), np.result_type(designs, angles.cos)
-    status = np.empty(shape, np.uint8)
-    rooms = [
-        None if wanted.isdisjoint(o.name for o in block) else np.empty((len(block), *shape), dtype) for block in blocks
-    ]
-    kernel(designs, angles.cos, angles.sin, status, outputs(*rooms[:-1]), rooms[-1])
-    columns: Columns = {
-        output.name: values
-        for block, room in zip(blocks, rooms, strict=True)
-        if room is not None
-        for output, values in zip(block, room, strict=True)
-        if output.name in wanted
-    }
-    return columns | {"status": status}
 
 
 MANY = 2**16  # poses of one call: dense samples, or the price of an output being measured

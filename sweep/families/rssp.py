@@ -7,28 +7,19 @@ line and its phi is counted from there.
 from __future__ import annotations
 
 from dataclasses import replace
+from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
 
 from kernels.families import rssp
 from kernels.types import EPS, Array
+from sweep.families import capabilities as can
 from sweep.families.base import Accuracy, Angles, Columns, Family, Output, Parameter, PoseFunction, Step
-from sweep.families.capabilities import (
-    Assembly,
-    Curve,
-    InSeries,
-    JointRecords,
-    LimitLocus,
-    Points,
-    PressureEllipse,
-    Skeleton,
-    constant,
-)
 from sweep.families.hardpoints import PLANAR_SLIDER_POINTS, SLIDER_CRANK_POINTS
-from sweep.families.outputs import ladders, place_outputs
-from sweep.families.poses import filled_with_places, move_records, step_of
-from sweep.families.skeletons import ORIGIN, SLIDER_CRANK, SLIDER_CRANK_SIZES, X, Y, crank_axis, standing
+from sweep.families.outputs import coordinate_outputs, joint_outputs, ladders
+from sweep.families.poses import move_records, poses_of, step_of
+from sweep.families.skeletons import ORIGIN, SLIDER_CRANK, SLIDER_CRANK_SIZES, X, Y, crank_axis, squared, standing
 
 PARAMETERS = (
     Parameter("a", "length", "crank", positive=True),
@@ -40,18 +31,15 @@ PARAMETERS = (
 )
 
 VALUE_OUTPUTS = (
-    *place_outputs("s", "slider displacement from the foot of the common perpendicular", "(2)", "(5)"),
+    *coordinate_outputs("s", "length", "slider displacement from the foot of the common perpendicular", "(2)", "(5)"),
     Output("discriminant", "length^2", "Q; the links reach where it is not negative", "(1)"),
     Output("pressure_angle", "rad", "between the coupler force and the velocity of the slider", "(3)"),
 )
 
-JOINT_OUTPUTS = (
-    Output("x_b", "length", "crank pin, along the common perpendicular", "(6)"),
-    Output("y_b", "length", "crank pin, along the slide direction", "(6)"),
-    Output("z_b", "length", "crank pin, normal to both", "(6)"),
-    Output("x_c", "length", "slider ball, along the common perpendicular", "(6)"),
-    Output("y_c", "length", "slider ball, along the slide direction", "(6)"),
-    Output("z_c", "length", "slider ball, normal to both", "(6)"),
+JOINT_OUTPUTS = joint_outputs(
+    {"b": "crank pin", "c": "slider ball"},
+    "(6)",
+    ("along the common perpendicular", "along the slide direction", "normal to both"),
 )
 
 MARGIN_OUTPUTS = (
@@ -70,17 +58,10 @@ LIMIT_OUTPUTS = (
     Output("stroke", "length", "largest minus smallest s over one turn", "(10)"),
 )
 
-_JOINTS = tuple(o.name for o in JOINT_OUTPUTS)
+poses = poses_of(rssp.poses, rssp.Outputs, {"joints": JOINT_OUTPUTS})
 
 
-def poses(designs: Array, angles: Angles, wanted: frozenset[str]) -> Columns:
-    """Compute the wanted pose outputs and status of every design at its crank angles, each (n, m)."""
-    return filled_with_places(rssp.poses, designs, angles, rssp.Outputs, _JOINTS, wanted)
-
-
-def precise_poses(designs: Array, angles: Angles, wanted: frozenset[str]) -> Columns:
-    """Compute what :func:`poses` does, in twice the working precision; for float64 only."""
-    return filled_with_places(rssp.precise_poses, designs, angles, rssp.Outputs, _JOINTS, wanted)
+precise_poses = poses_of(rssp.precise_poses, rssp.Outputs, {"joints": JOINT_OUTPUTS})
 
 
 def margins(designs: Array, wanted: frozenset[str], accuracy: Accuracy) -> Columns:
@@ -112,10 +93,10 @@ def limit_positions(designs: Array, wanted: frozenset[str], accuracy: Accuracy) 
     """Both limit positions of the slider, to rounding; the errors are bounds of the rounding errors."""
     n = len(designs)
     status = np.empty(n, np.uint8)
-    values = {o.name: np.empty(n) for o in LIMIT_OUTPUTS}
-    err_ext, err_fold = np.empty(n), np.empty(n)
-    outputs = [*values.values(), err_ext, err_fold]
-    rssp.limits(designs, status, *outputs)
+    outputs = np.empty((len(LIMIT_OUTPUTS) + 2, n))
+    rssp.limits(designs, status, outputs)
+    values = {o.name: row for o, row in zip(LIMIT_OUTPUTS, outputs, strict=False)}
+    err_ext, err_fold = outputs[-2:]
     stroke, ratio = np.abs(values["stroke"]), values["stroke_ratio"]
     ca, e = np.abs(np.cos(designs[:, 4])), np.abs(designs[:, 2])
     rho2 = [np.hypot(e, values[f"s_{end}"] * ca) ** 2 for end in ("ext", "fold")]
@@ -146,8 +127,8 @@ _JOINT_NEEDS = ("s", "ds", "d2s", "discriminant")
 
 def joint_records(designs: Array, angles: Angles, motion: Columns, per_pose: Array, per_design: Array) -> None:
     """Fill the joint records that effects work from; ``motion`` holds the pose outputs they are made of."""
-    s, ds, d2s, discriminant = (np.asarray(motion[name], dtype=np.float64) for name in _JOINT_NEEDS)
-    rssp.joints(designs, angles.cos, angles.sin, s, ds, d2s, discriminant, per_pose, per_design)
+    given = np.stack([np.asarray(motion[name], np.float64) for name in _JOINT_NEEDS])
+    rssp.joints(designs, angles.cos, angles.sin, given, per_pose, per_design)
 
 
 def ellipse(designs: Array) -> Array:
@@ -157,14 +138,8 @@ def ellipse(designs: Array) -> Array:
     return out
 
 
-def coupler_square(designs: Array) -> Array:
-    """Return b^2 of every design: the discriminant over it is the squared cosine of the pressure angle."""
-    square: Array = designs[:, 1] * designs[:, 1]
-    return square
-
-
 _NAMES = ("s", "ds", "d2s", "d3s")
-CURVES = {name: Curve(order, constant(1.0, 0.0, 0.0)) for order, name in enumerate(_NAMES)}
+CURVES = {name: can.Curve(order, can.constant(1.0, 0.0, 0.0)) for order, name in enumerate(_NAMES)}
 COMPONENTS = {"ds": "x1", "d2s": "x2", "d3s": "x3"}
 
 
@@ -189,14 +164,14 @@ FAMILY = Family(
     uses_phi=False,
     capabilities=(
         SLIDER_CRANK_SIZES,
-        Assembly("discriminant", "pressure_angle", coupler_square),
-        InSeries(rssp.FORM, CURVES, COMPONENTS, opening),
-        JointRecords(joint_records, _JOINT_NEEDS, "slider"),
-        PressureEllipse(ellipse),
-        LimitLocus("stroke"),
-        Points({"b": ("x_b", "y_b", "z_b"), "c": ("x_c", "y_c", "z_c")}),
+        can.Assembly("discriminant", "pressure_angle", squared(PARAMETERS, "b")),
+        can.InSeries(rssp.FORM, CURVES, COMPONENTS, opening),
+        can.JointRecords(joint_records, _JOINT_NEEDS, "slider"),
+        can.PressureEllipse(ellipse),
+        can.LimitLocus("stroke"),
+        can.Points({"b": ("x_b", "y_b", "z_b"), "c": ("x_c", "y_c", "z_c")}),
         SLIDER_CRANK_POINTS,
-        Skeleton(
+        can.Skeleton(
             {"a": crank_axis(PARAMETERS, "f", "alpha"), "d": standing(PARAMETERS, "e", axis=Y, kind="slide")},
             SLIDER_CRANK,
         ),
@@ -214,13 +189,10 @@ PLANAR_PARAMETERS = (
 )
 
 PLANAR_OUTPUTS = (
-    *place_outputs("s", "slider displacement from the foot of the crank pivot", "(1)", "(3)"),
+    *coordinate_outputs("s", "length", "slider displacement from the foot of the crank pivot", "(1)", "(3)"),
     Output("discriminant", "length^2", "Q; the links reach where it is not negative", "(1)"),
     Output("pressure_angle", "rad", "between the rod and the slide line", "(2)"),
-    Output("x_b", "length", "crank pin, along the slide line", "(1)"),
-    Output("y_b", "length", "crank pin, across the slide line", "(1)"),
-    Output("x_c", "length", "slider pin, along the slide line", "(1)"),
-    Output("y_c", "length", "slider pin, across the slide line", "(1)"),
+    *joint_outputs({"b": "crank pin", "c": "slider pin"}, "(1)", ("along the slide line", "across the slide line")),
 )
 
 # The spatial linkage has its slide line along y: its x is minus this y, and its crank angle a quarter turn more.
@@ -248,16 +220,6 @@ def _turned_poses(run: PoseFunction, designs: Array, angles: Angles, wanted: fro
         values: Array = np.asarray(found[_THEIRS.get(name, name)])
         columns[name] = 0.0 - values if name in ("y_b", "y_c") else values
     return columns
-
-
-def planar_poses(designs: Array, angles: Angles, wanted: frozenset[str]) -> Columns:
-    """Compute the wanted pose outputs and status of every design at its crank angles, each (n, m)."""
-    return _turned_poses(poses, designs, angles, wanted)
-
-
-def planar_precise_poses(designs: Array, angles: Angles, wanted: frozenset[str]) -> Columns:
-    """Compute what :func:`poses` does, in twice the working precision; for float64 only."""
-    return _turned_poses(precise_poses, designs, angles, wanted)
 
 
 def _planar_step(step: Step) -> Step:
@@ -291,7 +253,7 @@ PLANAR = Family(
     parameters=PLANAR_PARAMETERS,
     position="s",
     pose_outputs=PLANAR_OUTPUTS,
-    poses=planar_poses,
+    poses=partial(_turned_poses, poses),
     example={"a": 1.0, "b": 3.0, "e": 0.4, "branch": -1.0},
     steps=tuple(_planar_step(step) for step in FAMILY.steps),
     derivative_of=ladders("s"),
@@ -299,12 +261,12 @@ PLANAR = Family(
     uses_phi=False,
     capabilities=(
         SLIDER_CRANK_SIZES,
-        Assembly("discriminant", "pressure_angle", coupler_square),
-        InSeries(rssp.PLANAR_FORM, CURVES, COMPONENTS, planar_opening),
-        JointRecords(planar_joint_records, _JOINT_NEEDS, "slider"),
-        Points({"b": ("x_b", "y_b", None), "c": ("x_c", "y_c", None)}),
+        can.Assembly("discriminant", "pressure_angle", squared(PLANAR_PARAMETERS, "b")),
+        can.InSeries(rssp.PLANAR_FORM, CURVES, COMPONENTS, planar_opening),
+        can.JointRecords(planar_joint_records, _JOINT_NEEDS, "slider"),
+        can.Points({"b": ("x_b", "y_b", None), "c": ("x_c", "y_c", None)}),
         PLANAR_SLIDER_POINTS,
-        Skeleton({"a": ORIGIN, "d": standing(PLANAR_PARAMETERS, None, "e", axis=X, kind="slide")}, SLIDER_CRANK),
+        can.Skeleton({"a": ORIGIN, "d": standing(PLANAR_PARAMETERS, None, "e", axis=X, kind="slide")}, SLIDER_CRANK),
     ),
-    precise_poses=planar_precise_poses,
+    precise_poses=partial(_turned_poses, precise_poses),
 )

@@ -2,32 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from functools import lru_cache
+from functools import lru_cache, partial
 
 import numpy as np
-from numpy.typing import DTypeLike
 
 from kernels import status as st
 from kernels.families import rssr
 from kernels.types import Array
+from sweep.families import capabilities as can
 from sweep.families.base import Accuracy, Angles, Columns, Family, Output, Parameter, Step, Work
-from sweep.families.capabilities import (
-    Assembly,
-    CrankRockerLoop,
-    Curve,
-    InSeries,
-    JointRecords,
-    LimitLocus,
-    OutputLink,
-    Points,
-    PressureEllipse,
-    Skeleton,
-    constant,
-)
 from sweep.families.hardpoints import CRANK_ROCKER_POINTS
-from sweep.families.outputs import ladders
-from sweep.families.poses import optional_outputs, together
+from sweep.families.outputs import coordinate_outputs, joint_outputs, ladders
+from sweep.families.poses import optional_outputs, poses_of, together
 from sweep.families.provable import CRANK_ROCKER_BY_AXES, CRANK_ROCKER_BY_ROCKER
 from sweep.families.skeletons import CRANK_ROCKER, CRANK_ROCKER_SIZES, crank_axis, standing
 
@@ -42,21 +28,15 @@ PARAMETERS = (
     Parameter("branch", "sign", "assembly mode: sign of dF/dpsi", default=1.0, choices=(-1.0, 1.0)),
 )
 
+# Of joints in the frame of the rocker.
+WAYS = ("along the common perpendicular of the axes", "across it and the rocker axis", "along the rocker axis")
 POSE_OUTPUTS = (
-    Output("psi", "rad", "rocker angle in (-pi, pi]", "(2*)", wraps=True),
-    Output("dpsi", "1", "velocity analogue dpsi/dphi", "(3)"),
-    Output("d2psi", "1", "acceleration analogue", "(4)"),
-    Output("d3psi", "1", "jerk analogue", "(5)"),
-    Output("sin_psi", "1", "sine of the rocker angle", "(2*)"),
-    Output("cos_psi", "1", "cosine of the rocker angle", "(2*)"),
+    *coordinate_outputs(
+        "psi", "rad", "rocker angle in (-pi, pi]", "(2*)", "(3)", "(4)", "(5)", circle="the rocker angle"
+    ),
     Output("discriminant", "length^4", "A1^2 + A2^2 - A3^2; the links reach where it is not negative", "(2)"),
     Output("pressure_angle", "rad", "between the coupler force and the velocity of its joint on the rocker", "(13)"),
-    Output("x_b", "length", "crank pin, along the common perpendicular of the axes", "section 1"),
-    Output("y_b", "length", "crank pin, across it and the rocker axis", "section 1"),
-    Output("z_b", "length", "crank pin, along the rocker axis", "section 1"),
-    Output("x_c", "length", "rocker ball, along the common perpendicular of the axes", "section 1"),
-    Output("y_c", "length", "rocker ball, across it and the rocker axis", "section 1"),
-    Output("z_c", "length", "rocker ball, along the rocker axis", "section 1"),
+    *joint_outputs({"b": "crank pin", "c": "rocker ball"}, "section 1", WAYS),
 )
 
 MARGIN_OUTPUTS = (
@@ -89,35 +69,20 @@ MAXIMA_OUTPUTS = tuple(
 )
 
 MOST_CELLS = 1000  # enclosures of one design before its proof is given up; 100 suffice within 1e-9 of a change point
-_JOINTS = rssr.Joints._fields
-_VALUES = tuple(o.name for o in POSE_OUTPUTS if o.name not in _JOINTS)
+_poses = poses_of(rssr.poses, rssr.Outputs)
 
 
-def _filled(
-    kernel: Callable[..., object], arguments: tuple[Array, ...], wanted: frozenset[str], columns: int, dtype: DTypeLike
-) -> Columns:
-    """Call a kernel of poses whose last output is the record of joints, or None if no joint is wanted."""
-    status = np.empty((len(arguments[0]), columns), np.uint8)
-    values = optional_outputs(_VALUES, wanted, status.shape, dtype)
-    joints = optional_outputs(_JOINTS, wanted, status.shape, dtype)
-    kernel(*arguments, status, *values, None if wanted.isdisjoint(_JOINTS) else rssr.Joints(*joints))
-    every = zip((*_VALUES, *_JOINTS), (*values, *joints), strict=True)
-    return {name: x for name, x in every if x is not None} | {"status": status}
-
-
-@together(*_VALUES, *_JOINTS)
+@together(*rssr.Outputs._fields)
 def poses(designs: Array, angles: Angles, wanted: frozenset[str]) -> Columns:
     """Wanted pose outputs and status of every design at its crank angles, each (n, m)."""
-    dtype = np.result_type(designs, angles.cos)
-    return _filled(rssr.poses, (designs, angles.cos, angles.sin), wanted, angles.cos.shape[1], dtype)
+    return _poses(designs, angles, wanted)
 
 
 def precise_poses(designs: Array, angles: Angles, wanted: frozenset[str]) -> Columns:
     """As :func:`poses`, with the closure in twice the working precision; for float64 only."""
     constants = np.empty((len(designs), rssr.PRECISE_COLUMNS))
     rssr.precise_constants(designs, constants)
-    arguments = designs, constants, angles.cos, angles.sin
-    return _filled(rssr.precise_poses, arguments, wanted, angles.cos.shape[1], np.float64)
+    return poses_of(partial(rssr.precise_poses, constants), rssr.Outputs)(designs, angles, wanted)
 
 
 JOINT_NEEDS = ("cos_psi", "sin_psi", "dpsi", "d2psi", "discriminant")
@@ -125,8 +90,8 @@ JOINT_NEEDS = ("cos_psi", "sin_psi", "dpsi", "d2psi", "discriminant")
 
 def joint_records(designs: Array, angles: Angles, motion: Columns, per_pose: Array, per_design: Array) -> None:
     """Fill the joint records that effects work from; ``motion`` holds the pose outputs they are made of."""
-    cos_psi, sin_psi, dpsi, d2psi, discriminant = (np.asarray(motion[name], dtype=np.float64) for name in JOINT_NEEDS)
-    rssr.joints(designs, angles.cos, angles.sin, cos_psi, sin_psi, dpsi, d2psi, discriminant, per_pose, per_design)
+    given = np.stack([np.asarray(motion[name], np.float64) for name in JOINT_NEEDS])
+    rssr.joints(designs, angles.cos, angles.sin, given, per_pose, per_design)
 
 
 def ellipse(designs: Array) -> Array:
@@ -140,13 +105,6 @@ def discriminant_scale(designs: Array) -> Array:
     """(2 b c)^2 of every design: the discriminant over it is the squared cosine of the pressure angle."""
     scale: Array = (2.0 * designs[:, 1] * designs[:, 2]) ** 2
     return scale
-
-
-def rocker_origin(designs: Array) -> Array:
-    """Foot of the common perpendicular on the rocker axis, (n, 3)."""
-    origin = np.zeros((len(designs), 3), designs.dtype)
-    origin[:, 0] = designs[:, 3]
-    return origin
 
 
 def margin(designs: Array, wanted: frozenset[str], accuracy: Accuracy) -> Columns:
@@ -298,8 +256,11 @@ def _sampled(accuracy: Accuracy) -> bool:
     return accuracy.samples is not None
 
 
-CURVES = {name: Curve(order, constant(1.0, 0.0, 0.0)) for order, name in enumerate(("dpsi", "d2psi", "d3psi"), start=1)}
-SERIES = InSeries(rssr.FORM, CURVES, {"dpsi": "x1", "d2psi": "x2", "d3psi": "x3"}, rssr.opening)
+CURVES = {
+    name: can.Curve(order, can.constant(1.0, 0.0, 0.0))
+    for order, name in enumerate(("dpsi", "d2psi", "d3psi"), start=1)
+}
+SERIES = can.InSeries(rssr.FORM, CURVES, {"dpsi": "x1", "d2psi": "x2", "d3psi": "x3"}, rssr.opening)
 
 FAMILY = Family(
     name="rssr",
@@ -320,18 +281,20 @@ FAMILY = Family(
     uses_phi=False,
     capabilities=(
         CRANK_ROCKER_SIZES,
-        Assembly("discriminant", "pressure_angle", discriminant_scale),
+        can.Assembly("discriminant", "pressure_angle", discriminant_scale),
         SERIES,
-        JointRecords(joint_records, JOINT_NEEDS, "rocker"),
-        PressureEllipse(ellipse),
-        CrankRockerLoop(np.ascontiguousarray),
-        LimitLocus("swing", sized=("c", "e", "g")),
+        can.JointRecords(joint_records, JOINT_NEEDS, "rocker"),
+        can.PressureEllipse(ellipse),
+        can.CrankRockerLoop(np.ascontiguousarray),
+        can.LimitLocus("swing", sized=("c", "e", "g")),
         CRANK_ROCKER_BY_AXES,
         CRANK_ROCKER_BY_ROCKER,
-        Points({"b": ("x_b", "y_b", "z_b"), "c": ("x_c", "y_c", "z_c")}),
-        OutputLink(rocker_origin),
+        can.Points({"b": ("x_b", "y_b", "z_b"), "c": ("x_c", "y_c", "z_c")}),
+        can.OutputLink(standing(PARAMETERS, "e").at),
         CRANK_ROCKER_POINTS,
-        Skeleton({"a": crank_axis(PARAMETERS, "f", "alpha"), "d": standing(PARAMETERS, "e", None, "g")}, CRANK_ROCKER),
+        can.Skeleton(
+            {"a": crank_axis(PARAMETERS, "f", "alpha"), "d": standing(PARAMETERS, "e", None, "g")}, CRANK_ROCKER
+        ),
     ),
     precise_poses=precise_poses,
     example={"a": 1.0, "b": 4.1, "c": 3.2, "e": 2.9, "f": 0.6, "g": -0.4, "alpha": 0.7, "branch": -1.0},

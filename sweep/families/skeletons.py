@@ -10,7 +10,7 @@ import numpy as np
 
 from kernels.types import Array
 from sweep.families.base import Parameter
-from sweep.families.capabilities import Dimensions, Fixed, Link
+from sweep.families.capabilities import DesignMap, Dimensions, Fixed, Link
 
 X, Y, Z = (1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0)
 CRANK, COUPLER, ROCKER = Link("crank", ("a", "b")), Link("coupler", ("b", "c")), Link("rocker", ("d", "c"))
@@ -33,6 +33,11 @@ def parameter(parameters: tuple[Parameter, ...], name: str | None, designs: Arra
         return np.zeros(len(designs))
     column: Array = designs[:, [p.name for p in parameters].index(name)]
     return column
+
+
+def squared(parameters: tuple[Parameter, ...], name: str) -> DesignMap:
+    """Square of a parameter, (n,), such as the coupler's that makes a discriminant a squared cosine."""
+    return lambda designs: np.square(parameter(parameters, name, designs))
 
 
 def crank_axis(parameters: tuple[Parameter, ...], f: str, alpha: str) -> Fixed:

@@ -11,7 +11,7 @@ from itertools import chain
 import numpy as np
 
 from kernels.families import inverted_slider_crank, slotted, swivel
-from kernels.families.slotted.motion import links as fill_links
+from kernels.families.slotted import links as fill_links
 from kernels.families.swivel import links as fill_swivel_links
 from kernels.linkage.bodies import DRIVEN, FRAME, SLIDE, TURN
 from kernels.types import Array
@@ -19,10 +19,10 @@ from sweep.families.base import Angles, Columns, Family, Output, Parameter
 from sweep.families.capabilities import Assembly, Dimensions, Link, Made, OutputLink, Points, Skeleton
 from sweep.families.curve_features import Singular
 from sweep.families.link_tree import LinkBody, LinkJoint, LinkTree, filled_by
-from sweep.families.outputs import angle_outputs, joint_outputs, ladders, place_outputs, point_outputs
+from sweep.families.outputs import ALONG_FRAME, coordinate_outputs, joint_outputs, ladders, point_outputs
 from sweep.families.parts import AXES
 from sweep.families.planar_trees import slotted_rocker
-from sweep.families.poses import filled_blocks, filled_with_places
+from sweep.families.poses import poses_of
 from sweep.families.skeletons import CRANK, ORIGIN, crank_axis, links, parameter, standing
 
 PARAMETERS = (
@@ -41,43 +41,33 @@ PARAMETERS = (
 )  # fmt: skip
 
 VALUE_OUTPUTS = (
-    *angle_outputs("psi", "angle of the driven link: direction of the slot or bar", "(3)", "(5)"),
-    Output("sin_psi", "1", "sine of psi", "(3)"),
-    Output("cos_psi", "1", "cosine of psi", "(3)"),
-    *place_outputs(
-        "rho", "place of the ball along the slot or bar, from the foot of the driven axis", "(2)", "(6)", "sliding"
+    *coordinate_outputs(
+        "psi", "rad", "angle of the driven link: direction of the slot or bar", "(3)", "(5)", circle="psi"
+    ),
+    *coordinate_outputs(
+        "rho",
+        "length",
+        "place of the ball along the slot or bar, from the foot of the driven axis",
+        "(2)",
+        "(6)",
+        kind="sliding ",
     ),
     Output("discriminant", "1", "cos^2(pressure angle); negative where slot or arm do not reach the ball", "(7)"),
     Output("pressure_angle", "rad", "between the force on the driven link at the ball and its velocity there", "(7)"),
 )
 
+_WAYS = ("along the common perpendicular", "normal to both", "along the driven axis")
 JOINT_OUTPUTS = (
-    Output("x_b", "length", "ball of the crank, along the common perpendicular", "(1)"),
-    Output("y_b", "length", "ball of the crank, normal to both", "(1)"),
-    Output("z_b", "length", "ball of the crank, along the driven axis", "(1)"),
-    Output("x_c", "length", "point of the driven link that guides the ball, along the common perpendicular", "(2)"),
-    Output("y_c", "length", "point of the driven link that guides the ball, normal to both", "(2)"),
-    Output("z_c", "length", "point of the driven link that guides the ball, along the driven axis", "(2)"),
+    *joint_outputs({"b": "ball of the crank"}, "(1)", _WAYS),
+    *joint_outputs({"c": "point of the driven link that guides the ball"}, "(2)", _WAYS),
 )
 
-_JOINTS = tuple(o.name for o in JOINT_OUTPUTS)
-
-
-def poses(designs: Array, angles: Angles, wanted: frozenset[str]) -> Columns:
-    """Compute the wanted pose outputs and status of every design at its crank angles, each (n, m)."""
-    return filled_with_places(slotted.poses, designs, angles, slotted.Outputs, _JOINTS, wanted)
+poses = poses_of(slotted.poses, slotted.Outputs, {"joints": JOINT_OUTPUTS})
 
 
 def unit(designs: Array) -> Array:
     """Return 1 for every design: the discriminant is the squared cosine of the pressure angle itself."""
     return np.ones(len(designs))
-
-
-def driven_origin(designs: Array) -> Array:
-    """Point (e, 0, 0) of the driven axis, (n, 3)."""
-    origin = np.zeros((len(designs), 3), designs.dtype)
-    origin[:, 0] = designs[:, 1]
-    return origin
 
 
 _RATES = ("psi", "dpsi", "d2psi", "rho", "drho", "d2rho")
@@ -118,7 +108,7 @@ FAMILY = Family(
         Dimensions(links("a"), optional=("k",)),
         Assembly("discriminant", "pressure_angle", unit),
         Points({"b": ("x_b", "y_b", "z_b"), "c": ("x_c", "y_c", "z_c")}),
-        OutputLink(driven_origin),
+        OutputLink(standing(PARAMETERS, "e").at),
         LINKS,
         Skeleton(
             {"a": crank_axis(PARAMETERS, "f", "alpha"), "d": standing(PARAMETERS, "e", None, "g")},
@@ -137,32 +127,24 @@ PLANAR_PARAMETERS = (
 )  # fmt: skip
 
 PLANAR_VALUES = (
-    *angle_outputs("psi", "rocker angle in (-pi, pi]", "(2)", "(4)"),
-    Output("s", "length", "place of the crank pin along the slot, from the foot of the rocker pivot", "(2)"),
-    Output("ds", "length", "sliding velocity analogue ds/dphi", "(5)"),
-    Output("d2s", "length", "sliding acceleration analogue", "(5)"),
+    *coordinate_outputs("psi", "rad", "rocker angle in (-pi, pi]", "(2)", "(4)"),
+    *coordinate_outputs(
+        "s",
+        "length",
+        "place of the crank pin along the slot, from the foot of the rocker pivot",
+        "(2)",
+        "(5)",
+        kind="sliding ",
+    )[:3],
     Output(
         "discriminant", "1", "1 - h^2/r^2, r from pin to rocker pivot; the slot reaches where it is not negative", "(1)"
     ),
     Output("pressure_angle", "rad", "between the force of the slot and the velocity of the rocker there", "(3)"),
 )
 
-PLANAR_JOINTS = (
-    Output("x_b", "length", "crank pin, along the frame", "(1)"),
-    Output("y_b", "length", "crank pin, across the frame", "(1)"),
-)
+PLANAR_JOINTS = joint_outputs({"b": "crank pin"}, "(1)", ALONG_FRAME)
 
-_PIN = tuple(o.name for o in PLANAR_JOINTS)
-
-
-def planar_poses(designs: Array, angles: Angles, wanted: frozenset[str]) -> Columns:
-    """Compute the wanted pose outputs and status of every design at its crank angles, each (n, m)."""
-    return filled_with_places(inverted_slider_crank.poses, designs, angles, inverted_slider_crank.Outputs, _PIN, wanted)
-
-
-def slot_squared(designs: Array, angles: Angles, found: Columns) -> Array:
-    """Square of the pin's place in the slot, (n, m): where it nearly vanishes the rocker turns at once."""
-    return np.square(np.asarray(found["s"], np.float64))
+planar_poses = poses_of(inverted_slider_crank.poses, inverted_slider_crank.Outputs, {"joints": PLANAR_JOINTS})
 
 
 def slot_foot(designs: Array, angles: Angles, motion: Columns) -> Array:
@@ -183,11 +165,11 @@ PLANAR = Family(
     derivative_of=ladders("psi") | {"s": "ds", "ds": "d2s"},
     uses_phi=False,
     capabilities=(
-        Singular(slot_squared, ("s",)),
+        Singular.where_small("s"),
         Dimensions(links("a")),
         Assembly("discriminant", "pressure_angle", unit),
         Points({"b": ("x_b", "y_b", None)}),
-        OutputLink(driven_origin),
+        OutputLink(standing(PLANAR_PARAMETERS, "e").at),
         slotted_rocker(PLANAR_PARAMETERS),
         Skeleton(
             {"a": ORIGIN, "d": standing(PLANAR_PARAMETERS, "e")},
@@ -207,27 +189,22 @@ SWIVEL_PARAMETERS = (
     Parameter("Lw", "length", "working point from the crank pin along the rod, towards the block", default=0.0),
 )
 
-ROD_OUTPUTS = place_outputs("rho", "rod between crank pin and the block's centre", "(2)", "(3)", "sliding")
+ROD_OUTPUTS = coordinate_outputs(
+    "rho", "length", "rod between crank pin and the block's centre", "(2)", "(3)", kind="sliding "
+)
 POINT_OUTPUTS = point_outputs("(4)")
 ROD_JOINT_OUTPUTS = (
-    *joint_outputs((("b", "crank pin"),), "(1)"),
+    *joint_outputs({"b": "crank pin"}, "(1)"),
     *(Output(f"{axis}_n", "1", f"direction of the rod from the crank pin, along {axis}", "(2)") for axis in AXES),
 )
 
 _BLOCKS = (ROD_OUTPUTS, *POINT_OUTPUTS, ROD_JOINT_OUTPUTS)
 
 
-def swivel_poses(designs: Array, angles: Angles, wanted: frozenset[str]) -> Columns:
-    """Compute the wanted pose outputs and status of every design at its crank angles, each (n, m)."""
-    return filled_blocks(swivel.poses, swivel.Outputs, designs, angles, _BLOCKS, wanted)
+swivel_poses = poses_of(swivel.poses, swivel.Outputs, dict(zip(swivel.Outputs._fields, _BLOCKS, strict=True)))
 
 
-def pin_distance_squared(designs: Array, angles: Angles, found: Columns) -> Array:
-    """Square of the rod between pin and block, (n, m): where it nearly vanishes the rod turns at once."""
-    return np.square(np.asarray(found["rho"], np.float64))
-
-
-_ROD_RATES, _DIRECTION = ("rho", "drho"), ("x_n", "y_n", "z_n")
+_ROD_RATES = ("rho", "drho", "x_n", "y_n", "z_n")
 SWIVEL_LINKS = LinkTree(
     bodies=(
         LinkBody("crank", "along the crank, tangential, along its axis, from A"),
@@ -241,8 +218,8 @@ SWIVEL_LINKS = LinkTree(
     parents=(FRAME, 0),
     freedoms=((0, DRIVEN), (1, TURN), (1, TURN)),
     ends=((1, FRAME),) * 2,
-    needs=(*_ROD_RATES, *_DIRECTION),
-    fill=filled_by(fill_swivel_links, _ROD_RATES, _DIRECTION),
+    needs=_ROD_RATES,
+    fill=filled_by(fill_swivel_links, _ROD_RATES),
     carrier=1,
     tip=standing(SWIVEL_PARAMETERS, "Lw").at,
 )
@@ -258,7 +235,7 @@ SWIVEL = Family(
     example={"a": 1.0, "e": 2.6, "f": 0.7, "g": -0.4, "alpha": 0.6, "Lw": 5.0},
     uses_phi=False,
     capabilities=(
-        Singular(pin_distance_squared, ("rho",)),
+        Singular.where_small("rho"),
         Dimensions(links("a")),
         SWIVEL_LINKS,
         Points({"b": ("x_b", "y_b", "z_b"), "p": ("x_p", "y_p", "z_p")}),

@@ -10,12 +10,12 @@ from kernels.families import spherical_looper
 from kernels.families.spherical_looper import links as fill_links
 from kernels.linkage.bodies import DRIVEN, FRAME, TURN
 from kernels.types import Array
-from sweep.families.base import Angles, Columns, Family, Output, Parameter
+from sweep.families.base import Family, Output, Parameter
 from sweep.families.capabilities import Arm, Assembly, Dimensions, Fixed, Link, Points, Skeleton
 from sweep.families.link_tree import LinkBody, LinkJoint, LinkTree, filled_by
-from sweep.families.outputs import angle_outputs, joint_outputs, ladders, magnitude_outputs, point_outputs
-from sweep.families.poses import filled_blocks
-from sweep.families.skeletons import crank_axis, links, parameter, standing
+from sweep.families.outputs import coordinate_outputs, joint_outputs, ladders, magnitude_outputs, point_outputs
+from sweep.families.poses import poses_of
+from sweep.families.skeletons import crank_axis, links, parameter, squared, standing
 
 PARAMETERS = (
     Parameter("a1", "length", "crank that swings the carrier", positive=True),
@@ -46,8 +46,8 @@ PARAMETERS = (
     Parameter("branch2", "sign", "assembly mode of the looper's drive", default=1.0, choices=(-1.0, 1.0)),
 )
 
-CARRIER_OUTPUTS = angle_outputs("psi", "angle of the carrier", "(1)", "(1)")
-LOOPER_OUTPUTS = angle_outputs("chi", "angle of the looper in the carrier", "(3)", "(4)", of_name=True)
+CARRIER_OUTPUTS = coordinate_outputs("psi", "rad", "angle of the carrier", "(1)", "(1)")
+LOOPER_OUTPUTS = coordinate_outputs("chi", "rad", "angle of the looper in the carrier", "(3)", "(4)", of_name=True)
 CARRIER_LOOP_OUTPUTS = (
     Output("discriminant1", "length^2", "b1^2 cos^2(pressure_angle1); negative where the links do not reach", "(1)"),
     Output("pressure_angle1", "rad", "between the force of coupler 1 and the velocity of the carrier's ball", "(1)"),
@@ -60,30 +60,15 @@ LOOPER_LOOP_OUTPUTS = (
 POINT_OUTPUTS = point_outputs("(5)")
 MAGNITUDE_OUTPUTS = magnitude_outputs("(6)")
 JOINT_OUTPUTS = joint_outputs(
-    (("b1", "pin of crank 1"), ("c1", "carrier's ball"), ("b2", "pin of crank 2"), ("c2", "looper's ball")), "(1), (2)"
+    {"b1": "pin of crank 1", "c1": "carrier's ball", "b2": "pin of crank 2", "c2": "looper's ball"}, "(1), (2)"
 )
 
 _BLOCKS = (
     CARRIER_OUTPUTS, CARRIER_LOOP_OUTPUTS, LOOPER_OUTPUTS, LOOPER_LOOP_OUTPUTS,
     *POINT_OUTPUTS, MAGNITUDE_OUTPUTS, JOINT_OUTPUTS,
 )  # fmt: skip
-
-
-def poses(designs: Array, angles: Angles, wanted: frozenset[str]) -> Columns:
-    """Compute the wanted pose outputs and status of every design at its crank angles, each (n, m)."""
-    return filled_blocks(spherical_looper.poses, spherical_looper.Outputs, designs, angles, _BLOCKS, wanted)
-
-
-def first_coupler_square(designs: Array) -> Array:
-    """Return b1^2 of every design."""
-    square: Array = designs[:, 1] * designs[:, 1]
-    return square
-
-
-def second_coupler_square(designs: Array) -> Array:
-    """Return b2^2 of every design."""
-    square: Array = designs[:, 18] * designs[:, 18]
-    return square
+_BY_FIELD = dict(zip(spherical_looper.Outputs._fields, _BLOCKS, strict=True))
+poses = poses_of(spherical_looper.poses, spherical_looper.Outputs, _BY_FIELD)
 
 
 def second_shaft(designs: Array) -> Array:
@@ -144,8 +129,8 @@ FAMILY = Family(
     capabilities=(
         Dimensions((*links("a1 b1 c1 a2 b2"), LOOPER), arms=(Arm(("p0x", "p0y", "p0z"), LOOPER),)),
         LINKS,
-        Assembly("discriminant1", "pressure_angle1", first_coupler_square, "1"),
-        Assembly("discriminant2", "pressure_angle2", second_coupler_square, "2"),
+        Assembly("discriminant1", "pressure_angle1", squared(PARAMETERS, "b1"), "1"),
+        Assembly("discriminant2", "pressure_angle2", squared(PARAMETERS, "b2"), "2"),
         Points({name: (f"x_{name}", f"y_{name}", f"z_{name}") for name in ("b1", "c1", "b2", "c2", "p")}),
         Skeleton(
             {

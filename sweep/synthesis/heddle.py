@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
 from typing import TYPE_CHECKING, Literal
 
 import numpy as np
@@ -11,7 +10,7 @@ import numpy as np
 from kernels import status as st
 from kernels.synthesis import heddle as kernels
 from sweep.errors import InputError
-from sweep.evaluation.tables import design_matrix
+from sweep.evaluation.tables import Sheet, design_matrix
 from sweep.families.base import Array, Parameter
 
 if TYPE_CHECKING:
@@ -33,24 +32,8 @@ _FRAME = (
 )
 
 
-@dataclass(frozen=True)
-class _Requirement:
-    """Columns of one requirement, for the checks of tables."""
-
-    name: str
-    parameters: tuple[Parameter, ...]
-
-    @property
-    def parameter_names(self) -> tuple[str, ...]:
-        return tuple(p.name for p in self.parameters)
-
-    def read(self, table: Table) -> Array:
-        """Return the checked columns, (n, P)."""
-        return design_matrix(self, table)[0]
-
-
-_EXTREMES = _Requirement("extremes of a heddle drive", _FRAME)
-_LEVER = _Requirement(
+_EXTREMES = Sheet("extremes of a heddle drive", _FRAME)
+_LEVER = Sheet(
     "lever of a heddle drive",
     (
         *_FRAME,
@@ -59,7 +42,7 @@ _LEVER = _Requirement(
         _SIDE,
     ),
 )
-_RODS = _Requirement(
+_RODS = Sheet(
     "rod of a heddle drive",
     (
         *_FRAME,
@@ -68,7 +51,7 @@ _RODS = _Requirement(
         _SIDE,
     ),
 )
-_SHED = _Requirement(
+_SHED = Sheet(
     "shed",
     (
         Parameter("shaft", "count", "number of the shaft, 1 next to the fell", positive=True),
@@ -78,7 +61,7 @@ _SHED = _Requirement(
         Parameter("reference", "count", "number of the shaft with the given stroke", default=4.0, positive=True),
     ),
 )
-_ARMS = _Requirement(
+_ARMS = Sheet(
     "arms of the shafts",
     (
         Parameter("stroke", "length", "stroke of the shaft", positive=True),
@@ -115,7 +98,7 @@ def extremes(table: Table, mode: Mode = "exact") -> pd.DataFrame:
         for a missing or misspelt column, a bad number, an unknown mode, O1O3 not longer than O1O2.
     """
     with_rod = "BC" in table or "O2B" in table
-    matrix = (_LEVER if with_rod else _EXTREMES).read(table)
+    matrix = design_matrix(_LEVER if with_rod else _EXTREMES, table)[0]
     found, status = _positions(matrix, mode)
     turn = 2.0 * np.pi
     xi = [np.abs(found[:, k] - turn * np.rint(found[:, k] / turn)) for k in (1, 2)]
@@ -148,7 +131,7 @@ def rods(table: Table, mode: Mode = "exact") -> pd.DataFrame:
     InputError
         as :func:`extremes`, and for a swing of pi or more.
     """
-    matrix = _RODS.read(table)
+    matrix = design_matrix(_RODS, table)[0]
     _refuse(matrix[:, 7] >= np.pi, matrix[:, 7], "swing", "an angle below pi")
     found, status = _positions(matrix, mode)
     lengths, count = np.empty((len(matrix), 4)), np.empty(len(matrix), np.uint8)
@@ -186,7 +169,7 @@ def shed(table: Table) -> pd.DataFrame:
     InputError
         for a missing or misspelt column, a bad number.
     """
-    number, d1, t, stroke, reference = _SHED.read(table).T
+    number, d1, t, stroke, reference = design_matrix(_SHED, table)[0].T
     strokes = stroke * (d1 + (number - 1.0) * t) / (d1 + (reference - 1.0) * t)
     return _frame({"stroke": strokes}, _index(table, len(strokes)))
 
@@ -209,7 +192,7 @@ def arms(table: Table) -> pd.DataFrame:
     InputError
         for a missing or misspelt column, a bad number, mu_3 of a right angle or more.
     """
-    matrix = _ARMS.read(table)
+    matrix = design_matrix(_ARMS, table)[0]
     _refuse(matrix[:, 4] >= 0.5 * np.pi, matrix[:, 4], "mu_3", "an angle below pi/2")
     found, status = np.empty((len(matrix), 4)), np.empty(len(matrix), np.uint8)
     kernels.heddle_shaft_arms(matrix, found, status)

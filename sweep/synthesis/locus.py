@@ -95,59 +95,34 @@ class Locus:
         return ranges
 
 
-def _outputs(matrix: Array, parameters: int) -> tuple[Status, Status, Array, Array]:
-    n = len(matrix)
-    designs, other = np.empty((n, parameters), matrix.dtype), np.empty(n, matrix.dtype)
-    return np.empty(n, np.uint8), np.empty(n, np.uint8), designs, other
+def _solved(
+    kernel: Callable[..., None], parameters: int, gives: str, columns: Mapping[str, int], root: int | None = None
+) -> Callable[[Array], Found]:
+    """Make the solution by a kernel of a family of so many parameters.
+
+    ``columns`` are the requirement's that stand in :class:`Found` as they are, ``root`` the one that tells solutions
+    apart; ``gives`` names what the kernel finds beside the designs.
+    """
+
+    def solve(matrix: Array) -> Found:
+        n = len(matrix)
+        status, failed, designs = np.empty(n, np.uint8), np.empty(n, np.uint8), np.empty((n, parameters), matrix.dtype)
+        found = {name: np.empty(n, matrix.dtype) for name in gives.split()}
+        roots = [] if root is None else [np.ascontiguousarray(matrix[:, root])]
+        kernel(matrix, *roots, status, failed, designs, *found.values())
+        return Found(designs, status, failed, **{name: matrix[:, k] for name, k in columns.items()}, **found)
+
+    return solve
 
 
-def _rssr_on_locus(matrix: Array) -> Found:
-    status, failed, designs, psi1 = _outputs(matrix, 8)
-    kernels.rssr_on_locus(matrix, status, failed, designs, psi1)
-    return Found(designs, status, failed, matrix[:, 2], psi1, matrix[:, 1])
+def _ends(kernel: Callable[..., None], most: int) -> Callable[[Array], Array]:
+    """Make the places where arcs may begin and end, at most so many, by a kernel."""
 
+    def ends(matrix: Array) -> Array:
+        found = np.empty((len(matrix), most))
+        kernel(matrix, found)
+        return found
 
-def _rssr_of_size(matrix: Array) -> Found:
-    status, failed, designs, psi1 = _outputs(matrix, 8)
-    kernels.rssr_of_size(matrix, status, failed, designs, psi1)
-    return Found(designs, status, failed, matrix[:, 2], psi1, matrix[:, 1])
-
-
-def _rssr_at_direction(matrix: Array) -> Found:
-    status, failed, designs, phi1 = _outputs(matrix, 8)
-    kernels.rssr_at_direction(matrix, np.ascontiguousarray(matrix[:, 7]), status, failed, designs, phi1)
-    return Found(designs, status, failed, phi1, matrix[:, 2], matrix[:, 1])
-
-
-def _rssp_on_locus(matrix: Array) -> Found:
-    status, failed, designs, start = _outputs(matrix, 6)
-    kernels.rssp_on_locus(matrix, status, failed, designs, start)
-    return Found(designs, status, failed, matrix[:, 2], start, matrix[:, 1])
-
-
-def _rssp_at_offset(matrix: Array) -> Found:
-    status, failed, designs, start = _outputs(matrix, 6)
-    phi1 = np.empty(len(matrix))
-    kernels.rssp_at_offset(matrix, np.ascontiguousarray(matrix[:, 5]), status, failed, designs, start, phi1)
-    return Found(designs, status, failed, phi1, start, matrix[:, 1])
-
-
-def _rssp_at_place(matrix: Array) -> Found:
-    status, failed, designs, phi0 = _outputs(matrix, 6)
-    phi1 = np.empty(len(matrix))
-    kernels.rssp_at_place(matrix, status, failed, designs, phi0, phi1)
-    return Found(designs, status, failed, phi1, matrix[:, 1], phi0)
-
-
-def _rssr_arc_ends(matrix: Array) -> Array:
-    ends = np.empty((len(matrix), 8))
-    kernels.rssr_arc_ends(matrix, ends)
-    return ends
-
-
-def _rssp_arc_ends(matrix: Array) -> Array:
-    ends = np.empty((len(matrix), 4))
-    kernels.rssp_arc_ends(matrix, ends)
     return ends
 
 
@@ -165,26 +140,21 @@ _C = Parameter("c", "length", "rocker", positive=True)
 _DIRECTION = Parameter("direction", "angle", "atan2(g, e): how the offsets of the two axes are to each other")
 _ROOT = Parameter("root", "sign", "which of the two solutions", choices=(-1.0, 1.0), default=1.0)
 
+_rssr_on_locus = _solved(kernels.rssr_on_locus, 8, "start", {"phi0": 1, "phi1": 2})
+_rssr_at_direction = _solved(kernels.rssr_at_direction, 8, "phi1", {"phi0": 1, "start": 2}, root=7)
+_rssr_of_size = _solved(kernels.rssr_of_size, 8, "start", {"phi0": 1, "phi1": 2})
+_rssp_on_locus = _solved(kernels.rssp_on_locus, 6, "start", {"phi0": 1, "phi1": 2})
+_rssp_at_place = _solved(kernels.rssp_at_place, 6, "phi0 phi1", {"start": 1})
+_rssp_at_offset = _solved(kernels.rssp_at_offset, 6, "start phi1", {"phi0": 1}, root=5)
+_rssr_ends, _rssp_ends = _ends(kernels.rssr_arc_ends, 8), _ends(kernels.rssp_arc_ends, 4)
+_RSSR, _RSSP = "requirement of rssr", "requirement of rssp"
 LOCI = (
-    Locus(
-        "rssr",
-        "requirement of rssr",
-        (_SWING, _PHI0, _PHI1, _E, _F, _G, _ALPHA),
-        "phi1",
-        _rssr_on_locus,
-        _rssr_arc_ends,
-    ),
-    Locus("rssr", "requirement of rssr", (_SWING, _PHI0, _PSI1, _E, _F, _G, _ALPHA, _ROOT), "psi1", _rssr_at_direction),
-    Locus(
-        "rssr",
-        "requirement of rssr",
-        (_SWING, _PHI0, _PHI1, _C, _F, _DIRECTION, _ALPHA),
-        "direction",
-        _rssr_of_size,
-    ),
-    Locus("rssp", "requirement of rssp", (_STROKE, _PHI0, _PHI1, _F, _ALPHA), "phi1", _rssp_on_locus, _rssp_arc_ends),
-    Locus("rssp", "requirement of rssp", (_STROKE, _S1, _E, _F, _ALPHA), "s1", _rssp_at_place),
-    Locus("rssp", "requirement of rssp", (_STROKE, _PHI0, _E, _F, _ALPHA, _ROOT), "e", _rssp_at_offset),
+    Locus("rssr", _RSSR, (_SWING, _PHI0, _PHI1, _E, _F, _G, _ALPHA), "phi1", _rssr_on_locus, _rssr_ends),
+    Locus("rssr", _RSSR, (_SWING, _PHI0, _PSI1, _E, _F, _G, _ALPHA, _ROOT), "psi1", _rssr_at_direction),
+    Locus("rssr", _RSSR, (_SWING, _PHI0, _PHI1, _C, _F, _DIRECTION, _ALPHA), "direction", _rssr_of_size),
+    Locus("rssp", _RSSP, (_STROKE, _PHI0, _PHI1, _F, _ALPHA), "phi1", _rssp_on_locus, _rssp_ends),
+    Locus("rssp", _RSSP, (_STROKE, _S1, _E, _F, _ALPHA), "s1", _rssp_at_place),
+    Locus("rssp", _RSSP, (_STROKE, _PHI0, _E, _F, _ALPHA, _ROOT), "e", _rssp_at_offset),
 )
 
 

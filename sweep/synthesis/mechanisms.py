@@ -5,8 +5,6 @@ Slotted links for a wanted crank angle between the limit positions follow from (
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -18,7 +16,7 @@ from kernels.types import TWO_PI
 from sweep.errors import InputError
 from sweep.evaluation.angles import AngleUnit, in_radians, plain_names
 from sweep.evaluation.summaries import design_outputs
-from sweep.evaluation.tables import design_matrix, parameter_units
+from sweep.evaluation.tables import Sheet, design_matrix, parameter_units
 from sweep.families import family as find_family
 from sweep.families.base import Accuracy, Array, Parameter
 from sweep.synthesis.locus import Found, Locus, locus
@@ -31,22 +29,15 @@ if TYPE_CHECKING:
 _LIMITS = ("phi_ext", "phi_fold", "psi_ext", "psi_fold", "swing", "phi0", "margin", "max_pressure_angle")
 
 
-@dataclass(frozen=True)
-class CentralSlot:
-    """The columns of the requirement."""
-
-    name: str = "slotted"
-    parameters: tuple[Parameter, ...] = (
+CENTRAL_SLOT = Sheet(
+    "slotted",
+    (
         Parameter("phi0", "angle", "crank angle of the shorter stroke, below 180 deg"),
         Parameter("e", "length", "common perpendicular"),
         Parameter("f", "length", "offset of the crank plane", default=0.0),
         Parameter("alpha", "angle", "angle from the crank axis to the driven axis", default=0.0),
-    )
-
-    @property
-    def parameter_names(self) -> tuple[str, ...]:
-        """Columns of the requirement in order."""
-        return tuple(p.name for p in self.parameters)
+    ),
+)
 
 
 def central_slots(table: Table) -> pd.DataFrame:
@@ -71,7 +62,7 @@ def central_slots(table: Table) -> pd.DataFrame:
     """
     import pandas as pd
 
-    matrix, _ = design_matrix(CentralSlot(), table)
+    matrix, _ = design_matrix(CENTRAL_SLOT, table)
     phi0, e, f, alpha = matrix.T.copy()
     bad = ~((phi0 > 0.0) & (phi0 < np.pi))
     if bad.any():
@@ -98,8 +89,6 @@ def central_slots(table: Table) -> pd.DataFrame:
 
 
 _EXACT = Accuracy(target=1e-12)
-# Requirements that are met by other mechanisms than those on a locus.
-_OF_THEIR_OWN: dict[str, Callable[[Table], pd.DataFrame]] = {CentralSlot.name: central_slots}
 
 
 def synthesise(
@@ -150,8 +139,8 @@ def synthesise(
         max_pressure_angle = np.radians(max_pressure_angle)
     if max_pressure_angle is not None and not 0.0 < max_pressure_angle <= 0.5 * np.pi:
         raise InputError("max_pressure_angle", max_pressure_angle, "an angle between 0 and pi/2", "synthesise")
-    if family in _OF_THEIR_OWN:
-        return _OF_THEIR_OWN[family](in_radians(CentralSlot(), table, angles))
+    if family == CENTRAL_SLOT.name:  # met by other mechanisms than those on a locus
+        return central_slots(in_radians(CENTRAL_SLOT, table, angles))
     way = locus(family, plain_names(table))
     table = in_radians(way, table, angles)
     matrix = way.read(table)

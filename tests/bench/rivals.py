@@ -91,7 +91,7 @@ LEVEL(velocity, 0, ROOT FIRST, fabs(q1), >)
 LEVEL(acceleration, 0, ROOT FIRST SECOND, fabs(q2), >)
 LEVEL(jerk, 0, ROOT FIRST SECOND THIRD, fabs(q3), >)
 
-/* The algebra of kernels/families/rssr/dense.py: units of the crank, one division. */
+/* The algebra of kernels/families/rssr/motion.py: units of the crank, one division. */
 void ours(long n, long m, const double *d, const double *cs, const double *sn, double *out) {
   for (long i = 0; i < n; i++) { DESIGN
     double k0 = .5*K/(a*c), k1 = g*sa/c, k2 = e/c, y0 = branch*f*sa/a, best = 0;

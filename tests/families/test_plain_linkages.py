@@ -9,8 +9,7 @@ import pytest
 
 import sweep
 from kernels import status as st
-from kernels.families import epicyclic_dwell, inverted_slider_crank
-from kernels.families.cam import swinging, translating
+from kernels.families import cam, epicyclic_dwell, inverted_slider_crank
 from sweep.families import family
 from sweep.families.base import Angles
 from tests.reference import plain_linkages as naive
@@ -85,21 +84,23 @@ def matrix_of(name):
     [
         ("inverted_slider_crank", inverted_slider_crank.poses, 9, 2),
         ("epicyclic_dwell", epicyclic_dwell.poses, 8, 0),
-        ("cam", translating.poses, 7, 0),
-        ("cam_lever", swinging.poses, 7, 0),
+        ("cam", cam.poses, 7, 0),
+        ("cam_lever", cam.lever_poses, 7, 0),
     ],
 )
 def test_plain_linkage_kernel_jitted_equals_plain_python(name, function, outputs, places):
     designs, phi = matrix_of(name), np.linspace(0.0, 6.2, 23)[None, :]
-    modules = {"inverted_slider_crank": inverted_slider_crank, "epicyclic_dwell": epicyclic_dwell, "cam": translating}
-    modules["cam_lever"] = swinging
+    records = {
+        "inverted_slider_crank": inverted_slider_crank.Outputs, "epicyclic_dwell": epicyclic_dwell.Outputs,
+        "cam": cam.Outputs, "cam_lever": cam.LeverOutputs,
+    }  # fmt: skip
     angles = (phi,) if name.startswith("cam") else (np.cos(phi), np.sin(phi))
     results = []
     for run in (function, function.py_func):
         shape = (len(designs), phi.size)
         status, out = np.empty(shape, np.uint8), [np.empty(shape) for _ in range(outputs)]
         room = [np.empty((places, *shape))] if places else []
-        run(designs, *angles, status, modules[name].Outputs(*out), *room)
+        run(designs, *angles, status, records[name](*out, *room))
         results.append([status, *out, *room])
     for compiled, plain in zip(*results, strict=True):
         # the same arithmetic; sine and cosine come from two libraries that may differ by a rounding

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import inspect
 import sys
 
 import numpy as np
@@ -57,21 +56,12 @@ def factors(name, design, phi, expected, got):
 
 
 def of_kernel(function, designs, phi, shapes, dtype):
-    """Status and outputs of a kernel of poses; ``shapes`` are those of its outputs before (n, m), or a record."""
+    """Status and outputs of a kernel of poses; ``shapes`` are those of its outputs before (n, m)."""
     shape = (len(designs), phi.shape[1])
     status = np.empty(shape, np.uint8)
-    rooms = [
-        front(*np.empty((len(front._fields), *shape), dtype))
-        if isinstance(front, type)
-        else np.empty((*front, *shape), dtype)
-        for front in shapes
-    ]
-    source = getattr(function, "py_func", function)
-    given = rooms
-    if len(inspect.signature(source).parameters) < 4 + len(rooms):  # the first ones are fields of the kernel's record
-        record = sys.modules[source.__module__].Outputs
-        given = [record(*rooms[: len(record._fields)]), *rooms[len(record._fields) :]]
-    function(designs.astype(dtype), np.cos(phi), np.sin(phi), status, *given)
+    rooms = [np.empty((*front, *shape), dtype) for front in shapes]
+    outputs = sys.modules[getattr(function, "py_func", function).__module__].Outputs
+    function(designs.astype(dtype), np.cos(phi), np.sin(phi), status, outputs(*rooms))
     return [status, *rooms]
 
 

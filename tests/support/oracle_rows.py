@@ -9,7 +9,7 @@ import mpmath as mp
 import numpy as np
 
 from kernels.families import rssr
-from kernels.families.rssr.joints import joints
+from kernels.families.rssr.motion import joints
 from kernels.linkage.joints import PER_DESIGN, PER_POSE
 from sweep.families import family
 from sweep.families.base import Angles
@@ -48,7 +48,7 @@ def joint_records(designs, phi):
     per_pose = np.empty((*angles.cos.shape, PER_POSE))
     per_design = np.empty((len(designs), PER_DESIGN))
     args = [motion[name] for name in ("cos_psi", "sin_psi", "dpsi", "d2psi", "discriminant")]
-    joints(designs, angles.cos, angles.sin, *args, per_pose, per_design)
+    joints(designs, angles.cos, angles.sin, np.stack(args), per_pose, per_design)
     return per_pose, per_design, motion["status"].copy()
 
 

@@ -40,8 +40,7 @@ def poses(designs, phi, *, function=rssr.poses):
     dtype = np.result_type(designs, phi)
     out = {name: np.empty(shape, dtype) for name in (*POSE_NAMES, *JOINT_NAMES)}
     status = np.empty(shape, np.uint8)
-    values, joints = [out[name] for name in POSE_NAMES], rssr.Joints(*(out[name] for name in JOINT_NAMES))
-    function(designs, np.cos(phi), np.sin(phi), status, *values, joints)
+    function(designs, np.cos(phi), np.sin(phi), status, rssr.Outputs(**out))
     return out | {"status": status}
 
 

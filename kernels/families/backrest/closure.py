@@ -7,12 +7,13 @@ scale of the drawing costs a bit.  Designs and bracket angles may be complex128 
 from __future__ import annotations
 
 import math
+from collections import namedtuple
 from enum import IntEnum
 from typing import Any, NamedTuple
 
 import numpy as np
 
-from kernels.arithmetic.complex_step import arctan2, divisor, hypotenuse
+from kernels.arithmetic.complex_step import arctan2, divisor, hypotenuse, unit_near
 from kernels.jit import inline
 from kernels.types import Array
 
@@ -26,43 +27,12 @@ class Mode(IntEnum):
     CLOSURE = 3  # the source's balance of moments f N2 H = f N1 r0
 
 
-class Design(NamedTuple):
-    """Columns of the design matrix: lengths, forces and stiffness in consistent units, angles in radians."""
-
-    a1: float
-    b1: float
-    a2: float
-    b2: float
-    H: float
-    r: float
-    r0: float
-    psi: float
-    xE: float
-    yE: float
-    f: float
-    P1: float
-    P2: float
-    lM: float
-    nu: float
-    x3: float
-    y3: float
-    cs: float
-    l0: float
-    F0: float
-    rg: float
-    nug: float
-    s1: float
-    s2: float
-    phi: float
-    turn: float
-    rho_full: float
-    rho_empty: float
-    K0: float
-    phi_lo: float
-    phi_hi: float
-    root: float
-
-
+# Columns of the design matrix: lengths, forces and stiffness in consistent units, angles in radians.
+Design = namedtuple(
+    "Design",
+    "a1 b1 a2 b2 H r r0 psi xE yE f P1 P2 lM nu x3 y3 cs l0 F0 "
+    "rg nug s1 s2 phi turn rho_full rho_empty K0 phi_lo phi_hi root",
+)
 LENGTHS = (0, 1, 2, 3, 4, 5, 6, 8, 9, 13, 15, 16, 18, 20, 26, 27)
 STIFFNESS = 17
 ANGLES = (7, 14, 21, 24, 25, 29, 30)
@@ -85,22 +55,14 @@ class BracketPose(NamedTuple):
     defined: bool
 
 
-class Forces(NamedTuple):
-    """Tension and reactions, with the slider's reaction at the axis of the back-rest and with the slider's couple."""
-
-    K: Any
-    N1: Any
-    N2: Any
-    K_couple: Any
-    N1_couple: Any
-    N2_couple: Any
+# Tension and reactions, with the slider's reaction at the axis of the back-rest and with the slider's couple.
+Forces = namedtuple("Forces", "K N1 N2 K_couple N1_couple N2_couple")
 
 
 @inline
 def scaled(designs: Array, i: int, row: Array) -> tuple[float, bool]:
     """Write the columns of one design in units of a power of two near r into ``row``; the unit, and whether valid."""
-    _, exponent = math.frexp(designs[i, 5].real)
-    unit, per_unit = math.ldexp(1.0, exponent), math.ldexp(1.0, -exponent)
+    unit, per_unit = unit_near(designs[i, 5])
     good = True
     for k in range(designs.shape[1]):
         row[k] = designs[i, k]

@@ -186,7 +186,7 @@ def poses(
 
     Parameters
     ----------
-    designs : (n, 32) columns of :class:`Design`
+    designs : (n, 32) columns of ``Design``
     rho : (n, m), or (1, m) shared by all designs; radius of the yarn on the beam [length], complex where designs are
     modes : (n,) numbers of :class:`Mode`: what fixes the bracket angle
     status : (n, m) out; OK, NO_ROOT (fewer roots than ``root``), NOT_ASSEMBLED (a yarn branch has no length), SINGULAR
@@ -250,7 +250,7 @@ def positions(designs: Array, rho: Array, mode: int, angles: Array, count: Statu
 
     Parameters
     ----------
-    designs : (n, 32) columns of :class:`Design`; rho : (n,) [length]
+    designs : (n, 32) columns of ``Design``; rho : (n,) [length]
     mode : TENSION, COUPLE or CLOSURE of :class:`Mode`
     angles : (n, 8) out; ascending, nan last [rad]
     count : (n,) out

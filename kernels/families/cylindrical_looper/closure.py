@@ -13,13 +13,17 @@ are found by a scan; branches name the one that is meant.  Equation numbers are 
 from __future__ import annotations
 
 import math
+from collections import namedtuple
 from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from kernels import status as st
+from kernels.arithmetic.complex_step import unit_near
 from kernels.arithmetic.vectors import Vector
+from kernels.curves.arc_roots import MOST as MOST
+from kernels.curves.arc_roots import arc_search
 from kernels.jit import inline, kernel
 from kernels.linkage.driven_ball import Crank, reduce_crank
 from kernels.linkage.slider_closure import Reduced as Slider
@@ -45,8 +49,7 @@ class Reduced(NamedTuple):
 def reduce_design(designs: Numbers, i: int) -> Reduced:
     """Constants of one design; ``valid`` is false for links of no length and for what is not finite."""
     d = designs[i]
-    _, exponent = math.frexp(d[0].real)
-    unit, per = math.ldexp(1.0, exponent), math.ldexp(1.0, -exponent)
+    unit, per = unit_near(d[0])
     swings = reduce_crank(d, per)
     moves = reduce_scaled(d[8] * per, d[9] * per, d[10] * per, d[11] * per, d[12], d[14].real, unit)
     point = (d[16] * per, d[17] * per, d[18] * per)
@@ -59,37 +62,12 @@ def reduce_design(designs: Numbers, i: int) -> Reduced:
     return Reduced(swings, moves, size1, np.cos(d[13]), np.sin(d[13]), slides, point, unit, valid)
 
 
-SAMPLES = 48  # cells of the scan: H is a trigonometric polynomial of degree 1 and one root of another
-MOST = 8  # roots that are kept; there are at most four, and rounding at a double root may show it as a few
-_GOLDEN = 0.5 * (math.sqrt(5.0) - 1.0)
+# Both driving balls from the foot of the rocker at s = 0, real numbers: what H is made of at one crank angle.
+Loops = namedtuple("Loops", "x1 y1 z1 x2 y2 z2 b1 c1 b2 d cos_beta sin_beta branch2 slides")
 
 
-class Loops(NamedTuple):
-    """Both driving balls from the foot of the rocker at s = 0, real numbers: what H is made of at one crank angle."""
-
-    x1: Any
-    y1: Any
-    z1: Any
-    x2: Any
-    y2: Any
-    z2: Any
-    b1: Any
-    c1: Any
-    b2: Any
-    d: Any
-    cos_beta: Any
-    sin_beta: Any
-    branch2: float
-    slides: float
-
-
-class ShaftClosure(NamedTuple):
-    """H(psi), its derivative, the shaft's place s there, and what is left of the second coupler's square."""
-
-    value: Any
-    slope: Any
-    s: Any
-    q: Any
+# H(psi), its derivative, the shaft's place s there, and what is left of the second coupler's square.
+ShaftClosure = namedtuple("ShaftClosure", "value slope s q")
 
 
 @inline
@@ -113,44 +91,13 @@ def place(k: Loops, cos: Any, sin: Any) -> ShaftClosure:
 
 
 @inline
-def _at(k: Loops, centre: float, half: float, tau: float) -> tuple[float, float]:
-    """Angle of the shaft for the scan's parameter, and H there; on an arc the root of its ends becomes smooth."""
-    psi = tau if half >= math.pi else centre - half * math.cos(tau)
-    return psi, place(k, math.cos(psi), math.sin(psi)).value
+def _h(k: Loops, psi: float) -> float:
+    return float(place(k, math.cos(psi), math.sin(psi)).value)
 
 
-@kernel
-def _bracketed(k: Loops, centre: float, half: float, lo: float, hi: float, f_lo: float) -> float:
-    """Shaft angle of the root between two places of opposite sign: bisection, which no shape misleads."""
-    # 30 halvings of a cell leave 1e-10 rad, of which the caller's Newton steps leave rounding
-    for _ in range(30):
-        mid = 0.5 * (lo + hi)
-        _, f = _at(k, centre, half, mid)
-        if (f > 0.0) == (f_lo > 0.0):
-            lo = mid
-        else:
-            hi = mid
-    psi, _ = _at(k, centre, half, 0.5 * (lo + hi))
-    return psi
-
-
-@kernel
-def _dip(k: Loops, centre: float, half: float, lo: float, hi: float, sign: float) -> tuple[float, float]:
-    """Place and value of the least of sign * H between two places, by the golden section."""
-    p, q = hi - _GOLDEN * (hi - lo), lo + _GOLDEN * (hi - lo)
-    _, f_p = _at(k, centre, half, p)
-    _, f_q = _at(k, centre, half, q)
-    # 0.618^45 = 4e-10 of the cells: nearer to the least the value no longer changes by a rounding
-    for _ in range(45):
-        if sign * f_p <= sign * f_q:
-            hi, q, f_q = q, p, f_p
-            p = hi - _GOLDEN * (hi - lo)
-            _, f_p = _at(k, centre, half, p)
-        else:
-            lo, p, f_p = p, q, f_q
-            q = lo + _GOLDEN * (hi - lo)
-            _, f_q = _at(k, centre, half, q)
-    return (p, sign * f_p) if sign * f_p <= sign * f_q else (q, sign * f_q)
+# H is a trigonometric polynomial of degree 1 and one root of another: 48 cells part its waves.  30 halvings of a cell
+# leave 1e-10 rad, of which the caller's Newton steps leave rounding.
+_SCAN, _ = arc_search("shaft_angle", _h, 48, 30)
 
 
 @inline
@@ -168,7 +115,7 @@ def _arc(k: Loops) -> tuple[float, float]:
     return centre, 2.0 * math.atan2(math.sqrt(high), math.sqrt(-low))
 
 
-@kernel
+@inline
 def shaft_angles(k: Loops, noise: float, at: NDArray[np.float64]) -> tuple[int, float, float]:
     """Write the shaft angles of all solutions into ``at`` (MOST numbers).
 
@@ -179,39 +126,7 @@ def shaft_angles(k: Loops, noise: float, at: NDArray[np.float64]) -> tuple[int, 
     centre, half = _arc(k)
     if half == 0.0:
         return 0, math.nan, math.nan
-    whole = half >= math.pi
-    begin, width = (-math.pi, 2.0 * math.pi) if whole else (0.0, math.pi)
-    step = width / SAMPLES
-    count, before, least, most = 0, math.inf, math.inf, -math.inf
-    if whole:
-        _, before = _at(k, centre, half, begin - step)
-    _, here = _at(k, centre, half, begin)
-    for n in range(SAMPLES + 1):
-        tau, last, after = begin + step * n, n == SAMPLES, math.inf
-        if whole or not last:
-            _, after = _at(k, centre, half, tau + step)
-        sign = 1.0 if here > 0.0 else -1.0
-        least, most = min(least, here), max(most, here)
-        if not last and (after > 0.0) != (here > 0.0):
-            if count < MOST:
-                at[count] = _bracketed(k, centre, half, tau, tau + step, here)
-                count += 1
-        elif abs(here) <= abs(after) and (before == math.inf or sign * before >= abs(here)) and not (whole and last):
-            # the samples on both sides have the same sign and are no nearer to zero; beyond an end counts as far
-            lo = tau if before == math.inf else tau - step
-            hi = tau if after == math.inf else tau + step
-            place, dip = _dip(k, centre, half, lo, hi, sign)
-            least, most = min(least, sign * dip), max(most, sign * dip)
-            if dip <= 0.0 and count + 1 < MOST:
-                at[count] = _bracketed(k, centre, half, lo, place, sign)
-                at[count + 1] = _bracketed(k, centre, half, place, hi, -sign)
-                count += 2
-            # zero within the noise of H is a double root, which rounding may have lifted off
-            elif dip <= noise and count < MOST:
-                at[count], _ = _at(k, centre, half, place)
-                count += 1
-        before, here = here, after
-    return count, least, most
+    return _SCAN(k, centre, half, noise, 0, at)  # type: ignore[no-any-return]
 
 
 @kernel

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from kernels import status as st
 from kernels.arithmetic.complex_step import magnitude
-from kernels.arithmetic.vectors import Vector, dot
+from kernels.arithmetic.vectors import Vector, add, dot
 from kernels.families.cylindrical_looper.closure import MOST, Loops, Reduced, chosen, place, reduce_design
 from kernels.families.cylindrical_looper.motion import Outputs, Slide, carried
 from kernels.jit import inline, kernel
@@ -204,14 +204,7 @@ def _solved(r: Reduced, o: Fixed, first: Path, second: Path, at: NDArray[np.floa
 
 
 @kernel
-def coupled_poses(
-    designs: Numbers,
-    cos_phi: Numbers,
-    sin_phi: Numbers,
-    status: Status,
-    out: Outputs,
-    joints: Numbers | None,
-) -> None:
+def coupled_poses(designs: Numbers, cos_phi: Numbers, sin_phi: Numbers, status: Status, out: Outputs) -> None:
     """Poses as of the module ``motion``, for designs whose second ball is off the shaft's axis.
 
     Parameters
@@ -241,8 +234,5 @@ def coupled_poses(
             foot = (r.swings.e, 0.0 * r.swings.e, r.swings.g)
             path = carried(r, one, two)
             put_point(out, i, j, foot, path, scale)
-            if joints is not None:
-                ball = (r.swings.c * one.cos, r.swings.c * one.sin, r.slides * two.s)
-                for n in range(3):
-                    joints[n, i, j] = (foot[n] + first[0][n]) * scale
-                    joints[3 + n, i, j] = (foot[n] + ball[n]) * scale
+            pin, ball = add(foot, first[0]), (r.swings.c * one.cos, r.swings.c * one.sin, r.slides * two.s)
+            put_block(out.joints, i, j, (*pin, *add(foot, ball)), scale)

@@ -6,6 +6,7 @@ The bodies are two cranks and couplers, shaft and rocker.
 from __future__ import annotations
 
 import math
+from collections import namedtuple
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -15,7 +16,7 @@ from kernels.arithmetic.complex_step import magnitude
 from kernels.arithmetic.vectors import add, cross, mix, scale
 from kernels.families.cylindrical_looper.closure import Reduced, reduce_design
 from kernels.jit import inline, kernel
-from kernels.linkage.bodies import FRAME, Links, Moving, put, put_ball, put_body, put_crank, put_line, put_rod, shaft
+from kernels.linkage import bodies as tree
 from kernels.linkage.driven_ball import Path, Swung, pin_path, rotated, swing
 from kernels.linkage.outputs import has_point, put_angle, put_block, put_loop, put_point
 from kernels.linkage.slider_closure import Reduced as Slider
@@ -62,29 +63,12 @@ def _first_crank(r: Reduced, slide: Slide, u: float, v: float) -> Path:
     return m, m1, m2, m3
 
 
-class Outputs(NamedTuple):
-    """Blocks (k, n, m) of outputs, or None: what is None is not computed."""
-
-    shaft: Numbers | None
-    shaft_loop: Numbers | None
-    slide: Numbers | None
-    slide_loop: Numbers | None
-    point: Numbers | None
-    velocity: Numbers | None
-    acceleration: Numbers | None
-    jerk: Numbers | None
-    magnitudes: Numbers | None
+# Blocks (k, n, m) of outputs, or None: what is None is not computed.
+Outputs = namedtuple("Outputs", "shaft shaft_loop slide slide_loop point velocity acceleration jerk magnitudes joints")
 
 
 @kernel
-def poses(
-    designs: Numbers,
-    cos_phi: Numbers,
-    sin_phi: Numbers,
-    status: Status,
-    out: Outputs,
-    joints: Numbers | None,
-) -> None:
+def poses(designs: Numbers, cos_phi: Numbers, sin_phi: Numbers, status: Status, out: Outputs) -> None:
     """Angle and place of the looper's shaft and the working point, with derivatives, of every design and crank angle.
 
     Equations (1)-(5) of docs/cylindrical_looper.md.
@@ -121,7 +105,7 @@ def poses(
                 slide_counts = True
             if out.shaft is not None or out.shaft_loop is not None:
                 shaft_counts = True
-            if has_point(out) or joints is not None:
+            if has_point(out) or out.joints is not None:
                 slide_counts, shaft_counts = True, True
             status[i, j] = _code(r.valid, slide_counts, two.status, shaft_counts, one.status)
             undefined = 0.0 if r.valid else math.nan
@@ -133,8 +117,7 @@ def poses(
             foot = (drive.e, 0.0 * drive.e, drive.g)
             path = carried(r, one, two)
             put_point(out, i, j, foot, path, scale)
-            if joints is not None:
-                _put_joints(joints, i, j, r, first, one, two, v, scale)
+            put_block(out.joints, i, j, _joints(r, first, one, two, v), scale)
 
 
 @inline
@@ -163,36 +146,21 @@ def carried(r: Reduced, one: Swung, two: Slide) -> Path:
 
 
 @inline
-def _put_joints(
-    joints: Numbers, i: int, j: int, r: Reduced, first: Path, one: Swung, two: Slide, v: float, scale: Any
-) -> None:
-    """Write x y z of crank pin 1 and of the rocker's ball [length]."""
+def _joints(r: Reduced, first: Path, one: Swung, two: Slide, v: float) -> tuple[Any, ...]:
+    """Give x y z of crank pin 1 and of the rocker's ball."""
     # not from the path's own z, which the slide has been taken off
     drive = r.swings
     pin = (first[0][0] + drive.e, first[0][1], drive.lift - drive.a * (drive.sa * v))
     lift = drive.g + two.s if r.slides == 1.0 else drive.g + 0.0 * drive.e
     ball = (drive.e + drive.c * one.cos, drive.c * one.sin, lift)
-    for k in range(3):
-        joints[k, i, j] = pin[k] * scale
-        joints[3 + k, i, j] = ball[k] * scale
+    return (*pin, *ball)
 
 
 SHAFT = 2  # its number among the bodies
 
 
 @kernel
-def links(
-    designs: Array,
-    cos_phi: Array,
-    sin_phi: Array,
-    psi: Array,
-    dpsi: Array,
-    d2psi: Array,
-    s: Array,
-    ds: Array,
-    d2s: Array,
-    out: Links,
-) -> None:
+def links(designs: Array, cos_phi: Array, sin_phi: Array, motion: Array, out: tree.Links) -> None:
     """Fill the bodies, freedoms and closing lines of every pose; symbols are those of docs/cylindrical_looper.md.
 
     The rocker sits on the shaft, which guides it across and takes its torque by a key.  Along the shaft it is held by
@@ -201,14 +169,14 @@ def links(
     Parameters
     ----------
     designs : (n, 23);  cos_phi, sin_phi : (n, m) or (1, m)
-    psi, dpsi, d2psi, s, ds, d2s : (n, m), outputs of ``poses``
+    motion : (6, n, m), outputs psi, dpsi, d2psi, s, ds, d2s of ``poses``
     out : crank 1, crank 2, shaft, rocker, coupler 1, coupler 2; shaft and rocker from the axis at the height of the
         rocker's ball at s = 0, the shaft moved by s, the rocker where it slides.  Nine freedoms; seven lines, of both
         balls, whose forces act on rocker and shaft, and along the shaft on the rocker
     """
     for i in range(designs.shape[0]):
         d = designs[i]
-        u1, e2 = shaft(d[6])
+        u1, e2 = tree.shaft(d[6])
         first, k = (1.0, 0.0, 0.0), (0.0, 0.0, 1.0)
         centre1, foot = scale(d[4], u1), (d[3], 0.0, d[5])
         # Frame of crank 2: x2 across the shaft, y2 = k along it, z2 = x2 x k; its slide is the shaft's axis.
@@ -219,31 +187,33 @@ def links(
         centre2 = add(mix(1.0, foot, -d[10], x2), scale(d[11], u2))
         co, so = math.cos(d[13]), math.sin(d[13])
         row = i if cos_phi.shape[0] > 1 else 0
-        for j in range(psi.shape[1]):
+        for j in range(motion.shape[2]):
+            psi, dpsi, d2psi = motion[0, i, j], motion[1, i, j], motion[2, i, j]
+            s, ds, d2s = motion[3, i, j], motion[4, i, j], motion[5, i, j]
             bodies, axes, lines = out.bodies[i, j], out.axes[i, j], out.lines[i, j]
             u, v = cos_phi[row, j], sin_phi[row, j]
             w, x = u * co - v * so, v * co + u * so
-            crank1 = put_crank(bodies[0], axes[0], centre1, u1, first, e2, u, v)
-            crank2 = put_crank(bodies[1], axes[1], centre2, u2, x2, g2, w, x)
+            crank1 = tree.put_crank(bodies[0], axes[0], centre1, u1, first, e2, u, v)
+            crank2 = tree.put_crank(bodies[1], axes[1], centre2, u2, x2, g2, w, x)
             pin1 = add(centre1, scale(d[0], mix(u, first, v, e2)))
             pin2 = add(centre2, scale(d[8], mix(w, x2, x, g2)))
-            rho = (math.cos(psi[i, j]), math.sin(psi[i, j]), 0.0)
-            omega, eps = scale(dpsi[i, j], k), scale(d2psi[i, j], k)
-            place = mix(1.0, foot, s[i, j], k)
-            looper = Moving(place, scale(ds[i, j], k), scale(d2s[i, j], k), omega, eps)
-            put_body(bodies[2], looper, rho, cross(k, rho), k, foot)
-            held = mix(1.0, foot, d[15] * s[i, j], k)
-            rocker = Moving(held, scale(d[15] * ds[i, j], k), scale(d[15] * d2s[i, j], k), omega, eps)
-            put_body(bodies[3], rocker, rho, cross(k, rho), k, held)
-            put(axes[2], k)
-            put(axes[3], k)
-            put(axes[4], k)
+            rho = (math.cos(psi), math.sin(psi), 0.0)
+            omega, eps = scale(dpsi, k), scale(d2psi, k)
+            place = mix(1.0, foot, s, k)
+            looper = tree.Moving(place, scale(ds, k), scale(d2s, k), omega, eps)
+            tree.put_body(bodies[2], looper, rho, cross(k, rho), k, foot)
+            held = mix(1.0, foot, d[15] * s, k)
+            rocker = tree.Moving(held, scale(d[15] * ds, k), scale(d[15] * d2s, k), omega, eps)
+            tree.put_body(bodies[3], rocker, rho, cross(k, rho), k, held)
+            tree.put(axes[2], k)
+            tree.put(axes[3], k)
+            tree.put(axes[4], k)
             ball1 = add(held, scale(d[2], rho))
-            beta = psi[i, j] + d[20]
+            beta = psi + d[20]
             ball2 = add(place, scale(d[19], (math.cos(beta), math.sin(beta), 0.0)))
-            put_rod(bodies[4], axes[5:], crank1, pin1, rocker, ball1)
-            put_rod(bodies[5], axes[7:], crank2, pin2, looper, ball2)
-            put_ball(lines, ball1)
-            put_ball(lines[3:], ball2)
-            put_line(lines[6], held, k)
-            out.ends[i, 6, 1] = SHAFT if d[15] == 1.0 else FRAME
+            tree.put_rod(bodies[4], axes[5:], crank1, pin1, rocker, ball1)
+            tree.put_rod(bodies[5], axes[7:], crank2, pin2, looper, ball2)
+            tree.put_ball(lines, ball1)
+            tree.put_ball(lines[3:], ball2)
+            tree.put_line(lines[6], held, k)
+            out.ends[i, 6, 1] = SHAFT if d[15] == 1.0 else tree.FRAME

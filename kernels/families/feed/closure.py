@@ -7,12 +7,13 @@ drawing costs a bit.  Designs may be complex128 (exact gradients by the complex 
 from __future__ import annotations
 
 import math
+from collections import namedtuple
 from typing import Any, NamedTuple
 
 import numpy as np
 
 from kernels import status as st
-from kernels.arithmetic.complex_step import arctan2, hypotenuse
+from kernels.arithmetic.complex_step import arctan2, hypotenuse, unit_near
 from kernels.jit import inline
 from kernels.linkage.verdict import follower_status, pose_status
 from kernels.types import EPS, Array
@@ -59,22 +60,14 @@ class Reduced(NamedTuple):
     valid: bool
 
 
-class Driven(NamedTuple):
-    """A driven point with its first two derivatives by phi, or a driven angle with its sine and cosine."""
-
-    x: Any
-    y: Any
-    x1: Any
-    y1: Any
-    x2: Any
-    y2: Any
+# A driven point with its first two derivatives by phi, or a driven angle with its sine and cosine.
+Driven = namedtuple("Driven", "x y x1 y1 x2 y2")
 
 
 @inline
 def reduce_design(designs: Array, i: int) -> Reduced:
     """Constants of one design; ``valid`` is false for zero or negative lengths and for what is not finite."""
-    _, exponent = math.frexp(designs[i, 13].real)
-    unit, per_unit = math.ldexp(1.0, exponent), math.ldexp(1.0, -exponent)
+    unit, per_unit = unit_near(designs[i, 13])
     a, b, c, e = designs[i, 0] * per_unit, designs[i, 1] * per_unit, designs[i, 2] * per_unit, designs[i, 3] * per_unit
     f, g, alpha = designs[i, 4] * per_unit, designs[i, 5] * per_unit, designs[i, 6]
     sa, ca = np.sin(alpha), np.cos(alpha)

@@ -17,6 +17,7 @@ from typing import Any
 import numpy as np
 
 from kernels import status as st
+from kernels.arithmetic.complex_step import unit_near
 from kernels.families.feed.closure import Driven, Rocker, eccentric, rocker_angle
 from kernels.jit import inline, kernel
 from kernels.types import EPS, TWO_PI, Array, Status
@@ -43,8 +44,7 @@ def _scaled(designs: Array, i: int, d: Array) -> tuple[float, bool]:
     greatest = 0.0
     for k in _LENGTHS:
         greatest = max(greatest, abs(designs[i, k].real))
-    _, exponent = math.frexp(greatest if greatest < math.inf else 1.0)
-    unit, per_unit = math.ldexp(1.0, exponent), math.ldexp(1.0, -exponent)
+    unit, per_unit = unit_near(greatest if greatest < math.inf else 1.0)
     good = True
     for k in range(designs.shape[1]):
         d[k] = designs[i, k]

@@ -8,11 +8,23 @@ shares.
 
 In its limit positions the five-link lies in the plane of crank axis and crank, as the crank-rocker does, so that the
 same rocker and the same axes serve: only crank and coupler change with h.
+
+A scan finds all rocker angles that close the five-link at one crank angle, bounds prove that at most one has the wanted
+sign.  The scan serves where Newton's method does not; the proof says where it does; (4) of docs/five_link.md.
+
+G5 is defined where the coupler reaches the rocker's plane of motion along the crank axis, rho^2 >= 0: on the whole
+circle, on one arc or on two (:mod:`kernels.curves.arc_roots`).
+
+On a solution cos(delta) = (W - shift - share rho)/r, where delta is counted from the direction of the crank pin and
+r = hypot(X, Y).  Bounds of rho therefore confine delta to two intervals, one on each side, and over an interval rho
+changes less than over the circle: the bounds improve themselves.  Where dG5/dpsi = r sin(delta) - share rho' has the
+sign of sin(delta) throughout each of them, each holds one solution at most.
 """
 
 from __future__ import annotations
 
 import math
+from collections import namedtuple
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -20,6 +32,8 @@ import numpy as np
 from kernels import status as st
 from kernels.arithmetic.complex_step import divisor
 from kernels.arithmetic.sincos import sincos
+from kernels.curves.arc_roots import MOST as MOST
+from kernels.curves.arc_roots import angle_at, arc_search, way_of
 from kernels.jit import inline, kernel
 from kernels.linkage.crank_closure import Reduced, axial_terms, reduce_scaled, unit_scale
 from kernels.types import EPS, Array, Numbers, Status
@@ -44,16 +58,8 @@ class Joint(NamedTuple):
     valid: bool
 
 
-class Slope(NamedTuple):
-    """G5 and rho with their derivatives with respect to psi."""
-
-    value: Any
-    first: Any
-    second: Any
-    rho: Any
-    rho1: Any
-    rho2: Any
-    z: Any
+# G5 and rho with their derivatives with respect to psi.
+Slope = namedtuple("Slope", "value first second rho rho1 rho2 z")
 
 
 @inline
@@ -148,3 +154,162 @@ def with_limits_of(
             status[i] = st.INVALID_INPUT
         a[i] = found if status[i] == st.OK else math.nan
         b[i] = np.hypot(across, y1 * sa + g * ca - f) if status[i] == st.OK else math.nan
+
+
+SAMPLES = 32  # cells per arc
+# A rocker angle and G5 there.
+ClosureValue = namedtuple("ClosureValue", "psi value")
+# What G5 is made of at one crank angle: the joint, and X, Y, W of a crank-rocker.
+Terms = namedtuple("Terms", "joint x y w")
+
+
+@inline
+def _closure(k: Terms, psi: float) -> float:
+    """Evaluate G5; at the end of an arc a rho^2 that rounding made negative counts as 0."""
+    c, s = math.cos(psi), math.sin(psi)
+    _, square = axial_reach(k.joint, s)
+    return float(k.x * c - k.y * s + (k.w - k.joint.shift) - k.joint.share * math.sqrt(max(square, 0.0)))
+
+
+# 52 halvings of a cell come to its last bits; what they leave the caller's Newton steps take away
+_SCAN, _DIP = arc_search("five_link", _closure, SAMPLES, 52)
+
+
+@kernel
+def _extremes_of_arc(k: Terms, centre: float, half: float) -> tuple[ClosureValue, ClosureValue]:
+    """Find the places of the smallest and the largest G5 on one arc."""
+    begin, width = way_of(half)
+    step = width / SAMPLES
+    least, most, at_least, at_most = math.inf, -math.inf, 0, 0
+    low, high = ClosureValue(0.0, math.inf), ClosureValue(0.0, -math.inf)
+    for n in range(SAMPLES + 1):
+        f = _closure(k, angle_at(centre, half, begin + step * n))
+        if f < least:
+            least, at_least = f, n
+        if f > most:
+            most, at_most = f, n
+    for n, sign in ((at_least, 1.0), (at_most, -1.0)):
+        lo, hi = begin + step * (n - 1), begin + step * (n + 1)
+        if half < math.pi:
+            lo, hi = max(lo, 0.0), min(hi, math.pi)
+        tau, f = _DIP(k, centre, half, lo, hi, sign)
+        if sign > 0.0 and f < low.value:
+            low = ClosureValue(angle_at(centre, half, tau), f)
+        if sign < 0.0 and -f > high.value:
+            high = ClosureValue(angle_at(centre, half, tau), -f)
+    return low, high
+
+
+@inline
+def arcs(joint: Joint) -> tuple[int, float, float, float, float]:
+    """Count the arcs on which rho^2 >= 0, and give centre and half width of both; half width pi is the whole circle."""
+    if joint.sweep == 0.0:
+        reaches = abs(joint.axial) < joint.coupler
+        return (1 if reaches else 0), 0.0, math.pi, 0.0, 0.0
+    one, two = (-joint.coupler - joint.axial) / joint.sweep, (joint.coupler - joint.axial) / joint.sweep
+    low, high = min(one, two), max(one, two)
+    if low >= 1.0 or high <= -1.0:
+        return 0, 0.0, 0.0, 0.0, 0.0
+    if low <= -1.0 and high >= 1.0:
+        return 1, 0.0, math.pi, 0.0, 0.0
+    quarter = 0.5 * math.pi
+    if low <= -1.0:
+        return 1, -quarter, math.atan2(math.sqrt((1.0 - high) * (1.0 + high)), -high), 0.0, 0.0
+    if high >= 1.0:
+        return 1, quarter, math.atan2(math.sqrt((1.0 - low) * (1.0 + low)), low), 0.0, 0.0
+    first, second = math.asin(low), math.asin(high)
+    centre, half = 0.5 * (first + second), 0.5 * (second - first)
+    return 2, centre, half, math.pi - centre, half
+
+
+@kernel
+def all_roots(joint: Joint, x: float, y: float, w: float, noise: float, at: Array) -> int:
+    """Write the mirrored rocker angles [rad] of all solutions into ``at``, at least MOST numbers; their number.
+
+    A place where |G5| comes as near to zero as ``noise`` without crossing it counts as one.
+    """
+    number, centre, half, centre2, half2 = arcs(joint)
+    k, count = Terms(joint, x, y, w), 0
+    if number > 0:
+        count, _, _ = _SCAN(k, centre, half, noise, count, at)
+    if number > 1:
+        count, _, _ = _SCAN(k, centre2, half2, noise, count, at)
+    return count
+
+
+@kernel
+def extremes(joint: Joint, x: float, y: float, w: float) -> tuple[ClosureValue, ClosureValue]:
+    """Find the extremes of G5 on the arc where their product is nearest to zero; infinite without an arc."""
+    number, centre, half, centre2, half2 = arcs(joint)
+    k = Terms(joint, x, y, w)
+    low, high = ClosureValue(0.0, math.inf), ClosureValue(0.0, -math.inf)
+    if number > 0:
+        low, high = _extremes_of_arc(k, centre, half)
+    if number > 1:
+        low2, high2 = _extremes_of_arc(k, centre2, half2)
+        if abs(low2.value * high2.value) < abs(low.value * high.value):
+            low, high = low2, high2
+    return low, high
+
+
+ROUNDS = 5
+GUARD = 1e-9  # every bound is widened by this part of what it is made of, far above its rounding
+ONE, UNKNOWN, NONE = 1, 0, -1
+
+
+@inline
+def _reach_between(joint: Joint, s0: float, s1: float) -> tuple[float, float, float]:
+    """Smallest and largest rho and the largest |z| for sines between two values."""
+    z0, z1 = joint.sweep * s0 + joint.axial, joint.sweep * s1 + joint.axial
+    far = max(abs(z0), abs(z1)) + GUARD * joint.coupler
+    near = 0.0 if z0 * z1 <= 0.0 else max(min(abs(z0), abs(z1)) - GUARD * joint.coupler, 0.0)
+    low = max((joint.coupler - far) * (joint.coupler + far), 0.0)
+    high = max((joint.coupler - near) * (joint.coupler + near), 0.0)
+    return math.sqrt(low), math.sqrt(high), far
+
+
+@kernel
+def solutions(joint: Joint, x: float, y: float, w: float) -> int:
+    """Tell how many solutions there can be for each sign of dG5/dpsi.
+
+    ONE is one at most, NONE no solution; UNKNOWN where neither was proved.
+    """
+    r = math.sqrt(x * x + y * y)
+    if not r > 0.0:
+        return UNKNOWN
+    cos0, sin0 = -x / r, y / r  # direction of the crank pin
+    close = w - joint.shift
+    noise = GUARD * (1.0 + (abs(w) + joint.shift + abs(joint.share) * joint.coupler) / r)
+    first, last, _ = _reach_between(joint, -1.0, 1.0)
+    empty = 0
+    for side in (1.0, -1.0):
+        low, high = first, last
+        proved = False
+        for _ in range(ROUNDS):
+            one, two = (close - joint.share * low) / r, (close - joint.share * high) / r
+            cos_near, cos_far = max(one, two) + noise, min(one, two) - noise
+            if cos_near < -1.0 or cos_far > 1.0 or high <= 0.0:
+                empty += 1
+                proved = True
+                break
+            cos_near, cos_far = min(cos_near, 1.0), max(cos_far, -1.0)
+            sin_near = side * math.sqrt((1.0 - cos_near) * (1.0 + cos_near))
+            sin_far = side * math.sqrt((1.0 - cos_far) * (1.0 + cos_far))
+            s_near, c_near = sin0 * cos_near + cos0 * sin_near, cos0 * cos_near - sin0 * sin_near
+            s_far, c_far = sin0 * cos_far + cos0 * sin_far, cos0 * cos_far - sin0 * sin_far
+            # Over at most half a turn the sine passes 1 where the cosine changes sign downwards, -1 upwards, and the
+            # cosine passes 1 or -1 where the sine changes sign.
+            falls = (c_near * side >= 0.0) & (c_far * side <= 0.0)
+            rises = (c_near * side <= 0.0) & (c_far * side >= 0.0)
+            s_low = -1.0 if rises else min(s_near, s_far)
+            s_high = 1.0 if falls else max(s_near, s_far)
+            wide = 1.0 if s_near * s_far <= 0.0 else max(abs(c_near), abs(c_far))
+            low, high, far = _reach_between(joint, s_low, s_high)
+            if low > 0.0:
+                steep = abs(joint.share) * far * abs(joint.sweep) * wide / low
+                if r * min(abs(sin_near), abs(sin_far)) > steep * (1.0 + GUARD):
+                    proved = True
+                    break
+        if not proved:
+            return UNKNOWN
+    return NONE if empty == 2 else ONE

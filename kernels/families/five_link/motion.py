@@ -6,40 +6,25 @@ The bodies are crank, cross-piece, coupler and rocker (:mod:`kernels.linkage.bod
 from __future__ import annotations
 
 import math
-from typing import Any, NamedTuple
+from collections import namedtuple
+from typing import Any
 
 import numpy as np
 
 from kernels import status as st
 from kernels.arithmetic.complex_step import arctan2, divisor, hypotenuse
 from kernels.arithmetic.vectors import add, cross, dot, mix, scale, spun, sub
-from kernels.families.five_link.closure import Joint, axial_reach, reduce_design, slope
-from kernels.families.five_link.roots import MOST, extremes
+from kernels.families.five_link.closure import MOST, Joint, axial_reach, extremes, reduce_design, slope
 from kernels.families.five_link.solve import pose_terms, reaches, real_joint, solve
 from kernels.jit import inline, kernel
-from kernels.linkage.bodies import (
-    Links,
-    Moving,
-    acceleration_at,
-    put,
-    put_ball,
-    put_body,
-    put_crank,
-    put_turning,
-    shaft,
-    velocity_at,
-)
+from kernels.linkage import bodies as tree
 from kernels.linkage.crank_closure import Reduced
-from kernels.linkage.outputs import write
+from kernels.linkage.outputs import put_block, write
 from kernels.types import Array, Numbers, Status
 
-
-class Bends(NamedTuple):
-    """What the swivelling joint adds to the second and third derivative of the closure, and rho; zero where plain."""
-
-    rho: Any
-    second: Any  # share rho''
-    third: Any  # share (rho' + rho''')
+# What the swivelling joint adds to the second and third derivative of the closure, and rho; zero where plain.
+# ``second``: share rho''; ``third``: share (rho' + rho''').
+Bends = namedtuple("Bends", "rho second third")
 
 
 @inline
@@ -136,28 +121,12 @@ def discriminant_of(r: Reduced, joint: Joint, code: int, u: Any, v: Any, w: Any,
     return _shortfall(r, joint, u, v)
 
 
-class Outputs(NamedTuple):
-    """Pose outputs, each (n, m), or None: what is None is not computed."""
-
-    psi: Numbers | None
-    dpsi: Numbers | None
-    d2psi: Numbers | None
-    d3psi: Numbers | None
-    sin_psi: Numbers | None
-    cos_psi: Numbers | None
-    discriminant: Numbers | None
-    pressure_angle: Numbers | None
+# Pose outputs, each (n, m), and places (11, n, m); what is None is not computed.
+Outputs = namedtuple("Outputs", "psi dpsi d2psi d3psi sin_psi cos_psi discriminant pressure_angle places")
 
 
 @kernel
-def poses(
-    designs: Numbers,
-    cos_phi: Numbers,
-    sin_phi: Numbers,
-    status: Status,
-    out: Outputs,
-    places: Numbers | None,
-) -> None:
+def poses(designs: Numbers, cos_phi: Numbers, sin_phi: Numbers, status: Status, out: Outputs) -> None:
     """Position, transfer functions, discriminant, pressure angle and joints of every design at its crank angles.
 
     Equations (1)-(8) of docs/five_link.md; joints in the fixed frame of its section 1.
@@ -205,15 +174,13 @@ def poses(
                 write(out.dpsi, i, j, r.branch * p)
                 write(out.d2psi, i, j, r.branch * q)
                 write(out.d3psi, i, j, r.branch * jerk)
-            if places is not None:
-                _put_places(places, designs, i, j, r, joint, u, v, c, s)
+            if out.places is not None:
+                put_block(out.places, i, j, _places(designs[i], r, joint, u, v, c, s), 1.0)
 
 
 @inline
-def _put_places(
-    places: Numbers, designs: Numbers, i: int, j: int, r: Reduced, joint: Joint, u: Any, v: Any, c: Any, s: Any
-) -> None:
-    """Write theta and beta; crank pin B, the point of axis 2 nearest to axis 1 moved by s2 along it, rocker ball C."""
+def _places(d: Numbers, r: Reduced, joint: Joint, u: Any, v: Any, c: Any, s: Any) -> tuple[Any, ...]:
+    """Angles theta and beta, crank pin B, the point of axis 2 nearest to axis 1 moved by s2 along it, rocker ball C."""
     z, square = axial_reach(joint, -s)
     # the root of what rounding made negative is no number; the status has dealt with what is truly out of reach
     rho = np.sqrt(square) if square.real > 0.0 else 0.0 * square
@@ -222,32 +189,20 @@ def _put_places(
     d2 = -r.rocker * (r.ca * s + r.k1) - v
     reach = joint.h + rho
     towards, aside = d1 * reach + d2 * joint.s2, d2 * reach - d1 * joint.s2
-    places[0, i, j], places[1, i, j] = arctan2(aside, towards), arctan2(z, rho)
-
-    a, ca = designs[i, 0], r.branch * r.ca
+    theta, beta = arctan2(aside, towards), arctan2(z, rho)
+    a, ca = d[0], r.branch * r.ca
     length = hypotenuse(towards, aside)
     cos_theta, sin_theta = towards / divisor(length), aside / divisor(length)
     m1, m2 = joint.h * cos_theta - joint.s2 * sin_theta, joint.h * sin_theta + joint.s2 * cos_theta
-    x, y, z = a * u, designs[i, 4] * r.sa + a * (ca * v), designs[i, 4] * ca - a * (r.sa * v)
-    places[2, i, j], places[3, i, j], places[4, i, j] = x, y, z
-    places[5, i, j], places[6, i, j], places[7, i, j] = x + a * m1, y + a * (ca * m2), z - a * (r.sa * m2)
-    places[8, i, j] = designs[i, 3] - designs[i, 2] * c
-    places[9, i, j] = -r.branch * designs[i, 2] * s
-    places[10, i, j] = designs[i, 5] + 0.0 * c  # nan where there is no angle
+    x, y, z = a * u, d[4] * r.sa + a * (ca * v), d[4] * ca - a * (r.sa * v)
+    hinge = (x + a * m1, y + a * (ca * m2), z - a * (r.sa * m2))
+    # the last one is nan where there is no angle
+    ball = (d[3] - d[2] * c, -r.branch * d[2] * s, d[5] + 0.0 * c)
+    return (theta, beta, x, y, z, *hinge, *ball)
 
 
 @kernel
-def links(
-    designs: Array,
-    cos_phi: Array,
-    sin_phi: Array,
-    psi: Array,
-    dpsi: Array,
-    d2psi: Array,
-    theta: Array,
-    beta: Array,
-    out: Links,
-) -> None:
+def links(designs: Array, cos_phi: Array, sin_phi: Array, motion: Array, out: tree.Links) -> None:
     """Fill the bodies, freedoms and closing lines of every pose.
 
     The coupler turns about axis 1 by theta and about axis 2, t, by -beta; the rates of both follow from the motion of
@@ -256,45 +211,49 @@ def links(
     Parameters
     ----------
     designs : (n, 11);  cos_phi, sin_phi : (n, m) or (1, m)
-    psi, dpsi, d2psi, theta, beta : (n, m), outputs of ``poses``
+    motion : (5, n, m), outputs psi, dpsi, d2psi, theta, beta of ``poses``
     out : four bodies, four freedoms, three lines: the ball C, whose forces act on the rocker
     """
     for i in range(designs.shape[0]):
         d = designs[i]
-        u, e2 = shaft(d[6])
+        u, e2 = tree.shaft(d[6])
         e1, k = (1.0, 0.0, 0.0), (0.0, 0.0, 1.0)
         centre, foot = scale(d[4], u), (d[3], 0.0, d[5])
         row = i if cos_phi.shape[0] > 1 else 0
-        for j in range(psi.shape[1]):
+        for j in range(motion.shape[2]):
+            psi, dpsi = motion[0, i, j], motion[1, i, j]
+            d2psi, theta, beta = motion[2, i, j], motion[3, i, j], motion[4, i, j]
             bodies, axes = out.bodies[i, j], out.axes[i, j]
-            crank = put_crank(bodies[0], axes[0], centre, u, e1, e2, cos_phi[row, j], sin_phi[row, j])
+            crank = tree.put_crank(bodies[0], axes[0], centre, u, e1, e2, cos_phi[row, j], sin_phi[row, j])
             pin = add(centre, scale(d[0], mix(cos_phi[row, j], e1, sin_phi[row, j], e2)))
-            rho = (math.cos(psi[i, j]), math.sin(psi[i, j]), 0.0)
-            rocker = put_turning(bodies[3], foot, k, rho, dpsi[i, j], d2psi[i, j])
+            rho = (math.cos(psi), math.sin(psi), 0.0)
+            rocker = tree.put_turning(bodies[3], foot, k, rho, dpsi, d2psi)
             ball = add(foot, scale(d[2], rho))
-            m = mix(math.cos(theta[i, j]), e1, math.sin(theta[i, j]), e2)
+            m = mix(math.cos(theta), e1, math.sin(theta), e2)
             t = cross(u, m)
-            cb, sb = math.cos(beta[i, j]), math.sin(beta[i, j])
+            cb, sb = math.cos(beta), math.sin(beta)
             hinge = add(pin, mix(d[7], m, d[8], t))
             arm, swept = mix(cb, m, sb, u), mix(-sb, m, cb, u)
-            seen = sub(velocity_at(rocker, ball), velocity_at(crank, pin))
+            seen = sub(tree.velocity_at(rocker, ball), tree.velocity_at(crank, pin))
             reach = d[7] + d[1] * cb
             rate = dot(seen, u) / (d[1] * cb)
             spin = (dot(seen, t)) / reach
             omega1 = scale(spin, u)
-            seen2 = sub(acceleration_at(rocker, ball), acceleration_at(crank, pin))
+            seen2 = sub(tree.acceleration_at(rocker, ball), tree.acceleration_at(crank, pin))
             # What the ball does at constant rates: about axis 1, of Coriolis, about axis 2.
             known = add(spun(omega1, (0.0, 0.0, 0.0), sub(ball, pin)), scale(2.0 * rate * d[1], cross(omega1, swept)))
             left = sub(seen2, sub(known, scale(rate * rate * d[1], arm)))
             rate2, spin2 = dot(left, u) / (d[1] * cb), dot(left, t) / reach
             eps1 = scale(spin2, u)
-            piece = Moving(pin, velocity_at(crank, pin), acceleration_at(crank, pin), omega1, eps1)
-            put_body(bodies[1], piece, m, t, u, pin)
+            piece = tree.Moving(pin, tree.velocity_at(crank, pin), tree.acceleration_at(crank, pin), omega1, eps1)
+            tree.put_body(bodies[1], piece, m, t, u, pin)
             omega2 = mix(1.0, omega1, -rate, t)
             eps2 = add(mix(1.0, eps1, -rate2, t), scale(-rate, cross(omega1, t)))
-            coupler = Moving(hinge, velocity_at(piece, hinge), acceleration_at(piece, hinge), omega2, eps2)
-            put_body(bodies[2], coupler, arm, t, cross(arm, t), hinge)
-            put(axes[1], u)
-            put(axes[2], t)
-            put(axes[3], k)
-            put_ball(out.lines[i, j], ball)
+            coupler = tree.Moving(
+                hinge, tree.velocity_at(piece, hinge), tree.acceleration_at(piece, hinge), omega2, eps2
+            )
+            tree.put_body(bodies[2], coupler, arm, t, cross(arm, t), hinge)
+            tree.put(axes[1], u)
+            tree.put(axes[2], t)
+            tree.put(axes[3], k)
+            tree.put_ball(out.lines[i, j], ball)

@@ -10,8 +10,17 @@ import numpy as np
 from kernels import status as st
 from kernels.arithmetic.complex_step import divisor
 from kernels.curves.trigonometric_polynomials import rotate
-from kernels.families.five_link.closure import Joint, axial_reach, residual_size, slope
-from kernels.families.five_link.roots import MOST, NONE, ONE, all_roots, solutions
+from kernels.families.five_link.closure import (
+    MOST,
+    NONE,
+    ONE,
+    Joint,
+    all_roots,
+    axial_reach,
+    residual_size,
+    slope,
+    solutions,
+)
 from kernels.jit import inline, kernel
 from kernels.linkage.crank_closure import Reduced, discriminant_tolerance
 from kernels.linkage.verdict import pose_status

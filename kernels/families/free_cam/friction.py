@@ -8,7 +8,7 @@ march in the order of phi.
 from __future__ import annotations
 
 import math
-from typing import NamedTuple
+from collections import namedtuple
 
 from kernels import status as st
 from kernels.families.free_cam.contact import (
@@ -30,12 +30,8 @@ from kernels.types import Array, Status
 FAR = 64.0
 
 
-class Pull(NamedTuple):
-    """Ratio of the tensions T2/T1 = ratio e^(along wrap), sine of the angle of friction across the thread."""
-
-    ratio: float
-    along: float
-    sine: float
+# Ratio of the tensions T2/T1 = ratio e^(along wrap), sine of the angle of friction across the thread.
+Pull = namedtuple("Pull", "ratio along sine")
 
 
 @inline
@@ -72,7 +68,7 @@ def lean(cam: Cam, pull: Pull, at: float) -> tuple[float, float]:
 def excess(cam: Cam, pull: Pull, side: float, at: float) -> float:
     """T12 . tangent - side sin(rho) |T12|: zero at the limit point of that side, falling along the edge far out."""
     along, whole = lean(cam, pull, at)
-    return along - side * pull.sine * whole
+    return float(along - side * pull.sine * whole)
 
 
 @inline
@@ -86,7 +82,7 @@ def steepest_excess(cam: Cam, pull: Pull, low: float, high: float) -> float:
     # the wrap never exceeds pi, so this bounds the tension ratio for all points at once
     most = pull.ratio * math.exp(math.pi * pull.along)
     swing = tangent * (1.0 / first + most * (1.0 / second + pull.along * (1.0 / first + 1.0 / second)))
-    return (1.0 + pull.sine) * swing + (1.0 + most) * turning
+    return float((1.0 + pull.sine) * swing + (1.0 + most) * turning)
 
 
 @inline
@@ -207,21 +203,14 @@ def landed(designs: Array, i: int, u0: float, v0: float, u1: float, v1: float) -
     return y
 
 
-class MarchOutputs(NamedTuple):
-    """Pose outputs, each (n, m), or None: what is None is not computed."""
-
-    L: Array | None
-    wrap: Array | None
-    y_contact: Array | None
-    contact: Array | None
-    sticking: Array | None
+# Pose outputs, each (n, m), or None: what is None is not computed.
+MarchOutputs = namedtuple("MarchOutputs", "L wrap y_contact contact sticking")
 
 
 @kernel
 def march(
-    designs: Array, friction: Array, cos_phi: Array, sin_phi: Array, turns: int, status: Status,
-    out: MarchOutputs,
-) -> None:  # fmt: skip
+    friction: Array, turns: int, designs: Array, cos_phi: Array, sin_phi: Array, status: Status, out: MarchOutputs
+) -> None:
     """Follow the thread over an edge with friction, in the order of the given angles; docs/takeup.md, section 5.
 
     The thread starts where it lies without friction and is led through the angles ``turns`` times; what is given is
@@ -229,10 +218,10 @@ def march(
 
     Parameters
     ----------
-    designs : (n, 8) columns as `PARAMETERS` of sweep/families/free_cam.py
     friction : (n, 3), tension ratio T2/T1; coefficients of friction along the thread and across it (along the edge)
-    cos_phi, sin_phi : (n, m) or (1, m), angles of one turn in their order
     turns : how often the angles are gone through
+    designs : (n, 8) columns as `PARAMETERS` of sweep/families/free_cam.py
+    cos_phi, sin_phi : (n, m) or (1, m), angles of one turn in their order
     status : (n, m) out; OK, INVALID_INPUT, or NOT_CONVERGED where the thread slides off far outside; that and all that
         follows of the design
     L, wrap, y_contact : (n, m) out or None; thread length, wrap angle [rad], place along the edge's axis y [length]

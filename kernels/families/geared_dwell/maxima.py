@@ -83,6 +83,12 @@ def _slope(bend: Array, d: Array, slope: Array) -> None:
                 slope[x + z - 1] += (x - 3.0 * z) * (bend[x] * d[z])
 
 
+@inline
+def _put(out: Array | None, i: int, value: float) -> None:
+    if out is not None:
+        out[i] = value
+
+
 @kernel
 def turn_maxima(
     designs: Array,
@@ -154,14 +160,11 @@ def turn_maxima(
             code = st.NOT_CONVERGED
         status[i] = code
         scale = 2.0 * abs(total) if code == st.OK else math.nan
-        if max_abs_dpsi is not None:
-            max_abs_dpsi[i] = m1 if code == st.OK else math.nan
-        if max_abs_d2psi is not None:
-            max_abs_d2psi[i] = scale * m2
-        if phi_max_abs_d2psi is not None:
-            phi_max_abs_d2psi[i] = phi2 if code == st.OK else math.nan
-        if max_abs_d3psi is not None:
-            max_abs_d3psi[i] = scale * m3
+        valid = 1.0 if code == st.OK else math.nan
+        _put(max_abs_dpsi, i, valid * m1)
+        _put(max_abs_d2psi, i, scale * m2)
+        _put(phi_max_abs_d2psi, i, valid * phi2)
+        _put(max_abs_d3psi, i, scale * m3)
 
 
 @inline

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections import namedtuple
 from typing import NamedTuple
 
 import numpy as np
@@ -113,28 +114,12 @@ def velocity(h: Half, ak4: float, t: float, square: float) -> float:
     return (h.v0 + t * (h.v1 - ak4 * t)) / square
 
 
-class Outputs(NamedTuple):
-    """Pose outputs, each (n, m), or None: what is None is not computed."""
-
-    psi: Numbers | None
-    dpsi: Numbers | None
-    d2psi: Numbers | None
-    d3psi: Numbers | None
-    sin_psi: Numbers | None
-    cos_psi: Numbers | None
-    x_b: Numbers | None
-    y_b: Numbers | None
+# Pose outputs, each (n, m), or None: what is None is not computed.
+Outputs = namedtuple("Outputs", "psi dpsi d2psi d3psi sin_psi cos_psi x_b y_b")
 
 
 @kernel
-def poses(
-    designs: Numbers,
-    phi: Numbers,
-    cos_phi: Numbers,
-    sin_phi: Numbers,
-    status: Status,
-    out: Outputs,
-) -> None:
+def poses(designs: Numbers, phi: Numbers, cos_phi: Numbers, sin_phi: Numbers, status: Status, out: Outputs) -> None:
     """Compute the position, transfer functions and pin coordinates of every design at its carrier angles; (2)-(6).
 
     Parameters

@@ -6,31 +6,22 @@ complex step); decisions look at the real part.
 
 The one set of formulas behind the motion at given angles and behind the fused kernels of chains.  Derivatives of the
 closure F = X cos psi - Y sin psi + W are F_phi = ``g_ph``, F_phi psi = -``g_near``, F_phi phi psi = ``g_turn``.
+
+Behind them stands the guided four-bar as the last stage of a fused chain (:mod:`kernels.chains`).
 """
 
 from __future__ import annotations
 
+import math
+from collections import namedtuple
 from typing import Any, NamedTuple
 
 import numpy as np
 
-from kernels.arithmetic.intrinsics import power_below
+from kernels.arithmetic.intrinsics import largest, power_below
+from kernels.chains.form import STRIDE, Form, Travel
 from kernels.jit import inline
 from kernels.types import EPS, Array
-
-
-class Design(NamedTuple):
-    """Columns of the design matrix: lengths in one unit, lam in radians, branch +1 or -1."""
-
-    a: float
-    b: float
-    c: float
-    e: float
-    xi: float
-    eta: float
-    lam: float
-    h: float
-    branch: float
 
 
 class Reduced(NamedTuple):
@@ -63,24 +54,21 @@ class Reduced(NamedTuple):
 @inline
 def reduce_design(designs: Array, i: int) -> Reduced:
     """Constants of one design; ``valid`` is false for zero or negative lengths and for what is not finite."""
-    d = Design(
-        designs[i, 0], designs[i, 1], designs[i, 2], designs[i, 3], designs[i, 4], designs[i, 5], designs[i, 6],
-        designs[i, 7], designs[i, 8],
-    )  # fmt: skip
-    return reduce_along(d, np.cos(d.lam), np.sin(d.lam))
+    d = designs[i]
+    return reduce_along((d[0], d[1], d[2], d[3], d[4], d[5], d[6], d[7], d[8]), np.cos(d[6]), np.sin(d[6]))
 
 
 @inline
-def reduce_along(d: Any, cl: Any, sl: Any) -> Reduced:
-    """Constants as of :func:`reduce_design`, from a :class:`Design` and the cosine and sine of its lam.
+def reduce_along(d: tuple[Any, ...], cl: Any, sl: Any) -> Reduced:
+    """Constants as of :func:`reduce_design`, from the columns of a design and the cosine and sine of its lam.
 
     Without a branch or a call, so that it vectorises.
     """
-    half_unit = power_below(d.c.real)
+    a, b, c, e, xi, eta, lam, h, branch = d
+    half_unit = power_below(c.real)
     unit, per_unit = 2.0 * half_unit, 0.5 / half_unit
-    a, b, c, e = d.a * per_unit, d.b * per_unit, d.c * per_unit, d.e * per_unit
-    lam, h, branch = d.lam, d.h * per_unit, d.branch
-    xi, eta = d.xi * per_unit / b, d.eta * per_unit / b
+    a, b, c, e, h = a * per_unit, b * per_unit, c * per_unit, e * per_unit, h * per_unit
+    xi, eta = xi * per_unit / b, eta * per_unit / b
     along, across = xi * cl + eta * sl, eta * cl - xi * sl
     k0 = 0.5 * ((c - b) * (c + b) + (a * a + e * e)) / c
     k2 = a * e / c
@@ -95,16 +83,10 @@ def reduce_along(d: Any, cl: Any, sl: Any) -> Reduced:
     )  # fmt: skip
 
 
-class ClosurePose(NamedTuple):
-    """The closure at one crank angle, in units of ``Reduced.unit``."""
-
-    u: Any  # cos phi
-    v: Any  # sin phi
-    x: Any  # X, Y, W of the closure
-    y: Any
-    w: Any
-    rr: Any  # X^2 + Y^2, squared distance of the crank pin from the rocker pivot
-    delta: Any  # the discriminant X^2 + Y^2 - W^2
+# The closure at one crank angle, in units of ``Reduced.unit``.
+# ``u``: cos phi; ``v``: sin phi; ``x``: X, Y, W of the closure; ``rr``: X^2 + Y^2, squared distance of the crank pin
+# from the rocker pivot; ``delta``: the discriminant X^2 + Y^2 - W^2.
+ClosurePose = namedtuple("ClosurePose", "u v x y w rr delta")
 
 
 @inline
@@ -123,13 +105,8 @@ def discriminant_tolerance(r: Reduced, x: float, y: float, w: float) -> float:
     return t * first + t * t * (r.x_size * r.x_size + r.a.real * r.a.real + r.w_size * r.w_size)
 
 
-class First(NamedTuple):
-    """Derivatives of the closure, and psi'."""
-
-    g_turn: Any
-    g_near: Any
-    g_ph: Any
-    p: Any
+# Derivatives of the closure, and psi'.
+First = namedtuple("First", "g_turn g_near g_ph p")
 
 
 @inline
@@ -163,3 +140,114 @@ def snap(r: Any, at: ClosurePose, first: First, q: Any, j: Any, t: Any, per_t: A
     by_p = p * (4.0 * g_near - p * (6.0 * g_near - p * (4.0 * g_near - w * p)))
     by_q = q * (6.0 * g_turn - p * (12.0 * g_turn + 6.0 * t * p) + 3.0 * w * q)
     return (g_near + r.k2 * at.u - by_p - by_q - 4.0 * j * (w * p - g_near)) * per_t
+
+
+# The numbers of :class:`kernels.families.guide.closure.Reduced`; the point in the user's unit of length.
+# ``per_square``: 1/b^2 in the unit of the closure.
+Constants = namedtuple(
+    "Constants", "a e k0 k2 p_along p_across q_along q_across along0 across0 branch x_size w_size per_square doubt"
+)
+
+
+@inline
+def _constants(at: Array, i: int, step: int, cos: Any, sin: Any) -> Constants:
+    d = (
+        at[i], at[i + step], at[i + 2 * step], at[i + 3 * step], at[i + 4 * step], at[i + 5 * step], at[i + 6 * step],
+        at[i + 7 * step], at[i + 8 * step],
+    )  # fmt: skip
+    r = reduce_along(d, cos, sin)
+    unit = 8.0 * EPS
+    # discriminant_tolerance where every term has its full size
+    doubt = (unit + unit * unit) * (r.x_size * r.x_size + r.a * r.a + r.w_size * r.w_size) if r.valid else math.nan
+    return Constants(
+        r.a, r.e, r.k0, r.k2, r.p_along * r.unit, r.p_across * r.unit, r.q_along * r.unit, r.q_across * r.unit,
+        r.along0 * r.unit, r.across0 * r.unit, r.branch, r.x_size, r.w_size, 1.0 / (r.b * r.b), doubt,
+    )  # fmt: skip
+
+
+@inline
+def _put(at: Array, i: int, c: Constants) -> None:
+    at[i], at[i + STRIDE], at[i + 2 * STRIDE], at[i + 3 * STRIDE] = c.a, c.e, c.k0, c.k2
+    at[i + 4 * STRIDE], at[i + 5 * STRIDE] = c.p_along, c.p_across
+    at[i + 6 * STRIDE], at[i + 7 * STRIDE] = c.q_along, c.q_across
+    at[i + 8 * STRIDE], at[i + 9 * STRIDE], at[i + 10 * STRIDE] = c.along0, c.across0, c.branch
+    at[i + 11 * STRIDE], at[i + 12 * STRIDE] = c.x_size, c.w_size
+    at[i + 13 * STRIDE], at[i + 14 * STRIDE] = c.per_square, c.doubt
+
+
+@inline
+def _get(at: Array, i: int) -> Constants:
+    return Constants(
+        at[i], at[i + STRIDE], at[i + 2 * STRIDE], at[i + 3 * STRIDE], at[i + 4 * STRIDE], at[i + 5 * STRIDE],
+        at[i + 6 * STRIDE], at[i + 7 * STRIDE], at[i + 8 * STRIDE], at[i + 9 * STRIDE], at[i + 10 * STRIDE],
+        at[i + 11 * STRIDE], at[i + 12 * STRIDE], at[i + 13 * STRIDE], at[i + 14 * STRIDE],
+    )  # fmt: skip
+
+
+@inline
+def _travel(c: Constants, u: Any, v: Any) -> Travel:
+    """Equations (4) and (5) to the fourth order: each link's share of the point, turned by the derivatives of psi."""
+    at = place(c, u, v)
+    t = c.branch * math.sqrt(largest(at.delta, 1e-300))
+    per = 1.0 / (at.rr * t)  # one division gives both reciprocals
+    per_rr, per_t = t * per, at.rr * per
+    cos_psi, sin_psi = -(at.x * at.w + at.y * t) * per_rr, (at.y * at.w - at.x * t) * per_rr
+    first = velocity(c, at, cos_psi, sin_psi, per_t)
+    p, q = first.p, acceleration(c, at, first, per_t)
+    j = jerk(at, first, q, t, per_t)
+    k = snap(c, at, first, q, j, t, per_t)
+    b_along, b_across = c.p_along * u - c.p_across * v, c.p_along * v + c.p_across * u
+    c_along, c_across = c.q_along * cos_psi - c.q_across * sin_psi, c.q_along * sin_psi + c.q_across * cos_psi
+    square = p * p
+    turning, drawing = j - p * square, 3.0 * p * q
+    turning4, drawing4 = k - 6.0 * square * q, 4.0 * p * j + 3.0 * q * q - square * square
+    return Travel(
+        b_along + c_along + c.along0,
+        -(b_across + p * c_across),
+        -(b_along + q * c_across + square * c_along),
+        b_across - turning * c_across - drawing * c_along,
+        b_along - turning4 * c_across - drawing4 * c_along,
+        b_across + c_across + c.across0,
+        b_along + p * c_along,
+        q * c_along - square * c_across - b_across,
+        turning * c_along - drawing * c_across - b_along,
+        b_across + turning4 * c_along - drawing4 * c_across,
+        at.delta,
+    )
+
+
+@inline
+def _dip(c: Constants, u: Any, v: Any) -> tuple[Any, Any, Any]:
+    at = place(c, u, v)
+    x_ph, y_ph, w_ph = c.a * v, c.a * u, c.k2 * v
+    first = at.x * x_ph + at.y * y_ph - at.w * w_ph
+    second = x_ph * x_ph + at.x * y_ph + (y_ph * y_ph - at.y * x_ph) - (w_ph * w_ph + at.w * (c.k2 * u))
+    return at.delta * c.per_square, 2.0 * first * c.per_square, 2.0 * second * c.per_square
+
+
+@inline
+def _travel_blur(c: Constants, u: Any, v: Any, x1: Any, x2: Any, x3: Any) -> tuple[Any, ...]:
+    """Errors of psi and its derivatives as of the crank-rocker's, times the arm by which they move the point."""
+    at = place(c, u, v)
+    t = c.branch * math.sqrt(largest(at.delta, 1e-300))
+    per_t, per_rr = 1.0 / t, 1.0 / at.rr
+    first = velocity(c, at, -(at.x * at.w + at.y * t) * per_rr, (at.y * at.w - at.x * t) * per_rr, per_t)
+    second = acceleration(c, at, first, per_t)
+    p, q, j, per_t = abs(first.p), abs(second), abs(jerk(at, first, second, t, per_t)), abs(per_t)
+    tolerance = 4.0 * EPS * (abs(at.x) * c.x_size + abs(at.y) * c.a + abs(at.w) * c.w_size)
+    share = tolerance * per_t * per_t
+    angle = 4.0 * EPS * (c.x_size + c.a + c.w_size) * per_t
+    terms = (2.0 * EPS * (2.0 * c.a + abs(c.k2)) + c.a * angle) * per_t
+    b0, b1 = angle + 4.0 * EPS, p * (1.5 * share + 8.0 * EPS) + terms
+    more = 1.0 + c.a * per_t
+    b2, b3 = q * (2.5 * share + 8.0 * EPS) + terms * more, j * (3.5 * share + 8.0 * EPS) + terms * (more * more)
+    arm, crank = abs(c.q_along) + abs(c.q_across), abs(c.p_along) + abs(c.p_across)
+    bend, twist = q + p * p, j + p * (p * p + 3.0 * q)
+    e0 = arm * b0 + 4.0 * EPS * (arm + crank + abs(c.along0) + abs(c.across0))
+    e1 = arm * (b1 + p * b0) + 8.0 * EPS * (crank + arm * p)
+    e2 = arm * (b2 + 2.0 * p * b1 + bend * b0) + 8.0 * EPS * (crank + arm * bend)
+    e3 = arm * (b3 + 3.0 * p * b2 + 3.0 * bend * b1 + twist * b0) + 8.0 * EPS * (crank + arm * twist)
+    return e0, e1, e2, e3, e0, e1, e2, e3, tolerance * c.per_square
+
+
+FORM = Form("guide", 9, 6, 15, _constants, _put, _get, None, _travel, _dip, None, _travel_blur)

@@ -20,24 +20,18 @@ angle there allows.
 from __future__ import annotations
 
 import math
-from typing import NamedTuple
+from collections import namedtuple
 
 from kernels import status as st
 from kernels.curves.trigonometric_polynomials import minimum
-from kernels.families.rssp.closure import EPS, Reduced, place, reduce_design
+from kernels.families.rssp.motion import EPS, Reduced, place, reduce_design
 from kernels.jit import inline, kernel
 from kernels.linkage.verdict import turning_status
 from kernels.types import TWO_PI, Array, Status
 
-
-class LeastQ(NamedTuple):
-    """Smallest Q of the turn in squared units of the reduced design, where it is, and how well it is known."""
-
-    q: float
-    cos: float
-    sin: float
-    across: float  # distance of the coupler's ends across the slide line
-    tolerance: float
+# Smallest Q of the turn in squared units of the reduced design, where it is, and how well it is known.
+# ``across``: distance of the coupler's ends across the slide line.
+LeastQ = namedtuple("LeastQ", "q cos sin across tolerance")
 
 
 @inline
@@ -166,19 +160,7 @@ def _turn(angle: float) -> float:
 
 
 @kernel
-def limits(
-    designs: Array,
-    status: Status,
-    s_ext: Array,
-    s_fold: Array,
-    phi_ext: Array,
-    phi_fold: Array,
-    phi0: Array,
-    stroke_ratio: Array,
-    stroke: Array,
-    err_ext: Array,
-    err_fold: Array,
-) -> None:
+def limits(designs: Array, status: Status, out: Array) -> None:
     """Compute both limit positions of every design on its branch.
 
     Equations (7)-(10) of docs/rssp.md.
@@ -188,13 +170,11 @@ def limits(
     designs : (n, 6) columns as `PARAMETERS` of sweep/families/rssp.py
     status : (n,) out; OK, NOT_ROTATABLE, UNDECIDABLE, NOT_OSCILLATING (the slider stands still: e = 0, alpha = 90 deg),
         SINGULAR (the slider ball reaches the crank axis), NOT_CONVERGED or INVALID_INPUT
-    s_ext, s_fold : (n,) out [length], slider at the extended and the folded position
-    phi_ext, phi_fold : (n,) out [rad], crank angles in [0, 2 pi)
-    phi0 : (n,) out [rad], crank angle from the extended to the folded position, in [0, 2 pi)
-    stroke_ratio : (n,) out, phi0/(2 pi - phi0)
-    stroke : (n,) out [length], s_fold - s_ext with its sign, -branch; by the half-stroke identity (10), which keeps
-        full relative accuracy for tiny cranks
-    err_ext, err_fold : (n,) out [length], bounds of the rounding errors of s_ext and s_fold
+    out : (9, n) out; s_ext, s_fold [length], slider at the extended and the folded position; phi_ext, phi_fold [rad],
+        crank angles in [0, 2 pi); phi0 [rad], crank angle from the extended to the folded position, in [0, 2 pi);
+        stroke_ratio phi0/(2 pi - phi0); stroke [length], s_fold - s_ext with its sign, -branch, by the half-stroke
+        identity (10), which keeps full relative accuracy for tiny cranks; bounds of the rounding errors of s_ext and
+        s_fold [length]
 
     Notes
     -----
@@ -221,18 +201,18 @@ def limits(
         status[i] = code
         if code != st.OK:
             far, near = math.nan, math.nan
-        s_ext[i], s_fold[i] = far * r.unit, near * r.unit
+        out[0, i], out[1, i] = far * r.unit, near * r.unit
         # The ball's direction from the crank axis; at the folded position the crank points the other way.
         towards, away = math.atan2(far * ca, r.e), math.atan2(-near * ca, -r.e)
-        phi_ext[i], phi_fold[i] = _turn(towards), _turn(away)
+        out[2, i], out[3, i] = _turn(towards), _turn(away)
         # The stroke by the half-stroke identity: the difference far - near would lose the digits of a small stroke.
         step = -2.0 * r.a * (rho_ext + rho_fold) / (far + near - 2.0 * f * sa)
-        stroke[i] = step * r.unit
+        out[6, i] = step * r.unit
         # phi0 - pi as one arctangent: small for nearly central mechanisms, without a difference of angles.
         beyond = math.atan2(r.e * ca * step, r.e * r.e + (far * ca) * (near * ca))
-        phi0[i] = math.pi + beyond
-        stroke_ratio[i] = (math.pi + beyond) / (math.pi - beyond)
+        out[4, i] = math.pi + beyond
+        out[5, i] = (math.pi + beyond) / (math.pi - beyond)
         size = 8.0 * EPS * r.unit
         reach = (r.m_size + r.b) * (r.m_size + r.b) + r.n_size * r.n_size
-        err_ext[i] = size * (reach / abs(slope_ext) + abs(far))
-        err_fold[i] = size * (reach / abs(slope_fold) + abs(near))
+        out[7, i] = size * (reach / abs(slope_ext) + abs(far))
+        out[8, i] = size * (reach / abs(slope_fold) + abs(near))

@@ -6,35 +6,22 @@ The planar slider-crank is the spatial one with alpha = 0 and f = 0 whose crank 
 from __future__ import annotations
 
 import math
-from typing import Any, NamedTuple
+from collections import namedtuple
+from typing import Any
 
 from kernels.arithmetic.intrinsics import largest, power_below, smallest
 from kernels.chains.form import STRIDE, Form, Travel
 from kernels.curves.trigonometric_polynomials import far_minimum, point
-from kernels.families.rssp.closure import EPS, place, reduce_design
 from kernels.families.rssp.margin import least_q
+from kernels.families.rssp.motion import EPS, place, reduce_design
 from kernels.jit import inline, kernel
 from kernels.linkage.slider_closure import Reduced, reduce_along, root_derivatives
 from kernels.linkage.verdict import turning_status
 from kernels.types import Array, Status
 
-
-class Constants(NamedTuple):
-    """The numbers of :class:`kernels.linkage.slider_closure.Reduced`."""
-
-    a: Any
-    b: Any
-    e: Any
-    k0: Any
-    ka: Any
-    n0: Any
-    na: Any
-    m_size: Any
-    n_size: Any
-    branch: Any
-    unit: Any
-    per_square: Any  # 1/b^2
-    doubt: Any
+# The numbers of :class:`kernels.linkage.slider_closure.Reduced`.
+# ``per_square``: 1/b^2.
+Constants = namedtuple("Constants", "a b e k0 ka n0 na m_size n_size branch unit per_square doubt")
 
 
 @inline

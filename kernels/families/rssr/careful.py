@@ -10,8 +10,7 @@ from __future__ import annotations
 import math
 
 from kernels.arithmetic.intrinsics import largest
-from kernels.families.rssr.closure import EPS, closure_terms
-from kernels.families.rssr.derivatives import follower, order_pair
+from kernels.families.rssr.closure import EPS, closure_terms, follower, order_pair
 from kernels.jit import inline, kernel
 from kernels.types import TWO_PI
 

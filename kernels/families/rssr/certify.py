@@ -30,7 +30,7 @@ def certify_maxima(
 
     Parameters
     ----------
-    stages : (K, n, 8) columns of :class:`kernels.families.rssr.closure.Design`, the four-bar of a guide last
+    stages : (K, n, 8) columns as `PARAMETERS` of sweep/families/rssr.py, the four-bar of a guide last
     couplings : (K - 1, n, 2) kappa and offset [rad] of each stage but the first
     shares : (n, 8) of :func:`kernels.families.guide.point_shares`; any where no curve is of a point
     curves : (m, 2); of each curve whether it is the way along the line (0) or across it (1), or the velocity of the

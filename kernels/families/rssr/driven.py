@@ -16,7 +16,8 @@ phi, of degree 1 (X, Y, W, A), 2 (R, Delta) and 3 (B).  About phi they are polyn
 from __future__ import annotations
 
 import math
-from typing import Any, NamedTuple
+from collections import namedtuple
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -46,43 +47,13 @@ from kernels.families.rssr.closure import Array, closure_terms, reduce_design
 from kernels.jit import inline, kernel
 from kernels.types import EPS
 
-
-class Spread(NamedTuple):
-    """X, Y, W, R and Delta about one crank angle as series in s = sin z and m = 1 - cos z.
-
-    ``x0 + x1 s + x2 m`` is X, and Y and W alike; r0 ... r4 are the coefficients of 1, s, m, s m, m^2 in R, d0 ... d4
-    those in Delta.  ``x``, ``y``, ``w``, ``square`` bound sizes, ``ex``, ``ey``, ``ew``, ``e_square``, ``e_delta`` what
-    the functions are off by.
-    """
-
-    x0: Any
-    x1: Any
-    x2: Any
-    y0: Any
-    y1: Any
-    y2: Any
-    w0: Any
-    w1: Any
-    w2: Any
-    x: Any
-    y: Any
-    w: Any
-    ex: Any
-    ey: Any
-    ew: Any
-    square: Any
-    e_square: Any
-    e_delta: Any
-    r0: Any
-    r1: Any
-    r2: Any
-    r3: Any
-    r4: Any
-    d0: Any
-    d1: Any
-    d2: Any
-    d3: Any
-    d4: Any
+# X, Y, W, R and Delta about one crank angle as series in s = sin z and m = 1 - cos z.
+# ``x0 + x1 s + x2 m`` is X, and Y and W alike; r0 ... r4 are the coefficients of 1, s, m, s m, m^2 in R, d0 ... d4
+# those in Delta. ``x``, ``y``, ``w``, ``square`` bound sizes, ``ex``, ``ey``, ``ew``, ``e_square``, ``e_delta`` what
+# the functions are off by.
+Spread = namedtuple(
+    "Spread", "x0 x1 x2 y0 y1 y2 w0 w1 w2 x y w ex ey ew square e_square e_delta r0 r1 r2 r3 r4 d0 d1 d2 d3 d4"
+)
 
 
 @inline

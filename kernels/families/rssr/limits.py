@@ -36,8 +36,7 @@ from kernels.families.rssr.block import (
     load_block,
     new_block,
 )
-from kernels.families.rssr.closure import EPS, Array, Status, closure_terms
-from kernels.families.rssr.derivatives import follower
+from kernels.families.rssr.closure import EPS, Array, Status, closure_terms, follower
 from kernels.jit import inline, kernel
 from kernels.linkage.verdict import turning_status
 from kernels.types import TWO_PI
@@ -244,7 +243,7 @@ def limits(designs: Array, status: Status, out: Array, error: Array | None) -> N
 
     Parameters
     ----------
-    designs : (n, 8) columns of :class:`Design`
+    designs : (n, 8) columns as `PARAMETERS` of sweep/families/rssr.py
     status : (n,) out; OK, NOT_ROTATABLE, UNDECIDABLE, NOT_OSCILLATING, NOT_CONVERGED or INVALID_INPUT
     out : (n, 7) out, columns LIMIT_NAMES [rad]: rocker angles in (-pi, pi], crank angles in [0, 2 pi); swing
         psi_fold - psi_ext signed and unwrapped, its sign that of -branch; phi0 = phi_fold - phi_ext modulo 2 pi;

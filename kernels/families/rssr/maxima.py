@@ -254,7 +254,7 @@ def true_maxima(
 
     Parameters
     ----------
-    designs : (n, 8) columns of :class:`Design`
+    designs : (n, 8) columns as `PARAMETERS` of sweep/families/rssr.py
     cos, sin : :func:`sampling_tables`
     target : relative error wanted, 1e-3 ... 1e-12
     status : (n,) out; OK, NOT_ROTATABLE, UNDECIDABLE, NOT_CONVERGED or INVALID_INPUT

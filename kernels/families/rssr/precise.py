@@ -8,7 +8,7 @@ everything between the given numbers and the results is a pair of numbers (:mod:
 from __future__ import annotations
 
 import math
-from typing import NamedTuple
+from collections import namedtuple
 
 import numpy as np
 
@@ -16,8 +16,9 @@ from kernels import status as st
 from kernels.arithmetic import double_double as two
 from kernels.arithmetic.double_double import Twofold
 from kernels.families.rssr.closure import EPS, Array, Status, reduce_scaled, unit_scale
-from kernels.families.rssr.motion import Joints, put
+from kernels.families.rssr.motion import Outputs
 from kernels.jit import inline, kernel
+from kernels.linkage.outputs import write
 from kernels.linkage.verdict import pose_status
 
 # Columns of the constants: high and low parts in units of the crank, mirrored to branch +1; then plain numbers.
@@ -70,7 +71,7 @@ def precise_constants(designs: Array, out: Array) -> None:
 
     Parameters
     ----------
-    designs : (n, 8) columns of :class:`Design`
+    designs : (n, 8) columns as `PARAMETERS` of sweep/families/rssr.py
     out : (n, PRECISE_COLUMNS) out
     """
     at = np.empty(PRECISE_COLUMNS * _ROW)
@@ -94,30 +95,17 @@ def _get(constants: Array, row: int, i: int) -> Twofold:
 
 @kernel
 def precise_poses(
-    designs: Array,
-    constants: Array,
-    cos_phi: Array,
-    sin_phi: Array,
-    status: Status,
-    psi: Array | None,
-    dpsi: Array | None,
-    d2psi: Array | None,
-    d3psi: Array | None,
-    sin_psi: Array | None,
-    cos_psi: Array | None,
-    discriminant: Array | None,
-    pressure_angle: Array | None,
-    joints: Joints | None,
+    constants: Array, designs: Array, cos_phi: Array, sin_phi: Array, status: Status, out: Outputs
 ) -> None:
     """Poses as of the module ``motion``, correct to a few roundings, for float64 designs only.
 
     Parameters
     ----------
-    designs : (n, 8) columns of :class:`Design`
     constants : (n, PRECISE_COLUMNS) by :func:`precise_constants`
+    designs : (n, 8) columns as `PARAMETERS` of sweep/families/rssr.py
     cos_phi, sin_phi : (n, m), or (1, m) shared by all designs
     status : (n, m) out, as of ``poses``; the band of dead points is half as wide as in plain arithmetic
-    psi ... joints : as of :func:`kernels.families.rssr.motion.poses`
+    psi ... z_c : as of :func:`kernels.families.rssr.motion.poses`
 
     Notes
     -----
@@ -144,66 +132,43 @@ def precise_poses(
             tolerance += BAND * BAND * (mx * mx + my * my + mw * mw)
             code = pose_status(valid, delta[0], tolerance, rr[0])
             status[i, j] = code
-            if discriminant is not None:
-                discriminant[i, j] = (delta[0] * two_ac) * two_ac if valid else math.nan
+            write(out.discriminant, i, j, (delta[0] * two_ac) * two_ac if valid else math.nan)
             has_angle = code == st.OK or code == st.DEAD_POINT
             per_rr = 1.0 / rr[0] if has_angle else math.nan
             t = two.root(delta) if code == st.OK else (0.0, 0.0)
             # minus cosine and minus sine of the mirrored rocker angle
             c = two.divide(two.add(two.multiply(x, w), two.multiply(y, t)), rr, per_rr)
             s = two.divide(two.subtract(two.multiply(x, t), two.multiply(y, w)), rr, per_rr)
-            if cos_psi is not None:
-                cos_psi[i, j] = -c[0]
+            write(out.cos_psi, i, j, -c[0])
             sine = 0.0 - branch * s[0]  # never -0.0, which would turn the angle pi into -pi
-            if sin_psi is not None:
-                sin_psi[i, j] = sine
-            if psi is not None:
-                psi[i, j] = math.atan2(sine, -c[0])
+            write(out.sin_psi, i, j, sine)
+            write(out.psi, i, j, math.atan2(sine, -c[0]))
             z = two.subtract(z0, two.multiply(sa, v))
-            if joints is not None:
-                put(joints.x_b, i, j, designs[i, 0] * u[0] if valid else math.nan)
-                put(joints.y_b, i, j, branch * designs[i, 0] * y[0] if valid else math.nan)
-                put(joints.z_b, i, j, designs[i, 0] * z[0] + designs[i, 5] if valid else math.nan)
-                _put_ball(joints, designs, i, j, c[0], branch * s[0], has_angle)
-            if pressure_angle is not None:
+            write(out.x_b, i, j, designs[i, 0] * u[0] if valid else math.nan)
+            write(out.y_b, i, j, branch * designs[i, 0] * y[0] if valid else math.nan)
+            write(out.z_b, i, j, designs[i, 0] * z[0] + designs[i, 5] if valid else math.nan)
+            write(out.x_c, i, j, designs[i, 3] - designs[i, 2] * c[0])
+            write(out.y_c, i, j, -designs[i, 2] * (branch * s[0]))
+            write(out.z_c, i, j, designs[i, 5] if has_angle else math.nan)
+            if out.pressure_angle is not None:
                 across = math.hypot(two.subtract(rho, w)[0], z[0])
-                pressure_angle[i, j] = math.atan2(across, t[0]) if has_angle else math.nan
-            if dpsi is not None or d2psi is not None or d3psi is not None:
+                write(out.pressure_angle, i, j, math.atan2(across, t[0]) if has_angle else math.nan)
+            if out.dpsi is not None or out.d2psi is not None or out.d3psi is not None:
                 # d from the crank pin to the ball; dy and dz (which is z) are negative
                 dx, dy = two.subtract(x, two.multiply(rho, c)), two.add(y, two.multiply(rho, s))
                 at = Pose(u, v, ca, sa, rho, w, c, s, dx, dy, z, two.multiply(rho, t))
-                _put_derivatives(dpsi, d2psi, d3psi, i, j, at, code == st.OK, branch)
+                _put_derivatives(out, i, j, at, code == st.OK, branch)
+
+
+# One pose as a vector d from the crank pin to the rocker ball, all in units of the crank.
+# ``u``: cosine and sine of the crank angle; ``rho``: length of the rocker; ``w``: of the closure; ``c``: minus cosine
+# and minus sine of the mirrored rocker angle; ``dy``: negative; ``z``: negative; ``rise``: rho T: half the derivative
+# of d . d by the rocker angle.
+Pose = namedtuple("Pose", "u v ca sa rho w c s dx dy z rise")
 
 
 @inline
-def _put_ball(joints: Joints, designs: Array, i: int, j: int, c: float, s: float, has_angle: bool) -> None:
-    """Write the wanted coordinates of the rocker ball; c and s are minus cosine and minus sine of the rocker angle."""
-    put(joints.x_c, i, j, designs[i, 3] - designs[i, 2] * c)
-    put(joints.y_c, i, j, -designs[i, 2] * s)
-    put(joints.z_c, i, j, designs[i, 5] if has_angle else math.nan)
-
-
-class Pose(NamedTuple):
-    """One pose as a vector d from the crank pin to the rocker ball, all in units of the crank."""
-
-    u: Twofold  # cosine and sine of the crank angle
-    v: Twofold
-    ca: Twofold
-    sa: Twofold
-    rho: Twofold  # length of the rocker
-    w: Twofold  # of the closure
-    c: Twofold  # minus cosine and minus sine of the mirrored rocker angle
-    s: Twofold
-    dx: Twofold
-    dy: Twofold  # negative
-    z: Twofold  # negative
-    rise: Twofold  # rho T: half the derivative of d . d by the rocker angle
-
-
-@inline
-def _put_derivatives(
-    dpsi: Array | None, d2psi: Array | None, d3psi: Array | None, i: int, j: int, at: Pose, regular: bool, branch: float
-) -> None:
+def _put_derivatives(out: Outputs, i: int, j: int, at: Pose, regular: bool, branch: float) -> None:
     """Write the wanted transfer functions up to the highest of them.
 
     With B' = (-v, hu, -su), B'' = (-u, -hv, sv), k = -(c, s) and k' = (s, -c) of the mirrored mechanism.
@@ -213,9 +178,8 @@ def _put_derivatives(
     per_rise = 1.0 / rise[0] if regular else math.nan
     p = two.subtract(two.multiply(z, su), two.add(two.multiply(at.dy, hu), two.multiply(at.dx, v)))
     p = two.divide(p, rise, per_rise)
-    if dpsi is not None:
-        dpsi[i, j] = branch * p[0]
-    if d2psi is not None or d3psi is not None:
+    write(out.dpsi, i, j, branch * p[0])
+    if out.d2psi is not None or out.d3psi is not None:
         hv, sv = two.multiply(at.ca, v), two.multiply(at.sa, v)
         inward, turn = two.subtract(at.rho, at.w), two.multiply(p, at.rho)
         centre = two.multiply(p, turn)
@@ -224,9 +188,8 @@ def _put_derivatives(
         along = two.subtract(two.multiply(at.dx, u), two.multiply(centre, inward))
         along = two.add(along, two.subtract(two.multiply(z, sv), two.multiply(at.dy, hv)))
         q = two.divide(two.add(square, along), rise, per_rise)  # negative
-        if d2psi is not None:
-            d2psi[i, j] = -branch * q[0]
-        if d3psi is not None:
+        write(out.d2psi, i, j, -branch * q[0])
+        if out.d3psi is not None:
             swing = two.multiply(q, at.rho)
             d2x = two.subtract(two.add(two.multiply(centre, c), u), two.multiply(swing, s))
             d2y = two.add(two.add(two.multiply(centre, s), two.multiply(swing, c)), hv)
@@ -235,4 +198,4 @@ def _put_derivatives(
             both = two.add(both, two.multiply(two.multiply(turn, q), inward))
             cube = two.multiply(p, two.add(two.multiply(p, p), (-1.0, 0.0)))
             both = two.divide(both, rise, per_rise)
-            d3psi[i, j] = branch * two.subtract(cube, two.scale(both, 3.0))[0]
+            write(out.d3psi, i, j, branch * two.subtract(cube, two.scale(both, 3.0))[0])

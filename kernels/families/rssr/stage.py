@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import math
-from typing import Any, NamedTuple
+from collections import namedtuple
+from typing import Any
 
 from kernels.arithmetic.intrinsics import largest
 from kernels.chains.form import STRIDE, Form, Travel, Turned
@@ -18,30 +19,30 @@ from kernels.families.rssr.block import (
     new_block,
     singularity_distance,
 )
-from kernels.families.rssr.closure import EPS, Array, Design, Status, closure_terms, place, reduce_one
-from kernels.families.rssr.derivatives import acceleration, jerk, rocker, snap, velocity
+from kernels.families.rssr.closure import (
+    EPS,
+    Array,
+    Status,
+    acceleration,
+    closure_terms,
+    jerk,
+    place,
+    reduce_one,
+    rocker,
+    snap,
+    velocity,
+)
 from kernels.jit import inline, kernel
 from kernels.linkage.verdict import turning_status
 
-
-class Constants(NamedTuple):
-    """The numbers of the closure in units of the crank, see :class:`kernels.linkage.crank_closure.Reduced`."""
-
-    e: Any
-    y0: Any
-    ca: Any
-    k0: Any
-    k1: Any
-    k2: Any
-    branch: Any
-    w_size: Any
-    per_square: Any  # 1/b^2
-    doubt: Any
+# The numbers of the closure in units of the crank, see :class:`kernels.linkage.crank_closure.Reduced`.
+# ``per_square``: 1/b^2.
+Constants = namedtuple("Constants", "e y0 ca k0 k1 k2 branch w_size per_square doubt")
 
 
 @inline
 def _constants(at: Array, i: int, step: int, cos: Any, sin: Any) -> Constants:
-    d = Design(
+    d = (
         at[i], at[i + step], at[i + 2 * step], at[i + 3 * step], at[i + 4 * step], at[i + 5 * step], at[i + 6 * step],
         at[i + 7 * step],
     )  # fmt: skip
@@ -135,7 +136,7 @@ def opening(designs: Array, status: Status, distance: Array) -> None:
 
     Parameters
     ----------
-    designs : (n, P), whose first columns are those of :class:`kernels.families.rssr.closure.Design`
+    designs : (n, P), whose first columns are `PARAMETERS` of sweep/families/rssr.py
     status : (n,) out; OK, NOT_ROTATABLE, UNDECIDABLE or INVALID_INPUT
     distance : (n,) out [rad], to leading order, of the nearest singularity of the motion from the real crank angles;
         it means nothing where the status is not OK

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import warnings
 from collections.abc import Mapping
-from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -12,6 +11,7 @@ import numpy as np
 from sweep.errors import MeasuredRangeWarning
 from sweep.evaluation.angles import in_radians
 from sweep.evaluation.tables import Parametrised, design_matrix
+from sweep.evaluation.tables import Sheet as Sheet
 from sweep.families.base import Array, Parameter
 from sweep.families.thread_balance import Range
 
@@ -19,19 +19,6 @@ if TYPE_CHECKING:
     import pandas as pd
 
     from sweep.evaluation.tables import Table
-
-
-@dataclass(frozen=True)
-class Sheet:
-    """The columns that one function reads."""
-
-    name: str
-    parameters: tuple[Parameter, ...]
-
-    @property
-    def parameter_names(self) -> tuple[str, ...]:
-        """Names of the columns in order."""
-        return tuple(p.name for p in self.parameters)
 
 
 def columns_of(sheet: Parametrised, table: Table) -> dict[str, Array]:

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Literal, NamedTuple
 import numpy as np
 
 from kernels import synthesis as kernels
-from kernels.synthesis.sensitivity import PARAMETERS
+from kernels.synthesis.acceptance import PARAMETERS
 from sweep.errors import InputError
 from sweep.evaluation.summaries import design_outputs
 from sweep.evaluation.tables import design_matrix

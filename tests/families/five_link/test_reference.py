@@ -183,7 +183,7 @@ def test_five_link_kernel_jitted_equals_plain_python():
     for function in (five_link.poses, five_link.poses.py_func):
         out, places = [np.empty((12, 12)) for _ in range(8)], np.empty((11, 12, 12))
         status = np.empty((12, 12), np.uint8)
-        function(designs, np.cos(phi)[None, :], np.sin(phi)[None, :], status, motion.Outputs(*out), places)
+        function(designs, np.cos(phi)[None, :], np.sin(phi)[None, :], status, motion.Outputs(*out, places))
         results.append([status, *out, places])
     for compiled, plain in zip(*results, strict=True):
         np.testing.assert_array_equal(compiled, plain)

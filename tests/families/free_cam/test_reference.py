@@ -139,8 +139,8 @@ def test_second_turn_of_the_march_is_what_every_later_turn_repeats():
     out = []
     for turns in (2, 5):
         y, status = np.empty((1, 360)), np.empty((1, 360), np.uint8)
-        free_cam.march(designs, np.array([[1.0, 0.0, 0.3]]), np.cos(TURN)[None], np.sin(TURN)[None], turns, status,
-                       free_cam.MarchOutputs(None, None, y, None, None))  # fmt: skip
+        friction, outputs = np.array([[1.0, 0.0, 0.3]]), free_cam.MarchOutputs(None, None, y, None, None)
+        free_cam.march(friction, turns, designs, np.cos(TURN)[None], np.sin(TURN)[None], status, outputs)
         assert (status == st.OK).all()
         out.append(y)
     np.testing.assert_array_equal(*out)

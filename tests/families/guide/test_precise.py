@@ -85,7 +85,7 @@ def test_computing_less_changes_no_bit_and_plain_python_agrees():
         np.testing.assert_array_equal(PRECISE.poses(designs, angles, frozenset({name}))[name], everything[name])
     status, joints = np.empty((15, 11), np.uint8), np.empty((6, 15, 11))
     values = [np.empty((15, 11)) for _ in PLAIN.pose_names[:9]]
-    guide.precise_poses.py_func(designs, angles.cos, angles.sin, status, motion.Outputs(*values), joints)
+    guide.precise_poses.py_func(designs, angles.cos, angles.sin, status, motion.Outputs(*values, joints))
     np.testing.assert_array_equal(status, everything["status"])
     for name, column in zip(PLAIN.pose_names[:15], [*values, *joints], strict=True):
         np.testing.assert_allclose(column, everything[name], rtol=2.0**-50, err_msg=name)

@@ -39,7 +39,7 @@ def moved(designs, theta, dtype=np.float64, plain=False):
     outs = [np.empty(shape, dtype) for _ in range(9)] + [np.empty((7, *shape), dtype)]
     function = heddle.poses.py_func if plain else heddle.poses
     with np.errstate(all="ignore"):
-        function(matrix, np.cos(theta), np.sin(theta), status, heddle.Outputs(*outs[:-1]), outs[-1])
+        function(matrix, np.cos(theta), np.sin(theta), status, heddle.Outputs(*outs))
     return dict(zip((*NAMES, "discriminant", "places"), outs, strict=True)) | {"status": status}
 
 

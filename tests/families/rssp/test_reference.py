@@ -103,7 +103,7 @@ def test_rssp_jitted_equals_plain():
     def run(function, dtype):
         status = np.empty((12, 5), np.uint8)
         out = [np.empty((12, 5), dtype) for _ in range(6)] + [np.empty((6, 12, 5), dtype)]
-        function(designs.astype(dtype), np.cos(phi), np.sin(phi), status, motion.Outputs(*out[:-1]), out[-1])
+        function(designs.astype(dtype), np.cos(phi), np.sin(phi), status, motion.Outputs(*out))
         return [status, *out]
 
     for dtype in (np.float64, np.complex128):

@@ -178,9 +178,7 @@ def test_what_is_not_wanted_changes_no_bit_and_plain_python_agrees():
     rssr.precise_constants.py_func(designs, python)
     np.testing.assert_array_equal(constants, python)
     out, status = {name: np.empty((20, 11)) for name in RSSR.pose_names}, np.empty((20, 11), np.uint8)
-    values = [x for name, x in out.items() if name not in rssr.Joints._fields]
-    joints = rssr.Joints(*(out[name] for name in rssr.Joints._fields))
-    rssr.precise_poses.py_func(designs, constants, angles.cos, angles.sin, status, *values, joints)
+    rssr.precise_poses.py_func(constants, designs, angles.cos, angles.sin, status, rssr.Outputs(**out))
     for name, column in out.items():
         np.testing.assert_allclose(column, everything[name], rtol=2.0**-50, err_msg=name)
 

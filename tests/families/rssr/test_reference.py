@@ -12,6 +12,7 @@ import pytest
 import sweep
 from kernels import status as st
 from kernels.families import rssr
+from sweep.families import family
 from tests.reference.rssr import DIGITS, Linkage, golden_section
 from tests.support.rssr_designs import JOINT_NAMES, POSE_NAMES, dense, limits, margins, maxima, poses, random_designs
 
@@ -109,7 +110,8 @@ def test_largest_pressure_angle_of_long_offsets_along_nearly_parallel_axes_is_wi
     scale = 10.0 ** np.random.default_rng(15).uniform(3.0, 8.0, 2000)
     designs[:, 4], designs[:, 6] = scale * designs[:, 2], designs[:, 6] / scale
     designs[:, 5] += designs[:, 4]
-    frame = sweep.summarise("rssr", dict(zip(rssr.Design._fields, designs.T, strict=True)), ["max_pressure_angle"])
+    names = family("rssr").parameter_names
+    frame = sweep.summarise("rssr", dict(zip(names, designs.T, strict=True)), ["max_pressure_angle"])
     turning = np.flatnonzero(frame["status"] == st.OK)[:6]
     assert len(turning) == 6
     for i in turning:

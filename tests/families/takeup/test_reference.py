@@ -19,7 +19,6 @@ from kernels import status as st
 from kernels.effects.thread import guide_line, thread_over_point
 from kernels.families import eyelet, free_cam, guided_cam
 from kernels.families import guided_cam as cam_motion
-from kernels.families.free_cam import motion as free_motion
 from sweep.families import family
 from sweep.families.base import Angles
 from tests.reference import thread as reference
@@ -285,7 +284,7 @@ def test_compiled_take_ups_equal_plain_python_bit_for_bit():
         (guided_cam.poses, (matrices["guided_cam"], cos, sin), 10, True),
         (free_cam.poses, (matrices["free_cam"], cos, sin), 10, True),
         (free_cam.limit_points, (matrices["free_cam"], friction, cos, sin), 2, True),
-        (free_cam.march, (matrices["free_cam"], friction, cos, sin, 2), 5, True),
+        (free_cam.march, (friction, 2, matrices["free_cam"], cos, sin), 5, True),
         (eyelet.length_sensitivities, (matrices["eyelet"], cos, sin), 0, False),
         (thread_over_point, (np.ones((1, 6)), place, 0.0 * place + 1.0, 0.0 * place - 1.0), 4, True),
     ]  # fmt: skip
@@ -298,11 +297,10 @@ def test_compiled_take_ups_equal_plain_python_bit_for_bit():
             if first:
                 records = {
                     eyelet.poses: eyelet.Outputs, guided_cam.poses: cam_motion.Outputs,
-                    free_cam.poses: free_motion.Outputs, free_cam.march: free_cam.MarchOutputs,
+                    free_cam.poses: free_cam.Outputs, free_cam.march: free_cam.MarchOutputs,
                 }  # fmt: skip
                 record = records.get(kernel)
-                last = len(record._fields) if record else 0
-                given = [record(*outputs[:last]), *outputs[last:]] if record else outputs
+                given = [record(*outputs)] if record else outputs
                 function(*arguments, status, *given)
             else:
                 outputs = [np.empty((7, 1, 5))]

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from kernels import status as st
-from kernels.arithmetic.rounded_sincos import rounded_sincos
+from kernels.arithmetic.sincos import rounded_sincos
 from kernels.jit import kernel
 from sweep.evaluation.summaries import design_outputs
 from sweep.evaluation.tables import design_matrix

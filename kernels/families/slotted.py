@@ -1,36 +1,85 @@
-"""Motion of the slotted link at given crank angles, and its bodies for their loads.
+"""Spatial slotted link: a crank whose ball runs in a fork slot, or along a bar, of the driven link (R-S-R, R-S-C-R).
 
-The bodies are crank, driven link, between them an arm or a block.
+A design is brought to its smallest set of numbers, and the crank for a wanted phi0 is found; then come the motion at
+given crank angles, and the bodies for their loads: crank, driven link, between them an arm or a block.  Everything is
+computed in lengths divided by a power of two near the crank length, so no scale of the drawing costs a bit.  Designs
+may be complex128 (exact gradients by the complex step); decisions look at the real part.
 """
 
 from __future__ import annotations
 
 import math
+from collections import namedtuple
 from typing import Any, NamedTuple
 
 import numpy as np
 
 from kernels import status as st
-from kernels.arithmetic.complex_step import arctan2, hypotenuse, magnitude
+from kernels.arithmetic.complex_step import arctan2, hypotenuse, magnitude, unit_near
 from kernels.arithmetic.vectors import add, cross, dot, mix, scale, spun, sub
-from kernels.families.slotted.closure import Reduced, reduce_design
 from kernels.jit import inline, kernel
-from kernels.linkage.bodies import (
-    SLIDE,
-    Links,
-    Moving,
-    acceleration_at,
-    put,
-    put_ball,
-    put_body,
-    put_crank,
-    put_turning,
-    shaft,
-    velocity_at,
-)
-from kernels.linkage.outputs import write
+from kernels.linkage import bodies as tree
+from kernels.linkage.outputs import put_block, write
 from kernels.linkage.verdict import pose_status
 from kernels.types import EPS, Array, Numbers, Status
+
+
+class Reduced(NamedTuple):
+    """Per-design numbers in units of ``unit``: x = a u - e, y = y0 + ka v, z = z0 - na v (ball from the point D)."""
+
+    a: float
+    e: float
+    y0: float
+    ka: float
+    lift: float  # f cos(alpha), the crank's centre above the origin
+    z0: float
+    na: float
+    s: float
+    k: float  # 0 for the fork slot
+    tau: float
+    branch: float
+    x_size: float  # sums of the magnitudes whose rounding errors make up x, y and z
+    y_size: float
+    z_size: float
+    unit: float
+    valid: bool
+
+
+@inline
+def reduce_design(designs: Numbers, i: int) -> Reduced:
+    """Constants of one design; ``valid`` is false for a crank of no length, k < 0 and what is not finite."""
+    unit, per_unit = unit_near(designs[i, 0])
+    a, e, f, g = designs[i, 0] * per_unit, designs[i, 1] * per_unit, designs[i, 2] * per_unit, designs[i, 3] * per_unit
+    alpha, s, k = designs[i, 4], designs[i, 5] * per_unit, designs[i, 6] * per_unit
+    tau, branch = designs[i, 7].real, designs[i, 8].real
+    sa, ca = np.sin(alpha), np.cos(alpha)
+    y0, ka, lift, z0, na = f * sa, a * ca, f * ca, f * ca - g, a * sa
+    x_size, y_size = abs(e.real) + a.real, abs(y0.real) + abs(ka.real)
+    z_size = abs(lift.real) + abs(g.real) + abs(na.real)
+    valid = 0.0 < a.real <= 1.0 and x_size < 1e140 and y_size < 1e140 and z_size < 1e140
+    valid = valid and 0.0 <= k.real < 1e140 and abs(s.real) < 1e140 and abs(alpha.real) < 1e5
+    valid = valid and tau * tau == 1.0 and branch * branch == 1.0 and unit < math.inf
+    return Reduced(a, e, y0, ka, lift, z0, na, s, k, tau, branch, x_size, y_size, z_size, unit, valid)
+
+
+@kernel
+def crank_of_phi0(phi0: Numbers, e: Numbers, f: Numbers, alpha: Numbers, status: Status, a: Numbers) -> None:
+    """Compute the crank length a = cos(phi0/2) hypot(e, f tan(alpha)) of the fork slot with s = 0.
+
+    Parameters
+    ----------
+    phi0 : (n,) crank angle of the shorter stroke between the limit positions [rad], 0 < phi0 < pi
+    e, f : (n,) common perpendicular and offset of the crank plane [length];  alpha : (n,) [rad]
+    status : (n,) out; OK, or NOT_ADMISSIBLE where phi0 is outside (0, pi), the driven axis meets the crank's, or
+        cos(alpha) = 0 within rounding, where the projected crank circle is a segment
+    a : (n,) out [length]; nan where the status is not OK
+    """
+    for i in range(phi0.shape[0]):
+        tangent = math.tan(alpha[i])
+        reach = math.hypot(e[i], f[i] * tangent)
+        fine = 0.0 < phi0[i] < math.pi and 0.0 < reach < math.inf and abs(tangent) < 1e15
+        status[i] = st.OK if fine else st.NOT_ADMISSIBLE
+        a[i] = math.cos(0.5 * phi0[i]) * reach if fine else math.nan
 
 
 class Ball(NamedTuple):
@@ -75,32 +124,14 @@ def _closure(r: Reduced, u: Any, v: Any, is_bar: bool) -> Ball:
     return Ball(code, x, y, z, arm, q, rr, delta)
 
 
-class Outputs(NamedTuple):
-    """Pose outputs, each (n, m), or None: what is None is not computed."""
-
-    psi: Numbers | None
-    dpsi: Numbers | None
-    d2psi: Numbers | None
-    d3psi: Numbers | None
-    sin_psi: Numbers | None
-    cos_psi: Numbers | None
-    rho: Numbers | None
-    drho: Numbers | None
-    d2rho: Numbers | None
-    d3rho: Numbers | None
-    discriminant: Numbers | None
-    pressure_angle: Numbers | None
+# Pose outputs, each (n, m), and joints (6, n, m); what is None is not computed.
+Outputs = namedtuple(
+    "Outputs", "psi dpsi d2psi d3psi sin_psi cos_psi rho drho d2rho d3rho discriminant pressure_angle joints"
+)
 
 
 @kernel
-def poses(
-    designs: Numbers,
-    cos_phi: Numbers,
-    sin_phi: Numbers,
-    status: Status,
-    out: Outputs,
-    joints: Numbers | None,
-) -> None:
+def poses(designs: Numbers, cos_phi: Numbers, sin_phi: Numbers, status: Status, out: Outputs) -> None:
     """Angle of the driven link, place of the ball along the slot, and derivatives, of every design and crank angle.
 
     Equations (1)-(7) of docs/slotted.md.
@@ -142,19 +173,15 @@ def poses(
             write(out.rho, i, j, p * r.unit if has_angle else math.nan)
             if out.pressure_angle is not None:  # LLVM does not drop a hypotenuse that nobody wants
                 write(out.pressure_angle, i, j, _pressure_angle(r, ball, p, is_bar) if has_angle else math.nan)
-            if joints is not None:
-                _put_joints(joints, designs, i, j, r, ball, v, p, c, s, has_angle)
-            if (
-                out.dpsi is not None or out.d2psi is not None or out.d3psi is not None
-                or out.drho is not None or out.d2rho is not None or out.d3rho is not None
-            ):  # fmt: skip
-                w, w1, w2, p1, p2, p3 = _derivatives(r, ball, u, v, c, s, p, is_bar)
-                write(out.dpsi, i, j, w)
-                write(out.d2psi, i, j, w1)
-                write(out.d3psi, i, j, w2)
-                write(out.drho, i, j, p1 * r.unit)
-                write(out.d2rho, i, j, p2 * r.unit)
-                write(out.d3rho, i, j, p3 * r.unit)
+            at_joints = _joints(r, designs[i, 3] / r.unit, ball, v, p, c, s)
+            put_block(out.joints, i, j, at_joints, r.unit if has_angle else math.nan)
+            w, w1, w2, p1, p2, p3 = _derivatives(r, ball, u, v, c, s, p, is_bar)
+            write(out.dpsi, i, j, w)
+            write(out.d2psi, i, j, w1)
+            write(out.d3psi, i, j, w2)
+            write(out.drho, i, j, p1 * r.unit)
+            write(out.d2rho, i, j, p2 * r.unit)
+            write(out.d3rho, i, j, p3 * r.unit)
 
 
 @inline
@@ -181,20 +208,13 @@ def _pressure_angle(r: Reduced, ball: Ball, p: Any, is_bar: bool) -> Any:
 
 
 @inline
-def _put_joints(
-    joints: Numbers, designs: Numbers, i: int, j: int, r: Reduced, ball: Ball, v: Any, p: Any, c: Any, s: Any,
-    has_angle: bool,
-) -> None:  # fmt: skip
-    """Write the ball and the point that guides it, x y z each."""
-    joints[0, i, j], joints[1, i, j] = (ball.x + r.e) * r.unit, ball.y * r.unit
-    joints[2, i, j] = (r.lift - r.na * v) * r.unit
-    joints[3, i, j] = (r.e + p * c - r.s * s) * r.unit
-    joints[4, i, j] = (p * s + r.s * c) * r.unit
+def _joints(r: Reduced, g: Any, ball: Ball, v: Any, p: Any, c: Any, s: Any) -> tuple[Any, ...]:
+    """Ball and the point that guides it, x y z each."""
+    z = r.lift - r.na * v
     # a bar has a height of its own; the fork slot guides the ball at the ball's height
-    joints[5, i, j] = designs[i, 3] if r.k.real > 0.0 else joints[2, i, j]
-    if not has_angle:
-        for k in range(6):
-            joints[k, i, j] = math.nan
+    height = g + 0.0 * z if r.k.real > 0.0 else z
+    guide = (r.e + p * c - r.s * s, p * s + r.s * c, height)
+    return (ball.x + r.e, ball.y, z, *guide)
 
 
 @inline
@@ -226,18 +246,7 @@ def _derivatives(
 
 
 @kernel
-def links(
-    designs: Array,
-    cos_phi: Array,
-    sin_phi: Array,
-    psi: Array,
-    dpsi: Array,
-    d2psi: Array,
-    rho: Array,
-    drho: Array,
-    d2rho: Array,
-    out: Links,
-) -> None:
+def links(designs: Array, cos_phi: Array, sin_phi: Array, motion: Array, out: tree.Links) -> None:
     """Fill the bodies, freedoms and closing lines of every pose; t, n and rho are those of docs/slotted.md.
 
     The arm slides along the bar by rho and tilts about it.  In the fork slot (k = 0) a block takes its place, which
@@ -246,47 +255,49 @@ def links(
     Parameters
     ----------
     designs : (n, 9);  cos_phi, sin_phi : (n, m) or (1, m)
-    psi, dpsi, d2psi, rho, drho, d2rho : (n, m), outputs of ``poses``
+    motion : (6, n, m), outputs psi, dpsi, d2psi, rho, drho, d2rho of ``poses``
     out : crank, driven link, arm or block; four freedoms, three lines: the ball, whose forces act on the arm
     """
     for i in range(designs.shape[0]):
         d = designs[i]
-        u, e2 = shaft(d[4])
+        u, e2 = tree.shaft(d[4])
         first, k = (1.0, 0.0, 0.0), (0.0, 0.0, 1.0)
         centre, pivot = scale(d[2], u), (d[1], 0.0, d[3])
         row = i if cos_phi.shape[0] > 1 else 0
-        for j in range(psi.shape[1]):
+        for j in range(motion.shape[2]):
+            psi, dpsi, d2psi = motion[0, i, j], motion[1, i, j], motion[2, i, j]
+            rho, drho, d2rho = motion[3, i, j], motion[4, i, j], motion[5, i, j]
             bodies, axes = out.bodies[i, j], out.axes[i, j]
-            crank = put_crank(bodies[0], axes[0], centre, u, first, e2, cos_phi[row, j], sin_phi[row, j])
+            crank = tree.put_crank(bodies[0], axes[0], centre, u, first, e2, cos_phi[row, j], sin_phi[row, j])
             ball = add(centre, scale(d[0], mix(cos_phi[row, j], first, sin_phi[row, j], e2)))
-            t = (math.cos(psi[i, j]), math.sin(psi[i, j]), 0.0)
+            t = (math.cos(psi), math.sin(psi), 0.0)
             n = cross(k, t)
-            driven = put_turning(bodies[1], pivot, k, t, dpsi[i, j], d2psi[i, j])
-            put(axes[1], k)
-            put(axes[2], t)
-            put_ball(out.lines[i, j], ball)
+            driven = tree.put_turning(bodies[1], pivot, k, t, dpsi, d2psi)
+            tree.put(axes[1], k)
+            tree.put(axes[2], t)
+            tree.put_ball(out.lines[i, j], ball)
             if d[6] == 0.0:
-                block = Moving(
-                    ball, velocity_at(crank, ball), acceleration_at(crank, ball), driven.omega, driven.eps
+                block = tree.Moving(
+                    ball, tree.velocity_at(crank, ball), tree.acceleration_at(crank, ball), driven.omega, driven.eps
                 )  # fmt: skip
-                put_body(bodies[2], block, n, t, cross(n, t), ball)
-                put(axes[3], k)
-                out.freedoms[i, 3, 1] = SLIDE
+                tree.put_body(bodies[2], block, n, t, cross(n, t), ball)
+                tree.put(axes[3], k)
+                out.freedoms[i, 3, 1] = tree.SLIDE
             else:
-                foot = add(pivot, mix(rho[i, j], t, d[5], n))
+                foot = add(pivot, mix(rho, t, d[5], n))
                 arm = sub(ball, foot)
                 # Seen from the driven link the foot slides and the arm tilts about the bar, t x arm per radian.
-                slid, swept = scale(drho[i, j], t), cross(t, arm)
-                v = add(velocity_at(driven, foot), slid)
-                a = add(acceleration_at(driven, foot), scale(d2rho[i, j], t))
+                slid, swept = scale(drho, t), cross(t, arm)
+                v = add(tree.velocity_at(driven, foot), slid)
+                a = add(tree.acceleration_at(driven, foot), scale(d2rho, t))
                 a = add(a, scale(2.0, cross(driven.omega, slid)))
                 per = 1.0 / dot(swept, swept)
-                tilt = per * dot(swept, sub(sub(velocity_at(crank, ball), v), cross(driven.omega, arm)))
+                tilt = per * dot(swept, sub(sub(tree.velocity_at(crank, ball), v), cross(driven.omega, arm)))
                 omega = mix(1.0, driven.omega, tilt, t)
                 # eps = psi'' k + tilt'' t + tilt' psi' k x t; tilt'' from the ball's acceleration
                 known = mix(1.0, driven.eps, tilt, cross(driven.omega, t))
-                left = sub(sub(acceleration_at(crank, ball), a), spun(omega, known, arm))
+                left = sub(sub(tree.acceleration_at(crank, ball), a), spun(omega, known, arm))
                 eps = mix(1.0, known, per * dot(swept, left), t)
                 x = scale(1.0 / d[6], arm)
-                put_body(bodies[2], Moving(foot, v, a, omega, eps), x, t, cross(x, t), foot)
-                put(axes[3], t)
+                tree.put_body(bodies[2], tree.Moving(foot, v, a, omega, eps), x, t, cross(x, t), foot)
+                tree.put(axes[3], t)
