@@ -58,7 +58,8 @@ def map_figure(
     from matplotlib.colors import LogNorm
     from matplotlib.ticker import NullLocator
 
-    figure = new_figure(WIDTH, 4.6)
+    figure = new_figure(WIDTH, 4.6, "none")  # a layout found by drawing twice takes a tenth of the report's time
+    figure.subplots_adjust(left=0.08, right=0.98, bottom=0.2, top=0.98, wspace=0.08)
     panels = figure.subplots(1, 2 if objective is not None else 1, squeeze=False, sharex=True, sharey=True)[0]
     (x_cells, x_shown), (y_cells, y_shown) = x, y
     edges = x_cells.edges * x_shown.factor, y_cells.edges * y_shown.factor
@@ -72,7 +73,7 @@ def map_figure(
         axes.grid(False)
         norm = _norm(values) if colours == "viridis_r" else _share_norm(values)
         mesh = axes.pcolormesh(*edges, values, cmap=colours, norm=norm, rasterized=True)
-        bar = figure.colorbar(mesh, ax=axes, label=label, location="top", shrink=0.9, aspect=32)
+        bar = figure.colorbar(mesh, ax=axes, label=label, location="top", shrink=0.9, aspect=32, pad=0.04)
         if isinstance(norm, LogNorm):
             bar.set_ticks(_round_between(float(norm.vmin or 0.0), float(norm.vmax or 0.0)))
             bar.ax.xaxis.set_major_formatter(lambda value, _: f"{value:g}")
@@ -92,7 +93,7 @@ def map_figure(
     panels[0].set_ylabel(y_shown.label)
     handles, labels = panels[0].get_legend_handles_labels()
     if handles:
-        figure.legend(handles, labels, loc="outside lower center", ncols=4)
+        figure.legend(handles, labels, loc="lower center", ncols=4)
     return figure
 
 
@@ -133,7 +134,8 @@ def trade_off_figure(
 
     ``front`` draws what the optimiser made of it.
     """
-    figure = new_figure(WIDTH, 4.4)
+    figure = new_figure(WIDTH, 4.4, "none")
+    figure.subplots_adjust(left=0.08, right=0.98, bottom=0.2, top=0.97)
     axes = figure.subplots()
     scatter = found.scatter * (objective.factor, second.factor)
     beaten = found.front * (objective.factor, second.factor)
@@ -163,7 +165,7 @@ def trade_off_figure(
             axis("log")
     axes.set_xlabel(objective.title)
     axes.set_ylabel(second.title)
-    figure.legend(*axes.get_legend_handles_labels(), loc="outside lower center", ncols=4)
+    figure.legend(*axes.get_legend_handles_labels(), loc="lower center", ncols=4)
     return figure
 
 
