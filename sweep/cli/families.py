@@ -119,7 +119,7 @@ def main_outputs(family: Family) -> list[str]:
     """Design outputs of a family; of the reductions of its pose outputs only those a designer asks for first."""
     if isinstance(family, Machine):
         members = [f"{m.name}.{name}" for m in family.members for name in main_outputs(m.family)]
-        between = [f"min_{r.outputs[0].name}" for r in family.relations] + [t.name for t in family.timings]
+        between = [f"min_{o.name}" for r in family.relations for o in r.outputs[:1]] + [t.name for t in family.timings]
         between += [name for event in family.events for name in event_names(family, event)]
         return [*members, *between]
     general = {f"{prefix}{name}" for prefix in prefixes(family.domain) for name in family.pose_names}

@@ -7,6 +7,7 @@ from dataclasses import MISSING, fields
 from pathlib import Path
 from typing import Any
 
+from sweep.effects import extended
 from sweep.errors import InputError, StudyError, choices
 from sweep.families import family
 from sweep.quantities import units
@@ -146,6 +147,10 @@ def _entry(kind: str, name: str, raw: object, key: Key, faults: Faults) -> Any:
         unit_of = {p.name: units.internal_unit(p.unit) for p in family("rssr").parameters}
         table = _table(raw, key, unit_of, faults)
         return {k: _number(v, unit_of[k], (*key, k), faults) for k, v in table.items()}
+    if name == "bearings":
+        known = extended(family("rssr"), ["min_theta1_reserve", "min_theta1_reserve_rolling"]).parameters
+        unit_of = {p.name: units.internal_unit(p.unit) for p in known}
+        return {k: _number(v, unit_of[k], (*key, k), faults) for k, v in _table(raw, key, unit_of, faults).items()}
     if name == "bounds":
         if not isinstance(raw, dict):
             faults.value(key, raw, 'a table of { from = ..., to = ..., unit = "mm" }')

@@ -7,6 +7,10 @@ import pytest
 
 import sweep
 from kernels import status as st
+from sweep.effects import extended
+from sweep.evaluation.tables import design_matrix
+from sweep.families import family
+from sweep.optimise.manufacture.tolerance import sensitivities
 from tests.reference.momentum import derivative
 
 N = 512
@@ -115,3 +119,29 @@ def test_a_later_stage_or_one_named_twice_is_refused():
     for listed in (["needle2"], ["needle", "needle1"]):
         with pytest.raises(sweep.InputError, match="members each once"):
             sweep.machine(MEMBERS, {"shaft": {"torque": listed}})
+
+
+def test_phases_are_variables_and_torques_of_two_equal_members_cancel():
+    """Equal members in step double the torque; turned against each other they take what its orders say."""
+    one = {"family": "slotted", "shaft": "main"}
+    pair = sweep.machine({"x": one, "y": one}, {"shaft": {"torque": ["x", "y"]}}, shafts={"main": {}})
+    given = {f"{name}.{key}": x for name in "xy" for key, x in LOOPER.items()} | {"x.speed": OMEGA, "y.speed": OMEGA}
+    given |= {"shaft_flywheel": FLYWHEEL}
+    alone = sweep.evaluate("slotted", LOOPER | {"speed": OMEGA}, ["drive_torque"], phi=PHI)["drive_torque"].to_numpy()
+    keys = np.linspace(0.0, 2.0 * np.pi, 13)[:-1]
+    rms = sweep.summarise(pair, given | {"y.key": keys}, ["rms_shaft"], accuracy=1e-9)["rms_shaft"].to_numpy()
+    orders = np.fft.rfft(alone) / N
+    turned = [1.0 + np.exp(1j * np.arange(orders.size) * key) for key in keys]
+    expected = [np.sqrt(abs(t[0] * orders[0]) ** 2 + 2.0 * (np.abs(t * orders)[1:] ** 2).sum()) for t in turned]
+    np.testing.assert_allclose(rms, expected, rtol=1e-9)
+    assert rms.min() < 0.5 * rms[0]
+    # the optimiser has the slope of it
+    whole = extended(family(pair), ["rms_shaft"])
+    matrix = design_matrix(whole, given | {"y.key": 0.6})[0]
+    found = sensitivities(whole, matrix[0], ["rms_shaft"])
+    at = found["parameter"].index("y.key")
+    step = 1e-4
+    ends = sweep.summarise(pair, given | {"y.key": [0.6 - step, 0.6 + step]}, ["rms_shaft"], accuracy=1e-10)[
+        "rms_shaft"
+    ]
+    assert found["growing"][at] == pytest.approx((ends[1] - ends[0]) / (2.0 * step), rel=1e-5)

@@ -194,3 +194,39 @@ def test_engineering_method_keeps_the_joint_in_its_box():
     inside = (dense.limits >= 0.0).all(axis=1)
     assert inside.sum() > 50
     assert free.objective < kept.objective <= np.abs(dense.curve[inside]).max(axis=1).min() * (1.0 + 1e-9)
+
+
+BEARINGS = {
+    "resisting_torque": 900.0, "support_d1": -0.4, "support_d2": 1.1, "journal_diameter": 0.4, "journal_length1": 0.5,
+    "journal_length2": 0.5, "collar_diameter": 0.8, "mu_d": 0.1, "thrust_radius_d": 0.25,
+} | {f"permissible_pressure{k}": 7e3 for k in (1, 2, 3)}  # fmt: skip
+
+
+def test_bearings_bound_the_offsets_of_the_engineering_method():
+    """Step 3: what the bearings permit, by the formulas of their pressures at every pose, bounds the range of f."""
+    numbers = {"swing": 0.8, "phi0": 3.2, **SPACE, "f_range": (-3.0, 3.0), "max_pressure_angle": 1.2}
+    free, held = EngineeringMethod(**numbers), EngineeringMethod(**numbers, bearings=BEARINGS)
+    places, offsets = 24, 25
+    phi1, f = (x.ravel() for x in np.meshgrid(np.arange(places) * (2 * np.pi / places), np.linspace(-3, 3, offsets)))
+    found = held.evaluate(np.column_stack([phi1, f]))
+    alive = np.isfinite(found.results["a"])
+    table = {name: found.results[name][alive] for name in RSSR}
+    poses = sweep.evaluate("rssr", table, ["theta1", "theta2"], phi=np.arange(180) * (2 * np.pi / 180))
+    theta1, theta2 = (poses[name].to_numpy().reshape(-1, 180) for name in ("theta1", "theta2"))
+    z1, z2, d, c = BEARINGS["support_d1"], BEARINGS["support_d2"], BEARINGS["journal_diameter"], table["c"][:, None]
+    x, span = np.sin(theta1) * np.tan(theta2), abs(z2 - z1)
+    arms = [np.hypot(z * np.cos(theta1), z * np.sin(theta1) + c * x) for z in (z2, z1)]
+    friction = BEARINGS["mu_d"] * (d * sum(arms) / (2.0 * span) + BEARINGS["thrust_radius_d"] * np.abs(x))
+    force = BEARINGS["resisting_torque"] / (c * np.cos(theta1) - friction)
+    pressures = [force * arm / (span * d * 0.5) for arm in arms]
+    pressures.append(4.0 * force * np.abs(x) / (np.pi * (BEARINGS["collar_diameter"] ** 2 - d**2)))
+    permitted = ((force > 0.0) & (np.max(pressures, axis=0) <= 7e3)).all(axis=1)
+    slack = found.limits[alive, held.limits.index("bearings")]
+    assert (permitted == (slack >= 0.0)).all()
+    assert 0.02 < permitted.mean() < 0.9
+    kept = np.zeros(len(f), np.bool_)
+    kept[alive] = permitted & (found.limits[alive, 0] >= 0.0)
+    every = [set(np.round(np.linspace(*ends, round((ends[1] - ends[0]) / 0.25) + 1), 9)) for ends in
+             held.offset_ranges(places, offsets)]  # fmt: skip
+    assert set().union(*every) == set(np.round(f[kept], 9))
+    assert held.offset_ranges(places, offsets) != free.offset_ranges(places, offsets)

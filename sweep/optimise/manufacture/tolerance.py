@@ -7,6 +7,7 @@ from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from sweep.evaluation.summaries import design_outputs
 from sweep.families.base import Accuracy, Array, Family
@@ -48,7 +49,8 @@ def sensitivities(
     rad or 1), nan where the output does not exist.  Derivatives are exact to rounding (docs/optimiser.md, Gradients).
     An output that is constant in pieces, such as a count, has none: it has no rows.
     """
-    varied = [k for k, p in enumerate(family.parameters) if p.unit in DIMENSIONS and p.choices is None]
+    there = ~_absent(family, design)
+    varied = [k for k, p in enumerate(family.parameters) if p.unit in DIMENSIONS and there[k]]
     sizes = {
         unit: max((abs(design[k]) for k in varied if family.parameters[k].unit == unit), default=1.0) or 1.0
         for unit in ("length", "ratio")
@@ -117,11 +119,14 @@ def touched(family: Family, design: Array, tolerance: Tolerance) -> Array:
     What may not be negative and is 0 in the design (P,), as the arm of a fork slot, is a part that is not there.
     """
     widths, own = {"length": tolerance.lengths, "angle": tolerance.angles}, dict(tolerance.own)
-    absent = [
-        p.choices is not None or (p.not_negative and x == 0.0) for p, x in zip(family.parameters, design, strict=True)
-    ]
     wide = [own.get(p.name, widths.get(p.unit, 0.0)) for p in family.parameters]
-    return np.where(absent, 0.0, wide)
+    return np.where(_absent(family, design), 0.0, wide)
+
+
+def _absent(family: Family, design: Array) -> NDArray[np.bool_]:
+    """Tell which parameters (P,) of a design are choices, or parts that are not there."""
+    given = zip(family.parameters, design, strict=True)
+    return np.array([p.choices is not None or (p.not_negative and x == 0.0) for p, x in given])
 
 
 def deviating(family: Family, design: Array, tolerance: Tolerance, seed: int, samples: int = SAMPLES) -> Array:

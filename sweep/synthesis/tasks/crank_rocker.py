@@ -13,7 +13,9 @@ from typing import Literal, TypeAlias
 import numpy as np
 
 from kernels import synthesis as kernels
+from sweep.effects import extended
 from sweep.evaluation.summaries import design_outputs
+from sweep.evaluation.tables import design_matrix
 from sweep.families import family
 from sweep.families.base import Accuracy, Angles, Array
 from sweep.synthesis.tasks.problem import Found, Task, Unknown, turning
@@ -97,6 +99,21 @@ def pressure_limit(designs: Array, largest: float) -> Array:
     return slack
 
 
+def bearing_reserve(designs: Array, bearings: Mapping[str, float]) -> Array:
+    """Least permissible less actual radial pressure angle over a turn, (n,), of the bearings that the rocker has.
+
+    Step 3 of the engineering method.  ``bearings`` are the inputs of the effect ``sliding_bearings`` with its limits,
+    or of ``rolling_bearings``, its torque among them; nan where there is no mechanism.
+    """
+    rolling = "theta1_reserve_rolling"
+    name = rolling if "dynamic_capacity" in bearings else "theta1_reserve"
+    whole, least = extended(RSSR, [f"min_{name}"]), np.full(len(designs), np.nan)
+    alive = np.isfinite(designs).all(axis=1)
+    matrix = design_matrix(whole, {**named(designs[alive]), **bearings})[0]
+    least[alive] = np.asarray(whole.poses(matrix, turn(), frozenset({name}))[name], np.float64).min(axis=1)
+    return least
+
+
 def named(designs: Array, suffix: str = "") -> dict[str, Array]:
     """Design matrix as columns."""
     return {f"{name}{suffix}": column for name, column in zip(RSSR.parameter_names, designs.T, strict=True)}
@@ -127,12 +144,14 @@ class EngineeringMethod(OnLocus):
     e, g, alpha : position of the rocker axis and of the rocker's plane on it [length, rad]
     f_range : where f is looked for [length]; two equal numbers fix it.  With alpha = 0 only f - g matters.
     objective : "acceleration", max |d2psi|, or "pressure_angle", the largest over the turn
+    bearings : of the rocker, inputs of `bearing_reserve`: the radial pressure angle stays below what they permit
     bounds : of what is found, by name: the lengths a, b, c, and the place x_ext, y_ext of the rocker ball at the
         extended position, from the rocker axis: a box for the joint C1
     """
 
     f_range: tuple[float, float]
     objective: Literal["acceleration", "pressure_angle"] = "acceleration"
+    bearings: Mapping[str, float] = field(default_factory=dict)
 
     @property
     def unknowns(self) -> tuple[Unknown, ...]:
@@ -149,7 +168,20 @@ class EngineeringMethod(OnLocus):
             curve = acceleration(designs)
         else:
             curve = np.sqrt(1.0 - least_cos2(designs))[:, None]  # sine of the largest pressure angle
-        return Found({}, {"pressure angle": pressure_limit(designs, self.max_pressure_angle)}, curve, columns)
+        limits = {"pressure angle": pressure_limit(designs, self.max_pressure_angle)}
+        limits |= {"bearings": bearing_reserve(designs, self.bearings)} if self.bearings else {}
+        return Found({}, limits, curve, columns)
+
+    def offset_ranges(self, places: int = 180, offsets: int = 181) -> list[tuple[float, float]]:
+        """Return the ranges of f in which some place of the locus keeps all limits: step 3 of the method.
+
+        Seen on a grid of so many places and offsets: an end is good to a step of the grid.
+        """
+        f: Array = np.linspace(*self.f_range, offsets, dtype=np.float64)
+        phi1: Array = np.arange(places, dtype=np.float64) * (2.0 * np.pi / places)
+        kept = np.array([(self.evaluate(_rows(phi1, one)).limits >= 0.0).all(axis=1).any() for one in f])
+        edges = np.flatnonzero(np.diff(np.concatenate([[False], kept, [False]]).astype(np.int8)))
+        return [(float(f[a]), float(f[b - 1])) for a, b in edges.reshape(-1, 2)]
 
 
 @dataclass(frozen=True)

@@ -1,0 +1,71 @@
+"""Marks of machines: poses against the sum of their members', shaking and a gap over a turn, per design.
+
+``python -m tests.bench.machines`` times the head of the study head208 and prints a table; processor time, best of five.
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+
+import sweep
+from sweep.effects import extended
+from sweep.evaluation.summaries import design_outputs
+from sweep.evaluation.tables import design_matrix
+from sweep.families import family
+from sweep.families.base import Accuracy, Angles
+from sweep.study import load_study
+
+STUDY, DESIGNS, POSES = Path(sweep.__file__).parents[1] / "studies" / "head208", 256, 360
+MOTION = {"needle": ("s", "ds", "d2s"), "looper": ("psi", "dpsi", "d2psi")}
+RUNS = 5
+
+
+def best(run: Callable[[], object]) -> float:
+    """Least processor time of a call per design [us]."""
+    run()
+    found = []
+    for _ in range(RUNS):
+        start = time.process_time()
+        run()
+        found.append(time.process_time() - start)
+    return 1e6 * min(found) / DESIGNS
+
+
+def main() -> None:
+    """Time needle and looper of head208, their cranks a little different in every design."""
+    rows = []
+    shafts = {"main": {"axis": [1, 0, 0], "zero": [0, 1, 0]}}
+    shafts |= {"lower": {"at": [0, -39.743, -55.139], "axis": [1, 0, 0], "zero": [0, 1, 0], "ratio": -1}}
+    needle = {"chain": ["rssr", "guide"], "shaft": "main", "turn": 1.5 * np.pi, "key": 1.5 * np.pi}
+    looper = {"family": "slotted", "shaft": "lower", "sense": -1, "shift": 34.516, "key": np.radians(201.768)}
+    relations = {"shake": {"shaking": ["needle1", "needle2", "looper"]}}
+    relations |= {"gap": {"gap": ["needle.coupler2", "looper.driven_link"]}}
+    machine = sweep.machine({"needle": needle, "looper": looper}, relations, shafts=shafts)
+    head = extended(family(machine), ["max_shake", "rms_shake"])
+    reference = load_study(STUDY).reference or {}
+    given = {name: value for name, value in reference.items() if name in head.parameter_names}
+    matrix = np.repeat(design_matrix(head, given)[0], DESIGNS, axis=0)
+    rng = np.random.default_rng(208)
+    for name in ("needle.a1", "looper.a"):
+        matrix[:, head.parameter_names.index(name)] *= 1.0 + 1e-4 * rng.standard_normal(DESIGNS)
+    turn = Angles.of(2.0 * np.pi * np.arange(POSES)[None, :] / POSES)
+    alone = 0.0
+    for m in head.members:  # type: ignore[attr-defined]
+        own = m.designs(matrix)
+        alone += best(lambda m=m, own=own: m.family.poses(own, turn, frozenset(MOTION[m.name])))
+    names = frozenset(f"{name}.{output}" for name, wanted in MOTION.items() for output in wanted)
+    together = best(lambda: head.poses(matrix, turn, names))
+    rows.append(("poses, to the sum of the members' (1.3 at most)", f"{together / alone:.2f}"))
+    for output in ("max_shake", "rms_shake", "min_gap"):
+        spent = best(lambda output=output: design_outputs(head, matrix, [output], Accuracy(target=1e-8)))
+        rows.append((f"{output}, accuracy 1e-8 [us a design]", f"{spent:.0f}"))
+    for text, value in rows:
+        print(f"{text:60s}{value:>8s}")
+
+
+if __name__ == "__main__":
+    main()
