@@ -139,7 +139,9 @@ def _kept(
 def _costs(study: Study, limits: list[Limit], worst: Limit, design: Array) -> list[Cost]:
     """Dimensions by what their tolerances cost, the dearest first: the same mechanisms with one dimension exact."""
     assert study.tolerance is not None and study.optimise is not None
-    designs = deviating(study.family, design, study.tolerance, study.optimise.seed, SINGLE)
+    designs = deviating(
+        study.family, design, study.tolerance, study.optimise.seed, min(SINGLE, study.tolerance.samples)
+    )
     columns, kept = _kept(study, limits, designs)
     scatter, before = _variance(columns, worst), float(kept.mean())
     found = []
