@@ -53,6 +53,20 @@ def diagram(
     -----
     MeasuredRangeWarning
         where a thread is faster than the 7.4 m/s up to which the law of speed was measured (lengths in mm)
+
+    Examples
+    --------
+    >>> import sweep
+    >>> drive = {"family": "four_bar", "eye": [12.0, 5.0, 0.0]}
+    >>> thread = [[0.0, 60.0, 0.0], "drive.eye", [0.0, -30.0, 0.0]]
+    >>> machine = sweep.machine({"drive": drive}, {"upper": {"thread": thread}})
+    >>> design = {"drive.a": 10.0, "drive.b": 40.0, "drive.c": 30.0, "drive.e": 38.0}
+    >>> sweep.thread.diagram(machine, design, samples=4)[["phi", "upper_demand"]].round(2)
+        phi  upper_demand
+    0  0.00        101.76
+    1  1.57         92.58
+    2  3.14         90.17
+    3  4.71         95.23
     """
     family = find_family(mechanism)
     threads = [r for r in getattr(family, "relations", ()) if isinstance(r, ThreadBalance)]
