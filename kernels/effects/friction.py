@@ -90,12 +90,19 @@ def _of_moving(f: Friction, load: Loads) -> Friction:
 
 
 @inline
-def supports(force: Vector, moment: Vector, axis: Vector, z1: float, z2: float) -> tuple[float, float, float]:
-    """Radial loads of a shaft's two supports and the axial force, from force and moment about the origin of z."""
+def support_forces(force: Vector, moment: Vector, axis: Vector, z1: float, z2: float) -> tuple[Vector, Vector, float]:
+    """Return the forces across a shaft on its supports and that along it; force and moment about the origin of z."""
     axial = dot(force, axis)
     radial = mix(1.0, force, -axial, axis)
     second = scale(1.0 / (z2 - z1), mix(1.0, cross(moment, axis), -z1, radial))
-    return norm(sub(radial, second)), norm(second), axial
+    return sub(radial, second), second, axial
+
+
+@inline
+def supports(force: Vector, moment: Vector, axis: Vector, z1: float, z2: float) -> tuple[float, float, float]:
+    """Radial loads of a shaft's two supports and the axial force; see :func:`support_forces`."""
+    first, second, axial = support_forces(force, moment, axis, z1, z2)
+    return norm(first), norm(second), axial
 
 
 @inline

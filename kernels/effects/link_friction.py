@@ -1,9 +1,12 @@
 """D2 for any number of links: friction of shafts, balls, guides and contacts, by successive approximations.
 
 What rubs at a joint is a wrench of known direction times the joint's load: the directions follow from the motion, the
-load from the reactions.  So the needed wrenches are linear in the loads.  Loads from the latest reactions give new
-reactions, until the loads change by less than TOLERANCE; where they do not settle the status is JAMMED.  Equation
-numbers are of docs/links.md.
+load from the reactions.  Loads from the latest reactions give new reactions, until the loads change by less than
+TOLERANCE.  Reactions are linear in the loads, and loads are norms of reactions, so the iteration contracts for ordinary
+lubrication (6 to 15 passes) and diverges where the linkage jams: if five passes in a row do not shrink the correction,
+or the largest number of passes is reached, the status is JAMMED; the last iterate is never given out.  Near jamming the
+corrections form a slow geometric series, whose remainder is added every tenth pass.
+Equation numbers are of docs/links.md.
 """
 
 from __future__ import annotations
@@ -11,11 +14,10 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numpy.typing import NDArray
 
 from kernels import status as st
-from kernels.arithmetic.vectors import Vector, cross, dot, mix, norm, scale, sub
-from kernels.effects.friction import PASSES, STALLED, STILL, TOLERANCE, supports, unit_vector
+from kernels.arithmetic.vectors import Vector, add, cross, dot, mix, norm, scale, sub
+from kernels.effects.friction import LEAP, PASSES, STALLED, STILL, TOLERANCE, support_forces, unit_vector
 from kernels.effects.link_loads import (
     CONTACT,
     FREEDOM,
@@ -25,92 +27,146 @@ from kernels.effects.link_loads import (
     LINES,
     ROD,
     SHAFT,
+    SPEED,
     WRENCH,
-    add_wrench,
-    at_joint,
-    coefficients,
-    eliminate,
-    joint_ends,
+    Index,
+    Room,
+    driving,
     needed,
-    reactions,
-    right_sides,
-    spread,
+    prepare,
+    put_lines,
+    put_on_frame,
+    put_reactions,
+    put_wrench,
+    room_for,
+    solve,
 )
 from kernels.jit import inline, kernel
-from kernels.linkage.bodies import DRIVEN, Links, Moving, moving, vector, velocity_at
+from kernels.linkage.bodies import DRIVEN, Links, Moving, latter, moving, posed, vector, velocity_at
 from kernels.types import Array, Status
 
-Index = NDArray[np.int64]
-
 MU, RADIUS, THRUST, FIRST, SECOND, PER_FRICTION = 0, 1, 2, 3, 4, 5
+PART = 7  # of a shaft or a guide the loads of both supports across the axis, then the force along it; else the force
 
 
 @inline
-def _rates(links: Links, i: int, k: int, body: int) -> Moving:
-    """Return rates of a body; the frame stands still."""
-    none = (0.0, 0.0, 0.0)
-    if body < 0:
-        return Moving(none, none, none, none, none)
-    return moving(links.bodies[i, k, body])
+def _rates(record: Array, body: int) -> Moving:
+    """Return rates of a body from its record; the frame stands still."""
+    moves, found = (1.0 if body >= 0 else 0.0), moving(record)
+    return Moving(
+        found.at, scale(moves, found.v), scale(moves, found.a), scale(moves, found.omega), scale(moves, found.eps)
+    )
 
 
 @inline
 def _moved(a: Vector, b: Vector) -> Vector:
-    """Difference of two rates, zero where it is rounding: nothing moves then, and friction has no direction."""
+    """Difference of two rates, zero where it is rounding: nothing moves then, and friction has no direction.
+
+    In planar linkages coupler and rocker turn together where the crank points along the frame.
+    """
     found = sub(a, b)
     return found if norm(found) > STILL * (norm(a) + norm(b)) else (0.0, 0.0, 0.0)
 
 
 @inline
 def direction(
-    links: Links, i: int, k: int, joint: Index, place: Vector, data: Array, speed: float
+    links: Links, i: int, k: int, joint: Index, ends: Index, place: Vector, data: Array, speed: float
 ) -> tuple[Vector, Vector, float]:
     """Friction force and couple of a joint per unit of its load, (7), (8), and their power per unit crank speed."""
-    on, by = joint_ends(links, i, joint)
-    one, two = _rates(links, i, k, on), _rates(links, i, k, by)
+    records, lines, axis = links.bodies[i, k], links.lines[i, k], vector(links.axes[i, k, max(joint[FREEDOM], 0)])
+    one, two = _rates(records[max(ends[0], 0)], ends[0]), _rates(records[max(ends[1], 0)], ends[1])
+    rod, slender, kind = posed(records[max(joint[ROD], 0)]).x, joint[ROD], joint[KIND]
+    rubs, radius = data[MU], data[RADIUS]
     sense = math.copysign(1.0, speed) if speed != 0.0 else 0.0
-    turn = _moved(one.omega, two.omega)
-    if joint[ROD] >= 0:
+    turn, slip = _moved(one.omega, two.omega), (0.0, 0.0, 0.0)
+    if slender >= 0:
         # A rod is free about its own axis: it spins so that nothing turns it there.
-        along = vector(links.bodies[i, k, joint[ROD], 15:])
-        turn = mix(1.0, turn, -dot(turn, along), along)
-    slip = (0.0, 0.0, 0.0)
-    if joint[KIND] == GUIDE or joint[KIND] == CONTACT:
+        turn = mix(1.0, turn, -dot(turn, rod), rod)
+    if kind in (GUIDE, CONTACT):
         slip = _moved(velocity_at(one, place), velocity_at(two, place))
-        # What the joint does not allow is rounding: next to a reversal it would be seen as a share of the sliding.
-        if joint[KIND] == GUIDE:
-            along = vector(links.axes[i, k, joint[FREEDOM]])
-            slip = scale(dot(slip, along), along)
-        else:
-            for which in range(joint[LINE], joint[LINE] + joint[LINES]):
-                across = vector(links.lines[i, k, which, 3:])
-                slip = mix(1.0, slip, -dot(slip, across), across)
-    force, couple = (0.0, 0.0, 0.0), (0.0, 0.0, 0.0)
-    mu = -sense * data[MU]
-    if joint[KIND] == SHAFT or joint[KIND] == GUIDE:
-        axis = vector(links.axes[i, k, joint[FREEDOM]])
-        around = data[RADIUS] * dot(turn, axis)
+    # What the joint does not allow is rounding: next to a reversal it would be seen as a share of the sliding.
+    if kind == GUIDE:
+        slip = scale(dot(slip, axis), axis)
+    for which in range(joint[LINE], joint[LINE] + joint[LINES]):
+        across = latter(lines[which])
+        slip = mix(1.0, slip, -dot(slip, across), across)
+    mu = -sense * rubs
+    couple, force = scale(mu * radius, unit_vector(turn)), scale(mu, unit_vector(slip))
+    if kind in (SHAFT, GUIDE):
+        around = radius * dot(turn, axis)
         whole = math.hypot(around, norm(slip))
-        if whole > 0.0:
-            couple = scale(mu * data[RADIUS] * around / whole, axis)
-            force = scale(mu / whole, slip)
-    else:
-        couple, force = scale(mu * data[RADIUS], unit_vector(turn)), scale(mu, unit_vector(slip))
+        per = mu / whole if whole > 0.0 else 0.0
+        couple, force = scale(per * radius * around, axis), scale(per, slip)
     return force, couple, dot(force, slip) + dot(couple, turn)
 
 
 @inline
-def load_of(
-    links: Links, i: int, k: int, joint: Index, data: Array, found: Array, x: Array
-) -> tuple[float, float, float]:
+def _put_parts(links: Links, i: int, k: int, joints: Index, friction: Array, room: Room, parts: Array) -> None:
+    """Write the vectors whose norms are the loads of each joint, to every answer, (Q, A, PART)."""
+    for which in range(joints.shape[0]):
+        data, axis = friction[which], vector(links.axes[i, k, max(joints[which, FREEDOM], 0)])
+        held = joints[which, KIND] == SHAFT or joints[which, KIND] == GUIDE
+        for answer in range(room.x.shape[1]):
+            found, out = room.found[which, answer], parts[which, answer]
+            borne = support_forces(vector(found), latter(found), axis, data[FIRST], data[SECOND])
+            force, other, along = borne if held else (vector(found), (0.0, 0.0, 0.0), 0.0)
+            out[0], out[1], out[2] = force[0], force[1], force[2]
+            out[3], out[4], out[5], out[6] = other[0], other[1], other[2], along
+
+
+@inline
+def _sizes(joint: Index, data: Array, part: Array) -> tuple[float, float, float]:
     """Load of a joint that friction is proportional to, (9), and the loads of its two supports across the axis."""
-    force, moment, _ = at_joint(links, i, k, joint, found, x)
-    if joint[KIND] == SHAFT or joint[KIND] == GUIDE:
-        axis = vector(links.axes[i, k, joint[FREEDOM]])
-        first, second, along = supports(force, moment, axis, data[FIRST], data[SECOND])
-        thrust = data[THRUST] / data[RADIUS] * abs(along) if data[RADIUS] > 0.0 and joint[KIND] == SHAFT else 0.0
-        return first + second + thrust, first, second
-    return norm(force), 0.0, 0.0
+    kind, radius, thrust = joint[KIND], data[RADIUS], data[THRUST] * abs(part[6])
+    first, other = norm(vector(part)), norm(latter(part))
+    share = thrust / radius if kind == SHAFT and radius > 0.0 else 0.0
+    held = 1.0 if kind in (SHAFT, GUIDE) else 0.0
+    return first + other + share, held * first, held * other
+
+
+@inline
+def _sum(answers: Array, loads: Array, total: Array) -> None:
+    """Sum what is known without friction and per load of each joint: (A, N) at the loads (Q,), into (N,)."""
+    for at in range(total.shape[0]):
+        total[at] = answers[0, at]
+    for which in range(loads.shape[0]):
+        for at in range(total.shape[0]):
+            total[at] += loads[which] * answers[1 + which, at]
+
+
+@inline
+def _settled(joints: Index, friction: Array, parts: Array, loads: Array, new: Array, steps: Array) -> int:
+    """Iterate the loads, (Q,); passes it took, -1 where they do not settle.  ``new`` (Q,), ``steps`` (Q,) are room."""
+    last, least, stalled, part, passes, count = math.inf, math.inf, 0, steps[1], -1, 0
+    for which in range(loads.shape[0]):
+        loads[which], steps[0, which] = 0.0, 0.0
+    while passes < 0 and stalled < STALLED and count < PASSES:
+        count += 1
+        change, step, along, square = 0.0, 0.0, 0.0, 0.0
+        for which in range(joints.shape[0]):
+            _sum(parts[which], loads, part[:PART])
+            new[which] = _sizes(joints[which], friction[which], part)[0]
+            mu, before = friction[which, MU], steps[0, which]
+            apart, size = new[which] - loads[which], max(new[which], loads[which])
+            steps[0, which] = apart
+            if mu > 0.0:
+                change = max(change, abs(apart) / size if size > 0.0 else 0.0)
+                step = max(step, mu * abs(apart))
+                along += apart * before
+                square += before * before
+        # The last digits wander: a change at rounding level is convergence, not a stall.
+        if math.isfinite(step) and (change <= TOLERANCE or (count > 3 and change < 1e-12 and change >= last)):
+            passes = count
+        last = change
+        # In proportion to themselves loads change less and less even while they grow without end.
+        stalled = 0 if step < least else stalled + 1
+        least, further = step, 1.0
+        if count % LEAP == 0 and passes < 0:
+            # the rest of a geometric series of steps, in units of the next one; the plain step where none shrinks
+            further, least = square / (square - along) if abs(along) < square else 1.0, math.inf
+        for which in range(joints.shape[0]):
+            loads[which] = max(loads[which] + further * (new[which] - loads[which]), 0.0)
+    return passes
 
 
 @kernel
@@ -142,120 +198,47 @@ def link_friction(
     lost : (n, m, Q + 1) or None; share of each joint's friction in the driving torque; passes of the iteration
     on_supports : (n, m, Q, 2) or None; loads of the supports across the axis; 0 for balls and contacts
     """
-    count, lines, number = links.parents.shape[0], links.lines.shape[2], joints.shape[0]
-    room, rows, inverse = np.empty((count, lines + 1, WRENCH)), np.empty((lines, lines)), np.empty((lines, lines))
-    base, now, found = np.empty((count, WRENCH)), np.empty((count, WRENCH)), np.empty((count, WRENCH))
-    side, x, load = np.empty(lines), np.empty(lines), np.empty((number, 3))
-    rubbing, power = np.empty((number, WRENCH)), np.empty(number)
+    number = joints.shape[0]
+    room, parts = room_for(links, number, number), np.empty((number, 1 + number, PART))
+    loads, new, steps = np.empty(number), np.empty(number), np.empty((2, max(number, PART)))
+    power, total = np.empty(number), np.empty(WRENCH)
+    lines = room.rows.shape[0]
     for i in range(bodies.shape[0]):
+        prepare(links, i, joints, room)
         for k in range(status.shape[1]):
             given = drive[i, k if drive.shape[1] > 1 else 0]
             needed(links, i, k, bodies[i], tool[i], given, carrier, output, room)
-            for body in range(count):
-                for at in range(WRENCH):
-                    base[body, at] = room[body, 0, at]
-            spread(links, i, k, room)
-            coefficients(links, i, k, room, rows)
-            for row in range(lines):
-                for column in range(lines):
-                    inverse[row, column] = 1.0 if row == column else 0.0
-            if status[i, k] == st.OK and not eliminate(rows, inverse):
-                status[i, k] = st.DEAD_POINT
+            put_lines(links, i, k, joints, room)
             for which in range(number):
-                _, _, place = at_joint(links, i, k, joints[which], base, side)
-                one = direction(links, i, k, joints[which], place, friction[i, which], given[0])
-                for at in range(WRENCH):
-                    rubbing[which, at] = 0.0
-                add_wrench(rubbing[which], one[0], place, one[1])
-                power[which], load[which, 0] = one[2], 0.0
-            passes = 0
-            if status[i, k] == st.OK:
-                passes = _settled(
-                    links, i, k, joints, friction[i], base, room, inverse, rubbing, now, side, x, found, load
-                )  # fmt: skip
-                if passes < 0:
-                    status[i, k] = st.JAMMED
+                joint, place = joints[which], vector(room.places[which])
+                found = direction(links, i, k, joint, room.ends[which], place, friction[i, which], given[SPEED])
+                put_wrench(room.units[lines + which], found[0], place, found[1])
+                power[which] = found[2]
+            solvable = solve(links, i, room)
+            if status[i, k] == st.OK and not solvable:
+                status[i, k] = st.DEAD_POINT
+            put_reactions(joints, room)
+            _put_parts(links, i, k, joints, friction[i], room, parts)
+            solved, passes = status[i, k] == st.OK, _settled(joints, friction[i], parts, loads, new, steps)
+            if solved and passes < 0:
+                status[i, k] = st.JAMMED
             good = 1.0 if status[i, k] == st.OK else math.nan
             if torque is not None:
-                torque[i, k] = good * reactions(links, i, k, now, room, x, found)
+                torque[i, k] = driving(links, i, room, 0)
+                for which in range(number):
+                    torque[i, k] += loads[which] * driving(links, i, room, 1 + which)
+                torque[i, k] *= good
             if forces is not None or on_frame is not None:
-                _store(links, i, k, joints, rubbing, load, found, x, good, forces, on_frame)
+                _store(links, i, k, joints, room, loads, good, total, forces, on_frame)
             for which in range(number):
+                _sum(parts[which], loads, steps[1, :PART])
+                _, first, other = _sizes(joints[which], friction[i, which], steps[1])
                 if lost is not None:
-                    lost[i, k, which] = -good * load[which, 0] * power[which]
+                    lost[i, k, which] = -good * loads[which] * power[which]
                 if on_supports is not None:
-                    on_supports[i, k, which, 0] = good * load[which, 1]
-                    on_supports[i, k, which, 1] = good * load[which, 2]
+                    on_supports[i, k, which, 0], on_supports[i, k, which, 1] = good * first, good * other
             if lost is not None:
                 lost[i, k, number] = good * passes
-
-
-@inline
-def _settled(
-    links: Links,
-    i: int,
-    k: int,
-    joints: Index,
-    friction: Array,
-    base: Array,
-    room: Array,
-    inverse: Array,
-    rubbing: Array,
-    now: Array,
-    side: Array,
-    x: Array,
-    found: Array,
-    load: Array,
-) -> int:
-    """Iterate the loads, column 0, with those of the supports beside; passes it took, -1 where they do not settle."""
-    last, least, stalled = math.inf, math.inf, 0
-    for count in range(1, PASSES + 1):
-        _needed_with(links, i, joints, base, rubbing, load, now)
-        right_sides(links, i, k, now, side)
-        for row in range(x.shape[0]):
-            value = 0.0
-            for column in range(x.shape[0]):
-                value += inverse[row, column] * side[column]
-            x[row] = value
-        reactions(links, i, k, now, room, x, found)
-        change, step = 0.0, 0.0
-        for which in range(joints.shape[0]):
-            new, first, second = load_of(links, i, k, joints[which], friction[which], found, x)
-            load[which, 1], load[which, 2] = first, second
-            if friction[which, MU] > 0.0:
-                apart, size = abs(new - load[which, 0]), max(new, load[which, 0])
-                change = max(change, apart / size if size > 0.0 else 0.0)
-                step = max(step, friction[which, MU] * apart)
-            load[which, 0] = new
-        if not math.isfinite(step):
-            return -1
-        # The last digits wander: a change at rounding level is convergence, not a stall.
-        if change <= TOLERANCE or (count > 3 and change < 1e-12 and change >= last):
-            return count
-        last = change
-        stalled = 0 if step < least else stalled + 1
-        least = step
-        if stalled >= STALLED:
-            return -1
-    return -1
-
-
-@inline
-def _needed_with(links: Links, i: int, joints: Index, base: Array, rubbing: Array, load: Array, now: Array) -> None:
-    """Write the needed wrenches with what rubs, summed towards the frame, (B, 6)."""
-    for body in range(base.shape[0]):
-        for at in range(WRENCH):
-            now[body, at] = base[body, at]
-    for which in range(joints.shape[0]):
-        on, by = joint_ends(links, i, joints[which])
-        for at in range(WRENCH):
-            now[on, at] -= load[which, 0] * rubbing[which, at]
-            if by >= 0:
-                now[by, at] += load[which, 0] * rubbing[which, at]
-    for body in range(base.shape[0] - 1, -1, -1):
-        if links.parents[body] >= 0:
-            for at in range(WRENCH):
-                now[links.parents[body], at] += now[body, at]
 
 
 @inline
@@ -264,29 +247,31 @@ def _store(
     i: int,
     k: int,
     joints: Index,
-    rubbing: Array,
-    load: Array,
-    found: Array,
-    x: Array,
+    room: Room,
+    loads: Array,
     good: float,
+    total: Array,
     forces: Array | None,
     on_frame: Array | None,
 ) -> None:
     """Write what each joint bears with what rubs there, and what the frame bears."""
+    lines = room.rows.shape[0]
     if on_frame is not None:
         for at in range(WRENCH):
             on_frame[i, k, at] = 0.0
     for which in range(joints.shape[0]):
-        force, moment, place = at_joint(links, i, k, joints[which], found, x)
-        rubs = vector(rubbing[which])
-        couple = sub(vector(rubbing[which, 3:]), cross(place, rubs))
-        driven = joints[which, KIND] == SHAFT and links.freedoms[i, joints[which, FREEDOM], 1] == DRIVEN
+        _sum(room.found[which], loads, total)
+        force, moment = vector(total), latter(total)
+        rubbing, place = room.units[lines + which], vector(room.places[which])
+        rubbed = scale(loads[which], vector(rubbing))
+        couple = sub(scale(loads[which], latter(rubbing)), cross(place, rubbed))
+        force, whole = add(force, rubbed), add(moment, couple)
+        freedom = links.freedoms[i, max(joints[which, FREEDOM], 0), 1]
+        driven = min(joints[which, KIND] == SHAFT, freedom == DRIVEN)
         if forces is not None:
+            shown = moment if driven else whole
             for at in range(3):
-                forces[i, k, which, at] = good * (force[at] + load[which, 0] * rubs[at])
-                forces[i, k, which, 3 + at] = good * (moment[at] + (0.0 if driven else load[which, 0] * couple[at]))
-        if on_frame is not None and joint_ends(links, i, joints[which])[1] < 0:
-            add_wrench(on_frame[i, k], scale(-good, force), place, scale(-good, moment))
-            add_wrench(
-                on_frame[i, k], scale(-good * load[which, 0], rubs), place, scale(-good * load[which, 0], couple)
-            )
+                forces[i, k, which, at], forces[i, k, which, 3 + at] = good * force[at], good * shown[at]
+        if on_frame is not None:
+            share = good if room.ends[which, 1] < 0 else 0.0 * good
+            put_on_frame(on_frame[i, k], share, place, force, whole)

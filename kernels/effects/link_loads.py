@@ -1,24 +1,29 @@
-"""D1, D3 for any number of links: joint reactions, driving torque and reduced inertia of a tree of bodies with loops.
+"""D1-D3 for any number of links: joint reactions, driving torque, reduced inertia of a tree of bodies with loops.
 
 Equation numbers are of docs/links.md.  The loops are cut at the lines of :class:`kernels.linkage.bodies.Links`.  Each
 body needs a wrench for its inertia and weight; the force x_k of each line adds one that is linear in x_k.  What hangs
 on a joint is summed towards the frame, so the joint's wrench is known but for the x_k.  A freedom that nothing drives
 bears no moment about its axis, or no force along it: as many linear equations as there are lines.  They are solved by
 Gaussian elimination; every reaction and the driving torque then follow by adding up.
+
+Friction at a joint is a wrench of known direction times the joint's load: one more line, whose force is known once the
+loads are.  Reactions are linear in the loads, so the reactions without friction and those to the friction of each joint
+at unit load are found once, as columns of one elimination; successive approximations then sum vectors.
 """
 
 from __future__ import annotations
 
 import math
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from kernels import status as st
 from kernels.arithmetic.vectors import Vector, add, cross, dot, mix, scale, spun, sub, turned
-from kernels.effects.kinetostatics import BODY, LEAST_COSINE, Tensor
+from kernels.effects.kinetostatics import BODY, LEAST_COSINE
 from kernels.jit import inline, kernel
-from kernels.linkage.bodies import DRIVEN, SLIDE, Links, moving, vector
+from kernels.linkage.bodies import DRIVEN, SLIDE, Links, Posed, latter, posed, vector
 from kernels.types import Array, Status
 
 Index = NDArray[np.int64]
@@ -34,191 +39,281 @@ KIND, BODY_OF, FREEDOM, LINE, LINES, ROD, PER_JOINT = 0, 1, 2, 3, 4, 5, 6
 SHAFT, HINGED_BALL, GUIDE, BALL, CONTACT = 0, 1, 2, 3, 4
 
 
-@inline
-def inertia_times(body: Array, tensor: Tensor, a: Vector) -> Vector:
-    """Inertia tensor, given in the body's axes, times a vector in fixed axes."""
-    x, y, z = vector(body[15:]), vector(body[18:]), vector(body[21:])
-    p, q, r = dot(x, a), dot(y, a), dot(z, a)
-    xx, xy, xz, yy, yz, zz = tensor
-    return turned(x, y, z, (xx * p + xy * q + xz * r, xy * p + yy * q + yz * r, xz * p + yz * q + zz * r))
+class Room(NamedTuple):
+    """What the loads of one pose are worked out in: B bodies, F freedoms, K lines, Q joints, R of them rub, A = 1 + R.
 
-
-@inline
-def add_wrench(out: Array, force: Vector, at: Vector, couple: Vector) -> None:
-    """Add a force at a point and a couple to a wrench, (6,)."""
-    moment = add(cross(at, force), couple)
-    out[0] += force[0]
-    out[1] += force[1]
-    out[2] += force[2]
-    out[3] += moment[0]
-    out[4] += moment[1]
-    out[5] += moment[2]
-
-
-@inline
-def add_inertia(out: Array, body: Array, data: Array, gravity: Vector, drive: Array) -> tuple[float, float]:
-    """Add what a body needs for its inertia and weight, (1); its reduced inertia and half the derivative, (6)."""
-    rate = moving(body)
-    tensor = (data[4], data[5], data[6], data[7], data[8], data[9])
-    arm = turned(vector(body[15:]), vector(body[18:]), vector(body[21:]), (data[1], data[2], data[3]))
-    v, a = add(rate.v, cross(rate.omega, arm)), add(rate.a, spun(rate.omega, rate.eps, arm))
-    square, change = drive[SPEED] * drive[SPEED], drive[CHANGE]
-    force = scale(data[0], sub(mix(square, a, change, v), gravity))
-    momentum = inertia_times(body, tensor, rate.omega)
-    about = inertia_times(body, tensor, mix(square, rate.eps, change, rate.omega))
-    add_wrench(out, force, add(rate.at, arm), add(about, scale(square, cross(rate.omega, momentum))))
-    return data[0] * dot(v, v) + dot(rate.omega, momentum), data[0] * dot(v, a) + dot(momentum, rate.eps)
-
-
-@inline
-def add_tool(
-    out: Array, body: Array, tool: Array, gravity: Vector, drive: Array
-) -> tuple[float, float, Vector, Vector]:
-    """Add what the tool needs, (2); what it adds to the reduced inertia; force on the tool and its velocity."""
-    rate = moving(body)
-    arm = turned(vector(body[15:]), vector(body[18:]), vector(body[21:]), (tool[1], tool[2], tool[3]))
-    v, a = add(rate.v, cross(rate.omega, arm)), add(rate.a, spun(rate.omega, rate.eps, arm))
-    square = drive[SPEED] * drive[SPEED]
-    force = scale(tool[0], sub(mix(square, a, drive[CHANGE], v), gravity))
-    force = sub(force, vector(drive[FORCE:]))
-    add_wrench(out, force, add(rate.at, arm), (0.0, 0.0, 0.0))
-    return tool[0] * dot(v, v), tool[0] * dot(v, a), force, v
-
-
-@inline
-def spread(links: Links, i: int, k: int, room: Array) -> None:
-    """Write the wrenches of the lines' unit forces and sum all wrenches towards the frame, (3); room (B, K + 1, 6).
-
-    Column 0 is what each body needs; a line's force is taken off what its joint has to give.
+    Parameters
+    ----------
+    ends : (Q, 2) the body that a joint's force acts on, and the one that it acts on reversed
+    order : (F,) freedoms that nothing drives, as many as lines, then those that the drive turns
+    signs : (B, K + R) whether a line, or a joint's friction, is taken off (-1) or added to (1) what a body needs with
+        all that hangs on it
+    need : (B, 6) that without lines and friction
+    places : (Q, 3) of the joints
+    units : (K + R, 6) wrenches of the lines' unit forces and of what rubs
+    screws : (F, 6) what weighs a wrench on a freedom
+    rows : (K, K + A) the equations
+    x : (K, A) their last columns, in the end the lines' forces
+    found : (Q, A, 6) force and moment of each joint, without friction, then to the friction of each
     """
-    ends, lines, parents = links.ends[i], links.lines[i, k], links.parents
-    for which in range(ends.shape[0]):
-        point, along = vector(lines[which]), vector(lines[which, 3:])
-        add_wrench(room[ends[which, 0], 1 + which], scale(-1.0, along), point, (0.0, 0.0, 0.0))
-        if ends[which, 1] >= 0:
-            add_wrench(room[ends[which, 1], 1 + which], along, point, (0.0, 0.0, 0.0))
-    for body in range(parents.shape[0] - 1, -1, -1):
-        if parents[body] >= 0:
-            for column in range(room.shape[1]):
-                for x in range(WRENCH):
-                    room[parents[body], column, x] += room[body, column, x]
+
+    ends: Index
+    order: Index
+    signs: Array
+    need: Array
+    places: Array
+    units: Array
+    screws: Array
+    rows: Array
+    x: Array
+    found: Array
+
+
+# Below, no array is last used inside a branch, and every helper has one way out: otherwise numba counts references to
+# the arrays at every pose, which took half of the time.
 
 
 @inline
-def on_freedom(kind: int, axis: Vector, joint: Vector, wrench: Array) -> float:
-    """Moment of a wrench about an axis through the joint; its force along the axis where the freedom is a slide."""
-    force = vector(wrench)
-    if kind == SLIDE:
-        return dot(axis, force)
-    return dot(axis, sub(vector(wrench[3:]), cross(joint, force)))
+def room_for(links: Links, joints: int, rubbing: int) -> Room:
+    """Room for the loads of one pose."""
+    count, lines, freedoms = links.parents.shape[0], links.lines.shape[2], links.axes.shape[2]
+    rows = np.empty((lines, lines + 1 + rubbing))
+    return Room(
+        np.empty((joints, 2), np.int64), np.empty(freedoms, np.int64), np.empty((count, lines + rubbing)),
+        np.empty((count, WRENCH)), np.empty((joints, 3)), np.empty((lines + rubbing, WRENCH)),
+        np.empty((freedoms, WRENCH)), rows, rows[:, lines:],
+        np.empty((joints, 1 + rubbing, WRENCH)),
+    )  # fmt: skip
 
 
 @inline
-def coefficients(links: Links, i: int, k: int, room: Array, rows: Array) -> None:
-    """Write the factors of the lines' forces, (K, K), one row for each freedom that nothing drives, (4)."""
-    freedoms, axes, bodies = links.freedoms[i], links.axes[i, k], links.bodies[i, k]
-    row = 0
-    for which in range(freedoms.shape[0]):
-        kind, body = freedoms[which, 1], freedoms[which, 0]
-        if kind != DRIVEN:
-            axis, joint = vector(axes[which]), vector(bodies[body, 24:])
-            for column in range(room.shape[1] - 1):
-                rows[row, column] = on_freedom(kind, axis, joint, room[body, 1 + column])
-            row += 1
+def _put_signs(parents: Index, on: int, by: int, column: Array) -> None:
+    """Write of every body whether a wrench on ``on``, reversed on ``by``, lowers or raises what its joint gives."""
+    for body in range(column.shape[0]):
+        column[body] = 0.0
+    # both ways to the frame are gone; where they meet nothing is left
+    while on >= 0:
+        column[on] -= 1.0
+        on = parents[on]
+    while by >= 0:
+        column[by] += 1.0
+        by = parents[by]
 
 
 @inline
-def right_sides(links: Links, i: int, k: int, wrenches: Array, side: Array) -> None:
-    """Write what the lines have to give on each freedom that nothing drives, (K,); wrenches (B, 6) are those needed."""
-    freedoms, axes, bodies = links.freedoms[i], links.axes[i, k], links.bodies[i, k]
-    row = 0
-    for which in range(freedoms.shape[0]):
-        kind, body = freedoms[which, 1], freedoms[which, 0]
-        if kind != DRIVEN:
-            side[row] = -on_freedom(kind, vector(axes[which]), vector(bodies[body, 24:]), wrenches[body])
-            row += 1
+def prepare(links: Links, i: int, joints: Index, room: Room) -> None:
+    """Write what is the same at all poses of a design."""
+    lines, ends, first, last = room.rows.shape[0], links.ends[i], 0, room.order.shape[0] - 1
+    for which in range(room.order.shape[0]):
+        driven = links.freedoms[i, which, 1] == DRIVEN
+        room.order[last if driven else first] = which
+        first, last = (first, last - 1) if driven else (first + 1, last)
+    for which in range(lines):
+        _put_signs(links.parents, ends[which, 0], ends[which, 1], room.signs[:, which])
+    for which in range(joints.shape[0]):
+        held, body, line = joints[which, KIND] <= GUIDE, joints[which, BODY_OF], joints[which, LINE]
+        room.ends[which, 0] = body if held else ends[line, 0]
+        room.ends[which, 1] = links.parents[body] if held else ends[line, 1]
+    for which in range(room.signs.shape[1] - lines):
+        _put_signs(links.parents, room.ends[which, 0], room.ends[which, 1], room.signs[:, lines + which])
 
 
 @inline
-def eliminate(rows: Array, sides: Array) -> bool:
-    """Solve rows (K, K) for the columns of ``sides`` (K, R) in place; false where a pivot has no digits left.
+def inertia_times(body: Posed, data: Array, a: Vector) -> Vector:
+    """Inertia tensor of a body times a vector in fixed axes."""
+    p, q, r = dot(body.x, a), dot(body.y, a), dot(body.z, a)
+    return turned(body.x, body.y, body.z, (
+        data[4] * p + data[5] * q + data[6] * r, data[5] * p + data[7] * q + data[8] * r,
+        data[6] * p + data[8] * q + data[9] * r,
+    ))  # fmt: skip
+
+
+@inline
+def put_wrench(out: Array, force: Vector, at: Vector, couple: Vector) -> None:
+    """Write a force at a point and a couple as a wrench, (6,)."""
+    moment = add(cross(at, force), couple)
+    out[0], out[1], out[2] = force[0], force[1], force[2]
+    out[3], out[4], out[5] = moment[0], moment[1], moment[2]
+
+
+@inline
+def needed(
+    links: Links, i: int, k: int, bodies: Array, tool: Array, drive: Array, carrier: int, output: int, room: Room
+) -> tuple[float, float, Vector, Vector]:
+    """Write what each body and all that hangs on it need, (1), (3); reduced inertia and half its derivative, (6), tool.
+
+    Of the tool the force on it, (2), and its velocity.
+    """
+    need, parents, records = room.need, links.parents, links.bodies[i, k]
+    count, first, second = parents.shape[0], 0.0, 0.0
+    gravity = vector(bodies[BODY * count :])
+    square, change = drive[SPEED] * drive[SPEED], drive[CHANGE]
+    for b in range(count):
+        data, body = bodies[BODY * b : BODY * b + BODY], posed(records[b])
+        arm = turned(body.x, body.y, body.z, (data[1], data[2], data[3]))
+        v, a = add(body.v, cross(body.omega, arm)), add(body.a, spun(body.omega, body.eps, arm))
+        force = scale(data[0], sub(mix(square, a, change, v), gravity))
+        momentum, rate = inertia_times(body, data, body.omega), inertia_times(body, data, body.eps)
+        about = add(mix(square, rate, change, momentum), scale(square, cross(body.omega, momentum)))
+        put_wrench(need[b], force, add(body.at, arm), about)
+        first += data[0] * dot(v, v) + dot(body.omega, momentum)
+        second += data[0] * dot(v, a) + dot(momentum, body.eps)
+    body = posed(records[carrier])
+    arm = turned(body.x, body.y, body.z, (tool[1], tool[2], tool[3]))
+    v, a = add(body.v, cross(body.omega, arm)), add(body.a, spun(body.omega, body.eps, arm))
+    force = sub(scale(tool[0], sub(mix(square, a, change, v), gravity)), vector(drive[FORCE:]))
+    about = cross(add(body.at, arm), force)
+    for at in range(3):
+        need[carrier, at] += force[at]
+        need[carrier, 3 + at] += about[at]
+    first += tool[0] * dot(v, v)
+    second += tool[0] * dot(v, a)
+    freedom, load = max(output, 0), drive[LOAD] if output >= 0 else 0.0
+    loaded, slides = links.freedoms[i, freedom, 0], 1.0 if links.freedoms[i, freedom, 1] == SLIDE else 0.0
+    axis = vector(links.axes[i, k, freedom])
+    arm = scale(slides, cross(posed(records[loaded]).joint, axis))
+    for at in range(3):
+        need[loaded, at] -= slides * load * axis[at]
+        need[loaded, 3 + at] -= load * ((1.0 - slides) * axis[at] + arm[at])
+    for b in range(count - 1, -1, -1):
+        if parents[b] >= 0:
+            for at in range(WRENCH):
+                need[parents[b], at] += need[b, at]
+    return first, second, force, v
+
+
+@inline
+def put_lines(links: Links, i: int, k: int, joints: Index, room: Room) -> None:
+    """Write the wrenches of the lines' unit forces and couples, the screws of the freedoms, the places of the joints.
+
+    A wrench's moment about an axis through P is axis . (M - P x F) = axis . M + (P x axis) . F.
+    """
+    lines, axes, records, none = links.lines[i, k], links.axes[i, k], links.bodies[i, k], (0.0, 0.0, 0.0)
+    for which in range(lines.shape[0]):
+        put_wrench(room.units[which], latter(lines[which]), vector(lines[which]), none)
+    for which in range(axes.shape[0]):
+        axis = vector(axes[which])
+        arm = cross(posed(records[links.freedoms[i, which, 0]]).joint, axis)
+        slides = links.freedoms[i, which, 1] == SLIDE
+        put_wrench(room.screws[which], axis if slides else arm, none, none if slides else axis)
+    for which in range(joints.shape[0]):
+        held, body, line = joints[which, KIND] <= GUIDE, joints[which, BODY_OF], joints[which, LINE]
+        for at in range(3):
+            room.places[which, at] = records[body, 24 + at] if held else lines[line, at]
+
+
+@inline
+def weighed(screw: Array, wrench: Array) -> float:
+    """Moment of a wrench about a freedom's axis; its force along the axis where the freedom is a slide."""
+    return (
+        screw[0] * wrench[0] + screw[1] * wrench[1] + screw[2] * wrench[2]
+        + screw[3] * wrench[3] + screw[4] * wrench[4] + screw[5] * wrench[5]
+    )  # fmt: skip
+
+
+@inline
+def solve(links: Links, i: int, room: Room) -> bool:
+    """Find the forces of the lines, (4), without friction and to the friction of each joint; false at a dead point."""
+    rows, signs, units = room.rows, room.signs, room.units
+    lines = rows.shape[0]
+    for row in range(lines):
+        body, screw = links.freedoms[i, room.order[row], 0], room.screws[room.order[row]]
+        for column in range(lines):
+            rows[row, column] = signs[body, column] * weighed(screw, units[column])
+        rows[row, lines] = -weighed(screw, room.need[body])
+        for column in range(lines, units.shape[0]):
+            rows[row, 1 + column] = -signs[body, column] * weighed(screw, units[column])
+    return eliminate(rows)
+
+
+@inline
+def eliminate(rows: Array) -> bool:
+    """Solve rows (K, K + R) for their last R columns in place; false where a pivot has no digits left.
 
     Gaussian elimination.  Rows are brought to one size first: some are moments, some are forces.
     """
-    n = rows.shape[0]
+    n, width, solvable = rows.shape[0], rows.shape[1], True
     for i in range(n):
         size = 0.0
         for j in range(n):
             size = max(size, abs(rows[i, j]))
         per = 1.0 / size if size > 0.0 else math.nan
-        for j in range(n):
+        for j in range(width):
             rows[i, j] *= per
-        for j in range(sides.shape[1]):
-            sides[i, j] *= per
     for j in range(n):
-        best = j
+        best, most = j, abs(rows[j, j])
         for i in range(j + 1, n):
-            if abs(rows[i, j]) > abs(rows[best, j]):
-                best = i
-        if not abs(rows[best, j]) >= LEAST_COSINE:
-            return False
-        for column in range(j, n):
-            rows[j, column], rows[best, column] = rows[best, column], rows[j, column]
-        for column in range(sides.shape[1]):
-            sides[j, column], sides[best, column] = sides[best, column], sides[j, column]
+            size = abs(rows[i, j])
+            best, most = (i, size) if size > most else (best, most)
+        solvable = solvable and most >= LEAST_COSINE
+        if best != j:
+            for column in range(j, width):
+                rows[j, column], rows[best, column] = rows[best, column], rows[j, column]
+        per = 1.0 / rows[j, j]
         for i in range(j + 1, n):
-            factor = rows[i, j] / rows[j, j]
-            for column in range(j, n):
-                rows[i, column] -= factor * rows[j, column]
-            for column in range(sides.shape[1]):
-                sides[i, column] -= factor * sides[j, column]
-    for column in range(sides.shape[1]):
-        for j in range(n - 1, -1, -1):
-            value = sides[j, column]
+            factor = rows[i, j] * per
+            if factor != 0.0:
+                for column in range(j + 1, width):
+                    rows[i, column] -= factor * rows[j, column]
+        rows[j, j] = per
+    for j in range(n - 1, -1, -1):
+        for column in range(n, width):
+            value = rows[j, column]
             for i in range(j + 1, n):
-                value -= rows[j, i] * sides[i, column]
-            sides[j, column] = value / rows[j, j]
-    return True
+                value -= rows[j, i] * rows[i, column]
+            rows[j, column] = value * rows[j, j]
+    return solvable
 
 
 @inline
-def reactions(links: Links, i: int, k: int, wrenches: Array, room: Array, x: Array, found: Array) -> float:
-    """Write force and moment about the joint of each body's parent on it, (B, 6); the driving torque, (5)."""
-    bodies, freedoms, axes = links.bodies[i, k], links.freedoms[i], links.axes[i, k]
-    for body in range(bodies.shape[0]):
-        for at in range(WRENCH):
-            value = wrenches[body, at]
-            for which in range(x.shape[0]):
-                value += x[which] * room[body, 1 + which, at]
-            found[body, at] = value
-        moment = cross(vector(bodies[body, 24:]), vector(found[body]))
-        for at in range(3):
-            found[body, 3 + at] -= moment[at]
+def wrench_on(room: Room, body: int, answer: int) -> tuple[Vector, Vector]:
+    """Compute what a body's parent puts on it, about the origin: without friction, or to the friction of a joint."""
+    need, units, signs, x = room.need, room.units, room.signs, room.x
+    lines = x.shape[0]
+    force, moment = vector(need[body]), latter(need[body])
+    if answer > 0:
+        sign, at = signs[body, lines + answer - 1], lines + answer - 1
+        force = sign * units[at, 0], sign * units[at, 1], sign * units[at, 2]
+        moment = sign * units[at, 3], sign * units[at, 4], sign * units[at, 5]
+    for which in range(lines):
+        factor, unit = x[which, answer] * signs[body, which], units[which]
+        force, moment = mix(1.0, force, factor, vector(unit)), mix(1.0, moment, factor, latter(unit))
+    return force, moment
+
+
+@inline
+def put_reactions(joints: Index, room: Room) -> None:
+    """Write force and moment about its place of every joint, to every answer."""
+    for which in range(joints.shape[0]):
+        place, body = vector(room.places[which]), joints[which, BODY_OF]
+        for answer in range(room.x.shape[1]):
+            force, moment = wrench_on(room, max(body, 0), answer)
+            moment = sub(moment, cross(place, force))
+            if joints[which, KIND] > GUIDE:
+                force, moment = (0.0, 0.0, 0.0), (0.0, 0.0, 0.0)
+            for line in range(joints[which, LINE], joints[which, LINE] + joints[which, LINES]):
+                force = mix(1.0, force, room.x[line, answer], vector(room.units[line]))
+            put_wrench(room.found[which, answer], force, (0.0, 0.0, 0.0), moment)
+
+
+@inline
+def driving(links: Links, i: int, room: Room, answer: int) -> float:
+    """Torque of the drive on all freedoms that it turns together, (5)."""
     torque = 0.0
-    for which in range(freedoms.shape[0]):
-        if freedoms[which, 1] == DRIVEN:
-            torque += dot(vector(axes[which]), vector(found[freedoms[which, 0], 3:]))
+    for at in range(room.rows.shape[0], room.order.shape[0]):
+        which = room.order[at]
+        force, moment = wrench_on(room, links.freedoms[i, which, 0], answer)
+        torque += dot(vector(room.screws[which]), force) + dot(latter(room.screws[which]), moment)
     return torque
 
 
 @inline
-def at_joint(links: Links, i: int, k: int, joint: Index, found: Array, x: Array) -> tuple[Vector, Vector, Vector]:
-    """Force, moment and place of a body's joint with its parent, or of a joint made of lines that close a loop."""
-    if joint[KIND] <= GUIDE:
-        body = joint[BODY_OF]
-        return vector(found[body]), vector(found[body, 3:]), vector(links.bodies[i, k, body, 24:])
-    force = (0.0, 0.0, 0.0)
-    for which in range(joint[LINE], joint[LINE] + joint[LINES]):
-        force = add(force, scale(x[which], vector(links.lines[i, k, which, 3:])))
-    return force, (0.0, 0.0, 0.0), vector(links.lines[i, k, joint[LINE]])
-
-
-@inline
-def joint_ends(links: Links, i: int, joint: Index) -> tuple[int, int]:
-    """Return numbers of the body that a joint's force acts on and of the one that it acts on reversed."""
-    if joint[KIND] <= GUIDE:
-        return joint[BODY_OF], links.parents[joint[BODY_OF]]
-    return links.ends[i, joint[LINE], 0], links.ends[i, joint[LINE], 1]
+def put_on_frame(out: Array, good: float, place: Vector, force: Vector, moment: Vector) -> None:
+    """Take force and moment of the frame on a body off what the frame bears, (6,)."""
+    about = add(cross(place, force), moment)
+    for at in range(3):
+        out[at] -= good * force[at]
+        out[3 + at] -= good * about[at]
 
 
 @kernel
@@ -255,62 +350,34 @@ def link_loads(
     inertia : (n, m, 2) or None; inertia reduced to the crank and its derivative
     on_tool : (n, m, 4) or None; force of its carrier on the tool, fixed axes, and its power per unit crank speed
     """
-    count, lines = links.parents.shape[0], links.lines.shape[2]
-    room, rows, side = np.empty((count, lines + 1, WRENCH)), np.empty((lines, lines)), np.empty((lines, 1))
-    found = np.empty((count, WRENCH))
-    x = side[:, 0]
+    room = room_for(links, joints.shape[0], 0)
     for i in range(bodies.shape[0]):
+        prepare(links, i, joints, room)
         for k in range(status.shape[1]):
             given = drive[i, k if drive.shape[1] > 1 else 0]
             both = needed(links, i, k, bodies[i], tool[i], given, carrier, output, room)
-            spread(links, i, k, room)
-            coefficients(links, i, k, room, rows)
-            right_sides(links, i, k, room[:, 0], x)
-            if status[i, k] == st.OK and not eliminate(rows, side):
+            put_lines(links, i, k, joints, room)
+            solvable = solve(links, i, room)
+            if status[i, k] == st.OK and not solvable:
                 status[i, k] = st.DEAD_POINT
             good = 1.0 if status[i, k] == st.OK else math.nan
-            driving = reactions(links, i, k, room[:, 0], room, x, found)
+            if forces is not None or on_frame is not None:
+                put_reactions(joints, room)
             if forces is not None:
                 for which in range(joints.shape[0]):
-                    force, moment, _ = at_joint(links, i, k, joints[which], found, x)
-                    for at in range(3):
-                        forces[i, k, which, at] = good * force[at]
-                        forces[i, k, which, 3 + at] = good * moment[at]
+                    for at in range(WRENCH):
+                        forces[i, k, which, at] = good * room.found[which, 0, at]
             if on_frame is not None:
                 for at in range(WRENCH):
                     on_frame[i, k, at] = 0.0
                 for which in range(joints.shape[0]):
-                    force, moment, place = at_joint(links, i, k, joints[which], found, x)
-                    if joint_ends(links, i, joints[which])[1] < 0:
-                        add_wrench(on_frame[i, k], scale(-good, force), place, scale(-good, moment))
+                    found, share = room.found[which, 0], good if room.ends[which, 1] < 0 else 0.0 * good
+                    put_on_frame(on_frame[i, k], share, vector(room.places[which]), vector(found), latter(found))
             if torque is not None:
-                torque[i, k] = good * driving
+                torque[i, k] = good * driving(links, i, room, 0)
             if inertia is not None:
                 inertia[i, k, 0], inertia[i, k, 1] = good * both[0], good * 2.0 * both[1]
             if on_tool is not None:
                 for at in range(3):
                     on_tool[i, k, at] = good * both[2][at]
                 on_tool[i, k, 3] = good * dot(both[2], both[3])
-
-
-@inline
-def needed(
-    links: Links, i: int, k: int, bodies: Array, tool: Array, drive: Array, carrier: int, output: int, room: Array
-) -> tuple[float, float, Vector, Vector]:
-    """Empty the room and write what each body needs into its column 0; inertias and tool as :func:`add_tool`."""
-    count = links.parents.shape[0]
-    for body in range(count):
-        for column in range(room.shape[1]):
-            for at in range(WRENCH):
-                room[body, column, at] = 0.0
-    gravity = vector(bodies[BODY * count :])
-    first, second, force, v = add_tool(room[carrier, 0], links.bodies[i, k, carrier], tool, gravity, drive)
-    for body in range(count):
-        own = bodies[BODY * body : BODY * (body + 1)]
-        more, bend = add_inertia(room[body, 0], links.bodies[i, k, body], own, gravity, drive)
-        first += more
-        second += bend
-    if output >= 0:
-        none, load = (0.0, 0.0, 0.0), scale(-drive[LOAD], vector(links.axes[i, k, output]))
-        add_wrench(room[links.freedoms[i, output, 0], 0], none, none, load)
-    return first, second, force, v

@@ -56,10 +56,41 @@ class Moving(NamedTuple):
     eps: Vector
 
 
+class Posed(NamedTuple):
+    """A body at one pose: its rates, its axes and the point of its joint with the parent."""
+
+    at: Vector
+    v: Vector
+    a: Vector
+    omega: Vector
+    eps: Vector
+    x: Vector
+    y: Vector
+    z: Vector
+    joint: Vector
+
+
+@inline
+def posed(body: Array) -> Posed:
+    """Read the record of a body, (PER_BODY,)."""
+    # Written out: slices cost their bounds, and numba compiles a helper anew for every literal index.
+    return Posed(
+        (body[0], body[1], body[2]), (body[3], body[4], body[5]), (body[6], body[7], body[8]),
+        (body[9], body[10], body[11]), (body[12], body[13], body[14]), (body[15], body[16], body[17]),
+        (body[18], body[19], body[20]), (body[21], body[22], body[23]), (body[24], body[25], body[26]),
+    )  # fmt: skip
+
+
 @inline
 def vector(a: Array) -> Vector:
     """First three numbers."""
     return a[0], a[1], a[2]
+
+
+@inline
+def latter(a: Array) -> Vector:
+    """Second three numbers; a slice would cost its bounds."""
+    return a[3], a[4], a[5]
 
 
 @inline
@@ -71,9 +102,8 @@ def put(out: Array, a: Vector) -> None:
 @inline
 def moving(body: Array) -> Moving:
     """Return rates of a body from its record, (PER_BODY,)."""
-    return Moving(
-        vector(body), vector(body[3:]), vector(body[6:]), vector(body[9:]), vector(body[12:]),
-    )  # fmt: skip
+    all_of = posed(body)
+    return Moving(all_of.at, all_of.v, all_of.a, all_of.omega, all_of.eps)
 
 
 @inline

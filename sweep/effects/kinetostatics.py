@@ -1,7 +1,7 @@
 """D1-D3 in closed form: reactions, driving torque and friction of crank, coupler and a rocker or a slider.
 
-What a family needs for this is :class:`sweep.families.capabilities.JointRecords`.  The same of any number of links, at
-four times the time without friction and eleven times with it: :mod:`sweep.effects.link_loads`.
+What a family needs for this is :class:`sweep.families.capabilities.JointRecords`.  The same of any number of links,
+at three times the time without friction and 4.6 times with it: :mod:`sweep.effects.link_loads`.
 """
 
 from __future__ import annotations

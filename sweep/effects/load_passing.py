@@ -1,8 +1,8 @@
 """Loads of a stage of a chain, and what it hands back to the stage that drives it, by what its family offers.
 
 A family with joint records has its loads in closed form, one with a tree of links by virtual power.  The tree alone
-would do: for 1 100 crank-rockers at 360 angles both agree to 2e-15, but the closed form takes
-0.46 us per pose against 2.0 without friction, 1.6 us against 18 with it.
+would do: for crank-rockers, slider-cranks and guides at 360 angles both agree to 2e-15.  But it takes, with the poses
+of its bodies, 3.1 times the closed form without friction (0.40 us per pose) and 4.6 times with it (1.36 us).
 """
 
 from __future__ import annotations
