@@ -19,6 +19,7 @@ if TYPE_CHECKING:
     from sweep.evaluation.joints import joints
     from sweep.evaluation.mechanism import mechanism
     from sweep.evaluation.poses import evaluate
+    from sweep.evaluation.rods import rod
     from sweep.evaluation.summaries import summarise
     from sweep.exchange.export import export
     from sweep.exchange.points import from_points
@@ -42,6 +43,7 @@ __all__ = [
     "machine",
     "mechanism",
     "plot",
+    "rod",
     "run",
     "scan",
     "summarise",
@@ -64,6 +66,7 @@ _HOMES = {
     "load": "sweep.dataset.store",
     "machine": "sweep.families",
     "mechanism": "sweep.evaluation.mechanism",
+    "rod": "sweep.evaluation.rods",
     "run": "sweep.engine.run",
     "scan": "sweep.dataset.reading",
     "summarise": "sweep.evaluation.summaries",

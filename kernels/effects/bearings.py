@@ -113,12 +113,7 @@ def sliding_bearings(
     moment: Array,
     bearings: Array,
     status: Status,
-    support1: Array | None,
-    support2: Array | None,
-    thrust: Array | None,
-    pressure1: Array | None,
-    pressure2: Array | None,
-    pressure3: Array | None,
+    out: Array,
 ) -> None:
     """Compute support forces and mean pressures of two journals and a collar, massless estimate.
 
@@ -128,8 +123,7 @@ def sliding_bearings(
     moment : (n,) resisting torque M_c on the rocker
     bearings : (n, 10) columns of :class:`Sliding`
     status : (n, m), in and out; JAMMED where friction leaves no driving arm
-    support1, support2, thrust : (n, m) or None; radial forces and axial force
-    pressure1, pressure2, pressure3 : (n, m) or None; mean pressures of the journals and the collar
+    out : (6, n, m); radial forces of the supports, axial force, mean pressures of the journals and the collar
     """
     for i in range(t_tau.shape[0]):
         data = sliding_data(bearings, i)
@@ -139,18 +133,8 @@ def sliding_bearings(
             if status[i, j] == st.OK and not r.arm > 0.0:
                 status[i, j] = st.JAMMED
             good = 1.0 if status[i, j] == st.OK else math.nan
-            if support1 is not None:
-                support1[i, j] = good * r.r1
-            if support2 is not None:
-                support2[i, j] = good * r.r2
-            if thrust is not None:
-                thrust[i, j] = good * r.axial
-            if pressure1 is not None:
-                pressure1[i, j] = good * r.p1
-            if pressure2 is not None:
-                pressure2[i, j] = good * r.p2
-            if pressure3 is not None:
-                pressure3[i, j] = good * r.p3
+            out[0, i, j], out[1, i, j], out[2, i, j] = good * r.r1, good * r.r2, good * r.axial
+            out[3, i, j], out[4, i, j], out[5, i, j] = good * r.p1, good * r.p2, good * r.p3
 
 
 @kernel
@@ -161,10 +145,7 @@ def rolling_bearings(
     moment: Array,
     bearings: Array,
     status: Status,
-    equivalent1: Array | None,
-    equivalent2: Array | None,
-    life1: Array | None,
-    life2: Array | None,
+    out: Array,
 ) -> None:
     """Compute equivalent loads and L10 lives [10^6 turns] of two rolling bearings, frictionless support forces.
 
@@ -174,7 +155,7 @@ def rolling_bearings(
     moment : (n,) resisting torque on the rocker
     bearings : (n, 11) columns of :class:`Rolling`
     status : (n, m), in and out; JAMMED at cos(theta1) <= 0
-    equivalent1, equivalent2, life1, life2 : (n, m) or None
+    out : (4, n, m); equivalent loads and lives of both bearings
     """
     for i in range(t_tau.shape[0]):
         c, z1, z2 = bearings[i, 0], bearings[i, 1], bearings[i, 2]
@@ -189,14 +170,9 @@ def rolling_bearings(
             span = abs(z2 - z1)
             first = equivalent_load(bearings, i, abs(force) * pi1 / span, thrust if bearings[i, 10] == 1.0 else 0.0)
             second = equivalent_load(bearings, i, abs(force) * pi2 / span, thrust if bearings[i, 10] == 2.0 else 0.0)
-            if equivalent1 is not None:
-                equivalent1[i, j] = good * first
-            if equivalent2 is not None:
-                equivalent2[i, j] = good * second
-            if life1 is not None:
-                life1[i, j] = good * (bearings[i, 8] / first) ** bearings[i, 7]
-            if life2 is not None:
-                life2[i, j] = good * (bearings[i, 8] / second) ** bearings[i, 7]
+            out[0, i, j], out[1, i, j] = good * first, good * second
+            out[2, i, j] = good * (bearings[i, 8] / first) ** bearings[i, 7]
+            out[3, i, j] = good * (bearings[i, 8] / second) ** bearings[i, 7]
 
 
 @inline
@@ -215,11 +191,7 @@ def bearing_loads(
     axis: Array,
     bearings: Array,
     status: Status,
-    radial1: Array | None,
-    radial2: Array | None,
-    axial: Array | None,
-    equivalent1: Array | None,
-    equivalent2: Array | None,
+    out: Array,
 ) -> None:
     """Compute loads of two bearings that carry the force and the moment on a shaft.
 
@@ -229,7 +201,7 @@ def bearing_loads(
     axis : (n, m or 1, 3) axis of the shaft
     bearings : (n, 11) columns of :class:`kernels.effects.bearings.Rolling`; c is not read
     status : (n, m), in; nan where it is not OK
-    radial1, radial2, axial, equivalent1, equivalent2 : (n, m) or None
+    out : (5, n, m); radial loads of both, axial load, equivalent loads of both
     """
     for i in range(forces.shape[0]):
         for j in range(forces.shape[1]):
@@ -237,19 +209,10 @@ def bearing_loads(
             f, m = vector(forces[i, j, force:]), vector(forces[i, j, moment:])
             first, second, along = supports(f, m, k, bearings[i, 1], bearings[i, 2])
             good = 1.0 if status[i, j] == st.OK else math.nan
-            thrust = abs(along)
-            if radial1 is not None:
-                radial1[i, j] = good * first
-            if radial2 is not None:
-                radial2[i, j] = good * second
-            if axial is not None:
-                axial[i, j] = good * along
-            if equivalent1 is not None:
-                on_first = thrust if bearings[i, 10] == 1.0 else 0.0
-                equivalent1[i, j] = good * equivalent_load(bearings, i, first, on_first)
-            if equivalent2 is not None:
-                on_second = thrust if bearings[i, 10] == 2.0 else 0.0
-                equivalent2[i, j] = good * equivalent_load(bearings, i, second, on_second)
+            on_first, on_second = (abs(along), 0.0) if bearings[i, 10] == 1.0 else (0.0, abs(along))
+            out[0, i, j], out[1, i, j], out[2, i, j] = good * first, good * second, good * along
+            out[3, i, j] = good * equivalent_load(bearings, i, first, on_first)
+            out[4, i, j] = good * equivalent_load(bearings, i, second, on_second)
 
 
 @kernel
@@ -258,12 +221,9 @@ def journal_pressures(
     second: Array,
     axial: Array,
     journals: Array,
-    limits: Array | None,
+    limits: Array,
     status: Status,
-    pressure1: Array | None,
-    pressure2: Array | None,
-    pressure3: Array | None,
-    used: Array | None,
+    out: Array,
 ) -> None:
     """Compute mean pressures of two journals and a collar, and the largest one over its permissible value.
 
@@ -271,9 +231,9 @@ def journal_pressures(
     ----------
     first, second, axial : (n, m) loads of the journals and of the collar
     journals : (n, 4) diameter, lengths of journal 1 and 2, diameter of the collar; 0 for a shaft without one
-    limits : (n, 3) or None; permissible pressures of journal 1, journal 2, collar; read for ``used``
+    limits : (n, 3); permissible pressures of journal 1, journal 2, collar; 0 where nobody asks for the share
     status : (n, m), in; nan where it is not OK
-    pressure1, pressure2, pressure3, used : (n, m) or None
+    out : (4, n, m); pressures of the journals and the collar, the largest one over its permissible value
     """
     for i in range(first.shape[0]):
         for j in range(first.shape[1]):
@@ -284,12 +244,6 @@ def journal_pressures(
                 first[i, j], second[i, j], axial[i, j] if collar else 0.0, journals[i, 0], journals[i, 1],
                 journals[i, 2], outer,
             )  # fmt: skip
-            if pressure1 is not None:
-                pressure1[i, j] = good * p1
-            if pressure2 is not None:
-                pressure2[i, j] = good * p2
-            if pressure3 is not None:
-                pressure3[i, j] = good * p3
-            if used is not None and limits is not None:
-                share = max(p1 / limits[i, 0], p2 / limits[i, 1])
-                used[i, j] = good * (max(share, p3 / limits[i, 2]) if collar else share)
+            share = max(p1 / limits[i, 0], p2 / limits[i, 1])
+            out[0, i, j], out[1, i, j], out[2, i, j] = good * p1, good * p2, good * p3
+            out[3, i, j] = good * (max(share, p3 / limits[i, 2]) if collar else share)

@@ -10,11 +10,8 @@ from __future__ import annotations
 import math
 from typing import NamedTuple
 
-import numpy as np
-
-from kernels import status as st
 from kernels.jit import inline, kernel  # long helpers are kernels: folded into one another they took 17 s to compile
-from kernels.types import TWO_PI, Array, Status
+from kernels.types import TWO_PI, Array
 
 PLATE, RACK, FLIGHT = 0, 1, 2
 _PARTS = 4
@@ -93,7 +90,7 @@ def flown(foot: Foot, state: State, phi: float) -> tuple[float, float]:
 
 
 @inline
-def _force(foot: Foot, y: float, bend: float) -> float:
+def held(foot: Foot, y: float, bend: float) -> float:
     """Contact force of a foot that follows the rack, divided by m omega^2; (5)."""
     return foot.g0 + foot.kappa * foot.kappa * y + bend
 
@@ -105,7 +102,7 @@ def _measure(path: Array, foot: Foot, state: State, j: int, s: float, which: int
     if which == 0:
         return y
     if which == 1:
-        return _force(foot, y, bend)
+        return held(foot, y, bend)
     return flown(foot, state, (j + s) * (TWO_PI / path.shape[1]))[0] - max(y, 0.0)
 
 
@@ -141,7 +138,7 @@ def _struck(path: Array, foot: Foot, j: int, s: float, speed: float) -> tuple[St
     on_rack = y > 0.0 or (y >= -1e-14 * abs(y1) and y1 > 0.0)
     ground, surface = (max(y, 0.0), y1) if on_rack else (0.0, 0.0)
     closing = surface - speed
-    push = _force(foot, ground, bend if on_rack else 0.0)
+    push = held(foot, ground, bend if on_rack else 0.0)
     rebound = foot.restitution * max(closing, 0.0)
     if rebound > foot.still:
         # The hop is highest after rebound/push at a constant push; a longer one is seen by the parts of a cell.
@@ -215,7 +212,7 @@ def _record(tally: Array, path: Array, foot: Foot, state: State, j: int, low: fl
 
 
 @kernel
-def _cell(path: Array, foot: Foot, state: State, j: int, tally: Array) -> tuple[State, bool]:
+def march_cell(path: Array, foot: Foot, state: State, j: int, tally: Array) -> tuple[State, bool]:
     """March over one cell; the state at its end, false if the events did not come to an end."""
     s, step = 0.0, TWO_PI / path.shape[1]
     for _ in range(_MOST_EVENTS):
@@ -241,77 +238,3 @@ def _cell(path: Array, foot: Foot, state: State, j: int, tally: Array) -> tuple[
                 tally[1] = phi
         state, s = following, at
     return state, False
-
-
-@kernel
-def march(path: Array, feet: Array, turns: int, status: Status, outputs: Array, heights: Array, forces: Array) -> None:
-    """March feet over their racks for some turns and keep the last one; (4)-(12) of docs/foot.md.
-
-    Parameters
-    ----------
-    path : (n, 6, N) rack at N equal crank angles from 0: height above the plate, way along the feed as rows 0 and 3,
-        their first and second derivatives by phi in the rows behind each [length]
-    feet : (n, 5) mass, spring stiffness, preload (weight included), speed [rad per time], restitution
-    turns : how many turns are marched, from rest on the plate where the rack is lowest
-    status : (n,) out; OK, NO_EVENT (the rack never lies below the plate), NOT_CONVERGED (bounces without end) or
-        INVALID_INPUT
-    outputs : (11, n) out of the last turn in the order of :data:`OUTPUTS`; angles in [0, 2 pi), nan where there is none
-    heights, forces : (n, N) out; height of the foot and force between it and rack or plate at every node
-
-    Notes
-    -----
-    A bounce with less than 1e-9 of the greatest speed of the rack is taken for the last.
-    """
-    tally = np.empty(7)
-    for i in range(path.shape[0]):
-        rack, count = path[i], path.shape[2]
-        mass, stiffness, preload, speed, restitution = feet[i, 0], feet[i, 1], feet[i, 2], feet[i, 3], feet[i, 4]
-        for k in range(11):
-            outputs[k, i] = math.nan
-        heights[i, :] = math.nan
-        forces[i, :] = math.nan
-        valid = mass > 0.0 and stiffness >= 0.0 and preload > 0.0 and speed > 0.0 and 0.0 <= restitution < 1.0
-        unit = mass * speed * speed
-        lowest, quickest = 0, 0.0
-        for j in range(count):
-            valid = valid and abs(rack[0, j]) < math.inf
-            quickest = max(quickest, abs(rack[1, j]))
-            if rack[0, j] < rack[0, lowest]:
-                lowest = j
-        status[i] = st.OK if valid and unit > 0.0 and unit < math.inf else st.INVALID_INPUT
-        if status[i] == st.OK and rack[0, lowest] > 0.0:
-            status[i] = st.NO_EVENT
-        if status[i] != st.OK:
-            continue
-        foot = Foot(math.sqrt(stiffness / mass) / speed, preload / unit, restitution, 1e-9 * quickest)
-        state = State(PLATE, 0.0, 0.0, 0.0, 0.0)
-        least, most, still_lying = math.inf, 0.0, True
-        for turn in range(turns):
-            tally[:] = 0.0
-            tally[1], tally[2] = math.nan, math.nan
-            still_lying = state.mode == PLATE
-            for k in range(count):
-                j = turn * count + lowest + k
-                node, phi = (lowest + k) % count, j * (TWO_PI / count)
-                if state.mode == FLIGHT:
-                    heights[i, node], forces[i, node] = flown(foot, state, phi)[0], 0.0
-                else:
-                    on_rack = state.mode == RACK
-                    heights[i, node] = rack[0, node] if on_rack else 0.0
-                    forces[i, node] = unit * _force(foot, heights[i, node], rack[2, node] if on_rack else 0.0)
-                state, ended = _cell(rack, foot, state, j, tally)
-                if not ended:
-                    status[i] = st.NOT_CONVERGED
-        if status[i] != st.OK:
-            heights[i, :] = math.nan
-            forces[i, :] = math.nan
-            continue
-        for j in range(count):
-            if rack[0, j] > 0.0:
-                least = min(least, unit * _force(foot, rack[0, j], rack[2, j]))
-            most = max(most, forces[i, j])
-        outputs[0, i], outputs[1, i], outputs[2, i] = tally[0], tally[1] % TWO_PI, tally[2] % TWO_PI
-        outputs[3, i], outputs[4, i], outputs[5, i] = tally[3], tally[4], tally[5]
-        outputs[6, i], outputs[7, i] = tally[6] * speed, mass * (1.0 + restitution) * tally[6] * speed
-        outputs[8, i], outputs[9, i] = least if least < math.inf else math.nan, most
-        outputs[10, i] = 1.0 if still_lying and state.mode == PLATE else 0.0

@@ -1,4 +1,4 @@
-"""Presser foot on fabric: the march of :mod:`kernels.effects.foot` with a spring and a damper between foot and ground.
+"""Presser foot on fabric, a spring and a damper between foot and ground; and the march, of a rigid foot too.
 
 Equations (13)-(16) of docs/foot.md.  Ground is the rack where it stands above the plate, else the plate.  A cell of the
 path is cut into parts over which the foot on its fabric turns by at most a radian; over a part the forcing is a
@@ -13,11 +13,11 @@ from typing import NamedTuple
 import numpy as np
 
 from kernels import status as st
-from kernels.effects.foot import Foot, State, flown, rack_height
+from kernels.effects.foot import FLIGHT, PLATE, RACK, Foot, State, flown, held, march_cell, rack_height
 from kernels.jit import inline, kernel
 from kernels.types import TWO_PI, Array, Status
 
-LYING, FLIGHT = 1, 2
+LYING = 1  # in place of PLATE and RACK
 TERMS = 22  # of the power series: over a radian the next one is below 2^-53
 PARTS = 4  # of a cell at least
 MOST_PARTS = 4096  # of a cell: a fabric so stiff that it swings 650 times within a five-hundredth of a turn
@@ -205,37 +205,57 @@ def _cell(
     return state, True
 
 
+@inline
+def _borne(path: Array, node: int, foot: Foot, fabric: Fabric, state: State, phi: float) -> tuple[float, float]:
+    """Height of the foot at a node, and the force that it bears over m omega^2; (5), (14)."""
+    y, force = state.y, 0.0
+    if state.mode == FLIGHT:
+        y = flown(foot, state, phi)[0]
+    elif fabric.stiffness > 0.0:
+        ground, slope = (path[0, node], path[1, node]) if path[0, node] > 0.0 else (0.0, 0.0)
+        force = max(fabric.stiffness * (ground - y) + fabric.damping * (slope - state.v), 0.0)
+    else:
+        y, bend = (path[0, node], path[2, node]) if state.mode == RACK else (0.0, 0.0)
+        force = held(foot, y, bend)
+    return y, force
+
+
 @kernel
-def march_on_fabric(
-    path: Array, feet: Array, turns: int, status: Status, outputs: Array, heights: Array, forces: Array
-) -> None:
-    """March feet on fabric over their racks for some turns and keep the last one; (13)-(16) of docs/foot.md.
+def march(path: Array, feet: Array, turns: int, status: Status, outputs: Array, heights: Array, forces: Array) -> None:
+    """March feet over their racks for some turns and keep the last one; (4)-(16) of docs/foot.md.
 
     Parameters
     ----------
-    path, turns, heights, forces : as of :func:`kernels.effects.foot.march`; the foot's height is counted from the
-        unpressed fabric on the plate, so a foot that lies is below 0
-    feet : (n, 7) mass, spring stiffness, preload (weight included), speed [rad per time], restitution (0: the fabric's
-        damper takes the energy of an impact), stiffness and damping of the fabric
-    status : (n,) out; as of ``march``; NOT_CONVERGED too for a fabric that swings more than 650 times a cell
-    outputs : (11, n) out of the last turn in the order of :data:`kernels.effects.foot.OUTPUTS`.  ``impulse`` is 0, as
-        forces are finite; ``least_force`` is the least force of the fabric while the rack stands above the plate
+    path : (n, 6, N) rack at N equal crank angles from 0: height above the plate, way along the feed as rows 0 and 3,
+        their first and second derivatives by phi in the rows behind each [length]
+    feet : (n, 7) mass, spring stiffness, preload (weight included), speed [rad per time], restitution, stiffness and
+        damping of the fabric; both 0 for none.  On fabric restitution is 0: its damper takes the energy of an impact
+    turns : how many turns are marched, from rest on the plate where the rack is lowest
+    status : (n,) out; OK, NO_EVENT (the rack never lies below the plate), NOT_CONVERGED (bounces without end, or a
+        fabric that swings more than 650 times a cell) or INVALID_INPUT
+    outputs : (11, n) out of the last turn in the order of :data:`kernels.effects.foot.OUTPUTS`; angles in [0, 2 pi),
+        nan where there is none.  On fabric ``impulse`` is 0, as forces are finite, and ``least_force`` is the least
+        force of the fabric while the rack stands above the plate
+    heights, forces : (n, N) out; height of the foot and force between it and rack or plate at every node.  On fabric
+        heights count from the unpressed fabric on the plate, so a foot that lies is below 0
+
+    Notes
+    -----
+    A bounce with less than 1e-9 of the greatest speed of the rack is taken for the last.
     """
     tally, work = np.empty(9), np.empty((3, TERMS))
     for i in range(path.shape[0]):
         rack, count = path[i], path.shape[2]
-        mass, stiffness, preload, speed = feet[i, 0], feet[i, 1], feet[i, 2], feet[i, 3]
+        mass, stiffness, preload, speed, restitution = feet[i, 0], feet[i, 1], feet[i, 2], feet[i, 3], feet[i, 4]
         soft, damping = feet[i, 5], feet[i, 6]
-        for k in range(11):
-            outputs[k, i] = math.nan
-        heights[i, :] = math.nan
-        forces[i, :] = math.nan
-        valid = mass > 0.0 and stiffness >= 0.0 and preload > 0.0 and speed > 0.0 and soft > 0.0 and damping >= 0.0
-        valid = valid and feet[i, 4] == 0.0
-        unit, lowest, highest = mass * speed * speed, 0, 0.0
+        rigid, step, unit = soft == 0.0 and damping == 0.0, TWO_PI / count, mass * speed * speed
+        outputs[:, i], heights[i, :], forces[i, :] = math.nan, math.nan, math.nan
+        valid = mass > 0.0 and stiffness >= 0.0 and preload > 0.0 and speed > 0.0 and 0.0 <= restitution < 1.0
+        valid = valid and (rigid or (soft > 0.0 and damping >= 0.0 and restitution == 0.0))
+        lowest, quickest, highest = 0, 0.0, 0.0
         for j in range(count):
             valid = valid and abs(rack[0, j]) < math.inf
-            highest = max(highest, rack[0, j])
+            quickest, highest = max(quickest, abs(rack[1, j])), max(highest, rack[0, j])
             if rack[0, j] < rack[0, lowest]:
                 lowest = j
         status[i] = st.OK if valid and unit > 0.0 and unit < math.inf else st.INVALID_INPUT
@@ -243,17 +263,17 @@ def march_on_fabric(
             status[i] = st.NO_EVENT
         if status[i] != st.OK:
             continue
-        foot = Foot(math.sqrt(stiffness / mass) / speed, preload / unit, 0.0, 0.0)
+        foot = Foot(math.sqrt(stiffness / mass) / speed, preload / unit, restitution, 1e-9 * quickest)
         fabric = Fabric(soft / unit, damping / (mass * speed))
-        step = TWO_PI / count
-        quick = max(math.sqrt(foot.kappa * foot.kappa + fabric.stiffness), fabric.damping) * step
+        spring = foot.kappa * foot.kappa + fabric.stiffness
+        quick = max(math.sqrt(spring), fabric.damping) * step
         parts = max(PARTS, math.ceil(min(quick, 2.0 * MOST_PARTS)))
-        if parts > MOST_PARTS:
+        if parts > MOST_PARTS and not rigid:
             status[i] = st.NOT_CONVERGED
             continue
-        rest = -foot.g0 / (foot.kappa * foot.kappa + fabric.stiffness)
-        begin = lowest * step
-        state = State(LYING, begin, rest, 0.0, begin)
+        rest = 0.0 if rigid else -foot.g0 / spring
+        begin = 0.0 if rigid else lowest * step
+        state = State(PLATE if rigid else LYING, begin, rest, 0.0, begin)
         first = state
         for turn in range(turns):
             tally[:] = 0.0
@@ -261,25 +281,31 @@ def march_on_fabric(
             first = state
             for k in range(count):
                 j, node = turn * count + lowest + k, (lowest + k) % count
-                y, v = (state.y, state.v) if state.mode == LYING else flown(foot, state, j * step)
-                heights[i, node], forces[i, node] = y, 0.0
-                if state.mode == LYING:
-                    above = rack[0, node] > 0.0
-                    ground, slope = (rack[0, node], rack[1, node]) if above else (0.0, 0.0)
-                    push = fabric.stiffness * (ground - y) + fabric.damping * (slope - v)
-                    forces[i, node] = unit * max(push, 0.0)
-                state, ended = _cell(rack, foot, fabric, state, j, parts, work, tally)
+                y, force = _borne(rack, node, foot, fabric, state, j * step)
+                heights[i, node], forces[i, node] = y, unit * force
+                if rigid:
+                    state, ended = march_cell(rack, foot, state, j, tally)
+                else:
+                    state, ended = _cell(rack, foot, fabric, state, j, parts, work, tally)
                 if not ended:
                     status[i] = st.NOT_CONVERGED
         if status[i] != st.OK:
-            heights[i, :] = math.nan
-            forces[i, :] = math.nan
+            heights[i, :], forces[i, :] = math.nan, math.nan
             continue
+        settled = first.mode == state.mode and state.mode == (PLATE if rigid else LYING)
+        most = unit * tally[7]
+        if rigid:
+            for j in range(count):
+                if rack[0, j] > 0.0:
+                    tally[8] = min(tally[8], held(foot, rack[0, j], rack[2, j]))
+                most = max(most, forces[i, j])
+        else:
+            # A foot that lies still rises and sinks on its fabric: turns are alike once it comes back where it was.
+            moved = max(abs(state.y - first.y), abs(state.v - first.v))
+            settled = settled and moved <= ALIKE * max(-rest, highest)
         outputs[0, i], outputs[1, i], outputs[2, i] = tally[0], tally[1] % TWO_PI, tally[2] % TWO_PI
         outputs[3, i], outputs[4, i], outputs[5, i] = tally[3], tally[4], tally[5]
-        outputs[6, i], outputs[7, i] = tally[6] * speed, 0.0
-        outputs[8, i], outputs[9, i] = unit * tally[8] if tally[8] < math.inf else math.nan, unit * tally[7]
-        # A foot that lies still rises and sinks on its fabric: turns are alike once it comes back to where it was.
-        moved = max(abs(state.y - first.y), abs(state.v - first.v))
-        lying = first.mode == LYING and state.mode == LYING
-        outputs[10, i] = 1.0 if lying and moved <= ALIKE * max(-rest, highest) else 0.0
+        outputs[6, i] = tally[6] * speed
+        outputs[7, i] = mass * (1.0 + restitution) * tally[6] * speed if rigid else 0.0
+        outputs[8, i] = unit * tally[8] if tally[8] < math.inf else math.nan
+        outputs[9, i], outputs[10, i] = most, 1.0 if settled else 0.0

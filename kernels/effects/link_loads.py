@@ -205,10 +205,7 @@ def put_lines(links: Links, i: int, k: int, joints: Index, room: Room) -> None:
 @inline
 def weighed(screw: Array, wrench: Array) -> float:
     """Moment of a wrench about a freedom's axis; its force along the axis where the freedom is a slide."""
-    return (
-        screw[0] * wrench[0] + screw[1] * wrench[1] + screw[2] * wrench[2]
-        + screw[3] * wrench[3] + screw[4] * wrench[4] + screw[5] * wrench[5]
-    )  # fmt: skip
+    return dot(vector(screw), vector(wrench)) + dot(latter(screw), latter(wrench))
 
 
 @inline

@@ -14,8 +14,8 @@ from sweep.study.written import design_entries, toml
 
 # Units of the examples by unit word.  Those with forces or masses are in SI, the others in any length unit.
 SI = {
-    "length": "m", "1/length": "1/m", "mass": "kg", "inertia": "kg*m^2", "force": "N", "torque": "N*m",
-    "pressure": "N/m^2", "stiffness": "N/m", "damping": "N*s/m", "acceleration": "m/s^2",
+    "length": "m", "1/length": "1/m", "mass": "kg", "line_mass": "kg/m", "inertia": "kg*m^2", "force": "N",
+    "torque": "N*m", "pressure": "N/m^2", "stiffness": "N/m", "damping": "N*s/m", "acceleration": "m/s^2",
 }  # fmt: skip
 LENGTHS = {"length": "mm", "1/length": "1/mm"}
 POWER = {"length": 1, "1/length": -1}

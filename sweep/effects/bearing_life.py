@@ -19,7 +19,7 @@ from sweep.effects.scene import Rows, Scene, refuse
 from sweep.effects.turn import chosen
 from sweep.families.base import Accuracy, Array, Columns, Output
 from sweep.families.capabilities import Assembly
-from sweep.families.poses import filled_each
+from sweep.families.poses import filled_all
 from sweep.numerics.events import sign_changes, with_events
 from sweep.numerics.quadrature import integrate
 from sweep.numerics.singularities import crowded, singularities, turn_edges
@@ -105,7 +105,7 @@ class Shaft:
         status, names = status.copy(), load_names(self.name)
         refuse(status, loads.together(scene, self.name))
         arguments = (forces, *self.columns, np.ascontiguousarray(self.axis(scene)), self.data(scene))
-        return filled_each(bearing_loads, arguments, names, wanted & frozenset(names), status)
+        return filled_all(bearing_loads, arguments, names, wanted & frozenset(names), status)
 
 
 def bends(shaft: Shaft, *more: str) -> tuple[Bend, ...]:

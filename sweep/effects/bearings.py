@@ -14,7 +14,7 @@ from sweep.effects.loads import SPEED, together
 from sweep.effects.pressure import components
 from sweep.effects.scene import Scene, refuse
 from sweep.families.base import Array, Columns, Output, Parameter
-from sweep.families.poses import filled_each
+from sweep.families.poses import filled_all, filled_each
 
 EQUATION = "B1 (1)-(4)"
 FORMULAS = (
@@ -107,7 +107,8 @@ def _compute(
     arguments = [*direction, scene.inputs["resisting_torque"], _data(scene, inputs)]
     if permissible is not None:
         arguments.append(permissible(scene))
-    return filled_each(kernel, arguments, tuple(o.name for o in results), wanted, status)
+    filling = filled_all if permissible is None else filled_each
+    return filling(kernel, arguments, tuple(o.name for o in results), wanted, status)
 
 
 def _thrust(scene: Scene) -> Array:

@@ -16,7 +16,7 @@ from sweep.effects.scene import Driven, Scene
 from sweep.families.base import Array, Parameter
 
 # Units of what a stage has to be given to need a torque.
-WEIGHING = frozenset({"mass", "inertia", "force", "torque"})
+WEIGHING = frozenset({"mass", "line_mass", "inertia", "force", "torque"})
 
 STEP = 2e-3  # of the follower's angle, for the slope of the load: error of fourth order against rounding
 

@@ -32,7 +32,6 @@ COUPLES_WITH_FRICTION = {
     f"drive_torque{FRICTION_SUFFIX}": ("torque", "torque that drives the crank" + FRICTION_TEXT),
 }
 CONTRACTION = "friction_contraction"
-ACROSS = (7, 9)  # of a body's mass, centre x y z and moments xx xy xz yy yz zz
 PASSES = "friction_passes"
 
 
@@ -132,12 +131,14 @@ def _drive(scene: Scene, load: Array) -> Array:
 def _bodies(scene: Scene) -> Array:
     """Masses, centres, inertias and gravity in the order of the kernels."""
     follower = loads.follower(scene)
-    found, lengths = scene.table(follower.bodies), scene.records[1][:, 12:15]
-    for k, name in enumerate(follower.rods):
-        body, rod, length = found[:, BODY * k : BODY * (k + 1)], scene.inputs[name], lengths[:, k]
-        body[:, 1] += rod * 0.5 * length
-        for moment in ACROSS:
-            body[:, moment] += rod * body[:, 0] * length**2 / 12.0
+    found, ends = scene.table(follower.bodies), np.zeros((len(scene.designs), 3, 3))
+    ends[:, :, 0] = scene.records[1][:, 12:15]
+    for k, body in enumerate(follower.rods):
+        columns, rod, line = (
+            found[:, BODY * k : BODY * (k + 1)],
+            *(scene.inputs[f"{name}_{body}"] for name in ("rod", "line_mass")),
+        )
+        loads.put_rod(columns, rod, line, np.zeros_like(ends[:, k]), ends[:, k])
     return found
 
 

@@ -22,7 +22,7 @@ from sweep.effects.scene import Scene, refuse, take_over
 from sweep.families import family
 from sweep.families.base import Accuracy, Array, Columns, Output, Parameter
 from sweep.families.link_tree import LinkJoint, LinkTree
-from sweep.families.poses import filled_each
+from sweep.families.poses import filled_all
 
 EQUATION = "docs/links.md (10)-(13)"
 SLIDING_FORMULAS = (
@@ -80,7 +80,8 @@ def _sliding_outputs(joint: LinkJoint) -> tuple[Output, ...]:
 def _columns(scene: Scene, inputs: tuple[Parameter, ...], size: int) -> Array:
     """Put inputs side by side, (n, size); zeros behind those that the joint has."""
     table = np.zeros((len(scene.designs), size))
-    table[:, : len(inputs)] = scene.table(tuple(p.name for p in inputs))
+    for k, p in enumerate(inputs):
+        table[:, k] = scene.inputs[p.name]
     return table
 
 
@@ -108,11 +109,11 @@ def sliding(scene: Scene, wanted: frozenset[str]) -> Columns:
             refuse(
                 status, scene.inputs[f"collar_diameter_{joint.name}"] <= scene.inputs[f"journal_diameter_{joint.name}"]
             )
-        limits = _columns(scene, _pressure_limits(joint), 3) if outputs[-1] in wanted else None
+        limits = _columns(scene, _pressure_limits(joint) if outputs[-1] in wanted else (), 3)
         size = _columns(scene, _sliding_inputs(joint), 4)
         shaft = joint.kind == "shaft"
         named = outputs if shaft else (*outputs[:2], f"collar_pressure_{joint.name}", outputs[-1])
-        columns |= filled_each(
+        columns |= filled_all(
             journal_pressures, (first, second, along, size, limits), named, wanted & frozenset(outputs), status
         )  # fmt: skip
     return columns | {"status": status}

@@ -52,13 +52,33 @@ def tree_of(scene: Scene) -> LinkTree:
 @lru_cache
 def body_inputs(tree: LinkTree) -> tuple[Parameter, ...]:
     """Masses, centres and inertias of all bodies."""
-    return tuple(
-        p for body in tree.bodies for p in (loads.rod_inputs if body.slender else _whole)(body.name, body.axes)
-    )
+    rods, found = rods_of(tree), []
+    for k, body in enumerate(tree.bodies):
+        own = (loads.rod_inputs if body.slender else _whole)(body.name, body.axes)
+        found += [*own, *(loads.as_rod(body.name, own) if k in rods else ())]
+    return tuple(found)
 
 
 def _whole(name: str, axes: str) -> tuple[Parameter, ...]:
     return loads.body_inputs(name, axes, 0.0)
+
+
+@lru_cache
+def rods_of(tree: LinkTree) -> dict[int, tuple[int, int]]:
+    """Bodies that may be slender rods, by number: from their joint with the parent to where they carry another body.
+
+    That is the joint of a body that hangs on it, or the line of a ball that closes a loop: the body's or the line's
+    number, the other -1.  What slides on a body, or touches it, makes no end of a rod.
+    """
+    found: dict[int, tuple[int, int]] = {}
+    sliding = {joint.body for joint in tree.joints if joint.kind == "sleeve"}
+    for joint in tree.joints:
+        line, body = joint.lines[0], joint.body
+        ends = tree.ends[line] if joint.kind == "ball" else (tree.parents[body],) if joint.kind != "contact" else ()
+        for k in ends:
+            if k >= 0 and k not in sliding and body not in sliding:
+                found.setdefault(k, (-1, line) if joint.kind == "ball" else (body, -1))
+    return found
 
 
 def inputs(tree: LinkTree) -> tuple[Parameter, ...]:
@@ -143,16 +163,24 @@ def force_name(scene: Scene) -> str:
 
 def _bodies(scene: Scene) -> Array:
     """Masses, centres, inertias and gravity in the order of the kernel, (n, 10 B + 3)."""
-    tree, given = tree_of(scene), scene.inputs
-    columns: list[Array] = []
-    zero = np.zeros(len(scene.designs))
-    for body in tree.bodies:
+    tree, given, links = tree_of(scene), scene.inputs, scene.links
+    zero, rods, found = np.zeros(len(scene.designs)), rods_of(tree), []
+    # joints stand still in a body: the first pose that is assembled tells where
+    pose = np.arange(len(scene.designs)), (np.asarray(scene.motion["status"]) != 0).argmin(axis=1)
+    for k, body in enumerate(tree.bodies):
+        columns = [given[p.name] for p in (loads.rod_inputs if body.slender else _whole)(body.name, body.axes)]
         if body.slender:
-            across = given[f"j_{body.name}"]
-            columns += [given[f"m_{body.name}"], given[f"com_{body.name}_x"], *[zero] * 5, across, zero, across]
-        else:
-            columns += [given[p.name] for p in _whole(body.name, body.axes)]
-    return np.column_stack([*columns, *(given[p.name] for p in loads.GRAVITY)])
+            columns = [*columns[:2], *[zero] * 5, columns[2], zero, columns[2]]
+        own = np.column_stack(columns)
+        if k in rods and given[f"rod_{body.name}"].any():
+            child, line = rods[k]
+            record = links.bodies[:, :, k][pose]
+            end = links.lines[:, :, line, :3][pose] if child < 0 else links.bodies[:, :, child, 24:27][pose]
+            axes = record[:, 15:24].reshape(-1, 3, 3)
+            ends = (np.einsum("nij,nj->ni", axes, point - record[:, :3]) for point in (record[:, 24:27], end))
+            loads.put_rod(own, given[f"rod_{body.name}"], given[f"line_mass_{body.name}"], *ends)
+        found.append(own)
+    return np.hstack([*found, *(given[p.name][:, None] for p in loads.GRAVITY)])
 
 
 def _tool(scene: Scene) -> Array:

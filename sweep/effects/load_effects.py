@@ -156,7 +156,9 @@ def _share_of_inertia(scene: Scene, name: str, size: Callable[[Array], Array], q
     """Share of the ``size`` of one output over the turn that inertia and weight make; 1 without a useful load."""
     names = frozenset({name})
     whole = compute_loads(scene, names)
-    still = {name: np.zeros_like(x) if name.startswith(("m_", "j_")) else x for name, x in scene.inputs.items()}
+    still = {
+        name: np.zeros_like(x) if name.startswith(("m_", "j_", "line_mass_")) else x for name, x in scene.inputs.items()
+    }
     alone = compute_loads(replace(scene, inputs=still, memo={}), names)
     turning = (np.asarray(whole["status"]) == st.OK).all(axis=1)
     if not turning.any():

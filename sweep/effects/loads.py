@@ -51,13 +51,37 @@ def _body(body: str) -> tuple[Parameter, ...]:
     return body_inputs(body, _FRAMES[body])
 
 
-def slender(body: str) -> Parameter:
-    """Whether a body is a slender rod as far as nothing is said of its centre and inertia."""
-    own = f"rod_{body}"
-    others = tuple((own, p.name) for p in _body(body) if not p.name.startswith("m_"))
+def as_rod(body: str, own: tuple[Parameter, ...]) -> tuple[Parameter, Parameter]:
+    """Whether a body is a slender rod as far as nothing is said of its centre and inertia, and its mass per length.
+
+    ``own`` are its mass, centre and inertia.
+    """
+    name = f"rod_{body}"
+    others = tuple((name, p.name) for p in own if not p.name.startswith("m_"))
     text = f"1: the mass of the {body} is that of a slender rod between its joints, centre halfway, inertia m l^2/12"
     words = f"{text}; 0 where its centre or inertia is given, else"
-    return Parameter(own, "choice", words, default=1.0, choices=(0.0, 1.0), unless=others)
+    line = f"mass per length of the {body} between its joints, beside m_{body}; counts where rod_{body} is 1"
+    return (
+        Parameter(name, "choice", words, default=1.0, choices=(0.0, 1.0), unless=others),
+        Parameter(f"line_mass_{body}", "line_mass", line, default=0.0, not_negative=True),
+    )
+
+
+def put_rod(columns: Array, rod: Array, line_mass: Array, start: Array, end: Array) -> None:
+    """Make bodies slender rods where ``rod`` is 1: masses, centres and moments of inertia (n, BODY), in place.
+
+    Parameters
+    ----------
+    rod, line_mass : (n,)
+    start, end : (n, 3) its joints in the axes of the body
+    """
+    along = end - start
+    square = (along * along).sum(axis=1)
+    columns[:, 0] += rod * line_mass * np.sqrt(square)
+    columns[:, 1:4] += rod[:, None] * 0.5 * (start + end)
+    mass = rod * columns[:, 0] / 12.0
+    for at, (x, y) in enumerate(((0, 0), (0, 1), (0, 2), (1, 1), (1, 2), (2, 2))):
+        columns[:, 4 + at] += mass * ((square if x == y else 0.0) - along[:, x] * along[:, y])
 
 
 def rod_inputs(body: str, frame: str) -> tuple[Parameter, ...]:
@@ -118,15 +142,16 @@ class Follower(NamedTuple):
     prefix: str  # of the names of its effects
     load: Parameter
     bodies: tuple[str, ...]  # columns of kernels.effects.kinetostatics in order
-    rods: tuple[str, ...]  # of those that may be slender rods, in the order of the bodies
+    rods: tuple[str, ...]  # those that may be slender rods, in the order of the bodies
     parameters: tuple[Parameter, ...]
 
 
 def _follower(name: str, prefix: str, load: Parameter) -> Follower:
     bodies = (*_body("crank"), *_body("coupler"), *_body(name), *GRAVITY)
-    rods = tuple(slender(body) for body in ("crank", "coupler", name) if body != "slider")
-    parameters = (*bodies, *rods, load, SPEED, CHANGE, CONSTRUCTION)
-    return Follower(name, prefix, load, tuple(p.name for p in bodies), tuple(p.name for p in rods), parameters)
+    rods = tuple(body for body in ("crank", "coupler", name) if body != "slider")
+    made = (p for body in rods for p in as_rod(body, _body(body)))
+    parameters = (*bodies, *made, load, SPEED, CHANGE, CONSTRUCTION)
+    return Follower(name, prefix, load, tuple(p.name for p in bodies), rods, parameters)
 
 
 LINK_TORQUE = Parameter(

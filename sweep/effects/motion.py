@@ -82,7 +82,7 @@ def advise(scene: Scene) -> Advice | None:
     inertia = given[f"m_{follower}"]
     if not slider:
         square = given["com_rocker_x"] ** 2 + given["com_rocker_y"] ** 2
-        rod = given["rod_rocker"] * inertia / 3.0
+        rod = given["rod_rocker"] * (inertia + given["line_mass_rocker"] * c) / 3.0
         inertia = (given["j_rocker_zz"] + inertia * square) / c**2 + rod
     off = np.hypot(given["com_coupler_y"], given["com_coupler_z"]) / b
     with np.errstate(divide="ignore", invalid="ignore"):  # without a mass the quotient is not used

@@ -5,10 +5,12 @@ from __future__ import annotations
 import numpy as np
 
 from kernels.effects.thread import capstan, thread_contour, thread_speed
+from kernels.types import Status
 from sweep.effects.base import Effect
 from sweep.effects.scene import Scene
 from sweep.families.base import Array, Columns, Output, Parameter
 from sweep.families.capabilities import ThreadPath
+from sweep.families.poses import filled_each
 from sweep.families.thread_balance import ALPHA, BENDING, BETA, COUNT, DENSITY, EXPONENT, REFERENCE_SPEED, SHARE
 
 MM_PER_M = 1e3
@@ -61,11 +63,11 @@ def _path(scene: Scene) -> ThreadPath:
     return path
 
 
-def _wrap(scene: Scene) -> tuple[Array, Columns]:
-    """Wrap angle [rad] and the poses' columns with their status."""
+def _wrap(scene: Scene) -> tuple[Array, Status]:
+    """Wrap angle [rad] and the poses' status."""
     name = _path(scene).wrap
     found = scene.family.poses(scene.designs, scene.angles, frozenset({name}))
-    return np.ascontiguousarray(found[name], dtype=np.float64), found
+    return np.ascontiguousarray(found[name], dtype=np.float64), np.array(found["status"], np.uint8)
 
 
 def _per_pose(scene: Scene, name: str) -> Array:
@@ -74,24 +76,19 @@ def _per_pose(scene: Scene, name: str) -> Array:
 
 def contour(scene: Scene, wanted: frozenset[str]) -> Columns:
     """Tension behind the eyelet and its parts."""
-    wrap, motion = _wrap(scene)
+    wrap, status = _wrap(scene)
     names = ("eyelet_radius", "thread_adhesion", "thread_friction", "thread_bending", "thread_count", "thread_density")
-    outputs = {o.name: np.empty(scene.shape) if o.name in wanted else None for o in CONTOUR_OUTPUTS}
-    whole, own, bending, adhesion = outputs.values()
-    status = np.array(motion["status"], np.uint8)
     # The constants are per degree.
-    before, theta = _per_pose(scene, "thread_tension"), np.degrees(wrap)
-    thread_contour(before, theta, scene.table(names), status, whole, own, bending, adhesion, None)
-    return {name: out for name, out in outputs.items() if out is not None} | {"status": status}
+    arguments = _per_pose(scene, "thread_tension"), np.degrees(wrap), scene.table(names)
+    outputs = tuple(o.name for o in CONTOUR_OUTPUTS)
+    return filled_each(lambda *given: thread_contour(*given, None), arguments, outputs, wanted, status)
 
 
 def euler(scene: Scene, wanted: frozenset[str]) -> Columns:
     """Tension by Euler's law and force on the eyelet."""
-    wrap, motion = _wrap(scene)
-    outputs = {o.name: np.empty(scene.shape) if o.name in wanted else None for o in CAPSTAN_OUTPUTS}
-    status = np.array(motion["status"], np.uint8)
-    capstan(_per_pose(scene, "thread_tension"), wrap, scene.inputs["mu_eyelet"], status, *outputs.values())
-    return {name: out for name, out in outputs.items() if out is not None} | {"status": status}
+    wrap, status = _wrap(scene)
+    arguments = _per_pose(scene, "thread_tension"), wrap, scene.inputs["mu_eyelet"]
+    return filled_each(capstan, arguments, tuple(o.name for o in CAPSTAN_OUTPUTS), wanted, status)
 
 
 def speed(scene: Scene, wanted: frozenset[str]) -> Columns:

@@ -19,6 +19,7 @@ if TYPE_CHECKING:
 
 
 FORMS = "a DataFrame of pandas, or a dict of columns; most other tables become one by .to_pandas()"
+MOST_MASS = 10.0  # t: who writes 20 means grams
 FEW = 64  # rows of a table that is looked at as a whole: to take its columns out one by one takes longer than poses
 
 
@@ -195,6 +196,9 @@ def _checked_column(
         _refuse(~np.isfinite(values), values, p.name, "a finite number")
     if p.sign and (p.not_zero or p.wrong_sign(least)):
         _refuse(p.wrong_sign(values), values, p.name, f"a {p.sign} {p.unit}")
+    if p.unit == "mass" and largest > MOST_MASS:
+        allowed = f'a mass below {MOST_MASS:g} t, as bare masses are tonnes: "20 g", or 2e-5'
+        _refuse(values > MOST_MASS, values, p.name, allowed)
     if p.choices is not None:
         _refuse(np.logical_and.reduce([values != x for x in p.choices]), values, p.name, p.choice)
     return values

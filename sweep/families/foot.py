@@ -8,8 +8,7 @@ from functools import partial
 import numpy as np
 
 from kernels.effects.foot import OUTPUTS as _EVENTS
-from kernels.effects.foot import march
-from kernels.effects.foot_fabric import march_on_fabric
+from kernels.effects.foot_fabric import march
 from kernels.families import feed as feed_kernels
 from kernels.families import foot
 from kernels.families.feed.motion import OUTPUTS as _RACK
@@ -64,7 +63,10 @@ POSE_OUTPUTS = (
     Output("y_rack", "length", "height of the rack above the plate", "(1)"),
     Output("y_foot", "length", "height of the foot above the plate", "(6)"),
     Output("force", "N", "between the foot and rack or plate; 0 in flight", "(5)"),
-)
+    Output("drive_torque", "torque", "that the foot asks of the crank, impacts apart: force times dy_rack", "(17)"),
+    Output("shaking_force_y", "force", "force of foot, spring and rack on the frame, upwards; weight and impacts apart",
+           "(17)"),
+)  # fmt: skip
 
 EVENT_OUTPUTS = (
     Output("flights", "1", "how often contact is lost in a turn, bounces included", "(10)", jumps=True),
@@ -95,12 +97,7 @@ def marched(path: Array, feet: Array) -> tuple[Columns, Array, Array]:
     n = len(path)
     status, values = np.empty(n, np.uint8), np.empty((len(_EVENTS), n))
     heights, forces = np.empty((n, path.shape[2])), np.empty((n, path.shape[2]))
-    soft = (feet[:, 5] != 0.0) | (feet[:, 6] != 0.0)
-    for rows, kernel, count in ((~soft, march, 5), (soft, march_on_fabric, 7)):
-        if rows.any():
-            room = status[rows], values[:, rows], heights[rows], forces[rows]
-            kernel(path[rows], np.ascontiguousarray(feet[rows, :count]), TURNS, *room)
-            status[rows], values[:, rows], heights[rows], forces[rows] = room
+    march(path, np.ascontiguousarray(feet), TURNS, status, values, heights, forces)
     columns: dict[str, Array] = dict(zip(_EVENTS, values, strict=True))
     travel = columns.pop("travel")
     with np.errstate(all="ignore"):
@@ -123,6 +120,19 @@ def chosen(columns: Columns, wanted: frozenset[str]) -> Columns:
     return found | {"status": status}
 
 
+def pose_columns(designs: Array, path: Array, heights: Array, forces: Array, apart: int) -> Columns:
+    """Pose outputs at every so many nodes; ``designs`` are m, k, F0; (17)."""
+    _, k, preload = (designs[:, j, None] for j in range(3))
+    return {
+        "y_rack": path[:, 0, ::apart],
+        "x_rack": path[:, 3, ::apart],
+        "y_foot": heights[:, ::apart],
+        "force": forces[:, ::apart],
+        "drive_torque": np.where(path[:, 0] > 0.0, forces * path[:, 1], 0.0)[:, ::apart],
+        "shaking_force_y": (preload + k * heights - forces)[:, ::apart],
+    }
+
+
 def path_of(designs: Array, nodes: int) -> Array:
     """Path of the rack at so many equal crank angles, (n, 6, nodes)."""
     path = np.empty((len(designs), 6, nodes))
@@ -140,16 +150,13 @@ def on_rack(designs: Array, nodes: int) -> Marched:
     return columns, path, heights, forces
 
 
-def _poses(run: Callable[[Array, int], Marched], designs: Array, angles: Angles, wanted: frozenset[str]) -> Columns:
+def _poses(
+    run: Callable[[Array, int], Marched], feet: list[int], designs: Array, angles: Angles, wanted: frozenset[str]
+) -> Columns:
     """Compute the wanted pose outputs and status of every design over one turn in equal steps from 0, each (n, m)."""
     nodes, apart = nodes_for(angles.phi.shape[1])
     columns, path, heights, forces = run(designs, nodes)
-    found: Columns = {
-        "y_rack": path[:, 0, ::apart],
-        "x_rack": path[:, 3, ::apart],
-        "y_foot": heights[:, ::apart],
-        "force": forces[:, ::apart],
-    }
+    found = pose_columns(designs[:, feet], path, heights, forces, apart)
     status = np.repeat(np.asarray(columns["status"], np.uint8)[:, None], angles.phi.shape[1], axis=1)
     return {name: x for name, x in found.items() if name in wanted} | {"status": status}
 
@@ -190,7 +197,7 @@ FAMILY = Family(
     parameters=PARAMETERS,
     position="y_foot",
     pose_outputs=POSE_OUTPUTS,
-    poses=guarded(partial(_poses, on_rack)),
+    poses=guarded(partial(_poses, on_rack, FEET)),
     domain=March(turns=TURNS),
     steps=(
         Step("closed forms", CLOSED_OUTPUTS, closed, work=Work.LONG),
@@ -302,7 +309,7 @@ ON_FEED = Family(
     parameters=FEED_PARAMETERS,
     position="y_foot",
     pose_outputs=(*POSE_OUTPUTS, Output("x_rack", "length", "tooth, along the feed", "(11)")),
-    poses=guarded(partial(_poses, on_feed)),
+    poses=guarded(partial(_poses, on_feed, _FEET)),
     domain=March(turns=TURNS),
     steps=(
         Step("feeding", feed.FEEDING_OUTPUTS, feeding, work=Work.LONG),

@@ -15,8 +15,8 @@ from numpy.typing import NDArray
 
 Unit = Literal[
     "length", "1/length", "angle", "ratio", "sign", "count", "none", "choice",
-    "mass", "inertia", "force", "torque", "pressure", "stiffness", "damping", "speed", "angular_acceleration",
-    "acceleration", "time", "rotary_damping",
+    "mass", "line_mass", "inertia", "force", "torque", "pressure", "stiffness", "damping", "speed",
+    "angular_acceleration", "acceleration", "time", "rotary_damping",
 ]  # fmt: skip
 
 
@@ -69,6 +69,7 @@ WORDS = {
     "length": "mm",
     "angle": "rad",
     "mass": "t",
+    "line_mass": "t/mm",
     "inertia": "t*mm^2",
     "force": "N",
     "torque": "N*mm",

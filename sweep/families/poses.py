@@ -62,6 +62,16 @@ def filled_each(
     return columns | {"status": status}
 
 
+def filled_all(
+    kernel: Callable[..., object], arguments: Sequence[object], names: tuple[str, ...], wanted: frozenset[str],
+    status: Status,
+) -> Columns:  # fmt: skip
+    """Call ``kernel(*arguments, status, out)`` of an effect, which writes all its outputs, (k, n, m)."""
+    out = np.empty((len(names), *status.shape))
+    kernel(*arguments, status, out)
+    return {name: values for name, values in zip(names, out, strict=True) if name in wanted} | {"status": status}
+
+
 def poses_of(
     kernel: Callable[..., object],
     outputs: Any,

@@ -48,6 +48,7 @@ _EXAMPLES = {
     "mm": "a length, in mm, um, cm, m or inch",
     "rad": "an angle, in deg, rad, mrad or rev",
     "t": "a mass, in kg, g or t",
+    "t/mm": "a mass per length, in g/mm, kg/m or t/mm",
     "N": "a force, in N or kN",
     "N*mm": "a torque, in N*mm or N*m",
     "t*mm^2": "an inertia, in kg*mm^2, g*mm^2, kg*m^2 or t*mm^2",

@@ -5,7 +5,7 @@ A load over the turn is a file of two columns, the same two columns in the study
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Annotated, Any
@@ -15,7 +15,8 @@ from pydantic import Field
 
 from sweep.effects import curved_inputs, input_names
 from sweep.effects.base import STUDY_LOADS
-from sweep.errors import choices, closest
+from sweep.errors import InputError, choices, closest
+from sweep.evaluation.rods import rod
 from sweep.families.base import Family
 from sweep.families.machines import Machine
 from sweep.families.names import at_stage
@@ -31,6 +32,7 @@ FORMS = (
     '{ file = "load.csv", unit = "N" }',
     '{ mean = 1.0, cos = [0.5], sin = [0.2], unit = "N" }',
 )
+ROD = '{ material = "steel", section = "6 mm round" }'
 Numbers = Annotated[list[Number], Field(max_length=MOST_POINTS)]
 Names = Annotated[list[str], Field(min_length=2, max_length=2)]
 
@@ -74,7 +76,7 @@ def read_inputs(file: StudyFile, bare: Family) -> Inputs:
     homes = {name: home(bare, name) for name in (input_names(bare) if given else ())}
     design = file.free_table("design") or {}
     for table, entries in given.items():
-        for name, entry in entries.items():
+        for name, entry in _with_rods(entries, file.faults).items() if table == "bodies" else entries.items():
             key: Key = (table, name)
             if homes.get(name) != table:
                 _misplaced(bare, key, entry, homes, file.faults)
@@ -86,6 +88,26 @@ def read_inputs(file: StudyFile, bare: Family) -> Inputs:
                 found.raw[name], found.tables[name] = entry, table
     if given.get("loads"):
         found.inlined = {**given["loads"], **found.inlined}
+    return found
+
+
+def _with_rods(entries: Mapping[str, Any], faults: Faults) -> dict[str, Any]:
+    """[bodies] with the columns of :func:`sweep.evaluation.rods.rod` in place of bodies of a material and a section."""
+    found: dict[str, Any] = {}
+    for name, entry in entries.items():
+        if not isinstance(entry, dict) or {"material", "section"}.isdisjoint(entry):
+            found[name] = entry
+            continue
+        texts = {key: str(value) for key, value in entry.items()}
+        try:
+            mass, line = rod(name, **texts).items()
+        except (InputError, TypeError) as error:
+            allowed = error.allowed if isinstance(error, InputError) else ROD
+            faults.value(("bodies", name), entry, allowed)
+            continue
+        if mass[0] in entries:
+            faults.value(("bodies", mass[0]), entries[mass[0]], f"nothing beside the material and section of {name}")
+        found |= {mass[0]: "0 t", line[0]: f"{line[1]!r} t/mm"}
     return found
 
 

@@ -262,12 +262,11 @@ def test_compiled_loads_and_pressures_are_those_of_plain_python():
     status[1, 2] = st.DEAD_POINT
     sides = []
     for function in (bearing_loads, bearing_loads.py_func):
-        found = [np.empty(shape) for _ in range(5)]
-        function(forces, 6, 9, axis, bearings, status, *found)
-        pressures = [np.empty(shape) for _ in range(4)]
+        found, pressures = np.empty((5, *shape)), np.empty((4, *shape))
+        function(forces, 6, 9, axis, bearings, status, found)
         pressing = journal_pressures if function is bearing_loads else journal_pressures.py_func
         sizes = np.column_stack([bearings[:, 3:6], [0.0, 2.0, 3.0, 4.0]])
-        pressing(*found[:3], sizes, bearings[:, 6:9].copy(), status, *pressures)
+        pressing(*found[:3], sizes, bearings[:, 6:9].copy(), status, pressures)
         sides.append([*found, *pressures])
     for fast, slow in zip(*sides, strict=True):
         np.testing.assert_allclose(fast, slow, rtol=4e-15, atol=1e-15)

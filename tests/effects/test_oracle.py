@@ -190,8 +190,9 @@ def test_sliding_bearings_equal_oracle():
         sine = np.sin(given["theta1"])
         direction = [np.array([[x]]) for x in (np.cos(given["theta1"]), sine, sine * np.tan(given["theta2"]))]
         status = np.zeros((1, 1), np.uint8)
-        out = {name: np.empty((1, 1)) for name in ("R1", "R2", "X", "p1", "p2", "p3")}
-        bearings.sliding_bearings(*direction, np.array([given["M_c"]]), data, status, *out.values())
+        values = np.empty((6, 1, 1))
+        bearings.sliding_bearings(*direction, np.array([given["M_c"]]), data, status, values)
+        out = dict(zip(("R1", "R2", "X", "p1", "p2", "p3"), values, strict=True))
         assert status[0, 0] == st.OK
         for name, values in out.items():
             assert factor(values[0], expected[name], 0) < 16, (row["case"], name)
@@ -220,8 +221,9 @@ def test_rolling_bearings_equal_oracle():
         sine = np.sin(given["theta1"])
         direction = [np.array([[x]]) for x in (np.cos(given["theta1"]), sine, sine * np.tan(given["theta2"]))]
         status = np.zeros((1, 1), np.uint8)
-        out = {name: np.empty((1, 1)) for name in ("P_eq1", "P_eq2", "L10_1", "L10_2")}
-        bearings.rolling_bearings(*direction, np.array([given["M_c"]]), data, status, *out.values())
+        values = np.empty((4, 1, 1))
+        bearings.rolling_bearings(*direction, np.array([given["M_c"]]), data, status, values)
+        out = dict(zip(("P_eq1", "P_eq2", "L10_1", "L10_2"), values, strict=True))
         for name, values in out.items():
             assert factor(values[0], row["expected"][name], 0) < 16, (row["case"], name)
 

@@ -3,8 +3,12 @@
 from __future__ import annotations
 
 import numpy as np
+import pytest
 
 import sweep
+from sweep.effects.link_loads import rods_of
+from sweep.families import family
+from sweep.families.link_tree import LinkTree
 
 LINKS = {"a": 30.0, "b": 90.0, "c": 60.0, "e": 85.0, "f": 5.0, "g": -4.0, "alpha": 0.4}
 MASSES = {"m_crank": 2e-4, "m_coupler": 1e-4, "m_rocker": 3e-4}
@@ -68,3 +72,59 @@ def test_stages_of_a_chain_and_a_bound_design_have_their_own_rods():
     bound = sweep.mechanism("rssr", **LINKS, **MASSES, speed=500.0)
     one = bound.poses(PHI, ["drive_torque"])
     np.testing.assert_allclose(one["drive_torque"], loads("rssr", LINKS, **MASSES).drive_torque, rtol=1e-12)
+
+
+def test_bodies_of_trees_of_links_are_rods_between_their_joints_too():
+    """A lever drive: lengths of its parameters in place of its poses; explicit rods in place of the default."""
+    design = dict(family("heddle").example)
+    own = {p.name: p.default for p in family("heddle").parameters if p.default is not None} | design
+    lengths = {"lever": own["O2B"], "rod": own["BC"], "bell": own["O3C"]}
+    want, speed = ["drive_torque", "reduced_inertia", "shaking_moment"], {"speed": 60.0}
+    masses = {f"m_{body}": 1e-3 for body in lengths}
+    alone = sweep.evaluate("heddle", design | masses | speed, want, phi=PHI)[want]
+    given = masses | {f"com_{body}_x": 0.5 * length for body, length in lengths.items()}
+    given |= {f"j_{body}_{x}": 1e-3 * length**2 / 12.0 for body, length in lengths.items() for x in ("yy", "zz")}
+    explicit = sweep.evaluate("heddle", design | given | speed, want, phi=PHI)[want]
+    np.testing.assert_allclose(alone, explicit, rtol=1e-12, atol=1e-12 * explicit.abs().max().max())
+    assert explicit.drive_torque.abs().max() > 1.0
+
+
+def test_rods_that_hang_between_balls_have_their_centre_halfway():
+    design = dict(family("five_link").example)
+    bodies = {family("five_link").find(LinkTree).bodies[k].name for k in rods_of(family("five_link").find(LinkTree))}
+    assert bodies == {body.name for body in family("five_link").find(LinkTree).bodies}
+    loads = {f"m_{body}": 1e-4 for body in bodies} | {"speed": 100.0}
+    found = sweep.evaluate("five_link", design | loads, ["reduced_inertia"], phi=PHI)["reduced_inertia"]
+    points = sweep.evaluate(
+        "five_link", design | loads | {f"rod_{b}": 0.0 for b in bodies}, ["reduced_inertia"], phi=PHI
+    )
+    assert (found > 0.0).all() and not np.allclose(found, points["reduced_inertia"])
+
+
+def test_a_body_has_the_mass_of_its_material_and_section():
+    bars = sweep.rod("crank", "steel", "6 mm round") | sweep.rod("coupler", "aluminium", "0.8 x 0.4 cm rectangular")
+    bars |= sweep.rod("rocker", "titanium", "8 x 1 mm tube")
+    areas = {"crank": 9.0 * np.pi, "coupler": 32.0, "rocker": 7.0 * np.pi}
+    densities = {"crank": 7.85e-9, "coupler": 2.75e-9, "rocker": 4.506e-9}
+    masses = {f"m_{body}": densities[body] * areas[body] * LENGTHS[body] for body in LENGTHS}
+    np.testing.assert_allclose(loads("rssr", LINKS, **bars), loads("rssr", LINKS, **masses), rtol=1e-12, atol=1e-9)
+
+
+@pytest.mark.parametrize(
+    ("material", "section", "words"),
+    [
+        ("stell", "6 mm round", "steel"),
+        ("steel", "6 round", "a section, as"),
+        ("steel", "6 x 4 mm round", "a section, as"),
+        ("steel", "6 kg round", "a section, as"),
+        ("steel", "6 x 7 mm tube", "positive sizes"),
+    ],
+)
+def test_what_is_no_material_and_no_section_is_refused(material, section, words):
+    with pytest.raises(sweep.InputError, match=words):
+        sweep.rod("crank", material, section)
+
+
+def test_grams_given_as_tonnes_are_refused_with_value_and_unit():
+    with pytest.raises(sweep.InputError, match=r"m_crank = 20.*below 10 t.*20 g"):
+        loads("rssr", LINKS, **MASSES | {"m_crank": 20.0})

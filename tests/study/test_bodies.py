@@ -82,6 +82,16 @@ def test_bodies_of_which_only_the_mass_is_given_are_slender_rods_and_the_plan_sa
     assert lines[at + 1].split(", ") == ["  rod_crank2", "rod_coupler2"]
 
 
+def test_a_body_of_a_material_and_a_section_has_its_mass_per_length_among_the_parameters(tmp_path):
+    bar = BODIES.replace('m_crank2 = "10 g"', 'crank2 = { material = "steel", section = "6 mm round" }')
+    fixed = load(tmp_path, HEAD + "[bodies]\n" + bar).space.fixed
+    assert fixed["m_crank2"] == 0.0
+    assert fixed["line_mass_crank2"] == pytest.approx(7.85e-9 * 9.0 * np.pi, rel=1e-14)
+    wrong = 'crank2 = { material = "steel", section = "6 mm" }'
+    assert "bodies.crank2" in faults(tmp_path, HEAD + "[bodies]\n" + bar.replace(bar.split("\n")[1], wrong))
+    assert "nothing beside the material" in faults(tmp_path, HEAD + "[bodies]\n" + bar + 'm_crank2 = "1 g"\n')
+
+
 def test_what_nothing_wanted_takes_describes_the_machine_and_changes_no_study(tmp_path):
     bare = load(tmp_path, HEAD + "[bodies]\n" + BODIES)
     more = load(tmp_path, HEAD + "[bodies]\n" + BODIES + "mu_a1 = 0.05\nflywheel1 = '2 kg*mm^2'\n")

@@ -10,7 +10,7 @@ from scipy.integrate import solve_ivp
 
 import sweep
 from kernels import status as st
-from kernels.effects.foot_fabric import march_on_fabric
+from kernels.effects.foot_fabric import march
 from sweep.families.foot import NODES, TURNS, path_of
 from tests.families.foot.test_reference import HEAVY, RACK
 
@@ -47,7 +47,7 @@ def marched(p: dict[str, float], turns: int) -> tuple[int, np.ndarray, np.ndarra
     feet = np.array([[p[name] for name in ("m", "k", "F0", "omega", "restitution", "kf", "cf")]])
     status, outputs = np.empty(1, np.uint8), np.empty((11, 1))
     heights, forces = np.empty((1, NODES)), np.empty((1, NODES))
-    march_on_fabric(path_of(table, NODES), feet, turns, status, outputs, heights, forces)
+    march(path_of(table, NODES), feet, turns, status, outputs, heights, forces)
     return int(status[0]), heights[0], forces[0]
 
 
@@ -133,12 +133,12 @@ def test_feed_rack_carries_a_foot_on_fabric() -> None:
     assert np.isfinite(soft.most_force[0]) and soft.most_force[0] != rigid.most_force[0]
 
 
-def test_march_on_fabric_jitted_equals_plain() -> None:
+def test_march_jitted_equals_plain() -> None:
     p = HEAVY | {"kf": 5e4, "cf": 20.0}
     table = np.array([[p[name] for name in ("m", "k", "F0", "omega", "Y", "p", "restitution", "X")]])
     feet = np.array([[p[name] for name in ("m", "k", "F0", "omega", "restitution", "kf", "cf")]])
     path, results = path_of(table, 96), []
-    for function in (march_on_fabric, march_on_fabric.py_func):
+    for function in (march, march.py_func):
         room = np.empty(1, np.uint8), np.empty((11, 1)), np.empty((1, 96)), np.empty((1, 96))
         function(path, feet, 1, *room)
         results.append(room)
@@ -152,7 +152,7 @@ def settled_of(p: dict[str, float], turns: int) -> tuple[float, float]:
     feet = np.array([[p[name] for name in ("m", "k", "F0", "omega", "restitution", "kf", "cf")]])
     status, outputs = np.empty(1, np.uint8), np.empty((11, 1))
     room = np.empty((1, NODES)), np.empty((1, NODES))
-    march_on_fabric(path_of(table, NODES), feet, turns, status, outputs, *room)
+    march(path_of(table, NODES), feet, turns, status, outputs, *room)
     assert status[0] == st.OK
     return outputs[3, 0], outputs[10, 0]
 

@@ -14,6 +14,7 @@ from mpmath import mp, mpf
 import sweep
 from kernels import status as st
 from kernels.effects import foot as effect
+from kernels.effects import foot_fabric
 from kernels.families import foot
 from sweep.families import family
 from sweep.families.foot import NODES, TURNS, path_of
@@ -24,6 +25,11 @@ ROWS = [r for r in json.loads((Path(__file__).parents[2] / "oracle" / "feed_open
 NAMES = family("foot").parameter_names[:8]
 TABLE = pd.DataFrame([r["inputs"] for r in ROWS])
 HEAVY = {"m": 0.05, "k": 3000.0, "F0": 6.0, "omega": 400.0, "Y": 1.5e-3, "p": 0.5e-3, "restitution": 0.0, "X": 1e-3}
+
+
+def rigid(designs):
+    """Feet of the march without fabric."""
+    return np.hstack([designs[:, [0, 1, 2, 3, 6]], np.zeros((len(designs), 2))])
 
 
 def test_foot_matches_oracle_on_every_row():
@@ -64,7 +70,7 @@ def test_foot_first_landing_of_the_march_is_the_time_of_the_closed_form():
         designs = np.array([[table[name][0] for name in NAMES]])
         path, outputs, status = path_of(designs, NODES), np.empty((11, 1)), np.empty(1, np.uint8)
         room = [np.empty((1, NODES)) for _ in range(2)]
-        effect.march(path, designs[:, [0, 1, 2, 3, 6]].copy(), 1, status, outputs, *room)
+        foot_fabric.march(path, rigid(designs), 1, status, outputs, *room)
         events = dict(zip(effect.OUTPUTS, outputs[:, 0], strict=True))
         flight = (events["phi_land"] - events["phi_loss"]) % (2.0 * math.pi)
         if float(row["expected"]["t_recontact"]) * row["inputs"]["omega"] < math.pi:
@@ -201,7 +207,7 @@ def test_foot_jitted_equals_plain():
         call(foot.closed_forms)(designs, status, closed)
         call(foot.rack_path)(designs, path)
         events, heights, forces = np.empty((11, 3)), np.empty((3, 96)), np.empty((3, 96))
-        call(effect.march)(path, designs[:, [0, 1, 2, 3, 6]].copy(), 2, status, events, heights, forces)
+        call(foot_fabric.march)(path, rigid(designs), 2, status, events, heights, forces)
         results.append((closed, path, events, heights, forces, status))
     for one, two in zip(*results, strict=True):
         np.testing.assert_allclose(one, two, rtol=1e-12)
@@ -229,3 +235,17 @@ def test_foot_on_a_feed_rack_keeps_contact_from_the_softest_spring_and_the_least
     assert math.isnan(short.k_min_contact) and short.status == st.NO_EVENT
     plenty = sweep.summarise("feed_foot", p | {"F0": 50.0 * need}, ["k_min_contact"]).iloc[0]
     assert plenty.k_min_contact == 0.0 and plenty.status == st.OK
+
+
+def test_loads_are_the_momentum_of_the_foot_and_the_work_of_its_rack() -> None:
+    """Contact all the way: the force on the frame is that of the path, and the rack gets its work back."""
+    design = {"m": 0.05, "k": 3000.0, "F0": 60.0, "omega": 400.0, "Y": 1.5e-3, "p": 0.5e-3, "X": 1e-3}
+    phi = np.arange(720) * (2.0 * np.pi / 720)
+    found = sweep.evaluate("foot", design, ["y_rack", "force", "drive_torque", "shaking_force_y"], phi=phi)
+    above = found.y_rack > 0.0
+    bend = -1.5e-3 * np.sin(phi)
+    lifted = np.where(above, -0.05 * 400.0**2 * bend, 0.0)
+    np.testing.assert_allclose(found.shaking_force_y, lifted, atol=1e-9 * 60.0)
+    np.testing.assert_allclose(found.drive_torque, np.where(above, found.force * 1.5e-3 * np.cos(phi), 0.0), atol=1e-12)
+    # entry and leaving fall between nodes: a node's share of the largest torque is left
+    assert abs(found.drive_torque.mean()) < found.drive_torque.abs().max() / 720
