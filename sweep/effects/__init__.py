@@ -14,7 +14,7 @@ from importlib import import_module
 from types import MappingProxyType
 
 from sweep.effects.base import CURVED, Effect, Placed
-from sweep.effects.evaluation import bends, bent, effect_poses, on_own_columns, paces, piercing, run_design
+from sweep.effects.evaluation import Added, bends, bent, effect_poses, on_own_columns, paces, piercing, run_design
 from sweep.effects.scene import stages_of
 from sweep.errors import InputError
 from sweep.families.base import Accuracy, Family, Output, Parameter, Step, Work, of_family
@@ -280,31 +280,32 @@ def with_effects(family: Family, effects: tuple[Placed, ...], curves: Mapping[st
     """Family with the outputs and inputs of these effects."""
     if not effects:
         return family
-    added = inputs(family, effects)
+    added = Added(family, inputs(family, effects), curves)
     own = len(family.parameters)
     steps = tuple(
         Step(
             name=placed.name,
             provides=placed.design_outputs,
-            run=partial(run_design, family, placed, added, curves, own),
+            run=partial(run_design, added, placed),
             work=Work.EFFECT,
             cost=partial(_design_ns, placed.entry),
         )
         for placed in effects
         if placed.design_outputs
     )
+    precise = family.precise_poses and partial(effect_poses, replace(added, family=family.precise()), effects)
     return replace(
         family,
-        parameters=(*family.parameters, *added),
+        parameters=(*family.parameters, *added.inputs),
         pose_outputs=(*family.pose_outputs, *bent(effects, curves)),
-        poses=partial(effect_poses, family, effects, added, curves, own),
-        precise_poses=family.precise_poses and partial(effect_poses, family.precise(), effects, added, curves, own),
+        poses=partial(effect_poses, added, effects),
+        precise_poses=precise,
         steps=(*(on_own_columns(step, own) for step in family.steps), *steps),
         capabilities=(
             *family.capabilities,
             *paces(curves),
-            *piercing(family, added),
-            *bends(family, effects, added, curves),
+            *piercing(family, added.inputs),
+            *bends(added, effects),
         ),
         dear={o.name: (placed.name, placed.entry.ns_per_pose) for placed in effects for o in placed.pose_outputs},
     )

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 
 import numpy as np
@@ -12,9 +12,10 @@ from kernels import status as st
 from kernels.effects.bearings import bearing_loads
 from kernels.types import EPS, TWO_PI, Status
 from sweep.effects import loads
-from sweep.effects.base import Bend, DesignResult, Effect
+from sweep.effects.base import Bend, DesignResult
 from sweep.effects.bearings import CATALOGUE, SUPPORTS
-from sweep.effects.load_passing import LOADS, reactions
+from sweep.effects.load_effects import KINETOSTATICS
+from sweep.effects.load_passing import reactions
 from sweep.effects.scene import Rows, Scene, refuse
 from sweep.effects.turn import chosen
 from sweep.families.base import Accuracy, Array, Columns, Output
@@ -248,22 +249,21 @@ def _rocker_turning(scene: Scene) -> Array:
 ROCKER = Shaft("d", "", (9, 15), _rocker_axis, _rocker_turning)
 _TEXT, _EQUATION = "the rocker's bearings", "B2 (1)-(3)"
 
-EFFECT = Effect(
+EFFECT = replace(
+    KINETOSTATICS,
     key="B2",
     name="bearing_life",
     title="rolling bearings of the rocker under the joint reactions: loads, mean load over the turn, life",
     equation=_EQUATION,
     formulas=FORMULAS,
-    followers=(loads.ROCKER.name,),
     needs=("kinetostatics",),
     inputs=(*loads.ROCKER.parameters, *SUPPORTS, *CATALOGUE),
-    tool_inputs=loads.TOOLS,
     outputs=load_outputs("d", _TEXT, _EQUATION),
     compute=ROCKER.loads,
     called_for="life of the rocker's bearings",
     negligible="sliding bearings; elsewhere never, the life is what is asked for",
     even_crank=True,
-    takes_load=LOADS,
+    advise=None,
     bends=bends(ROCKER),
     design_result=DesignResult(turn_outputs("d", _TEXT, _EQUATION), partial(per_turn, shaft=ROCKER), BLOCK),
 )

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 
 from kernels import status as st
@@ -265,25 +267,19 @@ def _static(kind: loads.Follower) -> Effect:
 
 def _dynamic(kind: loads.Follower) -> Effect:
     outputs = _dynamic_outputs(kind)
-    return Effect(
+    return replace(
+        _static(kind),
         key="E2",
         name=f"{kind.prefix}dynamic_elasticity",
         title="periodic steady state of the elastic coupler and its stability",
-        equation=EQUATION,
-        formulas=FORMULAS,
-        followers=(kind.name,),
         needs=(f"{kind.prefix}elasticity",),
-        inputs=INPUTS[kind.name],
-        tool_inputs=_AT_TIP,
-        takes_load=LOADS,
-        may_drive_nothing=True,
         outputs=outputs,
+        least=(),
         compute=compute_dynamic,
         called_for="max|lag''/nu^2|/max|lag| above a third of the tolerance",
         negligible="max|lag''/nu^2|/max|lag| below 1/300 for a tolerance of 1 %; as a rule nu above 10 times the "
         "harmonics",
         whole_turn=True,
-        even_crank=True,
         design_result=DesignResult((FLOQUET, *reduction_outputs(outputs)), turn),
         advise=advise_dynamic,
     )

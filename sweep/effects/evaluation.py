@@ -6,7 +6,7 @@ What effects bring to the curves of a family between even samples is the matter 
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from functools import partial
 
 import numpy as np
@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from kernels.types import Status
 from sweep.effects.base import Bend, Placed
-from sweep.effects.scene import first_scene, stages_of, take_over
+from sweep.effects.scene import Scene, first_scene, stages_of, take_over
 from sweep.families.base import Accuracy, Angles, Array, Columns, Family, Output, Parameter, Step
 from sweep.families.curve_features import Bends, Crossing, of_order, of_table
 from sweep.numerics.curves import Curve, TableCurve
@@ -27,29 +27,40 @@ TURNS = 32
 DIFFERENCE = 1e-5
 
 
+@dataclass(frozen=True)
+class Added:
+    """A family or a chain with inputs of effects behind its own parameters, and loads over the turn by input."""
+
+    family: Family
+    inputs: tuple[Parameter, ...]
+    curves: Mapping[str, Curve]
+
+    def own(self, designs: Array) -> Array:
+        """Columns of the family itself."""
+        return np.ascontiguousarray(designs[:, : len(self.family.parameters)])
+
+    def scene(self, designs: Array, angles: Angles) -> Scene:
+        """Scene of the first stage, of all designs at their angles."""
+        own = len(self.family.parameters)
+        given = {p.name: np.ascontiguousarray(designs[:, own + k]) for k, p in enumerate(self.inputs)}
+        return first_scene(self.family, self.own(designs), angles, given, self.curves)
+
+
 def effect_poses(
-    family: Family,
-    effects: tuple[Placed, ...],
-    inputs: tuple[Parameter, ...],
-    curves: Mapping[str, Curve],
-    own: int,
-    designs: Array,
-    angles: Angles,
-    wanted: frozenset[str],
+    added: Added, effects: tuple[Placed, ...], designs: Array, angles: Angles, wanted: frozenset[str]
 ) -> Columns:
     """Family's own poses, then each effect with a wanted output; the status is the first that is not OK.
 
     Parameters
     ----------
-    family : without effects, or the chain;  own : number of its parameters
-    effects, inputs : what extends it;  curves : loads over the turn, by the input they add to
+    added, effects : what is extended, and by what
     designs : (n, P) with the inputs behind the family's own columns;  angles : (n, m) or (1, m)
     wanted : pose outputs of family and effects
     """
-    bare = np.ascontiguousarray(designs[:, :own])
-    columns = family.poses(bare, angles, wanted & frozenset(family.pose_names))
+    family = added.family
+    columns = family.poses(added.own(designs), angles, wanted & frozenset(family.pose_names))
     if np.iscomplexobj(designs) or np.iscomplexobj(angles.cos):
-        return _differenced(family, effects, inputs, curves, own, designs, angles, wanted) | columns
+        return _differenced(added, effects, designs, angles, wanted) | columns
     asked = [(placed, [name for name in placed.own if name in wanted]) for placed in effects]
     asked = [(placed, names) for placed, names in asked if names]
     if not asked:
@@ -57,14 +68,12 @@ def effect_poses(
     shape = columns["status"].shape
     status: Status = np.array(columns["status"], dtype=np.uint8)
     columns |= {name: np.empty(shape) for _, names in asked for name in names}
-    given = input_columns(inputs, designs, own)
     pointwise = [pair for pair in asked if not pair[0].entry.whole_turn]
     whole = [pair for pair in asked if pair[0].entry.whole_turn]
     # A whole-turn effect solves the turn of a design once, however many poses are asked for.
     for parts, blocks in ((pointwise, _blocks(shape, BLOCK)), (whole, _row_blocks(shape))):
         for rows, poses in blocks if parts else ():
-            part = _part(angles, rows, poses)
-            scene = first_scene(family, bare[rows], part, {n: x[rows] for n, x in given.items()}, curves)
+            scene = added.scene(designs[rows], _part(angles, rows, poses))
             for placed, names in parts:
                 found = placed.entry.compute(scene.stage(placed.stage), frozenset(placed.own[name] for name in names))
                 take_over(status[rows, poses], found["status"])
@@ -74,14 +83,7 @@ def effect_poses(
 
 
 def _differenced(
-    family: Family,
-    effects: tuple[Placed, ...],
-    inputs: tuple[Parameter, ...],
-    curves: Mapping[str, Curve],
-    own: int,
-    designs: Array,
-    angles: Angles,
-    wanted: frozenset[str],
+    added: Added, effects: tuple[Placed, ...], designs: Array, angles: Angles, wanted: frozenset[str]
 ) -> Columns:
     """Answer a complex step: effects are not analytic (norms, friction), so their derivative is a central difference.
 
@@ -95,7 +97,7 @@ def _differenced(
 
     def moved(sign: float) -> Columns:
         x, phi, cos, sin = (np.ascontiguousarray(z.real + sign * t * z.imag) for z in (designs, *angles))
-        return effect_poses(family, effects, inputs, curves, own, x, Angles(phi, cos, sin), names)
+        return effect_poses(added, effects, x, Angles(phi, cos, sin), names)
 
     here, ahead, behind = moved(0.0), moved(1.0), moved(-1.0)
     columns: Columns = {"status": here["status"]}
@@ -105,27 +107,15 @@ def _differenced(
     return columns
 
 
-def run_design(
-    family: Family,
-    placed: Placed,
-    inputs: tuple[Parameter, ...],
-    curves: Mapping[str, Curve],
-    own: int,
-    designs: Array,
-    wanted: frozenset[str],
-    accuracy: Accuracy,
-) -> Columns:
+def run_design(added: Added, placed: Placed, designs: Array, wanted: frozenset[str], accuracy: Accuracy) -> Columns:
     """Design outputs of an effect, block by block."""
     whole_turn = placed.entry.design_result
     assert whole_turn is not None
-    bare = np.ascontiguousarray(designs[:, :own])
-    given = input_columns(inputs, designs, own)
     names = frozenset(placed.own[name] for name in wanted)
     at_rest = Angles.of(np.zeros((1, 1)))
     parts = []
-    for start in range(0, max(len(bare), 1), whole_turn.block):
-        rows = slice(start, start + whole_turn.block)
-        scene = first_scene(family, bare[rows], at_rest, {n: x[rows] for n, x in given.items()}, curves)
+    for start in range(0, max(len(designs), 1), whole_turn.block):
+        scene = added.scene(designs[start : start + whole_turn.block], at_rest)
         parts.append(whole_turn.run(scene, names, accuracy))
     whole = {name: np.concatenate([part[name] for part in parts]) for name in parts[0]}
     columns: Columns = {"status": whole["status"]}
@@ -136,23 +126,12 @@ def run_design(
     return columns
 
 
-def bend_curves(
-    family: Family,
-    placed: Placed,
-    bend: Bend,
-    inputs: tuple[Parameter, ...],
-    curves: Mapping[str, Curve],
-    own: int,
-    designs: Array,
-    angles: Angles,
-) -> Array:
+def bend_curves(added: Added, placed: Placed, bend: Bend, designs: Array, angles: Angles) -> Array:
     """Functions at whose zeros outputs of an effect bend, (n, m, q), block by block."""
-    bare, given = np.ascontiguousarray(designs[:, :own]), input_columns(inputs, designs, own)
     shape = len(designs), angles.cos.shape[1]
     found: list[Array] = []
     for rows, poses in _blocks(shape, BLOCK):
-        part = {name: x[rows] for name, x in given.items()}
-        scene = first_scene(family, bare[rows], _part(angles, rows, poses), part, curves)
+        scene = added.scene(designs[rows], _part(angles, rows, poses))
         values = bend.curves(scene.stage(placed.stage))
         found = found or [np.empty((*shape, values.shape[2]))]
         found[0][rows, poses] = values
@@ -166,11 +145,6 @@ def on_own_columns(step: Step, own: int) -> Step:
         return step.run(np.ascontiguousarray(designs[:, :own]), wanted, accuracy)
 
     return replace(step, run=run)
-
-
-def input_columns(inputs: tuple[Parameter, ...], designs: Array, own: int) -> dict[str, Array]:
-    """Split off the inputs of the effects by name, each (n,)."""
-    return {p.name: np.ascontiguousarray(designs[:, own + k]) for k, p in enumerate(inputs)}
 
 
 def _part(angles: Angles, rows: slice, poses: slice) -> Angles:
@@ -215,16 +189,13 @@ def piercing(family: Family, added: tuple[Parameter, ...]) -> list[Crossing]:
     return found
 
 
-def bends(
-    family: Family, effects: tuple[Placed, ...], added: tuple[Parameter, ...], curves: Mapping[str, Curve]
-) -> list[Bends]:
+def bends(added: Added, effects: tuple[Placed, ...]) -> list[Bends]:
     """Where outputs of effects bend, from the most accurate poses: a cut beside a narrow peak is none."""
-    found = []
+    precise, found = replace(added, family=added.family.precise()), []
     for placed in effects:
         for bend in placed.entry.bends:
             of = frozenset(name for name, own in placed.own.items() if own in bend.outputs)
-            parts = family.precise(), placed, bend, added, curves, len(family.parameters)
-            found += [Bends(of, partial(bend_curves, *parts), bend.squares)] if of else []
+            found += [Bends(of, partial(bend_curves, precise, placed, bend), bend.squares)] if of else []
     return found
 
 

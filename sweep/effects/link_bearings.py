@@ -16,7 +16,7 @@ from sweep.effects.bearing_life import per_turn as turn_of_shaft
 from sweep.effects.bearings import CATALOGUE, REQUIRED_LIFE, permissible_load
 from sweep.effects.link_loads import SUPPORTED, friction_inputs, tree_of
 from sweep.effects.load_effects import friction_of, loads_of, tree_bends
-from sweep.effects.load_passing import FRICTION, LOADS, compute_friction
+from sweep.effects.load_passing import compute_friction
 from sweep.effects.loads import AXES, FRICTION_SUFFIX, FRICTION_TEXT
 from sweep.effects.scene import Scene, refuse, take_over
 from sweep.families import family
@@ -198,7 +198,8 @@ def sliding_of(name: str) -> Effect:
     only = {p.name: tuple(o.name for o in out) for own, _, out in found.values() for p in own}
     only |= {p.name: (out[-1].name,) for _, limits, out in found.values() for p in limits}
     own = tuple(p for sizes, limits, _ in found.values() for p in (*sizes, *limits))
-    return Effect(
+    return replace(
+        rubbing,
         key="B1",
         name=f"{name}_sliding_bearings",
         title=f"sliding bearings of every shaft and guide: mean pressures, utilisation: {family(name).title}",
@@ -211,9 +212,7 @@ def sliding_of(name: str) -> Effect:
         compute=sliding,
         called_for="choice of sliding bearings",
         negligible="other members govern: utilisation below 0.5",
-        takes_load=FRICTION,
-        requires=LinkTree,
-        tree=tree,
+        advise=None,
         bends=tree_bends(tree, tuple(o.name for _, _, out in found.values() for o in out)),
     )
 
@@ -236,7 +235,8 @@ def rolling_of(name: str) -> Effect:
         lives += turn
         only |= {p.name: tuple(o.name for o in (*out, *turn)) for p in own} | {life.name: (out[-1].name,)}
         bends += bends_of_shaft(_shaft(tree, joint), out[-1].name)
-    return Effect(
+    return replace(
+        bare,
         key="B2",
         name=f"{name}_rolling_bearings",
         title=f"rolling bearings of every shaft: loads, mean loads over the turn, lives: {family(name).title}",
@@ -250,9 +250,7 @@ def rolling_of(name: str) -> Effect:
         called_for="choice and life of rolling bearings",
         negligible="sliding bearings; elsewhere never, the life is what is asked for",
         even_crank=True,
-        takes_load=LOADS,
-        requires=LinkTree,
-        tree=tree,
+        advise=None,
         bends=tuple(bends),
         design_result=DesignResult(tuple(lives), rolling_turn, BLOCK),
     )

@@ -214,16 +214,15 @@ def _closed_friction(kind: loads.Follower) -> Effect:
         *loads.scalar_outputs(scalars, equation, kinetostatics.PASSES),
         Output(kinetostatics.CONTRACTION, "1", contraction, equation),
     ))  # fmt: skip
-    return Effect(
+    return replace(
+        _closed(kind),
         key=FRICTION,
         name=f"{kind.prefix}friction",
         title=f"friction of ball joints, crank shaft and {kind.name} by successive approximations",
         equation=equation,
         formulas=CLOSED_FRICTION_FORMULAS,
-        followers=(kind.name,),
         needs=(f"{kind.prefix}kinetostatics",),
         inputs=(*kind.parameters, *kinetostatics.friction_inputs(kind)),
-        tool_inputs=loads.TOOLS,
         outputs=outputs,
         compute=compute_friction,
         called_for="losses, drive sizing, a check against jamming",
@@ -281,7 +280,8 @@ def friction_of(name: str) -> Effect:
         *loads.vector_outputs(link_loads.vectors(tree, FRICTION_SUFFIX, FRICTION_TEXT), TREE_FRICTION_EQUATION),
         *loads.scalar_outputs(scalars, TREE_FRICTION_EQUATION, link_loads.PASSES),
     ))  # fmt: skip
-    return Effect(
+    return replace(
+        bare,
         key=FRICTION,
         name=f"{name}_friction",
         title=f"friction of all joints by successive approximations: {family(name).title}",
@@ -294,8 +294,6 @@ def friction_of(name: str) -> Effect:
         called_for="losses, drive sizing, loads of bearings, a check against jamming",
         negligible="a few passes settle it: joint loads change by less than 1 %",
         takes_load=FRICTION,
-        requires=LinkTree,
-        tree=tree,
         bends=tree_bends(tree, tuple(o.name for o in outputs)),
         advise=partial(
             largest,

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from functools import partial
 
 import numpy as np
@@ -222,18 +223,15 @@ def _effect(name: str, title: str, loaded: Effect, rubbing: Effect | None = None
     suffix, text = SUFFIX[rubs], FRICTION_TEXT if rubs else ""
     curves = _outputs(suffix, f" of constant mean speed{text}")
     results = (*_numbers(suffix, text), *reduction_outputs(curves))
-    return Effect(
+    return replace(
+        loaded,
         key="D4, D2" if rubs else "D4",
         name=f"{name}{suffix}",
         title=title.replace(TITLE, f"{TITLE}{text}"),
         equation="D4 (1)-(5)" if rubs else EQUATION,
         formulas=(*FORMULAS, FRICTION_FORMULA) if rubs else FORMULAS,
-        followers=loaded.followers,
-        requires=loaded.requires,
-        tree=loaded.tree,
         needs=(loaded.name,) if rubbing is None else (name, rubbing.name),
         inputs=(*(loaded if rubbing is None else rubbing).inputs, FLYWHEEL, MOTOR),
-        tool_inputs=loaded.tool_inputs,
         outputs=curves,
         compute=partial(compute, rubs=rubs),
         called_for="unevenness of a drive whose joints rub"

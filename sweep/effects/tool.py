@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
@@ -12,7 +13,7 @@ from sweep.effects.base import ON_LINE, ON_TIP, Effect, tool_place
 from sweep.effects.motion import CONSTRUCTION
 from sweep.effects.scene import Scene
 from sweep.families.base import Array, Columns, Output
-from sweep.families.capabilities import ToolPoint
+from sweep.families.capabilities import JointRecords, ToolPoint
 
 EQUATION = "docs/tool.md (1), (2), (6)"
 _SHARE = "in the torque about this stage's crank"
@@ -104,8 +105,6 @@ def compute(scene: Scene, wanted: frozenset[str]) -> Columns:
     return {name: columns[name] for name in wanted} | {"status": status}
 
 
-_NEGLIGIBLE = "mass of the tool far below that of the links, reduced to the same way"
-_INPUTS = (*loads.GRAVITY, loads.SPEED, loads.CHANGE, CONSTRUCTION)
 _FREE = "(6) a tool that moves freely with its point P: its load is |m_tool (a_P - gravity) - tool_force|"
 
 EFFECT = Effect(
@@ -120,27 +119,23 @@ EFFECT = Effect(
         _FREE,
     ),
     needs=(),
-    inputs=_INPUTS,
+    inputs=(*loads.GRAVITY, loads.SPEED, loads.CHANGE, CONSTRUCTION),
     tool_inputs=loads.TOOLS,
     outputs=OUTPUTS,
     compute=compute,
     called_for="mass of the needle bar, force of the needle",
-    negligible=_NEGLIGIBLE,
+    negligible="mass of the tool far below that of the links, reduced to the same way",
     requires=ToolPoint,
 )
 
-TIP = Effect(
-    key="U3",
+TIP = replace(
+    EFFECT,
     name="tip_tool",
     title="inertia, weight and working force of a tool at the tip of the rocker",
     equation="docs/tool.md (6), (7)",
     formulas=(_FREE, "(7) it acts on the rocker, reversed: loads, friction, drive torque, inertia"),
-    needs=(),
-    inputs=_INPUTS,
-    tool_inputs=loads.TOOLS,
     outputs=TIP_OUTPUTS,
-    compute=compute,
     called_for="mass of a looper on its rocker, force of the thread",
-    negligible=_NEGLIGIBLE,
+    requires=JointRecords,
     carried_at=ON_TIP,
 )
