@@ -80,8 +80,8 @@ def contour(scene: Scene, wanted: frozenset[str]) -> Columns:
     names = ("eyelet_radius", "thread_adhesion", "thread_friction", "thread_bending", "thread_count", "thread_density")
     # The constants are per degree.
     arguments = _per_pose(scene, "thread_tension"), np.degrees(wrap), scene.table(names)
-    outputs = tuple(o.name for o in CONTOUR_OUTPUTS)
-    return filled_each(lambda *given: thread_contour(*given, None), arguments, outputs, wanted, status)
+    outputs = *(o.name for o in CONTOUR_OUTPUTS), "radius of the thread, which nobody asks for"
+    return filled_each(thread_contour, arguments, outputs, wanted, status)
 
 
 def euler(scene: Scene, wanted: frozenset[str]) -> Columns:
