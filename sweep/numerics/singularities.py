@@ -115,19 +115,13 @@ def crowded(near: Singularities, share: float) -> Array:
     that needs fewer than others repeats some: its angles do not depend on what else is asked.
     """
     n, k = near.phi.shape
-    own = steps(near, share)
+    reach = np.arcsinh(np.pi / near.rho).max(axis=1, initial=1.0)
+    own = np.ceil(reach / share).astype(np.int64)  # angles on either side of its zeros that each design needs
     half = int(own.max(initial=1))
     number = np.clip(np.arange(-half, half + 1), -own[:, None], own[:, None]) / own[:, None]
     t = np.arcsinh(np.pi / near.rho)[:, :, None] * number[:, None, :]
     angles = near.phi[:, :, None] + near.rho[:, :, None] * np.sinh(t)
     return np.sort(np.mod(angles.reshape(n, k * (2 * half + 1)), TWO_PI), axis=1)
-
-
-def steps(near: Singularities, share: float) -> Index:
-    """How many angles on either side of its zeros each design needs, (n,)."""
-    reach = np.arcsinh(np.pi / near.rho).max(axis=1, initial=1.0)
-    found: Index = np.ceil(reach / share).astype(np.int64)
-    return found
 
 
 def turn_edges(near: Singularities, share: float) -> Array:

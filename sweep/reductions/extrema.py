@@ -127,4 +127,10 @@ def _searched(
             search.status[pending] = st.NOT_CONVERGED
             break
         samples *= 2
+    for request, torn in zip(requests, search.torn, strict=True):
+        rows = np.flatnonzero(torn)
+        if rows.size:
+            cut, search.status[rows] = panels.extrema(family, designs[rows], [request], target, locate)
+            for column, values in zip(search.found[request], cut[request], strict=True):
+                column[rows] = values
     return search.found, search.status

@@ -14,7 +14,6 @@ from sweep.families.base import Array, Family
 from sweep.families.curve_features import Singular
 from sweep.numerics.singularities import Singularities
 from sweep.quantities.kinds import Request
-from sweep.reductions.breaks import jumps, level, near_jumps, search
 from sweep.reductions.refine import (
     SHRINK,
     VARIES,
@@ -50,6 +49,9 @@ DISAGREEMENT = 0.05  # between the peak guessed from the samples and the refined
 RIVALS = 1e-3  # peaks lower than the best by no more of its size may turn out the highest
 NEVER = 2**40  # more samples than are ever needed
 CLOSE = 0.1  # distance of a singularity [rad] from which on it is measured what rounding does
+JUMPS = 32  # of a turn; a curve with more is not resolved
+STEP = 1.0 / 60.0  # of the curve's size; smaller steps are left to the samples
+SHARPER = 6.0  # times the differences beside it
 TIE = 1e-10  # to which peaks are told apart where their places are wanted
 
 
@@ -64,6 +66,29 @@ class Candidates(NamedTuple):
     def only(self, which: Index | Mask) -> Candidates:
         """Return some of them."""
         return Candidates(self.request[which], self.row[which], self.column[which], self.sign[which])
+
+
+def jumps(values: Array, size: Array, rough: float) -> Mask:
+    """Tell which rows of samples jump, and are resolved apart from that.
+
+    Friction changes its direction where the follower reverses, an angle of a direction leaps by pi: no number of
+    samples resolves such a place.
+
+    Parameters
+    ----------
+    values : (n, m) equidistant samples of whole turns;  size : (n,) of the curves
+    rough : fourth difference against the size above which samples do not resolve a curve
+    """
+    step = np.abs(np.roll(values, -1, axis=1) - values)
+    beside = np.maximum.reduce([np.roll(step, k, axis=1) for k in (-2, -1, 1, 2)])
+    between = (step > STEP * size[:, None]) & (step > SHARPER * beside)
+    near = np.logical_or.reduce([np.roll(between, k, axis=1) for k in (-1, 0, 1, 2)])
+    left, right = (np.roll(values, k, axis=1) + np.roll(values, -k, axis=1) for k in (1, 2))
+    fourth = np.abs(right - 4.0 * left + 6.0 * values)
+    smooth = np.where(near, 0.0, fourth).max(axis=1) <= rough * size
+    count = between.sum(axis=1)
+    found: Mask = smooth & (count > 0) & (count <= JUMPS)
+    return found
 
 
 @dataclass
@@ -83,6 +108,7 @@ class Search:
     names: list[str] = field(init=False)
     guards: list[str] = field(init=False)
     near: Singularities | None = field(init=False)
+    torn: Mask = field(init=False)
 
     def __post_init__(self) -> None:
         n = len(self.designs)
@@ -92,6 +118,7 @@ class Search:
         self.near = nearest(self.family, self.designs, MATTERS) if self.family.every(Singular) else None
         fewest = (START * denser(self.family, self.designs, self.near)).astype(np.int64)
         self.undone = np.tile(fewest, (len(self.requests), 1))
+        self.torn = np.zeros(self.undone.shape, np.bool_)  # curves that jump: panels are to search them
         if self.near is not None and not self.anywhere:
             broken(self.family, self.designs, self.near, self.status)
             self.undone[:, self.status != st.OK] = 0
@@ -126,7 +153,7 @@ class Search:
         if not rows.size:
             return
         looked = (self.undone[:, rows] > 0) & (self.undone[:, rows] <= samples)
-        candidates, scales, needed, breaks, alone = self._candidates(rows, columns, samples)
+        candidates, scales, needed, alone = self._candidates(rows, columns, samples)
         needed = np.maximum(needed, self._samples_by_singularity(columns, samples, rows.size))
         resolved = looked & ((needed <= samples) | (samples == LIMIT))
         candidates = candidates.only(resolved[candidates.request, candidates.row])
@@ -136,10 +163,6 @@ class Search:
             row, found = candidates.row[mine], peaks.only(mine)
             if self.window is not None and request.windowed:
                 row, found = self._within_window(rows, columns, request, row, found, resolved[number])
-            elif request in breaks:
-                floor = level(columns[request.pose], request.mode, SHARE)
-                between = breaks[request] & resolved[number][:, None]
-                row, found = self._beside_jumps(rows, samples, request, row, found, between, floor)
             moved = self._keep_best(rows, request, row, found) > DISAGREEMENT * scales[request]
             again = moved & resolved[number] & ~alone[number]
             needed[number, again] = np.maximum(needed[number, again], 2 * samples)
@@ -150,9 +173,9 @@ class Search:
 
     def _candidates(
         self, rows: Index, columns: dict[str, Array], samples: int
-    ) -> tuple[Candidates, dict[Request, Array], Index, dict[Request, Mask], Mask]:
-        """Candidates of all requests, sizes and jumps of their curves, samples needed, and what is rounding alone."""
-        needed, pieces, scales, breaks = np.full((len(self.requests), rows.size), START), [], {}, {}
+    ) -> tuple[Candidates, dict[Request, Array], Index, Mask]:
+        """Candidates of all requests, sizes of their curves, samples needed, and which need no more: noise, jumps."""
+        needed, pieces, scales = np.full((len(self.requests), rows.size), START), [], {}
         alone = np.zeros(needed.shape, np.bool_)
         for number, request in enumerate(self.requests):
             values = columns[request.pose]
@@ -170,18 +193,14 @@ class Search:
                 alone[number] = rounding_alone(self.family, self.designs[rows], request.pose, values, rough > ROUGH)
                 rough[alone[number]] = 0.0
             if samples >= BREAKING and allowed is None and (rough > ROUGH).any():
-                between, smooth = jumps(values, scale, ROUGH)
-                between[~smooth] = False
-                rough[smooth] = 0.0
-                breaks[request] = between
-                away = ~near_jumps(between, row, column)
-                row, column, count = row[away], column[away], int(away.sum())
+                torn = jumps(values, scale, ROUGH)
+                self.torn[number, rows[torn]], alone[number, torn], rough[torn] = True, True, 0.0
             sign = np.sign(values[row, column]) if request.mode == 0 else np.full(count, float(request.mode))
             pieces.append(Candidates(np.full(count, number), row, column, sign))
             scales[request] = scale
             needed[number, rough > ROUGH] = 2 * samples
         joined = [np.concatenate(parts) for parts in zip(*pieces, strict=True)]
-        return Candidates(*joined), scales, needed, breaks, alone
+        return Candidates(*joined), scales, needed, alone
 
     def _samples_by_singularity(self, columns: dict[str, Array], samples: int, count: int) -> Index:
         distance = np.full(count, np.inf)
@@ -300,26 +319,6 @@ class Search:
         none = np.zeros(edge.row.size)
         added = Peaks(edge.phi, height, none + 8.0 * EPS, edge.err, height, none, none)
         return np.concatenate([row[inside], edge.row]), peaks.only(inside).joined(added)
-
-    def _beside_jumps(
-        self, rows: Index, samples: int, request: Request, row: Index, peaks: Peaks, between: Mask, floor: Array
-    ) -> tuple[Index, Peaks]:
-        """Add the highest points of the arcs that end at a jump."""
-        at, column = np.nonzero(between)
-        if not at.size:
-            return row, peaks
-
-        def curve(phi: Array, which: Index) -> Array:
-            designs = self.designs[rows[at[which]]]
-            return pose_columns(self.family, designs, phi[:, None], [request.pose])[0][request.pose][:, 0]
-
-        def measured(phi: Array, which: Index) -> Array:
-            return np.abs(curve(phi, which)) if request.mode == 0 else request.mode * curve(phi, which)
-
-        arcs = search(curve, measured, column, samples, floor[at])
-        wide, none = np.full(arcs.phi.size, TWO_PI / samples), np.zeros(arcs.phi.size)
-        added = Peaks(arcs.phi, arcs.value, wide, arcs.err, arcs.value, none, none)
-        return np.concatenate([row, at, at]), peaks.joined(added)
 
     def _keep_best(self, rows: Index, request: Request, row: Index, peaks: Peaks) -> Array:
         """Store the best candidate of each row; by how much refinement moved it from the guess (0 where none)."""

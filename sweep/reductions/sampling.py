@@ -25,10 +25,10 @@ FEW = 4  # columns from which on there are fewer samples at once
 
 
 @lru_cache(maxsize=32)
-def turn(samples: int, shift: float = 0.0) -> Angles:
-    """Equidistant crank angles of one turn, from 0 or a share of their spacing, shape (1, samples)."""
+def turn(samples: int) -> Angles:
+    """Equidistant crank angles of one turn from 0, shape (1, samples)."""
     # Not locked: kernels would be compiled once more, for arrays that cannot be written.
-    phi: Array = (np.arange(samples, dtype=np.float64)[None, :] + shift) * (TWO_PI / samples)
+    phi: Array = np.arange(samples, dtype=np.float64)[None, :] * (TWO_PI / samples)
     return Angles.of(phi)
 
 
@@ -45,11 +45,9 @@ def discriminants(family: Family) -> tuple[str, ...]:
 
 
 def sample_turn(
-    family: Family, designs: Array, samples: int, names: Sequence[str], shift: float = 0.0
+    family: Family, designs: Array, samples: int, names: Sequence[str]
 ) -> tuple[dict[str, Array], Status, Mask]:
-    """Pose outputs over one turn, (n, samples), with angles made continuous.
-
-    The first crank angle is 0, or that share of the spacing by which all are shifted.
+    """Pose outputs over one turn, (n, samples), with angles made continuous; the first crank angle is 0.
 
     Returns
     -------
@@ -57,7 +55,7 @@ def sample_turn(
     worst : (n,) gravest status of the turn
     winds : (n,) whether a wanted follower's angle makes full turns, so that it has no extremum
     """
-    columns, status = _evaluate(family, designs, turn(samples, shift), names)
+    columns, status = _evaluate(family, designs, turn(samples), names)
     worst = np.empty(len(designs), np.uint8)
     scan.worst_status(status, worst)
     winds = np.zeros(len(designs), np.bool_)
