@@ -103,42 +103,22 @@ def size_of(jet: Jet) -> Any:
 
 @inline
 def harmonic(c0: Any, c1: Any, c2: Any, reach: Any, error: Any) -> Jet:
-    """Enclose c0 + c1 s + c2 m with s = sin z and m = 1 - cos z on |z| <= reach <= 1.
-
-    ``error`` bounds the size of the function that the errors of c0, c1, c2 themselves make.
-    """
-    r2 = reach * reach
-    r3, r4 = r2 * reach, r2 * r2
-    p = (
-        c0, reach * c1 * TABLE[1, 1], r2 * c2 * TABLE[2, 2], r3 * c1 * TABLE[1, 3], r4 * c2 * TABLE[2, 4],
-        r4 * reach * c1 * TABLE[1, 5], r4 * r2 * c2 * TABLE[2, 6],
-    )  # fmt: skip
-    whole = reach * abs(c1) * SIZE[1] + r2 * abs(c2) * SIZE[2]
-    rest = abs(c1) * REST[1] + abs(c2) * REST[2]
-    noise = (error + (ORDER + 8) * EPS * whole) * GUARD
-    return Jet(p, norm_of(p), noise, rest * (r4 * r3) * (1.0 + 2.0**-30))
+    """Enclose c0 + c1 s + c2 m, as :func:`triple_harmonic` does."""
+    return triple_harmonic(c0, c1, c2, 0.0, 0.0, 0.0, 0.0, reach, error)
 
 
 @inline
 def double_harmonic(c0: Any, c1: Any, c2: Any, c3: Any, c4: Any, reach: Any, error: Any) -> Jet:
-    """Enclose c0 + c1 s + c2 m + c3 s m + c4 m^2, as :func:`harmonic` does."""
-    r2 = reach * reach
-    r3, r4 = r2 * reach, r2 * r2
-    p = (
-        c0, reach * c1 * TABLE[1, 1], r2 * c2 * TABLE[2, 2], r3 * (c1 * TABLE[1, 3] + c3 * TABLE[3, 3]),
-        r4 * (c2 * TABLE[2, 4] + c4 * TABLE[4, 4]), r4 * reach * (c1 * TABLE[1, 5] + c3 * TABLE[3, 5]),
-        r4 * r2 * (c2 * TABLE[2, 6] + c4 * TABLE[4, 6]),
-    )  # fmt: skip
-    odd = reach * (abs(c1) * SIZE[1] + r2 * abs(c3) * SIZE[3])
-    whole = odd + r2 * (abs(c2) * SIZE[2] + r2 * abs(c4) * SIZE[4])
-    rest = abs(c1) * REST[1] + abs(c2) * REST[2] + abs(c3) * REST[3] + abs(c4) * REST[4]
-    noise = (error + (ORDER + 8) * EPS * whole) * GUARD
-    return Jet(p, norm_of(p), noise, rest * (r4 * r3) * (1.0 + 2.0**-30))
+    """Enclose c0 + c1 s + c2 m + c3 s m + c4 m^2, as :func:`triple_harmonic` does."""
+    return triple_harmonic(c0, c1, c2, c3, c4, 0.0, 0.0, reach, error)
 
 
 @inline
 def triple_harmonic(c0: Any, c1: Any, c2: Any, c3: Any, c4: Any, c5: Any, c6: Any, reach: Any, error: Any) -> Jet:
-    """Enclose c0 + c1 s + c2 m + c3 s m + c4 m^2 + c5 s m^2 + c6 m^3, as :func:`harmonic` does."""
+    """Enclose c0 + c1 s + c2 m + c3 s m + c4 m^2 + c5 s m^2 + c6 m^3 on |z| <= reach <= 1.
+
+    s is sin z, and m is 1 - cos z; ``error`` bounds the size of the function that the errors of c0 ... c6 make.
+    """
     r2 = reach * reach
     r3, r4 = r2 * reach, r2 * r2
     p = (

@@ -10,13 +10,14 @@ from dataclasses import dataclass
 from typing import Any
 
 from kernels.chains.chain import Chained
-from kernels.chains.form import Helper
+from kernels.chains.form import Helper, Travel
 from kernels.chains.links import Input
 from kernels.curves.trigonometric_polynomials import rotate
 from kernels.jit import generated_inline, inline
 
 MARGIN = -1  # instead of an order: the squared cosine of the last stage's pressure angle
 JERK = 3  # the highest order
+Y0 = Travel._fields.index("y0")
 AHEAD = 1e-5  # [rad] of the difference quotient for the fifth derivative, which only steers the iteration
 
 
@@ -56,9 +57,8 @@ def curve(chain: Chained, order: int, along: bool) -> Curve:
     """Return the derivative of that order, 0 to 3, or the `MARGIN`; with ``along`` b is 0 for all designs."""
     kind = "margin" if order == MARGIN else f"{'along' if along else 'order'}{order}"
     name = f"{kind}_{chain.record.name}"
-    derivatives = (_position, _velocity, _acceleration, _jerk)
     jet, sample, rounding = (
-        _margin(chain) if order == MARGIN else derivatives[order](chain, _along if along else _in_frame)
+        _margin(chain) if order == MARGIN else _derivative(chain, order, _along if along else _in_frame)
     )
     hand, take = _handing(max(order, 0))
     jet, sample, hand, take, rounding = (
@@ -95,68 +95,31 @@ def _in_frame(a: Any, b: Any, x: Any, y: Any) -> Any:
 
 
 @inline
+def _plus(value: Any, constant: Any) -> Any:
+    return value + constant
+
+
+@inline
+def _first(value: Any, constant: Any) -> Any:
+    return value  # a derivative has no constant
+
+
+@inline
 def _along(a: Any, b: Any, x: Any, y: Any) -> Any:
     return a * x  # then nothing of y is computed
 
 
-def _position(chain: Chained, made: Helper) -> tuple[Helper, Helper, Helper]:
+def _derivative(chain: Chained, order: int, made: Helper) -> tuple[Helper, Helper, Helper]:
     travel, land, blur = chain.travel, chain.land, chain.blur
+    x, y = order, Y0 + order  # places in `Travel`
+    e, f = order, JERK + 1 + order  # and among the rounding errors
+    plus = _plus if order == 0 else _first
 
     def jet(k: Any, a: Any, b: Any, c: Any, u: Any, v: Any) -> Any:
         m, _ = travel(k, u, v)
-        return made(a, b, m.x0, m.y0) + c, made(a, b, m.x1, m.y1), made(a, b, m.x2, m.y2)
+        return plus(made(a, b, m[x], m[y]), c), made(a, b, m[x + 1], m[y + 1]), made(a, b, m[x + 2], m[y + 2])
 
-    def sample(k: Any, a: Any, b: Any, c: Any, t: Any) -> Any:
-        m = land(k, t)
-        return made(a, b, m.x0, m.y0) + c, m.delta
-
-    def rounding(k: Any, a: Any, b: Any, u: Any, v: Any) -> Any:
-        e0, _, _, _, f0, _, _, _, _ = blur(k, u, v)
-        return abs(a) * e0 + abs(b) * f0
-
-    return jet, sample, rounding
-
-
-def _velocity(chain: Chained, made: Helper) -> tuple[Helper, Helper, Helper]:
-    travel, land, blur = chain.travel, chain.land, chain.blur
-
-    def jet(k: Any, a: Any, b: Any, c: Any, u: Any, v: Any) -> Any:
-        m, _ = travel(k, u, v)
-        return made(a, b, m.x1, m.y1), made(a, b, m.x2, m.y2), made(a, b, m.x3, m.y3)
-
-    def sample(k: Any, a: Any, b: Any, c: Any, t: Any) -> Any:
-        m = land(k, t)
-        return made(a, b, m.x1, m.y1), m.delta
-
-    def rounding(k: Any, a: Any, b: Any, u: Any, v: Any) -> Any:
-        _, e1, _, _, _, f1, _, _, _ = blur(k, u, v)
-        return abs(a) * e1 + abs(b) * f1
-
-    return jet, sample, rounding
-
-
-def _acceleration(chain: Chained, made: Helper) -> tuple[Helper, Helper, Helper]:
-    travel, land, blur = chain.travel, chain.land, chain.blur
-
-    def jet(k: Any, a: Any, b: Any, c: Any, u: Any, v: Any) -> Any:
-        m, _ = travel(k, u, v)
-        return made(a, b, m.x2, m.y2), made(a, b, m.x3, m.y3), made(a, b, m.x4, m.y4)
-
-    def sample(k: Any, a: Any, b: Any, c: Any, t: Any) -> Any:
-        m = land(k, t)
-        return made(a, b, m.x2, m.y2), m.delta
-
-    def rounding(k: Any, a: Any, b: Any, u: Any, v: Any) -> Any:
-        _, _, e2, _, _, _, f2, _, _ = blur(k, u, v)
-        return abs(a) * e2 + abs(b) * f2
-
-    return jet, sample, rounding
-
-
-def _jerk(chain: Chained, made: Helper) -> tuple[Helper, Helper, Helper]:
-    travel, land, blur = chain.travel, chain.land, chain.blur
-
-    def jet(k: Any, a: Any, b: Any, c: Any, u: Any, v: Any) -> Any:
+    def jerk_jet(k: Any, a: Any, b: Any, c: Any, u: Any, v: Any) -> Any:
         m, _ = travel(k, u, v)
         n, _ = travel(k, *rotate(u, v, AHEAD))
         slope = made(a, b, m.x4, m.y4)
@@ -164,13 +127,13 @@ def _jerk(chain: Chained, made: Helper) -> tuple[Helper, Helper, Helper]:
 
     def sample(k: Any, a: Any, b: Any, c: Any, t: Any) -> Any:
         m = land(k, t)
-        return made(a, b, m.x3, m.y3), m.delta
+        return plus(made(a, b, m[x], m[y]), c), m.delta
 
     def rounding(k: Any, a: Any, b: Any, u: Any, v: Any) -> Any:
-        _, _, _, e3, _, _, _, f3, _ = blur(k, u, v)
-        return abs(a) * e3 + abs(b) * f3
+        errors = blur(k, u, v)
+        return abs(a) * errors[e] + abs(b) * errors[f]
 
-    return jet, sample, rounding
+    return (jerk_jet if order == JERK else jet), sample, rounding
 
 
 def _margin(chain: Chained) -> tuple[Helper, Helper, Helper]:

@@ -44,7 +44,7 @@ from kernels.types import Array, Status
 Counts: TypeAlias = NDArray[np.int64]
 
 PLAIN = 2.0**-14  # of the target: larger rounding errors are left to precise poses
-RIVALS = 1e-3  # of the scale: peaks lower by no more may turn out the highest where rounding has moved them
+RIVALS = 64.0  # times the rounding error: peaks lower by no more may turn out the highest where it has moved them
 SETTLING = 8  # more steps for a maximum that is not trusted after the usual ones
 MORE = 4  # times as many samples for a design of which a maximum is not trusted even so
 ROUNDED, UNTRUSTED = 254, 253  # instead of a status; the first see `find_extrema`
@@ -137,11 +137,11 @@ def _decide(
         winner = peak if m[peak + HEIGHT] > m[winner + HEIGHT] else winner
     height, blur, scale = m[winner + HEIGHT], m[winner + ROUNDING], m[winner + SCALE]
     code = st.OK if blur <= rounding * scale else ROUNDED
-    apart = RIVALS if code == ROUNDED else tie
+    apart = RIVALS * blur if code == ROUNDED else tie * scale
     if apart >= 0.0:
         for slot in range(begin - 1, end):
             peak = (own if slot < begin else slot) & PLACE
-            if peak != winner and m[peak + HEIGHT] + m[peak + ROUNDING] >= height - blur - apart * scale:
+            if peak != winner and m[peak + HEIGHT] + m[peak + ROUNDING] >= height - blur - apart:
                 code = OPEN
     place = m[winner + START] + m[winner + MOVED] + m[winner + LAST]
     found[VALUE, i], found[PHI, i] = -height if mode < 0 else height, place - TURN * np.floor(place / TURN)

@@ -13,12 +13,11 @@ from numpy.typing import ArrayLike
 
 from kernels.types import TWO_PI
 from sweep.errors import InputError
-from sweep.evaluation.given_units import heading_factor, plain
 from sweep.evaluation.tables import Parametrised, numbers
 from sweep.families.base import Array, Parameter
 from sweep.families.domain import Domain, reads_as_degrees
 from sweep.families.names import stem
-from sweep.quantities.units import internal_unit
+from sweep.quantities.units import heading_factor, internal_unit, plain
 
 if TYPE_CHECKING:
     from sweep.evaluation.tables import Table

@@ -13,7 +13,6 @@ from kernels.types import TWO_PI, Array
 from sweep.effects import inputs_beside
 from sweep.errors import InputError, MissingInput, nearest
 from sweep.evaluation.angles import TURNING, grid_in_radians, is_plausible
-from sweep.evaluation.given_units import plain
 from sweep.evaluation.poses import asked_of_poses, check_march, values_of_the_variable
 from sweep.evaluation.routes import design_outputs
 from sweep.evaluation.statuses import explained
@@ -23,7 +22,7 @@ from sweep.families import family as find_family
 from sweep.families.base import Angles, Family, Parameter
 from sweep.families.domain import Domain, Turn
 from sweep.families.names import stem
-from sweep.quantities.units import LARGEST, UnitFault, factor, internal_unit, split
+from sweep.quantities.units import LARGEST, internal_unit, one_value, plain
 
 Number: TypeAlias = "float | str"
 """A dimension [mm, rad, t, s and what follows from them], or a text with its unit, as "12 mm"."""
@@ -180,13 +179,10 @@ def _is_number(given: object) -> TypeGuard[float]:
 def _value(name: str, p: Parameter, given: object, place: str) -> float:
     """Read one dimension, and check it as a table's column is checked."""
     internal = internal_unit(p.unit)
-    if isinstance(given, str):
-        try:
-            number, unit = split(given, internal)
-            value = number * factor(unit, internal)
-        except UnitFault as fault:
-            raise InputError(name, given, str(fault), place) from None
-    elif (said := plain(given, internal, name, place)) is not given and _is_number(said):
+    said: Any = (
+        one_value(given, internal, name, place) if isinstance(given, str) else plain(given, internal, name, place)
+    )
+    if said is not given and _is_number(said):
         value = float(said)
     elif _is_number(given):
         value = float(given)

@@ -17,7 +17,6 @@ import numpy as np
 from sweep.errors import InputError, StoreError
 from sweep.evaluation.angles import AngleUnit, grid_in_radians, in_radians
 from sweep.evaluation.curves import motion_curves
-from sweep.evaluation.given_units import speed_given
 from sweep.evaluation.poses import evaluate
 from sweep.evaluation.tables import design_matrix
 from sweep.exchange.dxf import write_dxf
@@ -29,6 +28,7 @@ from sweep.families import family as find_family
 from sweep.families.base import Family
 from sweep.families.domain import Interval, Turn, equal_steps
 from sweep.families.machines import Machine
+from sweep.quantities.units import speed_given
 
 if TYPE_CHECKING:
     from sweep.evaluation.tables import Table

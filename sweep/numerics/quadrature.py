@@ -67,10 +67,8 @@ class _Panels(NamedTuple):
     idle: Array
 
     def only(self, which: Mask) -> _Panels:
-        return _Panels(
-            self.row[which], self.origin[which], self.low[which], self.high[which], self.value[which], self.err[which],
-            self.idle[which],
-        )  # fmt: skip
+        row, origin, *others = self
+        return _Panels(row[which], origin[which], *(column[which] for column in others))
 
 
 def integrate(function: Integrand, edges: Array, target: float) -> Integrals:

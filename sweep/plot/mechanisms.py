@@ -14,7 +14,6 @@ from sweep.errors import InputError
 from sweep.evaluation.angles import AngleUnit, grid_in_radians, in_radians
 from sweep.evaluation.curves import motion_curves
 from sweep.evaluation.cyclogram import cyclogram as table
-from sweep.evaluation.given_units import speed_given
 from sweep.evaluation.joints import parts
 from sweep.evaluation.poses import evaluate, pose_wants
 from sweep.exchange.scene import VIEWS, exists, over, shown_name
@@ -24,6 +23,7 @@ from sweep.families.base import Array, Family
 from sweep.families.domain import Interval
 from sweep.plot.cyclogram import cyclogram_figure
 from sweep.plot.drawing import COLOURS, mechanism_figure
+from sweep.quantities.units import speed_given
 from sweep.report.figures import OPTIMUM, WIDTH, crank_axis, house_style, new_figure
 from sweep.report.live import is_angle, turns_fully
 from sweep.report.quantities import quantity

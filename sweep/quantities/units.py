@@ -1,4 +1,4 @@
-"""Written units: a number and its unit to mm, t, s, rad and what follows from them, or bytes.
+"""Written units: numbers, texts such as "20 g" and quantities of pint to mm, t, s, rad and what follows, or bytes.
 
 Forces in N, couples in N mm, pressures in MPa are consistent with lengths in mm, times in s and masses in tonnes: no
 factor stands in any equation of motion.
@@ -9,9 +9,13 @@ from __future__ import annotations
 import math
 import re
 from collections import Counter
+from collections.abc import Iterable
 from functools import lru_cache
+from typing import Any
 
-from sweep.errors import nearest
+import numpy as np
+
+from sweep.errors import InputError, nearest
 from sweep.families.parameter import spelt_out
 
 # Base units, then what each other one is of them, with its power; an angle is a dimension, so 45 is not 45 rad.
@@ -141,3 +145,78 @@ def _parsed(text: str) -> tuple[float, Counter[str]]:
         for base, power in known.items():
             powers[base] += (exponent if operator == "*" else -exponent) * power
     return size, powers
+
+
+def plain(values: Any, internal: str, name: str, place: str = "units") -> Any:
+    """Return values without their units, in the internal one; what says no unit stays as it is.
+
+    Parameters
+    ----------
+    values : a number, a text, a quantity of pint, or a column of any of them
+    internal : the unit that a bare number has, as "mm" or "rad/s"
+    name, place : for messages
+
+    Raises
+    ------
+    InputError
+        for a unit that is unknown or measures something else.
+    """
+    if isinstance(values, int | float):
+        return values
+    if _says(values):
+        return one_value(values, internal, name, place)
+    bare = getattr(getattr(values, "dtype", None), "kind", "O") != "O" or getattr(values, "ndim", 1) == 0
+    if bare or isinstance(values, str | bytes) or not isinstance(values, Iterable):
+        return values
+    rows = list(values)
+    if not any(map(_says, rows)):
+        return values
+    return [one_value(value, internal, name, place) if _says(value) else value for value in rows]
+
+
+def _says(value: object) -> bool:
+    """Tell whether one value says its unit; a text that is a bare number does not, nor one that begins with none."""
+    if isinstance(value, str):
+        text = value.strip()
+        if not text[:1].isdigit() and text[:1] not in ("+", "-", "."):
+            return False
+        try:
+            float(text)
+        except ValueError:
+            return True
+        return False
+    return hasattr(value, "magnitude") and hasattr(value, "to")
+
+
+def one_value(value: Any, internal: str, name: str, place: str) -> Any:
+    """Return one value that says its unit in the internal one; arguments and errors as of `plain`."""
+    if isinstance(value, str):
+        try:
+            number, unit = split(value, internal)
+            return number * factor(unit, internal)
+        except UnitFault as fault:
+            raise InputError(name, value, str(fault), place) from None
+    try:
+        return value.to("dimensionless" if internal == "1" else internal).magnitude
+    except (ValueError, TypeError, AttributeError) as error:  # what pint raises for another dimension is a TypeError
+        raise InputError(name, str(value), example(internal), place) from error
+
+
+def heading_factor(name: str, unit: str, internal: str) -> float:
+    """Return what a column whose heading says its unit is multiplied by, as `m_crank [g]`.
+
+    Raises
+    ------
+    InputError
+        for a unit that is unknown or measures something else.
+    """
+    try:
+        return factor(unit, internal)
+    except UnitFault as fault:
+        raise InputError("unit", unit, str(fault), f"column {name} [{unit}]") from None
+
+
+def speed_given(speed: Any) -> float | None:
+    """Return a speed of the driving shaft in rad/s, from a number or from what says its unit."""
+    found = plain(speed, "rad/s", "speed")
+    return None if found is None else float(np.float64(found))

@@ -12,12 +12,12 @@ from kernels.types import EPS, TWO_PI, Status
 from sweep.families.base import Accuracy, Array, Columns, Event, Family
 from sweep.families.domain import Interval
 from sweep.families.names import error_of
+from sweep.numerics.events import zeros
 from sweep.quantities.resolve import event_names
 from sweep.reductions.resolution import denser
 from sweep.reductions.sampling import DESIGN_STATUS, Index, blocks, pose_columns, sample_turn, variable
 
 START, LIMIT = 256, 16384  # samples of the first look, and those beyond which a design is given up
-PASSES = 80
 
 
 def event_outputs(family: Family, designs: Array, names: Sequence[str], accuracy: Accuracy) -> Columns:
@@ -101,26 +101,13 @@ def _crossings(family: Family, designs: Array, rows: Index, values: Array, event
 def _root(
     family: Family, designs: Array, event: Event, left: Array, right: Array, low: Array, high: Array
 ) -> tuple[Array, Array]:
-    """Find a passage between two samples by regula falsi in the Illinois form, all designs at once.
+    """Find a passage between two samples, with the values ``low`` and ``high``; its error is from their slope."""
 
-    Its error is from the last slope.
-    """
-    sense = 1.0 if event.rising else -1.0
-    slope = (high - low) / (right - left)
-    side, phi, off = np.zeros(left.size), right.copy(), high.copy()
-    a = np.arange(left.size)
-    for _ in range(PASSES):
-        if not a.size:
-            break
-        phi[a] = right[a] - high[a] * (right[a] - left[a]) / (high[a] - low[a])
-        now = sense * (pose_columns(family, designs[a], phi[a, None], [event.of])[0][event.of][:, 0] - event.level)
-        off[a] = now
-        below = now < 0.0
-        # Illinois: the end that stays a second time has its value halved, so that both ends close in.
-        high[a] = np.where(below, np.where(side[a] == -1.0, 0.5, 1.0) * high[a], now)
-        low[a] = np.where(below, now, np.where(side[a] == 1.0, 0.5, 1.0) * low[a])
-        left[a], right[a] = np.where(below, phi[a], left[a]), np.where(below, right[a], phi[a])
-        side[a] = np.where(below, -1.0, 1.0)
-        a = a[(now != 0.0) & (right[a] - left[a] > 4.0 * EPS * TWO_PI)]
-    rounding = 8.0 * EPS * (np.abs(event.level) + np.abs(off) + np.abs(slope))
-    return np.mod(phi, TWO_PI), (np.abs(off) + rounding) / np.maximum(np.abs(slope), 1e-300) + 8.0 * EPS
+    def off(which: Index, phi: Array) -> Array:
+        return pose_columns(family, designs[which], phi[:, None], [event.of])[0][event.of][:, 0] - event.level
+
+    slope = np.abs((high - low) / (right - left))
+    phi = zeros(off, left, right)
+    left_over = np.abs(off(np.arange(phi.size), phi))
+    rounding = 8.0 * EPS * (np.abs(event.level) + left_over + slope)
+    return np.mod(phi, TWO_PI), (left_over + rounding) / np.maximum(slope, 1e-300) + 8.0 * EPS

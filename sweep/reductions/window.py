@@ -9,10 +9,11 @@ import numpy as np
 from kernels.curves import samples as scan
 from kernels.types import EPS, TWO_PI
 from sweep.families.base import Array, Family
+from sweep.numerics.events import zeros
 from sweep.reductions.resolution import denser
 from sweep.reductions.sampling import Index, Mask, blocks, pose_columns, sample_turn
 
-PASSES = 60
+BESIDE = 1e-5  # [rad] of the difference quotient that tells how a value changes with the position
 
 
 class Window(NamedTuple):
@@ -67,43 +68,23 @@ def edges(family: Family, designs: Array, rows: Index, window: Window, columns: 
 
     Notes
     -----
-    Regula falsi in the Illinois form between the two samples on either side of each edge, all edges at once.  The error
-    is what is left of the position's error, and the error of the stroke's ends, carried over by the slope.
+    The error is what is left of the position's error, and the error of the stroke's ends, carried over by the slope.
     """
     positions, samples = columns[family.position], columns[pose].shape[1]
-    spacing = 2.0 * np.pi / samples
+    spacing, wraps = TWO_PI / samples, family.pose_output[family.position].wraps
     row, column, level = _brackets(rows, window, positions)
-    left, right = column * spacing, (column + 1) * spacing
-    after = (column + 1) % samples
-    f_left, f_right = positions[row, column] - level, positions[row, after] - level
-    slope = np.abs(columns[pose][row, after] - columns[pose][row, column]) / np.abs(f_right - f_left)
-    phi, side = 0.5 * (left + right), np.zeros(row.size)
-    values, f, size = np.full(row.size, np.nan), f_right.copy(), np.abs(positions).max(axis=1)[row]
-    names = (family.position, pose)
-    a = np.arange(row.size)
-    for _ in range(PASSES):
-        if not a.size:
-            break
-        phi[a] = right[a] - f_right[a] * (right[a] - left[a]) / (f_right[a] - f_left[a])
-        poses, _ = pose_columns(family, designs[rows[row[a]]], phi[a, None], names)
-        here, now = poses[pose][:, 0], poses[family.position][:, 0] - level[a]
-        if family.pose_output[family.position].wraps:
-            now -= TWO_PI * np.round(now / TWO_PI)
-        moved = np.abs(now - f[a])
-        tells = (moved > 1e-7 * size[a]) & np.isfinite(values[a])
-        slope[a] = np.where(tells, np.abs(here - values[a]) / np.where(tells, moved, 1.0), slope[a])
-        values[a], f[a] = here, now
-        onto_left = (now >= 0.0) == (f_left[a] >= 0.0)
-        # Illinois: the end that stays a second time has its value halved, so that both ends close in.
-        f_right[a] = np.where(onto_left, np.where(side[a] == -1.0, 0.5, 1.0) * f_right[a], now)
-        f_left[a] = np.where(onto_left, now, np.where(side[a] == 1.0, 0.5, 1.0) * f_left[a])
-        left[a], right[a] = np.where(onto_left, phi[a], left[a]), np.where(onto_left, right[a], phi[a])
-        side[a] = np.where(onto_left, -1.0, 1.0)
-        a = a[(np.abs(now) > 8.0 * EPS * size[a]) & (right[a] - left[a] > 8.0 * EPS)]
-    poses, _ = pose_columns(family.precise(), designs[rows[row]], phi[:, None], names)
-    exact, f = poses[pose][:, 0], poses[family.position][:, 0] - level
-    if family.pose_output[family.position].wraps:
-        f -= TWO_PI * np.round(f / TWO_PI)
+    size = np.abs(positions).max(axis=1)[row]
+
+    def at(which: Index, phi: Array, of: Family = family) -> tuple[Array, Array]:
+        poses, _ = pose_columns(of, designs[rows[row[which]]], phi, (family.position, pose))
+        off = poses[family.position] - level[which, None]
+        return poses[pose], off - TWO_PI * np.round(off / TWO_PI) if wraps else off
+
+    every = np.arange(row.size)
+    phi = zeros(lambda which, place: at(which, place[:, None])[1][:, 0], column * spacing, (column + 1) * spacing)
+    near, off = at(every, phi[:, None] + BESIDE * np.array([-1.0, 0.0, 1.0]))
+    slope = np.abs((near[:, 2] - near[:, 0]) / (off[:, 2] - off[:, 0]))
+    values, (exact, f) = near[:, 1], (x[:, 0] for x in at(every, phi[:, None], family.precise()))
     err = (
         slope * (np.abs(f) + window.err[rows[row]] + 4.0 * EPS * size)
         + np.abs(values - exact)
