@@ -15,7 +15,8 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from kernels.boxes.program import IMPOSSIBLE, multipliers
+from kernels import status as st
+from kernels.boxes.program import multipliers
 from kernels.boxes.taylor import LINEAR, ROUNDING, TINY, VALUE, least, up
 from kernels.jit import inline, kernel
 from kernels.types import Array
@@ -80,9 +81,8 @@ def _linear(rows: Array, count: int, objective: Flags, n: int, out: Array, sizes
 
 @kernel
 def best_bound(
-    rows: Array, count: int, objective: Flags, half: Array, work: Array, basis: Indices, linear: Array, sizes: Array,
-    factors: Array, total: Array,
-) -> tuple[float, bool]:  # fmt: skip
+    rows: Array, count: int, objective: Flags, half: Array, linear: Array, sizes: Array, factors: Array, total: Array
+) -> tuple[float, bool]:
     """Best bound (1) of a box, and whether it is one of limits alone: then a positive one empties the box.
 
     Parameters
@@ -90,7 +90,7 @@ def best_bound(
     rows : (m, width) forms, the first ``count`` of them used
     objective : (m,) which rows are the objective's
     half : (n,) ones: the variables of forms go from -1 to 1
-    work, basis, linear, sizes, total : scratch of (n + 5, n + 1), (n + 1,), (m, n + 1), (m,), (width,)
+    linear, sizes, total : scratch of (m, n + 1), (m,), (width,)
     factors : (m,) out, l_j, and -m_i; zero beyond ``count``
     """
     n = half.shape[0]
@@ -105,19 +105,19 @@ def best_bound(
         if objective[j]:
             for k in range(n + 1):
                 linear[j, k] *= per_scale
-    outcome = multipliers(linear, count, objective, half, work, basis, factors)
+    impossible = multipliers(linear, count, objective, half, factors) == st.LIMIT_EXCEEDED
     weight = 0.0
     for j in range(count):
         if not objective[j]:
-            factors[j] *= -sizes[j] * (scale if outcome != IMPOSSIBLE and scale > 0.0 else 1.0)
-        elif outcome == IMPOSSIBLE:
+            factors[j] *= -sizes[j] * (scale if not impossible and scale > 0.0 else 1.0)
+        elif impossible:
             factors[j] = 0.0
         else:
             weight += factors[j]
     if weight > 1.0 - ROUNDING:  # the sum of the factors as they are stored must not be above 1
         for j in range(count):
             factors[j] /= weight * (1.0 + 2.0 * ROUNDING)
-    return combined(rows, factors, count, n, total), outcome == IMPOSSIBLE
+    return combined(rows, factors, count, n, total), impossible
 
 
 @kernel

@@ -10,9 +10,9 @@ import numpy as np
 from kernels.descent.motion import Index, Motion, gradients, moving, no_motion, nothing_moved
 from kernels.descent.program import Program, begin, box, learn, no_program, prepare, solve, units
 from kernels.descent.room import rooms
-from kernels.descent.rows import Task, columns_of, row_count, slopes_of, solved, unknowns_of, values_of, worth_of
+from kernels.descent.rows import UNKNOWNS, Task, columns_of, slopes_of, values_of, worth_of
+from kernels.descent.unknowns import solved, unknowns_of
 from kernels.jit import inline, kernel, part
-from kernels.linear.minimax import UNKNOWNS
 from kernels.types import Array
 
 LOCKED = 1e6  # above what any design is worth that turns
@@ -40,7 +40,7 @@ def _no_design(task: Task) -> Design:
     m = len(task.cos)
     return Design(
         np.empty(len(task.columns)), np.empty(task.bases.shape[1]), no_motion(m), np.ones(UNKNOWNS), np.zeros(m + 1),
-        np.empty(row_count(task)),
+        np.empty(len(task.kinds)),
     )  # fmt: skip
 
 
@@ -231,7 +231,7 @@ def descend(task: Task, kind: int, place: Array, x: Array, state: Array, curvatu
                 state[BOX] = 0.0
                 break
         if new:
-            units(here.place, here.x, q.size)
+            units(here.x, q.size)
             prepare(task, slopes, curvature, q)
         box(here.place, _largest(here.values, 2 * len(task.cos)), task.unit, state[BOX], q)
         found, promised = _tried(task, kind, here, state[WORTH], slopes, q, weights, best)

@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 from kernels.families.guide import closure as guide
 from kernels.families.rssr import closure as rssr
 from kernels.families.rssr.closure import acceleration, rocker, velocity
-from kernels.jit import inline, kernel, part
+from kernels.jit import inline, part
 from kernels.types import Array
 
 Complex = NDArray[np.complex128]
@@ -229,12 +229,3 @@ def gradients(row: Array, at: Motion, columns: Index, cos: Array, sin: Array, ou
                 _put(out, k, p, b, (arm, t1, t2), (0.0, 0.0, 0.0), (d0, d1, d2), stretch, frame)
                 out.margins[1, k, p] = dip.imag / STEP
         design[column] = row[column]
-
-
-@kernel
-def motion_of(row: Array, columns: Index, cos: Array, sin: Array, out: Motion, moved: Moved) -> float:
-    """Compute the motion of a design and, where it turns, its derivatives; see :func:`moving`, :func:`gradients`."""
-    least = moving(row, cos, sin, out)
-    if least > 0.0:
-        gradients(row, out, columns, cos, sin, moved)
-    return least

@@ -8,9 +8,8 @@ from typing import NamedTuple
 import numpy as np
 
 from kernels.descent.motion import Index
-from kernels.descent.rows import Task, row_count
+from kernels.descent.rows import UNKNOWNS, Task
 from kernels.jit import kernel, part
-from kernels.linear.minimax import UNKNOWNS
 from kernels.linear.nearest_of_many import nearest_of_many
 from kernels.types import Array
 
@@ -45,7 +44,7 @@ class Program(NamedTuple):
 @part
 def no_program(task: Task) -> Program:
     """Room for a program."""
-    n, r = len(task.columns) + UNKNOWNS + 2, row_count(task)
+    n, r = len(task.columns) + UNKNOWNS + 2, len(task.kinds)
     return Program(
         np.empty((n, r)), np.zeros((n, n)), np.empty(n), np.empty(n), np.empty(n - 2), np.empty(n - 2), np.empty(r),
         np.empty(r), np.zeros(n + 1, np.int64),
@@ -53,9 +52,9 @@ def no_program(task: Task) -> Program:
 
 
 @part
-def units(place: Array, x: Array, size: Array) -> None:
-    """Units of what is varied: 1 for places, their own size for the unknowns."""
-    n = len(place)
+def units(x: Array, size: Array) -> None:
+    """Units of the linear unknowns, the last of ``size``: their own sizes; 1 for all that is varied before them."""
+    n = len(size) - UNKNOWNS
     for k in range(n):
         size[k] = 1.0
     size[n] = size[n + 1] = max(abs(x[0]), abs(x[1]))

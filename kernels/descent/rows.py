@@ -7,33 +7,28 @@ from typing import NamedTuple
 
 import numpy as np
 
-from kernels import status as st
-from kernels.curves.sampled_rows import EVERY, Limits, sampled_rows
-from kernels.descent.motion import DIP, MARGIN, SINE, TURN, Index, Motion, Moved, nothing_moved
+from kernels.curves.sampled_rows import Limits, sampled_rows
+from kernels.descent.motion import DIP, MARGIN, SINE, TURN, Index, Motion, Moved
 from kernels.jit import inline, part
-from kernels.linear.minimax import UNKNOWNS, minimax
 from kernels.types import Array
 
 # Codes of curves: both margins, the angle of stage 1, the coupler point in the frame of stage 2, then what it does
 # along and across the line by order of the derivative, and the deviation with its room added or taken off.
 FIRST_MARGIN, SECOND_MARGIN, ANGLE, POINT_X, POINT_Y, ALONG, ACROSS, HIGH, LOW = 0, 1, 2, 3, 4, 5, 6, 11, 12
-EXCESS = 0.5  # price of a deviation twice as large as allowed, in strokes
-SMALLEST = 1e-9  # scale of a guide that has any
-DIRECTIONS = 3  # in which the least scale of a guide is asked for
-FAR = 0.3  # value from which on rows of the coupler point's place do not join a linear program
+UNKNOWNS = 5  # that the motion is linear in: z1, z2 and the offset
 
 
 class Task(NamedTuple):
     """What all descents of one problem share; places (n,) are between 0 and 1.
 
-    ``bases`` (k, P) are designs of all combinations of signs, with 1 for the crank of stage 2.  A place moves its
-    column from ``low`` to ``high``, on a logarithmic scale of that width where ``wide`` is not 0.  ``codes`` (c,) are
-    the curves that ``limits`` name, first the one whose magnitude is to be small, twice.  ``lengths`` (q,) are columns
-    of stage 2 with bounds.  ``turns`` (T, m) are the numbers of rows around one turn.  A linear program in the unknowns
-    takes the rows ``soft``, and ``needed``, which it may not miss.  ``ranges`` are the rows of the position's range, in
-    units of ``spans``.  ``bound`` and ``stroke`` are the largest deviation and the least such range.  ``unit`` is that
-    of the objective, ``price`` that of a limit missed by its size.  ``sigma`` (P,) are standard deviations of what is
-    made, times how many of them are kept away from limits on deviation and range; empty for a drawing.
+    ``bases`` (k, P) are designs of all combinations of signs, with 1 for the crank of stage 2. A place moves its column
+    from ``low`` to ``high``, on a logarithmic scale of that width where ``wide`` is not 0. ``codes`` (c,) are the
+    curves that ``limits`` name, first the one whose magnitude is to be small, twice. ``lengths`` (q,) are columns of
+    stage 2 with bounds. ``turns`` (T, m) are the numbers of rows around one turn. ``kinds`` (r,) say what a linear
+    program in the unknowns makes of a row (:mod:`kernels.descent.unknowns`). ``ranges`` are the rows of the position's
+    range, in units of ``spans``. ``bound`` and ``stroke`` are the largest deviation and the least such range. ``unit``
+    is that of the objective, ``price`` that of a limit missed by its size. ``sigma`` (P,) are standard deviations of
+    what is made, times how many of them are kept away from limits on deviation and range; empty for a drawing.
     """
 
     bases: Array
@@ -49,8 +44,7 @@ class Task(NamedTuple):
     least: Array
     most: Array
     turns: Index
-    soft: Index
-    needed: Index
+    kinds: Index
     ranges: Index
     spans: Array
     bound: float
@@ -58,15 +52,6 @@ class Task(NamedTuple):
     unit: float
     price: float
     sigma: Array
-
-
-@part
-def row_count(task: Task) -> int:
-    """Count the rows of a design."""
-    r = 2 * len(task.lengths)
-    for at in task.limits.at:
-        r += len(task.cos) if at == EVERY else 1
-    return r
 
 
 @part
@@ -98,7 +83,7 @@ def _shares(code: int, x: Array) -> tuple[int, complex, complex]:
 
 
 @part
-def _curve(code: int, at: Motion, x: Array, room: Array, y: Array) -> None:
+def curve(code: int, at: Motion, x: Array, room: Array, y: Array) -> None:
     """One curve (m,)."""
     m = len(y)
     if code <= SECOND_MARGIN:
@@ -136,7 +121,7 @@ def _by_places(code: int, by: Moved, x: Array, of: Array) -> None:
 
 
 @part
-def _by_unknowns(code: int, at: Motion, x: Array, of: Array) -> None:
+def by_unknowns(code: int, at: Motion, x: Array, of: Array) -> None:
     """Compute derivatives (5, m) of a curve by the unknowns."""
     if code <= ANGLE:
         for k in range(UNKNOWNS):
@@ -185,7 +170,7 @@ def values_of(task: Task, row: Array, at: Motion, x: Array, room: Array, values:
     m, none = len(task.cos), np.empty((0, len(values)))
     y = np.empty((len(task.codes), m))
     for c in range(len(task.codes)):
-        _curve(task.codes[c], at, x, room, y[c])
+        curve(task.codes[c], at, x, room, y[c])
     sampled_rows(y, np.empty((len(task.codes), 0, m)), task.limits, values, none)
     for i in range(len(task.ranges)):
         values[task.ranges[i]] -= room[m] / task.spans[i]
@@ -201,9 +186,9 @@ def slopes_of(
     y, of = np.empty((len(task.codes), m)), np.empty((len(task.codes), n + UNKNOWNS, m))
     for c in range(len(task.codes)):
         code = task.codes[c]
-        _curve(code, at, x, room, y[c])
+        curve(code, at, x, room, y[c])
         _by_places(code, by, x, of[c, :n])
-        _by_unknowns(code, at, x, of[c, n:])
+        by_unknowns(code, at, x, of[c, n:])
         for k in range(n):
             column = task.columns[k]
             per = row[column] * task.wide[k] if task.wide[k] != 0.0 else task.high[k] - task.low[k]
@@ -240,93 +225,3 @@ def worth_of(task: Task, values: Array) -> float:
         else:
             others = min(others, values[j])
     return task.price * max(-others, 0.0) - own
-
-
-@part
-def solved(task: Task, row: Array, at: Motion, x: Array, room: Array, out: Array) -> None:
-    """Best linear unknowns (5,) of a design, what bends taken for straight about ``x``; x where there are none."""
-    m, r, soft = len(task.cos), row_count(task), task.soft
-    values, slopes = np.empty(r), np.empty((UNKNOWNS, r))
-    slopes_of(task, row, at, nothing_moved(0, m), x, room, np.zeros((UNKNOWNS, m + 1)), values, slopes)
-    wanted, others = np.empty((1, m, UNKNOWNS)), np.empty((1, len(soft), UNKNOWNS))
-    ranges, need = np.empty((1, len(task.needed), UNKNOWNS)), np.empty((1, len(task.needed)))
-    bound, count = np.full((1, 2, len(soft)), math.inf), 0
-    for p in range(m):
-        for k in range(UNKNOWNS):
-            wanted[0, p, k] = -slopes[k, p]
-    for j in soft:
-        if values[j] > FAR:
-            continue
-        bound[0, 1, count] = values[j]
-        for k in range(UNKNOWNS):
-            others[0, count, k] = -slopes[k, j]
-            bound[0, 1, count] -= slopes[k, j] * x[k]
-        count += 1
-    for i in range(len(task.needed)):
-        j = task.needed[i]
-        need[0, i] = -values[j]
-        for k in range(UNKNOWNS):
-            ranges[0, i, k] = slopes[k, j]
-            need[0, i] += slopes[k, j] * x[k]
-    # The rest of the rows hold whatever x is.
-    for i in range(count, len(soft)):
-        for k in range(UNKNOWNS):
-            others[0, i, k] = 0.0
-    _program(wanted, others, ranges, bound, need, task.price, x, out)
-
-
-@inline
-def _turned(by: Array, out: Array) -> None:
-    for k in range(by.shape[0]):
-        for p in range(by.shape[1]):
-            out[p, k] = by[k, p]
-
-
-@part
-def unknowns_of(task: Task, row: Array, at: Motion, room: Array, x: Array) -> bool:
-    """Best linear unknowns (5,) of a design as long as the lengths of stage 2 allow it; whether there are any.
-
-    That these are at least so long is a bound on the modulus of z1 from below, which no linear program knows.  It is
-    asked for in the direction that z1 has without it, then in the one it has with it.
-    """
-    m, none = len(task.cos), np.zeros(UNKNOWNS)
-    rows, needs = np.zeros((1, 2, UNKNOWNS)), np.zeros((1, 2))
-    wanted, across, bound = np.empty((1, m, UNKNOWNS)), np.empty((1, m, UNKNOWNS)), np.empty((1, 2, m))
-    code, by = task.codes[0], np.empty((UNKNOWNS, m))
-    _by_unknowns(code, at, none, by)
-    _turned(by, wanted[0])
-    _by_unknowns(ACROSS, at, none, by)
-    _turned(by, across[0])
-    for p in range(m):
-        bound[0, 0, p] = bound[0, 1, p] = task.bound - room[p]
-    _by_unknowns(ALONG, at, none, by)
-    high, low, angle = 0, 0, np.empty(m)
-    _curve(ANGLE, at, none, room, angle)
-    for p in range(m):
-        high, low = p if angle[p] > angle[high] else high, p if angle[p] < angle[low] else low
-    for k in range(UNKNOWNS):
-        rows[0, 0, k] = by[k, high] - by[k, low]
-    needs[0, 0] = task.stroke + room[m]
-    least = 0.0
-    for j in range(len(task.lengths)):
-        least = max(least, task.least[j] / row[task.lengths[j]])
-    for _ in range(DIRECTIONS):
-        if not _program(wanted, across, rows, bound, needs, EXCESS * task.stroke / task.bound, none, x):
-            return False
-        scale = math.sqrt(x[0] * x[0] + x[1] * x[1])
-        if not 0.0 < scale < (1.0 - 1e-6) * least:
-            break
-        rows[0, 1, 0], rows[0, 1, 1], needs[0, 1] = x[0] / scale, x[1] / scale, least
-    return bool(x[0] * x[0] + x[1] * x[1] > SMALLEST * SMALLEST)
-
-
-@part
-def _program(
-    wanted: Array, others: Array, ranges: Array, bound: Array, need: Array, price: float, x: Array, out: Array
-) -> bool:
-    """Solve a linear program; ``x`` where it has no solution."""
-    found, t, v, status = np.empty((1, UNKNOWNS)), np.empty(1), np.empty(1), np.empty(1, np.uint8)
-    minimax(wanted, others, ranges, bound, need, price, found, t, v, status)
-    for k in range(UNKNOWNS):
-        out[k] = found[0, k] if status[0] == st.OK else x[k]
-    return bool(status[0] == st.OK)

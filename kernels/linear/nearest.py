@@ -26,7 +26,9 @@ DEPENDENT = 1e-20  # square of what is left of a row across those that hold, rel
 class Held(NamedTuple):
     """Rows that hold, as an orthogonal triangle: ``q`` (n, n) and ``r`` (n, n), their numbers and their weights.
 
-    ``inside`` (m,) is 1 for rows that hold; ``d``, ``z`` and ``share`` (n,) and ``room`` (m,) are used on the way.
+    Behind the numbers of those that hold stands that of a row that none of the points keeps, whose ``share`` of the
+    others says so.  ``inside`` (m,) is 1 for rows that hold; ``d``, ``z`` and ``share`` (n,) and ``room`` (m,) are used
+    on the way.
     """
 
     q: Array
@@ -44,7 +46,7 @@ class Held(NamedTuple):
 def nothing_held(n: int, m: int) -> Held:
     """Begin with no row."""
     return Held(
-        np.eye(n), np.zeros((n, n)), np.empty(n, np.int64), np.zeros(n + 1), np.zeros(m, np.int64), np.empty(n),
+        np.eye(n), np.zeros((n, n)), np.empty(n + 1, np.int64), np.zeros(n + 1), np.zeros(m, np.int64), np.empty(n),
         np.empty(n), np.empty(n), np.empty(m),
     )  # fmt: skip
 
@@ -159,6 +161,7 @@ def pursued(
             step = min(part, full)
             left -= 1
             if step == math.inf or left < 0:
+                h.numbers[count] = p
                 status = int(st.LIMIT_EXCEEDED) if step == math.inf else int(st.NOT_CONVERGED)
                 break
             if full < math.inf:
@@ -175,6 +178,20 @@ def pursued(
             dropped(place, count, h)
             count -= 1
     return count, status
+
+
+@kernel
+def nearest_with(rows: Array, needs: Array, centre: Array, tolerance: float, y: Array, h: Held) -> tuple[int, int]:
+    """Point of :func:`nearest`; how many rows hold, and the status.  ``h`` begins as :func:`nothing_held`."""
+    n, m = rows.shape
+    size = np.zeros(m)
+    for i in range(n):
+        y[i] = centre[i]
+        for j in range(m):
+            size[j] += rows[i, j] * rows[i, j]
+    for j in range(m):
+        size[j] = math.sqrt(size[j])
+    return pursued(rows, needs, size, m, tolerance, y, h, 0)
 
 
 @kernel
@@ -200,15 +217,10 @@ def nearest(rows: Array, needs: Array, centre: Array, tolerance: float, y: Array
     Goldfarb and Idnani 1983, with an orthogonal triangle of the rows that hold.  Against scipy's least-distance
     programs: 1e-12.
     """
-    n, m = rows.shape
-    h, size = nothing_held(n, m), np.zeros(m)
-    for i in range(n):
-        y[i] = centre[i]
-        for j in range(m):
-            size[j] += rows[i, j] * rows[i, j]
-    for j in range(m):
-        weights[j], size[j] = 0.0, math.sqrt(size[j])
-    count, status = pursued(rows, needs, size, m, tolerance, y, h, 0)
+    h = nothing_held(*rows.shape)
+    count, status = nearest_with(rows, needs, centre, tolerance, y, h)
+    for j in range(len(weights)):
+        weights[j] = 0.0
     for k in range(count):
         weights[h.numbers[k]] = h.weights[k]
     return status

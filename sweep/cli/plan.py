@@ -13,7 +13,7 @@ from sweep.chunks.plan import PARAMETER_UNITS, Pilot, feasible_designs, pilot, s
 from sweep.cli.families import aligned, main_outputs
 from sweep.cli.options import SMOKE, STUDY
 from sweep.effects.advice import findings, left_out, tree
-from sweep.engine.estimate import LEAST_KEPT, Estimate, check_budget, estimate, other_accuracies
+from sweep.engine.estimate import LEAST_KEPT, Estimate, check_budget, estimate, other_accuracies, searches
 from sweep.evaluation.summaries import output
 from sweep.families.base import Family
 from sweep.families.machines import Machine
@@ -50,8 +50,10 @@ def check(study: Path, jobs: int, smoke: bool) -> None:
         sent = pilot(model, lambda done, of: phases.say("planning", done, of))
         cost = estimate(model, jobs, known=sent)
         others = other_accuracies(model, jobs, lambda done, of: phases.say("other accuracies", done, of), sent)
+        phases.say("what follows the sweep")
+        lines = _searches(cost, searches(model, jobs, sent))
         phases.say("what matters")
-        lines = plan_lines(model, cost, others, sent)
+        lines = plan_lines(model, cost, others, sent) + lines
     for line in lines:
         click.echo(line)
     check_budget(model, cost)
@@ -109,6 +111,16 @@ def plan_lines(study: Study, cost: Estimate, others: Sequence[tuple[str, float]]
         ]
     )
     return lines
+
+
+def _searches(cost: Estimate, found: Sequence[tuple[str, float, float]]) -> list[str]:
+    """Return what follows the sweep and what it takes, then the whole run."""
+    if not found:
+        return []
+    least, most = (cost.seconds + sum(times) for times in list(zip(*found, strict=True))[1:])
+    all_of_it = (*found, ("the whole run", least, most))
+    words = [(name, f"about {duration(typical)}, at most {duration(end)}") for name, typical, end in all_of_it]
+    return ["", "what follows the sweep, by looks at a design of this study", *aligned(words)]
 
 
 def _mechanism(family: Family) -> list[str]:

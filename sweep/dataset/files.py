@@ -24,6 +24,7 @@ PLAN, RUNS, LOCK, BAD, OLD = "_plan.json", "_runs.jsonl", "_lock", "_bad", "_old
 OPTIMUM, CURVES = "_optimum.parquet", "_curves.parquet"
 SENSITIVITY, TOLERANCE, PARETO = "_sensitivity.parquet", "_tolerance.parquet", "_pareto.parquet"
 PROOF = "_proof.parquet"
+SEARCH = "_search.json"  # what a search that is not over has found
 TEMPORARY = "_tmp-"
 
 DESIGNS = "designs"

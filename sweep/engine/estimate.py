@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import time
 from collections.abc import Callable
 from dataclasses import dataclass
 
@@ -34,6 +35,13 @@ BASE_MEMORY_BYTES = 350e6
 COPIES_OF_A_CHUNK = 3
 # Threads share memory bandwidth and the interpreter: two were measured at 1.95 times the speed of one.
 THREAD_EFFICIENCY = 0.97
+
+
+# Looks of a local search in the median, those that tell the price of one, and corrections of a robust design.
+TYPICAL_LOOKS, TRIED_LOOKS, CORRECTED = 300, 40, 3
+# Measured: processor time of a population of needle drives, for its drawing and with room for tolerances.
+POPULATION_SECONDS = (16.0, 25.0)
+REPORT_SECONDS = 5.0
 
 
 @dataclass(frozen=True)
@@ -99,6 +107,47 @@ def estimate(
         seconds=work / (1.0 if jobs == 1 else jobs * THREAD_EFFICIENCY),
         optimise_seconds=None if study.optimise is None else study.optimise.time_budget,
     )
+
+
+def searches(study: Study, jobs: int, known: Pilot) -> tuple[tuple[str, float, float], ...]:
+    """Return what follows the sweep, with the seconds it takes typically and at most, from measured looks at a design.
+
+    A design of the pilot, or a random one, is searched from for a few looks.  Compiling is left out.
+    """
+    settings = study.optimise
+    if settings is None or study.objective is None:
+        return ()
+    # scipy's minimisers take as long as numpy to import, which a study without a search need not wait for
+    from sweep.optimise.front import pareto
+    from sweep.optimise.local.start import search
+    from sweep.optimise.manufacture import robust
+    from sweep.optimise.multistart.survey import MET
+    from sweep.optimise.starts.dataset import drawn
+    from sweep.optimise.starts.posing import problem_of
+
+    designs = known.kept if len(known.kept) else drawn(study, 1, settings.seed)
+    if not len(designs):
+        return ()
+    problem = problem_of(study, designs)
+    search(0, problem, designs[0], lambda: False, TRIED_LOOKS)  # compiles
+    begin = time.process_time()
+    spent = search(0, problem, designs[0], lambda: False, TRIED_LOOKS).looks
+    look = (time.process_time() - begin) / max(spent, 1) / jobs
+    typical, most = min(settings.looks, TYPICAL_LOOKS) * look, settings.looks * look
+    found = [("search", settings.starts * typical, settings.starts * most)]
+    globally, share = settings.globally != "none", None if study.tolerance is None else study.tolerance.robust
+    if globally:
+        one = POPULATION_SECONDS[0] / jobs
+        found.insert(0, ("global search", MET * one, settings.populations * one))
+    if share is not None:
+        sample = robust.SAMPLES * known.seconds_per_design / jobs
+        first = robust.TRIED * min(robust.HEAT, settings.looks) * look + MET * POPULATION_SECONDS[1] / jobs * globally
+        least, last = robust.ENDED * (typical + sample), robust.ENDED * (most + robust.CORRECTIONS * sample)
+        found.append(("tolerances", first + CORRECTED * least, first + last))
+    if study.pareto is not None:
+        count = pareto.searches(study.pareto)
+        found.append(("front", count * typical, count * min(study.pareto.looks, settings.looks) * look))
+    return (*found, ("tables and report", REPORT_SECONDS, 4.0 * REPORT_SECONDS))
 
 
 def other_accuracies(

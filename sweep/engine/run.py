@@ -24,11 +24,11 @@ from sweep.chunks.plan import Plan
 from sweep.dataset import store
 from sweep.engine.estimate import check_budget, estimate
 from sweep.engine.opening import is_part, known_folder, open_plan, part_range, plan_note, refuse_or_clear_older
-from sweep.engine.searches import refuse_unprovable, search
+from sweep.engine.searches import refuse_unprovable, search, stages_of
 from sweep.engine.worker import ChunkTask, Done
 from sweep.errors import Interrupted, StoreError, TimeUsedUp, WorkerDied
 from sweep.jobs.executors import Executor, at_work, executor, for_tasks
-from sweep.jobs.progress import Phases, Progress
+from sweep.jobs.progress import Phases, Progress, stages
 from sweep.jobs.signals import Stop, stop_on_signal
 from sweep.study import Study
 from sweep.study.load import load_study, with_accuracy
@@ -148,18 +148,19 @@ def run(
     place = executor(backend, jobs)  # refuses what there is not
     model = _model(study, smoke, accuracy, certify)
     refuse_unprovable(model)
-    with Phases(progress) as phases:
-        warm(model, lambda done, total: phases.say("compiling", done, total))
-        _check_budget(model, jobs, force, lambda done, total: phases.say("planning", done, total))
-    default = Path("results", *(["smoke"] if smoke else []), model.name, store.DESIGNS)
-    folder = default if out is None else store.located(out)
-    refuse_or_clear_older(folder, force)
-    said = command(model, folder, smoke, accuracy, certify)
-    with store.locked(folder), logged(folder, said, jobs, backend) as end, at_work(place):
-        computed = _sweep(model, folder, jobs, place, force, progress)
-        if not is_part(folder):
-            search(model, folder, jobs, backend, progress)
-        end.append(f"{computed} chunks computed")
+    with stages(*stages_of(model)):
+        with Phases(progress) as phases:
+            warm(model, lambda done, total: phases.say("compiling", done, total))
+            _check_budget(model, jobs, force, lambda done, total: phases.say("planning", done, total))
+        default = Path("results", *(["smoke"] if smoke else []), model.name, store.DESIGNS)
+        folder = default if out is None else store.located(out)
+        refuse_or_clear_older(folder, force)
+        said = command(model, folder, smoke, accuracy, certify)
+        with store.locked(folder), logged(folder, said, jobs, backend) as end, at_work(place):
+            computed = _sweep(model, folder, jobs, place, force, progress)
+            if not is_part(folder):
+                search(model, folder, jobs, backend, progress)
+            end.append(f"{computed} chunks computed")
     return folder
 
 

@@ -36,6 +36,18 @@ def search(study: Study, folder: Path, jobs: int, backend: str, progress: bool) 
         raise SearchCutShort(folder, f"{folder}: optimise.prove.time ran out; run again, and the proof goes on")
 
 
+def stages_of(study: Study) -> tuple[str, ...]:
+    """Name the stages of a run in their order, as its progress does."""
+    found, settings = ["compiling", "planning", study.name], study.optimise
+    if settings is not None:
+        globally = settings.globally != "none"
+        robust = study.tolerance is not None and study.tolerance.robust is not None
+        asked = {"global search": globally, "search": True, "tolerances": globally and robust, "robust design": robust}
+        asked |= {"tables": True, "proof": settings.prove is not None, "front": study.pareto is not None}
+        found += [name for name, wanted in asked.items() if wanted]
+    return tuple(found)
+
+
 def optimum_key(study: Study, note: Mapping[str, Any]) -> str:
     """Name what an optimum or a front depends on: chunks by their plan's note, study, the optimiser's sources."""
     return f"{note['identity']}-{study.fingerprint[:12]}-{plans.optimiser_hash()}"
@@ -54,9 +66,8 @@ def _optimise(study: Study, folder: Path, jobs: int, progress: bool) -> None:
     assert study.optimise is not None
     store.write_plan(folder, note | {"optimised": None})
     with stop_on_signal() as stop, Phases(progress) as phases:
-        phases.say("optimum", 0, study.optimise.starts, "starts")
         try:
-            optimise.optimise_study(study, folder, lambda: bool(stop), jobs, phases.say)
+            optimise.optimise_study(study, folder, lambda: bool(stop), jobs, phases.say, key)
         except KeyboardInterrupt:
             number = stop.signal_number or signal.SIGINT
             text = f"{folder}: stopped by signal {number} while optimising; run again for the whole search"

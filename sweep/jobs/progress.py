@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import math
 import sys
 import threading
 import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from contextvars import ContextVar
 from types import TracebackType
 from typing import TYPE_CHECKING, Never, TextIO, TypeAlias
 
@@ -17,10 +19,33 @@ FIRST_SECONDS = 2.0  # of silence at the beginning
 LINE_SECONDS = 10.0
 TICK_SECONDS = 0.5
 TICKER = "linksweep: progress"
+ENOUGH, ALIKE = (
+    0.1,
+    2,
+)  # share, and number, of what is to be done from which the remaining time is known to a factor of two
+BAR = "{desc}: {n_fmt} of {total_fmt}{unit} [{elapsed}]"  # where it is not
 AT_MOST = "at most"  # in what is counted: its total is a maximum, of which no share and no remaining time is known
 
 Say: TypeAlias = Callable[[str, int, int, str], None]
 """``say(label, done, total, unit)``: what is worked on, and how much of it is done; ``total`` as is known by now."""
+
+
+_stages: ContextVar[tuple[str, ...]] = ContextVar("linksweep_stages", default=())
+
+
+@contextmanager
+def stages(*labels: str) -> Iterator[None]:
+    """Let progress of these labels within this context say which of all stages it is."""
+    token = _stages.set(labels)
+    try:
+        yield
+    finally:
+        _stages.reset(token)
+
+
+def best_words(value: float) -> str:
+    """Say the best value so far, behind a unit or alone; nothing where there is none."""
+    return f", the best {value:.5g}" if math.isfinite(value) else ""
 
 
 def unsaid(label: str, done: int, total: int, unit: str) -> None:
@@ -54,7 +79,8 @@ class Progress:
         quiet: bool = False,
     ) -> None:
         self.label, self.total, self.done, self.unit, self.quiet = label, total, done, unit, quiet
-        self.at_most = AT_MOST in unit
+        known = _stages.get()
+        self.shown = f"{known.index(label) + 1}/{len(known)} {label}" if label in known else label
         self.stream = sys.stderr if stream is None else stream
         self.show = show and self.stream is not None
         self.begin = time.monotonic()
@@ -67,8 +93,8 @@ class Progress:
             from tqdm import tqdm
 
             self.bar = tqdm(
-                desc=label, total=total or None, initial=done, unit=f" {unit}", unit_scale=True, file=self.stream,
-                delay=FIRST_SECONDS if quiet else 0.0, leave=not quiet,
+                desc=self.shown, bar_format=BAR, total=total or None, initial=done, unit=f" {unit}", unit_scale=True,
+                file=self.stream, delay=FIRST_SECONDS if quiet else 0.0, leave=not quiet,
             )  # fmt: skip
 
     def __enter__(self) -> Progress:
@@ -94,21 +120,34 @@ class Progress:
         """Whether a thread only shows progress."""
         return thread.name == TICKER or type(thread).__name__ == "TMonitor"  # that of tqdm
 
+    @property
+    def at_most(self) -> bool:
+        """Whether the total is a maximum."""
+        return AT_MOST in self.unit
+
+    @property
+    def foreseen(self) -> bool:
+        """Whether the remaining time is known within a factor of two."""
+        done, total = self.done - self.first, self.total - self.first
+        return not self.at_most and done >= ALIKE and ENOUGH * total <= done < total
+
     def advance(self, designs: int) -> None:
         """Count so many more designs as finished."""
         with self._listener():
             self.done += designs
             if self.bar is not None:
+                self.bar.bar_format = None if self.foreseen else BAR
                 self.bar.update(designs)
             else:
                 self._line_if_due()
 
-    def expect(self, total: int) -> None:
-        """Note how much there is in all, as is known by now."""
+    def expect(self, total: int, unit: str | None = None) -> None:
+        """Note how much there is in all, as is known by now, and what is counted."""
         with self._listener():
-            self.total = total
+            self.total, self.unit = total, self.unit if unit is None else unit
             if self.bar is not None:
-                self.bar.total = total or None
+                self.bar.total, self.bar.unit = total or None, f" {self.unit}"
+                self.bar.bar_format = None if self.foreseen else BAR
 
     def _tick(self) -> None:
         while not self.over.wait(TICK_SECONDS):
@@ -137,12 +176,12 @@ class Progress:
     def _line(self) -> None:
         self.said = time.monotonic()
         seconds = self.said - self.begin
-        text = f"{self.label}: "
+        text = f"{self.shown}: "
         if self.total:
             share = "" if self.at_most else f" ({self.done / self.total:.0%})"
             text += f"{self.done} of {self.total} {self.unit}{share}, "
         text += f"{seconds:.0f} s"
-        if self.first < self.done < self.total and not self.at_most:
+        if self.foreseen:
             text += f", {seconds * (self.total - self.done) / (self.done - self.first):.0f} s left"
         self.stream.write(text + "\n")
         self.stream.flush()
@@ -169,11 +208,10 @@ class Phases:
             self.end()
             self.now = Progress(label, total, done, self.show, self.stream, unit, quiet=True).__enter__()
             return
-        self.now.unit = unit
-        if total != self.now.total:
-            self.now.expect(total)
         if done > self.now.done:
             self.now.advance(done - self.now.done)
+        if (total, unit) != (self.now.total, self.now.unit) or self.now.bar is not None:
+            self.now.expect(total, unit)
 
     def end(self) -> None:
         """Note that the present piece is finished."""

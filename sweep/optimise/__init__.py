@@ -8,11 +8,12 @@ from threadpoolctl import threadpool_limits
 from sweep.optimise.front.pareto import pareto
 from sweep.optimise.front.study import front_study
 from sweep.optimise.local.kkt import Result
+from sweep.optimise.multistart.kept import read_survey
 from sweep.optimise.multistart.multistart import explore, minimise, optimum
 from sweep.optimise.multistart.survey import Survey
 from sweep.optimise.problem.on_locus import on_locus
 from sweep.optimise.problem.statement import Problem
-from sweep.optimise.study import optimise_study, read_survey
+from sweep.optimise.study import optimise_study
 
 __all__ = [
     "Problem",

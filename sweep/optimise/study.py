@@ -14,26 +14,25 @@ import numpy as np
 from kernels import status as st
 from sweep.chunks.plan import PARAMETER_UNITS, error_words
 from sweep.dataset import store
-from sweep.dataset.files import metadata
 from sweep.evaluation.curves import joint_curves, motion_curves
 from sweep.evaluation.summaries import design_outputs, output
 from sweep.evaluation.tables import design_matrix
 from sweep.families.base import Angles, Array, Columns
 from sweep.families.domain import Interval
 from sweep.families.names import is_error, without_error
-from sweep.jobs.progress import Say, unsaid
+from sweep.jobs.progress import AT_MOST, Say, best_words, unsaid
 from sweep.jobs.signals import Deadline
 from sweep.optimise.local.kkt import CAVEAT, Result
 from sweep.optimise.local.model import Model
 from sweep.optimise.manufacture.robust import better_made, robust, yields
 from sweep.optimise.manufacture.tolerance import sensitivities, tolerance_rows
-from sweep.optimise.multistart.discrete import listed, with_neighbours
-from sweep.optimise.multistart.multistart import explore
+from sweep.optimise.multistart.kept import Kept, noted, result_of, survey_of
+from sweep.optimise.multistart.multistart import explore, listed, with_neighbours
 from sweep.optimise.multistart.survey import CUT, Survey, later
 from sweep.optimise.problem.program import Program
 from sweep.optimise.problem.statement import Problem
 from sweep.optimise.starts.global_starts import insensitive
-from sweep.optimise.starts.posing import problem_and_starts, problem_of
+from sweep.optimise.starts.posing import problem_and_starts, problem_of, problem_of_dataset
 
 if TYPE_CHECKING:
     from sweep.study import Study
@@ -147,6 +146,7 @@ def optimise_study(
     stop: Callable[[], bool] | None = None,
     jobs: int = 1,
     say: Say = unsaid,
+    key: str = "",
 ) -> Path:
     """Search from diverse best designs of the dataset and write the result beside it.
 
@@ -157,6 +157,8 @@ def optimise_study(
     stop : asked often; true ends the search as Ctrl-C does
     jobs : processes the starts are spread over; the result does not depend on it
     say : called with the number of starts that are done and the most there will be, then with what else is worked on
+    key : what the result depends on, in a word: a search with this key that was stopped goes on behind the parts that
+        were over, and ends with the same bytes; without it nothing is kept
 
     Returns
     -------
@@ -174,58 +176,75 @@ def optimise_study(
         if the search was stopped, after the best so far was written.
     """
     place = Path(folder)
+    side = store.beside(place)
+    kept = Kept(side / store.SEARCH if key else None, key)
     deadline = Deadline(None if study.optimise is None else study.optimise.time_budget, stop)
-    settings, (problem, starts, origins) = problem_and_starts(study, place, deadline, jobs, say)
-    settings = replace(settings, time_budget=None)  # one deadline for all that follows
-    results, found = explore(
-        problem, starts, settings, deadline, jobs, lambda done, most: say("optimum", done, most, "starts"), origins
-    )
-    catalogue = listed(study)
-    if catalogue and found.ended not in CUT:
-        say("neighbours in the catalogue", 0, 0, "steps")
-        results = with_neighbours(problem, results, catalogue, settings, deadline, jobs)
-    if study.tolerance is not None and found.ended not in CUT:
-        results = better_made(problem, results, study.tolerance, settings.seed)
-    nominal = results[0]
-    if study.tolerance is not None and study.tolerance.robust is not None and found.ended not in CUT:
-        whole, more = insensitive(study, settings, problem, deadline, jobs, say)
+    problem, results, found = _drawing(study, place, deadline, jobs, say, kept)
+    nominal, settings = results[0], study.optimise
+    if study.tolerance is not None and study.tolerance.robust is not None and settings and found.ended not in CUT:
+        unlimited = replace(settings, time_budget=None)  # one deadline for all that follows
+        part = kept.parts.get("insensitive")
+        known = None if part is None else np.array(part).reshape(-1, len(problem.family.parameters))
+        whole, more = insensitive(study, unlimited, problem, deadline, jobs, say, known)
+        if not deadline():
+            kept.note("insensitive", more.tolist())
         made = robust(
-            whole, results, study.tolerance, settings, deadline, jobs, more,
-            lambda done, total: say("robust design", done, total, "searches"),
+            whole, results, study.tolerance, unlimited, deadline, jobs, more,
+            lambda done, total, best: say("robust design", done, total, f"searches {AT_MOST}{best}"), kept,
         )  # fmt: skip
         results = results if made is None else [made.result, *results]
     if deadline.pulled and found.ended not in CUT:
         found = later(found)
-    side = store.beside(place)
     parts = 3 if study.tolerance is None else 4
-    after = "curves, sensitivities" if study.tolerance is None else "yield, curves, sensitivities, tolerances"
-    say(after, 0, parts, "tables")
+    say("tables", 0, parts, "tables")
     frame = _table(study, problem, results, nominal)
     about = {"search": json.dumps(asdict(found)), "summary": "; ".join([found.words, *found.warnings])}
     write(side / store.OPTIMUM, frame, study, about=about)
-    say(after, 1, parts, "tables")
+    say("tables", 1, parts, "tables")
     write(side / store.CURVES, _curves(study, frame), study)
-    say(after, 2, parts, "tables")
+    say("tables", 2, parts, "tables")
     write(side / store.SENSITIVITY, _by_role(study, frame, sensitivity), study)
-    say(after, 3, parts, "tables")
+    say("tables", 3, parts, "tables")
     if study.tolerance is None:
         (side / store.TOLERANCE).unlink(missing_ok=True)
     else:
         write(side / store.TOLERANCE, _by_role(study, frame, _tolerance), study)
     if found.ended == "interrupted" or (stop is not None and stop()):
         raise KeyboardInterrupt
+    if not deadline.pulled:
+        kept.forget()
     return side / store.OPTIMUM
 
 
-def read_survey(path: Path) -> Survey | None:
-    """Return what the starts told of the search that a ``_optimum.parquet`` comes from;
-    None where there is no such file.
-    """
-    noted = metadata(path).get(b"search")
-    if noted is None:
-        return None
-    content = json.loads(noted)
-    return Survey(**content | {"kinds": tuple(tuple(kind) for kind in content["kinds"])})
+def _drawing(
+    study: Study, place: Path, deadline: Deadline, jobs: int, say: Say, kept: Kept
+) -> tuple[Problem, list[Result], Survey]:
+    """Return the problem, the results of its search, best first, and what they tell; those that are kept at once."""
+    part = kept.parts.get("drawing")
+    if part is not None:
+        problem = problem_of_dataset(study, place, np.empty((0, len(study.family.parameters))))
+        lower, upper = (np.array(part[name]) for name in ("lower", "upper"))
+        return (
+            replace(problem, lower=lower, upper=upper),
+            [result_of(r) for r in part["results"]],
+            survey_of(part["survey"]),
+        )
+    settings, (problem, starts, origins) = problem_and_starts(study, place, deadline, jobs, say)
+    settings = replace(settings, time_budget=None)
+    results, found = explore(
+        problem, starts, settings, deadline, jobs,
+        lambda done, most, best: say("search", done, most, f"starts {AT_MOST}{best_words(best)}"), origins,
+    )  # fmt: skip
+    catalogue = listed(study)
+    if catalogue and found.ended not in CUT:
+        say("search in the catalogue", 0, 0, "steps")
+        results = with_neighbours(problem, results, catalogue, settings, deadline, jobs)
+    if study.tolerance is not None and found.ended not in CUT:
+        results = better_made(problem, results, study.tolerance, settings.seed)
+    if not deadline.pulled and found.ended not in CUT:
+        bounds = {"lower": problem.lower.tolist(), "upper": problem.upper.tolist()}
+        kept.note("drawing", bounds | {"results": [noted(r) for r in results], "survey": asdict(found)})
+    return problem, results, found
 
 
 def _table(study: Study, problem: Problem, results: list[Result], nominal: Result) -> dict[str, Any]:

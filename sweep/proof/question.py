@@ -13,7 +13,7 @@ from sweep.errors import InputError
 from sweep.families.base import Array
 from sweep.families.capabilities import ProvableLocus
 from sweep.families.chain import Chain
-from sweep.optimise.multistart.discrete import listed
+from sweep.optimise.multistart.multistart import listed
 
 if TYPE_CHECKING:
     from sweep.study import Limit, Study

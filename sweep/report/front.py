@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from kernels import status as codes
-from sweep.optimise.front.front_refinement import SHOWN, gaps
+from sweep.optimise.front.pareto import SHOWN, gaps
 from sweep.quantities.limits import compared
 from sweep.report.figures import LIMIT, OPTIMUM
 from sweep.report.quantities import Quantity, change, number, quantity

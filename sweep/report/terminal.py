@@ -16,6 +16,9 @@ from sweep.chunks.plan import spread_designs
 from sweep.dataset import store
 from sweep.evaluation.statuses import meaning
 from sweep.evaluation.summaries import design_outputs
+from sweep.families.base import Angles
+from sweep.families.capabilities import Assembly
+from sweep.families.domain import Interval
 from sweep.optimise import read_survey
 from sweep.optimise.local.descent import KKT
 from sweep.optimise.multistart.survey import started
@@ -30,6 +33,7 @@ if TYPE_CHECKING:
     from sweep.study import Limit, Study
 
 OK, INFEASIBLE = 0, 4
+TURN = np.arange(360, dtype=np.float64) * (2.0 * math.pi / 360)
 LOOKED_AT = 1024  # designs of a space among which the nearest miss is sought where no optimiser has looked for it
 
 
@@ -114,6 +118,8 @@ def _optimum(data: Dataset) -> list[str]:
     made = float(data.optimum.get("yield", math.nan))
     asked = None if data.study.tolerance is None else data.study.tolerance.robust
     wanted = f", {100.0 * asked:g} % asked" if asked is not None else ""
+    if asked is not None and int(data.optimum.get("agree", 1)) > 1:
+        wanted += f", met by {data.optimum['agree']} searches"
     return [
         f"optimum: {shown.words} {shown.show(value)}{f' ({fast})' if fast else ''}",
         f"held back by: {held_back(held, str(data.optimum.get('ended')))}",
@@ -134,7 +140,36 @@ def _nearest(data: Dataset) -> list[str]:
     residual = float(data.optimum.get("kkt_residual", math.nan))
     # Only where the conditions of the smallest relaxation hold is what is missed the least that has to give way.
     open_end = [] if residual <= KKT else ["the search did not settle there: less may have to give way than it says"]
-    return ["no design keeps all limits", *_give_way(data, data.optimum, "the nearest design found"), *open_end]
+    apart = _cannot_meet(data)
+    return ["no design keeps all limits", *_give_way(data, data.optimum, "the nearest design found"), *apart, *open_end]
+
+
+def _cannot_meet(data: Dataset) -> list[str]:
+    """Which links meet at no crank angle, of the design whose links come nearest; nothing where all of them do."""
+    import pyarrow.parquet as pq
+
+    family, loops = data.study.family, data.study.family.every(Assembly)
+    if not loops or isinstance(family.domain, Interval):
+        return []
+    table = pq.read_table(store.beside(data.folder) / store.OPTIMUM, columns=list(family.parameter_names))
+    designs = np.column_stack([table[name].to_numpy() for name in family.parameter_names]).astype(np.float64)
+    with np.errstate(all="ignore"):
+        poses = family.poses(
+            designs, Angles.of(np.asarray(TURN[None, :], np.float64)), frozenset(loop.discriminant for loop in loops)
+        )
+        # Of a stage behind one that does not meet nothing is known.
+        reach = [np.max(poses[x.discriminant] / np.reshape(x.scale(designs), (-1, 1)), axis=1) for x in loops]
+    nearest = int(np.argmax(np.nanmin(np.nan_to_num(reach, nan=math.inf), axis=0)))
+    lines = []
+    for loop, value in zip(loops, [float(own[nearest]) for own in reach], strict=True):
+        if value < 0.0:
+            member, _, stage = loop.stage.rpartition(".")
+            links = [p.name for p in family.parameters if p.unit == "length" and p.name.startswith(member)]
+            words = ", ".join(
+                f"{n} = {designs[nearest, family.parameter_names.index(n)]:.4g}" for n in links if n.endswith(stage)
+            )
+            lines.append(f"  links that cannot meet at any crank angle: {words}; the margin is {value:.3g} at best")
+    return lines
 
 
 def _nearest_of_space(study: Study, data: Dataset) -> list[str]:

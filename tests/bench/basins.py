@@ -18,7 +18,7 @@ from sweep.optimise.multistart.survey import enough, settled, wanted
 from sweep.optimise.starts.dataset import drawn, kinds
 from sweep.optimise.starts.global_starts import searched
 from sweep.optimise.starts.linear import elimination
-from sweep.optimise.starts.populations import Population
+from sweep.optimise.starts.populations import population
 from sweep.optimise.starts.posing import problem_of
 from sweep.study import Study
 from tests.support.needle208_record import FOLDER, record
@@ -89,11 +89,11 @@ def populations(problem: str, seed: int, rows: Sequence[Row]) -> Iterator[Row]:
     own = problem_of(study, known)
     linear = elimination(own)
     assert linear is not None
-    task = Population(linear, tuple(kinds(study, own, known[:0])), seed)
+    signs = kinds(study, own, known[:0])
     found = list(rows)
     while not told(study, found):
         times = [time.process_time()]
-        bred = task(len(found), lambda: False)
+        bred = population(linear, signs, (seed, len(found)))
         times.append(time.process_time())
         end = searched(study, own, bred.designs[:1], study.optimise, lambda: False, 1)[0]
         times.append(time.process_time())

@@ -32,7 +32,7 @@ signs = [{"branch1": 1.0, "branch2": 1.0, "kappa2": 1.0}]
 size = populations.Size(sampled=1 << 13, first=6, later=4, generations=1)
 for tolerance in (None, study.tolerance):
     linear = elimination(problem_of(study, drawn(study, 1, 208)), tolerance)
-    print(populations.bred(linear, signs, 1, 7, size=size)[0].designs.tobytes().hex())
+    print(populations.population(linear, signs, (7, 0), size=size).designs.tobytes().hex())
 """
 # What numpy and OpenBLAS would choose on other processors: sums in another order, so other last bits on the way.
 OTHERS = [

@@ -16,7 +16,7 @@ from sweep.engine.run import run
 from sweep.errors import StudyError
 from sweep.families import family
 from sweep.optimise import Problem, minimise, on_locus, optimum
-from sweep.optimise.multistart.discrete import listed, with_neighbours
+from sweep.optimise.multistart.multistart import listed, with_neighbours
 from sweep.study import Limit, OptimiseSettings, load_study
 from tests.optimise.test_study import STUDY
 from tests.support.optimise_family import FAMILY

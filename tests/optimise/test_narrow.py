@@ -11,9 +11,8 @@ import pytest
 
 from sweep.engine.run import run
 from sweep.families import family
-from sweep.optimise import Problem, optimum
+from sweep.optimise import Problem, optimum, read_survey
 from sweep.optimise.starts.posing import problem_and_starts
-from sweep.optimise.study import read_survey
 from sweep.study import Limit, OptimiseSettings, load_study
 
 NARROW = """

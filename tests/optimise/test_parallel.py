@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import os
 import time
 from dataclasses import replace
@@ -18,7 +19,7 @@ from sweep.families import family
 from sweep.families.base import Angles
 from sweep.optimise import Problem, explore, minimise
 from sweep.optimise.local.start import search
-from sweep.optimise.multistart.parallel import in_processes
+from sweep.optimise.multistart.parallel import SearchTask, spread_over
 from sweep.study import Limit, OptimiseSettings
 from tests.support.optimise_family import FAMILY, poses
 
@@ -104,7 +105,7 @@ def test_killed_worker_is_reported() -> None:
     fatal = replace(FAMILY, poses=partial(_die_outside, os.getpid()))
     problem = Problem(fatal, ("p", "q"), -4 * np.ones(2), 4 * np.ones(2), {}, "max_abs_wave")
     with pytest.raises(WorkerDied, match="optimiser"):
-        in_processes(problem, problem.rows(np.ones((2, 2))), [0, 1], lambda: False, 2)
+        spread_over(SearchTask(problem, problem.rows(np.ones((2, 2))), math.inf), [0, 1], lambda: False, 2)
 
 
 def _die_outside(parent: int, designs: Any, angles: Angles, wanted: frozenset[str]) -> dict[str, Any]:
@@ -115,6 +116,6 @@ def _die_outside(parent: int, designs: Any, angles: Angles, wanted: frozenset[st
 
 def test_no_flag_file_is_left(problem: Problem, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("tempfile.tempdir", str(tmp_path))
-    found = in_processes(problem, problem.rows(STARTS), [1, 2], lambda: True, 2)
+    found = spread_over(SearchTask(problem, problem.rows(STARTS), math.inf), [1, 2], lambda: True, 2)
     assert found == [] or all(r.ended == "time" for r in found)
     assert not list(tmp_path.glob("linksweep-*"))

@@ -16,8 +16,7 @@ from sweep.evaluation.summaries import design_outputs
 from sweep.families import family
 from sweep.families.base import Accuracy
 from sweep.optimise import Problem, minimise, pareto
-from sweep.optimise.front.front_refinement import gaps
-from sweep.optimise.front.pareto import Front, advance, bounded, steps
+from sweep.optimise.front.pareto import Front, advance, bounded, gaps, steps
 from sweep.study import Limit, OptimiseSettings, ParetoSettings
 from tests.support.optimise_family import FAMILY
 

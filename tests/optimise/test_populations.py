@@ -5,6 +5,7 @@ from __future__ import annotations
 import itertools
 import json
 import math
+from dataclasses import replace
 from functools import partial
 from pathlib import Path
 
@@ -12,10 +13,13 @@ import numpy as np
 import pytest
 
 import sweep
+from kernels import status as st
 from kernels.curves.sampled_rows import RANGE
-from kernels.linear.minimax import UNKNOWNS
+from kernels.descent.descents import rows_at
+from kernels.descent.rows import UNKNOWNS
 from sweep.families.base import Angles
 from sweep.families.capabilities import Assembly
+from sweep.optimise.local.kkt import Result
 from sweep.optimise.manufacture.curve_margins import curve_derivatives
 from sweep.optimise.multistart.multistart import explore
 from sweep.optimise.starts import global_starts, populations
@@ -50,11 +54,11 @@ def rows() -> PoseRows:
 
 
 def place_of_record(rows: PoseRows) -> np.ndarray:
-    own, design = rows.own, EXPECTED["design"]
+    own, design = rows, EXPECTED["design"]
     free = rows.linear.free
     values = np.array([design[name] / (design["a2"] if name in rows.linear.links else 1.0) for name in free])
     place = (values - own.low) / (own.high - own.low)
-    log = own.log
+    log = own.wide != 0.0
     place[log] = np.log(values[log] / own.low[log]) / np.log(own.high[log] / own.low[log])
     return np.asarray(rows.wrapped(place[None, :]))
 
@@ -74,8 +78,16 @@ def test_record_is_worth_its_acceleration_and_its_rows_hold(rows: PoseRows) -> N
 def around_record(rows: PoseRows, count: int) -> tuple[np.ndarray, np.ndarray]:
     """Places about the record and their unknowns."""
     rng = np.random.default_rng(1)
-    places = np.clip(place_of_record(rows) + 0.003 * rng.standard_normal((count, len(rows.own.columns))), 0.01, 0.99)
+    places = np.clip(place_of_record(rows) + 0.003 * rng.standard_normal((count, len(rows.columns))), 0.01, 0.99)
     return places, rows.begun(places, FIRST[:count])[0]
+
+
+def rows_of(rows: PoseRows, place: np.ndarray, x: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Rows (r,) of one design and their gradients (n + 5, r), those of the objective minus its magnitude."""
+    count = len(rows.task.kinds)
+    values, slopes = np.empty(count), np.empty((len(place) + UNKNOWNS, count))
+    rows_at(rows.task, 0, place, x, values, slopes)
+    return values, slopes
 
 
 @pytest.mark.parametrize("robust", [False, True])
@@ -99,7 +111,7 @@ def test_rows_are_the_pose_outputs_of_the_design(robust: bool) -> None:
             room[1::2] = 0.5 * (room[::2] + np.roll(room[::2], -1))  # between two of the poses that tell it
             high, low = (2 * int(pick(found["s"][::2])) for pick in (np.argmax, np.argmin))
             ends = rows.linear.level * math.sqrt(((by["s"][0][:, high] - by["s"][0][:, low]) ** 2).sum())
-        values, first = rows.rows(place, 0, unknowns)[0], 0
+        values, first = rows_of(rows, place, unknowns)[0], 0
         for curve in rows.limits:
             y, size = found[curve.output], curve.size
             if curve.at == RANGE:
@@ -122,13 +134,13 @@ def test_rows_are_the_pose_outputs_of_the_design(robust: bool) -> None:
 @pytest.mark.parametrize("robust", [False, True])
 def test_gradients_by_places_and_unknowns_are_those_of_differences(robust: bool) -> None:
     rows = PoseRows(eliminated(robust=robust), SIGNS)
-    n = len(rows.own.columns)
+    n = len(rows.columns)
     for place, x in zip(*around_record(rows, 3), strict=True):
-        slopes = rows.rows(place, 0, x)[1]
+        slopes = rows_of(rows, place, x)[1]
         for k in range(n + UNKNOWNS):
             step = np.zeros(n + UNKNOWNS)
             step[k] = 1e-6 if k < n else 1e-5
-            up, down = (rows.rows(place + s[:n], 0, x + s[n:])[0] for s in (step, -step))
+            up, down = (rows_of(rows, place + s[:n], x + s[n:])[0] for s in (step, -step))
             expected = (up - down) / (2.0 * step[k])
             # Differences are good to the square of the step and to rounding over it; so are those of the tolerances.
             np.testing.assert_allclose(slopes[k], expected, rtol=1e-5, atol=4e-6 * np.abs(expected).max() + 1e-9)
@@ -136,7 +148,7 @@ def test_gradients_by_places_and_unknowns_are_those_of_differences(robust: bool)
 
 def test_descents_from_around_the_record_end_at_it(rows: PoseRows) -> None:
     rng = np.random.default_rng(4)
-    begin = place_of_record(rows)[0] + 0.004 * rng.standard_normal((8, len(rows.own.columns)))
+    begin = place_of_record(rows)[0] + 0.004 * rng.standard_normal((8, len(rows.columns)))
     many = Descents(rows, np.clip(begin, 0.0, 1.0), FIRST[:8])
     before = many.worth.copy()
     many.advance(40)
@@ -149,7 +161,7 @@ def test_descents_from_around_the_record_end_at_it(rows: PoseRows) -> None:
 
 def test_descents_beside_change_nothing_and_descents_can_be_given_up(rows: PoseRows) -> None:
     rng = np.random.default_rng(4)
-    begin = np.clip(place_of_record(rows)[0] + 0.004 * rng.standard_normal((4, len(rows.own.columns))), 0.0, 1.0)
+    begin = np.clip(place_of_record(rows)[0] + 0.004 * rng.standard_normal((4, len(rows.columns))), 0.0, 1.0)
     together, alone = Descents(rows, begin, FIRST[:4], jobs=3), Descents(rows, begin[2:3], FIRST[:1])
     for many in (together, alone):
         many.advance(3)
@@ -161,10 +173,10 @@ def test_descents_beside_change_nothing_and_descents_can_be_given_up(rows: PoseR
 
 
 def test_places_that_do_not_turn_are_worth_nothing(rows: PoseRows) -> None:
-    places = np.random.default_rng(3).random((400, len(rows.own.columns)))
+    places = np.random.default_rng(3).random((400, len(rows.columns)))
     places[:20] = np.clip(place_of_record(rows) + 0.002 * np.random.default_rng(4).standard_normal((20, 11)), 0.0, 1.0)
     _, worth = rows.begun(places, FIRST)
-    ratios = rows.own.placed(places, FIRST)
+    ratios = rows.placed(places, FIRST)
     table = {name: ratios[:, k] for k, name in enumerate(rows.family.parameter_names)}
     margins = sweep.summarise(["rssr", "guide"], table, ["margin1", "margin2"], accuracy=1e-3)
     turns = np.nan_to_num(np.minimum(margins["margin1"], margins["margin2"]).to_numpy(), nan=-1.0) > 0.0
@@ -220,7 +232,7 @@ def same(one: Bred, other: Bred) -> None:
 def test_populations_are_those_of_their_seed_and_number() -> None:
     linear = eliminated(8.0)
     first, second = bred(linear, SIGNS, 2, 5, size=SMALL)
-    same(bred(linear, SIGNS, 1, 5, size=SMALL)[0], first)
+    same(next(bred(linear, SIGNS, 1, 5, size=SMALL)), first)
     assert not np.array_equal(first.designs, second.designs)
     assert (np.diff(first.worth) > 0.0).all() and len(first.worth) >= 4
     names = linear.problem.family.parameter_names
@@ -231,36 +243,44 @@ def test_populations_are_those_of_their_seed_and_number() -> None:
     np.testing.assert_allclose(found["max_abs_d2s"][good], first.worth[good], rtol=0.05)
     np.testing.assert_allclose(found["stroke"].abs()[good], 24.5, rtol=0.02)
     assert (first.designs[:, names.index("a2")][good] >= 8.0 * 0.98).all()
-    assert not bred(linear, SIGNS, 2, 5, stop=lambda: True)
+    assert not list(bred(linear, SIGNS, 2, 5, stop=lambda: True))
 
 
 def test_populations_are_made_until_they_tell_enough(monkeypatch: pytest.MonkeyPatch) -> None:
-    """What is counted does not matter here: each stands for itself by its number."""
+    """What they find does not matter here: each leads to the value of its number."""
+    values = [1.1, 1.0, 1.1, 1.0, math.inf, 1.1, 1.0, 0.9, 0.9]
+    made = list[int]()
 
-    def numbered(task: object, number: int, stop: object) -> Bred:
-        return Bred(np.empty((0, 1)), np.empty(0), number)
+    def numbered(linear: object, signs: object, seed: tuple[int, int], *rest: object) -> Bred:
+        made.append(seed[1])
+        return Bred(known, np.array([1.0 + seed[1]]), 0)
 
-    monkeypatch.setattr(populations.Population, "__call__", numbered)
-    linear, asked = eliminated(8.0), list[int]()
+    def led(*rest: object) -> list[Result]:
+        value = values[made[-1]]
+        status = st.OK if math.isfinite(value) else st.LIMIT_EXCEEDED
+        return [Result(0, known[0], value, 0.0, 0.0, 0.0, (), {}, {}, {}, status, "converged")]
 
-    def enough(found: list[Bred]) -> int | None:
-        asked.append(len(found))
-        return 5 if len(found) >= 5 else None
-
+    monkeypatch.setattr(populations, "population", numbered)
+    monkeypatch.setattr(global_starts, "searched", led)
+    study = record(8.0, starts=4, populations=9, seed=3)
+    known = drawn(study, 1, 3)
+    problem = problem_of(study, known)
     # None is begun beyond what is enough, whatever the number of workers.
     for jobs in (1, 2, 64):
-        asked.clear()
-        assert [one.looks for one in bred(linear, SIGNS, 9, 5, jobs=jobs, enough=enough)] == [0, 1, 2, 3, 4]
-        assert asked == [1, 2, 3, 4, 5]
-    assert [one.looks for one in bred(linear, SIGNS, 3, 5)] == [0, 1, 2]
+        made.clear()
+        from_populations(study, study.optimise, problem, known[:0], np.empty(0), lambda: False, jobs)
+        assert made == [0, 1, 2, 3, 4, 5, 6]
+    made.clear()
+    few = replace(study.optimise, populations=3)
+    from_populations(study, few, problem, known[:0], np.empty(0), lambda: False, 1)
+    assert made == [0, 1, 2]
 
 
 def test_populations_in_threads_are_those_of_one_thread() -> None:
     tiny = SMALL._replace(sampled=1 << 11, first=4, generations=1, later=4, steps=5)
     for robust in (False, True):
         linear = eliminated(8.0, robust)
-        here, there = (bred(linear, SIGNS, 1, 5, jobs=jobs, size=tiny) for jobs in (1, 3))
-        same(here[0], there[0])
+        same(*(next(bred(linear, SIGNS, 1, 5, jobs=jobs, size=tiny)) for jobs in (1, 3)))
 
 
 def test_starts_are_the_best_of_every_population_then_others(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -272,7 +292,7 @@ def test_starts_are_the_best_of_every_population_then_others(monkeypatch: pytest
     begun = from_populations(study, study.optimise, problem, known[:0], np.empty(0), lambda: False, 1)
     linear = elimination(problem)
     assert linear is not None
-    found = bred(linear, kinds(study, begun.problem, known[:0]), 2, 3, size=SMALL)
+    found = list(bred(linear, kinds(study, begun.problem, known[:0]), 2, 3, size=SMALL))
     assert begun.origins is not None and begun.origins[:2] == (0, 1) and len(begun.starts) == 4
     ends = [one.designs[0] for one in found]
     settled = [searched(study, problem, end[None, :], study.optimise, lambda: False, 1)[0].design for end in ends]

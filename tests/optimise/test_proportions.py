@@ -11,10 +11,9 @@ import pytest
 import sweep
 from kernels.descent.descents import LOCKED
 from sweep.errors import StudyError
-from sweep.optimise.starts.linear import Elimination, elimination
+from sweep.optimise.starts.linear import Elimination, elimination, widened
 from sweep.optimise.starts.pose_rows import Descents, PoseRows
 from sweep.optimise.starts.posing import problem_of
-from sweep.optimise.starts.proportions import widened
 from sweep.study import load_study, study_from_data
 from tests.support.needle208_record import record
 
@@ -47,11 +46,12 @@ def eliminated(robust: bool = False) -> Elimination:
 
 def place_of(rows: PoseRows, design: np.ndarray) -> np.ndarray:
     """Place (1, n) of a design (P,), whatever its point, line and scale are."""
-    own, values = rows.own, design[rows.own.columns].copy()
+    own, values = rows, design[rows.columns].copy()
     guide = [own.columns.index(rows.linear.column(name)) for name in "bce"]
     values[guide] /= design[rows.linear.column("a")]
     place = (values - own.low) / (own.high - own.low)
-    place[own.log] = np.log(values[own.log] / own.low[own.log]) / own.wide[own.log]
+    log = own.wide != 0.0
+    place[log] = np.log(values[log] / own.low[log]) / own.wide[log]
     return np.asarray(rows.wrapped(place[None, :]))
 
 

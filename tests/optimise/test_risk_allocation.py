@@ -14,8 +14,7 @@ import pytest
 from sweep.families.base import Angles, Family, Output, Parameter
 from sweep.optimise import Problem, minimise
 from sweep.optimise.manufacture import robust as robust_search
-from sweep.optimise.manufacture.margins import excesses, prices, with_margins
-from sweep.optimise.manufacture.risk_allocation import risk_allocation
+from sweep.optimise.manufacture.margins import excesses, prices, risk_allocation, with_margins
 from sweep.optimise.manufacture.robust import robust
 from sweep.study import Limit, OptimiseSettings, Tolerance
 

@@ -15,11 +15,10 @@ import sweep.optimise.study
 from sweep.errors import SearchCutShort, StudyError
 from sweep.families import family
 from sweep.jobs.signals import Deadline
-from sweep.optimise import Problem, explore
+from sweep.optimise import Problem, explore, read_survey
 from sweep.optimise.local.model import Model
 from sweep.optimise.manufacture.margins import with_margins
 from sweep.optimise.problem.program import Program
-from sweep.optimise.study import read_survey
 from sweep.study import Limit, OptimiseSettings, Tolerance, load_study, study_from_data
 from tests.optimise.test_study import STUDY
 

@@ -6,17 +6,16 @@ import numpy as np
 import pytest
 from scipy.optimize import linprog
 
+from kernels import status as st
 from kernels.boxes.branching import combined
-from kernels.boxes.program import IMPOSSIBLE, SOLVED, multipliers
+from kernels.boxes.program import multipliers
 from kernels.boxes.taylor import width
 
 
 def solved(rows, objective, half):
     """Outcome and multipliers."""
-    n = len(half)
     out = np.zeros(len(rows))
-    outcome = multipliers(rows, len(rows), objective, half, np.zeros((n + 6, n + 1)), np.zeros(n + 1, np.int64), out)
-    return outcome, out
+    return multipliers(rows, len(rows), objective, half, out), out
 
 
 def least(rows, factors, half):
@@ -40,11 +39,12 @@ def test_multipliers_reach_the_optimum_of_another_solver(n):
         right = np.where(objective, -rows[:, 0], rows[:, 0])
         other = linprog(cost, left, right, bounds=[*((-h, h) for h in half), (0, None)])
         if other.status == 2:
-            assert outcome == IMPOSSIBLE
+            assert outcome == st.LIMIT_EXCEEDED
             assert least(rows, np.where(objective, 0.0, -factors), half) > 0.0
             continue
-        assert outcome == SOLVED
-        assert (factors >= 0.0).all() and factors[objective == 1].sum() <= 1.0 + 1e-12
+        assert outcome == st.OK
+        # what the lent curvature adds to their sum, 1e-8 of the bound, the caller divides by
+        assert (factors >= 0.0).all() and factors[objective == 1].sum() <= 1.0 + 1e-6
         # both solvers end where no row is missed by more than their tolerance, 1e-7 of HiGHS
         assert least(rows, np.where(objective, factors, -factors), half) == pytest.approx(other.fun, abs=1e-6)
         compared += 1

@@ -60,6 +60,17 @@ def test_remaining_time_is_that_of_this_run_after_a_resume(monkeypatch: pytest.M
         assert stream.getvalue().splitlines()[-1] == "x: 70 of 100 designs (70%), 20 s, 60 s left"
 
 
+def test_remaining_time_is_told_when_it_is_known_within_a_factor_of_two(monkeypatch: pytest.MonkeyPatch) -> None:
+    now = [1000.0]
+    monkeypatch.setattr("sweep.jobs.progress.time.monotonic", lambda: now[0])
+    stream = io.StringIO()
+    with Progress("x", 40, 0, True, stream) as shown:
+        for done in range(1, 6):
+            now[0] += 20.0
+            shown.advance(1)
+            assert stream.getvalue().splitlines()[-1].endswith(" left") == (done >= 4)
+
+
 def test_remaining_time_follows_what_is_expected_by_now(monkeypatch: pytest.MonkeyPatch) -> None:
     """A hundred of a million in 10 s; then it turns out that two hundred are enough."""
     now = [1000.0]
@@ -106,17 +117,21 @@ def test_every_part_of_a_run_is_told(tmp_path, quick, monkeypatch, capsys) -> No
         write_report(folder, say=phases.say)
     lines = capsys.readouterr().err.splitlines()
     labels = list(dict.fromkeys(line.split(":")[0] for line in lines))
-    after = "yield, curves, sensitivities, tolerances"
-    assert labels == ["compiling", "planning", "reading what is there", "words", "optimum", after, "front", "report"]
+    numbered = [
+        f"{k}/6 {label}" for k, label in enumerate(("compiling", "planning", "words", "search", "tables", "front"), 1)
+    ]
+    assert labels == [*numbered[:2], "reading what is there", *numbered[2:], "report"]
     for label, unit in (
-        ("compiling", "steps"),
-        (after, "tables"),
-        ("front", "steps"),
+        ("1/6 compiling", "steps"),
+        ("5/6 tables", "tables"),
+        ("6/6 front", "steps"),
         ("report", "steps"),
     ):
         counted = [line for line in lines if re.match(rf"{label}: \d+ of \d+ {unit} ", line)]
         assert any(line.endswith(" left") for line in counted), (label, counted)
-    assert any(line.startswith("optimum: 3 of 3 starts (100%)") for line in lines)
+    # Of a maximum no share and no remaining time is known, but the best value so far.
+    searched = [line for line in lines if line.startswith("4/6 search: 3 of 3 starts at most, the best ")]
+    assert searched and not any("%" in line or "left" in line for line in searched)
 
 
 def test_progress_that_nobody_reads_any_more_does_not_stop_the_sweep(monkeypatch: pytest.MonkeyPatch) -> None:

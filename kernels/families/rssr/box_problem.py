@@ -43,8 +43,6 @@ class BoxScratch(NamedTuple):
     theta: Array
     objective: Flags
     factors: Array
-    work: Array
-    basis: Indices
     linear: Array
     sizes: Array
     loose: Array
@@ -57,9 +55,8 @@ def room(forms: int, n: int) -> BoxScratch:
     """Return the room for boxes of ``n`` variables."""
     return BoxScratch(
         np.zeros((forms, width(n))), np.zeros((MOST_ROWS, width(n))), np.zeros(MOST_ROWS, np.int64),
-        np.zeros(MOST_ROWS), np.zeros(MOST_ROWS, np.uint8), np.zeros(MOST_ROWS), np.zeros((n + 6, n + 1)),
-        np.zeros(n + 1, np.int64), np.zeros((MOST_ROWS, n + 1)), np.zeros(MOST_ROWS), np.zeros(n), np.ones(n),
-        np.zeros(width(n)),
+        np.zeros(MOST_ROWS), np.zeros(MOST_ROWS, np.uint8), np.zeros(MOST_ROWS),
+        np.zeros((MOST_ROWS, n + 1)), np.zeros(MOST_ROWS), np.zeros(n), np.ones(n), np.zeros(width(n)),
     )  # fmt: skip
 
 

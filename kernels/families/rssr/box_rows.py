@@ -188,10 +188,7 @@ def _limits_alone(p: BoxQuestion, rows: BoxScratch, count: int) -> bool:
 
 @inline
 def _best(rows: BoxScratch, count: int) -> tuple[float, bool]:
-    return best_bound(
-        rows.forms, count, rows.objective, rows.ones, rows.work, rows.basis, rows.linear, rows.sizes, rows.factors,
-        rows.total,
-    )  # fmt: skip
+    return best_bound(rows.forms, count, rows.objective, rows.ones, rows.linear, rows.sizes, rows.factors, rows.total)
 
 
 @inline

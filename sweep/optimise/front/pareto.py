@@ -14,7 +14,6 @@ from kernels import status as st
 from sweep.errors import InputError
 from sweep.evaluation.summaries import design_outputs
 from sweep.families.base import Array
-from sweep.optimise.front.front_refinement import gaps
 from sweep.optimise.local.kkt import Result
 from sweep.optimise.multistart.multistart import minimise
 from sweep.optimise.multistart.survey import CUT
@@ -24,6 +23,11 @@ from sweep.study import Limit, OptimiseSettings
 
 if TYPE_CHECKING:
     from sweep.study import ParetoSettings
+
+
+NARROWEST = 1.0 / 256.0  # of the whole range of bounds: what is narrower is a jump, which no point fills
+LEAST = 1e-4  # of the square around the front: triangles that are smaller are no gap
+SHOWN = 0.02  # a gap is said where it is larger
 
 
 @dataclass(frozen=True)
@@ -222,9 +226,9 @@ def _placed(
     )
     for step in (Step(at + 1, at, first=False), *(Step(k, k + 1, first=False) for k in range(at, -1, -1))):
         near, held = front.results[step.neighbour], front.results[step.target]
-        if near is None or held is None or near.status == st.LIMIT_EXCEEDED or asked():
+        if near is None or held is None or not near.feasible or asked():
             continue
-        if step.target < step.neighbour and not _order(near) < _order(held):
+        if step.target < step.neighbour and not near.rank < held.rank:
             continue
         better = _search(problem, settings, front.bounds[step.target], near.design[None, :], asked, jobs)
         front = _with(front, step, number, better)
@@ -237,7 +241,7 @@ def places(problem: Problem, settings: ParetoSettings, front: Front) -> tuple[Ar
     the bound and nan where there is none.
     """
     reached, values = np.array(front.bounds, np.float64), np.full(len(front.bounds), np.nan)
-    good = [k for k, r in enumerate(front.results) if r is not None and r.status != st.LIMIT_EXCEEDED]
+    good = [k for k, r in enumerate(front.results) if r is not None and r.feasible]
     if good:
         designs = np.array([r.design for k in good if (r := front.results[k]) is not None])
         outputs = design_outputs(problem.family, designs, [settings.output], problem.accuracy, problem.window)
@@ -245,6 +249,52 @@ def places(problem: Problem, settings: ParetoSettings, front: Front) -> tuple[Ar
         reached[good] = np.where(np.isfinite(size), size, reached[good])
         values[good] = [r.objective for k in good if (r := front.results[k]) is not None]
     return reached, values
+
+
+@dataclass(frozen=True)
+class Gap:
+    """Two neighbouring points of a front: the number of the looser one, and how large the gap is.
+
+    Within bounds that tighten the objective only grows, so between two points the front lies in the rectangle they
+    span, and a convex one in its lower triangle.  ``area`` is that of the triangle, with both axes scaled to 1.
+    ``middle`` halves it.
+    """
+
+    number: int
+    area: float
+    middle: float
+
+
+def gaps(bounds: Array, reached: Array, values: Array) -> list[Gap]:
+    """Return the gaps of a front, the largest first, of equal ones the looser first;
+    only those that a point could fill.
+
+    Between the bound of a point and what it reaches the front is flat, so a gap goes from what the looser point reaches
+    to the bound of the tighter one.
+
+    Parameters
+    ----------
+    bounds : on the second output, the loosest first
+    reached : what the points reach of the second output; their bounds where nothing was found
+    values : the objective to be small, nan where no design keeps the bound: the front ends before it, at any height
+    """
+    known = np.isfinite(values)
+    if bounds.size < 2 or not known.any():
+        return []
+    sense = np.sign(bounds[-1] - bounds[0])
+    wide = float(sense * (bounds[-1] - reached[0]))
+    high = float(np.ptp(values[known]))
+    found = []
+    for k in range(bounds.size - 1):
+        step = float(sense * (bounds[k + 1] - reached[k])) / wide if wide > 0.0 else 0.0
+        rise = 0.0
+        if known[k] and known[k + 1]:
+            rise = abs(values[k + 1] - values[k]) / high if high > 0.0 else 0.0
+        elif known[k] or known[k + 1]:
+            rise = 1.0
+        if step >= NARROWEST and 0.5 * step * rise >= LEAST:
+            found.append(Gap(k, 0.5 * step * rise, 0.5 * float(reached[k] + bounds[k + 1])))
+    return sorted(found, key=lambda gap: (-gap.area, gap.number))
 
 
 def _begin(front: Front, step: Step, number: int, starts: Array) -> Array | None:
@@ -258,7 +308,7 @@ def _begin(front: Front, step: Step, number: int, starts: Array) -> Array | None
     if near is None or held is None:
         return None
     seen = step.neighbour < step.target and front.found[step.neighbour] < front.given
-    worse = near.status == st.LIMIT_EXCEEDED and held.status != st.LIMIT_EXCEEDED
+    worse = held.feasible and not near.feasible
     offers = not (seen or worse or np.array_equal(near.design, held.design))
     # A search that did not settle goes on from where it ended.
     unfinished = held.status == st.NOT_CONVERGED
@@ -284,14 +334,8 @@ def _search(
 def _with(front: Front, step: Step, number: int, result: Result) -> Front:
     """Return the front with this result where it is the better one."""
     held = front.results[step.target]
-    if held is not None and not _order(result) < _order(held):
+    if held is not None and not result.rank < held.rank:
         return front
     results, found = list(front.results), list(front.found)
     results[step.target], found[step.target] = result, number
     return replace(front, results=tuple(results), found=tuple(found))
-
-
-def _order(result: Result) -> tuple[bool, float]:
-    missed = result.status == st.LIMIT_EXCEEDED
-    value = result.violation if missed else result.objective
-    return missed, math.inf if math.isnan(value) else value

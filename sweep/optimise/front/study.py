@@ -20,7 +20,7 @@ from sweep.families.base import Array
 from sweep.families.names import by_magnitude
 from sweep.jobs.progress import Say, unsaid
 from sweep.optimise.front.pareto import Front, advance
-from sweep.optimise.local.kkt import Result
+from sweep.optimise.multistart.kept import noted, result_of
 from sweep.optimise.starts.candidates import diverse
 from sweep.optimise.starts.posing import problem_of_dataset
 from sweep.optimise.study import certificates, outputs, write
@@ -106,21 +106,11 @@ def saved(path: Path, key: str) -> Front | None:
     try:
         state = json.loads(about[STATE])
         return Front(
-            tuple(state["bounds"]), tuple(_result(r) for r in state["results"]), tuple(state["found"]), state["taken"],
-            state["given"], state["points"], state["filled"],
+            tuple(state["bounds"]), tuple(r and result_of(r) for r in state["results"]), tuple(state["found"]),
+            state["taken"], state["given"], state["points"], state["filled"],
         )  # fmt: skip
     except (ValueError, KeyError, TypeError):  # damaged: the search begins anew
         return None
-
-
-def _result(noted: dict[str, Any] | None) -> Result | None:
-    if noted is None:
-        return None
-    return Result(**noted | {"design": np.array(noted["design"]), "active": tuple(noted["active"])})
-
-
-def _noted(result: Result | None) -> dict[str, Any] | None:
-    return None if result is None else asdict(result) | {"design": result.design.tolist()}
 
 
 def _write(
@@ -134,7 +124,7 @@ def _write(
     columns |= outputs(study, designs) | certificates(results)
     side = "lower" if settings.at_least else "upper"
     texts = {"bound": (_unit(study, settings.output), f"{side} bound on {settings.output}")}
-    state = asdict(replace(kept, results=())) | {"results": [_noted(r) for r in kept.results]}
+    state = asdict(replace(kept, results=())) | {"results": [r and noted(r) for r in kept.results]}
     about = {"output": settings.output, "side": "at least" if settings.at_least else "at most"}
     about |= {"complete": str(best.complete).lower(), "steps": f"{kept.taken} of {kept.steps}"}
     about |= {"ended": ended} if ended else {}

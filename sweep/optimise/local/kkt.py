@@ -118,6 +118,12 @@ class Result:
         """Whether every limit is kept."""
         return self.status != st.LIMIT_EXCEEDED
 
+    @property
+    def rank(self) -> tuple[bool, float]:
+        """What results are ordered by: feasible ones by their objective, then the others by their violation."""
+        value = self.objective if self.feasible else self.violation
+        return not self.feasible, math.inf if math.isnan(value) else value
+
 
 def in_words(labels: tuple[Label, ...], found: Multipliers, variables: tuple[str, ...]) -> dict[str, float]:
     """Return active limits and bounds with their multipliers, by name; several points of one limit are one."""

@@ -13,12 +13,22 @@ from numpy.typing import NDArray
 
 from sweep.evaluation.summaries import design_outputs
 from sweep.families.base import Array
+from sweep.jobs.executors import Task
+from sweep.jobs.progress import best_words
 from sweep.optimise.local.kkt import AGREE, Result
 from sweep.optimise.local.model import Model
 from sweep.optimise.local.start import search
-from sweep.optimise.manufacture.margins import Levels, bounded, excesses, keyed, prices, with_margins
-from sweep.optimise.manufacture.risk_allocation import risk_allocation
+from sweep.optimise.manufacture.margins import (
+    Levels,
+    bounded,
+    excesses,
+    keyed,
+    prices,
+    risk_allocation,
+    with_margins,
+)
 from sweep.optimise.manufacture.tolerance import deviating
+from sweep.optimise.multistart.kept import Kept, noted, result_of
 from sweep.optimise.multistart.parallel import spread_over
 from sweep.optimise.multistart.survey import CUT
 from sweep.optimise.problem.program import Program
@@ -77,7 +87,8 @@ def robust(
     stop: Callable[[], bool] | None = None,
     jobs: int = 1,
     more: Array | None = None,
-    tell: Callable[[int, int], None] = lambda _, __: None,
+    say: Callable[[int, int, str], None] = lambda _, __, ___: None,
+    kept: Kept | None = None,
 ) -> Robust | None:
     """Return the best design of which the wanted share of toleranced mechanisms keeps all limits.
 
@@ -94,12 +105,14 @@ def robust(
     tolerance : with ``robust``, the share
     settings, stop, jobs : as for ``minimise``
     more : (k, P) designs that a search for insensitive ones has found, to begin with instead
-    tell : called with how many searches are done, and how many there are at most
+    say : called with how many searches are done, how many there are at most, and the best value so far in words
+    kept : what a run that was stopped has found, and where this one notes what it finds
 
     Returns
     -------
     The best one that reaches the share, else the one with the largest share; None where there is nothing to begin with.
-    ``agree`` of the result is the number of searches that met its objective in the first rounds, within 1e-4.
+    ``agree`` of the result is the number of searches that met it: whose first rounds ended at a design that was found
+    to have its objective, within 1e-4.
     ``violation`` and ``relaxation`` of the result are about the limits as they are asked for.
     """
     heads: list[Result] = []
@@ -113,56 +126,65 @@ def robust(
     starts = [h.start for h in heads] + list(range(number, number + len(begin) - len(heads)))
     if not begin:
         return None
-    asked = stop or _never
+    asked, kept = stop or _never, kept or Kept()
     level = NormalDist().inv_cdf(1.0 - (1.0 - (tolerance.robust or 0.0)) / BOTH)
+    total = len(begin) + min(ENDED, len(begin))
+
+    def over(name: str, task: Task[Robust], count: int, before: int) -> list[Robust]:
+        """Return what a task gives for the numbers below a count that were begun; what is kept is not done again."""
+        parts = {number: kept.parts.get(f"{name} {number}") for number in range(count)}
+        done = {k: Robust(result_of(part["result"]), part["share"]) for k, part in parts.items() if part is not None}
+
+        def told(number: int, one: Robust) -> None:
+            done[number] = one
+            if not one.cut:
+                kept.note(f"{name} {number}", {"result": noted(one.result), "share": one.share})
+            good = [x.result.objective for x in done.values() if x.share >= (tolerance.robust or 0.0)]
+            say(before + len(done), total, best_words(min(good, default=math.inf)))
+
+        say(before + len(done), total, "")
+        if rest := [number for number in range(count) if number not in done]:
+            spread_over(task, rest, asked, jobs, told)
+        return [done[number] for number in sorted(done)]
+
     near = _Approach(problem, np.array(begin), tuple(starts), tolerance, level, min(HEAT, settings.looks))
-    count = _Count(tell, len(begin) + min(ENDED, len(begin)))
-    found = spread_over(near, list(range(len(begin))), asked, jobs, count)
+    found = [x.result for x in over("approach", near, len(begin), 0)]
     # The objective of designs that miss their limits still says little.
     order = sorted(found, key=lambda r: (r.violation > NEARLY, r.objective if r.violation <= NEARLY else r.violation))
     ends = _different(problem, order)[:ENDED]
     if not ends:  # stopped before any of them was begun
         return None
-    numbers = {r.start: k for k, r in enumerate(ends)}
+    total = len(begin) + len(ends)
     last = _Calibrate(problem, tuple(ends), tolerance, level, settings.seed, settings.looks)
-    count.total = len(begin) + len(ends)
-    made = spread_over(last, list(numbers.values()), asked, jobs, count) or [
+    made = over("calibrated", last, len(ends), len(begin)) or [
         Robust(r, _share(problem, r.design, tolerance, settings.seed), True) for r in ends[:1]
     ]
     good = [x for x in made if x.share >= (tolerance.robust or 0.0)]
     best = min(good, key=lambda x: x.result.objective) if good else max(made, key=lambda x: x.share)
-    head = next(r for r in ends if r.start == best.result.start)
-    met = [
-        r for r in found if r.violation <= NEARLY and abs(r.objective - head.objective) <= AGREE * abs(head.objective)
-    ]
-    best = replace(best, result=replace(best.result, agree=max(1, len(met))))
+    value = best.result.objective
+    met = [end for end, x in zip(ends, made, strict=False) if abs(x.result.objective - value) <= AGREE * abs(value)]
+    agree = sum(any(_alike(problem, r, end) for end in met) for r in found)
+    best = replace(best, result=replace(best.result, agree=max(1, agree)))
     return replace(best, cut=best.cut or any(x.cut for x in made) or len(made) < len(ends) or len(found) < len(begin))
-
-
-class _Count:
-    """Counts what is done and tells it."""
-
-    def __init__(self, tell: Callable[[int, int], None], total: int) -> None:
-        self.tell, self.done, self.total = tell, 0, total
-        tell(0, total)
-
-    def __call__(self) -> None:
-        self.done += 1
-        self.tell(self.done, self.total)
 
 
 def _never() -> bool:
     return False
 
 
+def _alike(problem: Problem, one: Result, other: Result) -> bool:
+    """Whether two designs are near each other."""
+    places = problem.scaled(np.array([one.design, other.design]))
+    return float(np.abs(places[0] - places[1]).max()) <= ALIKE
+
+
 def _different(problem: Problem, results: Sequence[Result]) -> list[Result]:
     """Return results whose designs are not near those of better ones."""
-    places = [problem.scaled(r.design[None, :])[0] for r in results]
-    apart: list[int] = []
-    for k, place in enumerate(places):
-        if all(float(np.abs(place - places[other]).max()) > ALIKE for other in apart):
-            apart.append(k)
-    return [results[k] for k in apart]
+    apart: list[Result] = []
+    for result in results:
+        if not any(_alike(problem, result, other) for other in apart):
+            apart.append(result)
+    return apart
 
 
 @dataclass(frozen=True)
@@ -176,19 +198,14 @@ class _Approach:
     level: float
     looks: int
 
-    def __call__(self, number: int, should_stop: Callable[[], bool]) -> Result:
-        start = self.numbers[number]
-        return _approached(
-            self.problem,
-            start,
-            self.designs[number],
-            self.tolerance,
-            dict.fromkeys(keyed(self.problem).values(), self.level),
-            should_stop,
-            ROUNDS,
-            self.looks,
-            RADIUS,
-        )[0]
+    def __call__(self, number: int, should_stop: Callable[[], bool]) -> Robust:
+        """Return where the first rounds from a design end."""
+        levels = dict.fromkeys(keyed(self.problem).values(), self.level)
+        start, design = self.numbers[number], self.designs[number]
+        result, *_ = _approached(
+            self.problem, start, design, self.tolerance, levels, should_stop, ROUNDS, self.looks, RADIUS
+        )
+        return Robust(result, math.nan, result.ended in CUT)
 
 
 @dataclass(frozen=True)

@@ -1,25 +1,26 @@
-"""``minimise`` and ``optimum``: searches from several starts, best first, with budgets of starts and looks."""
+"""``minimise`` and ``optimum``: searches from several starts, best first, with budgets of starts and looks.
+
+Parameters that a study gives as a list of values are kept by each start; then the neighbouring ones are tried.
+"""
 
 from __future__ import annotations
 
 import math
 import signal
 import time
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
 
-from kernels import status as st
 from sweep.errors import InputError
 from sweep.families.base import Array
 from sweep.jobs.signals import Stop, stop_on_signal
-from sweep.optimise.local.kkt import AGREE, Result
+from sweep.optimise.local.kkt import Result
 from sweep.optimise.local.model import refuse_dependent
-from sweep.optimise.local.start import search
-from sweep.optimise.multistart.parallel import in_processes
+from sweep.optimise.multistart.parallel import SearchTask, spread_over
 from sweep.optimise.multistart.survey import CUT, Survey, survey, with_basins
 from sweep.optimise.problem.on_locus import on_locus
 from sweep.optimise.problem.program import Program
@@ -27,12 +28,14 @@ from sweep.optimise.problem.statement import PLACE, Problem
 from sweep.optimise.starts.candidates import from_sample, from_samples
 
 if TYPE_CHECKING:
-    from sweep.study import OptimiseSettings
+    from sweep.study import OptimiseSettings, Study
 
 BATCH = 6  # starts between two looks at whether more are needed: the same for any number of jobs
 LOOKED_AT = 3  # starts at which equations are looked at
 SERIAL_LOOKS = 800  # of a search before processes are worth their start, about a second
-Tell = Callable[[int, int], None]
+ROUNDS = 12  # steps from catalogue value to catalogue value, each of at most two searches per parameter
+GAIN = 1e-9  # relative, of a step that counts
+Tell = Callable[[int, int, float], None]
 
 
 def minimise(
@@ -71,7 +74,7 @@ def explore(
     stop : asked often; when it answers true, or at Ctrl-C, the search ends and each start in progress keeps its best
         design so far
     jobs : processes the starts are spread over, once the search turns out to be long; results do not depend on it
-    tell : called with the number of starts that are done and the most there will be
+    tell : called with the number of starts that are done, the most there will be, and the best value so far
     origins : see :func:`sweep.optimise.multistart.survey.survey`; with them all starts are searched
     samples : see there
 
@@ -93,12 +96,24 @@ def explore(
     # Unknown names and equations that say the same are refused here, not in a worker.
     refuse_dependent(problem, Program(problem), starts[:LOOKED_AT])
     end = math.inf if settings.time_budget is None else time.monotonic() + settings.time_budget
+    results, ended = list[Result](), "starts"
     with _signals() as own:
 
         def asked() -> bool:
             return time.monotonic() >= end or bool(own) or (stop is not None and stop())
 
-        results, ended = _in_batches(problem, starts, settings, asked, jobs, tell, origins is None, samples)
+        for first in range(0, len(starts), BATCH):
+            numbers = list(range(first, min(first + BATCH, len(starts))))
+            results += _batch(SearchTask(problem, starts, settings.looks), numbers, results, asked, jobs)
+            if tell is not None:
+                tell(len(results), len(starts), min((r.objective for r in results if r.feasible), default=math.inf))
+            last = numbers[-1] == len(starts) - 1
+            if len(results) <= numbers[-1] or any(r.ended in CUT for r in results) or (not last and asked()):
+                ended = "time"
+                break
+            if origins is None and survey(problem, starts, results, settings, "", samples=samples).enough:
+                ended = "enough"
+                break
     if own.signal_number is not None:
         results = [replace(r, ended="interrupted") if r.ended == "time" else r for r in results]
         if own.signal_number == signal.SIGTERM:
@@ -106,40 +121,6 @@ def explore(
     if ended == "time" and (own.signal_number is not None or any(r.ended == "interrupted" for r in results)):
         ended = "interrupted"
     return ranked(results), survey(problem, starts, results, settings, ended, origins, samples)
-
-
-def _in_batches(
-    problem: Problem,
-    starts: Array,
-    settings: OptimiseSettings,
-    asked: Callable[[], bool],
-    jobs: int,
-    tell: Tell | None,
-    early: bool,
-    samples: Sequence[int] | None,
-) -> tuple[list[Result], str]:
-    """Return results of the starts in batches, and what ended it.
-
-    ``early``: the search ends as soon as enough is known.
-    """
-    results: list[Result] = []
-    numbers = list(range(len(starts)))
-    for first in range(0, len(starts), BATCH):
-        batch = numbers[first : first + BATCH]
-        results += _batch(problem, starts, batch, results, settings, asked, jobs)
-        if tell is not None:
-            tell(len(results), len(starts))
-        last = batch[-1] == numbers[-1]
-        if _cut(results, first + len(batch)) or (not last and asked()):
-            return results, "time"
-        if early and survey(problem, starts, results, settings, "", samples=samples).enough:
-            return results, "enough"
-    return results, "starts"
-
-
-def _cut(results: Sequence[Result], count: int) -> bool:
-    """Return whether a search was stopped before so many results were there, or within one."""
-    return len(results) < count or any(r.ended in CUT for r in results)
 
 
 @contextmanager
@@ -153,62 +134,25 @@ def _signals() -> Iterator[Stop]:
 
 
 def _batch(
-    problem: Problem,
-    starts: Array,
-    numbers: list[int],
-    before: Sequence[Result],
-    settings: OptimiseSettings,
-    asked: Callable[[], bool],
-    jobs: int,
+    task: SearchTask, numbers: list[int], before: Sequence[Result], asked: Callable[[], bool], jobs: int
 ) -> list[Result]:
-    """Return results of some starts, in this process as long as few looks were needed, then in several.
-
-    A start that needs more looks than that is left to the processes, from its beginning; what is known of it counts if
-    they are stopped before they get there.
-    """
+    """Search from some starts, in this process as long as few looks were needed, then in several."""
     results: list[Result] = []
-    left = math.inf if jobs == 1 else SERIAL_LOOKS - sum(r.looks for r in before)
-    begun: Result | None = None
-    for k, number in enumerate(numbers):
-        if (results or before) and (left <= 0 or asked()):
+    while len(results) < len(numbers):
+        spent = sum(r.looks for r in (*before, *results))
+        # The very first start always has a result, whoever wants to stop.
+        if (results or before) and (asked() or (jobs > 1 and spent >= SERIAL_LOOKS)):
             break
-        last = k == len(numbers) - 1  # a worker would do it no faster
-        own = settings.looks if last else min(left, settings.looks)
-        found = search(number, problem, starts[number], asked, own)
-        if found.ended == "looks" and own < settings.looks:
-            begun = found
-            break
-        results.append(found)
-        left -= found.looks
-        if found.ended in CUT:
-            return results
+        results.append(task(numbers[len(results)], asked))
     rest = numbers[len(results) :]
-    if rest and not ((results or before or begun) and asked()):
-        results += in_processes(problem, starts, rest, asked, jobs, settings.looks)
-    if begun is not None and begun.start not in {r.start for r in results}:
-        results.append(replace(begun, ended="time"))
-    return results
+    return results + spread_over(task, rest, asked, jobs) if rest and not asked() else results
 
 
 def ranked(results: list[Result]) -> list[Result]:
-    """Return feasible results by objective, then the others by violation;
-    each told how many starts agree with the best.
-    """
-    order = sorted(with_basins(results), key=lambda r: (r.status == st.LIMIT_EXCEEDED, _rank(r), r.start))
-    best = order[0]
-    near = [r for r in order if _agrees(r, best)]
-    return [replace(r, agree=len(near)) if _agrees(r, best) else r for r in order]
-
-
-def _rank(r: Result) -> float:
-    value = r.violation if r.status == st.LIMIT_EXCEEDED else r.objective
-    return math.inf if math.isnan(value) else value
-
-
-def _agrees(r: Result, best: Result) -> bool:
-    if r.status == st.LIMIT_EXCEEDED or best.status == st.LIMIT_EXCEEDED:
-        return r is best
-    return abs(r.objective - best.objective) <= AGREE * max(abs(best.objective), 1e-300)
+    """Return results in the order of their rank; those in the best basin are told how many they are."""
+    order = sorted(with_basins(results), key=lambda r: (*r.rank, r.start))
+    agree = sum(r.basin == 1 for r in order)
+    return [replace(r, agree=agree) if r.basin == 1 else r for r in order]
 
 
 def optimum(
@@ -245,7 +189,7 @@ def optimum(
     results: list[Result] = []
     if len(starts) or searched is problem:
         results, _ = explore(searched, starts, settings, stop, jobs, samples=samples)
-    if searched is problem or any(result.status != st.LIMIT_EXCEEDED for result in results):
+    if searched is problem or any(result.feasible for result in results):
         return results
     near = [result.design for result in results[:1]]
     starts = from_sample(problem, signs, settings.starts, settings.seed)
@@ -253,3 +197,82 @@ def optimum(
     # The equations give way, or the bounds of the links do: the smaller relaxation is the answer.
     first = 1 + max((result.start for result in results), default=-1)
     return ranked([*results, *(replace(result, start=first + result.start) for result in others)])
+
+
+def listed(study: Study) -> dict[str, Array]:
+    """Return the parameters that the study gives as ``{ values = [...] }`` and that keep these values,
+    with them, sorted.
+
+    Signs are listed by nature and are not among them.  What [locus] or [fit] sets or scales has no list: there the
+    values are proportions, and prescribed ones are ranges.
+    """
+    raw = study.written
+    names = study.family.parameter_names
+    signs = {p.name for p in study.family.parameters if p.choices is not None}
+    found = {}
+    for axis in study.space.axes:
+        entry = raw.get(axis.name)
+        own = axis.name in names and axis.name not in (*signs, *study.made, *study.rescaled)
+        if own and axis.values is not None and isinstance(entry, dict) and "values" in entry:
+            values = np.unique(axis.values)
+            if len(values) > 1:
+                found[axis.name] = values
+    return found
+
+
+def with_neighbours(
+    problem: Problem,
+    results: list[Result],
+    catalogue: Mapping[str, Array],
+    settings: OptimiseSettings,
+    stop: Callable[[], bool] | None,
+    jobs: int,
+) -> list[Result]:
+    """Return results with those of searches from the best design with one listed value exchanged for the next,
+    best first.
+
+    The exchange goes on from the new best as long as it gains, so that the answer cannot be bettered by the next larger
+    or smaller value of any one parameter.  Same results for any number of jobs.
+
+    Parameters
+    ----------
+    problem, settings, stop, jobs : as for ``minimise``; the listed parameters are no variables
+    results : of the search so far, best first
+    catalogue : the listed parameters and their values
+    """
+    names = problem.family.parameter_names
+    tried: set[tuple[float, ...]] = set()
+    found = list(results)
+    for _ in range(ROUNDS):
+        best = found[0]
+        if best.ended in CUT:
+            break
+        tried.add(_chosen(best.design, names, catalogue))
+        starts = []
+        for name, values in catalogue.items():
+            at = int(np.argmin(np.abs(values - best.design[names.index(name)])))
+            for other in (at - 1, at + 1):
+                if 0 <= other < len(values):
+                    design = best.design.copy()
+                    design[names.index(name)] = values[other]
+                    if _chosen(design, names, catalogue) not in tried:
+                        tried.add(_chosen(design, names, catalogue))
+                        starts.append(design)
+        if not starts:
+            break
+        more = minimise(problem, np.array(starts), replace(settings, unseen=0.0), stop, jobs)
+        first = 1 + max(result.start for result in found)
+        found = ranked([*found, *(replace(result, start=first + result.start) for result in more)])
+        if not _better(found[0], best):
+            break
+    return found
+
+
+def _chosen(design: Array, names: tuple[str, ...], catalogue: Mapping[str, Array]) -> tuple[float, ...]:
+    return tuple(float(design[names.index(name)]) for name in catalogue)
+
+
+def _better(new: Result, old: Result) -> bool:
+    if new.feasible != old.feasible:
+        return new.feasible
+    return new.rank[1] < old.rank[1] - GAIN * abs(old.rank[1])

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Generic, TypeVar
@@ -10,7 +9,7 @@ from typing import Generic, TypeVar
 from sweep.chunks.plan import optimiser_hash
 from sweep.errors import InputError, WorkerDied
 from sweep.families.base import Array
-from sweep.jobs.executors import Task, place_of_searches
+from sweep.jobs.executors import Executor, Here, Task, place_of_searches
 from sweep.jobs.signals import Stop
 from sweep.optimise.local.kkt import Result
 from sweep.optimise.local.start import search
@@ -61,52 +60,17 @@ class SearchTask:
         return search(number, self.problem, self.starts[number], should_stop, self.allowed)
 
 
-def in_processes(
-    problem: Problem,
-    starts: Array,
+def spread_over(
+    task: Task[T],
     numbers: list[int],
     asked: Callable[[], bool],
     jobs: int,
-    allowed: float = math.inf,
-) -> list[Result]:
-    """Return results of the starts ``numbers`` that were begun before ``asked`` became true, in their order.
-
-    Each is what a serial search finds, to the bit.
-
-    Parameters
-    ----------
-    problem, starts : as for ``minimise``
-    numbers : which of the starts
-    asked, jobs : see :func:`over_processes`
-    allowed : looks at designs that each start may take
-    """
-    return over_processes(SearchTask(problem, starts, allowed), numbers, asked, jobs)
-
-
-def spread_over(
-    task: Task[T], numbers: list[int], asked: Callable[[], bool], jobs: int, tell: Callable[[], None] = lambda: None
-) -> list[T]:
-    """Return what a task gives for each number, in their order, here or in processes; those not begun are left out.
-
-    ``tell`` is called after each of them.
-    """
-    if jobs == 1 or len(numbers) == 1:
-        out = []
-        for number in numbers:
-            if asked():
-                break
-            out.append(task(number, asked))
-            tell()
-        return out
-    return over_processes(task, numbers, asked, jobs, tell)
-
-
-def over_processes(
-    task: Task[T], numbers: list[int], asked: Callable[[], bool], jobs: int, tell: Callable[[], None] = lambda: None
+    tell: Callable[[int, T], None] = lambda _, __: None,
 ) -> list[T]:
     """Return what a task gives for each number that was begun before ``asked`` became true, in their order.
 
-    They run on the cluster of the run, if it has one.
+    A single number, or what a single worker does, runs here; the rest in processes, or on the cluster of the run.  Each
+    result is what this process finds, to the bit.
 
     Parameters
     ----------
@@ -114,21 +78,21 @@ def over_processes(
     numbers : what it is called with
     asked : looked at in this process; workers learn of it, and what does not answer soon is given up
     jobs : how many workers
-    tell : called after each of them
+    tell : called with each number and what was found
 
     Raises
     ------
     WorkerDied
         if a worker process was killed.
     """
-    stop = _Asked(asked)
+    stop, checked = _Asked(asked), _Checked(task, optimiser_hash())
+    place: Executor = Here() if jobs == 1 or len(numbers) == 1 else place_of_searches()
     found: dict[int, T] = {}
     try:
-        checked = _Checked(task, optimiser_hash())
-        for outcome in place_of_searches().outcomes(checked, iter(numbers), min(jobs, len(numbers)), stop):
+        for outcome in place.outcomes(checked, iter(numbers), min(jobs, len(numbers)), stop):
             if outcome is not None:
                 found[outcome[0]] = outcome[1]
-                tell()
+                tell(*outcome)
     except WorkerDied as error:
         if not stop:  # the signal that stops us may have hit them too
             raise WorkerDied(f"optimiser: {error}; run again") from error

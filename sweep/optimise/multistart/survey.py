@@ -6,11 +6,10 @@ import math
 from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
-from kernels import status as st
 from sweep.families.base import Array
 from sweep.optimise.local.kkt import AGREE, Result
 from sweep.optimise.problem.statement import Problem
@@ -140,13 +139,12 @@ def survey(
     numbered = with_basins(whole)
     drawn = numbered if origins is None else _best_of_each(numbered, origins)
     met = Counter(r.basin for r in drawn if r.basin)
-    n, w = sum(met.values()), len(met)
     ends = [r.start for r in drawn if r.basin == 1]
     best = _distinct(problem, starts, ends, samples) if origins is None else len(ends)
     share = wanted(settings, origins is not None)
     return Survey(
-        len(whole), settings.starts, len(starts), w, best, _unseen(n, met), share, ended,
-        _kinds(problem, starts, numbered), populations=0 if origins is None else n,
+        len(whole), settings.starts, len(starts), len(met), best, _unseen(met), share, ended,
+        _kinds(problem, starts, numbered), populations=0 if origins is None else met.total(),
     )  # fmt: skip
 
 
@@ -159,9 +157,8 @@ def wanted(settings: OptimiseSettings, populations: bool) -> float:
 
 def settled(values: Sequence[float], share: float) -> bool:
     """Whether populations that ended at these values tell enough: the rule of :class:`Survey`."""
-    met = _counted(values)
-    n, best = len(values), met[min(met)] if met else 0
-    return Survey(n, n, n, len(met), best, _unseen(n, met), share, "", populations=n).enough
+    met = Counter(basins(values))
+    return Survey(len(values), len(values), len(values), len(met), met[1], _unseen(met), share, "").enough
 
 
 def enough(values: Sequence[float], share: float) -> int | None:
@@ -174,13 +171,14 @@ def enough(values: Sequence[float], share: float) -> int | None:
     return next((n for n, first in enumerate(known) if settled(first, share)), None)
 
 
-def _counted(values: Sequence[float]) -> Counter[float]:
-    """Return how often each basin was met, by the lowest value of it."""
-    first, met = -math.inf, Counter[float]()
-    for value in sorted(values):
-        first = value if not value - first <= AGREE * abs(value) else first
-        met[first] += 1
-    return met
+def basins(values: Sequence[float]) -> list[int]:
+    """Return the number of the basin of each value, 1 for the least; 0 for what is no number."""
+    numbers, number, first = [0] * len(values), 0, 0.0
+    for k in sorted((k for k, x in enumerate(values) if math.isfinite(x)), key=lambda k: values[k]):
+        if not number or not values[k] - first <= AGREE * max(abs(first), 1e-300):
+            number, first = number + 1, values[k]
+        numbers[k] = number
+    return numbers
 
 
 def _best_of_each(ranked: Sequence[Result], origins: Sequence[int]) -> list[Result]:
@@ -198,32 +196,17 @@ def later(found: Survey) -> Survey:
 
 
 def with_basins(results: Sequence[Result]) -> list[Result]:
-    """Return results, ranked by their objective, with the number of their basin: 1 for the best, 0 where infeasible."""
-    order = sorted(results, key=lambda r: (r.status == st.LIMIT_EXCEEDED, _objective(r), r.start))
-    number, first, found = 0, math.nan, []
-    for r in order:
-        if r.status == st.LIMIT_EXCEEDED or not math.isfinite(r.objective):
-            found.append(replace(r, basin=0))
-            continue
-        if not abs(r.objective - first) <= AGREE * max(abs(first), 1e-300):
-            number, first = number + 1, r.objective
-        found.append(replace(r, basin=number))
-    return found
+    """Return results with their basin, in its order: 1 for the best; infeasible ones have 0 and come last."""
+    numbers = basins([r.objective if r.feasible else math.inf for r in results])
+    found = [replace(r, basin=number) for r, number in zip(results, numbers, strict=True)]
+    return sorted(found, key=lambda r: (*r.rank, r.start))
 
 
-def _objective(r: Result) -> float:
-    return math.inf if math.isnan(r.objective) else r.objective
-
-
-def _unseen(n: int, met: Counter[Any]) -> float:
-    """Return the larger of both estimates of the share of unseen basins."""
+def _unseen(met: Counter[int]) -> float:
+    """Return the larger of both estimates of the share of unseen basins; 1 where they say nothing."""
+    n, w = met.total(), len(met)
     once = sum(1 for count in met.values() if count == 1)
-    return min(1.0, max(once / max(n, 1), _by_volumes(n, len(met))))
-
-
-def _by_volumes(n: int, w: int) -> float:
-    """Return the share by Boender and Rinnooy Kan of n searches that met w basins; 1 where they say nothing."""
-    return 1.0 if n < 2 else w * (w + 1) / (n * (n - 1))
+    return min(1.0, max(once / n, w * (w + 1) / (n * (n - 1)))) if n > 1 else 1.0
 
 
 def _distinct(problem: Problem, starts: Array, numbers: list[int], samples: Sequence[int] | None) -> int:

@@ -12,10 +12,10 @@ import numpy as np
 from sweep.errors import InputError, choices
 from sweep.families.base import Accuracy, Array, Family
 from sweep.families.domain import March
-from sweep.optimise.problem.coordinates import Coordinates
 
 if TYPE_CHECKING:
     from sweep.optimise.manufacture.curve_margins import Allowance, CurveMargin
+    from sweep.optimise.problem.on_locus import LocusCoordinates
     from sweep.study import Limit
 
 PLACE = "optimisation problem"
@@ -56,7 +56,7 @@ class Problem:
     limits: tuple[Limit, ...] = ()
     window: tuple[float, float] | None = None
     accuracy: Accuracy = field(default_factory=lambda: Accuracy(target=1e-9))
-    coordinates: Coordinates | None = None
+    coordinates: LocusCoordinates | None = None
     curve_margins: Mapping[str, CurveMargin] = field(default_factory=dict)
     allowances: Mapping[str, Allowance] = field(default_factory=dict)
 

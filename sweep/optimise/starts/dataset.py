@@ -108,13 +108,9 @@ def filled(study: Study, problem: Problem, starts: Array, count: int, seed: int)
     A sample of the problem's own variables finds more than the space of the study, unless [fit] has to finish every
     design; then designs of the space are drawn.
     """
-    if len(starts) >= count:
-        return starts
-    taken = starts
-    for more in _offered(study, problem, starts, count, seed):
+    taken, offered = starts, _offered(study, problem, starts, count, seed)
+    while len(taken) < count and (more := next(offered, None)) is not None:
         taken = apart(problem, taken, more, count)
-        if len(taken) == count:
-            break
     return taken
 
 

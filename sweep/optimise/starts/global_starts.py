@@ -3,25 +3,22 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
-from itertools import zip_longest
+from collections.abc import Callable, Sequence
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
 from sweep.errors import InputError
 from sweep.families.base import Array
-from sweep.jobs.progress import Say, unsaid
+from sweep.jobs.progress import AT_MOST, Say, best_words, unsaid
 from sweep.optimise.local.kkt import Result
 from sweep.optimise.multistart.parallel import SearchTask, spread_over
-from sweep.optimise.multistart.survey import enough as among
-from sweep.optimise.multistart.survey import wanted
+from sweep.optimise.multistart.survey import enough, wanted
 from sweep.optimise.problem.statement import Problem
 from sweep.optimise.starts.candidates import ALIKE, diverse
 from sweep.optimise.starts.dataset import kinds
-from sweep.optimise.starts.linear import NEEDED, Elimination, elimination
+from sweep.optimise.starts.linear import NEEDED, Elimination, elimination, widened
 from sweep.optimise.starts.populations import Bred, bred
-from sweep.optimise.starts.proportions import widened
 
 if TYPE_CHECKING:
     from sweep.study import OptimiseSettings, Study, Tolerance
@@ -69,50 +66,41 @@ def from_populations(
     InputError
         if the problem has no linear part, or nothing that turns was found.
     """
-    linear = _linear(study, problem)
-    count = settings.starts
+    count, what = settings.starts, "global search"
     own = diverse(problem, known, merit, count // SWEPT, ALIKE) if len(merit) else known[:0]
-    signs = kinds(study, problem, own)
-    results: list[Result | None] = []  # from the best end of each population; none where it has no end
-
-    def enough(found: list[Bred]) -> int | None:
-        """How many populations tell enough, by where their best ends lead: poses take one valley for several."""
-        new = found[len(results) :]
-        designs = [one.designs[0] for one in new if len(one.designs)]
-        made = iter(searched(study, problem, np.array(designs), settings, stop, jobs) if designs else [])
-        results.extend(next(made, None) if len(one.designs) else None for one in new)
-        return among([_value(result) for result in results], wanted(settings, True))
-
-    populations = bred(linear, signs, settings.populations, settings.seed, stop, jobs, say, enough)
-    # Where the local search has ended it is at home: it goes on from there, not from the population's end again.
-    first = [
-        (k, found.designs[0] if result is None else result.design)
-        for k, (found, result) in enumerate(zip_longest(populations, results[: len(populations)]))
-        if len(found.designs)
-    ]
-    met = [float(found.worth[0]) for found in populations if len(found.worth)]
-    others = sorted(
-        (float(worth), k, row)
-        for k, found in enumerate(populations)
-        for row, worth in enumerate(found.worth[1:], start=1)
-    )
-    for worth, k, row in others:
-        if len(first) >= count - len(own):
+    populations, first, values = list[Bred](), list[tuple[int, Array]](), list[float]()
+    say(what, 0, settings.populations, f"populations {AT_MOST}")
+    for one in bred(
+        _linear(study, problem), kinds(study, problem, own), settings.populations, settings.seed, stop, jobs
+    ):
+        # Where its best end leads decides: poses take one valley for several.
+        led = searched(study, problem, one.designs[:1], settings, stop, jobs)
+        # Where the local search has ended it is at home: it goes on from there, not from the population's end again.
+        first += [(len(populations), led[0].design if led else design) for design in one.designs[:1]]
+        populations.append(one)
+        values.append(led[0].objective if led and led[0].feasible else math.inf)
+        say(what, len(populations), settings.populations, f"populations {AT_MOST}{best_words(min(values))}")
+        if enough(values, wanted(settings, True)) is not None:
             break
-        if all(abs(worth - value) > ANOTHER * abs(value) for value in met):
-            first.append((k, populations[k].designs[row]))
-            met.append(worth)
-    found = np.array([design for _, design in first]).reshape(-1, known.shape[1])
+    met = [float(one.worth[0]) for one in populations if len(one.worth)]
+    chosen = [*first, *_ends_apart(populations, met, count - len(own) - len(first))]
+    found = np.array([design for _, design in chosen]).reshape(-1, known.shape[1])
     starts = np.concatenate([found, own])
     if not len(starts):
         allowed = "proportions with which the mechanism turns"
         raise InputError("design space", study.space.count, allowed, str(study.path))
-    origins = tuple([k for k, _ in first] + [-1] * len(own))
-    return Begun(holding(study, problem, found), starts, origins)
+    return Begun(holding(study, problem, found), starts, tuple([k for k, _ in chosen] + [-1] * len(own)))
 
 
-def _value(result: Result | None) -> float:
-    return result.objective if result is not None and result.feasible else math.inf
+def _ends_apart(populations: Sequence[Bred], met: list[float], most: int) -> list[tuple[int, Array]]:
+    """Return ends, the best first, whose values are not near those ``met`` or each other; each with its population."""
+    ends = sorted((float(x), k, row) for k, one in enumerate(populations) for row, x in enumerate(one.worth))
+    found, values = list[tuple[int, Array]](), list(met)
+    for worth, k, row in ends:
+        if len(found) < most and all(abs(worth - value) > ANOTHER * abs(value) for value in values):
+            found.append((k, populations[k].designs[row]))
+            values.append(worth)
+    return found
 
 
 def searched(
@@ -120,31 +108,38 @@ def searched(
 ) -> list[Result]:
     """Return where the local search ends from designs (k, P), by which populations are told apart."""
     task = SearchTask(holding(study, problem, designs), designs, settings.looks)
-    return spread_over(task, list(range(len(designs))), stop, jobs)
+    return spread_over(task, list(range(len(designs))), stop, jobs) if len(designs) else []
 
 
 def insensitive(
-    study: Study, settings: OptimiseSettings, problem: Problem, stop: Callable[[], bool], jobs: int, say: Say = unsaid
+    study: Study,
+    settings: OptimiseSettings,
+    problem: Problem,
+    stop: Callable[[], bool],
+    jobs: int,
+    say: Say = unsaid,
+    found: Array | None = None,
 ) -> tuple[Problem, Array]:
     """Look for designs that are good when they are made: ends of populations whose descents leave room for tolerances.
 
     Returns
     -------
     The problem with bounds that hold the designs, and these (k, P), the best first; none without a global search.
+    Designs that were ``found`` before are not looked for again.
     """
+    if found is not None and len(found):
+        return holding(study, problem, found), found
     if settings.globally != "proportions":
         return problem, np.empty((0, len(problem.family.parameters)))
-    linear = _linear(study, problem, study.tolerance)
     signs = kinds(study, problem, np.empty((0, len(problem.family.parameters))))
-    populations = bred(linear, signs, MADE, settings.seed + OTHER_SEED, stop, jobs, say, what="tolerances")
-    ends = sorted(
-        (float(worth), k, row) for k, found in enumerate(populations) for row, worth in enumerate(found.worth)
-    )
-    chosen: list[tuple[float, Array]] = []
-    for worth, k, row in ends:
-        if len(chosen) < BEGUN and all(abs(worth - value) > ANOTHER * abs(value) for value, _ in chosen):
-            chosen.append((worth, populations[k].designs[row]))
-    found = np.array([design for _, design in chosen]).reshape(-1, len(problem.family.parameters))
+    what, populations = "tolerances", list[Bred]()
+    say(what, 0, MADE, "populations")
+    for one in bred(_linear(study, problem, study.tolerance), signs, MADE, settings.seed + OTHER_SEED, stop, jobs):
+        populations.append(one)
+        best = min((float(one.worth[0]) for one in populations if len(one.worth)), default=math.inf)
+        say(what, len(populations), MADE, f"populations{best_words(best)}")
+    ends = [design for _, design in _ends_apart(populations, [], BEGUN)]
+    found = np.array(ends).reshape(-1, len(problem.family.parameters))
     return holding(study, problem, found), found
 
 

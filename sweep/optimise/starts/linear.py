@@ -12,7 +12,8 @@ straightness and a stroke prescribed, is a small linear program, which descents 
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
 from functools import cached_property
 from statistics import NormalDist
 from typing import TYPE_CHECKING
@@ -136,3 +137,28 @@ def elimination(problem: Problem, tolerance: Tolerance | None = None) -> Elimina
         problem, guide, last, driver, small[problem.objective], problem.objective == f"max_abs_{off}", bound,
         float(stroke.minimum), sigma, level,
     )  # fmt: skip
+
+
+def turned_into(problem: Problem, designs: Array) -> Array:
+    """Return the designs whose angles lie within their bounds, by whole turns."""
+    out = designs.copy()
+    for k, name in enumerate(problem.variables):
+        column = problem.family.parameter_names.index(name)
+        if problem.family.parameters[column].unit == "angle" and problem.span[k] >= 2.0 * math.pi:
+            middle = problem.lower[k] + 0.5 * problem.span[k]
+            out[:, column] -= 2.0 * math.pi * np.round((out[:, column] - middle) / (2.0 * math.pi))
+    return out
+
+
+def widened(problem: Problem, designs: Array, names: Sequence[str]) -> Problem:
+    """Return the problem with the bounds of some variables widened so
+    that the designs lie half their size within them.
+    """
+    lower, upper = problem.lower.astype(np.float64), problem.upper.astype(np.float64)
+    for k, name in enumerate(problem.variables):
+        if name in names and len(designs):
+            values = designs[:, problem.family.parameter_names.index(name)]
+            reach = 0.5 * np.abs(values)
+            lower[k] = min(lower[k], float((values - reach).min()))
+            upper[k] = max(upper[k], float((values + reach).max()))
+    return replace(problem, lower=lower, upper=upper)

@@ -8,8 +8,7 @@ from __future__ import annotations
 
 import math
 from collections import Counter
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Iterator, Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -17,12 +16,10 @@ from numpy.typing import NDArray
 
 from kernels.descent.descents import LOCKED
 from sweep.families.base import Array
-from sweep.jobs.progress import AT_MOST, Say, unsaid
 from sweep.optimise.local.kkt import AGREE
 from sweep.optimise.starts.candidates import spread
-from sweep.optimise.starts.linear import Elimination
-from sweep.optimise.starts.pose_rows import Descents, PoseRows
-from sweep.optimise.starts.proportions import Index, turned_into
+from sweep.optimise.starts.linear import Elimination, turned_into
+from sweep.optimise.starts.pose_rows import Descents, Index, PoseRows
 
 PARENTS = 40  # best ends, no two of them alike, from which a generation is made: as many of all signs
 TRIES, STRANGERS = 64, 256  # of every child, the best of which descends; of one half of which is at random
@@ -69,60 +66,82 @@ class _End(NamedTuple):
     swing: float = 0.0
 
 
-@dataclass(frozen=True)
-class Population:
-    """Generations from one seed, each descended from in ``jobs`` threads."""
-
-    linear: Elimination
-    signs: tuple[dict[str, float], ...]
-    seed: int
-    size: Size = FULL
-    jobs: int = 1
-
-    def __call__(self, number: int, should_stop: Callable[[], bool]) -> Bred:
-        """Return the ends of the population of that number."""
-        rows = PoseRows(self.linear, self.signs)
-        rng = np.random.default_rng((self.seed, number))
-        ends: list[_End] = []
-        looks = 0
-        for generation in range(1 + self.size.generations):
-            if should_stop():
-                break
-            parents = _parents(ends, -(-PARENTS // len(self.signs)), ~rows.driving)
-            if generation and not parents:
-                break
-            if generation == 0:
-                places, kinds, classes = _sampled(rows, rng, self.size, self.jobs)
-            else:
-                places, kinds = _children(rows, parents, rng, -(-self.size.later // len(self.signs)), self.jobs)
-                classes = _Classes.between(np.array([p.swing for p in parents]))
-            found, spent = _descended(rows, places, kinds, classes, self.size, should_stop, self.jobs)
-            ends, looks = ends + found, looks + spent
-        best = _parents(ends, PARENTS, ~rows.driving)[:PARENTS]
-        names = self.linear.problem.family.parameter_names
-        designs = np.array([end.design for end in best]).reshape(-1, len(names))
-        return Bred(turned_into(self.linear.problem, designs), np.array([end.worth for end in best]), looks)
+def population(
+    linear: Elimination,
+    signs: Sequence[dict[str, float]],
+    seed: tuple[int, int],
+    stop: Callable[[], bool] = lambda: False,
+    jobs: int = 1,
+    size: Size = FULL,
+) -> Bred:
+    """Return the ends of generations of descents from one seed, each descended from in ``jobs`` threads."""
+    rows, rng = PoseRows(linear, signs), np.random.default_rng(seed)
+    ends, looks = list[_End](), 0
+    for generation in range(1 + size.generations):
+        parents = _parents(ends, -(-PARENTS // len(signs)), ~rows.driving)
+        if stop() or (generation and not parents):
+            break
+        if generation == 0:
+            places, kinds, swings = _sampled(rows, rng, size, jobs)
+        else:
+            places, kinds = _children(rows, parents, rng, -(-size.later // len(signs)), jobs)
+            swings = np.array([p.swing for p in parents])
+        found, spent = _descended(rows, places, kinds, swings, size, stop, jobs)
+        ends, looks = ends + found, looks + spent
+    best = _parents(ends, PARENTS, ~rows.driving)[:PARENTS]
+    designs = np.array([end.design for end in best]).reshape(-1, len(rows.family.parameters))
+    return Bred(turned_into(linear.problem, designs), np.array([end.worth for end in best]), looks)
 
 
-def _sampled(rows: PoseRows, rng: np.random.Generator, size: Size, jobs: int) -> tuple[Array, Index, _Classes]:
-    """Places of a Sobol sample of each kind that turn, the best of every class of swings that are not alike."""
+def bred(
+    linear: Elimination,
+    signs: Sequence[dict[str, float]],
+    most: int,
+    seed: int,
+    stop: Callable[[], bool] = lambda: False,
+    jobs: int = 1,
+    size: Size = FULL,
+) -> Iterator[Bred]:
+    """Breed populations that know nothing of each other, one after the other, as long as they are asked for.
+
+    Parameters
+    ----------
+    linear : the linear part of the problem
+    signs : combinations of the parameters that are not varied
+    most : populations at most; each takes some 14 000 looks
+    seed : of samples and children
+    stop : true ends the populations where they are
+    jobs : threads; the ends do not depend on it
+    size : of each
+    """
+    for number in range(most):
+        if stop():
+            return
+        yield population(linear, signs, (seed, number), stop, jobs, size)
+
+
+def _sampled(rows: PoseRows, rng: np.random.Generator, size: Size, jobs: int) -> tuple[Array, Index, Array]:
+    """Places of a Sobol sample of each kind that turn, the best of every class of swings that are not alike.
+
+    The third result are swings of the better quarter.
+    """
     from scipy.stats import qmc
 
-    number = len(rows.own.bases)
-    place = np.concatenate([qmc.Sobol(len(rows.own.columns), seed=rng).random(size.sampled) for _ in range(number)])
+    number = len(rows.bases)
+    place = np.concatenate([qmc.Sobol(len(rows.columns), seed=rng).random(size.sampled) for _ in range(number)])
     kinds = np.repeat(np.arange(number), size.sampled)
     worth = _tried(rows, place, kinds, jobs)
     order = np.argsort(worth, kind="stable")
     order = order[worth[order] < LOCKED]
     place, kinds = place[order], kinds[order]
-    swings = rows.own.swings(rows.own.placed(place, kinds))
-    classes = _Classes.between(swings[: len(swings) // 4])
-    numbers, found = kinds * CLASSES + classes.of(swings), list[int]()
+    swings = rows.driven(place, kinds)[1]
+    better = swings[: len(swings) // 4]
+    numbers, found = kinds * CLASSES + _classes(swings, better), list[int]()
     for k in range(number * CLASSES):
         own = np.flatnonzero(numbers == k)
         found += own[spread(place[own], kinds[own], -(-size.first // (number * CLASSES)))].tolist()
     chosen = sorted(found)
-    return place[chosen], kinds[chosen], classes
+    return place[chosen], kinds[chosen], better
 
 
 def _tried(rows: PoseRows, places: Array, kinds: Index, jobs: int) -> Array:
@@ -180,45 +199,34 @@ def _best(rows: PoseRows, tries: Array, kind: int, jobs: int) -> Array:
 
 
 def _descended(
-    rows: PoseRows, places: Array, kinds: Index, classes: _Classes, size: Size, stop: Callable[[], bool], jobs: int
+    rows: PoseRows, places: Array, kinds: Index, swings: Array, size: Size, stop: Callable[[], bool], jobs: int
 ) -> tuple[list[_End], int]:
     """Where descents from some places end, the worse half given up after a heat; and how many looks that took.
 
-    Each class of swings of each kind has its own worse half.
+    Each class, among ``swings``, of each kind has its own worse half.
     """
     many = Descents(rows, rows.without_middle(places, kinds), kinds, jobs)
     many.advance(size.heat, stop)
-    own = kinds * CLASSES + classes.of(rows.own.swings(rows.own.placed(many.places, kinds)))
+    own = kinds * CLASSES + _classes(rows.driven(many.places, kinds)[1], swings)
     order = np.argsort(many.worth, kind="stable")
     better = [some[: -(-len(some) // 2)] for some in (order[own[order] == number] for number in np.unique(own))]
     many.keep(np.sort(np.concatenate(better)))
     many.advance(size.steps - size.heat, stop)
     there = rows.with_middle(many.places, many.kinds)
     designs = rows.finished(many.places, many.kinds, many.x)
-    swings = rows.own.swings(rows.own.placed(many.places, many.kinds))
+    reached = rows.driven(many.places, many.kinds)[1]
     known = np.flatnonzero(many.worth < LOCKED).tolist()
-    ends = [_End(float(many.worth[k]), int(many.kinds[k]), there[k], designs[k], float(swings[k])) for k in known]
+    ends = [_End(float(many.worth[k]), int(many.kinds[k]), there[k], designs[k], float(reached[k])) for k in known]
     return ends, many.looks
 
 
-class _Classes(NamedTuple):
-    """Classes of swings, equal on a log scale between those of useful mechanisms; beyond these are the outer ones."""
-
-    low: float
-    high: float
-
-    @classmethod
-    def between(cls, swings: Array) -> _Classes:
-        """Return the classes from the smallest to the largest of some swings."""
-        known = swings[swings > SMALLEST]
-        return cls(float(known.min(initial=math.inf)), float(known.max(initial=0.0)))
-
-    def of(self, swings: Array) -> NDArray[np.intp]:
-        """Return the class (k,) of each swing."""
-        if not self.low < self.high:
-            return np.zeros(len(swings), np.intp)
-        place = np.log(np.maximum(swings, SMALLEST) / self.low) * (CLASSES / math.log(self.high / self.low))
-        return np.asarray(np.clip(place, 0.0, CLASSES - 1.0), np.intp)
+def _classes(swings: Array, among: Array) -> Index:
+    """Class (k,) of each swing: equal on a log scale from the smallest to the largest among some useful ones."""
+    known = among[among > SMALLEST]
+    if not len(known) or not known.min() < known.max():
+        return np.zeros(len(swings), np.intp)
+    place = np.log(np.maximum(swings, SMALLEST) / known.min()) * (CLASSES / math.log(known.max() / known.min()))
+    return np.asarray(np.clip(place, 0.0, CLASSES - 1.0), np.intp)
 
 
 def _parents(ends: Sequence[_End], most: int, guide: NDArray[np.bool_]) -> list[_End]:
@@ -235,61 +243,16 @@ def _parents(ends: Sequence[_End], most: int, guide: NDArray[np.bool_]) -> list[
     useful = sorted(ends, key=lambda end: end.worth)
     useful = [end for end in useful if end.worth < USELESS * useful[0].worth]
     swings = np.array([end.swing for end in useful])
-    classes = dict(zip(map(id, useful), _Classes.between(swings).of(swings).tolist(), strict=True))
-    for end in useful:
+    for end, number in zip(useful, _classes(swings, swings).tolist(), strict=True):
         own = [p for p in found if p.kind == end.kind]
         alike = any(
             abs(end.worth - p.worth) <= 2.0 * AGREE * abs(p.worth)
             or math.sqrt(float(((end.place - p.place)[guide] ** 2).sum())) < least
             for p in own
         )
-        place = (end.kind, classes[id(end)])
+        place = (end.kind, number)
         if not alike and (first[end.kind] < most // 2 or beside[place] < -(-most // (2 * CLASSES))):
             first[end.kind] += 1
             beside[place] += 1
             found.append(end)
     return found
-
-
-def bred(
-    linear: Elimination,
-    signs: Sequence[dict[str, float]],
-    most: int,
-    seed: int,
-    stop: Callable[[], bool] = lambda: False,
-    jobs: int = 1,
-    say: Say = unsaid,
-    enough: Callable[[list[Bred]], int | None] = lambda found: None,
-    size: Size = FULL,
-    what: str = "global search",
-) -> list[Bred]:
-    """Breed populations that know nothing of each other, one after the other.
-
-    Parameters
-    ----------
-    linear : the linear part of the problem
-    signs : combinations of the parameters that are not varied
-    most : populations at most; each takes some 14 000 looks
-    seed : of samples and children
-    stop : true ends the populations where they are
-    jobs : threads; the ends do not depend on it
-    say : called with ``what`` is done, how many populations have ended, and how many there are at most
-    enough : says how many of those that are there tell enough, None where more are to be made
-    size : of each
-    """
-    task, found = Population(linear, tuple(signs), seed, size, jobs), list[Bred]()
-    while len(found) < most:
-        say(what, len(found), most, f"populations {AT_MOST}{_best_so_far(found)}")
-        if stop():
-            break
-        found.append(task(len(found), stop))
-        if stop() or enough(found):
-            break
-    say(what, len(found), most, f"populations {AT_MOST}{_best_so_far(found)}")
-    return found
-
-
-def _best_so_far(found: Sequence[Bred]) -> str:
-    """Return the best value of populations, as their poses see it."""
-    best = min((float(one.worth[0]) for one in found if len(one.worth)), default=math.inf)
-    return f", the best {best:.5g}" if best < LOCKED else ""

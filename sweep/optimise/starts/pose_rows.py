@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from kernels.curves.sampled_rows import EVERY, HIGHEST, LOWEST, RANGE, Limits
-from kernels.descent.descents import BOX, LEAST, LOCKED, RADIUS, begun, descend, rows_at
+from kernels.descent.descents import BOX, LEAST, LOCKED, RADIUS, begun, descend
 from kernels.descent.program import begin
 from kernels.descent.rows import (
     ACROSS,
@@ -26,18 +26,22 @@ from kernels.descent.rows import (
     LOW,
     POINT_X,
     POINT_Y,
+    UNKNOWNS,
     Task,
-    row_count,
 )
-from kernels.linear.minimax import UNKNOWNS
-from sweep.families.base import Array
+from kernels.descent.unknowns import LEFT_OUT, NEEDED, SOFT, WANTED
+from sweep.evaluation.summaries import design_outputs
+from sweep.families.base import Accuracy, Array
 from sweep.families.capabilities import Assembly
+from sweep.families.chain import stages_of
 from sweep.optimise.starts.linear import POSES, TURN, Elimination
-from sweep.optimise.starts.proportions import Index, Proportions
 from sweep.quantities.measures import ROTATABLE_MARGIN, Measure, measure
 
 T = TypeVar("T")
+Index = NDArray[np.intp]
 
+SHORT = 0.15  # shortest length of a guide that the search begins with, against the longest its crank may have
+MIDDLE = Accuracy(target=1e-3)
 BLOCK = 256  # places that a thread looks at in one go
 UNIT = 4.0 / math.pi**2  # of the objective, in strokes: no motion there and back has less acceleration
 PRICE = 6.0  # of a limit missed by its own size, in such units
@@ -66,15 +70,61 @@ class PoseRows:
     """
 
     def __init__(self, linear: Elimination, signs: Sequence[dict[str, float]]) -> None:
-        self.linear, self.own = linear, Proportions(linear, signs)
-        self.family = linear.problem.family
+        self.linear, problem = linear, linear.problem
+        self.family, names = problem.family, problem.family.parameter_names
+        self.driver = stages_of(self.family)[0].family
+        self.bases = np.array([problem.rows(problem.lower + 0.5 * problem.span, **choice)[0] for choice in signs])
+        self.bases[:, names.index(linear.links[0])] = 1.0
+        self.columns = [names.index(name) for name in linear.free]
+        self._bounds()
         # Places of stage 1, those of them that may change their side, and that of the angle between the stages.
-        own = self.own
-        self.driving = np.array([c < len(own.driver.parameters) for c in own.columns])
-        self.mirrored = self.driving & (own.low == -own.high)
-        self.turning = own.columns.index(own.offset) if own.offset >= 0 else -1
+        self.driving = np.array([c < len(self.driver.parameters) for c in self.columns])
+        self.mirrored = self.driving & (self.low == -self.high)
+        offset = f"offset{linear.last}"
+        self.turning = linear.free.index(offset) if offset in linear.free else -1
         self.limits = self._limits()
         self.task = self._task(self.limits)
+
+    def _bounds(self) -> None:
+        """Set ``low`` and ``high`` (n,), the ends of places, and ``wide``, the width of those on a logarithmic scale.
+
+        Lengths of the guide are told against its crank, which is the unit.  They and lengths of stage 1 that cannot
+        vanish are on a logarithmic scale.
+        """
+        problem, links = self.linear.problem, self.linear.links
+        at = [problem.variables.index(name) for name in self.linear.free]
+        self.low, self.high = problem.lower[at].astype(np.float64), problem.upper[at].astype(np.float64)
+        self.wide = np.zeros(len(at))
+        units, unit = {p.name: p.unit for p in self.family.parameters}, problem.variables.index(links[0])
+        for k, name in enumerate(self.linear.free):
+            if units[name] == "angle" and self.high[k] - self.low[k] >= 2.0 * math.pi:
+                self.low[k], self.high[k] = -math.pi, math.pi
+            # A frame to the other side is the same guide, turned by half a turn.
+            if name in links:
+                shortest = max(self.low[k], problem.upper[unit] * SHORT)
+                self.low[k] = shortest / problem.upper[unit]
+                self.high[k] /= max(problem.lower[unit], problem.upper[unit] * SHORT)
+            if name in links or (units[name] == "length" and self.low[k] > 0.0):
+                self.wide[k] = math.log(self.high[k] / self.low[k])
+
+    def placed(self, places: Array, kinds: Index) -> Array:
+        """Return designs (k, P) at places (k, n), of kinds (k,), with the point, line and scale still to be found."""
+        values: Array = self.low + places * (self.high - self.low)
+        log = self.wide != 0.0
+        # numpy's exponential depends on the processor, that of the C library does not
+        grown = [math.exp(x) for x in (places[:, log] * self.wide[log]).ravel().tolist()]
+        values[:, log] = self.low[log] * np.reshape(grown, (len(places), int(log.sum())))
+        designs = self.bases[kinds]
+        designs[:, self.columns] = values
+        return designs
+
+    def driven(self, places: Array, kinds: Index) -> tuple[Array, Array]:
+        """Return middle and range (k,) of the guide's input angles without offset; 0 where stage 1 does not turn."""
+        upstream = np.ascontiguousarray(self.placed(places, kinds)[:, : len(self.driver.parameters)])
+        found = design_outputs(self.driver, upstream, ("psi_ext", "swing"), MIDDLE)
+        swing = np.asarray(found["swing"], np.float64)
+        middle = np.asarray(found["psi_ext"], np.float64) + 0.5 * swing
+        return np.nan_to_num(middle), np.nan_to_num(np.abs(swing))
 
     def _codes(self) -> dict[str, int]:
         """Curves that the kernels know, by their names."""
@@ -104,7 +154,7 @@ class PoseRows:
         return [curve for curve in curves if curve.output in codes]
 
     def _task(self, curves: Sequence[_Curve]) -> Task:
-        linear, own, problem, codes = self.linear, self.own, self.linear.problem, self._codes()
+        linear, problem, codes = self.linear, self.linear.problem, self._codes()
         known = [codes[curve.output] for curve in curves]
         if linear.sigma is not None:
             # What is made leaves room on either side.
@@ -114,19 +164,18 @@ class PoseRows:
         used = list(dict.fromkeys(known))
         ends = np.cumsum([POSES if curve.at == EVERY else 1 for curve in curves])
         firsts = ends - np.array([POSES if curve.at == EVERY else 1 for curve in curves])
-        soft, needed = list[int](), list[int]()
-        for k in range(2, len(curves)):
-            if known[k] > ANGLE and curves[k].at in (EVERY, RANGE):
-                least = curves[k].at == RANGE and curves[k].sign < 0.0
-                (needed if least else soft).extend(range(firsts[k], ends[k]))
-        strokes = [k for k in range(2, len(curves)) if known[k] == ALONG and curves[k].at == RANGE]
         names = problem.family.parameter_names
         at = [problem.variables.index(name) for name in linear.links if name in problem.variables]
         lengths = [names.index(problem.variables[k]) for k in at]
+        kinds = np.full(ends[-1] + 2 * len(lengths), SOFT, np.int64)
+        for k, curve in enumerate(curves):
+            rows, least = slice(firsts[k], ends[k]), curve.at == RANGE and curve.sign < 0.0
+            straight = known[k] > ANGLE and curve.at in (EVERY, RANGE)
+            kinds[rows] = WANTED if k < 2 else LEFT_OUT if not straight else NEEDED if least else SOFT
+        strokes = [k for k in range(2, len(curves)) if known[k] == ALONG and curves[k].at == RANGE]
         unit = UNIT * linear.stroke
-        soft += range(int(ends[-1]), int(ends[-1]) + 2 * len(lengths))
         return Task(
-            np.ascontiguousarray(own.bases), np.array(own.columns), own.low, own.high, own.wide,
+            np.ascontiguousarray(self.bases), np.array(self.columns), self.low, self.high, self.wide,
             np.cos(TURN), np.sin(TURN), np.array(used),
             Limits(
                 np.array([used.index(code) for code in known]), np.array([curve.at for curve in curves]),
@@ -135,7 +184,7 @@ class PoseRows:
             ),
             np.array(lengths, np.int64), problem.lower[at].astype(np.float64), problem.upper[at].astype(np.float64),
             np.array([np.arange(e - POSES, e) for e, curve in zip(ends, curves, strict=True) if curve.at == EVERY]),
-            np.array(soft), np.array(needed, np.int64), firsts[strokes], np.array([curves[k].size for k in strokes]),
+            kinds, firsts[strokes], np.array([curves[k].size for k in strokes]),
             FREE * linear.stroke if linear.bound is None else linear.bound, linear.stroke, unit, PRICE * unit,
             np.empty(0) if linear.sigma is None else linear.level * linear.sigma,
         )  # fmt: skip
@@ -144,15 +193,15 @@ class PoseRows:
         """Places with the offset between the stages itself for those with the middle of the guide's input angles."""
         out = places.copy()
         if self.turning >= 0:
-            wide = self.own.high[self.turning] - self.own.low[self.turning]
-            out[:, self.turning] += sign * self.own.middles(self.own.placed(places, kinds)) / wide
+            wide = self.high[self.turning] - self.low[self.turning]
+            out[:, self.turning] += sign * self.driven(places, kinds)[0] / wide
             out[:, self.turning] = self.wrapped(out)[:, self.turning]
         return out
 
     def wrapped(self, places: Array) -> Array:
         """Places (k, n) brought back between 0 and 1: an angle that has a whole turn by turns, the others to an end."""
         out = np.clip(places, 0.0, 1.0)
-        if self.turning >= 0 and self.own.high[self.turning] - self.own.low[self.turning] >= 2.0 * math.pi - 1e-9:
+        if self.turning >= 0 and self.high[self.turning] - self.low[self.turning] >= 2.0 * math.pi - 1e-9:
             out[:, self.turning] = places[:, self.turning] % 1.0
         return out
 
@@ -162,14 +211,7 @@ class PoseRows:
 
     def finished(self, places: Array, kinds: Index, x: Array) -> Array:
         """Return designs (k, P) at places (k, n) with the linear unknowns (k, 5)."""
-        return self.linear.finished(self.own.placed(places, kinds), x)
-
-    def rows(self, place: Array, kind: int, x: Array) -> tuple[Array, Array]:
-        """Rows (r,) of one design and their gradients (n + 5, r), those of the objective minus its magnitude."""
-        count = row_count(self.task)
-        values, slopes = np.empty(count), np.empty((len(place) + UNKNOWNS, count))
-        rows_at(self.task, kind, place, x, values, slopes)
-        return values, slopes
+        return self.linear.finished(self.placed(places, kinds), x)
 
     def begun(self, places: Array, kinds: Index, jobs: int = 1) -> tuple[Array, Array]:
         """Return the best linear unknowns (k, 5) of some places, and what the designs are worth (k,)."""

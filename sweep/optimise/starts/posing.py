@@ -11,8 +11,8 @@ import numpy as np
 from sweep.errors import InputError
 from sweep.families.base import Array, Parameter
 from sweep.jobs.progress import Say, unsaid
-from sweep.optimise.multistart.discrete import listed
-from sweep.optimise.problem.coordinates import LocusCoordinates
+from sweep.optimise.multistart.multistart import listed
+from sweep.optimise.problem.on_locus import LocusCoordinates
 from sweep.optimise.problem.statement import Problem
 from sweep.optimise.starts.candidates import ALIKE, diverse, ranking
 from sweep.optimise.starts.dataset import apart, best_rows, drawn, filled, of_task
@@ -132,15 +132,29 @@ def problem_and_starts(
     """Return settings, problem and starts: the diverse best of the dataset, filled up from samples if too few.
 
     On the locus half of the starts come from samples in any case.  Where no row of the dataset is feasible, the first
-    starts are the best of random designs.  The mechanisms that do the study's [task] come before all others.  With
+    half are the best of random designs.  The mechanisms that do the study's [task] come before all others.  With
     ``optimise.global = "proportions"`` five of six starts come from the search over proportions instead, in ``jobs``
     processes; ``stop`` ends it early.
     """
-    settings, begun = _problem_and_starts(study, folder, stop, jobs, say)
-    first = of_task(study, settings.starts, settings.seed)
-    count = max(len(begun.starts), len(first))
-    origins = None if begun.origins is None else ((-1,) * len(first) + begun.origins)[:count]
-    return settings, begun._replace(starts=np.concatenate([first, begun.starts])[:count], origins=origins)
+    if study.optimise is None:
+        raise InputError("optimise", None, "an [optimise] section", str(study.path))
+    settings, (designs, merit, problem) = study.optimise, _known(study, folder)
+    count, origins, starts = settings.starts, None, designs[:0]
+    if _globally(study):
+        problem, starts, origins = from_populations(study, settings, problem, designs, merit, stop, jobs, say)
+    else:
+        # On the locus samples cost next to nothing, and reach the bounds, where a sweep may have no design at all.
+        sampled = not len(merit) or (problem.coordinates is not None and study.fit is None)
+        if not len(merit):
+            merit = ranking(problem, designs)
+        own = diverse(problem, designs, merit, count - count // 2 if sampled else count, ALIKE)
+        starts = filled(study, problem, own, count, settings.seed)
+        if len(starts) < count:
+            starts = apart(problem, starts, diverse(problem, designs, merit, count, ALIKE), count)
+    first = of_task(study, count, settings.seed)
+    kept = max(len(starts), len(first))
+    origins = None if origins is None else ((-1,) * len(first) + origins)[:kept]
+    return settings, Begun(problem, np.concatenate([first, starts])[:kept], origins)
 
 
 def problem_of_dataset(study: Study, folder: Path, found: Array) -> Problem:
@@ -157,50 +171,24 @@ def problem_of_dataset(study: Study, folder: Path, found: Array) -> Problem:
     InputError
         if nothing can change, or neither rows nor a sample give a design.
     """
+    problem = _known(study, folder)[2]
+    return holding(study, problem, found) if _globally(study) else problem
+
+
+def _known(study: Study, folder: Path) -> tuple[Array, Array, Problem]:
+    """Return the best designs of a dataset, what they are worth, and the problem; random ones without a worth where
+    none is feasible.
+    """
     if study.objective is None:
         raise InputError("objective", None, "[objective] minimise = an output", str(study.path))
-    designs, _ = best_rows(study.family, study.objective.output, folder)
+    designs, merit = best_rows(study.family, study.objective.output, folder)
     if not len(designs) and study.optimise is not None:
         designs = drawn(study, study.optimise.starts, study.optimise.seed)
     if not len(designs):
-        raise _nothing(study)
-    problem = problem_of(study, designs)
-    return holding(study, problem, found) if _globally(study) else problem
+        allowed = "at least one design that [locus] and [fit] can make"
+        raise InputError("design space", study.space.count, allowed, str(study.path))
+    return designs, merit, problem_of(study, designs)
 
 
 def _globally(study: Study) -> bool:
     return study.optimise is not None and study.optimise.globally == "proportions"
-
-
-def _nothing(study: Study) -> InputError:
-    allowed = "at least one design that [locus] and [fit] can make"
-    return InputError("design space", study.space.count, allowed, str(study.path))
-
-
-def _problem_and_starts(
-    study: Study, folder: Path, stop: Callable[[], bool], jobs: int, say: Say
-) -> tuple[OptimiseSettings, Begun]:
-    if study.optimise is None or study.objective is None:
-        raise InputError("optimise", None, "an [optimise] section and an objective", str(study.path))
-    settings = study.optimise
-    count, seed = settings.starts, settings.seed
-    designs, merit = best_rows(study.family, study.objective.output, folder)
-    if _globally(study):
-        known = designs if len(designs) else drawn(study, count, seed)
-        return settings, from_populations(study, settings, problem_of(study, known), known, merit, stop, jobs, say)
-    if len(designs):
-        problem = problem_of(study, designs)
-        # On the locus samples cost next to nothing, and reach the bounds, where a sweep may have no design at all.
-        sampled = count // 2 if problem.coordinates is not None and study.fit is None else 0
-        own = diverse(problem, designs, merit, count - sampled, ALIKE)
-        starts = filled(study, problem, own, count, seed)
-        if len(starts) < count:
-            starts = apart(problem, starts, diverse(problem, designs, merit, count, ALIKE), count)
-        return settings, Begun(problem, starts)
-    designs = drawn(study, count, seed)
-    if not len(designs):
-        raise _nothing(study)
-    problem = problem_of(study, designs)
-    # Half of them from the space itself: a sample of the problem's variables may miss what [locus] or [fit] makes.
-    own = diverse(problem, designs, ranking(problem, designs), -(-count // 2), ALIKE)
-    return settings, Begun(problem, filled(study, problem, own, count, seed))

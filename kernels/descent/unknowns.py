@@ -1,0 +1,128 @@
+"""The best linear unknowns of a design: point, line and scale of the guide for the least objective under its limits.
+
+    minimise t + price v   subject to   value_j + slopes_j x + (t, v or 0) >= 0,   v >= 0
+
+is a linear program.  A very small curvature lent to it makes the solution the point nearest to a centre far away that
+keeps linear rows (:mod:`kernels.linear.nearest`), and changes nothing where the solution stands at a vertex.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from kernels import status as st
+from kernels.descent.motion import Index, Motion, nothing_moved
+from kernels.descent.program import EXACT, LENT, units
+from kernels.descent.rows import ACROSS, ALONG, ANGLE, UNKNOWNS, Task, by_unknowns, curve, slopes_of
+from kernels.jit import kernel, part
+from kernels.linear.nearest import nearest
+from kernels.types import Array
+
+LEFT_OUT, WANTED, SOFT, NEEDED = 0, 1, 2, 3  # rows: of other things, with t, with v, and those that may not be missed
+FLAT = 1e-8  # curvature lent to the unknowns, in units of their size and of the objective
+EXCESS = 0.5  # price of a deviation twice as large as allowed, in strokes
+SMALLEST = 1e-9  # scale of a guide that has any
+DIRECTIONS = 3  # in which the least scale of a guide is asked for
+FAR = 0.3  # share of its bound, or of the objective, from which on a row does not join
+
+
+@kernel
+def best_unknowns(values: Array, slopes: Array, kinds: Index, size: Array, unit: float, price: float, x: Array) -> bool:
+    """Go to the best linear unknowns.
+
+    Parameters
+    ----------
+    values, slopes : (r,) and (5, r) of the rows at ``x``, those with t without it
+    kinds : (r,) of the rows
+    size, unit : (5,) of the unknowns, and of t
+    price : of a unit of v
+    x : (5,) written
+
+    Returns
+    -------
+    Whether some unknowns keep the rows that may not be missed; without any x stays.
+    """
+    count, n = 1, UNKNOWNS + 2
+    for kind in kinds:
+        count += 1 if kind != LEFT_OUT else 0
+    rows, needs, centre, y, weights = np.zeros((n, count)), np.zeros(count), np.zeros(n), np.empty(n), np.empty(count)
+    lent, joined, total = 1.0 / math.sqrt(LENT), 1, 0.0
+    rows[UNKNOWNS + 1, 0] = lent
+    for j in range(len(kinds)):
+        if kinds[j] != LEFT_OUT:
+            per = 1.0 / unit if kinds[j] == WANTED else 1.0
+            needs[joined] = -values[j] * per
+            for k in range(UNKNOWNS):
+                rows[k, joined] = slopes[k, j] * per * size[k] / math.sqrt(FLAT)
+                total += rows[k, joined] + needs[joined]
+            if kinds[j] != NEEDED:
+                rows[UNKNOWNS if kinds[j] == WANTED else UNKNOWNS + 1, joined] = lent
+            joined += 1
+    centre[UNKNOWNS], centre[UNKNOWNS + 1] = -lent, -lent * price / unit
+    if not math.isfinite(total) or nearest(rows, needs, centre, EXACT, y, weights) != st.OK:
+        return False
+    for k in range(UNKNOWNS):
+        x[k] += y[k] * size[k] / math.sqrt(FLAT)
+    return True
+
+
+@part
+def solved(task: Task, row: Array, at: Motion, x: Array, room: Array, out: Array) -> None:
+    """Best linear unknowns (5,) of a design, what bends taken for straight about ``x``; x where there are none."""
+    m, r = len(task.cos), len(task.kinds)
+    values, slopes, size, kinds = np.empty(r), np.empty((UNKNOWNS, r)), np.empty(UNKNOWNS), task.kinds.copy()
+    slopes_of(task, row, at, nothing_moved(0, m), x, room, np.zeros((UNKNOWNS, m + 1)), values, slopes)
+    units(x, size)
+    t = task.unit
+    for j in range(2 * m):
+        t = max(t, -values[j])
+    for j in range(r):
+        if (kinds[j] == SOFT and values[j] > FAR) or (kinds[j] == WANTED and values[j] + t > FAR * t):
+            kinds[j] = LEFT_OUT
+    for k in range(UNKNOWNS):
+        out[k] = x[k]
+    best_unknowns(values, slopes, kinds, size, task.unit, task.price, out)
+
+
+@part
+def unknowns_of(task: Task, row: Array, at: Motion, room: Array, x: Array) -> bool:
+    """Best linear unknowns (5,) of a design as long as the lengths of stage 2 allow it; whether there are any.
+
+    That these are at least so long is a bound on the modulus of z1 from below, which no linear program knows.  It is
+    asked for in the direction that z1 has without it, then in the one it has with it.
+    """
+    m, none, angle = len(task.cos), np.zeros(UNKNOWNS), np.empty(len(task.cos))
+    values, slopes, by = np.zeros(4 * m + 2), np.zeros((UNKNOWNS, 4 * m + 2)), np.empty((UNKNOWNS, m))
+    size, kinds = np.full(UNKNOWNS, task.stroke), np.zeros(4 * m + 2, np.int64)
+    kinds[4 * m] = NEEDED
+    for which in range(2):
+        by_unknowns(task.codes[0] if which == 0 else ACROSS, at, none, by)
+        for p in range(m):
+            for j, sign in ((2 * m * which + p, 1.0), (2 * m * which + m + p, -1.0)):
+                kinds[j] = WANTED if which == 0 else SOFT
+                values[j] = 0.0 if which == 0 else 1.0 - room[p] / task.bound
+                for k in range(UNKNOWNS):
+                    slopes[k, j] = sign * by[k, p] / (1.0 if which == 0 else task.bound)
+    by_unknowns(ALONG, at, none, by)
+    curve(ANGLE, at, none, room, angle)
+    high, low, least = 0, 0, 0.0
+    for p in range(m):
+        high, low = p if angle[p] > angle[high] else high, p if angle[p] < angle[low] else low
+    for k in range(UNKNOWNS):
+        slopes[k, 4 * m] = (by[k, high] - by[k, low]) / task.stroke
+    values[4 * m] = -1.0 - room[m] / task.stroke
+    for j in range(len(task.lengths)):
+        least = max(least, task.least[j] / row[task.lengths[j]])
+    for _ in range(DIRECTIONS):
+        for k in range(UNKNOWNS):
+            x[k] = 0.0
+        if not best_unknowns(values, slopes, kinds, size, task.unit, EXCESS * task.stroke, x):
+            return False
+        scale = math.sqrt(x[0] * x[0] + x[1] * x[1])
+        if not 0.0 < scale < (1.0 - 1e-6) * least:
+            break
+        kinds[4 * m + 1], values[4 * m + 1] = NEEDED, -1.0
+        slopes[0, 4 * m + 1], slopes[1, 4 * m + 1] = x[0] / (scale * least), x[1] / (scale * least)
+    return bool(x[0] * x[0] + x[1] * x[1] > SMALLEST * SMALLEST)

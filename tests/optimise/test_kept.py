@@ -1,0 +1,59 @@
+"""A search that was stopped goes on behind the parts that were over, and ends with the bytes of one never stopped."""
+
+from __future__ import annotations
+
+import json
+import math
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import sweep.optimise.study
+from sweep.engine.run import run
+from sweep.optimise import optimise_study
+from sweep.optimise.local.kkt import Result
+from sweep.optimise.multistart.kept import Kept, noted, result_of
+from sweep.study import load_study
+from tests.optimise.test_robust import ROBUST
+
+FILES = ("_optimum.parquet", "_tolerance.parquet", "_sensitivity.parquet", "_curves.parquet")
+
+
+def test_search_that_was_stopped_while_designs_were_made_robust_goes_on_there(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    (tmp_path / "study.toml").write_text(ROBUST)
+    study = load_study(tmp_path)
+    out = run(study, tmp_path / "designs", jobs=1)
+    whole = {name: (tmp_path / name).read_bytes() for name in FILES}
+    file = tmp_path / "_search.json"
+    assert not file.exists()
+
+    def begun() -> bool:
+        return file.exists() and any(name.startswith("approach") for name in json.loads(file.read_text())["parts"])
+
+    with pytest.raises(KeyboardInterrupt):
+        optimise_study(study, out, begun, key="k")
+    assert {"drawing", "insensitive", "approach 0"} <= set(Kept(file, "k").parts)
+    assert not Kept(file, "another").parts
+
+    def refused(*_: object) -> None:
+        raise AssertionError("the drawing was searched again")
+
+    monkeypatch.setattr(sweep.optimise.study, "explore", refused)
+    optimise_study(study, out, key="k")
+    assert not file.exists()
+    assert {name: (tmp_path / name).read_bytes() for name in FILES} == whole
+
+
+def test_results_come_back_with_every_bit_and_a_damaged_file_is_forgotten(tmp_path: Path) -> None:
+    design = np.array([0.1, 1e-300, math.nan])
+    result = Result(3, design, 1.0 / 3.0, math.inf, 0.0, 1e-13, ("a",), {"a": 0.1}, {}, {"b": 0.3}, 0, "looks")
+    kept = Kept(tmp_path / "search.json", "k")
+    kept.note("one", noted(result))
+    again = result_of(Kept(tmp_path / "search.json", "k").parts["one"])
+    assert again.design.tobytes() == result.design.tobytes()
+    assert {**vars(again), "design": 0} == {**vars(result), "design": 0}
+    (tmp_path / "search.json").write_text('{"key": "k"')
+    assert not Kept(tmp_path / "search.json", "k").parts
