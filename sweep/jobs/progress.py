@@ -208,10 +208,10 @@ class Phases:
             self.end()
             self.now = Progress(label, total, done, self.show, self.stream, unit, quiet=True).__enter__()
             return
+        if (total, unit) != (self.now.total, self.now.unit):
+            self.now.expect(total, unit)
         if done > self.now.done:
             self.now.advance(done - self.now.done)
-        if (total, unit) != (self.now.total, self.now.unit) or self.now.bar is not None:
-            self.now.expect(total, unit)
 
     def end(self) -> None:
         """Note that the present piece is finished."""

@@ -151,7 +151,7 @@ def _cannot_meet(data: Dataset) -> list[str]:
     family, loops = data.study.family, data.study.family.every(Assembly)
     if not loops or isinstance(family.domain, Interval):
         return []
-    table = pq.read_table(store.beside(data.folder) / store.OPTIMUM, columns=list(family.parameter_names))
+    table = pq.read_table(store.beside(data.folder) / store.OPTIMUM, filters=[("role", "!=", "reference")])
     designs = np.column_stack([table[name].to_numpy() for name in family.parameter_names]).astype(np.float64)
     with np.errstate(all="ignore"):
         poses = family.poses(

@@ -55,7 +55,7 @@ def test_links_that_cannot_meet_are_named_by_the_design_that_comes_nearest(tmp_p
     code, said = run(tmp_path, STUDY.format(swing=40).replace("e = { value = 100", "e = { value = 300"))
     assert code == 4 and "no design keeps all limits" in said
     line = next(x for x in said.splitlines() if "links that cannot meet at any crank angle" in x)
-    assert "a = 40, b = 150, c = 90" in line and float(line.rpartition("the margin is ")[2].split()[0]) < 0.0
+    assert "b = 150, c = 90, e = 300" in line and float(line.rpartition("the margin is ")[2].split()[0]) < 0.0
 
 
 def test_sweep_without_optimiser_and_without_survivors_names_the_nearest_miss(tmp_path: Path) -> None:
