@@ -15,7 +15,8 @@ from sweep.families.moments import RiseWindow, Taking
 from sweep.families.parts import Member, vector
 from sweep.families.relations import each, two
 from sweep.families.sewing import Sewing
-from sweep.families.thread_balance import Edge, TakeUp, ThreadBalance, Waypoint, spots
+from sweep.families.thread_balance import ThreadBalance
+from sweep.families.thread_way import Edge, TakeUp, Waypoint, spots
 from sweep.families.tools import Blade, Needle, Seam, Spot, Tool, length, number
 from sweep.families.triangles import Entering
 from sweep.numerics.curves import TableCurve, table_curve

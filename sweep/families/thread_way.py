@@ -1,0 +1,174 @@
+"""The way of a thread over points, blades and take-ups of a machine: its length, the rate of that, and its bends."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any, NamedTuple, TypeAlias
+
+import numpy as np
+
+from kernels.types import TWO_PI
+from sweep.families.segments import Point, dot, minus
+from sweep.families.tools import Spot
+
+PHI = "phi"
+
+
+@dataclass(frozen=True)
+class TakeUp:
+    """A take-up in the path: the dotted pose outputs of the thread it takes up and of its wrap angle."""
+
+    taken: str
+    wrap: str
+
+
+@dataclass(frozen=True)
+class Edge:
+    """A blade over which the thread slides without friction: it lies where the way over it is shortest."""
+
+    tip: Spot
+    back: Spot
+
+
+@dataclass(frozen=True)
+class Waypoint:
+    """What a thread runs over.
+
+    Parameters
+    ----------
+    on : a point, a blade, a take-up
+    held : two events, from and to: between them the thread runs over it; () for the whole turn
+    wrap : by which it is bent there beside the bend of its path, as in a needle's eye [rad]
+    fixed : two events: between them it does not slide there, which leaves the bend out of the tension; () for never
+    """
+
+    on: Spot | Edge | TakeUp
+    held: tuple[str, ...] = ()
+    wrap: float = 0.0
+    fixed: tuple[str, ...] = ()
+
+
+class Piece(NamedTuple):
+    """A place as it stands: coordinates, velocity, and where over the turn the thread runs over it; None is always."""
+
+    at: Point
+    rate: Point
+    on: Any
+
+
+Run: TypeAlias = tuple[Waypoint, ...]
+
+
+def spots(place: Waypoint) -> tuple[Spot, ...]:
+    """Return the points that a place of a path is made of."""
+    if isinstance(place.on, TakeUp):
+        return ()
+    return (place.on,) if isinstance(place.on, Spot) else (place.on.tip, place.on.back)
+
+
+def turned(angle: Any) -> Any:
+    """Return an angle within one turn from 0; complex ones by their real part."""
+    return angle - TWO_PI * np.floor(np.real(angle) / TWO_PI)
+
+
+def outside(ends: tuple[str, ...], found: Mapping[str, Any], inside: bool = False) -> Any:
+    """Tell where over the turn two events are not between, or are; None for the whole turn."""
+    if not ends:
+        return None
+    start, end = (np.real(found[f"phi_{name}"]) for name in ends)
+    return (turned(np.real(found[PHI]) - start) < turned(end - start)) == inside
+
+
+def only(where: Any, values: Any) -> Any:
+    """Return values where the thread runs so, else 0."""
+    return values if where is None else np.where(where, values, 0.0)
+
+
+def _chosen(where: Any, a: Point, b: Point) -> Point:
+    return [np.where(where, x, y) for x, y in zip(a, b, strict=True)]
+
+
+def laid(run: Sequence[Waypoint], found: Mapping[str, Any], moving: bool) -> list[Piece]:
+    """Place the points of a run, those on blades last: each lies between two that do not depend on it."""
+    pieces: list[Piece] = []
+    for place in run:
+        spot = place.on.tip if isinstance(place.on, Edge) else place.on
+        assert isinstance(spot, Spot)
+        rate = spot.velocity(found) if moving else ()
+        pieces.append(Piece(spot.position(found), rate, outside(place.held, found, inside=True)))
+    for k, place in enumerate(run):
+        if isinstance(place.on, Edge):
+            tip, back = pieces[k], place.on.back.position(found)
+            t = nearest_way(beside(pieces, k, -1).at, beside(pieces, k, 1).at, tip.at, back)
+            on = [a + t * (b - a) for a, b in zip(tip.at, back, strict=True)]
+            # of a shortest way the place on the blade does not count in its derivative, the blade's own motion does
+            ends = zip(tip.rate, place.on.back.velocity(found), strict=True) if moving else ()
+            pieces[k] = tip._replace(at=on, rate=[a + t * (b - a) for a, b in ends])
+    return pieces
+
+
+def beside(pieces: Sequence[Piece], k: int, step: int) -> Piece:
+    """Return the place before or after one, of those that the thread runs over; the ends it always does."""
+    piece = pieces[k + step]
+    if piece.on is None:
+        return piece
+    other = beside(pieces, k + step, step)
+    return Piece(_chosen(piece.on, piece.at, other.at), _chosen(piece.on, piece.rate, other.rate), None)
+
+
+def followed(pieces: Sequence[Piece], moving: bool, bent: bool) -> tuple[Any, Any, list[Any]]:
+    """Return the length of a run, its derivative, and the bends at all places but its ends."""
+    length: Any = 0.0
+    change: Any = 0.0
+    bends = []
+    for k, piece in enumerate(pieces):
+        if k == 0:
+            continue
+        before = beside(pieces, k, -1)
+        size, along = _piece(before.at, piece.at)
+        length = length + only(piece.on, size)
+        if moving:
+            change = change + only(piece.on, dot(along, minus(piece.rate, before.rate)))
+        if bent and k + 1 < len(pieces):
+            bends.append(bend(along, _piece(piece.at, beside(pieces, k, 1).at)[1]))
+    return length, change, bends
+
+
+def nearest_way(p: Point, q: Point, start: Point, end: Point) -> Any:
+    """Return where along a segment, 0 to 1, the way from p over it to q is shortest, (14).
+
+    Turned about the segment's line into one plane, on either side of it, p and q see each other straight across it.
+    The length is convex along the line, so beyond an end the end is nearest.
+    """
+    d = minus(end, start)
+    square = dot(d, d)
+    feet = [dot(minus(x, start), d) / square for x in (p, q)]
+    away = []
+    for x, foot in zip((p, q), feet, strict=True):
+        off = [u - foot * v for u, v in zip(minus(x, start), d, strict=True)]
+        away.append(np.sqrt(dot(off, off)))
+    both = away[0] + away[1]
+    t = np.where(both == 0.0, 0.5 * (feet[0] + feet[1]), 0.0)
+    t = t + (feet[0] * away[1] + feet[1] * away[0]) / np.where(both == 0.0, 1.0, both)
+    return np.where(np.real(t) < 0.0, 0.0, np.where(np.real(t) > 1.0, 1.0, t))
+
+
+def bend(before: Point, after: Point) -> Any:
+    """Measure the angle between unit vectors of a thread, (13): 2 arctan(|e1 - e2|/|e1 + e2|), exact near 0, pi."""
+    off, both = (_size([a + sign * b for a, b in zip(before, after, strict=True)]) for sign in (-1.0, 1.0))
+    with np.errstate(divide="ignore", invalid="ignore"):  # folded back upon itself: arctan of infinity, half a turn
+        folded = np.real(both) == 0.0
+        return np.where(folded, np.pi, 2.0 * np.arctan(off / np.where(folded, 1.0, both)))
+
+
+def _size(parts: Point) -> Any:
+    return np.sqrt(dot(parts, parts))
+
+
+def _piece(start: Point, end: Point) -> tuple[Any, Point]:
+    """Length and direction of a straight piece; a piece of no length has no direction (nan)."""
+    parts = minus(end, start)
+    length = _size(parts)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        return length, [part / length for part in parts]
