@@ -117,7 +117,7 @@ def test_every_set_with_the_pressure_angle_takes_one_code_and_gives_what_is_want
     target: float | None, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     designs, accuracy = random_designs(50, 7), Accuracy(target=target)
-    kernel, sets = kernels.families.rssr.block, set()
+    kernel, sets = kernels.families.rssr.margin, set()
 
     def noted(*arrays: Array | None) -> None:
         sets.add(tuple(x is None for x in arrays))
