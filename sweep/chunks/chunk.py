@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -53,11 +53,28 @@ def warm(study: Study, tell: Callable[[int, int], None] = lambda done, total: No
 
     ``tell`` is called with how many of the steps through which a design goes are ready, and how many there are.
     """
-    designs, asked = few_designs(study), asked_outputs(study)
-    for k, outputs in enumerate(asked):
-        tell(k, len(asked))
-        design_outputs(study.family, designs, outputs, study.accuracy, study.window)
-    tell(len(asked), len(asked))
+    warm_step, count = WarmStep(study), len(asked_outputs(study))
+    for k in range(count):
+        tell(k, count)
+        warm_step(k)
+    tell(count, count)
+
+
+@dataclass(frozen=True)
+class WarmStep:
+    """Compiles or loads the kernels of one step of a study by its number, here or in a worker."""
+
+    study: Study
+
+    def __getstate__(self) -> dict[str, Any]:
+        # A study remembers its family, which is made of functions; whoever unpickles it makes its own.
+        return {"study": replace(self.study)}
+
+    def __call__(self, number: int, should_stop: Callable[[], bool] = lambda: False) -> int:
+        """Return the number once its kernels are ready."""
+        study, outputs = self.study, asked_outputs(self.study)[number]
+        design_outputs(study.family, few_designs(study), outputs, study.accuracy, study.window)
+        return number
 
 
 def asked_outputs(study: Study) -> list[Sequence[str]]:

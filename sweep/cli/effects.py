@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable, Sequence
+
 import click
 
 from sweep.cli.families import aligned, echo_columns
@@ -9,6 +11,7 @@ from sweep.effects import NAMES, effect
 from sweep.effects.base import Effect
 from sweep.errors import InputError, choices
 from sweep.families.base import Output, Parameter
+from sweep.pages import rendered
 from sweep.quantities.units import internal_unit
 
 
@@ -53,31 +56,27 @@ def chain_words(entry: Effect) -> str:
 
 def explain(entry: Effect) -> list[str]:
     """Return one effect in full, line by line."""
-    lines = [f"{entry.name} ({entry.key}): {entry.title}", ""]
-    kind = "whole turn: it couples the crank angles" if entry.whole_turn else "pointwise in the crank angle"
-    lines += aligned(
-        [
-            ("families", ", ".join(entry.families)),
-            ("in a chain", chain_words(entry)),
-            ("needs", ", ".join(entry.needs) or "the motion"),
-            ("kind", kind),
-            ("cost", cost_words(entry)),
-            ("units", "of studies and datasets; in tables any consistent set"),
-            ("called for", entry.called_for),
-            ("negligible", entry.negligible),
-        ]
-    )
+    about = {
+        "families": ", ".join(entry.families),
+        "in a chain": chain_words(entry),
+        "needs": ", ".join(entry.needs) or "the motion",
+        "kind": "whole turn: it couples the crank angles" if entry.whole_turn else "pointwise in the crank angle",
+        "cost": cost_words(entry),
+        "units": "of studies and datasets; in tables any consistent set",
+        "called for": entry.called_for,
+        "negligible": entry.negligible,
+    }
+    result = entry.design_result.outputs if entry.design_result else ()
+    tables: dict[str, Iterable[Sequence[str]]] = {
+        "outputs per pose (and their reductions max_abs_x, max_x, min_x, range_x, rms_x)": _output_rows(entry.outputs),
+        "outputs per design": _output_rows(result),
+        "inputs": [
+            (p.name, internal_unit(p.unit), input_words(p)) for p in (every_input(entry) if entry.inputs else ())
+        ],
+    }
+    lines = [f"{entry.name} ({entry.key}): {entry.title}", "", *aligned(about.items())]
     lines += ["", "equations", *(f"  {formula}" for formula in entry.formulas)]
-    if entry.outputs:
-        lines += ["", "outputs per pose (and their reductions max_abs_x, max_x, min_x, range_x, rms_x)"]
-        lines += aligned(_output_rows(entry.outputs))
-    if entry.design_result:
-        lines += ["", "outputs per design"]
-        lines += aligned(_output_rows(entry.design_result.outputs))
-    if entry.inputs:
-        lines += ["", "inputs"]
-        lines += aligned([(p.name, internal_unit(p.unit), input_words(p)) for p in every_input(entry)])
-    return lines
+    return lines + [line for title, rows in tables.items() if rows for line in ("", title, *aligned(rows))]
 
 
 def _output_rows(outputs: tuple[Output, ...]) -> list[tuple[str, str, str, str]]:
@@ -98,50 +97,14 @@ def every_input(entry: Effect) -> tuple[Parameter, ...]:
 
 def page() -> str:
     """Return docs/effects.md, made from the register."""
-    entries = [effect(name) for name in NAMES]
-    lines = [
-        "# Effects",
-        "",
-        "Made from the register (`sweep/effects/`) by `make docs`. A scene names what it wants; only the effects that",
-        "some wanted name belongs to are computed, with what they need. Equations: Polukhin (1971), chapters I and",
-        "III, as corrected, and standard mechanics; what is marked ours the source does not give. A, B, C, D are crank",
-        "centre, crank pin, driven joint, rocker centre; (rho_B, tau_B, u) and (rho, tau, k) the triads of crank and",
-        "follower, s the unit vector from B to C.",
-        "",
-        "In a chain inputs and outputs carry the number of their stage (`m_crank2`, `force_c2`), `speed` and",
-        "`speed_change` that of the first; a later stage turns as the one before drives it, and its driving torque",
-        "loads that one. A negative `speed` turns the crank backwards: friction and piercing forces turn with it,",
-        "poses and phi do not; unevenness, lives and frequencies are of its magnitude. A tool (`m_tool` and its",
-        "force: docs/tool.md) at the guided point of a `guide`, at the coupler point of a `four_bar`, at the tip of",
-        "another rocker or at the working point of a looper loads the joints and the stages before. What is not",
-        "listed for a family the theory does not give: geared dwells have no effects, sliders no shaft bearings.",
-        "",
-        "Units are any consistent set; in studies and datasets mm, t, s, hence N, N mm, MPa. Costs are measured on one",
-        "core (`make bench`), each effect alone with all its outputs, the motion it needs not counted.",
-        "",
-        "| effect | key | families | what | needs | cost |",
-        "|---|---|---|---|---|---|",
-    ]
-    for e in entries:
-        needs = ", ".join(e.needs) or "motion"
-        lines.append(f"| `{e.name}` | {e.key} | {', '.join(e.families)} | {e.title} | {needs} | {cost_words(e)} |")
-    for e in entries:
-        kind = "Whole turn: it couples the crank angles." if e.whole_turn else "Pointwise in the crank angle."
-        lines += ["", f"## {e.name}", "", f"{e.title[0].upper()}{e.title[1:]}. {kind}", ""]
-        lines += [*(f"    {line}" for line in e.formulas), ""]
-        lines += [f"Families: {', '.join(e.families)}; in a chain {chain_words(e)}.", ""]
-        lines += [f"Called for: {e.called_for}.", "", f"Negligible: {e.negligible}.", ""]
-        outputs = [*e.outputs, *(e.design_result.outputs if e.design_result else ())]
-        lines += ["| output | unit | definition | equation |", "|---|---|---|---|"]
-        per_design = {o.name for o in e.design_result.outputs} if e.design_result else set()
-        for o in outputs:
-            per = " (per design)" if o.name in per_design else ""
-            lines.append(f"| `{o.name}` | {internal_unit(o.unit)} | {_cell(o.text)}{per} | {o.equation} |")
-        if e.inputs:
-            lines += ["", "| input | unit | definition |", "|---|---|---|"]
-            lines += [f"| `{p.name}` | {internal_unit(p.unit)} | {_cell(input_words(p))} |" for p in every_input(e)]
-    return "\n".join(lines) + "\n"
-
-
-def _cell(text: str) -> str:
-    return text.replace("|", "\\|")
+    return str(
+        rendered(
+            "effects.md.j2",
+            entries=[effect(name) for name in NAMES],
+            unit=internal_unit,
+            cost=cost_words,
+            in_chain=chain_words,
+            every_input=every_input,
+            input_words=input_words,
+        )
+    )

@@ -9,8 +9,7 @@ import click
 
 from sweep.cli.families import family_names
 from sweep.cli.first_study import study_text
-from sweep.dataset.files import located
-from sweep.dataset.store import PLAN, beside
+from sweep.dataset.files import PLAN, beside, located
 from sweep.explore.hand import Hand, of_results, of_study
 from sweep.explore.server import Server
 from sweep.families import family

@@ -9,7 +9,7 @@ import click
 from sweep.errors import LinksweepError
 from sweep.evaluation.summaries import output, output_names
 from sweep.families import NAMES, chain_names, family
-from sweep.families.base import Family
+from sweep.families.base import Family, Parameter
 from sweep.families.capabilities import (
     Assembly,
     CrankRockerLoop,
@@ -94,25 +94,26 @@ def capability_words(family: Family) -> list[str]:
 
 def describe(family: Family) -> list[str]:
     """Parameters, pose outputs and design outputs of a family with their units, one per line."""
+    words = ", ".join(capability_words(family))
+    points = ", ".join(name for found in family.every(Points) for name in found.at)
+    outputs = [output(family, name) for name in main_outputs(family)]
     lines = [f"{family.name}: {family.title}", "", f"over: {over(family)}"]
-    if words := capability_words(family):
-        lines.append(f"can be asked for: {', '.join(words)}")
-    if points := [name for found in family.every(Points) for name in found.at]:
-        lines.append(f"points: {', '.join(points)}")
+    lines += [f"can be asked for: {words}"] if words else []
+    lines += [f"points: {points}"] if points else []
     lines += ["", "parameters (one length unit throughout, angles in rad)"]
-    parameters = []
-    for p in family.parameters:
-        notes = [p.sign] if p.sign else []
-        notes += [p.choice] if p.choices else []
-        notes += [f"default {p.default:g}"] if p.default is not None else []
-        parameters.append((p.name, p.unit, p.text + (f" ({', '.join(notes)})" if notes else "")))
-    lines += aligned(parameters)
+    lines += aligned((p.name, p.unit, described(p, "default ")) for p in family.parameters)
     lines += ["", "pose outputs (sweep eval)"]
-    lines += aligned([(o.name, o.unit, o.text) for o in family.pose_outputs])
+    lines += aligned((o.name, o.unit, o.text) for o in family.pose_outputs)
     lines += ["", "design outputs (sweep summarise, and [scene] want of a study)"]
-    lines += aligned([(o.name, o.unit, o.text) for o in (output(family, n) for n in main_outputs(family))])
-    lines += [f"  and of any pose output x: {', '.join(f'{prefix}x' for prefix in prefixes(family.domain))}"]
-    return lines
+    lines += aligned((o.name, o.unit, o.text) for o in outputs)
+    return [*lines, f"  and of any pose output x: {', '.join(f'{prefix}x' for prefix in prefixes(family.domain))}"]
+
+
+def described(p: Parameter, default: str = "", left_out: str = "") -> str:
+    """Say what a parameter is and may be; a value that it has if left out stands between two words."""
+    notes = [p.sign, p.choice if p.choices else "", "" if p.default is None else f"{default}{p.default:g}{left_out}"]
+    told = ", ".join(filter(None, notes))
+    return f"{p.text} ({told})" if told else p.text
 
 
 def main_outputs(family: Family) -> list[str]:

@@ -1,15 +1,19 @@
-"""The text of a first study of a mechanism: its own example, two parameters swept, every table explained."""
+"""The text of a first study of a mechanism or a machine: its own example, swept in two, every table explained."""
 
 from __future__ import annotations
 
+import json
 import math
 from collections.abc import Iterator, Mapping
+from itertools import pairwise
 
-from sweep.cli.families import main_outputs
-from sweep.families.base import Family, Parameter
+from sweep.cli.families import described, main_outputs
+from sweep.families.base import Family
 from sweep.families.chain import Chain, stages_of
 from sweep.families.domain import March
+from sweep.families.machines import Machine
 from sweep.families.names import is_flag, parts, stem
+from sweep.pages import rendered
 from sweep.study.written import design_entries, toml
 
 # Units of the examples by unit word.  Those with forces or masses are in SI, the others in any length unit.
@@ -20,9 +24,10 @@ SI = {
 LENGTHS = {"length": "mm", "1/length": "1/mm"}
 POWER = {"length": 1, "1/length": -1}
 OTHERS = {"speed": "rad/s", "angular_acceleration": "rad/s^2", "time": "s", "angle": "deg"}
-PURE = ("ratio", "sign", "count", "none", "choice")
 SPREAD, COUNT = 0.05, 5  # of the swept parameters: part of the example's value to either side, values
 SWEPT = 2
+APART = 10  # mm between the frames of two members, along z
+OF_EACH = 2  # outputs of a member that are asked for
 LEAST_SIZE = 20.0  # mm, of the longest dimension of what stands in a machine
 FIRST = ("swing", "stroke", "margin", "max_pressure_angle", "dwell_angle", "dwell_deviation")
 FEWEST_WANTED, MOST_WANTED = 3, 5
@@ -34,64 +39,93 @@ def study_text(name: str, family: Family, schema: str, drawn: Mapping[str, float
 
     With the design of a drawing [mm, rad] it is about that design, and the design is its reference.
     """
+    if isinstance(family, Machine):
+        return _machine_text(name, family, schema)
     wanted = wanted_outputs(family)
-    goal = next((w for w in wanted if w.startswith("max_abs_d2")), wanted[-1])
-    lines = [
-        f"#:schema {schema}",
-        f"# A first study of {family.name}: {family.title}.",
-        f"# sweep check {name}          what it will compute, and what that costs",
-        f"# sweep run {name}            results/{name}/designs",
-        f"# sweep report results/{name}/designs",
-        "# What may stand here: docs/study-files.md.  What the mechanism can be asked: "
-        f"sweep families {'+'.join(_names(family))}",
-        "",
-        "[study]",
-        f'name = "{name}"',
-        f'title = "First look at {family.name}"',
-        'question = "What do small changes of two dimensions do?"',
-        "",
-        "[mechanism]",
-        mechanism_line(family),
-        "",
-        "[scene]",
-        '# speed = "3000 rpm"                       # for accelerations in time, and for loads',
-        f"want = [{', '.join(f'{w!r}' for w in wanted)}]".replace("'", '"'),
-        "",
-        "# One value as a text with its unit; several as { values = [...], unit = ... } or { from, to, count, unit }.",
-        "[design]",
-        *design_lines(family, swept_names(family), drawn),
-        "",
-        "# Designs beyond a limit are counted and dropped: { min = ..., max = ..., unit = ... }, or true.",
-        "[limits]",
-        *limit_lines(family),
-        "",
-        "[objective]",
-        f'minimise = "{goal}"',
-        "",
-        "[accuracy]",
-        *(
-            ["samples = 720                              # crank angles; this mechanism has a history, so no accuracy"]
-            if isinstance(family.domain, March)
-            else ["target = 1e-8                              # relative error of extrema over the turn"]
-        ),
-        "",
-        "# Search the best design between the swept ones, from this many of them:",
-        "# [optimise]",
-        "# starts = 12",
-        "",
-        "# What making it inaccurately does to the optimum:",
-        "# [tolerance]",
-        '# lengths = "0.02 mm"',
-    ]
-    reference = {} if drawn is None else {"reference": {"design": design_entries(family, drawn)}}
-    return "\n".join([*lines, "", toml(reference)] if reference else [*lines, ""])
+    return str(
+        rendered(
+            "first_study.toml.j2",
+            name=name,
+            family=family,
+            names=_names(family),
+            schema=schema,
+            mechanism=mechanism_line(family),
+            wanted=json.dumps(wanted),
+            design=design_lines(family, swept_names(family), drawn),
+            limits=limit_lines(family),
+            goal=next((w for w in wanted if w.startswith("max_abs_d2")), wanted[-1]),
+            march=isinstance(family.domain, March),
+            reference=drawn and toml({"reference": {"design": design_entries(family, drawn)}}),
+        )
+    )
 
 
 def smoke_text(family: Family) -> str:
     """Return the tiny version beside it."""
-    return "# The same question with few designs.\n[design]\n" + "".join(
-        f"{name} = {{ count = 2 }}\n" for name in swept_names(family)
+    tables = {"design": swept_names(family)}
+    if isinstance(family, Machine):
+        tables = {f"design.{m.name}": _swept_of(family, m.name) for m in family.members}
+    lines = [
+        x
+        for table, names in tables.items()
+        if names
+        for x in (f"[{table}]", *(f"{n} = {{ count = 2 }}" for n in names))
+    ]
+    return "\n".join(["# The same question with few designs.", *lines, ""])
+
+
+def _machine_text(name: str, machine: Machine, schema: str) -> str:
+    """Return the study of several mechanisms on one shaft, a dimension of two of them swept."""
+    wanted = {m.name: wanted_outputs(m.family)[-OF_EACH:] for m in machine.members}
+    members = {
+        m.name: {
+            "title": m.family.title,
+            "mechanism": mechanism_line(m.family),
+            "design": list(design_lines(m.family, _swept_of(machine, m.name))),
+            "limits": limit_lines(m.family),
+        }
+        for m in machine.members
+    }
+    last, relations = machine.members[-1].name, _relations(machine)
+    goal = next((w for w in wanted[last] if w.startswith("max_abs_d2")), wanted[last][-1])
+    text = rendered(
+        "first_machine.toml.j2",
+        name=name,
+        schema=schema,
+        members=members,
+        apart=APART,
+        relations=[line for line, _ in relations],
+        wanted=json.dumps(
+            [*(x for _, x in relations), *(f"{m}.{x}" for m, outputs in wanted.items() for x in outputs)]
+        ),
+        last_relation=relations[-1][1],
+        goal=f"{last}.{goal}",
     )
+    return f"{text}\n"
+
+
+def _swept_of(machine: Machine, member: str) -> list[str]:
+    """Return what is swept of a member: a dimension each of the first two."""
+    families = {m.name: m.family for m in machine.members[:2]}
+    return swept_names(families[member])[:1] if member in families else []
+
+
+def _relations(machine: Machine) -> list[tuple[str, str]]:
+    """Entries and the output of each: a distance where two neighbours have points, and their timing."""
+    found = []
+    for one, other in pairwise(machine.members):
+        points = [f"{m.name}.{m.points[-1]}" for m in (one, other) if m.points]
+        if len(points) == 2:
+            found.append((f"gap_{other.name} = {{ distance = {json.dumps(points)} }}", f"min_gap_{other.name}"))
+        places = json.dumps([f"{m.name}.{_place(m.family)}" for m in (one, other)])
+        found.append((f"lag_{other.name} = {{ timing = {places} }}", f"lag_{other.name}"))
+    return found
+
+
+def _place(family: Family) -> str:
+    """Crank angle at which the family's output is largest; of what turns on and on, its acceleration."""
+    turns = any(name.startswith("dwell_") for name in wanted_outputs(family))
+    return f"phi_max_abs_d2{family.position}" if turns else f"phi_max_{family.position}"
 
 
 def _names(family: Family) -> list[str]:
@@ -101,17 +135,13 @@ def _names(family: Family) -> list[str]:
 def mechanism_line(family: Family) -> str:
     """Return the family, or the families of a chain."""
     names = _names(family)
-    if len(names) == 1:
-        return f'family = "{names[0]}"'
-    return f"chain = [{', '.join(f'{name!r}' for name in names)}]".replace("'", '"')
+    return f'family = "{names[0]}"' if len(names) == 1 else f"chain = {json.dumps(names)}"
 
 
 def _example(family: Family) -> dict[str, float]:
-    """Return the examples of the stages under the names of the chain."""
-    stages = stages_of(family)
-    if not isinstance(family, Chain):
-        return dict(family.example)
-    return {f"{name}{stage.number}": value for stage in stages for name, value in stage.family.example.items()}
+    """Return the example, of a chain those of its stages under the names of the chain."""
+    own = {f"{name}{stage.number}": x for stage in stages_of(family) for name, x in stage.family.example.items()}
+    return own if isinstance(family, Chain) else dict(family.example)
 
 
 def wanted_outputs(family: Family) -> list[str]:
@@ -157,20 +187,13 @@ def design_lines(family: Family, swept: list[str], drawn: Mapping[str, float] | 
         else:
             entry = f"{p.name} = " + (f'"{shown:.6g} {unit}"' if unit else f"{shown:g}")
         left_out = p.name not in example
-        yield f"{'# ' if left_out else ''}{entry}".ljust(WIDTH) + f" # {_words(p)}"
+        yield f"{'# ' if left_out else ''}{entry}".ljust(WIDTH) + f" # {described(p, left_out=' if left out')}"
 
 
 def _scale(family: Family, example: Mapping[str, float]) -> float:
     """Return the power of ten by which the example, which is in any unit, becomes as large as a machine's."""
     longest = max((abs(example.get(p.name, 0.0)) for p in family.parameters if p.unit == "length"), default=0.0)
     return 10.0 ** max(0, math.ceil(math.log10(LEAST_SIZE / longest))) if longest else 1.0
-
-
-def _words(p: Parameter) -> str:
-    notes = [p.sign] if p.sign else []
-    notes += [p.choice] if p.choices else []
-    notes += [f"{p.default:g} if left out"] if p.default is not None else []
-    return p.text + (f" ({', '.join(notes)})" if notes else "")
 
 
 def limit_lines(family: Family) -> list[str]:

@@ -11,7 +11,6 @@ from typing import Any
 import click
 
 from sweep.cli.families import complete_families, family_names
-from sweep.cli.first_machine import machine_smoke_text, machine_text
 from sweep.cli.first_study import smoke_text, study_text
 from sweep.errors import InputError, StoreError
 from sweep.exchange.points import drawn
@@ -87,13 +86,9 @@ def init(
     folder = into / name
     shared = _shared_schema(into)
     seen = _seen_from(folder, shared)
-    if machine is not None:
-        files = {"study.toml": machine_text(name, machine, seen), "smoke.toml": machine_smoke_text(machine)}
-    else:
-        assert family is not None
-        mechanism = find_family(family_names(family))
-        design = None if points is None else drawn(family, points, unit=unit).parameters
-        files = {"study.toml": study_text(name, mechanism, seen, design), "smoke.toml": smoke_text(mechanism)}
+    mechanism = machine or find_family(family_names(family or ""))
+    design = None if points is None or family is None else drawn(family, points, unit=unit).parameters
+    files = {"study.toml": study_text(name, mechanism, seen, design), "smoke.toml": smoke_text(mechanism)}
     if shared is None:
         files[SCHEMA] = _current_schema()
     _write(folder, files)
@@ -146,20 +141,16 @@ def schema_text(found: dict[str, Any]) -> str:
     """Return a schema as it stands in a file: a line for each table, each family and each definition."""
     parts = []
     for key, value in found.items():
-        opening, closing = ("[", "]") if isinstance(value, list) else ("{", "}")
+        lines = json.dumps(value, ensure_ascii=False)
         if isinstance(value, dict):
-            inner = [f"{json.dumps(name)}: {_line(entry)}" for name, entry in value.items()]
+            lines = ",\n  ".join(
+                f"{json.dumps(name)}: {json.dumps(x, ensure_ascii=False)}" for name, x in value.items()
+            )
+            lines = f"{{\n  {lines}\n }}"
         elif isinstance(value, list):
-            inner = [_line(entry) for entry in value]
-        else:
-            parts.append(f"{json.dumps(key)}: {_line(value)}")
-            continue
-        parts.append(f"{json.dumps(key)}: {opening}\n  " + ",\n  ".join(inner) + f"\n {closing}")
+            lines = "[\n  " + ",\n  ".join(json.dumps(x, ensure_ascii=False) for x in value) + "\n ]"
+        parts.append(f"{json.dumps(key)}: {lines}")
     return "{\n " + ",\n ".join(parts) + "\n}\n"
-
-
-def _line(value: object) -> str:
-    return json.dumps(value, ensure_ascii=False)
 
 
 def _current_schema() -> str:

@@ -31,10 +31,10 @@ WORDS = "sweep: interrupted at work that cannot be stopped half way; what was fi
 
 # Where each verb is, and what the list of verbs says of it.
 VERBS = {
-    "cache": ("cache:cache", "Manage the compiled kernels that are kept on disk."),
+    "cache": ("kernels:cache", "Manage the compiled kernels that are kept on disk."),
     "check": ("plan:check", "Validate a study and print what running it would compute and cost."),
-    "compare": ("verify:compare", "Say what moved between two datasets of one study: values, rows, time."),
-    "draw": ("draw:draw", "Draw one picture."),
+    "compare": ("datasets:compare", "Say what moved between two datasets of one study: values, rows, time."),
+    "draw": ("report:draw", "Draw one picture."),
     "effects": ("effects:effects", "List the effects a scene can call for, or explain one."),
     "eval": ("tables:evaluate_table", "Compute pose outputs of the designs in TABLE, one row per pose."),
     "explore": (
@@ -44,18 +44,18 @@ VERBS = {
     "export": ("points:export", "Write one design of a dataset to a file that other programs read."),
     "families": ("families:families", "List the mechanism families, or the parameters and outputs of one."),
     "init": ("init:init", "Write a first study of a mechanism or a machine."),
-    "merge": ("parts:merge", "Bring the finished chunks of all parts of a study together."),
+    "merge": ("datasets:merge", "Bring the finished chunks of all parts of a study together."),
     "nightly": ("nightly:nightly", "Compute all STUDIES into a dated folder, and say what changed."),
     "points": ("points:points", "Find the dimensions of FAMILY from the points of a drawing."),
     "report": ("report:report", "Write report.html, figures and tables about a dataset."),
     "run": ("run:run", "Run or resume a study."),
     "schema": ("init:schema", "Write the JSON schema of study files, by which editors complete and check them."),
-    "split": ("parts:split", "Cut a study into parts that separate jobs compute."),
+    "split": ("datasets:split", "Cut a study into parts that separate jobs compute."),
     "summarise": ("tables:summarise_table", "Compute design outputs of the designs in TABLE, one row per design."),
-    "task": ("task:task", "Answer the [task] table of FILE: mechanisms, the best first."),
-    "verify": ("verify:verify", "Check a dataset: every byte against its hash, every row against the plan."),
+    "task": ("points:task", "Answer the [task] table of FILE: mechanisms, the best first."),
+    "verify": ("datasets:verify", "Check a dataset: every byte against its hash, every row against the plan."),
     "warm": (
-        "warm:warm",
+        "kernels:warm",
         "Compile what studies or families need, before they are run: for images, clusters and nights.",
     ),
 }

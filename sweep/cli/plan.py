@@ -69,48 +69,45 @@ def plan_lines(study: Study, cost: Estimate, others: Sequence[tuple[str, float]]
     others : what other accuracies would take [s], in words
     sent : the pilot that was sent for both
     """
-    lines = [f"{study.name}: {study.title}" if study.title else study.name]
-    lines += _mechanism(study.family)
+    kind = "every combination" if study.space.kind == "product" else "Sobol sample"
+    large = without_minus(study.objective.output) if study.objective is not None else None
+    costs = [
+        ("chunks", f"{cost.chunks} of {min(cost.chunk_size, cost.designs)} designs"),
+        ("rows kept", f"{_kept(cost)} ({study.output.keep}, {study.output.dtype})"),
+        ("memory", size(cost.memory_bytes)),
+        ("disk", f"{size(cost.disk_bytes)}, allowed {size(study.budget.disk_bytes)}"),
+        ("time", f"{duration(cost.seconds)} with {cost.jobs} workers, allowed {duration(study.budget.seconds)}"),
+        *((words, f"{duration(seconds)}, {_times(seconds / cost.seconds)}") for words, seconds in others),
+    ]
+    lines = [f"{study.name}: {study.title}" if study.title else study.name, *_mechanism(study.family)]
     if study.speed is not None:
         lines += [f"speed {study.speed * 30.0 / math.pi:g} rpm ({study.speed:.6g} rad/s)"]
-    kind = "every combination" if study.space.kind == "product" else "Sobol sample"
     lines += ["", f"{study.space.count} designs, {kind} of" if study.space.axes else "1 design, nothing is swept"]
     lines += aligned([(axis.name, _axis(axis)) for axis in study.space.axes])
-
-    lines += _computed(study)
-    lines += _before_and_between(study)
-    lines += _effects(study, sent)
-    lines += _left_out(study)
+    lines += [*_computed(study), *_before_and_between(study), *_effects(study, sent), *_left_out(study)]
     if study.objective is not None:
-        large = without_minus(study.objective.output)
         lines += ["", f"to be made large: {large}" if large else f"to be made small: {study.objective.output}"]
-    if study.optimise is not None:
-        from sweep.optimise.multistart.survey import MET, wanted
+    lines += [*_optimiser(study), *_proof(study), *_front(study)]
+    return [*lines, "", "estimated cost, without the first compilation of the kernels", *aligned(costs)]
 
-        settings = study.optimise
-        brake = "" if settings.time_budget is None else f"; emergency brake after {duration(settings.time_budget)}"
-        populations = settings.globally != "none"
-        share = 100.0 * wanted(settings, populations)
-        unlikely = f"better optima are unlikely (under {share:g} %) and " if share < 100.0 else ""
-        rule = f"fewer once {unlikely}the best was found {MET} times"
-        most = f"at most {settings.starts} starts of {settings.looks} looks"
-        if populations:
-            most = f"{settings.starts} starts of {settings.looks} looks from at most {settings.populations} populations"
-        lines += [f"optimiser: {most}, {rule}{brake}"]
-    lines += _proof(study)
-    lines += _front(study)
-    lines += ["", "estimated cost, without the first compilation of the kernels"]
-    lines += aligned(
-        [
-            ("chunks", f"{cost.chunks} of {min(cost.chunk_size, cost.designs)} designs"),
-            ("rows kept", f"{_kept(cost)} ({study.output.keep}, {study.output.dtype})"),
-            ("memory", size(cost.memory_bytes)),
-            ("disk", f"{size(cost.disk_bytes)}, allowed {size(study.budget.disk_bytes)}"),
-            ("time", f"{duration(cost.seconds)} with {cost.jobs} workers, allowed {duration(study.budget.seconds)}"),
-            *((words, f"{duration(seconds)}, {_times(seconds / cost.seconds)}") for words, seconds in others),
-        ]
-    )
-    return lines
+
+def _optimiser(study: Study) -> list[str]:
+    """Return how many starts are searched at most, and what ends the search earlier."""
+    if study.optimise is None:
+        return []
+    from sweep.optimise.multistart.survey import MET, wanted
+
+    settings, populations = study.optimise, study.optimise.globally != "none"
+    share = 100.0 * wanted(settings, populations)
+    unlikely = f"better optima are unlikely (under {share:g} %) and " if share < 100.0 else ""
+    most = f"at most {settings.starts} starts of {settings.looks} looks"
+    if populations:
+        most = f"{settings.starts} starts of {settings.looks} looks from at most {settings.populations} populations"
+    return [f"optimiser: {most}, fewer once {unlikely}the best was found {MET} times{_brake(settings.time_budget)}"]
+
+
+def _brake(seconds: float | None) -> str:
+    return "" if seconds is None else f"; emergency brake after {duration(seconds)}"
 
 
 def _searches(cost: Estimate, found: Sequence[tuple[str, float, float]]) -> list[str]:
@@ -145,19 +142,12 @@ def _computed(study: Study) -> list[str]:
         limit.output: bound_words(limit, quantity(limit.output, output(study.family, limit.output).unit))
         for limit in study.output_limits
     }
-    found = ordered_routes(study)
+    found, rows = ordered_routes(study), list[tuple[str, str, str]]()
     lines = ["", f"will be computed, {_accuracy(study)}; only designs within the limits so far go on to the next line"]
-    lines += aligned(
-        [
-            (
-                f"{k}. {route.name}",
-                f"{duration(1e-9 * route.ns_per_design)} per design",
-                ", ".join(name + (f" ({limits[name]})" if name in limits else "") for name in route.outputs),
-            )
-            for k, route in enumerate(found, 1)
-        ]
-    )
-    return lines
+    for k, route in enumerate(found, 1):
+        outputs = ", ".join(name + (f" ({limits[name]})" if name in limits else "") for name in route.outputs)
+        rows.append((f"{k}. {route.name}", f"{duration(1e-9 * route.ns_per_design)} per design", outputs))
+    return [*lines, *aligned(rows)]
 
 
 def _before_and_between(study: Study) -> list[str]:
@@ -196,11 +186,9 @@ def _front(study: Study) -> list[str]:
     shown = quantity(name, output(study.family, name).unit)
     ends = f"{number(min(bounds) * shown.factor)} to {shown.show(max(bounds))}"
     side = "at least" if study.pareto.at_least else "at most"
-    budget = study.pareto.time_budget
-    time = "" if budget is None else f"; emergency brake after {duration(budget)}"
     return [
         f"front: the same with {name} {side} {ends}, {len(bounds)} bounds; "
-        f"up to {searches(study.pareto)} searches besides those of the optimiser{time}"
+        f"up to {searches(study.pareto)} searches besides those of the optimiser{_brake(study.pareto.time_budget)}"
     ]
 
 
@@ -211,12 +199,11 @@ def _proof(study: Study) -> list[str]:
     from sweep.proof.question import question_of
 
     asked, question = study.optimise.prove, question_of(study)
-    brake = "" if asked.seconds is None else f"; emergency brake after {duration(asked.seconds)}"
     unused = f"; no use is made of the limits on {', '.join(question.left_out)}" if question.left_out else ""
     return [
         f"proof: that no design is better than the optimum by more than {100.0 * asked.gap:g} %, over "
         f"{', '.join(question.names)}; at most {asked.boxes} boxes, "
-        f"{duration(asked.boxes * SECONDS_PER_BOX)} of processor time{brake}{unused}"
+        f"{duration(asked.boxes * SECONDS_PER_BOX)} of processor time{_brake(asked.seconds)}{unused}"
     ]
 
 
@@ -243,13 +230,8 @@ def _effects(study: Study, sent: Pilot) -> list[str]:
     if rods:
         lines += ["", "bodies without centre and inertia are slender rods between their joints", f"  {', '.join(rods)}"]
     found = findings(bare, study.family, looked_at, study.want)
-    if found:
-        lines += [
-            "",
-            f"what matters here, {which}; the choice is yours",
-        ]
-        lines += [f"  {finding.words}" for finding in found]
-    return lines
+    told = ["", f"what matters here, {which}; the choice is yours", *(f"  {finding.words}" for finding in found)]
+    return lines + (told if found else [])
 
 
 def _axis(axis: Axis) -> str:

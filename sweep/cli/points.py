@@ -1,4 +1,4 @@
-"""The verbs that take points in and pass designs on: points, export."""
+"""The verbs that make designs of points and tasks, and pass them on: points, export, task."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ import pandas as pd
 from sweep.cli.families import complete_families
 from sweep.cli.options import DESIGN, FOLDER
 from sweep.cli.tables import checked_format, write_table
-from sweep.dataset.store import beside, located
+from sweep.dataset.files import beside, located
 from sweep.evaluation.angles import grid_in_radians
 from sweep.exchange.export import FORMATS
 from sweep.exchange.export import export as write
@@ -19,7 +19,9 @@ from sweep.families import family as find_family
 from sweep.plot.sheet import write_sheet
 from sweep.report.dataset import chosen
 from sweep.report.workbook import write_workbook
+from sweep.study.task import load_task
 from sweep.study.written import design_entries, toml
+from sweep.synthesis.tasks import solve
 
 OF_DATASETS = ("xlsx", "pdf", "svg", "dxf")  # what takes more than a design: its study
 FILE = click.argument("file", type=click.Path(exists=True, dir_okay=False, path_type=Path))
@@ -98,3 +100,28 @@ def _place(folder: Path, name: str) -> Path:
     place = beside(located(folder)) / "export"
     place.mkdir(exist_ok=True)
     return place / name
+
+
+NOTHING = 4  # as of `sweep run`: no design within the limits
+
+
+@click.command()
+@click.argument("file", type=click.Path(path_type=Path))
+@click.option("--candidates", default=4096, show_default=True, type=click.IntRange(min=16), help="Points tried first.")
+@click.option(
+    "--starts", default=6, show_default=True, type=click.IntRange(min=1), help="Of them, how many are refined."
+)
+@click.option("--seed", default=0, show_default=True, type=click.IntRange(min=0), help="Of the points.")
+@click.option("--out", type=click.Path(path_type=Path), help="The mechanisms as a table: .csv or .parquet.")
+def task(file: Path, candidates: int, starts: int, seed: int, out: Path | None) -> None:
+    """Answer the [task] table of FILE (docs/tasks.md): mechanisms, the best first, lengths in mm, angles in rad."""
+    solutions = solve(load_task(file), candidates=candidates, starts=starts, seed=seed)
+    for solution in solutions:
+        click.echo(str(solution))
+    if not solutions:
+        click.echo("no candidate was a mechanism at all")
+    if out is not None:
+        rows = [s.mechanism | {"objective": s.objective, "feasible": s.feasible} for s in solutions]
+        write_table(pd.DataFrame(rows), out)
+    if not any(s.feasible for s in solutions):
+        raise click.exceptions.Exit(NOTHING)

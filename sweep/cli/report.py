@@ -1,14 +1,22 @@
-"""The verb ``report``."""
+"""The verbs that show a dataset or a design: report and draw."""
 
 from __future__ import annotations
 
 from pathlib import Path
+from typing import Any, TypedDict, Unpack
 
 import click
 
-from sweep.cli.options import FOLDER
+import sweep.plot as plot
+from sweep.cli.families import family_names
+from sweep.cli.options import ANGLES, FOLDER
+from sweep.cli.tables import read_table
 from sweep.dataset.files import beside, located
+from sweep.errors import InputError
+from sweep.evaluation.angles import AngleUnit, grid_in_radians
+from sweep.evaluation.cyclogram import cyclogram, table_in_degrees
 from sweep.jobs.progress import Phases
+from sweep.report.dataset import chosen
 from sweep.report.judged import write_comparison
 from sweep.report.page import write_report
 
@@ -33,3 +41,100 @@ def report(folder: Path, others: tuple[Path, ...], out: Path | None) -> None:
     with Phases(show=True) as phases:
         written = write_report(folder, out, phases.say)
     click.echo(f"report: {written}")
+
+
+OF_DATASETS = ("map", "front", "tolerance", "sensitivity")
+OF_DESIGNS = ("motion", "mechanism", "polar_load", "cyclogram")
+ENDINGS = (".svg", ".png", ".pdf")
+
+
+class Options(TypedDict):
+    """Options of the pictures, each of them of some."""
+
+    design: str | None
+    row: int
+    want: str | None
+    phi: float
+    view: str | None
+    positions: int
+    output: str | None
+    angles: AngleUnit | None
+
+
+@click.command()
+@click.argument("what", type=click.Choice([*OF_DESIGNS, *OF_DATASETS]))
+@click.argument("source")
+@click.argument("table", required=False, type=click.Path(exists=True, dir_okay=False, path_type=Path))
+@click.option(
+    "--out",
+    required=True,
+    type=click.Path(dir_okay=False, path_type=Path),
+    help="A .svg, .png or .pdf file; of cyclogram also a .csv table.",
+)
+@click.option("--design", help="Of a dataset: optimum, reference, best, or the number of a row.")
+@click.option("--row", type=click.IntRange(min=0), default=0, show_default=True, help="Of TABLE.")
+@click.option("--want", help="Of motion: outputs, separated by commas.")
+@click.option("--phi", type=float, default=0.0, show_default=True, help="Of mechanism: crank angle [rad].")
+@ANGLES
+@click.option("--view", help="Of mechanism: space, xy, zy or xz.")
+@click.option(
+    "--positions", type=click.IntRange(min=1), default=1, show_default=True, help="Of mechanism, over its turn."
+)
+@click.option("--output", help="Of tolerance: the output whose histogram is drawn; all in percent if left out.")
+def draw(what: str, source: str, table: Path | None, out: Path, **options: Unpack[Options]) -> None:
+    """Draw one picture.
+
+    SOURCE is a FOLDER that `sweep run` left behind, or FAMILY with a TABLE of designs (.parquet or .csv, angles in rad
+    unless --angles or a header such as `alpha [deg]` says otherwise), of which --row is drawn.  map, front, tolerance
+    and sensitivity are pictures of a folder; motion, mechanism, polar_load and cyclogram of one design.
+    """
+    if what == "cyclogram" and out.suffix.lower() == ".csv":
+        _table(source, table, out, options)
+        return
+    if out.suffix.lower() not in ENDINGS:
+        raise InputError("--out", str(out), f"a file name ending in {' or '.join(ENDINGS)}", "command line")
+    if what in OF_DATASETS:
+        if table is not None or not Path(source).is_dir():
+            raise InputError("SOURCE", source, f"a dataset folder for {what}", "command line")
+        drawn: Any = getattr(plot, what)(source, **({"output": options["output"]} if what == "tolerance" else {}))
+    else:
+        drawn = _of_one(what, source, table, options)
+    axes = drawn if what in ("front", "tolerance", "sensitivity", "polar_load", "cyclogram") else drawn[0]
+    out.parent.mkdir(parents=True, exist_ok=True)
+    axes.figure.savefig(out)
+    click.echo(f"{what}: {out}")
+
+
+def _table(source: str, table: Path | None, out: Path, options: Options) -> None:
+    """Write the cyclogram of one design as a table."""
+    mechanism, design = _design(source, table, options["design"], options["row"])
+    rows = cyclogram(mechanism, design, angles="rad" if table is None else options["angles"])
+    out.parent.mkdir(parents=True, exist_ok=True)
+    table_in_degrees(rows).to_csv(out, index=False, float_format="%.4f")
+    click.echo(f"cyclogram: {out}")
+
+
+def _of_one(what: str, source: str, table: Path | None, options: Options) -> Any:
+    """Draw one design, out of a folder or of a family and a table."""
+    mechanism, design = _design(source, table, options["design"], options["row"])
+    known: dict[str, dict[str, Any]] = {
+        "motion": {"want": options["want"]},
+        "mechanism": {"phi": options["phi"], "view": options["view"], "positions": options["positions"]},
+    }
+    if table is None:
+        grid_in_radians("phi", "rad", options["phi"], None)  # a design out of a folder is in rad, --phi may not be
+    unit: AngleUnit | None = "rad" if table is None else options["angles"]
+    return getattr(plot, what)(mechanism, design, angles=unit, **known.get(what, {}))
+
+
+def _design(source: str, table: Path | None, design: str | None, row: int) -> tuple[Any, dict[str, Any]]:
+    """Mechanism and design out of a folder, or a family's name and a row of a table."""
+    if table is None:
+        if not Path(source).is_dir():
+            raise InputError("SOURCE", source, "a dataset folder, or a family with a table of designs", "command line")
+        found = chosen(source, design)
+        return found.family, found.design
+    designs = read_table(table)
+    if row >= len(designs):
+        raise InputError("--row", row, f"a row from 0 to {len(designs) - 1}", str(table))
+    return family_names(source), {str(name): designs[name].iloc[row] for name in designs}

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import io
-from collections.abc import Iterator
+import math
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -11,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from sweep.dataset import store
+from sweep.dataset import chunk_files, files
 from sweep.dataset.files import check_tables
 from sweep.errors import InputError, StoreError
 from sweep.families.names import is_error
@@ -104,12 +105,16 @@ class Comparison:
     def lines(self) -> list[str]:
         """Return the findings in words."""
         found = [*self.notes, f"{self.rows} rows in both"]
-        for count, words in ((self.only_old, "only in the old"), (self.only_new, "only in the new")):
-            found += [f"{count} rows {words} dataset"] if count else []
-        for names, words in ((self.columns_only_old, "old"), (self.columns_only_new, "new")):
-            found += [f"columns only in the {words} dataset: {', '.join(names)}"] if names else []
-        found += [f"{self.status_changed} rows with another status"] if self.status_changed else []
-        found += [f"the first of these rows: designs {', '.join(map(str, self.designs))}"] if self.designs else []
+        old, new = ", ".join(self.columns_only_old), ", ".join(self.columns_only_new)
+        told = {
+            f"{self.only_old} rows only in the old dataset": self.only_old,
+            f"{self.only_new} rows only in the new dataset": self.only_new,
+            f"columns only in the old dataset: {old}": old,
+            f"columns only in the new dataset: {new}": new,
+            f"{self.status_changed} rows with another status": self.status_changed,
+            f"the first of these rows: designs {', '.join(map(str, self.designs))}": self.designs,
+        }
+        found += [words for words, there in told.items() if there]
         for column in self.moved.values():
             if column.changed:
                 found.append(
@@ -121,9 +126,9 @@ class Comparison:
         if not (self.values_changed or self.rows_changed):
             found.append("no value changed")
         if self.seconds is not None:
-            old, new = self.seconds
+            before, now = self.seconds
             verdict = f", more than {self.slower:g} times as long" if self.is_slower else ""
-            found.append(f"time {old:.3g} s before, {new:.3g} s now{verdict}")
+            found.append(f"time {before:.3g} s before, {now:.3g} s now{verdict}")
         return found
 
 
@@ -168,58 +173,53 @@ def compare(old: str | Path, new: str | Path, rtol: float = 0.0, slower: float =
         raise InputError("rtol", rtol, "a relative change from 0", "compare")
     if not slower >= 1.0:
         raise InputError("slower", slower, "a factor from 1", "compare")
-    folders = store.located(old), store.located(new)
-    sides = _Rows(folders[0]), _Rows(folders[1])
+    folders = files.located(old), files.located(new)
+    chunks = [_chunks(folder) for folder in folders]
+    names = [_columns(own) for own in chunks]
     result = Comparison(slower=slower, notes=_notes(*folders), seconds=_seconds(*folders))
-    names = [side.columns for side in sides]
     result.columns_only_old = tuple(name for name in names[0] if name not in names[1])
     result.columns_only_new = tuple(name for name in names[1] if name not in names[0])
     shared = [name for name in names[0] if name in names[1] and name not in ("design", "status")]
     result.moved = {name: Moved(name) for name in shared}
-    for stop in sides[0].stops:
-        _look(result, sides[0].until(stop), sides[1].until(stop), rtol)
-    _look(result, sides[0].until(None), sides[1].until(None), rtol)
+    stops = [*(chunk_files.about(part)["stop"] for part in chunks[0]), math.inf]
+    sides = [_pieces(own, columns, stops) for own, columns in zip(chunks, names, strict=True)]
+    for before, after in zip(*sides, strict=True):
+        _look(result, before, after, rtol)
     _compare_optima(result, *folders, rtol)
     return result
 
 
-class _Rows:
-    """The rows of a dataset in design order, a chunk at a time."""
+def _chunks(folder: Path) -> list[chunk_files.Part]:
+    found = chunk_files.parts(folder) if folder.is_dir() else []
+    if not found:
+        raise InputError("folder", str(folder), "a folder with part-*.parquet written by sweep run", "compare")
+    return found
 
-    def __init__(self, folder: Path) -> None:
-        import pyarrow.parquet as pq
 
-        chunks = store.parts(folder) if folder.is_dir() else []
-        if not chunks:
-            raise InputError("folder", str(folder), "a folder with part-*.parquet written by sweep run", "compare")
-        self.folder = folder
-        self.stops = [store.about(part)["stop"] for part in chunks]
-        store.check_columns(chunks)
-        names = pq.read_schema(io.BytesIO(chunks[0].read())).names
-        self.columns = [name for name in names if not is_error(name)]
-        self._chunks: Iterator[tuple[int, store.Part]] = iter(zip(self.stops, chunks, strict=True))
-        self._rows: pd.DataFrame | None = None
-        self._reached = 0
+def _columns(chunks: Sequence[chunk_files.Part]) -> list[str]:
+    import pyarrow.parquet as pq
 
-    def until(self, stop: int | None) -> pd.DataFrame:
-        """Return the next rows, up to a design; all that are left without one."""
-        import pandas as pd
+    for part in chunks:
+        chunk_files.about(part)
+    chunk_files.check_columns(chunks)
+    return [name for name in pq.read_schema(io.BytesIO(chunks[0].read())).names if not is_error(name)]
 
-        pieces = [] if self._rows is None else [self._rows]
-        while stop is None or self._reached < stop:
-            following = next(self._chunks, None)
-            if following is None:
-                break
-            self._reached, part = following
-            pieces.append(part.rows(self.columns))
-        if not pieces:
-            return pd.DataFrame({name: [] for name in self.columns})
-        rows = pd.concat(pieces, ignore_index=True)
+
+def _pieces(chunks: Iterable[chunk_files.Part], columns: list[str], stops: Iterable[float]) -> Iterator[pd.DataFrame]:
+    """Yield the rows of a dataset in design order, up to one stop after the other; a chunk at a time is in memory."""
+    import pandas as pd
+
+    rows, reached, following = pd.DataFrame({name: [] for name in columns}), 0, iter(chunks)
+    for stop in stops:
+        while reached < stop and (part := next(following, None)) is not None:
+            reached, more = chunk_files.about(part)["stop"], part.rows(columns)
+            rows = pd.concat([rows, more], ignore_index=True) if len(rows) else more
         if np.any(np.diff(rows["design"].to_numpy()) <= 0):
-            raise StoreError(f"{self.folder}: designs are not in their order, or there twice; see sweep verify")
-        now = rows["design"] < (np.inf if stop is None else stop)
-        self._rows = rows[~now]
-        return rows[now]
+            where = next(iter(chunks)).path.parent
+            raise StoreError(f"{where}: designs are not in their order, or there twice; see sweep verify")
+        now = rows["design"] < stop
+        yield rows[now]
+        rows = rows[~now]
 
 
 def _look(result: Comparison, old: pd.DataFrame, new: pd.DataFrame, rtol: float) -> None:
@@ -238,30 +238,28 @@ def _look(result: Comparison, old: pd.DataFrame, new: pd.DataFrame, rtol: float)
 
 
 def _compare_optima(result: Comparison, old: Path, new: Path, rtol: float) -> None:
-    paths = [store.beside(folder) / store.OPTIMUM for folder in (old, new)]
+    paths = [files.beside(folder) / files.OPTIMUM for folder in (old, new)]
     if not all(path.is_file() for path in paths):
         return
     for folder in (old, new):
-        check_tables(folder, [store.OPTIMUM])
-    tables = [store.read_table(path).drop_duplicates("role").set_index("role") for path in paths]
-    shared = tuple(result.moved)
+        check_tables(folder, [files.OPTIMUM])
+    tables = [files.read_table(path).drop_duplicates("role").set_index("role") for path in paths]
     for role in ROLES:
         if not all(role in table.index for table in tables):
             continue
-        for name in shared:
-            if all(name in table.columns for table in tables):
-                before, after = (np.array([table.loc[role, name]], np.float64) for table in tables)
-                key = f"{name} of the {role}"
-                result.moved[key] = moved = Moved(key, kind="")
-                moved.look(before, after, np.array([role]), rtol)
+        for name in [name for name in result.moved if all(name in table.columns for table in tables)]:
+            before, after = (np.array([table.loc[role, name]], np.float64) for table in tables)
+            moved = Moved(f"{name} of the {role}", kind="")
+            result.moved[moved.name] = moved
+            moved.look(before, after, np.array([role]), rtol)
 
 
 def _notes(old: Path, new: Path) -> tuple[str, ...]:
-    plans = [store.trusted_plan(folder) or {} for folder in (old, new)]
+    plans = [files.trusted_plan(folder) or {} for folder in (old, new)]
     notes = [
         f"{folder}: not complete"
         for folder, plan in zip((old, new), plans, strict=True)
-        if not plan.get("complete") or store.missing_chunks(folder, store.parts(folder))
+        if not plan.get("complete") or chunk_files.missing_chunks(folder, chunk_files.parts(folder))
     ]
     if plans[0].get("study") != plans[1].get("study"):
         notes.append("the studies differ in what determines the values")
@@ -274,7 +272,7 @@ def _seconds(old: Path, new: Path) -> tuple[float, float] | None:
     """Return the time of all runs into each folder [s], if both came to their end."""
     times = []
     for folder in (old, new):
-        ends = [line for line in store.read_runs(folder) if line.get("event") == "end"]
+        ends = [line for line in files.read_runs(folder) if line.get("event") == "end"]
         if not ends or ends[-1].get("outcome") != "complete":
             return None
         seconds = [line.get("seconds", 0.0) for line in ends]

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from sweep.dataset import store
+from sweep.dataset import chunk_files, files
 from sweep.errors import InputError, StoreError, nearest
 from sweep.quantities.limits import compared
 
@@ -57,16 +57,16 @@ def scan(folder: str | Path) -> ds.Dataset:
     """
     import pyarrow.dataset as ds
 
-    place = store.located(folder)
-    chunks = store.parts(place) if place.is_dir() else []
+    place = files.located(folder)
+    chunks = chunk_files.parts(place) if place.is_dir() else []
     if not chunks:
         raise InputError("folder", str(folder), "a folder with part-*.parquet written by sweep run", "scan")
     for one, other in pairwise(chunks):
         if one.identity != other.identity or one.index == other.index:
             raise StoreError(f"{place}: {one.path.name} and {other.path.name} are not chunks of one table")
     for part in chunks:
-        store.about(part)
-    store.check_columns(chunks)
+        chunk_files.about(part)
+    chunk_files.check_columns(chunks)
     return ds.dataset([str(part.path) for part in chunks], format="parquet")
 
 

@@ -3,18 +3,24 @@
 from __future__ import annotations
 
 import io
+import math
 from collections import Counter
-from collections.abc import Iterable
+from collections.abc import Mapping
+from contextlib import suppress
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
+
 from sweep.chunks import plan as plans
 from sweep.chunks.chunk import compute_chunk
-from sweep.dataset import store
+from sweep.chunks.parameters import parameter_matrix
+from sweep.dataset import chunk_files, files, store
 from sweep.dataset.files import TABLES, altered
-from sweep.dataset.rowcheck import row_faults, spread, unequal
 from sweep.errors import InputError, LinksweepError, StoreError
+from sweep.families.base import Columns
+from sweep.families.names import is_error
 from sweep.study import Study
 from sweep.study.load import study_from_data
 
@@ -23,11 +29,14 @@ if TYPE_CHECKING:
 
 # What `sweep verify` ends with: chunks or the optimum are missing; something is damaged or wrong.
 INCOMPLETE, DAMAGED = 11, 74
+# What plan and chunks both say.
+SHARED = ("format", "study", "code", "designs", "chunks", "name")
+GOLDEN = (math.sqrt(5.0) - 1.0) / 2.0
 DEFAULT_DESIGNS = 32
 
 ANEW = "the next run moves it to _bad/ and computes it anew"
 UNSEEN = "a run takes it as finished; move it away, then the next run computes it anew"
-SIDE_FILES = (store.OPTIMUM, store.CURVES, store.SENSITIVITY, store.TOLERANCE, store.PARETO, store.PROOF)
+SIDE_FILES = (files.OPTIMUM, files.CURVES, files.SENSITIVITY, files.TOLERANCE, files.PARETO, files.PROOF)
 
 
 @dataclass(frozen=True)
@@ -58,6 +67,10 @@ class Verification:
     findings: list[Finding] = field(default_factory=list)
     notes: list[str] = field(default_factory=list)
 
+    def add(self, path: Path, words: str, remedy: str, damage: bool = True) -> None:
+        """Note something that is not as it should be."""
+        self.findings.append(Finding(path, words, remedy, damage))
+
     @property
     def exit_code(self) -> int:
         """74 if something is damaged or wrong, else 11 if something is missing, else 0."""
@@ -70,9 +83,9 @@ class Verification:
         words = [f"{self.chunks} whole chunks, {self.rows} rows, {self.size} bytes read"]
         words += [f"{self.recomputed} designs computed again"] if self.recomputed else []
         damaged = sum(finding.damage for finding in self.findings)
-        verdict = "complete and undamaged"
-        if self.findings:
-            verdict = f"{damaged} damaged, {len(self.findings) - damaged} missing"
+        verdict = (
+            f"{damaged} damaged, {len(self.findings) - damaged} missing" if self.findings else "complete and undamaged"
+        )
         words += [*self.notes, *map(str, self.findings), f"{self.folder}: {verdict}"]
         # The name of a file may be anything; bytes that are no letters are shown as such.
         return [line.encode("utf-8", "backslashreplace").decode() for line in words]
@@ -113,155 +126,224 @@ def verify(folder: str | Path, designs: int = DEFAULT_DESIGNS) -> Verification:
     """
     if isinstance(designs, bool) or not isinstance(designs, int) or designs < 0:
         raise InputError("designs", designs, "a whole number from 0", "verify")
-    place = store.located(folder)
-    plan = store.read_plan(place)
-    chunks, strangers = store.listing(place)
+    place = files.located(folder)
+    plan = files.read_plan(place)
+    chunks, strangers = chunk_files.listing(place)
     if plan is None and not chunks and not strangers:
         raise InputError("folder", str(folder), "a dataset that sweep run wrote", "verify")
     found = Verification(place)
-    words = "no chunk, but every reader of the folder takes it for one"
-    found.findings += [Finding(path, words, "the next run refuses it; move it away") for path in strangers]
-    about = plan or _about_without_plan(chunks)
-    study = None if plan is None else _study(found, plan, place)
+    for path in strangers:
+        words = "no chunk, but every reader of the folder takes it for one"
+        found.add(path, words, "the next run refuses it; move it away")
+    about = plan or {}
+    for part in chunks if plan is None else ():  # then the first readable chunk tells of the study
+        with suppress(StoreError):
+            about = about or chunk_files.about(part)
+    study = None if plan is None else _study(found, plan)
     if plan is None:
         # Chunks keep the study's tables, not the order of the axes in them.
         found.notes.append("without the plan, parameters are not checked and no design is computed again")
-        path = store.beside(place) / store.PLAN
-        found.findings.append(Finding(path, "not there, or damaged", "the next run writes it and keeps the chunks"))
+        found.add(
+            files.beside(place) / files.PLAN, "not there, or damaged", "the next run writes it and keeps the chunks"
+        )
     whole = _whole_chunks(found, chunks, about, study)
-    _missing(found, place, plan, about, whole)
-    _totals(found, place, plan, whole)
-    _side_files(found, place, plan or {})
+    _missing(found, plan or {}, about.get("chunks", 0), whole)
+    _side_files(found, plan or {})
     if study is not None and designs and whole:
         _recompute(found, study, about, whole, designs)
     return found
 
 
-def _about_without_plan(chunks: Iterable[store.Part]) -> dict[str, Any]:
-    """Return what the first readable chunk says of the study."""
-    for part in chunks:
-        try:
-            about = store.about(part)
-        except StoreError:
-            continue
-        return about
-    return {}
-
-
-def _study(found: Verification, plan: dict[str, Any], place: Path) -> Study | None:
+def _study(found: Verification, plan: dict[str, Any]) -> Study | None:
     """Return the study the dataset answers; None, with a note, if this version does not understand it."""
     data = plan.get("data") or plan["chunk_data"]
     try:
         title = plan.get("about") or {"name": plan["name"]}
-        return study_from_data({**data, "study": title}, store.beside(place) / store.PLAN)
+        return study_from_data({**data, "study": title}, files.beside(found.folder) / files.PLAN)
     except LinksweepError as error:
         found.notes.append(f"the study cannot be read by this version, so parameters are not checked: {error}")
         return None
 
 
 def _whole_chunks(
-    found: Verification, chunks: list[store.Part], about: dict[str, Any], study: Study | None
-) -> dict[int, store.Part]:
+    found: Verification, chunks: list[chunk_files.Part], about: dict[str, Any], study: Study | None
+) -> dict[int, chunk_files.Part]:
     """Return the chunks that are what their names say; what is wrong with the others, or with their rows, is noted."""
-    whole: dict[int, store.Part] = {}
+    import pandas as pd
+
+    whole: dict[int, chunk_files.Part] = {}
     for part in chunks:
         if part.identity != about.get("identity", part.identity):
             words = f"belongs to other data ({part.identity}, not {about['identity']})"
-            found.findings.append(Finding(part.path, words, "the next run refuses; --force sets it aside"))
+            found.add(part.path, words, "the next run refuses; --force sets it aside")
             continue
         try:
             data = part.read()
         except StoreError as error:
             if isinstance(error.__cause__, OSError):
                 raise
-            words = str(error).removeprefix(f"{part.path}: ").removesuffix(f"; {store.REMEDY}")
-            found.findings.append(Finding(part.path, words, ANEW))
+            words = str(error).removeprefix(f"{part.path}: ").removesuffix(f"; {chunk_files.REMEDY}")
+            found.add(part.path, words, ANEW)
             continue
         if part.index in whole:
             words = f"a second chunk {part.index}, besides {whole[part.index].path.name}"
-            found.findings.append(Finding(part.path, words, "the next run refuses; remove the one you do not trust"))
+            found.add(part.path, words, "the next run refuses; remove the one you do not trust")
             continue
         whole[part.index] = part
-        rows = _rows(data)
+        rows = pd.read_parquet(io.BytesIO(data))
         found.chunks, found.rows, found.size = found.chunks + 1, found.rows + len(rows), found.size + len(data)
-        found.findings += [
-            Finding(part.path, words, UNSEEN) for words in row_faults(rows, store.about(part, data), about, study)
-        ]
+        for words in row_faults(rows, chunk_files.about(part, data), about, study):
+            found.add(part.path, words, UNSEEN)
     return whole
 
 
-def _rows(data: bytes) -> pd.DataFrame:
-    import pandas as pd
-
-    return pd.read_parquet(io.BytesIO(data))
-
-
-def _missing(
-    found: Verification, place: Path, plan: dict[str, Any] | None, about: dict[str, Any], whole: dict[int, store.Part]
-) -> None:
-    """Report chunks that are missing, and the optimum or front that the plan asks for and that is missing."""
-    named = {finding.path.name for finding in found.findings}
-    lost = [k for k in range(about.get("chunks", 0)) if k not in whole]
-    lost = [k for k in lost if not any(name.startswith(f"part-{k:06d}-") for name in named)]
+def _missing(found: Verification, plan: dict[str, Any], number: int, whole: dict[int, chunk_files.Part]) -> None:
+    """Report chunks and searches that the plan asks for and that are missing, and counts that are not the chunks'."""
+    named = {finding.path.name[: len("part-000000-")] for finding in found.findings}
+    lost = [k for k in range(number) if k not in whole and f"part-{k:06d}-" not in named]
+    complete = bool(plan.get("complete"))
     if lost:
-        words = f"{len(lost)} of {about['chunks']} chunks are missing, the first is {lost[0]}"
-        complete = bool(plan and plan.get("complete"))
+        words = f"{len(lost)} of {number} chunks are missing, the first is {lost[0]}"
         words += ", although a run had finished them all" if complete else ""
-        found.findings.append(Finding(place, words, "the next run computes them", damage=complete))
-    if plan is None or not plan.get("optimise"):
-        return
-    optimum = store.beside(place) / store.OPTIMUM
-    if plan.get("optimised") is None or not optimum.is_file():
-        found.findings.append(Finding(optimum, "the search has not ended", "the next run searches it", damage=False))
-    front = store.beside(place) / store.PARETO
-    if plan.get("pareto") and not store.front_is_complete(front):
-        found.findings.append(Finding(front, "the front is not complete", "the next run goes on", damage=False))
+        found.add(found.folder, words, "the next run computes them", damage=complete)
+    place = files.beside(found.folder)
+    optimum, front = place / files.OPTIMUM, place / files.PARETO
+    if plan.get("optimise") and (plan.get("optimised") is None or not optimum.is_file()):
+        found.add(optimum, "the search has not ended", "the next run searches it", damage=False)
+    if plan.get("optimise") and plan.get("pareto") and not store.front_is_complete(front):
+        found.add(front, "the front is not complete", "the next run goes on", damage=False)
+    if complete and set(whole) == set(range(number)):
+        counts = sum((Counter(chunk_files.about(part)["counts"]) for part in whole.values()), Counter[str]())
+        if counts != Counter(plan.get("counts") or {}):
+            words = f"counts {plan.get('counts')}, but the chunks hold {dict(counts)}"
+            found.add(place / files.PLAN, words, "the next run writes the right ones")
 
 
-def _totals(found: Verification, place: Path, plan: dict[str, Any] | None, whole: dict[int, store.Part]) -> None:
-    """Compare the designs by status that the plan notes with those of the chunks."""
-    if plan is None or not plan.get("complete") or set(whole) != set(range(plan["chunks"])):
-        return
-    counts: Counter[str] = Counter()
-    for part in whole.values():
-        counts.update(store.about(part)["counts"])
-    if counts != Counter(plan.get("counts") or {}):
-        path = store.beside(place) / store.PLAN
-        words = f"counts {plan.get('counts')}, but the chunks hold {dict(counts)}"
-        found.findings.append(Finding(path, words, "the next run writes the right ones"))
-
-
-def _side_files(found: Verification, place: Path, plan: dict[str, Any]) -> None:
+def _side_files(found: Verification, plan: dict[str, Any]) -> None:
     """Check the tables beside the chunks: the checksums of their pages, and the hashes that the plan notes."""
-    for name in SIDE_FILES:
-        path = store.beside(place) / name
+    place, told = files.beside(found.folder), {finding.path for finding in found.findings}
+    for path in [place / name for name in SIDE_FILES]:
         if not path.is_file():
-            if name in (plan.get(TABLES) or {}) and path not in {finding.path for finding in found.findings}:
-                found.findings.append(Finding(path, "not there any more", "the next run searches it anew"))
+            if path.name in (plan.get(TABLES) or {}) and path not in told:
+                found.add(path, "not there any more", "the next run searches it anew")
             continue
         try:
-            store.read_table(path)
-            if altered(store.beside(place), plan, [name]):
+            files.read_table(path)
+            if altered(place, plan, [path.name]):
                 raise StoreError(f"{path}: not as its search has written it")
         except StoreError as error:
             words = str(error).removeprefix(f"{path}: ").split("; delete it")[0]
-            found.findings.append(Finding(path, words, "the next run searches it anew"))
+            found.add(path, words, "the next run searches it anew")
 
 
 def _recompute(
-    found: Verification, study: Study, about: dict[str, Any], whole: dict[int, store.Part], number: int
+    found: Verification, study: Study, about: dict[str, Any], whole: dict[int, chunk_files.Part], number: int
 ) -> None:
     """Compute some designs again, each by itself: what a design gets does not depend on its company."""
     if about.get("code") != plans.code_hash():
         found.notes.append("computed by other sources or libraries than these: no design was computed again")
         return
-    bounds = {index: (store.about(part)["start"], store.about(part)["stop"]) for index, part in whole.items()}
+    abouts = ((index, chunk_files.about(part)) for index, part in whole.items())
+    bounds = {index: (own["start"], own["stop"]) for index, own in abouts}
     fresh = replace(study)
     for index, chosen in spread(bounds, number).items():
         rows = whole[index].rows()
         for design in chosen:
             again = compute_chunk(fresh, design, design + 1).columns
             found.recomputed += 1
-            words = unequal(rows[rows["design"] == design], again)
-            if words:
-                found.findings.append(Finding(whole[index].path, f"design {design}: {words}", UNSEEN))
+            if words := unequal(rows[rows["design"] == design], again):
+                found.add(whole[index].path, f"design {design}: {words}", UNSEEN)
+
+
+def row_faults(rows: pd.DataFrame, own: Mapping[str, Any], about: Mapping[str, Any], study: Study | None) -> list[str]:
+    """Return what is wrong with the rows of one chunk, in words.
+
+    Parameters
+    ----------
+    rows : all of them, all columns
+    own : metadata of the chunk
+    about : the plan, or the metadata of a chunk where there is no plan
+    study : whose design space gives the parameters; None if it is not known
+    """
+    faults = []
+    if "chunk_size" in about:
+        start = own["chunk"] * about["chunk_size"]
+        stop = min(start + about["chunk_size"], about["designs"])
+        if (own["start"], own["stop"]) != (start, stop):
+            faults.append(f"designs {own['start']}:{own['stop']}, the plan says {start}:{stop}")
+    wanted = [(column["name"], column["dtype"]) for column in about.get("columns", [])]
+    there = [(str(name), str(dtype)) for name, dtype in rows.dtypes.items()]
+    if wanted and wanted != there:
+        return [*faults, f"columns {there}, the plan says {wanted}"]
+    if lacking := [name for name in ("design", "status") if name not in rows.columns]:
+        return [*faults, f"no column {', '.join(lacking)}"]
+    apart = [key for key in SHARED if key in about and own.get(key) != about[key]]
+    apart += ["data"] if own.get("data") != about.get("chunk_data", own.get("data")) else []
+    faults += [f"its metadata say another {', '.join(apart)} than the plan"] if apart else []
+    designs, status = rows["design"].to_numpy(), rows["status"].to_numpy()
+    if np.any(np.diff(designs) <= 0) or np.any((designs < own["start"]) | (designs >= own["stop"])):
+        return [*faults, f"design numbers not growing inside {own['start']}:{own['stop']}"]
+    faults += _count_faults(status, own)
+    if study is not None and study.output.keep == "all" and len(rows) != own["stop"] - own["start"]:
+        faults.append(f"{len(rows)} rows, although every one of {own['stop'] - own['start']} designs is kept")
+    outputs = [column["name"] for column in about.get("columns", []) if column["role"] == "output"]
+    missing = rows.loc[status == 0, [name for name in outputs if not is_error(name)]].isna().any()
+    faults += [f"{name}: missing values in rows whose status is ok" for name in missing.index[missing]]
+    if study is not None and len(rows):
+        faults += _parameter_faults(rows, own, study)
+    return faults
+
+
+def _count_faults(status: np.ndarray[Any, Any], own: Mapping[str, Any]) -> list[str]:
+    faults = []
+    noted, number = own["counts"], own["stop"] - own["start"]
+    if sum(noted.values()) != number:
+        faults.append(f"{sum(noted.values())} designs counted, {number} in the chunk")
+    codes, found = np.unique(status, return_counts=True)
+    rows = {
+        chunk_files.STATUS_NAMES.get(int(code), str(code)): int(count) for code, count in zip(codes, found, strict=True)
+    }
+    # Rows that were not kept are counted; what is kept is kept of its status entirely.
+    if any(noted.get(name, 0) != count for name, count in rows.items()) or (noted.get("OK", 0) and "OK" not in rows):
+        faults.append(f"rows by status {rows}, counted {noted}")
+    return faults
+
+
+def _parameter_faults(rows: pd.DataFrame, own: Mapping[str, Any], study: Study) -> list[str]:
+    """Parameters that are not those of the design space; what [fit] sets or scales is left to the recomputing."""
+    matrix, _ = parameter_matrix(study, own["start"], own["stop"])
+    at = rows["design"].to_numpy() - own["start"]
+    fitted = () if study.fit is None else (*study.fit.parameters(study.family), *study.rescaled)
+    faults = []
+    for k, name in enumerate(study.family.parameter_names):
+        if name in fitted or name not in rows.columns:
+            continue
+        wrong = ~np.isclose(rows[name].to_numpy(), matrix[at, k], rtol=0.0, atol=0.0, equal_nan=True)
+        if wrong.any():
+            first = int(rows["design"].to_numpy()[wrong][0])
+            faults.append(f"{name}: {int(wrong.sum())} values are not those of the design space (design {first})")
+    return faults
+
+
+def spread(bounds: Mapping[int, tuple[int, int]], number: int) -> dict[int, list[int]]:
+    """Choose about ``number`` designs spread evenly over chunks of these bounds, by chunk; the same at every call."""
+    indices = sorted(bounds)
+    ends = np.cumsum([bounds[index][1] - bounds[index][0] for index in indices])
+    places = np.unique((np.arange(1, number + 1) * GOLDEN % 1.0 * ends[-1]).astype(np.int64))
+    chosen: dict[int, list[int]] = {}
+    for k, place in zip(np.searchsorted(ends, places, side="right").tolist(), places.tolist(), strict=True):
+        chosen.setdefault(indices[k], []).append(bounds[indices[k]][1] - int(ends[k]) + place)
+    return chosen
+
+
+def unequal(row: pd.DataFrame, again: Columns) -> str:
+    """Return how a stored row (one or none) differs from the design computed again; empty if no bit does."""
+    if len(row) != len(again["design"]):
+        return "has a row, computed again it has none" if len(row) else "has no row, computed again it has one"
+    for name, values in again.items() if len(row) else ():
+        if name not in row.columns:
+            return f"no column {name}"
+        stored = row[name].to_numpy()
+        if not np.array_equal(stored, values, equal_nan=stored.dtype.kind == "f"):
+            return f"{name} = {stored[0]!r}, computed again {values[0]!r}"
+    return ""

@@ -139,8 +139,8 @@ def searches(study: Study, jobs: int, known: Pilot) -> tuple[tuple[str, float, f
     if globally:
         one = POPULATION_SECONDS[0] / jobs
         found.insert(0, ("global search", MET * one, settings.populations * one))
-    if share is not None:
-        sample = robust.SAMPLES * known.seconds_per_design / jobs
+    if study.tolerance is not None and share is not None:
+        sample = study.tolerance.samples * known.seconds_per_design / jobs
         first = robust.TRIED * min(robust.HEAT, settings.looks) * look + MET * POPULATION_SECONDS[1] / jobs * globally
         least, last = robust.ENDED * (typical + sample), robust.ENDED * (most + robust.CORRECTIONS * sample)
         found.append(("tolerances", first + CORRECTED * least, first + last))

@@ -9,8 +9,9 @@ from pathlib import Path
 from typing import Any
 
 from sweep.chunks.plan import NOT_IN_CHUNKS, Plan, make_plan
-from sweep.dataset import store
+from sweep.dataset import chunk_files, files, store
 from sweep.dataset.files import TABLES, outside
+from sweep.dataset.lock import locked
 from sweep.errors import InputError
 from sweep.study import Study
 
@@ -18,13 +19,13 @@ MOST = 6  # differences that are told
 
 # What concerns only these designs; the report about them as well.
 OWN_FILES = (
-    store.PLAN, store.OPTIMUM, store.CURVES, store.SENSITIVITY, store.TOLERANCE, store.PARETO, "report.html",
+    files.PLAN, files.OPTIMUM, files.CURVES, files.SENSITIVITY, files.TOLERANCE, files.PARETO, "report.html",
 )  # fmt: skip
 
 
 def open_plan(study: Study, folder: Path, force: bool) -> Plan:
     """Return the plan in the folder if it is this study's, otherwise a new one; foreign data only go with ``force``."""
-    noted = store.read_plan(folder)
+    noted = files.read_plan(folder)
     if noted is not None:
         plan = make_plan(study, noted["chunk_size"])
         if plan.identity == noted["identity"]:
@@ -41,7 +42,7 @@ def open_plan(study: Study, folder: Path, force: bool) -> Plan:
     if force:
         _set_foreign_aside(folder, plan, OWN_FILES)
     store.finished_chunks(folder, plan)  # refuses foreign chunks before the plan is written
-    store.write_plan(folder, plan_note(study, folder, plan))
+    files.write_plan(folder, plan_note(study, folder, plan))
     return plan
 
 
@@ -58,28 +59,28 @@ def _differs_in_limits_only(study: Study, noted: dict[str, Any], plan: Plan) -> 
 def _with_other_limits(study: Study, folder: Path, plan: Plan) -> Plan:
     """Set the chunks aside and note where: their designs are sorted by the new limits."""
     where = old_name()
-    files = [store.beside(folder) / name for name in OWN_FILES]
-    store.set_aside(
-        folder, [*(part.path for part in store.parts(folder)), *(path for path in files if path.is_file())], where
+    own = [files.beside(folder) / name for name in OWN_FILES]
+    files.set_aside(
+        folder, [*(part.path for part in chunk_files.parts(folder)), *(path for path in own if path.is_file())], where
     )
-    store.write_plan(folder, plan_note(study, folder, plan) | {"known": where})
+    files.write_plan(folder, plan_note(study, folder, plan) | {"known": where})
     return plan
 
 
 def known_folder(folder: Path) -> Path | None:
     """Return the folder of the chunks that those of this dataset are made from."""
-    where = (store.read_plan(folder) or {}).get("known")
-    return store.beside(folder) / where if isinstance(where, str) else None
+    where = (files.read_plan(folder) or {}).get("known")
+    return files.beside(folder) / where if isinstance(where, str) else None
 
 
 def is_part(folder: Path) -> bool:
     """Return whether the folder is for some of the chunks only, as ``sweep split`` makes it."""
-    return "part" in (store.read_plan(folder) or {})
+    return "part" in (files.read_plan(folder) or {})
 
 
 def part_range(folder: Path, chunks: int) -> range:
     """Return indices of the chunks that belong into the folder."""
-    first, stop = (store.read_plan(folder) or {}).get("part", (0, chunks))
+    first, stop = (files.read_plan(folder) or {}).get("part", (0, chunks))
     return range(first, stop)
 
 
@@ -97,16 +98,16 @@ def _conflict(study: Study, noted: dict[str, Any], plan: Plan) -> str:
 
 
 def _set_foreign_aside(folder: Path, plan: Plan, others: tuple[str, ...]) -> None:
-    place = store.beside(folder)
-    old = [part.path for part in store.parts(folder) if part.identity != plan.identity]
+    place = files.beside(folder)
+    old = [part.path for part in chunk_files.parts(folder) if part.identity != plan.identity]
     old += [place / name for name in others if (place / name).is_file()]
     if old:
-        store.set_aside(folder, old, old_name())
+        files.set_aside(folder, old, old_name())
 
 
 def old_name() -> str:
     """Return the name under which data are set aside now."""
-    return f"{store.OLD}/{time.strftime('%Y%m%d-%H%M%S')}"
+    return f"{files.OLD}/{time.strftime('%Y%m%d-%H%M%S')}"
 
 
 def refuse_or_clear_older(folder: Path, force: bool) -> None:
@@ -117,7 +118,7 @@ def refuse_or_clear_older(folder: Path, force: bool) -> None:
     InputError
         if there is one; with ``force`` it is set aside, every file of it.
     """
-    if not store.is_older(folder):
+    if not files.is_older(folder):
         return
     if not force:
         allowed = (
@@ -125,19 +126,19 @@ def refuse_or_clear_older(folder: Path, force: bool) -> None:
             "choose another folder with --out, or set it aside with --force"
         )
         raise InputError("dataset", "one of an earlier version, with its plan among the chunks", allowed, str(folder))
-    with store.locked(folder), store.store_errors(folder):
+    with locked(folder), files.store_errors(folder):
         target = outside(folder) / old_name()
         target.mkdir(parents=True, exist_ok=True)
         # The plan goes last: until then it is an older dataset, also for a run that begins after a kill.
-        for path in sorted(folder.iterdir(), key=lambda path: path.name == store.PLAN):
-            if path.name != store.LOCK:
+        for path in sorted(folder.iterdir(), key=lambda path: path.name == files.PLAN):
+            if path.name != files.LOCK:
                 path.replace(target / path.name)
-    (folder / store.LOCK).unlink(missing_ok=True)
+    (folder / files.LOCK).unlink(missing_ok=True)
 
 
 def plan_note(study: Study, folder: Path, plan: Plan) -> dict[str, Any]:
     """Return the content of ``_plan.json``, with what an earlier run noted of the optimum."""
-    noted = store.read_plan(folder) or {}
+    noted = files.read_plan(folder) or {}
     return plan.as_dict() | {
         "about": {"name": study.name, "title": study.title, "question": study.question},
         "data": study.data,

@@ -6,8 +6,9 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from sweep.chunks.plan import make_plan
-from sweep.dataset import store
+from sweep.dataset import chunk_files, files, store
 from sweep.dataset.files import link_or_copy
+from sweep.dataset.lock import locked
 from sweep.engine.opening import open_plan, plan_note
 from sweep.errors import InputError
 from sweep.study import load_study
@@ -43,22 +44,22 @@ def split(study: str | Path, out: str | Path, parts: int, *, smoke: bool = False
     """
     if isinstance(parts, bool) or not isinstance(parts, int) or not 1 <= parts <= MOST_PARTS:
         raise InputError("parts", parts, f"a whole number from 1 to {MOST_PARTS}", "split")
-    model, folder = load_study(study, smoke=smoke), store.located(out)
-    with store.locked(folder):
+    model, folder = load_study(study, smoke=smoke), files.located(out)
+    with locked(folder):
         plan = open_plan(model, folder, force=False)
         note = plan_note(model, folder, plan)
     count = min(parts, plan.chunks)
-    folders = [store.beside(folder) / PARTS / f"{k:04d}" / store.DESIGNS for k in range(count)]
+    folders = [files.beside(folder) / PARTS / f"{k:04d}" / files.DESIGNS for k in range(count)]
     for k, place in enumerate(folders):
         own = [plan.chunks * k // count, plan.chunks * (k + 1) // count]
-        there = store.read_plan(place)
+        there = files.read_plan(place)
         if there is not None and (there["identity"], there.get("part")) != (plan.identity, own):
             allowed = "parts of this study cut in this way; remove the old ones first"
             raise InputError("part", str(place), allowed, "split")
-        with store.store_errors(place):
+        with files.store_errors(place):
             place.mkdir(parents=True, exist_ok=True)
         if there is None:
-            store.write_plan(place, note | {"part": own, "optimised": None, "complete": False})
+            files.write_plan(place, note | {"part": own, "optimised": None, "complete": False})
     return folders
 
 
@@ -93,24 +94,24 @@ def merge(study: str | Path, out: str | Path, *, smoke: bool = False) -> Merged:
     LockedError, StoreError
         if a run is at work in ``out``, or the disk refuses.
     """
-    model, folder = load_study(study, smoke=smoke), store.located(out)
-    places = sorted((store.beside(folder) / PARTS).glob(f"*/{store.DESIGNS}"))
-    noted = store.read_plan(folder)
+    model, folder = load_study(study, smoke=smoke), files.located(out)
+    places = sorted((files.beside(folder) / PARTS).glob(f"*/{files.DESIGNS}"))
+    noted = files.read_plan(folder)
     if noted is None or not places:
         raise InputError("folder", str(out), "a folder that sweep split has prepared", "merge")
     plan = make_plan(model, noted["chunk_size"])
     taken, damaged = 0, []
-    with store.locked(folder):
+    with locked(folder):
         there = store.finished_chunks(folder, plan)
-        for part in [part for place in places for part in store.parts(place)]:
+        for part in [part for place in places for part in chunk_files.parts(place)]:
             if part.identity != plan.identity:
                 raise store.foreign(part.path.parent, f"the chunk {part.path.name}", plan)
             if part.index in there:
                 continue
-            if not store.is_whole(part):
+            if not chunk_files.is_whole(part):
                 damaged.append(part.path)
                 continue
-            with store.store_errors(folder):
+            with files.store_errors(folder):
                 link_or_copy(part.path, folder / part.path.name)
             there[part.index] = part
             taken += 1

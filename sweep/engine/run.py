@@ -19,9 +19,12 @@ from importlib.metadata import version
 from pathlib import Path
 from typing import Any
 
-from sweep.chunks.chunk import warm
+from numba.core.event import install_recorder
+
+from sweep.chunks.chunk import WarmStep, asked_outputs, warm
 from sweep.chunks.plan import Plan
-from sweep.dataset import store
+from sweep.dataset import files, store
+from sweep.dataset.lock import locked
 from sweep.engine.estimate import check_budget, estimate
 from sweep.engine.opening import is_part, known_folder, open_plan, part_range, plan_note, refuse_or_clear_older
 from sweep.engine.searches import refuse_unprovable, search, stages_of
@@ -73,15 +76,15 @@ def logged(folder: Path, said: str, jobs: int, backend: str) -> Iterator[list[st
     """Log the start of a run and its end: the error that ended it, or what the caller appends to the list."""
     head = {"run": uuid.uuid4().hex[:12]}
     begin = time.monotonic()
-    store.append_run(folder, head | {"event": "start", "command": said} | circumstances(jobs, backend))
+    files.append_run(folder, head | {"event": "start", "command": said} | circumstances(jobs, backend))
     words: list[str] = []
     try:
         yield words
     except Exception as error:
         if not isinstance(error, StoreError):  # the log stands on the disk that has just refused
-            store.append_run(folder, head | _end(begin, type(error).__name__, str(error)))
+            files.append_run(folder, head | _end(begin, type(error).__name__, str(error)))
         raise
-    store.append_run(folder, head | _end(begin, "complete", "; ".join(words)))
+    files.append_run(folder, head | _end(begin, "complete", "; ".join(words)))
 
 
 def _end(begin: float, outcome: str, text: str) -> dict[str, Any]:
@@ -150,13 +153,13 @@ def run(
     refuse_unprovable(model)
     with stages(*stages_of(model)):
         with Phases(progress) as phases:
-            warm(model, lambda done, total: phases.say("compiling", done, total))
+            _compile(model, jobs, phases)
             _check_budget(model, jobs, force, lambda done, total: phases.say("planning", done, total))
-        default = Path("results", *(["smoke"] if smoke else []), model.name, store.DESIGNS)
-        folder = default if out is None else store.located(out)
+        default = Path("results", *(["smoke"] if smoke else []), model.name, files.DESIGNS)
+        folder = default if out is None else files.located(out)
         refuse_or_clear_older(folder, force)
         said = command(model, folder, smoke, accuracy, certify)
-        with store.locked(folder), logged(folder, said, jobs, backend) as end, at_work(place):
+        with locked(folder), logged(folder, said, jobs, backend) as end, at_work(place):
             computed = _sweep(model, folder, jobs, place, force, progress)
             if not is_part(folder):
                 search(model, folder, jobs, backend, progress)
@@ -167,6 +170,25 @@ def run(
 def _model(study: str | Path | Study, smoke: bool, accuracy: float | None, certify: bool | None) -> Study:
     model = load_study(study, smoke=smoke) if isinstance(study, (str, Path)) else study
     return model if accuracy is None and certify is None else with_accuracy(model, accuracy, certify)
+
+
+def _compile(study: Study, jobs: int, phases: Phases) -> None:
+    """Load or compile every kernel the study needs; once one had to be compiled, those behind it are in processes."""
+    count, step = len(asked_outputs(study)), WarmStep(study)
+    for k in range(count):
+        phases.say("compiling", k, count)
+        with install_recorder("numba:compile") as compiled:
+            step(k)
+        if compiled.buffer and min(jobs, os.cpu_count() or 1, count - k - 1) > 1:
+            with stop_on_signal() as stop:
+                ready = executor("loky", jobs).outcomes(step, iter(range(k + 1, count)), jobs, stop)
+                for done, _ in enumerate(ready, k + 2):
+                    phases.say("compiling", done, count)
+            if stop.signal_number is not None:
+                raise Interrupted(
+                    stop.signal_number, "stopped by a signal; what is compiled is kept, run again to continue"
+                )
+            jobs = 1  # the rest is loaded
 
 
 def _check_budget(study: Study, jobs: int, force: bool, tell: Callable[[int, int], None]) -> None:
@@ -180,7 +202,7 @@ def _sweep(study: Study, folder: Path, jobs: int, place: Executor, force: bool, 
     with stop_on_signal() as stop, Phases(progress) as phases:
         reading = "reading what is there"
         phases.say(reading, 0, 0, "chunks")
-        store.remove_temporary(folder)
+        files.remove_temporary(folder)
         plan: Plan | None = None
         with stop.raising():  # a pilot may have to compile
             plan = open_plan(study, folder, force)
@@ -192,34 +214,28 @@ def _sweep(study: Study, folder: Path, jobs: int, place: Executor, force: bool, 
             phases.end()
             if not missing:
                 break
-            computed += _compute(study, plan, folder, missing, jobs, place, stop, force, progress)
+            task = ChunkTask(study, plan, folder.absolute(), known_folder(folder.absolute()))
+            computed += _compute(task, missing, jobs, place, stop, force, progress)
         else:
             raise StoreError(f"{folder}: somebody removes or damages chunks while this run writes them; run again")
         _raise_if_signalled(stop, folder)
     counts, missed = store.totals(folder)
     note = plan_note(study, folder, plan) | {"counts": counts, "missed": missed, "complete": not is_part(folder)}
-    store.write_plan(folder, note)
+    files.write_plan(folder, note)
     return computed
 
 
 def _compute(
-    study: Study,
-    plan: Plan,
-    folder: Path,
-    missing: list[int],
-    jobs: int,
-    place: Executor,
-    stop: Stop,
-    force: bool,
-    progress: bool,
+    task: ChunkTask, missing: list[int], jobs: int, place: Executor, stop: Stop, force: bool, progress: bool
 ) -> int:
     """Compute these chunks; returns their number."""
+    study, plan, folder = task.study, task.plan, task.folder
     failure: Exception | None = None
     allowed = math.inf if force else study.budget.seconds
     done = plan.designs - sum(len(range(*plan.bounds(index))) for index in missing)
     with Progress(study.name, plan.designs, done, progress) as shown:
         results = 0
-        for result in _results(study, plan, folder, missing, jobs, place, stop, allowed):
+        for result in _results(task, missing, jobs, place, stop, allowed):
             results += not result.dropped
             if result.error is not None:
                 failure = failure or result.error
@@ -236,26 +252,18 @@ def _compute(
 
 
 def _results(
-    study: Study,
-    plan: Plan,
-    folder: Path,
-    missing: list[int],
-    jobs: int,
-    place: Executor,
-    stop: Stop,
-    allowed: float,
+    task: ChunkTask, missing: list[int], jobs: int, place: Executor, stop: Stop, allowed: float
 ) -> Iterator[Done]:
     """Yield finished chunks in the order they become ready; no new one is begun when the allowed time [s] is over."""
     with stop.raising():
-        warm(study)  # one process compiles, the others load the machine code
+        warm(task.study)  # one process compiles, the others load the machine code
     deadline = time.monotonic() + allowed  # compiling does not count, so that every run gets on
     todo = (index for index in missing if not stop and time.monotonic() < deadline)
-    task = ChunkTask(study, plan, folder.absolute(), known_folder(folder.absolute()))
     try:
         yield from for_tasks(place, len(missing)).outcomes(task, todo, jobs, stop)
     except WorkerDied as error:
-        _raise_if_signalled(stop, folder)
-        raise WorkerDied(f"{folder}: {error}; finished chunks are kept, run again to continue") from error
+        _raise_if_signalled(stop, task.folder)
+        raise WorkerDied(f"{task.folder}: {error}; finished chunks are kept, run again to continue") from error
 
 
 def _raise_if_signalled(stop: Stop, folder: Path) -> None:

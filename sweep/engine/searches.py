@@ -10,7 +10,7 @@ from typing import Any
 
 from sweep import optimise
 from sweep.chunks import plan as plans
-from sweep.dataset import store
+from sweep.dataset import files
 from sweep.dataset.files import TABLES, altered, digests, metadata
 from sweep.errors import Interrupted, SearchCutShort
 from sweep.jobs.executors import Executor, Here, executor
@@ -22,7 +22,7 @@ from sweep.proof.rounds import Cores
 from sweep.study import Study
 
 # What is written together with the optimum.
-OF_OPTIMUM = (store.CURVES, store.SENSITIVITY, store.TOLERANCE)
+OF_OPTIMUM = (files.CURVES, files.SENSITIVITY, files.TOLERANCE)
 
 
 def search(study: Study, folder: Path, jobs: int, backend: str, progress: bool) -> None:
@@ -55,16 +55,16 @@ def optimum_key(study: Study, note: Mapping[str, Any]) -> str:
 
 def _optimise(study: Study, folder: Path, jobs: int, progress: bool) -> None:
     """Run the optimiser unless its result for these very sources is there already, whole."""
-    note = store.read_plan(folder) or {}
+    note = files.read_plan(folder) or {}
     key = optimum_key(study, note)
-    place = store.beside(folder)
-    found = optimise.read_survey(place / store.OPTIMUM)
+    place = files.beside(folder)
+    found = optimise.read_survey(place / files.OPTIMUM)
     noted = [name for name in OF_OPTIMUM if name in (note.get(TABLES) or {})]
-    whole = not altered(place, note, [store.OPTIMUM, *noted])
+    whole = not altered(place, note, [files.OPTIMUM, *noted])
     if note.get("optimised") == key and whole and (found is None or found.ended != "time"):
         return
     assert study.optimise is not None
-    store.write_plan(folder, note | {"optimised": None})
+    files.write_plan(folder, note | {"optimised": None})
     with stop_on_signal() as stop, Phases(progress) as phases:
         try:
             optimise.optimise_study(study, folder, lambda: bool(stop), jobs, phases.say, key)
@@ -72,12 +72,12 @@ def _optimise(study: Study, folder: Path, jobs: int, progress: bool) -> None:
             number = stop.signal_number or signal.SIGINT
             text = f"{folder}: stopped by signal {number} while optimising; run again for the whole search"
             raise Interrupted(number, text) from None
-    store.write_plan(folder, note | {"optimised": key, TABLES: digests(place, [store.OPTIMUM, *OF_OPTIMUM])})
+    files.write_plan(folder, note | {"optimised": key, TABLES: digests(place, [files.OPTIMUM, *OF_OPTIMUM])})
 
 
 def _raise_if_cut_short(folder: Path) -> None:
     """Raise where the optimum stands there but the emergency brake has kept some starts from being searched."""
-    found = optimise.read_survey(store.beside(folder) / store.OPTIMUM)
+    found = optimise.read_survey(files.beside(folder) / files.OPTIMUM)
     if found is not None and found.ended == "time":
         text = f"{folder}: {found.warnings[0]} searched; run again with a greater optimise.time_budget for all of them"
         raise SearchCutShort(folder, text)
@@ -86,18 +86,18 @@ def _raise_if_cut_short(folder: Path) -> None:
 def _front(study: Study, folder: Path, jobs: int, progress: bool) -> None:
     """Search the study's front, from where an earlier run of these very sources left it."""
     if study.pareto is None:
-        (store.beside(folder) / store.PARETO).unlink(missing_ok=True)
+        (files.beside(folder) / files.PARETO).unlink(missing_ok=True)
         return
 
-    note = store.read_plan(folder) or {}
+    note = files.read_plan(folder) or {}
     key = optimum_key(study, note)
-    place, known = store.beside(folder), dict(note.get(TABLES) or {})
-    damaged = altered(place, note, [store.PARETO])
+    place, known = files.beside(folder), dict(note.get(TABLES) or {})
+    damaged = altered(place, note, [files.PARETO])
     if damaged:
-        (place / store.PARETO).unlink(missing_ok=True)
-    if store.PARETO in known and (damaged or metadata(place / store.PARETO).get(b"key") != key.encode()):
-        del known[store.PARETO]  # of a front that is over: the new one grows step by step
-        store.write_plan(folder, note | {TABLES: known})
+        (place / files.PARETO).unlink(missing_ok=True)
+    if files.PARETO in known and (damaged or metadata(place / files.PARETO).get(b"key") != key.encode()):
+        del known[files.PARETO]  # of a front that is over: the new one grows step by step
+        files.write_plan(folder, note | {TABLES: known})
     with stop_on_signal() as stop, Phases(progress) as phases:
         try:
             optimise.front_study(study, folder, key, lambda: bool(stop), jobs, phases.say)
@@ -105,8 +105,8 @@ def _front(study: Study, folder: Path, jobs: int, progress: bool) -> None:
             number = stop.signal_number or signal.SIGINT
             text = f"{folder}: stopped by signal {number} while searching the front; run again to continue"
             raise Interrupted(number, text) from None
-    if digests(place, [store.PARETO]).items() - known.items():
-        store.write_plan(folder, note | {TABLES: known | digests(place, [store.PARETO])})
+    if digests(place, [files.PARETO]).items() - known.items():
+        files.write_plan(folder, note | {TABLES: known | digests(place, [files.PARETO])})
 
 
 def refuse_unprovable(study: Study) -> None:
@@ -136,17 +136,17 @@ def prove(study: Study, folder: Path, jobs: int, backend: str, progress: bool) -
     Interrupted
         by a signal; finished work is kept.
     """
-    place = store.beside(folder)
+    place = files.beside(folder)
     if study.optimise is None or study.optimise.prove is None:
-        (place / store.PROOF).unlink(missing_ok=True)
+        (place / files.PROOF).unlink(missing_ok=True)
         return False
-    note = store.read_plan(folder) or {}
-    if altered(place, note, [store.PROOF]):
-        (place / store.PROOF).unlink(missing_ok=True)
+    note = files.read_plan(folder) or {}
+    if altered(place, note, [files.PROOF]):
+        (place / files.PROOF).unlink(missing_ok=True)
     found = known_proof(study, folder) or _proven(study, folder, jobs, backend, progress)
-    known, now = dict(note.get(TABLES) or {}), digests(place, [store.PROOF])
+    known, now = dict(note.get(TABLES) or {}), digests(place, [files.PROOF])
     if now.items() - known.items():
-        store.write_plan(folder, note | {TABLES: known | now})
+        files.write_plan(folder, note | {TABLES: known | now})
     return found.cut_short
 
 

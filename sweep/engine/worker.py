@@ -11,7 +11,7 @@ from typing import Any
 from sweep.chunks import plan as plans
 from sweep.chunks.cascade import Dropped
 from sweep.chunks.chunk import compute_chunk
-from sweep.dataset.store import parts, write_chunk
+from sweep.dataset.chunk_files import parts, write_chunk
 from sweep.errors import InputError, LinksweepError, ProgramFault, StoreError, WorkerDied
 from sweep.families.base import Columns
 from sweep.study import Study

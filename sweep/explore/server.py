@@ -21,7 +21,7 @@ from sweep.explore.cells import cells, design_of
 from sweep.explore.drag import dragged
 from sweep.explore.hand import Hand
 from sweep.explore.improve import improve, problem_in_hand
-from sweep.report.figures import rendered
+from sweep.pages import rendered
 from sweep.report.live import PLANE, SPATIAL
 
 if TYPE_CHECKING:

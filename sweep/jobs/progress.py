@@ -115,11 +115,6 @@ class Progress:
             elif self.show and (not self.quiet or self.said is not None or self._is_due()):
                 self._line()
 
-    @staticmethod
-    def owns(thread: threading.Thread) -> bool:
-        """Whether a thread only shows progress."""
-        return thread.name == TICKER or type(thread).__name__ == "TMonitor"  # that of tqdm
-
     @property
     def at_most(self) -> bool:
         """Whether the total is a maximum."""

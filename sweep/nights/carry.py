@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 from sweep.chunks.plan import make_plan
-from sweep.dataset import store
+from sweep.dataset import files
 from sweep.dataset.files import link_or_copy
 from sweep.dataset.verification import verify
 from sweep.engine.searches import optimum_key
@@ -19,7 +19,7 @@ from sweep.proof import known_proof
 from sweep.study import Study
 
 REPORT, FIGURES, SURVIVORS = "report.html", "figures", "survivors.parquet"
-TABLES = (store.OPTIMUM, store.CURVES, store.SENSITIVITY, store.TOLERANCE, store.PARETO, store.PROOF)
+TABLES = (files.OPTIMUM, files.CURVES, files.SENSITIVITY, files.TOLERANCE, files.PARETO, files.PROOF)
 
 
 @dataclass(frozen=True)
@@ -47,8 +47,8 @@ def carry(study: Study, earlier: Sequence[Path], target: Path) -> Carried | None
         the plan; damaged ones are left out.
     """
     for night in earlier:
-        source = night / target.name / store.DESIGNS
-        noted = store.read_plan(source)
+        source = night / target.name / files.DESIGNS
+        noted = files.read_plan(source)
         if noted is None or make_plan(study, noted["chunk_size"]).identity != noted["identity"]:
             continue
         try:
@@ -59,22 +59,22 @@ def carry(study: Study, earlier: Sequence[Path], target: Path) -> Carried | None
         sound = [path for path in sorted(source.glob("part-*.parquet")) if path not in bad]
         if not sound:
             continue
-        designs = target / store.DESIGNS
-        with store.store_errors(target):
+        designs = target / files.DESIGNS
+        with files.store_errors(target):
             designs.mkdir(parents=True, exist_ok=True)
             for path in sound:
                 link_or_copy(path, designs / path.name)
-            link_or_copy(store.beside(source) / store.PLAN, target / store.PLAN)
+            link_or_copy(files.beside(source) / files.PLAN, target / files.PLAN)
             for name in TABLES:
-                path = store.beside(source) / name
+                path = files.beside(source) / name
                 if path.is_file() and path not in bad:
                     link_or_copy(path, target / name)
             # Lines are added to this one, so it is no link.
-            if (store.beside(source) / store.RUNS).is_file():
-                shutil.copyfile(store.beside(source) / store.RUNS, target / store.RUNS)
+            if (files.beside(source) / files.RUNS).is_file():
+                shutil.copyfile(files.beside(source) / files.RUNS, target / files.RUNS)
             whole = not found.findings and bool(noted.get("complete")) and searched(study, target)
             if whole:
-                _link_report(store.beside(source), target)
+                _link_report(files.beside(source), target)
         return Carried(night.name, len(sound), whole)
     return None
 
@@ -86,18 +86,18 @@ def searched(study: Study, folder: Path) -> bool:
 
     A search that time has cut short is made again.
     """
-    note = store.read_plan(folder / store.DESIGNS) or {}
+    note = files.read_plan(folder / files.DESIGNS) or {}
     if study.optimise is not None and note.get("optimised") != optimum_key(replace(study, pareto=None), note):
         return False
-    found = read_survey(folder / store.OPTIMUM)
+    found = read_survey(folder / files.OPTIMUM)
     if found is not None and found.ended == "time":
         return False
     asked = study.optimise is not None and study.optimise.prove is not None
-    if asked and known_proof(study, folder / store.DESIGNS) is None:
+    if asked and known_proof(study, folder / files.DESIGNS) is None:
         return False
     if study.pareto is None:
         return True
-    front = saved(folder / store.PARETO, optimum_key(study, note))
+    front = saved(folder / files.PARETO, optimum_key(study, note))
     return front is not None and front.complete
 
 

@@ -9,7 +9,7 @@ from pathlib import Path
 from statistics import median
 from typing import TYPE_CHECKING, Any
 
-from sweep.dataset import store
+from sweep.dataset import files
 from sweep.dataset.comparison import LEAST_SECONDS, ROWS_CHANGED, SLOWER, VALUES_CHANGED, compare
 from sweep.dataset.reading import best
 from sweep.engine.opening import differences
@@ -17,7 +17,7 @@ from sweep.engine.opening import differences
 if TYPE_CHECKING:
     import pandas as pd
 
-    from sweep.nights.records import NightRecord
+    from sweep.nights.archive import NightRecord
     from sweep.study import Study
 
 # A study that samples its extrema has no accuracy of its own: rounding may differ from version to version.
@@ -44,14 +44,14 @@ def figures(study: Study, folder: Path) -> tuple[dict[str, float], dict[str, str
 
     The best objective is that of the optimum, or where the study has none that of the best design of the sweep.
     """
-    counts = (store.read_plan(folder) or {}).get("counts") or {}
+    counts = (files.read_plan(folder) or {}).get("counts") or {}
     number, within = sum(counts.values()), counts.get("OK", 0)
     found: dict[str, float] = {DESIGNS: number, WITHIN: within, YIELD: within / number if number else 0.0}
     units = {DESIGNS: "", WITHIN: "", YIELD: ""}
     if study.objective is None:
         return found, units
     name = study.objective.output
-    optimum = _role(store.beside(folder) / store.OPTIMUM, "optimum")
+    optimum = _role(files.beside(folder) / files.OPTIMUM, "optimum")
     if optimum is not None:
         value = float(optimum[name])
     else:
@@ -59,7 +59,7 @@ def figures(study: Study, folder: Path) -> tuple[dict[str, float], dict[str, str
         value = float(rows[name].iloc[0]) if len(rows) else math.nan
     if math.isfinite(value):
         found[name] = value
-        plan = store.read_plan(folder) or {}
+        plan = files.read_plan(folder) or {}
         units[name] = next((c["unit"] for c in plan.get("columns", []) if c["name"] == name), "")
     return found, units
 
@@ -75,7 +75,7 @@ def changes(study: Study, old: Path, new: Path) -> Changes:
     study : as it is tonight
     old, new : folders of the chunks, both complete
     """
-    plans = [store.read_plan(folder) or {} for folder in (old, new)]
+    plans = [files.read_plan(folder) or {} for folder in (old, new)]
     if plans[0].get("study") != plans[1].get("study"):
         words = differences(plans[0].get("data") or {}, plans[1].get("data") or {})
         return Changes(ROWS_CHANGED, (f"the study itself was edited: {'; '.join(words) or 'its fixed tables'}",))
@@ -104,7 +104,7 @@ def _yield(plans: Sequence[Mapping[str, Any]]) -> tuple[list[str], list[str]]:
 
 
 def _optimum(study: Study, old: Path, new: Path) -> tuple[list[str], list[str]]:
-    before, after = (_role(store.beside(folder) / store.OPTIMUM, "optimum") for folder in (old, new))
+    before, after = (_role(files.beside(folder) / files.OPTIMUM, "optimum") for folder in (old, new))
     if before is None or after is None or study.objective is None:
         return [], []
     name, found = study.objective.output, []
@@ -124,11 +124,11 @@ def _optimum(study: Study, old: Path, new: Path) -> tuple[list[str], list[str]]:
 
 
 def _front(study: Study, old: Path, new: Path) -> tuple[list[str], list[str]]:
-    paths = [store.beside(folder) / store.PARETO for folder in (old, new)]
+    paths = [files.beside(folder) / files.PARETO for folder in (old, new)]
     if study.objective is None or study.pareto is None or not all(path.is_file() for path in paths):
         return [], []
     name = study.objective.output
-    tables = [store.read_table(path).drop_duplicates("bound") for path in paths]
+    tables = [files.read_table(path).drop_duplicates("bound") for path in paths]
     before, after = (dict(zip(t["bound"].tolist(), t[name].tolist(), strict=True)) for t in tables)
     shared = [bound for bound in before if bound in after]
     found = [f"front: {len(before)} bounds before, {len(after)} now"] if len(before) != len(after) else []
@@ -177,6 +177,6 @@ def _role(path: Path, role: str) -> pd.Series[Any] | None:
     """Return one row of the optimiser's table."""
     if not path.is_file():
         return None
-    table = store.read_table(path)
+    table = files.read_table(path)
     rows = table[table["role"] == role]
     return rows.iloc[0] if len(rows) else None

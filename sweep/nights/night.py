@@ -9,13 +9,10 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from sweep.dataset import store
+from sweep.dataset import chunk_files, files, store
 from sweep.errors import InputError, LinksweepError, StoreError, TimeUsedUp, WorkerDied
-from sweep.nights import folders
-from sweep.nights.carry import REPORT, Carried, carry
-from sweep.nights.changes import Changes, changes, figures, slower
-from sweep.nights.page import write_page
-from sweep.nights.records import (
+from sweep.nights import archive
+from sweep.nights.archive import (
     WORDS,
     Journal,
     NightRecord,
@@ -26,6 +23,9 @@ from sweep.nights.records import (
     read_night,
     write_night,
 )
+from sweep.nights.carry import REPORT, Carried, carry
+from sweep.nights.changes import Changes, changes, figures, slower
+from sweep.nights.page import write_page
 from sweep.nights.studies import FIGURE, RUN_LOG, Chosen, Ended, call, chosen, draw, in_order, notify
 from sweep.study import Study
 
@@ -77,9 +77,9 @@ def nightly(studies: Iterable[str | Path], settings: Settings, say: Callable[[st
     if settings.keep < 1:
         raise InputError("keep", settings.keep, "a number of nights from 1", "nightly")
     wanted = chosen(map(Path, studies), settings.smoke)
-    with folders.one_at_a_time(settings.into):
-        earlier = folders.nights(settings.into)[::-1]
-        night = _Night(settings, earlier, folders.new_night(settings.into), say)
+    with archive.one_at_a_time(settings.into):
+        earlier = archive.nights(settings.into)[::-1]
+        night = _Night(settings, earlier, archive.new_night(settings.into), say)
         return night.through(in_order(wanted, earlier))
 
 
@@ -88,7 +88,7 @@ class _Night:
 
     def __init__(self, settings: Settings, earlier: list[Path], folder: Path, say: Callable[[str], None]) -> None:
         self.settings, self.earlier, self.folder = settings, earlier, folder
-        self.good = folders.good_nights(settings.into)[::-1]
+        self.good = archive.good_nights(settings.into)[::-1]
         self.journal = Journal(folder, say)
         self.history = read_history(settings.into, lambda words: self.journal.note("history", words))
         self.begin = time.monotonic()
@@ -114,8 +114,8 @@ class _Night:
             raise
         result = self.written(records, exit_code(records))
         if result.good:
-            folders.point_latest(self.settings.into, self.folder)
-        gone = folders.drop_old(self.settings.into, self.settings.keep)
+            archive.point_latest(self.settings.into, self.folder)
+        gone = archive.drop_old(self.settings.into, self.settings.keep)
         if gone:
             self.journal.note("dropped", f"old nights deleted: {', '.join(gone)}", nights=gone)
         write_page(self.settings.into)
@@ -157,7 +157,7 @@ class _Night:
             carried = carry(one.study, self.earlier, target)
             ended = Ended(0, 0.0, "") if carried and carried.whole else self.run(one, target)
             source, linked = (carried.night, carried.chunks) if carried else (None, 0)
-            whole = store.is_complete(target / store.DESIGNS)
+            whole = store.is_complete(target / files.DESIGNS)
             if not whole:
                 state: State = "cut" if ended.code in CUT else "failed"
                 code = ended.code if ended.code in (*TOLD, *CUT) else WorkerDied.exit_code
@@ -173,7 +173,7 @@ class _Night:
 
     def run(self, one: Chosen, target: Path) -> Ended:
         """Compute what is not there yet, within the time that is left."""
-        words = ["run", str(one.path.resolve()), "--out", str(target / store.DESIGNS)]
+        words = ["run", str(one.path.resolve()), "--out", str(target / files.DESIGNS)]
         words += ["--jobs", str(self.settings.jobs), "--backend", self.settings.backend]
         return call([*words, *(["--smoke"] if self.settings.smoke else [])], target / RUN_LOG, self.left)
 
@@ -183,13 +183,13 @@ class _Night:
         if not (target / REPORT).is_file():
             message = call(["report", str(target)], target / RUN_LOG, max(self.left, 0.0)).message
         reported = (target / REPORT).is_file()
-        designs = target / store.DESIGNS
-        chunks = len(store.parts(designs))
+        designs = target / files.DESIGNS
+        chunks = len(chunk_files.parts(designs))
         values, units = self.figures(study, target, carried)
         base = self.base(study.name)
         found = Changes(0, ())
         if base is not None and not (carried and carried.whole and carried.night == base.name):
-            found = changes(study, base / study.name / store.DESIGNS, designs)
+            found = changes(study, base / study.name / files.DESIGNS, designs)
         if carried is None:
             late = slower(study.name, ended.seconds, self.history)
             found = Changes(found.code or late.code, (*found.lines, *late.lines), found.moved)
@@ -217,11 +217,11 @@ class _Night:
             known = read_night(self.settings.into / carried.night)
             if known is not None and study.name in known.studies and known.studies[study.name].figures:
                 return known.studies[study.name].figures, known.studies[study.name].units
-        return figures(study, target / store.DESIGNS)
+        return figures(study, target / files.DESIGNS)
 
     def base(self, name: str) -> Path | None:
         """Return the last good night that has this study whole."""
-        return next((night for night in self.good if store.is_complete(night / name / store.DESIGNS)), None)
+        return next((night for night in self.good if store.is_complete(night / name / files.DESIGNS)), None)
 
 
 def exit_code(studies: Mapping[str, StudyRecord]) -> int:
@@ -260,6 +260,4 @@ def _verdict(record: NightRecord) -> str:
     failed = [name for name, own in record.studies.items() if own.state == "failed"]
     parts = [("changed", changed), ("not ready", late), ("failed", failed)]
     words = "; ".join(f"{word}: {', '.join(names)}" for word, names in parts if names)
-    first = all(own.compared_with is None for own in record.studies.values())
-    quiet = "first night, nothing to compare with" if first else "no change"
-    return f"{words or quiet} (exit code {record.exit_code}, {record.seconds:.3g} s)"
+    return f"{words or record.quiet} (exit code {record.exit_code}, {record.seconds:.3g} s)"

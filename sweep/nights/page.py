@@ -3,14 +3,17 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 from pathlib import Path
+from types import SimpleNamespace
+from typing import NamedTuple
+
+import numpy as np
 
 from sweep.dataset.comparison import SLOWER
 from sweep.dataset.files import write_atomically
+from sweep.nights.archive import WORDS, NightRecord, StudyRecord, read_history
 from sweep.nights.changes import YIELD
-from sweep.nights.records import WORDS, NightRecord, StudyRecord, read_history
-from sweep.report.figures import rendered
+from sweep.pages import rendered
 from sweep.report.quantities import number, quantity
 
 INDEX = "index.html"
@@ -20,58 +23,13 @@ DIGITS = 6
 SECONDS = "time of the run"
 
 
-@dataclass(frozen=True)
-class Point:
+class Point(NamedTuple):
     """A figure in one night, by the night's place among those shown."""
 
     night: int
     value: float
     red: bool
     words: str
-
-
-@dataclass(frozen=True)
-class Dot:
-    """One night on a trend line."""
-
-    x: float
-    y: float
-    red: bool
-    words: str
-
-
-@dataclass(frozen=True)
-class Trend:
-    """A headline figure over the nights: its last value, the line, the nights on it."""
-
-    name: str
-    value: str
-    line: str
-    dots: tuple[Dot, ...]
-    red: bool
-
-
-@dataclass(frozen=True)
-class StudyRows:
-    """A study on the page: where its report lies (if it is still there), how its last night went, its trends."""
-
-    name: str
-    report: str | None
-    state: str
-    red: bool
-    words: tuple[str, ...]
-    trends: tuple[Trend, ...]
-
-
-@dataclass(frozen=True)
-class NightRow:
-    """A night on the page; ``log`` is None where its folder has been deleted."""
-
-    name: str
-    log: str | None
-    verdict: str
-    red: bool
-    seconds: str
 
 
 def write_page(into: Path) -> Path:
@@ -90,46 +48,44 @@ def write_page(into: Path) -> Path:
     return path
 
 
-def study_rows(name: str, nights: Sequence[NightRecord], into: Path) -> StudyRows:
-    """Return what the page says of one study."""
+def study_rows(name: str, nights: Sequence[NightRecord], into: Path) -> SimpleNamespace:
+    """Return what the page says of one study: its report (if it is still there), its last night, its trends."""
     mine = [(night.name, night.studies[name]) for night in nights if name in night.studies]
     last_night, last = mine[-1]
     reports = [night for night, record in mine if record.report and (into / night / name / "report.html").is_file()]
-    names = list(dict.fromkeys(figure for _, record in mine for figure in record.figures))
     order = [night.name for night in nights]
-    trends = [_trend(figure, mine, order) for figure in names]
+    trends = [_trend(figure, mine, order) for figure in dict.fromkeys(x for _, record in mine for x in record.figures)]
     trends += [_times(mine, order)] if any(record.seconds is not None for _, record in mine) else []
-    words = last.changes or ((last.message,) if last.message else ())
-    return StudyRows(
-        name,
-        f"{reports[-1]}/{name}/report.html" if reports else None,
-        _state(last) if last_night == nights[-1].name else f"not in the last night; {_state(last)} on {last_night}",
-        bool(last.changed) or last.state != "complete",
-        words,
-        tuple(trends),
+    return SimpleNamespace(
+        name=name,
+        report=f"{reports[-1]}/{name}/report.html" if reports else None,
+        state=_state(last) if last_night == order[-1] else f"not in the last night; {_state(last)} on {last_night}",
+        red=bool(last.changed) or last.state != "complete",
+        words=last.changes or ((last.message,) if last.message else ()),
+        trends=trends,
     )
 
 
-def _trend(name: str, mine: Sequence[tuple[str, StudyRecord]], order: Sequence[str]) -> Trend:
+def _trend(name: str, mine: Sequence[tuple[str, StudyRecord]], order: Sequence[str]) -> SimpleNamespace:
     """Return a headline figure, in the unit a designer reads."""
 
     def shown(record: StudyRecord) -> str:
-        unit = record.units.get(name, "")
+        value, unit = record.figures[name], record.units.get(name, "")
         if name == YIELD:
-            return f"{number(100.0 * record.figures[name], DIGITS)}\u00a0%"
-        return quantity(name, unit).show(record.figures[name], DIGITS) if unit else number(record.figures[name], DIGITS)
+            return f"{number(100.0 * value, DIGITS)}\u00a0%"
+        return quantity(name, unit).show(value, DIGITS) if unit else number(value, DIGITS)
 
+    with_it = [(night, record) for night, record in mine if name in record.figures]
     points = [
         Point(order.index(night), record.figures[name], name in record.moved, f"{night}: {shown(record)}")
-        for night, record in mine
-        if name in record.figures
+        for night, record in with_it
     ]
-    last = next(record for _, record in reversed(mine) if name in record.figures)
+    last = with_it[-1][1]
     unit = last.units.get(name, "")
     return _drawn(quantity(name, unit).heading if unit else name, shown(last), points, len(order))
 
 
-def _times(mine: Sequence[tuple[str, StudyRecord]], order: Sequence[str]) -> Trend:
+def _times(mine: Sequence[tuple[str, StudyRecord]], order: Sequence[str]) -> SimpleNamespace:
     """Return nights in which something was computed."""
     points = [
         Point(order.index(night), record.seconds, record.changed == SLOWER, f"{night}: {record.seconds:.3g} s")
@@ -139,18 +95,17 @@ def _times(mine: Sequence[tuple[str, StudyRecord]], order: Sequence[str]) -> Tre
     return _drawn(SECONDS, f"{points[-1].value:.3g} s", points, len(order))
 
 
-def _drawn(name: str, value: str, points: Sequence[Point], nights: int) -> Trend:
+def _drawn(name: str, value: str, points: Sequence[Point], nights: int) -> SimpleNamespace:
     """Place the nights on a line, the smallest value at the bottom and the largest at the top."""
-    low, high = (end(point.value for point in points) for end in (min, max))
-    span = high - low
-    dots = []
-    for point in points:
-        x = EDGE + (WIDTH - 2.0 * EDGE) * (point.night / (nights - 1) if nights > 1 else 1.0)
-        share = (point.value - low) / span if span > 0.0 else 0.5
-        y = HEIGHT - EDGE - share * (HEIGHT - 2.0 * EDGE)
-        dots.append(Dot(round(x, 1), round(y, 1), point.red, point.words))
+    values = np.array([point.value for point in points])
+    span = float(np.ptp(values))
+    x = EDGE + (WIDTH - 2.0 * EDGE) * np.array([p.night / (nights - 1) if nights > 1 else 1.0 for p in points])
+    share = (values - values.min()) / span if span > 0.0 else np.full(values.size, 0.5)
+    y = HEIGHT - EDGE - share * (HEIGHT - 2.0 * EDGE)
+    places = zip(x.round(1).tolist(), y.round(1).tolist(), points, strict=True)
+    dots = [SimpleNamespace(x=across, y=up, red=point.red, words=point.words) for across, up, point in places]
     line = " ".join(f"{dot.x},{dot.y}" for dot in dots)
-    return Trend(name, value, line, tuple(dots), points[-1].red)
+    return SimpleNamespace(name=name, value=value, line=line, dots=dots, red=points[-1].red)
 
 
 def _state(record: StudyRecord) -> str:
@@ -162,10 +117,13 @@ def _state(record: StudyRecord) -> str:
     return "first night" if record.compared_with is None else words[record.changed]
 
 
-def _night_row(night: NightRecord, into: Path) -> NightRow:
+def _night_row(night: NightRecord, into: Path) -> SimpleNamespace:
+    """Return what the page says of a night; there is no log where its folder has been deleted."""
     kinds = [(name, record) for name, record in night.studies.items() if record.changed or record.state != "complete"]
-    first = all(record.compared_with is None for record in night.studies.values())
-    quiet = "first night, nothing to compare with" if first else "no change"
-    verdict = "; ".join(f"{name}: {_state(record)}" for name, record in kinds) or quiet
-    log = f"{night.name}/{WORDS}" if (into / night.name / WORDS).is_file() else None
-    return NightRow(night.name, log, verdict, bool(kinds), f"{night.seconds:.3g} s")
+    return SimpleNamespace(
+        name=night.name,
+        log=f"{night.name}/{WORDS}" if (into / night.name / WORDS).is_file() else None,
+        verdict="; ".join(f"{name}: {_state(record)}" for name, record in kinds) or night.quiet,
+        red=bool(kinds),
+        seconds=f"{night.seconds:.3g} s",
+    )

@@ -13,10 +13,10 @@ from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from sweep.dataset import store
+from sweep.dataset import files, store
 from sweep.dataset.files import store_errors
 from sweep.errors import InputError, LinksweepError
-from sweep.nights.records import read_night
+from sweep.nights.archive import read_night
 from sweep.study import Study, load_study
 
 FILE, FIGURE = "study.toml", "figure.py"
@@ -40,7 +40,7 @@ class Chosen:
 
 
 def chosen(places: Iterable[Path], smoke: bool) -> list[Chosen]:
-    """Return the studies in these places: study files, folders with one, or folders of such folders.
+    """Return the studies in these places: study files, folders with one, or folders of such archive.
 
     Raises
     ------
@@ -95,7 +95,7 @@ def in_order(studies: Sequence[Chosen], earlier: Sequence[Path]) -> list[Chosen]
     def late(one: Chosen) -> bool:
         if record is not None:
             return one.name in record.studies and record.studies[one.name].state in ("cut", "waiting")
-        return not store.is_complete(last / one.name / store.DESIGNS)
+        return not store.is_complete(last / one.name / files.DESIGNS)
 
     return sorted(studies, key=lambda one: not late(one))
 

@@ -13,7 +13,7 @@ import numpy as np
 
 from kernels import status as st
 from sweep.chunks.plan import PARAMETER_UNITS, error_words
-from sweep.dataset import store
+from sweep.dataset import files
 from sweep.evaluation.curves import joint_curves, motion_curves
 from sweep.evaluation.summaries import design_outputs, output
 from sweep.evaluation.tables import design_matrix
@@ -129,7 +129,7 @@ def write(
     sink = pa.BufferOutputStream()
     table = pa.Table.from_arrays(list(arrays.values()), schema=schema)
     pq.write_table(table, sink, compression="zstd", write_page_checksum=True)
-    store.write_atomically(path, bytes(sink.getvalue()))
+    files.write_atomically(path, bytes(sink.getvalue()))
 
 
 def _plain(values: Any) -> Any:
@@ -176,8 +176,8 @@ def optimise_study(
         if the search was stopped, after the best so far was written.
     """
     place = Path(folder)
-    side = store.beside(place)
-    kept = Kept(side / store.SEARCH if key else None, key)
+    side = files.beside(place)
+    kept = Kept(side / files.SEARCH if key else None, key)
     deadline = Deadline(None if study.optimise is None else study.optimise.time_budget, stop)
     problem, results, found = _drawing(study, place, deadline, jobs, say, kept)
     nominal, settings = results[0], study.optimise
@@ -199,21 +199,21 @@ def optimise_study(
     say("tables", 0, parts, "tables")
     frame = _table(study, problem, results, nominal)
     about = {"search": json.dumps(asdict(found)), "summary": "; ".join([found.words, *found.warnings])}
-    write(side / store.OPTIMUM, frame, study, about=about)
+    write(side / files.OPTIMUM, frame, study, about=about)
     say("tables", 1, parts, "tables")
-    write(side / store.CURVES, _curves(study, frame), study)
+    write(side / files.CURVES, _curves(study, frame), study)
     say("tables", 2, parts, "tables")
-    write(side / store.SENSITIVITY, _by_role(study, frame, sensitivity), study)
+    write(side / files.SENSITIVITY, _by_role(study, frame, sensitivity), study)
     say("tables", 3, parts, "tables")
     if study.tolerance is None:
-        (side / store.TOLERANCE).unlink(missing_ok=True)
+        (side / files.TOLERANCE).unlink(missing_ok=True)
     else:
-        write(side / store.TOLERANCE, _by_role(study, frame, _tolerance), study)
+        write(side / files.TOLERANCE, _by_role(study, frame, _tolerance), study)
     if found.ended == "interrupted" or (stop is not None and stop()):
         raise KeyboardInterrupt
     if not deadline.pulled:
         kept.forget()
-    return side / store.OPTIMUM
+    return side / files.OPTIMUM
 
 
 def _drawing(

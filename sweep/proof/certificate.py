@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from kernels.boxes.branching import BOUND, EMPTY, OPEN, TOO_SMALL
-from sweep.dataset import store
+from sweep.dataset import files
 from sweep.dataset.files import metadata
 from sweep.families.base import Array
 from sweep.proof.question import Question, described
@@ -131,7 +131,7 @@ def write(path: Path, question: Question, leaves: Leaves, proof: Proof, target: 
     )
     sink = pa.BufferOutputStream()
     pq.write_table(table, sink, compression="zstd")
-    store.write_atomically(path, sink.getvalue().to_pybytes())
+    files.write_atomically(path, sink.getvalue().to_pybytes())
 
 
 def read_proof(path: Path) -> Proof | None:

@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 
 from kernels.boxes.branching import COMBINED, OPEN
 from kernels.types import Numbers
-from sweep.dataset import store
+from sweep.dataset import files
 from sweep.families.base import Array
 from sweep.families.capabilities import Searched
 from sweep.jobs.executors import Executor
@@ -132,7 +132,7 @@ def _write(path: Path, leaves: Leaves, judged: int, seconds: float) -> None:
 
     buffer, columns = io.BytesIO(), {n: getattr(leaves, n) for n in Leaves.__dataclass_fields__}
     np.savez_compressed(buffer, judged=judged, seconds=seconds, **columns)
-    store.write_atomically(path, buffer.getvalue())
+    files.write_atomically(path, buffer.getvalue())
 
 
 def _read(path: Path) -> Explored:

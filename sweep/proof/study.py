@@ -14,7 +14,7 @@ import numpy as np
 
 from kernels import status as st
 from kernels.cache_folder import source_hash
-from sweep.dataset import store
+from sweep.dataset import files
 from sweep.dataset.files import metadata
 from sweep.errors import InputError
 from sweep.proof.certificate import Proof, concluded, read_proof, write
@@ -54,13 +54,13 @@ def prove_study(study: Study, folder: str | Path, cores: Cores, tell: Tell = lam
     if known is not None:
         return known
     asked, question, target, key = _asked(study, Path(folder))
-    side = store.beside(Path(folder))
+    side = files.beside(Path(folder))
     found = explored(question, target, asked, side / PARTS / key, cores, tell)
-    proof = concluded(question, found, _best(side / store.OPTIMUM, question), asked.gap)
-    write(side / store.PROOF, question, found.leaves, proof, target, key)
+    proof = concluded(question, found, _best(side / files.OPTIMUM, question), asked.gap)
+    write(side / files.PROOF, question, found.leaves, proof, target, key)
     if cores.stop:
         raise KeyboardInterrupt
-    store.append_run(Path(folder), {"event": EVENT, "boxes": proof.boxes, "processor_seconds": round(found.seconds, 3)})
+    files.append_run(Path(folder), {"event": EVENT, "boxes": proof.boxes, "processor_seconds": round(found.seconds, 3)})
     if not proof.cut_short:
         shutil.rmtree(side / PARTS, ignore_errors=True)
     return proof
@@ -74,7 +74,7 @@ def known_proof(study: Study, folder: str | Path) -> Proof | None:
     InputError
         if the study asks for what cannot be proven.
     """
-    path = store.beside(Path(folder)) / store.PROOF
+    path = files.beside(Path(folder)) / files.PROOF
     found = read_proof(path)
     if found is None or found.cut_short:
         return None
@@ -87,7 +87,7 @@ def _asked(study: Study, folder: Path) -> tuple[ProveSettings, Question, float, 
     if study.optimise is None or study.optimise.prove is None:
         raise InputError("optimise.prove", None, '{ gap = "1 %", boxes = 1000000 }', str(study.path))
     asked, question = study.optimise.prove, question_of(study)
-    best = _best(store.beside(folder) / store.OPTIMUM, question)
+    best = _best(files.beside(folder) / files.OPTIMUM, question)
     target = question.in_kernel(best / (1.0 + asked.gap)) if np.isfinite(best) else NEVER
     what = [described(question), target, asked.gap, asked.boxes, asked.smallest, UNITS, SHARES, source_hash()]
     key = hashlib.sha256(json.dumps(what, default=str, sort_keys=True).encode()).hexdigest()[:16]

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 from kernels import status as codes
-from sweep.dataset import store
+from sweep.dataset import files
 from sweep.optimise.local.start import DIFFERS
 from sweep.proof import read_proof
 from sweep.proof.study import EVENT, proof_words
@@ -216,7 +216,7 @@ def _count(n: float) -> str:
 
 def proof_sentence(data: Dataset) -> str:
     """One sentence; empty where the study asked for no proof."""
-    found = read_proof(store.beside(data.folder) / store.PROOF)
+    found = read_proof(files.beside(data.folder) / files.PROOF)
     if found is None:
         return ""
     shown = quantity(found.objective, data.units.get(found.objective, found.unit))
@@ -237,7 +237,7 @@ def search_words(data: Dataset, found: Survey) -> str:
 
 
 def _is_proven(data: Dataset) -> bool:
-    proof = read_proof(store.beside(data.folder) / store.PROOF)
+    proof = read_proof(files.beside(data.folder) / files.PROOF)
     return proof is not None and proof.settled and not proof.exceptions
 
 

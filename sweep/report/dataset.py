@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 from kernels import status as codes
 from sweep.chunks.plan import PARAMETER_UNITS
-from sweep.dataset import store
+from sweep.dataset import chunk_files, files, store
 from sweep.dataset.files import check_tables
 from sweep.errors import InputError
 from sweep.evaluation.statuses import meaning
@@ -63,7 +63,7 @@ class Dataset:
     @property
     def counts(self) -> dict[int, int]:
         """Designs by status, those that were not kept included."""
-        codes = {name: code for code, name in store.STATUS_NAMES.items()}
+        codes = {name: code for code, name in chunk_files.STATUS_NAMES.items()}
         return {codes[name]: count for name, count in (self.plan.get("counts") or {}).items() if name in codes}
 
     @property
@@ -152,10 +152,10 @@ def read_dataset(folder: Path) -> Dataset:
     InputError
         if the folder is no complete dataset.
     """
-    folder = store.located(folder)
-    plan = store.trusted_plan(folder)
+    folder = files.located(folder)
+    plan = files.trusted_plan(folder)
     if plan is None:
-        allowed = f"a dataset folder, with a readable {store.PLAN} (sweep run makes one)"
+        allowed = f"a dataset folder, with a readable {files.PLAN} (sweep run makes one)"
         raise InputError("folder", str(folder), allowed, "report")
     if not store.is_complete(folder):
         raise InputError("folder", str(folder), "a complete dataset; run the study again to resume it", "report")
@@ -163,10 +163,10 @@ def read_dataset(folder: Path) -> Dataset:
         counts, missed = store.totals(folder)
         plan |= {"counts": counts, "missed": missed}
     study = study_of(plan, folder)
-    optima, curves, front = (store.beside(folder) / name for name in (store.OPTIMUM, store.CURVES, store.PARETO))
-    check_tables(folder, (store.OPTIMUM, store.CURVES, store.PARETO, store.SENSITIVITY, store.TOLERANCE))
-    chunks = store.parts(folder)
-    store.check_columns(chunks)
+    optima, curves, front = (files.beside(folder) / name for name in (files.OPTIMUM, files.CURVES, files.PARETO))
+    check_tables(folder, (files.OPTIMUM, files.CURVES, files.PARETO, files.SENSITIVITY, files.TOLERANCE))
+    chunks = chunk_files.parts(folder)
+    chunk_files.check_columns(chunks)
     parts = tuple(part.path for part in chunks)
     units, definitions = field_metadata([path for path in (*parts[:1], optima, curves, front) if path.exists()])
     return Dataset(
@@ -176,10 +176,10 @@ def read_dataset(folder: Path) -> Dataset:
         parts=parts,
         units={o.name: o.unit.replace("length", "mm") for o in study.family.pose_outputs} | units,
         definitions={o.name: o.text for o in study.family.pose_outputs} | definitions,
-        optima=_with_defaults(study, store.read_table(optima)) if optima.exists() else None,
-        curves=store.read_table(curves) if curves.exists() else None,
-        front=_with_defaults(study, store.read_table(front)) if front.exists() else None,
-        runs=tuple(store.read_runs(folder)),
+        optima=_with_defaults(study, files.read_table(optima)) if optima.exists() else None,
+        curves=files.read_table(curves) if curves.exists() else None,
+        front=_with_defaults(study, files.read_table(front)) if front.exists() else None,
+        runs=tuple(files.read_runs(folder)),
         survey=read_survey(optima),
         front_steps=store.front_cut_short(front),
     )
@@ -219,7 +219,7 @@ def _absent(study: Study, known: Container[str]) -> dict[str, float]:
 def study_of(plan: Mapping[str, Any], folder: Path) -> Study:
     """Study a dataset answers, from its plan; its title and question stand there under ``about``."""
     about = plan.get("about", {"name": plan["name"]})
-    return study_from_data({**plan["data"], "study": about}, store.beside(folder) / store.PLAN)
+    return study_from_data({**plan["data"], "study": about}, files.beside(folder) / files.PLAN)
 
 
 def field_metadata(files: Sequence[Path]) -> tuple[dict[str, str], dict[str, str]]:
@@ -264,7 +264,7 @@ def chosen(folder: str | Path, design: str | int | None = None) -> Chosen:
     InputError
         for a folder that is no complete dataset, or one that has no such design.
     """
-    path = store.located(folder)
+    path = files.located(folder)
     if isinstance(design, int) or (isinstance(design, str) and design.lstrip("-").isdigit()):
         return _row(path, int(design))
     if design is not None and design not in ROLES:

@@ -7,14 +7,14 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Literal
+from typing import TYPE_CHECKING, Literal
+
+from sweep.pages import TEMPLATES
 
 if TYPE_CHECKING:
-    from markupsafe import Markup
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-TEMPLATES = Path(__file__).resolve().parent.parent / "templates"
 OPTIMUM, REFERENCE, LIMIT, QUIET = "#1f5aa6", "#c8551b", "#b3261e", "#8a8f98"
 WIDTH = 9.6  # inches, the full text width of the page
 NARROW = 4.6  # bars and their names can still be read on a telephone
@@ -60,19 +60,6 @@ def drawn_before(path: Path) -> Saved:
     """Return a figure that was saved earlier."""
     encoded = base64.b64encode(path.read_bytes()).decode("ascii")
     return Saved(path, f"data:image/svg+xml;base64,{encoded}")
-
-
-def rendered(template: str, **names: Any) -> Markup:
-    """Fill a template, in which ``files`` sets others as they are; all names that it knows have to be given."""
-    from jinja2 import Environment, FileSystemLoader, StrictUndefined
-    from markupsafe import Markup
-
-    environment = Environment(
-        loader=FileSystemLoader(TEMPLATES), autoescape=True, undefined=StrictUndefined, trim_blocks=True,
-        lstrip_blocks=True,
-    )  # fmt: skip
-    environment.globals["files"] = lambda *names: Markup("\n".join((TEMPLATES / n).read_text("utf-8") for n in names))
-    return Markup(environment.get_template(template).render(**names))
 
 
 def crank_axis(axes: Axes, label: str) -> None:

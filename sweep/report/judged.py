@@ -11,8 +11,8 @@ from kernels import status as codes
 from sweep.dataset.files import write_atomically
 from sweep.errors import InputError, StoreError
 from sweep.evaluation.statuses import meaning
+from sweep.pages import rendered
 from sweep.report.dataset import Dataset, Row, chosen, read_dataset, row_of
-from sweep.report.figures import rendered
 from sweep.report.live import embedded, moving, scripts_of
 from sweep.report.optima import Shown
 from sweep.report.tables import ParameterRow, limit_states, output_rows, parameter_rows

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
-from sweep.dataset import store
+from sweep.dataset import files
 from sweep.evaluation.summaries import design_outputs
 from sweep.families.names import is_flag, judged_by, without_minus
 from sweep.optimise.manufacture.tolerance import deviating, touched
@@ -212,14 +212,14 @@ def spreads(data: Dataset) -> list[Spread]:
     return [
         Spread(quantity(str(row["output"]), data.units.get(str(row["output"]), "")),
                *(float(row[key]) for key in ("nominal", "low", "mean", "high", "within")))
-        for row in _optimum_rows(data, store.TOLERANCE)
+        for row in _optimum_rows(data, files.TOLERANCE)
         if row["output"] != "all limits" and not is_flag(str(row["output"]))
     ]  # fmt: skip
 
 
 def share_made(data: Dataset) -> float:
     """Share of what is made that keeps all limits, of as many mechanisms as it is known from; nan where it is not."""
-    few = [float(row["within"]) for row in _optimum_rows(data, store.TOLERANCE) if row["output"] == "all limits"]
+    few = [float(row["within"]) for row in _optimum_rows(data, files.TOLERANCE) if row["output"] == "all limits"]
     known = float((data.optimum or {}).get("yield", math.nan))
     return known if math.isfinite(known) else next(iter(few), math.nan)
 
@@ -256,7 +256,7 @@ def slopes(data: Dataset) -> list[Slope]:
         return []
     known = {p.name: p for p in data.study.family.parameters}
     ranked = []
-    for row in _optimum_rows(data, store.SENSITIVITY):
+    for row in _optimum_rows(data, files.SENSITIVITY):
         name, value = str(row["parameter"]), abs(float(row["value"]))
         if row["output"] != data.study.objective.output or not value > 0.0 or math.isnan(row["growing"]):
             continue
@@ -270,8 +270,8 @@ def slopes(data: Dataset) -> list[Slope]:
 
 def _optimum_rows(data: Dataset, file: str) -> list[dict[str, Any]]:
     """Rows of the optimum in a table beside the dataset; none where there is no such table."""
-    path = store.beside(data.folder) / file
+    path = files.beside(data.folder) / file
     if not path.exists():
         return []
-    frame = store.read_table(path)
+    frame = files.read_table(path)
     return [{str(k): v for k, v in row.items()} for row in frame[frame["role"] == "optimum"].to_dict("records")]

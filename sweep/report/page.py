@@ -13,9 +13,10 @@ from sweep.errors import StoreError
 from sweep.evaluation.cyclogram import cyclogram, table_in_degrees
 from sweep.families.machines import Machine
 from sweep.jobs.progress import Say, unsaid
+from sweep.pages import rendered
 from sweep.report import answer, front, maps, tables
 from sweep.report.dataset import Dataset, gather
-from sweep.report.figures import drawn_before, house_style, rendered, save
+from sweep.report.figures import drawn_before, house_style, save
 from sweep.report.live import live
 from sweep.report.made import COSTS, TELLING, made, made_sentence, share_made, slopes, spreads, tolerance_words
 from sweep.report.optima import CARDS, groups, optima, optima_sentence

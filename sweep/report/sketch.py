@@ -24,7 +24,7 @@ from sweep.exchange.scene import (
     side_by_side,
 )
 from sweep.families.base import Array, Family
-from sweep.report.figures import rendered
+from sweep.pages import rendered
 
 if TYPE_CHECKING:
     from markupsafe import Markup

@@ -13,7 +13,7 @@ import numpy as np
 
 from kernels import status as codes
 from sweep.chunks.plan import spread_designs
-from sweep.dataset import store
+from sweep.dataset import files
 from sweep.evaluation.statuses import meaning
 from sweep.evaluation.summaries import design_outputs
 from sweep.families.base import Angles
@@ -64,7 +64,7 @@ def ending(folder: Path) -> Ending:
     if best is not None:
         missed = int(best.get("status", 0)) == codes.LIMIT_EXCEEDED
         lines += _nearest(data) if missed else _optimum(data)
-        found = read_survey(store.beside(folder) / store.OPTIMUM)
+        found = read_survey(files.beside(folder) / files.OPTIMUM)
         if found is not None:
             lines.append(f"search: {started(found.starts)}, {search_words(data, found)}")
             kinds = [f"{words}: {started(n)}, {b} basin{'' if b == 1 else 's'}" for words, n, b in found.kinds]
@@ -151,7 +151,7 @@ def _cannot_meet(data: Dataset) -> list[str]:
     family, loops = data.study.family, data.study.family.every(Assembly)
     if not loops or isinstance(family.domain, Interval):
         return []
-    table = pq.read_table(store.beside(data.folder) / store.OPTIMUM, filters=[("role", "!=", "reference")])
+    table = pq.read_table(files.beside(data.folder) / files.OPTIMUM, filters=[("role", "!=", "reference")])
     designs = np.column_stack([table[name].to_numpy() for name in family.parameter_names]).astype(np.float64)
     with np.errstate(all="ignore"):
         poses = family.poses(

@@ -9,8 +9,7 @@ from pydantic import Field, PlainValidator
 from sweep.errors import InputError
 from sweep.families.base import Accuracy, Family
 from sweep.reductions.steps import check_certifiable, proofs
-from sweep.study.file import Faults
-from sweep.study.section import Section
+from sweep.study.file import Faults, Section
 
 DEFAULT_TARGET = 1e-8
 

@@ -12,8 +12,7 @@ from sweep.families.base import Family
 from sweep.quantities.limits import Limit
 from sweep.quantities.resolve import output as design_output
 from sweep.quantities.units import internal_unit
-from sweep.study.file import Faults, Key, StudyFile
-from sweep.study.section import Section, read_section
+from sweep.study.file import Faults, Key, Section, StudyFile, read_section
 
 Window = Annotated[list[str], Field(min_length=2, max_length=2)]
 ENDS = {"ext": "phi_ext", "fold": "phi_fold", "duration": "phi0"}

@@ -1,12 +1,24 @@
-"""A study file while it is read: its tables, and all its faults with file, line, key, value and what is allowed."""
+"""A study file while it is read: its tables as pydantic models, and its faults with file, line, key, value and rule."""
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Callable, Container, Iterable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from types import MappingProxyType
-from typing import Any, TypeAlias
+from typing import Annotated, Any, ClassVar, TypeAlias, TypeVar, get_args
+
+from pydantic import (
+    BaseModel,
+    BeforeValidator,
+    ConfigDict,
+    Discriminator,
+    Field,
+    Tag,
+    ValidationError,
+    WithJsonSchema,
+)  # fmt: skip
+from pydantic_core import PydanticCustomError
 
 from sweep.errors import StudyError, choices, closest, shown
 from sweep.quantities import units
@@ -116,21 +128,6 @@ class StudyFile:
         raw = self.data[table].get(key) if isinstance(self.data.get(table), dict) else None
         return [(k, name) for k, name in enumerate(raw) if isinstance(name, str)] if isinstance(raw, list) else []
 
-    def quantity(self, text: str | None, internal: str, key: Key, *, signed: bool = False) -> float | None:
-        """Read a text such as "7000 rpm" in the internal unit; positive, or just not zero if it is ``signed``."""
-        value = None if text is None else self.faults.number(text, internal, key)
-        if value is not None and not (abs(value) > 0.0 if signed else value > 0.0):
-            kind = "non-zero" if signed else "positive"
-            self.faults.value(key, text, f"a {kind} number; {units.example(internal)}")
-        return value
-
-    def share(self, text: str, key: Key) -> float:
-        """Read a text such as "2 %" as a share between 0 and 1, neither of them."""
-        share = self.quantity(text, "1", key)
-        if share is not None and not share < 1.0:
-            self.faults.value(key, text, 'a share below 100 %, as "2 %"')
-        return 0.5 if share is None else share
-
     def raise_faults(self) -> None:
         """Raise an error if there are faults.
 
@@ -156,3 +153,134 @@ def _holds(table: Any, key: Key) -> bool:
         except (KeyError, IndexError, TypeError):
             return False
     return True
+
+
+def quantity(internal: str, allowed: Callable[[float], bool] = lambda x: True, kind: str = "") -> BeforeValidator:
+    """Return what reads a text such as "7000 rpm" in the internal unit; ``kind`` says in words what is allowed."""
+
+    def read(value: object) -> float:
+        if not isinstance(value, str):
+            raise ValueError("no text")
+        try:
+            number, unit = units.split(value, internal)
+            number *= units.factor(unit, internal)
+        except units.UnitFault as fault:
+            raise PydanticCustomError(QUANTITY, "{words}", {"words": str(fault)}) from None
+        if not allowed(number):
+            raise PydanticCustomError(QUANTITY, "{words}", {"words": f"{kind}; {units.example(internal)}"})
+        return number
+
+    return BeforeValidator(read)
+
+
+def _positive(internal: str) -> BeforeValidator:
+    return quantity(internal, lambda x: x > 0.0, "a positive number")
+
+
+QUANTITY, TEXT = "quantity", WithJsonSchema({"type": "string"})
+Number = Annotated[float, Field(allow_inf_nan=False, ge=-1e100, le=1e100)]
+Count = Annotated[int, Field(ge=1, le=1_000_000)]
+Seed = Annotated[int, Field(ge=0, lt=2**63)]
+Fraction = Annotated[float, Field(ge=0.0, le=1.0)]
+Length = Annotated[float, quantity("mm"), TEXT]
+Angle = Annotated[float, quantity("rad"), TEXT]
+Size = Annotated[float, _positive("mm"), TEXT]
+Width = Annotated[float, _positive("rad"), TEXT]
+Seconds = Annotated[float, _positive("s"), TEXT]
+Bytes = Annotated[float, _positive("B"), TEXT]
+Speed = Annotated[float, quantity("rad/s", lambda x: x != 0.0, "a non-zero number"), TEXT]
+Share = Annotated[float, quantity("1", lambda x: 0.0 < x < 1.0, 'a share above 0 and below 100 %, as "2 %"'), TEXT]
+ThreeLengths = Annotated[list[Length], Field(min_length=3, max_length=3)]
+
+# Of a plain union of types pydantic reports the complaints of each one.
+ONE, LIST, TABLE = "<one>", "<list>", "<table>"
+KIND = Discriminator(
+    lambda value: LIST if isinstance(value, list) else TABLE if isinstance(value, dict | Section) else ONE
+)
+Place = Annotated[Annotated[str, Tag(ONE)] | Annotated[ThreeLengths, Tag(LIST)], KIND]
+LengthOrPlace = Annotated[Annotated[Length, Tag(ONE)] | Annotated[ThreeLengths, Tag(LIST)], KIND]
+Lengths = Annotated[Annotated[Length, Tag(ONE)] | Annotated[list[Length], Tag(LIST)], KIND]
+
+
+class Section(BaseModel):
+    """A table of the file; what each key may hold is its ``description``, which messages quote.
+
+    ``required`` keys are optional to pydantic, so that the others are read all the same.
+    """
+
+    model_config = ConfigDict(extra="forbid", strict=True, frozen=True, populate_by_name=False)
+    required: ClassVar[tuple[str, ...]] = ()
+
+
+S = TypeVar("S", bound=Section)
+
+
+def read_table(model: type[S], name: str, file: StudyFile) -> S:
+    """Read a table of the file by its model; all defaults where the file has no such table."""
+    return read_section(model, file.data[name], (name,), file.faults) if name in file else model()
+
+
+def read_section(model: type[S], raw: object, key: Key, faults: Faults) -> S:
+    """Read a table by its model; faulty keys are reported and left at their defaults."""
+    if not isinstance(raw, dict):
+        faults.value(key, raw, f"a table with the keys {', '.join(_names(model))}")
+        return model()
+    section = _validated(model, raw, key, faults)
+    missing_keys(model, raw, key, faults)
+    return section
+
+
+def missing_keys(model: type[Section], given: Container[str], key: Key, faults: Faults) -> None:
+    """Report the required keys that are not among the given ones."""
+    for name in model.required:
+        if name not in given:
+            faults.missing((*key, name), _described(model, (name,)))
+
+
+def _validated(model: type[S], raw: Mapping[str, Any], key: Key, faults: Faults) -> S:
+    try:
+        return model.model_validate(raw)
+    except ValidationError as error:
+        bad: set[str | int] = set()
+        for item in error.errors(include_url=False):
+            place = tuple(part for part in item["loc"] if part not in (ONE, LIST, TABLE))
+            bad.add(place[0])
+            if item["type"] == "extra_forbidden":
+                faults.unknown((*key, *place), _names(_model_at(model, place[:-1])))
+            else:
+                own = item.get("ctx", {}) if item["type"] == QUANTITY else {}
+                faults.value((*key, *place), item["input"], own.get("words") or _described(model, place))
+        return model.model_validate({name: value for name, value in raw.items() if name not in bad})
+
+
+def _names(model: type[Section]) -> list[str]:
+    return [field.alias or name for name, field in model.model_fields.items()]
+
+
+def _field(model: type[Section], name: str | int) -> Any:
+    return next((f for attribute, f in model.model_fields.items() if (f.alias or attribute) == name), None)
+
+
+def _described(model: type[Section], place: Key) -> str:
+    """Find the description of the innermost named key at this place."""
+    named = [k for k, part in enumerate(place) if isinstance(part, str)]
+    inner = _model_at(model, place[: named[-1]])
+    return str(_field(inner, place[named[-1]]).description)
+
+
+def _model_at(model: type[Section], place: Key) -> type[Section]:
+    """Find the model of the table at this place: the one named in the annotation of each key on the way."""
+    for part in place:
+        if isinstance(part, str):
+            model = _table_in(_field(model, part).annotation)
+    return model
+
+
+def _table_in(annotation: Any) -> type[Section]:
+    stack = [annotation]
+    while stack:
+        candidate = stack.pop()
+        if isinstance(candidate, type) and issubclass(candidate, Section):
+            return candidate
+        stack += get_args(candidate)
+    raise TypeError(f"{annotation!r} holds no table")

@@ -9,15 +9,14 @@ from pydantic import Field
 from sweep.errors import InputError
 from sweep.families.base import Family
 from sweep.families.chain import Chain
-from sweep.study.file import Faults, StudyFile
-from sweep.study.section import Section
+from sweep.study.file import Faults, Section, Size, StudyFile
 from sweep.synthesis.fit import LineFit
 
 
 class FitSection(Section):
     """Table [fit]."""
 
-    stroke: str | None = Field(None, description='a length as a text, as "24.5 mm"')
+    stroke: Size | None = Field(None, description='a length as a text, as "24.5 mm"')
     direction: Literal["free", "given"] = Field("free", description='"free" or "given"')
 
 
@@ -25,7 +24,7 @@ def read_fit(section: FitSection, file: StudyFile, family: Family) -> LineFit | 
     """Read the fit of the mechanism's guided point; None where the file asks for none."""
     if "fit" not in file:
         return None
-    fit = LineFit(file.quantity(section.stroke, "mm", ("fit", "stroke")), section.direction == "free")
+    fit = LineFit(section.stroke, section.direction == "free")
     try:
         fit.parameters(family)
     except InputError as error:

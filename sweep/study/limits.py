@@ -16,12 +16,12 @@ from sweep.quantities import units
 from sweep.quantities.limits import Limit
 from sweep.quantities.resolve import output as design_output
 from sweep.study.cyclogram import limits_of_cyclogram
-from sweep.study.file import Faults, Key, StudyFile
+from sweep.study.file import Faults, Key, Number, Section, StudyFile, read_section
 from sweep.study.locus import prescribed_limits
 from sweep.study.parameter import Entry
-from sweep.study.section import Number, Section, read_section
 from sweep.study.settings import limits_of_settings
 
+UPPER, LOWER = ("<=", "\u2264"), (">=", "\u2265")
 _SIDES = ("<", ">", "=", "\u2264", "\u2265")
 _SIDE = re.compile("([<>=\u2264\u2265]+)\\s*(.*)", re.DOTALL)
 
@@ -66,10 +66,8 @@ def read_limits(file: StudyFile, family: Family, prescribed: Mapping[str, Entry]
             if entry is not True:
                 faults.value(key, entry, "true")
             found.append(Limit(name, minimum=1.0))
-        elif isinstance(entry, str) and "+-" in entry:
-            found += _read_band(output, entry, key, faults)
-        elif isinstance(entry, str) and entry.lstrip()[:1] in _SIDES:
-            found += _read_side(output, entry, key, faults)
+        elif isinstance(entry, str) and ("+-" in entry or entry.lstrip()[:1] in _SIDES):
+            found += _read_text(output, entry, key, faults)
         elif isinstance(entry, dict):
             found += _read_bounds(output, entry, key, faults)
         else:
@@ -112,47 +110,38 @@ def _read_bounds(output: Output, raw: Mapping[str, Any], key: Key, faults: Fault
     return [Limit(output.name, *bounds)]
 
 
-def _read_band(output: Output, text: str, key: Key, faults: Faults) -> list[Limit]:
-    """Read a value and how far it may be missed, as "40 +- 0.2 deg"."""
+def _read_text(output: Output, text: str, key: Key, faults: Faults) -> list[Limit]:
+    """Read a value and how far it may be missed, as "40 +- 0.2 deg", or a bound on one side, as "<= 45 deg"."""
     internal = units.internal_unit(output.unit)
-    middle, _, width = (part.strip() for part in text.partition("+-"))
+    middle, band, rest = text.partition("+-")
+    form, sign = f"a value and its band, as {_band(internal)}", ""
+    if not band:
+        sign, rest = _SIDE.fullmatch(text.strip()).groups()  # type: ignore[union-attr]
+        form = f"a sign and a number, as {_side(internal)}"
+        if sign not in (*UPPER, *LOWER):
+            faults.value(key, text, f'"<=" or ">=", or "+-" for a band, as {_side(internal)} or {_band(internal)}')
+            return []
     try:
-        half, unit = units.split(width, internal) if internal != "1" else (float(width), "1")
-        factor = units.factor(unit, internal)
-        centre = float(middle)
+        number, unit = units.split(rest.strip(), internal) if internal != "1" else (float(rest), "1")
+        factor, centre = units.factor(unit, internal), float(middle) if band else 0.0
     except units.UnitFault as fault:
-        faults.value(key, text, str(fault))
+        faults.value(key, text, str(fault) if band else f"{fault}: {_side(internal)}")
         return []
     except ValueError:
-        faults.value(key, text, f"a value and its band, as {_band(internal)}")
+        faults.value(key, text, form)
         return []
-    if not (half > 0.0 and math.isfinite(centre) and math.isfinite(half)):
-        faults.value(key, text, f"a finite value and a positive band, as {_band(internal)}")
+    if not (math.isfinite(centre) and math.isfinite(number * factor) and (number > 0.0 or not band)):
+        allowed = (
+            f"a finite value and a positive band, as {_band(internal)}"
+            if band
+            else f"a finite number, as {_side(internal)}"
+        )
+        faults.value(key, text, allowed)
         return []
-    return [Limit(output.name, (centre - half) * factor, (centre + half) * factor)]
-
-
-def _read_side(output: Output, text: str, key: Key, faults: Faults) -> list[Limit]:
-    """Read a bound on one side, as "<= 45 deg"."""
-    internal = units.internal_unit(output.unit)
-    sign, rest = _SIDE.fullmatch(text.strip()).groups()  # type: ignore[union-attr]
-    if sign not in ("<=", ">=", "\u2264", "\u2265"):
-        faults.value(key, text, f'"<=" or ">=", or "+-" for a band, as {_side(internal)} or {_band(internal)}')
-        return []
-    try:
-        number, unit = units.split(rest, internal) if internal != "1" else (float(rest), "1")
-        bound = number * units.factor(unit, internal)
-    except units.UnitFault as fault:
-        faults.value(key, text, f"{fault}: {_side(internal)}")
-        return []
-    except ValueError:
-        faults.value(key, text, f"a sign and a number, as {_side(internal)}")
-        return []
-    if not math.isfinite(bound):
-        faults.value(key, text, f"a finite number, as {_side(internal)}")
-        return []
-    upper = sign in ("<=", "\u2264")
-    return [Limit(output.name, None if upper else bound, bound if upper else None)]
+    if band:
+        return [Limit(output.name, (centre - number) * factor, (centre + number) * factor)]
+    upper = sign in UPPER
+    return [Limit(output.name, None if upper else number * factor, number * factor if upper else None)]
 
 
 def _side(internal: str) -> str:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import copy
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 from pathlib import Path
 from types import MappingProxyType
 from typing import Any
@@ -15,7 +14,7 @@ from sweep.families.base import Accuracy, Family
 from sweep.families.specification import Specification
 from sweep.quantities.limits import Limit
 from sweep.study.accuracy import accuracy_table, check_proofs, read_accuracy
-from sweep.study.design import Elsewhere, check_varied, read_reference, read_space
+from sweep.study.design import Elsewhere, check_varied, read_reference, read_space, take, taken_reference
 from sweep.study.file import Faults, StudyFile
 from sweep.study.fit import read_fit
 from sweep.study.limits import read_limits
@@ -24,24 +23,23 @@ from sweep.study.locus import RATIOS, read_locus
 from sweep.study.mechanism import flattened, read_mechanism
 from sweep.study.objective import check_goal, check_objective
 from sweep.study.optimise import check_search, check_steady, read_optimise
-from sweep.study.output import read_budget
-from sweep.study.pareto import read_front_time, read_pareto
+from sweep.study.parameter import Entry
+from sweep.study.pareto import read_pareto
 from sweep.study.report import check_report
 from sweep.study.scene import read_window, speeds, with_effects
 from sweep.study.study import (
     Budget,
     Objective,
-    OptimiseSettings,
     OutputSettings,
     ParetoSettings,
     Study,
 )
 from sweep.study.tables import Sections, read_sections
-from sweep.study.taken import take, taken_reference
 from sweep.study.task import check_task, read_study_task
 from sweep.study.thread import read_threads
 from sweep.study.tolerance import check_tolerance, read_tolerance
 from sweep.study.toml import key_lines, read_toml, toml_text
+from sweep.synthesis.prescription import OnLocus
 from sweep.synthesis.tasks.problem import SynthesisTask
 
 
@@ -123,44 +121,25 @@ def _build(
     faults = Faults({name: flattened(content, members) for name, content in files.items()}, places)
     file = StudyFile(flattened(data, members), path, faults)
     sections = read_sections(file)
-    alone = _read_alone(file, sections)
+    window, accuracy = read_window(sections.scene.window, faults), read_accuracy(sections.accuracy, faults)
+    task = read_study_task(file)
+    check_goal(sections.objective, file)
+    if not (sections.scene.want or file.free_table("limits") or sections.objective.goal):
+        faults.missing(("scene", "want"), "design outputs to compute, here or in [limits] or [objective]")
     found = read_mechanism(sections.mechanism, file, read_threads(file))
     if found is None:  # nothing else can be checked
         raise StudyError(str(path), faults.lines)
-    return _study(file, sections, alone, *found)
-
-
-@dataclass(frozen=True)
-class _Alone:
-    """What tables say whatever the mechanism is."""
-
-    speed: float | None
-    window: tuple[float, float] | None
-    accuracy: Accuracy
-    optimise: OptimiseSettings | None
-    front_time: float | None
-    task: SynthesisTask | None
-    budget: Budget
-
-
-def _read_alone(file: StudyFile, sections: Sections) -> _Alone:
-    alone = _Alone(
-        file.quantity(sections.scene.speed, "rad/s", ("scene", "speed"), signed=True),
-        read_window(sections.scene.window, file.faults),
-        read_accuracy(sections.accuracy, file.faults),
-        read_optimise(sections.optimise, file),
-        read_front_time(sections.pareto, file),
-        read_study_task(file),
-        read_budget(sections.budget, file),
-    )
-    check_goal(sections.objective, file)
-    if not (sections.scene.want or file.free_table("limits") or sections.objective.goal):
-        file.faults.missing(("scene", "want"), "design outputs to compute, here or in [limits] or [objective]")
-    return alone
+    return _study(file, sections, window, accuracy, task, *found)
 
 
 def _study(
-    file: StudyFile, sections: Sections, alone: _Alone, mechanism: tuple[str, ...] | Specification, bare: Family
+    file: StudyFile,
+    sections: Sections,
+    window: tuple[float, float] | None,
+    accuracy: Accuracy,
+    task: SynthesisTask | None,
+    mechanism: tuple[str, ...] | Specification,
+    bare: Family,
 ) -> Study:
     faults, objective, goal = file.faults, sections.objective, sections.objective.goal
     named = [*(file.free_table("limits") or ()), *(x for x in (goal, sections.pareto.output) if x)]
@@ -172,17 +151,10 @@ def _study(
     check_search(sections.optimise, file, bare)
     check_objective(objective, family, faults)
     check_steady(file, family, objective, limits)
-    if alone.task is not None:
+    if task is not None:
         check_task(file, mechanism)
-    front = read_pareto(sections.pareto, file, family, objective, sections.optimise, alone.front_time)
-    other = Elsewhere(
-        fitted,
-        speeds(family, alone.speed),
-        () if locus is None else locus.made,
-        prescribed,
-        inputs.raw,
-        tables_of_inputs(file, bare, family, inputs),
-    )
+    front = read_pareto(sections.pareto, file, family, objective, sections.optimise)
+    other = _elsewhere(file, bare, family, fitted, sections.scene.speed, locus, prescribed, inputs)
     space = read_space(file, family, other)
     if space is not None and fit is None and (locus is None or sections.optimise.variables != "parameters"):
         check_varied(file, family, space, inputs.raw)
@@ -192,7 +164,7 @@ def _study(
     check_report(sections.report, file, family, prescribed)
     asked = [*prescribed, *(name for name in file.free_table("locus") or () if name.startswith(RATIOS))]
     want = _computed(family, [*expanded(bare, sections.scene.want), *asked], limits, goal, front)
-    check_proofs(alone.accuracy, family, want, window=alone.window is not None, faults=faults)
+    check_proofs(accuracy, family, want, window=window is not None, faults=faults)
     file.raise_faults()
     assert space is not None  # without it there are faults
     return Study(
@@ -201,7 +173,7 @@ def _study(
         question=sections.study.question,
         path=file.path,
         mechanism=mechanism,
-        speed=alone.speed,
+        speed=sections.scene.speed,
         curves=inputs.curves,
         want=want,
         space=space,
@@ -209,17 +181,27 @@ def _study(
         fit=fit,
         limits=limits,
         objective=Objective(goal) if goal else None,
-        accuracy=alone.accuracy,
-        window=alone.window,
-        optimise=alone.optimise,
+        accuracy=accuracy,
+        window=window,
+        optimise=read_optimise(sections.optimise) if "optimise" in file else None,
         pareto=front,
         tolerance=tolerance,
         reference=reference,
-        task=alone.task,
+        task=task,
         output=OutputSettings(**sections.output.model_dump()),
-        budget=alone.budget,
-        data=_completed(file, sections, alone.accuracy, inputs),
+        budget=Budget(sections.budget.disk, sections.budget.time),
+        data=_completed(file, sections, accuracy, inputs),
     )
+
+
+def _elsewhere(
+    file: StudyFile, bare: Family, family: Family, fitted: tuple[str, ...], speed: float | None, locus: OnLocus | None,
+    prescribed: dict[str, Entry], inputs: Inputs,
+) -> Elsewhere:  # fmt: skip
+    """Collect what other tables than [design] say of the parameters."""
+    tables = tables_of_inputs(file, bare, family, inputs)
+    made = () if locus is None else locus.made
+    return Elsewhere(fitted, speeds(family, speed), made, prescribed, inputs.raw, tables)
 
 
 def _computed(

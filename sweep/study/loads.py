@@ -22,8 +22,7 @@ from sweep.families.machines import Machine
 from sweep.families.names import at_stage
 from sweep.numerics.curves import Curve, SeriesCurve, table_curve
 from sweep.quantities import units
-from sweep.study.file import Faults, Key, StudyFile
-from sweep.study.section import Number, Section, read_section
+from sweep.study.file import Faults, Key, Number, Section, StudyFile, read_section
 
 OF_SCENE = ("speed", "speed_change")
 MOST_POINTS = 100_000

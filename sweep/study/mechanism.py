@@ -13,13 +13,25 @@ from sweep.families import family as find_family
 from sweep.families.base import Family
 from sweep.families.specification import Specification, specification
 from sweep.quantities import units
-from sweep.study.file import Faults, Key, StudyFile
-from sweep.study.section import Number, Section, read_section
-from sweep.study.tools import read_tool
+from sweep.study.file import (
+    TEXT,
+    Angle,
+    Faults,
+    Key,
+    Length,
+    Number,
+    Section,
+    StudyFile,
+    ThreeLengths,
+    quantity,
+    read_section,
+)
+from sweep.study.tools import ToolSection
 
 Names = Annotated[list[str], Field(min_length=1)]
 Three = Annotated[list[Number], Field(min_length=3, max_length=3)]
-ThreeTexts = Annotated[list[str], Field(min_length=3, max_length=3)]
+Rotation = Annotated[float, quantity("rad/s"), TEXT]
+TwoLengths = Annotated[list[Length], Field(min_length=2, max_length=2)]
 
 # Tables in which a member's own entries may stand in a table of the member's name.
 BY_MEMBER = (("design",), ("bodies",), ("loads",), ("limits",), ("reference", "design"))
@@ -35,7 +47,7 @@ class MechanismSection(Section):
 class PlaceTable(Section):
     """Table ``machine.<member>.place``."""
 
-    at: ThreeTexts | None = Field(None, description='three lengths, as ["0 mm", "30 mm", "12 mm"]')
+    at: ThreeLengths | None = Field(None, description='three lengths, as ["0 mm", "30 mm", "12 mm"]')
     axis: Three | None = Field(None, description="a direction [x, y, z]: the member's z")
     zero: Three | None = Field(None, description="a direction [x, y, z]: the member's x")
     stage: int | None = Field(None, description="of a chain, 1 where its first stage stands there; else its last")
@@ -44,11 +56,11 @@ class PlaceTable(Section):
 class ShaftSection(Section):
     """Table ``shafts.<name>``."""
 
-    at: ThreeTexts | None = Field(None, description='a point of the axis, as ["0 mm", "30 mm", "12 mm"]')
+    at: ThreeLengths | None = Field(None, description='a point of the axis, as ["0 mm", "30 mm", "12 mm"]')
     axis: Three | None = Field(None, description="its direction [x, y, z]")
     zero: Three | None = Field(None, description="the direction [x, y, z] of its mark at angle 0")
     ratio: int | None = Field(None, description="whole turns for one of the main shaft, with the sense, not 0")
-    phase: str | None = Field(None, description='its angle where that of the main shaft is 0, as "30 deg"')
+    phase: Angle | None = Field(None, description='its angle where that of the main shaft is 0, as "30 deg"')
 
 
 class MemberSection(Section):
@@ -57,18 +69,18 @@ class MemberSection(Section):
     family: str | None = Field(None, description="the name of a family")
     chain: Names | None = Field(None, description="a list of names of families")
     ratio: int | None = Field(None, description="a whole number of turns of its crank for one of what drives it, not 0")
-    offset: str | None = Field(None, description='an angle with its unit, as "180 deg"')
+    offset: Angle | None = Field(None, description='an angle with its unit, as "180 deg"')
     driver: str | None = Field(None, description='"shaft", or an angle of an earlier member, as "needle.psi1"')
     place: PlaceTable | None = Field(None, description="{ at = [...], axis = [...], zero = [...] }")
     shaft: str | None = Field(None, description="the shaft that its crank sits on, one of [shafts]")
     sense: int | None = Field(None, description="1 or -1: its crank axis along the shaft or against it")
-    shift: str | None = Field(None, description='place of its origin along the shaft, as "12 mm"')
-    turn: str | None = Field(None, description='angle of its frame about the shaft, as "90 deg"')
-    key: str | None = Field(None, description='angle of its crank on the shaft, as "15 deg"')
-    tip: ThreeTexts | None = Field(
+    shift: Length | None = Field(None, description='place of its origin along the shaft, as "12 mm"')
+    turn: Angle | None = Field(None, description='angle of its frame about the shaft, as "90 deg"')
+    key: Angle | None = Field(None, description='angle of its crank on the shaft, as "15 deg"')
+    tip: ThreeLengths | None = Field(
         None, description='three lengths along, across, along the axis, as ["30 mm", "0 mm", "2 mm"]'
     )
-    eye: ThreeTexts | None = Field(
+    eye: ThreeLengths | None = Field(
         None, description='three lengths along the coupler, across it, along its axes, as ["30 mm", "0 mm", "0 mm"]'
     )
 
@@ -84,9 +96,7 @@ class RelationSection(Section):
     rising: bool | None = Field(None, description="true or false: whether it passes upwards; true if left out")
     value: Names | None = Field(None, description='a pose output and a crank angle, as ["pace", "phi_arrive"]')
     gap: Names | None = Field(None, description='two bodies, links or tools, as ["needle.rocker1", "blade"]')
-    radii: Annotated[list[str], Field(min_length=2, max_length=2)] | None = Field(
-        None, description='of a gap, the radius of each body, as ["4 mm", "3 mm"]'
-    )
+    radii: TwoLengths | None = Field(None, description='of a gap, the radius of each body, as ["4 mm", "3 mm"]')
     take: Names | None = Field(None, description='a needle and a blade of [tools], as ["thin", "blade"]')
     enter: Names | None = Field(
         None, description='what passes, a blade and the seam of [tools], as ["thin", "upper", "seam"]'
@@ -95,10 +105,10 @@ class RelationSection(Section):
         None,
         description="1 or -1: of a take along n x w of the needle or against it, of an enter the triangle's normal",
     )
-    fields: dict[str, Annotated[list[str], Field(min_length=2, max_length=2)]] | None = Field(
+    fields: dict[str, TwoLengths] | None = Field(
         None, description='of a take, the least and most rise of each field of work, { slow = ["1.5 mm", "3 mm"] }'
     )
-    window: Annotated[list[str], Field(min_length=2, max_length=2)] | None = Field(
+    window: Annotated[list[Angle], Field(min_length=2, max_length=2)] | None = Field(
         None, description='of an enter, from and to, as ["200 deg", "300 deg"]'
     )
     settings: str | None = Field(
@@ -107,8 +117,10 @@ class RelationSection(Section):
     torque: Names | None = Field(None, description='members, as ["needle", "looper"]')
     shaking: Names | None = Field(None, description='members, as ["needle", "looper"]')
     sew: Names | None = Field(None, description='a moment A, and any of B and C, as ["a", "b", "c"]')
-    speeds: Names | None = Field(None, description='of a sew, as ["500 rpm", "8500 rpm"], growing')
-    clearance: Annotated[list[str], Field(min_length=2, max_length=2)] | None = Field(
+    speeds: Annotated[list[Annotated[float, quantity("rad/s"), TEXT]], Field(min_length=1)] | None = Field(
+        None, description='of a sew, as ["500 rpm", "8500 rpm"], growing'
+    )
+    clearance: TwoLengths | None = Field(
         None, description='of a sew, between which the tip takes the loop, as ["0 mm", "0.1 mm"]'
     )
     shaft: str | None = Field(None, description="of a sew, a relation torque whose unevenness counts")
@@ -205,30 +217,12 @@ def _machine(
 ) -> tuple[Specification, Family] | None:
     """Read the machine of a file with its threads, or None with its faults."""
     before = len(faults.lines)
-    tables = _tables(data, "machine", faults)
-    members = {name: _member(name, raw, faults) for name, raw in tables.items()}
-    relations = {}
-    for name, raw in _tables(data, "relations", faults).items():
-        section = read_section(RelationSection, raw, ("relations", name), faults)
-        relations[name] = section.model_dump(exclude_none=True, exclude={"settings"})
-        if section.radii is not None:
-            relations[name]["radii"] = _lengths(section.radii, ("relations", name, "radii"), faults)
-        if section.clearance is not None:
-            relations[name]["clearance"] = _lengths(section.clearance, ("relations", name, "clearance"), faults)
-        if section.speeds is not None:
-            key: Key = ("relations", name, "speeds")
-            relations[name]["speeds"] = [
-                faults.number(text, "rad/s", (*key, k)) or 0.0 for k, text in enumerate(section.speeds)
-            ]
-        for field, ends in (section.fields or {}).items():
-            relations[name]["fields"][field] = _lengths(ends, ("relations", name, "fields", field), faults)
-        if section.window is not None:
-            key = ("relations", name, "window")
-            relations[name]["window"] = [
-                faults.number(text, "rad", (*key, k)) or 0.0 for k, text in enumerate(section.window)
-            ]
-    shafts = {name: _shaft(name, raw, faults) for name, raw in _tables(data, "shafts", faults).items()}
-    tools = {name: read_tool(name, raw, faults) for name, raw in _tables(data, "tools", faults).items()}
+    members = _read_each(MemberSection, data, "machine", faults)
+    relations = _read_each(RelationSection, data, "relations", faults)
+    for relation in relations.values():
+        relation.pop("settings", None)
+    shafts = _read_each(ShaftSection, data, "shafts", faults)
+    tools = _read_each(ToolSection, data, "tools", faults)
     for name, thread in (threads or {}).items():
         if name in relations:
             faults.value(("thread", name), thread, "a name that no relation has")
@@ -280,43 +274,11 @@ def _level(given: str | float, internal: str, name: str, faults: Faults) -> floa
     return given
 
 
-def _tables(data: Mapping[str, Any], name: str, faults: Faults) -> dict[str, Any]:
-    raw = data.get(name, {})
+def _read_each(model: type[Section], data: Mapping[str, Any], table: str, faults: Faults) -> dict[str, dict[str, Any]]:
+    """Read what stands under each name of a table, in internal units."""
+    raw = data.get(table, {})
     if not isinstance(raw, dict):
-        faults.value((name,), raw, f"tables [{name}.NAME]")
+        faults.value((table,), raw, f"tables [{table}.NAME]")
         return {}
-    return raw
-
-
-def _member(name: str, raw: object, faults: Faults) -> dict[str, Any]:
-    key: Key = ("machine", name)
-    section = read_section(MemberSection, raw, key, faults)
-    units_of = {"offset": "rad", "turn": "rad", "key": "rad", "shift": "mm"}
-    found: dict[str, Any] = section.model_dump(exclude_none=True, exclude={*units_of, "place", "tip", "eye"})
-    for one, unit in units_of.items():
-        if (text := getattr(section, one)) is not None:
-            found[one] = faults.number(text, unit, (*key, one)) or 0.0
-    for name, texts in (("tip", section.tip), ("eye", section.eye)):
-        if texts is not None:
-            found[name] = _lengths(texts, (*key, name), faults)
-    if section.place is not None:
-        found["place"] = _placed(section.place, (*key, "place"), faults)
-    return found
-
-
-def _placed(section: PlaceTable | ShaftSection, key: Key, faults: Faults) -> dict[str, Any]:
-    place: dict[str, Any] = section.model_dump(exclude_none=True, exclude={"at", "phase"})
-    return place if section.at is None else place | {"at": _lengths(section.at, (*key, "at"), faults)}
-
-
-def _shaft(name: str, raw: object, faults: Faults) -> dict[str, Any]:
-    key: Key = ("shafts", name)
-    section = read_section(ShaftSection, raw, key, faults)
-    found = _placed(section, key, faults)
-    if section.phase is not None:
-        found["phase"] = faults.number(section.phase, "rad", (*key, "phase")) or 0.0
-    return found
-
-
-def _lengths(texts: list[str], key: Key, faults: Faults) -> list[float]:
-    return [faults.number(text, "mm", (*key, k)) or 0.0 for k, text in enumerate(texts)]
+    sections = {name: read_section(model, own, (table, name), faults) for name, own in raw.items()}
+    return {name: section.model_dump(exclude_none=True) for name, section in sections.items()}

@@ -6,9 +6,8 @@ from pydantic import Field
 
 from sweep.families.base import Family
 from sweep.families.names import negative
-from sweep.study.file import Faults, StudyFile
+from sweep.study.file import Faults, Section, StudyFile
 from sweep.study.limits import read_output_name
-from sweep.study.section import Section
 
 
 class ObjectiveSection(Section):

@@ -11,9 +11,8 @@ from sweep.families.base import Family
 from sweep.families.chain import driven_guide
 from sweep.quantities.limits import Limit
 from sweep.quantities.resolve import output
-from sweep.study.file import StudyFile
+from sweep.study.file import Seconds, Section, Seed, Share, StudyFile
 from sweep.study.objective import ObjectiveSection
-from sweep.study.section import Section, Seed
 from sweep.study.study import OptimiseSettings, ProveSettings
 
 
@@ -21,10 +20,12 @@ class ProveTable(Section):
     """Table ``optimise.prove``."""
 
     required = ("gap",)
-    gap: str | None = Field(None, description='a share as a text, as "1 %"')
+    gap: Share = Field(0.01, description='a share as a text, as "1 %"', json_schema_extra={"default": "1 %"})
     boxes: Annotated[int, Field(ge=64, le=10**9)] = Field(1_000_000, description="a whole number, 64 to 10^9")
-    smallest: str = Field("0.00001 %", description='a share of every range as a text, as "0.1 %"')
-    time: str | None = Field(None, description='a time as a text, as "60 s"')
+    smallest: Share = Field(
+        1e-7, description='a share of every range as a text, as "0.1 %"', json_schema_extra={"default": "0.00001 %"}
+    )
+    time: Seconds | None = Field(None, description='a time as a text, as "60 s"')
 
 
 class OptimiseSection(Section):
@@ -32,37 +33,20 @@ class OptimiseSection(Section):
 
     starts: Annotated[int, Field(ge=1, le=100_000)] = Field(20, description="a whole number, 1 to 100000")
     seed: Seed = Field(0, description="a whole number, 0 or greater")
-    unseen: str | None = Field(None, description='a share as a text, as "2 %"')
+    unseen: Share | None = Field(None, description='a share as a text, as "2 %"')
     looks: Annotated[int, Field(ge=100, le=10_000_000)] = Field(20_000, description="a whole number, 100 to 10000000")
-    time_budget: str | None = Field(None, description='a time as a text, as "60 s"')
+    time_budget: Seconds | None = Field(None, description='a time as a text, as "60 s"')
     variables: Literal["parameters", "locus"] | None = Field(None, description='"parameters" or "locus"')
     globally: Literal["none", "proportions"] = Field("none", alias="global", description='"none" or "proportions"')
     populations: Annotated[int, Field(ge=1, le=10_000)] = Field(40, description="a whole number, 1 to 10000")
     prove: ProveTable | None = Field(None, description='{ gap = "1 %", boxes = 1000000, time = "10 min" }')
 
 
-def read_optimise(section: OptimiseSection, file: StudyFile) -> OptimiseSettings | None:
-    """Read the settings of the search; None where the file asks for none."""
-    settings = OptimiseSettings(
-        starts=section.starts,
-        seed=section.seed,
-        time_budget=file.quantity(section.time_budget, "s", ("optimise", "time_budget")),
-        variables=section.variables,
-        unseen=None if section.unseen is None else file.share(section.unseen, ("optimise", "unseen")),
-        looks=section.looks,
-        globally=section.globally,
-        populations=section.populations,
-        prove=_prove(section.prove, file),
-    )
-    return settings if "optimise" in file else None
-
-
-def _prove(table: ProveTable | None, file: StudyFile) -> ProveSettings | None:
-    if table is None:
-        return None
-    gap = file.share(table.gap or "1 %", ("optimise", "prove", "gap"))
-    smallest = file.share(table.smallest, ("optimise", "prove", "smallest"))
-    return ProveSettings(gap, table.boxes, smallest, file.quantity(table.time, "s", ("optimise", "prove", "time")))
+def read_optimise(section: OptimiseSection) -> OptimiseSettings:
+    """Return the settings of the search."""
+    table = section.prove
+    prove = None if table is None else ProveSettings(table.gap, table.boxes, table.smallest, table.time)
+    return OptimiseSettings(**section.model_dump(exclude={"prove"}), prove=prove)
 
 
 def check_search(section: OptimiseSection, file: StudyFile, bare: Family) -> None:

@@ -6,9 +6,7 @@ from typing import Literal
 
 from pydantic import Field
 
-from sweep.study.file import StudyFile
-from sweep.study.section import Section
-from sweep.study.study import Budget
+from sweep.study.file import Bytes, Seconds, Section
 
 
 class OutputSection(Section):
@@ -22,13 +20,5 @@ class OutputSection(Section):
 class BudgetSection(Section):
     """Table [budget]."""
 
-    disk: str = Field("20 GB", description='a size as a text, as "20 GB"')
-    time: str = Field("1 h", description='a time as a text, as "60 s"')
-
-
-def read_budget(section: BudgetSection, file: StudyFile) -> Budget:
-    """Read the disk and time that a run may take."""
-    disk = file.quantity(section.disk, "B", ("budget", "disk"))
-    seconds = file.quantity(section.time, "s", ("budget", "time"))
-    # What cannot be read is a fault, and no study is made of it.
-    return Budget(disk or 0.0, seconds or 0.0)
+    disk: Bytes = Field(20e9, description='a size as a text, as "20 GB"', json_schema_extra={"default": "20 GB"})
+    time: Seconds = Field(3600.0, description='a time as a text, as "60 s"', json_schema_extra={"default": "1 h"})

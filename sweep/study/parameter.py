@@ -4,15 +4,13 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass
 from typing import Annotated, Any, Literal, TypeAlias
 
 from pydantic import Field
 
 from sweep.families.base import Parameter
 from sweep.quantities import units
-from sweep.study.file import Faults, Key
-from sweep.study.section import Count, Number, Section, read_section
+from sweep.study.file import Count, Faults, Key, Number, Section, read_section
 from sweep.study.space import Axis
 
 Entry: TypeAlias = Axis | float
@@ -45,17 +43,9 @@ class FixedEntry(Section):
     unit: str | None = Field(None, description='a unit as a text, as "mm"')
 
 
-@dataclass(frozen=True)
-class _Written:
-    """Read a parameter as written: its unit and the factor to the internal one."""
-
-    unit: str
-    factor: float
-
-
 def missing_parameter(p: Parameter) -> str:
     """Say what is needed where a parameter is missing: its meaning and the right ways to write it."""
-    return f"{p.text}: {forms(p)}, or an axis {_axis_form(p)}"
+    return f"{p.text}: {forms(p)}, or an axis {{ from = ..., to = ..., count = ...{_unit_form(p)} }}"
 
 
 def read_entry(p: Parameter, raw: object, key: Key, faults: Faults, sampled: bool) -> Entry | None:
@@ -79,7 +69,7 @@ def _read_plain(p: Parameter, raw: object, key: Key, faults: Faults) -> float | 
         value = faults.number(raw, internal, key)
         return None if value is None else _checked(p, units.split(raw, internal)[0], value, key, faults)
     if isinstance(raw, list):
-        faults.value(key, raw, _list_form(p))
+        faults.value(key, raw, f"{{ values = [...]{_unit_form(p)} }}")
         return None
     bare = raw if isinstance(raw, (int, float)) and not isinstance(raw, bool) else None
     if bare is None or internal != "1":
@@ -95,7 +85,7 @@ def _read_fixed(p: Parameter, raw: Mapping[str, Any], key: Key, faults: Faults) 
     written = _unit(p, entry.unit, raw, key, faults)
     if entry.value is None or written is None:
         return None
-    return _checked(p, entry.value, entry.value * written.factor, key, faults)
+    return _checked(p, entry.value, entry.value * written[1], key, faults)
 
 
 def _read_list(p: Parameter, raw: Mapping[str, Any], key: Key, faults: Faults) -> Axis | None:
@@ -111,7 +101,7 @@ def _read_list(p: Parameter, raw: Mapping[str, Any], key: Key, faults: Faults) -
         seen.add(value)
     if written is None:
         return None
-    return Axis.listed(p.name, entry.values, written.unit, written.factor)
+    return Axis.listed(p.name, entry.values, *written)
 
 
 def _read_range(p: Parameter, raw: Mapping[str, Any], key: Key, faults: Faults, sampled: bool) -> Axis | None:
@@ -135,20 +125,20 @@ def _read_range(p: Parameter, raw: Mapping[str, Any], key: Key, faults: Faults, 
     if len(faults.lines) > before or low is None or high is None or written is None:
         return None
     if sampled:
-        return Axis.sampled(p.name, (low, high), written.unit, written.factor, entry.scale)
-    return Axis.lattice(p.name, (low, high), entry.count or 1, written.unit, written.factor, entry.scale)
+        return Axis.sampled(p.name, (low, high), *written, entry.scale)
+    return Axis.lattice(p.name, (low, high), entry.count or 1, *written, entry.scale)
 
 
-def _unit(p: Parameter, unit: str | None, raw: Mapping[str, Any], key: Key, faults: Faults) -> _Written | None:
+def _unit(p: Parameter, unit: str | None, raw: Mapping[str, Any], key: Key, faults: Faults) -> tuple[str, float] | None:
     internal = units.internal_unit(p.unit)
     if unit is None:
         if internal == "1":
-            return _Written("1", 1.0)
+            return "1", 1.0
         if "unit" not in raw:
             faults.missing((*key, "unit"), f'{units.example(internal)}, as unit = "{_usual(internal)}"')
         return None
     factor = faults.factor(unit, internal, (*key, "unit"))
-    return None if factor is None else _Written(unit, factor)
+    return None if factor is None else (unit, factor)
 
 
 def _checked(p: Parameter, written: float, value: float, key: Key, faults: Faults) -> float:
@@ -171,19 +161,11 @@ def forms(p: Parameter, number: object = None) -> str:
     internal = units.internal_unit(p.unit)
     if internal == "1":
         return "a number"
-    shown = 40.0 if number is None else number
-    usual = _usual(internal)
+    shown, usual = 40.0 if number is None else number, _usual(internal)
     article = "an" if p.unit == "angle" else "a"
-    return f'{article} {p.unit} with its unit, as "{shown} {usual}" or {{ value = {shown}, unit = "{usual}" }}'
+    return f'{article} {p.unit} with its unit, as "{shown} {usual}" or {{ value = {shown}{_unit_form(p)} }}'
 
 
-def _list_form(p: Parameter) -> str:
-    """Show the right way to write several values of this parameter."""
+def _unit_form(p: Parameter) -> str:
     internal = units.internal_unit(p.unit)
-    return "{ values = [...] }" if internal == "1" else f'{{ values = [...], unit = "{_usual(internal)}" }}'
-
-
-def _axis_form(p: Parameter) -> str:
-    internal = units.internal_unit(p.unit)
-    unit = "" if internal == "1" else f', unit = "{_usual(internal)}"'
-    return f"{{ from = ..., to = ..., count = ...{unit} }}"
+    return "" if internal == "1" else f', unit = "{_usual(internal)}"'

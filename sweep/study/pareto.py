@@ -11,12 +11,11 @@ from sweep.errors import InputError
 from sweep.families.base import Family, Output, Parameter, Unit
 from sweep.families.names import without_minus
 from sweep.quantities.measures import measure
-from sweep.study.file import Faults, Key, StudyFile
+from sweep.study.file import Faults, Key, Seconds, Section, StudyFile
 from sweep.study.limits import read_output_name
 from sweep.study.objective import ObjectiveSection
 from sweep.study.optimise import OptimiseSection
 from sweep.study.parameter import read_entry
-from sweep.study.section import Section
 from sweep.study.space import Axis
 from sweep.study.study import ParetoSettings
 
@@ -33,14 +32,7 @@ class ParetoSection(Section):
     at_least: Any = None
     points: Annotated[int, Field(ge=2, le=64)] | None = Field(None, description="a whole number, 2 to 64")
     starts: Annotated[int, Field(ge=0, le=1000)] = Field(2, description="a whole number, 0 to 1000")
-    time_budget: str | None = Field(None, description='a time as a text, as "60 s"')
-
-
-def read_front_time(section: ParetoSection, file: StudyFile) -> float | None:
-    """Read the time for the whole front [s]; a front that has no optimum to begin at is reported."""
-    if "pareto" in file and "optimise" not in file:
-        file.faults.missing(("optimise",), "a table [optimise], as [pareto] begins at the optimum")
-    return file.quantity(section.time_budget, "s", ("pareto", "time_budget"))
+    time_budget: Seconds | None = Field(None, description='a time as a text, as "60 s"')
 
 
 def read_pareto(
@@ -49,7 +41,6 @@ def read_pareto(
     family: Family,
     objective: ObjectiveSection,
     search: OptimiseSection,
-    seconds: float | None,
 ) -> ParetoSettings | None:
     """Read the settings of the front, or None if something is faulty (all faults are reported).
 
@@ -58,9 +49,10 @@ def read_pareto(
     section : [pareto]
     family : with the effects that the second output calls for
     objective, search : [objective] and [optimise]
-    seconds : time for the whole front
     """
     raw, faults = file.data.get("pareto"), file.faults
+    if "pareto" in file and "optimise" not in file:
+        faults.missing(("optimise",), "a table [optimise], as [pareto] begins at the optimum")
     if not isinstance(raw, dict):
         return None
     given = [side for side in SIDES if side in raw]
@@ -86,9 +78,8 @@ def read_pareto(
         some = f"more than the {len(set(bounds))} bounds given, of which there must be two or more"
         faults.value(("pareto", "points"), section.points, some)
         return None
-    return ParetoSettings(
-        output.name, bounds, given[0] == "at_least", section.starts, seconds, section.points, search.looks
-    )
+    low, seconds = given[0] == "at_least", section.time_budget
+    return ParetoSettings(output.name, bounds, low, section.starts, seconds, section.points, search.looks)
 
 
 def _bounds(output: Output, raw: object, key: Key, faults: Faults) -> tuple[float, ...] | None:

@@ -10,8 +10,7 @@ from pydantic import Field
 
 from sweep.errors import choices
 from sweep.families.base import Family
-from sweep.study.file import StudyFile
-from sweep.study.section import Number, Section, missing_keys
+from sweep.study.file import Number, Section, StudyFile, missing_keys
 
 
 class StudySection(Section):

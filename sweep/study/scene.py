@@ -12,9 +12,8 @@ from sweep.families.base import Family
 from sweep.families.machines import Machine
 from sweep.families.names import parts
 from sweep.numerics.curves import Curve
-from sweep.study.file import Faults, StudyFile
+from sweep.study.file import Faults, Fraction, Section, Speed, StudyFile
 from sweep.study.limits import read_output_name
-from sweep.study.section import Fraction, Section
 
 
 class WindowTable(Section):
@@ -28,7 +27,7 @@ class WindowTable(Section):
 class SceneSection(Section):
     """Table [scene]."""
 
-    speed: str | None = Field(None, description='a speed of rotation as a text, as "7000 rpm"')
+    speed: Speed | None = Field(None, description='a speed of rotation as a text, as "7000 rpm"')
     want: list[str] = Field([], description="a list of names of design outputs")
     window: WindowTable | None = Field(None, description="{ from = 0.0, to = 0.6 }, fractions of the stroke")
 

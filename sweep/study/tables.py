@@ -8,7 +8,7 @@ from typing import Any
 
 from sweep.study.accuracy import AccuracySection
 from sweep.study.design import ReferenceSection
-from sweep.study.file import StudyFile
+from sweep.study.file import Section, StudyFile, read_table
 from sweep.study.fit import FitSection
 from sweep.study.loads import CurveSection
 from sweep.study.mechanism import MechanismSection, MemberSection, RelationSection, ShaftSection
@@ -18,7 +18,6 @@ from sweep.study.output import BudgetSection, OutputSection
 from sweep.study.pareto import ParetoSection
 from sweep.study.report import ReportSection, StudySection
 from sweep.study.scene import SceneSection
-from sweep.study.section import Section, read_table
 from sweep.study.thread import ThreadSection
 from sweep.study.tolerance import ToleranceSection
 from sweep.study.tools import ToolSection

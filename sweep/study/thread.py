@@ -2,33 +2,33 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from typing import Annotated, Any
 
 import numpy as np
-from pydantic import Field, PlainValidator
+from pydantic import Field, Tag
 
-from sweep.study.file import Faults, Key, StudyFile
-from sweep.study.section import Number, Section, missing_keys, read_section
+from sweep.study.file import (
+    KIND,
+    LIST,
+    ONE,
+    TABLE,
+    TEXT,
+    Angle,
+    Faults,
+    Key,
+    Length,
+    Lengths,
+    Number,
+    Place,
+    Section,
+    StudyFile,
+    ThreeLengths,
+    missing_keys,
+    quantity,
+    read_section,
+)
 
-PLACES = 'a list of places, as ["lever", ["10 mm", "0 mm", "40 mm"], "needle.point", { on = "low", held = ["a", "b"] }]'
 Events = Annotated[list[str], Field(min_length=2, max_length=2)]
-
-
-def _places(value: Any) -> Any:
-    if isinstance(value, list) and all(isinstance(x, str | dict) or _is_point(x) for x in value):
-        return value
-    raise ValueError("no places")
-
-
-def _is_point(value: object) -> bool:
-    return isinstance(value, list) and len(value) == 3 and all(isinstance(x, str) for x in value)
-
-
-def _texts(value: object) -> object:
-    if isinstance(value, str) or (isinstance(value, list) and all(isinstance(x, str) for x in value)):
-        return value
-    raise ValueError("no texts")
 
 
 class AllowedTable(Section):
@@ -49,27 +49,36 @@ class PlaceTable(Section):
     """A place of ``thread.<name>.path`` that counts between two events only, or has a bend of its own."""
 
     required = ("on",)
-    on: Annotated[Any, PlainValidator(lambda value: _places([value])[0])] | None = Field(
-        None, description='a name or three lengths, as "low" or ["10 mm", "0 mm", "40 mm"]'
-    )
+    on: Place | None = Field(None, description='a name or three lengths, as "low" or ["10 mm", "0 mm", "40 mm"]')
     held: Events | None = Field(None, description='two events, as ["a", "cast"]: the thread runs over it between them')
-    wrap: str | None = Field(None, description='an angle by which it is bent there besides, as "152.2 deg"')
+    wrap: Angle | None = Field(None, description='an angle by which it is bent there besides, as "152.2 deg"')
     fixed: Events | None = Field(None, description="two events between which the thread does not slide there")
+
+
+PathPlace = Annotated[
+    Annotated[str, Tag(ONE)] | Annotated[ThreeLengths, Tag(LIST)] | Annotated[PlaceTable, Tag(TABLE)], KIND
+]
 
 
 class ThreadSection(Section):
     """Table ``thread.<name>``."""
 
     required = ("path",)
-    path: Annotated[list[Any], PlainValidator(_places)] | None = Field(None, description=PLACES)
-    stock: str | None = Field(None, description='a length as a text, as "120 mm"')
-    tension: str | None = Field(None, description='a force as a text, as "20 gf" or "0.2 N"')
-    stiffness: str | None = Field(None, description='a force over a length as a text, as "50 gf/mm" or "0.5 N/mm"')
-    radius: Annotated[str | list[str], PlainValidator(_texts)] | None = Field(
-        None, description='a length as a text, as "0.5 mm", or a list of one for each bend'
+    path: list[PathPlace] | None = Field(
+        None,
+        description='a list of places, as ["lever", ["10 mm", "0 mm", "40 mm"], "needle.point", '
+        '{ on = "low", held = ["a", "b"] }]',
     )
+    stock: Length | None = Field(None, description='a length as a text, as "120 mm"')
+    tension: Annotated[float, quantity("N"), TEXT] | None = Field(
+        None, description='a force as a text, as "20 gf" or "0.2 N"'
+    )
+    stiffness: Annotated[float, quantity("N/mm"), TEXT] | None = Field(
+        None, description='a force over a length as a text, as "50 gf/mm" or "0.5 N/mm"'
+    )
+    radius: Lengths | None = Field(None, description='a length as a text, as "0.5 mm", or a list of one for each bend')
     allowed: AllowedTable | None = Field(None, description='{ phi = [...], values = [...], unit = "mm" }')
-    sewn: str | None = Field(None, description='what a stitch takes, a length as a text, as "6 mm"')
+    sewn: Length | None = Field(None, description='what a stitch takes, a length as a text, as "6 mm"')
     feeding: Events | None = Field(None, description='two events, as ["feeds", "rests"]: it is sewn in between them')
     drawing: Events | None = Field(None, description="two events between which it comes from the bobbin")
 
@@ -91,17 +100,11 @@ def read_threads(file: StudyFile) -> dict[str, dict[str, Any]] | None:
 
 
 def _relation(section: ThreadSection, key: Key, faults: Faults) -> dict[str, Any]:
-    found: dict[str, Any] = {"thread": [_place(x, (*key, "path", k), faults) for k, x in enumerate(section.path or [])]}
-    found |= section.model_dump(exclude_none=True, include={"feeding", "drawing"})
-    for name, internal in (("stock", "mm"), ("tension", "N"), ("stiffness", "N/mm"), ("sewn", "mm")):
-        text = getattr(section, name)
-        if text is not None:
-            found[name] = faults.number(text, internal, (*key, name)) or 0.0
-    radius = section.radius
-    if radius is not None:
-        each = [radius] if isinstance(radius, str) else radius
-        numbers = [faults.number(text, "mm", (*key, "radius")) or 0.0 for text in each]
-        found["radius"] = numbers[0] if isinstance(radius, str) else numbers
+    found = section.model_dump(exclude_none=True, exclude={"allowed"})
+    found["thread"] = found.pop("path", [])
+    for k, place in enumerate(section.path or ()):
+        if isinstance(place, PlaceTable):
+            missing_keys(PlaceTable, place.model_fields_set, (*key, "path", k), faults)
     if section.allowed is not None:
         found["allowed"] = _allowed(section.allowed, (*key, "allowed"), faults)
     return found
@@ -114,15 +117,3 @@ def _allowed(table: AllowedTable, key: Key, faults: Faults) -> dict[str, list[fl
         factor = faults.factor(unit, internal, (*key, "angle" if name == "phi" else "unit"))
         columns[name] = ((factor or 1.0) * np.array(getattr(table, name) or (), np.float64)).tolist()
     return columns
-
-
-def _place(given: str | Sequence[str] | dict[str, Any], key: Key, faults: Faults) -> str | list[float] | dict[str, Any]:
-    if isinstance(given, str):
-        return given
-    if isinstance(given, dict):
-        section = read_section(PlaceTable, given, key, faults)
-        found: dict[str, Any] = section.model_dump(exclude_none=True)
-        if section.wrap is not None:
-            found["wrap"] = faults.number(section.wrap, "rad", (*key, "wrap")) or 0.0
-        return found | {"on": _place(section.on or "", (*key, "on"), faults)}
-    return [faults.number(text, "mm", (*key, k)) or 0.0 for k, text in enumerate(given)]

@@ -10,8 +10,7 @@ from pydantic import Field
 from sweep.errors import nearest
 from sweep.families.base import Family
 from sweep.quantities.limits import Limit
-from sweep.study.file import Faults, StudyFile
-from sweep.study.section import Section
+from sweep.study.file import Faults, Section, Share, Size, StudyFile, Width
 from sweep.study.study import Tolerance
 
 UNITS = {"length": "mm", "angle": "rad"}
@@ -20,9 +19,9 @@ UNITS = {"length": "mm", "angle": "rad"}
 class ToleranceSection(Section):
     """Table [tolerance]."""
 
-    lengths: str | None = Field(None, description='a length as a text, as "0.02 mm"')
-    angles: str | None = Field(None, description='an angle as a text, as "0.05 deg"')
-    robust: str | None = Field(None, description='a share as a text, as "95 %"')
+    lengths: Size | None = Field(None, description='a length as a text, as "0.02 mm"')
+    angles: Width | None = Field(None, description='an angle as a text, as "0.05 deg"')
+    robust: Share | None = Field(None, description='a share as a text, as "95 %"')
     samples: int | None = Field(None, description="a power of two: mechanisms that say the share")
     own: dict[str, str] = Field(
         {}, description='of what a pattern names, as { "*.key" = "0.1 deg", "*_tilt" = "0 deg" }'
@@ -35,16 +34,15 @@ def read_tolerance(section: ToleranceSection, file: StudyFile, family: Family) -
         return None
     if "optimise" not in file:
         file.faults.missing(("optimise",), "a table [optimise], as [tolerance] is about the optimum")
-    if section.lengths is None and section.angles is None and not section.own:
+    written = file.data["tolerance"]
+    if isinstance(written, dict) and not {"lengths", "angles", "own"} & {*written}:
         needed = 'a length as "0.02 mm"; or angles, as "0.05 deg"'
         file.faults.missing(("tolerance", "lengths"), needed, instead="angles")
-    lengths = file.quantity(section.lengths, "mm", ("tolerance", "lengths"))
-    angles = file.quantity(section.angles, "rad", ("tolerance", "angles"))
-    share = None if section.robust is None else file.share(section.robust, ("tolerance", "robust"))
     samples = Tolerance.samples if section.samples is None else section.samples
     if samples < 2 or samples & (samples - 1):
         file.faults.value(("tolerance", "samples"), samples, "a power of two: a Sobol sample keeps its balance only so")
-    return Tolerance(lengths or 0.0, angles or 0.0, share, tuple(_own(section.own, file, family).items()), samples)
+    own = tuple(_own(section.own, file, family).items())
+    return Tolerance(section.lengths or 0.0, section.angles or 0.0, section.robust, own, samples)
 
 
 def _own(given: Mapping[str, str], file: StudyFile, family: Family) -> dict[str, float]:

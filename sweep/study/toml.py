@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 import tomllib
+from collections import Counter
 from pathlib import Path
 from typing import Any
 
@@ -14,11 +15,10 @@ _DIGITS = re.compile(r"\d[\d_]{4000,}")
 _PLACE = re.compile(r"\(at line (\d+), column \d+[^)]*\)")
 _KEY = re.compile(r"""\s*([\w."'-]+)\s*=""")
 _TABLE = re.compile(r"\s*\[+([^\[\]]+)\]+\s*(?:#.*)?")
-_BLANK = re.compile(r"(?:[ \t\r\n]|#[^\n]*)*")
-_BARE = re.compile(r"[A-Za-z0-9_-]+")
 _LONG, _SHORT = r'"""(?:\\.|[^\\])*?"{3,5}|\'\'\'.*?\'{3,5}', r'"(?:\\.|[^"\\\n])*"|\'[^\'\n]*\''
-_STRINGS = re.compile(f"{_LONG}|{_SHORT}", re.DOTALL)
-_SCALAR = re.compile(r"[^,\]}\n#]*")
+_TOKEN = re.compile(
+    rf"#[^\n]*|(?P<text>{_LONG}|{_SHORT})|(?P<mark>[\[\]{{}}=,.\n])|(?P<bare>[^\s#\[\]{{}}=,.\"']+)", re.DOTALL
+)
 _OPENED = re.compile(f"#[^\n]*|{_LONG}|(?P<three>[\"']{{3}})|{_SHORT}|(?P<one>[\"'])", re.DOTALL)
 # What tomllib says of a text that has no end.
 _QUOTED = 'a text between quotes, as name = "press", over several lines between three of them'
@@ -150,91 +150,76 @@ def key_lines(text: str) -> dict[str, int]:
 
 
 class _Walk:
-    """One pass over the text; it leans on the parser for what is wrong and looks for keys alone."""
+    """One pass over the tokens; it leans on the parser for what is wrong and looks for keys alone."""
 
     def __init__(self, text: str) -> None:
-        self.text, self.at, self.line, self.counted = text, 0, 1, 0
+        self.tokens, line = [("", "", 0)], 1
+        for match in _TOKEN.finditer(text):
+            self.tokens += [(match.lastgroup, match[0], line)] if match.lastgroup else []
+            line += match[0].count("\n")
+        self.tokens = self.tokens[:0:-1]  # the next one is the last
         self.found: dict[str, int] = {}
-        self.lengths: dict[str, int] = {}  # of lists of tables [[x]]
-        heading = ""
-        while self._blank():
-            if text[self.at] != "[":
+        lengths, heading = Counter[str](), ""  # of lists of tables [[x]]
+        while self._next() is not None:
+            if self._next() != "[":
                 self._entry(heading)
                 continue
-            double = text.startswith("[[", self.at)
-            line = self._here()
-            self.at += 2 if double else 1
-            names = self._names()
-            self.at += 2 if double else 1
-            heading = self._heading(names, double, line)
+            line, double, heading = self._take()[2], self._next() == "[", ""
+            names = self._names(skip=double)
+            for k, name in enumerate(names):
+                heading = _join(heading, name)
+                lengths[heading] += double and k == len(names) - 1
+                self.found.setdefault(heading, line)
+                if lengths[heading]:
+                    heading = f"{heading}[{lengths[heading] - 1}]"
+                    self.found.setdefault(heading, line)
+            del self.tokens[-1 - double :]
 
-    def _blank(self) -> bool:
-        match = _BLANK.match(self.text, self.at)
-        assert match is not None  # it matches nothing too
-        self.at = match.end()
-        return self.at < len(self.text)
+    def _take(self) -> tuple[str, str, int]:
+        return self.tokens.pop()
 
-    def _here(self) -> int:
-        self.line += self.text.count("\n", self.counted, self.at)
-        self.counted = self.at
-        return self.line
+    def _next(self) -> str | None:
+        """Return the next token that is no end of a line."""
+        while self.tokens and self.tokens[-1][1] == "\n":
+            self._take()
+        return self.tokens[-1][1] if self.tokens else None
 
-    def _heading(self, names: list[str], double: bool, line: int) -> str:
-        path = ""
-        for k, name in enumerate(names):
-            path = _join(path, name)
-            if double and k == len(names) - 1:
-                self.lengths[path] = self.lengths.get(path, 0) + 1
-            self.found.setdefault(path, line)
-            if path in self.lengths:
-                path = f"{path}[{self.lengths[path] - 1}]"
-                self.found.setdefault(path, line)
-        return path
+    def _names(self, skip: bool = False) -> list[str]:
+        if skip:
+            self._take()
+        names = []
+        while True:
+            kind, word, _ = self._take()
+            names.append(word[1:-1] if kind == "text" else word)
+            if self._next() != ".":
+                return names
+            self._take()
 
     def _entry(self, path: str) -> None:
-        """Print an entry as ``a.b = value``."""
-        line = self._here()
+        """Note the keys of ``a.b = value``."""
+        line = self.tokens[-1][2]
         for name in self._names():
             path = _join(path, name)
             self.found.setdefault(path, line)
-        self.at += 1  # the equals sign
+        self._take()  # the equals sign
         self._value(path)
 
-    def _names(self) -> list[str]:
-        names = []
-        while True:
-            self._blank()
-            quoted = self.text[self.at] in "\"'"
-            match = (_STRINGS if quoted else _BARE).match(self.text, self.at)
-            assert match is not None  # the parser has accepted the key
-            self.at = match.end()
-            names.append(match[0][1:-1] if quoted else match[0])
-            self._blank()
-            if self.text[self.at] != ".":
-                return names
-            self.at += 1
-
     def _value(self, path: str) -> None:
-        self._blank()
-        opening = self.text[self.at]
-        if opening not in "[{":
-            match = (_STRINGS if opening in "\"'" else _SCALAR).match(self.text, self.at)
-            assert match is not None  # the parser has accepted the value
-            self.at = match.end()
+        opening, k = self._take()[1], 0
+        if opening not in ("[", "{"):  # a number may hold a dot, a date a blank
+            while self.tokens and self.tokens[-1][1] not in (",", "]", "}", "\n"):
+                self._take()
             return
-        self.at += 1
-        k = 0
-        while self._blank() and self.text[self.at] not in "]}":
+        while self._next() not in ("]", "}"):
             if opening == "{":
                 self._entry(path)
             else:
-                self.found[f"{path}[{k}]"] = self._here()
+                self.found[f"{path}[{k}]"] = self.tokens[-1][2]
                 self._value(f"{path}[{k}]")
                 k += 1
-            self._blank()
-            if self.text[self.at] == ",":
-                self.at += 1
-        self.at += 1
+            if self._next() == ",":
+                self._take()
+        self._take()
 
 
 def _join(path: str, name: str) -> str:

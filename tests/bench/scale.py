@@ -78,7 +78,7 @@ def peak() -> float:
 def one(kind: str, power: int, folder: Path) -> dict[str, Any]:
     """Run one size in this process."""
     import sweep
-    from sweep.dataset.store import parts
+    from sweep.dataset.chunk_files import parts
 
     path = written(kind, power, folder)
     wall, processor = time.perf_counter(), time.process_time()

@@ -15,9 +15,9 @@ from click.testing import CliRunner, Result
 import sweep
 from sweep.cli import main
 from sweep.cli.families import family_names
+from sweep.cli.kernels import Part, rounds
 from sweep.cli.main import VERBS
 from sweep.cli.tables import read_table, wanted
-from sweep.cli.warm import Part, rounds
 from sweep.report.terminal import Ending
 
 STUDY = """
@@ -290,7 +290,7 @@ def test_cache_clear_removes_the_compiled_kernels_only(tmp_path: Path, monkeypat
         folder.mkdir(parents=True)
         (folder / "file").write_text("x")
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))  # whatever is patched, the user's own stay
-    monkeypatch.setattr("sweep.cli.cache.cache_root", lambda: kernels)
+    monkeypatch.setattr("sweep.cli.kernels.cache_root", lambda: kernels)
     assert call("cache", "clear").output == f"removed {kernels}\n"
     assert not kernels.exists()
     assert (other / "file").exists()

@@ -14,7 +14,7 @@ import sweep.chunks.plan
 from sweep.chunks.chunk import ChunkResult
 from sweep.chunks.plan import make_plan
 from sweep.cli import main
-from sweep.dataset import store
+from sweep.dataset import chunk_files, files
 from sweep.errors import InputError, StoreError
 from sweep.study import Study, load_study
 from tests.support.engine_study import SMALL_CHUNKS, write_study
@@ -41,14 +41,14 @@ def written(study: Study, rows: pd.DataFrame, folder: Path, chunk_size: int = 30
         start, stop = plan.bounds(index)
         part = rows[(rows["design"] >= start) & (rows["design"] < stop)]
         columns = {c.name: part[c.name].to_numpy().astype(c.dtype) for c in plan.columns}
-        store.write_chunk(folder, plan, index, ChunkResult(columns, {0: len(part)}, {}))
+        chunk_files.write_chunk(folder, plan, index, ChunkResult(columns, {0: len(part)}, {}))
     about = {"optimise": False, "complete": True}
-    store.write_plan(folder, plan.as_dict() | about)
+    files.write_plan(folder, plan.as_dict() | about)
     return folder
 
 
 def ended(folder: Path, seconds: float, outcome: str = "complete") -> None:
-    store.append_run(folder, {"event": "end", "outcome": outcome, "seconds": seconds})
+    files.append_run(folder, {"event": "end", "outcome": outcome, "seconds": seconds})
 
 
 def shell(*arguments: object) -> tuple[int, str]:
@@ -130,8 +130,8 @@ def test_optima_are_compared(study: Study, dataset: Path, tmp_path: Path) -> Non
     rows = sweep.load(dataset)
     old, new = written(study, rows, tmp_path / "old"), written(study, rows, tmp_path / "new")
     optimum = pd.DataFrame({"role": ["optimum", "start", "reference"], "swing": [1.0, 2.0, 3.0], "x": [0.0, 0.0, 0.0]})
-    optimum.to_parquet(store.beside(old) / store.OPTIMUM)
-    optimum.assign(swing=[1.5, 9.0, 3.0]).to_parquet(store.beside(new) / store.OPTIMUM)
+    optimum.to_parquet(files.beside(old) / files.OPTIMUM)
+    optimum.assign(swing=[1.5, 9.0, 3.0]).to_parquet(files.beside(new) / files.OPTIMUM)
     found = sweep.compare(old, new)
     assert [name for name, moved in found.moved.items() if moved.changed] == ["swing of the optimum"]
     assert found.exit_code == 10 and found.moved["swing of the optimum"].absolute == 0.5
@@ -139,7 +139,7 @@ def test_optima_are_compared(study: Study, dataset: Path, tmp_path: Path) -> Non
 
 def test_other_code_another_study_and_an_unfinished_one_are_said(study: Study, dataset: Path, tmp_path: Path) -> None:
     other = written(study, sweep.load(dataset), tmp_path / "new")
-    store.write_plan(other, (store.read_plan(other) or {}) | {"code": "x", "study": "y", "complete": False})
+    files.write_plan(other, (files.read_plan(other) or {}) | {"code": "x", "study": "y", "complete": False})
     text = "\n".join(sweep.compare(dataset, other).lines())
     assert f"{other}: not complete" in text and "the studies differ" in text and "different versions" in text
 
@@ -162,8 +162,9 @@ def test_bad_arguments_are_refused(dataset: Path, tmp_path: Path) -> None:
 
 def test_it_needs_no_more_memory_for_more_chunks(study: Study, dataset: Path, tmp_path: Path) -> None:
     """A chunk at a time: what was read and compared is let go."""
-    from sweep.dataset.comparison import _Rows
+    from sweep.dataset.comparison import _chunks, _columns, _pieces
 
-    side = _Rows(dataset)
-    sizes = [len(side.until(stop)) for stop in side.stops]
+    chunks = _chunks(dataset)
+    stops = [chunk_files.about(part)["stop"] for part in chunks]
+    sizes = [len(rows) for rows in _pieces(chunks, _columns(chunks), stops)]
     assert sum(sizes) == study.space.count and max(sizes) == SMALL_CHUNKS["CHUNK_STEP"]

@@ -11,21 +11,9 @@ import pytest
 
 from sweep.chunks.chunk import ChunkResult
 from sweep.chunks.plan import Column, Plan
-from sweep.dataset.store import (
-    METADATA,
-    append_run,
-    content_hash,
-    encode,
-    finished_chunks,
-    is_complete,
-    is_whole,
-    load,
-    parts,
-    read_runs,
-    totals,
-    write_atomically,
-    write_chunk,
-)
+from sweep.dataset.chunk_files import METADATA, content_hash, encode, is_whole, parts, write_chunk
+from sweep.dataset.files import append_run, read_runs, write_atomically
+from sweep.dataset.store import finished_chunks, is_complete, load, totals
 from sweep.errors import InputError, StoreError
 
 PLAN = Plan(

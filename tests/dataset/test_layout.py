@@ -15,8 +15,9 @@ from click.testing import CliRunner
 import sweep
 import sweep.chunks.plan
 from sweep.cli import main
-from sweep.dataset import store
+from sweep.dataset import chunk_files, files, store
 from sweep.dataset.files import LOCK, OLD, OPTIMUM, PLAN, RUNS, beside, located
+from sweep.dataset.lock import locked
 from sweep.errors import IncompleteWarning, InputError, LockedError, StoreError
 from sweep.study import Study, load_study
 from tests.support.engine_study import SMALL_CHUNKS, chunk_bytes, write_study
@@ -52,16 +53,16 @@ def copy(made: Path, tmp_path: Path) -> Path:
 def older(folder: Path, target: Path) -> Path:
     """The same dataset as an earlier version left it: all in one folder, chunks that do not tell their number."""
     target.mkdir()
-    for part in store.parts(folder):
+    for part in chunk_files.parts(folder):
         schema = pq.read_schema(part.path)
-        about = json.loads(schema.metadata[store.METADATA])
+        about = json.loads(schema.metadata[chunk_files.METADATA])
         del about["chunks"], about["designs"]
         table = pq.read_table(part.path)
-        table = table.replace_schema_metadata({store.METADATA: json.dumps(about | {"format": 1}).encode()})
+        table = table.replace_schema_metadata({chunk_files.METADATA: json.dumps(about | {"format": 1}).encode()})
         sink = pa.BufferOutputStream()
         pq.write_table(table, sink)
         data = bytes(sink.getvalue())
-        (target / f"part-{part.index:06d}-{part.identity}-{store.content_hash(data)}.parquet").write_bytes(data)
+        (target / f"part-{part.index:06d}-{part.identity}-{chunk_files.content_hash(data)}.parquet").write_bytes(data)
     for name in (PLAN, RUNS, OPTIMUM, LOCK):
         shutil.copy(beside(folder) / name, target / name)
     return target
@@ -73,7 +74,7 @@ def test_every_reader_of_a_folder_counts_the_same_rows(made: Path) -> None:
     import polars
 
     rows = len(sweep.load(made))
-    assert rows > 1000 and len(store.parts(made)) > 3
+    assert rows > 1000 and len(chunk_files.parts(made)) > 3
     assert len(pd.read_parquet(made)) == rows
     assert polars.read_parquet(made).height == rows
     assert polars.scan_parquet(made / "*.parquet").collect().height == rows
@@ -101,7 +102,7 @@ def test_the_folder_that_holds_designs_stands_for_them(study: Study, made: Path,
     assert located(made.parent) == located(made) == made
     pd.testing.assert_frame_equal(sweep.load(made.parent), sweep.load(made))
     assert sweep.is_complete(made.parent) and sweep.compare(made.parent, copy).exit_code == 0
-    assert sweep.run(study, copy.parent, jobs=1) == copy and store.read_runs(copy)[-1]["text"] == "0 chunks computed"
+    assert sweep.run(study, copy.parent, jobs=1) == copy and files.read_runs(copy)[-1]["text"] == "0 chunks computed"
 
 
 def test_a_link_to_the_folder_is_the_folder(made: Path, copy: Path, tmp_path: Path) -> None:
@@ -117,7 +118,7 @@ def test_dataset_of_an_earlier_version_is_read_and_reported(made: Path, tmp_path
     assert not found.rows_changed and not found.values_changed
     done = CliRunner().invoke(main, ["report", str(old)])
     assert done.exit_code == 0 and (old / "_report" / "report.html").is_file(), done.output
-    store.parts(old)[1].path.unlink()
+    chunk_files.parts(old)[1].path.unlink()
     with pytest.warns(IncompleteWarning, match="incomplete, 1 of"):
         sweep.load(old)
 
@@ -147,13 +148,13 @@ def test_forced_new_data_do_not_keep_the_old_report(study: Study, copy: Path, tm
 
 def test_exchanged_names_are_noticed_by_every_reader(study: Study, copy: Path) -> None:
     """Each file is whole, but lies under the other's index: names without their hashes exchanged."""
-    one, other = store.parts(copy)[:2]
+    one, other = chunk_files.parts(copy)[:2]
     kept = one.path.read_bytes()
     one.path.unlink()
     one = one.path.with_name(f"part-{one.index:06d}-{one.identity}-{other.digest}.parquet")
     one.write_bytes(other.path.read_bytes())
     other.path.unlink()
-    other.path.with_name(other.path.name.replace(other.digest, store.content_hash(kept))).write_bytes(kept)
+    other.path.with_name(other.path.name.replace(other.digest, chunk_files.content_hash(kept))).write_bytes(kept)
     assert not sweep.is_complete(copy)
     for reader in (sweep.load, store.totals, lambda folder: sweep.compare(folder, folder)):
         with pytest.raises(StoreError, match="under the name of chunk 0"):
@@ -165,11 +166,11 @@ def test_exchanged_names_are_noticed_by_every_reader(study: Study, copy: Path) -
 
 
 def test_a_copy_under_another_identity_is_noticed(copy: Path) -> None:
-    part = store.parts(copy)[2]
+    part = chunk_files.parts(copy)[2]
     part.path.rename(part.path.with_name(part.path.name.replace(part.identity, "0" * 12)))
     with pytest.raises(StoreError, match="different studies"):
         sweep.load(copy)
-    for other in store.parts(copy):
+    for other in chunk_files.parts(copy):
         if other.index != 2:
             other.path.unlink()
     with pytest.raises(StoreError, match=f"of {part.identity} under the name of chunk 2 of 000000000000"):
@@ -177,8 +178,8 @@ def test_a_copy_under_another_identity_is_noticed(copy: Path) -> None:
 
 
 def test_deleted_chunk_is_said_by_load(made: Path, copy: Path) -> None:
-    store.parts(copy)[-1].path.unlink()
-    count = len(store.parts(made))
+    chunk_files.parts(copy)[-1].path.unlink()
+    count = len(chunk_files.parts(made))
     with pytest.warns(
         IncompleteWarning, match=f"incomplete, 1 of {count} chunks are missing .the first is {count - 1}"
     ):
@@ -192,7 +193,7 @@ def test_deleted_chunk_is_said_by_load(made: Path, copy: Path) -> None:
 
 @pytest.mark.parametrize("damage", ["cut", "flip", "empty", "zeros", "text"])
 def test_damaged_chunk_is_named_by_compare(made: Path, copy: Path, damage: str) -> None:
-    victim = store.parts(copy)[1].path
+    victim = chunk_files.parts(copy)[1].path
     data = victim.read_bytes()
     flipped = bytearray(data)
     flipped[len(data) // 3] ^= 16
@@ -218,7 +219,7 @@ def test_damaged_optimum_is_named_and_made_again(study: Study, made: Path, copy:
 
 def test_page_checksums_find_flipped_bytes_where_readers_verify_them(made: Path, tmp_path: Path) -> None:
     """Bytes of pages: nearly all of a file; the rest, headers and footer, is for the hash in the name."""
-    part = store.parts(made)[0].path
+    part = chunk_files.parts(made)[0].path
     data = part.read_bytes()
     target = tmp_path / "part.parquet"
     chunks = pq.read_metadata(part).row_group(0)
@@ -232,7 +233,7 @@ def test_page_checksums_find_flipped_bytes_where_readers_verify_them(made: Path,
 
 
 def test_deleted_lock_file_lets_nobody_in(study: Study, copy: Path) -> None:
-    with store.locked(copy):
+    with locked(copy):
         (copy.parent / LOCK).unlink()
         with pytest.raises(LockedError, match="another run is writing here"):
             sweep.run(study, copy, jobs=1)
@@ -251,7 +252,7 @@ def test_chunks_damaged_or_deleted_during_the_run_are_made_again(
 ) -> None:
     for name, value in SMALL_CHUNKS.items():
         monkeypatch.setattr(sweep.chunks.plan, name, value)
-    write, hands = store.write_chunk, [lambda path: path.write_bytes(path.read_bytes()[:99]), Path.unlink]
+    write, hands = chunk_files.write_chunk, [lambda path: path.write_bytes(path.read_bytes()[:99]), Path.unlink]
 
     def meddled(*given: object) -> Path:
         path = write(*given)  # type: ignore[arg-type]

@@ -24,9 +24,9 @@ import sweep
 import sweep.chunks.plan
 import sweep.engine.worker
 from sweep.cli import main
-from sweep.dataset import store
+from sweep.dataset import chunk_files, files
+from sweep.dataset.chunk_files import content_hash
 from sweep.dataset.lock import locked
-from sweep.dataset.parts import content_hash
 from sweep.errors import InputError, LinksweepError, LinksweepWarning, LockedError, StoreError, WorkerDied
 from sweep.report.page import write_report
 from tests.support.engine_study import ROOT, SMALL_CHUNKS, chunk_bytes, write_study
@@ -79,7 +79,7 @@ CHANGES: dict[str, Callable[[dict[str, Any]], object]] = {
 
 @pytest.mark.parametrize("change", CHANGES)
 def test_a_plan_that_was_changed_is_no_plan(whole: tuple[Path, Path], dataset: Path, change: str) -> None:
-    path = store.beside(dataset) / store.PLAN
+    path = files.beside(dataset) / files.PLAN
     plan = json.loads(path.read_text())
     CHANGES[change](plan)
     path.write_text(json.dumps(plan))
@@ -91,7 +91,7 @@ def test_a_plan_that_was_changed_is_no_plan(whole: tuple[Path, Path], dataset: P
 
 
 def test_the_next_run_writes_a_changed_plan_anew(whole: tuple[Path, Path], dataset: Path) -> None:
-    path = store.beside(dataset) / store.PLAN
+    path = files.beside(dataset) / files.PLAN
     before = path.read_bytes()
     path.write_bytes(before.replace(b'"chunks": 3', b'"chunks": "3"'))
     sweep.run(whole[0], dataset)
@@ -113,7 +113,7 @@ STRANGERS: dict[str, Callable[[Path, Path], object]] = {
 
 @pytest.mark.parametrize("name", STRANGERS)
 def test_what_is_no_chunk_is_named_by_all(whole: tuple[Path, Path], dataset: Path, name: str) -> None:
-    STRANGERS[name](dataset / name, store.parts(dataset)[0].path)
+    STRANGERS[name](dataset / name, chunk_files.parts(dataset)[0].path)
     found = sweep.verify(dataset, designs=0)
     assert found.exit_code == 74 and [finding.path.name for finding in found.findings] == [name]
     if name.startswith("_"):  # pandas and pyarrow pass it over
@@ -142,7 +142,7 @@ IN_PLACE: dict[str, Callable[[Path], object]] = {
 def test_what_stands_in_place_of_a_chunk_is_damage_and_computed_anew(
     whole: tuple[Path, Path], dataset: Path, kind: str
 ) -> None:
-    path = store.parts(dataset)[1].path
+    path = chunk_files.parts(dataset)[1].path
     path.unlink()
     IN_PLACE[kind](path)
     found = sweep.verify(dataset, designs=0)
@@ -166,13 +166,13 @@ def test_a_name_that_is_no_text_is_shown(dataset: Path) -> None:
 
 
 def test_a_nested_line_in_the_log_and_wrong_times_are_left_out(whole: tuple[Path, Path], dataset: Path) -> None:
-    with (store.beside(dataset) / store.RUNS).open("a") as file:
+    with (files.beside(dataset) / files.RUNS).open("a") as file:
         file.write("[" * 100_000 + "\n" + json.dumps({"event": "end", "outcome": "complete", "seconds": "x"}) + "\n")
     assert sweep.compare(whole[1], dataset).exit_code == 0
 
 
 def test_a_chunk_that_lacks_a_column_under_a_right_hash_is_found(whole: tuple[Path, Path], dataset: Path) -> None:
-    part = store.parts(dataset)[1]
+    part = chunk_files.parts(dataset)[1]
     table = pq.read_table(part.path)
     buffer = io.BytesIO()
     pq.write_table(table.drop_columns(["swing"]), buffer)
@@ -195,7 +195,7 @@ def test_a_table_beside_the_chunks_that_was_changed_is_refused(tmp_path: Path) -
         file.write('[objective]\nminimise = "max_abs_d2psi"\n[optimise]\nstarts = 2\nseed = 1\n')
     folder = sweep.run(path, tmp_path / "data" / "designs", jobs=1)
     before = shutil.copytree(folder.parent, tmp_path / "before") / "designs"
-    table = store.beside(folder) / store.OPTIMUM
+    table = files.beside(folder) / files.OPTIMUM
     pq.write_table(pq.read_table(table).drop_columns(["role"]), table)
     for read in (write_report, lambda folder: sweep.compare(before, folder)):
         with pytest.raises(
@@ -257,7 +257,7 @@ def test_a_file_system_without_locks_is_said_and_used(
 
 
 def test_a_row_that_is_there_twice_under_a_right_hash_is_found(whole: tuple[Path, Path], dataset: Path) -> None:
-    part = store.parts(dataset)[1]
+    part = chunk_files.parts(dataset)[1]
     table, buffer = pq.read_table(part.path), io.BytesIO()
     pq.write_table(pa.concat_tables([table, table.slice(0, 1)]), buffer)
     part.path.unlink()

@@ -14,7 +14,7 @@ import sweep.chunks.plan
 from sweep.chunks.chunk import ChunkResult
 from sweep.chunks.plan import make_plan
 from sweep.cli import main
-from sweep.dataset import store
+from sweep.dataset import chunk_files, files
 from sweep.dataset.verification import DAMAGED, INCOMPLETE
 from sweep.errors import InputError
 from sweep.study import load_study
@@ -51,15 +51,15 @@ def chunk(folder: Path, index: int) -> Path:
 def rewritten(study: Path, folder: Path, index: int, column: str, row: int, value: float) -> None:
     """Change one number of a chunk and give the file the hash of its new content."""
     model = load_study(study)
-    plan = make_plan(model, (store.read_plan(folder) or {})["chunk_size"])
-    part = store.parts(folder)[index]
-    rows, about = part.rows(), store.about(part)
+    plan = make_plan(model, (files.read_plan(folder) or {})["chunk_size"])
+    part = chunk_files.parts(folder)[index]
+    rows, about = part.rows(), chunk_files.about(part)
     columns = {name: rows[name].to_numpy().copy() for name in rows.columns}
     columns[column][row] = value
-    codes = {name: code for code, name in store.STATUS_NAMES.items()}
+    codes = {name: code for code, name in chunk_files.STATUS_NAMES.items()}
     counts = {codes[name]: number for name, number in about["counts"].items()}
     part.path.unlink()
-    store.write_chunk(folder, plan, index, ChunkResult(columns, counts, about["missed"]))
+    chunk_files.write_chunk(folder, plan, index, ChunkResult(columns, counts, about["missed"]))
 
 
 def test_a_sound_dataset_has_no_finding_and_designs_are_computed_again(dataset: Path) -> None:
@@ -108,7 +108,7 @@ def test_a_chunk_under_another_ones_name_is_found(dataset: Path) -> None:
 def test_missing_chunks_of_a_complete_dataset_are_damage_of_an_unfinished_one_they_are_not(dataset: Path) -> None:
     chunk(dataset, 1).unlink()
     assert sweep.verify(dataset).exit_code == DAMAGED
-    store.write_plan(dataset, (store.read_plan(dataset) or {}) | {"complete": False})
+    files.write_plan(dataset, (files.read_plan(dataset) or {}) | {"complete": False})
     found = sweep.verify(dataset)
     assert found.exit_code == INCOMPLETE
     assert "1 of 3 chunks are missing, the first is 1" in found.findings[0].words
@@ -141,7 +141,7 @@ def test_a_duplicate_and_a_foreign_file_are_found_and_a_run_refuses_them(
 def test_a_wrong_row_under_a_right_hash_is_found(
     whole: tuple[Path, Path], dataset: Path, column: str, value: float, words: str
 ) -> None:
-    ok = store.parts(dataset)[1].rows()["status"].to_numpy() == 0
+    ok = chunk_files.parts(dataset)[1].rows()["status"].to_numpy() == 0
     rewritten(whole[0], dataset, 1, column, int(ok.argmax()), value)
     found = sweep.verify(dataset, designs=0)
     assert found.exit_code == DAMAGED
@@ -149,7 +149,7 @@ def test_a_wrong_row_under_a_right_hash_is_found(
 
 
 def test_a_wrong_value_is_found_by_computing_its_design_again(whole: tuple[Path, Path], dataset: Path) -> None:
-    rows = store.parts(dataset)[1].rows()
+    rows = chunk_files.parts(dataset)[1].rows()
     row = int((rows["status"].to_numpy() == 0).argmax())
     bits = rows["swing"].to_numpy()[row] * (1.0 + 2.0**-52)
     rewritten(whole[0], dataset, 1, "swing", row, bits)
@@ -173,12 +173,12 @@ def test_a_damaged_plan_is_found_and_the_next_run_keeps_the_chunks(whole: tuple[
     assert [finding.path.name for finding in found.findings] == ["_plan.json"]
     sweep.run(whole[0], dataset)
     assert sweep.verify(dataset).exit_code == 0
-    assert store.read_runs(dataset)[-1]["text"] == "0 chunks computed"
+    assert files.read_runs(dataset)[-1]["text"] == "0 chunks computed"
 
 
 def test_wrong_totals_and_a_damaged_table_beside_the_chunks_are_found(dataset: Path) -> None:
-    plan = store.read_plan(dataset) or {}
-    store.write_plan(dataset, plan | {"counts": {"OK": 1}})
+    plan = files.read_plan(dataset) or {}
+    files.write_plan(dataset, plan | {"counts": {"OK": 1}})
     (dataset.parent / "_optimum.parquet").write_bytes(b"no table")
     found = sweep.verify(dataset, designs=0)
     assert [finding.path.name for finding in found.findings] == ["_plan.json", "_optimum.parquet"]

@@ -9,7 +9,7 @@ from functools import partial
 from pathlib import Path
 
 import sweep
-from sweep.dataset.store import PLAN, RUNS, beside
+from sweep.dataset.files import PLAN, RUNS, beside
 from sweep.errors import IncompleteWarning, LinksweepError
 from tests.faults.ground import TABLES, Ground, Kind, Outcome, files
 

@@ -11,7 +11,7 @@ import time
 from functools import partial
 from pathlib import Path
 
-from sweep.dataset.store import beside
+from sweep.dataset.files import beside
 from tests.faults.ground import SECONDS, Ground, Kind, Outcome, files, last_line
 from tests.faults.kills import reached
 from tests.support.engine_study import ROOT

@@ -17,7 +17,7 @@ import pyarrow.parquet as pq
 import pytest
 
 import sweep.chunks.plan
-from sweep.dataset.store import CURVES, OPTIMUM, PARETO, SENSITIVITY, TOLERANCE, beside
+from sweep.dataset.files import CURVES, OPTIMUM, PARETO, SENSITIVITY, TOLERANCE, beside
 from sweep.engine.run import run
 from sweep.errors import LinksweepError
 from tests.optimise.test_front import TABLE

@@ -10,7 +10,7 @@ import time
 from functools import partial
 from pathlib import Path
 
-from sweep.dataset.store import PARETO, beside
+from sweep.dataset.files import PARETO, beside
 from tests.faults.ground import PAUSE, SECONDS, TABLES, Ground, Kind, Outcome, alone, files, last_line, session
 
 LEAVE_SECONDS = 2.0 + 1.5  # promised, and what a busy machine may take beyond

@@ -11,11 +11,11 @@ from typing import Any
 
 import pytest
 
-from sweep.dataset import store
+from sweep.dataset import chunk_files, files
 from sweep.errors import LockedError
-from sweep.nights import folders
+from sweep.nights import archive
+from sweep.nights.archive import HISTORY, NIGHT, read_history, read_night
 from sweep.nights.page import write_page
-from sweep.nights.records import HISTORY, NIGHT, read_history, read_night
 from sweep.nights.studies import chosen
 from tests.nights.test_nightly import night, written
 
@@ -39,7 +39,7 @@ def after_one(first: tuple[Path, Path], tmp_path: Path) -> tuple[Path, Path]:
 @pytest.mark.parametrize("change", [{"chunks": "1"}, {"columns": 5}, {"designs": "x"}, {"data": []}])
 def test_a_bad_plan_of_an_earlier_night_stops_no_night(after_one: tuple[Path, Path], change: dict[str, Any]) -> None:
     study, into = after_one
-    path = folders.nights(into)[0] / "tiny" / store.PLAN
+    path = archive.nights(into)[0] / "tiny" / files.PLAN
     path.write_text(json.dumps(json.loads(path.read_text()) | change))
     record, _ = night(into, [study])
     own = record.studies["tiny"]
@@ -52,7 +52,7 @@ def test_what_stands_in_place_of_a_chunk_is_computed_anew(
     after_one: tuple[Path, Path], make: Callable[[Path], object]
 ) -> None:
     study, into = after_one
-    (part,) = store.parts(folders.nights(into)[0] / "tiny" / "designs")
+    (part,) = chunk_files.parts(archive.nights(into)[0] / "tiny" / "designs")
     part.path.unlink()
     make(part.path)
     record, _ = night(into, [study])
@@ -93,7 +93,7 @@ def test_records_of_wrong_types_are_left_out_and_said(after_one: tuple[Path, Pat
     line = json.loads((into / HISTORY).read_text())
     with (into / HISTORY).open("a") as file:
         file.write(json.dumps(line | change) + "\n")
-    last = folders.nights(into)[0]
+    last = archive.nights(into)[0]
     (last / NIGHT).write_text(json.dumps(line | change))
     assert read_night(last) is None and len(read_history(into)) == 1
     record, said = night(into, [study])
@@ -103,9 +103,9 @@ def test_records_of_wrong_types_are_left_out_and_said(after_one: tuple[Path, Pat
 
 def test_a_deleted_lock_lets_no_second_night_in(tmp_path: Path) -> None:
     into = tmp_path / "nights"
-    with folders.one_at_a_time(into):
-        (into / folders.LOCK).unlink()
-        with pytest.raises(LockedError, match="another night"), folders.one_at_a_time(into):
+    with archive.one_at_a_time(into):
+        (into / archive.LOCK).unlink()
+        with pytest.raises(LockedError, match="another night"), archive.one_at_a_time(into):
             pass
 
 
@@ -122,7 +122,7 @@ def test_an_interrupted_night_says_what_it_kept(
         night(
             into, [study, written(tmp_path / "two", name="two", e=91), written(tmp_path / "three", name="three", e=92)]
         )
-    last = folders.nights(into)[-1]
+    last = archive.nights(into)[-1]
     record = read_night(last)
     assert record is not None and record.exit_code == 130
     assert {name: own.state for name, own in record.studies.items()} == {

@@ -14,13 +14,13 @@ from pathlib import Path
 import pytest
 
 import sweep
-from sweep.dataset import store
+from sweep.dataset import files
 from sweep.dataset.lock import locked
 from sweep.errors import InputError, LockedError
-from sweep.nights import Settings, folders, nightly
+from sweep.nights import Settings, archive, nightly
+from sweep.nights.archive import NightRecord, StudyRecord, write_night
 from sweep.nights.carry import carry
 from sweep.nights.changes import changes
-from sweep.nights.records import NightRecord, StudyRecord, write_night
 from sweep.nights.studies import chosen, in_order
 from sweep.study import load_study
 from tests.faults.ground import SLOW_DISK
@@ -102,7 +102,7 @@ def test_a_changed_constant_in_a_kernel_is_found_with_rows_study_and_outputs(tmp
     assert "no change (exit code 0" in second.stdout
     assert second.stdout.count("nothing to compute, 1 chunks linked") == 1
     assert not told.exists()
-    chunks = [next((place / "tiny" / "designs").glob("part-*")) for place in folders.nights(into)]
+    chunks = [next((place / "tiny" / "designs").glob("part-*")) for place in archive.nights(into)]
     assert chunks[0].stat().st_ino == chunks[1].stat().st_ino
 
     kernel = sources / SOURCE
@@ -117,7 +117,7 @@ def test_a_changed_constant_in_a_kernel_is_found_with_rows_study_and_outputs(tmp
     assert "changed: tiny (10) (exit code 10" in third.stdout
     assert "max_abs_dP: 6 values changed" in told.read_text()
     assert "--on-change ended with 3" in third.stdout
-    last = folders.nights(into)[-1]
+    last = archive.nights(into)[-1]
     assert (into / "latest").resolve() == last.resolve() != good
     events = [json.loads(line) for line in (last / "log.jsonl").read_text().splitlines()]
     assert [event["event"] for event in events] == ["night", "study", "end", "told"]
@@ -208,9 +208,9 @@ def test_chunks_of_a_night_that_was_cut_off_are_taken_over_and_damaged_ones_are_
     assert (carried.night, carried.chunks, carried.whole) == (old.name, 1, False)
     assert [path.name for path in (target / "designs").iterdir()] == [chunks[2].name]
     sweep.run(study, target / "designs", jobs=1)
-    assert store.read_runs(target / "designs")[-1]["text"] == "2 chunks computed"
+    assert files.read_runs(target / "designs")[-1]["text"] == "2 chunks computed"
     assert sweep.verify(target).exit_code == 0
-    assert len(store.read_runs(designs)) == 2
+    assert len(files.read_runs(designs)) == 2
     other = load_study(written(tmp_path / "one", count=1301))
     assert carry(other, [old], tmp_path / "another" / "tiny") is None
 
@@ -256,25 +256,25 @@ def test_retention_keeps_the_last_good_night_however_old(tmp_path: Path) -> None
         noted(tmp_path, name, one=GOOD if name in names[:2] else CUT)
     strange = tmp_path / "notes"
     strange.mkdir()
-    (tmp_path / f"{folders.GOING}2025-12-31T00-00-00Z").mkdir()
-    assert folders.drop_old(tmp_path, 3) == [names[0], *names[2:4]]
+    (tmp_path / f"{archive.GOING}2025-12-31T00-00-00Z").mkdir()
+    assert archive.drop_old(tmp_path, 3) == [names[0], *names[2:4]]
     assert sorted(path.name for path in tmp_path.iterdir()) == [names[1], *names[4:], "notes"]
     noted(tmp_path, "2026-01-08T00-00-00Z", one=GOOD)
-    assert folders.drop_old(tmp_path, 1) == [names[1], *names[4:]]
+    assert archive.drop_old(tmp_path, 1) == [names[1], *names[4:]]
 
 
 def test_a_night_comes_after_all_others_even_if_the_clock_goes_back(tmp_path: Path) -> None:
     (tmp_path / "2999-01-01T00-00-00Z").mkdir()
-    fresh = [folders.new_night(tmp_path) for _ in range(3)]
+    fresh = [archive.new_night(tmp_path) for _ in range(3)]
     assert [path.name for path in fresh] == [f"2999-01-01T00-00-00Z+{k:03d}" for k in (1, 2, 3)]
-    assert folders.nights(tmp_path)[1:] == fresh
+    assert archive.nights(tmp_path)[1:] == fresh
 
 
 def test_two_nights_at_once_are_refused(tmp_path: Path) -> None:
     path = written(tmp_path / "one")
-    with folders.one_at_a_time(tmp_path / "nights"), pytest.raises(LockedError):
+    with archive.one_at_a_time(tmp_path / "nights"), pytest.raises(LockedError):
         night(tmp_path / "nights", [path])
-    assert folders.nights(tmp_path / "nights") == []
+    assert archive.nights(tmp_path / "nights") == []
 
 
 def test_a_study_whose_folder_is_held_by_another_run_fails_with_75(tmp_path: Path) -> None:

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from pathlib import Path
 
+from sweep.nights.archive import NightRecord, StudyRecord, append_history
 from sweep.nights.page import HEIGHT, WIDTH, study_rows, write_page
-from sweep.nights.records import NightRecord, StudyRecord, append_history
 
 
 def record(value: float, *moved: str, **about: object) -> StudyRecord:

@@ -6,9 +6,9 @@ from pathlib import Path
 
 import pytest
 
+from sweep.nights.archive import NightRecord, StudyRecord, append_history, read_history, read_night, write_night
 from sweep.nights.changes import slower
 from sweep.nights.night import exit_code
-from sweep.nights.records import NightRecord, StudyRecord, append_history, read_history, read_night, write_night
 from tests.nights.test_nightly import CUT, GOOD
 
 

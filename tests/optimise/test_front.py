@@ -16,8 +16,8 @@ import pyarrow.parquet as pq
 import pytest
 
 import sweep.engine.run
-from sweep.dataset.files import TABLES, read_plan
-from sweep.dataset.store import OPTIMUM, PARETO, beside, is_complete, write_plan
+from sweep.dataset.files import OPTIMUM, PARETO, TABLES, beside, read_plan, write_plan
+from sweep.dataset.store import is_complete
 from sweep.engine.run import run
 from sweep.errors import Interrupted, StudyError
 from sweep.optimise import front_study

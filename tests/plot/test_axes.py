@@ -13,7 +13,7 @@ from click.testing import CliRunner
 
 import sweep
 from sweep.cli import main
-from sweep.dataset import store
+from sweep.dataset import files
 from sweep.families import family
 from sweep.report.page import write_report
 from tests.support.report_dataset import study_data, write_dataset, write_table
@@ -28,10 +28,10 @@ def folder(tmp_path_factory):
     place = write_dataset(tmp_path_factory.mktemp("plot") / "designs", data, optimum={})
     spread = {"role": "optimum", "output": ["max_abs_d2s", "stroke"], "nominal": [8.0, 24.5], "mean": [8.1, 24.5],
               "low": [7.6, 24.4], "high": [8.8, 24.6], "within": [math.nan, 0.9]}  # fmt: skip
-    write_table(store.beside(place) / store.TOLERANCE, pd.DataFrame(spread), {})
+    write_table(files.beside(place) / files.TOLERANCE, pd.DataFrame(spread), {})
     slopes = {"role": "optimum", "output": "max_abs_d2s", "parameter": ["a1", "b1"], "value": 8.0,
               "growing": [4.0, -16.0], "shrinking": [4.0, -16.0]}  # fmt: skip
-    write_table(store.beside(place) / store.SENSITIVITY, pd.DataFrame(slopes), {})
+    write_table(files.beside(place) / files.SENSITIVITY, pd.DataFrame(slopes), {})
     return place
 
 
@@ -177,7 +177,7 @@ def test_export_verb_takes_the_optimum_or_a_row_of_a_folder(kind, tmp_path):
     done = CliRunner().invoke(main, ["export", str(place), "--format", kind, "--design", "optimum"])
     assert done.exit_code == 0, done.output
     file = Path(done.output.split(": ")[1].strip())
-    assert file.parent == store.beside(place) / "export" and file.stat().st_size > 200
+    assert file.parent == files.beside(place) / "export" and file.stat().st_size > 200
     out = tmp_path / "row.csv"
     done = CliRunner().invoke(main, ["export", str(place), "--format", "csv", "--design", "3", "--out", str(out)])
     assert done.exit_code == 0, done.output

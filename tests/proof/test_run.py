@@ -12,7 +12,7 @@ from click.testing import CliRunner
 
 from studies import proof_space
 from sweep.cli import main
-from sweep.dataset import store
+from sweep.dataset import files
 from sweep.jobs.executors import Here
 from sweep.jobs.signals import Stop
 from sweep.nights.carry import carry, searched
@@ -152,7 +152,7 @@ def test_night_takes_the_certificate_over(again: Path, tmp_path: Path) -> None:
     study = load_study(again)
     carried = carry(study, [night], target)
     assert carried is not None and carried.whole
-    assert known_proof(study, target / store.DESIGNS) == read_proof(again / "_proof.parquet")
+    assert known_proof(study, target / files.DESIGNS) == read_proof(again / "_proof.parquet")
     (target / "_proof.parquet").unlink()
     assert not searched(study, target)
 

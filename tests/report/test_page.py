@@ -15,7 +15,7 @@ import pytest
 
 import sweep
 from sweep import run
-from sweep.dataset import store
+from sweep.dataset import files
 from sweep.errors import InputError, StoreError
 from sweep.plot.mechanisms import aligned_turn, rotates
 from sweep.report.answer import answer, searched
@@ -175,7 +175,7 @@ def test_signed_objective_is_best_where_it_is_least(tmp_path: Path) -> None:
 def test_a_run_killed_before_its_totals_were_noted_is_reported_in_full(tmp_path: Path) -> None:
     folder = write_dataset(tmp_path / "designs", study_data(optimise=None))
     whole, _, _ = gather(folder)
-    store.write_plan(folder, whole.plan | {"counts": None, "missed": None, "complete": False})
+    files.write_plan(folder, whole.plan | {"counts": None, "missed": None, "complete": False})
     again, _, _ = gather(folder)
     assert again.counts == whole.counts
     assert again.missed == whole.missed

@@ -16,7 +16,8 @@ from sweep.chunks.cascade import Batch, Cascade, Level, levels
 from sweep.chunks.chunk import compute_chunk, output_columns
 from sweep.chunks.parameters import Parameters, parameter_matrix
 from sweep.chunks.plan import make_plan
-from sweep.dataset.store import beside, is_complete, load, read_plan, read_runs
+from sweep.dataset.files import beside, read_plan, read_runs
+from sweep.dataset.store import is_complete, load
 from sweep.engine.run import run
 from sweep.errors import InputError
 from sweep.evaluation.summaries import Route, design_outputs

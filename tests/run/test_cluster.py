@@ -21,7 +21,8 @@ import sweep
 import sweep.chunks.plan
 import sweep.optimise.multistart.multistart
 from sweep.chunks.plan import make_plan
-from sweep.dataset.store import OPTIMUM, PARETO, beside, parts
+from sweep.dataset.chunk_files import parts
+from sweep.dataset.files import OPTIMUM, PARETO, beside
 from sweep.engine.worker import ChunkTask, Done
 from sweep.errors import InputError, WorkerDied
 from sweep.jobs.cluster import Dask

@@ -17,7 +17,7 @@ import pytest
 import sweep
 import sweep.chunks.plan
 from sweep.chunks.plan import make_plan
-from sweep.dataset import store
+from sweep.dataset import chunk_files
 from sweep.engine.worker import ChunkTask
 from sweep.errors import InputError
 from sweep.jobs.executors import EXECUTORS, Here, Task, Threads, at_work, executor
@@ -79,7 +79,7 @@ def test_a_worker_asks_nothing_of_its_parent(tmp_path: Path) -> None:
         worker = threading.Thread(target=task, args=(0, lambda: False))
         worker.start()
         worker.join()
-        assert [part.index for part in store.parts(folder)] == [0]
+        assert [part.index for part in chunk_files.parts(folder)] == [0]
     assert chunk_bytes(tmp_path / "one") == chunk_bytes(tmp_path / "two")
 
 

@@ -19,7 +19,10 @@ import pytest
 import sweep.chunks.plan
 import sweep.engine.run
 from sweep.chunks.chunk import ChunkResult, compute_chunk
-from sweep.dataset.store import BAD, LOCK, OLD, PLAN, beside, is_complete, load, locked, parts, read_runs
+from sweep.dataset.chunk_files import parts
+from sweep.dataset.files import BAD, LOCK, OLD, PLAN, beside, read_runs
+from sweep.dataset.lock import locked
+from sweep.dataset.store import is_complete, load
 from sweep.engine.run import run
 from sweep.errors import (
     IncompleteWarning,

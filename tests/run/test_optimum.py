@@ -14,7 +14,8 @@ import pyarrow.parquet as pq
 import pytest
 
 import sweep.chunks.plan
-from sweep.dataset.store import OPTIMUM, beside, is_complete, read_runs
+from sweep.dataset.files import OPTIMUM, beside, read_runs
+from sweep.dataset.store import is_complete
 from sweep.engine.run import run
 from sweep.errors import Interrupted
 from sweep.study import Objective, OptimiseSettings, Study, load_study

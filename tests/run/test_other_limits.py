@@ -11,7 +11,7 @@ import pytest
 import sweep
 import sweep.chunks.plan
 from sweep.chunks.chunk import compute_chunk
-from sweep.dataset import store
+from sweep.dataset import chunk_files, files
 from sweep.dataset.files import OLD, PLAN, beside
 from sweep.engine.opening import differences
 from sweep.errors import InputError
@@ -56,7 +56,7 @@ def test_the_conflict_of_a_changed_study_is_said_in_its_own_words(tmp_path: Path
         sweep.run(new, out, jobs=1)
     other = load_study(new)
     noted = json.loads((beside(out) / PLAN).read_text())
-    store.write_plan(out, noted | {"code": "0" * 16, "identity": "0" * 12})
+    files.write_plan(out, noted | {"code": "0" * 16, "identity": "0" * 12})
     with pytest.raises(InputError, match="other sources or libraries"):
         sweep.run(other, out, jobs=1)
 
@@ -85,14 +85,14 @@ def test_designs_kept_are_sorted_by_other_limits_as_if_computed_anew(
     (aside,) = (beside(out) / OLD).iterdir()
     assert chunk_bytes(aside) == kept, "what was there before is lost"
     sweep.run(new, out, jobs=1)
-    assert store.read_runs(out)[-1]["text"] == "0 chunks computed"
+    assert files.read_runs(out)[-1]["text"] == "0 chunks computed"
 
 
 def test_a_damaged_chunk_is_not_recalled_but_computed(tmp_path: Path) -> None:
     old = load_study(write_study(tmp_path / "old", count=20, limits=LOOSE))
     new = load_study(write_study(tmp_path / "new", count=20, limits=STRICT))
     out = sweep.run(old, tmp_path / "out" / "designs", jobs=1)
-    victim = store.parts(out)[1].path
+    victim = chunk_files.parts(out)[1].path
     victim.write_bytes(victim.read_bytes()[:-9])
     sweep.run(new, out, jobs=1)
     pd.testing.assert_frame_equal(sweep.load(out), sweep.load(sweep.run(new, tmp_path / "fresh", jobs=1)))

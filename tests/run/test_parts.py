@@ -11,7 +11,7 @@ from click.testing import CliRunner
 import sweep
 import sweep.chunks.plan
 from sweep.cli import main
-from sweep.dataset import store
+from sweep.dataset import files, store
 from sweep.engine.parts import merge, split
 from sweep.errors import InputError
 from tests.support.engine_study import SMALL_CHUNKS, chunk_bytes, write_study
@@ -42,7 +42,7 @@ def test_merged_parts_have_the_bytes_of_an_unsplit_run(study: Path, tmp_path: Pa
     assert (found.taken, found.missing, found.damaged) == (5, (), ())
     assert merge(study, out).taken == 0
     sweep.run(study, out)
-    assert store.read_runs(out)[-1]["text"] == "0 chunks computed"
+    assert files.read_runs(out)[-1]["text"] == "0 chunks computed"
     whole = sweep.run(study, tmp_path / "whole" / "designs")
     assert chunk_bytes(out) == chunk_bytes(whole)
     assert (out.parent / "_plan.json").read_bytes() == (whole.parent / "_plan.json").read_bytes()

@@ -10,7 +10,7 @@ import pytest
 import sweep
 from sweep.errors import StudyError
 from sweep.study import load_study, study_from_data
-from sweep.study.taken import fingerprint
+from sweep.study.design import fingerprint
 from tests.support.studies import beside_needle208
 
 STUDIES = Path(sweep.__file__).parents[1] / "studies"

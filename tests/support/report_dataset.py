@@ -17,7 +17,7 @@ import pyarrow.parquet as pq
 
 from sweep.chunks.chunk import ChunkResult
 from sweep.chunks.plan import make_plan
-from sweep.dataset import store
+from sweep.dataset import chunk_files, files, store
 from sweep.study import Study, study_from_data
 
 CHUNK = 4096
@@ -91,15 +91,15 @@ def write_dataset(folder: Path, data: dict[str, Any] | None = None, *, optimum: 
             {int(code): int((status == code).sum()) for code in np.unique(status)},
             {"max_abs_dev": int(bent.sum()), "max_pressure_angle1": int(((status == 5) & ~bent).sum())},
         )
-        store.write_chunk(folder, plan, index, result)
+        chunk_files.write_chunk(folder, plan, index, result)
     note = plan.as_dict() | {"about": data["study"], "data": study.data, "optimise": "optimise" in data}
     if optimum is not None:
         write_optimum(folder, study, optimum)
         note["optimised"] = "yes"
-    store.write_plan(
+    files.write_plan(
         folder, note | dict(zip(("counts", "missed"), store.totals(folder), strict=True)) | {"complete": True}
     )
-    store.append_run(folder, {"event": "start", "time": "2026-01-02T03:04:05Z", "versions": {"numpy": "2"}, "jobs": 2})
+    files.append_run(folder, {"event": "start", "time": "2026-01-02T03:04:05Z", "versions": {"numpy": "2"}, "jobs": 2})
     return folder
 
 
@@ -112,13 +112,13 @@ def write_optimum(folder: Path, study: Study, changes: dict[str, Any]) -> None:
     rows += [{"role": "start"} | fixed | OPTIMUM | errors | about] * 2
     rows += [{"role": "reference"} | fixed | REFERENCE | errors | about | {"kkt_residual": np.nan, "active": ""}]
     write_table(
-        store.beside(folder) / store.OPTIMUM,
+        files.beside(folder) / files.OPTIMUM,
         pd.DataFrame(rows),
         {"max_abs_d2s": "mm", "max_abs_dev": "mm", "stroke": "mm"},
     )
     curves = pd.concat([curve("optimum", 12.25), curve("reference", 15.0)])
     write_table(
-        store.beside(folder) / store.CURVES, curves, {"s": "mm", "ds": "mm", "d2s": "mm", "d3s": "mm", "dev": "mm"}
+        files.beside(folder) / files.CURVES, curves, {"s": "mm", "ds": "mm", "d2s": "mm", "d3s": "mm", "dev": "mm"}
     )
 
 

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from kernels import status as st
-from sweep.dataset import store
+from sweep.dataset import chunk_files, files
 from sweep.dataset.files import metadata
 from sweep.errors import InputError, SearchCutShort
 from sweep.evaluation.summaries import output
@@ -74,7 +74,7 @@ def front_study(
     if study.pareto is None:
         raise InputError("pareto", None, "a [pareto] section", str(study.path))
     place = Path(folder)
-    settings, path = study.pareto, store.beside(place) / store.PARETO
+    settings, path = study.pareto, files.beside(place) / files.PARETO
     front = saved(path, key) or Front.of(settings)
     if front.complete and path.exists():
         return path
@@ -139,7 +139,7 @@ def _unit(study: Study, name: str) -> str:
 def _searched(study: Study, folder: Path) -> tuple[Array, Array]:
     """Return the designs that the search for the optimum ended at (k, P), and of them the optimum (1, P)."""
     names = list(study.family.parameter_names)
-    rows = _columns(store.beside(folder) / store.OPTIMUM, [*names, "role"])
+    rows = _columns(files.beside(folder) / files.OPTIMUM, [*names, "role"])
     designs = np.column_stack([rows[name] for name in names]).astype(np.float64)
     return designs[rows["role"] != "reference"], designs[rows["role"] == "optimum"]
 
@@ -162,7 +162,7 @@ def within(
     assert study.objective is not None
     names = study.family.parameter_names
     kept = [(np.empty((0, len(names))), np.empty(0)) for _ in bounds]
-    for part in store.parts(folder):
+    for part in chunk_files.parts(folder):
         columns = _columns(part.path, [*names, study.objective.output, settings.output, "status"])
         designs = np.column_stack([columns[name] for name in names]).astype(np.float64)
         merit = columns[study.objective.output].astype(np.float64)

@@ -11,7 +11,7 @@ import numpy as np
 
 from kernels import status as st
 from sweep.chunks.parameters import parameter_matrix
-from sweep.dataset.store import parts
+from sweep.dataset.chunk_files import parts
 from sweep.families.base import Array, Family
 from sweep.optimise.problem.statement import Problem
 from sweep.optimise.starts.candidates import ALIKE, GROUP, diverse, ranking, sample

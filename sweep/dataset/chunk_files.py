@@ -1,4 +1,13 @@
-"""The chunks in a folder: what their names say, and whether it is true."""
+"""The chunks of a dataset: Parquet files whose names say what they hold, written once, read back with proof.
+
+A chunk is written beside the folder of designs, brought to the disk, renamed into it, and never touched again.
+Its name
+
+    part-<index>-<identity of study, code, cut and columns>-<hash of the file>.parquet
+
+says what it holds and whether it is whole, so the folder needs no manifest and survives a kill at any moment.
+Index and identity stand in the file's metadata too, so a file under another chunk's name is noticed.
+"""
 
 from __future__ import annotations
 
@@ -6,17 +15,20 @@ import hashlib
 import io
 import json
 import re
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from kernels import status as codes
-from sweep.dataset.files import is_older, read_plan, store_errors
+from sweep.dataset.files import beside, is_older, read_plan, store_errors, write_atomically
 from sweep.errors import InputError, StoreError
 
 if TYPE_CHECKING:
     import pandas as pd
+
+    from sweep.chunks.chunk import ChunkResult
+    from sweep.chunks.plan import Plan
 
 METADATA = b"linksweep"
 MOST_BYTES = 2**30  # of a chunk; they are planned to be a thirtieth of that
@@ -189,3 +201,60 @@ def missing_chunks(folder: Path, chunks: list[Part]) -> list[int]:
     plan = read_plan(folder) or {}
     count = about(chunks[0]).get("chunks") if chunks else None
     return sorted(set(range(plan.get("chunks", 0) if count is None else count)) - {part.index for part in chunks})
+
+
+def encode(plan: Plan, index: int, result: ChunkResult) -> bytes:
+    """Return the Parquet file of a chunk; equal input gives equal bytes.
+
+    Parameters that repeat (lattice axes, fixed values) are dictionary-encoded, everything else byte-stream-split,
+    all under zstd.  The file's metadata say what determined the values, the fields' metadata unit and definition.
+    Every page carries a checksum, which readers verify if they are asked to.
+    """
+    import pyarrow as pa
+    import pyarrow.parquet as pq
+
+    start, stop = plan.bounds(index)
+    own = {
+        "format": plan.format, "name": plan.name, "study": plan.study, "code": plan.code, "identity": plan.identity,
+        "chunk": index, "chunks": plan.chunks, "start": start, "stop": stop, "designs": plan.designs,
+        "counts": named_counts(result.counts_by_status), "missed": result.missed_by_limit, "data": plan.chunk_data,
+    }  # fmt: skip
+    fields = [
+        pa.field(c.name, pa.from_numpy_dtype(c.dtype), metadata={"unit": c.unit, "definition": c.text})
+        for c in plan.columns
+    ]
+    schema = pa.schema(fields, metadata={METADATA: json.dumps(own, sort_keys=True).encode()})
+    table = pa.Table.from_arrays([pa.array(result.columns[c.name]) for c in plan.columns], schema=schema)
+    dictionary = [*plan.repetitive, "status"]
+    split = {c.name: "BYTE_STREAM_SPLIT" for c in plan.columns if c.name not in dictionary}
+    sink = pa.BufferOutputStream()
+    pq.write_table(
+        table,
+        sink,
+        compression="zstd",
+        use_dictionary=dictionary,
+        column_encoding=split | {"design": "DELTA_BINARY_PACKED"},
+        write_page_checksum=True,
+    )
+    return bytes(sink.getvalue())
+
+
+def write_chunk(folder: Path, plan: Plan, index: int, result: ChunkResult) -> Path:
+    """Write one chunk so that at every moment its final name holds either nothing or the whole file."""
+    data = encode(plan, index, result)
+    path = folder / f"part-{index:06d}-{plan.identity}-{content_hash(data)}.parquet"
+    write_atomically(path, data, beside(folder))
+    return path
+
+
+def named_counts(counts: Mapping[int, int]) -> dict[str, int]:
+    """Return designs by the name of their status."""
+    return {STATUS_NAMES.get(code, str(code)): number for code, number in sorted(counts.items())}
+
+
+def units_of(part: Part) -> dict[str, str]:
+    """Return the unit of every column of a chunk that has one, as its field metadata say."""
+    import pyarrow.parquet as pq
+
+    schema = pq.read_schema(part.path)
+    return {field.name: field.metadata[b"unit"].decode() for field in schema if b"unit" in (field.metadata or {})}

@@ -1,8 +1,9 @@
-"""The verb ``warm``: kernels compiled before they are needed."""
+"""The verbs about compiled kernels: warm makes them before they are needed, cache clear removes them."""
 
 from __future__ import annotations
 
 import os
+import shutil
 import tempfile
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
@@ -13,6 +14,7 @@ from typing import NamedTuple
 import click
 import numpy as np
 
+from kernels.cache_folder import cache_root
 from sweep.chunks.chunk import asked_outputs, few_designs
 from sweep.cli.families import main_outputs
 from sweep.engine.run import run
@@ -146,3 +148,22 @@ def warm(what: tuple[str, ...], jobs: int | None) -> None:
     with stop_on_signal() as stop, Progress("compiling", len(first) + len(then), 0, True, unit="parts") as shown:
         compile_parts(first, workers, stop, shown.advance)
         compile_parts(then, workers, stop, shown.advance)
+
+
+@click.group()
+def cache() -> None:
+    """Manage the compiled kernels that are kept on disk."""
+
+
+@cache.command()
+def clear() -> None:
+    """Remove the compiled kernels of every version; they are compiled anew when needed.
+
+    Files cut short are noticed and made anew; this is the cure for any other damage, and makes room.
+    """
+    root = cache_root()
+    if not root.exists():
+        click.echo(f"nothing to remove: {root} does not exist")
+        return
+    shutil.rmtree(root)
+    click.echo(f"removed {root}")

@@ -1,0 +1,45 @@
+"""What a run finds missing of its kernels: once one step had to be compiled, those behind it are in processes."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from contextlib import nullcontext
+from types import SimpleNamespace
+
+import pytest
+
+from sweep.chunks.chunk import asked_outputs
+from sweep.engine import run as engine
+from sweep.jobs.progress import Phases
+from sweep.study import load_study
+from tests.support.engine_study import ROOT
+
+
+@pytest.mark.parametrize(
+    ("compiled_at", "jobs", "spread"), [(0, 2, True), (1, 2, True), (None, 2, False), (0, 1, False)]
+)
+def test_what_is_missing_is_compiled_side_by_side(
+    monkeypatch: pytest.MonkeyPatch, compiled_at: int | None, jobs: int, spread: bool
+) -> None:
+    study = load_study(ROOT / "studies" / "needle208-loads")
+    count = len(asked_outputs(study))
+    assert count > 4
+    here: list[int] = []
+    elsewhere: list[int] = []
+
+    class Processes:
+        def outcomes(self, task: object, numbers: Iterator[int], jobs: int, stop: object) -> Iterator[int]:
+            elsewhere.extend(numbers)
+            return iter(elsewhere)
+
+    def recorder(event: str) -> nullcontext[SimpleNamespace]:
+        return nullcontext(SimpleNamespace(buffer=["an event"] if len(here) == compiled_at else []))
+
+    monkeypatch.setattr(engine, "WarmStep", lambda study: here.append)
+    monkeypatch.setattr(engine, "install_recorder", recorder)
+    monkeypatch.setattr(engine, "executor", lambda name, jobs: Processes())
+    monkeypatch.setattr(engine.os, "cpu_count", lambda: 2)
+    with Phases(False) as phases:
+        engine._compile(study, jobs, phases)
+    assert here == list(range(count))  # this process has them all in the end
+    assert elsewhere == (list(range((compiled_at or 0) + 1, count)) if spread else [])
