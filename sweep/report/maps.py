@@ -58,7 +58,7 @@ def map_figure(
     from matplotlib.colors import LogNorm
     from matplotlib.ticker import NullLocator
 
-    figure = new_figure(WIDTH, 4.6, "none")  # a layout found by drawing twice takes a tenth of the report's time
+    figure = new_figure(WIDTH, 4.6, None)  # a layout found by drawing twice takes a tenth of the report's time
     figure.subplots_adjust(left=0.08, right=0.98, bottom=0.2, top=0.98, wspace=0.08)
     panels = figure.subplots(1, 2 if objective is not None else 1, squeeze=False, sharex=True, sharey=True)[0]
     (x_cells, x_shown), (y_cells, y_shown) = x, y
@@ -134,7 +134,7 @@ def trade_off_figure(
 
     ``front`` draws what the optimiser made of it.
     """
-    figure = new_figure(WIDTH, 4.4, "none")
+    figure = new_figure(WIDTH, 4.4, None)
     figure.subplots_adjust(left=0.08, right=0.98, bottom=0.2, top=0.97)
     axes = figure.subplots()
     scatter = found.scatter * (objective.factor, second.factor)
