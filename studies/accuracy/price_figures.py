@@ -114,5 +114,6 @@ def _list(table: pd.DataFrame, key: str, targets: tuple[float, ...]) -> Figure:
     right.set_xticks(ticks, [duration(tick) for tick in ticks], rotation=45, ha="right")
     for axes in (left, right):
         axes.minorticks_off()
+        axes.tick_params(axis="y", length=0)
     figure.legend(*left.get_legend_handles_labels(), loc="outside upper center", ncols=4, frameon=False, fontsize=8.5)
     return figure
