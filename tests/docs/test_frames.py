@@ -35,6 +35,15 @@ def test_every_family_has_its_picture_and_all_joints_in_the_page(name):
     assert {j.upper() if len(j) < 3 else j for j in part.joints} == named - {"joint"}
 
 
+def test_pages_of_families_show_their_pictures_and_no_figure_is_large():
+    pages = {path.stem: path.read_text() for path in DOCS.glob("*.md") if path.stem != "frames"}
+    shown = set(re.findall(r"figures/frame-(\w+)\.svg", "".join(pages.values())))
+    assert shown == set(NAMES)
+    assert all(f"figures/frame-{name}.svg" in page for name, page in pages.items() if name in NAMES)
+    sizes = {path.name: path.stat().st_size for path in (DOCS / "figures").iterdir()}
+    assert max(sizes.values()) <= 100_000, sizes
+
+
 @pytest.mark.parametrize("name", NAMES)
 def test_picture_has_a_line_for_each_link_and_a_label_for_each_joint(name):
     found = over(name, dict(family(name).example), 0.9, 12)
