@@ -45,7 +45,7 @@ class AllowedTable(Section):
     unit: str | None = Field(None, description='a unit as a text, as "mm"')
 
 
-class PlaceTable(Section):
+class ThreadPlaceTable(Section):
     """A place of ``thread.<name>.path`` that counts between two events only, or has a bend of its own."""
 
     required = ("on",)
@@ -56,7 +56,7 @@ class PlaceTable(Section):
 
 
 PathPlace = Annotated[
-    Annotated[str, Tag(ONE)] | Annotated[ThreeLengths, Tag(LIST)] | Annotated[PlaceTable, Tag(TABLE)], KIND
+    Annotated[str, Tag(ONE)] | Annotated[ThreeLengths, Tag(LIST)] | Annotated[ThreadPlaceTable, Tag(TABLE)], KIND
 ]
 
 
@@ -103,8 +103,8 @@ def _relation(section: ThreadSection, key: Key, faults: Faults) -> dict[str, Any
     found = section.model_dump(exclude_none=True, exclude={"allowed"})
     found["thread"] = found.pop("path", [])
     for k, place in enumerate(section.path or ()):
-        if isinstance(place, PlaceTable):
-            missing_keys(PlaceTable, place.model_fields_set, (*key, "path", k), faults)
+        if isinstance(place, ThreadPlaceTable):
+            missing_keys(ThreadPlaceTable, place.model_fields_set, (*key, "path", k), faults)
     if section.allowed is not None:
         found["allowed"] = _allowed(section.allowed, (*key, "allowed"), faults)
     return found
