@@ -69,7 +69,7 @@ def python_page() -> str:
     import sweep
 
     groups = (
-        ("Evaluate", ("evaluate", "summarise", "mechanism", "joints", "cyclogram", "machine")),
+        ("Evaluate", ("evaluate", "summarise", "mechanism", "joints", "cyclogram", "machine", "rod")),
         ("Find", ("synthesise", "from_points")),
         ("Sweep", ("run", "load", "scan", "is_complete", "verify", "compare")),
         ("Show and take along", ("export", "plot")),

@@ -149,13 +149,14 @@ class FusedCurve:
         return 4.0 * EPS * amplified
 
 
-def curve_of(family: Family, request: Request, anywhere: bool) -> FusedCurve | None:
+def curve_of(family: Family, request: Request, anywhere: bool, mean: bool = False) -> FusedCurve | None:
     """Fused curve of what is requested; None where there is none.
 
     ``anywhere`` as of `sweep.reductions.extrema.true_extrema`: then the least discriminant of a later stage.
     """
     forms = _forms(family)
-    if forms is None:
+    # What can drive another stage has steps of its own for its extrema, none for a ``mean``.
+    if forms is None or (len(forms) == 1 and forms[0].form.turn is not None and not mean):
         return None
     if anywhere:
         return _least_discriminant(family, forms, request)

@@ -66,7 +66,7 @@ def mean_squares(family: Family, designs: Array, names: Sequence[str], accuracy:
 def _of_one(family: Family, designs: Array, pose: str, target: float) -> tuple[Array, Array, Status]:
     """Means of one pose output and their errors (n,), and the status: of a fused chain by its kernel, else by poses."""
     known = family.pose_output[pose]
-    curve = None if known.kinks or known.jumps else curve_of(family, Request(pose, 0), False)
+    curve = None if known.kinks or known.jumps else curve_of(family, Request(pose, 0), False, mean=True)
     if curve is None:
         return _refined(family, designs, pose, target)
     mean, err, status, undecided = curve.mean(designs, target)

@@ -14,7 +14,7 @@ import sweep
 import sweep.synthesis
 from sweep.dataset import reading
 from sweep.families import NAMES, family
-from sweep.synthesis import five_link, heddle, mechanisms
+from sweep.synthesis import five_link, heddle, mechanisms, thread_law
 from sweep.synthesis.tasks import task3
 from tests.support.report_dataset import write_dataset
 
@@ -69,6 +69,8 @@ POINT = {"X_E": 2.0, "Y_E": 2.0, "Z_E": 0.0}
 LEVER = {"stroke": 60.0, "O4E": 90.0, "O1O2": 100.0, "O1O3": 250.0, "O3C": 120.0, "kappa": 1.6}
 CRANK = {"a": 2.0, "e": 3.0, "f": 1.0, "alpha": 0.5, "Z1": -3.0, "Z2": 4.0, "phi_h": 0.0, "P_h": 8.0, "phi": 1.0}
 SLOT = {"phi0": 2.8, "e": 10.0, "f": 2.0, "alpha": 0.4}
+THREAD = [[0.0, 60.0, 0.0], "drive.eye", [0.0, -30.0, 0.0]]
+LAW = thread_law.ThreadLaw(np.array([3.0, 0.4]), np.array([-1.0, 0.2]), 0.0, 0.0, 0.0)
 LOCUS = {"swing": 0.785, "phi0": 3.403, "phi1": 0.0, "e": 100.0, "f": 0.0, "g": 10.0, "alpha": 1.047}
 TABLES = {
     sweep.evaluate: lambda folder: sweep.evaluate("rssr", RSSR, "psi, dpsi", phi=[0.0]),
@@ -97,6 +99,12 @@ TABLES = {
     sweep.thread.path: lambda folder: sweep.thread.path(5.0, {"R": [1.0, 0.5], "theta_deg": 90.0}),
     sweep.thread.least_tension_radius: lambda folder: sweep.thread.least_tension_radius({"B": 10.0}),
     sweep.thread.speed: lambda folder: sweep.thread.speed({"v": 1.0}),
+    sweep.thread.diagram: lambda folder: sweep.thread.diagram(
+        sweep.machine({"drive": {"family": "four_bar", "eye": [12.0, 5.0, 0.0]}}, {"upper": {"thread": THREAD}}),
+        {"drive.a": 10.0, "drive.b": 40.0, "drive.c": 30.0, "drive.e": 38.0},
+        samples=4,
+    ),
+    thread_law.cam_edge: lambda folder: thread_law.cam_edge(LAW, [[60.0, -25.0, -20.0], [60.0, 20.0, 30.0]], 92.0, 90),
     sweep.thread.capstan: lambda folder: sweep.thread.capstan({"T1": 5.0, "wrap": 1.0, "mu": 0.2}),
 }
 COUNTED = {"design", "status", "failed", "adjusts"}

@@ -236,7 +236,7 @@ def test_study_has_its_threads_in_its_units(tmp_path):
         ('stock = "15 cm"', 'stok = "15 cm"', "thread.upper.stok: unknown key"),
         ("path = [", "pth = [", "thread.upper.pth: unknown key"),
         (', unit = "mm" }\n[scene]', " }\n[scene]", "thread.upper.allowed.unit is missing"),
-        ('"lever", ["40', '7, ["40', "thread.upper.path = [7, "),
+        ('"lever", ["40', '7, ["40', "thread.upper.path[0] = 7"),
     ],
 )
 def test_faults_of_a_thread_name_key_and_what_is_right(tmp_path, old, new, line):
