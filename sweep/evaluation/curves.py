@@ -9,8 +9,11 @@ from sweep.families.base import Family
 from sweep.families.capabilities import Assembly, Points
 from sweep.families.chain import Chain
 from sweep.families.machines import Machine
+from sweep.families.main_shaft import ShaftTorque
 from sweep.families.names import parts
 from sweep.families.parts import AXES
+from sweep.families.relations import Relation
+from sweep.families.shaking import Shaking
 
 _OF_FAMILY = re.compile(r"([xyz])_([a-z][a-z_]*)")
 _OF_MACHINE = re.compile(r"([a-z][a-z_0-9]*)_([xyz])")
@@ -39,10 +42,19 @@ def motion_curves(family: Family) -> tuple[str, ...]:
     """Position and its derivatives, deviations, pressure angles; of a machine those of its members, and relations."""
     if isinstance(family, Machine):
         members = [f"{m.name}.{name}" for m in family.members for name in _ladder(m.family, 2)]
-        return (*members, *(o.name for r in family.relations for o in r.outputs[:1]))
+        relations = [r for r in family.relations if r.outputs and _has_loads(family, r)]
+        return (*members, *(r.outputs[0].name for r in relations))
     deviations = [o.name for o in family.pose_outputs if o.windowed and not o.stage]
     loops = [loop.pressure_angle for loop in family.every(Assembly)]
     return (*_ladder(family, 3), *deviations, *loops)
+
+
+def _has_loads(machine: Machine, relation: Relation) -> bool:
+    """Tell whether the members have what a relation takes of their loads, which a scene may leave out."""
+    if not isinstance(relation, Shaking | ShaftTorque):
+        return True
+    needed = relation.needs(frozenset({relation.outputs[0].name}))
+    return needed <= {*machine.pose_names, *machine.parameter_names}
 
 
 def joint_curves(family: Family) -> tuple[str, ...]:
