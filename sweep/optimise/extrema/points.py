@@ -236,7 +236,8 @@ class Curves:
         if self.places or (points.how == CROSSING).any():
             slope, curvature, pace, _, value = self._local(design, phi, points, own)
             # A passage is its angle itself: the error of the last step above is worth one step more.
-            phi[passing] += np.clip((points.level - value) / slope, -SETTLED, SETTLED)[passing]
+            with np.errstate(divide="ignore", invalid="ignore"):  # points that do not pass may be level
+                phi[passing] += np.clip((points.level - value) / slope, -SETTLED, SETTLED)[passing]
         moved = replace(points, phi=phi, slope=slope, curvature=curvature, pace=pace)
         return replace(moved, value=self.values(design[None, :], moved)[0])
 
