@@ -23,6 +23,7 @@ from kernels import status as st
 from kernels.arithmetic.vectors import Vector, add, cross, dot, mix, scale, spun, sub, turned
 from kernels.effects.kinetostatics import BODY, LEAST_COSINE
 from kernels.jit import inline, kernel
+from kernels.linear.elimination import eliminate
 from kernels.linkage.bodies import DRIVEN, SLIDE, Links, Posed, latter, posed, vector
 from kernels.types import Array, Status
 
@@ -220,46 +221,7 @@ def solve(links: Links, i: int, room: Room) -> bool:
         rows[row, lines] = -weighed(screw, room.need[body])
         for column in range(lines, units.shape[0]):
             rows[row, 1 + column] = -signs[body, column] * weighed(screw, units[column])
-    return eliminate(rows)
-
-
-@inline
-def eliminate(rows: Array) -> bool:
-    """Solve rows (K, K + R) for their last R columns in place; false where a pivot has no digits left.
-
-    Gaussian elimination.  Rows are brought to one size first: some are moments, some are forces.
-    """
-    n, width, solvable = rows.shape[0], rows.shape[1], True
-    for i in range(n):
-        size = 0.0
-        for j in range(n):
-            size = max(size, abs(rows[i, j]))
-        per = 1.0 / size if size > 0.0 else math.nan
-        for j in range(width):
-            rows[i, j] *= per
-    for j in range(n):
-        best, most = j, abs(rows[j, j])
-        for i in range(j + 1, n):
-            size = abs(rows[i, j])
-            best, most = (i, size) if size > most else (best, most)
-        solvable = solvable and most >= LEAST_COSINE
-        if best != j:
-            for column in range(j, width):
-                rows[j, column], rows[best, column] = rows[best, column], rows[j, column]
-        per = 1.0 / rows[j, j]
-        for i in range(j + 1, n):
-            factor = rows[i, j] * per
-            if factor != 0.0:
-                for column in range(j + 1, width):
-                    rows[i, column] -= factor * rows[j, column]
-        rows[j, j] = per
-    for j in range(n - 1, -1, -1):
-        for column in range(n, width):
-            value = rows[j, column]
-            for i in range(j + 1, n):
-                value -= rows[j, i] * rows[i, column]
-            rows[j, column] = value * rows[j, j]
-    return solvable
+    return eliminate(rows, LEAST_COSINE)
 
 
 @inline

@@ -108,25 +108,7 @@ def _built(machine: Machine, members: tuple[Member, ...]) -> Machine:
             replace(m, mount=replace(m.mount, columns=columns)) if m.mount and m.mount.shaft == shaft else m
             for m in placed
         ]
-    outputs = [
-        replace(o, name=f"{m.name}.{o.name}", own=f"{m.name}.{o.base}") for m in placed for o in m.family.pose_outputs
-    ]
-    for m in placed:
-        outputs += [
-            Output(f"{m.name}.{point}_{axis}", "length", f"{m.name}: {axis} of {point}, machine's frame", "ours")
-            for point in m.points
-            for axis in AXES
-        ]
-        outputs += [
-            Output(
-                f"{m.name}.d{point}_{axis}",
-                "length",
-                f"{m.name}: velocity analogue of {point} along {axis}, machine's frame",
-                "ours",
-            )
-            for point in m.moving
-            for axis in AXES
-        ]
+    outputs = _outputs(placed)
     derivative_of = {
         f"{m.name}.{name}": f"{m.name}.{of}" for m in placed for name, of in m.family.derivative_of.items()
     }
@@ -157,6 +139,30 @@ def _built(machine: Machine, members: tuple[Member, ...]) -> Machine:
     steps += [sewing_step(r, found) for r in machine.relations if isinstance(r, Sewing)]
     steps += [speed_of(r, found) for r in machine.relations if isinstance(r, ShaftTorque)]
     return replace(found, steps=tuple(steps))
+
+
+def _outputs(placed: list[Member]) -> list[Output]:
+    """List the pose outputs of the members, and the coordinates and velocities of their points."""
+    outputs = [
+        replace(o, name=f"{m.name}.{o.name}", own=f"{m.name}.{o.base}") for m in placed for o in m.family.pose_outputs
+    ]
+    for m in placed:
+        outputs += [
+            Output(f"{m.name}.{point}_{axis}", "length", f"{m.name}: {axis} of {point}, machine's frame", "ours")
+            for point in m.points
+            for axis in AXES
+        ]
+        outputs += [
+            Output(
+                f"{m.name}.d{point}_{axis}",
+                "length",
+                f"{m.name}: velocity analogue of {point} along {axis}, machine's frame",
+                "ours",
+            )
+            for point in m.moving
+            for axis in AXES
+        ]
+    return outputs
 
 
 def _loop(member: Member, loop: Assembly) -> Assembly:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Container, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
@@ -21,7 +20,7 @@ from sweep.families.base import Family
 from sweep.families.names import is_largest, is_place, stem
 from sweep.optimise import Survey, read_survey
 from sweep.report.quantities import Quantity, quantity
-from sweep.report.scan import Cells, Scan, scan
+from sweep.report.scan import Cells, Scan, divided_axes, scan
 from sweep.study.load import study_from_data
 
 if TYPE_CHECKING:
@@ -31,8 +30,6 @@ if TYPE_CHECKING:
 
 
 Row = Mapping[str, Any]
-CELLS_OF_PAIR, CELLS_OF_MANY = 240, 32
-DESIGNS_PER_CELL = 3.0
 
 
 @dataclass(frozen=True)
@@ -330,25 +327,3 @@ def row_of(study: Study, design: Mapping[str, float]) -> Row:
     matrix, _ = design_matrix(study.family, design)
     found = design_outputs(study.family, matrix, study.want, study.accuracy, study.window)
     return dict(design) | {name: float(values[0]) for name, values in found.items()}
-
-
-def divided_axes(study: Study, feasible: int) -> list[Cells]:
-    """Swept axes, divided into cells: finely if a single map shows them all, else coarsely.
-
-    Axes of a sample are divided so that a cell holds some of the ``feasible`` designs on average.  Left out are signs,
-    which make no map, and what [locus] or [fit] makes.
-    """
-    signs = {p.name for p in study.family.parameters if p.choices is not None}
-    left_out = signs.union(study.made, study.rescaled)
-    swept = [axis for axis in study.space.axes if axis.varies and axis.name not in left_out]
-    most = CELLS_OF_PAIR if len(swept) <= 2 else CELLS_OF_MANY
-    if study.space.kind == "sobol":
-        # A power of two: a Sobol sequence puts equally many points into such cells.
-        sampled = 2 ** min(5, max(2, math.floor(0.5 * math.log2(max(feasible, 1) / DESIGNS_PER_CELL))))
-        return [
-            Cells.of_range(axis.name, axis.low, axis.high, sampled)
-            if axis.values is None
-            else Cells.of_values(axis.name, axis.values, most)
-            for axis in swept
-        ]
-    return [Cells.of_values(axis.name, axis.values, most) for axis in swept if axis.values is not None]

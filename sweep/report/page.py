@@ -80,10 +80,7 @@ def _write(folder: Path, out: Path, say: Say) -> Path:
         write_survivors(data.parts, out / "survivors.parquet")
         if strokes is not None:
             strokes.to_csv(out / "cyclogram.csv", index=False, float_format="%.4f")
-        if (turn := diagram_of_dataset(data)) is not None:
-            turn.to_csv(out / "threads.csv", index=False, float_format="%.6g")
-            with house_style():
-                figures["threads"] = save(threads_figure(turn), out / "figures" / "threads.svg").uri
+        figures |= _threads(data, out)
         within = tolerance_words(data)
         further = [text for text in (optima_sentence(data, several), made_sentence(told, within)) if text]
         text = rendered(
@@ -127,6 +124,16 @@ def _write(folder: Path, out: Path, say: Say) -> Path:
     except OSError as error:
         raise StoreError(f"report {out}: cannot be written: {error}") from error
     return out / "report.html"
+
+
+def _threads(data: Dataset, out: Path) -> dict[str, str]:
+    """Write the diagram of the threads of a machine, and draw it; nothing where there are none."""
+    turn = diagram_of_dataset(data)
+    if turn is None:
+        return {}
+    turn.to_csv(out / "threads.csv", index=False, float_format="%.6g")
+    with house_style():
+        return {"threads": save(threads_figure(turn), out / "figures" / "threads.svg").uri}
 
 
 def draw(data: Dataset, found: Scan, cells: list[Cells], folder: Path) -> dict[str, str]:

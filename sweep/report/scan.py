@@ -5,6 +5,7 @@ Memory is bounded by a batch of rows, whatever the size of the dataset.  Values 
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
 from itertools import combinations
@@ -15,9 +16,12 @@ import numpy as np
 from sweep.families.base import Array
 from sweep.families.names import is_error
 from sweep.quantities.limits import compared
+from sweep.study import Study
 
 ROWS_PER_BATCH = 262_144
 SCATTER_POINTS = 40_000
+CELLS_OF_PAIR, CELLS_OF_MANY = 240, 32
+DESIGNS_PER_CELL = 3.0
 
 
 @dataclass(frozen=True)
@@ -92,6 +96,28 @@ class Scan:
     front: Array = field(default_factory=lambda: np.empty((0, 2)))
     errors: dict[str, tuple[float, float]] = field(default_factory=dict)
     counts: dict[int, int] = field(default_factory=dict)
+
+
+def divided_axes(study: Study, feasible: int) -> list[Cells]:
+    """Swept axes, divided into cells: finely if a single map shows them all, else coarsely.
+
+    Axes of a sample are divided so that a cell holds some of the ``feasible`` designs on average.  Left out are signs,
+    which make no map, and what [locus] or [fit] makes.
+    """
+    signs = {p.name for p in study.family.parameters if p.choices is not None}
+    left_out = signs.union(study.made, study.rescaled)
+    swept = [axis for axis in study.space.axes if axis.varies and axis.name not in left_out]
+    most = CELLS_OF_PAIR if len(swept) <= 2 else CELLS_OF_MANY
+    if study.space.kind == "sobol":
+        # A power of two: a Sobol sequence puts equally many points into such cells.
+        sampled = 2 ** min(5, max(2, math.floor(0.5 * math.log2(max(feasible, 1) / DESIGNS_PER_CELL))))
+        return [
+            Cells.of_range(axis.name, axis.low, axis.high, sampled)
+            if axis.values is None
+            else Cells.of_values(axis.name, axis.values, most)
+            for axis in swept
+        ]
+    return [Cells.of_values(axis.name, axis.values, most) for axis in swept if axis.values is not None]
 
 
 def scan(

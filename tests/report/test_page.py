@@ -19,13 +19,13 @@ from sweep.dataset import files
 from sweep.errors import InputError, StoreError
 from sweep.plot.mechanisms import aligned_turn, rotates
 from sweep.report.answer import answer, searched
-from sweep.report.dataset import divided_axes, gather
+from sweep.report.dataset import gather
 from sweep.report.figures import house_style
 from sweep.report.live import in_window
 from sweep.report.maps import map_figure, overlays
 from sweep.report.page import write_report
 from sweep.report.quantities import quantity
-from sweep.report.scan import Cells, Grid
+from sweep.report.scan import Cells, Grid, divided_axes
 from sweep.report.tables import parameter_rows
 from sweep.study import study_from_data
 from tests.support.report_dataset import curve, designs, study_data, write_dataset
