@@ -79,6 +79,20 @@ def kept(problem: Problem, designs: Array) -> tuple[dict[str, Array], NDArray[np
     return {name: compared(name, np.asarray(found[name], np.float64)) for name in names}, good
 
 
+def _begun(results: Sequence[Result], more: Array | None) -> tuple[list[Array], list[int]]:
+    """Name the designs to begin with, and the numbers of their starts: found with room, else of the best basins."""
+    heads: list[Result] = []
+    for result in results:
+        if result.feasible and result.ended not in CUT and result.basin not in [h.basin for h in heads]:
+            heads.append(result)
+    # Designs that were looked for with room in their limits are far better starts than the best drawings.
+    heads = heads[: TRIED if more is None or not len(more) else 0]
+    number = 1 + max((r.start for r in results), default=-1)
+    begin = [h.design for h in heads] + list(np.empty((0, 0)) if more is None else more)
+    starts = [h.start for h in heads] + list(range(number, number + len(begin) - len(heads)))
+    return begin, starts
+
+
 def robust(
     problem: Problem,
     results: Sequence[Result],
@@ -115,15 +129,7 @@ def robust(
     to have its objective, within 1e-4.
     ``violation`` and ``relaxation`` of the result are about the limits as they are asked for.
     """
-    heads: list[Result] = []
-    for result in results:
-        if result.feasible and result.ended not in CUT and result.basin not in [h.basin for h in heads]:
-            heads.append(result)
-    # Designs that were looked for with room in their limits are far better starts than the best drawings.
-    heads = heads[: TRIED if more is None or not len(more) else 0]
-    number = 1 + max((r.start for r in results), default=-1)
-    begin = [h.design for h in heads] + list(np.empty((0, 0)) if more is None else more)
-    starts = [h.start for h in heads] + list(range(number, number + len(begin) - len(heads)))
+    begin, starts = _begun(results, more)
     if not begin:
         return None
     asked, kept = stop or _never, kept or Kept()
