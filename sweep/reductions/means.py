@@ -126,6 +126,7 @@ def _on_panels(family: Family, designs: Array, pose: str, edges: Array, target: 
     mean, off = np.sqrt(integrals.value[:, 0] / TWO_PI), integrals.err[:, 0] + blur
     half = np.divide(0.5 * off, TWO_PI * mean, out=np.sqrt(off / TWO_PI), where=mean > 0.0)
     state = DESIGN_STATUS[status].astype(np.uint8)
+    state[(state == st.OK) & ~np.isfinite(starts).all(axis=1)] = st.INVALID_INPUT  # a pose that leaves float64
     state[(state == st.OK) & ~integrals.settled] = st.NOT_CONVERGED
     return size * mean, size * (half + 16.0 * EPS * mean), state
 

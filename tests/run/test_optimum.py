@@ -30,7 +30,13 @@ class Optimiser:
         self.begin: Callable[[], None] = lambda: None
 
     def __call__(
-        self, study: Study, folder: Path, stop: Callable[[], bool], jobs: int, tell: Callable[[int, int], None]
+        self,
+        study: Study,
+        folder: Path,
+        stop: Callable[[], bool],
+        jobs: int,
+        tell: Callable[[int, int], None],
+        key: str,
     ) -> Path:
         self.calls.append(study.optimise)
         self.begin()

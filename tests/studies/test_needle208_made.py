@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from sweep.evaluation.summaries import design_outputs
-from sweep.optimise.manufacture.robust import SAMPLES, yields
+from sweep.optimise.manufacture.robust import yields
 from sweep.optimise.starts.posing import problem_of
 from sweep.study import load_study
 from tests.reference.made import normal, outputs
@@ -69,7 +69,7 @@ def test_reference_of_what_is_made_agrees_with_the_kernels():
 
 def tolerated(count):
     """Three standard errors of both samples, and what a grid of 720 poses misses of the deviation."""
-    return 3.0 * 0.5 * (1.0 / math.sqrt(count) + 1.0 / math.sqrt(SAMPLES)) + 0.002
+    return 3.0 * 0.5 * (1.0 / math.sqrt(count) + 1.0 / math.sqrt(STUDY.tolerance.samples)) + 0.002
 
 
 @pytest.mark.parametrize("count", [2000, pytest.param(100_000, marks=pytest.mark.long)])
