@@ -152,7 +152,9 @@ def cam_edge(law: ThreadLaw, guides: ArrayLike, P_h: float, count: int = 360) ->
     clear = np.where(apart * 100 >= count, longer, np.inf).min(axis=1)
     _refuse(clear < 0.0, phi, "an edge that touches the thread at one place alone")
     found = pd.DataFrame({"phi": phi, "x": x, "y": y, "nx": nx, "ny": ny, "curvature": turning / along, "clear": clear})
-    found.attrs["units"] = {"phi": "rad", "curvature": "1/length"} | dict.fromkeys(("x", "y", "clear"), "length")
+    found.attrs["units"] = {"phi": "rad", "nx": "1", "ny": "1", "curvature": "1/length"} | dict.fromkeys(
+        ("x", "y", "clear"), "length"
+    )
     return found
 
 

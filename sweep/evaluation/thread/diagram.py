@@ -83,6 +83,7 @@ def diagram(
     wanted = [name for t in threads for name in (f"{t.name}_{key}" for key in COLUMNS) if name in known]
     found = evaluate(family, given, wanted, phi=phi).drop(columns="design")
     found["demand"] = sum(found[f"{t.name}_demand"] for t in threads)
+    found.attrs["units"]["demand"] = found.attrs["units"][f"{threads[0].name}_demand"]
     for name in (name for name in wanted if name.endswith("_velocity")):
         speeds = np.abs(found[name].to_numpy(np.float64)) / MM_PER_M
         warn_outside(
