@@ -82,7 +82,9 @@ def _write(folder: Path, out: Path, say: Say) -> Path:
             strokes.to_csv(out / "cyclogram.csv", index=False, float_format="%.4f")
         figures |= _threads(data, out)
         within = tolerance_words(data)
-        further = [text for text in (optima_sentence(data, several), made_sentence(told, within)) if text]
+        stitch = sewn(data)
+        first = stitch.sentence if stitch else ""
+        further = [text for text in (first, optima_sentence(data, several), made_sentence(told, within)) if text]
         text = rendered(
             "report.html",
             study=data.study,
@@ -107,7 +109,7 @@ def _write(folder: Path, out: Path, say: Say) -> Path:
             made=told,
             made_words=made_sentence(told, within),
             costs=[x for x in told.costs if max(x.spread, x.gain) >= TELLING][:COSTS] if told else [],
-            sewn=sewn(data),
+            sewn=stitch,
             tolerance=within,
             spreads=spreads(data),
             share_made=share_made(data),

@@ -20,7 +20,15 @@ POSITIONS = {
     "phi_fold": "crank angle of the folded position",
 }
 DERIVATIVES = ("", "velocity", "acceleration", "jerk")
-SYMBOLS = {"psi": "ψ", "phi": "φ", "phi0": "φ₀", "phi_ext": "φ extended", "phi_fold": "φ folded"}
+SYMBOLS = {
+    "psi": "ψ",
+    "chi": "χ",
+    "rho": "ρ",
+    "phi": "φ",
+    "phi0": "φ₀",
+    "phi_ext": "φ extended",
+    "phi_fold": "φ folded",
+}
 PRIMES = ("", "′", "″", "‴")
 POWERS = {1: "", 2: "²", 3: "³", 4: "⁴"}
 # Units that a designer reads instead of those that are stored, with the factor to them.
@@ -99,11 +107,14 @@ def quantity(name: str, unit: str) -> Quantity:
     reduction, base = next(split(name, Turn()), (None, name))
     symbol_form, words_form = (reduction.symbol, reduction.words) if reduction else ("{}", "{}")
     order, root, stage = _derivative(base)
-    symbolic = order > 0 or root in ("s", "psi")
-    root = _POINT.sub(lambda m: f"{m[1]} of {m[2].upper()}", root)
-    symbol = SYMBOLS.get(root, root.replace("_", " ")) + PRIMES[order] + stage.translate(SUBSCRIPTS)
+    followed = root in ("s", "psi", "dev")  # the follower's own motion has a symbol and a word each
+    symbolic = followed and (order > 0 or root != "dev")
+    point = _POINT.fullmatch(root)
+    root, at = (point[1], f" of {point[2].upper()}") if point else (root, "")
+    symbol = SYMBOLS.get(root, root.replace("_", " ")) + PRIMES[order] + at + stage.translate(SUBSCRIPTS)
+    root += at
     words = POSITIONS.get(root, root.replace("_", " ")) if order == 0 else DERIVATIVES[order]
-    words += " across the line" if order and root == "dev" else ""
+    words += "" if not order or root in ("s", "psi") else " across the line" if root == "dev" else f" of {root}"
     words += f" of stage {stage}" if stage else ""
     symbol, words = symbol_form.format(symbol), words_form.format(words)
     if is_place(name) or (order == 0 and unit in ("rad", "angle")):
@@ -131,11 +142,11 @@ SUBSCRIPTS = str.maketrans("0123456789", "₀₁₂₃₄₅₆₇₈₉")
 def _derivative(base: str) -> tuple[int, str, str]:
     """Order, quantity and stage number of ``d2psi1``."""
     _, root, stage = parts(base)
-    match = re.fullmatch(r"(d[23]?)?(s|psi|dev)", root)
+    match = re.fullmatch(r"(d[23]?)?(s|psi|dev|chi|rho|P|S|y|[xyz]_[a-z])", root)
     if match:
         mark, root = match.groups()
         return (0 if mark is None else int(mark[1:] or 1)), root, stage
-    return 0, root, stage
+    return (0, f"{root}{stage}", "") if root.endswith("_") else (0, root, stage)  # a number of its own: sews_at_7000
 
 
 def _pretty_unit(unit: str) -> str:

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
 
+from kernels.types import Array
 from sweep.families.machines import Machine
 from sweep.families.sewing import RPM, Sewing
 from sweep.optimise.manufacture.tolerance import deviating
@@ -16,11 +18,10 @@ from sweep.report.quantities import number
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-    from kernels.types import Array
-
     Mask = NDArray[np.bool_]
 
 CURVE = 33  # speeds of the curve
+ON_LIMIT = 1e-9  # mm: an optimum ends on its limits, and is beyond them by the rounding of its search
 
 
 @dataclass(frozen=True)
@@ -36,8 +37,9 @@ class Row:
 
 @dataclass(frozen=True)
 class Sewn:
-    """What is made by speed: rows of the stated speeds, and a curve of shares between them."""
+    """What is made by speed: rows of the stated speeds, and a curve of shares between them; the answer in words."""
 
+    sentence: str
     moments: tuple[str, ...]
     rows: tuple[Row, ...]
     count: int
@@ -57,11 +59,35 @@ def sewn(data: Dataset) -> Sewn | None:
     designs = deviating(study.family, design, study.tolerance, study.optimise.seed, study.tolerance.samples)
     stated = np.array(sewing.speeds)
     speeds = np.union1d(stated, np.linspace(stated[0], stated[-1], CURVE))
+    own, _ = sewing.rooms(study.family, design[None], stated, study.accuracy)
+    sentence = sewing_sentence({name: room[0] for name, room in own.items()}, stated / RPM)
     rooms, _ = sewing.rooms(study.family, designs, speeds, study.accuracy)
     kept = {name: room >= 0.0 for name, room in rooms.items()}
     every = np.logical_and.reduce(list(kept.values()))
     rows = tuple(_row(sewing, kept, every, k, speeds[k]) for k in np.searchsorted(speeds, stated).tolist())
-    return Sewn(tuple(kept), rows, len(designs), speeds / RPM, every.mean(axis=0))
+    return Sewn(sentence, tuple(kept), rows, len(designs), speeds / RPM, every.mean(axis=0))
+
+
+def sewing_sentence(rooms: Mapping[str, Array], rpm: Array) -> str:
+    """Say whether a design sews, at which speeds it does not, and which moment has least to spare.
+
+    Parameters
+    ----------
+    rooms : by moment, what it has to spare at each speed, (S,) [mm]; nan where it does not happen
+    rpm : the speeds, (S,) [1/min]
+    """
+    never = [name for name, room in rooms.items() if np.isnan(room).any()]
+    if never:
+        return f"It does not sew: moment {' and moment '.join(name.upper() for name in never)} does not happen."
+    least = np.minimum.reduce(list(rooms.values()))
+    k = int(least.argmin())
+    name = min(rooms, key=lambda one: float(rooms[one][k]))
+    room, at = f"{number(abs(float(least[k])), 3)}\u00a0mm", f"at {rpm[k]:.6g}\u00a0rpm"
+    missed = " and ".join(f"{speed:.6g}" for speed in rpm[least < -ON_LIMIT])
+    if missed:
+        return f"It does not sew at {missed} rpm: moment {name.upper()} misses by {room} {at}."
+    spare = f"has least to spare, {room}" if least[k] > ON_LIMIT else "has nothing to spare"
+    return f"It sews at {rpm[0]:.6g} to {rpm[-1]:.6g} rpm: moment {name.upper()} {spare} {at}."
 
 
 def _row(sewing: Sewing, kept: dict[str, Mask], every: Mask, k: int, speed: float) -> Row:
