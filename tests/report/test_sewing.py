@@ -25,7 +25,10 @@ SPEEDS = np.array([500.0, 3000.0, 7000.0])
             [0.1, 0.1, 0.1], [-0.02, 0.2, 0.2],
             "It does not sew at 500 rpm: moment C misses by 0.02\u00a0mm at 500\u00a0rpm.",
         ),
-        ([-1e-13, 0.1, 0.1], [0.2, 0.2, 0.2], "It sews at 500 to 7000 rpm: moment A has nothing to spare at 500\u00a0rpm."),
+        (
+            [-1e-13, 0.1, 0.1], [0.2, 0.2, 0.2],
+            "It sews at 500 to 7000 rpm: moment A has nothing to spare at 500\u00a0rpm.",
+        ),
         ([0.1, 0.1, 0.1], [np.nan, np.nan, np.nan], "It does not sew: moment C does not happen."),
     ],
 )  # fmt: skip
