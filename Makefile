@@ -153,12 +153,12 @@ bench-first-use: $(VENV)/dev  ## from an empty cache of kernels to the first num
 bench-scene: $(VENV)/dev  ## all effects on 10^5 designs x 360 angles: rate, its parts, memory; about 5 minutes
 	$(BIN)/python -m tests.bench.effects
 
-bench-optimise: $(VENV)/dev  ## 60 specifications of a crank-rocker, three seeds each: writes docs/optimise-marks.md, about 10 minutes of processor time
-	$(BIN)/python -m tests.bench.optimise --out docs/optimise-marks.md
+bench-optimise: $(VENV)/dev  ## 60 specifications of a crank-rocker, three seeds each: writes docs/internals/optimise-marks.md, about 10 minutes of processor time
+	$(BIN)/python -m tests.bench.optimise --out docs/internals/optimise-marks.md
 
-bench-basins: $(VENV)/dev  ## five seeds of the search over proportions, two requirements: writes docs/basins.md, about an hour
+bench-basins: $(VENV)/dev  ## five seeds of the search over proportions, two requirements: writes docs/internals/basins.md, about an hour
 	mkdir -p results
-	$(BIN)/python -m tests.bench.basins --keep results/basins.jsonl --out docs/basins.md
+	$(BIN)/python -m tests.bench.basins --keep results/basins.jsonl --out docs/internals/basins.md
 
 # The moving picture of the report: three.js with its licence, what is used of it, in one file that pages carry.
 THREE := three@0.187.0

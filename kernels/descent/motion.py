@@ -4,8 +4,8 @@ With the crank pin B of the guide and the way w from it to the rocker pin, both 
 
     s + i (dev + h) = z1 B + z2 w,      z1 = scale e^{-i lam},  z2 = scale (xi + i eta)/b e^{-i lam}
 
-(docs/optimiser.md, Proportions).  Gradients of the crank-rocker and of the rocker pin are those of the complex step;
-what the first stage moves goes on by the chain rule.
+(docs/internals/optimiser.md, Proportions).  Gradients of the crank-rocker and of the rocker pin are those of the
+complex step; what the first stage moves goes on by the chain rule.
 """
 
 from __future__ import annotations

@@ -115,7 +115,7 @@ def page(rows: Sequence[Row]) -> str:
     """The table of all seeds, as markdown."""
     lines = [
         "# Basins that the search over proportions finds", "",
-        "Written by `make bench-basins`; do not edit. What is measured: [optimiser.md](optimiser.md), Populations.", "",
+        "Written by `make bench-basins`; do not edit. What is measured: [how the optimiser searches](optimiser.md), Proportions.", "",
         f"Measured on {description()}. Needle drive of a class-208 machine, 0.015 mm of the drawing alone and a stroke "
         "of at least 24.495 mm; the sweep's own starts are left out. The study makes at least "
         f"{fewest(record())} populations of every seed, whatever they end at, and at most {most(record())}; "
@@ -148,7 +148,7 @@ def main() -> None:
     parser.add_argument("--problems", nargs="+", choices=list(LEAST), default=list(LEAST))
     parser.add_argument("--seeds", type=int, nargs="+", default=list(range(1, SEEDS + 1)))
     parser.add_argument("--until-met", action="store_true", help="leave a seed as soon as it has met the best known")
-    parser.add_argument("--out", type=Path, help="page to write, such as docs/basins.md")
+    parser.add_argument("--out", type=Path, help="page to write, such as docs/internals/basins.md")
     options = parser.parse_args()
     rows = kept(options.keep)
     for problem in options.problems:

@@ -197,7 +197,7 @@ def page(rows: Sequence[Row], seed: int) -> str:
     lines = [
         "# The optimiser on random specifications",
         "",
-        f"Written by `{command}`; do not edit. What is measured: [optimiser.md](optimiser.md), Marks.",
+        f"Written by `{command}`; do not edit. What is measured: [the optimiser](../optimiser.md), Marks.",
         "",
         f"Measured on {description()}. Specifications of seed {seed}, {len(rows[0].cpu)} seeds of the search. "
         f"The whole took {sum(row.whole for row in rows) / 60.0:.0f} minutes of processor time.",
@@ -241,7 +241,7 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--count", type=int, default=COUNT)
     parser.add_argument("--seed", type=int, default=SEED)
-    parser.add_argument("--out", type=Path, help="file to write, such as docs/optimise-marks.md")
+    parser.add_argument("--out", type=Path, help="file to write, such as docs/internals/optimise-marks.md")
     parser.add_argument("--keep", type=Path, help="file of the rows so far: a run with the same options goes on there")
     options = parser.parse_args()
     rows = kept(options.keep)

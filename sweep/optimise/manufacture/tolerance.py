@@ -46,8 +46,8 @@ def sensitivities(
     Returns
     -------
     Rows ``parameter``, ``output``, ``value``, ``growing`` and ``shrinking`` (per internal unit of the parameter: mm,
-    rad or 1), nan where the output does not exist.  Derivatives are exact to rounding (docs/optimiser.md, Gradients).
-    An output that is constant in pieces, such as a count, has none: it has no rows.
+    rad or 1), nan where the output does not exist.  Derivatives are exact to rounding (docs/internals/optimiser.md,
+    Gradients).  An output that is constant in pieces, such as a count, has none: it has no rows.
     """
     there = ~_absent(family, design)
     varied = [k for k, p in enumerate(family.parameters) if p.unit in DIMENSIONS and there[k]]
