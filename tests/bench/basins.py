@@ -115,7 +115,8 @@ def page(rows: Sequence[Row]) -> str:
     """The table of all seeds, as markdown."""
     lines = [
         "# Basins that the search over proportions finds", "",
-        "Written by `make bench-basins`; do not edit. What is measured: [how the optimiser searches](optimiser.md), Proportions.", "",
+        "Written by `make bench-basins`; do not edit. What is measured: "
+        "[how the optimiser searches](optimiser.md), Proportions.", "",
         f"Measured on {description()}. Needle drive of a class-208 machine, 0.015 mm of the drawing alone and a stroke "
         "of at least 24.495 mm; the sweep's own starts are left out. The study makes at least "
         f"{fewest(record())} populations of every seed, whatever they end at, and at most {most(record())}; "
