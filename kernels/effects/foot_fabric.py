@@ -24,6 +24,7 @@ MOST_PARTS = 4096  # of a cell: a fabric so stiff that it swings 650 times withi
 _HALVINGS = 60
 _MOST_EVENTS = 64
 ALIKE = 1e-6  # share of the height of foot or rack by which turns that are alike may differ
+ROUNDING = 2.0**-36  # share of it by which a foot that repeats itself comes back elsewhere, with angles of many turns
 
 
 class Fabric(NamedTuple):
@@ -206,6 +207,12 @@ def _cell(
 
 
 @inline
+def _apart(one: State, other: State, spring: float) -> float:
+    """Return the height of the swing about its rest that is the difference of two states."""
+    return math.hypot(one.y - other.y, (one.v - other.v) / math.sqrt(spring))
+
+
+@inline
 def _borne(path: Array, node: int, foot: Foot, fabric: Fabric, state: State, phi: float) -> tuple[float, float]:
     """Height of the foot at a node, and the force that it bears over m omega^2; (5), (14)."""
     y, force = state.y, 0.0
@@ -274,10 +281,12 @@ def march(path: Array, feet: Array, turns: int, status: Status, outputs: Array, 
         rest = 0.0 if rigid else -foot.g0 / spring
         begin = 0.0 if rigid else lowest * step
         state = State(PLATE if rigid else LYING, begin, rest, 0.0, begin)
-        first = state
+        first, before = state, math.inf
         for turn in range(turns):
             tally[:] = 0.0
             tally[1], tally[2], tally[8] = math.nan, math.nan, math.inf
+            if turn > 0:
+                before = _apart(state, first, spring)
             first = state
             for k in range(count):
                 j, node = turn * count + lowest + k, (lowest + k) % count
@@ -300,9 +309,11 @@ def march(path: Array, feet: Array, turns: int, status: Status, outputs: Array, 
                     tally[8] = min(tally[8], held(foot, rack[0, j], rack[2, j]))
                 most = max(most, forces[i, j])
         else:
-            # A foot that lies still rises and sinks on its fabric: turns are alike once it comes back where it was.
-            moved = max(abs(state.y - first.y), abs(state.v - first.v))
-            settled = settled and moved <= ALIKE * max(-rest, highest)
+            # A foot that lies still rises and sinks on its fabric.  Turns are alike once it comes back where it was.
+            # What it moves by shrinks like a geometric series; its sum is what all later turns will differ by.
+            moved, size = _apart(state, first, spring), max(-rest, highest)
+            left = moved / (1.0 - moved / before) if moved < before < math.inf else math.inf
+            settled = settled and (moved <= ROUNDING * size or left <= ALIKE * size)
         outputs[0, i], outputs[1, i], outputs[2, i] = tally[0], tally[1] % TWO_PI, tally[2] % TWO_PI
         outputs[3, i], outputs[4, i], outputs[5, i] = tally[3], tally[4], tally[5]
         outputs[6, i] = tally[6] * speed
