@@ -274,8 +274,9 @@ def _seed(study: Study) -> int:
 
 
 def _reference(study: Study, problem: Problem) -> tuple[Array, float]:
-    """Return the study's reference design (1, P), which may lie outside the bounds or off the locus,
-    and its violation.
+    """Return the study's reference design, (1, P), and its violation.
+
+    It may lie outside the bounds or off the locus.
     """
     design, _ = design_matrix(study.family, study.reference or {})
     if problem.coordinates is not None:

@@ -110,8 +110,7 @@ def reading_gradient(curves: Curves, designs: Any, output: str, phi: float, move
 
 
 def scalar_gradient(function: Any, fractions: Array) -> Array:
-    """Return the gradient of a function of scaled variables that comes as a plain number,
-    from five values per variable.
+    """Return the gradient of a number without inner structure, from five values per variable.
 
     Exact steps of a family are good to 1e-15, so a fourth-order difference over 1e-3 of the bounds is good to 1e-11.
     Near a bound the five points lie on the inner side.

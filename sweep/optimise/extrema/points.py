@@ -126,8 +126,7 @@ class Curves:
             return self.family.poses(np.ascontiguousarray(designs), Angles.of(angles), wanted or self.wanted)
 
     def scan(self, design: Array, samples: int) -> tuple[Points, bool]:
-        """Return all extrema of all curves that can matter, refined,
-        and whether the design has every pose of the turn.
+        """Return all extrema of all curves that can matter, refined, and whether every pose exists.
 
         Only maxima in the upper half of a curve's range and minima in the lower half are kept.  A curve that is not
         defined over the whole turn has none.
@@ -279,9 +278,7 @@ class Curves:
     def _local(
         self, design: Array, phi: Array, points: Points, owners: list[tuple[Series, Index]]
     ) -> tuple[Array, Array, Array, Array, Array]:
-        """Return the slope and curvature of each point's own output, slope and value of the position,
-        value there, all (K,).
-        """
+        """Return slope and curvature of each point's output, slope and value of the position, (K,) each."""
         three = np.concatenate([phi - NEIGHBOUR, phi, phi + NEIGHBOUR])
         columns = self.poses(design[None, :], three + 1j * STEP)
         k = len(phi)

@@ -91,8 +91,9 @@ def passages(
 
 
 def first_passage(phi: Array, how: NDArray[np.intp], own: Sequence[int]) -> tuple[int | None, list[int]]:
-    """Return the point of a curve where it first passes its level in [0, 2 pi),
-    and those before it that only near the level.
+    """Return the point of a curve where it first passes its level in [0, 2 pi).
+
+    Points before it that only come near the level are returned, too.
 
     Parameters
     ----------

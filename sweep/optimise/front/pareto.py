@@ -118,8 +118,7 @@ def pareto(
     stop: Callable[[], bool] | None = None,
     jobs: int = 1,
 ) -> list[Result]:
-    """Return the least objective with the second output at most (at least) each of the bounds,
-    the loosest bound first.
+    """Return the least objective for each bound on the second output, the loosest bound first.
 
     With ``settings.points`` further bounds are placed, one after the other in the middle of the largest gap.
     Every bound is searched from its starts and from the result of the next looser one.  Then the results go back from
@@ -237,9 +236,7 @@ def _placed(
 
 
 def places(problem: Problem, settings: ParetoSettings, front: Front) -> tuple[Array, Array]:
-    """Return what the results reach of the second output, and their objective;
-    the bound and nan where there is none.
-    """
+    """Return the second output and the objective of each result; the bound and nan where there is none."""
     reached, values = np.array(front.bounds, np.float64), np.full(len(front.bounds), np.nan)
     good = [k for k, r in enumerate(front.results) if r is not None and r.feasible]
     if good:
@@ -266,8 +263,9 @@ class Gap:
 
 
 def gaps(bounds: Array, reached: Array, values: Array) -> list[Gap]:
-    """Return the gaps of a front, the largest first, of equal ones the looser first;
-    only those that a point could fill.
+    """Return the gaps of a front that a point could fill, the largest first.
+
+    Of equal gaps the looser comes first.
 
     Between the bound of a point and what it reaches the front is flat, so a gap goes from what the looser point reaches
     to the bound of the tighter one.

@@ -145,8 +145,9 @@ def _searched(study: Study, folder: Path) -> tuple[Array, Array]:
 
 
 def _starts(study: Study, settings: ParetoSettings, problem: Problem, folder: Path, own: Array) -> list[Array]:
-    """Return for each bound, the loosest first,
-    the optimum ``own`` and then diverse best designs of the dataset within the bound.
+    """Return the starts for each bound, the loosest bound first.
+
+    They are the optimum ``own`` and diverse best designs of the dataset within the bound.
     """
     chosen = []
     for designs, merit in within(study, settings, Front.of(settings).bounds, folder):

@@ -53,9 +53,7 @@ class Descent:
         self.best = self.model.state(fractions)
 
     def run(self) -> State:
-        """Search for a feasible design first, then for the best;
-        the result is polished and verified on a finer grid.
-        """
+        """Search for a feasible design first, then for the best; polish it and verify it on a finer grid."""
         for _ in range(3):
             if not self.best.feasible:
                 self._restore()

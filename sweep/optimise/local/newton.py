@@ -55,9 +55,7 @@ def _corrected(
     model: Model, at: State, form: Form, t: float, parts: tuple[Array, Array, Array],
     bounds: tuple[Array, Array, float | None],
 ) -> tuple[Array, float, float]:  # fmt: skip
-    """Return the step within bounds brought back to the curved rows, the merit it reaches,
-    and the gain that was promised.
-    """
+    """Return the step brought back to the curved rows, the merit it reaches, and the gain promised."""
     curvature, full, rows = parts
     low, high, floor = bounds
     box = (low, high, -np.inf if floor is None else floor - t)
@@ -119,8 +117,9 @@ def _holding(jacobian: Array, form: Form, found: Multipliers) -> Array:
 
 
 def _upward(curvature: Array, held: Array) -> Array:
-    """Return the curvature with negative parts made positive,
-    along the rows that hold (their null space) and across apart.
+    """Return the Hessian with its negative eigenvalues made positive.
+
+    That is done apart in the null space of the active rows and across it.
 
     Along them the curvature decides how far to go; across, the rows do.  Turned positive in one go, the strong
     curvature across would stiffen a flat valley, and every step along it would be a hundred times too short.

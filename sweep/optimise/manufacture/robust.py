@@ -256,9 +256,7 @@ class _Calibrate:
     def _corrected(
         self, design: Array, levels: Levels, values: Mapping[str, Array], reach: float
     ) -> tuple[Levels, float]:
-        """Return the numbers of standard deviations that share out what may miss best,
-        and by what part of itself the objective should fall.
-        """
+        """Return corrected numbers of standard deviations, and the relative gain that they promise."""
         known = prices(self.problem, design, self.tolerance, levels)
         found = excesses(self.problem, values, known)
         if not levels:

@@ -76,8 +76,9 @@ def sensitivities(
 
 
 def _ends(problem: Problem, design: Array) -> tuple[float, Array, Array]:
-    """Return the value of the objective,
-    smallest and largest of the gradients of the extrema that share it (scaled variables).
+    """Return the objective, and the smallest and largest gradient of the extrema that share it.
+
+    Gradients are by scaled variables.
     """
     program = Program(problem)
     model = Model(problem, program, design, lambda: False)

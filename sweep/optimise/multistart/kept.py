@@ -59,8 +59,6 @@ def survey_of(content: dict[str, Any]) -> Survey:
 
 
 def read_survey(path: Path) -> Survey | None:
-    """Return what the starts told of the search that a ``_optimum.parquet`` comes from;
-    None where there is no such file.
-    """
+    """Return what the starts of a search found, from its ``_optimum.parquet``; None without one."""
     content = metadata(path).get(b"search")
     return None if content is None else survey_of(json.loads(content))

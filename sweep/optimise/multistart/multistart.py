@@ -62,8 +62,7 @@ def explore(
     origins: Sequence[int] | None = None,
     samples: Sequence[int] | None = None,
 ) -> tuple[list[Result], Survey]:
-    """Return the smallest objective under the limits from one start after the other,
-    until enough is known of the basins.
+    """Search from one start after the other until enough is known of the basins.
 
     Parameters
     ----------
@@ -200,8 +199,7 @@ def optimum(
 
 
 def listed(study: Study) -> dict[str, Array]:
-    """Return the parameters that the study gives as ``{ values = [...] }`` and that keep these values,
-    with them, sorted.
+    """Return the parameters that keep the values listed by the study, with these values, sorted.
 
     Signs are listed by nature and are not among them.  What [locus] or [fit] sets or scales has no list: there the
     values are proportions, and prescribed ones are ranges.
@@ -228,8 +226,9 @@ def with_neighbours(
     stop: Callable[[], bool] | None,
     jobs: int,
 ) -> list[Result]:
-    """Return results with those of searches from the best design with one listed value exchanged for the next,
-    best first.
+    """Return results, the best first, with those of neighbours of the best among listed values.
+
+    A neighbour has one listed value exchanged for the next larger or smaller one.
 
     The exchange goes on from the new best as long as it gains, so that the answer cannot be bettered by the next larger
     or smaller value of any one parameter.  Same results for any number of jobs.

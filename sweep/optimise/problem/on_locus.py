@@ -84,8 +84,9 @@ class LocusCoordinates:
 
 
 def on_locus(problem: Problem) -> Problem:
-    """Return the problem on the locus of its first stage,
-    or the problem itself where that has no equations to eliminate.
+    """Return the problem on the locus of its first stage.
+
+    It is the problem itself where that has no equations to eliminate.
 
     Equations for swing (rssr) or stroke (rssp) and phi0 of the first stage become fixed coordinates, the place on the
     locus a variable; the links that follow keep their bounds as limits.  Where the rocker's length is fixed and e and g
@@ -180,8 +181,9 @@ def _around(problem: Problem, design: Array, links: tuple[str, ...], name: str) 
 def _directions(
     problem: Problem, bounds: Mapping[str, tuple[float, float]], sized: tuple[str, ...]
 ) -> tuple[float, float] | None:
-    """Return the least and greatest direction of the offsets (e,
-    g) where the rocker's length c alone is fixed, else None.
+    """Return the least and greatest direction of the offsets (e, g).
+
+    There is one where the rocker's length c alone is fixed, otherwise None.
     """
     if not sized:
         return None

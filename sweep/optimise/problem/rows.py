@@ -64,16 +64,15 @@ class Form:
         return float(-(self.constant + self.matrix @ atoms)[own].min())
 
     def violation(self, atoms: Array) -> float:
-        """Return the largest scaled violation of the limits;
-        infinite where one of them does not exist for this design.
-        """
+        """Return the largest scaled violation of the limits; infinite where one does not exist."""
         if not self.complete:
             return math.inf
         return self.known_violation(atoms)
 
     def known_violation(self, atoms: Array) -> float:
-        """Return the largest scaled violation of those limits that exist for this design;
-        infinite where it reaches nowhere.
+        """Return the largest scaled violation of the limits that exist for this design.
+
+        It is infinite where the design reaches nowhere.
         """
         if not self.reaches:
             return math.inf

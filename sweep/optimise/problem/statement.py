@@ -104,8 +104,9 @@ class Problem:
         return np.asarray(self.upper, np.float64) - np.asarray(self.lower, np.float64)
 
     def scaled(self, designs: Array) -> Array:
-        """Return variables of designs (k, P) as fractions of their bounds (k, n);
-        nan where a coordinate does not exist.
+        """Return the variables of designs (k, P) as fractions of their bounds, (k, n).
+
+        A coordinate that a design does not have is nan.
         """
         read = {} if self.coordinates is None else self.coordinates.read(self.family, designs)
         names = self.family.parameter_names
@@ -129,8 +130,9 @@ class Problem:
         return designs if fractions.ndim == 2 else np.asarray(designs[0])
 
     def rows(self, values: Array, **signs: float) -> Array:
-        """Return the design matrix (k, P) of variable values (k, n);
-        ``signs`` and ``fixed`` and the defaults fill the rest.
+        """Return the designs (k, P) of variable values (k, n).
+
+        The rest comes from ``signs``, ``fixed`` and the defaults.
 
         Raises
         ------

@@ -155,9 +155,7 @@ def _one_turn(problem: Problem) -> tuple[Array, Array]:
 
 
 def _verified(problem: Problem, bases: list[Array], place: Array, kind: NDArray[np.intp], merit: Array) -> Array:
-    """Return ranks of designs that the poses found good;
-    where these hid most of a peak, the rank by the true extrema.
-    """
+    """Return the ranks of designs, by true extrema where the poses hid most of a peak."""
     out = merit.copy()
     for own, base in enumerate(bases):
         rows = np.flatnonzero((kind == own) & (merit < OUTSIDE))
@@ -191,8 +189,10 @@ def _improved(
 
 
 def ranking(problem: Problem, designs: Array, accuracy: Accuracy = ACCURACY) -> Array:
-    """Return the objective where all limits are nearly kept; far above it the largest violation;
-    then what does not turn.
+    """Return the rank of each design; smaller is better.
+
+    It is the objective where all limits are nearly kept, far above that the largest violation, and above that what does
+    not turn.
 
     Cheap limits first: parameters, then margins and pressure angles, then the others; only designs that nearly keep
     them go on.  Infinite where there is no design or no objective.
@@ -245,8 +245,9 @@ def _values(problem: Problem, designs: Array, wanted: list[str], accuracy: Accur
 
 
 def _missed(limit: Any, value: Array) -> Array:
-    """Return the violation relative to the bound (n,);
-    an output that a design does not have misses its limit by far.
+    """Return the violation of a limit relative to its bound, (n,).
+
+    An output that a design does not have misses its limit by far.
     """
     value = compared(limit.output, value)
     out = np.zeros(len(value))
@@ -279,8 +280,9 @@ def diverse(problem: Problem, designs: Array, merit: Array, count: int, least: f
 
 
 def spread(place: Array, kind: NDArray[np.intp], count: int, least: float = 0.0, first: int = 0) -> list[int]:
-    """Return numbers of at most ``count`` rows of ``place`` (k, n), ranked best first,
-    that keep a distance from each other.
+    """Return the numbers of the best rows that keep a distance from each other.
+
+    At most ``count`` rows of ``place`` (k, n) are taken, which are ranked, the best first.
 
     ``kind`` (k,): rows of different kinds are never neighbours.  The distance is never less than ``least``, a share of
     the average one of two random designs.  The ``first`` rows are taken in any case.

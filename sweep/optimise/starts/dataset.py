@@ -49,8 +49,9 @@ def best_rows(family: Family, objective: str, folder: Path) -> tuple[Array, Arra
 
 
 def of_task(study: Study, count: int, seed: int) -> Array:
-    """Return designs of the study that do its [task], the best first, (k, P), at most ``count``;
-    none without a task.
+    """Return designs of the study that do its [task], the best first, (k, P).
+
+    There are at most ``count``, and none without a task.
 
     A parameter that the study gives as a number keeps it.
     """
@@ -86,8 +87,7 @@ MOST_KINDS = 64  # combinations of signs among which a sample is shared out
 
 
 def kinds(study: Study, problem: Problem, known: Array) -> list[dict[str, float]]:
-    """Return the combinations of signs and other values that are chosen, not varied,
-    as the designs of a study have them.
+    """Return the combinations of signs and listed values that the designs of a study have.
 
     Parameters
     ----------

@@ -151,9 +151,7 @@ def turned_into(problem: Problem, designs: Array) -> Array:
 
 
 def widened(problem: Problem, designs: Array, names: Sequence[str]) -> Problem:
-    """Return the problem with the bounds of some variables widened so
-    that the designs lie half their size within them.
-    """
+    """Return the problem with bounds so wide that the designs lie half their size within them."""
     lower, upper = problem.lower.astype(np.float64), problem.upper.astype(np.float64)
     for k, name in enumerate(problem.variables):
         if name in names and len(designs):

@@ -230,8 +230,10 @@ def _classes(swings: Array, among: Array) -> Index:
 
 
 def _parents(ends: Sequence[_End], most: int, guide: NDArray[np.bool_]) -> list[_End]:
-    """Return the best ends, half as many as said of the same signs, and the best of each class of swings,
-    no two of which have the same value or nearly the same guide.
+    """Return the designs from which a generation is made.
+
+    They are the best ends, at most half of them of the same signs, and the best of each class of swings.  No two have
+    the same value or nearly the same guide.
 
     Else the many that stopped on their way down one valley would take the places of all others, and guides that
     suit large swings those of all that suit small ones.

@@ -82,9 +82,7 @@ def _wanted(study: Study) -> bool:
 
 
 def _bounds(study: Study, name: str, designs: Array) -> tuple[float, float] | None:
-    """Return the bounds between which a parameter or a prescribed output may vary;
-    None where it is given, or a sign.
-    """
+    """Return the bounds of a parameter or of a prescribed output; None where it is given, or a sign."""
     names = study.family.parameter_names
     parameter = next(p for p in (*study.family.parameters, *_prescribed(study)) if p.name == name)
     if parameter.choices is not None:
@@ -176,8 +174,9 @@ def problem_of_dataset(study: Study, folder: Path, found: Array) -> Problem:
 
 
 def _known(study: Study, folder: Path) -> tuple[Array, Array, Problem]:
-    """Return the best designs of a dataset, what they are worth, and the problem; random ones without a worth where
-    none is feasible.
+    """Return the best designs of a dataset, their objectives, and the problem.
+
+    Where no design is feasible they are random ones without an objective.
     """
     if study.objective is None:
         raise InputError("objective", None, "[objective] minimise = an output", str(study.path))
