@@ -26,9 +26,7 @@ FIVE_POINTS = {
 
 
 def stepped(problem: Problem, base: Array, fractions: Array) -> Any:
-    """Return the complex designs (n, P):
-    the imaginary step STEP in one scaled variable (n,) each, and in all that follows.
-    """
+    """Return n complex designs (n, P), each with the imaginary step STEP in one scaled variable and what follows."""
     return problem.placed(base, fractions + 1j * STEP * np.eye(len(fractions)))
 
 

@@ -30,8 +30,9 @@ REACH = 0.1  # step outputs are differentiated over a thousandth of this part of
 def sensitivities(
     family: Family, design: Array, outputs: Sequence[str], window: tuple[float, float] | None = None
 ) -> dict[str, list[Any]]:
-    """Return derivatives of design outputs by lengths, angles and ratios of a design:
-    dx/dp = dx/dy dy/dp, y the inner value.
+    """Return derivatives of design outputs by lengths, angles and ratios of a design.
+
+    They are dx/dp = dx/dy dy/dp, where y is the inner value.
 
     A maximum that several extrema share has two: the largest of their gradients where the dimension grows, the smallest
     where it shrinks.  A corner optimum has them of opposite signs.

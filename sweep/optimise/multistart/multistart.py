@@ -161,8 +161,9 @@ def optimum(
     stop: Callable[[], bool] | None = None,
     jobs: int = 1,
 ) -> list[Result]:
-    """Return the best designs of a problem:
-    equations eliminated where they can be, samples, local searches from the best of each.
+    """Return the best designs of a problem.
+
+    Equations are eliminated where they can be; local searches begin from the best of several samples.
 
     Where no start becomes feasible the equations may give way as well: a second search, in the parameters themselves,
     begins from the least infeasible design and a sample; of both searches the smallest relaxation comes first.

@@ -141,8 +141,9 @@ def _parents(place: Array, kind: NDArray[np.intp], merit: Array, count: int) -> 
 
 
 def _one_turn(problem: Problem) -> tuple[Array, Array]:
-    """Return the bounds in which samples are drawn:
-    what repeats itself after a turn only in the middle turn of its bounds.
+    """Return the bounds in which samples are drawn.
+
+    What repeats itself after a turn is drawn in the middle turn of its bounds only.
     """
     periodic = () if problem.coordinates is None else problem.coordinates.periodic
     share = np.array(

@@ -67,8 +67,9 @@ def of_task(study: Study, count: int, seed: int) -> Array:
 
 
 def drawn(study: Study, count: int, seed: int) -> Array:
-    """Return designs of a study's space at random, finished by its [locus] and [fit]:
-    for datasets without feasible rows.
+    """Return random designs of a study's space, finished by its [locus] and [fit].
+
+    They serve datasets without feasible rows.
     """
     length = min(64, study.space.count)
     blocks = max(1, SCREENED * count // length)

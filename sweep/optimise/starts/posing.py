@@ -110,9 +110,7 @@ def _bounds(study: Study, name: str, designs: Array) -> tuple[float, float] | No
 
 
 def _limited(study: Study, name: str) -> tuple[float, float] | None:
-    """Return ends of a length of a guide whose proportions are searched globally:
-    its limits, not what the sweep reached.
-    """
+    """Return the limits of a guide's length, which are its bounds where proportions are searched globally."""
     limits = [x for x in study.parameter_limits if x.output == name and x.maximum is not None]
     if not _globally(study) or not limits:
         return None
