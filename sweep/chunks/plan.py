@@ -37,7 +37,8 @@ CHUNKS_AT_LEAST = 16
 SECONDS_AT_LEAST = 0.1
 CHUNK_STEP = 512
 
-PILOT_RUNS, PILOT_LENGTH, PILOT_PARTS = 32, 32, 4
+PILOT_MOST, PILOT_LEAST, PILOT_LENGTH, PILOT_PARTS = 1024, 16, 32, 4
+PILOT_SHARE = 8  # a pilot takes no more than this part of a sweep: of a small one it would cost as much again
 
 PARAMETER_UNITS = {word: internal_unit(word) for word in get_args(Unit)}
 
@@ -165,7 +166,7 @@ RUN = 8  # of them that stand side by side: what one call costs is shared
 
 
 def pilot(study: Study, tell: Callable[[int, int], None] = lambda _, __: None) -> Pilot:
-    """Send about a thousand designs, spread over the space, through the cascade.
+    """Send about a thousand designs, an eighth of a smaller space, through the cascade, spread over the space.
 
     ``tell`` is called with how many parts of them are done, and how many there are.
 
@@ -173,9 +174,10 @@ def pilot(study: Study, tell: Callable[[int, int], None] = lambda _, __: None) -
     designs reached it, by their own cost figures, so it is the same on every machine.
     """
     count = study.space.count
-    length = min(PILOT_LENGTH, count)
+    number = min(PILOT_MOST, max(count // PILOT_SHARE, min(PILOT_LEAST, count)))
+    length = min(PILOT_LENGTH, -(-number // PILOT_PARTS))
     golden = (math.sqrt(5.0) - 1.0) / 2.0
-    starts = sorted({int((k * golden) % 1.0 * (count - length + 1)) for k in range(PILOT_RUNS)})
+    starts = sorted({int((k * golden) % 1.0 * (count - length + 1)) for k in range(number // length)})
     blocks = [parameter_matrix(study, start, start + length) for start in starts]
     length = -(-len(blocks) // PILOT_PARTS)
     parts = [blocks[k : k + length] for k in range(0, len(blocks), length)]

@@ -23,8 +23,11 @@ OWN_FILES = (
 )  # fmt: skip
 
 
-def open_plan(study: Study, folder: Path, force: bool) -> Plan:
-    """Return the plan in the folder if it is this study's, otherwise a new one; foreign data only go with ``force``."""
+def open_plan(study: Study, folder: Path, force: bool, chunk_size: int | None = None) -> Plan:
+    """Return the plan in the folder if it is this study's, otherwise a new one; foreign data only go with ``force``.
+
+    ``chunk_size`` is that of a new plan, where an estimate has told it already.
+    """
     noted = files.read_plan(folder)
     if noted is not None:
         plan = make_plan(study, noted["chunk_size"])
@@ -38,7 +41,7 @@ def open_plan(study: Study, folder: Path, force: bool) -> Plan:
             return _with_other_limits(study, folder, plan)
         if not force:
             raise store.foreign(folder, _conflict(study, noted, plan), plan)
-    plan = make_plan(study)
+    plan = make_plan(study, chunk_size)
     if force:
         _set_foreign_aside(folder, plan, OWN_FILES)
     store.finished_chunks(folder, plan)  # refuses foreign chunks before the plan is written

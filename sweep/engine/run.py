@@ -154,13 +154,13 @@ def run(
     with stages(*stages_of(model)):
         with Phases(progress) as phases:
             _compile(model, jobs, phases)
-            _check_budget(model, jobs, force, lambda done, total: phases.say("planning", done, total))
+            chunk_size = None if force else _within_budget(model, jobs, lambda k, of: phases.say("planning", k, of))
         default = Path("results", *(["smoke"] if smoke else []), model.name, files.DESIGNS)
         folder = default if out is None else files.located(out)
         refuse_or_clear_older(folder, force)
         said = command(model, folder, smoke, accuracy, certify)
         with locked(folder), logged(folder, said, jobs, backend) as end, at_work(place):
-            computed = _sweep(model, folder, jobs, place, force, progress)
+            computed = _sweep(model, folder, jobs, place, force, chunk_size, progress)
             if not is_part(folder):
                 search(model, folder, jobs, backend, progress)
             end.append(f"{computed} chunks computed")
@@ -191,12 +191,16 @@ def _compile(study: Study, jobs: int, phases: Phases) -> None:
             jobs = 1  # the rest is loaded
 
 
-def _check_budget(study: Study, jobs: int, force: bool, tell: Callable[[int, int], None]) -> None:
-    if not force:
-        check_budget(study, estimate(study, jobs, tell))
+def _within_budget(study: Study, jobs: int, tell: Callable[[int, int], None]) -> int:
+    """Return designs per chunk of a study whose estimate is within its budget."""
+    cost = estimate(study, jobs, tell)
+    check_budget(study, cost)
+    return cost.chunk_size
 
 
-def _sweep(study: Study, folder: Path, jobs: int, place: Executor, force: bool, progress: bool) -> int:
+def _sweep(
+    study: Study, folder: Path, jobs: int, place: Executor, force: bool, chunk_size: int | None, progress: bool
+) -> int:
     """Compute the missing chunks and note the totals; returns the number of chunks computed."""
     computed = 0
     with stop_on_signal() as stop, Phases(progress) as phases:
@@ -205,7 +209,7 @@ def _sweep(study: Study, folder: Path, jobs: int, place: Executor, force: bool, 
         files.remove_temporary(folder)
         plan: Plan | None = None
         with stop.raising():  # a pilot may have to compile
-            plan = open_plan(study, folder, force)
+            plan = open_plan(study, folder, force, chunk_size)
         _raise_if_signalled(stop, folder)
         assert plan is not None
         for _ in range(ROUNDS + 1):

@@ -190,7 +190,7 @@ class PoseRows:
         )  # fmt: skip
 
     def without_middle(self, places: Array, kinds: Index, sign: float = -1.0) -> Array:
-        """Places with the offset between the stages itself for those with the middle of the guide's input angles."""
+        """Return places with the offset between the stages in place of the middle of the guide's input angles."""
         out = places.copy()
         if self.turning >= 0:
             wide = self.high[self.turning] - self.low[self.turning]
@@ -206,7 +206,7 @@ class PoseRows:
         return out
 
     def with_middle(self, places: Array, kinds: Index) -> Array:
-        """Return the other way round."""
+        """Return places with the middle of the guide's input angles in place of the offset between the stages."""
         return self.without_middle(places, kinds, 1.0)
 
     def finished(self, places: Array, kinds: Index, x: Array) -> Array:
