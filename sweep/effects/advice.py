@@ -26,15 +26,16 @@ class Finding(NamedTuple):
     @property
     def words(self) -> str:
         """One sentence with the number."""
-        side = "below" if self.advice.negligible else "not below"
+        advice, side = self.advice, "below" if self.advice.negligible else "not below"
+        numbers = f"{advice.worst:.3g}, {side} {advice.threshold:.3g}{advice.unit and f' {advice.unit}'}"
+        if not (self.wanted or advice.negligible):
+            return f"{advice.quantity[0].upper()}{advice.quantity[1:]} is large; ask for `{self.name}`: {numbers}"
         verdict = {
             (True, True): "wanted, but will not matter",
             (True, False): "matters",
             (False, True): "rightly left out",
-            (False, False): "not wanted, but will matter",
-        }[self.wanted, self.advice.negligible]
-        numbers = f"{self.advice.quantity} {self.advice.worst:.3g}, {side} {self.advice.threshold:.3g}"
-        return f"{self.name}: {verdict}: {numbers}"
+        }[self.wanted, advice.negligible]
+        return f"{self.name}: {verdict}: {advice.quantity} {numbers}"
 
 
 def closure(effects: Iterable[Effect]) -> tuple[Effect, ...]:

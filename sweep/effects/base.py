@@ -57,6 +57,7 @@ class Advice:
     quantity: str
     values: Array  # (n,) of the designs that could be estimated
     threshold: float
+    unit: str = ""  # of the values, in words
 
     @property
     def worst(self) -> float:
@@ -238,8 +239,10 @@ def no_poses(scene: Scene, wanted: frozenset[str]) -> Columns:
     return {"status": scene.status()}
 
 
-def largest(scene: Scene, compute: ComputeFunction, name: str, quantity: str, threshold: float) -> Advice | None:
+def largest(
+    scene: Scene, compute: ComputeFunction, name: str, quantity: str, threshold: float, unit: str = ""
+) -> Advice | None:
     """Advice from the largest magnitude of one output, of the designs where it is known all the way."""
     found = np.abs(np.asarray(compute(scene, frozenset({name}))[name], np.float64))
     turning = np.isfinite(found).all(axis=1)
-    return Advice(quantity, found[turning].max(axis=1), threshold) if turning.any() else None
+    return Advice(quantity, found[turning].max(axis=1), threshold, unit) if turning.any() else None

@@ -157,7 +157,7 @@ def _effect(
     name: str, title: str, inputs: tuple[Parameter, ...], results: tuple[Output, ...], compute: ComputeFunction,
     bends: tuple[Bend, ...], kind: str = "",
 ) -> Effect:  # fmt: skip
-    words = f"largest utilisation of the {kind} bearings"
+    words = f"utilisation of the {kind} bearings"
     advise = partial(largest, compute=compute, name=f"{kind}_utilisation", quantity=words, threshold=0.5)
     return Effect(
         key="B1",

@@ -87,5 +87,5 @@ def roller_of(name: str) -> Effect:
         takes_load=LOADS,
         requires=LinkTree,
         tree=bare.tree,
-        advise=partial(largest, compute=compute, name="undercut", quantity="largest undercut", threshold=0.3),
+        advise=partial(largest, compute=compute, name="undercut", quantity="undercut", threshold=0.3),
     )

@@ -142,6 +142,6 @@ def contact_of(name: str) -> Effect:
         takes_load=LOADS,
         requires=LinkTree,
         tree=tree,
-        advise=partial(largest, compute=run, name=f"stress_{joints[0].name}", quantity="largest pressure [MPa]",
-                       threshold=100.0),
+        advise=partial(largest, compute=run, name=f"stress_{joints[0].name}", quantity="pressure",
+                       threshold=100.0, unit="MPa"),
     )  # fmt: skip

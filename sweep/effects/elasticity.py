@@ -223,8 +223,8 @@ def advise_static(scene: Scene) -> Advice | None:
     if not turning.any():
         return None
     reach = _arguments(scene)[3][turning]
-    words = "[rad]" if loads.follower(scene) is loads.ROCKER else "over the coupler's length"
-    return Advice(f"largest quasi-static lag {words}", lag[turning].max(axis=1) / reach, 1e-4)
+    unit = "rad" if loads.follower(scene) is loads.ROCKER else "of the coupler's length"
+    return Advice("quasi-static lag", lag[turning].max(axis=1) / reach, 1e-4, unit)
 
 
 def advise_dynamic(scene: Scene) -> Advice | None:

@@ -233,7 +233,7 @@ def _closed_friction(kind: loads.Follower) -> Effect:
             largest,
             compute=compute_friction,
             name=kinetostatics.CONTRACTION,
-            quantity="largest contraction rho(L)",
+            quantity="contraction rho(L)",
             threshold=0.01,
         ),
     )
@@ -299,7 +299,7 @@ def friction_of(name: str) -> Effect:
             largest,
             compute=compute_friction,
             name=link_loads.PASSES,
-            quantity="most passes of the friction iteration",
+            quantity="number of passes of the friction iteration",
             threshold=4.0,
         ),
     )

@@ -20,7 +20,8 @@ FORMULAS = (
 )
 
 CONSTRUCTION = Parameter(
-    "finger", "choice", "which ball joint carries the finger: 0 the driven one (at C), 1 the driving one (at B)",
+    "finger", "choice",
+    "The coupler cannot spin freely: ball joint whose finger holds it, 0 the driven one (at C), 1 the driving one (at B)",
     default=0.0, choices=(0.0, 1.0),
 )  # fmt: skip
 

@@ -66,8 +66,9 @@ EFFECT = Effect(
         largest,
         compute=compute,
         name="t_k",
-        quantity="largest axial component of the coupler direction",
+        quantity="axial force",
         threshold=0.05,
+        unit="of the coupler force",
     ),
 )
 

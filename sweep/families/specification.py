@@ -300,10 +300,11 @@ def _shaken(members: Mapping[str, Member], listed: list[tuple[str, str]], where:
     for member, stage in listed:
         m = members[member]
         stages = getattr(m.family, "stages", ())
-        if listed.count((member, stage)) > 1 or (stages and not stages[-1].is_placed):
-            raise InputError(
-                "shaking", f"{member}{stage}", "stages each once, of chains that stand in one frame", where
-            )
+        if listed.count((member, stage)) > 1:
+            raise InputError("shaking", f"{member}{stage}", "every stage once", where)
+        if stages and not stages[-1].is_placed:
+            allowed = "a chain whose stages have places. For shaking forces, give one stage and its place"
+            raise InputError("shaking", f"{member}{stage}", allowed, where)
         yield shaken(member, stage, stages[int(stage) - 1].family if stage else m.family, listed)
 
 

@@ -168,8 +168,10 @@ def test_joint_records_stand_in_the_frame_of_the_family(name):
 
 
 def test_a_stage_counts_once_and_a_driven_member_no_forces():
-    with pytest.raises(sweep.InputError, match="stages each once"):
+    with pytest.raises(sweep.InputError, match="every stage once"):
         sweep.machine({"x": ["rssr", "rssr"]}, {"s": {"shaking": ["x1", "x1"]}})
+    with pytest.raises(sweep.InputError, match="For shaking forces, give one stage and its place"):
+        sweep.machine({"x": ["kim_dison", "rssr"]}, {"s": {"shaking": ["x2"]}})
     bare = replace(family("feed"), capabilities=())
     with pytest.raises(sweep.InputError, match="whose forces are known; feed has none"):
         shaken("x", "", bare, [])

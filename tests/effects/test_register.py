@@ -60,7 +60,7 @@ def test_an_effect_comes_after_what_it_needs():
 
 
 @pytest.mark.parametrize(("stiffness", "wanted", "verdict"), [
-    (1e3, ["max_lag"], "dynamic_elasticity: not wanted, but will matter"),
+    (1e3, ["max_lag"], "Estimated share that vibration adds to the lag is large; ask for `dynamic_elasticity`: "),
     (1e8, ["max_lag"], "dynamic_elasticity: rightly left out"),
     (1e8, ["max_lag", "floquet"], "dynamic_elasticity: wanted, but will not matter"),
     (1e3, ["max_lag", "floquet"], "dynamic_elasticity: matters"),
@@ -73,6 +73,19 @@ def test_a_rule_says_whether_an_effect_matters_here(stiffness, wanted, verdict):
     matrix[:, full.parameter_names.index("stiffness")] = stiffness
     words = [finding.words for finding in findings(bare, full, matrix, wanted)]
     assert any(line.startswith(verdict) for line in words), words
+
+
+def test_a_large_axial_force_is_said_where_nobody_asks_for_it():
+    bare = family("rssr")
+    full = extended(bare, ["psi"])
+    words = [finding.words for finding in findings(bare, full, designs(full, 4), ["psi"])]
+    (found,) = [line for line in words if line.startswith("Axial force is large; ask for `pressure`")]
+    assert float(found.split(": ")[1].split(",")[0]) > 0.05 and found.endswith("not below 0.05 of the coupler force")
+
+
+def test_the_finger_says_that_the_coupler_cannot_spin_freely():
+    (finger,) = [p for p in effect("coupler").inputs if p.name == "finger"]
+    assert finger.text.startswith("The coupler cannot spin freely")
 
 
 def test_every_rule_of_negligibility_that_has_a_number_is_applied():
