@@ -33,7 +33,7 @@ PRIMES = ("", "′", "″", "‴")
 POWERS = {1: "", 2: "²", 3: "³", 4: "⁴"}
 # Units that a designer reads instead of those that are stored, with the factor to them.
 READ_IN = {"t": ("g", 1e6), "t*mm^2": ("kg·mm²", 1e3), "life": ("h", 1.0 / 3600.0)}
-NO_ANGLE = 1e-12  # rad: what is smaller is the rounding of zero
+NO_ANGLE = 1e-10  # rad: what is smaller is the rounding of zero, or of the place of an extremum at zero
 _POINT = re.compile("([xyz])_([a-z])")
 
 
@@ -112,7 +112,7 @@ def quantity(name: str, unit: str) -> Quantity:
     point = _POINT.fullmatch(root)
     root, at = (point[1], f" of {point[2].upper()}") if point else (root, "")
     symbol = SYMBOLS.get(root, root.replace("_", " ")) + PRIMES[order] + at + stage.translate(SUBSCRIPTS)
-    root += at
+    symbol, root = symbol.replace("phi ", "φ "), root + at
     words = POSITIONS.get(root, root.replace("_", " ")) if order == 0 else DERIVATIVES[order]
     words += "" if not order or root in ("s", "psi") else " across the line" if root == "dev" else f" of {root}"
     words += f" of stage {stage}" if stage else ""

@@ -31,7 +31,7 @@ if TYPE_CHECKING:
 
 POSES, FAINT = 180, 7  # of paths; of the mechanism in other positions
 WIDE, ROOM = 540.0, 36.0  # of the picture and of its border, in pixels
-LETTER, LINE = 7.2, 12.0  # what a letter takes of a line, and its height
+LETTER, LINE = 8.2, 12.0  # what a letter takes of a line at most, and its height
 AROUND = [(9, -8), (9, 14), (-9, -8), (-9, 14), (0, -16), (0, 24), (22, 3), (-22, 3), (30, -22), (-30, -22), (30, 30)]
 NEAR = 1e-7  # of the mechanism's size: a distance that is a dimension
 TELLING = 1e-3  # by which dimensions are changed to tell those of one value apart

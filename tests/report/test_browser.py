@@ -27,6 +27,8 @@ BALLS = """() => {
     document.getElementById('live').view.scene.traverse((o) => { if (o.name) found[o.name] = o.position.toArray(); });
     return found;
 }"""
+NAMES = """() => [...document.querySelectorAll('.labels span')].map((e) => e.getBoundingClientRect())
+    .filter((box) => box.width > 0).map((box) => [box.left, box.top, box.right, box.bottom])"""
 ENDS = """() => {
     const data = JSON.parse(document.getElementById('lines-data').textContent), count = data.axes.length;
     const marks = data.designs.map((design) => numbersOf(design.values)[0]);
@@ -124,6 +126,18 @@ def test_mechanism_turns_by_itself_until_it_is_stopped(address, browser):
         assert angle.inner_text() == rest
         page.get_by_role("button", name="turn").click()
         page.wait_for_function("(rest) => document.querySelector('.angle').textContent !== rest", arg=rest)
+
+
+@pytest.mark.parametrize("width", [1400, 390])
+def test_names_in_the_picture_cover_no_others(address, browser, width):
+    with opened(browser, address, width) as page:
+        for share in (0.0, 0.3, 0.7):
+            page.evaluate(SET, share)
+            boxes = page.evaluate(NAMES)
+            assert len(boxes) >= 8
+            for k, (left, top, right, low) in enumerate(boxes):
+                for a, b, c, d in boxes[:k]:
+                    assert right <= a or c <= left or low <= b or d <= top
 
 
 def test_drawing_in_a_curve_moves_the_cursor(address, browser):

@@ -32,6 +32,8 @@ RPM = 2.0 * math.pi / 60.0
         ("range_x_m2", "length", "range of x of M₂", "range of x of M of stage 2", "mm"),
         ("min_discriminant", "length^4", "min discriminant", "smallest discriminant", "mm⁴"),
         ("margin", "1", "margin", "margin", ""),
+        ("phi_a", "rad", "φ a", "phi a", "°"),
+        ("sews_at_7000", "mm", "sews at 7000", "sews at 7000", "mm"),
         ("err_max_abs_d2s", "mm", "error of max |s″|", "error of the largest acceleration", "mm/rad²"),
         ("err_swing", "rad", "error of swing", "error of the swing", "°"),
     ],

@@ -4,6 +4,10 @@
 
 const UP = new THREE.Vector3(0, 0, 1);
 
+// Pixels of a name: its height, and where it may stand from its joint, the upper left corner of it.
+const LINE = 14;
+const AROUND = (wide) => [[8, -20], [8, 4], [-8 - wide, -20], [-8 - wide, 4], [-wide / 2, -30], [-wide / 2, 14], [12, -8], [-12 - wide, -8]];
+
 function colourOf(name) {
   return new THREE.Color(getComputedStyle(document.documentElement).getPropertyValue(name).trim());
 }
@@ -320,18 +324,20 @@ class MechanismView {
     this.renderer.render(this.scene, this.camera);
     const { clientWidth: width, clientHeight: height } = this.host;
     const taken = [];
-    for (const { label, group, at } of this.points) {
+    // Joints before the parts they belong to. A name that would cover another one stands beside it; what finds no free
+    // place, or stands there already, is left out.
+    for (const { label, group, at } of [...this.points].sort((a, b) => (a.part === undefined) - (b.part === undefined))) {
       const place = at(this.share).clone().applyMatrix4(group.matrixWorld).project(this.camera);
-      const shown = this.named && Number.isFinite(place.x);
-      label.style.display = shown ? "" : "none";
-      if (!shown) continue;
-      const x = ((place.x + 1) * width) / 2, wide = 7 * label.textContent.length + 4;
-      let y = ((1 - place.y) * height) / 2;
-      // A name that would cover another one stands above it.
-      const covers = (other) => Math.abs(other.y - y) < 13 && x < other.x + other.wide && other.x < x + wide;
-      while (taken.some(covers)) y -= 13;
-      taken.push({ x, y, wide });
-      label.style.transform = `translate(${x}px, ${y}px)`;
+      const text = label.textContent, wide = 7.5 * text.length + 4;
+      const x = ((place.x + 1) * width) / 2, y = ((1 - place.y) * height) / 2;
+      const clear = ([dx, dy]) => x + dx >= 0 && x + dx + wide <= width && y + dy >= 0 && y + dy + LINE <= height &&
+        !taken.some((other) => Math.abs(other.y - y - dy) < LINE && x + dx < other.x + other.wide && other.x < x + dx + wide);
+      const known = taken.some((other) => other.text === text && Math.hypot(other.joint.x - x, other.joint.y - y) < 1.5 * LINE);
+      const beside = this.named && Number.isFinite(place.x) && !known && AROUND(wide).find(clear);
+      label.style.display = beside ? "" : "none";
+      if (!beside) continue;
+      taken.push({ x: x + beside[0], y: y + beside[1], wide, text, joint: { x, y } });
+      label.style.transform = `translate(${x + beside[0]}px, ${y + beside[1]}px)`;
     }
   }
 }
