@@ -134,11 +134,8 @@ def _bodies(scene: Scene) -> Array:
     found, ends = scene.table(follower.bodies), np.zeros((len(scene.designs), 3, 3))
     ends[:, :, 0] = scene.records[1][:, 12:15]
     for k, body in enumerate(follower.rods):
-        columns, rod, line = (
-            found[:, BODY * k : BODY * (k + 1)],
-            *(scene.inputs[f"{name}_{body}"] for name in ("rod", "line_mass")),
-        )
-        loads.put_rod(columns, rod, line, np.zeros_like(ends[:, k]), ends[:, k])
+        given = [scene.inputs[f"{name}_{body}"] for name in loads.ROD]
+        loads.put_rod(found[:, BODY * k : BODY * (k + 1)], *given, np.zeros_like(ends[:, k]), ends[:, k])
     return found
 
 

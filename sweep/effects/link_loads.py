@@ -178,7 +178,7 @@ def _bodies(scene: Scene) -> Array:
             end = links.lines[:, :, line, :3][pose] if child < 0 else links.bodies[:, :, child, 24:27][pose]
             axes = record[:, 15:24].reshape(-1, 3, 3)
             ends = (np.einsum("nij,nj->ni", axes, point - record[:, :3]) for point in (record[:, 24:27], end))
-            loads.put_rod(own, given[f"rod_{body.name}"], given[f"line_mass_{body.name}"], *ends)
+            loads.put_rod(own, *(given[f"{name}_{body.name}"] for name in loads.ROD), *ends)
         found.append(own)
     return np.hstack([*found, *(given[p.name][:, None] for p in loads.GRAVITY)])
 

@@ -51,8 +51,8 @@ def _body(body: str) -> tuple[Parameter, ...]:
     return body_inputs(body, _FRAMES[body])
 
 
-def as_rod(body: str, own: tuple[Parameter, ...]) -> tuple[Parameter, Parameter]:
-    """Whether a body is a slender rod as far as nothing is said of its centre and inertia, and its mass per length.
+def as_rod(body: str, own: tuple[Parameter, ...]) -> tuple[Parameter, ...]:
+    """Whether a body is a rod as far as nothing is said of its centre and inertia, its mass per length, its thickness.
 
     ``own`` are its mass, centre and inertia.
     """
@@ -61,18 +61,26 @@ def as_rod(body: str, own: tuple[Parameter, ...]) -> tuple[Parameter, Parameter]
     text = f"1: the mass of the {body} is that of a slender rod between its joints, centre halfway, inertia m l^2/12"
     words = f"{text}; 0 where its centre or inertia is given, else"
     line = f"mass per length of the {body} between its joints, beside m_{body}; counts where rod_{body} is 1"
+    thick = f"radius of gyration of the section of the {body} about a line across it; 0: slender, no inertia along it"
     return (
         Parameter(name, "choice", words, default=1.0, choices=(0.0, 1.0), unless=others),
         Parameter(f"line_mass_{body}", "line_mass", line, default=0.0, not_negative=True),
+        Parameter(f"gyration_{body}", "length", thick, default=0.0, not_negative=True),
     )
 
 
-def put_rod(columns: Array, rod: Array, line_mass: Array, start: Array, end: Array) -> None:
-    """Make bodies slender rods where ``rod`` is 1: masses, centres and moments of inertia (n, BODY), in place.
+ROD = ("rod", "line_mass", "gyration")  # what the names of these begin with
+
+
+def put_rod(columns: Array, rod: Array, line_mass: Array, gyration: Array, start: Array, end: Array) -> None:
+    """Make bodies rods where ``rod`` is 1: masses, centres and moments of inertia (n, BODY), in place.
+
+    The inertia is m l^2/12 across the rod, and m k^2 more with the radius of gyration k of a section that is the same
+    about all lines across the rod; along the rod it is 2 m k^2.
 
     Parameters
     ----------
-    rod, line_mass : (n,)
+    rod, line_mass, gyration : (n,)
     start, end : (n, 3) its joints in the axes of the body
     """
     along = end - start
@@ -82,6 +90,8 @@ def put_rod(columns: Array, rod: Array, line_mass: Array, start: Array, end: Arr
     mass = rod * columns[:, 0] / 12.0
     for at, (x, y) in enumerate(((0, 0), (0, 1), (0, 2), (1, 1), (1, 2), (2, 2))):
         columns[:, 4 + at] += mass * ((square if x == y else 0.0) - along[:, x] * along[:, y])
+        turned = along[:, x] * along[:, y] / np.where(square > 0.0, square, 1.0)
+        columns[:, 4 + at] += 12.0 * mass * gyration**2 * (float(x == y) + turned)
 
 
 def rod_inputs(body: str, frame: str) -> tuple[Parameter, ...]:

@@ -21,7 +21,7 @@ FORMULAS = (
 
 CONSTRUCTION = Parameter(
     "finger", "choice",
-    "The coupler cannot spin freely: ball joint whose finger holds it, 0 the driven one (at C), 1 the driving one (at B)",
+    "The coupler cannot spin freely: a finger holds it in a joint, 0 the driven one (at C), 1 the driving one (at B)",
     default=0.0, choices=(0.0, 1.0),
 )  # fmt: skip
 

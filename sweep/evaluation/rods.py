@@ -20,6 +20,7 @@ DENSITIES = {
     "titanium": 4506.0,
     "magnesium": 1738.0,
 }
+INERTIAS = ("slender", "exact")
 SECTIONS = '"6 mm round", "5 mm square", "6 x 4 mm rectangular", "8 x 1 mm tube" (outer diameter, wall)'
 _SECTION = re.compile(r"([\d.]+)(?:\s*x\s*([\d.]+))?\s*([a-z]+)\s+(round|square|rectangular|tube)")
 _AREAS: dict[str, Callable[..., float]] = {
@@ -28,35 +29,46 @@ _AREAS: dict[str, Callable[..., float]] = {
     "rectangular": lambda a, b: a * b,
     "tube": lambda d, wall: math.pi * wall * (d - wall),
 }
+# Square of the radius of gyration about a line across the bar, of sections for which all these lines are alike.
+_GYRATIONS: dict[str, Callable[..., float]] = {
+    "round": lambda d: d * d / 16.0,
+    "square": lambda a: a * a / 12.0,
+    "tube": lambda d, wall: (d * d + (d - 2.0 * wall) ** 2) / 16.0,
+}
+UNITS = ("t", "t/mm", "mm")  # of the columns
 
 
-def rod(body: str, material: str, section: str) -> dict[str, float]:
-    """Mass of a body as a slender bar between its joints: columns to put into a table beside the dimensions.
+def rod(body: str, material: str, section: str, inertia: str = "slender") -> dict[str, float]:
+    """Mass of a body as a bar between its joints: columns to put into a table beside the dimensions.
 
-    Centre and inertia follow from the length that the body has in each design, J = m l^2/12.
+    Centre and inertia follow from the length that the body has in each design.
 
     Parameters
     ----------
     body : its name, with the number of its stage, as ``crank``, ``rocker2``, ``needle.coupler1``
     material : one of :data:`DENSITIES`
     section : as "6 mm round", "5 mm square", "6 x 4 mm rectangular", "8 x 1 mm tube" (outer diameter, wall)
+    inertia : "slender", J = m l^2/12 across the bar and nothing along it, or "exact", m (l^2/12 + k^2) and 2 m k^2 with
+        the section's radius of gyration k; a rectangular section is slender: how it lies is not known
 
     Returns
     -------
     dict
-        the mass per length [t/mm], and 0 for what its mass is besides [t]
+        0 for what its mass is besides [t], the mass per length [t/mm], and k [mm], 0 where it is slender
 
     Raises
     ------
     InputError
-        for an unknown material, or a section that is not written like these
+        for an unknown material, a section that is not written like these, or another inertia
 
     Examples
     --------
     >>> import sweep
     >>> found = sweep.rod("crank", "steel", "6 mm round")
     >>> {name: round(value * 1e9, 3) for name, value in found.items()}  # g/m
-    {'m_crank': 0.0, 'line_mass_crank': 221.954}
+    {'m_crank': 0.0, 'line_mass_crank': 221.954, 'gyration_crank': 0.0}
+    >>> sweep.rod("crank", "steel", "6 mm round", "exact")["gyration_crank"]  # mm
+    1.5
     """
     if material not in DENSITIES:
         raise InputError("material", material, choices(material, list(DENSITIES)), body)
@@ -64,11 +76,15 @@ def rod(body: str, material: str, section: str) -> dict[str, float]:
         match = _SECTION.fullmatch(section.strip())
         assert match is not None
         sizes = [factor(match[3], "mm") * float(size) for size in match.groups()[:2] if size is not None]
-        area = _AREAS[match[4]](*sizes)
+        area, square = _AREAS[match[4]](*sizes), _GYRATIONS.get(match[4], lambda *_: math.nan)(*sizes)
     except (AssertionError, TypeError, ValueError):
         raise InputError("section", section, f"a section, as {SECTIONS}", body) from None
     if not area > 0.0:
         raise InputError("section", section, "positive sizes, a wall of less than the diameter", body)
+    if inertia not in INERTIAS or (inertia == "exact" and math.isnan(square)):
+        allowed = f"{' or '.join(INERTIAS)}; how a rectangular section lies is not known, so it is slender"
+        raise InputError("inertia", inertia, allowed, body)
     member, dot, own = body.rpartition(".")
-    place = f"{member}{dot}"
-    return {f"{place}m_{own}": 0.0, f"{place}line_mass_{own}": 1e-12 * DENSITIES[material] * area}
+    thick = math.sqrt(square) if inertia == "exact" else 0.0
+    values = 0.0, 1e-12 * DENSITIES[material] * area, thick
+    return {f"{member}{dot}{name}_{own}": x for name, x in zip(("m", "line_mass", "gyration"), values, strict=True)}

@@ -15,7 +15,7 @@ from sweep.report.quantities import quantity
 if TYPE_CHECKING:
     import pandas as pd
 
-MOST_ROWS = 100_000  # of designs: a sheet holds 1 048 576, but nobody scrolls through them
+MOST_ROWS = 10_000  # of designs: a sheet holds 1 048 576, but nobody scrolls through them, and 100 000 take minutes
 
 
 def write_workbook(folder: str | Path, path: str | Path) -> Path:
@@ -30,7 +30,7 @@ def write_workbook(folder: str | Path, path: str | Path) -> Path:
     -------
     Path
         the file, with the sheets ``designs`` (within all limits, the best first where the study has an objective, at
-        most 100 000), ``optimum`` and ``curves`` (one turn, where the study optimises) and ``definitions``.  Headings
+        most 10 000), ``optimum`` and ``curves`` (one turn, where the study optimises) and ``definitions``.  Headings
         carry units; angles are in degrees, lengths in mm.
 
     Raises
@@ -41,8 +41,6 @@ def write_workbook(folder: str | Path, path: str | Path) -> Path:
     StoreError
         if the file cannot be written.
     """
-    import pandas as pd
-
     target = Path(path)
     if target.suffix.lower() != ".xlsx":
         raise InputError("path", target.name, "a file ending in .xlsx", "export")
@@ -51,10 +49,18 @@ def write_workbook(folder: str | Path, path: str | Path) -> Path:
     kept = {name: frame for name, frame in sheets.items() if frame is not None}
     partial = target.with_name(f"_tmp-{os.getpid()}-{target.name}")
     try:
-        with pd.ExcelWriter(partial, engine="openpyxl") as book:
-            for name, frame in kept.items():
-                _headed(data, frame).to_excel(book, sheet_name=name, index=False, freeze_panes=(1, 1))
-            _definitions(data, kept).to_excel(book, sheet_name="definitions", index=False, freeze_panes=(1, 1))
+        import openpyxl
+
+        book = openpyxl.Workbook(write_only=True)
+        for name, frame in [
+            *((n, _headed(data, f)) for n, f in kept.items()),
+            ("definitions", _definitions(data, kept)),
+        ]:
+            sheet = book.create_sheet(name)
+            sheet.freeze_panes = "B2"
+            for row in [list(frame), *frame.astype(object).where(frame.notna(), None).to_numpy().tolist()]:
+                sheet.append(row)
+        book.save(partial)
         partial.replace(target)
     except ModuleNotFoundError as error:
         raise InputError(

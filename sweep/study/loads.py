@@ -16,7 +16,7 @@ from pydantic import Field
 from sweep.effects import curved_inputs, input_names
 from sweep.effects.base import STUDY_LOADS
 from sweep.errors import InputError, choices, closest
-from sweep.evaluation.rods import rod
+from sweep.evaluation.rods import UNITS, rod
 from sweep.families.base import Family
 from sweep.families.machines import Machine
 from sweep.families.names import at_stage
@@ -31,7 +31,7 @@ FORMS = (
     '{ file = "load.csv", unit = "N" }',
     '{ mean = 1.0, cos = [0.5], sin = [0.2], unit = "N" }',
 )
-ROD = '{ material = "steel", section = "6 mm round" }'
+ROD = '{ material = "steel", section = "6 mm round", inertia = "exact" }'
 Numbers = Annotated[list[Number], Field(max_length=MOST_POINTS)]
 Names = Annotated[list[str], Field(min_length=2, max_length=2)]
 
@@ -99,14 +99,14 @@ def _with_rods(entries: Mapping[str, Any], faults: Faults) -> dict[str, Any]:
             continue
         texts = {key: str(value) for key, value in entry.items()}
         try:
-            mass, line = rod(name, **texts).items()
+            columns = rod(name, **texts)
         except (InputError, TypeError) as error:
             allowed = error.allowed if isinstance(error, InputError) else ROD
             faults.value(("bodies", name), entry, allowed)
             continue
-        if mass[0] in entries:
-            faults.value(("bodies", mass[0]), entries[mass[0]], f"nothing beside the material and section of {name}")
-        found |= {mass[0]: "0 t", line[0]: f"{line[1]!r} t/mm"}
+        for column in columns.keys() & entries.keys():
+            faults.value(("bodies", column), entries[column], f"nothing beside the material and section of {name}")
+        found |= {column: f"{value!r} {unit}" for (column, value), unit in zip(columns.items(), UNITS, strict=True)}
     return found
 
 

@@ -38,6 +38,32 @@ def test_masses_alone_are_slender_rods():
     assert found.drive_torque.abs().max() > 1000.0  # N mm; it was 2e-13
 
 
+def thick(body, mass, radius):
+    """Explicit centre and inertia of a round bar: m (l^2/12 + r^2/4) across it, m r^2/2 along it."""
+    across, along = mass * (LENGTHS[body] ** 2 / 12.0 + radius**2 / 4.0), mass * radius**2 / 2.0
+    given = {f"j_{body}_xx": along, f"j_{body}_yy": across, f"j_{body}_zz": across}
+    return {f"m_{body}": mass, f"com_{body}_x": 0.5 * LENGTHS[body]} | given
+
+
+def test_an_exact_bar_of_a_material_and_a_section_is_its_cylinder():
+    bars, given = {}, {}
+    for body, length in LENGTHS.items():
+        bars |= sweep.rod(body, "steel", "12 mm round", "exact")
+        given |= thick(body, 7.85e-9 * np.pi * 36.0 * length, 6.0)
+    found = loads("rssr", LINKS, **bars)
+    np.testing.assert_allclose(found, loads("rssr", LINKS, **given), rtol=1e-12, atol=1e-9)
+    slender = bars | {name: 0.0 for name in bars if name.startswith("gyration")}
+    assert not np.allclose(found, loads("rssr", LINKS, **slender), rtol=1e-3)
+
+
+def test_exact_inertia_needs_a_section_that_is_alike_all_round():
+    assert sweep.rod("crank", "steel", "6 mm square", "exact")["gyration_crank"] == pytest.approx(np.sqrt(3.0))
+    assert sweep.rod("crank", "steel", "8 x 1 mm tube", "exact")["gyration_crank"] == pytest.approx(2.5)
+    for section, inertia in (("6 x 4 mm rectangular", "exact"), ("6 mm round", "thick")):
+        with pytest.raises(sweep.InputError, match="slender"):
+            sweep.rod("crank", "steel", section, inertia)
+
+
 def test_an_explicit_zero_is_a_mass_in_its_pivot():
     zeros = {f"com_{body}_x": 0.0 for body in LENGTHS}
     assert loads("rssr", LINKS, **MASSES, **zeros).drive_torque.abs().max() > 0.0

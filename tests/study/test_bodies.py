@@ -87,6 +87,8 @@ def test_a_body_of_a_material_and_a_section_has_its_mass_per_length_among_the_pa
     fixed = load(tmp_path, HEAD + "[bodies]\n" + bar).space.fixed
     assert fixed["m_crank2"] == 0.0
     assert fixed["line_mass_crank2"] == pytest.approx(7.85e-9 * 9.0 * np.pi, rel=1e-14)
+    exact = bar.replace('round" }', 'round", inertia = "exact" }')
+    assert load(tmp_path, HEAD + "[bodies]\n" + exact).space.fixed["gyration_crank2"] == pytest.approx(1.5, rel=1e-14)
     wrong = 'crank2 = { material = "steel", section = "6 mm" }'
     assert "bodies.crank2" in faults(tmp_path, HEAD + "[bodies]\n" + bar.replace(bar.split("\n")[1], wrong))
     assert "nothing beside the material" in faults(tmp_path, HEAD + "[bodies]\n" + bar + 'm_crank2 = "1 g"\n')
