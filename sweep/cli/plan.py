@@ -13,6 +13,7 @@ from sweep.chunks.plan import PARAMETER_UNITS, Pilot, feasible_designs, pilot, s
 from sweep.cli.families import aligned, main_outputs
 from sweep.cli.options import SMOKE, STUDY
 from sweep.effects.advice import findings, left_out, tree
+from sweep.effects.loads import POINT
 from sweep.engine.estimate import LEAST_KEPT, Estimate, check_budget, estimate, other_accuracies, searches
 from sweep.evaluation.summaries import output
 from sweep.families.base import Family
@@ -229,9 +230,28 @@ def _effects(study: Study, sent: Pilot) -> list[str]:
     rods = [p.name for p in study.family.parameters if p.unless and study.space.fixed.get(p.name) == 1.0]
     if rods:
         lines += ["", "bodies without centre and inertia are slender rods between their joints", f"  {', '.join(rods)}"]
+    if points := _points(study):
+        lines += ["", "masses in the joints of their bodies, as centre and inertia are 0", f"  {', '.join(points)}"]
     found = findings(bare, study.family, looked_at, study.want)
     told = ["", f"what matters here, {which}; the choice is yours", *(f"  {finding.words}" for finding in found)]
     return lines + (told if found else [])
+
+
+def _points(study: Study) -> list[str]:
+    """Name the masses that have neither centre nor inertia, of bodies that have no second joint to be rods to."""
+    names, fixed = study.family.parameter_names, study.space.fixed
+
+    def of(mass: str) -> list[str]:
+        place, dot, own = mass.rpartition(".")
+        body = own.removeprefix("m_")
+        stage = "" if f"{place}{dot}com_{body}_x" in names else body[-1]
+        heads = tuple(f"{place}{dot}{head}_{body.removesuffix(stage)}_" for head in ("com", "j"))
+        return [name for name in names if name.startswith(heads) and name.endswith(stage)]
+
+    return [
+        p.name for p in study.family.parameters
+        if POINT in p.text and fixed.get(p.name) != 0.0 and all(fixed.get(name) == 0.0 for name in of(p.name))
+    ]  # fmt: skip
 
 
 def _axis(axis: Axis) -> str:

@@ -55,7 +55,7 @@ def body_inputs(tree: LinkTree) -> tuple[Parameter, ...]:
     rods, found = rods_of(tree), []
     for k, body in enumerate(tree.bodies):
         own = (loads.rod_inputs if body.slender else _whole)(body.name, body.axes)
-        found += [*own, *(loads.as_rod(body.name, own) if k in rods else ())]
+        found += [*own, *loads.as_rod(body.name, own)] if k in rods else [loads.as_point(own[0]), *own[1:]]
     return tuple(found)
 
 
@@ -68,7 +68,8 @@ def rods_of(tree: LinkTree) -> dict[int, tuple[int, int]]:
     """Bodies that may be slender rods, by number: from their joint with the parent to where they carry another body.
 
     That is the joint of a body that hangs on it, or the line of a ball that closes a loop: the body's or the line's
-    number, the other -1.  What slides on a body, or touches it, makes no end of a rod.
+    number, the other -1.  What slides on a body, or touches it, makes no end of a rod; a body with nothing else reaches
+    to the point of its arm, or, both numbers -1, to the place of the tool that it carries.
     """
     found: dict[int, tuple[int, int]] = {}
     sliding = {joint.body for joint in tree.joints if joint.kind == "sleeve"}
@@ -78,7 +79,8 @@ def rods_of(tree: LinkTree) -> dict[int, tuple[int, int]]:
         for k in ends:
             if k >= 0 and k not in sliding and body not in sliding:
                 found.setdefault(k, (-1, line) if joint.kind == "ball" else (body, -1))
-    return found
+    tips = ((tree.carrier, -1),) if tree.tip is not None and tree.carrier not in sliding else ()
+    return {body: (-1, line) for body, line in (*tips, *tree.arms)} | found
 
 
 def inputs(tree: LinkTree) -> tuple[Parameter, ...]:
@@ -163,24 +165,33 @@ def force_name(scene: Scene) -> str:
 
 def _bodies(scene: Scene) -> Array:
     """Masses, centres, inertias and gravity in the order of the kernel, (n, 10 B + 3)."""
-    tree, given, links = tree_of(scene), scene.inputs, scene.links
+    tree, given = tree_of(scene), scene.inputs
     zero, rods, found = np.zeros(len(scene.designs)), rods_of(tree), []
-    # joints stand still in a body: the first pose that is assembled tells where
-    pose = np.arange(len(scene.designs)), (np.asarray(scene.motion["status"]) != 0).argmin(axis=1)
     for k, body in enumerate(tree.bodies):
         columns = [given[p.name] for p in (loads.rod_inputs if body.slender else _whole)(body.name, body.axes)]
         if body.slender:
             columns = [*columns[:2], *[zero] * 5, columns[2], zero, columns[2]]
         own = np.column_stack(columns)
         if k in rods and given[f"rod_{body.name}"].any():
-            child, line = rods[k]
-            record = links.bodies[:, :, k][pose]
-            end = links.lines[:, :, line, :3][pose] if child < 0 else links.bodies[:, :, child, 24:27][pose]
-            axes = record[:, 15:24].reshape(-1, 3, 3)
-            ends = (np.einsum("nij,nj->ni", axes, point - record[:, :3]) for point in (record[:, 24:27], end))
+            ends = _rod_ends(scene, k, *rods[k])
             loads.put_rod(own, *(given[f"{name}_{body.name}"] for name in loads.ROD), *ends)
         found.append(own)
     return np.hstack([*found, *(given[p.name][:, None] for p in loads.GRAVITY)])
+
+
+def _rod_ends(scene: Scene, k: int, child: int, line: int) -> tuple[Array, Array]:
+    """Find both ends of a rod in the axes of its body, each (n, 3); ``child`` and ``line`` as of :func:`rods_of`."""
+    # joints stand still in a body: the first pose that is assembled tells where
+    pose = np.arange(len(scene.designs)), (np.asarray(scene.motion["status"]) != 0).argmin(axis=1)
+    links, record = scene.links, scene.links.bodies[:, :, k][pose]
+
+    def seen(point: Array) -> Array:
+        return np.asarray(np.einsum("nij,nj->ni", record[:, 15:24].reshape(-1, 3, 3), point - record[:, :3]))
+
+    start = seen(record[:, 24:27])
+    if child >= 0:
+        return start, seen(links.bodies[:, :, child, 24:27][pose])
+    return start, seen(links.lines[:, :, line, :3][pose]) if line >= 0 else _tool(scene)[:, 1:]
 
 
 def _tool(scene: Scene) -> Array:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Collection, Mapping
+from dataclasses import replace
 from typing import NamedTuple, TypeAlias
 
 import numpy as np
@@ -70,6 +71,14 @@ def as_rod(body: str, own: tuple[Parameter, ...]) -> tuple[Parameter, ...]:
 
 
 ROD = ("rod", "line_mass", "gyration")  # what the names of these begin with
+
+
+POINT = "in its joint where its centre and inertia are left out"
+
+
+def as_point(mass: Parameter) -> Parameter:
+    """Mass of a body that has no second joint to be a rod to."""
+    return replace(mass, text=f"{mass.text}; {POINT}")
 
 
 def put_rod(columns: Array, rod: Array, line_mass: Array, gyration: Array, start: Array, end: Array) -> None:

@@ -139,6 +139,7 @@ LINKS = LinkTree(
     fill=filled_by(fill_links, _RATES),
     carrier=2,
     tip=standing(PARAMETERS, "p0x", "p0y", "p0z").at,
+    arms=((3, 0),),
 )  # fmt: skip
 
 FAMILY = Family(

@@ -73,6 +73,7 @@ class LinkTree:
     tip : place of the tool in the axes of that body, (n, 3); None where it is an input
     output : number of the freedom that is the family's position, on which a load acts; -1 where no load does
     rubs : whether its joints have dimensions for friction and bearings
+    arms : numbers of bodies without a second joint, each with the line whose point is their end
     """
 
     bodies: tuple[LinkBody, ...]
@@ -86,6 +87,7 @@ class LinkTree:
     tip: DesignMap | None = None
     output: int = -1
     rubs: bool = True
+    arms: tuple[tuple[int, int], ...] = ()
 
 
 def filled_by(kernel: Callable[..., object], needs: tuple[str, ...]) -> LinkFill:

@@ -150,6 +150,7 @@ def _cam_and(follower: LinkBody, joint: LinkJoint, kind: int, needs: tuple[str, 
         carrier=1,
         tip=_tip_at_origin if kind == SLIDE else None,
         output=1,
+        arms=((1, 0),) if kind == TURN else (),
     )
 
 
@@ -294,6 +295,7 @@ def heddle_shaft(parameters: Parameters, line: Callable[[Array], tuple[Array, Ar
         carrier=4,
         tip=_tip_at_origin,
         output=4,
+        arms=((3, 3),),
     )
 
 

@@ -6,8 +6,10 @@ import numpy as np
 import pytest
 
 import sweep
+from sweep.effects import extended, offered
 from sweep.effects.link_loads import rods_of
-from sweep.families import family
+from sweep.effects.loads import POINT
+from sweep.families import NAMES, family
 from sweep.families.link_tree import LinkTree
 
 LINKS = {"a": 30.0, "b": 90.0, "c": 60.0, "e": 85.0, "f": 5.0, "g": -4.0, "alpha": 0.4}
@@ -125,6 +127,41 @@ def test_rods_that_hang_between_balls_have_their_centre_halfway():
         "five_link", design | loads | {f"rod_{b}": 0.0 for b in bodies}, ["reduced_inertia"], phi=PHI
     )
     assert (found > 0.0).all() and not np.allclose(found, points["reduced_inertia"])
+
+
+@pytest.mark.parametrize(
+    ("name", "body", "length"),
+    [
+        ("swivel", "rod", "Lw"), ("eyelet", "crank", "a"), ("cam_lever", "lever", "c"), ("heddle", "back", "O4E"),
+        ("cylindrical_looper", "rocker", "c1"), ("cylindrical_looper", "coupler2", "b2"),
+        ("geared_dwell", "carrier", None),
+    ],
+)  # fmt: skip
+def test_a_body_that_slides_or_touches_is_a_rod_to_its_end_too(name, body, length):
+    """To the working point, the roller, the end that bears another rod, the ball."""
+    design, mass = dict(family(name).example) | {"speed": 60.0}, {f"m_{body}": 1e-3}
+    reach = design[length] if length else 2.0
+    want = ["drive_torque", "reduced_inertia", "shaking_force", "shaking_moment"]
+    parameters = extended(family(name), want).parameter_names
+    inertia = 1e-3 * reach**2 / 12.0
+    given = {n: inertia for n in (f"j_{body}", f"j_{body}_yy", f"j_{body}_zz") if n in parameters}
+    phi = np.linspace(0.1, 6.1, 13)
+    alone = sweep.evaluate(name, design | mass, want, phi=phi)[want]
+    explicit = sweep.evaluate(name, design | mass | given | {f"com_{body}_x": 0.5 * reach}, want, phi=phi)[want]
+    np.testing.assert_allclose(alone, explicit, rtol=1e-11, atol=1e-12 * explicit.abs().max().max())
+    assert explicit.reduced_inertia.max() > 0.0 and explicit.shaking_moment.abs().max() > 0.0
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_of_every_mass_it_is_said_what_it_is_without_centre_and_inertia(name):
+    """A rod where the body has a length among its dimensions; else it lies in its joint, and the register says so."""
+    if "drive_torque" not in {output.name for output in offered(family(name))}:
+        return
+    parameters = {p.name: p for p in extended(family(name), ["drive_torque"]).parameters}
+    masses = [p for p in parameters if p.startswith("m_") and p not in ("m_tool", "m_slider")]
+    assert masses or name == "free_cam_friction"
+    for mass in masses:
+        assert (mass.replace("m_", "rod_") in parameters) != (POINT in parameters[mass].text), mass
 
 
 def test_a_body_has_the_mass_of_its_material_and_section():

@@ -82,6 +82,43 @@ def test_bodies_of_which_only_the_mass_is_given_are_slender_rods_and_the_plan_sa
     assert lines[at + 1].split(", ") == ["  rod_crank2", "rod_coupler2"]
 
 
+def test_masses_that_lie_in_their_joints_are_said_by_the_plan(tmp_path):
+    """The link of a slotted link has no second joint; its arm has a centre of mass."""
+    text = """
+[study]
+name = "slotted"
+[mechanism]
+chain = ["rssr", "slotted"]
+[scene]
+speed = "600 rpm"
+want = ["max_abs_drive_torque1"]
+[design]
+a1 = "12 mm"
+b1 = "40 mm"
+c1 = "30 mm"
+e1 = "35 mm"
+f1 = "0 mm"
+g1 = "0 mm"
+alpha1 = "20 deg"
+a2 = "10 mm"
+e2 = "26 mm"
+[bodies]
+m_crank1 = "10 g"
+m_coupler1 = "10 g"
+m_rocker1 = "10 g"
+m_link2 = "12 g"
+m_arm2 = "2 g"
+com_arm_y2 = "1 mm"
+[accuracy]
+samples = 32
+"""
+    study = load(tmp_path, text)
+    at = (lines := _effects(study, pilot(study))).index(
+        "masses in the joints of their bodies, as centre and inertia are 0"
+    )
+    assert lines[at + 1] == "  m_link2"
+
+
 def test_a_body_of_a_material_and_a_section_has_its_mass_per_length_among_the_parameters(tmp_path):
     bar = BODIES.replace('m_crank2 = "10 g"', 'crank2 = { material = "steel", section = "6 mm round" }')
     fixed = load(tmp_path, HEAD + "[bodies]\n" + bar).space.fixed
