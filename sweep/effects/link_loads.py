@@ -173,8 +173,8 @@ def _bodies(scene: Scene) -> Array:
             columns = [*columns[:2], *[zero] * 5, columns[2], zero, columns[2]]
         own = np.column_stack(columns)
         if k in rods and given[f"rod_{body.name}"].any():
-            ends = _rod_ends(scene, k, *rods[k])
-            loads.put_rod(own, *(given[f"{name}_{body.name}"] for name in loads.ROD), *ends)
+            is_rod, line_mass, gyration = (given[f"{name}_{body.name}"] for name in loads.ROD)
+            loads.put_rod(own, is_rod, line_mass, gyration, *_rod_ends(scene, k, *rods[k]))
         found.append(own)
     return np.hstack([*found, *(given[p.name][:, None] for p in loads.GRAVITY)])
 
