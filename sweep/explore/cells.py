@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 from functools import lru_cache
 from itertools import chain
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,7 +18,8 @@ from sweep.families.base import Array
 from sweep.quantities.limits import compared
 from sweep.report.quantities import quantity
 
-MOST_BINS = 64
+MOST_BINS, NOWHERE = 64, 255
+Places: TypeAlias = NDArray[np.uint8]
 
 
 class Column(NamedTuple):
@@ -28,10 +29,11 @@ class Column(NamedTuple):
     low: float
     high: float
 
-    def bins(self, count: int) -> NDArray[np.intp]:
-        """Return the number of the cell of every value, -1 where there is none."""
+    def bins(self, count: int) -> Places:
+        """Return the number of the cell of every value, NOWHERE where there is none."""
         share = (self.values - self.low) / (self.high - self.low)
-        return np.where(np.isfinite(share), np.minimum(np.nan_to_num(share) * count, count - 1), -1).astype(np.intp)
+        known = np.minimum(np.nan_to_num(share) * count, count - 1)
+        return np.where(np.isfinite(share), known, NOWHERE).astype(np.uint8)
 
 
 def cells(
@@ -62,7 +64,10 @@ def cells(
         room = 1e-9 * (columns[name].high - columns[name].low)
         kept &= (columns[name].values >= low - room) & (columns[name].values <= high + room)
     rows = np.flatnonzero(kept)
-    places = {name: column.bins(bins)[rows] for name, column in columns.items()}
+    number = design if rows.size == design.size else design[rows]
+    places = {name: _places(hand.folder, merit, name, bins) for name in dict.fromkeys(chain.from_iterable(pairs))}
+    if rows.size < design.size:
+        places = {name: found[rows] for name, found in places.items()}
     return {
         "axes": {
             name: {
@@ -73,20 +78,24 @@ def cells(
             }
             for name, of in shown.items()
         },
-        "pairs": [_counted(places[x], places[y], bins, design[rows]) for x, y in pairs],
+        "pairs": [_counted(places[x], places[y], bins, number) for x, y in pairs],
         "kept": int(rows.size),
         "of": int(design.size),
     }
 
 
-def _counted(x: NDArray[np.intp], y: NDArray[np.intp], bins: int, design: Array) -> list[list[int]]:
+def _counted(x: Places, y: Places, bins: int, design: Array) -> list[list[int]]:
     """Return the filled cells as place, count and the first design, which is the best."""
-    known = np.flatnonzero((x >= 0) & (y >= 0))
-    cell = y[known] * bins + x[known]
-    count = np.bincount(cell, minlength=bins * bins)
-    first = np.zeros(bins * bins, np.intp)
-    first[cell[::-1]] = known[::-1]  # of several the last one written stays: the first one
+    cell = np.where((x == NOWHERE) | (y == NOWHERE), bins * bins, y.astype(np.intp) * bins + x)
+    count = np.bincount(cell, minlength=bins * bins)[: bins * bins]
+    first = np.zeros(bins * bins + 1, np.intp)
+    first[cell[::-1]] = np.arange(cell.size - 1, -1, -1)  # of several the last one written stays: the first one
     return [[int(c % bins), int(c // bins), int(count[c]), int(design[first[c]])] for c in np.flatnonzero(count)]
+
+
+@lru_cache(64)
+def _places(folder: Path, merit: str, name: str, bins: int) -> Places:
+    return _column(folder, merit, name).bins(bins)
 
 
 @lru_cache(64)

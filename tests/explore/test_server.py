@@ -5,6 +5,7 @@ from __future__ import annotations
 import http.client
 import json
 import tomllib
+from itertools import pairwise
 from urllib.error import HTTPError
 from urllib.parse import urlparse
 from urllib.request import Request, urlopen
@@ -15,7 +16,8 @@ import pytest
 import sweep
 from sweep.report.quantities import quantity
 from sweep.study import study_from_data
-from tests.support.explorer import asked
+from tests.explore.conftest import BARS
+from tests.support.explorer import asked, explored
 
 DESIGN = {"a": 9.5, "b": 36.25, "c": 31.0, "e": 32.0, "xi": 20.0, "eta": 5.0}
 FREE = {"a": [8.0, 12.0], "b": [30.0, 40.0]}
@@ -144,6 +146,27 @@ def test_cells_hold_every_feasible_design_and_give_their_best(address, folder, s
     assert design["a"] == rows.loc[rows["design"] == best, "a"].item()
     assert "allowed: design" in refused(address, "cells", {"pairs": [["nothing", "a"]], "bins": 20})[1]
     assert refused(address, "design", {"number": 10**9})[0] == 422
+
+
+@pytest.mark.slow
+def test_a_million_rows_are_sent_as_cells_that_hold_all_of_them(tmp_path):
+    sizes = {"a": {"from": 8.0, "to": 11.0, "count": 1000, "unit": "mm"},
+             "b": {"from": 36.0, "to": 40.0, "count": 1000, "unit": "mm"}}  # fmt: skip
+    data = {key: BARS[key] for key in ("study", "mechanism", "scene", "objective")}
+    study = study_from_data(data | {"design": BARS["design"] | sizes}, "study.toml")
+    with explored(sweep.run(study, out=tmp_path / "designs", jobs=1)) as million:
+        names = ["a", "b", "max_abs_d2psi", "swing"]
+        question = {"pairs": list(pairwise(names)), "bins": 48}
+        found = asked(million, "cells", question)
+        assert found["kept"] == found["of"] == 1_000_000
+        assert [sum(cell[2] for cell in pair) for pair in found["pairs"]] == [1_000_000] * 3
+        assert len(json.dumps(found)) < 300_000  # bytes, of 3 x 48^2 cells; the rows would be 40 MB
+        some = asked(million, "cells", question | {"ranges": {"a": [9.0, 9.5]}})
+        firsts = {cell[3] for pair in some["pairs"] for cell in pair}
+        rows = sweep.load(tmp_path / "designs")
+        rows = rows[rows["a"].between(9.0, 9.5)]
+        assert some["kept"] == len(rows) and firsts <= set(rows["design"])
+        assert int(rows.loc[rows["max_abs_d2psi"].idxmin(), "design"]) in firsts
 
 
 def test_saved_study_reads_back_around_the_design(address):
