@@ -155,8 +155,8 @@ def curve_of(family: Family, request: Request, anywhere: bool, mean: bool = Fals
     ``anywhere`` as of `sweep.reductions.extrema.true_extrema`: then the least discriminant of a later stage.
     """
     forms = _forms(family)
-    # What can drive another stage has steps of its own for its extrema, none for a ``mean``.
-    if forms is None or (len(forms) == 1 and forms[0].form.turn is not None and not mean):
+    # What can drive another stage has steps of its own for its largest magnitudes, none for a ``mean``.
+    if forms is None or (len(forms) == 1 and forms[0].form.turn is not None and request.mode == 0 and not mean):
         return None
     if anywhere:
         return _least_discriminant(family, forms, request)
@@ -216,8 +216,11 @@ def _component(family: Family, forms: tuple[InSeries, ...], request: Request) ->
 
 
 def _forms(family: Family) -> tuple[InSeries, ...] | None:
-    """Return what the stages of a chain are fused by; None for any other family, and for poses of higher precision."""
-    if family.poses is family.precise_poses:
+    """Return what the stages of a chain are fused by; None for any other family, and for poses of higher precision.
+
+    Where rounding counts precise poses decide, so a family without them is not searched this way.
+    """
+    if family.precise_poses is None or family.poses is family.precise_poses:
         return None
     forms = [stage.family.find(InSeries) for stage in stages_of(family)]
     known = tuple(form for form in forms if form is not None)
