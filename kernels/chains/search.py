@@ -45,6 +45,7 @@ Counts: TypeAlias = NDArray[np.int64]
 
 PLAIN = 2.0**-14  # of the target: larger rounding errors are left to precise poses
 RIVALS = 64.0  # times the rounding error: peaks lower by no more may turn out the highest where it has moved them
+LEVEL = 2.0**-4  # of the target: rounding errors up to which tops as high as each other need no precise poses
 SETTLING = 8  # more steps for a maximum that is not trusted after the usual ones
 MORE = 4  # times as many samples for a design of which a maximum is not trusted even so
 ROUNDED, UNTRUSTED = 254, 253  # instead of a status; the first see `find_extrema`
@@ -100,7 +101,7 @@ def find_extrema(chain: Chained, order: int, along: bool = False) -> Helper:
                         if not m[peak + ERROR] < math.inf:  # a flat top, which Newton's method climbs slowly
                             refine(1, m[peak:], SETTLING)
                             finish(1, m[peak:], target)
-                status[i] = _decide(own, low, high, m, mode, allowed * target, tie, i, found)
+                status[i] = _decide(own, low, high, m, mode, allowed, target, tie, i, found)
             # Now the list is free for those, one by one, whose tops were not single ones between their samples.
             for i in range(start, end):
                 rho = per_rho / (FEWEST * MORE)
@@ -112,7 +113,7 @@ def find_extrema(chain: Chained, order: int, along: bool = False) -> Helper:
                     finish(length, m, target)
                     if status[i] == st.OK:
                         own, low, high = span[0, 0], span[0, 1], span[0, 2]
-                        status[i] = _decide(own, low, high, m, mode, allowed * target, tie, i, found)
+                        status[i] = _decide(own, low, high, m, mode, allowed, target, tie, i, found)
                     rho /= MORE
                 status[i] = OPEN if status[i] == UNTRUSTED else status[i]
                 if status[i] != st.OK and status[i] != ROUNDED:
@@ -123,7 +124,7 @@ def find_extrema(chain: Chained, order: int, along: bool = False) -> Helper:
 
 @inline
 def _decide(
-    own: int, begin: int, end: int, m: Array, mode: int, rounding: float, tie: float, i: int, found: Array
+    own: int, begin: int, end: int, m: Array, mode: int, allowed: float, target: float, tie: float, i: int, found: Array
 ) -> int:
     """Write the highest maximum of design i, of the one at ``own`` and those from ``begin`` on.
 
@@ -136,16 +137,18 @@ def _decide(
         peak = slot & PLACE
         winner = peak if m[peak + HEIGHT] > m[winner + HEIGHT] else winner
     height, blur, scale = m[winner + HEIGHT], m[winner + ROUNDING], m[winner + SCALE]
-    code = st.OK if blur <= rounding * scale else ROUNDED
-    apart = RIVALS * blur if code == ROUNDED else tie * scale
+    code = st.OK if blur <= allowed * target * scale else ROUNDED
+    apart, error = RIVALS * blur if code == ROUNDED else tie * scale, m[winner + ERROR] + blur
     if apart >= 0.0:
         for slot in range(begin - 1, end):
             peak = (own if slot < begin else slot) & PLACE
             if peak != winner and m[peak + HEIGHT] + m[peak + ROUNDING] >= height - blur - apart:
-                code = OPEN
+                code, error = OPEN, max(error, m[peak + ERROR] + m[peak + ROUNDING])
+        # A follower that turns back within the swing of its driver stands twice at one end, as high both times.
+        code = st.OK if code == OPEN and tie < 0.0 and error <= LEVEL * target * scale else code
     place = m[winner + START] + m[winner + MOVED] + m[winner + LAST]
     found[VALUE, i], found[PHI, i] = -height if mode < 0 else height, place - TURN * np.floor(place / TURN)
-    found[VALUE_ERROR, i], found[PHI_ERROR, i] = m[winner + ERROR] + blur, m[winner + REACH]
+    found[VALUE_ERROR, i], found[PHI_ERROR, i] = error, m[winner + REACH]
     found[SCALE_ROW, i], found[SPACING, i] = scale, m[winner + WIDTH]
     return code if _trusted(own, begin, end, m) else UNTRUSTED
 

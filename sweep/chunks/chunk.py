@@ -11,7 +11,7 @@ import numpy as np
 
 from kernels.status import OK
 from sweep.chunks.cascade import BLOCK, Batch, Cascade, Recalled, levels
-from sweep.chunks.parameters import Parameters, parameter_matrix
+from sweep.chunks.parameters import Parameters, runs_matrix
 from sweep.errors import InputError
 from sweep.evaluation.summaries import design_outputs
 from sweep.families.base import Array, Columns
@@ -86,9 +86,9 @@ def few_designs(study: Study) -> Array:
     """Return a few designs (n, P) spread over the space of a study."""
     count = study.space.count
     starts = sorted({k * (count - 1) // 7 for k in range(8)})
-    blocks = [parameter_matrix(study, start, start + 1) for start in starts]
+    matrix, _ = runs_matrix(study, [(start, start + 1) for start in starts])
     # Any numbers will do, also for a design that [locus] cannot make: it compiles the same.
-    designs = np.nan_to_num(np.concatenate([matrix for matrix, _ in blocks]), nan=1.0)
+    designs = np.nan_to_num(matrix, nan=1.0)
     if study.fit is not None:
         designs, _ = fit_line(study.family, designs, study.fit, study.window)
     return np.asarray(designs, np.float64)

@@ -27,14 +27,23 @@ def parameter_matrix(study: Study, start: int, stop: int) -> tuple[Array, NDArra
 
     The status is OK unless [locus] found no mechanism for a design; its links are nan then.
     """
-    columns = study.space.columns(start, stop)
+    return runs_matrix(study, [(start, stop)])
+
+
+def runs_matrix(study: Study, runs: Iterable[tuple[int, int]]) -> tuple[Array, NDArray[np.uint8]]:
+    """Check several runs of designs as `parameter_matrix` does, each from its start to its stop; one below the other.
+
+    To check all at once takes no longer than to check one run.
+    """
+    found = [study.space.columns(start, stop) for start, stop in runs]
+    columns = {name: np.concatenate([run[name] for run in found]) for name in found[0]}
     if study.locus is None:
         matrix, _ = design_matrix(study.family, columns)
         return matrix, np.zeros(len(matrix), np.uint8)
     made, status = study.locus.links(columns)
     # What has no mechanism is marked, not refused.
     given = {name: values for name, values in columns.items() if name in study.family.parameter_names}
-    matrix, _ = design_matrix(study.family, given | {name: np.ones(stop - start) for name in made})
+    matrix, _ = design_matrix(study.family, given | {name: np.ones(status.size) for name in made})
     for name, values in made.items():
         matrix[:, study.family.parameter_names.index(name)] = values
     return matrix, status

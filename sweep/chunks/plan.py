@@ -16,7 +16,7 @@ from kernels.cache_folder import source_hash
 from kernels.status import OK
 from sweep.chunks.cascade import BLOCK, CALL_SECONDS, Cascade, levels
 from sweep.chunks.chunk import output_columns
-from sweep.chunks.parameters import parameter_matrix, parameter_ns
+from sweep.chunks.parameters import parameter_ns, runs_matrix
 from sweep.evaluation.summaries import output
 from sweep.families.base import Array, Unit, Work
 from sweep.families.names import is_error, without_error
@@ -178,14 +178,13 @@ def pilot(study: Study, tell: Callable[[int, int], None] = lambda _, __: None) -
     length = min(PILOT_LENGTH, -(-number // PILOT_PARTS))
     golden = (math.sqrt(5.0) - 1.0) / 2.0
     starts = sorted({int((k * golden) % 1.0 * (count - length + 1)) for k in range(number // length)})
-    blocks = [parameter_matrix(study, start, start + length) for start in starts]
-    length = -(-len(blocks) // PILOT_PARTS)
-    parts = [blocks[k : k + length] for k in range(0, len(blocks), length)]
+    many = -(-len(starts) // PILOT_PARTS)
+    parts = [starts[k : k + many] for k in range(0, len(starts), many)]
     asked = _telling(study)
     reached, feasible, total, kept = np.zeros(len(levels(study))), 0, 0, []
     for k, part in enumerate(parts):
         tell(k, len(parts))
-        designs, status = (np.concatenate(columns) for columns in zip(*part, strict=True))
+        designs, status = runs_matrix(study, [(start, start + length) for start in part])
         cascade = Cascade(study, keep=False)
         cascade.levels = cascade.levels[:asked]
         cascade.feed(np.arange(len(designs)), designs, status)
@@ -238,8 +237,9 @@ def spread_designs(study: Study, number: int) -> Array:
     count = study.space.count
     golden = (math.sqrt(5.0) - 1.0) / 2.0
     starts = sorted({int((k * golden) % 1.0 * count) for k in range(number)})
-    blocks = [parameter_matrix(study, start, start + 1) for start in starts]
-    return np.concatenate([matrix[status == OK] for matrix, status in blocks])
+    matrix, status = runs_matrix(study, [(start, start + 1) for start in starts])
+    found: Array = matrix[status == OK]
+    return found
 
 
 def feasible_designs(study: Study, number: int) -> tuple[Array, int]:
@@ -254,8 +254,7 @@ def feasible_designs(study: Study, number: int) -> tuple[Array, int]:
     for many in TRIED:
         runs = -(-count // RUN)
         chosen = range(runs) if count <= many else sorted({int((k * golden) % 1.0 * runs) for k in range(many // RUN)})
-        blocks = [parameter_matrix(study, k * RUN, min((k + 1) * RUN, count)) for k in chosen]
-        designs, status = (np.concatenate(parts) for parts in zip(*blocks, strict=True))
+        designs, status = runs_matrix(study, [(k * RUN, min((k + 1) * RUN, count)) for k in chosen])
         cascade = Cascade(study, keep=False)
         cascade.feed(np.arange(len(designs)), designs, status)
         kept, tried = cascade.end(()).designs, len(designs)

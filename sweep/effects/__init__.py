@@ -109,6 +109,7 @@ def effect(name: str) -> Effect:
     return entry
 
 
+@of_family
 def serving(family: Family) -> tuple[Effect, ...]:
     """Effects that a family has what they require for, in the order of the register.
 

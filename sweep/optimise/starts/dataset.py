@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from kernels import status as st
-from sweep.chunks.parameters import parameter_matrix
+from sweep.chunks.parameters import runs_matrix
 from sweep.dataset.chunk_files import parts
 from sweep.families.base import Array, Family
 from sweep.optimise.problem.statement import Problem
@@ -74,8 +74,8 @@ def drawn(study: Study, count: int, seed: int) -> Array:
     length = min(64, study.space.count)
     blocks = max(1, SCREENED * count // length)
     begins = np.random.default_rng(seed).integers(0, study.space.count - length + 1, blocks)
-    drawn_blocks = [parameter_matrix(study, int(k), int(k) + length) for k in begins]
-    designs = np.concatenate([matrix[made == st.OK] for matrix, made in drawn_blocks])
+    matrix, made = runs_matrix(study, [(int(k), int(k) + length) for k in begins])
+    designs: Array = matrix[made == st.OK]
     if study.fit is None or not len(designs):
         return designs
     fitted, status = fit_line(study.family, designs, study.fit, study.window)
