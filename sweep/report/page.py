@@ -15,6 +15,7 @@ from sweep.families.machines import Machine
 from sweep.jobs.progress import Say, unsaid
 from sweep.pages import rendered
 from sweep.report import answer, front, maps, tables
+from sweep.report.bodies import bars
 from sweep.report.dataset import Dataset, gather
 from sweep.report.figures import drawn_before, house_style, save
 from sweep.report.live import live
@@ -98,6 +99,7 @@ def _write(folder: Path, out: Path, say: Say) -> Path:
             limits=tables.limit_states(data),
             outputs=tables.output_rows(data),
             parameters=tables.parameter_rows(data),
+            bars=bars(data),
             fates=tables.fates(data, found),
             errors=tables.error_rows(data, found),
             provenance=tables.provenance(data),

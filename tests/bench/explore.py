@@ -13,7 +13,7 @@ import numpy as np
 from tests.support.browser import DRAWS, launcher
 from tests.support.explorer import ROOT, asked, explored
 
-REQUESTS = 100
+REQUESTS = 50
 # Move a slider and wait for the page to have drawn the answer: times to that, of which the server and the drawing.
 MOVED = """async (count) => {
     const name = page.ranges.find((range) => rows[range.name].slider).name, { slider } = rows[name], found = [];
