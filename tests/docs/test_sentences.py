@@ -1,0 +1,40 @@
+"""What a designer reads where a number alone would not tell him enough: sentences, where they stand."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from types import SimpleNamespace
+
+import pytest
+from click.testing import CliRunner
+
+from sweep.cli import main
+from sweep.cli.plan import _optimiser
+from sweep.report.answer import search_warnings
+from sweep.study.study import OptimiseSettings
+
+DOCS = Path(__file__).parents[2] / "docs"
+
+
+@pytest.mark.parametrize("name", ["rssr", "rssp", "four_bar", "slider_crank", "guide"])
+def test_margin_says_what_it_is_and_when_the_linkage_jams(name):
+    text = CliRunner().invoke(main, ["families", name]).output
+    (line,) = [line for line in text.splitlines() if line.split()[:1] == ["margin"]]
+    assert "cos^2 of the worst pressure angle" in line and "below 0 the linkage jams" in line
+
+
+def test_page_on_study_files_says_how_maximised_outputs_are_stored():
+    page = (DOCS / "study-files.md").read_text(encoding="utf-8")
+    assert "Maximised outputs are stored negated, as `minus_<output>`" in page
+
+
+def test_plan_says_when_a_search_ends():
+    (line,) = _optimiser(SimpleNamespace(optimise=OptimiseSettings()))
+    assert "fewer once better optima are unlikely (under 2 %) and the best was found 3 times" in line
+
+
+@pytest.mark.parametrize(("best", "words"), [(1, "Only one start reached"), (2, "Only two starts reached")])
+def test_an_optimum_that_few_starts_reached_asks_for_more(tmp_path, best, words):
+    survey = SimpleNamespace(shortcomings=[], doubts=True, populations=0, best=best)
+    data = SimpleNamespace(survey=survey, front_steps=None, folder=tmp_path / "designs", optimum={})
+    assert f"{words} this optimum; run more." in search_warnings(data)
