@@ -12,7 +12,7 @@ from typing import Any
 from kernels.chains.chain import Chained
 from kernels.chains.form import Helper, Travel
 from kernels.chains.links import Input
-from kernels.curves.trigonometric_polynomials import rotate
+from kernels.curves.polynomials import rotate
 from kernels.jit import generated_inline, inline
 
 MARGIN = -1  # instead of an order: the squared cosine of the last stage's pressure angle

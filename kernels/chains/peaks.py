@@ -12,7 +12,7 @@ from typing import Any
 from kernels.arithmetic.intrinsics import largest
 from kernels.chains.curves import Curve
 from kernels.chains.form import STRIDE, Helper
-from kernels.curves.trigonometric_polynomials import rotate
+from kernels.curves.polynomials import rotate
 from kernels.jit import generated_part, inline
 from kernels.types import EPS, Array
 

@@ -15,8 +15,7 @@ from sweep.costs import nanoseconds
 from sweep.errors import InputError
 from sweep.evaluation.summaries import design_outputs
 from sweep.families import chain_names, family
-from sweep.families.base import Accuracy, Array, Family
-from sweep.families.domain import March
+from sweep.families.base import Accuracy, Array, Family, March
 from sweep.reductions.steps import check_certifiable
 
 if TYPE_CHECKING:

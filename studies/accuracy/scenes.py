@@ -13,7 +13,7 @@ from studies.accuracy.effect_witness import Effected
 from sweep.effects import extended
 from sweep.effects.costs import designs as ordinary
 from sweep.families import family
-from sweep.families.domain import Turn
+from sweep.families.base import Turn
 from sweep.numerics.curves import table_curve
 
 GIVEN = tomllib.loads((Path(__file__).parent / "scenes.toml").read_text(encoding="utf-8"))

@@ -10,9 +10,8 @@ from kernels import status as st
 from studies.accuracy.regions import Region
 from sweep.evaluation.summaries import design_outputs
 from sweep.families import NAMES, family
-from sweep.families.base import Accuracy, Array, Family
+from sweep.families.base import Accuracy, Array, Family, Turn
 from sweep.families.chain import Chain
-from sweep.families.domain import Turn
 from sweep.reductions.sampling import Mask
 
 CHAINS = ("rssr+guide", "rssr+rssr")

@@ -20,8 +20,7 @@ from numpy.polynomial import chebyshev
 from kernels.types import TWO_PI
 from studies.accuracy.subjects import measure
 from sweep.evaluation.summaries import design_outputs
-from sweep.families.base import Accuracy, Array, Family
-from sweep.families.domain import March
+from sweep.families.base import Accuracy, Array, Family, March
 from sweep.reductions.sampling import Index, on_closed_turn, pose_columns
 
 GRID, FINER = 2048, 33  # angles of the first grid over a turn, and of each narrower one round a place

@@ -8,13 +8,12 @@ from collections.abc import Iterator, Mapping
 from itertools import pairwise
 
 from sweep.cli.families import described, main_outputs
-from sweep.families.base import Family
+from sweep.families.base import Family, March
 from sweep.families.chain import Chain, stages_of
-from sweep.families.domain import March
 from sweep.families.machines import Machine
 from sweep.families.names import is_flag, parts, stem
 from sweep.pages import rendered
-from sweep.study.written import design_entries, toml
+from sweep.study.toml import design_entries, toml
 
 # Units of the examples by unit word.  Those with forces or masses are in SI, the others in any length unit.
 SI = {

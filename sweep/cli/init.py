@@ -19,7 +19,7 @@ from sweep.families.machines import Machine
 from sweep.study.by_member import studies_of_members
 from sweep.study.load import load_study
 from sweep.study.schema import study_schema
-from sweep.study.written import toml
+from sweep.study.toml import toml
 
 SCHEMA = "study.schema.json"
 NAME = re.compile(r"[a-z0-9][a-z0-9-]{0,63}")

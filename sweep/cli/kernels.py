@@ -21,9 +21,8 @@ from sweep.engine.run import run
 from sweep.errors import Interrupted
 from sweep.evaluation.summaries import DEFAULT_TARGET, design_outputs, routes
 from sweep.families import family as find_family
-from sweep.families.base import Accuracy, Angles, Array, Family
+from sweep.families.base import Accuracy, Angles, Array, Family, March, equal_steps
 from sweep.families.chain import stages_of
-from sweep.families.domain import March, equal_steps
 from sweep.jobs.executors import executor, for_tasks
 from sweep.jobs.progress import Progress
 from sweep.jobs.signals import Stop, stop_on_signal

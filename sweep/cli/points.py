@@ -20,7 +20,7 @@ from sweep.plot.sheet import write_sheet
 from sweep.report.dataset import chosen
 from sweep.report.workbook import write_workbook
 from sweep.study.task import load_task
-from sweep.study.written import design_entries, toml
+from sweep.study.toml import design_entries, toml
 from sweep.synthesis.tasks import solve
 
 OF_DATASETS = ("xlsx", "pdf", "svg", "dxf")  # what takes more than a design: its study

@@ -12,8 +12,7 @@ from kernels import status as st
 from kernels.curves.periodic import turn_extremes
 from kernels.types import Status
 from sweep.effects.scene import Scene, take_over
-from sweep.families.base import Array, Columns, Output
-from sweep.families.domain import Turn
+from sweep.families.base import Array, Columns, Output, Turn
 from sweep.families.reduction import REDUCTIONS
 
 RESOLVED = 1e-9

@@ -19,8 +19,7 @@ from sweep.evaluation.statuses import explained
 from sweep.evaluation.summaries import asked_of_designs, chosen_accuracy
 from sweep.families import Mechanism
 from sweep.families import family as find_family
-from sweep.families.base import Angles, Family, Parameter
-from sweep.families.domain import Domain, Turn
+from sweep.families.base import Angles, Domain, Family, Parameter, Turn
 from sweep.families.names import stem
 from sweep.quantities.units import LARGEST, internal_unit, one_value, plain
 

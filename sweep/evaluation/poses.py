@@ -18,8 +18,7 @@ from sweep.evaluation.statuses import explained, meanings
 from sweep.evaluation.tables import design_matrix, kept_columns, numbers, plain_columns, wanted_names
 from sweep.families import Mechanism
 from sweep.families import family as find_family
-from sweep.families.base import Angles, Columns, Family, of_family
-from sweep.families.domain import Domain, March
+from sweep.families.base import Angles, Columns, Domain, Family, March, of_family
 from sweep.quantities.resolve import output_names
 
 if TYPE_CHECKING:

@@ -16,12 +16,11 @@ from kernels import status as st
 from kernels.types import TWO_PI
 from sweep import costs
 from sweep.errors import InputError
-from sweep.evaluation import composed
+from sweep.evaluation import route
 from sweep.evaluation.route import Part, Route, check_window, general_route, own_route
 from sweep.evaluation.statuses import explained
-from sweep.families.base import Accuracy, Array, Columns, Family, Step, Work, of_family
+from sweep.families.base import Accuracy, Array, Columns, Family, Interval, March, Step, Work, of_family
 from sweep.families.capabilities import Assembly
-from sweep.families.domain import Interval, March
 from sweep.families.machines import Machine
 from sweep.families.names import error_of, is_place
 from sweep.families.parts import Member, Stage
@@ -187,18 +186,18 @@ def _composed(family: Family, asked: Negative | Extent | TimingOf, accuracy: Acc
     match asked:
         case Negative(inner=inner):
             of = (inner.output.name,)
-            title, compose = f"negative of {of[0]}", partial(composed.negative, name, of[0])
+            title, compose = f"negative of {of[0]}", partial(route.negative, name, of[0])
         case Extent(box=box):
-            of, title, compose = box.asked, f"box {name}", partial(composed.extent, box)
+            of, title, compose = box.asked, f"box {name}", partial(route.extent, box)
         case TimingOf(timing=timing):
             of = timing.places
             # each of its places is a search by itself, and a value there a search of all of its passage
             order = max((Work.LONG, 0), *(route.order for route in routes(family, of, accuracy)))
             if isinstance(timing, EventValue):
                 assert isinstance(family, Machine)
-                title, compose = f"value {name}", partial(composed.value_at, family, timing)
+                title, compose = f"value {name}", partial(route.value_at, family, timing)
             else:
-                title, compose = f"timing {name}", partial(composed.difference, timing)
+                title, compose = f"timing {name}", partial(route.difference, timing)
     cost = sum(route.ns_per_design for route in routes(family, of, accuracy))
     whole = isinstance(asked, Extent)  # joints reach as far as they do, whatever window counts for deviations
     return Route(title, (name,), cost, partial(_run_composed, family, of, compose, whole), order=order)

@@ -20,8 +20,7 @@ from sweep.evaluation.statuses import meanings
 from sweep.evaluation.tables import design_matrix, kept_columns, plain_columns, wanted_names
 from sweep.families import Mechanism
 from sweep.families import family as find_family
-from sweep.families.base import Accuracy, Family
-from sweep.families.domain import Domain, March
+from sweep.families.base import Accuracy, Domain, Family, March
 from sweep.families.names import error_of
 from sweep.quantities.resolve import output, output_names
 from sweep.reductions.steps import check_certifiable, proofs

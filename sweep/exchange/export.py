@@ -25,8 +25,7 @@ from sweep.exchange.mjcf import write_mjcf
 from sweep.exchange.scene import pose, shown_name, turn
 from sweep.families import Mechanism
 from sweep.families import family as find_family
-from sweep.families.base import Family
-from sweep.families.domain import Interval, Turn, equal_steps
+from sweep.families.base import Family, Interval, Turn, equal_steps
 from sweep.families.machines import Machine
 from sweep.quantities.units import speed_given
 

@@ -15,8 +15,7 @@ from sweep.evaluation.statuses import meaning
 from sweep.evaluation.tables import design_matrix
 from sweep.families import Mechanism
 from sweep.families import family as find_family
-from sweep.families.base import Array
-from sweep.families.domain import Interval, March, equal_steps
+from sweep.families.base import Array, Interval, March, equal_steps
 
 if TYPE_CHECKING:
     from sweep.evaluation.tables import Table

@@ -10,8 +10,7 @@ from sweep.errors import InputError
 from sweep.evaluation.joints import Part, parts
 from sweep.exchange.scene import is_spatial, shown_name
 from sweep.explore.hand import Hand
-from sweep.families.base import Array
-from sweep.families.domain import Turn
+from sweep.families.base import Array, Turn
 
 STEP = 1e-6  # of differences: a part of the mechanism's size, or rad
 ROUNDS, HALVINGS = 3, 5

@@ -20,7 +20,7 @@ from sweep.report.judged import judged
 from sweep.report.quantities import quantity
 from sweep.study import Study
 from sweep.study.load import study_from_data
-from sweep.study.written import design_entries, toml
+from sweep.study.toml import design_entries, toml
 
 Design = Mapping[str, float]
 """Dimensions in internal units by name; inputs of effects that are left out are those of the study."""

@@ -13,9 +13,8 @@ import numpy as np
 
 from kernels.families import backrest
 from kernels.types import Array
-from sweep.families.base import Angles, Columns, Family, Output, Parameter
+from sweep.families.base import Angles, Columns, Family, Interval, Output, Parameter
 from sweep.families.capabilities import Fixed, Link, Made, Points, Skeleton
-from sweep.families.domain import Interval
 from sweep.families.poses import guarded
 from sweep.families.skeletons import ORIGIN, parameter, standing
 

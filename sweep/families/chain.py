@@ -9,14 +9,13 @@ from typing import Any
 
 import numpy as np
 
-from kernels.chains.derivatives import chain_rule, input_angle
+from kernels.chains.links import chain_rule, input_angle
 from kernels.status import OK
 from kernels.types import Array
 from sweep.errors import InputError
-from sweep.families.base import Angles, Columns, Family, Output, Parameter
+from sweep.families.base import Angles, Columns, Family, Output, Parameter, Turn
 from sweep.families.capabilities import Assembly, GuidedPoint, LimitLocus, OutputLink, Points
 from sweep.families.curve_features import of_stages
-from sweep.families.domain import Turn
 from sweep.families.frames import Frame, can_be_placed, stage_frames
 from sweep.families.parts import Stage
 

@@ -7,9 +7,8 @@ from collections import Counter
 from collections.abc import Mapping
 
 from kernels.linkage.bodies import DRIVEN
-from sweep.families.base import Family
+from sweep.families.base import Family, March, Turn
 from sweep.families.capabilities import Assembly, Dimensions, JointRecords, OutputLink, Points, Skeleton
-from sweep.families.domain import March, Turn
 from sweep.families.link_tree import LinkTree
 from sweep.families.parameter import WORDS, is_known, of_derivative
 

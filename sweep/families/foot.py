@@ -16,9 +16,8 @@ from kernels.families.foot import OUTPUTS as _CLOSED
 from kernels.status import NO_EVENT, OK
 from kernels.types import Array
 from sweep.families import feed
-from sweep.families.base import Accuracy, Angles, Columns, Family, Output, Parameter, Step, Work
+from sweep.families.base import Accuracy, Angles, Columns, Family, March, Output, Parameter, Step, Work
 from sweep.families.capabilities import Fixed, Link, Made, Skeleton
-from sweep.families.domain import March
 from sweep.families.poses import guarded
 from sweep.families.skeletons import Y as UPWARDS
 from sweep.families.skeletons import parameter, standing

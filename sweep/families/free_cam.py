@@ -9,9 +9,8 @@ import numpy as np
 
 from kernels.families import free_cam
 from kernels.types import Array
-from sweep.families.base import Angles, Columns, Family, Output, Parameter
+from sweep.families.base import Angles, Columns, Family, March, Output, Parameter
 from sweep.families.capabilities import Link, Made, Points, Skeleton, ThreadPath
-from sweep.families.domain import March
 from sweep.families.planar_trees import turning_cam
 from sweep.families.poses import poses_of
 from sweep.families.skeletons import ORIGIN, parameter, standing

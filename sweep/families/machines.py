@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from kernels.chains.derivatives import chain_rule
+from kernels.chains.links import chain_rule
 from kernels.status import OK
 from kernels.types import Array
 from sweep.families.base import Angles, Columns, Event, Family, Output, Parameter

@@ -14,8 +14,7 @@ import numpy as np
 
 from sweep.families.base import Output, Parameter
 from sweep.families.frames import Frame
-from sweep.families.gaps import Gap
-from sweep.families.segments import cross, dot, minus
+from sweep.families.segments import Gap, cross, dot, minus
 from sweep.families.sites import AXES
 from sweep.families.tools import Blade, Needle, rate_of
 

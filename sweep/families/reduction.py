@@ -6,8 +6,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Literal, TypeAlias
 
-from sweep.families.base import Family, Output
-from sweep.families.domain import Domain, Turn
+from sweep.families.base import Domain, Family, Output, Turn
 from sweep.families.names import without_minus
 
 Mode: TypeAlias = Literal[-1, 0, 1]

@@ -11,17 +11,16 @@ from typing import Any
 import numpy as np
 
 from sweep.errors import InputError, choices, nearest
-from sweep.families.base import Event, Family, Output
+from sweep.families.base import Event, Family, Output, Turn, reads_as_degrees
 from sweep.families.capabilities import OutputLink
-from sweep.families.domain import Turn, reads_as_degrees
 from sweep.families.frames import crank_axis
-from sweep.families.gaps import Body, Gap
 from sweep.families.happenings import check_happenings
 from sweep.families.link_tree import LinkTree
 from sweep.families.machines import Machine, assemble
 from sweep.families.main_shaft import Driven, ShaftTorque
 from sweep.families.parts import Member, coupler_joints, is_planar, placement, vector
 from sweep.families.relations import Distance, EventValue, Relation, Speed, Timing, each, two
+from sweep.families.segments import Body, Gap
 from sweep.families.shafts import MOUNT_KEYS, SHAFT_KEYS, Mount, Shaft, read_mount, read_shafts
 from sweep.families.shaking import Shaken, Shaking, shaken
 from sweep.families.stitching import read_entering, read_sewing, read_taking, read_thread

@@ -10,8 +10,8 @@ import numpy as np
 
 from sweep.errors import InputError, choices
 from sweep.families.capabilities import OutputLink
-from sweep.families.gaps import Body
 from sweep.families.parts import Member, vector
+from sweep.families.segments import Body
 from sweep.families.sites import AXES, links_of
 
 NEEDLE_KEYS = ("on", "line", "sense", "scarf", "diameter", "floor", "top", "scarf_end", "eye", "point")

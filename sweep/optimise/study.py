@@ -17,8 +17,7 @@ from sweep.dataset import files
 from sweep.evaluation.curves import joint_curves, motion_curves
 from sweep.evaluation.summaries import design_outputs, output
 from sweep.evaluation.tables import design_matrix
-from sweep.families.base import Angles, Array, Columns
-from sweep.families.domain import Interval
+from sweep.families.base import Angles, Array, Columns, Interval
 from sweep.families.names import is_error, without_error
 from sweep.jobs.progress import AT_MOST, Say, best_words, unsaid
 from sweep.jobs.signals import Deadline

@@ -1,4 +1,4 @@
-"""Pictures of one design: its motion, the mechanism itself, the load on a bearing."""
+"""Pictures of one design: its motion, the mechanism itself, the load on a bearing, its cyclogram."""
 
 from __future__ import annotations
 
@@ -19,20 +19,58 @@ from sweep.evaluation.poses import evaluate, pose_wants
 from sweep.exchange.scene import VIEWS, exists, over, shown_name
 from sweep.families import Mechanism
 from sweep.families import family as find_family
-from sweep.families.base import Array, Family
-from sweep.families.domain import Interval
-from sweep.plot.cyclogram import cyclogram_figure
+from sweep.families.base import Array, Family, Interval
 from sweep.plot.drawing import COLOURS, mechanism_figure
 from sweep.quantities.units import speed_given
-from sweep.report.figures import OPTIMUM, WIDTH, crank_axis, house_style, new_figure
+from sweep.report.figures import LIMIT, OPTIMUM, QUIET, WIDTH, crank_axis, house_style, new_figure
 from sweep.report.live import is_angle, turns_fully
 from sweep.report.quantities import quantity
 
 if TYPE_CHECKING:
     import pandas as pd
     from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
 
     from sweep.evaluation.tables import Table
+
+TURN = 360.0
+BAR, THIN = 0.5, 0.16  # heights of strokes and dwells, a row being 1
+
+
+def cyclogram_figure(rows: pd.DataFrame) -> Figure:
+    """Draw a cyclogram over one turn of the main shaft: rising strokes dark, falling ones light, dwells beneath."""
+    members = list(dict.fromkeys(rows["member"][rows["kind"] != "event"]))
+    events = rows[rows["kind"] == "event"]
+    figure = new_figure(WIDTH, 0.62 * len(members) + 1.0 + 0.14 * len(events))
+    axes = figure.subplots()
+    spans: Any = zip(*(rows[column] for column in ("member", "kind", "name", "start", "end")), strict=True)
+    for member, kind, name, begin, end in spans:
+        if kind == "event":
+            continue
+        height = len(members) - 1 - members.index(member)
+        start, length = math.degrees(begin), math.degrees(end - begin) % TURN
+        stroke = kind == "stroke"
+        colour = (OPTIMUM if name == "rises" else "#a9c1df") if stroke else QUIET
+        bottom = height - 0.5 * BAR if stroke else height - 0.5 * BAR - THIN - 0.04
+        pieces = [(start, min(length, TURN - start)), (0.0, max(start + length - TURN, 0.0))]
+        axes.broken_barh(pieces, (bottom, BAR if stroke else THIN), color=colour, linewidth=0, zorder=2)
+    _events(axes, events, len(members))
+    axes.set_yticks(range(len(members)), members[::-1])
+    axes.set_ylim(-0.6, len(members) - 0.3 + 0.34 * len(events))
+    crank_axis(axes, "angle of the main shaft [°]")
+    return figure
+
+
+def _events(axes: Axes, events: pd.DataFrame, rows: int) -> None:
+    """Draw each event as a line, its name above the rows, one below the other so that none covers another."""
+    named: Any = zip(events["name"], events["start"], strict=True)
+    for k, (name, start) in enumerate(named):
+        phi, height = math.degrees(start), rows - 0.35 + 0.34 * k
+        axes.plot([phi, phi], [-0.6, height], color=LIMIT, linewidth=1.0, zorder=3)
+        right = phi > 0.75 * TURN
+        words = f"{name} {phi:.1f}°"
+        axes.text(phi - 3 if right else phi + 3, height, words, ha="right" if right else "left", va="top", fontsize=8)
+
 
 POSES = 720
 MOST_LINES = 20  # in one panel

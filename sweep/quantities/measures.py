@@ -12,9 +12,8 @@ from dataclasses import dataclass
 from typing import Literal, TypeAlias, cast
 
 from sweep.errors import InputError
-from sweep.families.base import Family
+from sweep.families.base import Family, Turn
 from sweep.families.capabilities import Assembly
-from sweep.families.domain import Turn
 from sweep.families.names import parts, stem, without_minus
 from sweep.families.relations import EventValue, Timing
 from sweep.quantities.dimensions import Piece

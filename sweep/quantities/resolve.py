@@ -6,10 +6,9 @@ from dataclasses import replace
 
 from sweep.effects import elsewhere, offered
 from sweep.errors import InputError, listed, nearest
-from sweep.families.base import Event, Family, Output, of_family
+from sweep.families.base import Event, Family, Interval, Output, Turn, of_family
 from sweep.families.capabilities import Assembly
 from sweep.families.chain import Chain
-from sweep.families.domain import Interval, Turn
 from sweep.families.machines import Machine
 from sweep.families.names import at_stage, parts, without_minus
 from sweep.families.parts import Member

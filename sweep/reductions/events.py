@@ -9,8 +9,7 @@ import numpy as np
 from kernels import status as st
 from kernels.curves import samples as scan
 from kernels.types import EPS, TWO_PI, Status
-from sweep.families.base import Accuracy, Array, Columns, Event, Family
-from sweep.families.domain import Interval
+from sweep.families.base import Accuracy, Array, Columns, Event, Family, Interval
 from sweep.families.names import error_of
 from sweep.numerics.events import zeros
 from sweep.quantities.resolve import event_names

@@ -13,9 +13,8 @@ from numpy.typing import NDArray
 from kernels import status as st
 from kernels.curves import samples as scan
 from kernels.types import TWO_PI, Status
-from sweep.families.base import Angles, Array, Columns, Family, PoseFunction, of_family
+from sweep.families.base import Angles, Array, Columns, Family, Interval, PoseFunction, of_family
 from sweep.families.capabilities import Assembly
-from sweep.families.domain import Interval
 
 Index: TypeAlias = NDArray[np.int64]
 Mask: TypeAlias = NDArray[np.bool_]

@@ -19,8 +19,7 @@ from sweep.errors import InputError
 from sweep.evaluation.curves import coordinate, motion_curves
 from sweep.evaluation.joints import Part, parts
 from sweep.exchange.scene import Placed, extent, is_spatial, shown_name, side_by_side
-from sweep.families.base import Angles, Array, Family
-from sweep.families.domain import Interval, equal_steps
+from sweep.families.base import Angles, Array, Family, Interval, equal_steps
 from sweep.families.names import is_flag, is_largest, reduced, stem
 from sweep.quantities.limits import compared
 from sweep.report.optima import shown_designs

@@ -23,9 +23,8 @@ from sweep.report.made import COSTS, TELLING, made, made_sentence, share_made, s
 from sweep.report.optima import CARDS, groups, optima, optima_sentence
 from sweep.report.quantities import number, rpm
 from sweep.report.scan import Cells, Scan, most_telling
-from sweep.report.sewing import sewn
+from sweep.report.sewing import diagram_of_dataset, sewn, threads_figure
 from sweep.report.sketch import dimensioned, drawn_parts, sketch
-from sweep.report.threads import diagram_of_dataset, threads_figure
 
 if TYPE_CHECKING:
     import pandas as pd

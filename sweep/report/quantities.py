@@ -6,7 +6,7 @@ import math
 import re
 from dataclasses import dataclass, replace
 
-from sweep.families.domain import Turn
+from sweep.families.base import Turn
 from sweep.families.names import is_error, is_place, parts, without_error, without_minus
 from sweep.families.reduction import split
 from sweep.quantities.units import internal_unit

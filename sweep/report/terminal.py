@@ -16,9 +16,8 @@ from sweep.chunks.plan import spread_designs
 from sweep.dataset import files
 from sweep.evaluation.statuses import meaning
 from sweep.evaluation.summaries import design_outputs
-from sweep.families.base import Angles
+from sweep.families.base import Angles, Interval
 from sweep.families.capabilities import Assembly
-from sweep.families.domain import Interval
 from sweep.optimise import read_survey
 from sweep.optimise.local.descent import KKT
 from sweep.optimise.multistart.survey import started

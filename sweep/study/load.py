@@ -16,15 +16,13 @@ from sweep.quantities.limits import Limit
 from sweep.study.accuracy import accuracy_table, check_proofs, read_accuracy
 from sweep.study.design import Elsewhere, check_varied, read_reference, read_space, take, taken_reference
 from sweep.study.file import Faults, StudyFile
-from sweep.study.fit import read_fit
 from sweep.study.limits import read_limits
 from sweep.study.loads import Inputs, read_inputs, tables_of_inputs
-from sweep.study.locus import RATIOS, read_locus
+from sweep.study.locus import RATIOS, read_fit, read_locus
 from sweep.study.mechanism import flattened, read_mechanism
-from sweep.study.objective import check_goal, check_objective
-from sweep.study.optimise import check_search, check_steady, read_optimise
+from sweep.study.objective import check_goal, check_objective, check_steady, read_pareto
+from sweep.study.optimise import check_search, read_optimise
 from sweep.study.parameter import Entry
-from sweep.study.pareto import read_pareto
 from sweep.study.report import check_report
 from sweep.study.scene import read_window, speeds, with_effects
 from sweep.study.study import (
@@ -39,7 +37,7 @@ from sweep.study.task import check_task, read_study_task
 from sweep.study.thread import read_threads
 from sweep.study.tolerance import check_tolerance, read_tolerance
 from sweep.study.toml import key_lines, read_toml, toml_text
-from sweep.synthesis.prescription import OnLocus
+from sweep.synthesis.locus import OnLocus
 from sweep.synthesis.tasks.problem import SynthesisTask
 
 

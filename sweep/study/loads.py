@@ -91,7 +91,7 @@ def read_inputs(file: StudyFile, bare: Family) -> Inputs:
 
 
 def _with_rods(entries: Mapping[str, Any], faults: Faults) -> dict[str, Any]:
-    """[bodies] with the columns of :func:`sweep.evaluation.rods.rod` in place of bodies of a material and a section."""
+    """Fill [bodies] with the columns of :func:`sweep.evaluation.rods.rod` for bodies of a material and a section."""
     found: dict[str, Any] = {}
     for name, entry in entries.items():
         if not isinstance(entry, dict) or {"material", "section"}.isdisjoint(entry):

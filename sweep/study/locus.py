@@ -1,21 +1,24 @@
-"""[locus]: limit positions of the first stage, from which its links follow, each given once, in its unit."""
+"""[locus] and [fit]: limit positions from which the links of a stage follow, and the line of a guided point."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
+from pydantic import Field
 
+from sweep.errors import InputError
 from sweep.families.base import Family, Parameter
 from sweep.families.capabilities import LimitLocus
 from sweep.families.chain import Chain, stages_of
 from sweep.quantities.limits import Limit
-from sweep.study.file import Faults, StudyFile
+from sweep.study.file import Faults, Section, Size, StudyFile
 from sweep.study.parameter import Entry, missing_parameter, read_entry
 from sweep.study.space import Axis
 from sweep.synthesis import LOCI
-from sweep.synthesis.prescription import OnLocus
+from sweep.synthesis.fit import LineFit
+from sweep.synthesis.locus import OnLocus
 
 # Two words for phi0/(2 pi - phi0): that of the time there over the time back, and the output's.
 RATIOS = ("time_ratio", "stroke_ratio")
@@ -110,3 +113,33 @@ def _values(entry: Entry) -> np.ndarray[tuple[int], np.dtype[np.float64]]:
     if not isinstance(entry, Axis):
         return np.array([entry])
     return np.array([entry.low, entry.high]) if entry.values is None else np.asarray(entry.values)
+
+
+class FitSection(Section):
+    """Table [fit]."""
+
+    stroke: Size | None = Field(None, description='a length as a text, as "24.5 mm"')
+    direction: Literal["free", "given"] = Field("free", description='"free" or "given"')
+
+
+def read_fit(section: FitSection, file: StudyFile, family: Family) -> LineFit | None:
+    """Read the fit of the mechanism's guided point; None where the file asks for none."""
+    if "fit" not in file:
+        return None
+    fit = LineFit(section.stroke, section.direction == "free")
+    try:
+        fit.parameters(family)
+    except InputError as error:
+        file.faults.value(("fit",), family.name, error.allowed)
+        return None
+    if "optimise" in file and fit.stroke is not None:
+        _check_stroke(fit.stroke, family, file.free_table("limits") or {}, file.faults)
+    return fit
+
+
+def _check_stroke(stroke: float, family: Family, limits: dict[str, object], faults: Faults) -> None:
+    """Report an optimum without a bound on its stroke: [fit] scales the designs of the sweep, not of the search."""
+    names = ("stroke", f"stroke{len(family.stages)}") if isinstance(family, Chain) else ("stroke",)
+    if not any(name in limits for name in names):
+        words = f'{{ min = {stroke * 0.999:g}, max = {stroke * 1.001:g}, unit = "mm" }}'
+        faults.missing(("limits", "stroke"), f"bounds near fit.stroke that [optimise] must keep, as {words}")

@@ -1,13 +1,24 @@
-"""[objective]: the design output to be made small, or large."""
+"""[objective] and [pareto]: what is made small or large, and the second output that it is set against."""
 
 from __future__ import annotations
 
+import math
+from typing import Annotated, Any, cast
+
 from pydantic import Field
 
-from sweep.families.base import Family
-from sweep.families.names import negative
-from sweep.study.file import Faults, Section, StudyFile
+from sweep.errors import InputError
+from sweep.families.base import Family, Output, Parameter, Unit
+from sweep.families.names import negative, without_minus
+from sweep.quantities.limits import Limit
+from sweep.quantities.measures import measure
+from sweep.quantities.resolve import output
+from sweep.study.file import Faults, Key, Seconds, Section, StudyFile
 from sweep.study.limits import read_output_name
+from sweep.study.optimise import OptimiseSection
+from sweep.study.parameter import read_entry
+from sweep.study.space import Axis
+from sweep.study.study import ParetoSettings
 
 
 class ObjectiveSection(Section):
@@ -46,3 +57,121 @@ def check_objective(section: ObjectiveSection, family: Family, faults: Faults) -
     """Report an objective that is no output of the mechanism."""
     for key, name in section.named:
         read_output_name(family, name, ("objective", key), faults)
+
+
+def check_steady(file: StudyFile, family: Family, objective: ObjectiveSection, limits: tuple[Limit, ...]) -> None:
+    """Report an objective and limits that are constant in pieces: no slope leads a search to them.
+
+    What is only wanted may jump; it has no sensitivities.
+    """
+    if "optimise" not in file:
+        return
+    written = file.free_table("limits") or {}
+    asked = [(("objective", key), name, name) for key, name in objective.named]
+    asked += [(("limits", limit.output), limit.output, written.get(limit.output, limit.output)) for limit in limits]
+    for key, name, shown in asked:
+        if name not in family.parameter_names and _jumps(family, name):
+            allowed = (
+                f"a quantity that changes steadily; {name} is constant in pieces, so no slope leads to it: ask for it "
+                "in scene.want, or leave out [optimise] and let the sweep alone decide"
+            )
+            file.faults.value(key, shown, allowed)
+
+
+def _jumps(family: Family, name: str) -> bool:
+    try:
+        return output(family, name).jumps
+    except InputError:  # an unknown name is reported where it stands
+        return False
+
+
+MOST_BOUNDS = 64
+SIDES = ("at_most", "at_least")
+
+
+class ParetoSection(Section):
+    """Table [pareto]; at_most and at_least are read like parameters."""
+
+    required = ("output",)
+    output: str | None = Field(None, description="the name of a design output, not the objective")
+    at_most: Any = None
+    at_least: Any = None
+    points: Annotated[int, Field(ge=2, le=64)] | None = Field(None, description="a whole number, 2 to 64")
+    starts: Annotated[int, Field(ge=0, le=1000)] = Field(2, description="a whole number, 0 to 1000")
+    time_budget: Seconds | None = Field(None, description='a time as a text, as "60 s"')
+
+
+def read_pareto(
+    section: ParetoSection,
+    file: StudyFile,
+    family: Family,
+    objective: ObjectiveSection,
+    search: OptimiseSection,
+) -> ParetoSettings | None:
+    """Read the settings of the front, or None if something is faulty (all faults are reported).
+
+    Parameters
+    ----------
+    section : [pareto]
+    family : with the effects that the second output calls for
+    objective, search : [objective] and [optimise]
+    """
+    raw, faults = file.data.get("pareto"), file.faults
+    if "pareto" in file and "optimise" not in file:
+        faults.missing(("optimise",), "a table [optimise], as [pareto] begins at the optimum")
+    if not isinstance(raw, dict):
+        return None
+    given = [side for side in SIDES if side in raw]
+    if len(given) == 2:
+        faults.value(("pareto", "at_least"), raw["at_least"], "either at_most or at_least, not both")
+    elif not given:
+        faults.missing(("pareto", "at_most"), "bounds on the output; or at_least", instead="at_least")
+    if section.output is None:
+        return None
+    place: Key = ("pareto", "output")
+    output = read_output_name(family, section.output, place, faults)
+    if output is None or len(given) != 1:
+        return None
+    goal = objective.goal or ""
+    if output.name in (goal, without_minus(goal)):
+        faults.value(place, output.name, "another output than the objective")
+        return None
+    key: Key = ("pareto", given[0])
+    bounds = _bounds(output, raw[given[0]], key, faults)
+    if bounds is None or not _searchable(family, output, bounds, given[0], faults):
+        return None
+    if section.points is not None and not 2 <= len(set(bounds)) < section.points:
+        some = f"more than the {len(set(bounds))} bounds given, of which there must be two or more"
+        faults.value(("pareto", "points"), section.points, some)
+        return None
+    low, seconds = given[0] == "at_least", section.time_budget
+    return ParetoSettings(output.name, bounds, low, section.starts, seconds, section.points, search.looks)
+
+
+def _bounds(output: Output, raw: object, key: Key, faults: Faults) -> tuple[float, ...] | None:
+    # Bounds are written as the values of a parameter are, in any unit that an output can have.
+    word = cast(Unit, "angle" if output.unit == "rad" else output.unit)
+    entry = read_entry(Parameter(output.name, word, output.text), raw, key, faults, sampled=False)
+    if entry is None:
+        return None
+    bounds = (entry,) if not isinstance(entry, Axis) or entry.values is None else tuple(entry.values.tolist())
+    if len(bounds) > MOST_BOUNDS:
+        faults.value(key, f"{len(bounds)} bounds", f"at most {MOST_BOUNDS}: each is a search of its own")
+        return None
+    return tuple(float(bound) for bound in bounds)
+
+
+def _searchable(family: Family, output: Output, bounds: tuple[float, ...], side: str, faults: Faults) -> bool:
+    """Tell whether the optimiser can hold such bounds."""
+    try:
+        found = measure(family, output.name)
+    except InputError as error:
+        faults.value(("pareto", "output"), output.name, error.allowed)
+        return False
+    if found.inner == "rotatable" or output.jumps:
+        faults.value(("pareto", "output"), output.name, "a quantity that changes steadily")
+        return False
+    if found.inner in ("pressure", "transmission") and not all(0.0 < bound < 0.5 * math.pi for bound in bounds):
+        faults.value(("pareto", side), list(bounds), "angles between 0 and 90 deg")
+        return False
+    return True

@@ -6,13 +6,9 @@ from typing import Annotated, Literal
 
 from pydantic import Field
 
-from sweep.errors import InputError
 from sweep.families.base import Family
 from sweep.families.chain import driven_guide
-from sweep.quantities.limits import Limit
-from sweep.quantities.resolve import output
 from sweep.study.file import Seconds, Section, Seed, Share, StudyFile
-from sweep.study.objective import ObjectiveSection
 from sweep.study.study import OptimiseSettings, ProveSettings
 
 
@@ -55,29 +51,3 @@ def check_search(section: OptimiseSection, file: StudyFile, bare: Family) -> Non
         file.faults.value(("optimise", "variables"), "locus", '"parameters", or a table [locus]')
     if section.globally == "proportions" and driven_guide(bare) is None:
         file.faults.value(("optimise", "global"), "proportions", '"none", or the chain ["rssr", "guide"]')
-
-
-def check_steady(file: StudyFile, family: Family, objective: ObjectiveSection, limits: tuple[Limit, ...]) -> None:
-    """Report an objective and limits that are constant in pieces: no slope leads a search to them.
-
-    What is only wanted may jump; it has no sensitivities.
-    """
-    if "optimise" not in file:
-        return
-    written = file.free_table("limits") or {}
-    asked = [(("objective", key), name, name) for key, name in objective.named]
-    asked += [(("limits", limit.output), limit.output, written.get(limit.output, limit.output)) for limit in limits]
-    for key, name, shown in asked:
-        if name not in family.parameter_names and _jumps(family, name):
-            allowed = (
-                f"a quantity that changes steadily; {name} is constant in pieces, so no slope leads to it: ask for it "
-                "in scene.want, or leave out [optimise] and let the sweep alone decide"
-            )
-            file.faults.value(key, shown, allowed)
-
-
-def _jumps(family: Family, name: str) -> bool:
-    try:
-        return output(family, name).jumps
-    except InputError:  # an unknown name is reported where it stands
-        return False

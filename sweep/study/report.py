@@ -1,16 +1,16 @@
-"""[study] and [report]: name, title and question of the study, and figures and curves of its report."""
+"""[study], [report], [output] and [budget]: what a study asks, what is shown and stored, what it may cost."""
 
 from __future__ import annotations
 
 import re
 from collections.abc import Iterable
-from typing import Annotated
+from typing import Annotated, Literal
 
 from pydantic import Field
 
 from sweep.errors import choices
 from sweep.families.base import Family
-from sweep.study.file import Number, Section, StudyFile, missing_keys
+from sweep.study.file import Bytes, Number, Seconds, Section, StudyFile, missing_keys
 
 
 class StudySection(Section):
@@ -75,3 +75,18 @@ def check_report(report: ReportSection, file: StudyFile, family: Family, prescri
             if axis is not None and axis not in parameters:
                 allowed = f"one of {choices(axis, parameters)}"
                 faults.value(("report", "curves", k, key), axis, allowed)
+
+
+class OutputSection(Section):
+    """Table [output]."""
+
+    keep: Literal["feasible", "all"] = Field("feasible", description='"feasible" or "all"')
+    dtype: Literal["float32", "float64"] = Field("float64", description='"float32" or "float64"')
+    curves: Literal["optimum", "none"] = Field("optimum", description='"optimum" or "none"')
+
+
+class BudgetSection(Section):
+    """Table [budget]."""
+
+    disk: Bytes = Field(20e9, description='a size as a text, as "20 GB"', json_schema_extra={"default": "20 GB"})
+    time: Seconds = Field(3600.0, description='a time as a text, as "60 s"', json_schema_extra={"default": "1 h"})

@@ -21,7 +21,7 @@ from sweep.study.space import DesignSpace
 
 if TYPE_CHECKING:
     from sweep.synthesis.fit import LineFit
-    from sweep.synthesis.prescription import OnLocus
+    from sweep.synthesis.locus import OnLocus
     from sweep.synthesis.tasks.problem import SynthesisTask
 
 

@@ -1,6 +1,7 @@
 """``synthesise``: families of mechanisms from a table of requirements, each with the verdict of its tests.
 
-Slotted links for a wanted crank angle between the limit positions follow from (8) of docs/slotted.md.
+Slotted links for a wanted crank angle between the limit positions follow from (8) of docs/slotted.md.  Five-links in
+place of crank-rockers have the same limit positions, with two revolutes at the crank pin.
 """
 
 from __future__ import annotations
@@ -10,6 +11,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from kernels import status as st
+from kernels.families import five_link, rssr
 from kernels.families.slotted import crank_of_phi0
 from kernels.synthesis import acceptance
 from kernels.types import TWO_PI
@@ -17,6 +19,7 @@ from sweep.errors import InputError
 from sweep.evaluation.angles import AngleUnit, in_radians, plain_names
 from sweep.evaluation.summaries import design_outputs
 from sweep.evaluation.tables import Sheet, design_matrix, parameter_units
+from sweep.families import family
 from sweep.families import family as find_family
 from sweep.families.base import Accuracy, Array, Parameter
 from sweep.synthesis.locus import Found, Locus, locus
@@ -201,3 +204,48 @@ def _verdict(family: str, found: Found, limit: float | None) -> dict[str, object
         status[steep], failed[steep] = st.LIMIT_EXCEEDED, acceptance.PRESSURE
     words = pd.Categorical.from_codes(failed.astype(np.int8), pd.Index(acceptance.NAMES))
     return {"margin": margin, "max_pressure_angle": angle, "failed": words, "status": status}
+
+
+def five_links_with_limits(table: Table, h: float) -> pd.DataFrame:
+    """Return five-links whose rocker stands still where that of a crank-rocker does; (10) of docs/five_link.md.
+
+    The limit positions, so swing, phi0 and stroke ratio, are those of the crank-rocker; crank and coupler change with
+    h, all other links stay.
+
+    Parameters
+    ----------
+    table : crank-rockers, a b c e f g alpha branch, one row each; synthesis gives such tables
+    h : common perpendicular of the two revolutes, in the table's unit of length
+
+    Returns
+    -------
+    pandas.DataFrame
+        the columns of ``five_link`` and ``status``: OK, NOT_ADMISSIBLE where no five-link has these limits,
+        NOT_ROTATABLE or UNDECIDABLE where its crank does not turn fully; otherwise why the crank-rocker has no limits.
+        Links that were not found are nan.
+
+    Raises
+    ------
+    InputError
+        for a table that is no table of crank-rockers.
+    """
+    import pandas as pd
+
+    designs, _ = design_matrix(family("rssr"), table)
+    n = len(designs)
+    state, limits = np.empty(n, np.uint8), np.empty((n, len(rssr.LIMIT_NAMES)))
+    rssr.limits(designs, state, limits, None)
+    ext, fold = (np.ascontiguousarray(limits[:, rssr.LIMIT_NAMES.index(name)]) for name in ("psi_ext", "psi_fold"))
+    found, a, b = np.empty(n, np.uint8), np.empty(n), np.empty(n)
+    five_link.with_limits_of(designs, ext, fold, np.full(n, float(h)), found, a, b)
+    status = np.where(state == st.OK, found, state)
+    matrix = np.column_stack(
+        [a, b, designs[:, 2:7], np.full(n, float(h)), np.zeros(n), designs[:, 7], np.ones(n)]
+    )  # fmt: skip
+    there = np.flatnonzero(status == st.OK)
+    turning = design_outputs(family("five_link"), matrix[there], ["margin"], Accuracy(target=1e-9))
+    status[there] = turning["status"]
+    frame = pd.DataFrame(matrix, columns=list(family("five_link").parameter_names))
+    frame["status"] = status
+    frame.attrs["units"] = parameter_units(family("five_link").parameters)
+    return frame

@@ -25,8 +25,7 @@ from sweep.families.capabilities import InSeries
 from sweep.families.chain import Chain
 from sweep.families.poses import own_code
 from sweep.quantities.dimensions import size_step
-from sweep.reductions.steps import POSES_EVENT, POSES_PEAK, POSES_SEARCH
-from sweep.reductions.travel import certified_travel
+from sweep.reductions.steps import POSES_EVENT, POSES_PEAK, POSES_SEARCH, certified_travel
 from sweep.study import Study, load_study
 from sweep.study.space import Axis, DesignSpace
 from sweep.synthesis.fit import fit_line

@@ -14,8 +14,7 @@ from typing import NamedTuple
 import numpy as np
 
 from sweep.families import NAMES, family
-from sweep.families.base import Accuracy, Angles, Array, Family
-from sweep.families.domain import March
+from sweep.families.base import Accuracy, Angles, Array, Family, March
 from sweep.reductions.margins import margin_suffixes, own_step
 from sweep.reductions.sampling import on_closed_turn
 from sweep.reductions.turn import margin_group

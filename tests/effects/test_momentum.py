@@ -13,10 +13,9 @@ import pytest
 import sweep
 from sweep.effects.scene import first_scene
 from sweep.families import NAMES, family
-from sweep.families.base import Angles
+from sweep.families.base import Angles, Turn
 from sweep.families.capabilities import Assembly, OutputLink
 from sweep.families.chain import Chain
-from sweep.families.domain import Turn
 from sweep.families.frames import can_be_placed
 from sweep.families.link_tree import LinkTree
 from tests.reference.momentum import balance, body_momentum, triads

@@ -12,8 +12,7 @@ import pytest
 
 from sweep.evaluation.summaries import design_outputs
 from sweep.families import NAMES, family
-from sweep.families.base import Accuracy
-from sweep.families.domain import March
+from sweep.families.base import Accuracy, March
 from sweep.families.names import error_of
 from sweep.families.reduction import prefixes
 from tests.search.brute import blurred, poses

@@ -14,7 +14,7 @@ import sweep
 import sweep.synthesis
 from sweep.dataset import reading
 from sweep.families import NAMES, family
-from sweep.synthesis import five_link, heddle, mechanisms, thread_law
+from sweep.synthesis import heddle, mechanisms, thread_law
 from sweep.synthesis.tasks import task3
 from tests.support.report_dataset import write_dataset
 
@@ -84,7 +84,7 @@ TABLES = {
     mechanisms.central_slots: lambda folder: sweep.synthesise(
         "slotted", {"phi0": 2.8, "e": 10.0, "f": 2.0, "alpha": 0.4}
     ),
-    five_link.five_links_with_limits: lambda folder: five_link.five_links_with_limits(RSSR, 0.1),
+    mechanisms.five_links_with_limits: lambda folder: mechanisms.five_links_with_limits(RSSR, 0.1),
     task3.adjustments: lambda folder: task3.adjustments(RSSR),
     heddle.extremes: lambda folder: heddle.extremes(LEVER),
     heddle.rods: lambda folder: heddle.rods(LEVER | {"O2B": 80.0, "swing": 0.4}),

@@ -21,7 +21,7 @@ from sweep.evaluation.joints import parts
 from sweep.exchange.points import read_points, reader_of
 from sweep.exchange.scene import over, turn
 from sweep.families import NAMES, family
-from sweep.families.domain import Interval, March
+from sweep.families.base import Interval, March
 
 DRAWN = NAMES
 LINKED = ("rssr", "rssp", "guide", "four_bar", "slider_crank", "kim_dison")  # crank, coupler, rocker or slider

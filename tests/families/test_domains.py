@@ -14,8 +14,7 @@ import pytest
 
 import sweep
 from kernels import status as st
-from sweep.families.base import Angles, Event, Family, Output, Parameter
-from sweep.families.domain import Interval, March
+from sweep.families.base import Angles, Event, Family, Interval, March, Output, Parameter
 
 
 def _no_status(shape: tuple[int, ...]) -> dict[str, Any]:

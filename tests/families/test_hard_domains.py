@@ -11,8 +11,7 @@ import pytest
 from kernels import status as st
 from sweep.evaluation.summaries import design_outputs
 from sweep.families import NAMES, family
-from sweep.families.base import Accuracy, Angles
-from sweep.families.domain import March, Turn
+from sweep.families.base import Accuracy, Angles, March, Turn
 
 CASES = [name for name in NAMES if not isinstance(family(name).domain, Turn)]
 SECONDS = 120.0  # far more than any of these takes, far less than a hang

@@ -16,10 +16,9 @@ import pytest
 from kernels import status as st
 from sweep.evaluation.summaries import design_outputs
 from sweep.families import NAMES, family
-from sweep.families.base import Accuracy, Angles
+from sweep.families.base import Accuracy, Angles, Turn
 from sweep.families.capabilities import Assembly
 from sweep.families.chain import Chain
-from sweep.families.domain import Turn
 
 SECOND = {"a": 1.9, "b": 3.3, "c": 3.1, "e": 3.0, "xi": 4.2, "eta": 0.8, "lam": 1.1, "h": -0.6, "branch": 1.0}
 # Over a closed turn; families over an interval or a march: test_hard_domains.py.

@@ -12,8 +12,8 @@ import sweep
 from sweep.evaluation.joints import parts
 from sweep.exchange.scene import over
 from sweep.families import NAMES, family
+from sweep.families.base import March
 from sweep.families.capabilities import Points, Skeleton
-from sweep.families.domain import March
 
 DRAWN = NAMES
 PHI = np.linspace(0.0, 2.0 * math.pi, 24, endpoint=False)

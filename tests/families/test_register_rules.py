@@ -10,10 +10,9 @@ import pytest
 
 import sweep
 from sweep.families import NAMES, family
-from sweep.families.base import Event, Family, Output, Parameter, Step
+from sweep.families.base import Event, Family, Interval, March, Output, Parameter, Step
 from sweep.families.capabilities import Assembly, Dimensions, JointRecords, Link, Made, OutputLink, Points, Skeleton
 from sweep.families.check import FamilyError, check_family
-from sweep.families.domain import Interval, March
 from sweep.families.skeletons import ORIGIN
 from sweep.quantities.units import factor, internal_unit
 

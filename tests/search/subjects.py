@@ -13,8 +13,7 @@ from sweep.effects import NAMES as EFFECTS
 from sweep.effects import effect, extended
 from sweep.effects.costs import designs as ordinary
 from sweep.families import NAMES, family
-from sweep.families.base import Angles, Array, Columns, Family
-from sweep.families.domain import March
+from sweep.families.base import Angles, Array, Columns, Family, March
 from sweep.reductions.sampling import on_closed_turn
 from tests.support.turn_designs import guided_four_bars
 

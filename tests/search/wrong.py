@@ -19,9 +19,8 @@ import numpy as np
 
 from kernels import status as st
 from sweep.evaluation.summaries import design_outputs
-from sweep.families.base import Accuracy, Array, Columns, Family
+from sweep.families.base import Accuracy, Array, Columns, Family, Interval
 from sweep.families.chain import Chain
-from sweep.families.domain import Interval
 from sweep.families.names import error_of
 from sweep.families.reduction import prefixes
 from sweep.quantities.resolve import output_names

@@ -16,8 +16,8 @@ from studies.accuracy.scenes import SCENES
 from sweep.effects import NAMES as EFFECTS
 from sweep.effects import effect, extended
 from sweep.families import NAMES, family
+from sweep.families.base import March
 from sweep.families.capabilities import InSeries
-from sweep.families.domain import March
 from tests.support import sixty_digits
 from tests.support.rssr_designs import random_designs
 

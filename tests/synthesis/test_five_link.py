@@ -6,7 +6,7 @@ import numpy as np
 
 import sweep
 from kernels import status as st
-from sweep.synthesis.five_link import five_links_with_limits
+from sweep.synthesis.mechanisms import five_links_with_limits
 from tests.support.rssr_designs import random_designs
 
 

@@ -9,7 +9,7 @@ import numpy as np
 
 from kernels import status as st
 from kernels.arithmetic.complex_step import divisor
-from kernels.curves.trigonometric_polynomials import rotate
+from kernels.curves.polynomials import rotate
 from kernels.families.five_link.closure import (
     MOST,
     NONE,

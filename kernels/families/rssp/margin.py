@@ -23,7 +23,7 @@ import math
 from collections import namedtuple
 
 from kernels import status as st
-from kernels.curves.trigonometric_polynomials import minimum
+from kernels.curves.polynomials import minimum
 from kernels.families.rssp.motion import EPS, Reduced, place, reduce_design
 from kernels.jit import inline, kernel
 from kernels.linkage.verdict import turning_status

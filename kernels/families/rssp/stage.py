@@ -11,7 +11,7 @@ from typing import Any
 
 from kernels.arithmetic.intrinsics import largest, power_below, smallest
 from kernels.chains.form import STRIDE, Form, Travel
-from kernels.curves.trigonometric_polynomials import far_minimum, point
+from kernels.curves.polynomials import far_minimum, point
 from kernels.families.rssp.margin import least_q
 from kernels.families.rssp.motion import EPS, place, reduce_design
 from kernels.jit import inline, kernel

@@ -16,7 +16,7 @@ import numpy as np
 
 from kernels import status as st
 from kernels.arithmetic.intrinsics import largest, smallest
-from kernels.curves.trigonometric_polynomials import approach, far_minimum, lowest_of_16, minimum, point, shortfall
+from kernels.curves.polynomials import approach, far_minimum, lowest_of_16, minimum, point, shortfall
 from kernels.families.rssr.closure import (
     EPS,
     Array,

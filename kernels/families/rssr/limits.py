@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from kernels import status as st
 from kernels.arithmetic.intrinsics import largest, lowest_bit, smallest
 from kernels.arithmetic.sincos import sincos
-from kernels.curves.trigonometric_polynomials import minimum, rotate
+from kernels.curves.polynomials import minimum, rotate
 from kernels.families.rssr.block import (
     BLOCK,
     BRANCH,

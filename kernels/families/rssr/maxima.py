@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from kernels import status as st
-from kernels.curves.trigonometric_polynomials import far_minimum, point
+from kernels.curves.polynomials import far_minimum, point
 from kernels.families.rssr.block import (
     ACROSS,
     BLOCK,

@@ -15,7 +15,7 @@ import math
 import numpy as np
 
 from kernels.arithmetic.intrinsics import largest, lowest_bit
-from kernels.curves.trigonometric_polynomials import rotate
+from kernels.curves.polynomials import rotate
 from kernels.families.rssr.block import BLOCK, CA, K0, K1, K2, W_SIZE, Y0, E
 from kernels.families.rssr.careful import rounding
 from kernels.families.rssr.closure import Array, follower

@@ -11,9 +11,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from kernels.types import TWO_PI
-from sweep.families.base import Array, Family
+from sweep.families.base import Array, Family, Interval
 from sweep.families.curve_features import Crossing, Singular, Switches, Waves, crossed, switches
-from sweep.families.domain import Interval
 from sweep.reductions.resolution import FEWEST, denser, events
 
 STATIONARY, CROSSING, STATIC, EDGE = 0, 1, 2, 4  # how a point is held; 3 is PASSING of sweep.optimise.extrema.scanned

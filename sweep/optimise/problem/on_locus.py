@@ -19,7 +19,7 @@ from sweep.families.capabilities import LimitLocus
 from sweep.families.chain import Chain, stages_of
 from sweep.optimise.problem.statement import Problem
 from sweep.study import Limit
-from sweep.synthesis.prescription import OnLocus
+from sweep.synthesis.locus import OnLocus
 
 # The place on the locus is an angle without ends: a search that begins within one turn may leave it on either side.
 PLACE_BOUNDS = (-math.pi, 3.0 * math.pi)

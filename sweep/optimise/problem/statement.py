@@ -10,8 +10,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from sweep.errors import InputError, choices
-from sweep.families.base import Accuracy, Array, Family
-from sweep.families.domain import March
+from sweep.families.base import Accuracy, Array, Family, March
 
 if TYPE_CHECKING:
     from sweep.optimise.manufacture.curve_margins import Allowance, CurveMargin

@@ -10,7 +10,7 @@ from mpmath import mp
 
 import sweep
 from kernels import status as st
-from kernels.chains import derivatives as kernel
+from kernels.chains import links as kernel
 from sweep.families import chain as chains
 from sweep.families import family
 from sweep.families.base import Angles, Family, Output, Parameter

@@ -1,6 +1,6 @@
 """Fused chains: one kernel for all stages gives what the stages give one after the other.
 
-The staged route (kernels/chains/derivatives.py, poses of each family) shares no loop, no chain rule and no search with
+The staged route (kernels/chains/links.py, poses of each family) shares no loop, no chain rule and no search with
 the fused one; extrema are compared with poses in twice the working precision about the peaks that the search on poses
 finds.
 """

@@ -1,6 +1,6 @@
 """Slider-cranks, spatial and planar, at the end of fused chains and by themselves.
 
-The staged route (poses of each family, kernels/chains/derivatives.py) shares no loop, no chain rule and no search with
+The staged route (poses of each family, kernels/chains/links.py) shares no loop, no chain rule and no search with
 the fused one.  Single poses are compared with the 25-digit table, extrema with poses in twice the working precision.
 """
 

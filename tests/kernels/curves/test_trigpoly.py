@@ -10,7 +10,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as hs
 
 from kernels.arithmetic.sincos import sincos
-from kernels.curves.trigonometric_polynomials import lowest_of_16, minimum, rotate, shortfall
+from kernels.curves.polynomials import lowest_of_16, minimum, rotate, shortfall
 
 
 @numba.njit
