@@ -17,9 +17,9 @@ if TYPE_CHECKING:
     from sweep.evaluation import thread
     from sweep.evaluation.cyclogram import cyclogram
     from sweep.evaluation.joints import joints
+    from sweep.evaluation.loads import rod
     from sweep.evaluation.mechanism import mechanism
     from sweep.evaluation.poses import evaluate
-    from sweep.evaluation.rods import rod
     from sweep.evaluation.summaries import summarise
     from sweep.exchange.export import export
     from sweep.exchange.points import from_points
@@ -66,7 +66,7 @@ _HOMES = {
     "load": "sweep.dataset.store",
     "machine": "sweep.families",
     "mechanism": "sweep.evaluation.mechanism",
-    "rod": "sweep.evaluation.rods",
+    "rod": "sweep.evaluation.loads",
     "run": "sweep.engine.run",
     "scan": "sweep.dataset.reading",
     "summarise": "sweep.evaluation.summaries",

@@ -1,17 +1,20 @@
-"""Loads over the turn as a user of ``evaluate`` and ``summarise`` gives them."""
+"""Bodies and loads as a user states them: ``rod`` from material and section, curves over the turn."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+import math
+import re
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any, TypeAlias
 
 import numpy as np
 
 from sweep.effects import curved_inputs
-from sweep.errors import InputError, nearest
+from sweep.errors import InputError, choices, nearest
 from sweep.evaluation.tables import numbers
 from sweep.families.base import Array, Family
 from sweep.numerics.curves import Curve, SeriesCurve, TableCurve, table_curve
+from sweep.quantities.units import factor
 
 SERIES = ("mean", "cos", "sin")
 ALLOWED = "a pair (angles [rad], values), or a Fourier series as a dict of mean, cos and sin"
@@ -69,3 +72,84 @@ def _column(values: object, name: str) -> Array:
     if column.ndim != 1 or not np.isfinite(column).all():
         raise InputError("loads", values, "finite numbers in one row", name)
     return column
+
+
+# kg/m^3.  EN 1991-1-1, table A.4: weights over 9.81 m/s^2, the middle of a range, of steel its lower end.  Titanium and
+# magnesium: CRC Handbook of Chemistry and Physics, physical constants of the elements.
+DENSITIES = {
+    "steel": 7850.0,
+    "cast iron": 7310.0,
+    "aluminium": 2750.0,
+    "brass": 8560.0,
+    "bronze": 8560.0,
+    "titanium": 4506.0,
+    "magnesium": 1738.0,
+}
+INERTIAS = ("slender", "exact")
+SECTIONS = '"6 mm round", "5 mm square", "6 x 4 mm rectangular", "8 x 1 mm tube" (outer diameter, wall)'
+_SECTION = re.compile(r"([\d.]+)(?:\s*x\s*([\d.]+))?\s*([a-z]+)\s+(round|square|rectangular|tube)")
+_AREAS: dict[str, Callable[..., float]] = {
+    "round": lambda d: 0.25 * math.pi * d * d,
+    "square": lambda a: a * a,
+    "rectangular": lambda a, b: a * b,
+    "tube": lambda d, wall: math.pi * wall * (d - wall),
+}
+# Square of the radius of gyration about a line across the bar, of sections for which all these lines are alike.
+_GYRATIONS: dict[str, Callable[..., float]] = {
+    "round": lambda d: d * d / 16.0,
+    "square": lambda a: a * a / 12.0,
+    "tube": lambda d, wall: (d * d + (d - 2.0 * wall) ** 2) / 16.0,
+}
+UNITS = ("t", "t/mm", "mm")  # of the columns
+
+
+def rod(body: str, material: str, section: str, inertia: str = "slender") -> dict[str, float]:
+    """Mass of a body as a bar between its joints: columns to put into a table beside the dimensions.
+
+    Centre and inertia follow from the length that the body has in each design.
+
+    Parameters
+    ----------
+    body : its name, with the number of its stage, as ``crank``, ``rocker2``, ``needle.coupler1``
+    material : one of :data:`DENSITIES`
+    section : as "6 mm round", "5 mm square", "6 x 4 mm rectangular", "8 x 1 mm tube" (outer diameter, wall)
+    inertia : "slender", J = m l^2/12 across the bar and nothing along it, or "exact", m (l^2/12 + k^2) and 2 m k^2 with
+        the section's radius of gyration k; a rectangular section is slender: how it lies is not known
+
+    Returns
+    -------
+    dict
+        0 for what its mass is besides [t], the mass per length [t/mm], and k [mm], 0 where it is slender
+
+    Raises
+    ------
+    InputError
+        for an unknown material, a section that is not written like these, or another inertia
+
+    Examples
+    --------
+    >>> import sweep
+    >>> found = sweep.rod("crank", "steel", "6 mm round")
+    >>> {name: round(value * 1e9, 3) for name, value in found.items()}  # g/m
+    {'m_crank': 0.0, 'line_mass_crank': 221.954, 'gyration_crank': 0.0}
+    >>> sweep.rod("crank", "steel", "6 mm round", "exact")["gyration_crank"]  # mm
+    1.5
+    """
+    if material not in DENSITIES:
+        raise InputError("material", material, choices(material, list(DENSITIES)), body)
+    try:
+        match = _SECTION.fullmatch(section.strip())
+        assert match is not None
+        sizes = [factor(match[3], "mm") * float(size) for size in match.groups()[:2] if size is not None]
+        area, square = _AREAS[match[4]](*sizes), _GYRATIONS.get(match[4], lambda *_: math.nan)(*sizes)
+    except (AssertionError, TypeError, ValueError):
+        raise InputError("section", section, f"a section, as {SECTIONS}", body) from None
+    if not area > 0.0:
+        raise InputError("section", section, "positive sizes, a wall of less than the diameter", body)
+    if inertia not in INERTIAS or (inertia == "exact" and math.isnan(square)):
+        allowed = f"{' or '.join(INERTIAS)}; how a rectangular section lies is not known, so it is slender"
+        raise InputError("inertia", inertia, allowed, body)
+    member, dot, own = body.rpartition(".")
+    thick = math.sqrt(square) if inertia == "exact" else 0.0
+    values = 0.0, 1e-12 * DENSITIES[material] * area, thick
+    return {f"{member}{dot}{name}_{own}": x for name, x in zip(("m", "line_mass", "gyration"), values, strict=True)}

@@ -16,7 +16,7 @@ from pydantic import Field
 from sweep.effects import curved_inputs, input_names
 from sweep.effects.base import STUDY_LOADS
 from sweep.errors import InputError, choices, closest
-from sweep.evaluation.rods import UNITS, rod
+from sweep.evaluation.loads import UNITS, rod
 from sweep.families.base import Family
 from sweep.families.machines import Machine
 from sweep.families.names import at_stage
@@ -91,7 +91,7 @@ def read_inputs(file: StudyFile, bare: Family) -> Inputs:
 
 
 def _with_rods(entries: Mapping[str, Any], faults: Faults) -> dict[str, Any]:
-    """Fill [bodies] with the columns of :func:`sweep.evaluation.rods.rod` for bodies of a material and a section."""
+    """Fill [bodies] with the columns of :func:`sweep.evaluation.loads.rod` for bodies of a material and a section."""
     found: dict[str, Any] = {}
     for name, entry in entries.items():
         if not isinstance(entry, dict) or {"material", "section"}.isdisjoint(entry):
