@@ -74,12 +74,10 @@ def _write(folder: Path, out: Path, say: Say) -> Path:
         figures = draw(data, found, cells, out / "figures")
         say("report", 2, STEPS, "steps")
         told = made(data)
-        strokes = _cyclogram(data)
+        strokes = _cyclogram(data, out)
         say("report", 3, STEPS, "steps")
         copy_tables(folder, out)
         write_survivors(data.parts, out / "survivors.parquet")
-        if strokes is not None:
-            strokes.to_csv(out / "cyclogram.csv", index=False, float_format="%.4f")
         figures |= _threads(data, out)
         within = tolerance_words(data)
         stitch = sewn(data)
@@ -166,12 +164,14 @@ def answer_sketch(data: Dataset) -> Markup | None:
     return sketch(placed, f"{data.result_name} with its dimensions", words)
 
 
-def _cyclogram(data: Dataset) -> pd.DataFrame | None:
-    """Return the cyclogram of the result of a machine; None of anything else."""
+def _cyclogram(data: Dataset, out: Path) -> pd.DataFrame | None:
+    """Write and return the cyclogram of the result of a machine; None of anything else."""
     row, family = data.result, data.study.family
     if row is None or not isinstance(family, Machine):
         return None
-    return table_in_degrees(cyclogram(family, {name: row[name] for name in family.parameter_names}, angles="rad"))
+    found = table_in_degrees(cyclogram(family, {name: row[name] for name in family.parameter_names}, angles="rad"))
+    found.to_csv(out / "cyclogram.csv", index=False, float_format="%.4f")
+    return found
 
 
 def own_figures(study: Study, folder: Path) -> list[dict[str, Any]]:
