@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -12,11 +12,12 @@ from numpy.typing import NDArray
 from sweep.evaluation.summaries import design_outputs
 from sweep.families.base import Accuracy, Array, Family
 from sweep.families.names import is_flag
+from sweep.optimise.extrema.gradients import scalar_gradient
 from sweep.optimise.local.model import Model
 from sweep.optimise.problem.program import Program
 from sweep.optimise.problem.statement import Problem
 from sweep.quantities.limits import meets
-from sweep.quantities.measures import Measure
+from sweep.quantities.measures import Measure, measure
 from sweep.quantities.resolve import output as described
 
 if TYPE_CHECKING:
@@ -60,20 +61,45 @@ def sensitivities(
     names = tuple(family.parameters[k].name for k in varied)
     fixed = {n: float(x) for n, x in zip(family.parameter_names, design, strict=True) if n not in names}
     rows: dict[str, list[Any]] = {name: [] for name in ("parameter", "output", "value", "growing", "shrinking")}
-    for output in outputs:
-        if is_flag(output) or described(family, output).jumps:
-            continue
-        place = design[varied]
-        problem = Problem(
-            family, names, place - 0.5 * span, place + 0.5 * span, fixed, output, (), window, Accuracy(target=1e-9)
-        )
-        value, low, high = _ends(problem, design)
+    asked = [name for name in outputs if not is_flag(name) and not described(family, name).jumps]
+    place, accuracy = design[varied], Accuracy(target=1e-9)
+
+    def problem(output: str) -> Problem:
+        return Problem(family, names, place - 0.5 * span, place + 0.5 * span, fixed, output, (), window, accuracy)
+
+    found = _plain_ends(problem, design, [name for name in asked if _is_plain(family, name, window)])
+    for output in asked:
+        value, low, high = found[output] if output in found else _ends(problem(output), design)
         rows["parameter"] += names
         rows["output"] += [output] * len(names)
         rows["value"] += [value] * len(names)
         rows["growing"] += (high / span).tolist()
         rows["shrinking"] += (low / span).tolist()
     return rows
+
+
+def _is_plain(family: Family, output: str, window: tuple[float, float] | None) -> bool:
+    """Tell whether an output is a number without extrema that could be followed, and no parameter."""
+    found = measure(family, output, window)
+    return found.kind == "scalar" and not found.parts and output not in family.parameter_names
+
+
+def _plain_ends(
+    problem: Callable[[str], Problem], design: Array, outputs: Sequence[str]
+) -> dict[str, tuple[float, Array, Array]]:
+    """Return what :func:`_ends` does of plain numbers, all computed together: they share poses and steps."""
+    if not outputs:
+        return {}
+    asked = problem(outputs[0])
+
+    def values(designs: Array) -> Array:
+        columns = design_outputs(asked.family, designs, list(outputs), asked.accuracy, asked.window)
+        return np.stack([np.asarray(columns[name], np.float64) for name in outputs], axis=1)
+
+    at = asked.scaled(design[None, :])[0]
+    slopes = scalar_gradient(lambda moved: values(asked.placed(design, moved)), at)
+    numbers = values(design[None, :])[0]
+    return {name: (float(numbers[k]), slopes[:, k], slopes[:, k]) for k, name in enumerate(outputs)}
 
 
 def _ends(problem: Problem, design: Array) -> tuple[float, Array, Array]:
