@@ -82,3 +82,38 @@ def test_random_bit_patterns_never_raise_never_hang_and_every_nan_is_explained(n
         assert explained(poses(mechanism, rows), mechanism.position)
         assert explained(*summary(mechanism, rows))
     assert time.process_time() - start < SECONDS
+
+
+POWERS = {"length": 1, "1/length": -1, "force": 1, "N": 1, "length^2": 2, "length/time": 1, "torque": 2, "N*s": 1}
+
+
+@pytest.mark.parametrize("exponent", [-199, -60, 60, 199])
+@pytest.mark.parametrize("name", CASES)
+def test_scale_changes_no_bit(name, exponent):
+    """All lengths times 2^k, and all forces, so that stiffnesses, masses and times stay what they are."""
+    mechanism = family(name)
+    names = frozenset(o.name for o in mechanism.pose_outputs)
+    designs = example(mechanism) * np.where(
+        [p.unit in ("length", "force") for p in mechanism.parameters],
+        np.random.default_rng(25).uniform(0.99, 1.01, (3, len(mechanism.parameters))), 1.0,
+    )  # fmt: skip
+    scaled = np.ldexp(designs, exponent * np.array([POWERS.get(p.unit, 0) for p in mechanism.parameters]))
+    at = variable(mechanism, designs)
+    of_domain = exponent * POWERS.get(mechanism.domain.unit, 0)
+    plain = mechanism.poses(designs, Angles.of(at), names)
+    big = mechanism.poses(scaled, Angles.of(np.ldexp(at, of_domain)), names)
+    np.testing.assert_array_equal(plain["status"], big["status"])
+    assert (plain["status"] == st.OK).any()
+    for output in mechanism.pose_outputs:
+        power = exponent * POWERS.get(output.unit, 0)
+        same = np.asarray(plain["status"]) == st.OK
+        np.testing.assert_array_equal(
+            np.ldexp(plain[output.name], power)[same], big[output.name][same], err_msg=output.name
+        )
+    wanted = f"max_{mechanism.position}"
+    (unit,) = (o.unit for o in mechanism.pose_outputs if o.name == mechanism.position)
+    accuracies = [Accuracy(samples=SAMPLES)] + [Accuracy(target=1e-8)] * (not isinstance(mechanism.domain, March))
+    for accuracy in accuracies:
+        one, other = (design_outputs(mechanism, d, [wanted], accuracy) for d in (designs, scaled))
+        np.testing.assert_array_equal(one["status"], other["status"])
+        np.testing.assert_array_equal(np.ldexp(one[wanted], exponent * POWERS.get(unit, 0)), other[wanted])
