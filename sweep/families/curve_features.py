@@ -50,7 +50,11 @@ class Singular:
         """Make the sum of the squares of pose outputs: where they nearly vanish something turns or moves at once."""
 
         def curve(designs: Array, angles: Angles, found: Columns) -> Array:
-            return sum(np.square(np.asarray(found[name], np.float64)) for name in names)  # type: ignore[return-value]
+            values = np.stack([np.asarray(found[name], np.float64) for name in names])
+            # To one size by a power of two: the square of a determinant of large lengths leaves float64.
+            power = np.frexp(np.fmax.reduce(np.abs(values), axis=(0, 2)))[1]
+            squared: Array = np.square(np.ldexp(values, -power[:, None])).sum(axis=0)
+            return squared
 
         return cls(curve, names)
 
