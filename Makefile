@@ -88,7 +88,7 @@ bench-peers: $(VENV)/dev  ## next to pylinkage and Pinocchio, which get an envir
 	$(BIN)/python -m tests.bench.loads --out results/accuracy
 	$(BIN)/python -m tests.bench.programs --out results/accuracy
 
-bench-latency: $(VENV)/dev  ## one design, one pose: next to a plain numba function, and to pylinkage where make bench-peers has been; a minute
+bench-latency: $(VENV)/dev  ## one design, one pose: next to a plain numba function, and to pylinkage where make bench-peers has been; commands and reports; five minutes
 	$(if $(wildcard .venv-peers/bin/python),.venv-peers/bin/python,$(BIN)/python) -m tests.bench.latency
 
 bench-scale: $(VENV)/dev  ## 10^5 to 10^9 samples, to 10^8 designs, and reading them: writes docs/scale.md, about 10 minutes
