@@ -178,9 +178,8 @@ def test_extrema_of_a_tiny_swivel_are_those_of_a_large_one():
     assert found["max_abs_d3x_p"][0] / tiny["a"] == pytest.approx(4.44783510044, rel=1e-11)
 
 
-@pytest.mark.parametrize("exponent", [-199, 199])
 @pytest.mark.parametrize("name", LINKED)
-def test_scale_changes_no_bit_of_extrema(name, exponent):
+def test_scale_changes_no_bit_of_extrema(name):
     """The error that is allowed is a part of the curve's size, so no number of the search stands for itself."""
     mechanism, design = built(name)
     generator = np.random.default_rng(24)
@@ -192,15 +191,16 @@ def test_scale_changes_no_bit_of_extrema(name, exponent):
     names = [f"{kind}_{n}" for n in outputs for kind in ("max_abs", "min", "phi_max")]
     accuracy = Accuracy(target=1e-9)
     plain = design_outputs(mechanism, designs, names, accuracy)
-    big = design_outputs(mechanism, np.ldexp(designs, powers * exponent), names, accuracy)
-    np.testing.assert_array_equal(plain["status"], big["status"])
     assert (plain["status"] == st.OK).any()
-    for n in outputs:
-        for kind in ("max_abs", "min", "phi_max"):
-            power = exponent if units[n] == "length" and kind != "phi_max" else 0
-            key = f"{kind}_{n}"
-            np.testing.assert_array_equal(np.ldexp(plain[key], power), big[key], err_msg=key)
-            np.testing.assert_array_equal(np.ldexp(plain[f"err_{key}"], power), big[f"err_{key}"], err_msg=key)
+    for exponent in (-199, 199):
+        big = design_outputs(mechanism, np.ldexp(designs, powers * exponent), names, accuracy)
+        np.testing.assert_array_equal(plain["status"], big["status"])
+        for n in outputs:
+            for kind in ("max_abs", "min", "phi_max"):
+                power = exponent if units[n] == "length" and kind != "phi_max" else 0
+                key = f"{kind}_{n}"
+                np.testing.assert_array_equal(np.ldexp(plain[key], power), big[key], err_msg=key)
+                np.testing.assert_array_equal(np.ldexp(plain[f"err_{key}"], power), big[f"err_{key}"], err_msg=key)
 
 
 @pytest.mark.parametrize("exponent", [-1000, -332, 332, 1000])  # 1e-300, 1e-100, 1e100, 1e300
