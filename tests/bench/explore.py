@@ -1,7 +1,4 @@
-"""How long `sweep explore` takes from a request to its answer, and from the hand to the picture in headless Chromium.
-
-`python -m tests.bench.explore [SOURCE]`; the picture in space is drawn by software there.
-"""
+"""How long `sweep explore` takes from a request to its answer: `python -m tests.bench.explore [SOURCE]`."""
 
 from __future__ import annotations
 
@@ -10,28 +7,9 @@ import time
 
 import numpy as np
 
-from tests.support.browser import DRAWS, launcher
 from tests.support.explorer import ROOT, asked, explored
 
-REQUESTS = 50
-# Move a slider and wait for the page to have drawn the answer: times to that, of which the server and the drawing.
-MOVED = """async (count) => {
-    const name = page.ranges.find((range) => rows[range.name].slider).name, { slider } = rows[name], found = [];
-    const drawing = show, spent = { drawing: 0 };
-    show = (answer) => { const begun = performance.now(); drawing(answer); spent.drawing = performance.now() - begun; };
-    for (let k = 0; k < count; k += 1) {
-        const begun = performance.now(), low = Number(slider.min), high = Number(slider.max);
-        const drawn = new Promise((done) => {
-            const watch = new MutationObserver(() => { watch.disconnect(); done(performance.now()); });
-            watch.observe(document.body, { attributeFilter: ['data-answers'] });
-        });
-        slider.value = low + (high - low) * ((k % 20) + 0.5) / 20;
-        slider.dispatchEvent(new Event('input'));
-        found.push([await drawn - begun, spent.drawing]);
-        await new Promise(requestAnimationFrame);
-    }
-    return found;
-}"""
+REQUESTS = 100
 
 
 def main(source: str) -> None:
@@ -44,14 +22,8 @@ def main(source: str) -> None:
             found = asked(address, "answer", {"designs": [{"a1": 8.0 + 0.04 * k}], "names": ["in hand"]})
             whole.append(1e3 * (time.perf_counter() - begun))
             computing.append(found["milliseconds"])
-        with launcher() as launch:
-            page = launch(*DRAWS).new_page(viewport={"width": 1400, "height": 900}, reduced_motion="reduce")
-            page.goto(address)
-            page.wait_for_function("document.body.dataset.answers >= 1 && !asking")
-            picture, drawing = np.array(page.evaluate(MOVED, REQUESTS)).T
     print(f"{len(first['outputs'])} outputs, {REQUESTS} requests: median and least, milliseconds")
-    named = (("request to answer", whole), ("computing", computing), ("hand to picture", picture), ("drawing", drawing))
-    for words, times in named:
+    for words, times in (("request to answer", whole), ("computing", computing)):
         print(f"{words:18} {np.median(times):6.1f} {min(times):6.1f}")
 
 
