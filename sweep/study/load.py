@@ -17,14 +17,13 @@ from sweep.study.accuracy import accuracy_table, check_proofs, read_accuracy
 from sweep.study.design import Elsewhere, check_varied, read_reference, read_space, take, taken_reference
 from sweep.study.file import Faults, StudyFile
 from sweep.study.limits import read_limits
-from sweep.study.loads import Inputs, read_inputs, tables_of_inputs
+from sweep.study.loads import Inputs, read_inputs, read_window, speeds, tables_of_inputs, with_effects
 from sweep.study.locus import RATIOS, read_fit, read_locus
 from sweep.study.mechanism import flattened, read_mechanism
 from sweep.study.objective import check_goal, check_objective, check_steady, read_pareto
 from sweep.study.optimise import check_search, read_optimise
 from sweep.study.parameter import Entry
 from sweep.study.report import check_report
-from sweep.study.scene import read_window, speeds, with_effects
 from sweep.study.study import (
     Budget,
     Objective,

@@ -9,13 +9,12 @@ from typing import Any
 from sweep.study.accuracy import AccuracySection
 from sweep.study.design import ReferenceSection
 from sweep.study.file import Section, StudyFile, read_table
-from sweep.study.loads import CurveSection
+from sweep.study.loads import CurveSection, SceneSection
 from sweep.study.locus import FitSection
 from sweep.study.mechanism import MechanismSection, MemberSection, RelationSection, ShaftSection, ToolSection
 from sweep.study.objective import ObjectiveSection, ParetoSection
 from sweep.study.optimise import OptimiseSection
 from sweep.study.report import BudgetSection, OutputSection, ReportSection, StudySection
-from sweep.study.scene import SceneSection
 from sweep.study.thread import ThreadSection
 from sweep.study.tolerance import ToleranceSection
 
