@@ -141,7 +141,8 @@ def rod(body: str, material: str, section: str, inertia: str = "slender") -> dic
         match = _SECTION.fullmatch(section.strip())
         assert match is not None
         sizes = [factor(match[3], "mm") * float(size) for size in match.groups()[:2] if size is not None]
-        area, square = _AREAS[match[4]](*sizes), _GYRATIONS.get(match[4], lambda *_: math.nan)(*sizes)
+        area, across = _AREAS[match[4]](*sizes), _GYRATIONS.get(match[4])
+        square = math.nan if across is None else across(*sizes)
     except (AssertionError, TypeError, ValueError):
         raise InputError("section", section, f"a section, as {SECTIONS}", body) from None
     if not area > 0.0:
