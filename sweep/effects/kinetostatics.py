@@ -134,8 +134,9 @@ def _bodies(scene: Scene) -> Array:
     found, ends = scene.table(follower.bodies), np.zeros((len(scene.designs), 3, 3))
     ends[:, :, 0] = scene.records[1][:, 12:15]
     for k, body in enumerate(follower.rods):
-        given = [scene.inputs[f"{name}_{body}"] for name in loads.ROD]
-        loads.put_rod(found[:, BODY * k : BODY * (k + 1)], *given, np.zeros_like(ends[:, k]), ends[:, k])
+        is_rod, line_mass, gyration = (scene.inputs[f"{name}_{body}"] for name in loads.ROD)
+        own = found[:, BODY * k : BODY * (k + 1)]
+        loads.put_rod(own, is_rod, line_mass, gyration, np.zeros_like(ends[:, k]), ends[:, k])
     return found
 
 
