@@ -33,7 +33,7 @@ test-long: $(VENV)/dev  ## the tests that take minutes, thousands of hostile tab
 	$(BIN)/python -m pip install --constraint constraints.txt --editable '.[dev,peers]'
 	$(BIN)/python -m pytest -m 'long or hypothesis' --hypothesis-profile=random
 
-test-faults: $(VENV)/dev  ## kills, signals, full disks, damage: 150 kills and 370 other faults, a table
+test-faults: $(VENV)/dev  ## kills, signals, full disks, damage: 150 kills and 375 other faults, a table
 	$(BIN)/python -m tests.faults
 
 test-versions: $(VENV)/dev  ## oracle tables, bits and speed with the oldest and the newest dependencies allowed
