@@ -81,8 +81,7 @@ def _write(folder: Path, out: Path, say: Say) -> Path:
         figures |= _threads(data, out)
         within = tolerance_words(data)
         stitch = sewn(data)
-        first = stitch.sentence if stitch else ""
-        further = [text for text in (first, optima_sentence(data, several), made_sentence(told, within)) if text]
+        further = (stitch.sentence if stitch else "", optima_sentence(data, several), made_sentence(told, within))
         text = rendered(
             "report.html",
             study=data.study,
