@@ -23,6 +23,7 @@ from sweep.proof.rounds import Cores, explored
 from sweep.report.page import write_report
 from sweep.study import load_study
 from tests.study.test_words import STUDY
+from tests.support.engine_study import write_study
 
 
 @pytest.fixture
@@ -106,6 +107,21 @@ def test_pilot_of_planning_is_told_part_by_part() -> None:
     assert told == [(0, 4), (1, 4), (2, 4), (3, 4)]
     again = pilot(study)
     assert np.array_equal(whole.kept, again.kept) and whole._replace(kept=again.kept) == again
+
+
+def test_pilot_of_a_small_sweep_is_an_eighth_of_it_and_sent_once(tmp_path, monkeypatch) -> None:
+    study = load_study(write_study(tmp_path, count=2))
+    tried: list[int] = []
+
+    def counted(*given):
+        found = pilot(*given)
+        tried.append(found.tried)
+        return found
+
+    for module in ("sweep.engine.estimate", "sweep.chunks.plan"):
+        monkeypatch.setattr(f"{module}.pilot", counted)
+    run(study, out=tmp_path / "out", jobs=1, progress=False)
+    assert study.space.count == 1024 and tried == [128]
 
 
 def test_every_part_of_a_run_is_told(tmp_path, quick, monkeypatch, capsys) -> None:
