@@ -27,6 +27,8 @@ _OPENED = re.compile(f"#[^\n]*|{_LONG}|(?P<three>[\"']{{3}})|{_SHORT}|(?P<one>[\
 # What tomllib says of a text that has no end.
 _QUOTED = 'a text between quotes, as name = "press", over several lines between three of them'
 _NO_END = ("Illegal character '\\n'", "Found invalid character '\\n'", "Unterminated string", "Expected \"'")
+# What tomllib says of words without quotes, and of a unit behind a bare number.
+_BARE_WORDS = ("Invalid value", "Expected newline or end of document after a statement")
 # What tomllib says where a key or a table comes a second time.
 _TWICE = ("Cannot overwrite", "Cannot declare", "Duplicate inline")
 
@@ -88,6 +90,8 @@ def _said(text: str, message: str) -> str:
         opened = next((found.start() for found in _OPENED.finditer(text) if found.lastgroup), None)
         line = int(place[1]) if opened is None else text.count("\n", 0, opened) + 1
         return f"line {line}: a text without its closing quote; allowed: {_QUOTED}"
+    if place is not None and message.startswith(_BARE_WORDS):
+        return f"{message}; a text, and a number with its unit, stands between quotes, as in b = \"3 mm\""
     if place is None or not message.startswith(_TWICE):
         return message
     lines = text.splitlines()[: int(place[1])]

@@ -36,6 +36,7 @@ finally:
     ("arguments", "words"),
     [
         (("frobnicate",), "No such command 'frobnicate'"),
+        (("optimise",), "[optimise] is a table of a study, which `sweep run STUDY` obeys"),
         (("run", "nowhere"), "'nowhere' does not exist"),
         (("run",), "Missing argument 'STUDY'"),
         (("run", ".", "--jobs", "0"), "0 is not in the range x>=1"),

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import errno
 import json
 import os
 import shutil
@@ -12,7 +13,7 @@ from typing import Any
 import pytest
 
 from sweep.dataset import chunk_files, files
-from sweep.errors import LockedError
+from sweep.errors import LinksweepWarning, LockedError
 from sweep.nights import archive
 from sweep.nights.archive import HISTORY, NIGHT, read_history, read_night
 from sweep.nights.page import write_page
@@ -99,6 +100,29 @@ def test_records_of_wrong_types_are_left_out_and_said(after_one: tuple[Path, Pat
     record, said = night(into, [study])
     assert record.studies["tiny"].state == "complete"
     assert any("line 2 cannot be read" in words for words in said)
+    page = (into / "index.html").read_text()
+    assert record.name in page and line["name"] in page
+
+
+@pytest.mark.parametrize("number", [errno.ENOLCK, errno.ENOSYS])
+def test_a_night_where_the_disk_has_no_locks_is_computed_and_says_so(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, number: int
+) -> None:
+    def refuse(*_: object) -> None:
+        raise OSError(number, os.strerror(number))
+
+    monkeypatch.setattr("fcntl.flock", refuse)
+    study, into = written(tmp_path / "one"), tmp_path / "nights"
+    for linked in (0, 1):
+        with pytest.warns(LinksweepWarning, match="no locks"):
+            record, _ = night(into, [study])
+        assert (record.exit_code, record.studies["tiny"].linked) == (0, linked)
+    with (
+        pytest.warns(LinksweepWarning, match="no locks"),
+        archive.one_at_a_time(into),
+        pytest.raises(LockedError, match="another night"),
+    ):
+        night(into, [study])
 
 
 def test_a_deleted_lock_lets_no_second_night_in(tmp_path: Path) -> None:

@@ -35,6 +35,14 @@ def test_a_quote_that_is_not_closed_is_told_with_its_line(title: str, line: int,
     assert message.startswith(f"study.toml: line {line}: a text without its closing quote; allowed: ")
 
 
+@pytest.mark.parametrize(
+    ("line", "place"), [("title = crank-rocker, 110 off", "line 2, column 9"), ("b = 3 mm", "line 2, column 7")]
+)
+def test_words_and_units_without_quotes_are_told_where_quotes_go(line: str, place: str, tmp_path: Path) -> None:
+    (message,) = faults_of(f"[design]\n{line}\n", tmp_path)
+    assert place in message and message.endswith('stands between quotes, as in b = "3 mm"')
+
+
 def test_a_file_that_is_no_text(tmp_path: Path) -> None:
     (tmp_path / "study.toml").write_bytes(b"[study]\nname = '\xff'\n")
     with pytest.raises(StudyError, match="line 2 is no UTF-8 text"):
