@@ -1,17 +1,20 @@
-"""One sheet of a design for the shop: views, dimensions with tolerances, hardpoints, limits; as PDF, SVG or DXF."""
+"""One sheet of a design for the shop: views and tables of its dimensions, joints and limits; as PDF, SVG or DXF."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import itertools
+from collections.abc import Iterable, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
 from sweep.errors import InputError, StoreError
+from sweep.evaluation.cyclogram import cyclogram, table_in_degrees
 from sweep.exchange.dxf import add_tables
 from sweep.exchange.export import export
 from sweep.exchange.scene import exists, frames_of, is_spatial, over, pose, shown_name
+from sweep.families.machines import Machine
 from sweep.plot.drawing import draw
 from sweep.report.dataset import Dataset, chosen, read_dataset, row_of
 from sweep.report.figures import house_style, new_figure
@@ -25,6 +28,9 @@ if TYPE_CHECKING:
     from sweep.evaluation.joints import Part
 
 A3 = (16.54, 11.69)  # inches, lying
+VIEWS_HIGH, TABLES_HIGH = 5.7, 6.0  # inches, of the views and of each row of tables; longer ones make the sheet longer
+LINES = 24  # of a table before it goes on in the next one
+WIDTHS = ((1.5, 1.1, 1.0), (1.0, 1.0))  # of the tables in the first row and in those below it, as shares
 POSES = 180  # of the paths of joints
 WORDS = {"xy": "front", "zy": "side", "xz": "top"}
 DIGITS = 6  # of coordinates: a micrometre in half a metre
@@ -75,7 +81,7 @@ def write_sheet(folder: str | Path, design: str | int | None, path: str | Path, 
 
 
 def tables_of(data: Dataset, parts: Sequence[Part]) -> list[Table]:
-    """Return dimensions with tolerances, hardpoints of one position, and limits of the result of ``data``."""
+    """Return dimensions with tolerances, hardpoints of one position, limits, and a machine's cyclogram."""
     study, tolerance = data.study, data.study.tolerance
     spread = {} if tolerance is None else {"length": tolerance.lengths, "angle": tolerance.angles}
     units = {p.name: p.unit for p in study.family.parameters}
@@ -83,7 +89,9 @@ def tables_of(data: Dataset, parts: Sequence[Part]) -> list[Table]:
     for row in parameter_rows(data):
         shown = quantity(row.name, {"length": "mm", "angle": "rad"}.get(units[row.name], "1"))
         give = spread.get(units[row.name], 0.0)
-        lines.append((row.name, row.value, f"± {shown.show(give, 3)}" if give else "", row.text))
+        member = row.name.rpartition(".")[0]
+        text = row.text.removeprefix(f"{member}: ")
+        lines.append((row.name, row.value, f"± {shown.show(give, 3)}" if give else "", text))
     dimensions = Table("Dimensions", ("name", "value", "tolerance", ""), tuple(lines))
     joints = tuple(
         (_joint(part, name), *(number(_zero(x), DIGITS) for x in path[0].tolist()))
@@ -91,12 +99,26 @@ def tables_of(data: Dataset, parts: Sequence[Part]) -> list[Table]:
         for name, path in part.joints.items()
     )
     limits = tuple((x.shown.symbol, x.bound, x.value, x.state) for x in limit_states(data))
-    found = (
+    found = [
         dimensions,
         Table("Hardpoints [mm]", ("joint", "x", "y", "z"), joints),
         Table("Limits", ("limit", "required", "design", ""), limits),
-    )
+        *_cyclogram(data),
+    ]
     return [t._replace(lines=tuple(tuple(x.replace("\u00a0", " ") for x in line) for line in t.lines)) for t in found]
+
+
+def _cyclogram(data: Dataset) -> list[Table]:
+    family, row = data.study.family, data.result
+    if row is None or not isinstance(family, Machine):
+        return []
+    turn = table_in_degrees(cyclogram(family, {name: row[name] for name in family.parameter_names}, angles="rad"))
+    events: Iterable[tuple[str, str, str, float, float, float]] = turn.itertuples(index=False, name=None)
+    lines = [
+        (f"{member} {name}".strip(), kind, f"{number(start, 4)}°", "" if kind == "event" else f"{number(end, 4)}°")
+        for member, kind, name, start, end, _ in events
+    ]
+    return [Table("Cyclogram, by the angle of the main shaft", ("what", "", "from", "to"), tuple(lines))]
 
 
 def _joint(part: Part, name: str) -> str:
@@ -110,18 +132,34 @@ def _zero(x: float) -> float:
 def _draw(data: Dataset, parts: Sequence[Part], tables: Sequence[Table], target: Path) -> None:
     frames = frames_of(parts)
     panels = [(frame, view) for frame, same in frames.items() for view in (_views(same))]
+    rows = _rows(tables)
     with house_style():
-        figure = new_figure(*A3)
-        above, below = np.asarray(figure.subfigures(2, 1, height_ratios=[1.0, 1.05])).ravel().tolist()
+        figure = new_figure(A3[0], VIEWS_HIGH + TABLES_HIGH * len(rows))
+        heights = [VIEWS_HIGH, *[TABLES_HIGH] * len(rows)]
+        above, *below = np.asarray(figure.subfigures(len(heights), 1, height_ratios=heights)).ravel().tolist()
         for axes, (frame, view) in zip(above.subplots(1, len(panels), squeeze=False)[0], panels, strict=True):
             draw(axes, frames[frame], view, "mm", 1)
-            axes.set_title(f"{', '.join(part.label for part in frames[frame])}: {WORDS[view]}")
-        widths = [1.5, 1.1, 1.0]
-        for axes, table in zip(below.subplots(1, 3, width_ratios=widths), tables, strict=True):
-            _set(axes, table)
+            labels = ", ".join(part.label for part in frames[frame])
+            axes.set_title(WORDS[view] if len(frames) == 1 else f"{labels}: {WORDS[view]}")
+        for k, (place, row) in enumerate(zip(below, rows, strict=True)):
+            widths = WIDTHS[min(k, 1)]
+            for axes, table in itertools.zip_longest(place.subplots(1, len(widths), width_ratios=widths), row):
+                _set(axes, table)
         speed = f", {rpm(data.study.speed)}" if data.study.speed is not None else ""
         figure.suptitle(f"{data.study.title or data.study.name}{speed}. Lengths in mm, angles in degrees.")
         figure.savefig(target, format=target.suffix[1:].lower(), metadata=_no_date(target))
+
+
+def _rows(tables: Sequence[Table]) -> list[list[Table]]:
+    """Lay out tables beside and below each other: the beginnings of the first ones, then all that is left."""
+    blocks = [
+        table._replace(title=table.title + ", continued" * (k > 0), lines=table.lines[k : k + LINES])
+        for table in tables
+        for k in range(0, max(1, len(table.lines)), LINES)
+    ]
+    first = [next(x for x in blocks if x.title == table.title) for table in tables[: len(WIDTHS[0])]]
+    rest, wide = [x for x in blocks if x not in first], len(WIDTHS[1])
+    return [first, *(rest[k : k + wide] for k in range(0, len(rest), wide))]
 
 
 def _views(parts: Sequence[Part]) -> tuple[str, ...]:
@@ -133,23 +171,24 @@ def _no_date(target: Path) -> dict[str, None]:
     return {"CreationDate": None} if target.suffix.lower() == ".pdf" else {"Date": None}
 
 
-def _set(axes: Axes, table: Table) -> None:
-    """Set a table, its lines as high as there is room for all of them."""
+def _set(axes: Axes, table: Table | None) -> None:
+    """Set a table whose lines are as high as those of all others."""
     from matplotlib.transforms import Bbox
 
     axes.set_axis_off()
+    if table is None:
+        return
     axes.set_title(table.title, loc="left", fontweight="bold")
     if not table.lines:
         axes.text(0.0, 1.0, "none", va="top")
         return
-    rows = len(table.lines) + 1
-    high = min(1.0, 0.045 * rows)
+    high = (len(table.lines) + 1) / (LINES + 1)
     found = axes.table(
         [list(line) for line in table.lines], colLabels=list(table.heads), cellLoc="left", colLoc="left",
         edges="horizontal", bbox=Bbox.from_bounds(0.0, 1.0 - high, 1.0, high),
     )  # fmt: skip
     found.auto_set_font_size(False)
-    found.set_fontsize(7.5 * min(1.0, 24 / rows))
+    found.set_fontsize(7.5)
     found.auto_set_column_width(list(range(len(table.heads))))
     for cell in found.get_celld().values():
         cell.set_linewidth(0.3)

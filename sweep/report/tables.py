@@ -29,6 +29,7 @@ ACTIVE = 1e-5  # a limit is called active if the optimum is this near to it, rel
 class LimitState:
     """One limit and where the result stands; ``state`` is "active", "met", "missed" or "unknown".
 
+    ``value`` and ``reference`` are what the limit compares: a swing or stroke by its magnitude.
     ``room`` is the distance to the limit relative to its size, negative where it is missed.
     """
 
@@ -79,8 +80,8 @@ def limit_state(
     return LimitState(
         shown,
         bound_words(limit, shown),
-        shown.show(value),
-        shown.show(other),
+        shown.show(size),
+        shown.show(compared(limit.output, other)),
         slack,
         state,
         room / max(abs(bound), 1e-12),

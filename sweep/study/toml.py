@@ -91,7 +91,7 @@ def _said(text: str, message: str) -> str:
         line = int(place[1]) if opened is None else text.count("\n", 0, opened) + 1
         return f"line {line}: a text without its closing quote; allowed: {_QUOTED}"
     if place is not None and message.startswith(_BARE_WORDS):
-        return f"{message}; a text, and a number with its unit, stands between quotes, as in b = \"3 mm\""
+        return f'{message}; a text, and a number with its unit, stands between quotes, as in b = "3 mm"'
     if place is None or not message.startswith(_TWICE):
         return message
     lines = text.splitlines()[: int(place[1])]

@@ -12,7 +12,7 @@ from click.testing import CliRunner
 import sweep
 from sweep.cli import main
 from sweep.exchange.scene import pose
-from sweep.plot.sheet import tables_of, write_sheet
+from sweep.plot.sheet import LINES, _rows, tables_of, write_sheet
 from sweep.report.dataset import chosen, read_dataset
 from sweep.report.judged import as_result, row_of
 from sweep.study import study_from_data
@@ -48,7 +48,7 @@ def test_tables_hold_dimensions_tolerances_joints_and_limits(folder):
         np.testing.assert_allclose([float(x.replace("−", "-")) for x in at], true.loc[name.lower()], atol=5e-5)
     ((_, required, value, state),) = limits.lines
     assert required == "at least 30°" and state in ("met", "active")
-    assert float(value.replace("−", "-").rstrip("°")) == pytest.approx(math.degrees(row["swing"]), abs=5e-4)
+    assert float(value.rstrip("°")) == pytest.approx(abs(math.degrees(row["swing"])), abs=5e-4)
 
 
 @pytest.mark.parametrize("kind", ["pdf", "svg", "dxf"])
@@ -68,6 +68,41 @@ def test_dxf_holds_the_tables_and_still_reads_back(folder, tmp_path):
     said = CliRunner().invoke(main, ["points", "rssr", str(target)])
     assert said.exit_code == 0, said.output
     assert float(tomllib.loads(said.output)["design"]["b"].split()[0]) == pytest.approx(40.0, abs=1e-9)
+
+
+@pytest.fixture(scope="module")
+def machine(tmp_path_factory):
+    """A machine of three slider-cranks, whose dimensions are more than a table has lines."""
+    slider = {"family": "slider_crank", "driver": "shaft"}
+    size = {"a": {"from": 10.0, "to": 12.0, "count": 2, "unit": "mm"}, "b": "40 mm", "e": "2 mm"}
+    data = {
+        "study": {"name": "three"},
+        "machine": {"left": slider, "right": slider, "rear": slider},
+        "scene": {"want": ["left.stroke", "right.stroke"]},
+        "design": {"left": size, "right": size | {"a": "11 mm"}, "rear": size | {"a": "12 mm"}},
+        "limits": {"left": {"stroke": {"max": 30.0, "unit": "mm"}}},
+    }
+    return sweep.run(study_from_data(data, "study.toml"), out=tmp_path_factory.mktemp("three") / "designs", jobs=1)
+
+
+def test_a_long_table_goes_on_below_in_lines_of_the_same_height(machine, tmp_path):
+    data, found = read_dataset(machine), chosen(machine)
+    tables = tables_of(as_result(data, row_of(data.study, found.design)), pose(found.family, found.design, 0.0))
+    first, *below = _rows(tables)
+    assert [table.title for table in first] == ["Dimensions", "Hardpoints [mm]", "Limits"]
+    laid = [table for row in (first, *below) for table in row]
+    assert all(len(table.lines) <= LINES for table in laid)
+    lines = {t.title: [x for one in laid if one.title.startswith(t.title) for x in one.lines] for t in tables}
+    assert lines == {t.title: list(t.lines) for t in tables}
+    assert below and below[0][0].title == "Dimensions, continued"
+    assert write_sheet(machine, None, tmp_path / "three.pdf").read_bytes().startswith(b"%PDF")
+
+
+def test_a_machine_has_its_cyclogram_on_the_sheet(machine):
+    data, found = read_dataset(machine), chosen(machine)
+    tables = tables_of(as_result(data, row_of(data.study, found.design)), pose(found.family, found.design, 0.0))
+    lines = {line[0]: line[1:] for line in tables[-1].lines}
+    assert lines["left falls"][0] == "stroke" and lines["right rises"][0] == "stroke"
 
 
 def test_same_data_same_bytes(folder, tmp_path):
