@@ -6,6 +6,7 @@ from pathlib import Path
 from typing import Any, TypedDict, Unpack
 
 import click
+import pandas as pd
 
 import sweep.plot as plot
 from sweep.cli.families import family_names
@@ -17,6 +18,7 @@ from sweep.evaluation.angles import AngleUnit, grid_in_radians
 from sweep.evaluation.cyclogram import cyclogram, table_in_degrees
 from sweep.jobs.progress import Phases
 from sweep.report.dataset import chosen
+from sweep.report.figures import house_style, save
 from sweep.report.judged import write_comparison
 from sweep.report.page import write_report
 
@@ -38,7 +40,7 @@ def report(folder: Path, others: tuple[Path, ...], out: Path | None) -> None:
     if others:
         click.echo(f"report: {write_comparison([folder, *others], out or beside(located(folder)))}")
         return
-    with Phases(show=True) as phases:
+    with Phases(show=True, quiet=False) as phases:
         written = write_report(folder, out, phases.say)
     click.echo(f"report: {written}")
 
@@ -71,7 +73,10 @@ class Options(TypedDict):
     type=click.Path(dir_okay=False, path_type=Path),
     help="A .svg, .png or .pdf file; of cyclogram also a .csv table.",
 )
-@click.option("--design", help="Of a dataset: optimum, reference, best, or the number of a row.")
+@click.option(
+    "--design",
+    help="Of a dataset: optimum, reference, best, or the number of a row; of motion several, as a,b.",
+)
 @click.option("--row", type=click.IntRange(min=0), default=0, show_default=True, help="Of TABLE.")
 @click.option("--want", help="Of motion: outputs, separated by commas.")
 @click.option("--phi", type=float, default=0.0, show_default=True, help="Of mechanism: crank angle [rad].")
@@ -101,7 +106,11 @@ def draw(what: str, source: str, table: Path | None, out: Path, **options: Unpac
         drawn = _of_one(what, source, table, options)
     axes = drawn if what in ("front", "tolerance", "sensitivity", "polar_load", "cyclogram") else drawn[0]
     out.parent.mkdir(parents=True, exist_ok=True)
-    axes.figure.savefig(out)
+    with house_style():
+        if out.suffix.lower() == ".svg":
+            save(axes.figure, out)
+        else:
+            axes.figure.savefig(out)
     click.echo(f"{what}: {out}")
 
 
@@ -116,7 +125,7 @@ def _table(source: str, table: Path | None, out: Path, options: Options) -> None
 
 def _of_one(what: str, source: str, table: Path | None, options: Options) -> Any:
     """Draw one design, out of a folder or of a family and a table."""
-    mechanism, design = _design(source, table, options["design"], options["row"])
+    mechanism, design = _design(source, table, options["design"], options["row"], several=what == "motion")
     known: dict[str, dict[str, Any]] = {
         "motion": {"want": options["want"]},
         "mechanism": {"phi": options["phi"], "view": options["view"], "positions": options["positions"]},
@@ -127,13 +136,20 @@ def _of_one(what: str, source: str, table: Path | None, options: Options) -> Any
     return getattr(plot, what)(mechanism, design, angles=unit, **known.get(what, {}))
 
 
-def _design(source: str, table: Path | None, design: str | None, row: int) -> tuple[Any, dict[str, Any]]:
-    """Mechanism and design out of a folder, or a family's name and a row of a table."""
+def _design(source: str, table: Path | None, design: str | None, row: int, several: bool = False) -> tuple[Any, Any]:
+    """Mechanism and design out of a folder, or a family's name and a row of a table.
+
+    Of ``several`` designs, named between commas, it is a table with a row for each.
+    """
     if table is None:
         if not Path(source).is_dir():
             raise InputError("SOURCE", source, "a dataset folder, or a family with a table of designs", "command line")
-        found = chosen(source, design)
-        return found.family, found.design
+        if not several or design is None or "," not in design:
+            found = chosen(source, design)
+            return found.family, found.design
+        names = [int(name) if name.strip().isdigit() else name.strip() for name in design.split(",")]
+        every = [chosen(source, name) for name in names]
+        return every[0].family, pd.DataFrame([one.design for one in every], index=names)
     designs = read_table(table)
     if row >= len(designs):
         raise InputError("--row", row, f"a row from 0 to {len(designs) - 1}", str(table))

@@ -23,6 +23,7 @@ ENOUGH, ALIKE = (
     0.1,
     2,
 )  # share, and number, of what is to be done from which the remaining time is known to a factor of two
+SCALED = 10_000  # numbers from which a bar counts in thousands and millions
 BAR = "{desc}: {n_fmt} of {total_fmt}{unit} [{elapsed}]"  # where it is not
 AT_MOST = "at most"  # in what is counted: its total is a maximum, of which no share and no remaining time is known
 
@@ -83,7 +84,7 @@ class Progress:
         self.shown = f"{known.index(label) + 1}/{len(known)} {label}" if label in known else label
         self.stream = sys.stderr if stream is None else stream
         self.show = show and self.stream is not None
-        self.begin = time.monotonic()
+        self.begin = self.moved = time.monotonic()
         self.said: float | None = None
         self.first = done
         self.bar: tqdm[Never] | None = None
@@ -93,8 +94,8 @@ class Progress:
             from tqdm import tqdm
 
             self.bar = tqdm(
-                desc=self.shown, bar_format=BAR, total=total or None, initial=done, unit=f" {unit}", unit_scale=True,
-                file=self.stream, delay=FIRST_SECONDS if quiet else 0.0, leave=not quiet,
+                desc=self.shown, bar_format=BAR, total=total or None, initial=done, unit=f" {unit}",
+                unit_scale=total >= SCALED, file=self.stream, delay=FIRST_SECONDS if quiet else 0.0, leave=not quiet,
             )  # fmt: skip
 
     def __enter__(self) -> Progress:
@@ -129,7 +130,7 @@ class Progress:
     def advance(self, designs: int) -> None:
         """Count so many more designs as finished."""
         with self._listener():
-            self.done += designs
+            self.done, self.moved = self.done + designs, time.monotonic()
             if self.bar is not None:
                 self.bar.bar_format = None if self.foreseen else BAR
                 self.bar.update(designs)
@@ -141,7 +142,7 @@ class Progress:
         with self._listener():
             self.total, self.unit = total, self.unit if unit is None else unit
             if self.bar is not None:
-                self.bar.total, self.bar.unit = total or None, f" {self.unit}"
+                self.bar.total, self.bar.unit, self.bar.unit_scale = total or None, f" {self.unit}", total >= SCALED
                 self.bar.bar_format = None if self.foreseen else BAR
 
     def _tick(self) -> None:
@@ -168,6 +169,11 @@ class Progress:
             except OSError:
                 self.show, self.bar = False, None
 
+    def _left(self, now: float) -> float:
+        """Return the time [s] that the rest takes if it is as quick as what is done; not positive where it is late."""
+        share = (self.total - self.done) / (self.done - self.first)
+        return (self.moved - self.begin) * share - (now - self.moved)
+
     def _line(self) -> None:
         self.said = time.monotonic()
         seconds = self.said - self.begin
@@ -176,17 +182,20 @@ class Progress:
             share = "" if self.at_most else f" ({self.done / self.total:.0%})"
             text += f"{self.done} of {self.total} {self.unit}{share}, "
         text += f"{seconds:.0f} s"
-        if self.foreseen:
-            text += f", {seconds * (self.total - self.done) / (self.done - self.first):.0f} s left"
+        if self.foreseen and (left := self._left(self.said)) > 0.0:
+            text += f", {left:.0f} s left"
         self.stream.write(text + "\n")
         self.stream.flush()
 
 
 class Phases:
-    """One piece of work after the other, each told by itself if it takes more than two seconds; used as a context."""
+    """One piece of work after the other, each told by itself, if ``quiet`` only what takes more than two seconds.
 
-    def __init__(self, show: bool, stream: TextIO | None = None) -> None:
-        self.show, self.stream = show, stream
+    It is used as a context.
+    """
+
+    def __init__(self, show: bool, stream: TextIO | None = None, quiet: bool = True) -> None:
+        self.show, self.stream, self.quiet = show, stream, quiet
         self.now: Progress | None = None
 
     def __enter__(self) -> Phases:
@@ -201,7 +210,7 @@ class Phases:
         """Note how much is done of this piece of work; another one than before begins its own count."""
         if self.now is None or self.now.label != label:
             self.end()
-            self.now = Progress(label, total, done, self.show, self.stream, unit, quiet=True).__enter__()
+            self.now = Progress(label, total, done, self.show, self.stream, unit, self.quiet).__enter__()
             return
         if (total, unit) != (self.now.total, self.now.unit):
             self.now.expect(total, unit)

@@ -22,7 +22,7 @@ from sweep.families import family as find_family
 from sweep.families.base import Array, Family, Interval
 from sweep.plot.drawing import COLOURS, mechanism_figure
 from sweep.quantities.units import speed_given
-from sweep.report.figures import LIMIT, OPTIMUM, QUIET, WIDTH, crank_axis, house_style, new_figure
+from sweep.report.figures import LIMIT, OPTIMUM, QUIET, REFERENCE, WIDTH, crank_axis, house_style, new_figure
 from sweep.report.live import is_angle, turns_fully
 from sweep.report.quantities import quantity
 
@@ -152,7 +152,8 @@ def _panels(
         shown = quantity(name, family.pose_output[name].unit.replace("length", unit))
         for (design, turn), colour in zip(turns.items(), cycle(COLOURS)):
             angle, values = aligned_turn(turn, name, family.position)
-            axes.plot(np.degrees(angle), values * shown.factor, label=design, color=colour, zorder=3)
+            look = {"color": REFERENCE, "linestyle": "--"} if design == "reference" else {"color": colour}
+            axes.plot(np.degrees(angle), values * shown.factor, label=design, zorder=3, **look)
         axes.set_title(shown.title)
         if speed is not None and shown.order:
             scale = shown.speed_scale * speed**shown.order / shown.factor

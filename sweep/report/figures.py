@@ -59,8 +59,11 @@ def save(figure: Figure, path: Path) -> Saved:
 
 
 def smaller(text: str) -> str:
-    """Write an SVG in less: hundredths of a point, no indents, and each style that is there several times once."""
-    text = re.sub(r"(\d\.\d\d)\d+", r"\1", re.sub(r"\n\s+", "\n", text))
+    """Write an SVG in less: hundredths of a point, no indents, and each style that is there several times once.
+
+    Letters stay what they are: only numbers within tags are places.
+    """
+    text = re.sub(r"<[^>]*>", lambda tag: re.sub(r"(\d\.\d\d)\d+", r"\1", tag[0]), re.sub(r"\n\s+", "\n", text))
     styles = {style: f"s{k}" for k, style in enumerate(dict.fromkeys(re.findall(r' style="([^"]*)"/>', text)))}
     text = re.sub(r' style="([^"]*)"/>', lambda m: f' class="{styles[m[1]]}"/>', text)
     rules = " ".join(f".{name} {{{style}}}" for style, name in styles.items())

@@ -121,6 +121,7 @@ def _write(folder: Path, out: Path, say: Say) -> Path:
             **live(data, cells, several),
         )
         write_atomically(out / "report.html", text.encode())
+        say("report", STEPS, STEPS, "steps")
     except OSError as error:
         raise StoreError(f"report {out}: cannot be written: {error}") from error
     return out / "report.html"

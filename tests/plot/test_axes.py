@@ -15,6 +15,7 @@ import sweep
 from sweep.cli import main
 from sweep.dataset import files
 from sweep.families import family
+from sweep.report.figures import house_style, new_figure, save
 from sweep.report.page import write_report
 from tests.support.report_dataset import study_data, write_dataset, write_table
 
@@ -150,6 +151,25 @@ def test_verb_draws_a_folder(what, folder, tmp_path):
     done = CliRunner().invoke(main, ["draw", what, str(folder), "--out", str(out)])
     assert done.exit_code == 0, done.output
     assert out.read_text().count("<path") > 10
+
+
+def test_verb_draws_motions_of_several_designs_with_real_letters(folder, tmp_path):
+    out = tmp_path / "motion.svg"
+    done = CliRunner().invoke(main, ["draw", "motion", str(folder), "--design", "0,2,reference", "--out", str(out)])
+    assert done.exit_code == 0, done.output
+    text = out.read_text()
+    for words in ("design 0", "design 2", "reference", "displacement s [mm]"):
+        assert f">{words}</text>" in text
+    assert len(text) < 100_000
+
+
+def test_numbers_of_a_saved_figure_are_whole_and_its_places_are_short(tmp_path):
+    with house_style():
+        figure = new_figure(4.0, 3.0)
+        figure.subplots().set_xticks([0.0, 0.025, 0.125])
+        text = save(figure, tmp_path / "x.svg").path.read_text()
+    assert all(f">{number}</text>" in text for number in ("0.000", "0.025", "0.125"))
+    assert not re.search(r"\d\.\d{3}", " ".join(re.findall(r"<[^>]*>", text)))
 
 
 def test_verb_draws_a_row_of_a_table(tmp_path):

@@ -50,6 +50,24 @@ def test_short_work_is_not_told() -> None:
     assert stream.getvalue() == ""
 
 
+def test_work_that_is_always_told_names_its_end() -> None:
+    stream = io.StringIO()
+    with Phases(True, stream, quiet=False) as phases:
+        phases.say("report", 0, 4)
+        phases.say("report", 4, 4)
+    assert stream.getvalue() == "report: 4 of 4 steps (100%), 0 s\n"
+
+
+@pytest.mark.parametrize(("total", "shown"), [(40, "3 of 40"), (16_777_216, "3.00 of 16.8M")])
+def test_bar_counts_whole_things_and_millions_in_millions(total: int, shown: str) -> None:
+    stream = io.StringIO()
+    stream.isatty = lambda: True  # type: ignore[method-assign]
+    with Phases(True, stream, quiet=False) as phases:
+        phases.say("search", 0, 0)  # how many is not known yet
+        phases.say("search", 3, total)
+    assert f"search: {shown} steps [" in stream.getvalue()
+
+
 def test_remaining_time_is_that_of_this_run_after_a_resume(monkeypatch: pytest.MonkeyPatch) -> None:
     """60 of 100 were there: 10 more took 20 s, so 30 take another 60 s."""
     now = [1000.0]
@@ -59,6 +77,23 @@ def test_remaining_time_is_that_of_this_run_after_a_resume(monkeypatch: pytest.M
         now[0] += 20.0
         shown.advance(10)
         assert stream.getvalue().splitlines()[-1] == "x: 70 of 100 designs (70%), 20 s, 60 s left"
+
+
+def test_remaining_time_falls_between_two_steps_and_is_not_told_once_they_are_late(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    now = [1000.0]
+    monkeypatch.setattr("sweep.jobs.progress.time.monotonic", lambda: now[0])
+    stream = io.StringIO()
+    with Phases(True, stream) as phases:
+        phases.say("front", 0, 4, "searches")
+        now[0] += 100.0
+        phases.say("front", 2, 4, "searches")
+        for seconds, left in ((0.0, ", 100 s left"), (70.0, ", 30 s left"), (40.0, "")):
+            now[0] += seconds
+            phases.now._line()
+            told = f"front: 2 of 4 searches (50%), {now[0] - 1000.0:.0f} s{left}"
+            assert stream.getvalue().splitlines()[-1] == told
 
 
 def test_remaining_time_is_told_when_it_is_known_within_a_factor_of_two(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import importlib.util
 import json
 import math
 from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
+import pandas as pd
 import pytest
 
 from sweep.evaluation.summaries import design_outputs
@@ -103,3 +105,44 @@ def test_yield_of_other_tolerances_is_another_one():
     lengths, angles = ({name for name, unit in UNITS.items() if unit == kind} for kind in ("length", "angle"))
     rough = normal(design, lengths, angles, (2.0 * STUDY.tolerance.lengths, 2.0 * STUDY.tolerance.angles), 2000)
     assert kept(outputs(rough), limits) < kept(found, limits) - 2.0 * tolerated(2000)
+
+
+def script(name):
+    spec = importlib.util.spec_from_file_location(f"needle208_{name}", FOLDER / f"{name}.py")
+    module = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(module)
+    return module
+
+
+def array(design):
+    return np.array([({"shift2": 0.0, "turn2": 0.0} | design)[name] for name in STUDY.family.parameter_names])
+
+
+def test_price_of_a_mechanism_is_that_of_its_accepted_figures(monkeypatch):
+    figure, told = script("figure"), []
+    monkeypatch.setattr(figure, "SAMPLES", 2048)
+    designs = {"record on paper": array(EXPECTED["record"]["design"]), "optimum": array(EXPECTED["better"]["design"])}
+    table = figure.price(STUDY, designs, lambda *said: told.append(said)).set_index("mechanism")
+    assert told == [("figure", k, 2, "mechanisms") for k in range(3)]
+    for row, accepted in (("record on paper", EXPECTED["record"]), ("optimum", EXPECTED["better"])):
+        assert table.loc[row, "acceleration"] == pytest.approx(accepted["outputs"]["max_abs_d2s"], rel=1e-6)
+        assert table.loc[row, "deviation drawn"] == pytest.approx(accepted["outputs"]["max_abs_dev"], rel=1e-6)
+        # Three standard errors of 2048 mechanisms, at a share of a half.
+        assert table.loc[row, "made within every limit [%]"] == pytest.approx(100.0 * accepted["share"], abs=3.4)
+    assert (table["deviation of 95 % made"] <= 0.05).tolist() == [False, True]
+    picture = figure.chart(table.reset_index(), 0.05)
+    assert [text.get_text() for text in picture.axes[0].get_yticklabels()] == ["record on paper", "to be built"]
+
+
+@pytest.mark.long
+def test_front_gives_acceleration_for_deviation_and_keeps_the_share(monkeypatch):
+    front = script("front")
+    monkeypatch.setattr(front, "ROUNDS", ((0.07,),))
+    own = dict(zip(STUDY.family.parameter_names, array(EXPECTED["better"]["design"]), strict=True))
+    row = pd.Series(own | {"max_abs_d2s": EXPECTED["better"]["outputs"]["max_abs_d2s"], "yield": 0.952})
+    points = front.front(STUDY, row, jobs=1)
+    assert points["deviation"].tolist() == [0.05, 0.07] and points["kept"].all()
+    gain = points["acceleration"][1] / points["acceleration"][0]
+    # docs: 0.4 % less; no drive of this stroke has less than constant acceleration.
+    assert 0.99 < gain < 0.998
+    assert points["share"][1] >= STUDY.tolerance.robust
