@@ -5,6 +5,7 @@ from __future__ import annotations
 import importlib.util
 import json
 import math
+import sys
 from dataclasses import replace
 from pathlib import Path
 
@@ -107,9 +108,10 @@ def test_yield_of_other_tolerances_is_another_one():
     assert kept(outputs(rough), limits) < kept(found, limits) - 2.0 * tolerated(2000)
 
 
-def script(name):
+def script(name, monkeypatch):
     spec = importlib.util.spec_from_file_location(f"needle208_{name}", FOLDER / f"{name}.py")
     module = importlib.util.module_from_spec(spec)
+    monkeypatch.setitem(sys.modules, spec.name, module)  # where dataclasses look for their types
     spec.loader.exec_module(module)
     return module
 
@@ -119,7 +121,7 @@ def array(design):
 
 
 def test_price_of_a_mechanism_is_that_of_its_accepted_figures(monkeypatch):
-    figure, told = script("figure"), []
+    figure, told = script("figure", monkeypatch), []
     monkeypatch.setattr(figure, "SAMPLES", 2048)
     designs = {"record on paper": array(EXPECTED["record"]["design"]), "optimum": array(EXPECTED["better"]["design"])}
     table = figure.price(STUDY, designs, lambda *said: told.append(said)).set_index("mechanism")
@@ -136,7 +138,7 @@ def test_price_of_a_mechanism_is_that_of_its_accepted_figures(monkeypatch):
 
 @pytest.mark.long
 def test_front_gives_acceleration_for_deviation_and_keeps_the_share(monkeypatch):
-    front = script("front")
+    front = script("front", monkeypatch)
     monkeypatch.setattr(front, "ROUNDS", ((0.07,),))
     own = dict(zip(STUDY.family.parameter_names, array(EXPECTED["better"]["design"]), strict=True))
     row = pd.Series(own | {"max_abs_d2s": EXPECTED["better"]["outputs"]["max_abs_d2s"], "yield": 0.952})
