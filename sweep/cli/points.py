@@ -72,8 +72,8 @@ def export(folder: Path, design: str | None, kind: str, out: Path | None, phi: f
     csv: hardpoints and axes.  glb: an animated model that a browser opens.  mjcf: a model for MuJoCo.  law: the motion
     over one turn with units, .csv or .parquet.
 
-    pdf, svg, dxf: a sheet with three views, dimensions and tolerances, hardpoints and limits.  dxf needs `pip install
-    'linksweep[cad]'`.
+    pdf, svg, dxf: a sheet with three views, dimensions and tolerances, hardpoints, limits, and a machine's cyclogram.
+    dxf needs `pip install 'linksweep[cad]'`.
 
     xlsx: the whole dataset as a workbook, best designs first, with optimum, curves and definitions; it needs
     `pip install 'linksweep[excel]'`.
