@@ -128,12 +128,16 @@ def _left(off: Callable[[float], float], phi: float, way: float) -> float:
     return float(brentq(off, inside, inside + step)) if abs(inside - phi) < TWO_PI else inside
 
 
+def event_angles(family: Family) -> dict[str, str]:
+    """Return the output that is the crank angle of each event and moment, by its name in the cyclogram."""
+    names = {event.name: event_names(family, event)[0] for event in family.events}
+    relations: tuple[Any, ...] = getattr(family, "relations", ())
+    return names | {r.name: f"phi_{r.name}" for r in relations if isinstance(r, Taking | Entering)}
+
+
 def _events(family: Family, designs: Array) -> Iterator[Row]:
     """Yield the moments and events of the machine that happen."""
-    names = [(event.name, event_names(family, event)[0]) for event in family.events]
-    relations: tuple[Any, ...] = getattr(family, "relations", ())
-    names += [(r.name, f"phi_{r.name}") for r in relations if isinstance(r, Taking | Entering)]
-    for name, place in names:
+    for name, place in event_angles(family).items():
         found = design_outputs(family, designs, [place], Accuracy(target=1e-9))
         phi = float(np.asarray(found[place], np.float64)[0])
         if np.isfinite(phi):

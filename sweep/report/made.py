@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 
 from sweep.dataset import files
+from sweep.evaluation.cyclogram import event_angles
 from sweep.evaluation.summaries import design_outputs
 from sweep.families.names import is_flag, judged_by, without_minus
 from sweep.optimise.manufacture.tolerance import deviating, touched
@@ -215,6 +216,16 @@ def spreads(data: Dataset) -> list[Spread]:
         for row in _optimum_rows(data, files.TOLERANCE)
         if row["output"] != "all limits" and not is_flag(str(row["output"]))
     ]  # fmt: skip
+
+
+def event_bands(data: Dataset) -> dict[str, tuple[float, float]]:
+    """Main-shaft angles [deg] between which 95 % of what is made has an event of the cyclogram, by the event's name."""
+    rows = {str(row["output"]): row for row in _optimum_rows(data, files.TOLERANCE)}
+    return {
+        name: (math.degrees(rows[output]["low"]), math.degrees(rows[output]["high"]))
+        for name, output in event_angles(data.study.family).items()
+        if output in rows
+    }
 
 
 def share_made(data: Dataset) -> float:

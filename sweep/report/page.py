@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+import math
 import shutil
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from datetime import date
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -19,7 +20,17 @@ from sweep.report.bodies import bars
 from sweep.report.dataset import Dataset, gather
 from sweep.report.figures import drawn_before, house_style, save
 from sweep.report.live import live
-from sweep.report.made import COSTS, TELLING, made, made_sentence, share_made, slopes, spreads, tolerance_words
+from sweep.report.made import (
+    COSTS,
+    TELLING,
+    event_bands,
+    made,
+    made_sentence,
+    share_made,
+    slopes,
+    spreads,
+    tolerance_words,
+)
 from sweep.report.optima import CARDS, groups, optima, optima_sentence
 from sweep.report.quantities import number, rpm
 from sweep.report.scan import Cells, Scan, most_telling
@@ -27,7 +38,6 @@ from sweep.report.sewing import diagram_of_dataset, sewn, threads_figure
 from sweep.report.sketch import dimensioned, drawn_parts, sketch
 
 if TYPE_CHECKING:
-    import pandas as pd
     from markupsafe import Markup
 
     from sweep.study import Study
@@ -73,15 +83,15 @@ def _write(folder: Path, out: Path, say: Say) -> Path:
         say("report", 1, STEPS, "steps")
         figures = draw(data, found, cells, out / "figures")
         say("report", 2, STEPS, "steps")
-        told = made(data)
-        strokes = _cyclogram(data, out)
+        as_made = _as_made(data)
+        events = event_bands(data)
+        strokes = _cyclogram(data, events, out)
         say("report", 3, STEPS, "steps")
         copy_tables(folder, out)
         write_survivors(data.parts, out / "survivors.parquet")
         figures |= _threads(data, out)
-        within = tolerance_words(data)
         stitch = sewn(data)
-        further = (stitch.sentence if stitch else "", optima_sentence(data, several), made_sentence(told, within))
+        further = (stitch.sentence if stitch else "", optima_sentence(data, several), as_made["made_words"])
         text = rendered(
             "report.html",
             study=data.study,
@@ -104,20 +114,15 @@ def _write(folder: Path, out: Path, say: Say) -> Path:
             front_note=front.front_note(data),
             optima=optima(data, several),
             optima_left=max(len(several) - CARDS, 0),
-            made=told,
-            made_words=made_sentence(told, within),
-            costs=[x for x in told.costs if max(x.spread, x.gain) >= TELLING][:COSTS] if told else [],
             sewn=stitch,
-            tolerance=within,
-            spreads=spreads(data),
-            share_made=share_made(data),
-            slopes=slopes(data),
-            cyclogram=[] if strokes is None else [tuple(row) for row in strokes.itertuples(index=False)],
+            cyclogram=strokes,
+            events=events,
             number=number,
             pair=most_telling(found) or (cells[0].name,) if cells else (),
             axes=len(cells),
             speed=rpm(data.study.speed),
             today=date.today().isoformat(),
+            **as_made,
             **live(data, cells, several),
         )
         write_atomically(out / "report.html", text.encode())
@@ -125,6 +130,16 @@ def _write(folder: Path, out: Path, say: Say) -> Path:
     except OSError as error:
         raise StoreError(f"report {out}: cannot be written: {error}") from error
     return out / "report.html"
+
+
+def _as_made(data: Dataset) -> dict[str, Any]:
+    """Gather what the report says of the optimum as it is made."""
+    told, within = made(data), tolerance_words(data)
+    return {
+        "made": told, "made_words": made_sentence(told, within), "tolerance": within, "spreads": spreads(data),
+        "costs": [x for x in told.costs if max(x.spread, x.gain) >= TELLING][:COSTS] if told else [],
+        "share_made": share_made(data), "slopes": slopes(data),
+    }  # fmt: skip
 
 
 def _threads(data: Dataset, out: Path) -> dict[str, str]:
@@ -164,14 +179,20 @@ def answer_sketch(data: Dataset) -> Markup | None:
     return sketch(placed, f"{data.result_name} with its dimensions", words)
 
 
-def _cyclogram(data: Dataset, out: Path) -> pd.DataFrame | None:
-    """Write and return the cyclogram of the result of a machine; None of anything else."""
+def _cyclogram(data: Dataset, events: Mapping[str, tuple[float, float]], out: Path) -> list[tuple[Any, ...]]:
+    """Write and return the cyclogram of the result of a machine; nothing of anything else.
+
+    The file says besides where the ``events`` of what is made lie.
+    """
     row, family = data.result, data.study.family
     if row is None or not isinstance(family, Machine):
-        return None
+        return []
     found = table_in_degrees(cyclogram(family, {name: row[name] for name in family.parameter_names}, angles="rad"))
-    found.to_csv(out / "cyclogram.csv", index=False, float_format="%.4f")
-    return found
+    made_at = [events.get(name, (math.nan, math.nan)) if kind == "event" else (math.nan, math.nan)
+               for kind, name in zip(found["kind"], found["name"], strict=True)]  # fmt: skip
+    bands = {"made from [deg]": [low for low, _ in made_at], "made to [deg]": [high for _, high in made_at]}
+    found.assign(**(bands if events else {})).to_csv(out / "cyclogram.csv", index=False, float_format="%.4f")
+    return list(found.itertuples(index=False, name=None))
 
 
 def own_figures(study: Study, folder: Path) -> list[dict[str, Any]]:
