@@ -48,7 +48,8 @@ def _finish(g: Given, at: Limits, i: int, status: Status, failed: Status, design
     stroke, e, f, alpha, sa, ca, valid = g
     s1, s2, middle, ahead, back, v1, v2, point = at
     branch = -1.0 if stroke.real > 0.0 else 1.0
-    a = stroke * (f * sa - middle) / (ahead - back)
+    between, size = ahead - back, stroke * (f * sa - middle)
+    a = size / between if between != 0.0 else math.nan  # numba's complex division by zero raises
     radial, axial = ahead - a, s1 * sa - f
     b = np.sqrt(radial * radial + axial * axial)
     t1, t2 = s1 - (f * sa + a * ca * v1), s2 - (f * sa + a * ca * v2)

@@ -93,7 +93,8 @@ def _finish(
     x1, y1, ahead, back = p.x, p.y, p.ahead, p.back
     c = np.sqrt(x1 * x1 + y1 * y1)
     x_mid, y_mid = x1 * r.cos_half - y1 * r.sin_half, y1 * r.cos_half + x1 * r.sin_half
-    a = 2.0 * r.sin_half * (r.e * y_mid + r.f * r.sa * x_mid) / (ahead - back)
+    between, size = ahead - back, 2.0 * r.sin_half * (r.e * y_mid + r.f * r.sa * x_mid)
+    a = size / between if between != 0.0 else math.nan  # numba's complex division by zero raises
     axial, radial = r.g * r.ca + y1 * r.sa - r.f, ahead - a
     b = np.sqrt(axial * axial + radial * radial)
     # t1, t2 have the sign of dF/dpsi, the assembly mode: c dF/dpsi/(2 c) = -X sin psi - Y cos psi at both limits

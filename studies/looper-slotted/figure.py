@@ -17,7 +17,8 @@ from kernels.status import LIMIT_EXCEEDED
 from sweep.evaluation.summaries import design_outputs
 from sweep.families import family
 from sweep.families.base import Accuracy
-from sweep.optimise import minimise
+from sweep.jobs.progress import Phases, Say, unsaid
+from sweep.optimise.multistart.multistart import optimum
 from sweep.optimise.starts.dataset import drawn
 from sweep.optimise.starts.posing import problem_of
 from sweep.report.figures import OPTIMUM, REFERENCE, WIDTH, house_style, new_figure, save
@@ -26,8 +27,7 @@ from sweep.study import OptimiseSettings, study_from_data
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-    from sweep.families.base import Array
-    from sweep.optimise import Result
+    from sweep.optimise.local.kkt import Result
 
 # The crank-rockers that are compared: room and pressure angle as in study.toml, the swing of its lower limit.
 CRANK_ROCKER: dict[str, Any] = {
@@ -52,43 +52,39 @@ CRANK_ROCKER: dict[str, Any] = {
     "objective": {"minimise": "max_abs_d2psi"},
     "accuracy": {"target": 1e-6},
 }
-LOOKS = 500  # designs that each start may look at: counted, so that a busy machine finds the same
+SIGNS = [{"branch": 1.0}, {"branch": -1.0}]
+SEED, KNOWN = 56, 16  # designs whose links say how small they may be
+STARTS, LOOKS = 12, 1000  # of each stroke ratio, counted, so that a busy machine finds the same
+JOBS = 2
 OUTPUTS = ["max_abs_d2psi", "max_pressure_angle", "swing", "stroke_ratio"]
 
 
-def crank_rocker(ratio: float, known: list[Array], starts: int) -> Result:
-    """Return the crank-rocker of least acceleration found for a stroke ratio, from drawn and from known designs."""
+def crank_rocker(ratio: float, starts: int) -> Result:
+    """Return the crank-rocker of least acceleration found for a stroke ratio; where there is none the nearest to it."""
     locus = CRANK_ROCKER["locus"] | {"phi0": f"{360.0 * ratio / (1.0 + ratio)!r} deg"}
     study = study_from_data(CRANK_ROCKER | {"locus": locus}, Path("crank-rocker"))
-    designs = np.array([*known, *drawn(study, starts, 56)[:starts]])
-    settings = OptimiseSettings(starts=len(designs), looks=LOOKS)
-    return minimise(problem_of(study, designs), designs, settings)[0]
+    problem = problem_of(study, drawn(study, KNOWN, SEED), on_locus=False)
+    return optimum(problem, SIGNS, OptimiseSettings(starts=starts, seed=SEED, looks=LOOKS), jobs=JOBS)[0]
 
 
-def crank_rockers(ratios: list[float], starts: int) -> pd.DataFrame:
-    """One row per stroke ratio, searched upwards and then downwards again, each also from its neighbour's answer."""
-    best: dict[float, Result] = {}
-    for ratio in (*ratios, *ratios[-2::-1]):
-        known = [best[other].design for other in ratios if other in best]
-        now = crank_rocker(ratio, known, 0 if ratio in best else starts)
-        if ratio not in best or merit(now) < merit(best[ratio]):
-            best[ratio] = now
-    designs = np.array([best[ratio].design for ratio in ratios])
+def crank_rockers(ratios: list[float], starts: int, say: Say = unsaid) -> pd.DataFrame:
+    """One row per stroke ratio."""
+    best: list[Result] = []
+    for ratio in ratios:
+        say("figure", len(best), len(ratios), "stroke ratios")
+        best.append(crank_rocker(ratio, starts))
+    say("figure", len(best), len(ratios), "stroke ratios")
+    designs = np.array([result.design for result in best])
     found = design_outputs(family("rssr"), designs, OUTPUTS, Accuracy(target=1e-6))
     links = dict(zip(family("rssr").parameter_names, designs.T, strict=True))
-    status = [best[ratio].status for ratio in ratios]
+    status = [result.status for result in best]
     return pd.DataFrame(links | {name: found[name] for name in OUTPUTS} | {"status": status, "ratio": ratios})
 
 
-def merit(result: Result) -> tuple[bool, float]:
-    """Rank designs that miss a limit after those that keep all, settled or not."""
-    return result.status == LIMIT_EXCEEDED, result.objective
-
-
-def table(front: pd.DataFrame, starts: int) -> pd.DataFrame:
+def table(front: pd.DataFrame, starts: int, say: Say = unsaid) -> pd.DataFrame:
     """One row per stroke ratio and mechanism; one that misses a limit has status LIMIT_EXCEEDED."""
     slotted = front.sort_values("bound").assign(mechanism="slotted link", ratio=lambda rows: rows["bound"])
-    others = crank_rockers(slotted["ratio"].tolist(), starts).assign(mechanism="crank-rocker")
+    others = crank_rockers(slotted["ratio"].tolist(), starts, say).assign(mechanism="crank-rocker")
     both = pd.concat([slotted, others], ignore_index=True)
     return both[["mechanism", "ratio", *OUTPUTS, "status", "a", "b", "c", "e", "f", "g", "alpha", "s", "branch"]]
 
@@ -114,7 +110,8 @@ def main() -> None:
     folder: Path = parser.parse_args().folder
     front = pd.read_parquet(folder / "_pareto.parquet")
     small = len(front) < 4  # smoke
-    drives = table(front, 2 if small else 160)
+    with Phases(show=True, quiet=False) as phases:
+        drives = table(front, 2 if small else STARTS, phases.say)
     drives.to_parquet(folder / "drives.parquet", index=False)
     print(drives.to_string(index=False, float_format="{:.4g}".format))  # noqa: T201
     with house_style():

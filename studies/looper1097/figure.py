@@ -28,7 +28,7 @@ OUTPUTS = ["max_abs_d2psi", "max_abs_beta", "max_pressure_angle", "swing", "stro
 LINKS = ["a", "b", "c", "e", "f", "g", "h", "branch"]
 
 
-def along_h(optimum: pd.Series, lengths: list[float], seconds: float) -> pd.DataFrame:
+def along_h(optimum: pd.Series, lengths: list[float]) -> pd.DataFrame:
     """Best five-links for every h [mm], each started from its neighbour, beginning next to the optimum's h."""
     data = load_study(FOLDER).data
     rows = []
@@ -37,7 +37,7 @@ def along_h(optimum: pd.Series, lengths: list[float], seconds: float) -> pd.Data
         study = study_from_data(data | {"design": data["design"] | {"h": f"{h!r} mm"}}, FOLDER)
         names = study.family.parameter_names
         designs, _ = design_matrix(study.family, {name: start[name] for name in names} | {"h": np.array([h])})
-        best = minimise(problem_of(study, designs), designs, OptimiseSettings(starts=1, time_budget=seconds))[0]
+        best = minimise(problem_of(study, designs), designs, OptimiseSettings(starts=1))[0]
         found = design_outputs(study.family, best.design[None, :], OUTPUTS, study.accuracy)
         start = pd.DataFrame([dict(zip(names, best.design.tolist(), strict=True))])
         rows.append(
@@ -67,7 +67,7 @@ def main() -> None:
     folder: Path = parser.parse_args().folder
     best = pd.read_parquet(folder / "_optimum.parquet").iloc[0]
     small = best["status"] != 0  # smoke
-    joint = along_h(best, [0.0, 5.0] if small else [0.0, 1.0, 2.0, 4.0, 6.0, 8.0, 10.0], 3.0 if small else 30.0)
+    joint = along_h(best, [0.0, 5.0] if small else [0.0, 1.0, 2.0, 4.0, 6.0, 8.0, 10.0])
     joint.to_parquet(folder / "joint.parquet", index=False)
     print(joint.to_string(index=False, float_format="{:.5g}".format))  # noqa: T201
     with house_style():

@@ -39,6 +39,21 @@ def accepted(frame):
     return frame[frame["status"] == st.OK]
 
 
+@pytest.mark.parametrize("kind", [np.float64, np.complex128])
+@pytest.mark.parametrize(
+    ("family", "row"),
+    [
+        ("rssr", [0.87, 3.0, 1.0, 0.0, 5.0, 2.0, 0.0]),  # axes in line: the rocker ball stays on the crank axis
+        ("rssp", [0.0, 3.0, 1.0, 5.0, 0.5]),  # no stroke
+    ],
+)
+def test_a_place_without_a_crank_has_none_and_raises_nothing(family, row, kind):
+    """Both balls lie on the crank axis, so the crank is 0/0; optimisers come there with complex steps."""
+    found = locus(family, ("phi1",)).solve(np.array([row], kind))
+    assert found.status[0] != st.OK
+    assert np.isnan(found.designs[0, :2]).all()
+
+
 def test_crank_rockers_come_back_from_their_limits():
     designs = pd.DataFrame(crank_rockers(600, 71), columns=RSSR_NAMES)
     limits = sweep.summarise("rssr", designs, ["swing", "phi0", "phi_ext", "psi_ext"], accuracy=1e-12)
