@@ -283,9 +283,17 @@ def _level(study: Study, route: Route) -> Level:
 
 
 def ordered_routes(study: Study) -> tuple[Route, ...]:
-    """Return the routes of a study in the order of `Work`; those that need the fitted parameters come last."""
+    """Return the routes of a study in the order of `Work`; those that need the fitted parameters come last.
+
+    Where only feasible designs count, those without a limit are for the designs that keep all limits.
+    """
     found = routes(study.family, study.want, study.accuracy)
-    return tuple(sorted(found, key=lambda route: not _before_fit(study, route)))
+    limited = {limit.output for limit in study.tested_limits}
+
+    def place(route: Route) -> tuple[bool, bool]:
+        return not _before_fit(study, route), study.output.keep != "all" and limited.isdisjoint(route.outputs)
+
+    return tuple(sorted(found, key=place))
 
 
 def _before_fit(study: Study, route: Route) -> bool:

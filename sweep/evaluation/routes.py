@@ -30,7 +30,7 @@ from sweep.quantities.resolve import resolve
 from sweep.reductions.margins import NAMES as MARGINS
 from sweep.reductions.margins import combined, margin_suffixes, margins, with_transmission
 from sweep.reductions.sampling import Index, on_closed_turn
-from sweep.reductions.steps import applying_step, group_ns
+from sweep.reductions.steps import applying_step, beyond_motion, group_ns
 from sweep.reductions.turn import margin_group
 
 # With these some outputs are missing or rough, the others are worth having.
@@ -159,7 +159,7 @@ def _routes(family: Family, wanted: Sequence[str], accuracy: Accuracy) -> tuple[
             steps.setdefault((step[0].name, number), (*step, []))[2].append(name)
         elif group is not None:
             # Each effect by itself: one that jams or leaves its range takes nothing from the others.
-            effect = family.dear.get(one.of, ("", 0.0))[0]
+            effect = beyond_motion(family, one.of).name
             groups.setdefault((group, effect), []).append(name)
         else:
             raise _unserved(family, name, accuracy)

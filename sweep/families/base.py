@@ -203,7 +203,7 @@ class Step:
     ``applies`` says for which accuracy it serves (a dense kernel does not serve ``accuracy=``).  ``certifies``: its
     maxima are proven, and serve ``Accuracy.certify`` only.  Steps of the same kind of work are taken in the order in
     which the family lists them.  ``cost`` estimates its time [ns per design]; without it the row "family: step" of
-    sweep/costs.toml does.
+    sweep/costs.toml does.  ``analytic``: it takes complex designs, for exact gradients by the complex step.
     """
 
     name: str
@@ -213,6 +213,7 @@ class Step:
     work: Work = Work.QUICK
     certifies: bool = False
     cost: Callable[[Accuracy], float] | None = None
+    analytic: bool = False
 
 
 @dataclass(frozen=True)

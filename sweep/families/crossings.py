@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
@@ -24,7 +24,11 @@ ROUNDING: Any = {"xatol": 4.0 * EPS * TWO_PI, "xrtol": 0.0}  # of a root that is
 NEAR = 1e-3  # of a sample's step: a polynomial that is so near is trusted in its slope
 LAGRANGE = np.array([-120.0, 24.0, -12.0, 12.0, -24.0, 120.0])  # products of the differences of -2 ... 3
 
-Passages = Callable[["Poses", int, frozenset[str]], Columns]
+Places: TypeAlias = dict[str, Any]
+"""Angles (n,) of each design by what they are, "count" and "status"."""
+
+Find: TypeAlias = Callable[["Poses", int, frozenset[str]], Places]
+Read: TypeAlias = Callable[["Machine", Any, Places, frozenset[str]], Columns]
 
 
 @dataclass
@@ -39,22 +43,53 @@ class Found:
         return Found(self.row[which], self.phi[which])
 
 
-def step_of(name: str, provides: Sequence[Output], machine: Machine, passages: Passages) -> Step:
-    """Return the machine's own route to what ``passages`` finds of its poses."""
+def step_of(name: str, provides: Sequence[Output], machine: Machine, find: Find, read: Read) -> Step:
+    """Return the machine's own route to what is read at places of its turn."""
+
+    def block(designs: Array, wanted: frozenset[str], samples: int) -> Columns:
+        if not np.iscomplexobj(designs):
+            return read(machine, designs, find(Poses(machine, machine.precise(), designs), samples, wanted), wanted)
+        # Of a complex step all designs have the same real parts.
+        real, which = np.unique(designs.real, axis=0, return_inverse=True)
+        places = find(Poses(machine, machine.precise(), real), samples, wanted)
+        return read(machine, designs, {key: values[which.ravel()] for key, values in places.items()}, wanted)
 
     def run(designs: Array, wanted: frozenset[str], accuracy: Accuracy) -> Columns:
-        samples, precise = accuracy.samples or SAMPLES, machine.precise()
-        blocks = [designs[k : k + BLOCK] for k in range(0, max(len(designs), 1), BLOCK)]
-        parts = [passages(Poses(machine, precise, block), samples, wanted) for block in blocks]
+        samples = accuracy.samples or SAMPLES
+        parts = [block(designs[k : k + BLOCK], wanted, samples) for k in range(0, max(len(designs), 1), BLOCK)]
         found: Columns = {key: np.concatenate([part[key] for part in parts]) for key in parts[0]}
         if accuracy.target is not None:
-            found |= {f"err_{key}": np.abs(np.asarray(found[key], np.float64)) * accuracy.target for key in wanted}
+            found |= {f"err_{key}": np.abs(found[key]) * accuracy.target for key in wanted}
         return found
 
     def cost(accuracy: Accuracy) -> float:
         return 2000.0 * (accuracy.samples or SAMPLES)
 
-    return Step(f"passage {name}", tuple(provides), run, work=Work.LONG, cost=cost)
+    return Step(f"passage {name}", tuple(provides), run, work=Work.LONG, cost=cost, analytic=machine.analytic)
+
+
+def outputs_at(
+    machine: Machine, designs: Any, places: Mapping[str, Any], names: Sequence[str]
+) -> dict[str, dict[str, Any]]:
+    """Return outputs of designs at angles of each, (n,) by output and place; precise ones, or complex ones."""
+    phi = np.stack(list(places.values()), axis=1)
+    known = np.isfinite(phi)
+    family = machine if np.iscomplexobj(phi) else machine.precise()
+    found = family.poses(designs, Angles.of(np.where(known, phi, 0.0)), frozenset(names))
+    return {name: dict(zip(places, np.where(known, found[name], np.nan).T, strict=True)) for name in names}
+
+
+def moved(machine: Machine, designs: Any, phi: Array, names: Sequence[str]) -> Any:
+    """Return where complex designs have the roots (n, k) of outputs, one of each column: phi - f_p/f'.
+
+    The imaginary parts are the derivatives, by the theorem of the implicit function.
+    """
+    step, wanted, known = 1e-100, frozenset(names), np.isfinite(phi)
+    at: Any = np.where(known, phi, 0.0)
+    along = machine.poses(designs.real, Angles.of(at + 1j * step), wanted)
+    across = machine.poses(designs, Angles.of(at), wanted)
+    moves = [across[name][:, k].imag / (along[name][:, k].imag / step) for k, name in enumerate(names)]
+    return np.where(known, phi - 1j * np.stack(moves, axis=1), np.nan)
 
 
 @dataclass(frozen=True)
@@ -161,7 +196,7 @@ class Poses:
         return np.asarray(better, np.float64)
 
     def least(self, row: NDArray[np.intp], start: Array, end: Array, name: str, samples: int = 64) -> Array:
-        """Return the least value of an output between two angles of each of these designs, (k,)."""
+        """Return where an output is least between two angles of each of these designs, (k,)."""
         from scipy.optimize.elementwise import find_minimum
 
         if not row.size:
@@ -169,15 +204,21 @@ class Poses:
         step = 1.0 / (samples - 1)  # one sample beyond either end, so that a dip next to an end has neighbours
         grid = start[:, None] + np.linspace(-step, 1.0 + step, samples + 2) * (end - start)[:, None]
         values = self.at(row, grid, name)[0]
-        least: Array = values[:, 1:-1].min(axis=1)
+        which = values[:, 1:-1].argmin(axis=1) + 1
+        place: Array = np.take_along_axis(grid, which[:, None], axis=1)[:, 0]
+        place = np.where(which == 1, start, np.where(which == samples, end, place))
         k, j = np.nonzero((values[:, 1:-1] <= values[:, :-2]) & (values[:, 1:-1] <= values[:, 2:]))
         if k.size:
             of: Any = lambda phi, rows: self.near(rows.astype(np.intp), phi, name)  # noqa: E731
             args: Any = (row[k],)
             found = find_minimum(of, (grid[k, j], grid[k, j + 1], grid[k, j + 2]), args=args)
             phi = np.clip(np.asarray(found.x, np.float64), start[k], end[k])
-            np.minimum.at(least, k, self.at(row[k], phi, name)[0])
-        return least
+            height = self.at(row[k], phi, name)[0]
+            least = values[:, 1:-1].min(axis=1)
+            for one in np.argsort(-height, kind="stable"):  # the least one last
+                if height[one] < least[k[one]]:
+                    place[k[one]] = phi[one]
+        return place
 
 
 def _bracketed(of: Any, left: Array, right: Array, which: NDArray[np.intp]) -> Array:
@@ -219,6 +260,12 @@ def largest(row: NDArray[np.intp], values: Array, n: int) -> Array:
     most = np.full(n, -np.inf)
     np.maximum.at(most, row, values)
     return np.where(np.isfinite(most), most, np.nan)
+
+
+def where_largest(found: Found, values: Array, n: int) -> Array:
+    """Return the angle of each design at which the value is largest; nan where there is none."""
+    order = np.argsort(values, kind="stable")
+    return whole(n, found.row[order], found.phi[order])
 
 
 def whole(n: int, row: NDArray[np.intp], values: Array) -> Array:

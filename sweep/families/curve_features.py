@@ -6,7 +6,7 @@ searches for extrema, means and events begin with samples that are dense enough,
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Collection, Sequence
 from dataclasses import dataclass
 from functools import partial
 from typing import TypeAlias, TypeVar
@@ -63,10 +63,12 @@ class Singular:
 class Switches:
     """Crank angles, known beforehand, at which outputs have a kink or a jump: ``angles(designs)``, (n, k) [rad].
 
-    They are the ends of a law's phases, or the points of a table of loads.
+    They are the ends of a law's phases, or the points of a table of loads.  ``of`` names the pose outputs that switch
+    there; None: all of them may.
     """
 
     angles: DesignMap
+    of: frozenset[str] | None = None
 
 
 @dataclass(frozen=True)
@@ -105,9 +107,14 @@ def waves(family: Family, designs: Array) -> Array:
     return most
 
 
-def switches(family: Family, designs: Array) -> Array:
-    """Angles at which outputs switch, in [0, 2 pi), (n, k); 0 for what is no number."""
-    every = [np.zeros((len(designs), 0)), *(known.angles(designs) for known in family.every(Switches))]
+def switching(family: Family, outputs: Collection[str]) -> list[Switches]:
+    """Return what tells at which crank angles one of some pose outputs switches."""
+    return [known for known in family.every(Switches) if known.of is None or not known.of.isdisjoint(outputs)]
+
+
+def switches(family: Family, designs: Array, outputs: Collection[str]) -> Array:
+    """Angles at which one of some pose outputs switches, in [0, 2 pi), (n, k); 0 for what is no number."""
+    every = [np.zeros((len(designs), 0)), *(known.angles(designs) for known in switching(family, outputs))]
     angles = np.mod(np.concatenate(every, axis=1), TWO_PI)
     return np.where(np.isfinite(angles), angles, 0.0)
 

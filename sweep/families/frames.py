@@ -69,6 +69,12 @@ def tilted(rotation: Array, tilts: Array) -> Array:
     return rows
 
 
+def product(a: Array, b: Array) -> Array:
+    """Return the vector products of vectors, (..., 3)."""
+    found: Array = a[..., [1, 2, 0]] * b[..., [2, 0, 1]] - a[..., [2, 0, 1]] * b[..., [1, 2, 0]]
+    return found
+
+
 def place_parameters(what: str, at: Sequence[float]) -> tuple[Parameter, ...]:
     """Return where something stands in the machine's frame, and how it is tilted there: what tolerances are about."""
     return (
@@ -99,14 +105,14 @@ def mounted(axis: Axis, crank: Axis, sense: Any, shift: Any, turn: Any) -> Frame
     turn : angle about the axis, from its zero, to the direction of the crank at phi = 0, (n,)
     """
     sense, shift, turn = (np.atleast_1d(x)[:, None] for x in (sense, shift, turn))
-    zero = np.cos(turn) * axis.zero + np.sin(turn) * np.cross(axis.along, axis.zero)
+    zero = np.cos(turn) * axis.zero + np.sin(turn) * product(axis.along, axis.zero)
     rotation = _columns(zero, sense * axis.along) @ np.swapaxes(_columns(crank.zero, crank.along), 1, 2)
     return Frame(rotation, axis.at + shift * axis.along - _times(rotation, crank.at))
 
 
 def _columns(zero: Array, along: Array) -> Array:
     zero, along = np.broadcast_arrays(zero, along)
-    return np.stack([zero, np.cross(along, zero), along], axis=-1)
+    return np.stack([zero, product(along, zero), along], axis=-1)
 
 
 def crank_axis(family: Family, designs: Array) -> Axis | None:

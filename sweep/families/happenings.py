@@ -11,8 +11,8 @@ from numpy.typing import NDArray
 from kernels.status import OK
 from kernels.types import Array
 from sweep.errors import InputError, choices
-from sweep.families.base import Angles, Event, of_family
-from sweep.families.crossings import SAMPLES, Poses
+from sweep.families.base import Event, of_family
+from sweep.families.crossings import SAMPLES, Poses, moved
 from sweep.families.curve_features import Switches
 from sweep.families.moments import Taking
 from sweep.families.passages import passages
@@ -71,16 +71,18 @@ def event_angles(machine: Machine, designs: Array) -> tuple[dict[str, Any], NDAr
         angles = _search(machine, events, np.ascontiguousarray(designs[list(new.values())].real))
         known.update(zip(new, angles, strict=True))
     table = np.array([known[row] for row in rows]).reshape(len(rows), len(events) + 1)
-    found: dict[str, Any] = {}
-    for k, (name, event) in enumerate(events.items()):
-        phi = table[:, [k]]
-        found[f"phi_{name}"] = phi if designs.dtype == np.float64 else phi + _shift(machine, event, designs, phi)
-    return found, table[:, -1].astype(np.uint8)
+    phi: Any = table[:, :-1]
+    if np.iscomplexobj(designs) and designs.imag.any():
+        names = [event.of if isinstance(event, Event) else next(iter(event.rates)) for event in events.values()]
+        phi = moved(machine, designs, phi, names)
+    return {f"phi_{name}": phi[:, [k]] for k, name in enumerate(events)}, table[:, -1].astype(np.uint8)
 
 
 def switches_of_events(machine: Machine) -> list[Switches]:
     """Return where curves of threads have kinks and jumps."""
-    return [Switches(partial(_switches, machine))] if happenings(machine) else []
+    threads = [r for r in machine.relations if isinstance(r, ThreadBalance)]
+    of = frozenset(output.name for thread in threads for output in thread.outputs)
+    return [Switches(partial(_switches, machine), of)] if happenings(machine) else []
 
 
 def _switches(machine: Machine, designs: Array) -> Array:
@@ -121,18 +123,8 @@ def _search(machine: Machine, events: dict[str, Happening], designs: Array) -> A
             now, phi = poses.first(event.of, event.level, 1.0 if event.rising else -1.0)
         else:
             find: Any = passages if isinstance(event, Taking) else entries
-            columns = find(event, poses, SAMPLES, frozenset())
+            columns = find(event, machine, poses, SAMPLES)
             now, phi = columns["status"], columns[f"phi_{name}"]
         status = np.where(status == OK, now, status)
         found.append(phi)
     return np.column_stack([*found, status])
-
-
-def _shift(machine: Machine, event: Happening, designs: Array, phi: Array) -> Any:
-    """Return by how much complex designs move a root, in the imaginary direction: -f_p/f' (implicit function)."""
-    name = event.of if isinstance(event, Event) else next(iter(event.rates))
-    step = 1e-100
-    ahead: Any = phi + 1j * step
-    slope = machine.poses(designs.real, Angles.of(ahead), frozenset({name}))[name].imag / step
-    across = machine.poses(designs, Angles.of(phi), frozenset({name}))[name].imag
-    return -1j * across / slope

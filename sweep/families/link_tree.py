@@ -15,6 +15,7 @@ import numpy as np
 from kernels.types import Array
 from sweep.families.base import Angles, Columns
 from sweep.families.capabilities import DesignMap
+from sweep.families.frames import product
 
 if TYPE_CHECKING:  # families without such kernels do not wait for them
     from kernels.linkage.bodies import Links
@@ -133,7 +134,7 @@ class Turning(NamedTuple):
         """Return a vector that turns with the angle: along its direction and to the left of it, (n, 1) or (n, m)."""
         cos, sin = np.cos(self.angle), np.sin(self.angle)
         at = _stacked(along * cos - across * sin, along * sin + across * cos)
-        turned = np.cross(_Z, at)
+        turned = product(_Z, at)
         rate, bend = self.rate[..., None], self.bend[..., None]
         return Path(at, rate * turned, bend * turned - rate * rate * at)
 
@@ -176,7 +177,7 @@ def crank_arm(angles: Angles, alpha: Array, length: Array) -> Path:
 def put_about(links: Links, body: int, at: Path, turned: Turning) -> None:
     """Write a body that turns about z, first axis at the angle; its joint is its origin."""
     x = turned.arm(np.ones((1, 1))).at
-    _put(links, body, at, x, np.cross(_Z, x), turned.rate[..., None] * _Z, turned.bend[..., None] * _Z)
+    _put(links, body, at, x, product(_Z, x), turned.rate[..., None] * _Z, turned.bend[..., None] * _Z)
 
 
 def put_shifted(links: Links, body: int, at: Path) -> None:
@@ -189,7 +190,7 @@ def put_crank(links: Links, body: int, freedom: int, at: Path, arm: Path) -> Non
     """Write a crank that turns with the crank angle, first axis along its arm, and the axis that drives it."""
     x = arm.at / np.linalg.norm(arm.at, axis=-1, keepdims=True)
     y = arm.v / np.linalg.norm(arm.v, axis=-1, keepdims=True)
-    u = np.cross(x, y)
+    u = product(x, y)
     _put(links, body, at, x, y, u, np.zeros(3))
     links.axes[:, :, freedom] = u
 
@@ -203,14 +204,14 @@ def put_between(links: Links, body: int, start: Path, end: Path) -> None:
     square = (along.at * along.at).sum(axis=-1, keepdims=True)
     x = along.at / np.sqrt(square)
     least = np.eye(3)[np.where(np.abs(x[..., 2]) < 0.5, 2, 0)]
-    y = np.cross(least, x)
+    y = product(least, x)
     y /= np.linalg.norm(y, axis=-1, keepdims=True)
-    _put(links, body, start, x, y, np.cross(along.at, along.v) / square, np.cross(along.at, along.a) / square)
+    _put(links, body, start, x, y, product(along.at, along.v) / square, product(along.at, along.a) / square)
 
 
 def _put(links: Links, body: int, at: Path, x: Array, y: Array, omega: Array, eps: Array) -> None:
     record = links.bodies[:, :, body]
-    for k, part in enumerate((*at, omega, eps, x, y, np.cross(x, y), at.at)):
+    for k, part in enumerate((*at, omega, eps, x, y, product(x, y), at.at)):
         record[:, :, 3 * k : 3 * k + 3] = part
 
 

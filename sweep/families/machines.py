@@ -12,7 +12,7 @@ import numpy as np
 from kernels.chains.links import chain_rule
 from kernels.status import OK
 from kernels.types import Array
-from sweep.families.base import Angles, Columns, Event, Family, Output, Parameter
+from sweep.families.base import Angles, Columns, Event, Family, Output, Parameter, of_family
 from sweep.families.capabilities import Assembly, Points
 from sweep.families.curve_features import of_members
 from sweep.families.frames import Frame
@@ -182,6 +182,58 @@ def _precise_poses(machine: Machine, designs: Array, angles: Angles, wanted: fro
 
 def _poses(machine: Machine, designs: Array, angles: Angles, wanted: frozenset[str]) -> Columns:
     """Compute the wanted outputs of members and relations, and the first status that is not OK."""
+    known = _known_needs(machine)
+    if wanted not in known:
+        known[wanted] = _needs(machine, wanted)
+    asked = known[wanted]
+    shape = (len(designs), angles.cos.shape[1])
+    status = np.zeros(shape, np.uint8)
+    found: dict[str, Any] = {}
+    for needs in asked.members:
+        columns = _member(needs, designs, angles, found)
+        np.copyto(status, columns.pop("status"), where=status == OK)
+        found |= {f"{needs.member.name}.{name}": values for name, values in columns.items()}
+    frames = _frames(machine, designs) if any(isinstance(r, Shaking) for r in asked.relations) else {}
+    found["phi"] = angles.phi
+    if asked.events:
+        events, code = event_angles(machine, designs)
+        np.copyto(status, code[:, None], where=status == OK)
+        found |= events
+    found |= {name: designs[:, [column]] for name, column in asked.inputs.items()}
+    for relation in asked.relations:
+        found |= relation.compute(found, frames, wanted)
+    return {name: _whole(found[name], shape) for name in wanted} | {"status": status}
+
+
+@dataclass(frozen=True)
+class _OfMember:
+    """What is needed of a member: outputs by its own names, and what they are made of."""
+
+    member: Member
+    own: frozenset[str]
+    motion: frozenset[str]
+    sites: tuple[str, ...]
+    placed: tuple[str, ...]
+    moving: tuple[str, ...]
+
+
+@dataclass(frozen=True)
+class _Needs:
+    """What some wanted outputs are made of: members, relations, columns of the design matrix, angles of events."""
+
+    members: tuple[_OfMember, ...]
+    relations: tuple[Relation, ...]
+    inputs: Mapping[str, int]
+    events: bool
+
+
+@of_family
+def _known_needs(machine: Any) -> dict[frozenset[str], _Needs]:
+    """Remember what outputs are made of: a search asks for few sets of them, many times."""
+    return {}
+
+
+def _needs(machine: Machine, wanted: frozenset[str]) -> _Needs:
     relations = [r for r in machine.relations if not wanted.isdisjoint(o.name for o in r.outputs)]
     columns_of = machine.parameter_names
     needed = set(wanted).union(*(r.needs(wanted) for r in relations))
@@ -191,25 +243,19 @@ def _poses(machine: Machine, designs: Array, angles: Angles, wanted: frozenset[s
     needed -= changes
     for m in reversed(machine.members):
         needed |= _driving(m, needed)
-    shape = (len(designs), angles.cos.shape[1])
-    status = np.zeros(shape, np.uint8)
-    found: dict[str, Any] = {}
-    for m in machine.members:
-        own = {name for name in map(m.own, needed) if name}
-        if own:
-            columns = _member(m, designs, angles, own, found)
-            np.copyto(status, columns.pop("status"), where=status == OK)
-            found |= {f"{m.name}.{name}": values for name, values in columns.items()}
-    frames = _frames(machine, designs) if any(isinstance(r, Shaking) for r in relations) else {}
-    found["phi"] = angles.phi
-    if changes:
-        events, code = event_angles(machine, designs)
-        np.copyto(status, code[:, None], where=status == OK)
-        found |= events
-    found |= {name: designs[:, [columns_of.index(name)]] for name in inputs}
-    for relation in relations:
-        found |= relation.compute(found, frames, wanted)
-    return {name: _whole(found[name], shape) for name in wanted} | {"status": status}
+    members = tuple(_of_member(m, own) for m in machine.members if (own := frozenset(map(m.own, needed)) - {""}))
+    return _Needs(members, tuple(relations), {name: columns_of.index(name) for name in inputs}, bool(changes))
+
+
+def _of_member(m: Member, own: frozenset[str]) -> _OfMember:
+    motion = {name for name in own if name in m.family.pose_output}
+    motion |= {x for point in (*m.points, *dict(m.carried)) for x in _made_of(m, point, own)}
+    sites = {m.site_of[name] for name in own if name in m.site_of}
+    motion |= {x for site in sites for x in made_of(m, m.sites[site])}
+    motion |= {name for derivative in motion for name in m.family.orders(derivative)}
+    placed = tuple(p for p in m.points if any(f"{p}_{axis}" in own for axis in AXES))
+    moving = tuple(p for p in (*m.points, *dict(m.carried)) if any(f"d{p}_{axis}" in own for axis in AXES))
+    return _OfMember(m, own, frozenset(motion), tuple(sorted(sites)), placed, moving)
 
 
 def _frames(machine: Machine, designs: Array) -> dict[str, Frame]:
@@ -240,30 +286,24 @@ def _driving(member: Member, needed: set[str]) -> set[str]:
     return {f"{driver}.{name}" for name in names}
 
 
-def _member(m: Member, designs: Array, angles: Angles, own: set[str], found: Mapping[str, Any]) -> dict[str, Any]:
+def _member(needs: _OfMember, designs: Array, angles: Angles, found: Mapping[str, Any]) -> dict[str, Any]:
     """Return pose outputs of a member by their own names, and ``status``; what no design varies is computed once."""
+    m = needs.member
     own_designs, phase = m.designs(designs), m.phase(designs)
     once = m.driver is None and angles.cos.shape[0] == 1 and len(designs) > 1
     if once and (own_designs[1:] == own_designs[0]).all() and (phase[1:] == phase[0]).all():
         own_designs, phase = own_designs[:1], phase[:1]
-    motion = {name for name in own if name in m.family.pose_output}
-    motion |= {x for point in (*m.points, *dict(m.carried)) for x in _made_of(m, point, own)}
-    sites = {m.site_of[name] for name in own if name in m.site_of}
-    motion |= {x for site in sites for x in made_of(m, m.sites[site])}
-    motion |= {name for derivative in motion for name in m.family.orders(derivative)}
     turned = _turned(m, phase, angles, found)
-    result: dict[str, Any] = dict(m.family.poses(own_designs, turned, frozenset(motion)))
+    result: dict[str, Any] = dict(m.family.poses(own_designs, turned, needs.motion))
     _with_respect_to_shaft(m, result, found)
-    placed = [p for p in m.points if any(f"{p}_{axis}" in own for axis in AXES)]
-    moving = [p for p in (*m.points, *dict(m.carried)) if any(f"d{p}_{axis}" in own for axis in AXES)]
-    frames = m.frames(designs) if sites or placed or moving else []
-    for site in sites:
+    frames = m.frames(designs) if needs.sites or needs.placed or needs.moving else []
+    for site in needs.sites:
         result |= coordinates_of_site(m, site, frames, designs, result)
-    for point in placed:
+    for point in needs.placed:
         result |= coordinates(m, point, frames[-1], designs, own_designs, result)
-    for point in moving:
+    for point in needs.moving:
         result |= velocity(m, point, frames[-1], designs, result)
-    return {name: result[name] for name in (*own, "status")}
+    return {name: result[name] for name in (*needs.own, "status")}
 
 
 def _turned(m: Member, phase: Array, angles: Angles, found: Mapping[str, Any]) -> Angles:
@@ -277,13 +317,14 @@ def _turned(m: Member, phase: Array, angles: Angles, found: Mapping[str, Any]) -
 
 def _with_respect_to_shaft(m: Member, result: dict[str, Any], found: Mapping[str, Any]) -> None:
     """Make derivatives by the member's crank angle those by the angle of the main shaft, in place."""
+    if m.driver is None and m.ratio == 1:
+        return
     tops = [name for name in result if name in m.derivatives and m.family.derivative_of.get(name) not in result]
     for top in tops:
         names = m.family.orders(top)
         if m.driver is None:
             for order, name in enumerate(names, start=1):
-                if m.ratio != 1:
-                    result[name] = result[name] * float(m.ratio) ** order
+                result[name] = result[name] * float(m.ratio) ** order
             continue
         driver, output = m.driver
         inner = [output]
@@ -295,7 +336,7 @@ def _with_respect_to_shaft(m: Member, result: dict[str, Any], found: Mapping[str
         chain_rule(np.full(len(outer[0]), float(m.ratio)), *given, *missing, *outer, *missing)
 
 
-def _made_of(m: Member, point: str, own: set[str]) -> set[str]:
+def _made_of(m: Member, point: str, own: frozenset[str]) -> set[str]:
     """Return pose outputs that a point's coordinates and velocity are made of, as far as they are wanted."""
     at, moves = (any(f"{of}{point}_{axis}" in own for axis in AXES) for of in ("", "d"))
     found = {name for name in m.moving.get(point, ()) if name} if moves else set()

@@ -39,7 +39,7 @@ class Placement:
     zero: tuple[float, float, float] = (1.0, 0.0, 0.0)
     stage: int = 0
 
-    @property
+    @cached_property
     def rotation(self) -> Array:
         """R (3, 3): a vector v of the member's frame is R v in the machine's frame."""
         z = np.array(self.axis) / np.linalg.norm(self.axis)
@@ -159,9 +159,13 @@ class Member:
 
     def column(self, designs: Array, name: str) -> Array:
         """Column of one of the added parameters, (n,)."""
-        at = [p.name for p in self.added].index(name)
-        column: Array = designs[:, self.columns.stop + at]
+        column: Array = designs[:, self.columns.stop + self._place[name]]
         return column
+
+    @cached_property
+    def _place(self) -> Mapping[str, int]:
+        """Of each added parameter where it stands behind those of the family."""
+        return {p.name: k for k, p in enumerate(self.added)}
 
     def phase(self, designs: Array) -> Array:
         """Crank angle where the driving angle is 0, (n,)."""
@@ -179,8 +183,8 @@ class Member:
 
     def _given(self, designs: Array) -> Frame:
         """Frame that ``place`` gives, of the stage that it is about."""
-        at, tilts = (np.stack([self.column(designs, f"{x}_{of}") for x in AXES], axis=1) for of in ("at", "tilt"))
-        return Frame(tilted(self.place.rotation[None], tilts), at)
+        at, tilt = (self.columns.stop + self._place[name] for name in ("x_at", "x_tilt"))
+        return Frame(tilted(self.place.rotation[None], designs[:, tilt : tilt + 3]), designs[:, at : at + 3])
 
     def frames(self, designs: Array) -> list[Frame | None]:
         """Frames of all stages in the machine's; None where a chain does not say how they stand to each other."""

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from functools import partial
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -10,8 +11,21 @@ from numpy.typing import NDArray
 from kernels import status as st
 from kernels.types import TWO_PI, Array
 from sweep.families.base import Columns, Output, Step
-from sweep.families.crossings import TANGENT, Found, Poses, largest, step_of, verdict, whole
+from sweep.families.crossings import (
+    TANGENT,
+    Found,
+    Places,
+    Poses,
+    largest,
+    moved,
+    outputs_at,
+    step_of,
+    verdict,
+    where_largest,
+    whole,
+)
 from sweep.families.moments import Taking
+from sweep.families.thread_way import turned as turned_back
 
 if TYPE_CHECKING:
     from sweep.families.machines import Machine
@@ -41,11 +55,16 @@ def taking_step(taking: Taking, machine: Machine) -> Step:
     count = Output(f"count_{name}", "1", "passages in the stated sense beside the needle", "5.2", jumps=True)
     texts = TEXTS | ({"room": ("length", taking.window.words)} if taking.window else {})
     provides = (place, count, *(Output(f"{name}_{key}", unit, text, "5.2") for key, (unit, text) in texts.items()))
-    return step_of(name, provides, machine, lambda *asked: passages(taking, *asked))
+    return step_of(name, provides, machine, partial(_found, taking), partial(_read, taking))
 
 
-def passages(taking: Taking, poses: Poses, samples: int, wanted: frozenset[str]) -> Columns:
-    """Return all outputs of the passage, each (n,), and status.
+def passages(taking: Taking, machine: Machine, poses: Poses, samples: int) -> Columns:
+    """Return outputs of the passage that need no search of their own, each (n,), and status."""
+    return _read(taking, machine, poses.designs, _found(taking, poses, samples, frozenset()), frozenset())
+
+
+def _found(taking: Taking, poses: Poses, samples: int, wanted: frozenset[str]) -> Places:
+    """Return where the tip passes, where it passes next, and where the other outputs are read.
 
     Extremes of the way across are found first, on a grid and then as roots of its derivative; between neighbours of
     opposite sign lies one passage.  A pair of extremes between two samples is missed.
@@ -56,44 +75,68 @@ def passages(taking: Taking, poses: Poses, samples: int, wanted: frozenset[str])
     status, (x, dx, ddepth) = poses.samples(names, samples)
     status[(status == st.OK) & np.isnan(dx).any(axis=1)] = st.NO_FRAME
     x, dx, ddepth = (np.where((status == st.OK)[:, None], values, np.nan) for values in (x, dx, ddepth))
-    good = status == st.OK
     stops, extremes = poses.turning(names[2], ddepth), poses.turning(names[1], dx)
     (depths,), (across,) = at(stops, "depth"), at(extremes, "across")
-    deepest = largest(stops.row, depths, n)
     roots = poses.roots(extremes, across, names[0], names[1], x)
-    side, height, turned, depth, speed = at(roots, "side", "height", "dacross", "depth", "speed")
+    height, turned = at(roots, "height", "dacross")
     beside, right = taking.beside(height), sense * turned > 0.0
     count, ways = (np.bincount(roots.row, beside & one, n) for one in (right, ~right))
     found = verdict(status, at.touches(extremes, across), count, ways)
     taken = np.flatnonzero(beside & right & (found[roots.row] == st.OK))
     row, phi = roots.row[taken], roots.phi[taken]
-    place = whole(n, row, phi)
-    low, rows, gauge = _last(stops, depths, deepest, place), np.flatnonzero(good), np.full(n, np.nan)
-    gauge[rows] = -sense * at(Found(rows, low[rows]), "across")[0]
+    passage = whole(n, row, phi)
+    after = whole(n, row, roots.phi[_following(roots, taken)])
+    low = _last(stops, depths, largest(stops.row, depths, n), passage)
     top = _last(stops, -depths, largest(stops.row, -depths, n), low)
-    after = _following(roots, taken)
-    rise = deepest[row] - depth[taken]
+    places: Places = {"at": passage, "after": after, "low": low, "top": low - np.mod(low - top, TWO_PI)}
+    places["far"] = where_largest(extremes, -sense * across, n)
+    lag = np.mod(extremes.phi - passage[extremes.row], TWO_PI)
+    between = (lag <= np.mod(after - passage, TWO_PI)[extremes.row]) & (sense * across > 0.0)
+    places["beyond"] = where_largest(extremes.take(between), sense * across[between], n)
+    if f"{name}_free" in wanted:
+        rows = np.flatnonzero(status == st.OK)
+        places["near"] = whole(n, rows, poses.least(rows, places["top"][rows], low[rows], f"{name}_gap"))
+    return places | {"count": np.where(status == st.OK, count, np.nan), "status": found}
+
+
+def _read(taking: Taking, machine: Machine, designs: Any, places: Places, wanted: frozenset[str]) -> Columns:
+    """Return all outputs of the passage, each (n,), and status; complex designs carry the places along."""
+    name, sense = taking.name, float(taking.sense)
+    status = np.array(places["status"])
+    angles = {key: values for key, values in places.items() if key not in ("count", "status")}
+    if np.iscomplexobj(designs):
+        roots = {"at": "across", "after": "across", "low": "ddepth", "top": "ddepth"}
+        before = np.stack([angles[key] for key in roots], axis=1)
+        after = moved(machine, designs, before, [f"{name}_{what}" for what in roots.values()])
+        now = dict(zip(roots, after.T, strict=True))
+        for end in ("low", "top") if "near" in angles else ():  # an end of the needle's way takes the least gap along
+            now["near"] = np.where(places["near"] == places[end], now[end], now.get("near", places["near"]))
+        angles |= now  # extremes need no account of their own motion
+    del angles["top"]
+    names = ["across", "side", "height", "dacross", "depth", "speed", *(["gap"] if "near" in angles else [])]
+    found = outputs_at(machine, designs, angles, [f"{name}_{what}" for what in names])
+    across, side, height, turned, depth, speed, *gap = (found[f"{name}_{what}"] for what in names)
+    rise = depth["low"] - depth["at"]
     values = {
-        "lag": np.mod(phi - low[row], TWO_PI),
+        "lag": turned_back(angles["at"] - angles["low"]),
         "rise": rise,
-        "clearance": side[taken] - taking.needle.floor,
-        "above_eye": taking.needle.eye - height[taken],
-        "below_scarf_end": height[taken] - taking.needle.scarf_end,
-        "directness": sense * turned[taken] / speed[taken],
-        "back_side": side[after],
-        "back_height": height[taken] - height[after],
-        "overtravel": _between(extremes, sense * across, phi, roots.phi[after], row),
+        "clearance": side["at"] - taking.needle.floor,
+        "above_eye": taking.needle.eye - height["at"],
+        "below_scarf_end": height["at"] - taking.needle.scarf_end,
+        "directness": sense * turned["at"] / speed["at"],
+        "back_side": side["after"],
+        "back_height": height["at"] - height["after"],
+        "overtravel": np.where(np.isnan(across["beyond"]), 0.0 * rise, sense * across["beyond"]),
+        "gauge": -sense * across["low"],
+        "reach": -sense * across["far"],
     }
     if taking.window:
         values["room"] = np.minimum(rise - taking.window.least, taking.window.most - rise)
-    columns: Columns = {f"phi_{name}": place, f"count_{name}": np.where(good, count, np.nan), f"{name}_gauge": gauge}
-    columns[f"{name}_reach"] = largest(extremes.row, -sense * across, n)
-    if f"{name}_free" in wanted:
-        start = low - np.mod(low - top, TWO_PI)
-        columns[f"{name}_free"] = whole(n, rows, poses.least(rows, start[rows], low[rows], f"{name}_gap"))
-    columns |= {f"{name}_{key}": whole(n, row, value) for key, value in values.items()}
-    found[row[side[taken] <= 0.0]] = st.WRONG_SIDE
-    return columns | {"status": found}
+    if gap:
+        values["free"] = gap[0]["near"]
+    status[np.real(side["at"]) <= 0.0] = st.WRONG_SIDE
+    columns: Columns = {f"phi_{name}": angles["at"], f"count_{name}": places["count"], "status": status}
+    return columns | {f"{name}_{key}": value for key, value in values.items()}
 
 
 class _Tip:
@@ -133,13 +176,3 @@ def _following(roots: Found, taken: NDArray[np.intp]) -> NDArray[np.intp]:
     same = np.append(roots.row, -1)[after] == roots.row[taken]
     following: NDArray[np.intp] = np.where(same, after, np.searchsorted(roots.row, roots.row[taken]))
     return following
-
-
-def _between(extremes: Found, values: Array, start: Array, end: Array, row: NDArray[np.intp]) -> Array:
-    """Return the largest extreme of each design between two angles of its turn."""
-    found = np.full(row.size, np.nan)
-    for k, one in enumerate(row.tolist()):
-        own = extremes.row == one
-        inside = np.mod(extremes.phi[own] - start[k], TWO_PI) <= np.mod(end[k] - start[k], TWO_PI)
-        found[k] = values[own][inside].max(initial=0.0)
-    return found

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from functools import partial
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -15,7 +16,7 @@ import numpy as np
 from kernels import status as st
 from kernels.types import TWO_PI
 from sweep.families.base import Columns, Output, Parameter, Step
-from sweep.families.crossings import TANGENT, Poses, step_of, verdict, whole
+from sweep.families.crossings import TANGENT, Places, Poses, moved, outputs_at, step_of, verdict, whole
 from sweep.families.frames import Frame
 from sweep.families.segments import cross, dot, minus
 from sweep.families.tools import Spot
@@ -107,11 +108,16 @@ def entering_step(entering: Entering, machine: Machine) -> Step:
     place = Output(f"phi_{name}", "rad", "crank angle at which the tip passes the plane of the triangle", "(13)")
     count = Output(f"count_{name}", "1", "passages of the plane in the stated sense and window", "(13)", jumps=True)
     provides = (place, count, *(Output(f"{name}_{key}", "length", text, "(13)") for key, text in TEXTS.items()))
-    return step_of(name, provides, machine, lambda *asked: entries(entering, *asked))
+    return step_of(name, provides, machine, partial(_found, entering), partial(_read, entering))
 
 
-def entries(entering: Entering, poses: Poses, samples: int, wanted: frozenset[str]) -> Columns:
-    """Return all outputs of the entry, each (n,), and status; found as the passage of a needle is."""
+def entries(entering: Entering, machine: Machine, poses: Poses, samples: int) -> Columns:
+    """Return all outputs of the entry, each (n,), and status."""
+    return _read(entering, machine, poses.designs, _found(entering, poses, samples, frozenset()), frozenset())
+
+
+def _found(entering: Entering, poses: Poses, samples: int, wanted: frozenset[str]) -> Places:
+    """Return where the tip enters; found as the passage of a needle is."""
     name, sense, n = entering.name, float(entering.sense), len(poses.designs)
     above, dabove = f"{name}_above", f"{name}_dabove"
     status, (x, slope) = poses.samples([above, dabove], samples)
@@ -120,25 +126,32 @@ def entries(entering: Entering, poses: Poses, samples: int, wanted: frozenset[st
     extremes = poses.turning(dabove, slope)
     (heights,) = poses.at(extremes.row, extremes.phi, above)
     roots = poses.roots(extremes, heights, above, dabove, x)
-    reads = [dabove, *(f"{name}_to_{side}" for side in ("blade", "thread", "seam"))]
-    turned, *distances = poses.at(roots.row, roots.phi, *reads)
+    (turned,) = poses.at(roots.row, roots.phi, dabove)
     inside, right = _within(entering, roots.phi), sense * turned > 0.0
     count, ways = (np.bincount(roots.row, inside & one, n) for one in (right, ~right))
     size = np.abs(poses.designs[extremes.row]).max(axis=1, initial=0.0)
     near = _within(entering, extremes.phi) & (np.abs(heights) <= TANGENT * size)
     found = verdict(status, np.bincount(extremes.row, near, n) > 0, count, ways)
     taken = np.flatnonzero(inside & right & (found[roots.row] == st.OK))
-    row = roots.row[taken]
-    least = np.minimum.reduce(distances)[taken] - entering.radius
-    values = dict(zip(("from_blade", "from_thread", "from_seam"), (one[taken] for one in distances), strict=True))
-    values |= {"margin": least, "pace": sense * turned[taken]}
-    columns: Columns = {f"phi_{name}": whole(n, row, roots.phi[taken])}
-    columns[f"count_{name}"] = np.where(status == st.OK, count, np.nan)
-    columns |= {f"{name}_{key}": whole(n, row, value) for key, value in values.items()}
-    flat = row[np.isnan(least)]
-    found[row[least <= -entering.radius]] = st.WRONG_SIDE
-    found[flat] = st.NO_TRIANGLE
-    return columns | {"status": found}
+    place = whole(n, roots.row[taken], roots.phi[taken])
+    return {"at": place, "count": np.where(status == st.OK, count, np.nan), "status": found}
+
+
+def _read(entering: Entering, machine: Machine, designs: Any, places: Places, wanted: frozenset[str]) -> Columns:
+    """Return all outputs of the entry, each (n,), and status; complex designs carry the place along."""
+    name, status, at = entering.name, np.array(places["status"]), places["at"]
+    if np.iscomplexobj(designs):
+        at = moved(machine, designs, at[:, None], [f"{name}_above"])[:, 0]
+    reads = [f"{name}_dabove", *(f"{name}_to_{side}" for side in SIDES)]
+    found = outputs_at(machine, designs, {"at": at}, reads)
+    turned, *distances = (found[one]["at"] for one in reads)
+    least = np.minimum.reduce(distances) - entering.radius
+    columns: Columns = {f"phi_{name}": at, f"count_{name}": places["count"], f"{name}_margin": least}
+    columns |= {f"{name}_from_{side}": one for side, one in zip(SIDES, distances, strict=True)}
+    columns[f"{name}_pace"] = float(entering.sense) * turned
+    status[np.real(least) <= -entering.radius] = st.WRONG_SIDE
+    status[np.isfinite(places["at"]) & np.isnan(least)] = st.NO_TRIANGLE
+    return columns | {"status": status}
 
 
 def _within(entering: Entering, phi: Any) -> Any:

@@ -57,7 +57,9 @@ def _events(family: Family, designs: Array, event: Event, accuracy: Accuracy) ->
     n = len(designs)
     phi, err, number, status = np.full(n, np.nan), np.full(n, np.nan), np.zeros(n), np.zeros(n, np.uint8)
     samples = accuracy.samples or START
-    fewest = samples if accuracy.samples is not None else np.minimum(START * denser(family, designs), LIMIT)
+    fewest = (
+        samples if accuracy.samples is not None else np.minimum(START * denser(family, designs, (event.of,)), LIMIT)
+    )
     pending = np.ones(n, np.bool_)
     while pending.any():
         doubtful = np.zeros(n, np.bool_)

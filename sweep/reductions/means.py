@@ -1,7 +1,8 @@
-"""Root mean square over one turn of any pose output: adaptive quadrature of precise poses on panels of the turn.
+"""Root mean square over one turn of any pose output: equidistant precise poses, or adaptive quadrature on panels.
 
-Panels crowd about the nearest singularities, and begin and end where a curve has kinks or jumps; they are halved where
-needed.  Chains whose stages are fused have a kernel for it, which leaves the hard designs to panels.
+A smooth curve settles on equidistant poses.  Panels are for what does not: they crowd about the nearest singularities,
+begin and end where a curve has kinks or jumps, and are halved where needed.  Chains whose stages are fused have a
+kernel for it, which leaves the hard designs to panels.
 """
 
 from __future__ import annotations
@@ -14,16 +15,16 @@ from kernels import status as st
 from kernels.curves import samples as scan
 from kernels.types import EPS, TWO_PI, Status
 from sweep.families.base import Accuracy, Array, Columns, Family
-from sweep.families.curve_features import Switches, crossed
+from sweep.families.curve_features import crossed, switching
 from sweep.numerics.events import with_events
 from sweep.numerics.quadrature import integrate
-from sweep.numerics.singularities import turn_edges
+from sweep.numerics.singularities import FAR, turn_edges
 from sweep.quantities.kinds import Request
 from sweep.reductions.fused import curve_of
 from sweep.reductions.resolution import denser, ends, nearest
 from sweep.reductions.sampling import DESIGN_STATUS, Index, blocks, pose_columns, sample_turn
 
-START = 32  # samples that tell whether a design turns
+SAMPLES = 128  # of a turn at first
 NEAR = 0.3  # distance of a singularity [rad] from which on it is looked at closely
 PANEL = 1.0  # length of the first panels against that distance; the rule of 15 points errs by 1e-13 there
 PANELS_AT_ONCE = 1024
@@ -78,14 +79,18 @@ def _of_one(family: Family, designs: Array, pose: str, target: float) -> tuple[A
 
 def _refined(family: Family, designs: Array, pose: str, target: float) -> tuple[Array, Array, Status]:
     """Means of one pose output and their errors (n,), and the status, from poses alone."""
-    (mean,), status = _on_grid(family, designs, START, [pose])
-    err, output = np.full_like(mean, np.nan), family.pose_output[pose]
+    mean, err, status = _on_turn(family.precise(), designs, pose)
+    output = family.pose_output[pose]
     # What jumps, bends or waves is cut there.
-    cut = crossed(family, designs) | (denser(family, designs) > 1.0) | output.kinks | output.jumps
-    even = KNOWN if family.every(Switches) and pose not in family.dear else EVEN
+    cut = crossed(family, designs) | (denser(family, designs, (pose,)) > 1.0) | output.kinks | output.jumps
+    even = KNOWN if switching(family, (pose,)) and pose not in family.dear else EVEN
     alive = np.flatnonzero(status == st.OK)
     for rows in np.split(alive, range(PANELS_AT_ONCE, alive.size, PANELS_AT_ONCE)):
-        edges = turn_edges(nearest(family, designs[rows], NEAR), PANEL)
+        near = nearest(family, designs[rows], NEAR)
+        open_ = cut[rows] | (near.rho.min(axis=1, initial=FAR) < NEAR) | ~(err[rows] <= target * mean[rows])
+        edges, rows = turn_edges(near.only(np.flatnonzero(open_)), PANEL), rows[open_]
+        if not rows.size:
+            continue
         which = np.flatnonzero(cut[rows])
         if which.size:
             places = ends(family, designs[rows[which]], even, LOOKS, pose)
@@ -93,6 +98,25 @@ def _refined(family: Family, designs: Array, pose: str, target: float) -> tuple[
         mean[rows], err[rows], status[rows] = _on_panels(family, designs[rows], pose, edges, target)
     lost = (status != st.OK) & (status != st.NOT_CONVERGED)
     mean[lost], err[lost] = np.nan, np.nan
+    return mean, err, status
+
+
+def _on_turn(family: Family, designs: Array, pose: str) -> tuple[Array, Array, Status]:
+    """Means over equidistant samples, their errors and the status; every other sample gives the mean before.
+
+    Of a periodic curve without near singularities the error falls by its square when samples are doubled.
+    """
+    n = len(designs)
+    mean, err, status = np.full(n, np.nan), np.full(n, np.nan), np.empty(n, np.uint8)
+    for part in blocks(np.arange(n), SAMPLES):
+        columns, worst, winds = sample_turn(family, designs[part], SAMPLES, [pose])
+        status[part] = np.where((worst == st.OK) & winds, st.NOT_OSCILLATING, DESIGN_STATUS[worst])
+        values = columns[pose]
+        size = np.abs(values).max(axis=1)
+        size = np.where((size > 0.0) & np.isfinite(size), size, 1.0)
+        squares = np.square(values / size[:, None])
+        whole, before = (np.sqrt(some.sum(axis=1) / some.shape[1]) for some in (squares, squares[:, ::2]))
+        mean[part], err[part] = size * whole, size * (np.abs(whole - before) + _rounded(_blur(squares), whole))
     return mean, err, status
 
 
@@ -107,7 +131,7 @@ def _on_panels(family: Family, designs: Array, pose: str, edges: Array, target: 
         scan.unwrap(starts, np.empty(n, np.int64))
     size = np.abs(starts).max(axis=1)
     size = np.where((size > 0.0) & np.isfinite(size), size, 1.0)
-    blur = _blur(starts / size[:, None])
+    blur = _blur(np.square(starts / size[:, None]))
 
     def squares(rows: Index, origins: Index, phi: Array) -> Array:
         columns, codes = pose_columns(family, designs[rows], phi, [pose])
@@ -123,17 +147,21 @@ def _on_panels(family: Family, designs: Array, pose: str, edges: Array, target: 
         return out[:, :, None]
 
     integrals = integrate(squares, edges, 2.0 * target)  # the root halves a relative error
-    mean, off = np.sqrt(integrals.value[:, 0] / TWO_PI), integrals.err[:, 0] + blur
-    half = np.divide(0.5 * off, TWO_PI * mean, out=np.sqrt(off / TWO_PI), where=mean > 0.0)
+    mean = np.sqrt(integrals.value[:, 0] / TWO_PI)
     state = DESIGN_STATUS[status].astype(np.uint8)
     state[(state == st.OK) & ~np.isfinite(starts).all(axis=1)] = st.INVALID_INPUT  # a pose that leaves float64
     state[(state == st.OK) & ~integrals.settled] = st.NOT_CONVERGED
-    return size * mean, size * (half + 16.0 * EPS * mean), state
+    return size * mean, size * _rounded(integrals.err[:, 0] + blur, mean), state
 
 
-def _blur(values: Array) -> Array:
-    """Bound what the rounding of the crank angles may do to the integral of the squares: their variation times that."""
-    squares = values * values
+def _rounded(off: Array, mean: Array) -> Array:
+    """Return the error of means whose integrals of squares are wrong by ``off``, their own rounding included."""
+    half: Array = np.divide(0.5 * off, TWO_PI * mean, out=np.sqrt(off / TWO_PI), where=mean > 0.0)
+    return half + 16.0 * EPS * mean
+
+
+def _blur(squares: Array) -> Array:
+    """Bound what the rounding of the crank angles may do to the integral of squares: their variation times that."""
     # One after the other: repeated angles add nothing, however many there are.
     variation: Array = np.cumsum(np.abs(squares - np.roll(squares, 1, axis=1)), axis=1)[:, -1]
     return 2.0 * EPS * TWO_PI * variation

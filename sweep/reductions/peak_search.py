@@ -114,18 +114,18 @@ class Search:
         n = len(self.designs)
         self.found = {request: Extremum.unknown(n) for request in self.requests}
         self.status = np.zeros(n, np.uint8)
+        # A discriminant is a smooth function whatever its sign; the motion is not where it vanishes.
+        self.guards = [] if self.anywhere else list(discriminants(self.family))
+        position = [self.family.position] if self.window is not None else []
+        self.names = list(dict.fromkeys([*(r.pose for r in self.requests), *position, *self.guards]))
         # Samples that each request still needs of each design; 0 once it is found.
         self.near = nearest(self.family, self.designs, MATTERS) if self.family.every(Singular) else None
-        fewest = (START * denser(self.family, self.designs, self.near)).astype(np.int64)
+        fewest = (START * denser(self.family, self.designs, self.names, self.near)).astype(np.int64)
         self.undone = np.tile(fewest, (len(self.requests), 1))
         self.torn = np.zeros(self.undone.shape, np.bool_)  # curves that jump: panels are to search them
         if self.near is not None and not self.anywhere:
             broken(self.family, self.designs, self.near, self.status)
             self.undone[:, self.status != st.OK] = 0
-        # A discriminant is a smooth function whatever its sign; the motion is not where it vanishes.
-        self.guards = [] if self.anywhere else list(discriminants(self.family))
-        position = [self.family.position] if self.window is not None else []
-        self.names = list(dict.fromkeys([*(r.pose for r in self.requests), *position, *self.guards]))
 
     def needed(self, rows: Index) -> Index:
         """Fewest samples that a request of these designs still needs, 0 where all are found."""

@@ -5,6 +5,8 @@ A family says what it knows of its curves by capabilities (`sweep.families.curve
 
 from __future__ import annotations
 
+from collections.abc import Collection
+
 import numpy as np
 
 from kernels import status as st
@@ -33,14 +35,16 @@ MOST = 1024.0  # times the fewest samples
 MATTERS = 2.0 * PER_SINGULARITY / FEWEST
 
 
-def denser(family: Family, designs: Array, near: Singularities | None = None) -> Array:
-    """Return by which power of two the fewest samples of a turn are multiplied, (n,); ``near`` if it is known.
+def denser(family: Family, designs: Array, outputs: Collection[str], near: Singularities | None = None) -> Array:
+    """Return by which power of two the fewest samples of pose outputs over a turn are multiplied, (n,).
+
+    ``near`` are the nearest singularities if they are known.
 
     Between two switches stand several samples, in a wave at least half of what else stands in a turn, and 12 in the
     distance of a singularity that the samples themselves would not see.
     """
     factor = np.maximum(waves(family, designs) / PER_WAVE, 1.0)
-    angles = np.sort(switches(family, designs), axis=1)
+    angles = np.sort(switches(family, designs, outputs), axis=1)
     if angles.shape[1] > 1:
         gaps = np.concatenate([np.diff(angles, axis=1), angles[:, :1] + TWO_PI - angles[:, -1:]], axis=1)
         # Two switches in one place are one.
@@ -101,7 +105,7 @@ def ends(family: Family, designs: Array, even: int, looks: int, output: str) -> 
     """
     n = len(designs)
     edges = np.tile(np.linspace(0.0, TWO_PI, even + 1), (n, 1))
-    known = switches(family, designs)
+    known = switches(family, designs, (output,))
     edges = with_events(edges, np.repeat(np.arange(n), known.shape[1]), known.ravel())
     fast = np.ceil(waves(family, designs) / PER_PANEL).astype(np.int64)  # even ends of so many panels
     more = np.repeat(np.arange(n), np.where(fast > even, fast, 0))
@@ -112,9 +116,7 @@ def ends(family: Family, designs: Array, even: int, looks: int, output: str) -> 
     about = crowded(near.only(close), 1.0)
     edges = with_events(edges, np.repeat(close, about.shape[1]), about.ravel())
     angles = crowded(near.only(close), LOOK)
-    # What reverses is felt by friction and loads, of effects; a family knows its own kinks.
-    speeds = reversing(family) if output in family.dear else ()
-    edges = with_events(edges, *_passed(family, designs, speeds, _looked(n, looks, close, angles)))
+    edges = with_events(edges, *_passed(family, designs, (output,), _looked(n, looks, close, angles)))
     for bent in bends(family, output):
 
         def bending(rows: Index, phi: Array, bent: Bends = bent) -> Array:
@@ -126,18 +128,20 @@ def ends(family: Family, designs: Array, even: int, looks: int, output: str) -> 
     return edges
 
 
-def events(family: Family, designs: Array, looks: int) -> tuple[Index, Array]:
+def events(family: Family, designs: Array, looks: int, outputs: Collection[str]) -> tuple[Index, Array]:
     """Return designs (k,) and angles (k,) where a pose output passes its level, or a follower reverses.
 
-    They are looked for between ``looks`` even samples of the turn.
+    They are looked for between ``looks`` even samples of the turn, as far as ``outputs`` depend on them.
     """
     even = np.arange(looks) * (TWO_PI / looks)
-    return _passed(family, designs, reversing(family), np.tile(even, (len(designs), 1)))
+    return _passed(family, designs, outputs, np.tile(even, (len(designs), 1)))
 
 
-def _passed(family: Family, designs: Array, speeds: tuple[str, ...], looked: Array) -> tuple[Index, Array]:
+def _passed(family: Family, designs: Array, outputs: Collection[str], looked: Array) -> tuple[Index, Array]:
     """Return designs and angles where an output passes its level or a speed passes zero, as seen at ``looked``."""
     crossings = family.every(Crossing)
+    # What reverses is felt by friction and loads, of effects; a family knows its own kinks.
+    speeds = () if family.dear.keys().isdisjoint(outputs) else reversing(family)
     if not speeds and not crossings:
         return np.zeros(0, np.intp), np.zeros(0)
     names = list(dict.fromkeys([*speeds, *(crossing.of for crossing in crossings)]))

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from functools import partial
+from typing import NamedTuple
 
 import numpy as np
 
@@ -218,6 +219,38 @@ POSES_PEAK = 30.0
 POSES_PLACE = 240.0  # of a place after a fused search: nine precise poses take as long as so many others
 
 
+class Beyond(NamedTuple):
+    """What a pose output is computed by beside the motion, "" for nothing: place among routes, cost [ns per pose]."""
+
+    name: str = ""
+    order: tuple[Work, int] = (Work.EFFECT, 0)
+    ns: float = 0.0
+
+
+EVENTS = 1e4  # ns per pose: angles of events are found once per design, in some milliseconds
+
+
+def beyond_motion(family: Family, pose: str) -> Beyond:
+    """Return the effect that a pose output is of, or the relation of a machine that needs effects or events."""
+    return _beyond(family).get(pose, Beyond())
+
+
+@of_family
+def _beyond(family: Family) -> dict[str, Beyond]:
+    effects = list(dict.fromkeys(effect for effect, _ in family.dear.values()))
+    found = {name: Beyond(what, (Work.EFFECT, effects.index(what)), ns) for name, (what, ns) in family.dear.items()}
+    for number, relation in enumerate(family.relations if isinstance(family, Machine) else ()):
+        for name in (output.name for output in relation.outputs):
+            needs = relation.needs(frozenset((name,)))
+            ns = sum(dict(family.dear[one] for one in needs if one in family.dear).values())
+            if any(one.startswith("phi_") for one in needs):
+                # behind the routes that find events, and their limits
+                found[name] = Beyond(relation.name, (Work.LONG, len(family.steps) + number), ns + EVENTS)
+            elif ns:
+                found[name] = Beyond(relation.name, (Work.EFFECT, len(effects) + number), ns)
+    return found
+
+
 def group_ns(family: Family, group: Group, names: Sequence[str], accuracy: Accuracy) -> float:
     """Estimated time of a general route [ns per design], made of measured times of poses and of searches."""
     stages, pose = _stages(family), pose_ns(family)
@@ -228,7 +261,7 @@ def group_ns(family: Family, group: Group, names: Sequence[str], accuracy: Accur
         return POSES_EVENT * pose + nanoseconds("work", "event") * len(asked)
     requested = {r for one in asked for r in requests(family, one, False)}
     # What effects add is paid once per effect and pose, and far outweighs the motion.
-    effects = sum(dict(family.dear[one.of] for one in asked if one.of in family.dear).values())
+    effects = sum({(name, ns): ns for name, _, ns in (beyond_motion(family, one.of) for one in asked)}.values())
     if accuracy.samples is not None or group == "means":
         scans = len(asked) if group == "means" else len(requested)
         return (accuracy.samples or POSES_MEAN) * (pose + nanoseconds("work", "scan") * scans + effects)
@@ -277,10 +310,9 @@ def pose_ns(family: Family) -> float:
 def group_order(family: Family, group: Group, names: Sequence[str]) -> tuple[Work, int]:
     """Place of a general route among others: what shows that a design does not turn first, then the fewest extrema."""
     asked = [resolve(family, name) for name in names]
-    effects = list(dict.fromkeys(effect for effect, _ in family.dear.values()))
-    effect = next((family.dear[one.of][0] for one in asked if one.of in family.dear), None)
-    if effect is not None:
-        return Work.EFFECT, effects.index(effect)
+    beyond = next((found for one in asked if (found := beyond_motion(family, one.of)).name), None)
+    if beyond is not None:
+        return beyond.order
     first = {"margin": 0, "means": 1, "events": 2}
     extrema = {r for one in asked for r in requests(family, one, False)} if group not in first else ()
     return Work.SEARCH, first.get(group, 2 + len(extrema))

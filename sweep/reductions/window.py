@@ -125,7 +125,7 @@ def window_angle(family: Family, designs: Array, window: Window) -> tuple[Array,
     angle, err = np.full(len(designs), np.nan), np.full(len(designs), np.nan)
     open_end = np.full(len(designs), np.inf)
     names = (family.position, family.derivative_of[family.position])
-    samples, known = SAMPLES * denser(family, designs), np.isfinite(window.err)
+    samples, known = SAMPLES * denser(family, designs, names), np.isfinite(window.err)
     every = (rows for m in np.unique(samples[known]) for rows in blocks(np.flatnonzero(known & (samples == m)), int(m)))
     for rows in every:
         columns, _, _ = sample_turn(family, designs[rows], int(samples[rows[0]]), names)

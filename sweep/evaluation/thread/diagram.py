@@ -76,10 +76,10 @@ def diagram(
     matrix = design_matrix(family, given)[0]
     if len(matrix) != 1:
         raise InputError("design", "several rows", "the parameters of one design", f"table of {family.name}")
-    events = switches(family, matrix)[0]
+    known = {o.name for thread in threads for o in thread.outputs}
+    events = switches(family, matrix, known)[0]
     turn = np.arange(samples) * (TWO_PI / samples)
     phi = np.unique(np.mod(np.concatenate([turn, events - BESIDE, events + BESIDE]), TWO_PI))
-    known = {o.name for thread in threads for o in thread.outputs}
     wanted = [name for t in threads for name in (f"{t.name}_{key}" for key in COLUMNS) if name in known]
     found = evaluate(family, given, wanted, phi=phi).drop(columns="design")
     found["demand"] = sum(found[f"{t.name}_demand"] for t in threads)

@@ -3,14 +3,16 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
 
-from sweep.families.base import Angles, Array
+from sweep.families.base import Accuracy, Angles, Array, Family, Step
 from sweep.optimise.extrema.points import STEP, Curves, Points
 from sweep.optimise.extrema.scanned import CROSSING, EDGE, PASSING, followed
 from sweep.optimise.problem.statement import Problem
+from sweep.reductions.steps import applying_step
 
 # Mixed derivative of the slope: complex step in the variable, fourth-order difference in the crank angle.
 OFFSET = 1e-3
@@ -83,7 +85,7 @@ def _at_edges(curves: Curves, designs: Any, points: Points, values: Array, moves
     base, direction = designs[0].real, designs.imag / STEP
     both = np.concatenate([base + ALONG * direction, base - ALONG * direction])
     which, n = np.flatnonzero(points.how == EDGE), len(direction)
-    phi = followed(curves.problem.family, both, points.phi[which], points.level[which])
+    phi = followed(curves.problem.family, both, points.phi[which], points.level[which], curves.plain)
     columns = curves.family.poses(both, Angles.of(phi), curves.wanted)
     moves[which] = ((phi[:n] - phi[n:]) / (2.0 * ALONG)).T
     for number, series in enumerate(curves.series):
@@ -105,6 +107,21 @@ def reading_gradient(curves: Curves, designs: Any, output: str, phi: float, move
     standing = curves.poses(designs, np.array([phi]), wanted)[output][:, 0].imag / STEP
     along = curves.poses(designs[:1].real, np.array([phi + 1j * STEP]), wanted)[output][0, 0].imag / STEP
     return np.asarray(standing + along * moves, np.float64)
+
+
+def step_gradients(family: Family, designs: Any, outputs: Sequence[str], accuracy: Accuracy) -> dict[str, Array]:
+    """Return gradients (n,) of those outputs that steps of the family give of designs as of :func:`stepped`."""
+    steps: dict[str, tuple[Step, list[str]]] = {}
+    for name in outputs:
+        found = applying_step(family, name, accuracy)
+        if found is not None and found[0].analytic:
+            steps.setdefault(found[0].name, (found[0], []))[1].append(name)
+    gradients: dict[str, Array] = {}
+    for step, names in steps.values():
+        with np.errstate(all="ignore"):  # what is nan has no gradient
+            columns: Any = step.run(designs, frozenset(names), accuracy)
+        gradients |= {name: columns[name].imag / STEP for name in names}
+    return gradients
 
 
 def scalar_gradient(function: Any, fractions: Array) -> Array:

@@ -131,7 +131,7 @@ class Curves:
         Only maxima in the upper half of a curve's range and minima in the lower half are kept.  A curve that is not
         defined over the whole turn has none.
         """
-        samples = max(samples, poses_needed(self.problem.family, design))
+        samples = max(samples, poses_needed(self.problem.family, design, self.wanted))
         phi: Array = np.arange(samples, dtype=np.float64) * (2.0 * math.pi / samples)
         columns = self.poses(design[None, :], phi)
         turns = not columns["status"].any()
@@ -163,7 +163,7 @@ class Curves:
         if not names:
             return points
         bent = [n for n, s in enumerate(self.series) if _is_plain(s) and s.output in {self.plain[k] for k in names}]
-        sides, which = edges(self.problem.family, design)
+        sides, which = edges(self.problem.family, design, self.plain)
         there = self.poses(design[None, :], sides.ravel())
         rows = []
         for n in bent:
@@ -212,7 +212,8 @@ class Curves:
         held, passing, edge = points.how == STATIONARY, points.how == PASSING, points.how == EDGE
         phi = points.phi.copy()
         if edge.any():
-            phi[edge] = followed(self.problem.family, design[None, :], phi[edge], points.level[edge])[0]
+            given = design[None, :], phi[edge], points.level[edge]
+            phi[edge] = followed(self.problem.family, *given, self.plain)[0]
         own = self._by_series(points)
         reach, uphill = np.full(len(phi), stride), np.zeros(len(phi))
         for _ in range(12):

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import itertools
 import math
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from typing import Any, TypeAlias
 
 import numpy as np
@@ -115,11 +115,11 @@ BESIDE = 1e-11  # distance from an edge at which its sides are looked at [rad]
 REACH = 0.1  # by which an edge moves with a step of the search at most [rad]: further ones are others
 
 
-def poses_needed(family: Family, design: Array) -> int:
-    """Return how many poses of a turn show all that a design's curves hold; 0 where any number will do."""
+def poses_needed(family: Family, design: Array, outputs: Collection[str]) -> int:
+    """Return how many poses of a turn show all that curves of a design hold; 0 where any number will do."""
     if isinstance(family.domain, Interval) or not any(family.every(kind) for kind in (Waves, Singular, Switches)):
         return 0
-    return int(FEWEST * denser(family, design[None, :])[0])
+    return int(FEWEST * denser(family, design[None, :], outputs)[0])
 
 
 def may_bend(family: Family, outputs: tuple[str, ...]) -> bool:
@@ -135,18 +135,19 @@ def bending(family: Family, design: Array, outputs: tuple[str, ...]) -> list[int
     return [n for n, name in enumerate(outputs) if jumps or _bends(family, name)]
 
 
-def edges(family: Family, design: Array) -> tuple[Array, Array]:
-    """Return crank angles just before and just behind every edge, (2, k) [rad], and what the edge is, (k,).
+def edges(family: Family, design: Array, outputs: Collection[str]) -> tuple[Array, Array]:
+    """Return crank angles just before and just behind every edge of some curves, (2, k) [rad], and what each is, (k,).
 
     The latter is 1 + j for the end j of those known beforehand, 1/2 where a level is passed or a follower reverses.
     """
-    known, found = switches(family, design[None, :])[0], events(family.precise(), design[None, :], LOOKS)[1]
+    known = switches(family, design[None, :], outputs)[0]
+    found = events(family.precise(), design[None, :], LOOKS, outputs)[1]
     cut = np.concatenate([known, found])
     which = np.concatenate([np.arange(1.0, 1.0 + known.size), np.full(found.size, 0.5)])
     return np.stack([cut - BESIDE, cut + BESIDE]), which
 
 
-def followed(family: Family, designs: Array, phi: Array, level: Array) -> Array:
+def followed(family: Family, designs: Array, phi: Array, level: Array, outputs: Collection[str]) -> Array:
     """Return where points at edges belong on other designs, (n, k).
 
     An end known beforehand is found by its number, another one as the nearest: where that is far away the point stays.
@@ -156,15 +157,16 @@ def followed(family: Family, designs: Array, phi: Array, level: Array) -> Array:
     family, designs : (n, P)
     phi : (k,) crank angles of the points, beside an edge of a design near by
     level : (k,) what the edge is, negative for a point before it
+    outputs : as of :func:`edges`
     """
     side, number = np.sign(level), np.abs(level)
     at, moved = phi - BESIDE * side, np.zeros((len(designs), len(phi)))
     known = np.flatnonzero(number >= 1.0)
     if known.size:
-        moved[:, known] = _way(at[known], switches(family, designs)[:, number[known].astype(np.intp) - 1])
+        moved[:, known] = _way(at[known], switches(family, designs, outputs)[:, number[known].astype(np.intp) - 1])
     other = np.flatnonzero(number < 1.0)
     if other.size:
-        rows, found = events(family.precise(), designs, LOOKS)
+        rows, found = events(family.precise(), designs, LOOKS, outputs)
         for row in range(len(designs)):
             ways = _way(at[other], found[rows == row][:, None])
             nearest = np.abs(ways).argmin(axis=0) if len(ways) else np.zeros(other.size, np.intp)

@@ -13,7 +13,7 @@ import numpy as np
 from sweep.errors import InputError
 from sweep.evaluation.summaries import design_outputs
 from sweep.families.base import Array
-from sweep.optimise.extrema.gradients import gradients, reading_gradient, scalar_gradient, stepped
+from sweep.optimise.extrema.gradients import gradients, reading_gradient, scalar_gradient, step_gradients, stepped
 from sweep.optimise.extrema.points import STEP, Curves, Points
 from sweep.optimise.local.kkt import ACTIVE, Multipliers, multipliers
 from sweep.optimise.problem.program import Program
@@ -184,6 +184,8 @@ class Model:
                 none = np.full(len(fractions), math.nan)
                 found[name] = none if k < 0 else reading_gradient(self.curves, designs, of, points.phi[k], moves[k])
         rest = [name for name in names if name not in found]
+        found |= step_gradients(self.problem.family, designs, rest, self.problem.accuracy)
+        rest = [name for name in rest if name not in found]
         if rest:
 
             def values(at: Array) -> Array:

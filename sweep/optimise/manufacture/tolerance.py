@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from sweep.evaluation.summaries import design_outputs
 from sweep.families.base import Accuracy, Array, Family
 from sweep.families.names import is_flag
-from sweep.optimise.extrema.gradients import scalar_gradient
+from sweep.optimise.extrema.gradients import scalar_gradient, step_gradients, stepped
 from sweep.optimise.local.model import Model
 from sweep.optimise.problem.program import Program
 from sweep.optimise.problem.statement import Problem
@@ -91,15 +91,19 @@ def _plain_ends(
     if not outputs:
         return {}
     asked = problem(outputs[0])
-
-    def values(designs: Array) -> Array:
-        columns = design_outputs(asked.family, designs, list(outputs), asked.accuracy, asked.window)
-        return np.stack([np.asarray(columns[name], np.float64) for name in outputs], axis=1)
-
     at = asked.scaled(design[None, :])[0]
-    slopes = scalar_gradient(lambda moved: values(asked.placed(design, moved)), at)
-    numbers = values(design[None, :])[0]
-    return {name: (float(numbers[k]), slopes[:, k], slopes[:, k]) for k, name in enumerate(outputs)}
+
+    def values(designs: Array, names: Sequence[str]) -> Array:
+        columns = design_outputs(asked.family, designs, names, asked.accuracy, asked.window)
+        return np.stack([np.asarray(columns[name], np.float64) for name in names], axis=1)
+
+    slopes = step_gradients(asked.family, stepped(asked, design, at), outputs, asked.accuracy)
+    rest = [name for name in outputs if name not in slopes]
+    if rest:
+        found = scalar_gradient(lambda moved: values(asked.placed(design, moved), rest), at)
+        slopes |= dict(zip(rest, found.T, strict=True))
+    numbers = values(design[None, :], outputs)[0]
+    return {name: (float(x), slopes[name], slopes[name]) for name, x in zip(outputs, numbers, strict=True)}
 
 
 def _ends(problem: Problem, design: Array) -> tuple[float, Array, Array]:
