@@ -20,7 +20,7 @@ from sweep.families.curve_features import Bends, Crossing, of_order, of_table
 from sweep.numerics.curves import Curve, TableCurve
 
 # Poses per block: their joint records, 24 numbers each, fill about half a second-level cache.
-BLOCK = 4096
+BLOCK = 16384
 # Designs per block of an effect that samples the turn itself, some hundred poses of each.
 TURNS = 32
 # Relative step of central differences: error of second order against rounding.

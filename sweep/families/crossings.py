@@ -45,14 +45,25 @@ class Found:
 
 def step_of(name: str, provides: Sequence[Output], machine: Machine, find: Find, read: Read) -> Step:
     """Return the machine's own route to what is read at places of its turn."""
+    last: dict[str, tuple[bytes, Places]] = {}
+
+    def places_of(designs: Array, wanted: frozenset[str], samples: int) -> Places:
+        """Find the places of designs, unless they were the last ones: a search asks for values, then for slopes."""
+        asked = designs.tobytes() + repr((samples, sorted(wanted))).encode()
+        known = last.get(name)
+        if known is None or known[0] != asked:
+            known = last[name] = asked, find(Poses(machine, machine.precise(), designs), samples, wanted)
+        return known[1]
 
     def block(designs: Array, wanted: frozenset[str], samples: int) -> Columns:
         if not np.iscomplexobj(designs):
-            return read(machine, designs, find(Poses(machine, machine.precise(), designs), samples, wanted), wanted)
-        # Of a complex step all designs have the same real parts.
-        real, which = np.unique(designs.real, axis=0, return_inverse=True)
-        places = find(Poses(machine, machine.precise(), real), samples, wanted)
-        return read(machine, designs, {key: values[which.ravel()] for key, values in places.items()}, wanted)
+            return read(machine, designs, places_of(designs, wanted, samples), wanted)
+        real = np.ascontiguousarray(designs.real)
+        if (real == real[:1]).all():  # the complex step: one design, moved along each variable
+            places = {key: np.repeat(x, len(real)) for key, x in places_of(real[:1], wanted, samples).items()}
+        else:
+            places = places_of(real, wanted, samples)
+        return read(machine, designs, places, wanted)
 
     def run(designs: Array, wanted: frozenset[str], accuracy: Accuracy) -> Columns:
         samples = accuracy.samples or SAMPLES

@@ -312,6 +312,8 @@ def _turned(m: Member, phase: Array, angles: Angles, found: Mapping[str, Any]) -
         return Angles.of(m.ratio * found[".".join(m.driver)] + phase[:, None])
     if m.ratio == 1 and not phase.any():
         return angles
+    if angles.cos.shape[0] == 1 and (phase == phase[:1]).all():
+        phase = phase[:1]
     return Angles.of(m.ratio * angles.phi + phase[:, None])
 
 

@@ -90,7 +90,9 @@ def made(data: Dataset) -> Made | None:
     columns, kept = _kept(study, limits, designs)
     worst = min(limits, key=lambda limit: float(meets(limit, columns[limit.output]).mean()))
     histogram = _histogram(data, worst, columns[worst.output])
-    return Made(float(kept.mean()), histogram, tuple(_costs(study, limits, worst, design)))
+    few = {name: values[:SINGLE] for name, values in columns.items()}
+    costs = _costs(study, limits, worst, design, designs[:SINGLE], few, float(kept[:SINGLE].mean()))
+    return Made(float(kept.mean()), histogram, tuple(costs))
 
 
 def made_sentence(found: Made | None, tolerance: str) -> str:
@@ -137,14 +139,16 @@ def _kept(
     return columns, np.logical_and.reduce([meets(limit, columns[limit.output]) for limit in limits])
 
 
-def _costs(study: Study, limits: list[Limit], worst: Limit, design: Array) -> list[Cost]:
-    """Dimensions by what their tolerances cost, the dearest first: the same mechanisms with one dimension exact."""
-    assert study.tolerance is not None and study.optimise is not None
-    designs = deviating(
-        study.family, design, study.tolerance, study.optimise.seed, min(SINGLE, study.tolerance.samples)
-    )
-    columns, kept = _kept(study, limits, designs)
-    scatter, before = _variance(columns, worst), float(kept.mean())
+def _costs(
+    study: Study, limits: list[Limit], worst: Limit, design: Array, designs: Array,
+    columns: dict[str, NDArray[np.generic]], before: float,
+) -> list[Cost]:  # fmt: skip
+    """Dimensions by what their tolerances cost, the dearest first: the same mechanisms with one dimension exact.
+
+    Of the mechanisms ``designs`` the ``columns`` are known, and the share ``before`` that keeps all limits.
+    """
+    assert study.tolerance is not None
+    scatter = _variance(columns, worst)
     found = []
     own = np.flatnonzero(touched(study.family, design, study.tolerance))
     values = compared(worst.output, np.asarray(columns[worst.output], np.float64))

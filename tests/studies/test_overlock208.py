@@ -10,7 +10,13 @@ import numpy as np
 import pytest
 
 import sweep
+from sweep.chunks.cascade import levels
+from sweep.evaluation.summaries import design_outputs
+from sweep.evaluation.tables import design_matrix
+from sweep.families.base import Accuracy
 from sweep.families.thread_balance import ThreadBalance
+from sweep.optimise.extrema.gradients import scalar_gradient, step_gradients
+from sweep.optimise.extrema.points import STEP
 from sweep.quantities.limits import refusals
 from sweep.study.load import load_study
 from sweep.synthesis.thread_law import smoothest_law
@@ -63,3 +69,47 @@ def test_take_ups_are_the_smoothest_that_leave_a_tenth_of_a_millimetre(study):
         # the coefficients stand with three decimals
         assert own == pytest.approx(law.coefficients, abs=2e-3)
         assert found[f"{thread.name}_surplus"].min() > 0.09
+
+
+def test_outputs_without_a_limit_are_for_heads_that_keep_all(study):
+    limited = {limit.output for limit in study.tested_limits}
+    asked = [not limited.isdisjoint(level.outputs) for level in levels(study) if level.route is not None]
+    assert asked == sorted(asked, reverse=True) and not asked[-1]
+    whole = replace(study, output=replace(study.output, keep="all"))
+    order = [level.route.order for level in levels(whole) if level.route is not None]
+    assert order == sorted(order)
+
+
+def test_slopes_of_the_moments_are_those_of_differences(study):
+    family, accuracy = study.bare, Accuracy(target=1e-9)
+    columns = {name: RECORD["design"][name] for name in family.parameter_names if name in RECORD["design"]}
+    design = design_matrix(family, columns)[0][0]
+    moved = (
+        "needle.a1",
+        "needle.xi2",
+        "lower.a",
+        "lower.offset",
+        "lower.x_tilt",
+        "lower.z_at",
+        "upper.f",
+        "upper.y_at",
+    )
+    columns = [family.parameter_names.index(name) for name in moved]
+    span = np.maximum(0.1 * np.abs(design[columns]), 0.1)
+    names = [f"a_{key}" for key in ("rise", "clearance", "directness", "gauge", "reach", "overtravel", "back_height")]
+    names += ["a_free", "phi_a", "phi_b", "b_margin", "phi_c", "c_margin", "c_pace"]
+
+    def values(fractions):
+        designs = np.repeat(design[None, :], len(fractions), axis=0)
+        designs[:, columns] += (fractions - 0.5) * span
+        found = design_outputs(family, designs, names, accuracy)
+        return np.stack([found[name] for name in names], axis=1)
+
+    wanted = scalar_gradient(values, np.full(len(moved), 0.5))
+    steps = np.zeros((len(moved), design.size))
+    steps[np.arange(len(moved)), columns] = STEP * span
+    found = step_gradients(family, design + 1j * steps, names, accuracy)
+    assert list(found) == names
+    for name, slopes in zip(names, wanted.T, strict=True):
+        # Differences over 1e-4 mm of what is known to 1e-13 mm; the least gap's place is known to 1e-9 rad.
+        assert found[name] == pytest.approx(slopes, rel=1e-6, abs=1e-6 * np.abs(slopes).max()), name

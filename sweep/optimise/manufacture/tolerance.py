@@ -97,7 +97,8 @@ def _plain_ends(
         columns = design_outputs(asked.family, designs, names, asked.accuracy, asked.window)
         return np.stack([np.asarray(columns[name], np.float64) for name in names], axis=1)
 
-    slopes = step_gradients(asked.family, stepped(asked, design, at), outputs, asked.accuracy)
+    moves = design + 1j * stepped(asked, design, at).imag  # about the very design whose values are asked for
+    slopes = step_gradients(asked.family, moves, outputs, asked.accuracy)
     rest = [name for name in outputs if name not in slopes]
     if rest:
         found = scalar_gradient(lambda moved: values(asked.placed(design, moved), rest), at)
