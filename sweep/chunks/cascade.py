@@ -20,7 +20,7 @@ from sweep.chunks.parameters import completed
 from sweep.costs import nanoseconds
 from sweep.effects import called_for
 from sweep.evaluation.summaries import Route, design_outputs, routes
-from sweep.families.base import Array, Columns
+from sweep.families.base import Array, Columns, Work
 from sweep.families.chain import stages_of
 from sweep.families.names import error_of, parts
 from sweep.quantities.limits import Limit, meets
@@ -285,13 +285,15 @@ def _level(study: Study, route: Route) -> Level:
 def ordered_routes(study: Study) -> tuple[Route, ...]:
     """Return the routes of a study in the order of `Work`; those that need the fitted parameters come last.
 
-    Where only feasible designs count, those without a limit are for the designs that keep all limits.
+    Where only feasible designs count, effects and what is long are for those that keep all limits, unless limits are
+    on them.
     """
     found = routes(study.family, study.want, study.accuracy)
     limited = {limit.output for limit in study.tested_limits}
 
     def place(route: Route) -> tuple[bool, bool]:
-        return not _before_fit(study, route), study.output.keep != "all" and limited.isdisjoint(route.outputs)
+        waits = study.output.keep != "all" and route.order[0] >= Work.EFFECT and limited.isdisjoint(route.outputs)
+        return not _before_fit(study, route), waits
 
     return tuple(sorted(found, key=place))
 

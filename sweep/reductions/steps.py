@@ -231,7 +231,7 @@ EVENTS = 1e4  # ns per pose: angles of events are found once per design, in some
 
 
 def beyond_motion(family: Family, pose: str) -> Beyond:
-    """Return the effect that a pose output is of, or the relation of a machine that needs effects or events."""
+    """Return the effect or the relation of a machine that a pose output is of."""
     return _beyond(family).get(pose, Beyond())
 
 
@@ -248,6 +248,8 @@ def _beyond(family: Family) -> dict[str, Beyond]:
                 found[name] = Beyond(relation.name, (Work.LONG, len(family.steps) + number), ns + EVENTS)
             elif ns:
                 found[name] = Beyond(relation.name, (Work.EFFECT, len(effects) + number), ns)
+            else:  # poses of several members: behind all that one of them says alone
+                found[name] = Beyond("of relations", (Work.SEARCH, len(family.pose_names)), 0.0)
     return found
 
 

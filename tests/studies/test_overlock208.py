@@ -13,7 +13,7 @@ import sweep
 from sweep.chunks.cascade import levels
 from sweep.evaluation.summaries import design_outputs
 from sweep.evaluation.tables import design_matrix
-from sweep.families.base import Accuracy
+from sweep.families.base import Accuracy, Work
 from sweep.families.thread_balance import ThreadBalance
 from sweep.optimise.extrema.gradients import scalar_gradient, step_gradients
 from sweep.optimise.extrema.points import STEP
@@ -71,10 +71,12 @@ def test_take_ups_are_the_smoothest_that_leave_a_tenth_of_a_millimetre(study):
         assert found[f"{thread.name}_surplus"].min() > 0.09
 
 
-def test_outputs_without_a_limit_are_for_heads_that_keep_all(study):
+def test_dear_outputs_without_a_limit_are_for_heads_that_keep_all(study):
     limited = {limit.output for limit in study.tested_limits}
-    asked = [not limited.isdisjoint(level.outputs) for level in levels(study) if level.route is not None]
+    found = [level for level in levels(study) if level.route is not None]
+    asked = [not limited.isdisjoint(level.outputs) for level in found if level.route.order[0] >= Work.EFFECT]
     assert asked == sorted(asked, reverse=True) and not asked[-1]
+    assert next(level for level in found if "rms_shake" in level.outputs) in found[asked.index(False) - len(asked) :]
     whole = replace(study, output=replace(study.output, keep="all"))
     order = [level.route.order for level in levels(whole) if level.route is not None]
     assert order == sorted(order)
