@@ -76,6 +76,25 @@ def new_room(guarded: int, wide: int) -> Scratch:
     )  # fmt: skip
 
 
+@inline
+def _enough(distance: float, per_rho: float) -> int:
+    """How many samples resolve a curve whose nearest singularity is so far away; 0 if more than the search takes."""
+    n = FEWEST
+    while n <= MOST and not n * distance >= per_rho:
+        n *= 2
+    return n if n <= MOST else 0
+
+
+@inline
+def _counting(mode: int, most: float, least: float) -> tuple[float, float]:
+    """Size of a curve by its extreme samples, and from where on one of its peaks may be the highest."""
+    if mode == 0:
+        scale = max(most, -least)
+        return scale, SHARE * scale
+    scale = most - least
+    return scale, (most if mode > 0 else -least) - (1.0 - SHARE) * scale
+
+
 def enlister(chain: Chained, of: Curve) -> Helper:
     """Make the part ``enlist(designs, begin, end, near, ...)``, which lists the local maxima of some designs.
 
@@ -113,11 +132,9 @@ def enlister(chain: Chained, of: Curve) -> Helper:
             put(m, place + CONSTANTS, loaded(block, place))
         look_abreast((abreast + 7) & ~7, m, cos, sin, mode, values[ABREAST:], dips, said, handed)
         for i in range(begin, end):
-            n, distance = FEWEST, near[i - begin]
-            if not distance * MOST >= per_rho:
+            n = _enough(near[i - begin], per_rho)
+            if n == 0:
                 continue
-            while n * distance < per_rho:
-                n *= 2
             own = places[i - begin] & PLACE
             k: Any = get(m, own + CONSTANTS)
             limits: Any = doubts(k)
@@ -129,8 +146,7 @@ def enlister(chain: Chained, of: Curve) -> Helper:
             if alone:
                 first, stride = 0, 1
                 n, most, least, status[i] = look(k, a, b, c, n, cos, sin, mode, limits, values, guards, handed)
-                scale = max(most, -least) if mode == 0 else most - least
-                floor = SHARE * scale if mode == 0 else (most if mode > 0 else -least) - (1.0 - SHARE) * scale
+                scale, floor = _counting(mode, most, least)
             if status[i] != st.OK:
                 continue
             # The first maximum stands where the constants are already.

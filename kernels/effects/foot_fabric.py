@@ -227,6 +227,31 @@ def _borne(path: Array, node: int, foot: Foot, fabric: Fabric, state: State, phi
     return y, force
 
 
+@inline
+def _extremes(rack: Array) -> tuple[bool, int, float, float]:
+    """Whether the rack's heights are numbers, the node where it is lowest, its greatest speed and height."""
+    known, lowest, quickest, highest = True, 0, 0.0, 0.0
+    for j in range(rack.shape[1]):
+        known = known and abs(rack[0, j]) < math.inf
+        quickest, highest = max(quickest, abs(rack[1, j])), max(highest, rack[0, j])
+        if rack[0, j] < rack[0, lowest]:
+            lowest = j
+    return known, lowest, quickest, highest
+
+
+@inline
+def _written(outputs: Array, i: int, tally: Array, foot: Array, most: float, settled: bool) -> None:
+    """Write what the last turn has told of a foot, in the order of :data:`kernels.effects.foot.OUTPUTS`."""
+    mass, speed, restitution, rigid = foot[0], foot[3], foot[4], foot[5] == 0.0 and foot[6] == 0.0
+    unit = mass * speed * speed
+    outputs[0, i], outputs[1, i], outputs[2, i] = tally[0], tally[1] % TWO_PI, tally[2] % TWO_PI
+    outputs[3, i], outputs[4, i], outputs[5, i] = tally[3], tally[4], tally[5]
+    outputs[6, i] = tally[6] * speed
+    outputs[7, i] = mass * (1.0 + restitution) * tally[6] * speed if rigid else 0.0
+    outputs[8, i] = unit * tally[8] if tally[8] < math.inf else math.nan
+    outputs[9, i], outputs[10, i] = most, 1.0 if settled else 0.0
+
+
 @kernel
 def march(path: Array, feet: Array, turns: int, status: Status, outputs: Array, heights: Array, forces: Array) -> None:
     """March feet over their racks for some turns and keep the last one; (4)-(16) of docs/foot.md.
@@ -259,13 +284,8 @@ def march(path: Array, feet: Array, turns: int, status: Status, outputs: Array, 
         outputs[:, i], heights[i, :], forces[i, :] = math.nan, math.nan, math.nan
         valid = mass > 0.0 and stiffness >= 0.0 and preload > 0.0 and speed > 0.0 and 0.0 <= restitution < 1.0
         valid = valid and (rigid or (soft > 0.0 and damping >= 0.0 and restitution == 0.0))
-        lowest, quickest, highest = 0, 0.0, 0.0
-        for j in range(count):
-            valid = valid and abs(rack[0, j]) < math.inf
-            quickest, highest = max(quickest, abs(rack[1, j])), max(highest, rack[0, j])
-            if rack[0, j] < rack[0, lowest]:
-                lowest = j
-        status[i] = st.OK if valid and unit > 0.0 and unit < math.inf else st.INVALID_INPUT
+        known, lowest, quickest, highest = _extremes(rack)
+        status[i] = st.OK if valid and known and unit > 0.0 and unit < math.inf else st.INVALID_INPUT
         if status[i] == st.OK and rack[0, lowest] > 0.0:
             status[i] = st.NO_EVENT
         if status[i] != st.OK:
@@ -314,9 +334,4 @@ def march(path: Array, feet: Array, turns: int, status: Status, outputs: Array, 
             moved, size = _apart(state, first, spring), max(-rest, highest)
             left = moved / (1.0 - moved / before) if moved < before < math.inf else math.inf
             settled = settled and (moved <= ROUNDING * size or left <= ALIKE * size)
-        outputs[0, i], outputs[1, i], outputs[2, i] = tally[0], tally[1] % TWO_PI, tally[2] % TWO_PI
-        outputs[3, i], outputs[4, i], outputs[5, i] = tally[3], tally[4], tally[5]
-        outputs[6, i] = tally[6] * speed
-        outputs[7, i] = mass * (1.0 + restitution) * tally[6] * speed if rigid else 0.0
-        outputs[8, i] = unit * tally[8] if tally[8] < math.inf else math.nan
-        outputs[9, i], outputs[10, i] = most, 1.0 if settled else 0.0
+        _written(outputs, i, tally, feet[i], most, settled)

@@ -70,21 +70,16 @@ def speed_fluctuation(
         row = i if phi.shape[0] > 1 else 0
         coefficients(inertia[i], turn, all_jc, all_js)
         coefficients(excess[i], turn, all_wc, all_ws)
-        code = st.OK if math.isfinite(all_jc[0] + all_wc[0]) else st.NOT_ROTATABLE
-        if code == st.OK and not all_jc[0] > 0.0:
-            code = st.INVALID_INPUT
         # A torque excess far below the inertia torque moves no speed: its noise need not be resolved.
         energy_scale = all_jc[0] * mean_speed[i] * mean_speed[i]
         left = tail(all_wc, all_ws, energy_scale)
-        if code == st.OK and (tail(all_jc, all_js, 0.0) > RESOLVED or left > coarsest):
-            code = st.NOT_CONVERGED
+        code = _checked(all_jc, all_js, all_wc, left, coarsest)
         if missed is not None:
             missed[i] = left
         all_wc[0], all_ws[0] = 0.0, 0.0
         if slope is not None:
             all_xc[:], all_xs[:] = all_wc, all_ws
-        for k in range(1, half):
-            all_wc[k], all_ws[k] = -all_ws[k] / k, all_wc[k] / k
+        _integrate(all_wc, all_ws)
         count = significant(all_jc, all_js)
         jc, js = all_jc[:count], all_js[:count]
         on_grid(jc, js, looks, fine_j)
@@ -112,13 +107,37 @@ def speed_fluctuation(
         fastest[i], slowest[i], delta[i] = high, low, (high - low) / mean_speed[i]
         if speed is not None or acceleration is not None:
             for j in range(phi.shape[1]):
-                j_red, dj = series(jc, js, phi[row, j])
-                w, dw = series(wc, ws, phi[row, j])
-                square = 2.0 * (e + w) / j_red
+                omega, change = _speed_at(phi[row, j], jc, js, wc, ws, e)
                 if speed is not None:
-                    speed[i, j] = math.sqrt(square) if code == st.OK else math.nan
+                    speed[i, j] = omega if code == st.OK else math.nan
                 if acceleration is not None:
-                    acceleration[i, j] = (dw - 0.5 * square * dj) / j_red if code == st.OK else math.nan
+                    acceleration[i, j] = change if code == st.OK else math.nan
+
+
+@inline
+def _checked(jc: Array, js: Array, wc: Array, left: float, coarsest: float) -> int:
+    """Status by the harmonics of inertia and excess; ``left`` is the share of the excess that its highest ones have."""
+    if not math.isfinite(jc[0] + wc[0]):
+        return st.NOT_ROTATABLE
+    if not jc[0] > 0.0:
+        return st.INVALID_INPUT
+    return st.NOT_CONVERGED if tail(jc, js, 0.0) > RESOLVED or left > coarsest else st.OK
+
+
+@inline
+def _integrate(c: Array, s: Array) -> None:
+    """Put the integral over the crank angle in the place of a series without a mean."""
+    for k in range(1, c.size):
+        c[k], s[k] = -s[k] / k, c[k] / k
+
+
+@inline
+def _speed_at(phi: float, jc: Array, js: Array, wc: Array, ws: Array, e: float) -> tuple[float, float]:
+    """Compute the speed and d omega/d t at a crank angle."""
+    j_red, dj = series(jc, js, phi)
+    w, dw = series(wc, ws, phi)
+    square = 2.0 * (e + w) / j_red
+    return math.sqrt(square), (dw - 0.5 * square * dj) / j_red
 
 
 @inline

@@ -115,6 +115,30 @@ def _row(dx: Array, dy: Array, j: int, k: int) -> float:
 
 
 @inline
+def _first_reference(
+    target: Array, dx: Array, dy: Array, inside: NDArray[np.bool_], x: Array, points: NDArray[np.int64]
+) -> bool:
+    """Write the four points of alternating largest residuals along the path; false where there are too few."""
+    count = 0
+    for j in range(dx.size):
+        count += inside[j]
+    if count < 5:
+        return False
+    seen = 0
+    for i in range(4):
+        points[i] = -1
+    for j in range(dx.size):
+        if inside[j]:
+            r = target[j] + x[0] * dy[j] + x[1] * dx[j] - x[2]
+            quarter = min(seen * 4 // count, 3)
+            old = points[quarter]
+            if old < 0 or abs(r) > abs(target[old] + x[0] * dy[old] + x[1] * dx[old] - x[2]):
+                points[quarter] = j
+            seen += 1
+    return True
+
+
+@inline
 def _exchange(
     target: Array,
     dx: Array,
@@ -127,23 +151,8 @@ def _exchange(
 ) -> bool:
     """Minimax x = (w_x, w_y, h) of |target + w_x dy + w_y dx - h| over the masked points, started at least squares."""
     m = dx.size
-    # First reference: the four points of alternating largest residuals along the path.
-    count = 0
-    for j in range(m):
-        count += inside[j]
-    if count < 5:
+    if not _first_reference(target, dx, dy, inside, x, points):
         return False
-    seen = 0
-    for i in range(4):
-        points[i] = -1
-    for j in range(m):
-        if inside[j]:
-            r = target[j] + x[0] * dy[j] + x[1] * dx[j] - x[2]
-            quarter = min(seen * 4 // count, 3)
-            old = points[quarter]
-            if old < 0 or abs(r) > abs(target[old] + x[0] * dy[old] + x[1] * dx[old] - x[2]):
-                points[quarter] = j
-            seen += 1
     weights = np.empty(4)
     for _ in range(EXCHANGES):
         # Weights of the reference: sum_i weight_i row_i = 0 with weight_3 = 1.

@@ -86,6 +86,46 @@ def _peaks(values: Array, below: float, turns: Index, lowest: Index, found: Inde
                 found[turns[t, p]] = 0
 
 
+@inline
+def _box_rows(low: Array, high: Array, back: Array, rows: Array, needs: Array, size: Array) -> None:
+    """Write the bounds of the step as the first rows."""
+    n = len(low)
+    for k in range(n + len(high)):
+        sign, i = (1.0, k) if k < n else (-1.0, k - n)
+        needs[k] = low[i] if k < n else -high[i]
+        square = 0.0
+        for a in range(n):
+            rows[a, k] = sign * back[i, a]
+            square += back[i, a] * back[i, a]
+        size[k] = math.sqrt(square)
+
+
+@inline
+def _own_row(slopes: Array, j: int, back: Array, rows: Array, place: int) -> float:
+    """Write row j of the program in the step's own axes; its size."""
+    square = 0.0
+    for a in range(slopes.shape[0]):
+        value = 0.0
+        for i in range(slopes.shape[0]):
+            value += back[i, a] * slopes[i, j]
+        rows[a, place] = value
+        square += value * value
+    return math.sqrt(square)
+
+
+@inline
+def _stepped(values: Array, slopes: Array, back: Array, y: Array, step: Array, there: Array) -> None:
+    """Write the step of a point y, and the rows after it."""
+    for j in range(len(values)):
+        there[j] = values[j]
+    for i in range(len(y)):
+        step[i] = 0.0
+        for a in range(len(y)):
+            step[i] += back[i, a] * y[a]
+        for j in range(len(values)):
+            there[j] += step[i] * slopes[i, j]
+
+
 @kernel
 def nearest_of_many(
     values: Array,
@@ -131,14 +171,7 @@ def nearest_of_many(
     rows, needs, size = np.empty((n, count + boxes)), np.empty(count + boxes), np.empty(count + boxes)
     more, joined, lowest = np.empty(count, np.int64), np.zeros(count, np.int64), np.empty(turns.shape[1], np.int64)
     place, y, h = np.empty(count, np.int64), np.empty(n), nothing_held(n, count + boxes)
-    for k in range(boxes):
-        sign, i = (1.0, k) if k < n else (-1.0, k - n)
-        needs[k] = low[i] if k < n else -high[i]
-        square = 0.0
-        for a in range(n):
-            rows[a, k] = sign * back[i, a]
-            square += back[i, a] * back[i, a]
-        size[k] = math.sqrt(square)
+    _box_rows(low, high, back, rows, needs, size)
     for i in range(n):
         y[i] = centre[i]
     _peaks(values, near[0], turns, lowest, more)
@@ -150,14 +183,7 @@ def nearest_of_many(
         for j in range(count):
             if more[j] == 1 and joined[j] == 0:
                 joined[j], place[total - boxes], needs[total] = 1, j, -values[j]
-                square = 0.0
-                for a in range(n):
-                    value = 0.0
-                    for i in range(n):
-                        value += back[i, a] * slopes[i, j]
-                    rows[a, total] = value
-                    square += value * value
-                size[total] = math.sqrt(square)
+                size[total] = _own_row(slopes, j, back, rows, total)
                 total += 1
         if held < 0:
             for k in range(begin[0]):
@@ -165,14 +191,7 @@ def nearest_of_many(
                 begin[1 + k] = -1 - number if number < 0 else boxes + _place_of(place, total - boxes, number)
             held = _resumed(rows, needs, size, begin, centre, y, h)
         held, status = pursued(rows, needs, size, total, tolerance, y, h, held)
-        for j in range(count):
-            there[j] = values[j]
-        for i in range(n):
-            step[i] = 0.0
-            for a in range(n):
-                step[i] += back[i, a] * y[a]
-            for j in range(count):
-                there[j] += step[i] * slopes[i, j]
+        _stepped(values, slopes, back, y, step, there)
         _peaks(there, -near[1], turns, lowest, more)
         new = 0
         for j in range(count):

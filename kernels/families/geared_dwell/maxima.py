@@ -84,6 +84,15 @@ def _slope(bend: Array, d: Array, slope: Array) -> None:
 
 
 @inline
+def _speed_at(r: Reduced, number: int, tau: float, d: Array, lean: Array) -> float:
+    """Compute |psi'| at a place of a stretch."""
+    square = quadratic(d, tau)
+    if number < 2:
+        return abs(velocity(r.front if number == 0 else r.back, r.ak4, tau, square))
+    return abs(1.0 - (lean[0] + lean[1] * tau) / square)
+
+
+@inline
 def _put(out: Array | None, i: int, value: float) -> None:
     if out is not None:
         out[i] = value
@@ -131,12 +140,7 @@ def turn_maxima(
             if max_abs_dpsi is not None:
                 count = roots_up_to(end, q, 2, scratch, found)
                 for n in range(-2, count):
-                    tau = found[n] if n >= 0 else (0.0 if n == -1 else end)
-                    square = quadratic(d, tau)
-                    if number < 2:
-                        value = abs(velocity(r.front if number == 0 else r.back, r.ak4, tau, square))
-                    else:
-                        value = abs(1.0 - (lean[0] + lean[1] * tau) / square)
+                    value = _speed_at(r, number, found[n] if n >= 0 else (0.0 if n == -1 else end), d, lean)
                     m1 = value if not value <= m1 else m1  # nan, a root that did not settle, stays
             if max_abs_d2psi is not None or phi_max_abs_d2psi is not None or max_abs_d3psi is not None:
                 _bend(s2, q, d, bend)
