@@ -12,7 +12,7 @@ from collections import namedtuple
 import numpy as np
 
 from kernels import status as st
-from kernels.arithmetic.complex_step import arctan2, magnitude, unit_near
+from kernels.arithmetic.complex_step import arctan2, divisor, magnitude, unit_near
 from kernels.jit import kernel
 from kernels.linkage.outputs import put_block, write
 from kernels.linkage.verdict import follower_status
@@ -60,7 +60,7 @@ def poses(designs: Numbers, cos_phi: Numbers, sin_phi: Numbers, status: Status, 
             root = np.sqrt(delta) if code == st.OK else 0.0 * delta
             assembled = code == st.OK or code == st.DEAD_POINT
             w = branch * root if assembled else math.nan * delta
-            per_square = 1.0 / square
+            per_square = 1.0 / divisor(square)
             c, sine = (x * w + y * h) * per_square, (y * w - x * h) * per_square
             write(out.psi, i, j, arctan2(0.0 + sine, c))  # + 0.0: -0.0 would turn the angle pi into -pi
             write(out.s, i, j, w * unit)

@@ -12,7 +12,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from kernels.arithmetic.complex_step import arctan2
+from kernels.arithmetic.complex_step import arctan2, divisor
 from kernels.arithmetic.vectors import Vector, cross, dot, sub
 from kernels.jit import inline
 
@@ -28,7 +28,7 @@ def length(e: Vector, n1: Vector, n2: Vector) -> float:
 def slope(e: Vector, n1: Vector, n2: Vector, de: Vector) -> float:
     """First derivative of the length where E has the derivative ``de``; (3)."""
     d1, d2 = sub(e, n1), sub(e, n2)
-    return dot(d1, de) / np.sqrt(dot(d1, d1)) + dot(d2, de) / np.sqrt(dot(d2, d2))  # type: ignore[no-any-return]
+    return dot(d1, de) / divisor(np.sqrt(dot(d1, d1))) + dot(d2, de) / divisor(np.sqrt(dot(d2, d2)))  # type: ignore[no-any-return]
 
 
 @inline
@@ -40,7 +40,7 @@ def bend(e: Vector, n1: Vector, n2: Vector, de: Vector, d2e: Vector) -> float:
 @inline
 def _bend(d: Vector, de: Vector, d2e: Vector) -> float:
     square, across = dot(d, d), cross(d, de)
-    return (dot(d, d2e) + dot(across, across) / square) / np.sqrt(square)  # type: ignore[no-any-return]
+    return (dot(d, d2e) + dot(across, across) / divisor(square)) / divisor(np.sqrt(square))  # type: ignore[no-any-return]
 
 
 @inline

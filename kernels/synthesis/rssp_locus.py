@@ -11,6 +11,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from kernels.arithmetic.complex_step import divisor
 from kernels.arithmetic.sincos import sine_cosine
 from kernels.jit import inline, kernel
 from kernels.synthesis.acceptance import design_status, first_failure
@@ -48,8 +49,7 @@ def _finish(g: Given, at: Limits, i: int, status: Status, failed: Status, design
     stroke, e, f, alpha, sa, ca, valid = g
     s1, s2, middle, ahead, back, v1, v2, point = at
     branch = -1.0 if stroke.real > 0.0 else 1.0
-    between, size = ahead - back, stroke * (f * sa - middle)
-    a = size / between if between != 0.0 else math.nan  # numba's complex division by zero raises
+    a = stroke * (f * sa - middle) / divisor(ahead - back)
     radial, axial = ahead - a, s1 * sa - f
     b = np.sqrt(radial * radial + axial * axial)
     t1, t2 = s1 - (f * sa + a * ca * v1), s2 - (f * sa + a * ca * v2)

@@ -14,7 +14,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from kernels.arithmetic.complex_step import arctan2
+from kernels.arithmetic.complex_step import arctan2, divisor
 from kernels.arithmetic.sincos import sine_cosine
 from kernels.jit import inline, kernel
 from kernels.synthesis.acceptance import design_status, first_failure
@@ -93,8 +93,7 @@ def _finish(
     x1, y1, ahead, back = p.x, p.y, p.ahead, p.back
     c = np.sqrt(x1 * x1 + y1 * y1)
     x_mid, y_mid = x1 * r.cos_half - y1 * r.sin_half, y1 * r.cos_half + x1 * r.sin_half
-    between, size = ahead - back, 2.0 * r.sin_half * (r.e * y_mid + r.f * r.sa * x_mid)
-    a = size / between if between != 0.0 else math.nan  # numba's complex division by zero raises
+    a = 2.0 * r.sin_half * (r.e * y_mid + r.f * r.sa * x_mid) / divisor(ahead - back)
     axial, radial = r.g * r.ca + y1 * r.sa - r.f, ahead - a
     b = np.sqrt(axial * axial + radial * radial)
     # t1, t2 have the sign of dF/dpsi, the assembly mode: c dF/dpsi/(2 c) = -X sin psi - Y cos psi at both limits

@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 
 from kernels import status as st
+from kernels.arithmetic.complex_step import divisor
 from kernels.families.backrest.closure import BracketPose, Mode, forces, place, residual, scaled, spring
 from kernels.jit import inline, kernel
 from kernels.types import EPS, Array, Status
@@ -144,7 +145,7 @@ def _by_law(d: Array, rho: Any) -> tuple[Any, bool]:
     ordered = full.real > empty.real > 0.0
     if not ordered:  # compiled complex numbers raise where real ones give inf
         return math.nan * d[24], False
-    return d[24] + d[25] * (empty * (full - rho)) / (rho * (full - empty)), True
+    return d[24] + d[25] * (empty * (full - rho)) / divisor(rho * (full - empty)), True
 
 
 @inline
@@ -161,7 +162,7 @@ def _by_root(d: Array, plain: Array, rho: Any, mode: int, roots: Array) -> tuple
     # the slope by a complex step, which has no difference to cancel
     slope = residual(plain, complex(phi, 1e-100), rho.real, mode)[0].imag * 1e100
     value, _ = residual(d, phi + 0.0 * d[24], rho, mode)
-    step = value / slope
+    step = value / divisor(slope)
     # At a double root the step is noise: the bracket is better.
     return phi - (step if abs(step) < 1e-12 else 0.0 * step), count, st.OK
 
@@ -235,7 +236,7 @@ def poses(
                     n = forces(d, phi, at, moment, d[22], d[23])
                     loads[0, i, j], loads[1, i, j], loads[2, i, j] = n.K, n.N1, n.N2
                     loads[3, i, j], loads[4, i, j], loads[5, i, j] = n.K_couple, n.N1_couple, n.N2_couple
-                    offset = d[10] * (d[22] * n.N1_couple * d[6] - d[23] * n.N2_couple * d[4]) / n.N2_couple
+                    offset = d[10] * (d[22] * n.N1_couple * d[6] - d[23] * n.N2_couple * d[4]) / divisor(n.N2_couple)
                     loads[6, i, j] = offset * unit
                     loads[7, i, j], loads[8, i, j] = force, length * unit
                 if band is not None:

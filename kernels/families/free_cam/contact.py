@@ -15,7 +15,7 @@ from typing import NamedTuple
 import numpy as np
 
 from kernels import status as st
-from kernels.arithmetic.complex_step import unit_near
+from kernels.arithmetic.complex_step import divisor, unit_near
 from kernels.jit import inline, kernel
 from kernels.linkage.outputs import write
 from kernels.linkage.thread_path import wrap_angle
@@ -64,7 +64,7 @@ def turned_cam(designs: Array, i: int, u: float, v: float) -> Cam:
 @inline
 def straight(cam: Cam) -> Line:
     """Line between the guides at the plane of the cam."""
-    share = cam.z1 / (cam.z1 - cam.z2)
+    share = cam.z1 / divisor(cam.z1 - cam.z2)
     x, y = cam.x1 + share * (cam.x2 - cam.x1), cam.y1 + share * (cam.y2 - cam.y1)
     dx, dy, dz = cam.x2 - cam.x1, cam.y2 - cam.y1, cam.z2 - cam.z1
     return Line(x, y, np.sqrt(dx * dx + dy * dy + dz * dz), (x - cam.a * y * y).real > 0.0)
@@ -77,8 +77,8 @@ def part(a: float, x: float, y: float, z: float, at: float) -> tuple[float, floa
     square = dx * dx + dy * dy + z * z
     distance = np.sqrt(square)
     across = tx * dy - dx
-    turning = (z * z * (1.0 + tx * tx) + across * across) / square
-    return distance, (dx * tx + dy) / distance, (turning + 2.0 * a * dx) / distance
+    turning, by = (z * z * (1.0 + tx * tx) + across * across) / divisor(square), divisor(distance)
+    return distance, (dx * tx + dy) / by, (turning + 2.0 * a * dx) / by
 
 
 @inline
@@ -184,7 +184,7 @@ def by_angle(a: float, x: float, y: float, z: float, at: float) -> tuple[float, 
     """Distance of a guide: first and second derivative by phi at a fixed y, and the mixed one; (21)."""
     cx, cy, tx = a * at * at, at, 2.0 * a * at
     dx, dy = cx - x, cy - y
-    distance = np.sqrt(dx * dx + dy * dy + z * z)
+    distance = divisor(np.sqrt(dx * dx + dy * dy + z * z))
     # In the axes of the cam the guide turns backwards: x' = y, y' = -x.
     first = (dy * x - dx * y) / distance
     along = (dx * tx + dy) / distance
@@ -200,7 +200,7 @@ def over_edge(cam: Cam, at: float) -> tuple[float, float]:
     two = by_angle(cam.a, cam.x2, cam.y2, cam.z2, at)
     mixed = one[2] + two[2]
     # The contact moves along the edge so that dL/dy stays 0, which adds nothing to the first derivative.
-    return one[0] + two[0], one[1] + two[1] - mixed * mixed / along_edge(cam, at)[2]
+    return one[0] + two[0], one[1] + two[1] - mixed * mixed / divisor(along_edge(cam, at)[2])
 
 
 # Pose outputs, each (n, m), or None: what is None is not computed.
@@ -270,4 +270,4 @@ def follow_minimum(cam: Cam, y: float) -> float:
     """Minimum as a function of complex designs: one step of Newton's method for the imaginary parts alone."""
     # The real part of the slope is the search's remaining error, which is below rounding: it is left out.
     _, slope, bend = along_edge(cam, y)
-    return y + (slope.real - slope) / bend
+    return y + (slope.real - slope) / divisor(bend)
