@@ -36,12 +36,16 @@ def main() -> None:
     try:
         command_line()
     except SystemExit as leaving:
-        if leaving.code not in SIGNALLED:
+        code = leaving.code if isinstance(leaving.code, int) else int(leaving.code is not None)
+        if code not in SIGNALLED:
+            # The answer is out: a signal while Python tidies up ends that, and the exit code stays the answer's.
+            for number in SIGNALS:
+                signal.signal(number, lambda *_: os._exit(code))
             raise
         # Whoever was interrupted half way (a compiler, a pool) has nothing to tidy up, and may hang when it tries.
         sys.stdout.flush()
         sys.stderr.flush()
-        os._exit(int(leaving.code))
+        os._exit(code)
 
 
 if __name__ == "__main__":

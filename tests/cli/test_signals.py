@@ -125,3 +125,18 @@ def test_so_many_workers_are_refused(tmp_path: Path) -> None:
         process = begun(study, tmp_path / "out", None, "--jobs", jobs)
         _, errors = process.communicate(timeout=60)
         assert process.returncode == 2 and "a whole number from 1 to 1024" in errors and "Traceback" not in errors
+
+
+def test_a_signal_after_the_answer_keeps_the_answers_exit_code() -> None:
+    # A thread that Python waits for at its end.
+    waiting = "import sys, threading, time; threading.Thread(target=time.sleep, args=(30,)).start()"
+    program = f"{waiting}; from sweep.__main__ import main; sys.argv = ['sweep', 'families', 'rssr']; main()"
+    process = subprocess.Popen(
+        [sys.executable, "-u", "-c", program], cwd=ROOT, stdout=subprocess.PIPE, text=True, start_new_session=True
+    )
+    assert process.stdout is not None
+    said = process.stdout.readline()
+    time.sleep(1.0)  # the rest of the answer, and the way out of the verb
+    process.send_signal(signal.SIGTERM)
+    rest, _ = process.communicate(timeout=20)
+    assert process.returncode == 0 and "rssr" in said + rest
