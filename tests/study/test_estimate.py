@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
+import itertools
 from dataclasses import replace
 from pathlib import Path
+from types import SimpleNamespace
 
 import pytest
 
-from sweep.engine.estimate import check_budget, estimate, other_accuracies
+from sweep.engine.estimate import check_budget, estimate, other_accuracies, searches
 from sweep.errors import BudgetError
+from sweep.evaluation.tables import design_matrix
 from sweep.study import Budget, Study, load_study
 
 PROOF = "with the proof that no peak is missed"
@@ -126,3 +129,19 @@ def test_twice_the_samples_cost_nearly_twice(tmp_path: Path) -> None:
 )
 def test_no_price_is_named_for_what_cannot_be_asked(tmp_path: Path, accuracy: str, left: list[str]) -> None:
     assert [words for words, _ in other_accuracies(with_accuracy(tmp_path, accuracy), 1)] == left
+
+
+@pytest.mark.parametrize("jobs", [1, 2])
+def test_price_of_what_follows_counts_every_search(monkeypatch, jobs):
+    """A look takes 10 ms: 27 s of a population and 36 s of a robust end were measured at 9."""
+    monkeypatch.setattr("sweep.optimise.local.start.search", lambda *_: SimpleNamespace(looks=10))
+    ticks = itertools.count(step=0.1)
+    monkeypatch.setattr("sweep.engine.estimate.time.process_time", lambda: next(ticks))
+    study = load_study(Path(__file__).parents[2] / "studies" / "needle208")
+    designs, _ = design_matrix(study.family, study.reference)
+    found = {name: (typical, most) for name, typical, most in searches(study, jobs, SimpleNamespace(kept=designs))}
+    assert list(found) == ["global search", "search", "tolerances", "tables and report"]
+    assert found["global search"] == pytest.approx((3 * 30.0 / jobs, 40 * 30.0 / jobs))
+    assert found["search"] == pytest.approx((12 * 3.0 / jobs, 12 * 40.0 / jobs))
+    whole = (4 * 16.0 + 3 * 40.0 + 3 * 30.0) / jobs
+    assert found["tolerances"] == pytest.approx((whole, 2.0 * whole))
