@@ -34,6 +34,7 @@ POWERS = {1: "", 2: "²", 3: "³", 4: "⁴"}
 # Units that a designer reads instead of those that are stored, with the factor to them.
 READ_IN = {"t": ("g", 1e6), "t*mm^2": ("kg·mm²", 1e3), "life": ("h", 1.0 / 3600.0)}
 NO_ANGLE = 1e-10  # rad: what is smaller is the rounding of zero, or of the place of an extremum at zero
+NONE_OF = {"°": NO_ANGLE, "mm": 1e-12}  # of quantities shown in these units, as stored: what is smaller is rounding
 _POINT = re.compile("([xyz])_([a-z])")
 
 
@@ -73,8 +74,8 @@ class Quantity:
         return f"{self.heading} [{self.unit}]" if self.unit else self.heading
 
     def show(self, stored: float, digits: int = 5) -> str:
-        """Value with its unit; an angle that only rounding keeps from 0 is 0, but an error is as small as it is."""
-        if self.unit == "°" and abs(stored) < NO_ANGLE and not is_error(self.name):
+        """Value with its unit; what only rounding keeps from 0 is 0, but an error is as small as it is."""
+        if abs(stored) < NONE_OF.get(self.unit, 0.0) and not is_error(self.name):
             stored = 0.0
         return with_unit(number(stored * self.factor, digits), self.unit)
 

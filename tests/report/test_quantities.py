@@ -127,8 +127,11 @@ def test_heading_names_a_member_once() -> None:
     assert quantity("d2s", "mm").title == "acceleration s″ [mm/rad²]"
 
 
-def test_rounding_of_an_angle_is_no_angle():
+def test_rounding_of_an_angle_or_a_length_is_none():
     shown = quantity("swing", "rad")
     assert shown.show(5e-16) == "0°" and shown.show(1e-9) != "0°"
     assert change(shown, 5e-16, 0.0) == "the same"
     assert quantity("err_swing", "rad").show(5e-16) != "0°"
+    assert (
+        quantity("a_room", "mm").show(-7e-15) == "0\u00a0mm" and quantity("err_a_room", "mm").show(7e-15) != "0\u00a0mm"
+    )
