@@ -102,3 +102,9 @@ def test_every_task_has_a_row() -> None:
 def test_every_source_has_rows() -> None:
     marks = {row["mark"] for head, body in tables() if head == ["mark", "source"] for row in body}
     assert marks == {row["item"].split()[0] for row in rows(COMPUTED)} == {"P", "G", "K", "H", "B"}
+
+
+def test_both_pages_say_where_the_limit_positions_of_kim_and_dison_are() -> None:
+    (row,) = (row for row in rows(COMPUTED) if row["item"] == "K limit positions")
+    assert "they are at phi = 0 and 180 deg" in row["erratum"]
+    assert "limits at phi = 0 and phi = pi" in (PAGE.parent / "kim_dison.md").read_text()
