@@ -270,4 +270,4 @@ def follow_minimum(cam: Cam, y: float) -> float:
     """Minimum as a function of complex designs: one step of Newton's method for the imaginary parts alone."""
     # The real part of the slope is the search's remaining error, which is below rounding: it is left out.
     _, slope, bend = along_edge(cam, y)
-    return y + (slope.real - slope) / divisor(bend)
+    return y + (slope.real - slope) / divisor(bend)  # type: ignore[no-any-return]

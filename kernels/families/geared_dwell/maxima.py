@@ -89,7 +89,7 @@ def _speed_at(r: Reduced, number: int, tau: float, d: Array, lean: Array) -> flo
     square = quadratic(d, tau)
     if number < 2:
         return abs(velocity(r.front if number == 0 else r.back, r.ak4, tau, square))
-    return abs(1.0 - (lean[0] + lean[1] * tau) / square)
+    return abs(1.0 - (lean[0] + lean[1] * tau) / square)  # type: ignore[no-any-return]
 
 
 @inline
