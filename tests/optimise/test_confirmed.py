@@ -170,7 +170,7 @@ def test_a_straightness_in_a_window_is_that_of_summarise_beside_a_tool_that_pier
 
 def blind(monkeypatch: pytest.MonkeyPatch) -> None:
     """Let the search look at its poses alone, as if no family knew of phases and edges."""
-    monkeypatch.setattr(points, "poses_needed", lambda family, design: 0)
+    monkeypatch.setattr(points, "poses_needed", lambda family, design, outputs: 0)
     monkeypatch.setattr(points, "may_bend", lambda family, outputs: False)
 
 
@@ -197,14 +197,14 @@ def test_edges_are_the_ends_of_phases_and_where_a_tool_pierces() -> None:
     design = np.array([{p.name: p.default for p in cam.parameters} | CAM], dtype=object)[0]
     matrix = np.array([design[name] for name in cam.parameter_names], np.float64)
     ends = 0.3 + np.array([0.0, 1.0, 1.7, 2.9])
-    (before, behind), which = edges.edges(cam, matrix)
+    (before, behind), which = edges.edges(cam, matrix, ["d3s"])
     assert sorted(which[which >= 1.0]) == list(range(1, 9))
     for end in ends:
         k = int(np.abs(0.5 * (before + behind) - end).argmin())
         assert before[k] < end < behind[k] and behind[k] - before[k] < 1e-10
     row = pierced(0.01)
     full = extended(family("guide"), ["tool_load"])
-    sides, _ = edges.edges(full, np.array([row[name] for name in full.parameter_names]))
+    sides, _ = edges.edges(full, np.array([row[name] for name in full.parameter_names]), ["tool_load"])
     loads = sweep.evaluate("guide", row, ["tool_load"], phi=sides.ravel())["tool_load"].to_numpy().reshape(2, -1)
     jumps = np.abs(loads[1] - loads[0])
     # In at the fabric and off at the turning point; elsewhere a slope of some hundreds makes 1e-8.
