@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Any
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -48,33 +48,15 @@ def output_columns(study: Study) -> dict[str, str]:
     return columns
 
 
-def warm(study: Study, tell: Callable[[int, int], None] = lambda done, total: None) -> None:
-    """Compile or load every kernel the study needs, on a few designs spread over its space.
-
-    ``tell`` is called with how many of the steps through which a design goes are ready, and how many there are.
-    """
-    warm_step, count = WarmStep(study), len(asked_outputs(study))
-    for k in range(count):
-        tell(k, count)
-        warm_step(k)
-    tell(count, count)
+def warm(study: Study) -> None:
+    """Compile or load every kernel the study's sweep needs, on a few designs spread over its space."""
+    for number in range(len(asked_outputs(study))):
+        warm_step(study, number)
 
 
-@dataclass(frozen=True)
-class WarmStep:
-    """Compiles or loads the kernels of one step of a study by its number, here or in a worker."""
-
-    study: Study
-
-    def __getstate__(self) -> dict[str, Any]:
-        # A study remembers its family, which is made of functions; whoever unpickles it makes its own.
-        return {"study": replace(self.study)}
-
-    def __call__(self, number: int, should_stop: Callable[[], bool] = lambda: False) -> int:
-        """Return the number once its kernels are ready."""
-        study, outputs = self.study, asked_outputs(self.study)[number]
-        design_outputs(study.family, few_designs(study), outputs, study.accuracy, study.window)
-        return number
+def warm_step(study: Study, number: int) -> None:
+    """Compile or load the kernels of one of the steps through which a design goes."""
+    design_outputs(study.family, few_designs(study), asked_outputs(study)[number], study.accuracy, study.window)
 
 
 def asked_outputs(study: Study) -> list[Sequence[str]]:

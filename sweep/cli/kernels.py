@@ -15,9 +15,8 @@ import click
 import numpy as np
 
 from kernels.cache_folder import cache_root
-from sweep.chunks.chunk import asked_outputs, few_designs
 from sweep.cli.families import main_outputs
-from sweep.engine.run import run
+from sweep.engine.run import KernelStep, run
 from sweep.errors import Interrupted
 from sweep.evaluation.summaries import DEFAULT_TARGET, design_outputs, routes
 from sweep.families import family as find_family
@@ -36,10 +35,15 @@ WHOLE_STROKE = (0.0, 1.0)
 
 
 class Part(NamedTuple):
-    """What one process compiles at a time: some outputs of a study or family; without any, all that is left of it."""
+    """What one process compiles at a time.
+
+    Of a study it is the step of a number, without one all that is left of it; of a family some outputs, without any
+    its poses.
+    """
 
     of: str
     outputs: tuple[str, ...] = ()
+    step: int | None = None
 
 
 @dataclass(frozen=True)
@@ -53,9 +57,8 @@ class Compile:
         part = self.parts[number]
         if not Path(part.of).exists():
             _compile_family(find_family(part.of), part.outputs)
-        elif part.outputs:
-            study = _study(part.of)
-            design_outputs(study.family, few_designs(study), part.outputs, study.accuracy, study.window)
+        elif part.step is not None:
+            KernelStep(_study(part.of))(part.step)
         else:
             with tempfile.TemporaryDirectory(prefix="linksweep-") as folder:
                 run(part.of, Path(folder, "designs"), 1, smoke=True, force=True)
@@ -111,7 +114,7 @@ def rounds(what: Sequence[str]) -> tuple[list[Part], list[Part]]:
             continue
         for file in files_of(Path(name)):
             study = load_study(file)
-            first += [Part(str(file), tuple(outputs)) for outputs in asked_outputs(study)]
+            first += [Part(str(file), step=number) for number in reversed(range(KernelStep(study).count))]
             if study.optimise is not None and (file.parent / TINY).exists():
                 then.append(Part(str(file)))
     return list(dict.fromkeys(first)), list(dict.fromkeys(then))

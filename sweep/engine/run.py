@@ -15,13 +15,15 @@ import time
 import uuid
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from dataclasses import dataclass, replace
 from importlib.metadata import version
 from pathlib import Path
 from typing import Any
 
 from numba.core.event import install_recorder
 
-from sweep.chunks.chunk import WarmStep, asked_outputs, warm
+from sweep import optimise
+from sweep.chunks.chunk import asked_outputs, warm, warm_step
 from sweep.chunks.plan import Plan
 from sweep.dataset import files, store
 from sweep.dataset.lock import locked
@@ -172,16 +174,45 @@ def _model(study: str | Path | Study, smoke: bool, accuracy: float | None, certi
     return model if accuracy is None and certify is None else with_accuracy(model, accuracy, certify)
 
 
+@dataclass(frozen=True)
+class KernelStep:
+    """Compiles or loads what a study needs, by number: the kernels of each step of its sweep, then of its descents."""
+
+    study: Study
+
+    def __getstate__(self) -> dict[str, Any]:
+        # A study remembers its family, which is made of functions; whoever unpickles it makes its own.
+        return {"study": replace(self.study)}
+
+    @property
+    def count(self) -> int:
+        """How many numbers there are."""
+        settings = self.study.optimise
+        return len(asked_outputs(self.study)) + (settings is not None and settings.globally == "proportions")
+
+    def __call__(self, number: int, should_stop: Callable[[], bool] = lambda: False) -> int:
+        """Return the number once its kernels are ready."""
+        if number < len(asked_outputs(self.study)):
+            warm_step(self.study, number)
+        else:
+            optimise.compile_descents(self.study)
+        return number
+
+
 def _compile(study: Study, jobs: int, phases: Phases) -> None:
-    """Load or compile every kernel the study needs; once one had to be compiled, those behind it are in processes."""
-    count, step = len(asked_outputs(study)), WarmStep(study)
+    """Load or compile every kernel the study needs; once one had to be compiled, those behind it are in processes.
+
+    The last, of the descents, take longest to compile and come first there.
+    """
+    step = KernelStep(study)
+    count = step.count
     for k in range(count):
         phases.say("compiling", k, count)
         with install_recorder("numba:compile") as compiled:
             step(k)
         if compiled.buffer and min(jobs, os.cpu_count() or 1, count - k - 1) > 1:
             with stop_on_signal() as stop:
-                ready = executor("loky", jobs).outcomes(step, iter(range(k + 1, count)), jobs, stop)
+                ready = executor("loky", jobs).outcomes(step, reversed(range(k + 1, count)), jobs, stop)
                 for done, _ in enumerate(ready, k + 2):
                     phases.say("compiling", done, count)
             if stop.signal_number is not None:

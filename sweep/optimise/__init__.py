@@ -13,12 +13,14 @@ from sweep.optimise.multistart.multistart import explore, minimise, optimum
 from sweep.optimise.multistart.survey import Survey
 from sweep.optimise.problem.on_locus import on_locus
 from sweep.optimise.problem.statement import Problem
+from sweep.optimise.starts.posing import compile_descents
 from sweep.optimise.study import optimise_study
 
 __all__ = [
     "Problem",
     "Result",
     "Survey",
+    "compile_descents",
     "explore",
     "front_study",
     "minimise",

@@ -248,8 +248,8 @@ def test_run_passes_its_options_on(study: Path, monkeypatch: pytest.MonkeyPatch)
 def test_warm_compiles_levels_in_processes_and_the_rest_by_the_tiny_version(study: Path) -> None:
     first, then = rounds([str(study), "geared_dwell"])
     assert [part.of for part in first].count("geared_dwell") > 1 and Part("geared_dwell") in first
-    assert [part.outputs for part in first if part.of.startswith(str(study))]
-    assert all(part.of.startswith(str(study)) and not part.outputs for part in then)
+    assert [part.step for part in first if part.of.startswith(str(study))]
+    assert all(part.of.startswith(str(study)) and part.step is None for part in then)
     result = call("warm", study, "geared_dwell")
     assert result.exit_code == 0, result.output
 

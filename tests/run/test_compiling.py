@@ -8,6 +8,7 @@ from types import SimpleNamespace
 
 import pytest
 
+from kernels.descent.descents import begun, descend
 from sweep.chunks.chunk import asked_outputs
 from sweep.engine import run as engine
 from sweep.jobs.progress import Phases
@@ -22,7 +23,7 @@ def test_what_is_missing_is_compiled_side_by_side(
     monkeypatch: pytest.MonkeyPatch, compiled_at: int | None, jobs: int, spread: bool
 ) -> None:
     study = load_study(ROOT / "studies" / "needle208-loads")
-    count = len(asked_outputs(study))
+    count = engine.KernelStep(study).count
     assert count > 4
     here: list[int] = []
     elsewhere: list[int] = []
@@ -35,11 +36,19 @@ def test_what_is_missing_is_compiled_side_by_side(
     def recorder(event: str) -> nullcontext[SimpleNamespace]:
         return nullcontext(SimpleNamespace(buffer=["an event"] if len(here) == compiled_at else []))
 
-    monkeypatch.setattr(engine, "WarmStep", lambda study: here.append)
+    monkeypatch.setattr(engine.KernelStep, "__call__", lambda step, number: here.append(number))
     monkeypatch.setattr(engine, "install_recorder", recorder)
     monkeypatch.setattr(engine, "executor", lambda name, jobs: Processes())
     monkeypatch.setattr(engine.os, "cpu_count", lambda: 2)
     with Phases(False) as phases:
         engine._compile(study, jobs, phases)
     assert here == list(range(count))  # this process has them all in the end
-    assert elsewhere == (list(range((compiled_at or 0) + 1, count)) if spread else [])
+    assert elsewhere == (list(range(count - 1, compiled_at or 0, -1)) if spread else [])
+
+
+def test_what_the_search_for_starts_needs_is_compiled_too() -> None:
+    study = load_study(ROOT / "studies" / "needle208")
+    step = engine.KernelStep(study)
+    assert step.count == len(asked_outputs(study)) + 1
+    step(step.count - 1)
+    assert descend.nopython_signatures and begun.nopython_signatures

@@ -18,7 +18,7 @@ from sweep.optimise.problem.statement import Problem
 from sweep.optimise.starts.candidates import ALIKE, diverse
 from sweep.optimise.starts.dataset import kinds
 from sweep.optimise.starts.linear import NEEDED, Elimination, elimination, widened
-from sweep.optimise.starts.populations import Bred, bred
+from sweep.optimise.starts.populations import TINY, Bred, bred
 
 if TYPE_CHECKING:
     from sweep.study import OptimiseSettings, Study, Tolerance
@@ -141,6 +141,13 @@ def insensitive(
     ends = [design for _, design in _ends_apart(populations, [], BEGUN)]
     found = np.array(ends).reshape(-1, len(problem.family.parameters))
     return holding(study, problem, found), found
+
+
+def descend_once(study: Study, problem: Problem) -> None:
+    """Run a tiny population of descents, so that their kernels are compiled or loaded."""
+    signs = kinds(study, problem, np.empty((0, len(problem.family.parameters))))
+    for _ in bred(_linear(study, problem), signs, 1, 0, size=TINY):
+        pass
 
 
 def _linear(study: Study, problem: Problem, tolerance: Tolerance | None = None) -> Elimination:

@@ -16,7 +16,7 @@ from sweep.optimise.problem.on_locus import LocusCoordinates
 from sweep.optimise.problem.statement import Problem
 from sweep.optimise.starts.candidates import ALIKE, diverse, ranking
 from sweep.optimise.starts.dataset import apart, best_rows, drawn, filled, of_task
-from sweep.optimise.starts.global_starts import Begun, from_populations, holding
+from sweep.optimise.starts.global_starts import Begun, descend_once, from_populations, holding
 
 if TYPE_CHECKING:
     from sweep.study import OptimiseSettings, Study
@@ -151,6 +151,13 @@ def problem_and_starts(
     kept = max(len(starts), len(first))
     origins = None if origins is None else ((-1,) * len(first) + origins)[:kept]
     return settings, Begun(problem, np.concatenate([first, starts])[:kept], origins)
+
+
+def compile_descents(study: Study) -> None:
+    """Compile or load what the search over proportions of a study runs, on a few designs of its space."""
+    designs = drawn(study, 1, 0)
+    if len(designs):  # otherwise the search will say what is wrong
+        descend_once(study, problem_of(study, designs))
 
 
 def problem_of_dataset(study: Study, folder: Path, found: Array) -> Problem:
