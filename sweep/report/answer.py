@@ -53,7 +53,11 @@ def answer(data: Dataset, found: Scan, further: Sequence[str] = ()) -> list[str]
     sentences += further
     sentences += [] if cut else search_warnings(data)
     # What [locus] prescribes as an axis is a space that was searched; as a value it holds by construction.
-    sentences += _limit_sentences([s for s in limit_states(data) if s.shown.name not in data.study.prescribed])
+    states = [s for s in limit_states(data) if s.shown.name not in data.study.prescribed]
+    tolerance = data.study.tolerance
+    sentences += _limit_sentences(
+        states, data.optimum is not None and tolerance is not None and tolerance.robust is not None
+    )
     sentences += _edge_sentence(data)
     sentences += _sweep_sentences(data, found)
     sentences.append(front_sentence(data))
@@ -89,13 +93,16 @@ def _with_speed(data: Dataset, shown: Quantity, value: float) -> str:
     return f"{shown.show(value)} ({fast} at {rpm(data.study.speed)})" if fast else shown.show(value)
 
 
-def _limit_sentences(states: list[LimitState]) -> list[str]:
+def _limit_sentences(states: list[LimitState], robust: bool) -> list[str]:
+    """Say which limits are active and which are not; a robust design keeps the distance that its tolerances need."""
     active = [f"{s.shown.words} ({s.bound})" for s in states if s.state == "active"]
     met = sorted((s for s in states if s.state == "met" and s.slack), key=lambda s: s.room)
     slack = [f"{s.shown.words} ({s.value}, {s.bound})" for s in met[:NEAREST]]
     slack += [f"{len(met) - NEAREST} more"] if len(met) > NEAREST else []
+    words = f"the active limit{'s' if len(active) > 1 else ''}"
+    words += ", from which the drawing keeps the distance that what is made needs" if robust else ""
     return [
-        f"Held back by the active limit{'s' if len(active) > 1 else ''}: {'; '.join(active)}." if active else "",
+        f"Held back by {words}: {'; '.join(active)}." if active else "",
         f"Met with room to spare, the nearest first: {'; '.join(slack)}." if slack else "",
     ]
 

@@ -51,13 +51,14 @@ class Group:
 
 
 def groups(data: Dataset) -> list[Group]:
-    """Different optima, the study's answer first, then by their objective; empty without a search."""
+    """Different optima: the answer, the best on paper, then the others by their objective; empty without a search."""
     objective = data.study.objective
     if data.optima is None or objective is None:
         return []
     kept = data.optima[(data.optima["role"] != "reference") & (data.optima["status"] == codes.OK)]
     rows = [{str(key): value for key, value in row.items()} for row in kept.to_dict("records")]
-    rows.sort(key=lambda row: (row["role"] != "optimum", float(compared(objective.output, row[objective.output]))))
+    order = {"optimum": 0, "nominal": 1}
+    rows.sort(key=lambda row: (order.get(row["role"], 2), float(compared(objective.output, row[objective.output]))))
     places = _places(data, rows)
     values = [float(row[objective.output]) for row in rows]
     leaders: list[int] = []

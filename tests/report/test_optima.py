@@ -102,6 +102,8 @@ def test_cards_have_picture_sizes_and_yield() -> None:
     assert "2 structurally different optima; the next has 0.7" in optima_sentence(data, found)
     sentence = optima_sentence(data, groups(data_of(row("optimum", 0.7), row("nominal", 0.5, c=17.0))))
     assert "the best on paper has 0.5" in sentence and "% less), but" in sentence and "keeps all limits" in sentence
+    alike = groups(data_of(row("optimum", 0.7), row(value=0.5, c=18.0), row("nominal", 0.5, c=17.0)))
+    assert "the best on paper has 0.5" in optima_sentence(data, alike)
     assert optima(data, found[:1]) == [] and optima_sentence(data, found[:1]) == ""
 
 

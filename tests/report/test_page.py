@@ -27,7 +27,7 @@ from sweep.report.page import write_report
 from sweep.report.quantities import quantity
 from sweep.report.scan import Cells, Grid, divided_axes
 from sweep.report.tables import parameter_rows
-from sweep.study import study_from_data
+from sweep.study import Tolerance, study_from_data
 from tests.support.report_dataset import curve, designs, study_data, write_dataset
 
 SECTIONS = ["answer", "motion", "result", "limits", "lines", "map", "trade-off", "fates", "accuracy", "provenance"]
@@ -90,6 +90,16 @@ def test_answer_states_optimum_against_reference(full: Path) -> None:
     assert "Limits the reference itself misses: largest deviation from the line (0.1 mm, at most 0.05 mm)" in words
     assert "no proof of a global optimum: the optimiser started from 3 designs of the sweep, 2 of which" in words
     assert "Not achieved" not in words
+
+
+def test_a_robust_answer_says_why_its_drawing_is_not_at_the_limits(full: Path) -> None:
+    data_set, found, _ = gather(full)
+    study = replace(data_set.study, tolerance=Tolerance(0.02, 0.001, robust=0.95))
+    data_set = replace(data_set, study=study)
+    words = plain(" ".join(answer(data_set, found)))
+    assert (
+        "Held back by the active limit, from which the drawing keeps the distance that what is made needs: largest dev"
+    ) in words
 
 
 def test_counts_agree_with_the_designs(full: Path) -> None:
