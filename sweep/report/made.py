@@ -26,7 +26,7 @@ if TYPE_CHECKING:
     from sweep.study import Study
 
 SINGLE = 1024  # for what each dimension costs
-COSTS = 8  # dimensions that are tried exact: those that the scatter of the worst limit goes with most
+COSTS = 8  # dimensions that are tried exact
 BINS = 41
 FAR = 2.0  # spreads of what is made from which on a bound is not drawn: it would make one bar of them
 TELLING = 0.002  # a share of mechanisms below which a dimension costs nothing that 1024 of them could tell
@@ -103,13 +103,11 @@ def made_sentence(found: Made | None, tolerance: str) -> str:
     most = next(iter(found.costs), None)
     if most is None or found.share == 1.0:
         return f"{text}."
-    text += f"; the dimension that costs most is {most.name}, with {number(100.0 * most.spread, 2)}\u00a0% of the"
-    text += f" scatter of the {found.histogram.shown.words}"
-    return (
-        f"{text}: were it exact, {number(100.0 * most.gain, 2)} points more would."
-        if most.gain >= TELLING
-        else f"{text}."
-    )
+    if most.gain >= TELLING:
+        gain = number(100.0 * most.gain, 2)
+        return f"{text}; the dimension that costs most is {most.name}: were it exact, {gain} points more would."
+    share, words = number(100.0 * most.spread, 2), found.histogram.shown.words
+    return f"{text}; the dimension that scatters the {words} most is {most.name}, with {share}\u00a0% of its variance."
 
 
 def histogram(data: Dataset, output: str) -> Histogram | None:
@@ -145,24 +143,28 @@ def _costs(
 ) -> list[Cost]:  # fmt: skip
     """Dimensions by what their tolerances cost, the dearest first: the same mechanisms with one dimension exact.
 
-    Of the mechanisms ``designs`` the ``columns`` are known, and the share ``before`` that keeps all limits.
+    Of the mechanisms ``designs`` the ``columns`` are known, and the share ``before`` that keeps all limits.  Made exact
+    are the dimensions whose share in the variance of an output, times the share that misses its limit, is largest.
     """
     assert study.tolerance is not None
     scatter = _variance(columns, worst)
     found = []
     own = np.flatnonzero(touched(study.family, design, study.tolerance))
-    values = compared(worst.output, np.asarray(columns[worst.output], np.float64))
-    known = np.isfinite(values)
-    off, away = designs[known][:, own] - design[own], values[known] - values[known].mean()
-    along = (away @ off) ** 2 / (off**2).sum(axis=0)
-    for k in own[np.argsort(-along, kind="stable")[:COSTS]]:
+    matters = np.zeros(len(own))
+    for limit in limits:
+        values = compared(limit.output, np.asarray(columns[limit.output], np.float64))
+        known = np.isfinite(values)
+        off, away = designs[known][:, own] - design[own], values[known] - values[known].mean()
+        along = (away @ off) ** 2 / (off**2).sum(axis=0)
+        matters += along / max(along.sum(), 1e-300) * (1.0 - float(meets(limit, columns[limit.output]).mean()))
+    for k in own[np.argsort(-matters, kind="stable")[:COSTS]]:
         exact = designs.copy()
         exact[:, k] = design[k]
         parameter = study.family.parameters[k]
         columns, kept = _kept(study, limits, exact)
         spread = 1.0 - _variance(columns, worst) / scatter if scatter > 0.0 else 0.0
         found.append(Cost(parameter.name, parameter.text, max(spread, 0.0), float(kept.mean()) - before))
-    return sorted(found, key=lambda cost: -cost.spread)
+    return sorted(found, key=lambda cost: (-cost.gain if cost.gain >= TELLING else 0.0, -cost.spread))
 
 
 def _variance(columns: dict[str, NDArray[np.generic]], limit: Limit) -> float:
