@@ -109,6 +109,8 @@ def _limit_sentences(states: list[LimitState], robust: bool) -> list[str]:
 
 def _edge_sentence(data: Dataset) -> list[str]:
     """Parameters that lie on the edge of what was searched."""
+    if data.study.objective is None:
+        return []
     edges = [f"{row.name} ({row.edge}, {row.value})" for row in parameter_rows(data) if row.edge]
     return (
         [f"On the edge of the space that was searched: {'; '.join(edges)}. A wider one may hold better."]
@@ -191,7 +193,7 @@ def _residual(value: float) -> str:
 
 def search_sentence(data: Dataset, found: Scan) -> str:
     """Say how the optimum was searched, and that this proves nothing where there is no proof besides."""
-    if data.result is None:
+    if data.result is None or data.study.objective is None:
         return ""
     if data.optimum is None:
         return f"{NO_PROOF}: no optimiser was run, and the best of the sweep is as fine as the spacing of its designs."

@@ -86,13 +86,15 @@ class Dataset:
 
     @property
     def result(self) -> Row | None:
-        """The optimum, or without an optimiser the best design of the sweep."""
+        """The optimum, without an optimiser the best design of the sweep, without an objective its first one."""
         return self.optimum if self.optimum is not None else self.best
 
     @property
     def result_name(self) -> str:
-        """What the result is called."""
-        return "optimum" if self.optimum is not None else "best of the sweep"
+        """What the result is called; without an objective none is better than another."""
+        if self.optimum is not None:
+            return "optimum"
+        return "first of the sweep" if self.study.objective is None else "best of the sweep"
 
     @property
     def starts(self) -> int:
@@ -303,7 +305,8 @@ def shown_objective(data: Dataset) -> Quantity | None:
 
 def marked(data: Dataset) -> dict[str, Any]:
     """Return the designs that are marked in the pictures of the design space."""
-    return {data.result_name: data.result, "reference": data.reference}
+    found = {} if data.study.objective is None else {data.result_name: data.result}
+    return found | {"reference": data.reference}
 
 
 def gather(folder: Path) -> tuple[Dataset, Scan, list[Cells]]:

@@ -288,13 +288,14 @@ def parallel(data: Dataset, cells: Sequence[Cells], shown: Sequence[Shown]) -> d
 
 
 def _axes(data: Dataset, cells: Sequence[Cells]) -> list[Quantity]:
-    """Swept dimensions, then the objective and what is limited."""
+    """Swept dimensions, then the objective and what is limited; without an objective what the study wants."""
     study = data.study
-    objective = [] if study.objective is None else [study.objective.output]
+    objective = study.want if study.objective is None else [study.objective.output]
     second = [] if data.second is None else [data.second]
     stored = set(data.units) | set(study.want)
     limits = [limit.output for limit in study.limits if limit.output in study.want and not is_flag(limit.output)]
-    outputs = [name for name in dict.fromkeys([*objective, *second, *limits]) if name in stored][:OUTPUTS]
+    told = [name for name in dict.fromkeys([*objective, *second, *limits]) if name in stored and not is_flag(name)]
+    outputs = told[:OUTPUTS]
     dimensions = [limited(data, cell.name) for cell in cells][:DIMENSIONS]
     return [*dimensions, *(quantity(name, data.units.get(name, "")) for name in outputs)]
 

@@ -216,7 +216,10 @@ def design_map(data: Dataset, found: Scan, cells: list[Cells], pair: tuple[str, 
     by_name = {c.name: c for c in cells}
     marks = {role: row for role, row in marked(data).items() if row is not None}
     shown = shown_objective(data)
-    pair = most_telling(found) if pair is None else pair
+    if pair is None:
+        if shown is None and found.feasible == data.designs:
+            return None  # all of one colour
+        pair = most_telling(found)
     if pair is not None:
         x, y = pair
         at = {role: (by_name[x].placed(float(row[x])), by_name[y].placed(float(row[y]))) for role, row in marks.items()}

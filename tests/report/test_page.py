@@ -19,10 +19,10 @@ from sweep.dataset import files
 from sweep.errors import InputError, StoreError
 from sweep.plot.mechanisms import aligned_turn, rotates
 from sweep.report.answer import answer, searched
-from sweep.report.dataset import gather
+from sweep.report.dataset import gather, marked
 from sweep.report.figures import house_style
 from sweep.report.live import in_window
-from sweep.report.maps import map_figure, overlays
+from sweep.report.maps import design_map, map_figure, overlays
 from sweep.report.page import write_report
 from sweep.report.quantities import quantity
 from sweep.report.scan import Cells, Grid, divided_axes
@@ -313,3 +313,22 @@ def test_pictures_the_study_draws_itself_are_shown(tmp_path: Path) -> None:
     words = text_of(page)
     assert "The atlas Of atlas" in words
     assert "The other figures/other.svg has not been drawn" in words
+
+
+def test_without_an_objective_nothing_is_called_best(tmp_path: Path) -> None:
+    """Every design of a plain sweep is within the limits: no edge that could be better, no map of one colour."""
+    data: dict[str, Any] = {
+        "study": {"name": "plain"},
+        "mechanism": {"family": "rssp"},
+        "scene": {"want": ["stroke"]},
+        "design": {"b": {"values": [40, 60], "unit": "mm"}, "a": {"values": [8, 9], "unit": "mm"}, "branch": -1}
+        | dict.fromkeys(("e", "f"), "0 mm") | {"alpha": "0 deg"},
+        "output": {"keep": "all"},
+    }  # fmt: skip
+    folder = run(study_from_data(data, "study.toml"), tmp_path / "designs", jobs=1)
+    data_set, found, cells = gather(folder)
+    assert data_set.result_name == "first of the sweep" and list(marked(data_set)) == ["reference"]
+    assert plain(" ".join(answer(data_set, found))) == "Of 4 designs in the sweep 4 (100 %) meet all limits."
+    assert design_map(data_set, found, cells) is None
+    words = text_of(write_report(folder))
+    assert "best" not in words.lower() and "stroke" in words

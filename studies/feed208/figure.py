@@ -1,0 +1,75 @@
+"""Where the presser foot leaves the rack, and what that takes from the stitch.
+
+``python studies/feed208/figure.py FOLDER`` writes FOLDER/contact.parquet and FOLDER/figures/contact.svg.
+"""
+
+from __future__ import annotations
+
+import argparse
+import math
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import pandas as pd
+
+import sweep
+from sweep.report.figures import WIDTH, house_style, new_figure, save
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+RPM = 30.0 / math.pi  # of one rad/s
+COLOURS = ("#1f5aa6", "#c8551b", "#2f8f5b")
+LOSSES_OF = 20.0  # preload whose losses of stitch are drawn [N]: the softest one
+
+
+def contact(designs: pd.DataFrame) -> pd.DataFrame:
+    """Least speed of the map at which the foot leaves the rack, for each spring and preload; nan where it never does.
+
+    Without rebound: with one the foot hops at every entry.
+    """
+    still = designs[designs["restitution"] == 0.0]
+    lost = still[still["flights"] > 0.0].groupby(["k", "F0"])["omega"].min() * RPM
+    pairs = pd.MultiIndex.from_frame(still[["k", "F0"]].drop_duplicates().sort_values(["k", "F0"]))
+    return lost.reindex(pairs).rename("rpm").reset_index()
+
+
+def chart(table: pd.DataFrame, designs: pd.DataFrame) -> Figure:
+    """Speed at which contact is lost against the preload; share of the stitch that is lost against the speed."""
+    figure = new_figure(WIDTH, 4.2)
+    left, right = figure.subplots(1, 2)
+    highest = designs["omega"].max() * RPM
+    losses = designs[(designs["restitution"] == 0.0) & (designs["F0"] == LOSSES_OF)]
+    for (k, rows), colour in zip(table.groupby("k"), COLOURS, strict=True):
+        left.plot(rows["F0"], rows["rpm"], "o-", color=colour, label=f"k = {k:g} N/mm")
+        own = losses[losses["k"] == k].sort_values("omega")
+        right.plot(own["omega"] * RPM, 100.0 * own["stitch_error"], "-", color=colour, label=f"k = {k:g} N/mm")
+    never = sorted(table.loc[table["rpm"].isna(), "F0"].unique())
+    for preload in never:
+        left.annotate("never", (preload, highest), xytext=(0, -14), textcoords="offset points", ha="center")
+    left.axhline(highest, color="#8a8f98", linewidth=1.0, linestyle="--", label=f"highest speed, {highest:.0f} rpm")
+    left.set_xlabel("preload F0 [N]")
+    left.set_ylabel("least speed at which contact is lost [rpm]")
+    left.set_xlim(table["F0"].min() - 2.0, table["F0"].max() + 2.0)
+    right.set_xlabel("speed [rpm]")
+    right.set_ylabel(f"stitch lost at F0 = {LOSSES_OF:g} N [%]")
+    for axes in (left, right):
+        axes.legend(fontsize="small")
+    return figure
+
+
+def main() -> None:
+    """Read the designs of a run, write table and chart beside them."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("folder", type=Path, help="results of the study, with its designs/")
+    folder: Path = parser.parse_args().folder
+    designs = sweep.load(folder / "designs")
+    table = contact(designs)
+    table.to_parquet(folder / "contact.parquet", index=False)
+    print(table.to_string(index=False, float_format="{:.0f}".format, na_rep="never"))  # noqa: T201
+    with house_style():
+        print(save(chart(table, designs), folder / "figures" / "contact.svg").path)  # noqa: T201
+
+
+if __name__ == "__main__":
+    main()
