@@ -15,7 +15,7 @@ import hashlib
 import io
 import json
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -26,12 +26,14 @@ from sweep.errors import InputError, StoreError
 
 if TYPE_CHECKING:
     import pandas as pd
+    import pyarrow as pa
 
     from sweep.chunks.chunk import ChunkResult
     from sweep.chunks.plan import Plan
 
 METADATA = b"linksweep"
 MOST_BYTES = 2**30  # of a chunk; they are planned to be a thirtieth of that
+ROWS_PER_BATCH = 262_144  # at most, of what is read at a time
 REMEDY = "run the study again to have it computed anew"
 
 # What the metadata of a chunk say at least, and as what.
@@ -172,6 +174,18 @@ def is_whole(part: Part) -> bool:
             raise
         return False
     return True
+
+
+def batches(paths: Iterable[Path], columns: list[str] | None = None) -> Iterator[pa.RecordBatch]:
+    """Yield all rows of chunks, or some columns of them, in their order.
+
+    Columns are read one after the other: in chunks as small as most are, threads would take longer than the reading.
+    """
+    import pyarrow.parquet as pq
+
+    for path in paths:
+        with pq.ParquetFile(path) as source:
+            yield from source.iter_batches(batch_size=ROWS_PER_BATCH, columns=columns, use_threads=False)
 
 
 def check_columns(chunks: Sequence[Part]) -> None:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-import scipy.optimize  # noqa: F401 (its BLAS is limited below only once it is loaded)
+import scipy.linalg  # noqa: F401 (its BLAS is limited below only once it is loaded)
 from threadpoolctl import threadpool_limits
 
 from sweep.optimise.front.pareto import pareto

@@ -15,6 +15,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from sweep.dataset.chunk_files import batches
 from sweep.errors import InputError
 from sweep.evaluation.curves import coordinate, motion_curves
 from sweep.evaluation.joints import Part, parts
@@ -321,15 +322,9 @@ def _lines(parts: Sequence[Path], names: list[str], objective: str | None) -> tu
 
 def _feasible(parts: Sequence[Path], names: list[str]) -> Iterator[tuple[Array, Array]]:
     """Yield batches of feasible designs with finite values: row numbers over all parts, and values (n, names)."""
-    import pyarrow.parquet as pq
-
     start = 0
-    for part in parts:
-        with pq.ParquetFile(part) as source:
-            for batch in source.iter_batches(columns=[*names, "status"]):
-                columns = [np.asarray(batch.column(name).to_numpy(zero_copy_only=False), float) for name in names]
-                table = np.column_stack(columns)
-                status = batch.column("status").to_numpy(zero_copy_only=False)
-                good = np.flatnonzero((status == 0) & np.isfinite(table).all(axis=1))
-                yield (start + good).astype(np.float64), table[good]
-                start += batch.num_rows
+    for batch in batches(parts, [*names, "status"]):
+        table = np.column_stack([np.asarray(batch[name], np.float64) for name in names])
+        good = np.flatnonzero((np.asarray(batch["status"]) == 0) & np.isfinite(table).all(axis=1))
+        yield (start + good).astype(np.float64), table[good]
+        start += batch.num_rows

@@ -9,6 +9,7 @@ from datetime import date
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from sweep.dataset.chunk_files import ROWS_PER_BATCH, batches
 from sweep.dataset.files import beside, is_older, located, write_atomically
 from sweep.errors import StoreError
 from sweep.evaluation.cyclogram import cyclogram, table_in_degrees
@@ -216,6 +217,7 @@ def copy_tables(folder: Path, out: Path) -> None:
 
 def write_survivors(parts: Sequence[Path], target: Path) -> None:
     """Write the designs within all limits, in the order of the sweep, with the parts' units and definitions."""
+    import pyarrow as pa
     import pyarrow.compute as pc
     import pyarrow.parquet as pq
 
@@ -224,10 +226,13 @@ def write_survivors(parts: Sequence[Path], target: Path) -> None:
     schema = pq.read_schema(parts[0])
     partial = target.with_name(f"_tmp-{target.name}")
     with pq.ParquetWriter(partial, schema, compression="zstd") as writer:
-        for part in parts:
-            with pq.ParquetFile(part) as source:
-                for batch in source.iter_batches():
-                    writer.write_batch(batch.filter(pc.equal(batch["status"], 0)).cast(schema))
+        kept: list[pa.RecordBatch] = []
+        for batch in batches(parts):
+            kept.append(batch.filter(pc.equal(batch["status"], 0)))
+            if sum(map(len, kept)) >= ROWS_PER_BATCH:  # a group of rows for each small chunk would take as long again
+                writer.write_table(pa.Table.from_batches(kept, schema))
+                kept = []
+        writer.write_table(pa.Table.from_batches(kept, schema))
     partial.replace(target)
 
 

@@ -6,19 +6,19 @@ Memory is bounded by a batch of rows, whatever the size of the dataset.  Values 
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from itertools import combinations
 from pathlib import Path
 
 import numpy as np
 
+from sweep.dataset.chunk_files import batches
 from sweep.families.base import Array
 from sweep.families.names import is_error
 from sweep.quantities.limits import compared
 from sweep.study import Study
 
-ROWS_PER_BATCH = 262_144
 SCATTER_POINTS = 40_000
 CELLS_OF_PAIR, CELLS_OF_MANY = 240, 32
 DESIGNS_PER_CELL = 3.0
@@ -141,7 +141,9 @@ def scan(
         found.grids[x.name, y.name] = Grid(np.full(shape, np.inf), np.zeros(shape))
     stride = max(1, _row_count(parts) // SCATTER_POINTS)
     best, samples = np.inf, []
-    for batch, names in _batches(parts):
+    for rows in batches(parts):
+        names = list(rows.schema.names)
+        batch = {name: np.asarray(rows[name], np.float64) for name in names}
         ok = batch["status"] == 0
         for code, count in zip(*np.unique(batch["status"], return_counts=True), strict=True):
             found.counts[int(code)] = found.counts.get(int(code), 0) + int(count)
@@ -224,16 +226,3 @@ def _row_count(parts: Sequence[Path]) -> int:
     import pyarrow.parquet as pq
 
     return sum(pq.read_metadata(part).num_rows for part in parts)
-
-
-def _batches(parts: Sequence[Path]) -> Iterator[tuple[dict[str, Array], list[str]]]:
-    import pyarrow.parquet as pq
-
-    for part in parts:
-        with pq.ParquetFile(part) as source:
-            for batch in source.iter_batches(batch_size=ROWS_PER_BATCH):
-                names = list(batch.schema.names)
-                yield (
-                    {name: np.asarray(batch.column(name).to_numpy(zero_copy_only=False), float) for name in names},
-                    names,
-                )

@@ -12,6 +12,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as some
 
+from sweep.dataset import chunk_files
 from sweep.report import scan as module
 from sweep.report.scan import Cells, most_telling, non_dominated, scan
 
@@ -22,7 +23,7 @@ Y = np.geomspace(1.0, 100.0, 9)
 @pytest.fixture
 def parts(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> tuple[list[Path], pd.DataFrame]:
     """A lattice of three axes in three files of unequal length, read in batches that end inside a file."""
-    monkeypatch.setattr(module, "ROWS_PER_BATCH", 700)
+    monkeypatch.setattr(chunk_files, "ROWS_PER_BATCH", 700)
     rng = np.random.default_rng(5)
     lattice = np.stack(np.meshgrid(X, Y, np.arange(40.0), indexing="ij"), axis=-1).reshape(-1, 3)
     table = pd.DataFrame(lattice, columns=["x", "y", "z"])

@@ -11,7 +11,7 @@ import numpy as np
 
 from kernels import status as st
 from sweep.chunks.parameters import runs_matrix
-from sweep.dataset.chunk_files import parts
+from sweep.dataset.chunk_files import batches, parts
 from sweep.families.base import Array, Family
 from sweep.optimise.problem.statement import Problem
 from sweep.optimise.starts.candidates import ALIKE, GROUP, diverse, ranking, sample
@@ -31,20 +31,16 @@ def best_rows(family: Family, objective: str, folder: Path) -> tuple[Array, Arra
 
     Only the parameters, the objective and the status are read, batch by batch.
     """
-    import pyarrow.parquet as pq
-
     names = family.parameter_names
     designs, merit = np.empty((0, len(names))), np.empty(0)
-    for part in parts(folder):
-        with pq.ParquetFile(part.path) as file:
-            for batch in file.iter_batches(batch_size=KEPT, columns=[*names, objective, "status"]):
-                good = np.asarray(batch["status"]) == st.OK
-                more = np.column_stack([np.asarray(batch[name], np.float64) for name in names])[good]
-                designs = np.concatenate([designs, more])
-                merit = np.concatenate([merit, compared(objective, np.asarray(batch[objective], np.float64)[good])])
-                if len(merit) > KEPT:
-                    best = np.sort(np.argsort(merit, kind="stable")[:KEPT])
-                    designs, merit = designs[best], merit[best]
+    for batch in batches((part.path for part in parts(folder)), [*names, objective, "status"]):
+        good = np.asarray(batch["status"]) == st.OK
+        more = np.column_stack([np.asarray(batch[name], np.float64) for name in names])[good]
+        designs = np.concatenate([designs, more])
+        merit = np.concatenate([merit, compared(objective, np.asarray(batch[objective], np.float64)[good])])
+        if len(merit) > KEPT:
+            best = np.sort(np.argsort(merit, kind="stable")[:KEPT])
+            designs, merit = designs[best], merit[best]
     return designs, merit
 
 
