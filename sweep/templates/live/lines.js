@@ -2,7 +2,13 @@
 // Feasible designs as lines over their dimensions and outputs. A range is brushed by drawing along an axis and cleared
 // by a click on it; the lines within all ranges stay, and the best of them are listed.
 
-const ROOM = { top: 34, bottom: 34, side: 46, high: 330, step: 92 }, LISTED = 5;
+const ROOM = { top: 48, bottom: 34, side: 46, high: 344, step: 92 }, LISTED = 5, LETTERS = 14;
+
+// A name that is too long for the room of its axis is broken at the space before its last words that have room.
+function inTwo(name) {
+  const at = name.length > LETTERS ? name.indexOf(" ", name.length - LETTERS - 1) : -1;
+  return at < 0 ? [name] : [name.slice(0, at), name.slice(at + 1)];
+}
 
 class Lines {
   constructor(host, data) {
@@ -74,13 +80,13 @@ class Lines {
   addAxis(axis, k) {
     const x = this.x(k), { top, bottom, high } = ROOM;
     svg("line", { class: "axis", x1: x, x2: x, y1: top, y2: high - bottom }, this.frame);
-    const words = [[axis.symbol, 12, "name"], [withUnit(short(this.ends[k][1], 3), axis.unit), 27, ""],
+    const words = [[withUnit(short(this.ends[k][1], 3), axis.unit), top - 7, ""],
       [withUnit(short(this.ends[k][0], 3), axis.unit), high - bottom + 14, ""]];
+    inTwo(axis.symbol).reverse().forEach((part, line) => words.push([part, top - 22 - 13 * line, "name"]));
     for (const [text, y, kind] of words) {
       const label = svg("text", { x, y, "text-anchor": "middle", class: kind }, this.frame);
-      label.textContent = text;
-      if (kind && text.length > 13) svg("title", {}, label).textContent = label.textContent;
-      if (kind && text.length > 13) label.firstChild.textContent = `${text.slice(0, 12)}…`;
+      label.textContent = text.length > LETTERS + 2 ? `${text.slice(0, LETTERS + 1)}…` : text;
+      if (kind) svg("title", {}, label).textContent = axis.symbol;
     }
     const range = svg("rect", { class: "range", x: x - 7, width: 14, y: top, height: 0 }, this.frame);
     const hit = { class: "hit", x: x - 16, width: 32, y: top - 8, height: high - top - bottom + 16, "data-axis": axis.name };
