@@ -134,9 +134,10 @@ class GuidedPoint:
 class LimitLocus:
     """The limit positions of the follower can be prescribed; the links that keep them lie on a locus.
 
-    The loci of a family are those of :data:`sweep.synthesis.LOCI`.  ``travel`` is the design output for the way between
-    both limit positions.  ``sized`` are the length of the follower and the offsets of its axis, along the common
-    perpendicular and along the axis, where the length can be given instead of the offsets; empty where it cannot.
+    The loci of a family are those of :data:`sweep.synthesis.locus.LOCI`.  ``travel`` is the design output for the way
+    between both limit positions.  ``sized`` are the length of the follower and the offsets of its axis, along the
+    common perpendicular and along the axis, where the length can be given instead of the offsets; empty where it
+    cannot.
     """
 
     travel: str

@@ -6,7 +6,7 @@ import copy
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from types import MappingProxyType
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from sweep.effects.wanted import expanded
 from sweep.errors import StudyError
@@ -32,12 +32,13 @@ from sweep.study.study import (
     Study,
 )
 from sweep.study.tables import Sections, read_sections
-from sweep.study.task import check_task, read_study_task
 from sweep.study.thread import read_threads
 from sweep.study.tolerance import check_tolerance, read_tolerance
 from sweep.study.toml import key_lines, read_toml, toml_text
 from sweep.synthesis.locus import OnLocus
-from sweep.synthesis.tasks.problem import SynthesisTask
+
+if TYPE_CHECKING:
+    from sweep.synthesis.tasks.problem import SynthesisTask
 
 
 def load_study(path: str | Path, smoke: bool = False) -> Study:
@@ -119,11 +120,15 @@ def _build(
     file = StudyFile(flattened(data, members), path, faults)
     sections = read_sections(file)
     window, accuracy = read_window(sections.scene.window, faults), read_accuracy(sections.accuracy, faults)
-    task = read_study_task(file)
     check_goal(sections.objective, file)
     if not (sections.scene.want or file.free_table("limits") or sections.objective.goal):
         faults.missing(("scene", "want"), "design outputs to compute, here or in [limits] or [objective]")
     found = read_mechanism(sections.mechanism, file, read_threads(file))
+    task = None
+    if "task" in file:
+        from sweep.study.task import read_study_task  # with all that does tasks, which few studies ask for
+
+        task = read_study_task(file, found and found[0])
     if found is None:  # nothing else can be checked
         raise StudyError(str(path), faults.lines)
     return _study(file, sections, window, accuracy, task, *found)
@@ -148,8 +153,6 @@ def _study(
     check_search(sections.optimise, file, bare)
     check_objective(objective, family, faults)
     check_steady(file, family, objective, limits)
-    if task is not None:
-        check_task(file, mechanism)
     front = read_pareto(sections.pareto, file, family, objective, sections.optimise)
     other = _elsewhere(file, bare, family, fitted, sections.scene.speed, locus, prescribed, inputs)
     space = read_space(file, family, other)

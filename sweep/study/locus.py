@@ -16,9 +16,8 @@ from sweep.quantities.limits import Limit
 from sweep.study.file import Faults, Section, Size, StudyFile
 from sweep.study.parameter import Entry, missing_parameter, read_entry
 from sweep.study.space import Axis
-from sweep.synthesis import LOCI
 from sweep.synthesis.fit import LineFit
-from sweep.synthesis.locus import OnLocus
+from sweep.synthesis.locus import LOCI, OnLocus
 
 # Two words for phi0/(2 pi - phi0): that of the time there over the time back, and the output's.
 RATIOS = ("time_ratio", "stroke_ratio")

@@ -96,19 +96,17 @@ def read_task(raw: object, faults: Faults) -> SynthesisTask | None:
     return problem
 
 
-def read_study_task(file: StudyFile) -> SynthesisTask | None:
-    """Read the task of a study, which asks for the search that begins at the task's mechanisms."""
-    if "task" not in file:
-        return None
+def read_study_task(file: StudyFile, mechanism: object) -> SynthesisTask | None:
+    """Read the task of a study, which asks for the search that begins at the task's mechanisms.
+
+    It is a fault if these are not those of the study, unless its ``mechanism`` is unknown, None.
+    """
     task = read_task(file.data["task"], file.faults)
     if "optimise" not in file:
         needed = "a table [optimise]: the mechanisms that do a [task] are where its search begins"
         file.faults.missing(("optimise",), needed)
-    return task
-
-
-def check_task(file: StudyFile, mechanism: object) -> None:
-    """Report a task whose mechanisms are not those of the study."""
+    if task is None or mechanism is None:
+        return task
     kind = file.data["task"]["kind"]
     chain = CHAINS.get(kind)
     if chain is None:
@@ -117,6 +115,7 @@ def check_task(file: StudyFile, mechanism: object) -> None:
         wanted = f'family = "{chain[0]}"' if len(chain) == 1 else f"chain = {list(chain)}"
         allowed = f"in this study a task of its mechanism; {kind} is about {wanted}"
         file.faults.value(("task", "kind"), kind, allowed)
+    return task
 
 
 def _needed(name: str) -> str:

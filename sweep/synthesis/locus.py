@@ -190,7 +190,7 @@ def locus_designs(family: str, columns: Table) -> tuple[Columns, Status]:
     Parameters
     ----------
     family : "rssr" or "rssp"
-    columns : the requirement, one array or number per column [one length unit, rad]; see `sweep.synthesis.LOCI`
+    columns : the requirement, one array or number per column [one length unit, rad]; see `LOCI`
 
     Returns
     -------

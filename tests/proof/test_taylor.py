@@ -14,7 +14,7 @@ from kernels.boxes.tape import Tape, run
 from kernels.boxes.taylor import VALUE, constant, least, multiply, variable, width
 from kernels.families.rssr import box_by_axes, box_by_rocker
 from kernels.families.rssr import box_turn as bt
-from sweep.synthesis import locus_designs
+from sweep.synthesis.locus import locus_designs
 
 ENDS = hs.floats(-1e3, 1e3).filter(lambda x: abs(x) > 1e-6)
 

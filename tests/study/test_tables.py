@@ -12,7 +12,7 @@ from sweep.families.capabilities import LimitLocus
 from sweep.families.chain import driven_guide
 from sweep.study import study_from_data
 from sweep.study.tables import REQUIRED_TABLES, TABLES, Sections
-from sweep.synthesis import LOCI
+from sweep.synthesis.locus import LOCI
 
 
 def test_every_table_has_a_word_and_the_shape_of_those_whose_keys_are_fixed_is_read():

@@ -12,8 +12,7 @@ from mpmath import mp
 import sweep
 from kernels import status as st
 from sweep.errors import InputError
-from sweep.synthesis import admissible_arcs, locus_designs
-from sweep.synthesis.locus import locus
+from sweep.synthesis.locus import admissible_arcs, locus, locus_designs
 from tests.reference import synthesis as naive
 from tests.support.turn_designs import crank_rockers, slider_cranks
 
