@@ -269,8 +269,11 @@ def _frames(machine: Machine, designs: Array) -> dict[str, Frame]:
 
 
 def _whole(values: Any, shape: tuple[int, int]) -> Any:
-    """Spread what was computed for one design over all: an array of their own, which may be written on."""
-    return values if values.shape == shape else np.array(np.broadcast_to(values, shape))
+    """Spread what was computed for one design over all: an array of their own, which may be written on.
+
+    Poses of a design lie side by side, as where it is alone: sums over the turn have the same bits.
+    """
+    return values if values.shape == shape else np.array(np.broadcast_to(values, shape), order="C")
 
 
 def _driving(member: Member, needed: set[str]) -> set[str]:

@@ -22,7 +22,8 @@ from sweep.engine.run import run
 from sweep.errors import InputError
 from sweep.evaluation.summaries import Route, design_outputs
 from sweep.evaluation.tables import design_matrix
-from sweep.families.base import Array, Columns
+from sweep.families import family
+from sweep.families.base import Accuracy, Array, Columns, Family
 from sweep.quantities.limits import meets
 from sweep.study import Limit, OutputSettings, Study, load_study
 from tests.support.engine_study import CHUNK, SMALL_CHUNKS, chunk_bytes, write_study
@@ -212,6 +213,25 @@ def test_pandas_reads_the_folder_and_the_run_is_noted(study: Study, tmp_path: Pa
     run(study, folder)
     assert read_runs(folder)[-1]["text"] == "0 chunks computed"
     assert chunk_bytes(folder) == before
+
+
+@pytest.mark.parametrize("accuracy", [Accuracy(samples=720), Accuracy(target=1e-8)])
+def test_a_machine_has_the_bits_it_has_alone_where_all_designs_share_a_member(accuracy: Accuracy) -> None:
+    """Sums over the turn: poses of the shared member are computed once, and lie in memory as those of one design."""
+    machine = family({"shared": "rssr", "other": "rssr"})
+    designs = np.tile(design_matrix(machine, _pair_of(machine))[0], (7, 1))
+    designs[:, machine.parameter_names.index("other.b")] *= np.linspace(0.99, 1.01, 7)
+    wanted = ["rms_shared.dpsi", "rms_shared.d2psi", "rms_shared.discriminant"]
+    together = design_outputs(machine, designs, wanted, accuracy)
+    alone = [design_outputs(machine, designs[[k]], wanted, accuracy) for k in range(7)]
+    for name in wanted:
+        assert np.isfinite(np.asarray(together[name], np.float64)).all()
+        assert np.array_equal(together[name], [found[name][0] for found in alone])
+
+
+def _pair_of(machine: Family) -> dict[str, float]:
+    example = family("rssr").example
+    return {f"{member}.{name}": value for member in ("shared", "other") for name, value in example.items()}
 
 
 def test_chunk_in_pieces_equals_chunk_at_once(study: Study) -> None:
