@@ -17,12 +17,15 @@ from sweep.families.base import Accuracy, Work
 from sweep.families.thread_balance import ThreadBalance
 from sweep.optimise.extrema.gradients import scalar_gradient, step_gradients
 from sweep.optimise.extrema.points import STEP
+from sweep.optimise.manufacture.robust import yields
+from sweep.optimise.starts.posing import problem_of
 from sweep.quantities.limits import refusals
 from sweep.study.load import load_study
 from sweep.synthesis.thread_law import smoothest_law
 
 FOLDER = Path(sweep.__file__).parents[1] / "studies" / "overlock208"
-RECORD = json.loads((FOLDER / "expected.json").read_text())["optimum"]
+EXPECTED = json.loads((FOLDER / "expected.json").read_text())
+RECORD = EXPECTED["optimum"]
 THREADS = {"top": "pull", "bottom": "pull_low", "over": "pull_high"}
 
 
@@ -60,15 +63,29 @@ def test_recorded_head_has_all_moments_in_its_cyclogram(study):
     assert degrees["c"] < degrees["drop"] < degrees["cast"] < 180.0
 
 
-def test_take_ups_are_the_smoothest_that_leave_a_tenth_of_a_millimetre(study):
+def test_take_ups_are_the_smoothest_with_room_for_another_head(study):
     found = sweep.thread.diagram(study.bare, RECORD["design"], samples=360)
     for thread in (r for r in study.bare.relations if isinstance(r, ThreadBalance)):
-        allowed = thread.allowed(found["phi"].to_numpy()) - 0.2
-        law = smoothest_law(found["phi"], found[f"{thread.name}_demand"] + 0.1, allowed)
+        # 0.15 mm above the demand, 0.5 mm below what is allowed
+        allowed = thread.allowed(found["phi"].to_numpy()) - 0.65
+        law = smoothest_law(found["phi"], found[f"{thread.name}_demand"] + 0.15, allowed)
         own = {k: RECORD["design"][f"{THREADS[thread.name]}.{k}"] for k in law.coefficients}
         # the coefficients stand with three decimals
         assert own == pytest.approx(law.coefficients, abs=2e-3)
-        assert found[f"{thread.name}_surplus"].min() > 0.09
+        assert found[f"{thread.name}_surplus"].min() > 0.14
+
+
+@pytest.mark.long
+def test_most_of_what_is_made_keeps_every_limit_and_none_of_the_drawing_does(study):
+    start = design_matrix(study.family, dict(study.space.fixed) | RECORD["design"])[0]
+    problem = problem_of(study, start)
+    drawing = start[0].copy()
+    for name, value in EXPECTED["drawing"]["design"].items():
+        drawing[study.family.parameter_names.index(name)] = value
+    # mechanisms that the search did not see: of 256 their share is good to 1.4 %, one standard deviation
+    built, drawn = yields(problem, np.array([start[0], drawing]), study.tolerance, seed=1)
+    assert built > EXPECTED["optimum"]["share"] - 0.042
+    assert drawn == 0.0
 
 
 def test_dear_outputs_without_a_limit_are_for_heads_that_keep_all(study):
