@@ -65,7 +65,7 @@ class Descent:
         return self.best
 
     def _settle(self) -> None:
-        """Make the objective small until the conditions of optimality hold; on a locus that is slow, go on without."""
+        """Minimise until the conditions of optimality hold; where a locus makes that slow, use the parameters."""
         other = in_parameters(self.model.problem, self.best.design)
         for _ in range(CYCLES):
             self._rounds(slsqp.propose, relaxed=False, enough=1e-4, rounds=8)
@@ -101,7 +101,7 @@ class Descent:
         for _ in range(ROUNDS):
             before = self.best
             if math.isinf(before.known):
-                return  # the links reach nowhere: there is nothing to follow
+                return  # the mechanism cannot be assembled: it has no extrema to follow
             crept = self._rounds(slsqp.propose, relaxed=True, enough=1e-4, patience=patience)
             if crept and self.best.form.complete:
                 self._rounds(newton.propose, relaxed=True, enough=1e-4)
@@ -115,13 +115,13 @@ class Descent:
     def _rounds(
         self, propose: Propose, relaxed: bool, enough: float, rounds: int = ROUNDS, patience: int | None = None
     ) -> bool:
-        """Let ``propose`` find the next design, keep it if its true extrema are better, until it gains too little.
+        """Take the designs that ``propose`` finds, if their true extrema are better, until a round gains too little.
 
         A refused design shortens the next step, and its extrema that the rows did not know are added to them.
 
         Returns
         -------
-        Whether it crept: ``patience`` rounds in a row have not halved what the limits are missed by.
+        Whether the search was slow: ``patience`` rounds in a row have not halved the violation.
         """
         radius, extra, refused = 0.25, Points.of([]), False
         missed: list[float] = []
@@ -152,7 +152,7 @@ class Descent:
                 if gain <= enough * max(abs(true), 1.0) or (relaxed and new.feasible):
                     break
                 if residual <= (KKT if gain <= DWINDLING else 1e-2 * KKT):
-                    break  # the polish makes the rest of the way in one step
+                    break  # the polish covers the rest of the distance in one step
             elif step < 1e-10 or gain > -1e-13 or radius < 1e-7:
                 break
             else:
@@ -166,7 +166,7 @@ class Descent:
         apart = np.abs(np.remainder(found.phi[:, None] - known.phi + np.pi, 2.0 * np.pi) - np.pi)
         same = (found.series[:, None] == known.series) & (found.sense[:, None] == known.sense)
         new = ~((apart < NEAR_ANGLE) & same).any(axis=1)
-        # A window moves with the design: a fixed angle may lie outside of it, where nothing is asked; so do passages.
+        # Windows and passages move with the design: a fixed angle may leave them, and outside the limit does not apply.
         held = [s.window is None and s.passes is None for s in self.model.curves.series]
         new &= np.array(held, dtype=np.bool_)[found.series]
         return replace(found, how=np.full(len(found), STATIC)).take(new)

@@ -29,7 +29,7 @@ WORDS = {"minimum": "at its minimum", "maximum": "at its maximum", "equal": "hel
 class Multipliers:
     """Least-squares multipliers: ``gradient of t = sum weights * gradient of rows + bounds``.
 
-    ``residual`` is the largest component of what is left, in variables scaled to their bounds and the objective scaled
+    ``residual`` is the largest component of the remainder, in variables scaled to their bounds and the objective scaled
     by its value at the start; ``bounds`` holds the multipliers of the lower (+) and upper (-) bounds.
     """
 

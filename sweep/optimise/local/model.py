@@ -49,7 +49,7 @@ class State:
     violation: float
 
     def merit(self, price: float) -> float:
-        """Return the objective and violation in one number; infinite where the objective does not exist."""
+        """Return the merit: objective plus priced violation; infinite where the objective does not exist."""
         return self.objective + price * self.violation
 
     @property
@@ -64,7 +64,7 @@ class State:
 
     @property
     def short(self) -> float:
-        """What the elastic program makes small; designs that do not turn rank behind all that do."""
+        """The violation that the elastic program minimises; designs that do not turn rank behind all that do."""
         return self.known if self.form.complete else self.known + NOT_TURNING
 
 
@@ -109,7 +109,7 @@ class Model:
         return self.uncounted(fractions, samples)
 
     def uncounted(self, fractions: Array, samples: int | None = None) -> State:
-        """Return what :meth:`state` does, of a design that was looked at before, whoever wants to stop."""
+        """Return the result of :meth:`state` for a design evaluated before: not counted, never stopped."""
         design = self.design(fractions)
         points, turns = self.curves.scan(design, samples or self.samples)
         form = self.program.lay_out(self.curves, design, points, turns, self.scale)
@@ -124,7 +124,7 @@ class Model:
         return self.program.lay_out(self.curves, at.design, points, at.form.complete, self.scale)
 
     def atoms(self, design: Array, form: Form, points: Points) -> Array:
-        """Return what the form's rows are made of: curves at the points, their angles, plain numbers."""
+        """Return the quantities that make up the form's rows: curves at the points, their angles, plain numbers."""
         found = self._scalars(form.scalars, design[None, :])
         return np.concatenate([points.value, points.phi, [found[name][0] for name in form.scalars]])
 
@@ -141,7 +141,7 @@ class Model:
         values, moves = gradients(self.curves, designs, points, self.program.places)
         scalars = self._scalar_gradients(form.scalars, fractions, designs, points, moves)
         jacobian = np.concatenate([values, moves, *(scalars[name][None, :] for name in form.scalars)])
-        # What has no derivative, as the angle of a vanishing extremum, spoils the rows that ask for it and no others.
+        # A quantity without a derivative, as the angle of a vanishing extremum, gives nan only in the rows that use it.
         lost = ~np.isfinite(jacobian).all(axis=1)
         jacobian[lost] = 0.0
         rows = np.asarray(form.matrix @ jacobian)
@@ -196,7 +196,7 @@ class Model:
         return found
 
     def _scalars(self, names: Sequence[str], designs: Any) -> dict[str, Any]:
-        """Return plain numbers of designs, each (k,); those that one step of the family gives are asked together."""
+        """Return plain numbers of designs, each (k,); one step of the family is called once for all that it gives."""
         problem, found, steps = self.problem, {}, defaultdict(list)
         for name in names:
             if name in problem.family.parameter_names:
@@ -243,7 +243,7 @@ def refuse_dependent(problem: Problem, program: Program, starts: Array) -> None:
 
 
 def _dependent(rows: Array, names: list[str]) -> set[str]:
-    """Return the names of rows (k, n) that a vanishing sum of them takes in."""
+    """Return the names of the rows (k, n) that take part in a linear dependency."""
     length = np.linalg.norm(rows, axis=1)
     if (length < DEPENDENT).any():
         return {name for name, size in zip(names, length, strict=True) if size < DEPENDENT}

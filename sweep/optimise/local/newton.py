@@ -46,7 +46,7 @@ def propose(model: Model, at: State, form: Form, t: float, radius: float, floor:
             best, value = step, merit
         if merit <= now - KEPT * promised:
             break
-        # The limits bend more than their corrections can follow: a shorter step, with the same curvature.
+        # The limits are curved more than the corrections can follow: shorten the step, keep the Hessian.
         reach = 0.5 * min(reach, float(np.abs(step[:-1]).max()))
     return np.clip(at.fractions + best[:-1], 0.0, 1.0), t + float(best[-1])
 
@@ -73,7 +73,7 @@ def _corrected(
         best, value = step, merit
         if missed <= FEASIBLE or missed > LOST:
             break
-        # The rows bend away from their tangents: aim beside by what was missed.
+        # The rows are curved: shift their linear targets by what the step missed (second-order correction).
         step, _ = quadratic_step(curvature, full, true - full @ step, form, box, model.price)
     return best, value, promised
 
@@ -105,7 +105,7 @@ def hessian(model: Model, at: State, form: Form, found: Multipliers, free: Index
 
 
 def _holding(jacobian: Array, form: Form, found: Multipliers) -> Array:
-    """Give gradients whose null space are the steps that keep the active set.
+    """Return gradients (rows) whose null space holds the steps that keep the active set.
 
     Such a step changes no active limit and no bound, and it changes all active rows of the objective alike.
     """
@@ -119,10 +119,9 @@ def _holding(jacobian: Array, form: Form, found: Multipliers) -> Array:
 def _upward(curvature: Array, held: Array) -> Array:
     """Return the Hessian with its negative eigenvalues made positive.
 
-    That is done apart in the null space of the active rows and across it.
-
-    Along them the curvature decides how far to go; across, the rows do.  Turned positive in one go, the strong
-    curvature across would stiffen a flat valley, and every step along it would be a hundred times too short.
+    The null space of the active rows and its complement are treated separately.  In the null space the curvature sets
+    the length of a step; in the complement the rows do.  If both were treated together, the strong curvature of the
+    complement would stiffen a flat valley, and every step along it would be a hundred times too short.
     """
     out = np.zeros_like(curvature)
     for part in split(held, RANK):
@@ -168,7 +167,7 @@ def polish(model: Model, state: State) -> State:
         if fractions is None:
             break
         new = model.state(fractions)
-        # Limits that bend are missed by the square of a step; the next one brings them back.
+        # A step misses a curved limit by the order of its square; the next step corrects that.
         if not new.merit(model.price) <= begun.merit(model.price) + SLIPPED * size:
             break
         new_residual = model.certificate(new).residual

@@ -146,7 +146,7 @@ def confirmed(problem: Problem, program: Program, found: Result) -> Result:
 
 
 def _differing(problem: Problem, kept: Result, far: dict[str, tuple[float, float]]) -> Result:
-    """Return a result as not converged, or infeasible, of whose outputs some are by so much beside the search's."""
+    """Return the result marked as not converged, or infeasible, since its outputs differ from those of the search."""
     short, missed = {}, []
     for limit in problem.limits:
         value = far[limit.output][0] if limit.output in far else math.nan
@@ -166,7 +166,7 @@ def _differing(problem: Problem, kept: Result, far: dict[str, tuple[float, float
 
 
 def _has_margin(problem: Problem, m: Measure) -> bool:
-    """Return whether tolerances are in the value that the search has of an output, or in its limit."""
+    """Return whether tolerances enter the value that the search has of an output, or its limit."""
     return m.name in problem.allowances or any(s.output in problem.curve_margins for s in m.series)
 
 

@@ -15,7 +15,7 @@ from sweep.optimise.local.least_squares import least_squares
 from sweep.optimise.problem.program import Program
 from sweep.optimise.problem.statement import Problem
 
-POSES, HARMONICS = 64, 16  # per turn at which the room is known, and of the sum that runs through it
+POSES, HARMONICS = 64, 16  # poses per turn at which the margin is known, and harmonics of the sum through it
 MOVED = 1e-4  # of the variables' bounds: a deviation from exact derivatives, so its difference is good to 1e-4
 
 
@@ -32,7 +32,7 @@ class CurveMargin:
     slopes: Array
 
     def at(self, designs: Any, phi: Array) -> Any:
-        """Return the room (n, m) of designs (n, P), which may carry the imaginary step, at crank angles (m,)."""
+        """Return the margin (n, m) of designs (n, P), which may carry the imaginary step, at crank angles (m,)."""
         moved = designs[:, list(self.columns)] - self.place
         room = trigonometric_sum(self.constant + moved.real @ self.slopes.T, phi)
         if np.iscomplexobj(moved):
@@ -40,7 +40,7 @@ class CurveMargin:
         return room
 
     def slope(self, design: Array, phi: Array) -> Array:
-        """Return the derivative (m,) of the room of one design (P,) by the crank angle."""
+        """Return the derivative (m,) of the margin of one design (P,) by the crank angle."""
         moved = design[list(self.columns)] - self.place
         return np.asarray(trigonometric_sum((self.constant + self.slopes @ moved)[None, :], phi, True)[0], np.float64)
 
@@ -58,13 +58,13 @@ class Allowance:
 
 
 def allowances(problem: Problem, design: Array, spread: Callable[[Array], dict[str, float]]) -> dict[str, Allowance]:
-    """Return how the rooms of some outputs change with the variables, to first order.
+    """Return how the margins of some outputs change with the variables, to first order.
 
     Parameters
     ----------
     problem : its variables are the ones that may change
     design : (P,)
-    spread : gives the room of every output for a design
+    spread : gives the margin of every output for a design
     """
     around, moved = _around(problem, design)
     found = [spread(row) for row in around[1:]]
@@ -104,13 +104,13 @@ def trigonometric_sum(coefficients: Array, phi: Array, derivative: bool = False)
 
 
 def curves_with_margin(problem: Problem) -> dict[str, str]:
-    """Return pose outputs whose limits can have a room along the turn, by the names of these limits.
+    """Return pose outputs whose limits can have a margin along the turn, by the names of these limits.
 
-    Those of largest and smallest values, as long as no other kind of limit is made of the same curve.
+    These limits are on largest and smallest values, and no other kind of limit is made of the same curve.
     """
     program = Program(problem)
     measures = [program.objective, *(r.measure for r in program.requirements)]
-    # The room pushes maxima up and minima down: a largest value that has to be large needs it the other way.
+    # The margin raises maxima and lowers minima: a largest value with a lower limit needs the opposite sign.
     inward = {
         r.measure.name
         for r in program.requirements
@@ -188,7 +188,7 @@ def curve_derivatives(
     stepped = np.repeat(designs[known].astype(np.complex128), len(own), axis=0)
     stepped[np.arange(len(stepped)), np.tile(own, len(known))] += 1j * STEP * np.tile(sigma[own], len(known))
     angles = Angles.of(phi[None, :].astype(np.complex128))
-    with np.errstate(all="ignore"):  # a design may not reach every pose; its nan is answered by the caller
+    with np.errstate(all="ignore"):  # a design may not reach every pose; the caller handles its nan
         found = family.poses(np.ascontiguousarray(stepped), angles, frozenset(outputs))
     out = {name: np.full((len(designs), len(own), len(phi)), np.nan) for name in outputs}
     for name, values in out.items():

@@ -1,4 +1,4 @@
-"""Limits drawn in: the room that tolerances need, the price of that room, and who misses a limit all the same."""
+"""Limits tightened by the margins that tolerances need, the price of a margin, and mechanisms out of limits."""
 
 from __future__ import annotations
 
@@ -31,15 +31,15 @@ Levels = Mapping[str, float]
 
 
 def bounded(problem: Problem) -> list[Limit]:
-    """Return the limits on outputs that leave room; those on parameters are about the drawing."""
+    """Return the inequality limits on outputs: these give up a margin; limits on parameters are about the drawing."""
     own = [x for x in problem.limits if x.output not in problem.family.parameter_names]
     return [x for x in own if x.minimum is None or x.minimum != x.maximum]
 
 
 def keyed(problem: Problem) -> dict[str, str]:
-    """Return the limited outputs that give up room, each with the key of its number of standard deviations.
+    """Return the limited outputs that give up a margin, each with the key of its number of standard deviations.
 
-    Limits of one curve share its room, so their key is the pose output; that of all others is their own name.
+    Limits on one curve share its margin, so their key is the pose output.  The key of any other limit is its own name.
     """
     along = curves_with_margin(problem)
     names = dict.fromkeys(x.output for x in bounded(problem))
@@ -49,7 +49,7 @@ def keyed(problem: Problem) -> dict[str, str]:
 def with_margins(
     problem: Problem, design: Array, tolerance: Tolerance, levels: Levels, radius: float | None
 ) -> Problem:
-    """Return the problem with the room that a design needs taken from its limits, within a distance of it.
+    """Return the problem with its limits tightened by the margins of a design, bounded to a box about that design.
 
     Parameters
     ----------
@@ -82,9 +82,9 @@ def with_margins(
 
 @dataclass(frozen=True)
 class Price:
-    """What a limit's room costs, and its unit.
+    """What the margin of a limit costs, and its unit.
 
-    ``price`` is the relative change of the objective per standard deviation of room; ``spread`` is that standard
+    ``price`` is the relative change of the objective per standard deviation of margin; ``spread`` is that standard
     deviation, of a curve where it is at its limit.
     """
 
@@ -93,7 +93,7 @@ class Price:
 
 
 def prices(problem: Problem, design: Array, tolerance: Tolerance, levels: Levels) -> dict[str, Price]:
-    """Return what the room of every limit costs at an optimum of :func:`with_margins`, by its key.
+    """Return the price of the margin of every limit at an optimum of :func:`with_margins`, by its key.
 
     The multipliers of the rows that hold tell it: a bound that moves by a standard deviation moves its rows, and the
     objective by their multipliers times that.
@@ -175,16 +175,16 @@ def _spreads(problem: Problem, design: Array, sigma: Array, names: Sequence[str]
 
 
 def _drawn_in(limit: Limit, room: float) -> Limit:
-    """Return a limit that gives up room; a band narrower than that is missed until the design needs less."""
+    """Return a limit tightened by its margin; a band narrower than the margins is missed until a design needs less."""
     low = None if limit.minimum is None else limit.minimum + room
     high = None if limit.maximum is None else limit.maximum - room
     return replace(limit, minimum=low, maximum=high)
 
 
 def risk_allocation(excess: Array, prices: Array, share: float, reach: float = math.inf) -> tuple[Array, float]:
-    """Return how much more room each limit gets so that a share of a sample keeps all of them, at the least price.
+    """Return the change of each limit's margin with which a share of a sample keeps all limits, at the least price.
 
-    More room moves all of the sample away from a limit.  The share holds where the largest excess less its limit's
+    A larger margin moves the whole sample away from a limit.  The share holds where the largest excess less its limit's
     shift is negative; the sum of prices times shifts is made small under this condition.
 
     Parameters

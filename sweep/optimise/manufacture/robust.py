@@ -1,4 +1,4 @@
-"""Limits that hold for what is made: they give up room until the wanted share of toleranced mechanisms keeps them."""
+"""Limits with margins so large that the wanted share of toleranced mechanisms keeps them."""
 
 from __future__ import annotations
 
@@ -106,11 +106,11 @@ def robust(
 ) -> Robust | None:
     """Return the best design of which the wanted share of toleranced mechanisms keeps all limits.
 
-    Every limit gives up the room that the tolerances need, a number of standard deviations of its own: of curves it is
-    followed along the turn, and to first order as the design changes, so the search trades acceleration for
-    insensitivity; of other outputs it is a fixed amount.  Rounds of search with the room of the design before end where
-    the design stays.  The numbers are corrected until the share of a sample holds, and until no other way to spend what
-    may miss its limits is cheaper.
+    Every limit gives up a margin of its own number of standard deviations.  The margin of a curve follows the turn and,
+    to first order, the design, so the search trades acceleration for insensitivity.  The margin of any other output is
+    one number; near its limit it too follows the design to first order.  Each round of search takes the margins of the
+    design before it; the rounds end where the design stays.  Then the numbers are corrected until the share of a sample
+    holds and no cheaper risk allocation is found.
 
     Parameters
     ----------
@@ -244,7 +244,7 @@ class _Calibrate:
             if result.violation <= NEARLY and (better or (best.share < wanted and share > best.share)):
                 best = Robust(result, share, result.ended in CUT)
             if spent >= self.looks or (corrected and share >= wanted and not better and result.ended == "looks"):
-                break  # what the limits of a search cost that does not settle leads nowhere
+                break  # prices from a search that has not settled mislead the correction
             levels, saved = self._corrected(design, levels, values, reach)
             if wanted <= share <= wanted + ENOUGH and step < STAYED and saved < SAVED:
                 break
@@ -266,7 +266,7 @@ class _Calibrate:
         shifts, saved = risk_allocation(excess, np.array([known[key].price for key in keys]), wanted, reach)
         out = {}
         for key, shift in zip(keys, shifts.tolist(), strict=True):
-            # A limit that nothing presses against has more room than it was asked for.
+            # A limit without a price is not active: the design has a larger margin there than it was asked for.
             now = levels[key] if known[key].price > 0.0 else max(levels[key], -float(found[key][0]))
             out[key] = min(max(now + min(shift, LEAP), 0.0), AMPLE)
         return out, saved
@@ -289,7 +289,7 @@ def _approached(
     looks: int,
     radius: float,
 ) -> tuple[Result, float, float]:
-    """Search again and again, each time with the room of the design before, until the design stays.
+    """Repeat the search, each time with the margins of the design before, until the design stays.
 
     Returns
     -------
@@ -303,7 +303,7 @@ def _approached(
         step, room_of, design = float(np.abs(move).max()), design, result.design
         if result.ended in CUT or step < SETTLED:
             break
-        # The room is exact where it was taken.  Who turns round goes to and fro in a flat valley.
+        # The margin is exact at the design where it was taken.  A reversed step tells of oscillation in a flat valley.
         if (move * before).sum() < 0.0:
             radius *= 0.5
         elif step > 0.9 * radius:
@@ -325,7 +325,7 @@ def yields(problem: Problem, designs: Array, tolerance: Tolerance, seed: int) ->
 
 
 def better_made(problem: Problem, results: list[Result], tolerance: Tolerance, seed: int) -> list[Result]:
-    """Return results with the one first that is made best, of those that have the value of the best."""
+    """Return results, first the one with the largest yield among those whose value is that of the best."""
     best = results[0]
     equal = [r for r in results if r.feasible and abs(r.objective - best.objective) <= SAME * abs(best.objective)]
     twins = _different(problem, equal)[:TRIED]

@@ -19,7 +19,7 @@ T = TypeVar("T")
 
 
 class _Asked(Stop):
-    """A flag that is set as soon as somebody who looks at it finds that a function answers true."""
+    """A flag that is set as soon as a reader of it finds that a function answers true."""
 
     def __init__(self, asked: Callable[[], bool]) -> None:
         self._asked = asked
@@ -94,6 +94,6 @@ def spread_over(
                 found[outcome[0]] = outcome[1]
                 tell(*outcome)
     except WorkerDied as error:
-        if not stop:  # the signal that stops us may have hit them too
+        if not stop:  # the signal that stops this process may have reached the workers too
             raise WorkerDied(f"optimiser: {error}; run again") from error
     return [found[number] for number in numbers if number in found]

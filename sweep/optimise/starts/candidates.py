@@ -1,6 +1,6 @@
 """Starts without a dataset: the best of large samples, improved by ever smaller samples around them.
 
-Each half a dozen starts has a sample of its own, so that what one of them does not hit the next one may.
+Every six starts come from a sample of their own: a region that one sample misses the next one may hit.
 """
 
 from __future__ import annotations
@@ -108,10 +108,10 @@ def sample(problem: Problem, signs: Sequence[dict[str, float]], count: int, seed
 
 
 def _brought_in(problem: Problem, fractions: Array) -> Array:
-    """Return the places of a block of a sample between the bounds, half of them drawn from beyond the bounds.
+    """Return points of a block of a sample within the bounds, half of them drawn beyond and brought back onto a bound.
 
-    Optima stand at bounds, often at several at once, and the designs that keep the limits there may fill less than a
-    millionth of the space between the bounds.
+    Optima lie on bounds, often on several at once, and the feasible designs near them may fill less than a millionth of
+    the space between the bounds.
     """
     low, high = _one_turn(problem)
     bounded = high - low == 1.0  # an angle of a whole turn has no ends
@@ -123,11 +123,12 @@ def _brought_in(problem: Problem, fractions: Array) -> Array:
 
 
 def _parents(place: Array, kind: NDArray[np.intp], merit: Array, count: int) -> tuple[NDArray[np.intp], int]:
-    """Return numbers of diverse designs to be improved, and how many of them, the first, keep the limits.
+    """Return the row numbers of diverse designs to be improved, feasible ones first, and how many are feasible.
 
-    These are up to half; the others miss the limits and are away from them.
+    The feasible ones are up to half; the others miss the limits and keep a distance from them.
 
-    A limit may leave several separate regions, the smallest of which a sample does not hit, but finds the way to.
+    A limit may leave several separate regions.  A sample can miss the smallest, which is then reached from infeasible
+    designs beside it.
     """
     order = np.argsort(merit, kind="stable")
     order = order[np.isfinite(merit[order])]
@@ -143,7 +144,7 @@ def _parents(place: Array, kind: NDArray[np.intp], merit: Array, count: int) -> 
 def _one_turn(problem: Problem) -> tuple[Array, Array]:
     """Return the bounds in which samples are drawn.
 
-    What repeats itself after a turn is drawn in the middle turn of its bounds only.
+    A variable with the period of a turn is drawn from the middle turn of its bounds only.
     """
     periodic = () if problem.coordinates is None else problem.coordinates.periodic
     share = np.array(
@@ -169,7 +170,7 @@ def _verified(problem: Problem, bases: list[Array], place: Array, kind: NDArray[
 def _improved(
     problem: Problem, bases: list[Array], place: Array, kind: NDArray[np.intp], merit: Array, rng: np.random.Generator
 ) -> tuple[Array, Array]:
-    """Replace every design by the best of a sample around it, again and again; no better one halves the radius."""
+    """Repeatedly replace each design by the best of a sample around it; without a better one the radius is halved."""
     place, merit = place.copy(), merit.copy()
     radius = np.full(len(place), RADIUS)
     for _ in range(ROUNDS):

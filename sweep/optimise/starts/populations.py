@@ -179,13 +179,13 @@ def _mixed(rows: PoseRows, own: Sequence[_End], parents: Sequence[_End], rng: np
     its mirror image move alike.
     """
     guide = rng.integers(0, len(own), count)
-    # Among all drivers the best try would be that of the same valley nearly every time.
+    # With all drivers at once the best try would nearly always lie in the same basin.
     driver = np.repeat(rng.integers(0, len(parents), (count, DRIVERS)), TRIES // DRIVERS, axis=1)
     places = np.repeat(np.array([p.place for p in own])[guide][:, None], TRIES, axis=1)
     places[:, :, rows.driving] = np.array([p.place for p in parents])[driver][:, :, rows.driving]
     other = (rng.random((count, TRIES)) < 0.5)[:, :, None] & rows.mirrored
     places = np.where(other, 1.0 - places, places)
-    # A parent put together as it was only ends where it stands.
+    # A child equal to its parent would only end where the parent is.
     numbers = np.array([next(k for k, p in enumerate(parents) if p is end) for end in own])
     same = driver == numbers[guide][:, None]
     spread_by = np.where(same, MUTATIONS[-1], np.array(MUTATIONS)[rng.integers(0, len(MUTATIONS), count)][:, None])
@@ -222,7 +222,7 @@ def _descended(
 
 
 def _classes(swings: Array, among: Array) -> Index:
-    """Class (k,) of each swing: equal on a log scale from the smallest to the largest among some useful ones."""
+    """Return the class (k,) of each swing, of equal width on a log scale between the extremes of useful swings."""
     known = among[among > SMALLEST]
     if not len(known) or not known.min() < known.max():
         return np.zeros(len(swings), np.intp)
@@ -236,8 +236,8 @@ def _parents(ends: Sequence[_End], most: int, guide: NDArray[np.bool_]) -> list[
     They are the best ends, at most half of them of the same signs, and the best of each class of swings.  No two have
     the same value or nearly the same guide.
 
-    Else the many that stopped on their way down one valley would take the places of all others, and guides that
-    suit large swings those of all that suit small ones.
+    Without these rules the many descents that ran out of steps in one basin would displace those in all others, and
+    guides for large swings would displace guides for small ones.
     """
     found: list[_End] = []
     beside: Counter[tuple[int, int]] = Counter()

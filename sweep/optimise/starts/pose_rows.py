@@ -1,7 +1,7 @@
 """A problem with a linear part as compiled descents see it: rows at fixed poses, of places and linear unknowns.
 
 The search in all variables follows the true extrema of one design.  Here 64 poses stand for the turn, and limits that
-these curves do not tell are left to that search (:mod:`kernels.descent`).
+these curves do not give are left to that search (:mod:`kernels.descent`).
 """
 
 from __future__ import annotations
@@ -99,7 +99,7 @@ class PoseRows:
         for k, name in enumerate(self.linear.free):
             if units[name] == "angle" and self.high[k] - self.low[k] >= 2.0 * math.pi:
                 self.low[k], self.high[k] = -math.pi, math.pi
-            # A frame to the other side is the same guide, turned by half a turn.
+            # A frame of opposite sign is the same guide, rotated by half a turn.
             if name in links:
                 shortest = max(self.low[k], problem.upper[unit] * SHORT)
                 self.low[k] = shortest / problem.upper[unit]
@@ -137,7 +137,7 @@ class PoseRows:
         return codes
 
     def _limits(self) -> list[_Curve]:
-        """Return the objective with both signs, then what turns, then the limits that these curves tell."""
+        """Return the rows: the objective with both signs, rotatability, then the limits that these curves give."""
         linear, codes = self.linear, self._codes()
         objective = linear.guide.across[linear.wanted] if linear.straight else linear.wanted
         off = linear.guide.across[linear.position]
@@ -256,7 +256,7 @@ class Descents:
         return int(self.spent + self.states[:, 3].sum())
 
     def keep(self, numbers: NDArray[np.intp]) -> None:
-        """Go on with some of the descents only."""
+        """Continue only some of the descents."""
         self.spent += float(self.states[:, 3].sum() - self.states[numbers, 3].sum())
         for name in ("places", "kinds", "x", "states", "curvature"):
             setattr(self, name, getattr(self, name)[numbers])
