@@ -10,6 +10,7 @@ from sweep.study.load import load_study
 from tests.bench import libflint
 from tests.bench.boxes import WANTED, mechanisms, taylor
 from tests.bench.enclosures import COMPILED, IN_PYTHON, NAMES, STUDIES, parts_needed, spread
+from tests.support.selection import mostly_long
 
 SIDE, BOXES = 1 / 1024, 6  # of the ranges
 ARITHMETICS = COMPILED | IN_PYTHON
@@ -24,7 +25,7 @@ def drawn(request):
     return formula, boxes, spread(formula, boxes)
 
 
-@pytest.mark.parametrize("name", ARITHMETICS)
+@pytest.mark.parametrize("name", mostly_long(ARITHMETICS, list(ARITHMETICS)[::4]))
 def test_every_arithmetic_encloses_the_values_of_designs_in_its_boxes(drawn, name):
     formula, boxes, (least, most) = drawn
     low, high = ARITHMETICS[name](formula, boxes)

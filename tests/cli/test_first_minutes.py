@@ -21,6 +21,7 @@ from sweep.families import NAMES
 from sweep.study import load_study
 from sweep.study.schema import study_schema
 from sweep.study.tables import TABLES
+from tests.support.selection import mostly_long
 
 ROOT = Path(__file__).parents[2]
 CHAINS = ("rssr+guide", "rssr+rssr")
@@ -38,7 +39,10 @@ def written(folder: Path, family: str) -> Path:
     return folder / "first"
 
 
-@pytest.mark.parametrize("family", [*NAMES, *CHAINS])
+QUICK = ("rssr", "guide", "geared_dwell", "cam", "backrest", "feed_foot", "swivel", "rssr+guide")
+
+
+@pytest.mark.parametrize("family", mostly_long([*NAMES, *CHAINS], QUICK))
 def test_first_study_of_every_family_is_sound_and_runs(family, tmp_path):
     folder = written(tmp_path, family)
     text = (folder / "study.toml").read_text(encoding="utf-8")
@@ -70,11 +74,11 @@ def test_first_study_has_sizes_of_a_machine(family, tmp_path):
         assert all(min(abs(axis.low), abs(axis.high)) > 50 * 0.02 for axis in swept)
 
 
-@pytest.mark.parametrize("members", [
+@pytest.mark.parametrize("members", mostly_long([
     ("needle=rssr+guide", "looper=rssr"),
     ("cam=cam", "bar=slider_crank"),
     ("feed=feed", "takeup=eyelet", "dwell=geared_dwell"),
-])  # fmt: skip
+], [("needle=rssr+guide", "looper=rssr")]))  # fmt: skip
 def test_first_study_of_a_machine_is_sound_and_runs(members, tmp_path):
     options = [x for member in members for x in ("--member", member)]
     done = call("init", "first", *options, "--into", tmp_path)

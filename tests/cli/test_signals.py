@@ -15,6 +15,7 @@ import pytest
 
 from sweep.dataset.files import OPTIMUM
 from tests.support.engine_study import ROOT, write_study
+from tests.support.selection import mostly_long
 
 SECONDS = 2.0
 # A machine that has other things to do, too, needs longer for the same: so much is allowed beyond.
@@ -72,7 +73,7 @@ def test_it_leaves_while_it_compiles(tmp_path: Path, number: int, code: int) -> 
 
 
 @pytest.mark.parametrize(("number", "code"), [(signal.SIGINT, 130), (signal.SIGTERM, 143)])
-@pytest.mark.parametrize("group", [True, False])
+@pytest.mark.parametrize("group", mostly_long([True, False], [True]))
 def test_it_leaves_while_it_optimises_with_the_best_so_far(tmp_path: Path, number: int, code: int, group: bool) -> None:
     study = write_study(tmp_path / "study", keep="feasible", count=20)
     study.write_text(study.read_text() + OPTIMISE)

@@ -212,6 +212,7 @@ def test_dead_points_say_so_and_give_no_number():
         assert np.isfinite(found[name][0][~bad]).all(), name
 
 
+@pytest.mark.long
 def test_a_scene_with_everything_on_keeps_its_memory():
     """Reduced from `make bench-scene`: what several chunks need is what the first one needed.
 

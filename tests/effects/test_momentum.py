@@ -19,6 +19,7 @@ from sweep.families.chain import Chain
 from sweep.families.frames import can_be_placed
 from sweep.families.link_tree import LinkTree
 from tests.reference.momentum import balance, body_momentum, triads
+from tests.support.selection import mostly_long
 
 N = 256
 PHI = 2.0 * np.pi * np.arange(N) / N
@@ -95,7 +96,10 @@ def poses_of(scene):
     return list(zip((first, b, last), frames, strict=True))
 
 
-@pytest.mark.parametrize("names", [[name] for name in MOVING] + [chained(name) for name in MOVING if chained(name)])
+MECHANISMS = [[name] for name in MOVING] + [chained(name) for name in MOVING if chained(name)]
+
+
+@pytest.mark.parametrize("names", mostly_long(MECHANISMS, MECHANISMS[::2]))
 def test_shaking_is_minus_the_rate_of_momentum_and_torque_the_power_over_the_speed(names):
     machine, design, expected = reference(names)
     axes = [f"{what}_{x}" for what in ("f", "f_moment") for x in "xyz"]

@@ -19,11 +19,13 @@ from sweep.families.reduction import prefixes
 from tests.search.brute import blurred, poses
 from tests.search.subjects import all_at_once, random_designs, subjects
 from tests.support.near_change_points import near_change_points
+from tests.support.selection import mostly_long
 
 SUBJECTS = subjects()
 BARE = [name for name in NAMES if not isinstance(family(name).domain, March)]
 LOADED = ("pressure", "coupler", "kinetostatics", "rolling_limits", "tool", "thread_speed")
 ASKED = [*BARE, "rssr+guide", "rssr+rssp", *LOADED]
+QUICK = ("rssr", "guide", "geared_dwell", "cam", "five_link", "spherical_looper", "rssr+guide", "kinetostatics", "tool")
 GEOMETRIC = ("length", "angle", "sign", "choice", "ratio")
 TARGET = 1e-6
 MOST = 2  # outputs of each that are asked for
@@ -50,7 +52,7 @@ def assert_same(one, other, rows=slice(None)):
         np.testing.assert_array_equal(one[key], np.asarray(other[key])[rows], err_msg=key)
 
 
-@pytest.mark.parametrize("name", ASKED)
+@pytest.mark.parametrize("name", mostly_long(ASKED, QUICK))
 def test_an_answer_does_not_depend_on_company(name):
     """Not on other outputs, on other designs, on their order, nor on another thread that asks too."""
     _, full, designs, names, whole = asked(name)
@@ -78,7 +80,7 @@ def test_bits_near_change_points_do_not_depend_on_company(want):
         )
 
 
-@pytest.mark.parametrize("name", ASKED)
+@pytest.mark.parametrize("name", mostly_long(ASKED, QUICK))
 def test_a_pose_at_the_place_of_an_extremum_is_the_extremum(name):
     _, full, designs, names, whole = asked(name)
     variable = full.domain.name

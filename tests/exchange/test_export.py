@@ -22,6 +22,7 @@ from sweep.exchange.points import read_points, reader_of
 from sweep.exchange.scene import over, turn
 from sweep.families import NAMES, family
 from sweep.families.base import Interval, March
+from tests.support.selection import mostly_long
 
 DRAWN = NAMES
 LINKED = ("rssr", "rssp", "guide", "four_bar", "slider_crank", "kim_dison")  # crank, coupler, rocker or slider
@@ -49,7 +50,7 @@ def values_of(model, accessor):
     return np.frombuffer(data, np.float32).reshape(entry.count, width)
 
 
-@pytest.mark.parametrize("name", DRAWN)
+@pytest.mark.parametrize("name", mostly_long(DRAWN, DRAWN[::3]))
 def test_animated_model_of_every_family_carries_its_joints(name, tmp_path):
     file = sweep.export(name, scaled(name), tmp_path / "model.glb", poses=36, speed=4.0 * math.pi)
     model = pygltflib.GLTF2().load(file)
@@ -315,7 +316,7 @@ def test_law_has_units_in_its_headings_and_its_metadata(tmp_path):
     np.testing.assert_array_equal(pd.read_parquet(file)["d2s"], poses["d2s"])
 
 
-@pytest.mark.parametrize("name", NAMES)
+@pytest.mark.parametrize("name", mostly_long(NAMES, NAMES[::3]))
 def test_law_of_every_family_runs_over_its_whole_domain(name, tmp_path):
     design, domain = scaled(name), family(name).domain
     table = pd.read_csv(sweep.export(name, design, tmp_path / "law.csv", "law", poses=48, speed=10.0))

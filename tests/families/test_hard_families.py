@@ -19,6 +19,7 @@ from sweep.families import NAMES, family
 from sweep.families.base import Accuracy, Angles, Turn
 from sweep.families.capabilities import Assembly
 from sweep.families.chain import Chain
+from tests.support.selection import mostly_long
 
 SECOND = {"a": 1.9, "b": 3.3, "c": 3.1, "e": 3.0, "xi": 4.2, "eta": 0.8, "lam": 1.1, "h": -0.6, "branch": 1.0}
 # Over a closed turn; families over an interval or a march: test_hard_domains.py.
@@ -178,7 +179,7 @@ def test_extrema_of_a_tiny_swivel_are_those_of_a_large_one():
     assert found["max_abs_d3x_p"][0] / tiny["a"] == pytest.approx(4.44783510044, rel=1e-11)
 
 
-@pytest.mark.parametrize("name", LINKED)
+@pytest.mark.parametrize("name", mostly_long(LINKED, ("rssr", "swivel", "guide")))
 def test_scale_changes_no_bit_of_extrema(name):
     """The error that is allowed is a part of the curve's size, so no number of the search stands for itself."""
     mechanism, design = built(name)

@@ -1,6 +1,6 @@
 """Mutated study files and hostile tables: an answer or a message of ours, in bounded time and memory.
 
-250 of each in `make test`, 2000 in `make test-long`.
+100 of each in `make test`, 2000 in `make test-long`.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ from tests.support.engine_study import ROOT
 from tests.support.hostile_child import MOST_BYTES, REQUESTS
 from tests.support.hostile_tables import FAMILIES, case
 
-COUNTS = (250, pytest.param(2000, marks=pytest.mark.long))
+COUNTS = (100, pytest.param(2000, marks=pytest.mark.long))
 SECONDS = 900.0  # with a cold cache of kernels on a busy machine
 
 

@@ -10,6 +10,8 @@ from pathlib import Path
 
 import pytest
 
+from tests.support.selection import mostly_long
+
 SEARCH = """
 from pathlib import Path
 import numpy as np
@@ -67,6 +69,6 @@ def test_search_ends_at_the_same_bits_in_every_process() -> None:
     assert answer({}) == usual()
 
 
-@pytest.mark.parametrize("choice", OTHERS, ids=lambda choice: "-".join(choice.values()))
+@pytest.mark.parametrize("choice", mostly_long(OTHERS, OTHERS[:1]), ids=lambda choice: "-".join(choice.values()))
 def test_best_converged_objective_is_the_same_with_any_kernel_of_the_library(choice: dict[str, str]) -> None:
     assert best_converged(answer(choice)) == pytest.approx(best_converged(usual()), rel=1e-9)

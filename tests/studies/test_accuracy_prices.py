@@ -20,6 +20,7 @@ from sweep.families.base import March
 from sweep.families.capabilities import InSeries
 from tests.support import sixty_digits
 from tests.support.rssr_designs import random_designs
+from tests.support.selection import mostly_long
 
 DOCS = Path(__file__).parents[2] / "docs" / "accuracy"
 WRONG = 1e-6
@@ -58,7 +59,7 @@ def test_measure_is_the_second_derivative_that_the_register_names():
     assert subjects.measure(family("foot")) == "range_y_foot"  # a march
 
 
-@pytest.mark.parametrize("name", ["rssr", "guide", "backrest", "rssr+guide"])
+@pytest.mark.parametrize("name", mostly_long(["rssr", "guide", "backrest", "rssr+guide"], ["rssr", "rssr+guide"]))
 def test_regions_hold_designs_that_move(name):
     mechanism = family(name)
     for region in subjects.regions_of(name, (3, 3, 2)):
@@ -119,7 +120,7 @@ def refined(rows):
     return [row for row in rows if row["method"] == prices.REFINED]
 
 
-@pytest.mark.parametrize("name", ["guide", "slotted"])
+@pytest.mark.parametrize("name", mostly_long(["guide", "slotted"], ["slotted"]))
 @pytest.mark.parametrize("bad", ["d2", "position"])
 def test_a_wrong_kernel_shows_up_as_an_error(name, bad):
     """Negative control: one output wrong by 1e-6, all else as it is; without the fused search, which takes no poses."""
@@ -161,7 +162,7 @@ def effected(name, count=1):
     return Effected(bare, full, effect_prices.loaded(bare, full, count))
 
 
-@pytest.mark.parametrize("name", EFFECTS)
+@pytest.mark.parametrize("name", mostly_long(EFFECTS, EFFECTS[::4]))
 def test_no_effect_is_priced_where_it_has_nothing_to_do(name):
     """Bodies without mass would have loads of zero, which are right to any digit."""
     given = effected(name)

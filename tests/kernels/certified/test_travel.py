@@ -18,6 +18,7 @@ from sweep.families.base import Accuracy
 from sweep.quantities.kinds import Request
 from sweep.reductions.extrema import true_extrema
 from tests.support.guided_proofs import CURVES, MAKERS, certify, exact_point, parts, rotating
+from tests.support.selection import mostly_long
 from tests.support.turn_designs import NEEDLE, needle_drives
 
 USED = 5  # lanes; the design that is looked at has others beside it
@@ -119,7 +120,7 @@ def test_summarise_proves_the_travel(name):
     np.testing.assert_array_equal(proven["stroke"], searched["stroke"])
 
 
-@pytest.mark.parametrize("name", ["guide", "rssr+guide"])
+@pytest.mark.parametrize("name", mostly_long(["guide", "rssr+guide"], ["rssr+guide"]))
 def test_summarise_proves_several_curves_together_as_each_alone(name):
     mechanism, make, *_ = MAKERS[name]
     table = dict(zip(mechanism.parameter_names, make(150, 17).T, strict=True))

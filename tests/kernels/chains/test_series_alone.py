@@ -11,6 +11,7 @@ from sweep.families.base import Accuracy
 from sweep.quantities.kinds import Request
 from sweep.reductions import extrema, fused
 from tests.support.climbing import assert_fused_extrema_lie_within_their_errors, climbed
+from tests.support.selection import mostly_long
 from tests.support.turn_designs import GUIDE, guided_four_bars
 
 EPS = 2.0**-53
@@ -34,7 +35,7 @@ REQUESTS = (
 )  # fmt: skip
 
 
-@pytest.mark.parametrize("request_", REQUESTS, ids=str)
+@pytest.mark.parametrize("request_", mostly_long(REQUESTS, REQUESTS[:3]), ids=str)
 def test_extrema_lie_within_their_errors_of_precise_poses_climbed_from_the_search_on_poses(request_):
     designs, _ = turning(400, 3)
     assert_fused_extrema_lie_within_their_errors(GUIDE, designs, request_)
