@@ -246,4 +246,4 @@ def _on_shaft(member: Member, angles: DesignMap, designs: Array) -> Array:
     own = angles(member.designs(designs)) - member.phase(designs)[:, None]
     turns = TWO_PI * np.arange(abs(member.ratio))
     every: Array = (own[:, :, None] + turns) / member.ratio
-    return every.reshape(len(designs), -1)
+    return every.reshape(len(designs), own.shape[1] * turns.size)

@@ -7,6 +7,7 @@ import pytest
 
 import sweep
 from kernels import status as st
+from sweep.families import family
 from sweep.families.base import Angles
 from tests.support.near_change_points import RSSR, crowded_angles, near_change_points
 
@@ -56,3 +57,16 @@ def test_root_mean_squares_near_change_points_are_dense_sums_within_their_errors
         # Where the search is not sure its error still has to hold.
         assert (off <= found[f"err_rms_{output}"] + 1e-10 * exact).all()
         assert (found["status"] == st.OK).mean() > 0.9
+
+
+def test_a_mean_of_a_curve_that_switches_stands_where_another_member_of_a_machine_does_not_turn():
+    """Every design is lost to the needle's route: what comes behind is asked for no design at all."""
+    machine = sweep.machine({"needle": "slider_crank", "thread": {"family": "cam", "ratio": -3}})
+    given = {f"needle.{name}": value for name, value in family("slider_crank").example.items()}
+    given |= {f"thread.{name}": value for name, value in family("cam").example.items()}
+    asked = ["max_needle.d2s", "rms_needle.d2s", "rms_thread.d2s"]
+    turning = sweep.summarise(machine, given, asked, accuracy=1e-8).iloc[0]
+    lost = sweep.summarise(machine, given | {"needle.b": 0.5 * given["needle.a"]}, asked, accuracy=1e-8).iloc[0]
+    assert turning["status"] == st.OK and lost["status"] == st.NOT_ROTATABLE
+    assert lost["rms_thread.d2s"] == pytest.approx(turning["rms_thread.d2s"], rel=1e-8)  # as accurate as asked for
+    assert np.isnan(lost["rms_needle.d2s"]) and np.isnan(lost["max_needle.d2s"])
