@@ -49,7 +49,7 @@ def command(study: Study, folder: Path, smoke: bool, accuracy: float | None, cer
 
 
 def circumstances(jobs: int, backend: str) -> dict[str, Any]:
-    """Return what may differ between runs that give the same bytes."""
+    """Return the circumstances of a run, which may differ between runs that give the same bytes."""
     return {
         "time": time.strftime("%Y-%m-%dT%H:%M:%SZ", time.gmtime()),
         "host": socket.gethostname(),
@@ -83,7 +83,7 @@ def logged(folder: Path, said: str, jobs: int, backend: str) -> Iterator[list[st
     try:
         yield words
     except Exception as error:
-        if not isinstance(error, StoreError):  # the log stands on the disk that has just refused
+        if not isinstance(error, StoreError):  # the log is on the disk that has just failed
             files.append_run(folder, head | _end(begin, type(error).__name__, str(error)))
         raise
     files.append_run(folder, head | _end(begin, "complete", "; ".join(words)))

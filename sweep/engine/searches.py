@@ -1,4 +1,4 @@
-"""What a run searches after its sweep: the optimum, the proof and the front that its study asks for."""
+"""The stages of a run after its sweep: the optimum, the proof and the front that its study asks for."""
 
 from __future__ import annotations
 
@@ -21,12 +21,12 @@ from sweep.proof.question import question_of
 from sweep.proof.rounds import Cores
 from sweep.study import Study
 
-# What is written together with the optimum.
+# Files that are written together with the optimum.
 OF_OPTIMUM = (files.CURVES, files.SENSITIVITY, files.TOLERANCE)
 
 
 def search(study: Study, folder: Path, jobs: int, backend: str, progress: bool) -> None:
-    """Compute optimum, proof and front, as far as the study asks for them."""
+    """Compute those of optimum, proof and front that the study asks for."""
     if study.optimise is not None:
         _optimise(replace(study, pareto=None), folder, jobs, progress)
     proof_cut_short = prove(study, folder, jobs, backend, progress)
@@ -76,7 +76,7 @@ def _optimise(study: Study, folder: Path, jobs: int, progress: bool) -> None:
 
 
 def _raise_if_cut_short(folder: Path) -> None:
-    """Raise where the optimum stands there but the emergency brake has kept some starts from being searched."""
+    """Raise where the optimum is written but the deadline has kept some starts from being searched."""
     found = optimise.read_survey(files.beside(folder) / files.OPTIMUM)
     if found is not None and found.ended == "time":
         text = f"{folder}: {found.warnings[0]} searched; run again with a greater optimise.time_budget for all of them"
@@ -96,7 +96,7 @@ def _front(study: Study, folder: Path, jobs: int, progress: bool) -> None:
     if damaged:
         (place / files.PARETO).unlink(missing_ok=True)
     if files.PARETO in known and (damaged or metadata(place / files.PARETO).get(b"key") != key.encode()):
-        del known[files.PARETO]  # of a front that is over: the new one grows step by step
+        del known[files.PARETO]  # it belongs to a finished front: the new one grows step by step
         files.write_plan(folder, note | {TABLES: known})
     with stop_on_signal() as stop, Phases(progress) as phases:
         try:

@@ -35,7 +35,7 @@ def stepped(problem: Problem, base: Array, fractions: Array) -> Any:
 def gradients(curves: Curves, designs: Any, points: Points, places: bool) -> tuple[Array, Array]:
     """Return derivatives of the curves at the points, and of the points' crank angles, by the scaled variables.
 
-    A stationary point needs no account of its own motion (envelope theorem); a crossing of the window's edge moves with
+    The motion of a stationary point does not enter (envelope theorem); a crossing of the window's edge moves with
     the position curve and its two ends, and takes the curve along its slope.  The angle of a stationary point moves by
     -(dx'/dp)/x'', that of the passage of a level by -(dx/dp)/x'.
 
@@ -118,7 +118,7 @@ def step_gradients(family: Family, designs: Any, outputs: Sequence[str], accurac
             steps.setdefault(found[0].name, (found[0], []))[1].append(name)
     gradients: dict[str, Array] = {}
     for step, names in steps.values():
-        with np.errstate(all="ignore"):  # what is nan has no gradient
+        with np.errstate(all="ignore"):  # an output that is nan has no gradient
             columns: Any = step.run(designs, frozenset(names), accuracy)
         gradients |= {name: columns[name].imag / STEP for name in names}
     return gradients

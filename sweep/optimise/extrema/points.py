@@ -121,7 +121,7 @@ class Curves:
         angles = np.asarray(phi)[None, :]
         if np.iscomplexobj(angles) or np.iscomplexobj(designs):
             angles, designs = angles.astype(np.complex128), np.asarray(designs).astype(np.complex128)
-        # A trial design may leave the domain of its kernel; the nan it gives is answered by a shorter step.
+        # A trial design may leave the domain of its kernel; the search answers the resulting nan by a shorter step.
         with np.errstate(all="ignore"):
             return self.family.poses(np.ascontiguousarray(designs), Angles.of(angles), wanted or self.wanted)
 
@@ -201,7 +201,7 @@ class Curves:
         return int(low[np.argmin(points.value[low])]), int(high[np.argmax(points.value[high])])
 
     def follow(self, design: Array, points: Points, stride: float = STRIDE) -> Points:
-        """Move the points to where they belong on this design, and bring their values up to date.
+        """Move the points to their places on this design, and update their values.
 
         A stationary point climbs (or descends) to its extremum by Newton's method on the slope, at most ``stride`` at a
         time.  Whatever angle it ends at, the curve's value there bounds the maximum from below.  Slopes, curvatures and
@@ -225,7 +225,7 @@ class Curves:
             climb = held & ~peak
             move[climb] = np.copysign(stride, points.sense * slope)[climb]
             self._approach_edges(points, phi, place, pace, move)
-            # Who turned round has stepped over the extremum: shorter steps from now on.
+            # A point whose step changes sign has passed the extremum: halve its longest step from now on.
             reach[uphill * move < 0.0] *= 0.5
             uphill = move
             move = np.minimum(np.maximum(move, -reach), reach)
@@ -235,7 +235,7 @@ class Curves:
                 break
         if self.places or (points.how == CROSSING).any():
             slope, curvature, pace, _, value = self._local(design, phi, points, own)
-            # A passage is its angle itself: the error of the last step above is worth one step more.
+            # The angle of a passage is itself an atom, so its error is of first order: one more Newton step.
             with np.errstate(divide="ignore", invalid="ignore"):  # points that do not pass may be level
                 phi[passing] += np.clip((points.level - value) / slope, -SETTLED, SETTLED)[passing]
         moved = replace(points, phi=phi, slope=slope, curvature=curvature, pace=pace)

@@ -39,7 +39,9 @@ def extrema(
     before, after, middle = np.roll(x, 1), np.roll(x, -1), 0.5 * (top + bottom)
     peak = counts & (sense * x > sense * before) & (sense * x >= sense * after)
     if inside is None:
-        peak &= sense * (x - middle) >= 0.0  # in a window all count: a refused step cannot add those it met
+        peak &= (
+            sense * (x - middle) >= 0.0
+        )  # in a window all extrema count: a refused step cannot add the extrema of its design
     return [(n, float(phi[j]), sense, STATIONARY, math.nan, float(x[j])) for j in np.flatnonzero(peak)]
 
 
@@ -68,7 +70,7 @@ def tops(n: int, phi: Array, which: Array, values: Array, curve: Array) -> list[
     return rows
 
 
-NEARING, PASSING = 0, 3  # how a point is held: an extremum that only points to the level; the passage itself
+NEARING, PASSING = 0, 3  # how a point is held: an extremum that only comes near the level; the passage itself
 
 
 def passages(
@@ -76,7 +78,7 @@ def passages(
 ) -> list[tuple[int, float, float, int, float, float]]:
     """List where samples over the turn pass the level in that sense, and where they only come near it.
 
-    Rows are those of :meth:`sweep.optimise.extrema.points.Points.of`.  The extrema that point to the level without
+    Rows are those of :meth:`sweep.optimise.extrema.points.Points.of`.  The extrema that come near the level without
     reaching it say how far another passage is.
     """
     if not np.isfinite(x).all():
@@ -101,8 +103,8 @@ def first_passage(phi: Array, how: NDArray[np.intp], own: Sequence[int]) -> tupl
 
     Notes
     -----
-    Where one of the latter reaches the level, an earlier passage arises and the event jumps to it.  No slope says so:
-    the search has to keep these points on their side.
+    If a point that only comes near the level reaches it, an earlier passage arises and the event jumps to it.  No
+    gradient foretells that, so the search has to keep these points on their side of the level.
     """
     order = sorted(own, key=lambda k: math.remainder(phi[k] - math.pi, math.tau))
     before = list(itertools.takewhile(lambda k: how[k] != PASSING, order))

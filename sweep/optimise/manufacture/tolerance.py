@@ -35,8 +35,8 @@ def sensitivities(
 
     They are dx/dp = dx/dy dy/dp, where y is the inner value.
 
-    A maximum that several extrema share has two: the largest of their gradients where the dimension grows, the smallest
-    where it shrinks.  A corner optimum has them of opposite signs.
+    A maximum that several extrema share has two derivatives: the largest of their gradients where the dimension grows,
+    the smallest where it shrinks.  A corner optimum has them of opposite signs.
 
     Parameters
     ----------
@@ -87,7 +87,7 @@ def _is_plain(family: Family, output: str, window: tuple[float, float] | None) -
 def _plain_ends(
     problem: Callable[[str], Problem], design: Array, outputs: Sequence[str]
 ) -> dict[str, tuple[float, Array, Array]]:
-    """Return what :func:`_ends` does of plain numbers, all computed together: they share poses and steps."""
+    """Return the results of :func:`_ends` for plain numbers, computed together since they share poses and steps."""
     if not outputs:
         return {}
     asked = problem(outputs[0])
@@ -180,7 +180,7 @@ def deviating(family: Family, design: Array, tolerance: Tolerance, seed: int, sa
     varied = np.flatnonzero(sigma)
     uniform = qmc.Sobol(len(varied), seed=seed).random(samples)
     designs = np.repeat(design[None, :], samples, axis=0)
-    # A sample at 0 would be infinitely far away.
+    # A sample at 0 would give an infinite deviation.
     designs[:, varied] += sigma[varied] * ndtri(np.maximum(uniform, 0.5 / samples))
     return designs
 
@@ -203,7 +203,7 @@ def tolerance_rows(
     ----------
     family, design : (P,) what is made
     outputs : names of design outputs
-    limits : those that ``within`` counts; equations are left out, since nothing that is made keeps them
+    limits : those that ``within`` counts; equations are left out, since no toleranced mechanism keeps them
     tolerance, seed : see :func:`deviating`
     accuracy, window : as for ``summarise``
 

@@ -17,9 +17,9 @@ from sweep.optimise.problem.statement import Problem
 if TYPE_CHECKING:
     from sweep.study import OptimiseSettings
 
-MET = 3  # starts from distinct valleys that have to end in the best basin
+MET = 3  # distinct starts that have to end in the best basin
 UNSEEN = 0.02  # share of basins that starts may leave unseen, unless a study asks for another
-DISTINCT = 0.05  # of the average distance of two random designs: nearer starts stand in one valley
+DISTINCT = 0.05  # of the average distance of two random designs: nearer starts are not distinct
 CUT = ("time", "interrupted")  # how a start ends that was not searched to its end
 
 
@@ -71,12 +71,12 @@ class Survey:
 
     @property
     def warnings(self) -> tuple[str, ...]:
-        """What a reader has to know before trusting the result."""
+        """The warnings that a reader has to know before trusting the result."""
         return (*self.shortcomings, *self.doubts)
 
     @property
     def shortcomings(self) -> tuple[str, ...]:
-        """What the search did not do that it was asked for."""
+        """The parts of the search that were asked for and not done."""
         found = []
         if self.ended in CUT:
             why = "time ran out" if self.ended == "time" else "interrupted"
@@ -132,7 +132,7 @@ def survey(
     -----
     The unseen share is the larger of two estimates for n starts that met w basins, s of them once: s / n (Good and
     Turing) and w (w + 1) / (n (n - 1)) (Boender and Rinnooy Kan 1987, for unknown volumes).  Both suppose that starts
-    are drawn at random; ours are the best of samples, so the estimate says how much to expect from more of their kind.
+    are drawn at random; these are the best of samples, so the estimate is about further starts of the same kind.
     Populations are drawn at random: they differ by their seeds alone.
     """
     whole = [r for r in results if r.ended not in CUT]
@@ -156,13 +156,13 @@ def wanted(settings: OptimiseSettings, populations: bool) -> float:
 
 
 def settled(values: Sequence[float], share: float) -> bool:
-    """Whether populations that ended at these values tell enough: the rule of :class:`Survey`."""
+    """Whether populations that ended at these values suffice: the rule of :class:`Survey`."""
     met = Counter(basins(values))
     return Survey(len(values), len(values), len(values), len(met), met[1], _unseen(met), share, "").enough
 
 
 def enough(values: Sequence[float], share: float) -> int | None:
-    """How many of the first populations tell enough, None where all of them do not.
+    """Return how many of the first populations suffice; None where all of them do not.
 
     Values are infinite where nothing feasible was found.  What later populations have ended at does not matter, so the
     answer does not depend on how many are made at a time.

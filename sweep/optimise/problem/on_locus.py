@@ -1,6 +1,6 @@
 """Equations for limit positions eliminated: the same problem in coordinates in which they hold by construction.
 
-And back again, for the places where these coordinates are bad ones.
+The way back to the parameters serves near singular places of these coordinates.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ from sweep.optimise.problem.statement import Problem
 from sweep.study import Limit
 from sweep.synthesis.locus import OnLocus
 
-# The place on the locus is an angle without ends: a search that begins within one turn may leave it on either side.
+# The place on the locus is a periodic angle: a search that begins within one turn may leave it on either side.
 PLACE_BOUNDS = (-math.pi, 3.0 * math.pi)
 WHOLE_TURN = 2.0 * math.pi * (1.0 - 1e-9)
 SHORTEST = 0.1  # of its present length is a link without a lower limit
@@ -131,7 +131,7 @@ def in_parameters(problem: Problem, design: Array) -> Problem | None:
     """Return a problem on the locus in the parameters themselves.
 
     What the locus holds becomes limits, equations where it is fixed, and the links that follow become variables.
-    None where the problem is in the parameters anyway, where the place on the locus is not free, and where limits
+    None where the problem is already in the parameters, where the place on the locus is not free, and where limits
     leave a link no room.
 
     Parameters

@@ -74,7 +74,7 @@ class Program:
             if found.inner == "rotatable":
                 if limit.maximum is not None or limit.minimum not in (1, 1.0, True):
                     raise InputError(limit.output, (limit.minimum, limit.maximum), "at least 1 (it turns)", PLACE)
-                continue  # demanded of every design anyway
+                continue  # required of every design without being asked
             sides = [None if side is None else found.to_inner(float(side)) for side in (limit.minimum, limit.maximum)]
             if (
                 found.inner == "pressure"
@@ -180,7 +180,7 @@ class _Layout:
         return found
 
     def _moved(self, terms: list[tuple[Term, float]], moving: Moving) -> list[tuple[Term, float]]:
-        """Return sums less by how much their bound has moved."""
+        """Return the sums minus the shift of their bound."""
         first = 2 * len(self.points)
         more = {first + self.scalars.index(name): -slope for name, slope in moving[0].items()}
         return [
@@ -261,7 +261,7 @@ class _Layout:
         return first_passage(self.points.phi, self.points.how, own)
 
     def _keep_first(self, r: Requirement, side: str) -> None:
-        """Add rows that let no earlier passage arise where an event is limited."""
+        """Add rows that keep earlier passages from arising where an event is limited: a limit would jump to them."""
         for series in r.measure.series:
             if series.passes is None:
                 continue

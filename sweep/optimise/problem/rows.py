@@ -1,6 +1,6 @@
 """The epigraph program of one design: rows ``c = constant + matrix @ atoms + slack * t``, to be >= 0 or = 0.
 
-Atoms are what the gradients know: the curves at K points, the crank angles of these points, and plain numbers.
+Atoms are the quantities with known gradients: the curves at K points, the points' crank angles, and plain numbers.
 """
 
 from __future__ import annotations
@@ -72,7 +72,7 @@ class Form:
     def known_violation(self, atoms: Array) -> float:
         """Return the largest scaled violation of the limits that exist for this design.
 
-        It is infinite where the design reaches nowhere.
+        It is infinite where some stage of the design assembles nowhere.
         """
         if not self.reaches:
             return math.inf
@@ -83,7 +83,7 @@ class Form:
         return float(np.maximum(np.where(self.equal, np.abs(c), -c)[own], 0.0).max(initial=0.0))
 
     def near(self, atoms: Array, t: float) -> Form:
-        """Return the form without the rows that are far inside: no short step reaches them."""
+        """Return the form without the rows far from their bounds, which no short step reaches."""
         keep = (self.rows(atoms, t) < AT_HAND) | self.equal
         labels = tuple(label for label, kept in zip(self.labels, keep, strict=True) if kept)
         return replace(

@@ -73,9 +73,9 @@ def from_populations(
     for one in bred(
         _linear(study, problem), kinds(study, problem, own), settings.populations, settings.seed, stop, jobs
     ):
-        # Where its best end leads decides: poses take one valley for several.
+        # A population counts by the local optimum of its best end: at fixed poses one basin looks like several.
         led = searched(study, problem, one.designs[:1], settings, stop, jobs)
-        # Where the local search has ended it is at home: it goes on from there, not from the population's end again.
+        # The main search starts from this local optimum, so that the way to it is not searched twice.
         first += [(len(populations), led[0].design if led else design) for design in one.designs[:1]]
         populations.append(one)
         values.append(led[0].objective if led and led[0].feasible else math.inf)

@@ -1,7 +1,7 @@
-"""Starts from generations of descents: stages of good mechanisms are put together anew, and descended from again.
+"""Starts from generations of descents: stages of good mechanisms are recombined, and descents begin from them.
 
-A guide that suits one crank-rocker suits others, so the parts of two good mechanisms are a far better beginning than a
-mechanism at random.  Populations know nothing of each other: where several end at the same design, it is no accident.
+A guide that suits one crank-rocker suits others, so the stages of two good mechanisms are a far better start than a
+random mechanism.  Populations are independent: that several end at the same design is evidence for it.
 """
 
 from __future__ import annotations
@@ -103,7 +103,7 @@ def bred(
     jobs: int = 1,
     size: Size = FULL,
 ) -> Iterator[Bred]:
-    """Breed populations that know nothing of each other, one after the other, as long as they are asked for.
+    """Breed independent populations, one after the other, as long as the caller asks for more.
 
     Parameters
     ----------
@@ -146,7 +146,7 @@ def _sampled(rows: PoseRows, rng: np.random.Generator, size: Size, jobs: int) ->
 
 
 def _tried(rows: PoseRows, places: Array, kinds: Index, jobs: int) -> Array:
-    """Return what places with the middle of the guide's input angles are worth (k,) before any descent."""
+    """Return the values (k,), before any descent, of places with the middle of the guide's input angles."""
     return rows.begun(rows.without_middle(places, kinds), kinds, jobs)[1]
 
 
@@ -173,7 +173,7 @@ def _children(
 
 
 def _mixed(rows: PoseRows, own: Sequence[_End], parents: Sequence[_End], rng: np.random.Generator, count: int) -> Array:
-    """Put stage 1 of one parent and the guide of another together, slightly varied, many tries of each child.
+    """Combine stage 1 of one parent with the guide of another, slightly varied, in many tries of each child.
 
     Offsets whose bounds lie on both sides of zero alike change their side in every second try: a crank-rocker and
     its mirror image move alike.
@@ -202,7 +202,7 @@ def _best(rows: PoseRows, tries: Array, kind: int, jobs: int) -> Array:
 def _descended(
     rows: PoseRows, places: Array, kinds: Index, swings: Array, size: Size, stop: Callable[[], bool], jobs: int
 ) -> tuple[list[_End], int]:
-    """Where descents from some places end, the worse half given up after a heat; and how many looks that took.
+    """Return the ends of descents from some places, and their looks; the worse half is given up after a heat.
 
     Each class, among ``swings``, of each kind has its own worse half.
     """
