@@ -1,8 +1,8 @@
 """Designs through the outputs of a study, quick routes first; only those within every limit so far go on.
 
-Few designs survive the first limits, and the dear routes cost a millisecond or more however few they are given.  So
-survivors wait before each route until there are enough of them, or until no more come.  Measured times say how many
-are enough, and nothing else: a design's row does not depend on them.
+Few designs survive the first limits, and a call of a costly route takes a millisecond or more even for a few designs.
+So survivors wait before each route until there are enough of them, or until no more come.  Measured times decide only
+how many are enough: a design's row does not depend on them.
 """
 
 from __future__ import annotations
@@ -34,7 +34,7 @@ if TYPE_CHECKING:
 BLOCK = 16384
 BATCH_SECONDS = 0.1
 FEWEST = 64
-# Measured: what a call of a route takes however few designs it is given.
+# Measured: the time [s] that a call of a route takes even for a few designs.
 CALL_SECONDS = 1e-3
 
 # With these one output is missing or rough, the others are worth having where all rows are kept.
@@ -158,7 +158,7 @@ class Cascade:
         left, width = self._left, len(self.study.family.parameters)
         index = np.concatenate([np.empty(0, np.int64), *(batch.index for batch in left)])
         order = np.argsort(index, kind="stable")
-        # Column by column, each let go of once it is collected: a chunk is in memory once, not three times.
+        # Column by column, each released once it is collected: a chunk is in memory once, not three times.
         outputs: dict[str, Array] = {}
         for name in names:
             taken = [batch.outputs.pop(name, None) for batch in left]
@@ -240,7 +240,7 @@ class Cascade:
             self._waiting[number].append(batch if staying.size == goes_on.size else batch.only(staying))
         if staying.size == goes_on.size:
             return
-        # Most leave: those that stay are fewer to look at.
+        # Most designs leave: counting all and subtracting those that stay is cheaper than selecting those that leave.
         self.counts += np.bincount(batch.status, minlength=self.counts.size)
         self.counts -= np.bincount(batch.status[staying], minlength=self.counts.size)
         leaves = np.ones(goes_on.size, np.bool_) if self.keep else batch.status == codes.OK
@@ -306,5 +306,5 @@ def _before_fit(study: Study, route: Route) -> bool:
     numbers = [parts(name).stage for name in route.outputs]
     if not all(number and int(number) < last for number in numbers):
         return False
-    # Loads of a stage are those of all stages behind it.
+    # The loads of a stage include those of all stages behind it.
     return not any(placed.entry.takes_load for placed in called_for(study.bare, route.outputs))

@@ -60,7 +60,7 @@ def warm_step(study: Study, number: int) -> None:
 
 
 def asked_outputs(study: Study) -> list[Sequence[str]]:
-    """Return what is asked of a design, step by step, in the order in which it is computed."""
+    """Return the outputs asked of a design, step by step, in the order in which they are computed."""
     return [level.route.outputs for level in levels(study) if level.route is not None]
 
 

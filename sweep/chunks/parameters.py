@@ -1,7 +1,7 @@
-"""Parameters of the designs of a chunk: of all at first those that the first outputs need, the others of survivors.
+"""Parameters of the designs of a chunk: first those that the first outputs need, then all others, of survivors only.
 
 Of a chain only one design in some thirty survives the limits on its first stage, and making parameters takes as long as
-these limits; so what the first stage does not need is made later, by the numbers of the designs that are left.
+these limits; so what the first stage does not need is made later, by the numbers of the surviving designs.
 """
 
 from __future__ import annotations
@@ -41,7 +41,7 @@ def runs_matrix(study: Study, runs: Iterable[tuple[int, int]]) -> tuple[Array, N
         matrix, _ = design_matrix(study.family, columns)
         return matrix, np.zeros(len(matrix), np.uint8)
     made, status = study.locus.links(columns)
-    # What has no mechanism is marked, not refused.
+    # A design without a mechanism gets a status; it is not refused.
     given = {name: values for name, values in columns.items() if name in study.family.parameter_names}
     matrix, _ = design_matrix(study.family, given | {name: np.ones(status.size) for name in made})
     for name, values in made.items():

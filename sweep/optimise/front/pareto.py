@@ -25,9 +25,9 @@ if TYPE_CHECKING:
     from sweep.study import ParetoSettings
 
 
-NARROWEST = 1.0 / 256.0  # of the whole range of bounds: what is narrower is a jump, which no point fills
-LEAST = 1e-4  # of the square around the front: triangles that are smaller are no gap
-SHOWN = 0.02  # a gap is said where it is larger
+NARROWEST = 1.0 / 256.0  # of the whole range of bounds: a narrower gap is a jump, which no point fills
+LEAST = 1e-4  # of the square around the front: a smaller triangle is no gap
+SHOWN = 0.02  # a larger gap is reported
 
 
 @dataclass(frozen=True)
@@ -57,7 +57,7 @@ class Front:
 
     @property
     def steps(self) -> int:
-        """How many there are: for the bounds that were given, and one for each further point."""
+        """The number of steps: those of the given bounds, and one for each further point."""
         return len(steps(self.given)) + max(self.points - self.given, 0)
 
     @property
@@ -308,7 +308,7 @@ def _begin(front: Front, step: Step, number: int, starts: Array) -> Array | None
     seen = step.neighbour < step.target and front.found[step.neighbour] < front.given
     worse = held.feasible and not near.feasible
     offers = not (seen or worse or np.array_equal(near.design, held.design))
-    # A search that did not settle goes on from where it ended.
+    # A search that has not converged goes on from where it ended.
     unfinished = held.status == st.NOT_CONVERGED
     begin = [near.design] * offers + [held.design] * unfinished
     return np.array(begin) if begin else None
@@ -322,7 +322,7 @@ def _search(
     asked: Callable[[], bool],
     jobs: int,
 ) -> Result:
-    # All starts of a bound count: none of them may be lost to a rule that has seen enough.
+    # All starts of a bound are searched: the rule that ends a search early does not apply here.
     search = OptimiseSettings(len(begin), unseen=0.0, looks=settings.looks)
     results = minimise(bounded(problem, settings, bound), begin, search, asked, jobs)
     cut = any(r.ended in CUT for r in results) or len(results) < len(begin)
