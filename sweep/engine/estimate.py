@@ -94,7 +94,7 @@ def estimate(
     sampled = len(study.space.axes) * SAMPLED_VALUE_BYTES if study.space.kind == "sobol" else 0.0
     chunks = -(-designs // chunk_size)
     work = designs * (found.seconds_per_design + kept * WRITE_SECONDS_PER_ROW)
-    # At the end of a chunk every level does what waits there, however little.
+    # At the end of a chunk every level works on the designs that wait there, even on a few.
     work += chunks * (WRITE_SECONDS_PER_CHUNK + CALL_SECONDS * len(levels(study)))
     return Estimate(
         designs=designs,
@@ -110,7 +110,7 @@ def estimate(
 
 
 def searches(study: Study, jobs: int, known: Pilot) -> tuple[tuple[str, float, float], ...]:
-    """Return what follows the sweep, with the seconds it takes typically and at most, from measured looks at a design.
+    """Return the searches after the sweep, with their typical and longest time [s], from measured looks at a design.
 
     A design of the pilot, or a random one, is searched from for a few looks.  Compiling is left out.
     """
@@ -141,7 +141,7 @@ def searches(study: Study, jobs: int, known: Pilot) -> tuple[tuple[str, float, f
     if globally:
         found.insert(0, ("global search", MET * population, settings.populations * population))
     if study.tolerance is not None and share is not None:
-        # A robust search uses up what it is allowed: 9 to 14 s of each start and 33 to 41 s of each end were measured,
+        # A robust search uses up its allowed looks: 9 to 14 s of each start and 33 to 41 s of each end were measured,
         # samples included, where 1600 and 4000 looks take 14 and 36 s.
         first = robust.TRIED * robust.ROUNDS * min(robust.HEAT, settings.looks) * look
         whole = first + robust.ENDED * most + MADE * population * globally
@@ -156,7 +156,7 @@ def searches(study: Study, jobs: int, known: Pilot) -> tuple[tuple[str, float, f
 def other_accuracies(
     study: Study, jobs: int, tell: Callable[[int, int], None] = lambda _, __: None, known: Pilot | None = None
 ) -> tuple[tuple[str, float], ...]:
-    """Return what the same sweep would take at other accuracies: in words, and the estimated seconds.
+    """Return the estimated time [s] of the same sweep at other accuracies, each accuracy in words.
 
     ``tell`` is called with how many of them are done, and how many there are.  ``known`` is the pilot of the study.
     """

@@ -15,7 +15,7 @@ from sweep.dataset.lock import locked
 from sweep.errors import InputError
 from sweep.study import Study
 
-MOST = 6  # differences that are told
+MOST = 6  # differences that are reported
 
 # What concerns only these designs; the report about them as well.
 OWN_FILES = (
@@ -32,7 +32,7 @@ def open_plan(study: Study, folder: Path, force: bool, chunk_size: int | None = 
     if noted is not None:
         plan = make_plan(study, noted["chunk_size"])
         if plan.identity == noted["identity"]:
-            # What the chunks say of the study stays as the first run said it, whatever units it is now written in.
+            # The chunks keep the study as the first run wrote it, even if it is now written in other units.
             plan = replace(plan, name=noted["name"], chunk_data=noted["chunk_data"])
             if force:
                 _set_foreign_aside(folder, plan, ())
@@ -88,7 +88,7 @@ def part_range(folder: Path, chunks: int) -> range:
 
 
 def _conflict(study: Study, noted: dict[str, Any], plan: Plan) -> str:
-    """Say what sets the data in the folder apart from what this run would compute."""
+    """Name the differences between the data in the folder and those that this run would compute."""
     before, now = (
         {key: value for key, value in data.items() if key not in NOT_IN_CHUNKS}
         for data in (noted.get("data") or noted["chunk_data"], study.data)
@@ -114,7 +114,7 @@ def old_name() -> str:
 
 
 def refuse_or_clear_older(folder: Path, force: bool) -> None:
-    """See that no dataset of an earlier version, with plan and optimum among its chunks, is in the folder.
+    """Refuse or set aside a dataset of an earlier version, whose plan and optimum lie among its chunks.
 
     Raises
     ------

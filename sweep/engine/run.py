@@ -93,7 +93,7 @@ def _end(begin: float, outcome: str, text: str) -> dict[str, Any]:
     return {"event": "end", "outcome": outcome, "seconds": round(time.monotonic() - begin, 3), "text": text}
 
 
-# So often chunks are computed that somebody removes or damages while the run goes on.
+# How often chunks that were removed or damaged during the run are computed again.
 ROUNDS = 3
 
 

@@ -199,7 +199,7 @@ def _composed(family: Family, asked: Negative | Extent | TimingOf, accuracy: Acc
             else:
                 title, compose = f"timing {name}", partial(route.difference, timing)
     cost = sum(route.ns_per_design for route in routes(family, of, accuracy))
-    whole = isinstance(asked, Extent)  # joints reach as far as they do, whatever window counts for deviations
+    whole = isinstance(asked, Extent)  # an extent is about the whole motion; the window is for deviations only
     return Route(title, (name,), cost, partial(_run_composed, family, of, compose, whole), order=order)
 
 

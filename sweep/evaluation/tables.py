@@ -250,7 +250,7 @@ def _converted(values: object) -> Array | None:
 
 
 def _entries(values: object) -> list[Any]:
-    """Return what stands in the rows, whatever it is; one row where it is no column."""
+    """Return the entries of the rows, of any type; a value that is no column gives one row."""
     if isinstance(values, np.ndarray):
         return list(values.flat)
     if isinstance(values, (str, bytes)) or not isinstance(values, Iterable):

@@ -274,7 +274,7 @@ def _only(top: Top, which: Index | Mask) -> Top:
 
 
 def _upper(panels: Panels, mode: int) -> Array:
-    """Return what a curve does not exceed on a panel, as far as its coefficients tell."""
+    """Return an upper bound of a curve on each panel, estimated from its coefficients."""
     dense = product(panels.series, rising(np.linspace(-1.0, 1.0, DENSE)))
     doubt = CAREFUL * np.abs(panels.series[:, -TAIL:]).sum(axis=1) + LATELY * panels.missed
     upper: Array = np.maximum(_measured(dense, mode).max(axis=1), panels.peak) + doubt
@@ -282,7 +282,7 @@ def _upper(panels: Panels, mode: int) -> Array:
 
 
 def _rounding(guards: Sequence[str], poses: dict[str, Array], good: Mask, row: Index, top: Top, precise: bool) -> Array:
-    """Return what rounding near a dead point may have moved each height by (as in `sweep.reductions.peak_search`)."""
+    """Return how far rounding near a dead point may have moved each height (as in `sweep.reductions.peak_search`)."""
     amplified = np.zeros(top.row.size)
     for name in guards[1:] if precise else guards:
         values = poses[name][good]

@@ -144,8 +144,8 @@ def confirmed(
     ----------
     sample : evaluates the measured quantity with less rounding than what the peaks come from
     peaks, tolerance, locate : as in `sharpen`
-    rounding : (k,) what rounding may have moved the heights by that the peaks come from.  One pose may see none of it
-        by chance, and the place may be spoilt all the same
+    rounding : (k,) how far rounding may have moved the heights that the peaks come from.  Even where one pose shows
+        no such error by chance, the place may be wrong
     there : (k,) what ``sample`` says at the places of the peaks, where that is known
     """
     before = peaks.height
