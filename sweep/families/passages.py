@@ -30,6 +30,7 @@ from sweep.families.thread_way import turned as turned_back
 if TYPE_CHECKING:
     from sweep.families.machines import Machine
 
+MEET = 1e-6  # rad of the tip's way: nearer axes meet, as the place of a least distance is known to some 1e-8 rad
 TEXTS = {
     "lag": ("rad", "crank angle from the needle's lowest point to the passage"),
     "rise": ("length", "rise of the needle at the passage since its lowest point"),
@@ -133,7 +134,9 @@ def _read(taking: Taking, machine: Machine, designs: Any, places: Places, wanted
     if taking.window:
         values["room"] = np.minimum(rise - taking.window.least, taking.window.most - rise)
     if gap:
-        values["free"] = gap[0]["near"]
+        free, radii = gap[0]["near"], sum(body.radius for body in taking.gap.bodies)
+        # Axes that meet do so on every design near by: the least gap stays what it is, and has no slope.
+        values["free"] = np.where(np.real(free) + radii > MEET * np.real(speed["near"]), free, np.real(free))
     status[np.real(side["at"]) <= 0.0] = st.WRONG_SIDE
     columns: Columns = {f"phi_{name}": angles["at"], f"count_{name}": places["count"], "status": status}
     return columns | {f"{name}_{key}": value for key, value in values.items()}

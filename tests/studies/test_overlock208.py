@@ -132,3 +132,21 @@ def test_slopes_of_the_moments_are_those_of_differences(study):
     for name, slopes in zip(names, wanted.T, strict=True):
         # Differences over 1e-4 mm of what is known to 1e-13 mm; the least gap's place is known to 1e-9 rad.
         assert found[name] == pytest.approx(slopes, rel=1e-6, abs=1e-6 * np.abs(slopes).max()), name
+
+
+def test_the_least_gap_of_axes_that_meet_has_no_slope(study):
+    """A blade that is 1.7 mm too near passes through the needle's axis, and so do all blades near by."""
+    family, accuracy = study.bare, Accuracy(target=1e-9)
+    given = {name: RECORD["design"][name] for name in family.parameter_names if name in RECORD["design"]}
+    design = design_matrix(family, given)[0][0]
+    column = family.parameter_names.index("lower.x_at")
+    steps = np.zeros((1, design.size))
+    steps[0, column] = STEP
+    slope = step_gradients(family, design + 1j * steps, ["a_free"], accuracy)["a_free"]
+    assert abs(slope[0]) > 0.1
+    design[column] += 1.7
+    found = design_outputs(family, np.stack([design, design + 1e-3 * (steps[0] > 0.0)]), ["a_free"], accuracy)
+    # The place of the least gap is known to some 1e-9 rad of some 40 mm.
+    assert found["a_free"][1] == pytest.approx(found["a_free"][0], abs=1e-6)
+    slope = step_gradients(family, design + 1j * steps, ["a_free"], accuracy)["a_free"]
+    assert slope[0] == 0.0
