@@ -269,10 +269,7 @@ def _frames(machine: Machine, designs: Array) -> dict[str, Frame]:
 
 
 def _whole(values: Any, shape: tuple[int, int]) -> Any:
-    """Spread what was computed for one design over all: an array of their own, which may be written on.
-
-    Poses of a design lie side by side, as where it is alone: sums over the turn have the same bits.
-    """
+    """Spread what was computed for one design over all, pose beside pose: sums over the turn keep their bits."""
     return values if values.shape == shape else np.array(np.broadcast_to(values, shape), order="C")
 
 
