@@ -24,7 +24,6 @@ from sweep.families import NAMES, family
 from sweep.families.base import Interval, March
 from tests.support.selection import mostly_long
 
-DRAWN = NAMES
 LINKED = ("rssr", "rssp", "guide", "four_bar", "slider_crank", "kim_dison")  # crank, coupler, rocker or slider
 MM = 20.0  # the examples as linkages of a machine: their lengths in units of 20 mm
 
@@ -50,7 +49,7 @@ def values_of(model, accessor):
     return np.frombuffer(data, np.float32).reshape(entry.count, width)
 
 
-@pytest.mark.parametrize("name", mostly_long(DRAWN, DRAWN[::3]))
+@pytest.mark.parametrize("name", mostly_long(NAMES, NAMES[::3]))
 def test_animated_model_of_every_family_carries_its_joints(name, tmp_path):
     file = sweep.export(name, scaled(name), tmp_path / "model.glb", poses=36, speed=4.0 * math.pi)
     model = pygltflib.GLTF2().load(file)
@@ -106,7 +105,7 @@ def test_stages_of_a_chain_stand_in_one_frame(tmp_path):
     np.testing.assert_allclose(found[1].joints["a"][0], [design["e1"], 0.0, 7.5], atol=1e-12)
 
 
-@pytest.mark.parametrize("name", DRAWN)
+@pytest.mark.parametrize("name", NAMES)
 def test_drawing_of_every_family_passes_the_audit_and_has_its_joints(name, tmp_path):
     design, phi = scaled(name), 0.0 if isinstance(family(name).domain, March) else 0.4
     document = ezdxf.readfile(sweep.export(name, design, tmp_path / "drawing.dxf", phi=phi))
