@@ -29,7 +29,7 @@ setup: $(VENV)/ready  ## create the environment in .venv, with what studies need
 test: $(VENV)/dev  ## run the tests, in two processes
 	$(BIN)/python -m pytest -n 2 --dist loadfile
 
-test-long: $(VENV)/dev  ## the tests that take minutes, thousands of hostile tables; properties at random; loads against Pinocchio, which it installs
+test-long: $(VENV)/dev  ## what make test leaves out: slow tests, all parameters, thousands of hostile tables; properties at random; loads against Pinocchio, which it installs
 	$(BIN)/python -m pip install --constraint constraints.txt --editable '.[dev,peers]'
 	$(BIN)/python -m pytest -m 'long or hypothesis' --hypothesis-profile=random
 
