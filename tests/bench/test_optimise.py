@@ -11,6 +11,7 @@ from sweep.families.base import Accuracy
 from tests.bench.optimise import RSSR, measure, page, solve, specifications
 
 
+@pytest.mark.long
 def test_three_specifications_are_solved_to_a_local_optimum() -> None:
     outcomes = list(measure(3, starts=8, seeds=1))
     for outcome in outcomes:

@@ -30,6 +30,7 @@ from sweep.dataset.lock import locked
 from sweep.errors import InputError, LinksweepError, LinksweepWarning, LockedError, StoreError, WorkerDied
 from sweep.report.page import write_report
 from tests.support.engine_study import ROOT, SMALL_CHUNKS, chunk_bytes, write_study
+from tests.support.selection import mostly_long
 
 
 @pytest.fixture(autouse=True)
@@ -293,7 +294,7 @@ def test_a_folder_closed_to_the_user_is_said(whole: tuple[Path, Path], dataset: 
     assert done.returncode == 2 and "Traceback" not in done.stderr and "not readable" in done.stderr
 
 
-@pytest.mark.parametrize("bytes_allowed", [8 * 10**8, 12 * 10**8, 16 * 10**8])
+@pytest.mark.parametrize("bytes_allowed", mostly_long([8 * 10**8, 12 * 10**8, 16 * 10**8], [12 * 10**8]))
 def test_little_memory_ends_with_70_or_suffices(whole: tuple[Path, Path], tmp_path: Path, bytes_allowed: int) -> None:
     limited = f"import resource, sys; resource.setrlimit(resource.RLIMIT_AS, ({bytes_allowed}, {bytes_allowed})); "
     program = f"{limited}sys.argv = ['sweep', *sys.argv[1:]]; from sweep.__main__ import main; main()"

@@ -19,6 +19,7 @@ from sweep.dataset.verification import DAMAGED, INCOMPLETE
 from sweep.errors import InputError
 from sweep.study import load_study
 from tests.support.engine_study import SMALL_CHUNKS, chunk_bytes, write_study
+from tests.support.selection import mostly_long
 
 
 @pytest.fixture(autouse=True)
@@ -27,7 +28,7 @@ def small_chunks(monkeypatch: pytest.MonkeyPatch) -> None:
         monkeypatch.setattr(sweep.chunks.plan, name, value)
 
 
-@pytest.fixture(scope="module", params=["all", "feasible"])
+@pytest.fixture(scope="module", params=mostly_long(["all", "feasible"], ["feasible"]))
 def whole(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, Path]:
     """A study of 10240 designs in three chunks, and its dataset."""
     place = tmp_path_factory.mktemp(request.param)

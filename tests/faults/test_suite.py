@@ -10,12 +10,10 @@ from tests.faults.ground import Ground, Kind, Outcome
 from tests.faults.suite import KINDS, Row, tried, verdict
 
 TENTH = 0.1
-# One trial each; every sort of fault and every stage of a run has one at least.
+# One trial each: a kill in the sweep and in the search, a signal, a full disk, damage, two at a time, kernels.
 QUICK = (
     "kill -9 of the group, sweep",
     "kill -9 of a worker, optimiser",
-    "kill -9 of the group, tolerance",
-    "kill -9 of the group, report",
     "Ctrl-C to the group, sweep",
     "files no larger than so many bytes",
     "flipped chunk",

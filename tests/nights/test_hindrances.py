@@ -51,7 +51,9 @@ def test_a_bad_plan_of_an_earlier_night_stops_no_night(after_one: tuple[Path, Pa
     assert read_night(into / record.name) == record
 
 
-@pytest.mark.parametrize("make", [os.mkfifo, Path.mkdir, lambda path: path.symlink_to("nowhere")])
+@pytest.mark.parametrize(
+    "make", mostly_long([os.mkfifo, Path.mkdir, lambda path: path.symlink_to("nowhere")], [os.mkfifo])
+)
 def test_what_stands_in_place_of_a_chunk_is_computed_anew(
     after_one: tuple[Path, Path], make: Callable[[Path], object]
 ) -> None:
@@ -107,7 +109,7 @@ def test_records_of_wrong_types_are_left_out_and_said(after_one: tuple[Path, Pat
     assert record.name in page and line["name"] in page
 
 
-@pytest.mark.parametrize("number", [errno.ENOLCK, errno.ENOSYS])
+@pytest.mark.parametrize("number", mostly_long([errno.ENOLCK, errno.ENOSYS], [errno.ENOLCK]))
 def test_a_night_where_the_disk_has_no_locks_is_computed_and_says_so(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, number: int
 ) -> None:

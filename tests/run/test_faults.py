@@ -35,6 +35,7 @@ from sweep.errors import (
 )
 from sweep.study import Budget, Study, load_study
 from tests.support.engine_study import CHUNK, ROOT, SMALL, SMALL_CHUNKS, chunk_bytes, write_study
+from tests.support.selection import mostly_long
 
 PAUSE = 0.05
 
@@ -283,7 +284,7 @@ def test_folder_that_cannot_be_made_is_a_store_error(study: Study, tmp_path: Pat
     assert caught.value.exit_code == 74
 
 
-@pytest.mark.parametrize("backend", ["threading", "loky"])
+@pytest.mark.parametrize("backend", mostly_long(["threading", "loky"], ["threading"]))
 def test_full_disk_ends_with_74_and_nothing_half_written(
     path: Path, whole: dict[str, bytes], tmp_path: Path, backend: str
 ) -> None:

@@ -10,6 +10,7 @@ import sweep
 from sweep.errors import MOST_FAULTS, MOST_NAMES, InputError, choices
 from sweep.study import load_study
 from tests.study.test_faults import RIGHT, faults_of
+from tests.support.selection import mostly_long
 
 TAKEUP = (Path(__file__).parents[1] / "studies" / "earlier" / "takeup" / "study.toml").read_text()
 
@@ -33,7 +34,7 @@ def test_a_faulty_thread_does_not_take_the_names_of_its_outputs_for_faults(
     assert words in message
 
 
-@pytest.mark.parametrize("table", ["study", "design", "limits"])
+@pytest.mark.parametrize("table", mostly_long(["study", "design", "limits"], ["design"]))
 def test_of_thousands_of_faults_the_first_are_told(table: str, tmp_path: Path) -> None:
     keys = "\n".join(f"k{k} = 1" for k in range(3000))
     with pytest.raises(sweep.StudyError) as caught:

@@ -14,6 +14,7 @@ from kernels.effects.foot import OUTPUTS
 from kernels.effects.foot_fabric import march
 from sweep.families.foot import NODES, TURNS, path_of
 from tests.families.foot.test_reference import HEAVY, RACK
+from tests.support.selection import mostly_long
 
 PHI = np.arange(NODES) * (2.0 * math.pi / NODES)
 
@@ -172,7 +173,7 @@ def test_turns_that_differ_are_not_called_alike() -> None:
     assert (table.lost_angle[0], table.settled[0]) == (lost[TURNS - 1], 0.0)
 
 
-@pytest.mark.parametrize("cf", [0.0, 1.0, 30.0])
+@pytest.mark.parametrize("cf", mostly_long([0.0, 1.0, 30.0], [1.0]))
 @pytest.mark.parametrize("kf", [2e4, 1e5])
 def test_turns_called_alike_are_so_in_every_later_turn(kf: float, cf: float) -> None:
     for p in (SWINGING, HEAVY):

@@ -10,6 +10,8 @@ from pathlib import Path
 
 import pytest
 
+from tests.support.selection import mostly_long
+
 SOURCES = Path(__file__).resolve().parents[3] / "kernels"
 HELPER = """
 from kernels.jit import inline
@@ -95,7 +97,7 @@ def test_an_index_that_names_what_only_its_writer_knew_is_made_anew(tree: Path) 
     assert report(tree, program) == ["2.0", "1"]
 
 
-@pytest.mark.parametrize("kind", ["nbc", "nbi"])
+@pytest.mark.parametrize("kind", mostly_long(["nbc", "nbi"], ["nbc"]))
 def test_a_changed_bit_anywhere_in_a_file_is_found_and_the_code_made_anew(tree: Path, kind: str) -> None:
     report(tree)
     (file,) = (tree.parents[1] / "cache").rglob(f"*run-*.{kind}")
@@ -260,7 +262,7 @@ def test_what_lies_in_a_cache_is_run(tree: Path) -> None:
     assert mark.exists()
 
 
-@pytest.mark.parametrize("level", ["kernels", "linksweep", "cache"])
+@pytest.mark.parametrize("level", mostly_long(["kernels", "linksweep", "cache"], ["cache"]))
 def test_a_cache_that_others_may_write_to_is_not_used(tree: Path, tmp_path: Path, level: str) -> None:
     root, mark = planted(tree)
     {"kernels": root, "linksweep": root.parent, "cache": root.parent.parent}[level].chmod(0o777)
