@@ -154,6 +154,8 @@ def _costs(
     for limit in limits:
         values = compared(limit.output, np.asarray(columns[limit.output], np.float64))
         known = np.isfinite(values)
+        if not known.any():
+            continue  # no mechanism has this output, and no dimension alone gives it one
         off, away = designs[known][:, own] - design[own], values[known] - values[known].mean()
         along = (away @ off) ** 2 / (off**2).sum(axis=0)
         matters += along / max(along.sum(), 1e-300) * (1.0 - float(meets(limit, columns[limit.output]).mean()))
