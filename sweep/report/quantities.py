@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 import re
 from dataclasses import dataclass, replace
+from functools import lru_cache
 
 from sweep.families.base import Turn
 from sweep.families.names import is_error, is_place, parts, without_error, without_minus
@@ -93,6 +94,7 @@ def with_unit(text: str, unit: str) -> str:
     return text + unit if unit == "°" else f"{text}\u00a0{unit}"
 
 
+@lru_cache(maxsize=4096)  # the page of a slider asks for the same forty names at every step
 def quantity(name: str, unit: str) -> Quantity:
     """How the column ``name``, stored in ``unit`` ("mm" or "length", "rad", "1" ...), is shown."""
     unit = internal_unit(unit)

@@ -42,8 +42,6 @@ function ticksBetween(low, high) {
 
 class Panel {
   constructor(host, curve, data, chosen) {
-    this.curve = curve;
-    this.data = data;
     const box = host.appendChild(document.createElement("figure"));
     box.className = "panel";
     const head = box.appendChild(document.createElement("figcaption"));
@@ -51,23 +49,36 @@ class Panel {
     head.firstChild.textContent = curve.unit ? `${curve.title} [${curve.unit}]` : curve.title;
     this.value = head.querySelector("output");
     this.frame = svg("svg", { viewBox: `0 0 ${WIDE} ${HIGH}`, role: "img", "aria-label": curve.title }, box);
-    let [low, high] = curve.range;
-    const room = high - low > 1e-12 * Math.max(Math.abs(low), Math.abs(high)) ? 0.06 * (high - low) : Math.abs(high) || 1;
-    [this.low, this.high] = [low - room, high + room];
-    this.drawAxes();
+    this.turn = svg("g", {}, this.frame);
+    this.scale = svg("g", {}, this.frame);
     this.shade = svg("g", { class: "shade" }, this.frame);
     const clip = `clip-${curve.name.replace(/[^a-z0-9]/gi, "-")}`;
     const field = svg("clipPath", { id: clip }, this.frame);
     svg("rect", { x: LEFT, y: TOP, width: WIDE - LEFT - RIGHT, height: HIGH - TOP - BOTTOM }, field);
     const inside = svg("g", { "clip-path": `url(#${clip})` }, this.frame);
-    for (const limit of curve.limits) {
-      svg("line", { class: "limit", x1: LEFT, x2: WIDE - RIGHT, y1: this.y(limit), y2: this.y(limit) }, inside);
-    }
-    this.lines = data.designs.map((design) => svg("path", { d: this.path(design), class: design.role }, inside));
+    this.bounds = svg("g", {}, inside);
+    this.lines = data.designs.map((design) => svg("path", { class: design.role }, inside));
     this.cursor = svg("line", { class: "cursor", y1: TOP, y2: HIGH - BOTTOM }, this.frame);
     this.dot = svg("circle", { class: "dot", r: 3.5 }, inside);
     this.frame.addEventListener("pointerdown", (event) => { this.follow(event, chosen); });
     this.frame.addEventListener("pointermove", (event) => { if (event.buttons) this.follow(event, chosen); });
+    this.data = data;
+    this.drawTurn();
+    this.renew(curve, data);
+  }
+
+  // Draw the curve of later designs in the same panel: a slider calls for it many times a second.
+  renew(curve, data) {
+    [this.curve, this.data] = [curve, data];
+    const [low, high] = curve.range;
+    const room = high - low > 1e-12 * Math.max(Math.abs(low), Math.abs(high)) ? 0.06 * (high - low) : Math.abs(high) || 1;
+    [this.low, this.high] = [low - room, high + room];
+    this.drawScale();
+    this.bounds.replaceChildren();
+    for (const limit of curve.limits) {
+      svg("line", { class: "limit", x1: LEFT, x2: WIDE - RIGHT, y1: this.y(limit), y2: this.y(limit) }, this.bounds);
+    }
+    this.lines.forEach((line, k) => line.setAttribute("d", this.path(data.designs[k])));
   }
 
   follow(event, chosen) {
@@ -80,20 +91,24 @@ class Panel {
 
   y(value) { return TOP + ((this.high - value) / (this.high - this.low)) * (HIGH - TOP - BOTTOM); }
 
-  drawAxes() {
+  drawScale() {
+    this.scale.replaceChildren();
     for (const value of ticksBetween(this.low, this.high)) {
-      svg("line", { class: "grid", x1: LEFT, x2: WIDE - RIGHT, y1: this.y(value), y2: this.y(value) }, this.frame);
-      svg("text", { x: LEFT - 5, y: this.y(value) + 3.5, "text-anchor": "end" }, this.frame).textContent = short(value);
+      svg("line", { class: "grid", x1: LEFT, x2: WIDE - RIGHT, y1: this.y(value), y2: this.y(value) }, this.scale);
+      svg("text", { x: LEFT - 5, y: this.y(value) + 3.5, "text-anchor": "end" }, this.scale).textContent = short(value);
     }
+  }
+
+  drawTurn() {
     const { ends, closed } = this.data;
     const marks = closed ? [0, 90, 180, 270, 360] : ticksBetween(...ends);
     for (const mark of marks) {
       const x = this.x((mark - ends[0]) / (ends[1] - ends[0]));
-      svg("line", { class: "grid", x1: x, x2: x, y1: TOP, y2: HIGH - BOTTOM }, this.frame);
-      svg("text", { x, y: HIGH - BOTTOM + 14, "text-anchor": "middle" }, this.frame).textContent = short(mark);
+      svg("line", { class: "grid", x1: x, x2: x, y1: TOP, y2: HIGH - BOTTOM }, this.turn);
+      svg("text", { x, y: HIGH - BOTTOM + 14, "text-anchor": "middle" }, this.turn).textContent = short(mark);
     }
     const below = { x: (LEFT + WIDE - RIGHT) / 2, y: HIGH - 4, "text-anchor": "middle" };
-    svg("text", below, this.frame).textContent = `${this.data.axis} [${this.data.unit}]`;
+    svg("text", below, this.turn).textContent = `${this.data.axis} [${this.data.unit}]`;
   }
 
   path(design) {

@@ -72,32 +72,42 @@ function show(answer) {
   }
   steady = true;
   const heads = ["in hand", ...pins.map((p) => p.name)];
-  table(by("limits"), ["limit", "asked", ...heads], answer.limits, (line, row) => {
-    made("td", line, { textContent: row.symbol, title: row.name });
-    made("td", line, { textContent: row.bound });
-    row.values.forEach((value, k) => {
-      const cell = made("td", line, { className: "n", textContent: `${value} ` }), slack = row.slack[k];
-      const words = { missed: slack ? `by ${slack}` : "missed", active: "just", unknown: "?" }[row.states[k]];
-      made("span", cell, { className: `state ${row.states[k]}`, textContent: words ?? (slack ? `${slack} left` : "kept") });
-    });
-  });
-  table(by("outputs"), ["output", ...heads], answer.outputs, (line, row) => {
-    made("td", line, { textContent: row.symbol, title: row.text });
-    row.values.forEach((value, k) => {
-      const cell = made("td", line, { className: "n", textContent: value });
-      if (row.fast[k]) made("div", cell, { className: "fast", textContent: row.fast[k] });
-      if (k === 0) cell.dataset.output = row.name;
-    });
-  });
+  const limits = answer.limits.map((row) => [[row.symbol, row.name], [row.bound], ...row.values.map((value, k) => {
+    const slack = row.slack[k], words = { missed: slack ? `by ${slack}` : "missed", active: "just", unknown: "?" }[row.states[k]];
+    return [value, "", words ?? (slack ? `${slack} left` : "kept"), `state ${row.states[k]}`];
+  })]);
+  const outputs = answer.outputs.map((row) => [[row.symbol, row.text], ...row.values.map((value, k) => [value, "", row.fast[k], "fast"])]);
+  table(by("limits"), ["limit", "asked", ...heads], limits, 2);
+  table(by("outputs"), ["output", ...heads], outputs, 1);
+  answer.outputs.forEach((row, k) => { by("outputs").tBodies[0].rows[k].cells[1].dataset.output = row.name; });
 }
 
-function table(host, heads, lines, fill) {
-  host.replaceChildren();
-  const words = pins.length || host.id === "limits" ? heads : ["output", ""], top = made("tr", made("thead", host));
-  const plain = heads.length - pins.length;
-  words.forEach((text, k) => made("th", top, { textContent: text, className: k >= plain ? `pin-${k - plain + 1}` : "" }));
-  const body = made("tbody", host);
-  for (const row of lines) fill(made("tr", body), row);
+// Cells are [text, title, words below, their class], the first `plain` of a row words and the others numbers. A table of the
+// same shape keeps its cells, and only what is new is written: laying a table out anew costs more than computing it.
+function table(host, heads, lines, plain) {
+  const words = pins.length || host.id === "limits" ? heads : ["output", ""], shape = JSON.stringify([words, lines.length]);
+  if (host.dataset.shape !== shape) {
+    host.replaceChildren();
+    const top = made("tr", made("thead", host)), body = made("tbody", host);
+    words.forEach((text, k) => made("th", top, { textContent: text, className: k > plain ? `pin-${k - plain}` : "" }));
+    for (const line of lines) {
+      const row = made("tr", body);
+      line.forEach((_, k) => {
+        const cell = made("td", row, { className: k < plain ? "" : "n" });
+        cell.append("");
+        if (k >= plain) made("span", cell);
+      });
+    }
+    host.dataset.shape = shape;
+  }
+  lines.forEach((line, j) => line.forEach(([text, title = "", below = "", kind = ""], k) => {
+    const cell = host.tBodies[0].rows[j].cells[k], small = cell.lastElementChild;
+    if (cell.firstChild.data !== text) cell.firstChild.data = text;
+    if (cell.title !== title) cell.title = title;
+    if (!small) return;
+    if (small.textContent !== below) small.textContent = below;
+    if (small.className !== kind) small.className = kind;
+  }));
 }
 
 function keep() {

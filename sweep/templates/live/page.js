@@ -49,10 +49,16 @@ class Moving {
       design.values = Object.fromEntries(Object.entries(design.curves).map(([name, text]) => [name, numbersOf(text)]));
     }
     data.ends = data.closed ? [0, 360] : [data.designs[0].phi[0], data.designs[0].phi[data.designs[0].phi.length - 1]];
-    this.find(".panels").replaceChildren();
-    this.panels = data.curves.map((curve) => {
-      return new Panel(this.find(".panels"), curve, data, (to) => { this.rest(); this.set(to); });
-    });
+    const { axis, ends, designs } = data, roles = designs.map((design) => design.role);
+    const asked = JSON.stringify([axis, ends, roles, data.curves.map(({ name, title, unit }) => [name, title, unit])]);
+    if (asked === this.asked) this.panels.forEach((panel, k) => panel.renew(data.curves[k], data));
+    else {
+      this.find(".panels").replaceChildren();
+      this.panels = data.curves.map((curve) => {
+        return new Panel(this.find(".panels"), curve, data, (to) => { this.rest(); this.set(to); });
+      });
+    }
+    this.asked = asked;
     if (this.view) this.view.data = data;
     this.choose(Math.min(this.index, data.designs.length - 1));
   }
