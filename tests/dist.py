@@ -8,7 +8,6 @@ import subprocess
 import sys
 import tarfile
 import tempfile
-import tomllib
 import urllib.request
 from pathlib import Path
 
@@ -25,8 +24,9 @@ def said(*words: str) -> str:
 
 def main(folder: Path) -> None:
     """Go the way of a new user in an empty folder."""
-    version = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]["version"]
-    (source,) = folder.glob("*.tar.gz")
+    (source,), (wheel,) = folder.glob("*.tar.gz"), folder.glob("*.whl")
+    version = wheel.name.split("-")[1]
+    assert source.name == f"linksweep-{version}.tar.gz", (source.name, wheel.name)
     with tarfile.open(source) as content:
         names = [name.partition("/")[2] for name in content.getnames()]
     needed = ["pyproject.toml", "README.md", "LICENSE", "sweep/templates/explore.html", "kernels/jit.py"]

@@ -49,7 +49,7 @@ class Server:
     def __init__(self, hand: Hand, port: int = 0) -> None:
         _needed()
         self.hand, self.token = hand, secrets.token_urlsafe(TOKEN_BYTES)
-        # Named as TCP, or asyncio leaves its delay on: a body that follows its head would wait 40 ms for the head's receipt.
+        # Named as TCP, or asyncio leaves its delay on: a body waits 40 ms until its head has been acknowledged.
         self.socket = socket.socket(proto=socket.IPPROTO_TCP)
         self.socket.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
         try:

@@ -79,7 +79,7 @@ def draw_frame(axes: Axes, parts: Sequence[Part], seen: Array, *, pose: int = 0)
         draw_links(axes, part, seen, pose)
         for name, path in part.joints.items():
             _joint(axes, path, seen, pose, fixed=name in part.kinds)
-            names.append((seen @ path[pose], shown_name(name)))
+            names.append((seen @ path[pose], f"{shown_name(name)}{part.stage}"))
     for at, words in _joined(names, CLOSE * size):
         axes.annotate(words, (float(at[0]), float(at[1])), (6, 5), textcoords="offset points", zorder=8)
     axes.set_aspect("equal", adjustable="datalim")

@@ -5,6 +5,7 @@ from __future__ import annotations
 import itertools
 from collections.abc import Iterable, Sequence
 from pathlib import Path
+from textwrap import shorten
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
@@ -33,6 +34,7 @@ LINES = 24  # of a table before it goes on in the next one
 WIDTHS = ((1.5, 1.1, 1.0), (1.0, 1.0))  # of the tables in the first row and in those below it, as shares
 POSES = 180  # of the paths of joints
 WORDS = {"xy": "front", "zy": "side", "xz": "top"}
+LETTERS, PAD, LEAST = 23.0, 1.0, 12.0  # of an inch, of a cell's rim, of the last column
 DIGITS = 6  # of coordinates: a micrometre in half a metre
 ENDINGS = (".pdf", ".svg", ".dxf")
 
@@ -81,18 +83,21 @@ def write_sheet(folder: str | Path, design: str | int | None, path: str | Path, 
 
 
 def tables_of(data: Dataset, parts: Sequence[Part]) -> list[Table]:
-    """Return dimensions with tolerances, hardpoints of one position, limits, and a machine's cyclogram."""
+    """Return dimensions with tolerances, hardpoints of one position, limits, cyclogram, and inputs of effects."""
     study, tolerance = data.study, data.study.tolerance
     spread = {} if tolerance is None else {"length": tolerance.lengths, "angle": tolerance.angles}
     units = {p.name: p.unit for p in study.family.parameters}
-    lines = []
+    own = study.bare.parameter_names
+    lines: list[tuple[str, ...]] = []
+    others: list[tuple[str, ...]] = []
     for row in parameter_rows(data):
         shown = quantity(row.name, {"length": "mm", "angle": "rad"}.get(units[row.name], "1"))
         give = spread.get(units[row.name], 0.0)
         member = row.name.rpartition(".")[0]
         text = row.text.removeprefix(f"{member}: ")
-        lines.append((row.name, row.value, f"± {shown.show(give, 3)}" if give else "", text))
-    dimensions = Table("Dimensions", ("name", "value", "tolerance", ""), tuple(lines))
+        line = (row.name, row.value, f"± {shown.show(give, 3)}" if give else "", text)
+        (lines if row.name in own else others).append(line)
+    heads = ("name", "value", "tolerance", "")
     joints = tuple(
         (_joint(part, name), *(number(_zero(x), DIGITS) for x in path[0].tolist()))
         for part in parts
@@ -100,10 +105,11 @@ def tables_of(data: Dataset, parts: Sequence[Part]) -> list[Table]:
     )
     limits = tuple((x.shown.symbol, x.bound, x.value, x.state) for x in limit_states(data))
     found = [
-        dimensions,
+        Table("Dimensions", heads, tuple(lines)),
         Table("Hardpoints [mm]", ("joint", "x", "y", "z"), joints),
         Table("Limits", ("limit", "required", "design", ""), limits),
         *_cyclogram(data),
+        *([Table("Bodies, loads and scene", heads, tuple(others))] if others else []),
     ]
     return [t._replace(lines=tuple(tuple(x.replace("\u00a0", " ") for x in line) for line in t.lines)) for t in found]
 
@@ -182,13 +188,24 @@ def _set(axes: Axes, table: Table | None) -> None:
     if not table.lines:
         axes.text(0.0, 1.0, "none", va="top")
         return
-    high = (len(table.lines) + 1) / (LINES + 1)
+    high, wide = (len(table.lines) + 1) / (LINES + 1), axes.get_window_extent().width / axes.figure.dpi * LETTERS
+    lines, widths = _fitted(table, wide)
     found = axes.table(
-        [list(line) for line in table.lines], colLabels=list(table.heads), cellLoc="left", colLoc="left",
+        lines, colLabels=list(table.heads), cellLoc="left", colLoc="left", colWidths=widths,
         edges="horizontal", bbox=Bbox.from_bounds(0.0, 1.0 - high, 1.0, high),
     )  # fmt: skip
     found.auto_set_font_size(False)
     found.set_fontsize(7.5)
-    found.auto_set_column_width(list(range(len(table.heads))))
     for cell in found.get_celld().values():
+        cell.PAD = PAD / wide
         cell.set_linewidth(0.3)
+
+
+def _fitted(table: Table, wide: float) -> tuple[list[list[str]], list[float]]:
+    """Return lines of a table and shares of its columns, as wide as their longest words; the last one is cut to fit."""
+    rows = [table.heads, *table.lines]
+    longest = [max(len(row[k]) for row in rows) + 2 * PAD for k in range(len(table.heads))]
+    rest = max(wide - sum(longest[:-1]), min(longest[-1], LEAST))
+    most = int(rest - 2 * PAD)
+    lines = [[*line[:-1], shorten(line[-1], most, placeholder=" …")] for line in table.lines]
+    return lines, [x / (sum(longest[:-1]) + rest) for x in (*longest[:-1], rest)]

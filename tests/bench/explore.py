@@ -55,7 +55,10 @@ def main(source: str) -> None:
             computing.append(found["milliseconds"])
         said("computing", computing)
         said("request to answer", whole)
-        for words, arguments in (("hand to picture, curves and tables", FLAT), ("the same with 3-D by software", DRAWS)):
+        for words, arguments in (
+            ("hand to picture, curves and tables", FLAT),
+            ("the same with 3-D by software", DRAWS),
+        ):
             browser = launch(*arguments)
             page = browser.new_page(viewport={"width": 1400, "height": 900})
             page.goto(address)

@@ -68,7 +68,9 @@ def test_what_make_does_for_a_user_stands_on_the_page_without_make() -> None:
 
 
 def test_version_is_the_same_everywhere() -> None:
-    """A release is named once in each place."""
-    version = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]["version"]
+    """What sources without history or tags are called is the release that the pages name."""
+    versions = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["tool"]["versioningit"]
+    version = versions["default-version"]
+    assert versions["vcs"]["default-tag"] == f"v{version}"
     assert f"\nversion: {version}\n" in (ROOT / "CITATION.cff").read_text(encoding="utf-8")
     assert f"\n## {version}" in (ROOT / "CHANGELOG.md").read_text(encoding="utf-8")
