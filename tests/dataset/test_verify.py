@@ -6,6 +6,7 @@ import json
 import shutil
 from pathlib import Path
 
+import numpy as np
 import pytest
 from click.testing import CliRunner
 
@@ -15,7 +16,7 @@ from sweep.chunks.chunk import ChunkResult
 from sweep.chunks.plan import make_plan
 from sweep.cli import main
 from sweep.dataset import chunk_files, files
-from sweep.dataset.verification import DAMAGED, INCOMPLETE
+from sweep.dataset.verification import DAMAGED, INCOMPLETE, spread
 from sweep.errors import InputError
 from sweep.study import load_study
 from tests.support.engine_study import SMALL_CHUNKS, chunk_bytes, write_study
@@ -150,12 +151,15 @@ def test_a_wrong_row_under_a_right_hash_is_found(
 
 
 def test_a_wrong_value_is_found_by_computing_its_design_again(whole: tuple[Path, Path], dataset: Path) -> None:
-    rows = chunk_files.parts(dataset)[1].rows()
-    row = int((rows["status"].to_numpy() == 0).argmax())
+    part = chunk_files.parts(dataset)[1]
+    rows, about = part.rows(), chunk_files.about(part)
+    whole_space = spread({k: (4096 * k, min(4096 * (k + 1), 10240)) for k in range(3)}, 512)
+    row = int(((rows["status"].to_numpy() == 0) & np.isin(rows["design"], whole_space[1])).argmax())
+    assert (about["start"], about["stop"]) == (4096, 8192) and rows["design"][row] in whole_space[1]
     bits = rows["swing"].to_numpy()[row] * (1.0 + 2.0**-52)
     rewritten(whole[0], dataset, 1, "swing", row, bits)
     assert sweep.verify(dataset, designs=0).exit_code == 0
-    found = sweep.verify(dataset, designs=10240)
+    found = sweep.verify(dataset, designs=512)
     assert [f"design {rows['design'][row]}: swing" in finding.words for finding in found.findings] == [True]
 
 

@@ -17,7 +17,8 @@ from tests.support.selection import mostly_long
 TABLE = json.loads((Path(__file__).parents[1] / "oracle" / "machine_open.json").read_text())["rows"]
 ROWS = [row["inputs"] for row in TABLE if row["kind"] == "moment_A" and row["case"] == "passage"]
 pytestmark = pytest.mark.slow
-MACHINES, FACTOR = 200, 64.0 * 2.0**-53
+MACHINES = (60, pytest.param(200, marks=pytest.mark.long))
+FACTOR = 64.0 * 2.0**-53
 CLOSE = 1e-11  # extremes nearer to 0 than this, in lengths of some 50, may be undecidable
 DECIDED = (st.OK, st.WRONG_SIDE)
 PLACE = ("at", "axis", "zero")
@@ -97,9 +98,10 @@ def agrees(worst, read, p, phi, found):
         worst[name] = max(worst.get(name, 0.0), float(off / size) / FACTOR)
 
 
-def test_moment_a_of_random_machines_is_that_of_the_reference():
+@pytest.mark.parametrize("machines", MACHINES)
+def test_moment_a_of_random_machines_is_that_of_the_reference(machines):
     rng, worst, seen = np.random.default_rng(31), {}, {}
-    for trial in range(MACHINES):
+    for trial in range(machines):
         given, sense = moved(rng, trial), int(rng.choice([-1, 1]))
         machine, design = machine_of(given, {"a": {"take": ["thin", "blade"], "sense": sense}})
         names = ["phi_a", "count_a", "a_clearance", "a_rise", "a_above_eye", "a_gauge", "a_reach", "a_back_side"]
@@ -147,9 +149,10 @@ def test_moment_a_of_random_machines_is_that_of_the_reference():
 
 
 @pytest.mark.parametrize("by", mostly_long(["needle", "upper"], ["needle"]))
-def test_moments_b_and_c_of_random_machines_are_those_of_the_reference(by):
+@pytest.mark.parametrize("machines", MACHINES)
+def test_moments_b_and_c_of_random_machines_are_those_of_the_reference(by, machines):
     rng, worst, seen = np.random.default_rng(32), {}, {}
-    for trial in range(MACHINES):
+    for trial in range(machines):
         given, sense = moved(rng, trial), int(rng.choice([-1, 1]))
         start, width = rng.uniform(0.0, 6.2), rng.uniform(1.0, 6.0)
         tools = ["thin" if by == "needle" else "other", "blade", "seam"]

@@ -1,4 +1,4 @@
-"""One fault of every sort, and for `make test-long` a tenth of the suite; ``make test-faults`` tries all of it."""
+"""A fault of each sort, and for `make test-long` a tenth of the suite; ``make test-faults`` tries all of it."""
 
 from __future__ import annotations
 
@@ -10,18 +10,13 @@ from tests.faults.ground import Ground, Kind, Outcome
 from tests.faults.suite import KINDS, Row, tried, verdict
 
 TENTH = 0.1
-# One trial each: a kill in the sweep and in the search, a signal, a full disk, damage, two at a time, kernels.
+# One trial each: a kill, a signal, a full disk, damage, two at a time, kernels.
 QUICK = (
     "kill -9 of the group, sweep",
-    "kill -9 of a worker, optimiser",
     "Ctrl-C to the group, sweep",
     "files no larger than so many bytes",
     "flipped chunk",
-    "truncated chunk",
-    "deleted table",
-    "flipped plan",
     "two runs in one folder",
-    "flipped kernel cache",
     "kernel that raises",
 )
 
