@@ -7,15 +7,14 @@ most 45 degrees, and the least pressure angle of all.
 
 from __future__ import annotations
 
-import argparse
-from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
 import pandas as pd
 
 import sweep
-from sweep.report.figures import WIDTH, house_style, new_figure, save
+from studies.figure import folder_asked, save_chart
+from sweep.report.figures import WIDTH, new_figure
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -80,13 +79,10 @@ def _panel(axes: Axes, table: pd.DataFrame, name: str, levels: Array) -> QuadMes
 
 def main() -> None:
     """Read the designs of a run, write table and chart beside them."""
-    parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("folder", type=Path, help="results of the study, with its designs/")
-    folder: Path = parser.parse_args().folder
+    folder = folder_asked(__doc__)
     table = atlas(sweep.load(folder / "designs"))
     table.to_parquet(folder / "atlas.parquet", index=False)
-    with house_style():
-        print(save(chart(table), folder / "figures" / "atlas.svg").path)  # noqa: T201
+    save_chart(folder, "atlas", lambda: chart(table))
 
 
 if __name__ == "__main__":

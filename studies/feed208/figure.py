@@ -5,15 +5,14 @@
 
 from __future__ import annotations
 
-import argparse
 import math
-from pathlib import Path
 from typing import TYPE_CHECKING
 
 import pandas as pd
 
 import sweep
-from sweep.report.figures import WIDTH, house_style, new_figure, save
+from studies.figure import folder_asked, print_table, save_chart
+from sweep.report.figures import WIDTH, new_figure
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -60,15 +59,12 @@ def chart(table: pd.DataFrame, designs: pd.DataFrame) -> Figure:
 
 def main() -> None:
     """Read the designs of a run, write table and chart beside them."""
-    parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("folder", type=Path, help="results of the study, with its designs/")
-    folder: Path = parser.parse_args().folder
+    folder = folder_asked(__doc__)
     designs = sweep.load(folder / "designs")
     table = contact(designs)
     table.to_parquet(folder / "contact.parquet", index=False)
-    print(table.to_string(index=False, float_format="{:.0f}".format, na_rep="never"))  # noqa: T201
-    with house_style():
-        print(save(chart(table, designs), folder / "figures" / "contact.svg").path)  # noqa: T201
+    print_table(table, "{:.0f}", "never")
+    save_chart(folder, "contact", lambda: chart(table, designs))
 
 
 if __name__ == "__main__":

@@ -5,16 +5,15 @@
 
 from __future__ import annotations
 
-import argparse
 import math
-from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
 import pandas as pd
 
 import sweep
-from sweep.report.figures import OPTIMUM, REFERENCE, WIDTH, house_style, new_figure, save
+from studies.figure import folder_asked, print_table, save_chart
+from sweep.report.figures import OPTIMUM, REFERENCE, WIDTH, new_figure
 from sweep.synthesis.heddle import arms, extremes, shed
 
 if TYPE_CHECKING:
@@ -79,14 +78,11 @@ def chart(rows: pd.DataFrame) -> Figure:
 
 def main() -> None:
     """Write table and chart."""
-    parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("folder", type=Path, help="results of the study, with its designs/")
-    folder: Path = parser.parse_args().folder
+    folder = folder_asked(__doc__)
     rows = table()
     rows.to_parquet(folder / "shafts.parquet", index=False)
-    print(rows.to_string(index=False, float_format="{:.5g}".format))  # noqa: T201
-    with house_style():
-        print(save(chart(rows), folder / "figures" / "shafts.svg").path)  # noqa: T201
+    print_table(rows, "{:.5g}")
+    save_chart(folder, "shafts", lambda: chart(rows))
 
 
 if __name__ == "__main__":

@@ -6,15 +6,14 @@ effect the median, the 5 % and 95 % quantiles and the threshold of the effect's 
 
 from __future__ import annotations
 
-import argparse
-from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
 import pandas as pd
 
 import sweep
-from sweep.report.figures import WIDTH, house_style, new_figure, save
+from studies.figure import folder_asked, print_table, save_chart
+from sweep.report.figures import WIDTH, new_figure
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -82,15 +81,12 @@ def _mark(axes: Axes, scale: str) -> None:
 
 def main() -> None:
     """Read the designs of a run, write table and chart beside them."""
-    parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("folder", type=Path, help="results of the study, with its designs/")
-    folder: Path = parser.parse_args().folder
+    folder = folder_asked(__doc__)
     designs = sweep.load(folder / "designs")
     effects = table(designs)
     effects.to_parquet(folder / "effects.parquet", index=False)
-    print(effects.to_string(index=False, float_format="{:.3g}".format))  # noqa: T201
-    with house_style():
-        print(save(chart(effects, designs), folder / "figures" / "effects.svg").path)  # noqa: T201
+    print_table(effects, "{:.3g}")
+    save_chart(folder, "effects", lambda: chart(effects, designs))
 
 
 if __name__ == "__main__":

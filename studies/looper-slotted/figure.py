@@ -6,7 +6,6 @@ the best crank-rocker for each of its stroke ratios and writes FOLDER/drives.par
 
 from __future__ import annotations
 
-import argparse
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -14,6 +13,7 @@ import numpy as np
 import pandas as pd
 
 from kernels.status import LIMIT_EXCEEDED
+from studies.figure import folder_asked, print_table, save_chart
 from sweep.evaluation.summaries import design_outputs
 from sweep.families import family
 from sweep.families.base import Accuracy
@@ -21,7 +21,7 @@ from sweep.jobs.progress import Phases, Say, unsaid
 from sweep.optimise.multistart.multistart import optimum
 from sweep.optimise.starts.dataset import drawn
 from sweep.optimise.starts.posing import problem_of
-from sweep.report.figures import OPTIMUM, REFERENCE, WIDTH, house_style, new_figure, save
+from sweep.report.figures import OPTIMUM, REFERENCE, WIDTH, new_figure
 from sweep.study import OptimiseSettings, study_from_data
 
 if TYPE_CHECKING:
@@ -105,17 +105,14 @@ def chart(drives: pd.DataFrame) -> Figure:
 
 def main() -> None:
     """Read the front of a run, search the crank-rockers, write table and chart."""
-    parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("folder", type=Path, help="results of the study, with its designs/")
-    folder: Path = parser.parse_args().folder
+    folder = folder_asked(__doc__)
     front = pd.read_parquet(folder / "_pareto.parquet")
     small = len(front) < 4  # smoke
     with Phases(show=True, quiet=False) as phases:
         drives = table(front, 2 if small else STARTS, phases.say)
     drives.to_parquet(folder / "drives.parquet", index=False)
-    print(drives.to_string(index=False, float_format="{:.4g}".format))  # noqa: T201
-    with house_style():
-        print(save(chart(drives), folder / "figures" / "drives.svg").path)  # noqa: T201
+    print_table(drives, "{:.4g}")
+    save_chart(folder, "drives", lambda: chart(drives))
 
 
 if __name__ == "__main__":

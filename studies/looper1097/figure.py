@@ -6,18 +6,18 @@ writes FOLDER/joint.parquet and FOLDER/figures/joint.svg.
 
 from __future__ import annotations
 
-import argparse
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
 import pandas as pd
 
+from studies.figure import folder_asked, print_table, save_chart
 from sweep.evaluation.summaries import design_outputs
 from sweep.evaluation.tables import design_matrix
 from sweep.optimise import minimise
 from sweep.optimise.starts.posing import problem_of
-from sweep.report.figures import OPTIMUM, REFERENCE, WIDTH, house_style, new_figure, save
+from sweep.report.figures import OPTIMUM, REFERENCE, WIDTH, new_figure
 from sweep.study import OptimiseSettings, load_study, study_from_data
 
 if TYPE_CHECKING:
@@ -62,16 +62,13 @@ def chart(joint: pd.DataFrame) -> Figure:
 
 def main() -> None:
     """Read the optimum of a run, follow it along h, write table and chart."""
-    parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("folder", type=Path, help="results of the study, with its designs/")
-    folder: Path = parser.parse_args().folder
+    folder = folder_asked(__doc__)
     best = pd.read_parquet(folder / "_optimum.parquet").iloc[0]
     small = best["status"] != 0  # smoke
     joint = along_h(best, [0.0, 5.0] if small else [0.0, 1.0, 2.0, 4.0, 6.0, 8.0, 10.0])
     joint.to_parquet(folder / "joint.parquet", index=False)
-    print(joint.to_string(index=False, float_format="{:.5g}".format))  # noqa: T201
-    with house_style():
-        print(save(chart(joint), folder / "figures" / "joint.svg").path)  # noqa: T201
+    print_table(joint, "{:.5g}")
+    save_chart(folder, "joint", lambda: chart(joint))
 
 
 if __name__ == "__main__":

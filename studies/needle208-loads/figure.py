@@ -6,7 +6,6 @@ per design and case) and FOLDER/figures/loads.svg.
 
 from __future__ import annotations
 
-import argparse
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -14,8 +13,9 @@ import numpy as np
 import pandas as pd
 
 import sweep
+from studies.figure import folder_asked, print_table, save_chart
 from sweep.families.base import Array
-from sweep.report.figures import OPTIMUM, REFERENCE, WIDTH, house_style, new_figure, save
+from sweep.report.figures import OPTIMUM, REFERENCE, WIDTH, new_figure
 from sweep.study import Study, load_study, study_from_data
 
 if TYPE_CHECKING:
@@ -101,9 +101,7 @@ def chart(table: pd.DataFrame, torques: dict[str, Array]) -> Figure:
 
 def main() -> None:
     """Read the optimum of a run, add load by load, write table and chart."""
-    parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("folder", type=Path, help="results of the study, with its designs/")
-    folder: Path = parser.parse_args().folder
+    folder = folder_asked(__doc__)
     study = load_study(Path(__file__).parent)
     assert study.reference is not None
     best = pd.read_parquet(folder / "_optimum.parquet").iloc[0]
@@ -114,9 +112,8 @@ def main() -> None:
     }
     table, torques = cases(study, designs)
     table.to_parquet(folder / "loads.parquet", index=False)
-    print(table.to_string(index=False, float_format="{:.4g}".format))  # noqa: T201
-    with house_style():
-        print(save(chart(table, torques), folder / "figures" / "loads.svg").path)  # noqa: T201
+    print_table(table, "{:.4g}")
+    save_chart(folder, "loads", lambda: chart(table, torques))
 
 
 if __name__ == "__main__":

@@ -6,7 +6,6 @@ FOLDER/figures/price.svg.
 
 from __future__ import annotations
 
-import argparse
 import json
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -14,13 +13,14 @@ from typing import TYPE_CHECKING
 import numpy as np
 import pandas as pd
 
+from studies.figure import folder_asked, print_table, save_chart
 from sweep.evaluation.summaries import design_outputs
 from sweep.evaluation.tables import design_matrix
 from sweep.jobs.progress import Phases, Say, unsaid
 from sweep.optimise.manufacture.robust import kept
 from sweep.optimise.manufacture.tolerance import deviating
 from sweep.optimise.starts.posing import problem_of
-from sweep.report.figures import LIMIT, OPTIMUM, QUIET, REFERENCE, WIDTH, house_style, new_figure, save
+from sweep.report.figures import LIMIT, OPTIMUM, QUIET, REFERENCE, WIDTH, new_figure
 from sweep.study import Study, load_study
 
 if TYPE_CHECKING:
@@ -103,17 +103,14 @@ def chart(table: pd.DataFrame, most: float) -> Figure:
 
 def main() -> None:
     """Read the optimum of a run, write table and chart."""
-    parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("folder", type=Path, help="results of the study, with its designs/")
-    folder: Path = parser.parse_args().folder
+    folder = folder_asked(__doc__)
     study = load_study(FOLDER)
     with Phases(show=True, quiet=False) as phases:
         table = price(study, mechanisms(study, folder), phases.say)
     table.to_csv(folder / "price.csv", index=False)
-    print(table.to_string(index=False, float_format="{:.5g}".format))  # noqa: T201
+    print_table(table, "{:.5g}")
     most = next(x.maximum for x in study.output_limits if x.output == "max_abs_dev")
-    with house_style():
-        print(save(chart(table, most or 0.0), folder / "figures" / "price.svg").path)  # noqa: T201
+    save_chart(folder, "price", lambda: chart(table, most or 0.0))
 
 
 if __name__ == "__main__":
