@@ -131,6 +131,25 @@ def inertia_loads(j: Joints, coupler: Coupler, bodies: Array, drive: Array) -> L
 
 
 @inline
+def put_plane(out: Array | None, i: int, k: int, good: float, a: Vector) -> None:
+    """Write what the frame bears, (3, n, m), of what it puts on the bodies; without ``out`` nothing is compiled."""
+    if out is not None:
+        out[0, i, k], out[1, i, k], out[2, i, k] = -good * a[0], -good * a[1], -good * a[2]
+
+
+@inline
+def borne(j: Joints, on: Loads) -> tuple[Vector, Vector]:
+    """Force and moment about the origin that the frame puts on all bodies: what they need, less the useful load."""
+    slides = 1.0 - j.turns
+    pushed = scale(slides * on.torque, j.tau)
+    force = sub(add(add(on.f1, on.f2), on.f3), pushed)
+    moment = add(add(on.t1, cross(add(j.A, on.d1), on.f1)), add(on.t2, cross(add(j.B, on.d2), on.f2)))
+    at = mix(j.turns, j.D, slides, j.C)
+    moment = add(moment, add(on.t3, cross(add(at, on.d3), on.f3)))
+    return force, sub(sub(moment, scale(j.turns * on.torque, j.k)), cross(at, pushed))
+
+
+@inline
 def loaded(on: Loads, wrench: Array) -> Loads:
     """Return the loads with a force and a moment about B, (6,), that act on the coupler from outside.
 
@@ -207,8 +226,10 @@ def kinetostatics(
     inertia: Array | None,
     wrench: Array | None = None,
     on_follower: Array | None = None,
+    frame_force: Array | None = None,
+    frame_moment: Array | None = None,
 ) -> None:
-    """Compute the frictionless joint reactions, driving torque and reduced inertia.
+    """Compute the frictionless joint reactions, driving torque and reduced inertia, and what the frame bears.
 
     Parameters
     ----------
@@ -225,6 +246,8 @@ def kinetostatics(
     inertia : (n, m, 2) or None; inertia reduced to the crank and its derivative
     wrench : (n, m, 6) or None; force and moment about B that act on the coupler besides, fixed axes
     on_follower : (n, m, 6) or None; force and moment about D that act on the follower besides, fixed axes
+    frame_force, frame_moment : (3, n, m) or None; force on the frame, and moment about its origin, that of the drive
+        included.  They are what the bodies need: nothing is solved for them, and friction inside changes nothing
 
     Notes
     -----
@@ -244,6 +267,10 @@ def kinetostatics(
                 load = loaded_follower(load, on_follower[i, k])
             if inertia is not None:
                 inertia[i, k, 0], inertia[i, k, 1] = good * load.j_red, good * load.dj_red
+            if frame_force is not None or frame_moment is not None:
+                force, moment = borne(j, load)
+                put_plane(frame_force, i, k, good, force)
+                put_plane(frame_moment, i, k, good, moment)
             if forces is not None or couples is not None:
                 r = solve(j, coupler, load, finger[i], zero, zero, 0.0, 0.0)
                 if forces is not None:

@@ -35,14 +35,12 @@ from kernels.effects.link_loads import (
     needed,
     prepare,
     put_lines,
-    put_on_frame,
     put_reactions,
-    put_wrench,
     room_for,
     solve,
 )
 from kernels.jit import inline, kernel
-from kernels.linkage.bodies import DRIVEN, Links, Moving, latter, moving, posed, vector, velocity_at
+from kernels.linkage.bodies import DRIVEN, Links, Moving, latter, moving, posed, put_wrench, vector, velocity_at
 from kernels.types import Array, Status
 
 MU, RADIUS, THRUST, FIRST, SECOND, PER_FRICTION = 0, 1, 2, 3, 4, 5
@@ -181,7 +179,6 @@ def link_friction(
     output: int,
     status: Status,
     forces: Array | None,
-    on_frame: Array | None,
     torque: Array | None,
     lost: Array | None,
     on_supports: Array | None,
@@ -194,7 +191,6 @@ def link_friction(
         supports along its axis from its place; a ball or a contact reads the first two
     status : also JAMMED where the loads do not settle
     forces : (n, m, Q, 6) or None; with what rubs, but of a driven joint with the drive torque in its place
-    on_frame : (n, m, 6) or None; as without friction, what rubs on the frame included
     lost : (n, m, Q + 1) or None; share of each joint's friction in the driving torque; passes of the iteration
     on_supports : (n, m, Q, 2) or None; loads of the supports across the axis; 0 for balls and contacts
     """
@@ -228,8 +224,8 @@ def link_friction(
                 for which in range(number):
                     torque[i, k] += loads[which] * driving(links, i, room, 1 + which)
                 torque[i, k] *= good
-            if forces is not None or on_frame is not None:
-                _store(links, i, k, joints, room, loads, good, total, forces, on_frame)
+            if forces is not None:
+                _store(links, i, k, joints, room, loads, good, total, forces)
             for which in range(number):
                 _sum(parts[which], loads, steps[1, :PART])
                 _, first, other = _sizes(joints[which], friction[i, which], steps[1])
@@ -251,14 +247,10 @@ def _store(
     loads: Array,
     good: float,
     total: Array,
-    forces: Array | None,
-    on_frame: Array | None,
+    forces: Array,
 ) -> None:
-    """Write what each joint bears with what rubs there, and what the frame bears."""
+    """Write what each joint bears with what rubs there."""
     lines = room.rows.shape[0]
-    if on_frame is not None:
-        for at in range(WRENCH):
-            on_frame[i, k, at] = 0.0
     for which in range(joints.shape[0]):
         _sum(room.found[which], loads, total)
         force, moment = vector(total), latter(total)
@@ -268,10 +260,6 @@ def _store(
         force, whole = add(force, rubbed), add(moment, couple)
         freedom = links.freedoms[i, max(joints[which, FREEDOM], 0), 1]
         driven = min(joints[which, KIND] == SHAFT, freedom == DRIVEN)
-        if forces is not None:
-            shown = moment if driven else whole
-            for at in range(3):
-                forces[i, k, which, at], forces[i, k, which, 3 + at] = good * force[at], good * shown[at]
-        if on_frame is not None:
-            share = good if room.ends[which, 1] < 0 else 0.0 * good
-            put_on_frame(on_frame[i, k], share, place, force, whole)
+        shown = moment if driven else whole
+        for at in range(3):
+            forces[i, k, which, at], forces[i, k, which, 3 + at] = good * force[at], good * shown[at]

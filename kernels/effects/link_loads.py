@@ -20,11 +20,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from kernels import status as st
-from kernels.arithmetic.vectors import Vector, add, cross, dot, mix, scale, spun, sub, turned
-from kernels.effects.kinetostatics import BODY, LEAST_COSINE
+from kernels.arithmetic.vectors import Vector, add, cross, dot, mix, scale, sub, turned
+from kernels.effects.kinetostatics import BODY, LEAST_COSINE, put_plane
 from kernels.jit import inline, kernel
 from kernels.linear.elimination import eliminate
-from kernels.linkage.bodies import DRIVEN, SLIDE, Links, Posed, latter, posed, vector
+from kernels.linkage.bodies import DRIVEN, SLIDE, Links, Posed, latter, point, posed, put_wrench, vector
 from kernels.types import Array, Status
 
 Index = NDArray[np.int64]
@@ -130,14 +130,6 @@ def inertia_times(body: Posed, data: Array, a: Vector) -> Vector:
 
 
 @inline
-def put_wrench(out: Array, force: Vector, at: Vector, couple: Vector) -> None:
-    """Write a force at a point and a couple as a wrench, (6,)."""
-    moment = add(cross(at, force), couple)
-    out[0], out[1], out[2] = force[0], force[1], force[2]
-    out[3], out[4], out[5] = moment[0], moment[1], moment[2]
-
-
-@inline
 def needed(
     links: Links, i: int, k: int, bodies: Array, tool: Array, drive: Array, carrier: int, output: int, room: Room
 ) -> tuple[float, float, Vector, Vector]:
@@ -151,8 +143,7 @@ def needed(
     square, change = drive[SPEED] * drive[SPEED], drive[CHANGE]
     for b in range(count):
         data, body = bodies[BODY * b : BODY * b + BODY], posed(records[b])
-        arm = turned(body.x, body.y, body.z, (data[1], data[2], data[3]))
-        v, a = add(body.v, cross(body.omega, arm)), add(body.a, spun(body.omega, body.eps, arm))
+        arm, v, a = point(body, data)
         force = scale(data[0], sub(mix(square, a, change, v), gravity))
         momentum, rate = inertia_times(body, data, body.omega), inertia_times(body, data, body.eps)
         about = add(mix(square, rate, change, momentum), scale(square, cross(body.omega, momentum)))
@@ -160,8 +151,7 @@ def needed(
         first += data[0] * dot(v, v) + dot(body.omega, momentum)
         second += data[0] * dot(v, a) + dot(momentum, body.eps)
     body = posed(records[carrier])
-    arm = turned(body.x, body.y, body.z, (tool[1], tool[2], tool[3]))
-    v, a = add(body.v, cross(body.omega, arm)), add(body.a, spun(body.omega, body.eps, arm))
+    arm, v, a = point(body, tool)
     force = sub(scale(tool[0], sub(mix(square, a, change, v), gravity)), vector(drive[FORCE:]))
     about = cross(add(body.at, arm), force)
     for at in range(3):
@@ -267,12 +257,29 @@ def driving(links: Links, i: int, room: Room, answer: int) -> float:
 
 
 @inline
-def put_on_frame(out: Array, good: float, place: Vector, force: Vector, moment: Vector) -> None:
-    """Take force and moment of the frame on a body off what the frame bears, (6,)."""
-    about = add(cross(place, force), moment)
-    for at in range(3):
-        out[at] -= good * force[at]
-        out[3 + at] -= good * about[at]
+def borne_force(
+    links: Links, i: int, k: int, bodies: Array, tool: Array, drive: Array, carrier: int, output: int
+) -> Vector:
+    """Force that the frame puts on all bodies and the tool: what they need, less the useful load."""
+    records, count, total = links.bodies[i, k], links.parents.shape[0], scale(-1.0, vector(drive[FORCE:]))
+    gravity, square, change = vector(bodies[BODY * count :]), drive[SPEED] * drive[SPEED], drive[CHANGE]
+    for b in range(count + 1):
+        data = bodies[BODY * b : BODY * b + BODY] if b < count else tool
+        _, v, a = point(posed(records[b if b < count else carrier]), data)
+        total = mix(1.0, total, data[0], sub(mix(square, a, change, v), gravity))
+    freedom = max(output, 0)
+    pushed = drive[LOAD] if output >= 0 and links.freedoms[i, freedom, 1] == SLIDE else 0.0
+    return mix(1.0, total, -pushed, vector(links.axes[i, k, freedom]))
+
+
+@inline
+def borne_moment(parents: Index, need: Array) -> Vector:
+    """Moment about the origin that the frame puts on all bodies; forces between them change nothing of it."""
+    x, y, z = 0.0, 0.0, 0.0
+    for b in range(parents.shape[0]):
+        held = 1.0 if parents[b] < 0 else 0.0
+        x, y, z = x + held * need[b, 3], y + held * need[b, 4], z + held * need[b, 5]
+    return x, y, z
 
 
 @kernel
@@ -286,7 +293,8 @@ def link_loads(
     output: int,
     status: Status,
     forces: Array | None,
-    on_frame: Array | None,
+    frame_force: Array | None,
+    frame_moment: Array | None,
     torque: Array | None,
     inertia: Array | None,
     on_tool: Array | None,
@@ -304,34 +312,34 @@ def link_loads(
     output : number of the freedom that the load acts on; below 0 for none
     status : (n, m), in and out; DEAD_POINT where the forces of the lines have no digits left; gives nan
     forces : (n, m, Q, 6) or None; force and moment of each joint, about its place, fixed axes
-    on_frame : (n, m, 6) or None; force on the frame and moment about its origin, that of the drive included
+    frame_force, frame_moment : (3, n, m) or None; on the frame, that of the drive included; needs no forces of lines
     torque : (n, m) or None; of the drive, on all freedoms that it turns together
     inertia : (n, m, 2) or None; inertia reduced to the crank and its derivative
     on_tool : (n, m, 4) or None; force of its carrier on the tool, fixed axes, and its power per unit crank speed
     """
     room = room_for(links, joints.shape[0], 0)
+    solved = forces is not None or torque is not None or inertia is not None or on_tool is not None
     for i in range(bodies.shape[0]):
         prepare(links, i, joints, room)
         for k in range(status.shape[1]):
             given = drive[i, k if drive.shape[1] > 1 else 0]
-            both = needed(links, i, k, bodies[i], tool[i], given, carrier, output, room)
-            put_lines(links, i, k, joints, room)
-            solvable = solve(links, i, room)
-            if status[i, k] == st.OK and not solvable:
-                status[i, k] = st.DEAD_POINT
+            if frame_moment is not None or solved:
+                both = needed(links, i, k, bodies[i], tool[i], given, carrier, output, room)
+            if solved:
+                put_lines(links, i, k, joints, room)
+                if not solve(links, i, room) and status[i, k] == st.OK:
+                    status[i, k] = st.DEAD_POINT
             good = 1.0 if status[i, k] == st.OK else math.nan
-            if forces is not None or on_frame is not None:
-                put_reactions(joints, room)
+            if frame_force is not None:
+                force = borne_force(links, i, k, bodies[i], tool[i], given, carrier, output)
+                put_plane(frame_force, i, k, good, force)
+            if frame_moment is not None:
+                put_plane(frame_moment, i, k, good, borne_moment(links.parents, room.need))
             if forces is not None:
+                put_reactions(joints, room)
                 for which in range(joints.shape[0]):
                     for at in range(WRENCH):
                         forces[i, k, which, at] = good * room.found[which, 0, at]
-            if on_frame is not None:
-                for at in range(WRENCH):
-                    on_frame[i, k, at] = 0.0
-                for which in range(joints.shape[0]):
-                    found, share = room.found[which, 0], good if room.ends[which, 1] < 0 else 0.0 * good
-                    put_on_frame(on_frame[i, k], share, vector(room.places[which]), vector(found), latter(found))
             if torque is not None:
                 torque[i, k] = good * driving(links, i, room, 0)
             if inertia is not None:

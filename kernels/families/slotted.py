@@ -255,7 +255,7 @@ def links(designs: Array, cos_phi: Array, sin_phi: Array, motion: Array, out: tr
     Parameters
     ----------
     designs : (n, 9);  cos_phi, sin_phi : (n, m) or (1, m)
-    motion : (6, n, m), outputs psi, dpsi, d2psi, rho, drho, d2rho of ``poses``
+    motion : (7, n, m), outputs cos_psi, sin_psi, dpsi, d2psi, rho, drho, d2rho of ``poses``
     out : crank, driven link, arm or block; four freedoms, three lines: the ball, whose forces act on the arm
     """
     for i in range(designs.shape[0]):
@@ -265,12 +265,12 @@ def links(designs: Array, cos_phi: Array, sin_phi: Array, motion: Array, out: tr
         centre, pivot = scale(d[2], u), (d[1], 0.0, d[3])
         row = i if cos_phi.shape[0] > 1 else 0
         for j in range(motion.shape[2]):
-            psi, dpsi, d2psi = motion[0, i, j], motion[1, i, j], motion[2, i, j]
-            rho, drho, d2rho = motion[3, i, j], motion[4, i, j], motion[5, i, j]
+            dpsi, d2psi = motion[2, i, j], motion[3, i, j]
+            rho, drho, d2rho = motion[4, i, j], motion[5, i, j], motion[6, i, j]
             bodies, axes = out.bodies[i, j], out.axes[i, j]
             crank = tree.put_crank(bodies[0], axes[0], centre, u, first, e2, cos_phi[row, j], sin_phi[row, j])
             ball = add(centre, scale(d[0], mix(cos_phi[row, j], first, sin_phi[row, j], e2)))
-            t = (math.cos(psi), math.sin(psi), 0.0)
+            t = (motion[0, i, j], motion[1, i, j], 0.0)
             n = cross(k, t)
             driven = tree.put_turning(bodies[1], pivot, k, t, dpsi, d2psi)
             tree.put(axes[1], k)

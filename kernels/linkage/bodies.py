@@ -16,7 +16,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from kernels.arithmetic.vectors import Vector, add, cross, dot, mix, norm, scale, spun, sub
+from kernels.arithmetic.vectors import Vector, add, cross, dot, mix, norm, scale, spun, sub, turned
 from kernels.jit import inline
 from kernels.types import Array
 
@@ -91,6 +91,21 @@ def vector(a: Array) -> Vector:
 def latter(a: Array) -> Vector:
     """Second three numbers; a slice would cost its bounds."""
     return a[3], a[4], a[5]
+
+
+@inline
+def point(body: Posed, data: Array) -> tuple[Vector, Vector, Vector]:
+    """Point of a body from its origin, in fixed axes, with velocity and acceleration; ``data`` has it behind a mass."""
+    arm = turned(body.x, body.y, body.z, (data[1], data[2], data[3]))
+    return arm, add(body.v, cross(body.omega, arm)), add(body.a, spun(body.omega, body.eps, arm))
+
+
+@inline
+def put_wrench(out: Array, force: Vector, at: Vector, couple: Vector) -> None:
+    """Write a force at a point and a couple as a wrench, (6,)."""
+    moment = add(cross(at, force), couple)
+    out[0], out[1], out[2] = force[0], force[1], force[2]
+    out[3], out[4], out[5] = moment[0], moment[1], moment[2]
 
 
 @inline

@@ -19,8 +19,8 @@ from sweep.families.base import Accuracy, Angles, Array, Columns, Family, Output
 from sweep.families.curve_features import Bends, Crossing, of_order, of_table
 from sweep.numerics.curves import Curve, TableCurve
 
-# Poses per block: their joint records, 24 numbers each, fill about half a second-level cache.
-BLOCK = 16384
+# Poses per block: so many that what a block costs by itself, some milliseconds, is little for each.
+BLOCK = 32768
 # Designs per block of an effect that samples the turn itself, some hundred poses of each.
 TURNS = 32
 # Relative step of central differences: error of second order against rounding.
@@ -41,8 +41,8 @@ class Added:
 
     def scene(self, designs: Array, angles: Angles) -> Scene:
         """Scene of the first stage, of all designs at their angles."""
-        own = len(self.family.parameters)
-        given = {p.name: np.ascontiguousarray(designs[:, own + k]) for k, p in enumerate(self.inputs)}
+        columns = np.ascontiguousarray(designs[:, len(self.family.parameters) :].T)
+        given = {p.name: column for p, column in zip(self.inputs, columns, strict=True)}
         return first_scene(self.family, self.own(designs), angles, given, self.curves)
 
 
@@ -58,15 +58,18 @@ def effect_poses(
     wanted : pose outputs of family and effects
     """
     family = added.family
-    columns = family.poses(added.own(designs), angles, wanted & frozenset(family.pose_names))
+    own = wanted & frozenset(family.pose_names)
     if np.iscomplexobj(designs) or np.iscomplexobj(angles.cos):
-        return _differenced(added, effects, designs, angles, wanted) | columns
+        return _differenced(added, effects, designs, angles, wanted) | family.poses(added.own(designs), angles, own)
     asked = [(placed, [name for name in placed.own if name in wanted]) for placed in effects]
     asked = [(placed, names) for placed, names in asked if names]
+    last, shape = len(stages_of(family)) - 1, (len(designs), angles.cos.shape[1])
+    # Without an output of the family's own its motion is that of the scenes, pose by pose.
+    bare = not own and bool(asked) and not any(placed.entry.whole_turn for placed, _ in asked)
+    columns: Columns = {} if bare else family.poses(added.own(designs), angles, own)
     if not asked:
         return columns
-    shape = columns["status"].shape
-    status: Status = np.array(columns["status"], dtype=np.uint8)
+    status: Status = np.zeros(shape, np.uint8) if bare else np.array(columns["status"], dtype=np.uint8)
     columns |= {name: np.empty(shape) for _, names in asked for name in names}
     pointwise = [pair for pair in asked if not pair[0].entry.whole_turn]
     whole = [pair for pair in asked if pair[0].entry.whole_turn]
@@ -74,6 +77,8 @@ def effect_poses(
     for parts, blocks in ((pointwise, _blocks(shape, BLOCK)), (whole, _row_blocks(shape))):
         for rows, poses in blocks if parts else ():
             scene = added.scene(designs[rows], _part(angles, rows, poses))
+            if bare:
+                status[rows, poses] = scene.stage(last).status()
             for placed, names in parts:
                 found = placed.entry.compute(scene.stage(placed.stage), frozenset(placed.own[name] for name in names))
                 take_over(status[rows, poses], found["status"])

@@ -14,11 +14,10 @@ from kernels.types import Status
 from sweep.effects import loads
 from sweep.effects.loads import FRICTION_SUFFIX, FRICTION_TEXT, Named, together
 from sweep.effects.scene import Scene, refuse
-from sweep.effects.tool import weighs
+from sweep.effects.tool import Weighs, weighs
 from sweep.families.base import Array, Columns, Parameter
 from sweep.families.poses import optional_outputs
 
-SHAKING = "shaking_force"
 COUPLES = {
     "finger_couple": ("torque", "couple of the finger along n x w"),
     "drive_torque": ("torque", "torque that drives the crank, about its axis"),
@@ -35,7 +34,7 @@ CONTRACTION = "friction_contraction"
 PASSES = "friction_passes"
 
 
-def forces(follower: str, suffix: str = "", text: str = "") -> Named:
+def joint_forces(follower: str, suffix: str = "", text: str = "") -> Named:
     """Six vectors in the order in which the kernel gives them, with unit and meaning."""
     about = "about D" if follower == "rocker" else "about C"
     found = {
@@ -49,16 +48,12 @@ def forces(follower: str, suffix: str = "", text: str = "") -> Named:
     return {f"{name}{suffix}": (unit, f"{words}{text}") for name, (unit, words) in found.items()}
 
 
-FORCES = tuple(forces("rocker"))
+FORCES = tuple(joint_forces("rocker"))
 
 
 def vectors(follower: str, suffix: str = "", text: str = "") -> Named:
     """Vectors that are given: the six of the joints, and what the frame bears."""
-    moment = "moment on the frame about the origin of the family's frame, drive torque included"
-    return forces(follower, suffix, text) | {
-        f"{SHAKING}{suffix}": ("force", f"force on the frame{text}"),
-        f"shaking_moment{suffix}": ("torque", f"{moment}{text}"),
-    }
+    return joint_forces(follower, suffix, text) | loads.frame(suffix, text)
 
 
 _JOINTS = {"a": "crank bearing", "b": "ball joint at B", "c": "ball joint at C"}
@@ -142,20 +137,21 @@ def _bodies(scene: Scene) -> Array:
 
 def frictionless(scene: Scene, load: Array, wanted: frozenset[str], status: Status) -> Columns:
     """Wanted reactions and inertias; a group none of whose outputs is wanted is not compiled."""
-    groups = loads.asked(vectors(""), wanted), not wanted.isdisjoint(COUPLES), not wanted.isdisjoint(INERTIAS)
+    groups = loads.asked(FORCES, wanted), not wanted.isdisjoint(COUPLES), not wanted.isdisjoint(INERTIAS)
     sizes = zip((18, 2, 2), groups, strict=True)
     forces, couples, inertia = (np.empty((*scene.shape, size)) if asked else None for size, asked in sizes)
+    on_frame = loads.frame_room(scene.shape, wanted)
     drive = _drive(scene, load)
     tool = weighs(scene, drive, inertia is not None)
     kinetostatics(
         *scene.records, _bodies(scene), drive, scene.inputs["finger"], status, forces, couples, inertia, tool.coupler,
-        tool.follower,
+        tool.follower, *on_frame,
     )  # fmt: skip
     if inertia is not None and tool.inertia is not None:
         inertia += tool.inertia
     if forces is not None:
         scene.memo["reactions"] = forces, status
-    columns = _vector_columns(forces, scene.records, wanted)
+    columns = _vector_columns(forces, wanted) | loads.frame_columns(on_frame, wanted)
     for names, values in ((COUPLES, couples), (INERTIAS, inertia)):
         columns |= loads.scalar_columns(names, values, wanted)
     return columns
@@ -166,7 +162,7 @@ def with_friction(scene: Scene, load: Array, wanted: frozenset[str], status: Sta
     refuse(status, together(scene, "a") | together(scene, "d"))
     lost = tuple(losses(loads.follower(scene)))
     sizes = (
-        (18, loads.asked(vectors("", FRICTION_SUFFIX), wanted)),
+        (18, loads.asked(joint_forces("", FRICTION_SUFFIX), wanted)),
         (2, not wanted.isdisjoint(COUPLES_WITH_FRICTION)),
         (len(lost), not wanted.isdisjoint(lost)),
     )
@@ -184,36 +180,30 @@ def with_friction(scene: Scene, load: Array, wanted: frozenset[str], status: Sta
         *scene.records, _bodies(scene), drive, data, scene.inputs["finger"], status, forces, couples, given,
         contraction, tool.coupler, tool.follower,
     )  # fmt: skip
-    columns = _vector_columns(forces, scene.records, wanted, FRICTION_SUFFIX)
+    columns = _vector_columns(forces, wanted, FRICTION_SUFFIX)
+    columns |= _frame(scene, drive, tool, status, wanted, FRICTION_SUFFIX)
     for names, values in ((tuple(COUPLES_WITH_FRICTION), couples), (lost, given)):
         columns |= loads.scalar_columns(names, values, wanted)
     return columns if contraction is None else columns | {CONTRACTION: contraction}
 
 
-def _vector_columns(
-    forces: Array | None, records: tuple[Array, Array], wanted: frozenset[str], suffix: str = ""
+def _frame(
+    scene: Scene, drive: Array, tool: Weighs, status: Status, wanted: frozenset[str], suffix: str = ""
 ) -> Columns:
-    """Wanted magnitudes and components of the six vectors, (n, m, 18), and of force and moment on the frame."""
+    """Wanted force and moment on the frame, which friction inside does not change; nan where the status is not OK."""
+    on_frame = loads.frame_room(scene.shape, wanted, suffix)
+    if on_frame == (None, None):
+        return {}
+    kinetostatics(
+        *scene.records, _bodies(scene), drive, scene.inputs["finger"], status, None, None, None, tool.coupler,
+        tool.follower, *on_frame,
+    )  # fmt: skip
+    return loads.frame_columns(on_frame, wanted, suffix)
+
+
+def _vector_columns(forces: Array | None, wanted: frozenset[str], suffix: str = "") -> Columns:
+    """Wanted magnitudes and components of the six vectors, (n, m, 18)."""
     if forces is None:
         return {}
     found = {f"{name}{suffix}": forces[:, :, 3 * k : 3 * k + 3] for k, name in enumerate(FORCES)}
-    shaking, moment = f"{SHAKING}{suffix}", f"shaking_moment{suffix}"
-    if shaking in wanted:
-        found[shaking] = forces[:, :, 0:3] + forces[:, :, 9:12]
-    if loads.asked((moment,), wanted):
-        found[moment] = _frame_moment(forces, records)
     return loads.vector_columns(found, wanted)
-
-
-def _frame_moment(forces: Array, records: tuple[Array, Array]) -> Array:
-    """Moment of crank and follower on the frame about the origin of the family's frame, (n, m, 3).
-
-    The moments of the bearings are about A, and about D or, where a slider moves, about C; each force adds its arm.
-    """
-    poses, designs = (joints[..., None, :] if joints.ndim == 2 else joints for joints in records)
-    turns = designs[..., 16:17] == 1.0
-    follower = np.where(turns, designs[..., 9:12], poses[..., 3:6])
-    on_links = forces[:, :, 12:15] + np.cross(designs[..., 6:9], forces[:, :, 0:3])
-    on_links += forces[:, :, 15:18] + np.cross(follower, forces[:, :, 9:12])
-    moment: Array = -on_links
-    return moment

@@ -22,10 +22,6 @@ KINDS = {
     "ball": link_loads.BALL,
     "contact": link_loads.CONTACT,
 }
-FRAME = {
-    "shaking_force": ("force", "force on the frame"),
-    "shaking_moment": ("torque", "moment on the frame about the origin of the family's frame, drive torque included"),
-}
 INERTIAS = {
     "reduced_inertia": ("inertia", "inertia of all links and the tool, of later stages too, reduced to the crank"),
     "dreduced_inertia": ("inertia", "derivative of the reduced inertia by the crank angle"),
@@ -59,6 +55,7 @@ def body_inputs(tree: LinkTree) -> tuple[Parameter, ...]:
     return tuple(found)
 
 
+@lru_cache
 def _whole(name: str, axes: str) -> tuple[Parameter, ...]:
     return loads.body_inputs(name, axes, 0.0)
 
@@ -118,7 +115,7 @@ def vectors(tree: LinkTree, suffix: str = "", text: str = "") -> Named:
             found[f"moment_{joint.name}{suffix}"] = (
                 "torque", f"{joint.text}: moment of the {joint.acts}{text}",
             )  # fmt: skip
-    return found | {f"{name}{suffix}": (unit, f"{words}{text}") for name, (unit, words) in FRAME.items()}
+    return found | loads.frame(suffix, text)
 
 
 def losses(tree: LinkTree) -> Named:
@@ -209,43 +206,39 @@ def _drive(scene: Scene, load: Array) -> Array:
     return np.stack(np.broadcast_arrays(*scene.crank(), load, *force), axis=2)
 
 
-def _vector_columns(
-    tree: LinkTree, forces: Array | None, on_frame: Array | None, wanted: frozenset[str], suffix: str = ""
-) -> Columns:
-    """Wanted magnitudes and components of joint reactions (n, m, Q, 6) and of what the frame bears, (n, m, 6)."""
+def _vector_columns(tree: LinkTree, forces: Array | None, wanted: frozenset[str], suffix: str = "") -> Columns:
+    """Wanted magnitudes and components of joint reactions (n, m, Q, 6)."""
+    if forces is None:
+        return {}
     found = {}
-    if forces is not None:
-        for k, joint in enumerate(tree.joints):
-            found[f"force_{joint.name}{suffix}"] = forces[:, :, k, :3]
-            found[f"moment_{joint.name}{suffix}"] = forces[:, :, k, 3:]
-    if on_frame is not None:
-        found |= {f"shaking_force{suffix}": on_frame[:, :, :3], f"shaking_moment{suffix}": on_frame[:, :, 3:]}
+    for k, joint in enumerate(tree.joints):
+        found[f"force_{joint.name}{suffix}"] = forces[:, :, k, :3]
+        found[f"moment_{joint.name}{suffix}"] = forces[:, :, k, 3:]
     return loads.vector_columns(found, wanted)
 
 
-def _asked_for(scene: Scene, wanted: frozenset[str], suffix: str = "") -> tuple[Array | None, Array | None]:
-    """Room for the reactions of the joints and for what the frame bears; None where no output of it is wanted."""
-    tree, frame = tree_of(scene), tuple(f"{name}{suffix}" for name in FRAME)
+def _reactions(scene: Scene, wanted: frozenset[str], suffix: str = "") -> Array | None:
+    """Room for the reactions of the joints; None where none of them is wanted."""
+    tree, frame = tree_of(scene), loads.frame(suffix)
     joints = tuple(name for name in vectors(tree, suffix) if name not in frame)
-    forces = np.empty((*scene.shape, len(tree.joints), 6)) if loads.asked(joints, wanted) else None
-    return forces, np.empty((*scene.shape, 6)) if loads.asked(frame, wanted) else None
+    return np.empty((*scene.shape, len(tree.joints), 6)) if loads.asked(joints, wanted) else None
 
 
 def frictionless(scene: Scene, load: Array, wanted: frozenset[str], status: Status) -> Columns:
     """Wanted reactions, driving torque and inertias; what is not wanted is not compiled."""
     tree, shape = tree_of(scene), scene.shape
-    forces, on_frame = _asked_for(scene, wanted)
+    forces, on_frame = _reactions(scene, wanted), loads.frame_room(scene.shape, wanted)
     torque = np.empty(shape) if "drive_torque" in wanted else None
     inertia = np.empty((*shape, 2)) if not wanted.isdisjoint(INERTIAS) else None
     of_tool = loads.asked(TOOL_VECTOR, wanted) or TOOL_TORQUE in wanted
     on_tool = np.empty((*shape, 4)) if of_tool else None
     link_loads.link_loads(
         scene.links, joint_table(tree), _bodies(scene), _tool(scene), _drive(scene, load), tree.carrier, tree.output,
-        status, forces, on_frame, torque, inertia, on_tool,
+        status, forces, *on_frame, torque, inertia, on_tool,
     )  # fmt: skip
     if forces is not None:
         scene.memo["reactions"] = forces.reshape(*shape, 6 * len(tree.joints)), status
-    columns = _vector_columns(tree, forces, on_frame, wanted)
+    columns = _vector_columns(tree, forces, wanted) | loads.frame_columns(on_frame, wanted)
     if on_tool is not None:
         columns |= loads.vector_columns({"tool_load": on_tool[:, :, :3]}, wanted)
         columns |= {TOOL_TORQUE: on_tool[:, :, 3]} if TOOL_TORQUE in wanted else {}
@@ -271,15 +264,22 @@ def with_friction(scene: Scene, load: Array, wanted: frozenset[str], status: Sta
         same |= together(scene, joint.name) if joint.kind in SUPPORTED else False
     refuse(status, same)
     number, lost, supports = len(tree.joints), tuple(losses(tree)), support_loads(tree)
-    forces, on_frame = _asked_for(scene, wanted, FRICTION_SUFFIX)
+    forces = _reactions(scene, wanted, FRICTION_SUFFIX)
     torque = np.empty(shape) if TORQUE_WITH_FRICTION in wanted else None
     given = np.empty((*shape, number + 1)) if not wanted.isdisjoint(lost) else None
     carried = np.empty((*shape, number, 2)) if not wanted.isdisjoint(supports) else None
     link_friction.link_friction(
         scene.links, joint_table(tree), _bodies(scene), _tool(scene), _drive(scene, load), _friction_data(scene),
-        tree.carrier, tree.output, status, forces, on_frame, torque, given, carried,
+        tree.carrier, tree.output, status, forces, torque, given, carried,
     )  # fmt: skip
-    columns = _vector_columns(tree, forces, on_frame, wanted, FRICTION_SUFFIX)
+    columns = _vector_columns(tree, forces, wanted, FRICTION_SUFFIX)
+    on_frame = loads.frame_room(scene.shape, wanted, FRICTION_SUFFIX)
+    if on_frame != (None, None):  # friction is inside: it changes nothing of what the frame bears
+        link_loads.link_loads(
+            scene.links, joint_table(tree), _bodies(scene), _tool(scene), _drive(scene, load), tree.carrier,
+            tree.output, status, None, *on_frame, None, None, None,
+        )  # fmt: skip
+    columns |= loads.frame_columns(on_frame, wanted, FRICTION_SUFFIX)
     if torque is not None:
         columns[TORQUE_WITH_FRICTION] = torque
     columns |= loads.scalar_columns(lost, given, wanted)

@@ -193,7 +193,7 @@ def _closed(kind: loads.Follower) -> Effect:
         inputs=kind.parameters,
         tool_inputs=loads.TOOLS,
         outputs=(
-            *loads.vector_outputs(kinetostatics.vectors(kind.name), CLOSED_EQUATION, (kinetostatics.SHAKING,)),
+            *loads.vector_outputs(kinetostatics.vectors(kind.name), CLOSED_EQUATION),
             *loads.scalar_outputs(kinetostatics.COUPLES | kinetostatics.INERTIAS, CLOSED_EQUATION),
         ),
         compute=compute_loads,
@@ -205,12 +205,12 @@ def _closed(kind: loads.Follower) -> Effect:
 
 
 def _closed_friction(kind: loads.Follower) -> Effect:
-    equation, shaking = CLOSED_FRICTION_EQUATION, f"{kinetostatics.SHAKING}{FRICTION_SUFFIX}"
+    equation = CLOSED_FRICTION_EQUATION
     vectors = kinetostatics.vectors(kind.name, FRICTION_SUFFIX, FRICTION_TEXT)
     scalars = kinetostatics.COUPLES_WITH_FRICTION | kinetostatics.losses(kind)
     contraction = "rho(L), bound of its rate; below 1 the solution is unique"
     outputs = _with_kinks((
-        *loads.vector_outputs(vectors, equation, (shaking,)),
+        *loads.vector_outputs(vectors, equation),
         *loads.scalar_outputs(scalars, equation, kinetostatics.PASSES),
         Output(kinetostatics.CONTRACTION, "1", contraction, equation),
     ))  # fmt: skip

@@ -23,6 +23,7 @@ from sweep.families.link_tree import LinkTree
 LOADS, FRICTION = "D1, D3", "D2"  # keys of the effects that hand something back
 INERTIAS = ("reduced_inertia", "dreduced_inertia")
 _TORQUE = {LOADS: "drive_torque", FRICTION: "drive_torque_friction"}
+_SHAKING_FORCE = frozenset(f"shaking_force{tail}" for tail in ("", "_x", "_y", "_z"))
 _HANDED_BACK = {LOADS: frozenset({_TORQUE[LOADS], *INERTIAS}), FRICTION: frozenset({_TORQUE[FRICTION]})}
 
 Reactions: TypeAlias = Callable[[Scene, Array, frozenset[str], Status], Columns]
@@ -74,7 +75,9 @@ def inputs_of_loads(family: Family) -> tuple[Parameter, ...]:
 
 def compute_loads(scene: Scene, wanted: frozenset[str]) -> Columns:
     """Wanted reactions, driving torque and inertias of one stage, those of the later stages included."""
-    found, status, handed_back = _route_of(scene), scene.status(), behind(scene, LOADS)
+    found, status = _route_of(scene), scene.status()
+    # A torque that the next stage hands back leaves the force on the frame as it is.
+    handed_back = None if wanted <= _SHAKING_FORCE else behind(scene, LOADS)
     columns = found.frictionless(scene, _on_output(scene, found, handed_back, LOADS), wanted, status)
     if handed_back is not None:
         take_over(status, handed_back["status"])

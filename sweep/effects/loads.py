@@ -81,6 +81,11 @@ def as_point(mass: Parameter) -> Parameter:
     return replace(mass, text=f"{mass.text}; {POINT}")
 
 
+# Entries of a tensor in the order of its inputs.
+_FIRST, _SECOND = np.array([0, 0, 0, 1, 1, 2]), np.array([0, 1, 2, 1, 2, 2])
+_UNIT = np.array([1.0, 0.0, 0.0, 1.0, 0.0, 1.0])
+
+
 def put_rod(columns: Array, rod: Array, line_mass: Array, gyration: Array, start: Array, end: Array) -> None:
     """Make bodies rods where ``rod`` is 1: masses, centres and moments of inertia (n, BODY), in place.
 
@@ -93,14 +98,15 @@ def put_rod(columns: Array, rod: Array, line_mass: Array, gyration: Array, start
     start, end : (n, 3) its joints in the axes of the body
     """
     along = end - start
-    square = (along * along).sum(axis=1)
+    lengths = along * along
+    square = lengths[:, 0] + lengths[:, 1] + lengths[:, 2]
     columns[:, 0] += rod * line_mass * np.sqrt(square)
-    columns[:, 1:4] += rod[:, None] * 0.5 * (start + end)
-    mass = rod * columns[:, 0] / 12.0
-    for at, (x, y) in enumerate(((0, 0), (0, 1), (0, 2), (1, 1), (1, 2), (2, 2))):
-        columns[:, 4 + at] += mass * ((square if x == y else 0.0) - along[:, x] * along[:, y])
-        turned = along[:, x] * along[:, y] / np.where(square > 0.0, square, 1.0)
-        columns[:, 4 + at] += 12.0 * mass * gyration**2 * (float(x == y) + turned)
+    columns[:, 1:4] += (0.5 * rod)[:, None] * (start + end)
+    mass, across = rod * columns[:, 0] / 12.0, along[:, _FIRST] * along[:, _SECOND]
+    columns[:, 4:10] += mass[:, None] * (square[:, None] * _UNIT - across)
+    if gyration.any():
+        per = np.divide(1.0, square, out=np.zeros_like(square), where=square > 0.0)
+        columns[:, 4:10] += (12.0 * mass * gyration**2)[:, None] * (_UNIT + per[:, None] * across)
 
 
 def rod_inputs(body: str, frame: str) -> tuple[Parameter, ...]:
@@ -191,13 +197,10 @@ def follower_of(family: Family) -> Follower:
     return SLIDER if joints is not None and joints.follower == SLIDER.name else ROCKER
 
 
-def vector_outputs(named: Named, equation: str, whole: Collection[str] = ()) -> tuple[Output, ...]:
-    """Magnitude and components of vectors; of those in ``whole`` the magnitude alone."""
+def vector_outputs(named: Named, equation: str) -> tuple[Output, ...]:
+    """Magnitude and components of vectors."""
     found = []
     for name, (unit, text) in named.items():
-        if name in whole:
-            found.append(Output(name, unit, f"magnitude of the {text}", equation))
-            continue
         found.append(Output(name, unit, f"magnitude: {text}", equation))
         found += [Output(f"{name}_{axis}", unit, f"{axis}: {text}", equation) for axis in AXES]
     return tuple(found)
@@ -206,6 +209,31 @@ def vector_outputs(named: Named, equation: str, whole: Collection[str] = ()) -> 
 def scalar_outputs(named: Named, equation: str, jumps: str = "") -> tuple[Output, ...]:
     """List outputs that are no vectors; the one called ``jumps`` jumps."""
     return tuple(Output(name, unit, text, equation, name == jumps) for name, (unit, text) in named.items())
+
+
+def frame(suffix: str = "", text: str = "") -> Named:
+    """Force and moment of the bearings on the frame."""
+    moment = "moment on the frame about the origin of the family's frame, drive torque included"
+    return {
+        f"shaking_force{suffix}": ("force", f"force on the frame{text}"),
+        f"shaking_moment{suffix}": ("torque", f"{moment}{text}"),
+    }
+
+
+def frame_room(shape: tuple[int, int], wanted: frozenset[str], suffix: str = "") -> tuple[Array | None, Array | None]:
+    """Room for force and moment on the frame, (3, n, m) each; None for what is not wanted."""
+    force, moment = (np.empty((3, *shape)) if asked((name,), wanted) else None for name in frame(suffix))
+    return force, moment
+
+
+def frame_columns(on_frame: tuple[Array | None, Array | None], wanted: frozenset[str], suffix: str = "") -> Columns:
+    """Wanted magnitudes and components of force and moment on the frame, (3, n, m) or None each."""
+    columns: Columns = {}
+    for name, vector in zip(frame(suffix), on_frame, strict=True):
+        if vector is not None:
+            columns |= {f"{name}_{a}": x for a, x in zip(AXES, vector, strict=True) if f"{name}_{a}" in wanted}
+            columns |= {name: np.sqrt(np.square(vector).sum(axis=0))} if name in wanted else {}
+    return columns
 
 
 def asked(names: Collection[str], wanted: frozenset[str]) -> bool:

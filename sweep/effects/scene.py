@@ -70,10 +70,17 @@ class Scene:
 
     @cached_property
     def motion(self) -> Columns:
-        """Pose outputs of the family that its joint records, or the poses of its links, are made of."""
+        """Pose outputs of the family that its joint records, or its links, and the next stage's crank are made of."""
         tree = self.family.find(LinkTree)
-        needs = self._joints.needs if tree is None else tree.needs
+        needs = {*(self._joints.needs if tree is None else tree.needs), *(self._gears if self.after else ())}
+        if self.after:
+            needs |= driving_names(self.family, self.after[0].family)
         return self.family.poses(self.designs, self.angles, frozenset(needs))
+
+    @cached_property
+    def _gears(self) -> tuple[str, str]:
+        rate = self.family.derivative_of[self.family.position]
+        return rate, self.family.derivative_of[rate]
 
     @cached_property
     def records(self) -> tuple[Array, Array]:
@@ -110,9 +117,7 @@ class Scene:
         if not self.after:
             return None
         following, *rest = self.after
-        names = frozenset(driving_names(self.family, following.family))
-        turn = self.family.poses(self.designs, self.angles, names)
-        angles = drive(turn, self.family.position, following.kappa, following.offset)
+        angles = drive(self.motion, self.family.position, following.kappa, following.offset)
         return Scene(following.family, following.designs, angles, following.inputs, tuple(rest), self, following.curves)
 
     def stage(self, index: int) -> Scene:
@@ -126,11 +131,8 @@ class Scene:
     @cached_property
     def gear(self) -> tuple[Array, Array]:
         """First and second derivative of the next stage's crank angle with respect to this stage's, (n, m)."""
-        rate = self.family.derivative_of[self.family.position]
-        names = rate, self.family.derivative_of[rate]
-        turn = self.family.poses(self.designs, self.angles, frozenset(names))
         kappa = self.after[0].kappa[:, None]
-        first, second = (kappa * np.asarray(turn[name], np.float64) for name in names)
+        first, second = (kappa * np.asarray(self.motion[name], np.float64) for name in self._gears)
         return first, second
 
     @cached_property

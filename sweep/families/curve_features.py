@@ -98,6 +98,17 @@ class Bends:
     squares: bool = False
 
 
+@dataclass(frozen=True)
+class Smooth:
+    """A dear pose output that is smooth all over the turn: the length of the vector that the outputs ``parts`` make.
+
+    A number is its own only part.
+    """
+
+    of: str
+    parts: tuple[str, ...]
+
+
 def waves(family: Family, designs: Array) -> Array:
     """How many waves one turn holds at least, (n,)."""
     most = np.ones(len(designs))

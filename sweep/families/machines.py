@@ -132,7 +132,8 @@ def _built(machine: Machine, members: tuple[Member, ...]) -> Machine:
     found = replace(found, poses=partial(_poses, found))  # events of a thread are looked for on poses of the others
     poses = partial(_poses, found)
     precise = partial(_precise_poses, found) if any(m.family.precise_poses for m in placed) else None
-    capabilities = (*found.capabilities, *switches_of_events(found))
+    smooth = (known for r in machine.relations if isinstance(r, Shaking | ShaftTorque) for known in r.smooth)
+    capabilities = (*found.capabilities, *switches_of_events(found), *smooth)
     found = replace(found, poses=poses, precise_poses=precise, capabilities=capabilities)
     steps = [taking_step(r, found) for r in machine.relations if isinstance(r, Taking)]
     steps += [entering_step(r, found) for r in machine.relations if isinstance(r, Entering)]

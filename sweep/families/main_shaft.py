@@ -16,6 +16,7 @@ from kernels import status as st
 from kernels.effects.speed_fluctuation import RESOLVED
 from kernels.types import Array, Status
 from sweep.families.base import Accuracy, Angles, Columns, Output, Parameter, Step, Work
+from sweep.families.curve_features import Smooth
 from sweep.families.frames import Frame
 from sweep.numerics.steady_speed import ERROR, FINER, GRIDS, LEFT, PER_LEFT, steady
 
@@ -67,6 +68,11 @@ class ShaftTorque:
         )
         lost = Output(f"{self.name}_friction", "torque", f"torque on it that friction of {words} takes", "2")
         return (*found, lost) if self.rubs else found
+
+    @property
+    def smooth(self) -> tuple[Smooth, ...]:
+        """Torque and inertia are smooth over the turn; friction is not."""
+        return tuple(Smooth(name, (name,)) for name in (self.name, f"{self.name}_inertia", f"{self.name}_dinertia"))
 
     @property
     def numbers(self) -> tuple[Output, ...]:

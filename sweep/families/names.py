@@ -38,6 +38,7 @@ def stem(name: str) -> str:
     return parts(name).stem
 
 
+@lru_cache(maxsize=4096)
 def at_stage(name: str, number: str) -> str:
     """Name at the stage of that number without the number; "" for a name of another stage.
 

@@ -9,6 +9,7 @@ from typing import Any
 from sweep.errors import InputError
 from sweep.families.base import Family, Output, Parameter
 from sweep.families.capabilities import GuidedPoint, JointRecords, Skeleton, ToolPoint
+from sweep.families.curve_features import Smooth
 from sweep.families.frames import CRANKS, Frame
 from sweep.families.link_tree import LinkTree
 from sweep.families.relations import with_size
@@ -23,8 +24,6 @@ class Shaken:
     Parameters
     ----------
     member, stage : its names; the stage is empty where there is one only
-    forces : pose outputs whose sum with ``sign`` is the force on the frame, without axis and stage
-    sign : of those forces
     rod : whether a tool runs along a line beside which its point may stand: the guides of the line bear the couple
     driving : the stage before that drives it, if that is part of the machine's shaking too; "" for the shaft
     crank : its joint on the crank axis
@@ -32,8 +31,6 @@ class Shaken:
 
     member: str
     stage: str
-    forces: tuple[str, ...]
-    sign: float
     rod: bool
     driving: str = ""
     crank: str = "a"
@@ -60,12 +57,7 @@ def shaken(member: str, stage: str, family: Family, listed: Sequence[tuple[str, 
     InputError
         for a family without forces.
     """
-    if family.find(LinkTree) is not None:
-        sign = 1.0
-        forces: tuple[str, ...] = ("shaking_force",)
-    elif family.find(JointRecords) is not None:
-        forces, sign = ("force_a", "force_d"), -1.0
-    else:
+    if family.find(LinkTree) is None and family.find(JointRecords) is None:
         allowed = f"a mechanism whose forces are known; {family.name} has none"
         raise InputError("shaking", f"{member}{stage}", allowed, "machine.relations")
     tool = family.find(ToolPoint)
@@ -73,7 +65,7 @@ def shaken(member: str, stage: str, family: Family, listed: Sequence[tuple[str, 
     before = str(int(stage) - 1) if stage else ""
     skeleton = family.find(Skeleton)
     crank = next((name for name in CRANKS if skeleton and name in skeleton.fixed), "")
-    return Shaken(member, stage, forces, sign, rod, before if (member, before) in listed else "", crank)
+    return Shaken(member, stage, rod, before if (member, before) in listed else "", crank)
 
 
 @dataclass(frozen=True)
@@ -97,6 +89,13 @@ class Shaking:
         return tuple(found)
 
     @property
+    def smooth(self) -> tuple[Smooth, ...]:
+        """Its outputs are smooth over the turn: each component, and both vectors."""
+        vectors = {name: tuple(f"{name}_{x}" for x in AXES) for name in (self.name, self._moment)}
+        alone = (Smooth(part, (part,)) for parts in vectors.values() for part in parts)
+        return (*(Smooth(name, parts) for name, parts in vectors.items()), *alone)
+
+    @property
     def parameters(self) -> tuple[Parameter, ...]:
         """It has none of its own."""
         return ()
@@ -112,7 +111,7 @@ class Shaking:
         """Name the forces of the frame on every stage, and moments where one is wanted."""
         names: set[str] = set()
         for one in self.stages:
-            vectors = [*one.forces, *(["shaking_moment"] if self._turning(wanted) else [])]
+            vectors = ["shaking_force", *(["shaking_moment"] if self._turning(wanted) else [])]
             names |= {one.named(f"{vector}_{axis}") for vector in vectors for axis in AXES}
             if self._turning(wanted) and one.rod:
                 names |= {one.named("tool_load"), one.named("dev")}
@@ -126,8 +125,7 @@ class Shaking:
         moment: list[Any] = [0.0, 0.0, 0.0]
         for one in self.stages:
             frame = frames[f"{one.member}{one.stage}"]
-            parts = zip(*(one.vector(found, vector) for vector in one.forces), strict=True)
-            own = frame.turned([one.sign * sum(part) for part in parts])
+            own = frame.turned(one.vector(found, "shaking_force"))
             force = [total + part for total, part in zip(force, own, strict=True)]
             if self._turning(wanted):
                 about = frame.turned(self._about_own(one, found))

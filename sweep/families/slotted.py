@@ -70,7 +70,7 @@ def unit(designs: Array) -> Array:
     return np.ones(len(designs))
 
 
-_RATES = ("psi", "dpsi", "d2psi", "rho", "drho", "d2rho")
+_RATES = ("cos_psi", "sin_psi", "dpsi", "d2psi", "rho", "drho", "d2rho")
 LINKS = LinkTree(
     bodies=(
         LinkBody("crank", "along the crank, tangential, along its axis, from A"),

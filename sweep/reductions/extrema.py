@@ -1,8 +1,8 @@
 """True extrema over one turn of any pose output of any family; docs/extrema.md.
 
 Sampled, refined between the samples, and sampled again more densely where the samples do not resolve the curve.  A
-chain of families that can be fused has one kernel for that; what it leaves open, and everything else, is searched for
-from poses alone.
+chain of families that can be fused has one kernel for that, and a smooth curve of dear poses is the Fourier series of
+its samples; what they leave open, and everything else, is searched for from poses alone.
 """
 
 from __future__ import annotations
@@ -18,6 +18,7 @@ from sweep.families.curve_features import crossed
 from sweep.quantities.kinds import Request
 from sweep.reductions import fused, panels, peak_search
 from sweep.reductions.peak_search import LIMIT
+from sweep.reductions.resolution import series_of
 from sweep.reductions.sampling import Extremum, Mask, blocks
 from sweep.reductions.window import Window
 
@@ -69,7 +70,8 @@ def true_extrema(
         if not anywhere and panels.has_kinks(family, request, bool(jumping.any())):
             kinked.append(request)
             continue
-        curve = None if locate or request.windowed else fused.curve_of(family, request, anywhere)
+        quickly = not locate and not request.windowed
+        curve = (fused.curve_of(family, request, anywhere) or series_of(family, request)) if quickly else None
         if curve is None:
             left.append(request)
             continue

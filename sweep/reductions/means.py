@@ -21,7 +21,7 @@ from sweep.numerics.quadrature import integrate
 from sweep.numerics.singularities import FAR, turn_edges
 from sweep.quantities.kinds import Request
 from sweep.reductions.fused import curve_of
-from sweep.reductions.resolution import denser, ends, nearest
+from sweep.reductions.resolution import denser, ends, nearest, series_of
 from sweep.reductions.sampling import DESIGN_STATUS, Index, blocks, pose_columns, sample_turn
 
 SAMPLES = 128  # of a turn at first
@@ -67,7 +67,9 @@ def mean_squares(family: Family, designs: Array, names: Sequence[str], accuracy:
 def _of_one(family: Family, designs: Array, pose: str, target: float) -> tuple[Array, Array, Status]:
     """Means of one pose output and their errors (n,), and the status: of a fused chain by its kernel, else by poses."""
     known = family.pose_output[pose]
-    curve = None if known.kinks or known.jumps else curve_of(family, Request(pose, 0), False, mean=True)
+    request = Request(pose, 0)
+    smooth = not known.kinks and not known.jumps
+    curve = (curve_of(family, request, False, mean=True) or series_of(family, request)) if smooth else None
     if curve is None:
         return _refined(family, designs, pose, target)
     mean, err, status, undecided = curve.mean(designs, target)

@@ -5,26 +5,33 @@ A family says what it knows of its curves by capabilities (`sweep.families.curve
 
 from __future__ import annotations
 
-from collections.abc import Collection
+from collections.abc import Collection, Iterator
+from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from kernels import status as st
-from kernels.types import TWO_PI, Status
+from kernels.curves import samples as scan
+from kernels.types import EPS, TWO_PI, Status
 from sweep.families.base import Angles, Array, Family
 from sweep.families.curve_features import (
     Bends,
     Crossing,
     Singular,
     SingularCurve,
+    Smooth,
     bends,
     singular_curves,
     switches,
+    switching,
     waves,
 )
 from sweep.numerics.events import near_zeros, sign_changes, with_events
 from sweep.numerics.singularities import FAR, SAMPLES, SHORTEST, Curve, Singularities, crowded, singularities
-from sweep.reductions.sampling import DESIGN_STATUS, Index, blocks, pose_columns
+from sweep.quantities.kinds import Request
+from sweep.reductions.sampling import DESIGN_STATUS, Extremum, Index, Mask, blocks, pose_columns, sample_turn
 
 PER_WAVE = 2.0  # waves that the fewest samples of any curve resolve
 SHARES = 16.0  # samples of a turn are a multiple of this over the shortest way between two switches
@@ -165,3 +172,172 @@ def reversing(family: Family) -> tuple[str, ...]:
     speeds = set(family.derivative_of.values())
     dear = set(family.dear)
     return tuple(rate for of, rate in family.derivative_of.items() if of not in speeds and rate not in dear)
+
+
+FIRST, LAST = 48, 384  # samples of a series at first, and at most: what needs more is searched between its poses
+FIRST_OF_MEAN = 32  # its error falls with the square of what the samples leave out
+FINER = 2  # times as many points show which tops of a series may be the highest
+RIVALS = 0.2  # of the range of a curve that the tops between its points may add
+STEPS, STILL = 6, 1e-6  # steps to a top; one that is shorter [rad] leaves an error far below rounding
+DOUBT = 4.0  # times what the falling coefficients say of those beyond
+
+
+class Turns(NamedTuple):
+    """Designs whose samples resolve a curve: their numbers, values (r, q, N), coefficients, error and size, (r,)."""
+
+    rows: Index
+    values: Array
+    series: NDArray[np.complex128]
+    err: Array
+    size: Array
+
+
+@dataclass(frozen=True)
+class Series:
+    """A smooth curve of dear poses as the Fourier series of its samples, with the two questions of a fused curve.
+
+    Coefficients of a smooth periodic curve fall by the same factor from order to order.  How they fall tells what those
+    beyond the samples add up to: the error, several times over.
+    """
+
+    family: Family
+    request: Request
+    parts: tuple[str, ...]  # the curve is the length of the vector that they make
+
+    def extremum(self, designs: Array, target: float) -> tuple[Extremum, Status, Mask]:
+        """Return what is requested of every design, its status, and where a slower search is to be asked."""
+        found, status = Extremum.unknown(len(designs)), np.zeros(len(designs), np.uint8)
+        undecided: Mask = np.ones(len(designs), np.bool_)
+        for turns in self._resolved(designs, target, status, False):
+            value, phi, err_phi, good = self._top(turns)
+            for column, part in zip(found, (value, phi, turns.err, err_phi), strict=True):
+                column[turns.rows] = part
+            undecided[turns.rows] = ~good
+        return found, status, undecided & (status == st.OK)
+
+    def mean(self, designs: Array, target: float) -> tuple[Array, Array, Status, Mask]:
+        """Return root mean squares over the turn, their errors, the status and what is undecided, as `extremum`."""
+        mean, err = np.full((2, len(designs)), np.nan)
+        status = np.zeros(len(designs), np.uint8)
+        for turns in self._resolved(designs, target, status, True):
+            mean[turns.rows], err[turns.rows] = _root_mean_square(turns.values), turns.err
+        return mean, err, status, np.isnan(mean) & (status == st.OK)
+
+    def _resolved(self, designs: Array, target: float, status: Status, mean: bool) -> Iterator[Turns]:
+        """Yield designs as soon as their samples resolve the curve; write the status."""
+        rows, samples = np.arange(len(designs)), FIRST_OF_MEAN if mean else FIRST
+        fewest = samples * denser(self.family, designs, self.parts)
+        while rows.size and samples <= LAST:
+            now, left = rows[fewest[rows] <= samples], [rows[fewest[rows] > samples]]
+            for part in blocks(now, FINER * samples, 2 * len(self.parts)):
+                columns, worst, _ = sample_turn(self.family, designs[part], samples, self.parts)
+                status[part] = DESIGN_STATUS[worst]
+                values = np.stack([columns[name] for name in self.parts], axis=1)
+                series = np.fft.rfft(values) / samples
+                size = np.sqrt(np.square(values).sum(axis=1).max(axis=1))
+                err = (_beyond_mean if mean else _beyond)(np.sqrt(np.square(np.abs(series)).sum(axis=1)))
+                err += 16.0 * EPS * size
+                allowed = target * (_root_mean_square(values) if mean else size)
+                done = (err <= allowed) & (status[part] == st.OK)
+                yield Turns(part[done], values[done], series[done], err[done], size[done])
+                left.append(part[~done & (status[part] == st.OK)])
+            rows, samples = np.concatenate(left), 2 * samples
+
+    def _top(self, turns: Turns) -> tuple[Array, Array, Array, Mask]:
+        """Highest point of each series: value, place, its error, and whether it was reached."""
+        mode, (count, parts, orders) = self.request.mode, turns.series.shape
+        size = FINER * 2 * (orders - 1)
+        fine = np.fft.irfft(turns.series, size) * size
+        square = parts > 1 or mode == 0
+        heights = np.square(fine).sum(axis=1) if square else mode * fine[:, 0]
+        top = heights.max(axis=1, keepdims=True)
+        peak = (heights >= np.roll(heights, 1, axis=1)) & (heights > np.roll(heights, -1, axis=1))
+        row, column = np.nonzero(peak & (heights >= top - RIVALS * (top - heights.min(axis=1, keepdims=True))))
+        before, here, after = (heights[row, (column + k) % size] for k in (-1, 0, 1))
+        spacing = TWO_PI / size
+        phi = spacing * (column + 0.5 * (before - after) / (before - 2.0 * here + after))
+        series, height, bend, still = (
+            turns.series[row],
+            np.empty(row.size),
+            np.empty(row.size),
+            np.zeros(row.size, bool),
+        )
+        for _ in range(STEPS):
+            go = np.flatnonzero(~still)
+            if not go.size:
+                break
+            value, slope, second = _slopes(series[go], phi[go], square, mode)
+            bent = second < 0.0
+            step = np.where(bent, -slope / np.where(bent, second, 1.0), np.sign(slope) * 0.5 * spacing)
+            step = np.clip(step, -spacing, spacing)
+            phi[go] += step
+            height[go], bend[go] = value + step * (slope + 0.5 * second * step), second
+            still[go] = bent & (np.abs(step) < STILL)
+        best = np.full(count, -1)
+        scan.best_candidate(row, height, np.full(count, -np.inf), best)
+        good: Mask = (best >= 0) & (np.bincount(row[~still], minlength=count) == 0)
+        value = np.sqrt(np.maximum(height[best], 0.0)) if square else mode * height[best]
+        # the curve, or its square, may be off by so much at its flat top
+        off = 2.0 * (turns.size if square else 1.0) * turns.err
+        err_phi = np.sqrt(2.0 * off / np.maximum(-bend[best], 1e-300))
+        return value, np.mod(phi[best], TWO_PI), err_phi, good
+
+
+def _root_mean_square(values: Array) -> Array:
+    found: Array = np.sqrt(np.square(values).sum(axis=1).sum(axis=1) / values.shape[2])
+    return found
+
+
+BANDS = (12, 16)  # of a turn's samples: so narrow are the bands of orders that tell how coefficients fall
+
+
+def _beyond(coefficients: Array) -> Array:
+    """Bound what orders beyond the samples may add to a curve, (n,), from its coefficients, (n, K + 1).
+
+    Three bands of the highest orders tell how they fall, in the slower of their two steps.  Where rounding or a kink
+    lets them fall no further, the orders beyond count as if they were as high as the last ones, as many as there are
+    samples.
+    """
+    half, found = coefficients.shape[1] - 1, np.zeros(len(coefficients))
+    for share in BANDS:
+        wide = 2 * half // share
+        first, second, last = (coefficients[:, half - k * wide : half - (k - 1) * wide].max(axis=1) for k in (3, 2, 1))
+        steps = [np.divide(b, a, out=np.zeros_like(b), where=a > 0.0) for a, b in ((first, second), (second, last))]
+        fall = np.minimum(np.maximum(*steps), 1.0)
+        per_order = np.minimum(fall ** (1.0 / wide), 1.0 - 0.5 / half)
+        found = np.maximum(found, DOUBT * 2.0 * last * np.minimum(fall / (1.0 - per_order), 2.0 * half))
+    return found
+
+
+def _beyond_mean(coefficients: Array) -> Array:
+    """Bound the error of a root mean square, (n,): products of two orders that make up N count as a mean.
+
+    All of them are as large as that of the two in the middle, where coefficients fall evenly.
+    """
+    half = coefficients.shape[1] - 1
+    last = coefficients[:, half - half // 8 : half].max(axis=1)
+    square, whole = DOUBT * 2.0 * half * last * last, np.sqrt(np.square(coefficients).sum(axis=1))
+    found: Array = 0.5 * np.divide(square, whole, out=np.sqrt(square), where=whole > 0.0)
+    return found
+
+
+def _slopes(series: NDArray[np.complex128], phi: Array, square: bool, mode: int) -> tuple[Array, Array, Array]:
+    """Values with two derivatives, (k,), of series (k, q, K + 1) at places, or of their sums of squares if ``square``."""
+    orders = np.arange(1, series.shape[2])
+    waves = np.cumprod(np.broadcast_to(np.exp(1j * phi)[:, None], (phi.size, orders.size)), axis=1)
+    turned = 2.0 * series[:, :, 1:] * waves[:, None, :]
+    turned[:, :, -1] *= 0.5  # the highest order of an even number of samples stands alone
+    value = series[:, :, 0].real + turned.real.sum(axis=2)
+    slope, second = -(orders * turned.imag).sum(axis=2), -(orders * orders * turned.real).sum(axis=2)
+    if not square:
+        return mode * value[:, 0], mode * slope[:, 0], mode * second[:, 0]
+    bend = 2.0 * (slope * slope + value * second).sum(axis=1)
+    return (value * value).sum(axis=1), 2.0 * (value * slope).sum(axis=1), bend
+
+
+def series_of(family: Family, request: Request) -> Series | None:
+    """Return the series of what is requested; None for a curve that is not known to be smooth and dear."""
+    known = next((smooth for smooth in family.every(Smooth) if smooth.of == request.pose), None)
+    if known is None or request.place or request.windowed or switching(family, known.parts):
+        return None
+    return Series(family, request, known.parts) if len(known.parts) == 1 or request.mode >= 0 else None
