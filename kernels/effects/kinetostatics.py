@@ -132,9 +132,9 @@ def inertia_loads(j: Joints, coupler: Coupler, bodies: Array, drive: Array) -> L
 
 @inline
 def put_plane(out: Array | None, i: int, k: int, good: float, a: Vector) -> None:
-    """Write what the frame bears, (3, n, m), of what it puts on the bodies; without ``out`` nothing is compiled."""
+    """Write what the frame bears, (n, 3, m), of what it puts on the bodies; without ``out`` nothing is compiled."""
     if out is not None:
-        out[0, i, k], out[1, i, k], out[2, i, k] = -good * a[0], -good * a[1], -good * a[2]
+        out[i, 0, k], out[i, 1, k], out[i, 2, k] = -good * a[0], -good * a[1], -good * a[2]
 
 
 @inline
@@ -246,7 +246,7 @@ def kinetostatics(
     inertia : (n, m, 2) or None; inertia reduced to the crank and its derivative
     wrench : (n, m, 6) or None; force and moment about B that act on the coupler besides, fixed axes
     on_follower : (n, m, 6) or None; force and moment about D that act on the follower besides, fixed axes
-    frame_force, frame_moment : (3, n, m) or None; force on the frame, and moment about its origin, that of the drive
+    frame_force, frame_moment : (n, 3, m) or None; force on the frame, and moment about its origin, that of the drive
         included.  They are what the bodies need: nothing is solved for them, and friction inside changes nothing
 
     Notes

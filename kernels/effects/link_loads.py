@@ -312,7 +312,7 @@ def link_loads(
     output : number of the freedom that the load acts on; below 0 for none
     status : (n, m), in and out; DEAD_POINT where the forces of the lines have no digits left; gives nan
     forces : (n, m, Q, 6) or None; force and moment of each joint, about its place, fixed axes
-    frame_force, frame_moment : (3, n, m) or None; on the frame, that of the drive included; needs no forces of lines
+    frame_force, frame_moment : (n, 3, m) or None; on the frame, that of the drive included; needs no forces of lines
     torque : (n, m) or None; of the drive, on all freedoms that it turns together
     inertia : (n, m, 2) or None; inertia reduced to the crank and its derivative
     on_tool : (n, m, 4) or None; force of its carrier on the tool, fixed axes, and its power per unit crank speed

@@ -178,24 +178,23 @@ def _bodies(scene: Scene) -> Array:
 
 def _rod_ends(scene: Scene, k: int, child: int, line: int) -> tuple[Array, Array]:
     """Find both ends of a rod in the axes of its body, each (n, 3); ``child`` and ``line`` as of :func:`rods_of`."""
-    # joints stand still in a body: the first pose that is assembled tells where
-    pose = np.arange(len(scene.designs)), (np.asarray(scene.motion["status"]) != 0).argmin(axis=1)
-    links, record = scene.links, scene.links.bodies[:, :, k][pose]
+    links = scene.still_links  # joints stand still in a body
+    record = links.bodies[:, 0, k]
 
     def seen(point: Array) -> Array:
         return np.asarray(np.einsum("nij,nj->ni", record[:, 15:24].reshape(-1, 3, 3), point - record[:, :3]))
 
     start = seen(record[:, 24:27])
     if child >= 0:
-        return start, seen(links.bodies[:, :, child, 24:27][pose])
-    return start, seen(links.lines[:, :, line, :3][pose]) if line >= 0 else _tool(scene)[:, 1:]
+        return start, seen(links.bodies[:, 0, child, 24:27])
+    return start, seen(links.lines[:, 0, line, :3]) if line >= 0 else _tool(scene)[:, 1:]
 
 
 def _tool(scene: Scene) -> Array:
     """Mass of the tool and its place in the axes of the body that carries it, (n, 4)."""
     tree = tree_of(scene)
     # the output link turns about an axis along z, so the height of its origin is that of every pose
-    of_design = scene.links.bodies[:, 0, tree.carrier, 2]
+    of_design = scene.still_links.bodies[:, 0, tree.carrier, 2]
     tip = loads.tip_from(scene, of_design) if tree.tip is None else tree.tip(scene.designs)
     return np.column_stack([scene.inputs["m_tool"], tip])
 
@@ -224,6 +223,17 @@ def _reactions(scene: Scene, wanted: frozenset[str], suffix: str = "") -> Array 
     return np.empty((*scene.shape, len(tree.joints), 6)) if loads.asked(joints, wanted) else None
 
 
+def _fill(scene: Scene, load: Array, status: Status, *out: Array | None) -> None:
+    """Let the kernel write the wanted ones of its results, (n, ...) each, some designs after others."""
+    tree, bodies, tool, drive = tree_of(scene), _bodies(scene), _tool(scene), _drive(scene, load)
+    for rows, links in scene.links_by_parts():
+        part = (x if x is None else x[rows] for x in out)
+        link_loads.link_loads(
+            links, joint_table(tree), bodies[rows], tool[rows], drive[rows], tree.carrier, tree.output, status[rows],
+            *part,
+        )  # fmt: skip
+
+
 def frictionless(scene: Scene, load: Array, wanted: frozenset[str], status: Status) -> Columns:
     """Wanted reactions, driving torque and inertias; what is not wanted is not compiled."""
     tree, shape = tree_of(scene), scene.shape
@@ -232,10 +242,7 @@ def frictionless(scene: Scene, load: Array, wanted: frozenset[str], status: Stat
     inertia = np.empty((*shape, 2)) if not wanted.isdisjoint(INERTIAS) else None
     of_tool = loads.asked(TOOL_VECTOR, wanted) or TOOL_TORQUE in wanted
     on_tool = np.empty((*shape, 4)) if of_tool else None
-    link_loads.link_loads(
-        scene.links, joint_table(tree), _bodies(scene), _tool(scene), _drive(scene, load), tree.carrier, tree.output,
-        status, forces, *on_frame, torque, inertia, on_tool,
-    )  # fmt: skip
+    _fill(scene, load, status, forces, *on_frame, torque, inertia, on_tool)
     if forces is not None:
         scene.memo["reactions"] = forces.reshape(*shape, 6 * len(tree.joints)), status
     columns = _vector_columns(tree, forces, wanted) | loads.frame_columns(on_frame, wanted)
@@ -275,10 +282,7 @@ def with_friction(scene: Scene, load: Array, wanted: frozenset[str], status: Sta
     columns = _vector_columns(tree, forces, wanted, FRICTION_SUFFIX)
     on_frame = loads.frame_room(scene.shape, wanted, FRICTION_SUFFIX)
     if on_frame != (None, None):  # friction is inside: it changes nothing of what the frame bears
-        link_loads.link_loads(
-            scene.links, joint_table(tree), _bodies(scene), _tool(scene), _drive(scene, load), tree.carrier,
-            tree.output, status, None, *on_frame, None, None, None,
-        )  # fmt: skip
+        _fill(scene, load, status, None, *on_frame, None, None, None)
     columns |= loads.frame_columns(on_frame, wanted, FRICTION_SUFFIX)
     if torque is not None:
         columns[TORQUE_WITH_FRICTION] = torque

@@ -221,18 +221,18 @@ def frame(suffix: str = "", text: str = "") -> Named:
 
 
 def frame_room(shape: tuple[int, int], wanted: frozenset[str], suffix: str = "") -> tuple[Array | None, Array | None]:
-    """Room for force and moment on the frame, (3, n, m) each; None for what is not wanted."""
-    force, moment = (np.empty((3, *shape)) if asked((name,), wanted) else None for name in frame(suffix))
+    """Room for force and moment on the frame, (n, 3, m) each; None for what is not wanted."""
+    force, moment = (np.empty((shape[0], 3, shape[1])) if asked((name,), wanted) else None for name in frame(suffix))
     return force, moment
 
 
 def frame_columns(on_frame: tuple[Array | None, Array | None], wanted: frozenset[str], suffix: str = "") -> Columns:
-    """Wanted magnitudes and components of force and moment on the frame, (3, n, m) or None each."""
+    """Wanted magnitudes and components of force and moment on the frame, (n, 3, m) or None each."""
     columns: Columns = {}
     for name, vector in zip(frame(suffix), on_frame, strict=True):
         if vector is not None:
-            columns |= {f"{name}_{a}": x for a, x in zip(AXES, vector, strict=True) if f"{name}_{a}" in wanted}
-            columns |= {name: np.sqrt(np.square(vector).sum(axis=0))} if name in wanted else {}
+            columns |= {f"{name}_{a}": vector[:, k] for k, a in enumerate(AXES) if f"{name}_{a}" in wanted}
+            columns |= {name: np.sqrt(np.square(vector).sum(axis=1))} if name in wanted else {}
     return columns
 
 

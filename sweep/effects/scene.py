@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
 from types import MappingProxyType
@@ -23,6 +23,7 @@ from sweep.families.names import at_stage
 from sweep.numerics.curves import Curve
 
 _PER_LINK = (PER_BODY, 3, PER_LINE)
+PART = 2048  # poses of bodies at once where their loads are written design by design
 
 Rows: TypeAlias = NDArray[np.intp]
 Index: TypeAlias = NDArray[np.int64]
@@ -92,16 +93,35 @@ class Scene:
     @cached_property
     def links(self) -> Links:
         """Bodies of the family and their poses; see :mod:`kernels.linkage.bodies`."""
+        return self._links(self.designs, self.angles, self.motion)
+
+    @cached_property
+    def still_links(self) -> Links:
+        """The bodies at the first pose of each design that is assembled, (n, 1): what stands still in them is seen."""
+        at = np.arange(len(self.designs))[:, None], (np.asarray(self.motion["status"]) != st.OK).argmin(axis=1)[:, None]
+        angles = Angles(*(np.broadcast_to(x, self.shape)[at] for x in self.angles))
+        return self._links(self.designs, angles, {name: x[at] for name, x in self.motion.items()})
+
+    def links_by_parts(self) -> Iterator[tuple[slice, Links]]:
+        """Yield the bodies of some designs after others, so few that their poses stay in the cache."""
+        n, m = self.shape
+        size = max(1, PART // max(m, 1))
+        for rows in (slice(start, start + size) for start in range(0, n, size)):
+            angles = Angles(*(x[rows] for x in self.angles)) if self.angles.cos.shape[0] > 1 else self.angles
+            motion = {name: x[rows] for name, x in self.motion.items()}
+            yield rows, self._links(self.designs[rows], angles, motion)
+
+    def _links(self, designs: Array, angles: Angles, motion: Columns) -> Links:
         tree = self.family.find(LinkTree)
         if tree is None:
             raise TypeError(f"{self.family.name} has no tree of links")
-        n, every = len(self.designs), (len(tree.bodies), len(tree.freedoms), len(tree.ends))
-        bodies, axes, lines = (np.empty((*self.shape, k, per)) for k, per in zip(every, _PER_LINK, strict=True))
+        shape, every = motion["status"].shape, (len(tree.bodies), len(tree.freedoms), len(tree.ends))
+        bodies, axes, lines = (np.empty((*shape, k, per)) for k, per in zip(every, _PER_LINK, strict=True))
         parents = np.array(tree.parents, np.int64)
         pairs = (np.array(given, np.int64).reshape(-1, 2) for given in (tree.freedoms, tree.ends))
-        freedoms, ends = (np.tile(pair, (n, 1, 1)) for pair in pairs)
+        freedoms, ends = (np.tile(pair, (len(designs), 1, 1)) for pair in pairs)
         found = Links(parents, freedoms, ends, bodies, axes, lines)
-        tree.fill(self.designs, self.angles, self.motion, found)
+        tree.fill(designs, angles, motion, found)
         return found
 
     @cached_property

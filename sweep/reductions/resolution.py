@@ -179,7 +179,7 @@ FIRST_OF_MEAN = 32  # its error falls with the square of what the samples leave 
 FINER = 2  # times as many points show which tops of a series may be the highest
 RIVALS = 0.2  # of the range of a curve that the tops between its points may add
 STEPS, STILL = 6, 1e-6  # steps to a top; one that is shorter [rad] leaves an error far below rounding
-DOUBT = 4.0  # times what the falling coefficients say of those beyond
+DOUBT = 3.0  # times what the falling coefficients say of those beyond
 
 
 class Turns(NamedTuple):
@@ -322,7 +322,7 @@ def _beyond_mean(coefficients: Array) -> Array:
 
 
 def _slopes(series: NDArray[np.complex128], phi: Array, square: bool, mode: int) -> tuple[Array, Array, Array]:
-    """Values with two derivatives, (k,), of series (k, q, K + 1) at places, or of their sums of squares if ``square``."""
+    """Values with two derivatives, (k,), of series (k, q, K + 1) at places; of sums of squares if ``square``."""
     orders = np.arange(1, series.shape[2])
     waves = np.cumprod(np.broadcast_to(np.exp(1j * phi)[:, None], (phi.size, orders.size)), axis=1)
     turned = 2.0 * series[:, :, 1:] * waves[:, None, :]

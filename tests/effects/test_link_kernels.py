@@ -74,7 +74,7 @@ def test_loads_compiled_are_those_of_plain_python(monkeypatch, case, hard):
     arguments = given_to(monkeypatch, loads_effect, "link_loads",
                          lambda: sweep.evaluate(name, table, ["drive_torque"], phi=PHI))  # fmt: skip
     n, m, q = *arguments[7].shape, len(family(name).find(LinkTree).joints)
-    shapes = ((n, m, q, 6), (3, n, m), (3, n, m), (n, m), (n, m, 2), (n, m, 4))
+    shapes = ((n, m, q, 6), (n, 3, m), (n, 3, m), (n, m), (n, m, 2), (n, m, 4))
     fast, slow = both(link_loads, arguments, 7, range(8, 14), shapes)
     np.testing.assert_array_equal(fast[0], slow[0])
     for one, two in zip(fast[1:], slow[1:], strict=True):
