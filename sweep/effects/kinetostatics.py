@@ -192,7 +192,7 @@ def _frame(
 ) -> Columns:
     """Wanted force and moment on the frame, which friction inside does not change; nan where the status is not OK."""
     on_frame = loads.frame_room(scene.shape, wanted, suffix)
-    if on_frame == (None, None):
+    if all(part is None for part in on_frame):
         return {}
     kinetostatics(
         *scene.records, _bodies(scene), drive, scene.inputs["finger"], status, None, None, None, tool.coupler,

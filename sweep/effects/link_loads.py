@@ -281,7 +281,7 @@ def with_friction(scene: Scene, load: Array, wanted: frozenset[str], status: Sta
     )  # fmt: skip
     columns = _vector_columns(tree, forces, wanted, FRICTION_SUFFIX)
     on_frame = loads.frame_room(scene.shape, wanted, FRICTION_SUFFIX)
-    if on_frame != (None, None):  # friction is inside: it changes nothing of what the frame bears
+    if any(part is not None for part in on_frame):  # friction is inside: it changes nothing of what the frame bears
         _fill(scene, load, status, None, *on_frame, None, None, None)
     columns |= loads.frame_columns(on_frame, wanted, FRICTION_SUFFIX)
     if torque is not None:

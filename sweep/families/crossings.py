@@ -70,7 +70,8 @@ def step_of(name: str, provides: Sequence[Output], machine: Machine, find: Find,
         parts = [block(designs[k : k + BLOCK], wanted, samples) for k in range(0, max(len(designs), 1), BLOCK)]
         found: Columns = {key: np.concatenate([part[key] for part in parts]) for key in parts[0]}
         if accuracy.target is not None:
-            found |= {f"err_{key}": np.abs(found[key]) * accuracy.target for key in wanted}
+            rounded = TANGENT * np.abs(designs).max(axis=1, initial=0.0)
+            found |= {f"err_{key}": np.maximum(np.abs(found[key]) * accuracy.target, rounded) for key in wanted}
         return found
 
     def cost(accuracy: Accuracy) -> float:
@@ -222,7 +223,8 @@ class Poses:
         if k.size:
             of: Any = lambda phi, rows: self.near(rows.astype(np.intp), phi, name)  # noqa: E731
             args: Any = (row[k],)
-            found = find_minimum(of, (grid[k, j], grid[k, j + 1], grid[k, j + 2]), args=args)
+            # To rounding, not to its root: where axes meet the curve is a wedge, as steep as the bodies are fast.
+            found = find_minimum(of, (grid[k, j], grid[k, j + 1], grid[k, j + 2]), args=args, tolerances=ROUNDING)
             phi = np.clip(np.asarray(found.x, np.float64), start[k], end[k])
             height = self.at(row[k], phi, name)[0]
             least = values[:, 1:-1].min(axis=1)

@@ -30,7 +30,7 @@ from sweep.families.thread_way import turned as turned_back
 if TYPE_CHECKING:
     from sweep.families.machines import Machine
 
-MEET = 1e-6  # rad of the tip's way: nearer axes meet, as the place of a least distance is known to some 1e-8 rad
+MEET = 1e-9  # rad of the tip's way: nearer axes meet, as quick poses know the place of a least distance no better
 TEXTS = {
     "lag": ("rad", "crank angle from the needle's lowest point to the passage"),
     "rise": ("length", "rise of the needle at the passage since its lowest point"),

@@ -103,6 +103,14 @@ def test_the_gap_counts_from_the_needles_top_to_its_lowest_point_only():
     assert got["min_whole"] < got["a_free"] and got["phi_min_whole"] > math.pi
 
 
+@pytest.mark.parametrize("shift", [4.0, 8.0, 12.0, 16.0])
+def test_axes_that_meet_on_the_way_down_leave_minus_the_radii(shift):
+    """The curve of the gap is a wedge there: its place counts to first order, so it is found to rounding."""
+    machine = machine_of(at=(AT[0], AT[1] + shift, AT[2]), needle={"scarf_end": 2.0, "eye": 60.0, "point": 80.0})
+    got = found(machine, ["a_free"])
+    assert abs(got["a_free"] + 0.375 + 0.4) <= min(got["err_a_free"], 1e-12)
+
+
 STILL = {"family": "slotted", "place": {"at": [-28.0, -5.0, -4.0], "axis": [0.0, 1.0, 0.0], "zero": [0.0, 0.0, 1.0]}}
 TRIANGLE = {
     "still": {"on": "upper", "tip": [5.0, 0.0, 0.0], "back": [0.0, 0.0, 0.0], "eye": [0.0, 0.0, 0.0]}
