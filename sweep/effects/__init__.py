@@ -24,6 +24,7 @@ from sweep.families.main_shaft import ShaftTorque
 from sweep.families.names import stem
 from sweep.families.reduction import reduced
 from sweep.families.relations import EventValue
+from sweep.families.shaking import Shaking
 from sweep.numerics.curves import Curve
 
 # Name of each effect's entry: module and constant.  A new effect is a kernel file, an entry file and its line here.
@@ -271,7 +272,7 @@ def _asked(machine: Machine, wanted: Iterable[str]) -> set[str]:
     names |= {about for name in places for about in reduced(name, machine.domain)}
     names |= {timing.of.name for timing in asked if isinstance(timing, EventValue)}
     for relation in machine.relations:
-        numbers = relation.numbers if isinstance(relation, ShaftTorque) else ()
+        numbers = relation.numbers if isinstance(relation, ShaftTorque | Shaking) else ()
         if not names.isdisjoint(o.name for o in (*relation.outputs, *numbers)):
             names |= relation.needs(frozenset(names))
     return names

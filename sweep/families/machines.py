@@ -23,7 +23,7 @@ from sweep.families.parts import AXES, EYE, TIP, Member, coordinates, coupler_jo
 from sweep.families.passages import taking_step
 from sweep.families.relations import EventValue, Relation, Timing
 from sweep.families.sewing import Sewing, sewing_step
-from sweep.families.shaking import Shaking
+from sweep.families.shaking import Shaking, orders_of
 from sweep.families.sites import coordinates as coordinates_of_site
 from sweep.families.sites import made_of
 from sweep.families.thread_balance import ThreadBalance
@@ -130,15 +130,15 @@ def _built(machine: Machine, members: tuple[Member, ...]) -> Machine:
         members=tuple(placed),
     )
     found = replace(found, poses=partial(_poses, found))  # events of a thread are looked for on poses of the others
-    poses = partial(_poses, found)
     precise = partial(_precise_poses, found) if any(m.family.precise_poses for m in placed) else None
-    smooth = (known for r in machine.relations if isinstance(r, Shaking | ShaftTorque) for known in r.smooth)
-    capabilities = (*found.capabilities, *switches_of_events(found), *smooth)
-    found = replace(found, poses=poses, precise_poses=precise, capabilities=capabilities)
+    smooth = (one for r in machine.relations if isinstance(r, Shaking | ShaftTorque) for one in r.smooth)
+    known = (*found.capabilities, *switches_of_events(found), *smooth)
+    found = replace(found, poses=partial(_poses, found), precise_poses=precise, capabilities=known)
     steps = [taking_step(r, found) for r in machine.relations if isinstance(r, Taking)]
     steps += [entering_step(r, found) for r in machine.relations if isinstance(r, Entering)]
     steps += [sewing_step(r, found) for r in machine.relations if isinstance(r, Sewing)]
     steps += [speed_of(r, found) for r in machine.relations if isinstance(r, ShaftTorque)]
+    steps += [orders_of(r, found) for r in machine.relations if isinstance(r, Shaking)]
     return replace(found, steps=tuple(steps))
 
 

@@ -4,10 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
+import numpy as np
+
+from kernels import status as st
+from kernels.types import EPS, TWO_PI, Array, Status
 from sweep.errors import InputError
-from sweep.families.base import Family, Output, Parameter
+from sweep.families.base import Accuracy, Angles, Columns, Family, Output, Parameter, Step, Work
 from sweep.families.capabilities import GuidedPoint, JointRecords, Skeleton, ToolPoint
 from sweep.families.curve_features import Smooth
 from sweep.families.frames import CRANKS, Frame
@@ -15,6 +19,12 @@ from sweep.families.link_tree import LinkTree
 from sweep.families.relations import with_size
 from sweep.families.segments import cross
 from sweep.families.sites import AXES
+
+if TYPE_CHECKING:
+    from sweep.families.machines import Machine
+
+ORDERS = {1: "first", 2: "second"}  # in waves of one turn of the main shaft
+GRIDS = (64, 128, 256, 512, 1024)  # samples of a turn, the first that tell the orders
 
 
 @dataclass(frozen=True)
@@ -89,6 +99,16 @@ class Shaking:
         return tuple(found)
 
     @property
+    def numbers(self) -> tuple[Output, ...]:
+        """Design outputs: root mean squares of the orders that counterweights act on."""
+        found = []
+        for name, unit, what in ((self.name, "force", "force"), (self._moment, "torque", "moment")):
+            for order, word in ORDERS.items():
+                text = f"root mean square of the {word} order of the {what} on the frame, by turns of the main shaft"
+                found.append(Output(f"{name}_order{order}", unit, text, "3.1"))
+        return tuple(found)
+
+    @property
     def smooth(self) -> tuple[Smooth, ...]:
         """Its outputs are smooth over the turn: each component, and both vectors."""
         vectors = {name: tuple(f"{name}_{x}" for x in AXES) for name in (self.name, self._moment)}
@@ -105,7 +125,8 @@ class Shaking:
         return f"{self.name}_moment"
 
     def _turning(self, wanted: frozenset[str]) -> bool:
-        return not wanted.isdisjoint((self._moment, *(f"{self._moment}_{axis}" for axis in AXES)))
+        names = (f"{self._moment}{tail}" for tail in ("", *(f"_{x}" for x in AXES), *(f"_order{n}" for n in ORDERS)))
+        return not wanted.isdisjoint(names)
 
     def needs(self, wanted: frozenset[str]) -> frozenset[str]:
         """Name the forces of the frame on every stage, and moments where one is wanted."""
@@ -145,3 +166,54 @@ class Shaking:
             # The bar's force acts on its point, beside the line by dev; its guides take the couple up.
             moment[2] = moment[2] - found[one.named("dev")] * found[one.named("tool_load")]
         return moment
+
+
+def orders_of(shaking: Shaking, machine: Machine) -> Step:
+    """Return the machine's route to the first orders of its shaking."""
+
+    def run(designs: Array, wanted: frozenset[str], accuracy: Accuracy) -> Columns:
+        asked = [o.name for o in shaking.numbers if o.name in wanted]
+        found: dict[str, Array] = {f"{e}{name}": np.full(len(designs), np.nan) for name in asked for e in ("", "err_")}
+        status: Status = np.full(len(designs), st.NOT_CONVERGED, np.uint8)
+        rows = np.arange(len(designs))
+        for samples in GRIDS if accuracy.samples is None else (accuracy.samples,):
+            codes, amplitudes = _amplitudes(shaking, machine, designs[rows], asked, samples)
+            settled = np.ones(rows.size, np.bool_)
+            for name, (value, err, size) in amplitudes.items():
+                found[name][rows], found[f"err_{name}"][rows] = value, err
+                settled &= (accuracy.target is None) | (err <= (accuracy.target or 0.0) * size)
+            done = settled | (codes != st.OK)
+            status[rows[done]] = codes[done]
+            rows = rows[~done]
+            if not rows.size:
+                break
+        return found | {"status": status}
+
+    return Step(f"orders of {shaking.name}", shaking.numbers, run, work=Work.LONG, cost=_cost)
+
+
+def _cost(accuracy: Accuracy) -> float:
+    return 5e4
+
+
+def _amplitudes(
+    shaking: Shaking, machine: Machine, designs: Array, asked: Sequence[str], samples: int
+) -> tuple[Status, dict[str, tuple[Array, Array, Array]]]:
+    """Return the status, and of each order its root mean square, the error, and that of the whole curve, (n,).
+
+    What every other sample would give is as far off as the orders beyond a quarter of the samples are high.
+    """
+    made_of = {name: name.rpartition("_order") for name in asked}
+    parts = frozenset(f"{vector}_{x}" for vector, _, _ in made_of.values() for x in AXES)
+    angles = Angles.of(TWO_PI * np.arange(samples)[None] / samples)
+    poses = machine.poses(designs, angles, parts)
+    codes = np.asarray(poses["status"], np.uint8).max(axis=1, initial=0)
+    codes[codes == st.NOT_ASSEMBLED] = st.NOT_ROTATABLE
+    found = {}
+    for name, (vector, _, order) in made_of.items():
+        curve = np.stack([np.asarray(poses[f"{vector}_{x}"], np.float64) for x in AXES], axis=1)
+        fine, coarse = (np.fft.rfft(some)[:, :, int(order)] / some.shape[2] for some in (curve, curve[:, :, ::2]))
+        value, off = (np.sqrt(2.0 * np.square(np.abs(x)).sum(axis=1)) for x in (fine, fine - coarse))
+        size = np.sqrt(np.square(curve).sum(axis=1).sum(axis=1) / samples)
+        found[name] = value, off + 16.0 * EPS * size, size
+    return codes, found
