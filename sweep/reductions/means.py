@@ -22,6 +22,7 @@ from sweep.numerics.singularities import FAR, turn_edges
 from sweep.quantities.kinds import Request
 from sweep.reductions.fused import curve_of
 from sweep.reductions.resolution import denser, ends, nearest, series_of
+from sweep.reductions.rounding import shaken
 from sweep.reductions.sampling import DESIGN_STATUS, Index, blocks, pose_columns, sample_turn
 
 SAMPLES = 128  # of a turn at first
@@ -81,7 +82,7 @@ def _of_one(family: Family, designs: Array, pose: str, target: float) -> tuple[A
 
 def _refined(family: Family, designs: Array, pose: str, target: float) -> tuple[Array, Array, Status]:
     """Means of one pose output and their errors (n,), and the status, from poses alone."""
-    mean, err, status = _on_turn(family.precise(), designs, pose)
+    mean, err, status, top = _on_turn(family.precise(), designs, pose)
     output = family.pose_output[pose]
     # What jumps, bends or waves is cut there.
     cut = crossed(family, designs) | (denser(family, designs, (pose,)) > 1.0) | output.kinks | output.jumps
@@ -100,26 +101,30 @@ def _refined(family: Family, designs: Array, pose: str, target: float) -> tuple[
         mean[rows], err[rows], status[rows] = _on_panels(family, designs[rows], pose, edges, target)
     lost = (status != st.OK) & (status != st.NOT_CONVERGED)
     mean[lost], err[lost] = np.nan, np.nan
+    if family.precise_poses is None and alive.size:
+        # Badly scaled designs lose digits in every pose: what the largest one loses, the mean may lose.
+        err[alive] = np.maximum(err[alive], shaken(family, designs[alive], top[alive], pose))
     return mean, err, status
 
 
-def _on_turn(family: Family, designs: Array, pose: str) -> tuple[Array, Array, Status]:
-    """Means over equidistant samples, their errors and the status; every other sample gives the mean before.
+def _on_turn(family: Family, designs: Array, pose: str) -> tuple[Array, Array, Status, Array]:
+    """Means over equidistant samples, their errors, the status and where a curve is largest [rad], (n,) each.
 
-    Of a periodic curve without near singularities the error falls by its square when samples are doubled.
+    Every other sample gives the mean before.  Of a periodic curve without near singularities the error falls by its square when samples are doubled.
     """
     n = len(designs)
-    mean, err, status = np.full(n, np.nan), np.full(n, np.nan), np.empty(n, np.uint8)
+    mean, err, top, status = np.full(n, np.nan), np.full(n, np.nan), np.empty(n), np.empty(n, np.uint8)
     for part in blocks(np.arange(n), SAMPLES):
         columns, worst, winds = sample_turn(family, designs[part], SAMPLES, [pose])
         status[part] = np.where((worst == st.OK) & winds, st.NOT_OSCILLATING, DESIGN_STATUS[worst])
         values = columns[pose]
+        top[part] = np.abs(values).argmax(axis=1) * (TWO_PI / SAMPLES)
         size = np.abs(values).max(axis=1)
         size = np.where((size > 0.0) & np.isfinite(size), size, 1.0)
         squares = np.square(values / size[:, None])
         whole, before = (np.sqrt(some.sum(axis=1) / some.shape[1]) for some in (squares, squares[:, ::2]))
         mean[part], err[part] = size * whole, size * (np.abs(whole - before) + _rounded(_blur(squares), whole))
-    return mean, err, status
+    return mean, err, status, top
 
 
 def _on_panels(family: Family, designs: Array, pose: str, edges: Array, target: float) -> tuple[Array, Array, Status]:
