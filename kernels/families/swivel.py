@@ -82,10 +82,9 @@ def _turning(
     # Two forms of one number: of a short crank the first, near the block's centre the second is the difference of large
     # terms.  The one with the smaller terms is taken.
     terms = (r.a * square).real * (abs((r.e * u).real) + abs((r.side * v).real) + r.a.real)
+    k = 0.5 * (pull - 1.0)
     if terms < 0.5 * (1.0 + abs(pull.real)):
         k = r.a * square * (r.e * u + r.side * v - r.a)
-    else:
-        k = 0.5 * (pull - 1.0)
     fast = lean * lean + k * k
     bend = fast + k
     spoke, tangent, axis = (u, r.ca * v, -r.sa * v), (-v, r.ca * u, -r.sa * u), (0.0, r.sa, r.ca)

@@ -110,7 +110,8 @@ def _refined(family: Family, designs: Array, pose: str, target: float) -> tuple[
 def _on_turn(family: Family, designs: Array, pose: str) -> tuple[Array, Array, Status, Array]:
     """Means over equidistant samples, their errors, the status and where a curve is largest [rad], (n,) each.
 
-    Every other sample gives the mean before.  Of a periodic curve without near singularities the error falls by its square when samples are doubled.
+    Every other sample gives the mean before.  Of a periodic curve without near singularities the error falls by its
+    square when samples are doubled.
     """
     n = len(designs)
     mean, err, top, status = np.full(n, np.nan), np.full(n, np.nan), np.empty(n), np.empty(n, np.uint8)
