@@ -62,15 +62,19 @@ def event_angles(machine: Machine, designs: Array) -> tuple[dict[str, Any], NDAr
     """
     known, events = _known(machine), happenings(machine)
     columns = _columns(machine)
-    rows = [row.tobytes() for row in np.ascontiguousarray(designs[:, columns].real)]
+    given = np.ascontiguousarray(designs[:, columns].real)
+    # The panels of a design stand below one another: its row is looked up once.
+    other = np.append(True, (given[1:] != given[:-1]).any(axis=1))[: len(given)]
+    first = np.flatnonzero(other)
+    rows = [row.tobytes() for row in given[first]]
     new = {row: k for k, row in enumerate(rows) if row not in known}
     if new:
         if len(known) + len(new) > MOST:
             known.clear()
             new = {row: k for k, row in enumerate(rows)}
-        angles = _search(machine, events, np.ascontiguousarray(designs[list(new.values())].real))
+        angles = _search(machine, events, np.ascontiguousarray(designs[first[list(new.values())]].real))
         known.update(zip(new, angles, strict=True))
-    table = np.array([known[row] for row in rows]).reshape(len(rows), len(events) + 1)
+    table = np.array([known[row] for row in rows]).reshape(len(rows), len(events) + 1)[np.cumsum(other) - 1]
     phi: Any = table[:, :-1]
     if np.iscomplexobj(designs) and designs.imag.any():
         names = [event.of if isinstance(event, Event) else next(iter(event.rates)) for event in events.values()]

@@ -14,7 +14,7 @@ import pytest
 from sweep.families.base import Angles, Family, Output, Parameter
 from sweep.optimise import Problem, minimise
 from sweep.optimise.manufacture import robust as robust_search
-from sweep.optimise.manufacture.margins import excesses, prices, risk_allocation, with_margins
+from sweep.optimise.manufacture.margins import Scatter, excesses, prices, risk_allocation, with_margins
 from sweep.optimise.manufacture.robust import robust
 from sweep.study import Limit, OptimiseSettings, Tolerance
 
@@ -130,9 +130,9 @@ TOLERANCE = Tolerance(lengths=3.0 * SIGMA, angles=0.0, robust=SHARE)
 def test_price_of_room_is_what_the_objective_pays_for_a_standard_deviation_of_it() -> None:
     levels = {"u": 2.0, "v": 1.0}
     design = np.array([1.0 - 2.0 * SIGMA, 1.0 - SIGMA, 1.0])
-    held = with_margins(PROBLEM, design, TOLERANCE, levels, None)
+    held = with_margins(Scatter(PROBLEM, TOLERANCE), design, levels, None)
     (result,) = minimise(held, design[None, :], OptimiseSettings(starts=1))
-    found = prices(PROBLEM, result.design, TOLERANCE, levels)
+    found = prices(Scatter(PROBLEM, TOLERANCE), result.design, levels)
     # Sixteen harmonics of |cos phi| miss its height by 1 %, and |cos 2 phi| by 2 %: the room is so much smaller.
     for key, dear in (("u", DEAR), ("v", 1.0)):
         assert found[key].price == pytest.approx(dear * SIGMA / result.objective, rel=0.05)

@@ -17,7 +17,7 @@ from sweep.families import family
 from sweep.jobs.signals import Deadline
 from sweep.optimise import Problem, explore, read_survey
 from sweep.optimise.local.model import Model
-from sweep.optimise.manufacture.margins import with_margins
+from sweep.optimise.manufacture.margins import Scatter, with_margins
 from sweep.optimise.problem.program import Program
 from sweep.study import Limit, OptimiseSettings, Tolerance, load_study, study_from_data
 from tests.optimise.test_study import STUDY
@@ -79,7 +79,7 @@ def test_band_narrower_than_its_room_is_missed_and_no_equation() -> None:
     problem = Problem(family("rssr"), names, design - 0.2, design + 0.2, {"branch": 1.0}, "max_abs_d2psi", (band,))
     start = problem.rows(design)[0]
     for lengths, missed in ((1e-4, False), (0.02, True)):
-        drawn_in = with_margins(problem, start, Tolerance(lengths, 1e-3 * lengths, 0.95), {"swing": 2.0}, None)
+        drawn_in = with_margins(Scatter(problem, Tolerance(lengths, 1e-3 * lengths, 0.95)), start, {"swing": 2.0}, None)
         low, high = drawn_in.limits[0].minimum, drawn_in.limits[0].maximum
         assert low is not None and high is not None and (low > high) == missed
         model = Model(drawn_in, Program(drawn_in), start, lambda: False)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -31,6 +31,10 @@ class CurveMargin:
     constant: Array
     slopes: Array
 
+    def times(self, level: float) -> CurveMargin:
+        """Return so many of these margins."""
+        return replace(self, constant=level * self.constant, slopes=level * self.slopes)
+
     def at(self, designs: Any, phi: Array) -> Any:
         """Return the margin (n, m) of designs (n, P), which may carry the imaginary step, at crank angles (m,)."""
         moved = designs[:, list(self.columns)] - self.place
@@ -55,6 +59,10 @@ class Allowance:
     names: tuple[str, ...]
     place: Array
     slopes: Array
+
+    def times(self, level: float) -> Allowance:
+        """Return so many of these margins."""
+        return replace(self, slopes=level * self.slopes)
 
 
 def allowances(problem: Problem, design: Array, spread: Callable[[Array], dict[str, float]]) -> dict[str, Allowance]:

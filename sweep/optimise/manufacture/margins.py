@@ -11,7 +11,14 @@ import numpy as np
 
 from sweep.families.base import Array
 from sweep.optimise.local.model import Model
-from sweep.optimise.manufacture.curve_margins import POSES, allowances, curve_margins, curves_with_margin
+from sweep.optimise.manufacture.curve_margins import (
+    POSES,
+    Allowance,
+    CurveMargin,
+    allowances,
+    curve_margins,
+    curves_with_margin,
+)
 from sweep.optimise.manufacture.tolerance import SIGMAS, sensitivities, touched
 from sweep.optimise.problem.program import Program
 from sweep.optimise.problem.statement import Problem
@@ -46,32 +53,64 @@ def keyed(problem: Problem) -> dict[str, str]:
     return {name: along.get(name, name) for name in names if not name.startswith("rotatable")}
 
 
-def with_margins(
-    problem: Problem, design: Array, tolerance: Tolerance, levels: Levels, radius: float | None
-) -> Problem:
-    """Return the problem with its limits tightened by the margins of a design, bounded to a box about that design.
+class Scatter:
+    """What tolerances do to the limited outputs of a design, in standard deviations, and how that changes with it.
+
+    What is known of the last design is kept: a search asks for its margins again with other numbers of deviations.
 
     Parameters
     ----------
     problem : with the limits as they are asked for
-    design : (P,)
     tolerance : of what is made
+    """
+
+    def __init__(self, problem: Problem, tolerance: Tolerance) -> None:
+        self.problem, self.tolerance, self.keys = problem, tolerance, keyed(problem)
+        self._design: Array = np.empty(0)
+        self.curves: dict[str, CurveMargin] = {}
+        self.single: dict[str, tuple[float, float]] = {}
+        self._changes: dict[str, Allowance] = {}
+
+    def look(self, design: Array) -> None:
+        """Find the deviations ``curves`` of curves, and those of ``single`` outputs with their values."""
+        if np.array_equal(design, self._design):
+            return
+        sigma = touched(self.problem.family, design, self.tolerance) / SIGMAS
+        along = {key: 1.0 for name, key in self.keys.items() if key != name}
+        self.curves = curve_margins(self.problem, design, sigma, along)
+        others = [name for name, key in self.keys.items() if key not in self.curves]
+        self.single = _spreads(self.problem, design, sigma, others)
+        self._design, self._sigma, self._changes = design.copy(), sigma, {}
+
+    def changes(self, names: Sequence[str]) -> dict[str, Allowance]:
+        """Return how the deviations of single outputs change with the variables of the design last looked at."""
+        new = [name for name in names if name not in self._changes]
+        if new:
+
+            def spread(row: Array) -> dict[str, float]:
+                return {name: one for name, (one, _) in _spreads(self.problem, row, self._sigma, new).items()}
+
+            self._changes |= allowances(self.problem, self._design, spread)
+        return {name: self._changes[name] for name in names if name in self._changes}
+
+
+def with_margins(scatter: Scatter, design: Array, levels: Levels, radius: float | None) -> Problem:
+    """Return the problem with its limits tightened by the margins of a design, bounded to a box about that design.
+
+    Parameters
+    ----------
+    scatter : of what is made, with the problem as it is asked for
+    design : (P,)
     levels : standard deviations that each limit gives up
     radius : of the box about the design in scaled variables; None for the bounds of the problem
     """
-    sigma, keys = touched(problem.family, design, tolerance) / SIGMAS, keyed(problem)
-    along = {key: levels[key] for name, key in keys.items() if key != name}
-    curves = curve_margins(problem, design, sigma, along)
-    others = [name for name, key in keys.items() if key not in curves]
-
-    def room(row: Array, names: Sequence[str]) -> dict[str, tuple[float, float]]:
-        found = _spreads(problem, row, sigma, names)
-        return {name: (levels[keys[name]] * spread, value) for name, (spread, value) in found.items()}
-
-    fixed = room(design, others)
+    problem, keys = scatter.problem, scatter.keys
+    scatter.look(design)
+    curves = {key: curve.times(levels[key]) for key, curve in scatter.curves.items()}
+    fixed = {name: (levels[keys[name]] * spread, value) for name, (spread, value) in scatter.single.items()}
     limits = tuple(_drawn_in(x, fixed[x.output][0]) if x.output in fixed else x for x in problem.limits)
     close = [x.output for x in problem.limits if x.output in fixed and _close(x, *fixed[x.output])]
-    given = allowances(problem, design, lambda row: {name: found[0] for name, found in room(row, close).items()})
+    given = {name: change.times(levels[keys[name]]) for name, change in scatter.changes(close).items()}
     lower, upper = problem.lower, problem.upper
     if radius is not None:
         place = np.clip(problem.scaled(design[None, :])[0], 0.0, 1.0)
@@ -92,16 +131,14 @@ class Price:
     spread: float
 
 
-def prices(problem: Problem, design: Array, tolerance: Tolerance, levels: Levels) -> dict[str, Price]:
+def prices(scatter: Scatter, design: Array, levels: Levels) -> dict[str, Price]:
     """Return the price of the margin of every limit at an optimum of :func:`with_margins`, by its key.
 
     The multipliers of the rows that hold tell it: a bound that moves by a standard deviation moves its rows, and the
     objective by their multipliers times that.
     """
-    sigma, keys = touched(problem.family, design, tolerance) / SIGMAS, keyed(problem)
-    whole = with_margins(problem, design, tolerance, levels, None)
-    units = curve_margins(problem, design, sigma, dict.fromkeys(whole.curve_margins, 1.0))
-    spreads = _spreads(problem, design, sigma, [name for name, key in keys.items() if key not in units])
+    whole = with_margins(scatter, design, levels, None)
+    keys, units, spreads = scatter.keys, scatter.curves, scatter.single
     model = Model(whole, Program(whole), design, lambda: False)
     state = model.state(whole.scaled(design[None, :])[0])
     found, form, points = model.certificate(state), state.form, state.form.points

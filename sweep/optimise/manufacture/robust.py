@@ -20,6 +20,7 @@ from sweep.optimise.local.model import Model
 from sweep.optimise.local.start import search
 from sweep.optimise.manufacture.margins import (
     Levels,
+    Scatter,
     bounded,
     excesses,
     keyed,
@@ -208,9 +209,8 @@ class _Approach:
         """Return where the first rounds from a design end."""
         levels = dict.fromkeys(keyed(self.problem).values(), self.level)
         start, design = self.numbers[number], self.designs[number]
-        result, *_ = _approached(
-            self.problem, start, design, self.tolerance, levels, should_stop, ROUNDS, self.looks, RADIUS
-        )
+        scatter = Scatter(self.problem, self.tolerance)
+        result, *_ = _approached(scatter, start, design, levels, should_stop, ROUNDS, self.looks, RADIUS)
         return Robust(result, math.nan, result.ended in CUT)
 
 
@@ -227,26 +227,29 @@ class _Calibrate:
 
     def __call__(self, number: int, should_stop: Callable[[], bool]) -> Robust:
         head, wanted = self.results[number], self.tolerance.robust or 0.0
+        scatter, enough = Scatter(self.problem, self.tolerance), max(ENOUGH, 1.0 / self.tolerance.samples)
         levels: Levels = dict.fromkeys(keyed(self.problem).values(), self.level)
-        best = Robust(head, _share(self.problem, head.design, self.tolerance, self.seed), True)
-        design, radius, reach, spent = head.design, RADIUS, REACH, 0
+        values, share = self._made(head.design)
+        best = Robust(head, share, head.ended in CUT)
+        design, result, radius, step, reach, spent = head.design, head, RADIUS, math.inf, REACH, 0
         for corrected in range(CORRECTIONS):
             if should_stop():
                 return replace(best, cut=True)
-            # A design whose rounds do not settle must not hold up the others: all corrections share the looks of one.
-            looks = max(HEAT, (self.looks - spent) // ROUNDS)
-            result, radius, step = _approached(
-                self.problem, head.start, design, self.tolerance, levels, should_stop, ROUNDS, looks, radius
-            )
-            design, spent = result.design, spent + result.looks
-            values, share = self._made(design)
+            if corrected or head.ended != "converged":  # else these margins have led to this head already
+                # One whose rounds do not settle must not hold up the others: all corrections share the looks of one.
+                looks = max(HEAT, (self.looks - spent) // ROUNDS)
+                result, radius, step = _approached(
+                    scatter, head.start, design, levels, should_stop, ROUNDS, looks, radius
+                )
+                design, spent = result.design, spent + result.looks
+                values, share = self._made(design)
             better = share >= wanted and (best.share < wanted or result.objective < best.result.objective)
             if result.violation <= NEARLY and (better or (best.share < wanted and share > best.share)):
                 best = Robust(result, share, result.ended in CUT)
             if spent >= self.looks or (corrected and share >= wanted and not better and result.ended == "looks"):
                 break  # prices from a search that has not settled mislead the correction
-            levels, saved = self._corrected(design, levels, values, reach)
-            if wanted <= share <= wanted + ENOUGH and step < STAYED and saved < SAVED:
+            levels, saved = self._corrected(scatter, design, levels, values, reach)
+            if wanted <= share <= wanted + enough and step < STAYED and saved < SAVED:
                 break
             reach *= FADING
         nominal = Model(self.problem, Program(self.problem), best.result.design, _never)
@@ -254,10 +257,10 @@ class _Calibrate:
         return replace(best, result=replace(best.result, violation=state.violation, relaxation={}))
 
     def _corrected(
-        self, design: Array, levels: Levels, values: Mapping[str, Array], reach: float
+        self, scatter: Scatter, design: Array, levels: Levels, values: Mapping[str, Array], reach: float
     ) -> tuple[Levels, float]:
         """Return corrected numbers of standard deviations, and the relative gain that they promise."""
-        known = prices(self.problem, design, self.tolerance, levels)
+        known = prices(scatter, design, levels)
         found = excesses(self.problem, values, known)
         if not levels:
             return levels, 0.0
@@ -279,10 +282,9 @@ class _Calibrate:
 
 
 def _approached(
-    problem: Problem,
+    scatter: Scatter,
     number: int,
     design: Array,
-    tolerance: Tolerance,
     levels: Levels,
     asked: Callable[[], bool],
     rounds: int,
@@ -295,9 +297,10 @@ def _approached(
     -------
     The last result, the radius for further rounds, and the last step, in scaled variables.
     """
+    problem = scatter.problem
     total, step, room_of, before = 0, math.inf, design, np.zeros(len(problem.variables))
     for _ in range(rounds):
-        result = search(number, with_margins(problem, design, tolerance, levels, radius), design, asked, looks)
+        result = search(number, with_margins(scatter, design, levels, radius), design, asked, looks)
         total += result.looks
         move = (problem.scaled(result.design[None, :]) - problem.scaled(design[None, :]))[0]
         step, room_of, design = float(np.abs(move).max()), design, result.design
@@ -310,7 +313,7 @@ def _approached(
             radius = min(2.0 * radius, RADIUS)
         before = move
     # Bounds of the last round may hold the design where those of the problem do not.
-    whole = search(number, with_margins(problem, room_of, tolerance, levels, None), design, asked, ONCE)
+    whole = search(number, with_margins(scatter, room_of, levels, None), design, asked, ONCE)
     kept_ended = result.ended if whole.ended == "looks" else whole.ended
     return replace(whole, looks=total, ended=kept_ended), radius, step
 
