@@ -17,9 +17,10 @@ from sweep.errors import InputError
 from sweep.evaluation.angles import AngleUnit, grid_in_radians
 from sweep.evaluation.cyclogram import cyclogram, table_in_degrees
 from sweep.jobs.progress import Phases
-from sweep.report.dataset import chosen
+from sweep.report.dataset import chosen, read_dataset
 from sweep.report.figures import house_style, save
 from sweep.report.judged import write_comparison
+from sweep.report.made import event_bands, with_bands
 from sweep.report.page import write_report
 
 
@@ -119,8 +120,15 @@ def _table(source: str, table: Path | None, out: Path, options: Options) -> None
     mechanism, design = _design(source, table, options["design"], options["row"])
     rows = cyclogram(mechanism, design, angles="rad" if table is None else options["angles"])
     out.parent.mkdir(parents=True, exist_ok=True)
-    table_in_degrees(rows).to_csv(out, index=False, float_format="%.4f")
+    with_bands(table_in_degrees(rows), _made(source, table, options)).to_csv(out, index=False, float_format="%.4f")
     click.echo(f"cyclogram: {out}")
+
+
+def _made(source: str, table: Path | None, options: Options) -> dict[str, tuple[float, float]]:
+    """Angles [deg] between which what is made has an event, by its name: they are known of the optimum of a folder."""
+    if table is not None or options["design"] not in (None, "optimum"):
+        return {}
+    return event_bands(read_dataset(located(source)))
 
 
 def _of_one(what: str, source: str, table: Path | None, options: Options) -> Any:
@@ -132,6 +140,8 @@ def _of_one(what: str, source: str, table: Path | None, options: Options) -> Any
     }
     if table is None:
         grid_in_radians("phi", "rad", options["phi"], None)  # a design out of a folder is in rad, --phi may not be
+    if what == "cyclogram":
+        known[what] = {"made": _made(source, table, options)}
     unit: AngleUnit | None = "rad" if table is None else options["angles"]
     return getattr(plot, what)(mechanism, design, angles=unit, **known.get(what, {}))
 

@@ -37,8 +37,11 @@ TURN = 360.0
 BAR, THIN = 0.5, 0.16  # heights of strokes and dwells, a row being 1
 
 
-def cyclogram_figure(rows: pd.DataFrame) -> Figure:
-    """Draw a cyclogram over one turn of the main shaft: rising strokes dark, falling ones light, dwells beneath."""
+def cyclogram_figure(rows: pd.DataFrame, made: Mapping[str, tuple[float, float]]) -> Figure:
+    """Draw a cyclogram over one turn of the main shaft: rising strokes dark, falling ones light, dwells beneath.
+
+    Events are lines; a band about one shows between which angles [deg] ``made`` what is made has it.
+    """
     members = list(dict.fromkeys(rows["member"][rows["kind"] != "event"]))
     events = rows[rows["kind"] == "event"]
     figure = new_figure(WIDTH, 0.62 * len(members) + 1.0 + 0.14 * len(events))
@@ -54,14 +57,14 @@ def cyclogram_figure(rows: pd.DataFrame) -> Figure:
         bottom = height - 0.5 * BAR if stroke else height - 0.5 * BAR - THIN - 0.04
         pieces = [(start, min(length, TURN - start)), (0.0, max(start + length - TURN, 0.0))]
         axes.broken_barh(pieces, (bottom, BAR if stroke else THIN), color=colour, linewidth=0, zorder=2)
-    _events(axes, events, len(members))
+    _events(axes, events, len(members), made)
     axes.set_yticks(range(len(members)), members[::-1])
     axes.set_ylim(-0.6, len(members) - 0.3 + 0.34 * len(events))
     crank_axis(axes, "angle of the main shaft [°]")
     return figure
 
 
-def _events(axes: Axes, events: pd.DataFrame, rows: int) -> None:
+def _events(axes: Axes, events: pd.DataFrame, rows: int, made: Mapping[str, tuple[float, float]]) -> None:
     """Draw each event as a line, its name above the rows, one below the other so that none covers another."""
     named: Any = zip(events["name"], events["start"], strict=True)
     for k, (name, start) in enumerate(named):
@@ -69,6 +72,10 @@ def _events(axes: Axes, events: pd.DataFrame, rows: int) -> None:
         axes.plot([phi, phi], [-0.6, height], color=LIMIT, linewidth=1.0, zorder=3)
         right = phi > 0.75 * TURN
         words = f"{name} {phi:.1f}°"
+        if name in made:
+            low, high = made[name]
+            axes.fill_betweenx([-0.6, height], low, high, color=LIMIT, alpha=0.3, linewidth=0, zorder=1)
+            words += f" ({low:.2f} to {high:.2f}°)"
         axes.text(phi - 3 if right else phi + 3, height, words, ha="right" if right else "left", va="top", fontsize=8)
 
 
@@ -189,12 +196,20 @@ def rotates(turn: pd.DataFrame, position: str) -> bool:
     return turns_fully(np.unwrap(turn[position].to_numpy(float)))
 
 
-def cyclogram(mechanism: Mechanism, design: Table, *, dwell: float = 0.02, angles: AngleUnit | None = None) -> Axes:
+def cyclogram(
+    mechanism: Mechanism,
+    design: Table,
+    *,
+    dwell: float = 0.02,
+    angles: AngleUnit | None = None,
+    made: Mapping[str, tuple[float, float]] | None = None,
+) -> Axes:
     """Show what all members of a machine do over one turn: strokes, dwells and events; :func:`sweep.cyclogram`.
 
     Parameters
     ----------
     mechanism, design, dwell, angles : as of :func:`sweep.cyclogram`
+    made : by the name of an event, between which angles [deg] what is made has it: drawn as a band
 
     Returns
     -------
@@ -210,7 +225,7 @@ def cyclogram(mechanism: Mechanism, design: Table, *, dwell: float = 0.02, angle
     """
     rows = table(mechanism, design, dwell=dwell, angles=angles)
     with house_style():
-        return cyclogram_figure(rows).axes[0]
+        return cyclogram_figure(rows, made or {}).axes[0]
 
 
 def mechanism(

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, NamedTuple
 
@@ -20,11 +21,13 @@ from sweep.report.quantities import Quantity, number, quantity
 from sweep.study import Limit
 
 if TYPE_CHECKING:
+    import pandas as pd
     from numpy.typing import NDArray
 
     from sweep.families.base import Array
     from sweep.study import Study
 
+NOWHERE = (math.nan, math.nan)
 SINGLE = 1024  # for what each dimension costs
 COSTS = 8  # dimensions that are tried exact
 BINS = 41
@@ -234,6 +237,14 @@ def event_bands(data: Dataset) -> dict[str, tuple[float, float]]:
         for name, output in event_angles(data.study.family).items()
         if output in rows
     }
+
+
+def with_bands(rows: pd.DataFrame, bands: Mapping[str, tuple[float, float]]) -> pd.DataFrame:
+    """Return the cyclogram in degrees with the angles between which what is made has an event; as it is without any."""
+    known = [bands.get(name, NOWHERE) if kind == "event" else NOWHERE
+             for kind, name in zip(rows["kind"], rows["name"], strict=True)]  # fmt: skip
+    ends = {"made from [deg]": [low for low, _ in known], "made to [deg]": [high for _, high in known]}
+    return rows.assign(**(ends if bands else {}))
 
 
 def share_made(data: Dataset) -> float:

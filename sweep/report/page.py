@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 import shutil
 from collections.abc import Mapping, Sequence
 from datetime import date
@@ -31,6 +30,7 @@ from sweep.report.made import (
     slopes,
     spreads,
     tolerance_words,
+    with_bands,
 )
 from sweep.report.optima import CARDS, groups, optima, optima_sentence
 from sweep.report.quantities import number, rpm
@@ -189,10 +189,7 @@ def _cyclogram(data: Dataset, events: Mapping[str, tuple[float, float]], out: Pa
     if row is None or not isinstance(family, Machine):
         return []
     found = table_in_degrees(cyclogram(family, {name: row[name] for name in family.parameter_names}, angles="rad"))
-    made_at = [events.get(name, (math.nan, math.nan)) if kind == "event" else (math.nan, math.nan)
-               for kind, name in zip(found["kind"], found["name"], strict=True)]  # fmt: skip
-    bands = {"made from [deg]": [low for low, _ in made_at], "made to [deg]": [high for _, high in made_at]}
-    found.assign(**(bands if events else {})).to_csv(out / "cyclogram.csv", index=False, float_format="%.4f")
+    with_bands(found, events).to_csv(out / "cyclogram.csv", index=False, float_format="%.4f")
     return list(found.itertuples(index=False, name=None))
 
 

@@ -33,7 +33,7 @@ RECORDS: Mapping[str, Any] = {"task1": Position, "task2": Position, "task3": Set
 ANGLES = ("swing", "phi0", "alpha", "alpha2", "max_pressure_angle", "dwell", "dphi", "dpsi", "start_direction",
           "end_direction")  # fmt: skip
 RATIOS = ("ratio", "coupler", "offset", "f2_ratio", "size")
-WORDS = ("objective", "adjusted", "limit", "kappa", "branch")
+WORDS = ("objective", "adjusted", "limit", "kappa", "branch", "second")
 
 
 def load_task(path: str | Path) -> SynthesisTask:
@@ -108,7 +108,7 @@ def read_study_task(file: StudyFile, mechanism: object) -> SynthesisTask | None:
     if task is None or mechanism is None:
         return task
     kind = file.data["task"]["kind"]
-    chain = CHAINS.get(kind)
+    chain = ("rssr", task.second) if isinstance(task, tasks.Task6) else CHAINS.get(kind)
     if chain is None:
         file.faults.value(("task", "kind"), kind, f"{', '.join(CHAINS)}; {kind} is answered by `sweep task` alone")
     elif mechanism != chain:

@@ -7,8 +7,10 @@ import math
 import numpy as np
 import pandas as pd
 import pytest
+from click.testing import CliRunner
 
 import sweep
+from sweep.cli.main import main
 from sweep.report.page import write_report
 from sweep.study import study_from_data
 
@@ -58,3 +60,25 @@ def test_events_of_what_is_made_lie_in_the_band_of_the_cyclogram(folder):
     for beyond in (phi < low, phi > high):
         assert abs(beyond.mean() - 0.025) < 4.0 * math.sqrt(0.025 / COUNT + 0.025 / 2048)
     assert f"{low:.2f} to {high:.2f}°" in page.read_text(encoding="utf-8")
+
+
+def test_command_draws_the_bands_of_the_page(folder, tmp_path):
+    page = write_report(folder)
+    for name in ("table.csv", "chart.svg"):
+        drawn = CliRunner().invoke(main, ["draw", "cyclogram", str(folder), "--out", str(tmp_path / name)])
+        assert drawn.exit_code == 0, drawn.output
+    assert (tmp_path / "table.csv").read_bytes() == (page.parent / "cyclogram.csv").read_bytes()
+    (event,) = pd.read_csv(tmp_path / "table.csv").query("kind == 'event'").to_dict("records")
+    low, high = event["made from [deg]"], event["made to [deg]"]
+    best = pd.read_parquet(page.parent / "optimum.parquet").query("role == 'optimum'").iloc[0]
+    family = study_from_data(STUDY, "study.toml").family
+    design = {name: best[name] for name in family.parameter_names}
+    axes = sweep.plot.cyclogram(family, design, angles="rad", made={"passes": (low, high)})
+    assert f"passes {event['from [deg]']:.1f}° ({low:.2f} to {high:.2f}°)" in [text.get_text() for text in axes.texts]
+    (band,) = (one for one in axes.collections if one.get_alpha() == 0.3)
+    ends = band.get_paths()[0].vertices[:, 0]
+    assert (ends.min(), ends.max()) == (low, high)
+    # Of a design that was not made there is no band.
+    other = ["draw", "cyclogram", str(folder), "--design", "0", "--out", str(tmp_path / "row.csv")]
+    assert CliRunner().invoke(main, other).exit_code == 0
+    assert "made from" not in (tmp_path / "row.csv").read_text()

@@ -64,6 +64,8 @@ TASK4 = Case(Task4, swing=np.radians(45.0), phi0=np.radians(165.0), e=1.0, objec
 TASK5 = Case(Task5, swing=0.8, phi0=3.2, **SPACE, f_range=(-3.0, 3.0), rho0=0.5, bounds=STAGE_BOUNDS,
              max_pressure_angle=1.2, positions=(SlotPosition(1.0, 0.1), SlotPosition(2.0, 0.38)))  # fmt: skip
 TASK6 = Case(Task6, drive=DRIVE, start=(0.0, 0.0), end=(1.0, 0.2), start_direction=0.5, end_direction=-0.1)
+TASK6_SLIDER = Case(Task6, **TASK6.numbers, second="slider_crank")
+TASK6_SLOTTED = Case(Task6, **TASK6.numbers, second="swivel")
 TASK7 = Case(Task7, drive=DRIVE, stroke=1.0, start_acceleration=0.6, end_acceleration=-0.5)
 TASK8 = Case(Task8, swing=0.8, phi0=3.2, **SPACE, f_range=(-3.0, 3.0), stroke=1.0, dwell=1.0, tolerance=0.004,
              limit="folded", bounds=STAGE_BOUNDS)  # fmt: skip

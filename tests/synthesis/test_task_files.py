@@ -13,7 +13,7 @@ from click.testing import CliRunner
 from sweep.cli import main
 from sweep.errors import StudyError
 from sweep.study.task import KINDS, load_task
-from sweep.synthesis.tasks import EngineeringMethod, Position, Setting, SlotPosition, Task1, solve
+from sweep.synthesis.tasks import EngineeringMethod, Position, Setting, SlotPosition, Task1, Task6, solve
 
 PAGE = Path(__file__).parents[2] / "docs" / "tasks.md"
 LENGTHS = 'a = "10 mm", b = "35 mm", c = "25 mm", e = "30 mm", f = "0 mm", g = "0 mm"'
@@ -53,6 +53,12 @@ def test_every_kind_has_a_file_here() -> None:
 def test_file_of_every_kind_becomes_its_problem(kind: str, tmp_path: Path) -> None:
     problem = load_task(written(tmp_path, f'[task]\nkind = "{kind}"\n{FILES[kind]}\n'))
     assert isinstance(problem, KINDS[kind])
+
+
+def test_second_stage_of_task6_is_named_in_the_file(tmp_path: Path) -> None:
+    problem = load_task(written(tmp_path, f'[task]\nkind = "task6"\n{FILES["task6"]}\nsecond = "swivel"\n'))
+    assert isinstance(problem, Task6) and problem.second == "swivel"
+    assert [unknown.name for unknown in problem.unknowns] == ["frame", "rod", "theta1"]
 
 
 def test_units_are_those_of_the_project(tmp_path: Path) -> None:

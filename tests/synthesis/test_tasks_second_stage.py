@@ -12,7 +12,20 @@ from sweep.synthesis.tasks import (
     Task8,
     solve,
 )
-from tests.support.task_cases import DRIVE, RSSR, TASK5, TASK6, TASK7, TASK8, Case, best, chain_columns, check_limits
+from tests.support.task_cases import (
+    DRIVE,
+    RSSR,
+    TASK5,
+    TASK6,
+    TASK6_SLIDER,
+    TASK6_SLOTTED,
+    TASK7,
+    TASK8,
+    Case,
+    best,
+    chain_columns,
+    check_limits,
+)
 
 
 def test_task5_pin_goes_as_prescribed():
@@ -49,6 +62,52 @@ def test_task6_point_goes_between_the_places_along_the_tangents():
     turn = sweep.summarise(["rssr", "guide"], chain_columns(solution, "guide"), ["max_abs_d2s", "max_pressure_angle2"])
     assert turn["status"][0] == st.OK
     assert turn["max_abs_d2s"][0] == pytest.approx(solution.objective, rel=5e-3)
+    assert turn["max_pressure_angle2"][0] < np.radians(60.5)
+
+
+def rod_of_a_slider(m, phi):
+    """Working point on the coupler of a slider-crank, the crank's angle given: by circle and line."""
+    pin = m["a2"] * np.exp(1j * phi)
+    slider = pin.real + m["branch2"] * np.sqrt(m["b2"] ** 2 - (m["e2"] - pin.imag) ** 2) + 1j * m["e2"]
+    return pin + (m["xi2"] + 1j * m["eta2"]) * (slider - pin) / m["b2"]
+
+
+def rod_through_a_block(m, phi):
+    """Working point on a rod from the crank pin through a block at e on the x-axis."""
+    pin = m["a2"] * np.exp(1j * phi)
+    return pin + m["Lw2"] * (m["e2"] - pin) / np.abs(m["e2"] - pin)
+
+
+@pytest.mark.parametrize(("case", "point_of"), [(TASK6_SLIDER, rod_of_a_slider), (TASK6_SLOTTED, rod_through_a_block)])
+def test_task6_with_other_second_stages_goes_between_the_places_along_the_tangents(case, point_of):
+    solution = best(case)
+    m = solution.mechanism
+    limits = sweep.summarise("rssr", DRIVE, ["phi_ext", "phi_fold"], accuracy=1e-12).iloc[0]
+    phi = np.array([limits["phi_ext"], limits["phi_fold"]])
+
+    def at(angles):
+        psi = sweep.evaluate("rssr", DRIVE, ["psi"], phi=angles)["psi"].to_numpy()
+        return m["x0"] + 1j * m["y0"] + np.exp(1j * m["beta0"]) * point_of(m, m["kappa2"] * psi + m["offset2"])
+
+    point = at(np.concatenate([phi, phi + np.array([2e-3, -2e-3])]))  # just after the start, just before the end
+    assert abs(point[0]) < 1e-9
+    assert abs(point[1] - (1.0 + 0.2j)) < 1e-9
+    assert np.angle(point[2] - point[0]) == pytest.approx(0.5, abs=1e-4)
+    assert np.angle(point[1] - point[3]) == pytest.approx(-0.1, abs=1e-4)
+    # Second differences over 0.5 degree are good to a share of 1e-4 here; the task looks at every other pose of these.
+    grid = np.arange(720) * (2.0 * np.pi / 720)
+    along = (at(grid) * np.exp(-1j * np.angle(1.0 + 0.2j))).real
+    second = (np.roll(along, 1) - 2.0 * along + np.roll(along, -1)) / grid[1] ** 2
+    assert np.abs(second).max() == pytest.approx(solution.objective, rel=5e-3)
+    # The chain that the answer names is that mechanism.
+    chain = chain_columns(solution, case.numbers["second"])
+    turn = sweep.summarise(["rssr", case.numbers["second"]], chain, ["stroke"])
+    assert turn["status"][0] == st.OK
+
+
+def test_task6_of_a_rocker_slider_keeps_its_pressure_angle():
+    chain = chain_columns(best(TASK6_SLIDER), "slider_crank")
+    turn = sweep.summarise(["rssr", "slider_crank"], chain, ["max_pressure_angle2"])
     assert turn["max_pressure_angle2"][0] < np.radians(60.5)
 
 

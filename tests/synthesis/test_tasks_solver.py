@@ -127,6 +127,7 @@ def test_solution_reads_as_text():
         (lambda: Task5(3.5, **FRAME, rho0=0.5), "below pi"),
         (lambda: Task5(0.8, **FRAME, rho0=0.5, ratio_range=(0.5, 2.0)), "one side of 1"),
         (lambda: Task6(DRIVE, (0.0, 0.0), (0.0, 0.0), 0.5, -0.1), "another place"),
+        (lambda: Task6(DRIVE, (0.0, 0.0), (1.0, 0.0), 0.5, -0.1, second="cam"), "guide, slider_crank or swivel"),
         (lambda: Task8(0.8, **FRAME, stroke=-1.0, dwell=1.0, tolerance=0.1), "stroke = -1.0"),
         (lambda: Task8(0.8, **FRAME, stroke=1.0, dwell=1.0, tolerance=0.1, limit="middle"), "extended or folded"),
         (lambda: Task7(DRIVE | {"a": 5.0}, 1.0, 0.6, -0.5), "drive"),

@@ -31,11 +31,13 @@ _TURN: Rule = ("an angle between 0 and 2 pi", lambda x: 0.0 < x < TWO_PI)
 _PLACES: Rule = ("finite numbers", lambda x: bool(np.isfinite(np.asarray(x, np.float64)).all()))
 _RANGE: Rule = ("two finite numbers, the lower one first", lambda x: -math.inf < x[0] <= x[1] < math.inf)
 _LENGTHS: Rule = ("two positive numbers, the lower one first", lambda x: 0.0 < x[0] <= x[1] < math.inf)
+SECOND = ("guide", "slider_crank", "swivel")
 RULES: dict[str, Rule] = {
     "swing": ("an angle between 0 and 2 pi, or its negative", lambda x: 0.0 < abs(x) < TWO_PI),
     "phi0": _TURN,
     "max_pressure_angle": ("an angle between 0 and pi/2", lambda x: 0.0 < x <= 0.5 * math.pi),
     "objective": ("acceleration or pressure_angle", lambda x: x in ("acceleration", "pressure_angle")),
+    "second": ("guide, slider_crank or swivel", lambda x: x in SECOND),
     "limit": ("extended or folded", lambda x: x in ("extended", "folded")),
     "adjusted": ("a, b, c, e, f or g", lambda x: x in tuple("abcefg")),
     "swing_range": (

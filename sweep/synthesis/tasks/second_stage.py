@@ -1,16 +1,17 @@
 """Tasks 6 and 7: a given crank-rocker as first stage, and the chains that it drives.
 
-In task 6 it drives a guiding four-bar: a coupler point between two places with given tangents.  In task 7 it drives a
-slider, with given stroke and given accelerations at its ends.
+In task 6 it drives a guiding four-bar, a rocker-slider or a rocker-slotted linkage: a working point between two places
+with given tangents.  In task 7 it drives a slider, with given stroke and given accelerations at its ends.
 """
 
 from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from typing import Literal, NamedTuple
+from typing import ClassVar, Literal, NamedTuple, TypeAlias
 
 import numpy as np
+from numpy.typing import NDArray
 
 from sweep.errors import InputError
 from sweep.evaluation.summaries import design_outputs
@@ -20,7 +21,8 @@ from sweep.families.base import Accuracy, Angles, Array
 from sweep.synthesis.tasks.crank_rocker import RSSR, motion, named, turn
 from sweep.synthesis.tasks.problem import Found, Task, Unknown, turning
 
-GUIDE, RSSP = family("guide"), family("rssp")
+RSSP = family("rssp")
+SIDEWAYS = {"along": (-4.0, 6.0), "across": (-4.0, 4.0)}
 
 
 class Drive(NamedTuple):
@@ -69,20 +71,109 @@ def second_pressure_limit(angle: Array, largest: float) -> Array:
     return slack
 
 
+Points: TypeAlias = NDArray[np.complex128]
+
+
+class FourBar:
+    """A coupler point of a four-bar: ``shape``, proportions in cranks; ``dimensions``, their names in the family."""
+
+    family = "guide"
+    shape: ClassVar[Mapping[str, tuple[float, float]]] = {
+        "coupler": (0.5, 5.0), "rocker": (0.5, 5.0), "frame": (0.5, 5.0), **SIDEWAYS,
+    }  # fmt: skip
+    dimensions: ClassVar[Mapping[str, str]] = {
+        "coupler": "b",
+        "rocker": "c",
+        "frame": "e",
+        "along": "xi",
+        "across": "eta",
+    }
+    coordinates: tuple[str, ...] = ("s", "dev", "ds", "ddev")
+
+    def path(self, shape: Mapping[str, Array], angles: Angles, branch: int) -> tuple[Points, Points]:
+        """Return the working point and its derivative by the crank angle, (n, m), for a crank of 1."""
+        x, y, dx, dy = self.poses(shape, angles, branch, self.coordinates)
+        return x + 1j * y, dx + 1j * dy
+
+    def poses(
+        self, shape: Mapping[str, Array], angles: Angles, branch: int, wanted: tuple[str, ...]
+    ) -> tuple[Array, ...]:
+        """Return pose outputs of stages with a crank of 1, (n, m) each."""
+        known = family(self.family)
+        columns = {"a": 1.0, "branch": float(branch)} | {self.dimensions[name]: part for name, part in shape.items()}
+        n = len(angles.phi)
+        rows = np.column_stack([np.broadcast_to(columns.get(p.name, 0.0), n) for p in known.parameters])
+        found = known.poses(rows, angles, frozenset(wanted))
+        return tuple(np.asarray(found[name], np.float64) for name in wanted)
+
+    def over_the_turn(self, drive: Drive, columns: Mapping[str, Array]) -> tuple[Array, Array | None]:
+        """Return acceleration along ``lam2`` and pressure angle, if any, over a turn of the drive, (n, m)."""
+        d2s, angle = chain_motion(self.family, columns, "d2s", "pressure_angle2")
+        return d2s, angle
+
+
+class RockerSlider(FourBar):
+    """A point of the rod of a slider-crank, along the rod and across from the crank pin."""
+
+    family = "slider_crank"
+    shape: ClassVar[Mapping[str, tuple[float, float]]] = {"coupler": (1.05, 5.0), "offset": (-4.0, 4.0), **SIDEWAYS}
+    dimensions: ClassVar[Mapping[str, str]] = {"coupler": "b", "offset": "e", "along": "xi", "across": "eta"}
+
+    def path(self, shape: Mapping[str, Array], angles: Angles, branch: int) -> tuple[Points, Points]:
+        """See `FourBar`."""
+        own = {name: shape[name] for name in ("coupler", "offset")}
+        s, ds = self.poses(own, angles, branch, ("s", "ds"))
+        share = ((shape["along"] + 1j * shape["across"]) / shape["coupler"])[:, None]
+        pin, slide = angles.cos + 1j * angles.sin, s + 1j * shape["offset"][:, None]
+        point, moving = (1.0 - share) * pin + share * slide, (1.0 - share) * 1j * pin + share * ds
+        return np.asarray(point, np.complex128), np.asarray(moving, np.complex128)
+
+    def over_the_turn(self, drive: Drive, columns: Mapping[str, Array]) -> tuple[Array, Array | None]:
+        """See `FourBar`."""
+        d2s, angle = chain_motion(self.family, columns, "d2s", "pressure_angle2")
+        psi, dpsi, d2psi = motion(drive.row[None, :], turn(), "psi", "dpsi", "d2psi")
+        kappa, offset, lam = (columns[name][:, None] for name in ("kappa2", "offset2", "lam2"))
+        with np.errstate(invalid="ignore"):  # of a linkage that does not reach all is nan
+            share = ((columns["xi2"] + 1j * columns["eta2"]) / columns["b2"])[:, None]
+            pin = columns["a2"][:, None] * np.exp(1j * (kappa * psi + offset - lam)) * (1j * kappa * d2psi - dpsi**2)
+            return np.real((1.0 - share) * pin + share * d2s * np.exp(-1j * lam)), angle
+
+
+class RockerSlotted(FourBar):
+    """A point of a rod from the crank pin through a swinging block."""
+
+    family = "swivel"
+    shape: ClassVar[Mapping[str, tuple[float, float]]] = {"frame": (1.05, 6.0), "rod": (0.0, 12.0)}
+    dimensions: ClassVar[Mapping[str, str]] = {"frame": "e", "rod": "Lw"}
+    coordinates = ("x_p", "y_p", "dx_p", "dy_p")
+
+    def over_the_turn(self, drive: Drive, columns: Mapping[str, Array]) -> tuple[Array, Array | None]:
+        """See `FourBar`."""
+        d2x, d2y = chain_motion(self.family, columns, "d2x_p", "d2y_p")
+        lam = columns["lam2"][:, None]
+        return d2x * np.cos(lam) + d2y * np.sin(lam), None
+
+
+STAGES: Mapping[str, FourBar] = {one.family: one for one in (FourBar(), RockerSlider(), RockerSlotted())}
+
+
 @dataclass(frozen=True)
 class Task6(Task):
-    """The unknowns are shape and place of a guiding four-bar whose coupler point goes from J1 to J2 on given tangents.
+    """The unknowns are shape and place of a second stage whose working point goes from J1 to J2 on given tangents.
 
-    Size, direction and place of the four-bar follow from J1 and J2 (they are similarity transformations), so the
-    unknowns are its proportions and the crank angle at J1; the two tangents are the equations.
+    Size, direction and place of the stage follow from J1 and J2 (they are similarity transformations), so the unknowns
+    are its proportions and the crank angle at J1; the two tangents are the equations.
 
     Parameters
     ----------
     drive : the crank-rocker, parameters of ``rssr``; J1 belongs to its extended, J2 to its folded position
-    start, end : J1 and J2 (x, y) in the plane of the four-bar [length]
+    start, end : J1 and J2 (x, y) in the plane of the second stage [length]
     start_direction, end_direction : of the path there, in the sense of going from J1 to J2 [rad]
-    kappa, branch : sense of the connection of the stages, assembly mode of the four-bar
-    max_pressure_angle : limit of the four-bar over the whole motion [rad]; below pi/2 keeps dead points away
+    second : the second stage: "guide", a coupler point of a four-bar; "slider_crank", one of a rocker-slider; "swivel",
+        a point of the rod of a rocker-slotted linkage
+    kappa, branch : sense of the connection of the stages, assembly mode of the second stage
+    max_pressure_angle : limit of the second stage over the whole motion [rad]; below pi/2 keeps dead points away.  A
+        rod through a block has none
     """
 
     drive: Mapping[str, float]
@@ -90,6 +181,7 @@ class Task6(Task):
     end: tuple[float, float]
     start_direction: float
     end_direction: float
+    second: Literal["guide", "slider_crank", "swivel"] = "guide"
     kappa: int = 1
     branch: int = 1
     max_pressure_angle: float = field(default=np.radians(60.0), kw_only=True)
@@ -104,26 +196,16 @@ class Task6(Task):
 
     @property
     def unknowns(self) -> tuple[Unknown, ...]:
-        """Proportions of the four-bar in cranks, and the crank angle at J1."""
-        shape = {
-            "coupler": (0.5, 5.0),
-            "rocker": (0.5, 5.0),
-            "frame": (0.5, 5.0),
-            "along": (-4.0, 6.0),
-            "across": (-4.0, 4.0),
-        }
-        return (*(Unknown(name, *ends) for name, ends in shape.items()), turning("theta1"))
+        """Proportions of the second stage in cranks, and the crank angle at J1."""
+        return (*(Unknown(name, *ends) for name, ends in STAGES[self.second].shape.items()), turning("theta1"))
 
     def found(self, x: Mapping[str, Array]) -> Found:
         """See `Task`."""
-        *shape, theta = x.values()
-        n, first = len(theta), self._first
-        ones = np.ones(n)
-        four_bar = np.column_stack([ones, *shape, 0.0 * ones, 0.0 * ones, self.branch * ones])
+        first, stage, theta = self._first, STAGES[self.second], x["theta1"]
+        shape = {name: x[name] for name in stage.shape}
+        ones = np.ones(len(theta))
         angles = Angles.of(np.column_stack([theta, theta + self.kappa * first.swing]))
-        path = GUIDE.poses(four_bar, angles, frozenset(("s", "dev", "ds", "ddev")))
-        s, dev, ds, ddev = (np.asarray(path[name], np.float64) for name in ("s", "dev", "ds", "ddev"))
-        point, moving = s + 1j * dev, ds + 1j * ddev
+        point, moving = stage.path(shape, angles, self.branch)
         chord = complex(*self.end) - complex(*self.start)
         with np.errstate(divide="ignore", invalid="ignore"):
             similarity = chord / (point[:, 1] - point[:, 0])
@@ -133,21 +215,25 @@ class Task6(Task):
         turned = along * wanted.conj()
         size, beta = np.abs(similarity), np.angle(similarity)
         origin = complex(*self.start) - similarity * point[:, 0]
-        columns = first.columns(n) | {
+        columns = first.columns(len(theta)) | {
             "a2": size,
-            **{f"{name}2": size * part for name, part in zip(("b", "c", "e", "xi", "eta"), shape, strict=True)},
+            **{f"{stage.dimensions[name]}2": size * part for name, part in shape.items()},
             "lam2": np.angle(chord) - beta,
             "h2": 0.0 * ones,
             "branch2": self.branch * ones,
             "kappa2": self.kappa * ones,
             "offset2": theta - self.kappa * first.psi_ext,
         }
-        d2s, angle = chain_motion("guide", columns, "d2s", "pressure_angle2")
+        d2s, angle = stage.over_the_turn(first, columns)
         ends = ("start", "end")
         limits = {f"sense at the {end}": part for end, part in zip(ends, turned.real.T, strict=True)}
-        limits["pressure angle 2"] = second_pressure_limit(angle, self.max_pressure_angle)
+        limits |= {} if angle is None else {"pressure angle 2": second_pressure_limit(angle, self.max_pressure_angle)}
         equations = {f"tangent at the {end}": part for end, part in zip(ends, turned.imag.T, strict=True)}
-        return Found(equations, limits, d2s, columns | {"x0": origin.real, "y0": origin.imag, "beta0": beta})
+        beyond = {f"{name}2" for name in ("lam", "h", "branch")}.difference(
+            family(["rssr", self.second]).parameter_names
+        )
+        named_columns = {name: column for name, column in columns.items() if name not in beyond}
+        return Found(equations, limits, d2s, named_columns | {"x0": origin.real, "y0": origin.imag, "beta0": beta})
 
 
 @dataclass(frozen=True)
