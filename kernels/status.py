@@ -29,6 +29,7 @@ WRONG_SIDE = 19
 WRONG_WAY = 20
 NO_FRAME = 21
 NO_TRIANGLE = 22
+NO_WINDOW = 23
 
 MEANING: dict[int, str] = {
     OK: "ok",
@@ -56,4 +57,5 @@ MEANING: dict[int, str] = {
     WRONG_WAY: "the tip passes against the stated sense only",
     NO_FRAME: "the needle has no frame: its scarf points along it",
     NO_TRIANGLE: "blade, thread and seam lie in one line: they span no triangle",
+    NO_WINDOW: "the fields of work leave the needle's rise no window in common",
 }

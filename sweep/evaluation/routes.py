@@ -37,7 +37,7 @@ from sweep.reductions.turn import margin_group
 PARTIAL = (
     st.OK, st.NOT_OSCILLATING, st.NOT_CONVERGED, st.NO_DWELL, st.JAMMED, st.NOT_LINEAR, st.SINGULAR, st.INVALID_INPUT,
     st.NO_EVENT, st.NEVER, st.TWICE, st.TANGENT, st.WRONG_SIDE, st.WRONG_WAY, st.NO_FRAME,
-    st.NO_TRIANGLE,
+    st.NO_TRIANGLE, st.NO_WINDOW,
 )  # fmt: skip
 GOES_ON = np.isin(np.arange(256), PARTIAL)
 

@@ -6,12 +6,14 @@ at X = (T - G).u across, Y = (T - G).w aside, Z = (T - G).n along the needle fro
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+import re
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
+from kernels.types import Array
 from sweep.families.base import Output, Parameter
 from sweep.families.frames import Frame
 from sweep.families.segments import Gap, cross, dot, minus
@@ -25,36 +27,51 @@ PARALLEL = 1e-6  # of the scarf's size: what is square to the needle says no dir
 class RiseWindow:
     """Where the rise of the needle at A may lie: what two or more fields of work permit in common, 5.4.
 
-    ``fields`` are their names with the least and the most rise that each permits.
+    ``fields`` are their names with the least and the most rise that each permits.  Where ``vary`` holds these are
+    defaults of parameters of the machine, ``of`` being the name of the moment.
     """
 
+    of: str
     fields: tuple[tuple[str, float, float], ...]
+    vary: bool = False
 
     @property
-    def least(self) -> float:
-        """The largest of the fields' least rises."""
-        return self._low[1]
+    def parameters(self) -> tuple[Parameter, ...]:
+        """Both ends of every field, where these vary."""
+        texts = {"least": "least rise that {} permits", "most": "largest rise that {} permits"}
+        return tuple(
+            Parameter(f"{self.of}_{end}_{_word(field)}", "length", text.format(field), default=value, not_negative=True)
+            for field, *values in (self.fields if self.vary else ())
+            for (end, text), value in zip(texts.items(), values, strict=True)
+        )
 
-    @property
-    def most(self) -> float:
-        """The smallest of the fields' largest rises."""
-        return self._high[2]
+    def ends(self, designs: Any, names: Sequence[str]) -> tuple[Any, Any]:
+        """Return the least and the most rise that every field permits, each (n, F), of designs with these columns."""
+        if self.vary:
+            found = designs[:, [names.index(p.name) for p in self.parameters]]
+            return found[:, 0::2], found[:, 1::2]
+        given = np.broadcast_to([ends for _, *ends in self.fields], (len(designs), len(self.fields), 2))
+        return given[:, :, 0], given[:, :, 1]
+
+    def binding(self, design: Array, names: Sequence[str]) -> tuple[tuple[str, float], tuple[str, float]]:
+        """Return which fields set the least and the most rise of a design (P,), each with that rise."""
+        low, high = (one[0] for one in self.ends(design[None, :], names))
+        first, last = int(low.argmax()), int(high.argmin())
+        return (self.fields[first][0], float(low[first])), (self.fields[last][0], float(high[last]))
 
     @property
     def words(self) -> str:
         """What is left to the rise, with the fields that bind."""
-        return (
-            f"how far the rise lies inside its window: at least {self.least:g} for {self._low[0]}, "
-            f"at most {self.most:g} for {self._high[0]}"
-        )
+        text = "how far the rise lies inside its window"
+        if self.vary:
+            return f"{text}, which {' and '.join(field for field, *_ in self.fields)} leave"
+        (slow, least), (fast, most) = self.binding(np.empty(0), ())
+        none = ": none is left" if least > most else ""
+        return f"{text}: at least {least:g} for {slow}, at most {most:g} for {fast}{none}"
 
-    @property
-    def _low(self) -> tuple[str, float, float]:
-        return max(self.fields, key=lambda field: field[1])
 
-    @property
-    def _high(self) -> tuple[str, float, float]:
-        return min(self.fields, key=lambda field: field[2])
+def _word(field: str) -> str:
+    return re.sub(r"\W+", "_", field)
 
 
 @dataclass(frozen=True)
@@ -106,8 +123,8 @@ class Taking:
 
     @property
     def parameters(self) -> tuple[Parameter, ...]:
-        """It has none of its own."""
-        return ()
+        """Those of the window of the rise."""
+        return self.window.parameters if self.window else ()
 
     def needs(self, wanted: frozenset[str]) -> frozenset[str]:
         """Return coordinates of both points and the line, and velocities where they are wanted."""

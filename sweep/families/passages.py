@@ -46,6 +46,11 @@ TEXTS = {
     "free": ("length", "least gap between needle and blade while the needle goes down"),
 }
 
+WINDOW = {
+    "least": ("length", "least rise that every field of work permits"),
+    "most": ("length", "largest rise that every field of work permits"),
+}
+
 
 def taking_step(taking: Taking, machine: Machine) -> Step:
     """Return the machine's own route to where and how the tip passes."""
@@ -54,7 +59,7 @@ def taking_step(taking: Taking, machine: Machine) -> Step:
         f"phi_{name}", "rad", "crank angle at which the tip passes the needle, in its sense, beside it", "5.2"
     )
     count = Output(f"count_{name}", "1", "passages in the stated sense beside the needle", "5.2", jumps=True)
-    texts = TEXTS | ({"room": ("length", taking.window.words)} if taking.window else {})
+    texts = TEXTS | (WINDOW | {"room": ("length", taking.window.words)} if taking.window else {})
     provides = (place, count, *(Output(f"{name}_{key}", unit, text, "5.2") for key, (unit, text) in texts.items()))
     return step_of(name, provides, machine, partial(_found, taking), partial(_read, taking))
 
@@ -132,7 +137,10 @@ def _read(taking: Taking, machine: Machine, designs: Any, places: Places, wanted
         "reach": -sense * across["far"],
     }
     if taking.window:
-        values["room"] = np.minimum(rise - taking.window.least, taking.window.most - rise)
+        low, high = taking.window.ends(designs, machine.parameter_names)
+        least, most = low.max(axis=1), high.min(axis=1)
+        values |= {"least": least, "most": most, "room": np.minimum(rise - least, most - rise)}
+        status[(status == st.OK) & (np.real(least) > np.real(most))] = st.NO_WINDOW
     if gap:
         free, radii = gap[0]["near"], sum(body.radius for body in taking.gap.bodies)
         # Axes that meet do so on every design near by: the least gap stays what it is, and has no slope.

@@ -27,6 +27,10 @@ if TYPE_CHECKING:
     from sweep.families.machines import Machine
 
 RPM = 2.0 * np.pi / 60.0
+ENDS = {
+    "above": "how far the rise at A stands above the least one permitted",
+    "below": "how far the rise at A stands below the most permitted",
+}
 
 
 @dataclass(frozen=True)
@@ -54,9 +58,24 @@ class Sewing:
     parameters: tuple[Parameter, ...] = ()
 
     @property
-    def numbers(self) -> Mapping[str, int]:
-        """Design outputs, one of each speed: names with the place of the speed."""
-        return {f"{self.name}_at_{speed / RPM:.6g}": k for k, speed in enumerate(self.speeds)}
+    def numbers(self) -> Mapping[str, tuple[str, int]]:
+        """Design outputs of each speed: names with what is to spare, "" for the least of all, and the speed's place."""
+        return {
+            f"{self.name}_{part}{'_' if part else ''}at_{speed / RPM:.6g}": (part, k)
+            for part in ("", *ENDS)
+            for k, speed in enumerate(self.speeds)
+        }
+
+    @property
+    def ends(self) -> dict[str, str]:
+        """Names of what the rise leaves to both ends of its window, among the rooms: no relation has such names."""
+        return {end: f"{self.taking.name} {end}" for end in ENDS}
+
+    def fields(self) -> tuple[str, str]:
+        """Return the fields of work of the least and of the greatest speed."""
+        assert self.taking.window is not None
+        first, *_, last = (*self.taking.window.fields, self.taking.window.fields[-1])
+        return first[0], last[0]
 
     def needs(self, wanted: frozenset[str]) -> frozenset[str]:
         """Poses give nothing of it."""
@@ -66,13 +85,19 @@ class Sewing:
         """Poses give nothing of it."""
         return {}
 
-    def window(self, speeds: Array) -> tuple[Array, Array]:
-        """Return the least and the most rise that are permitted at some speeds, each as ``speeds``."""
+    def binding(self, machine: Machine, design: Array) -> tuple[tuple[str, float], tuple[str, float]]:
+        """Return which fields set the least and the most rise of a design (P,) that suits all, each with that rise."""
         assert self.taking.window is not None
-        (_, low, high), *_, (_, to_low, to_high) = (*self.taking.window.fields, self.taking.window.fields[-1])
+        return self.taking.window.binding(design, machine.parameter_names)
+
+    def window(self, machine: Machine, designs: Array, speeds: Array) -> tuple[Array, Array]:
+        """Return the least and the most rise that are permitted, each (n, S), of designs at speeds (S,) or (n, S)."""
+        assert self.taking.window is not None
         first, last = self.speeds[0], self.speeds[-1]
-        part = (speeds - first) / (last - first)
-        return low + part * (to_low - low), high + part * (to_high - high)
+        part = np.atleast_2d((speeds - first) / (last - first))
+        ends = self.taking.window.ends(designs, machine.parameter_names)
+        low, high = (own[:, [0]] + part * (own[:, [-1]] - own[:, [0]]) for own in ends)
+        return low, high
 
     def rooms(
         self, machine: Machine, designs: Array, speeds: Array, accuracy: Accuracy
@@ -80,7 +105,8 @@ class Sewing:
         """Return what each moment has to spare at each speed, (n, S) by the name of its relation, and status (n,).
 
         Of A the least of what rise, clearance, scarf and eye leave, of B and C the margin of the triangle; nan where
-        there is no such moment.  Negative: the stitch is missed.
+        there is no such moment.  Negative: the stitch is missed.  ``ends`` are what the rise at A leaves to the
+        least and to the most rise permitted: parts of A.
         """
         lag = self._lag(machine)
         slow, fast, status = self._unevenness(machine, designs, accuracy)
@@ -93,10 +119,10 @@ class Sewing:
             parts = {name: [one[name] for one in each] for name in each[0]}
         rooms = {name: np.stack(values, axis=1) for name, values in parts.items()}
         rise = rooms.pop("rise")
-        for share in (slow, fast):
-            low, high = self.window(speeds[None, :] * share[:, None])
-            room = np.minimum(rise - low, high - rise)
-            rooms[self.taking.name] = np.minimum(rooms[self.taking.name], room)
+        windows = [self.window(machine, designs, speeds[None, :] * share[:, None]) for share in (slow, fast)]
+        rooms[self.ends["above"]] = np.minimum.reduce([rise - low for low, _ in windows])
+        rooms[self.ends["below"]] = np.minimum.reduce([high - rise for _, high in windows])
+        rooms[self.taking.name] = np.minimum.reduce([rooms[name] for name in (self.taking.name, *self.ends.values())])
         return rooms, status
 
     def _moments(self, machine: Machine, designs: Array, accuracy: Accuracy, status: Status) -> dict[str, Array]:
@@ -154,21 +180,24 @@ class Sewing:
 
 def sewing_step(sewing: Sewing, machine: Machine) -> Step:
     """Return the machine's route to the least room of all moments at each speed."""
-    text = "least room of moments {} at {:.6g} rpm; negative: it does not sew"
     moments = ", ".join((sewing.taking.name, *(one.name for one in sewing.entering)))
+    texts = ENDS | {"": f"least room of moments {moments}"}
     provides = tuple(
-        Output(name, "length", text.format(moments, sewing.speeds[k] / RPM), "5.4")
-        for name, k in sewing.numbers.items()
+        Output(name, "length", f"{texts[part]} at {sewing.speeds[k] / RPM:.6g} rpm; negative: it does not sew", "5.4")
+        for name, (part, k) in sewing.numbers.items()
     )
 
     def run(designs: Array, wanted: frozenset[str], accuracy: Accuracy) -> Columns:
         rooms, status = sewing.rooms(machine, designs, np.array(sewing.speeds), accuracy)
         least = np.minimum.reduce(list(rooms.values()))
+        rooms[""] = least
         status = np.where((status == st.OK) & np.isnan(least).any(axis=1), st.NEVER, status).astype(np.uint8)
-        most = float(sewing.window(np.array(sewing.speeds))[1].max())  # lengths that the rooms are differences of
+        # lengths that the rooms are differences of
+        most = sewing.window(machine, designs, np.array(sewing.speeds))[1].max(axis=1)
         columns: Columns = {}
-        for name, k in sewing.numbers.items():
-            columns |= {name: least[:, k], f"err_{name}": (np.abs(least[:, k]) + most) * (accuracy.target or 0.0)}
+        for name, (part, k) in sewing.numbers.items():
+            room = rooms[sewing.ends.get(part, "")][:, k]
+            columns |= {name: room, f"err_{name}": (np.abs(room) + most) * (accuracy.target or 0.0)}
         return columns | {"status": status}
 
     return Step(f"sewing {sewing.name}", provides, run, work=Work.LONG, cost=lambda accuracy: 3e6)

@@ -30,29 +30,29 @@ PLACE_KEYS = ("on", "held", "wrap", "fixed")
 def read_taking(name: str, table: dict[str, Any], tools: Mapping[str, Tool], where: str) -> Taking:
     """Read a relation ``take``: a needle, a blade, the sense, fields of work."""
     for key in table:
-        if key not in ("take", "sense", "fields"):
-            raise InputError(key, table[key], "take, sense, fields", where)
+        if key not in ("take", "sense", "fields", "vary"):
+            raise InputError(key, table[key], "take, sense, fields, vary", where)
     needle, blade = (tools[one] for one in two(table["take"], list(tools), "tools", where))
     if not isinstance(needle, Needle) or not isinstance(blade, Blade):
         raise InputError("take", table["take"], "a needle, then a blade", where)
-    window = _rise_window(table["fields"], where) if "fields" in table else None
+    vary = table.get("vary", False)
+    if not isinstance(vary, bool) or (vary and "fields" not in table):
+        raise InputError("vary", vary, "true or false: whether the ends of its fields are parameters", where)
+    window = _rise_window(name, table["fields"], vary, where) if "fields" in table else None
     return Taking(name, needle, blade, _sense(table, "the tip passes along n x w or against it", where), window)
 
 
-def _rise_window(given: tuple[tuple[str, Any], ...], where: str) -> RiseWindow:
-    """Read what rise each field of work permits; refuse fields that leave none in common."""
+def _rise_window(name: str, given: tuple[tuple[str, Any], ...], vary: bool, where: str) -> RiseWindow:
+    """Read what rise each field of work permits."""
     fields = []
-    for name, ends in given:
+    for field, ends in given:
         if not isinstance(ends, tuple) or len(ends) != 2:
             raise InputError("fields", ends, "of each field the least and the most rise", where)
         least, most = (length(name, end, where) for end in ends)
-        fields.append((name, least, most))
+        fields.append((field, least, most))
     if not fields:
         raise InputError("fields", {}, "at least one field with the least and the most rise", where)
-    window = RiseWindow(tuple(fields))
-    if window.least > window.most:
-        raise InputError("fields", dict(given), f"fields that leave a window in common, {window.words}: none is", where)
-    return window
+    return RiseWindow(name, tuple(fields), vary)
 
 
 def read_entering(name: str, table: dict[str, Any], tools: Mapping[str, Tool], where: str) -> Entering:

@@ -308,7 +308,7 @@ def _by_role(study: Study, table: dict[str, Any], rows_of: Callable[[Study, Arra
     """Return rows about the optimum and about the reference, one below the other."""
     rows: dict[str, list[Any]] = {"role": []}
     for k, role in enumerate(table["role"]):
-        if role != "start":
+        if role in ("optimum", "reference"):
             own = rows_of(study, np.array([table[name][k] for name in study.family.parameter_names], np.float64))
             rows["role"] += [role] * len(own["output"])
             for name, values in own.items():

@@ -33,10 +33,15 @@ ON_LIMIT = 1e-9  # mm: an optimum ends on its limits, and is beyond them by the 
 
 @dataclass(frozen=True)
 class Row:
-    """One speed: the window of the rise, shares that keep each moment and all of them, with the interval of 95 %."""
+    """One speed: the window of the rise, which end of it binds the optimum, and how many machines keep what.
+
+    ``shares`` are of what is made: of the moments, then of the least and of the most rise; ``interval`` is that of 95 %
+    of the share ``every`` that keeps all moments.
+    """
 
     speed: str
     window: str
+    binds: str
     shares: tuple[str, ...]
     every: str
     interval: str
@@ -44,7 +49,11 @@ class Row:
 
 @dataclass(frozen=True)
 class Sewn:
-    """What is made by speed: rows of the stated speeds, and a curve of shares between them; the answer in words."""
+    """What is made by speed: rows of the stated speeds, and curves of shares between them; the answer in words.
+
+    ``shares`` (S,) keep all moments, between ``low`` and ``high`` with 95 % sureness; ``ends`` are the shares that keep
+    the least and the most rise permitted.
+    """
 
     sentence: str
     moments: tuple[str, ...]
@@ -52,6 +61,9 @@ class Sewn:
     count: int
     speeds: Array
     shares: Array
+    low: Array
+    high: Array
+    ends: dict[str, Array]
 
 
 def sewn(data: Dataset) -> Sewn | None:
@@ -66,13 +78,30 @@ def sewn(data: Dataset) -> Sewn | None:
     designs = deviating(study.family, design, study.tolerance, study.optimise.seed, study.tolerance.samples)
     stated = np.array(sewing.speeds)
     speeds = np.union1d(stated, np.linspace(stated[0], stated[-1], CURVE))
-    own, _ = sewing.rooms(study.family, design[None], stated, study.accuracy)
-    sentence = sewing_sentence({name: room[0] for name, room in own.items()}, stated / RPM)
+    ends = sewing.ends.values()
+    found, _ = sewing.rooms(study.family, design[None], stated, study.accuracy)
+    own = {name: room[0] for name, room in found.items()}
+    sentence = sewing_sentence({name: room for name, room in own.items() if name not in ends}, stated / RPM)
+    sentence += f" {window_sentence(*sewing.binding(study.family, design))}"
+    windows = np.stack(sewing.window(study.family, design[None], stated), axis=-1)[0]
     rooms, _ = sewing.rooms(study.family, designs, speeds, study.accuracy)
     kept = {name: room >= 0.0 for name, room in rooms.items()}
+    moments = tuple(name for name in kept if name not in ends)
     every = np.logical_and.reduce(list(kept.values()))
-    rows = tuple(_row(sewing, kept, every, k, speeds[k]) for k in np.searchsorted(speeds, stated).tolist())
-    return Sewn(sentence, tuple(kept), rows, len(designs), speeds / RPM, every.mean(axis=0))
+    rows = tuple(
+        Row(
+            f"{stated[k] / RPM:.6g}",
+            f"{number(float(windows[k, 0]))} to {number(float(windows[k, 1]))}",
+            _binds(sewing, {end: float(own[name][k]) for end, name in sewing.ends.items()}, k),
+            tuple(_percent(float(kept[name][:, at].mean())) for name in (*moments, *ends)),
+            _percent(float(every[:, at].mean())),
+            " to ".join(map(_percent, _interval(every[:, at]))),
+        )
+        for k, at in enumerate(np.searchsorted(speeds, stated).tolist())
+    )
+    low, high = np.array([_interval(one) for one in every.T]).T
+    of_ends = {end: kept[name].mean(axis=0) for end, name in sewing.ends.items()}
+    return Sewn(sentence, moments, rows, len(designs), speeds / RPM, every.mean(axis=0), low, high, of_ends)
 
 
 def sewing_sentence(rooms: Mapping[str, Array], rpm: Array) -> str:
@@ -97,18 +126,28 @@ def sewing_sentence(rooms: Mapping[str, Array], rpm: Array) -> str:
     return f"It sews at {rpm[0]:.6g} to {rpm[-1]:.6g} rpm: moment {name.upper()} {spare} {at}."
 
 
-def _row(sewing: Sewing, kept: dict[str, Mask], every: Mask, k: int, speed: float) -> Row:
+def window_sentence(low: tuple[str, float], high: tuple[str, float]) -> str:
+    """Say which fields of work set the least and the most rise, or that they leave none."""
+    (slow, least), (fast, most) = low, high
+    ends = f"at least {number(least, 3)}\u00a0mm for {slow}, at most {number(most, 3)}\u00a0mm for {fast}"
+    return f"No rise suits all fields: {ends}." if least > most else f"All fields permit a rise of {ends}."
+
+
+def _binds(sewing: Sewing, rooms: Mapping[str, float], k: int) -> str:
+    """Say which end of the window is nearer to the rise of the optimum at the k-th speed, whose it is, and how near."""
+    end = min(rooms, key=lambda name: rooms[name])
+    slow, fast = sewing.fields()
+    whose = slow if k == 0 else fast if k == len(sewing.speeds) - 1 else f"{slow}, {fast}"
+    words = {"above": "least", "below": "most"}
+    return f"{words[end]} ({whose}), {number(rooms[end], 3)}\u00a0mm"
+
+
+def _interval(kept: Mask) -> tuple[float, float]:
+    """Return between which shares the true one lies with 95 % sureness, of machines (n,) that keep a limit or not."""
     from scipy.stats import binomtest
 
-    low, high = sewing.window(np.array([speed]))
-    known = binomtest(int(every[:, k].sum()), len(every)).proportion_ci(method="wilson")
-    return Row(
-        f"{speed / RPM:.6g}",
-        f"{number(float(low[0]))} to {number(float(high[0]))}",
-        tuple(_percent(float(one[:, k].mean())) for one in kept.values()),
-        _percent(float(every[:, k].mean())),
-        f"{_percent(known.low)} to {_percent(known.high)}",
-    )
+    known = binomtest(int(kept.sum()), len(kept)).proportion_ci(method="wilson")
+    return float(known.low), float(known.high)
 
 
 def _percent(share: float) -> str:

@@ -137,6 +137,9 @@ class RelationSection(Section):
     fields: dict[str, TwoLengths] | None = Field(
         None, description='of a take, the least and most rise of each field of work, { slow = ["1.5 mm", "3 mm"] }'
     )
+    vary: bool | None = Field(
+        None, description="of a take, true or false: whether the ends of its fields are parameters of the machine"
+    )
     window: Annotated[list[Angle], Field(min_length=2, max_length=2)] | None = Field(
         None, description='of an enter, from and to, as ["200 deg", "300 deg"]'
     )

@@ -9,11 +9,13 @@ from __future__ import annotations
 
 import math
 
+import pandas as pd
 import pytest
 
 import sweep
 from kernels import status as st
 from sweep.errors import InputError
+from sweep.evaluation.tables import design_matrix
 
 CRANK, ARM, SHARE = 12.0, 30.0, 0.625
 AFTER = math.radians(30.0)  # from the needle's lowest point to A
@@ -186,7 +188,44 @@ def test_rise_has_the_window_that_two_fields_leave():
     assert text.endswith("at least 1.5 for slow and loose, at most 2.5 for fast and thick")
 
 
-def test_fields_that_leave_no_window_are_refused_by_name():
+def text_of_room(machine):
+    (step,) = (step for step in machine.steps if step.name == "passage a")
+    return next(output.text for output in step.provides if output.name == "a_room")
+
+
+def test_fields_that_leave_no_window_are_said_by_status_and_name():
     fields = {"slow and loose": [2.0, 3.0], "fast and thick": [1.0, 1.8]}
-    with pytest.raises(InputError, match=r"at least 2 for slow and loose, at most 1\.8 for fast and thick: none is"):
-        machine_of({"a": {"take": ["thin", "blade"], "fields": fields}})
+    machine = machine_of({"a": {"take": ["thin", "blade"], "fields": fields}})
+    got = found(machine, ["a_room", "a_least", "a_most", "a_rise"])
+    assert got["status"] == st.NO_WINDOW
+    assert (got["a_least"], got["a_most"]) == (2.0, 1.8)
+    assert got["a_room"] == pytest.approx(got["a_rise"] - 2.0, abs=1e-12) and got["a_room"] < 0.0
+    assert text_of_room(machine).endswith("at least 2 for slow and loose, at most 1.8 for fast and thick: none is left")
+
+
+def test_fields_that_vary_leave_a_window_or_none_design_by_design():
+    fields = {"slow and loose": [1.5, 3.0], "fast and thick": [1.0, 2.5]}
+    machine = machine_of({"a": {"take": ["thin", "blade"], "fields": fields, "vary": True}})
+    rise = CRANK * (1.0 - math.cos(AFTER))
+    changed = [{}, {"a_least_slow_and_loose": 2.6}, {"a_most_fast_and_thick": 1.7}, {"a_least_fast_and_thick": 1.55}]
+    rows = pd.DataFrame([DESIGN | one for one in changed]).fillna(
+        {"a_least_slow_and_loose": 1.5, "a_most_fast_and_thick": 2.5, "a_least_fast_and_thick": 1.0}
+    )
+    got = sweep.summarise(machine, rows, ["a_room", "a_least", "a_most"], accuracy=1e-9)
+    assert got["status"].tolist() == [st.OK, st.NO_WINDOW, st.OK, st.OK]
+    ends = [(1.5, 2.5), (2.6, 2.5), (1.5, 1.7), (1.55, 2.5)]
+    assert list(zip(got["a_least"], got["a_most"], strict=True)) == ends
+    rooms = [min(rise - least, most - rise) for least, most in ends]
+    assert got["a_room"].tolist() == pytest.approx(rooms, abs=1e-12)
+    window = next(relation.window for relation in machine.relations if relation.name == "a")
+    for one, row in zip(changed[1:], (1, 2, 3), strict=True):
+        design = design_matrix(machine, dict(rows.loc[row]))[0][0]
+        (slow, _), (fast, _) = window.binding(design, machine.parameter_names)
+        assert slow == ("fast and thick" if "a_least_fast_and_thick" in one else "slow and loose")
+        assert fast == "fast and thick"
+    assert text_of_room(machine).endswith("its window, which slow and loose and fast and thick leave")
+
+
+def test_fields_vary_only_where_there_are_some():
+    with pytest.raises(InputError, match="whether the ends of its fields are parameters"):
+        machine_of({"a": {"take": ["thin", "blade"], "vary": True}})

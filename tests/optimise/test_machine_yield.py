@@ -145,12 +145,17 @@ def test_shares_and_scatter_of_relations_are_those_of_an_independent_sample(row)
     relations["sews"] = {"sew": ["a"], "speeds": SPEEDS, "clearance": take}
     sewing, _ = machine_of(given, relations, tips=("looper",))
     names = [f"sews_at_{60.0 * speed / (2.0 * np.pi):.6g}" for speed in SPEEDS]
-    found = design_outputs(family(sewing), designs, names, Accuracy(target=1e-8))
+    ends = [name.replace("_at_", f"_{end}_at_") for name in names for end in ("above", "below")]
+    found = design_outputs(family(sewing), designs, [*names, *ends], Accuracy(target=1e-8))
     shares = []
     for speed, name in zip(SPEEDS, names, strict=True):
         part = (speed - SPEEDS[0]) / (SPEEDS[-1] - SPEEDS[0])
         low, high = (x + part * (y - x) for x, y in zip(slow, fast, strict=True))
-        inside = (theirs["a_rise"] >= low) & (theirs["a_rise"] <= high)
+        kept = {"above": theirs["a_rise"] >= low, "below": theirs["a_rise"] <= high}
+        for end, own in kept.items():
+            part = found[name.replace("_at_", f"_{end}_at_")]
+            assert (part >= 0.0).mean() == pytest.approx(own.mean(), abs=SHARE), end
+        inside = kept["above"] & kept["below"]
         inside &= (theirs["above_eye"] >= 0.0) & (theirs["below_scarf_end"] >= 0.0)
         inside &= (theirs["a_clearance"] >= take[0]) & (theirs["a_clearance"] <= take[1])
         shares.append(inside.mean())

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from sweep.report.sewing import sewing_sentence
+from sweep.report.sewing import sewing_sentence, window_sentence
 
 SPEEDS = np.array([500.0, 3000.0, 7000.0])
 
@@ -34,3 +34,18 @@ SPEEDS = np.array([500.0, 3000.0, 7000.0])
 )  # fmt: skip
 def test_moment_with_least_to_spare_is_named(a, c, sentence):
     assert sewing_sentence({"a": np.array(a), "c": np.array(c)}, SPEEDS) == sentence
+
+
+@pytest.mark.parametrize(
+    ("low", "high", "sentence"),
+    [
+        (
+            1.5,
+            2.5,
+            "All fields permit a rise of at least 1.5\u00a0mm for loose, at most 2.5\u00a0mm for thick.",
+        ),
+        (2.0, 1.8, "No rise suits all fields: at least 2\u00a0mm for loose, at most 1.8\u00a0mm for thick."),
+    ],
+)
+def test_fields_that_bind_are_named(low, high, sentence):
+    assert window_sentence(("loose", low), ("thick", high)) == sentence

@@ -66,6 +66,8 @@ class Descent:
 
     def _settle(self) -> None:
         """Minimise until the conditions of optimality hold; where a locus makes that slow, use the parameters."""
+        if self.best.violation <= ACTIVE and self.model.certificate(self.best).residual <= KKT:
+            return  # it began where an earlier search had ended
         other = in_parameters(self.model.problem, self.best.design)
         for _ in range(CYCLES):
             self._rounds(slsqp.propose, relaxed=False, enough=1e-4, rounds=8)
