@@ -24,11 +24,22 @@ from sweep.families.segments import Body, Gap
 from sweep.families.shafts import MOUNT_KEYS, SHAFT_KEYS, Mount, Shaft, read_mount, read_shafts
 from sweep.families.shaking import Shaken, Shaking, shaken
 from sweep.families.stitching import read_entering, read_sewing, read_taking, read_thread
-from sweep.families.tools import BLADE_KEYS, NEEDLE_KEYS, SEAM_KEYS, Tool, bodies, length, read_tools
+from sweep.families.tools import (
+    BLADE_KEYS,
+    NEEDLE_KEYS,
+    PLATE_KEYS,
+    SEAM_KEYS,
+    Tool,
+    bodies,
+    length,
+    read_height,
+    read_tools,
+)
 
 MEMBER_KEYS = ("family", "chain", "ratio", "offset", "driver", "place", "tip", "eye", *MOUNT_KEYS)
 RELATION_KINDS = (
     "distance", "speed", "timing", "event", "value", "torque", "shaking", "thread", "gap", "take", "enter", "sew",
+    "above",
 )  # fmt: skip
 EVENT_KEYS = ("event", "level", "rising")
 _WORD = re.compile(r"[A-Za-z][A-Za-z0-9_]*")
@@ -74,7 +85,8 @@ def specification(
     between = tuple((name, _frozen(r)) for name, r in (relations or {}).items())
     turning = tuple((name, _frozen(s, "shaft", SHAFT_KEYS)) for name, s in (shafts or {}).items())
     working = tuple(
-        (name, _frozen(t, "tool", (*NEEDLE_KEYS, *BLADE_KEYS, *SEAM_KEYS))) for name, t in (tools or {}).items()
+        (name, _frozen(t, "tool", (*NEEDLE_KEYS, *BLADE_KEYS, *SEAM_KEYS, *PLATE_KEYS)))
+        for name, t in (tools or {}).items()
     )
     return Specification(tuple(found), between, turning, working)
 
@@ -254,6 +266,8 @@ def _relation(
         return read_taking(name, table, tools, where)
     if "enter" in table:
         return read_entering(name, table, tools, where)
+    if "above" in table:
+        return read_height(name, table, members, tools, where)
     if "thread" in table:
         return read_thread(name, table, members, tools)
     if len(table) != 1 or next(iter(table)) not in RELATION_KINDS:

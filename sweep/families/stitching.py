@@ -190,7 +190,7 @@ def _on(given: Any, members: Mapping[str, Member], tools: Mapping[str, Tool], wh
             known[name] = Spot(tool.on, tool.line, tool.sense * tool.eye)
         elif isinstance(tool, Seam):
             known[name] = Spot(at=tool.at)
-        else:
+        elif isinstance(tool, Blade):
             known[name] = Edge(Spot(tool.tip), Spot(tool.back))
             known |= {f"{name}.eye": Spot(tool.eye)} if tool.eye else {}
     for m in members.values():

@@ -1,7 +1,8 @@
-"""Tools of a machine: needles that a guided point carries along its line, blades of an output link, the seam."""
+"""Tools of a machine: needles that a guided point carries along its line, blades of an output link, seam and plate."""
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from typing import Any, TypeAlias
@@ -9,19 +10,24 @@ from typing import Any, TypeAlias
 import numpy as np
 
 from sweep.errors import InputError, choices
+from sweep.families.base import Output, Parameter
 from sweep.families.capabilities import OutputLink
+from sweep.families.frames import Frame
 from sweep.families.parts import Member, vector
-from sweep.families.segments import Body
+from sweep.families.relations import two
+from sweep.families.segments import Body, dot, minus
 from sweep.families.sites import AXES, links_of
 
 NEEDLE_KEYS = ("on", "line", "sense", "scarf", "diameter", "floor", "top", "scarf_end", "eye", "point")
 BLADE_KEYS = ("on", "tip", "back", "eye", "hold", "radius")
 SEAM_KEYS = ("at",)
+PLATE_KEYS = ("at", "normal", "fabric")
 PLACES = ("tip", "back", "eye", "hold")  # of a blade, as a member's tip
 NEEDED = {
     "needle": ("on", "line", "scarf", "diameter", "eye", "point"),
     "blade": ("on", "tip", "back"),
     "seam": ("at",),
+    "plate": ("at", "normal"),
 }
 
 
@@ -140,7 +146,82 @@ class Seam:
     at: tuple[float, float, float]
 
 
-Tool: TypeAlias = Needle | Blade | Seam
+@dataclass(frozen=True)
+class Plate:
+    """The throat plate, a plane that stands still, with fabric on it.
+
+    Parameters
+    ----------
+    name : of the tool
+    at : a point of its upper side
+    normal : unit vector out of that side
+    fabric : thickness of what lies on it
+    """
+
+    name: str
+    at: tuple[float, float, float]
+    normal: tuple[float, float, float]
+    fabric: float
+
+
+Tool: TypeAlias = Needle | Blade | Seam | Plate
+
+
+@dataclass(frozen=True)
+class Height:
+    """How high a point stands above a throat plate, and above the fabric on it."""
+
+    name: str
+    of: str
+    spot: Spot
+    plate: Plate
+
+    @property
+    def rates(self) -> Mapping[str, str]:
+        """Of each pose output its derivative by the angle of the main shaft."""
+        return {self.name: f"d{self.name}", f"{self.name}_fabric": f"d{self.name}"}
+
+    @property
+    def outputs(self) -> tuple[Output, ...]:
+        """Both heights and their derivative."""
+        text = f"height of {self.of} above {self.plate.name}"
+        return (
+            Output(self.name, "length", text, "ours"),
+            Output(f"{self.name}_fabric", "length", f"{text}, less the fabric's thickness", "ours"),
+            Output(f"d{self.name}", "length", f"derivative of the {text} by phi of the main shaft", "ours"),
+        )
+
+    @property
+    def parameters(self) -> tuple[Parameter, ...]:
+        """It has none of its own."""
+        return ()
+
+    def needs(self, wanted: frozenset[str]) -> frozenset[str]:
+        """Return coordinates of the point, and velocities where the derivative is wanted."""
+        return frozenset(self.spot.needs(f"d{self.name}" in wanted))
+
+    def compute(self, found: Mapping[str, Any], frames: Mapping[str, Frame], wanted: frozenset[str]) -> dict[str, Any]:
+        """Return the wanted outputs, (n, m)."""
+        normal = list(self.plate.normal)
+        height = dot(minus(self.spot.position(found), list(self.plate.at)), normal)
+        columns = {self.name: height, f"{self.name}_fabric": height - self.plate.fabric}
+        if f"d{self.name}" in wanted:
+            columns[f"d{self.name}"] = dot(self.spot.velocity(found), normal)
+        return columns
+
+
+def read_height(
+    name: str, table: Mapping[str, Any], members: Mapping[str, Member], tools: Mapping[str, Tool], where: str
+) -> Height:
+    """Read a relation ``above``: a needle, a blade or a moving point of a member, and a plate."""
+    spots = {tool.name: tool.working for tool in tools.values() if isinstance(tool, Needle | Blade)}
+    spots |= {point: Spot(point) for m in members.values() for point in (f"{m.name}.{own}" for own in m.moving)}
+    plates = {tool.name: tool for tool in tools.values() if isinstance(tool, Plate)}
+    of, plate = two(table["above"], [*spots, *(name for name in tools if name not in spots)], "tools and points", where)
+    if len(table) != 1 or of not in spots or plate not in plates:
+        allowed = f"a needle, a blade or a moving point, then a plate: {', '.join(plates) or 'there is none'}"
+        raise InputError("above", table["above"], allowed, where)
+    return Height(name, of, spots[of], plates[plate])
 
 
 def read_tools(given: Mapping[str, Mapping[str, Any]], members: dict[str, Member]) -> dict[str, Tool]:
@@ -154,8 +235,8 @@ def read_tools(given: Mapping[str, Mapping[str, Any]], members: dict[str, Member
     found: dict[str, Tool] = {}
     for name, table in given.items():
         where = f"machine.tools.{name}"
-        kind = "blade" if "back" in table else "seam" if "at" in table else "needle"
-        keys = {"blade": BLADE_KEYS, "seam": SEAM_KEYS, "needle": NEEDLE_KEYS}[kind]
+        kind = "blade" if "back" in table else "plate" if "normal" in table else "seam" if "at" in table else "needle"
+        keys = {"blade": BLADE_KEYS, "seam": SEAM_KEYS, "plate": PLATE_KEYS, "needle": NEEDLE_KEYS}[kind]
         for key in table:
             if key not in keys:
                 raise InputError(key, table[key], f"for a {kind}, {choices(key, keys)}", where)
@@ -164,9 +245,20 @@ def read_tools(given: Mapping[str, Mapping[str, Any]], members: dict[str, Member
                 raise InputError(key, None, f"what a {kind} needs: {', '.join(NEEDED[kind])}", where)
         if kind == "seam":
             found[name] = Seam(name, vector(table["at"], f"{where}.at"))
+        elif kind == "plate":
+            found[name] = _plate(name, table, where)
         else:
             found[name] = (_blade if kind == "blade" else _needle)(name, table, members, where)
     return found
+
+
+def _plate(name: str, table: Mapping[str, Any], where: str) -> Plate:
+    x, y, z = vector(table["normal"], f"{where}.normal")
+    size = math.hypot(x, y, z)
+    if size == 0.0:
+        raise InputError("normal", table["normal"], "a direction", where)
+    fabric = length("fabric", table.get("fabric", 0.0), where)
+    return Plate(name, vector(table["at"], f"{where}.at"), (x / size, y / size, z / size), fabric)
 
 
 def _needle(name: str, table: Mapping[str, Any], members: dict[str, Member], where: str) -> Tool:
@@ -232,7 +324,7 @@ def number(key: str, value: object, where: str) -> float:
 
 def bodies(members: Mapping[str, Member], tools: Mapping[str, Tool]) -> dict[str, Body]:
     """Return what gaps can be between: tools by their name, links by member and name."""
-    found = {name: tool.body for name, tool in tools.items() if not isinstance(tool, Seam)}
+    found = {name: tool.body for name, tool in tools.items() if isinstance(tool, Needle | Blade)}
     for m in members.values():
         for link, (first, second) in links_of(m).items():
             found[f"{m.name}.{link}"] = Body(f"{m.name}.{link}", (f"{m.name}.{first}", f"{m.name}.{second}"))

@@ -53,8 +53,14 @@ class ToolSection(Section):
     hold: ThreeLengths | None = Field(
         None, description="where the blade holds a loop, or meets the plane of the seam, as tip"
     )
-    at: ThreeLengths | None = Field(None, description="of the last stitch, three lengths in the machine's frame")
+    at: ThreeLengths | None = Field(
+        None, description="of the last stitch, or a point of the throat plate, three lengths in the machine's frame"
+    )
     radius: Length | None = Field(None, description='of the blade as a capsule, as "0.4 mm"; 0 if left out')
+    normal: Annotated[list[Number], Field(min_length=3, max_length=3)] | None = Field(
+        None, description="of a throat plate, a direction [x, y, z] of the machine's frame, up from it"
+    )
+    fabric: Length | None = Field(None, description='of a throat plate, thickness of what lies on it, as "2 mm"')
 
 
 Names = Annotated[list[str], Field(min_length=1)]
@@ -129,6 +135,9 @@ class RelationSection(Section):
     take: Names | None = Field(None, description='a needle and a blade of [tools], as ["thin", "blade"]')
     enter: Names | None = Field(
         None, description='what passes, a blade and the seam of [tools], as ["thin", "upper", "seam"]'
+    )
+    above: Names | None = Field(
+        None, description='a needle, blade or moving point and a plate of [tools], as ["thin", "plate"]'
     )
     sense: int | None = Field(
         None,

@@ -113,6 +113,32 @@ def test_axes_that_meet_on_the_way_down_leave_minus_the_radii(shift):
     assert abs(got["a_free"] + 0.375 + 0.4) <= min(got["err_a_free"], 1e-12)
 
 
+PLATE = {"plate": {"at": [-28.0, 7.0, 9.0], "normal": [2.0, 0.0, 0.0], "fabric": 2.0}}
+
+
+def test_needle_goes_through_fabric_and_plate_where_they_are():
+    """The plate is the plane x = -28, up along x; the needle's point stands at x = CRANK cos phi - 34."""
+    relations = {"lift": {"above": ["thin", "plate"]}, "tip": {"above": ["blade", "plate"]}}
+    relations |= {"enters": {"event": "lift_fabric", "rising": False}, "leaves": {"event": "lift"}}
+    machine = machine_of(relations, tools=PLATE)
+    got = found(machine, ["phi_enters", "phi_leaves", "min_lift", "phi_min_lift", "min_lift_fabric"])
+    expected = {
+        "phi_enters": math.acos((34.0 - 28.0 + 2.0) / CRANK), "phi_leaves": 2.0 * math.pi - math.acos(6.0 / CRANK),
+        "min_lift": -CRANK - 6.0, "phi_min_lift": math.pi, "min_lift_fabric": -CRANK - 8.0,
+    }  # fmt: skip
+    for name, value in expected.items():
+        assert got[name] == pytest.approx(value, abs=1e-9), name
+    poses = sweep.evaluate(machine, DESIGN, ["dlift", "dtip", "tip"], phi=[1.0])
+    assert poses["dlift"][0] == pytest.approx(-CRANK * math.sin(1.0), abs=1e-12)
+    assert poses["tip"][0] == pytest.approx(AT[0] + 28.0, abs=1e-12) and abs(poses["dtip"][0]) < 1e-12
+
+
+@pytest.mark.parametrize("of", [["thin", "blade"], ["plate", "thin"]])
+def test_height_is_one_above_a_plate(of):
+    with pytest.raises(InputError, match="a needle, a blade or a moving point, then a plate: plate"):
+        machine_of({"lift": {"above": of}}, tools=PLATE)
+
+
 STILL = {"family": "slotted", "place": {"at": [-28.0, -5.0, -4.0], "axis": [0.0, 1.0, 0.0], "zero": [0.0, 0.0, 1.0]}}
 TRIANGLE = {
     "still": {"on": "upper", "tip": [5.0, 0.0, 0.0], "back": [0.0, 0.0, 0.0], "eye": [0.0, 0.0, 0.0]}
