@@ -26,8 +26,6 @@ from sweep.families.sewing import Sewing, sewing_step
 from sweep.families.shaking import Shaking, orders_of
 from sweep.families.sites import coordinates as coordinates_of_site
 from sweep.families.sites import made_of
-from sweep.families.thread_balance import ThreadBalance
-from sweep.families.tools import Height
 from sweep.families.triangles import Entering, entering_step
 
 
@@ -114,8 +112,7 @@ def _built(machine: Machine, members: tuple[Member, ...]) -> Machine:
         f"{m.name}.{name}": f"{m.name}.{of}" for m in placed for name, of in m.family.derivative_of.items()
     }
     outputs += [o for relation in machine.relations for o in relation.outputs]
-    moving = [r for r in machine.relations if isinstance(r, Taking | Entering | ThreadBalance | Height)]
-    derivative_of |= {name: rate for r in moving for name, rate in r.rates.items()}
+    derivative_of |= {name: rate for r in machine.relations for name, rate in getattr(r, "rates", {}).items()}
     loops = tuple(_loop(m, loop) for m in placed for loop in m.family.every(Assembly))
     found = replace(
         machine,
