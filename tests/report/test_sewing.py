@@ -2,10 +2,18 @@
 
 from __future__ import annotations
 
+import json
+import math
+from dataclasses import replace
+from pathlib import Path
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 
-from sweep.report.sewing import sewing_sentence, window_sentence
+import sweep
+from sweep.report.sewing import sewing_sentence, sewn, window_sentence
+from sweep.study.load import load_study
 
 SPEEDS = np.array([500.0, 3000.0, 7000.0])
 
@@ -49,3 +57,24 @@ def test_moment_with_least_to_spare_is_named(a, c, sentence):
 )
 def test_fields_that_bind_are_named(low, high, sentence):
     assert window_sentence(("loose", low), ("thick", high)) == sentence
+
+
+def test_shares_by_speed_have_their_intervals_and_both_ends_of_the_window():
+    folder = Path(sweep.__file__).parents[1] / "studies" / "overlock208"
+    study, count = load_study(folder), 64
+    record = json.loads((folder / "expected.json").read_text())["optimum"]["design"]
+    # Four times as rough as the study has it, so that some of what is made miss the least rise at the least speed.
+    tolerance = replace(study.tolerance, lengths=4.0 * study.tolerance.lengths, samples=count)
+    optimum = dict(study.space.fixed) | record
+    found = sewn(SimpleNamespace(study=replace(study, tolerance=tolerance), optimum=optimum))
+    assert found.count == count and [row.speed for row in found.rows] == ["500", "3000", "7000", "8500"]
+    assert found.rows[0].binds.startswith("least (slow and loose), 0.036")
+    assert found.rows[-1].binds.startswith("least (fast and thick), 0.536")
+    assert 0.5 < found.ends["above"][0] < 1.0 and found.ends["above"][-1] == 1.0
+    assert (found.shares <= np.minimum(*found.ends.values())).all()
+    # Wilson's interval: shares p with |p - seen| <= z sqrt(p (1 - p)/n), z = 1.96
+    z = 1.959963984540054
+    for seen, low, high in zip(found.shares, found.low, found.high, strict=True):
+        for p in {low, high} - {0.0, 1.0}:
+            assert abs(p - seen) == pytest.approx(z * math.sqrt(p * (1.0 - p) / count), abs=1e-9)
+        assert low <= seen <= high
