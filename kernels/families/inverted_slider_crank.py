@@ -24,7 +24,7 @@ Outputs = namedtuple("Outputs", "psi dpsi d2psi d3psi s ds d2s discriminant pres
 
 @kernel
 def poses(designs: Numbers, cos_phi: Numbers, sin_phi: Numbers, status: Status, out: Outputs) -> None:
-    """Rocker angle, place of the pin on the rocker and derivatives of every design at its crank angles; (1)-(5).
+    """Rocker angle, place of the pin on the rocker and derivatives of every design at its crank angles; (1)-(6).
 
     Parameters
     ----------
@@ -72,15 +72,23 @@ def poses(designs: Numbers, cos_phi: Numbers, sin_phi: Numbers, status: Status, 
             put_block(out.joints, i, j, (u, v), designs[i, 0])
             # at a dead point (w = 0) the position stands and the derivatives, (4) and (5), do not exist
             per_w = 1.0 / w if code == st.OK else math.nan * w
-            # the crank in the rocker's axes, along the slot and across it
-            along, aside = a * (u * c + v * sine), a * (v * c - u * sine)
+            # the crank in the rocker's axes, along the slot and across it; written out, as of a short frame the one
+            # across is the difference of large terms otherwise
+            level, lift = a * (a - e * u) * per_square, a * e * v * per_square
+            along, aside = w * level + h * lift, h * level - w * lift
             p = along * per_w
-            slide = p * h - aside
+            slide, late = p * h - aside, 1.0 - p
             q = (aside * (2.0 * p - 1.0) - p * p * h) * per_w
+            turned = e * x * per_square
+            behind = -turned - h * lift * per_w
+            if abs(behind.real) < 0.5:  # the rocker nearly turns with the crank: 1 - dpsi by itself, no difference
+                apart = h * turned - w * lift
+                slide, late = -apart - behind * h, behind
+                q = (p * p * apart - late * late * aside) * per_w
             write(out.dpsi, i, j, p)
             write(out.ds, i, j, slide * unit)
             write(out.d2psi, i, j, q)
-            write(out.d2s, i, j, (q * h - along * (1.0 - p)) * unit)
+            write(out.d2s, i, j, (q * h - along * late) * unit)
             if out.d3psi is not None:
-                turn = along * (1.0 - p) * (2.0 * p - 1.0) + 2.0 * q * (aside - p * h)
+                turn = along * late * (2.0 * p - 1.0) - 2.0 * q * slide
                 write(out.d3psi, i, j, (turn - q * slide) * per_w)

@@ -38,6 +38,7 @@ class Reduced(NamedTuple):
     side: float  # p2, of Q in the frame of the crank
     rise: float  # p3
     power: float  # D
+    frame: float  # D + a^2
     length: float  # Lw
     size: float  # sum of the magnitudes whose rounding errors make up the vector from B to Q
     unit: float
@@ -55,9 +56,10 @@ def reduce_design(designs: Numbers, i: int) -> Reduced:
     valid = 0.0 < a.real <= 1.0 and size < 1e140 and abs(length.real) < 1e140
     valid = valid and abs(alpha.real) < 1e5 and unit < math.inf
     side, rise = -g * sa, g * ca - f
-    power = (e - a) * (e + a) + side * side + rise * rise
+    across = side * side + rise * rise
+    power, frame = (e - a) * (e + a) + across, e * e + across
     return Reduced(
-        a, e, f * sa, a * ca, f * ca, a * sa, g, sa, ca, side, rise, power, length, size, unit, valid
+        a, e, f * sa, a * ca, f * ca, a * sa, g, sa, ca, side, rise, power, frame, length, size, unit, valid
     )  # fmt: skip
 
 
@@ -77,16 +79,22 @@ def _turning(
 
     No difference of large terms is left in them but those that the design itself has.
     """
-    square = per * per
+    square, ahead = per * per, r.e * u + r.side * v
     m, lean, pull = h1 * per, r.a * square * r.rise, r.power * square
-    # Two forms of one number: of a short crank the first, near the block's centre the second is the difference of large
-    # terms.  The one with the smaller terms is taken.
-    terms = (r.a * square).real * (abs((r.e * u).real) + abs((r.side * v).real) + r.a.real)
-    k = 0.5 * (pull - 1.0)
-    if terms < 0.5 * (1.0 + abs(pull.real)):
-        k = r.a * square * (r.e * u + r.side * v - r.a)
+    # Three forms of one number: the first is the difference of large terms unless the pin is near the block's centre,
+    # the others unless the crank or the frame is short.  The one with the smallest terms is taken.
+    k, more = 0.5 * (pull - 1.0), 0.5 * (pull + 1.0)
+    size = abs((r.e * u).real) + abs((r.side * v).real)
+    terms = 0.5 * (1.0 + abs(pull.real)) / square.real
+    of_crank, of_frame = r.a.real * (size + r.a.real), r.frame.real + r.a.real * size
+    if of_crank < terms and of_crank <= of_frame:
+        k = r.a * square * (ahead - r.a)
+        more = 1.0 + k
+    elif of_frame < terms:
+        more = square * (r.frame - r.a * ahead)
+        k = more - 1.0
     fast = lean * lean + k * k
-    bend = fast + k
+    bend = lean * lean + k * more
     spoke, tangent, axis = (u, r.ca * v, -r.sa * v), (-v, r.ca * u, -r.sa * u), (0.0, r.sa, r.ca)
     w = mix(lean, spoke, -k, axis)
     w1 = mix(1.0, mix(-2.0 * m * lean, spoke, lean, tangent), m * pull, axis)
@@ -138,7 +146,8 @@ def poses(designs: Numbers, cos_phi: Numbers, sin_phi: Numbers, status: Status, 
             length = np.sqrt(square) if code == st.OK else square * math.nan
             per = 1.0 / length if code == st.OK else length
             n = scale(per, reach)
-            rod, fast, w, w1, w2 = _turning(r, u, v, length, per, dot(n, reach1))
+            # n . E' without the part of E that is the crank's own, which is square to E'
+            rod, fast, w, w1, w2 = _turning(r, u, v, length, per, r.a * (r.e * v - r.side * u) * per)
             put_block(out.rod, i, j, rod, r.unit)
             n1 = cross(w, n)
             n2 = mix(1.0, cross(w1, n), -fast, n)

@@ -164,12 +164,13 @@ def test_swivel_status_explains_every_nan(change, status):
     assert row[ALL].isna().all() == (status != st.OK)
 
 
-def test_swivel_with_a_short_crank_keeps_the_digits_of_its_derivatives():
-    # The turning of the rod is as small as the crank against it.  Taken from the length of the rod it was a difference
-    # of numbers near 1, wrong by 2^-53 times rod over crank: 6e-12 here.  Each output counts by itself.
+@pytest.mark.parametrize("power", [(2.0, 6.0), (-6.0, -1.0)])
+def test_swivel_with_a_short_crank_or_frame_keeps_the_digits_of_its_derivatives(power):
+    # The turning of the rod is as small as the crank against it, or as the frame against the crank.  Taken from the
+    # length of the rod it was a difference of numbers near 1, wrong by 2^-53 times the ratio.  Each counts alone.
     generator = np.random.default_rng(6)
     for _ in range(20):
-        scale = 10.0 ** generator.uniform(2.0, 6.0)
+        scale = 10.0 ** generator.uniform(*power)
         e, f, g, reach = scale * generator.uniform(0.5, 3.0, 4) * generator.choice([-1.0, 1.0], 4)
         design, phi = (1.0, e, f, g, generator.uniform(-3.0, 3.0), reach), generator.uniform(0.0, 6.0)
         expected = naive.outputs(design, phi)
