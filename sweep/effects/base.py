@@ -16,6 +16,7 @@ from sweep.families import family as find_family
 from sweep.families.base import Accuracy, Array, Columns, Family, Output, Parameter
 from sweep.families.capabilities import JointRecords, OutputLink, ToolPoint
 from sweep.families.link_tree import LinkTree
+from sweep.families.names import ends_in_digit
 
 ON_LINE, ON_COUPLER, ON_TIP = 0, 1, 2  # where a tool can hang, in the order of Effect.tool_inputs
 
@@ -221,13 +222,16 @@ class Placed:
         """The effect's own names of its outputs by the names they have here."""
         names = [o.name for o in (*self.entry.outputs, *_design(self.entry))]
         found = {f"{name}{self.number}": name for name in names}
-        return found | {name: name for name in names} if self.last else found
+        return found | {name: name for name in names if self._stands_alone(name)}
 
     def _numbered(self, outputs: tuple[Output, ...]) -> tuple[Output, ...]:
         if not self.number:
             return outputs
-        numbered = tuple(o.of_stage(int(self.number)) for o in outputs)
-        return (*numbered, *outputs) if self.last else numbered
+        numbered = (o.of_stage(int(self.number)) for o in outputs)
+        return (*numbered, *(o for o in outputs if self._stands_alone(o.name)))
+
+    def _stands_alone(self, name: str) -> bool:
+        return self.last and not (self.number and ends_in_digit(name))
 
 
 def _design(entry: Effect) -> tuple[Output, ...]:

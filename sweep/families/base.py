@@ -111,6 +111,7 @@ class Output:
     wraps : an angle that is known only up to full turns; curves of it are made continuous
     windowed : a deviation, of which only the part inside the window of the stroke counts where a window is given
     stage, own : in a chain the number of the stage that gives it, and its name there
+    parts : of the magnitude of a rate, its components
     kinks : curves of it have kinks or jumps where something reverses, as all with friction: extrema are then searched
         for panel by panel
     """
@@ -125,6 +126,7 @@ class Output:
     stage: str = ""
     own: str = ""
     kinks: bool = False
+    parts: tuple[str, ...] = ()
 
     @property
     def base(self) -> str:

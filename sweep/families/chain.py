@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field, replace
 from functools import cached_property, partial
 from typing import Any
@@ -15,8 +15,9 @@ from kernels.types import Array
 from sweep.errors import InputError
 from sweep.families.base import Angles, Columns, Family, Output, Parameter, Turn
 from sweep.families.capabilities import Assembly, GuidedPoint, LimitLocus, OutputLink, Points
-from sweep.families.curve_features import of_stages
+from sweep.families.curve_features import of_stages, on_part
 from sweep.families.frames import Frame, can_be_placed, stage_frames
+from sweep.families.names import ends_in_digit
 from sweep.families.parts import Stage
 
 BLOCK = 16384  # poses per block: its ten or so arrays (1.3 MB) stay in the caches; half or four times this is slower
@@ -64,7 +65,8 @@ class _Plan:
     order: int = 0
     needed: list[set[str]] = field(default_factory=list)
     composed: list[list[str]] = field(default_factory=list)  # of the last stage: derivatives 1..k of one output
-    source: dict[str, tuple[int, str]] = field(default_factory=dict)  # wanted name -> stage index, its own name
+    source: dict[str, tuple[int, str]] = field(default_factory=dict)  # name -> stage index, its own name
+    sizes: dict[str, tuple[str, ...]] = field(default_factory=dict)  # magnitudes, of what was composed
 
 
 def stages_of(family: Family) -> tuple[Stage, ...]:
@@ -91,33 +93,32 @@ def chain(families: tuple[Family, ...]) -> Chain:
     """Return the chain of these families, each driven by the one before it.
 
     Parameters and the stages' own outputs carry the stage number; the outputs of the last stage also stand without a
-    number, their derivatives being those with respect to phi of stage 1.
+    number, unless they end in a digit; their derivatives are those with respect to phi of stage 1.
 
     Raises
     ------
     InputError
-        if a stage other than the last has no output angle: a slider cannot drive a crank; if a stage has several loops
-        of its own.
+        if a stage other than the last has no output angle: a slider cannot drive a crank; if it has several loops.
     """
     place = f"chain {[f.name for f in families]}"
     for number, family in enumerate(families, start=1):
         if not isinstance(family.domain, Turn):
             allowed = f"a family over a closed turn; {family.name} is evaluated over {family.domain.text}"
             raise InputError(f"stage {number}", family.name, allowed, place)
-        if len(family.every(Assembly)) > 1:  # their margins, and magnitudes of velocities, would carry no clear name
-            allowed = f"a family with one loop; {family.name} has several: make it a driven member of a machine"
+        if number < len(families) and len(family.every(Assembly)) > 1:
+            allowed = f"a family of one loop; {family.name} moves one link by two cranks, so put it last"
             raise InputError(f"stage {number}", family.name, allowed, place)
         if number < len(families) and not family.pose_output[family.position].wraps:
             allowed = f"a family with an output angle psi; {family.name} has {family.position}, which drives no crank"
             raise InputError(f"stage {number}", family.name, allowed, place)
     stages, parameters = _numbered(families)
     last = families[-1]
-    outputs = [_with_respect_to_chain(o, last) for o in last.pose_outputs]
+    outputs = [_with_respect_to_chain(o, last) for o in last.pose_outputs if not ends_in_digit(o.name)]
     for stage in stages:
         outputs += [
             o.of_stage(stage.number)
             for o in stage.family.pose_outputs
-            if stage.number == 1 or o.name not in stage.family.derivative_of.values()
+            if stage.number == 1 or not _is_rate(o, stage.family)
         ]
     named = {o.name: o for o in outputs}
     own = {f"{name}1": f"{derivative}1" for name, derivative in families[0].derivative_of.items()}
@@ -152,8 +153,8 @@ def _loops(stage: Stage) -> list[Assembly]:
         Assembly(
             f"{loop.discriminant}{stage.number}",
             f"{loop.pressure_angle}{stage.number}",
-            partial(_on_stage, stage, loop.scale),
-            str(stage.number),
+            partial(on_part, stage.designs, loop.scale),
+            f"{loop.stage}{stage.number}",
         )
         for loop in stage.family.every(Assembly)
     ]
@@ -161,12 +162,12 @@ def _loops(stage: Stage) -> list[Assembly]:
 
 def _of_last(stage: Stage) -> list[object]:
     """Carry over points and output link of the last stage, whose outputs also stand without a number."""
-    links = [OutputLink(partial(_on_stage, stage, link.origin)) for link in stage.family.every(OutputLink)]
-    return [*stage.family.every(Points), *links]
-
-
-def _on_stage(stage: Stage, of_design: Callable[[Array], Array], designs: Array) -> Array:
-    return of_design(stage.designs(designs))
+    links = [OutputLink(partial(on_part, stage.designs, link.origin)) for link in stage.family.every(OutputLink)]
+    own = (
+        Points({name: at for name, at in points.at.items() if not ends_in_digit(name)})
+        for points in stage.family.every(Points)
+    )
+    return [*own, *links]
 
 
 def _numbered(families: tuple[Family, ...]) -> tuple[tuple[Stage, ...], tuple[Parameter, ...]]:
@@ -204,8 +205,12 @@ def _numbered(families: tuple[Family, ...]) -> tuple[tuple[Stage, ...], tuple[Pa
     return tuple(stages), tuple(parameters)
 
 
+def _is_rate(output: Output, family: Family) -> bool:
+    return bool(output.parts) or output.name in family.derivative_of.values()
+
+
 def _with_respect_to_chain(output: Output, last: Family) -> Output:
-    if output.name not in last.derivative_of.values():
+    if not _is_rate(output, last):
         return output
     return replace(output, text=f"{output.text}, with respect to phi of stage 1")
 
@@ -213,16 +218,17 @@ def _with_respect_to_chain(output: Output, last: Family) -> Output:
 def _plan(stages: tuple[Stage, ...], outputs: Mapping[str, Output], wanted: frozenset[str]) -> _Plan:
     last = stages[-1].family
     plan = _Plan(needed=[set() for _ in stages])
+    plan.sizes = {name: parts for name in wanted if (parts := outputs[name].parts) and not outputs[name].stage}
     chains: dict[str, list[str]] = {}
-    for name in wanted:
-        if name in last.pose_names:
-            plan.source[name] = len(stages) - 1, name
-            derivatives = last.orders(name)
-            if derivatives:
-                chains[derivatives[0]] = max(chains.get(derivatives[0], []), derivatives, key=len)
-        else:
-            output = outputs[name]
+    for name in wanted.difference(plan.sizes).union(*plan.sizes.values()):
+        output = outputs[name]
+        if output.stage:
             plan.source[name] = int(output.stage) - 1, output.own
+            continue
+        plan.source[name] = len(stages) - 1, name
+        derivatives = last.orders(name)
+        if derivatives:
+            chains[derivatives[0]] = max(chains.get(derivatives[0], []), derivatives, key=len)
     plan.composed = list(chains.values())
     plan.order = max((len(names) for names in plan.composed), default=0)
     for index, own in plan.source.values():
@@ -270,14 +276,14 @@ def _poses(
         plan = plans[wanted] = _plan(stages, outputs, wanted)
     shape = (designs.shape[0], angles.cos.shape[1])
     if shape[0] * shape[1] <= BLOCK:
-        return _block(stages, plan, designs, angles)
+        return _block(stages, plan, designs, angles, wanted)
     dtype = np.result_type(designs, angles.cos)
-    columns: Columns = {name: np.empty(shape, dtype) for name in plan.source}
+    columns: Columns = {name: np.empty(shape, dtype) for name in wanted}
     columns["status"] = np.empty(shape, np.uint8)
     for rows, poses in _blocks(shape):
         of_angles = rows if angles.cos.shape[0] > 1 else slice(None)
         part = Angles(*(np.ascontiguousarray(x[of_angles, poses]) for x in angles))
-        for name, values in _block(stages, plan, designs[rows], part).items():
+        for name, values in _block(stages, plan, designs[rows], part, wanted).items():
             columns[name][rows, poses] = values
     return columns
 
@@ -289,8 +295,8 @@ def _blocks(shape: tuple[int, int]) -> Iterator[tuple[slice, slice]]:
             yield slice(i, i + rows), slice(j, j + poses)
 
 
-def _block(stages: tuple[Stage, ...], plan: _Plan, designs: Array, angles: Angles) -> Columns:
-    """Return all stages of one block, the derivatives carried along by the chain rule."""
+def _block(stages: tuple[Stage, ...], plan: _Plan, designs: Array, angles: Angles, wanted: frozenset[str]) -> Columns:
+    """Return what is wanted of all stages of one block, the derivatives carried along by the chain rule."""
     results: list[dict[str, Any]] = []
     inner: list[Any] = []  # derivatives of the angle that drives the present stage
     status = np.zeros((designs.shape[0], angles.cos.shape[1]), np.uint8)
@@ -315,7 +321,13 @@ def _block(stages: tuple[Stage, ...], plan: _Plan, designs: Array, angles: Angle
         if not is_last:
             inner = [result[name] for name in composed[0]]
     columns: Columns = {name: results[index][own] for name, (index, own) in plan.source.items()}
-    return columns | {"status": status}
+    columns |= {name: magnitude(columns, parts) for name, parts in plan.sizes.items()}
+    return {name: columns[name] for name in wanted} | {"status": status}
+
+
+def magnitude(columns: Mapping[str, Any], parts: tuple[str, ...]) -> Any:
+    """Return the magnitude of a vector, (n, m), from the names of its components."""
+    return np.sqrt(sum(columns[part] ** 2 for part in parts))
 
 
 def drive(result: dict[str, Any], angle: str, kappa: Array, offset: Array) -> Angles:

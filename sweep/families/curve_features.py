@@ -174,7 +174,7 @@ def of_stages(stages: Sequence[Stage]) -> list[object]:
     """Return what the stages of a chain bring in: waves multiply; the switches of stage 1 are at known angles."""
     first = stages[0]
     found: list[object] = [
-        Switches(partial(_on_part, first.designs, known.angles)) for known in first.family.every(Switches)
+        Switches(partial(on_part, first.designs, known.angles)) for known in first.family.every(Switches)
     ]
     for stage in stages:
         for known in stage.family.every(Singular):
@@ -202,7 +202,7 @@ def of_members(members: Sequence[Member]) -> list[object]:
 
 
 def _of_part(member: Member, known: Crossing) -> Crossing:
-    level, matters = partial(_on_part, member.designs, known.level), partial(_on_part, member.designs, known.matters)
+    level, matters = partial(on_part, member.designs, known.level), partial(on_part, member.designs, known.matters)
     return Crossing(f"{member.name}.{known.of}", level, matters)
 
 
@@ -225,7 +225,8 @@ def _many(count: float, designs: Array) -> Array:
     return np.full(len(designs), count)
 
 
-def _on_part(part: Callable[[Array], Array], of_design: Callable[[Array], T], designs: Array) -> T:
+def on_part(part: Callable[[Array], Array], of_design: Callable[[Array], T], designs: Array) -> T:
+    """Return a function of the designs of a stage or a member for those of the whole."""
     return of_design(part(designs))
 
 

@@ -14,7 +14,8 @@ from kernels.status import OK
 from kernels.types import Array
 from sweep.families.base import Angles, Columns, Event, Family, Output, Parameter, of_family
 from sweep.families.capabilities import Assembly, Points
-from sweep.families.curve_features import of_members
+from sweep.families.chain import magnitude
+from sweep.families.curve_features import of_members, on_part
 from sweep.families.frames import Frame
 from sweep.families.happenings import event_angles, switches_of_events
 from sweep.families.main_shaft import ShaftTorque, speed_of
@@ -166,13 +167,9 @@ def _outputs(placed: list[Member]) -> list[Output]:
 
 def _loop(member: Member, loop: Assembly) -> Assembly:
     return Assembly(
-        f"{member.name}.{loop.discriminant}", f"{member.name}.{loop.pressure_angle}", partial(_scale, member, loop),
-        f"{member.name}.{loop.stage}",
+        f"{member.name}.{loop.discriminant}", f"{member.name}.{loop.pressure_angle}",
+        partial(on_part, member.designs, loop.scale), f"{member.name}.{loop.stage}",
     )  # fmt: skip
-
-
-def _scale(member: Member, loop: Assembly, designs: Array) -> Array:
-    return loop.scale(member.designs(designs))
 
 
 def _precise_poses(machine: Machine, designs: Array, angles: Angles, wanted: frozenset[str]) -> Columns:
@@ -241,6 +238,7 @@ def _needs(machine: Machine, wanted: frozenset[str]) -> _Needs:
     changes = {name for name in needed if name.startswith("phi_")}
     needed -= changes
     for m in reversed(machine.members):
+        needed |= {f"{m.name}.{part}" for name in needed for part in m.geared_parts(m.own(name))}
         needed |= _driving(m, needed)
     members = tuple(_of_member(m, own) for m in machine.members if (own := frozenset(map(m.own, needed)) - {""}))
     return _Needs(members, tuple(relations), {name: columns_of.index(name) for name in inputs}, bool(changes))
@@ -335,6 +333,7 @@ def _with_respect_to_shaft(m: Member, result: dict[str, Any], found: Mapping[str
         outer: list[Any] = [result[name] for name in names]
         missing: list[Any] = [None] * (3 - len(names))
         chain_rule(np.full(len(outer[0]), float(m.ratio)), *given, *missing, *outer, *missing)
+    result |= {name: magnitude(result, parts) for name in result if (parts := m.geared_parts(name))}
 
 
 def _made_of(m: Member, point: str, own: frozenset[str]) -> set[str]:

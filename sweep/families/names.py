@@ -50,6 +50,11 @@ def at_stage(name: str, number: str) -> str:
     return name.removesuffix(number) if name.endswith(number) else ""
 
 
+def ends_in_digit(name: str) -> bool:
+    """Tell whether a name of a chain's last stage needs its number: ``b1`` is joint b of stage 1, not pin 1 of it."""
+    return name[-1].isdigit()
+
+
 def reduced(prefix: str, name: str) -> str:
     """Name of a reduction of an output.
 

@@ -50,11 +50,11 @@ def point_outputs(equation: str) -> tuple[tuple[Output, ...], ...]:
 
 
 def magnitude_outputs(equation: str) -> tuple[Output, ...]:
-    """Magnitudes of the working point's velocity, acceleration and jerk, per radian of the family's own crank."""
-    return (
-        Output("speed_p", "length", "magnitude of the working point's velocity analogue", equation),
-        Output("acceleration_p", "length", "magnitude of the working point's acceleration analogue", equation),
-        Output("jerk_p", "length", "magnitude of the working point's jerk analogue", equation),
+    """Magnitudes of the working point's velocity, acceleration and jerk."""
+    text, words = "magnitude of the working point's", ("velocity", "acceleration", "jerk")
+    return tuple(
+        Output(f"{name}_p", "length", f"{text} {word} analogue", equation, parts=tuple(f"{order}{x}_p" for x in AXES))
+        for name, word, order in zip(("speed", *words[1:]), words, _ORDERS[1:], strict=True)
     )
 
 

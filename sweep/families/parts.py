@@ -210,6 +210,11 @@ class Member:
         prefix = f"{self.name}."
         return name.removeprefix(prefix) if name.startswith(prefix) else ""
 
+    def geared_parts(self, name: str) -> tuple[str, ...]:
+        """Name what a magnitude is made of anew where the crank does not turn as the main shaft does."""
+        output = self.family.pose_output.get(name)
+        return () if output is None or (self.driver is None and self.ratio == 1) else output.parts
+
     @cached_property
     def added(self) -> tuple[Parameter, ...]:
         """Its parameters beside those of its family: phase and place, tip, eye."""

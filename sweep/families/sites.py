@@ -9,6 +9,7 @@ import numpy as np
 
 from kernels.types import Array
 from sweep.families.capabilities import Coordinates, DesignMap, OutputLink, Points, Skeleton
+from sweep.families.names import ends_in_digit
 
 if TYPE_CHECKING:
     from sweep.families.frames import Frame
@@ -41,20 +42,25 @@ def sites_of(member: Member) -> dict[str, Site]:
     stages = getattr(member.family, "stages", ())
     families = [stage.family for stage in stages] or [member.family]
     for k, family in enumerate(families):
-        last = k + 1 == len(families)
-        numbers = [str(k + 1)] * bool(stages) + [""] * last
-        for number in numbers:
-            for points in family.every(Points):
-                for name, at in points.at.items():
-                    x, y, z = (one and f"{one}{number}" for one in at)
-                    found[f"{name}{number}"] = Site(k, moving=(x, y, z))
-            for skeleton in family.every(Skeleton):
-                for name, fixed in skeleton.fixed.items():
-                    found[f"{name}{number}"] = Site(k, fixed=fixed.at)
-                    if fixed.axis is not None:
-                        found[f"{name}{number}_axis"] = Site(k, fixed=fixed.axis, free=True)
+        for name, at in ((name, at) for points in family.every(Points) for name, at in points.at.items()):
+            for number in _numbers(stages, k, name):
+                x, y, z = (one and f"{one}{number}" for one in at)
+                found[f"{name}{number}"] = Site(k, moving=(x, y, z))
+        for name, fixed in ((name, at) for skeleton in family.every(Skeleton) for name, at in skeleton.fixed.items()):
+            for number in _numbers(stages, k, name):
+                found[f"{name}{number}"] = Site(k, fixed=fixed.at)
+                if fixed.axis is not None:
+                    found[f"{name}{number}_axis"] = Site(k, fixed=fixed.axis, free=True)
     found |= {name: Site(len(families) - 1, on_link=at) for name, at in member.carried}
     return found
+
+
+def _numbers(stages: Sequence[Stage], k: int, *names: str) -> list[str]:
+    """Return what can stand behind names of the stage of index k: its number, in the last one also nothing."""
+    if not stages:
+        return [""]
+    bare = k + 1 == len(stages) and not any(map(ends_in_digit, names))
+    return [str(k + 1)] + [""] * bare
 
 
 def links_of(member: Member) -> dict[str, tuple[str, str]]:
@@ -63,8 +69,8 @@ def links_of(member: Member) -> dict[str, tuple[str, str]]:
     stages = getattr(member.family, "stages", ())
     families = [stage.family for stage in stages] or [member.family]
     for k, family in enumerate(families):
-        for number in [str(k + 1)] * bool(stages) + [""] * (k + 1 == len(families)):
-            for link in (link for skeleton in family.every(Skeleton) for link in skeleton.links):
+        for link in (link for skeleton in family.every(Skeleton) for link in skeleton.links):
+            for number in _numbers(stages, k, link.name, *link.joints[:2]):
                 ends = [f"{joint}{number}" for joint in link.joints[:2]]
                 if len(ends) == 2 and set(ends) <= known.keys():
                     found[f"{link.name}{number}".replace(" ", "_")] = (ends[0], ends[1])
