@@ -7,11 +7,13 @@ from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any, TypeAlias
 
 import numpy as np
+from numpy.polynomial.polynomial import polyder, polyval
 from numpy.typing import NDArray
 
 from kernels import status as st
-from kernels.types import EPS, TWO_PI, Array
+from kernels.types import TWO_PI, Array
 from sweep.families.base import Accuracy, Angles, Columns, Family, Output, Step, Work
+from sweep.numerics.events import bottoms, zeros
 
 if TYPE_CHECKING:
     from sweep.families.machines import Machine
@@ -19,10 +21,7 @@ if TYPE_CHECKING:
 SAMPLES = 512
 BLOCK = 256  # designs at once: their samples stay in the caches
 TANGENT = 64.0 * 2.0**-53  # of the coordinates that a distance is a difference of
-ROUNDING: Any = {"xatol": 4.0 * EPS * TWO_PI, "xrtol": 0.0}  # of a root that is closed
-
 NEAR = 1e-3  # of a sample's step: a polynomial that is so near is trusted in its slope
-LAGRANGE = np.array([-120.0, 24.0, -12.0, 12.0, -24.0, 120.0])  # products of the differences of -2 ... 3
 
 Places: TypeAlias = dict[str, Any]
 """Angles (n,) of each design by what they are, "count" and "status"."""
@@ -191,26 +190,24 @@ class Poses:
         if not row.size:
             return np.zeros(0)
         step = TWO_PI / values.shape[1]
-        local = _local(values, row, np.floor((0.5 * (left + right)) / step).astype(np.intp)) - level
-        cell = np.floor(0.5 * (left + right) / step) * step
-        on_samples: Any = lambda phi, k: _polynomial(local[k.astype(np.intp)], (phi - cell[k.astype(np.intp)]) / step)  # noqa: E731
-        every: Any = np.arange(row.size)
-        guess = _bracketed(on_samples, left, right, every)
+        column = np.floor(0.5 * (left + right) / step).astype(np.intp)
+        near = values[row[:, None], (column[:, None] + np.arange(-2, 4)) % values.shape[1]] - level
+        polynomial = np.linalg.solve(np.vander(np.arange(-2.0, 4.0), increasing=True), near.T)
+        on_samples: Any = lambda k, t: polyval(t, polynomial[:, k], tensor=False)  # noqa: E731
+        t = zeros(on_samples, left / step - column, right / step - column)
+        guess: Array = (column + t) * step
         height = self.near(row, guess, name) - level
-        slope = _polynomial(local, (guess - cell) / step + 1e-4) - _polynomial(local, (guess - cell) / step - 1e-4)
         with np.errstate(divide="ignore", invalid="ignore"):
-            better = guess - height * (2e-4 * step) / slope
+            better = guess - height * step / polyval(t, polyder(polynomial), tensor=False)
         close = (np.abs(better - guess) <= NEAR * step) & (better >= left) & (better <= right)
         rest = np.flatnonzero(~close)
         if rest.size:
-            of: Any = lambda phi, rows: self.near(rows.astype(np.intp), phi, name) - level  # noqa: E731
-            better[rest] = _bracketed(of, left[rest], right[rest], row[rest])
+            some = row[rest]
+            better[rest] = zeros(lambda k, phi: self.near(some[k], phi, name) - level, left[rest], right[rest])
         return np.asarray(better, np.float64)
 
     def least(self, row: NDArray[np.intp], start: Array, end: Array, name: str, samples: int = 64) -> Array:
         """Return where an output is least between two angles of each of these designs, (k,)."""
-        from scipy.optimize.elementwise import find_minimum
-
         if not row.size:
             return np.zeros(0)
         step = 1.0 / (samples - 1)  # one sample beyond either end, so that a dip next to an end has neighbours
@@ -221,42 +218,15 @@ class Poses:
         place = np.where(which == 1, start, np.where(which == samples, end, place))
         k, j = np.nonzero((values[:, 1:-1] <= values[:, :-2]) & (values[:, 1:-1] <= values[:, 2:]))
         if k.size:
-            of: Any = lambda phi, rows: self.near(rows.astype(np.intp), phi, name)  # noqa: E731
-            args: Any = (row[k],)
             # To rounding, not to its root: where axes meet the curve is a wedge, as steep as the bodies are fast.
-            found = find_minimum(of, (grid[k, j], grid[k, j + 1], grid[k, j + 2]), args=args, tolerances=ROUNDING)
-            phi = np.clip(np.asarray(found.x, np.float64), start[k], end[k])
+            phi = bottoms(lambda places: self.near(row[k], places, name), grid[k, j], grid[k, j + 2])
+            phi = np.clip(phi, start[k], end[k])
             height = self.at(row[k], phi, name)[0]
             least = values[:, 1:-1].min(axis=1)
             for one in np.argsort(-height, kind="stable"):  # the least one last
                 if height[one] < least[k[one]]:
                     place[k[one]] = phi[one]
         return place
-
-
-def _bracketed(of: Any, left: Array, right: Array, which: NDArray[np.intp]) -> Array:
-    """Return a root of a function of angles and rows in each bracket, to rounding."""
-    from scipy.optimize.elementwise import find_root
-
-    args: Any = (which,)
-    found = find_root(of, (np.asarray(left, np.float64), np.asarray(right, np.float64)), args=args, tolerances=ROUNDING)
-    # A root within rounding of an end of its bracket may leave no change of sign: that end is the root then.
-    (first, last), (low, high) = found.bracket, found.f_bracket
-    return np.asarray(np.where(found.success, found.x, np.where(np.abs(low) < np.abs(high), first, last)))
-
-
-def _local(values: Array, row: NDArray[np.intp], column: NDArray[np.intp]) -> Array:
-    """Return the six samples about each cell, (k, 6)."""
-    found: Array = values[row[:, None], (column[:, None] + np.arange(-2, 4)) % values.shape[1]]
-    return found
-
-
-def _polynomial(samples: Array, t: Array) -> Array:
-    """Evaluate the polynomials of degree five through samples (k, 6) at -2 ... 3 (Lagrange)."""
-    away = t[:, None] - np.arange(-2, 4)
-    others = [np.delete(away, k, axis=1).prod(axis=1) for k in range(6)]
-    found: Array = (np.stack(others, axis=1) / LAGRANGE * samples).sum(axis=1)
-    return found
 
 
 def _neighbours(ordered: Found) -> tuple[Array, Array, NDArray[np.intp]]:

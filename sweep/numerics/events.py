@@ -17,6 +17,7 @@ NARROWER = 1.0 / 16.0
 WIDER = 8.0  # times the place before: between them a pole beside the nearer end leaves 2.1^-k of the k-th coefficient
 SHORTEST = 1e-11  # distance of a zero [rad] below which no pose sees what turns there
 BISECTIONS = 120  # at most; a smooth function takes some eight steps, a jump one for each bit of the angle
+GRID = 65  # places of each grid about a minimum
 LAST = 2.0**-48  # width of the last brackets [rad]: four times the rounding of an angle
 
 Functions: TypeAlias = Callable[[Index, Array], Array]
@@ -71,11 +72,14 @@ def zeros(function: Callable[[Index, Array], Array], low: Array, high: Array) ->
     Parameters
     ----------
     function : values (j,) of the functions with numbers (j,) at one place each (j,)
-    low, high : (k,) places on either side of a zero
+    low, high : (k,) places on either side of a zero; where rounding hides the change of sign one of them is the zero
     """
-    found, left = 0.5 * (low + high), np.arange(low.size)
-    x1, x2, at1, at2 = low, high, function(left, low), function(left, high)
-    share = np.full(low.size, 0.5)
+    every = np.arange(low.size)
+    at_low, at_high = function(every, low), function(every, high)
+    found: Array = np.where(np.abs(at_low) < np.abs(at_high), low, high)
+    left = np.flatnonzero((at_low < 0.0) != (at_high < 0.0))
+    x1, x2, at1, at2 = (y[left] for y in (low, high, at_low, at_high))
+    share = np.full(left.size, 0.5)
     for _ in range(BISECTIONS):
         if not left.size:
             break
@@ -91,6 +95,25 @@ def zeros(function: Callable[[Index, Array], Array], low: Array, high: Array) ->
         more = (least < 0.5) & (at != 0.0)
         left, share, x1, x2, at1, at2 = (y[more] for y in (left, share, x1, x2, at1, at2))
     return found
+
+
+def bottoms(function: Callable[[Array], Array], low: Array, high: Array) -> Array:
+    """Return where functions with one minimum between two places each are least, to the rounding of the angle.
+
+    Ever finer grids find it, of a wedge as of a smooth function: many places at once take hardly longer than one.
+
+    Parameters
+    ----------
+    function : values (k, m) of all functions at m places of each (k, m)
+    low, high : (k,) places on either side of the minimum
+    """
+    every, share = np.arange(low.size), np.linspace(0.0, 1.0, GRID)
+    while (high - low).max(initial=0.0) > LAST:
+        places = low[:, None] + share * (high - low)[:, None]
+        least = np.argmin(function(places), axis=1)
+        low, high = places[every, np.maximum(least - 1, 0)], places[every, np.minimum(least + 1, GRID - 1)]
+    middle: Array = 0.5 * (low + high)
+    return middle
 
 
 def _inverse(x1: Array, x2: Array, x3: Array, at1: Array, at2: Array, at3: Array) -> Array:
