@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterable, Sequence
+from itertools import groupby, takewhile
+from typing import TypeAlias
 
 import click
 
@@ -13,6 +16,12 @@ from sweep.errors import InputError, choices
 from sweep.families.base import Output, Parameter
 from sweep.pages import rendered
 from sweep.quantities.units import internal_unit
+
+Rows: TypeAlias = list[tuple[str, str, str]]  # names, unit, definition
+COMPONENT = re.compile(r"_[xyz]{1,2}$")  # of a vector or a tensor
+OF_COMPONENT = re.compile(r"^(?:magnitude|[xyz]): |: entry of the tensor, - integral [xyz] [xyz] dm")
+ALONG = re.compile(r" along [xyz](?= of the fixed axes)")
+REDUCED = re.compile(r"(?:(?:phi_)?(?:max_abs|max|min)|range|rms)_(?P<pose>.+)")
 
 
 def complete_effects(context: click.Context, parameter: click.Parameter, incomplete: str) -> list[str]:
@@ -66,28 +75,56 @@ def explain(entry: Effect) -> list[str]:
         "called for": entry.called_for,
         "negligible": entry.negligible,
     }
-    result = entry.design_result.outputs if entry.design_result else ()
-    tables: dict[str, Iterable[Sequence[str]]] = {
+    tables = {
         "outputs per pose (and their reductions max_abs_x, max_x, min_x, range_x, rms_x)": _output_rows(entry.outputs),
-        "outputs per design": _output_rows(result),
-        "inputs": [
-            (p.name, internal_unit(p.unit), input_words(p)) for p in (every_input(entry) if entry.inputs else ())
-        ],
+        "outputs per design": _design_rows(entry),
+        "inputs": _input_rows(every_input(entry) if entry.inputs else ()),
     }
     lines = [f"{entry.name} ({entry.key}): {entry.title}", "", *aligned(about.items())]
-    lines += ["", "equations", *(f"  {formula}" for formula in entry.formulas)]
+    lines += ["", f"equations, {entry.equation}", *(f"  {formula}" for formula in entry.formulas)]
     return lines + [line for title, rows in tables.items() if rows for line in ("", title, *aligned(rows))]
 
 
-def _output_rows(outputs: tuple[Output, ...]) -> list[tuple[str, str, str, str]]:
-    return [(o.name, internal_unit(o.unit), o.text, o.equation) for o in outputs]
+def _output_rows(outputs: Iterable[Output]) -> Rows:
+    return joined((o.name, internal_unit(o.unit), o.text, "") for o in outputs)
 
 
-def input_words(p: Parameter) -> str:
-    """Return the definition of an input with what it may be."""
+def _design_rows(entry: Effect) -> Rows:
+    """Return outputs per design, but for reductions of outputs per pose."""
+    poses = {o.name for o in entry.outputs}
+    results = entry.design_result.outputs if entry.design_result else ()
+    reduced = [(found := REDUCED.fullmatch(o.name)) is not None and found["pose"] in poses for o in results]
+    return _output_rows(o for o, one in zip(results, reduced, strict=True) if not one)
+
+
+def _input_rows(inputs: Iterable[Parameter]) -> Rows:
+    return joined((p.name, internal_unit(p.unit), p.text, f" ({input_notes(p)})") for p in inputs)
+
+
+def joined(rows: Iterable[tuple[str, str, str, str]]) -> Rows:
+    """Make one row of the components of a vector or a tensor, which stand one below the other.
+
+    Parameters
+    ----------
+    rows : name, unit, definition and what is said behind it
+    """
+
+    def vector(row: tuple[str, str, str, str]) -> tuple[str, str, str]:
+        words = ALONG.sub(" along x, y, z", OF_COMPONENT.sub("", row[2]))
+        return COMPONENT.sub("", row[0]), row[1], words
+
+    out: Rows = []
+    for (stem, unit, text), group in groupby(rows, key=vector):
+        first, *others = group
+        names = [first[0], *(row[0].removeprefix(stem) for row in others)]
+        out.append((", ".join(names), unit, (text if others else first[2]) + first[3]))
+    return out
+
+
+def input_notes(p: Parameter) -> str:
+    """Return what an input may be, and what it is where it is left out."""
     notes = [p.sign] if p.sign else []
-    notes += [f"{p.default:g} if left out" if p.default is not None else "required"]
-    return f"{p.text} ({', '.join(notes)})"
+    return ", ".join([*notes, f"{p.default:g} if left out" if p.default is not None else "required"])
 
 
 def every_input(entry: Effect) -> tuple[Parameter, ...]:
@@ -95,16 +132,54 @@ def every_input(entry: Effect) -> tuple[Parameter, ...]:
     return tuple(dict.fromkeys((*entry.inputs, *(p for tool in entry.tool_inputs for p in tool))))
 
 
+def grouped(entries: Iterable[Effect]) -> list[list[Effect]]:
+    """Gather the effects that are one and the same for several families: same equations, same reason to ask for it."""
+    groups: dict[tuple[object, ...], list[Effect]] = {}
+    for entry in entries:
+        groups.setdefault((entry.formulas, entry.called_for, entry.negligible), []).append(entry)
+    return list(groups.values())
+
+
+def heading(group: Sequence[Effect]) -> str:
+    """Return the words that the names of a group end with, or all its names."""
+    names = [entry.name.split("_")[::-1] for entry in group]
+    alike = takewhile(lambda words: len(set(words)) == 1, zip(*names, strict=False))
+    return "_".join([words[0] for words in alike][::-1]) or ", ".join(entry.name for entry in group)
+
+
+def parts(group: Sequence[Effect]) -> list[tuple[str, list[str], Rows]]:
+    """Return the tables of a group: the kind, of whom (empty: of all its effects), and the rows.
+
+    Inputs that an effect has from one that it needs are not said again.
+    """
+    known = [{p for name in entry.needs for p in every_input(effect(name))} for entry in group]
+    kinds = {
+        "output": [_output_rows(entry.outputs) for entry in group],
+        "output per design": [_design_rows(entry) for entry in group],
+        "input": [
+            _input_rows(p for p in every_input(entry) if p not in old) for entry, old in zip(group, known, strict=True)
+        ],
+    }
+    out: list[tuple[str, list[str], Rows]] = []
+    for kind, tables in kinds.items():
+        common = [row for row in tables[0] if all(row in table for table in tables)]
+        out.append((kind, [], common))
+        for entry, table in zip(group, tables, strict=True):
+            out.append((kind, [entry.name], [row for row in table if row not in common]))
+    return [part for part in out if part[2]]
+
+
 def page() -> str:
     """Return docs/effects.md, made from the register."""
+    entries = [effect(name) for name in NAMES]
     return str(
         rendered(
             "effects.md.j2",
-            entries=[effect(name) for name in NAMES],
-            unit=internal_unit,
+            entries=entries,
+            groups=grouped(entries),
+            heading=heading,
+            parts=parts,
             cost=cost_words,
             in_chain=chain_words,
-            every_input=every_input,
-            input_words=input_words,
         )
     )

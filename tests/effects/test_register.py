@@ -9,7 +9,7 @@ import pytest
 from click.testing import CliRunner
 
 from sweep.cli import main
-from sweep.cli.effects import page
+from sweep.cli.effects import every_input, page
 from sweep.effects import NAMES, applicable, effect, extended, offered
 from sweep.effects.advice import closure, findings
 from sweep.effects.base import Placed
@@ -118,7 +118,20 @@ def test_the_command_lists_and_explains():
     assert "did you mean 'friction'?" in wrong.output
 
 
+def test_the_page_names_every_output_and_input_once_for_all_effects_that_share_it():
+    """Names in one row share their stem; reductions of outputs per pose are not listed."""
+    named = set()
+    for cell in re.findall(r"^\| `([^`]+)` \| [^|]+ \| [^|]+ \|$", page(), re.MULTILINE):
+        first, *others = cell.split(", ")
+        named |= {first, *(re.sub(r"_[xyz]{1,2}$", "", first) + other for other in others)}
+    for entry in map(effect, NAMES):
+        reductions = {o.name for o in entry.design_result.outputs} if entry.design_result else set()
+        assert {o.name for o in entry.outputs} | {p.name for p in every_input(entry)} <= named, entry.name
+        rest = {re.sub(r"^((phi_)?(max_abs|max|min)|range|rms)_", "", name) for name in reductions - named}
+        assert rest <= {o.name for o in entry.outputs}, entry.name
+
+
 def test_an_effect_says_the_unit_of_all_it_takes_and_gives():
     words = CliRunner().invoke(main, ["effects", "friction"]).output
-    for name, unit in (("m_crank", "t"), ("j_rocker_xy", r"t\*mm\^2"), ("mu_b", "1"), ("load_support_d1", "N")):
+    for name, unit in (("m_crank", "t"), ("j_rocker_xx, _xy, .*", r"t\*mm\^2"), ("mu_b", "1"), ("load_support_d1", "N")):
         assert re.search(rf"^  {name} +{unit} ", words, re.MULTILINE), name
