@@ -12,6 +12,7 @@ import pytest
 import sweep
 from kernels import status as st
 from kernels.effects.tool import free_tool
+from sweep.effects import all_inputs
 from sweep.effects.scene import first_scene
 from sweep.families import family
 from sweep.families.base import Angles
@@ -158,3 +159,32 @@ def test_mass_and_tip_stand_at_one_point():
     assert np.abs(force - rate).max() < 1e-10 * np.abs(rate).max()
     turning = np.cross(tip, rate)
     assert np.abs(moment - turning).max() < 1e-10 * np.abs(turning).max()
+
+
+# Loopers whose crank and output link turn about one axis, so that the link goes round evenly: a mass at its tip pulls
+# outwards with m omega^2 r and nothing else acts.
+EVEN = {
+    "rssr": {"a": 10.0, "b": 734.0**0.5, "c": 25.0},
+    "five_link": {"a": 10.0, "b": 730.0**0.5, "c": 25.0, "h": 2.0},
+    "slotted": {"a": 10.0},
+}
+
+
+@pytest.mark.parametrize("name", EVEN)
+def test_moment_of_a_mass_at_the_tip_is_its_pull_times_its_height_above_zero(name):
+    """With g = -3 and a tip at z = 4 the pull acts at 4: 18.0 and 120.7 N mm by hand, 4.5 and 30.2 from z = g."""
+    pull = np.array([30.175, 4.5])  # along x and y of the frame [N]
+    radius = 30.0
+    tool = {"m_tool": np.hypot(*pull) / (radius * OMEGA**2), "tool_x": radius, "tool_y": 0.0, "tool_z": 4.0}
+    looper = EVEN[name] | {"e": 0.0, "f": 0.0, "g": -3.0, "alpha": 0.0}
+    ahead = sweep.evaluate(name, looper, ["psi"], phi=[0.0])["psi"][0]
+    machine = sweep.machine({"x": {"family": name, "tip": [radius, 0.0, 4.0]}}, {"f": {"shaking": ["x"]}})
+    bodies = {p.name: 0.0 for p in all_inputs(family(name)).values() if p.name.startswith("m_")}
+    table = {f"x.{key}": x for key, x in (bodies | looper | tool | {"speed": OMEGA}).items()}
+    names = ["x.tip_z", "f_moment_x", "f_moment_y", "f_moment_z", "f_x", "f_y"]
+    found = sweep.evaluate(machine, table, names, phi=[np.arctan2(pull[1], pull[0]) - ahead]).iloc[0]
+    assert found["status"] == 0
+    assert found["x.tip_z"] == 4.0
+    # some forty roundings of terms of the size of the largest
+    for one, exact in zip(names[1:], (-18.0, 120.7, 0.0, *pull), strict=True):
+        assert abs(found[one] - exact) < 1e-12 * 120.7
