@@ -141,14 +141,15 @@ def moving(data: Dataset, shown: Sequence[Shown]) -> dict[str, Any] | None:
     phase = "" if interval or any(motion.free for motion in motions) else " from the lowest position"
     variable = quantity(family.domain.name, family.domain.unit)
     joints = [one.part for motion in motions for one in motion.placed]
+    designs = [_design(data, motion, variable.factor) for motion in motions]
     return {
         "closed": not interval,
         "axis": f"{family.domain.text}{phase}",
         "unit": variable.unit,
-        "size": extent(joints) if joints else 0.0,
+        "size": max(design["size"] for design in designs),
         "plane": bool(joints) and not is_spatial(joints),
         "curves": [_panel(data, name, motions) for name in names],
-        "designs": [_design(data, motion, variable.factor) for motion in motions],
+        "designs": designs,
     }
 
 

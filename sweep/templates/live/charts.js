@@ -2,10 +2,22 @@
 // Curves over the turn as small panels with one cursor. Pointing into a panel moves the cursor.
 
 const WIDE = 340, HIGH = 172, LEFT = 46, RIGHT = 14, TOP = 8, BOTTOM = 34;
+const TENTH = 0.1; // unit of the curves' paths: whole numbers are written in a tenth of the time
 
 // Numbers that Python has packed as base64 of float32.
 function numbersOf(text) {
-  return new Float32Array(Uint8Array.from(atob(text), (c) => c.charCodeAt(0)).buffer);
+  const raw = atob(text), bytes = new Uint8Array(raw.length);
+  for (let k = 0; k < raw.length; k += 1) bytes[k] = raw.charCodeAt(k); // Uint8Array.from takes twenty times as long
+  return new Float32Array(bytes.buffer);
+}
+
+// Write what is new: an attribute or a text that is written again is laid out and painted again.
+function write(element, name, value) {
+  if (element.getAttribute(name) !== String(value)) element.setAttribute(name, value);
+}
+
+function tell(node, text) {
+  if (node.data !== text) node.data = text;
 }
 
 function svg(name, attributes, parent) {
@@ -45,19 +57,21 @@ class Panel {
     const box = host.appendChild(document.createElement("figure"));
     box.className = "panel";
     const head = box.appendChild(document.createElement("figcaption"));
-    head.innerHTML = "<b></b> <output></output>";
+    head.innerHTML = "<b></b> <output> </output>";
     head.firstChild.textContent = curve.unit ? `${curve.title} [${curve.unit}]` : curve.title;
-    this.value = head.querySelector("output");
+    this.value = head.querySelector("output").firstChild;
     this.frame = svg("svg", { viewBox: `0 0 ${WIDE} ${HIGH}`, role: "img", "aria-label": curve.title }, box);
     this.turn = svg("g", {}, this.frame);
+    this.grid = svg("path", { class: "grid" }, this.frame);
     this.scale = svg("g", {}, this.frame);
-    this.shade = svg("g", { class: "shade" }, this.frame);
+    this.shade = svg("path", { class: "shade" }, this.frame);
     const clip = `clip-${curve.name.replace(/[^a-z0-9]/gi, "-")}`;
     const field = svg("clipPath", { id: clip }, this.frame);
     svg("rect", { x: LEFT, y: TOP, width: WIDE - LEFT - RIGHT, height: HIGH - TOP - BOTTOM }, field);
     const inside = svg("g", { "clip-path": `url(#${clip})` }, this.frame);
-    this.bounds = svg("g", {}, inside);
-    this.lines = data.designs.map((design) => svg("path", { class: design.role }, inside));
+    this.bounds = svg("path", { class: "limit" }, inside);
+    this.curves = svg("g", { class: "curves", transform: `scale(${TENTH})` }, inside);
+    this.lines = data.designs.map((design) => svg("path", { class: design.role }, this.curves));
     this.cursor = svg("line", { class: "cursor", y1: TOP, y2: HIGH - BOTTOM }, this.frame);
     this.dot = svg("circle", { class: "dot", r: 3.5 }, inside);
     this.frame.addEventListener("pointerdown", (event) => { this.follow(event, chosen); });
@@ -74,11 +88,8 @@ class Panel {
     const room = high - low > 1e-12 * Math.max(Math.abs(low), Math.abs(high)) ? 0.06 * (high - low) : Math.abs(high) || 1;
     [this.low, this.high] = [low - room, high + room];
     this.drawScale();
-    this.bounds.replaceChildren();
-    for (const limit of curve.limits) {
-      svg("line", { class: "limit", x1: LEFT, x2: WIDE - RIGHT, y1: this.y(limit), y2: this.y(limit) }, this.bounds);
-    }
-    this.lines.forEach((line, k) => line.setAttribute("d", this.path(data.designs[k])));
+    write(this.bounds, "d", this.across(curve.limits));
+    this.lines.forEach((line, k) => write(line, "d", this.path(data.designs[k])));
   }
 
   follow(event, chosen) {
@@ -91,12 +102,18 @@ class Panel {
 
   y(value) { return TOP + ((this.high - value) / (this.high - this.low)) * (HIGH - TOP - BOTTOM); }
 
+  // Lines from side to side.
+  across(values) { return values.map((value) => `M${LEFT} ${this.y(value)}H${WIDE - RIGHT}`).join(""); }
+
   drawScale() {
-    this.scale.replaceChildren();
-    for (const value of ticksBetween(this.low, this.high)) {
-      svg("line", { class: "grid", x1: LEFT, x2: WIDE - RIGHT, y1: this.y(value), y2: this.y(value) }, this.scale);
-      svg("text", { x: LEFT - 5, y: this.y(value) + 3.5, "text-anchor": "end" }, this.scale).textContent = short(value);
-    }
+    const marks = ticksBetween(this.low, this.high), texts = this.scale.children;
+    write(this.grid, "d", this.across(marks));
+    while (texts.length < marks.length) svg("text", { x: LEFT - 5, "text-anchor": "end" }, this.scale).append("");
+    while (texts.length > marks.length) this.scale.lastChild.remove();
+    marks.forEach((value, k) => {
+      write(texts[k], "y", this.y(value) + 3.5);
+      tell(texts[k].firstChild, short(value));
+    });
   }
 
   drawTurn() {
@@ -118,7 +135,7 @@ class Panel {
       const value = values[k % values.length];
       // A position that turns fully does not close: its last step is left out.
       if (k === values.length && Math.abs(value - values[k - 1]) > 0.5 * (this.high - this.low)) break;
-      if (Number.isFinite(value)) text += `${pen}${this.x(k / last).toFixed(1)} ${this.y(value).toFixed(1)}`;
+      if (Number.isFinite(value)) text += `${pen}${Math.round(this.x(k / last) / TENTH)} ${Math.round(this.y(value) / TENTH)}`;
       pen = Number.isFinite(value) ? "L" : "M";
     }
     return text;
@@ -127,14 +144,11 @@ class Panel {
   show(index) {
     this.index = index;
     this.lines.forEach((line, k) => line.classList.toggle("chosen", k === index));
-    this.lines[index].parentNode.insertBefore(this.lines[index], this.dot);
-    this.shade.replaceChildren();
-    const design = this.data.designs[index], poses = design.phi.length;
+    if (this.curves.lastChild !== this.lines[index]) this.curves.append(this.lines[index]);
     if (this.curve.name !== "dev") return;
-    for (const [first, last] of design.shaded) {
-      const box = { x: this.x(first / poses), width: this.x((last + 1) / poses) - this.x(first / poses) };
-      svg("rect", { ...box, y: TOP, height: HIGH - TOP - BOTTOM }, this.shade);
-    }
+    const { phi, shaded } = this.data.designs[index], at = (pose) => this.x(pose / phi.length);
+    const boxes = shaded.map(([first, last]) => `M${at(first)} ${TOP}H${at(last + 1)}V${HIGH - BOTTOM}H${at(first)}Z`);
+    write(this.shade, "d", boxes.join(""));
   }
 
   pose(share) {
@@ -143,13 +157,13 @@ class Panel {
     const x = this.x(share), { unit, fast, range } = this.curve;
     // What is this small beside the curve is the rounding of zero.
     const shown = Math.abs(value) < 1e-9 * Math.max(...range.map(Math.abs)) ? 0 : value;
-    this.cursor.setAttribute("x1", x);
-    this.cursor.setAttribute("x2", x);
+    write(this.cursor, "x1", x);
+    write(this.cursor, "x2", x);
     this.dot.style.display = Number.isFinite(value) ? "" : "none";
-    this.dot.setAttribute("cx", x);
-    this.dot.setAttribute("cy", Number.isFinite(value) ? this.y(value) : 0);
+    write(this.dot, "cx", x);
+    write(this.dot, "cy", Number.isFinite(value) ? this.y(value) : 0);
     const also = fast ? ` = ${withUnit(short(shown * fast.factor), fast.unit)}` : "";
-    this.value.textContent = withUnit(short(shown), unit) + also;
+    tell(this.value, withUnit(short(shown), unit) + also);
   }
 }
 

@@ -95,18 +95,18 @@ function table(host, heads, lines, plain) {
       line.forEach((_, k) => {
         const cell = made("td", row, { className: k < plain ? "" : "n" });
         cell.append("");
-        if (k >= plain) made("span", cell);
+        if (k >= plain) made("span", cell).append("");
       });
     }
     host.dataset.shape = shape;
   }
   lines.forEach((line, j) => line.forEach(([text, title = "", below = "", kind = ""], k) => {
     const cell = host.tBodies[0].rows[j].cells[k], small = cell.lastElementChild;
-    if (cell.firstChild.data !== text) cell.firstChild.data = text;
+    tell(cell.firstChild, text);
     if (cell.title !== title) cell.title = title;
     if (!small) return;
-    if (small.textContent !== below) small.textContent = below;
-    if (small.className !== kind) small.className = kind;
+    tell(small.firstChild, below);
+    write(small, "class", kind);
   }));
 }
 

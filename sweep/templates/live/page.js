@@ -68,7 +68,7 @@ class Moving {
     this.slider.value = to;
     const { data } = this, phi = data.designs[this.index].phi, here = data.ends[0] + to * (data.ends[1] - data.ends[0]);
     const own = data.closed ? (((phi[0] + 360 * to) % 360) + 360) % 360 : between(phi, to, false);
-    this.said.textContent = data.closed ? `${here.toFixed(1)}° (φ = ${own.toFixed(1)}°)` : `${short(own)} ${data.unit}`;
+    tell(this.said.firstChild, data.closed ? `${here.toFixed(1)}° (φ = ${own.toFixed(1)}°)` : `${short(own)} ${data.unit}`);
     if (this.view) this.view.pose(to);
     for (const panel of this.panels) panel.pose(to);
   }
@@ -83,7 +83,7 @@ class Moving {
 
   choose(to) {
     this.index = to;
-    this.find(".note").textContent = this.data.designs[to].note;
+    tell(this.find(".note").firstChild, this.data.designs[to].note);
     if (this.view) this.view.show(to);
     for (const panel of this.panels) panel.show(to);
     this.set(this.share);
