@@ -199,7 +199,7 @@ def _checked_column(
     if p.unit == "mass" and largest > MOST_MASS:
         allowed = f'a mass below {MOST_MASS:g} t, as bare masses are tonnes: "20 g", or 2e-5'
         _refuse(values > MOST_MASS, values, p.name, allowed)
-    if p.choices is not None:
+    if p.choices is not None and not (least == largest and least in p.choices):
         _refuse(np.logical_and.reduce([values != x for x in p.choices]), values, p.name, p.choice)
     return values
 

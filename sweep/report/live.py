@@ -92,11 +92,9 @@ def turns_fully(path: Array) -> bool:
 def limit_values(name: str, limits: tuple[Limit, ...]) -> list[float]:
     """Ordinates, in stored units, that the limits set to a curve itself; both signs where its size is limited."""
     found = []
+    above, below = (reduced("max_abs", name), reduced("max", name)), (reduced("min", name),)
     for limit in limits:
-        for value, outputs in (
-            (limit.maximum, (reduced("max_abs", name), reduced("max", name))),
-            (limit.minimum, (reduced("min", name),)),
-        ):
+        for value, outputs in ((limit.maximum, above), (limit.minimum, below)):
             if value is None or limit.output not in outputs:
                 continue
             both = is_largest(limit.output, magnitude=True) and stem(name) != "pressure_angle"
