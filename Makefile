@@ -57,14 +57,10 @@ check: lint types imports test  ## what CI runs first
 smoke: $(STUDIES:%=smoke-%) smoke-accuracy  ## every study's tiny version
 
 $(STUDIES:%=study-%): study-%: $(VENV)/ready
-	$(SWEEP) run studies/$* --out results/$*/designs
-	$(if $(wildcard studies/$*/figure.py),$(BIN)/python studies/$*/figure.py results/$*)
-	$(SWEEP) report results/$*/designs
+	$(SWEEP) run studies/$* --out results/$*/designs --report
 
 $(STUDIES:%=smoke-%): smoke-%: $(VENV)/ready
-	$(SWEEP) run studies/$* --smoke --force --out results/smoke/$*/designs
-	$(if $(wildcard studies/$*/figure.py),$(BIN)/python studies/$*/figure.py results/smoke/$*)
-	$(SWEEP) report results/smoke/$*/designs
+	$(SWEEP) run studies/$* --smoke --force --out results/smoke/$*/designs --report
 
 NIGHTS ?= nights
 nightly: $(VENV)/ready  ## all studies into a dated folder under nights/, and what changed since the last good night

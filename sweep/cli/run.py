@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import subprocess
+import sys
 from pathlib import Path
 
 import click
@@ -23,6 +25,7 @@ from sweep.errors import SearchCutShort
     is_flag=True,
     help="No budget: start and go on whatever it costs; set data of another study in the folder aside.",
 )
+@click.option("--report", is_flag=True, help="Then draw the study's own figures (its figure.py) and write report.html.")
 def run(
     study: Path,
     out: Path | None,
@@ -32,6 +35,7 @@ def run(
     certify: bool,
     smoke: bool,
     force: bool,
+    report: bool,
 ) -> None:
     """Run or resume a study.
 
@@ -41,23 +45,48 @@ def run(
     """
     from sweep.engine.opening import is_part  # the engine takes a second, which --help need not wait for
     from sweep.engine.run import run as run_study
+    from sweep.engine.searches import stages_of
+    from sweep.jobs.progress import stages
+    from sweep.nights.studies import FIGURE
     from sweep.report.terminal import ending
+    from sweep.study import load_study
 
     proof = True if certify else None
     late: SearchCutShort | None = None
-    try:
-        folder = run_study(
-            study, out, jobs, backend, smoke=smoke, force=force, accuracy=accuracy, certify=proof, progress=True
-        )
-    except SearchCutShort as error:
-        late, folder = error, error.folder
-    if is_part(folder):  # the answer is for the whole, once the parts are merged
-        click.echo(f"part: {folder}")
-        return
-    found = ending(folder)
-    for line in found.lines:
-        click.echo(line)
-    click.echo(f"dataset: {folder}")
+    model = load_study(study, smoke=smoke)
+    figure = (study if study.is_dir() else study.parent) / FIGURE
+    after = [*(["figures"] if figure.exists() else []), "report"] if report else []
+    with stages(*stages_of(model), *after):
+        try:
+            folder = run_study(
+                model, out, jobs, backend, smoke=smoke, force=force, accuracy=accuracy, certify=proof, progress=True
+            )
+        except SearchCutShort as error:
+            late, folder = error, error.folder
+        if is_part(folder):  # the answer is for the whole, once the parts are merged
+            click.echo(f"part: {folder}")
+            return
+        found = ending(folder)
+        for line in (*found.lines, *([] if report else [found.next])):
+            click.echo(line)
+        click.echo(f"dataset: {folder}")
+        code = _report(folder, figure if "figures" in after else None) if report else 0
     if late is not None:
         raise late
-    click.get_current_context().exit(found.exit_code)
+    click.get_current_context().exit(found.exit_code or code)
+
+
+def _report(folder: Path, figure: Path | None) -> int:
+    """Draw the study's own figures and write the report; return the exit code of what draws them."""
+    from sweep.dataset.files import beside
+    from sweep.jobs.progress import Phases
+    from sweep.report.page import write_report
+
+    code = 0
+    with Phases(show=True, quiet=False) as phases:
+        if figure is not None:
+            phases.say("figures")
+            code = subprocess.run([sys.executable, str(figure), str(beside(folder))], check=False).returncode
+        written = write_report(folder, None, phases.say)
+    click.echo(f"report: {written}")
+    return code

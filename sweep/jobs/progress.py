@@ -36,8 +36,9 @@ _stages: ContextVar[tuple[str, ...]] = ContextVar("linksweep_stages", default=()
 
 @contextmanager
 def stages(*labels: str) -> Iterator[None]:
-    """Let progress of these labels within this context say which of all stages it is."""
-    token = _stages.set(labels)
+    """Let progress of these labels within this context say which of all stages it is, or of those of a wider one."""
+    known = _stages.get()
+    token = _stages.set(known if set(labels) <= set(known) else labels)
     try:
         yield
     finally:

@@ -38,10 +38,11 @@ LOOKED_AT = 1024  # designs of a space among which the nearest miss is sought wh
 
 @dataclass(frozen=True)
 class Ending:
-    """Lines to print, and the exit code: 0, or 4 where no design keeps all limits."""
+    """Lines to print, the exit code (0, or 4 where no design keeps all limits), and the command that comes next."""
 
     lines: tuple[str, ...]
     exit_code: int
+    next: str
 
 
 def ending(folder: Path) -> Ending:
@@ -75,10 +76,9 @@ def ending(folder: Path) -> Ending:
         lines += _nearest_of_space(data.study, data) if missed else []
     if data.front_steps is not None:
         lines.append(f"warning: time ran out: {data.front_steps} steps of the front")
-    lines.append(f"next: sweep report {shlex.quote(str(folder))}")
     # No-break spaces keep values with their units on a page; a shell's tools look for plain ones.
     lines = [line.replace("\u00a0", " ") for line in lines]
-    return Ending(tuple(lines), INFEASIBLE if missed else OK)
+    return Ending(tuple(lines), INFEASIBLE if missed else OK, f"next: sweep report {shlex.quote(str(folder))}")
 
 
 def _best_of_sweep(data: Dataset, feasible: int) -> str:

@@ -33,6 +33,20 @@ def test_answer_names_the_optimum_what_holds_it_back_and_the_next_command(tmp_pa
     assert f"next: sweep report {tmp_path / 'designs'}" in text
 
 
+def test_run_with_report_draws_the_figures_and_writes_the_page_as_stages_of_its_own(tmp_path: Path) -> None:
+    (tmp_path / "study.toml").write_text(STUDY.format(swing=40).split("[optimise]")[0])
+    (tmp_path / "figure.py").write_text(
+        "import pathlib, sys\npathlib.Path(sys.argv[1], 'drawn').touch()\nsys.exit(7)\n"
+    )
+    found = CliRunner().invoke(
+        main, ["run", str(tmp_path), "--out", str(tmp_path / "out" / "designs"), "--jobs", "1", "--report"]
+    )
+    assert found.exit_code == 7  # that of the program that draws; the page is there all the same
+    assert (tmp_path / "out" / "drawn").exists() and (tmp_path / "out" / "report.html").exists()
+    assert found.stdout.endswith(f"report: {tmp_path / 'out' / 'report.html'}\n") and "next:" not in found.stdout
+    assert "4/5 figures" in found.stderr and "5/5 report: 4 of 4 steps" in found.stderr
+
+
 def test_an_optimum_is_in_the_open_only_if_its_search_has_settled() -> None:
     assert held_back([], "converged") == "nothing: an optimum in the open"
     assert held_back(["swing"], "converged") == "swing"
