@@ -147,9 +147,11 @@ def _costs(
     """Dimensions by what their tolerances cost, the dearest first: the same mechanisms with one dimension exact.
 
     Of the mechanisms ``designs`` the ``columns`` are known, and the share ``before`` that keeps all limits.  Made exact
-    are the dimensions whose share in the variance of an output, times the share that misses its limit, is largest.
+    are the dimensions whose share in the variance of an output, times the share that misses its limit, is largest.  A
+    limit that none of these mechanisms misses is kept with one dimension exact, too.
     """
     assert study.tolerance is not None
+    limits = [x for x in limits if not meets(x, columns[x.output]).all()] or [worst]
     scatter = _variance(columns, worst)
     found = []
     own = np.flatnonzero(touched(study.family, design, study.tolerance))
