@@ -33,6 +33,7 @@ POSES, FAINT = 180, 7  # of paths; of the mechanism in other positions
 WIDE, ROOM = 540.0, 36.0  # of the picture and of its border, in pixels
 LETTER, LINE = 8.2, 12.0  # what a letter takes of a line at most, and its height
 AROUND = [(9, -8), (9, 14), (-9, -8), (-9, 14), (0, -16), (0, 24), (22, 3), (-22, 3), (30, -22), (-30, -22), (30, 30)]
+FEW = 2  # members whose joints are named; of more only the members are
 NEAR = 1e-7  # of the mechanism's size: a distance that is a dimension
 TELLING = 1e-3  # by which dimensions are changed to tell those of one value apart
 
@@ -131,11 +132,16 @@ def sketch(
         first, second = at(ends).tolist()
         lines.append(("measure", _line(at(ends))))
         _write(taken, 0.5 * (first[0] + second[0]), 0.5 * (first[1] + second[1]), words, "dimension")
+    members = {part.member: part for part in reversed(parts)}
+    if names and len(members) > FEW:  # letters of so many joints would lie on each other
+        for member, part in members.items():
+            ((x, y),) = at(next(iter(part.joints.values()))[[pose]]).tolist()
+            _write(taken, x, y, member, "name")
     for part in parts:
         for name, path in part.joints.items():
             ((x, y),) = at(path[[pose]]).tolist()
             marks.append(("pivot" if name in part.kinds else "joint", x, y))
-            if names:
+            if names and len(members) <= FEW:
                 _write(taken, x, y, f"{shown_name(name)}{part.stage}", "name")
     size = (WIDE, float(wide[1]) * scale + 2.0 * ROOM)
     return rendered("sketch.svg", title=title, size=size, lines=lines, marks=marks, labels=taken)
