@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
@@ -148,10 +148,10 @@ def _costs(
 
     Of the mechanisms ``designs`` the ``columns`` are known, and the share ``before`` that keeps all limits.  Made exact
     are the dimensions whose share in the variance of an output, times the share that misses its limit, is largest.  A
-    limit that none of these mechanisms misses is kept with one dimension exact, too.
+    limit from which all these mechanisms keep a standard deviation of theirs is kept with one dimension exact, too.
     """
     assert study.tolerance is not None
-    limits = [x for x in limits if not meets(x, columns[x.output]).all()] or [worst]
+    limits = [x for x in limits if _near(x, columns[x.output])] or [worst]
     scatter = _variance(columns, worst)
     found = []
     own = np.flatnonzero(touched(study.family, design, study.tolerance))
@@ -172,6 +172,13 @@ def _costs(
         spread = 1.0 - _variance(columns, worst) / scatter if scatter > 0.0 else 0.0
         found.append(Cost(parameter.name, parameter.text, max(spread, 0.0), float(kept.mean()) - before))
     return sorted(found, key=lambda cost: (-cost.gain if cost.gain >= TELLING else 0.0, -cost.spread))
+
+
+def _near(limit: Limit, column: NDArray[np.generic]) -> bool:
+    """Return whether a value misses the limit, or comes as near to it as the values scatter."""
+    room = math.sqrt(_variance({limit.output: column}, limit))
+    low, high = (None if x is None else x + d for x, d in ((limit.minimum, room), (limit.maximum, -room)))
+    return not meets(replace(limit, minimum=low, maximum=high), column).all()
 
 
 def _variance(columns: dict[str, NDArray[np.generic]], limit: Limit) -> float:
