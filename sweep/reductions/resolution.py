@@ -225,14 +225,24 @@ class Series:
 
     def _resolved(self, designs: Array, target: float, status: Status, mean: bool) -> Iterator[Turns]:
         """Yield designs as soon as their samples resolve the curve; write the status."""
-        rows, samples = np.arange(len(designs)), FIRST_OF_MEAN if mean else FIRST
-        fewest = samples * denser(self.family, designs, self.parts)
+        fewest = (FIRST_OF_MEAN if mean else FIRST) * denser(self.family, designs, self.parts)
+        for first in np.unique(fewest):
+            yield from self._doubled(np.flatnonzero(fewest == first), int(first), designs, target, status, mean)
+
+    def _doubled(
+        self, rows: Index, samples: int, designs: Array, target: float, status: Status, mean: bool
+    ) -> Iterator[Turns]:
+        """Yield some of the designs from so many samples on; where these do not suffice, those between follow."""
+        known = np.empty((rows.size, len(self.parts), 0))
         while rows.size and samples <= LAST:
-            now, left = rows[fewest[rows] <= samples], [rows[fewest[rows] > samples]]
-            for part in blocks(now, FINER * samples, 2 * len(self.parts)):
-                columns, worst, _ = sample_turn(self.family, designs[part], samples, self.parts)
+            left, between = [], known.shape[2] > 0
+            for at in blocks(np.arange(rows.size), FINER * samples, 2 * len(self.parts)):
+                part = rows[at]
+                columns, worst, _ = sample_turn(self.family, designs[part], samples, self.parts, between)
                 status[part] = DESIGN_STATUS[worst]
                 values = np.stack([columns[name] for name in self.parts], axis=1)
+                if between:
+                    values = np.stack([known[at], values], axis=3).reshape(part.size, -1, samples)
                 series = np.fft.rfft(values) / samples
                 size = np.sqrt(np.square(values).sum(axis=1).max(axis=1))
                 err = (_beyond_mean if mean else _beyond)(np.sqrt(np.square(np.abs(series)).sum(axis=1)))
@@ -240,8 +250,9 @@ class Series:
                 allowed = target * (_root_mean_square(values) if mean else size)
                 done = (err <= allowed) & (status[part] == st.OK)
                 yield Turns(part[done], values[done], series[done], err[done], size[done])
-                left.append(part[~done & (status[part] == st.OK)])
-            rows, samples = np.concatenate(left), 2 * samples
+                again = ~done & (status[part] == st.OK)
+                left.append((part[again], values[again]))
+            (rows, known), samples = (np.concatenate(both) for both in zip(*left, strict=True)), 2 * samples
 
     def _top(self, turns: Turns) -> tuple[Array, Array, Array, Mask]:
         """Highest point of each series: value, place, its error, and whether it was reached."""
@@ -256,12 +267,8 @@ class Series:
         before, here, after = (heights[row, (column + k) % size] for k in (-1, 0, 1))
         spacing = TWO_PI / size
         phi = spacing * (column + 0.5 * (before - after) / (before - 2.0 * here + after))
-        series, height, bend, still = (
-            turns.series[row],
-            np.empty(row.size),
-            np.empty(row.size),
-            np.zeros(row.size, bool),
-        )
+        series, still = turns.series[row], np.zeros(row.size, bool)
+        height, bend = np.empty((2, row.size))
         for _ in range(STEPS):
             go = np.flatnonzero(~still)
             if not go.size:

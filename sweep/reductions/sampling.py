@@ -24,10 +24,10 @@ FEW = 4  # columns from which on there are fewer samples at once
 
 
 @lru_cache(maxsize=32)
-def turn(samples: int) -> Angles:
-    """Equidistant crank angles of one turn from 0, shape (1, samples)."""
+def turn(samples: int, between: bool = False) -> Angles:
+    """Equidistant crank angles of one turn from 0, (1, samples); ``between`` what half as many do not have."""
     # Not locked: kernels would be compiled once more, for arrays that cannot be written.
-    phi: Array = np.arange(samples, dtype=np.float64)[None, :] * (TWO_PI / samples)
+    phi: Array = np.arange(int(between), samples, 1 + between, dtype=np.float64)[None, :] * (TWO_PI / samples)
     return Angles.of(phi)
 
 
@@ -44,9 +44,11 @@ def discriminants(family: Family) -> tuple[str, ...]:
 
 
 def sample_turn(
-    family: Family, designs: Array, samples: int, names: Sequence[str]
+    family: Family, designs: Array, samples: int, names: Sequence[str], between: bool = False
 ) -> tuple[dict[str, Array], Status, Mask]:
     """Pose outputs over one turn, (n, samples), with angles made continuous; the first crank angle is 0.
+
+    With ``between`` only those of the crank angles that half as many samples do not have, (n, samples/2).
 
     Returns
     -------
@@ -54,7 +56,7 @@ def sample_turn(
     worst : (n,) gravest status of the turn
     winds : (n,) whether a wanted follower's angle makes full turns, so that it has no extremum
     """
-    columns, status = _evaluate(family, designs, turn(samples), names)
+    columns, status = _evaluate(family, designs, turn(samples, between), names)
     worst = np.empty(len(designs), np.uint8)
     scan.worst_status(status, worst)
     winds = np.zeros(len(designs), np.bool_)
