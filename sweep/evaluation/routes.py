@@ -82,7 +82,11 @@ def design_outputs(
     kinds = {route.general for route in ways if route.general}
     if accuracy.samples is not None and kinds and "margin" not in kinds and margin_suffixes(family):
         # Refinement meets a dead point between samples, a plain grid does not.
-        status = margin_group(family, designs, (), accuracy)["status"].astype(np.uint8)
+        if isinstance(family, Machine):
+            found = _margins(family, designs, accuracy, None)  # of the members by themselves, by their own steps
+        else:
+            found = margin_group(family, designs, (), accuracy)
+        status = found["status"].astype(np.uint8)
     with np.errstate(all="ignore"):  # what leaves float64 has a status in the end
         for route in ways:
             assert route.run is not None
