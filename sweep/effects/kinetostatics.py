@@ -130,8 +130,9 @@ def _bodies(scene: Scene) -> Array:
     ends[:, :, 0] = scene.records[1][:, 12:15]
     for k, body in enumerate(follower.rods):
         is_rod, line_mass, gyration = (scene.inputs[f"{name}_{body}"] for name in loads.ROD)
-        own = found[:, BODY * k : BODY * (k + 1)]
-        loads.put_rod(own, is_rod, line_mass, gyration, np.zeros_like(ends[:, k]), ends[:, k])
+        if is_rod.any():
+            own = found[:, BODY * k : BODY * (k + 1)]
+            loads.put_rod(own, is_rod, line_mass, gyration, np.zeros_like(ends[:, k]), ends[:, k])
     return found
 
 

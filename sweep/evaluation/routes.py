@@ -254,20 +254,23 @@ def _is_of_point(member: Member, asked: Quantity) -> bool:
     return bool(asked.of) and member.own(asked.of) not in member.family.pose_output
 
 
-def _of_member(m: Member, inner: Route, designs: Array, accuracy: Accuracy, window: Part) -> Columns:
-    """Run a member's own route under the machine's names; once where no design varies the member."""
+def _by_itself(m: Member, outputs: Sequence[str], designs: Array, accuracy: Accuracy, window: Part) -> Columns:
+    """Compute outputs of a member's family; once where no design varies the member."""
     own = m.designs(designs)
     once = len(own) > 1 and bool((own[1:] == own[0]).all())
-    found = design_outputs(m.family, own[:1] if once else own, inner.outputs, accuracy, window)
-    phase = m.phase(designs)
+    found = design_outputs(m.family, own[:1] if once else own, outputs, accuracy, window)
+    return {name: np.repeat(values, len(own)) for name, values in found.items()} if once else found
+
+
+def _of_member(m: Member, inner: Route, designs: Array, accuracy: Accuracy, window: Part) -> Columns:
+    """Run a member's own route under the machine's names."""
+    found, phase = _by_itself(m, inner.outputs, designs, accuracy, window), m.phase(designs)
     columns: Columns = {"status": found["status"]}
     for name in inner.outputs:
         dotted = f"{m.name}.{name}"
         columns[dotted] = found[name]
         if accuracy.target is not None:
             columns[error_of(dotted)] = found[error_of(name)]
-    if once:
-        columns = {name: np.repeat(values, len(own)) for name, values in columns.items()}
     for name in filter(is_place, inner.outputs):  # from the member's crank to the main shaft
         at_crank = np.asarray(columns[f"{m.name}.{name}"], np.float64)
         columns[f"{m.name}.{name}"] = np.mod(at_crank - phase, TWO_PI)
@@ -283,8 +286,8 @@ def _margins(machine: Machine, designs: Array, accuracy: Accuracy, window: Part)
         loops = tuple(loop.stage for loop in machine.every(Assembly) if m.own(loop.stage) or loop.stage == f"{m.name}.")
         if not loops:
             continue
-        if is_alone(m):
-            found = design_outputs(m.family, m.designs(designs), MARGINS, accuracy, None)
+        if m.driver is None:  # whatever its gear, its crank turns fully
+            found = _by_itself(m, MARGINS, designs, accuracy, None)
             now, none = found["status"], np.zeros(len(designs))
             for name in MARGINS:
                 columns[f"{name}{m.name}"] = found[name]

@@ -293,7 +293,7 @@ def _member(needs: _OfMember, designs: Array, angles: Angles, found: Mapping[str
     turned = _turned(m, phase, angles, found)
     result: dict[str, Any] = dict(m.family.poses(own_designs, turned, needs.motion))
     _with_respect_to_shaft(m, result, found)
-    frames = m.frames(designs) if needs.sites or needs.placed or needs.moving else []
+    frames = m.frames(designs) if needs.sites else [m.frame(designs)] if needs.placed or needs.moving else []
     for site in needs.sites:
         result |= coordinates_of_site(m, site, frames, designs, result)
     for point in needs.placed:
