@@ -11,6 +11,7 @@ import pandas as pd
 import pytest
 
 import sweep
+from kernels import status as st
 from sweep.quantities.limits import meets
 
 NEEDLE = {
@@ -48,6 +49,20 @@ def test_members_say_the_same_as_alone_to_the_bit() -> None:
     poses = sweep.evaluate(two(), TABLE, ["needle.s", "looper.d2psi"], phi=PHI)
     single = sweep.evaluate("rssr", LOOPER, ["d2psi"], phi=PHI)
     np.testing.assert_array_equal(poses["looper.d2psi"], single["d2psi"])
+
+
+@pytest.mark.parametrize("ratio", [1, -3])
+def test_margin_of_a_machine_is_that_of_its_weakest_member_whatever_its_gear(ratio: int) -> None:
+    """A gear of whole turns takes a crank through all its angles; on a grid, too, what does not turn says so."""
+    stuck = LOOPER | {"a": 26.0}
+    table = pd.concat([TABLE, TABLE.assign(**{f"looper.{k}": x for k, x in stuck.items()})], ignore_index=True)
+    found = sweep.summarise(two(ratio=ratio), table, ["margin"], accuracy=1e-8)
+    alone = sweep.summarise("rssr", pd.DataFrame([LOOPER, stuck]), ["margin"], accuracy=1e-8)
+    needle = sweep.summarise(["rssr", "guide"], pd.DataFrame([NEEDLE]), ["margin"], accuracy=1e-8)
+    assert found["margin"][0] == min(alone["margin"][0], needle["margin"][0])
+    assert found["margin"][1] == alone["margin"][1] < 0.0
+    on_grid = sweep.summarise(two(ratio=ratio), table, ["max_clearance"], samples=64)
+    assert on_grid["status"].tolist() == [0, st.NOT_ROTATABLE]
 
 
 def test_a_table_of_members_serves_where_a_machine_does() -> None:
