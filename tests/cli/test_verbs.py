@@ -19,6 +19,7 @@ from sweep.cli.kernels import Part, rounds
 from sweep.cli.main import VERBS
 from sweep.cli.tables import read_table, wanted
 from sweep.report.terminal import Ending
+from sweep.study import load_study
 
 STUDY = """
 [study]
@@ -237,11 +238,13 @@ def test_run_passes_its_options_on(study: Path, monkeypatch: pytest.MonkeyPatch)
         return Path("somewhere")
 
     monkeypatch.setattr("sweep.engine.run.run", run)
-    ended = Ending(("the answer",), 0)
+    ended = Ending(("the answer",), 0, "next: more")
+    (study / "smoke.toml").write_text("")
     monkeypatch.setattr("sweep.report.terminal.ending", lambda folder: ended)
     options = ("--jobs", 3, "--backend", "loky", "--accuracy", 1e-5, "--smoke", "--force", "--out", "x")
-    assert call("run", study, *options).output == "the answer\ndataset: somewhere\n"
-    assert given["positional"] == (study, Path("x"), 3, "loky")
+    assert call("run", study, *options).output == "the answer\nnext: more\ndataset: somewhere\n"
+    loaded, *others = given["positional"]
+    assert loaded.path == load_study(study, smoke=True).path and others == [Path("x"), 3, "loky"]
     assert {given["accuracy"], given["smoke"], given["force"]} == {1e-5, True}
 
 
