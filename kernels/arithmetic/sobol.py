@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -16,19 +18,26 @@ TABLE_BITS = 10  # binary digits of the number of a point that one table stands 
 RUN = 2**TABLE_BITS
 
 
+class Digits(NamedTuple):
+    """What the digits of a point's number make of each dimension.
+
+    Parameters
+    ----------
+    first_runs : (dimensions, 2, RUN) what the lowest digits of the Gray code make in an even and in an odd run
+    tables : (dimensions, parts, RUN) the same of each group of TABLE_BITS digits; that of the lowest is not used
+    shift : (dimensions,) digital shift
+    centre : added to the integer of a point before it is scaled to (0, 1)
+    """
+
+    first_runs: Integers
+    tables: Integers
+    shift: Integers
+    centre: float
+
+
 @kernel
 def sobol_points(
-    start: int,
-    stop: int,
-    first_runs: Integers,
-    tables: Integers,
-    shift: Integers,
-    centre: float,
-    which: Integers,
-    low: Array,
-    high: Array,
-    columns: Integers,
-    out: Array,
+    start: int, stop: int, of: Digits, which: Integers, low: Array, high: Array, columns: Integers, out: Array
 ) -> None:
     """Compute the points start, ..., stop - 1 in some dimensions, stretched from (0, 1) to between two ends.
 
@@ -38,10 +47,7 @@ def sobol_points(
     Parameters
     ----------
     start, stop : numbers of the first point and of the one after the last
-    first_runs : (dimensions, 2, RUN) what the lowest digits of the Gray code make in an even and in an odd run
-    tables : (dimensions, parts, RUN) the same of each group of TABLE_BITS digits; that of the lowest is not used
-    shift : (dimensions,) digital shift
-    centre : added to the integer of a point before it is scaled to (0, 1)
+    of : the sequence
     which : (k,) dimensions wanted
     low, high : (k,) ends of each, low <= high; a point at the share x of the way is low (1 - x) + high x, clipped
     columns : (k,) where each stands in ``out``
@@ -54,14 +60,14 @@ def sobol_points(
         begin, end = max(start - first, 0), min(stop - first, RUN)
         for k in range(which.size):
             dimension, a, b = which[k], low[k], high[k]
-            digits, upper = run ^ (run >> 1), shift[which[k]]
-            for part in range(1, tables.shape[1]):
-                upper ^= tables[dimension, part, digits & (RUN - 1)]
+            digits, upper = run ^ (run >> 1), of.shift[which[k]]
+            for part in range(1, of.tables.shape[1]):
+                upper ^= of.tables[dimension, part, digits & (RUN - 1)]
                 digits >>= TABLE_BITS
             # Whole rows and whole runs: so the compiler sees that no index counts from the end, and makes vector code.
-            these, to = first_runs[dimension, run & 1], values[k]
+            these, to = of.first_runs[dimension, run & 1], values[k]
             for j in range(RUN):
-                share = (np.float64(these[j] ^ upper) + centre) * scale
+                share = (np.float64(these[j] ^ upper) + of.centre) * scale
                 to[j] = smallest(largest(a * (1.0 - share) + b * share, a), b)
         for k in range(which.size):
             column = columns[k]

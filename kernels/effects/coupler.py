@@ -94,20 +94,28 @@ def euler_angles(j: Joints, body: Coupler, construction: float) -> tuple[float, 
     return math.atan2(j.s[0], -across), math.atan2(-dot(j.u, j.s), body.sine)
 
 
+class CouplerMotion(NamedTuple):
+    """What is wanted of the motion of a coupler and a point on it; None for what is not.
+
+    Parameters
+    ----------
+    position, velocity, acceleration : (n, m, 3) with respect to the crank angle [length]
+    n, omega, eps : (n, m, 3) unit vector n, angular velocity and acceleration per unit crank speed
+    euler : (n, m, 2) nutation and rotation about the coupler's own axis, `euler_angles` [rad]
+    """
+
+    position: Array | None = None
+    velocity: Array | None = None
+    acceleration: Array | None = None
+    n: Array | None = None
+    omega: Array | None = None
+    eps: Array | None = None
+    euler: Array | None = None
+
+
 @kernel
 def coupler_point(
-    poses: Array,
-    designs: Array,
-    point: Array,
-    finger: Array,
-    status: Status,
-    position: Array | None,
-    velocity: Array | None,
-    acceleration: Array | None,
-    orientation_n: Array | None,
-    omega: Array | None,
-    eps: Array | None,
-    euler: Array | None,
+    poses: Array, designs: Array, point: Array, finger: Array, status: Status, out: CouplerMotion
 ) -> None:
     """Compute the motion of a point of the coupler and the coupler's orientation and rates.
 
@@ -117,9 +125,7 @@ def coupler_point(
     point : (n, 3), coordinates along (s, n x s, n) from B [length]
     finger : (n,) DRIVEN or DRIVING, which ball joint carries the finger
     status : (n, m), in and out; poses that are not OK give nan, SINGULAR where the finger axis meets the coupler
-    position, velocity, acceleration : (n, m, 3) or None, with respect to the crank angle [length]
-    orientation_n, omega, eps : (n, m, 3) or None; unit vector n, angular velocity and acceleration per unit crank speed
-    euler : (n, m, 2) or None; nutation and rotation about the coupler's own axis, `euler_angles` [rad]
+    out : what is wanted
     """
     for i in range(poses.shape[0]):
         p = (point[i, 0], point[i, 1], point[i, 2])
@@ -130,26 +136,29 @@ def coupler_point(
                 status[i, j] = st.SINGULAR
             good = 1.0 if status[i, j] == st.OK else math.nan
             arm = add(mix(p[0], joints.s, p[1], body.across), scale(p[2], body.n))
-            if position is not None:
-                _store(position, i, j, good, add(joints.B, arm))
-            if velocity is not None:
-                _store(velocity, i, j, good, add(body.v_b, cross(body.omega, arm)))
-            if acceleration is not None:
-                _store(acceleration, i, j, good, add(body.a_b, spun(body.omega, body.eps, arm)))
-            if orientation_n is not None:
-                _store(orientation_n, i, j, good, body.n)
-            if omega is not None:
-                _store(omega, i, j, good, body.omega)
-            if eps is not None:
-                _store(eps, i, j, good, body.eps)
-            if euler is not None:
-                theta, turn = euler_angles(joints, body, finger[i])
-                euler[i, j, 0], euler[i, j, 1] = good * theta, good * turn
+            _store(out.position, i, j, good, add(joints.B, arm))
+            _store(out.velocity, i, j, good, add(body.v_b, cross(body.omega, arm)))
+            _store(out.acceleration, i, j, good, add(body.a_b, spun(body.omega, body.eps, arm)))
+            _store(out.n, i, j, good, body.n)
+            _store(out.omega, i, j, good, body.omega)
+            _store(out.eps, i, j, good, body.eps)
+            _store_euler(out.euler, i, j, good, joints, body, finger[i])
 
 
 @inline
-def _store(out: Array, i: int, j: int, good: float, a: Vector) -> None:
-    out[i, j, 0], out[i, j, 1], out[i, j, 2] = good * a[0], good * a[1], good * a[2]
+def _store(out: Array | None, i: int, j: int, good: float, a: Vector) -> None:
+    """Write a vector where it is wanted; without ``out`` nothing is compiled."""
+    if out is not None:
+        out[i, j, 0], out[i, j, 1], out[i, j, 2] = good * a[0], good * a[1], good * a[2]
+
+
+@inline
+def _store_euler(
+    out: Array | None, i: int, j: int, good: float, joints: Joints, body: Coupler, construction: float
+) -> None:
+    if out is not None:
+        theta, turn = euler_angles(joints, body, construction)
+        out[i, j, 0], out[i, j, 1] = good * theta, good * turn
 
 
 @kernel

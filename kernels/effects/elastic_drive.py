@@ -14,9 +14,9 @@ import numpy as np
 
 from kernels import status as st
 from kernels.curves.periodic import coefficients, series, tail
-from kernels.effects.elasticity import LINEAR, PHASE_STEP, RESOLVED, solve_band
+from kernels.effects.elasticity import LINEAR, PHASE_STEP, RESOLVED, Steady, solve_band
 from kernels.jit import inline, kernel
-from kernels.types import Array, Status
+from kernels.types import Array
 
 KEPT = 1e-12  # share of its largest harmonic below which a coefficient is the rounding of what it is made of
 
@@ -110,19 +110,18 @@ def driven_multiplier(bc: Array, bs: Array, cc: Array, cs: Array) -> float:
 
 @kernel
 def driven_steady_state(
-    p: Array, b: Array, c: Array, r: Array, radius: Array, reach: Array, phi: Array, last: bool, status: Status,
-    eta: Array, elongation: Array, floquet: Array,
-) -> None:  # fmt: skip
+    p: Array, b: Array, c: Array, r: Array, radius: Array, reach: Array, phi: Array, last: bool, found: Steady
+) -> None:
     """Compute the periodic steady state of the lag and the largest Floquet multiplier from coefficients on a grid.
 
     Parameters
     ----------
     p : (n, N) c t_tau, on the grid phi_j = 2 pi j/N, N odd
     b, c, r : (n, N) coefficients of eta'' + b eta' + c eta = r
-    radius : (n,) c of the driven joint;  reach, phi, last, status, eta, elongation, floquet : as in
-        :func:`kernels.effects.elasticity.steady_state`
+    radius : (n,) c of the driven joint
+    reach, phi, last, found : as in :func:`kernels.effects.elasticity.steady_state`
     """
-    n = p.shape[1]
+    n, (status, eta, elongation, floquet) = p.shape[1], found
     half = (n + 1) // 2
     turn, bc, bs, cc, cs = np.empty((4, half)), np.empty(half), np.empty(half), np.empty(half), np.empty(half)
     pc, ps, ec, es = np.empty(half), np.empty(half), np.empty(half), np.empty(half)

@@ -13,6 +13,7 @@ system with as many bands as p^2 has harmonics, two for a linkage of one crank a
 from __future__ import annotations
 
 import math
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -73,10 +74,27 @@ def quasi_static(
                 frequency_ratio[i, j] = good * math.sqrt(stiffness / inertia) * abs(p[i, j]) / speed
 
 
+class Steady(NamedTuple):
+    """Periodic steady state of the lag: what comes out.
+
+    Parameters
+    ----------
+    status : (n,) NOT_CONVERGED where N does not resolve the solution (tail above 1e-9) or a multiplier exceeds 1,
+        NOT_LINEAR where |eta| > 0.1 reach cos(pressure angle) somewhere (the numbers stay), NOT_ROTATABLE where p is
+        nan
+    eta, elongation : (n, m) [rad], [length];  floquet : (n,) largest modulus of the multipliers, or nan
+    """
+
+    status: Status
+    eta: Array
+    elongation: Array
+    floquet: Array
+
+
 @kernel
 def steady_state(
-    p: Array, d2psi: Array, c: Array, reach: Array, data: Array, phi: Array, last: bool, status: Status, eta: Array,
-    elongation: Array, floquet: Array, varying: Array | None = None,
+    p: Array, d2psi: Array, c: Array, reach: Array, data: Array, phi: Array, last: bool, found: Steady,
+    varying: Array | None = None,
 ) -> None:  # fmt: skip
     """Compute the periodic steady state of the lag and the largest Floquet multiplier.
 
@@ -85,13 +103,10 @@ def steady_state(
     p, d2psi : (n, N) on the grid phi_j = 2 pi j / N, N odd;  c, reach : (n,), see `quasi_static`;  data : (n, 5)
     phi : (n, m) or (1, m), where eta and elongation are wanted
     last : whether no finer grid follows
-    status : (n,) out; NOT_CONVERGED where N does not resolve the solution (tail above 1e-9) or a multiplier exceeds 1,
-        NOT_LINEAR where |eta| > 0.1 reach cos(pressure angle) somewhere (the numbers stay), NOT_ROTATABLE where p is
-        nan
-    eta, elongation : (n, m) out [rad], [length];  floquet : (n,) out, largest modulus or nan
+    found : out
     varying : (n, N) or None; what is added to the torque M on the grid
     """
-    n = p.shape[1]
+    n, (status, eta, elongation, floquet) = p.shape[1], found
     half = (n + 1) // 2
     all_qc, all_qs, all_ec, all_es = np.empty(half), np.empty(half), np.empty(half), np.empty(half)
     square, right, turn = np.empty(n), np.empty(n), np.empty((4, half))

@@ -252,6 +252,20 @@ def _written(outputs: Array, i: int, tally: Array, foot: Array, most: float, set
     outputs[9, i], outputs[10, i] = most, 1.0 if settled else 0.0
 
 
+@inline
+def _checked(feet: Array, known: bool, lowest: float) -> int:
+    """Status by the numbers of a foot and the least height of its rack, ``known`` where all its heights are numbers."""
+    mass, stiffness, preload, speed, restitution, soft, damping = (
+        feet[0], feet[1], feet[2], feet[3], feet[4], feet[5], feet[6],
+    )  # fmt: skip
+    rigid, unit = soft == 0.0 and damping == 0.0, mass * speed * speed
+    valid = mass > 0.0 and stiffness >= 0.0 and preload > 0.0 and speed > 0.0 and 0.0 <= restitution < 1.0
+    valid = valid and (rigid or (soft > 0.0 and damping >= 0.0 and restitution == 0.0))
+    if not (valid and known and unit > 0.0 and unit < math.inf):
+        return st.INVALID_INPUT
+    return st.NO_EVENT if lowest > 0.0 else st.OK
+
+
 @kernel
 def march(path: Array, feet: Array, turns: int, status: Status, outputs: Array, heights: Array, forces: Array) -> None:
     """March feet over their racks for some turns and keep the last one; (4)-(16) of docs/foot.md.
@@ -282,12 +296,8 @@ def march(path: Array, feet: Array, turns: int, status: Status, outputs: Array, 
         soft, damping = feet[i, 5], feet[i, 6]
         rigid, step, unit = soft == 0.0 and damping == 0.0, TWO_PI / count, mass * speed * speed
         outputs[:, i], heights[i, :], forces[i, :] = math.nan, math.nan, math.nan
-        valid = mass > 0.0 and stiffness >= 0.0 and preload > 0.0 and speed > 0.0 and 0.0 <= restitution < 1.0
-        valid = valid and (rigid or (soft > 0.0 and damping >= 0.0 and restitution == 0.0))
         known, lowest, quickest, highest = _extremes(rack)
-        status[i] = st.OK if valid and known and unit > 0.0 and unit < math.inf else st.INVALID_INPUT
-        if status[i] == st.OK and rack[0, lowest] > 0.0:
-            status[i] = st.NO_EVENT
+        status[i] = _checked(feet[i], known, rack[0, lowest])
         if status[i] != st.OK:
             continue
         foot = Foot(math.sqrt(stiffness / mass) / speed, preload / unit, restitution, 1e-9 * quickest)

@@ -22,10 +22,9 @@ from kernels.arithmetic.vectors import Vector, cross, dot, mix, norm, scale, sub
 from kernels.effects.coupler import Coupler, orientation
 from kernels.effects.kinetostatics import (
     SPEED,
+    Loading,
     Loads,
-    inertia_loads,
-    loaded,
-    loaded_follower,
+    loads_of,
     pose_status,
     solve,
     store_forces,
@@ -122,46 +121,37 @@ def unit_vector(a: Vector) -> Vector:
 def friction_loads(
     poses: Array,
     designs: Array,
-    bodies: Array,
-    drive: Array,
-    friction: Array,
     finger: Array,
+    given: Loading,
+    friction: Array,
     status: Status,
     forces: Array | None,
     couples: Array | None,
     losses: Array | None,
     contraction: Array | None,
-    wrench: Array | None = None,
-    on_follower: Array | None = None,
 ) -> None:
     """Compute joint reactions and driving torque with friction.
 
     Parameters
     ----------
-    poses, designs, bodies, drive, finger, status, forces, couples : as in :func:`kernels.effects.kinetostatics`
+    poses, designs, finger, given, status, forces, couples : as in :func:`kernels.effects.kinetostatics`
     friction : (n, 14) columns of :class:`Friction`
     losses : (n, m, 9) or None; friction torque on the crank about u; friction torque on the rocker about k, or force on
         the slider along tau; magnitudes of the friction couples of the ball joints B and C; radial loads of crank
         supports 1, 2 and follower supports 1, 2; passes of the iteration
     contraction : (n, m) or None; rho(L), below 1 the solution is proven unique; known also where the iteration jams
     status : also JAMMED where the iteration does not contract
-    wrench : (n, m, 6) or None; force and moment about B that act on the coupler besides, fixed axes
-    on_follower : (n, m, 6) or None; force and moment about D that act on the follower besides, fixed axes
     """
     answers, total, matrix = np.empty((4, ANSWER)), np.empty(ANSWER), np.empty((3, 3))
     for i in range(poses.shape[0]):
-        given = _columns(friction, i)
+        rubbing = _columns(friction, i)
         for k in range(poses.shape[1]):
             j = read(poses[i, k], designs[i])
             coupler = orientation(j, finger[i])
             code = pose_status(status[i, k], j, coupler)
-            load = inertia_loads(j, coupler, bodies[i], drive[i, k if drive.shape[1] > 1 else 0])
-            if wrench is not None:
-                load = loaded(load, wrench[i, k])
-            if on_follower is not None:
-                load = loaded_follower(load, on_follower[i, k])
-            f = _of_moving(given, load)
-            speed_a = drive[i, k if drive.shape[1] > 1 else 0, SPEED]
+            load = loads_of(j, coupler, given, i, k)
+            f = _of_moving(rubbing, load)
+            speed_a = given.drive[i, k if given.drive.shape[1] > 1 else 0, SPEED]
             speed_d = speed_a * j.dpsi
             # A rocker turns about k on two supports, a slider moves along tau on two shoes.
             axis = mix(j.turns, j.k, 1.0 - j.turns, j.tau)

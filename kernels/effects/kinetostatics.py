@@ -40,6 +40,24 @@ class Body(NamedTuple):
     third: Vector
 
 
+class Loading(NamedTuple):
+    """What loads the links.
+
+    Parameters
+    ----------
+    bodies : (n, BODIES): per body m, centre of mass, inertia about it (body axes: crank rho_B, tau_B, u from A; coupler
+        s, n x s, n from B; follower rho, tau, k from D); gravity
+    drive : (n, m, 3) or (n, 1, 3): torque on the rocker about k or force on the slider along tau; crank speed; its rate
+    on_coupler : (n, m, 6) or None; force and moment about B that act on the coupler besides, fixed axes
+    on_follower : (n, m, 6) or None; force and moment about D that act on the follower besides, fixed axes
+    """
+
+    bodies: Array
+    drive: Array
+    on_coupler: Array | None = None
+    on_follower: Array | None = None
+
+
 class Loads(NamedTuple):
     """Inertia forces F = m (a - gravity) and torques T about the centres of mass, with their arms d."""
 
@@ -150,11 +168,21 @@ def borne(j: Joints, on: Loads) -> tuple[Vector, Vector]:
 
 
 @inline
-def loaded(on: Loads, wrench: Array) -> Loads:
-    """Return the loads with a force and a moment about B, (6,), that act on the coupler from outside.
+def loads_of(j: Joints, coupler: Coupler, given: Loading, i: int, k: int) -> Loads:
+    """Inertia loads of pose k of design i, with what acts on coupler and follower besides."""
+    on = inertia_loads(j, coupler, given.bodies[i], given.drive[i, k if given.drive.shape[1] > 1 else 0])
+    return _follower_loaded(_coupler_loaded(on, given.on_coupler, i, k), given.on_follower, i, k)
+
+
+@inline
+def _coupler_loaded(on: Loads, wrenches: Array | None, i: int, k: int) -> Loads:
+    """Return the loads with a force and a moment about B that act on the coupler from outside.
 
     F2 - F takes the place of F2 everywhere; T2 is moved by what that changes in the moment about B.
     """
+    if wrenches is None:
+        return on
+    wrench = wrenches[i, k]
     force, moment = (wrench[0], wrench[1], wrench[2]), (wrench[3], wrench[4], wrench[5])
     return Loads(
         on.f1, on.t1, on.d1,
@@ -165,8 +193,11 @@ def loaded(on: Loads, wrench: Array) -> Loads:
 
 
 @inline
-def loaded_follower(on: Loads, wrench: Array) -> Loads:
-    """Return the loads with a force and a moment about D, (6,), that act on the follower from outside."""
+def _follower_loaded(on: Loads, wrenches: Array | None, i: int, k: int) -> Loads:
+    """Return the loads with a force and a moment about D that act on the follower from outside."""
+    if wrenches is None:
+        return on
+    wrench = wrenches[i, k]
     force, moment = (wrench[0], wrench[1], wrench[2]), (wrench[3], wrench[4], wrench[5])
     return Loads(
         on.f1, on.t1, on.d1, on.f2, on.t2, on.d2,
@@ -217,15 +248,12 @@ def solve(
 def kinetostatics(
     poses: Array,
     designs: Array,
-    bodies: Array,
-    drive: Array,
     finger: Array,
+    given: Loading,
     status: Status,
     forces: Array | None,
     couples: Array | None,
     inertia: Array | None,
-    wrench: Array | None = None,
-    on_follower: Array | None = None,
     frame_force: Array | None = None,
     frame_moment: Array | None = None,
 ) -> None:
@@ -234,18 +262,14 @@ def kinetostatics(
     Parameters
     ----------
     poses : (n, m, PER_POSE), designs : (n, PER_DESIGN), records of :mod:`kernels.linkage.joints`
-    bodies : (n, BODIES): per body m, centre of mass, inertia about it (body axes: crank rho_B, tau_B, u from A; coupler
-        s, n x s, n from B; follower rho, tau, k from D); gravity
-    drive : (n, m, 3) or (n, 1, 3): torque on the rocker about k or force on the slider along tau; crank speed; its rate
     finger : (n,) DRIVEN or DRIVING, which ball joint carries the finger
+    given : masses, inertias, and what acts on the links
     status : (n, m), in and out; DEAD_POINT where cos(pressure angle) < LEAST_COSINE, SINGULAR where the finger axis
         meets the coupler: both give nan
     forces : (n, m, 18) or None, fixed axes; force frame on crank, crank on coupler, coupler and frame on follower;
         moment of the frame on crank (about A) and follower (about D)
     couples : (n, m, 2) or None; couple of the finger along n x w, torque on the crank about u
     inertia : (n, m, 2) or None; inertia reduced to the crank and its derivative
-    wrench : (n, m, 6) or None; force and moment about B that act on the coupler besides, fixed axes
-    on_follower : (n, m, 6) or None; force and moment about D that act on the follower besides, fixed axes
     frame_force, frame_moment : (n, 3, m) or None; force on the frame, and moment about its origin, that of the drive
         included.  They are what the bodies need: nothing is solved for them, and friction inside changes nothing
 
@@ -260,11 +284,7 @@ def kinetostatics(
             coupler = orientation(j, finger[i])
             status[i, k] = pose_status(status[i, k], j, coupler)
             good = 1.0 if status[i, k] == st.OK else math.nan
-            load = inertia_loads(j, coupler, bodies[i], drive[i, k if drive.shape[1] > 1 else 0])
-            if wrench is not None:
-                load = loaded(load, wrench[i, k])
-            if on_follower is not None:
-                load = loaded_follower(load, on_follower[i, k])
+            load = loads_of(j, coupler, given, i, k)
             if inertia is not None:
                 inertia[i, k, 0], inertia[i, k, 1] = good * load.j_red, good * load.dj_red
             if frame_force is not None or frame_moment is not None:

@@ -31,6 +31,8 @@ from kernels.effects.link_loads import (
     WRENCH,
     Index,
     Room,
+    TreeLoading,
+    drive_at,
     driving,
     needed,
     prepare,
@@ -171,12 +173,8 @@ def _settled(joints: Index, friction: Array, parts: Array, loads: Array, new: Ar
 def link_friction(
     links: Links,
     joints: Index,
-    bodies: Array,
-    tool: Array,
-    drive: Array,
+    given: TreeLoading,
     friction: Array,
-    carrier: int,
-    output: int,
     status: Status,
     forces: Array | None,
     torque: Array | None,
@@ -199,15 +197,15 @@ def link_friction(
     loads, new, steps = np.empty(number), np.empty(number), np.empty((2, max(number, PART)))
     power, total = np.empty(number), np.empty(WRENCH)
     lines = room.rows.shape[0]
-    for i in range(bodies.shape[0]):
+    for i in range(status.shape[0]):
         prepare(links, i, joints, room)
         for k in range(status.shape[1]):
-            given = drive[i, k if drive.shape[1] > 1 else 0]
-            needed(links, i, k, bodies[i], tool[i], given, carrier, output, room)
+            drive = drive_at(given, i, k)
+            needed(links, i, k, given, drive, room)
             put_lines(links, i, k, joints, room)
             for which in range(number):
                 joint, place = joints[which], vector(room.places[which])
-                found = direction(links, i, k, joint, room.ends[which], place, friction[i, which], given[SPEED])
+                found = direction(links, i, k, joint, room.ends[which], place, friction[i, which], drive[SPEED])
                 put_wrench(room.units[lines + which], found[0], place, found[1])
                 power[which] = found[2]
             solvable = solve(links, i, room)

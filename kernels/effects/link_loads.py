@@ -40,6 +40,25 @@ KIND, BODY_OF, FREEDOM, LINE, LINES, ROD, PER_JOINT = 0, 1, 2, 3, 4, 5, 6
 SHAFT, HINGED_BALL, GUIDE, BALL, CONTACT = 0, 1, 2, 3, 4
 
 
+class TreeLoading(NamedTuple):
+    """What loads a tree of B bodies.
+
+    Parameters
+    ----------
+    bodies : (n, 10 B + 3), per body m, centre of mass, inertia about it (xx xy xz yy yz zz), in its own axes; gravity
+    tool : (n, TOOL), mass of the tool and its place in the axes of the body ``carrier``
+    drive : (n, m or 1, PER_DRIVE): crank speed, its rate, torque on the freedom ``output``, force on the tool
+    carrier : number of the body that carries the tool
+    output : number of the freedom that the load acts on; below 0 for none
+    """
+
+    bodies: Array
+    tool: Array
+    drive: Array
+    carrier: int
+    output: int
+
+
 class Room(NamedTuple):
     """What the loads of one pose are worked out in: B bodies, F freedoms, K lines, Q joints, R of them rub, A = 1 + R.
 
@@ -130,14 +149,21 @@ def inertia_times(body: Posed, data: Array, a: Vector) -> Vector:
 
 
 @inline
+def drive_at(given: TreeLoading, i: int, k: int) -> Array:
+    """Speed, its rate and the loads of one pose, (PER_DRIVE,)."""
+    return given.drive[i, k if given.drive.shape[1] > 1 else 0]
+
+
+@inline
 def needed(
-    links: Links, i: int, k: int, bodies: Array, tool: Array, drive: Array, carrier: int, output: int, room: Room
+    links: Links, i: int, k: int, given: TreeLoading, drive: Array, room: Room
 ) -> tuple[float, float, Vector, Vector]:
     """Write what each body and all that hangs on it need, (1), (3); reduced inertia and half its derivative, (6), tool.
 
     Of the tool the force on it, (2), and its velocity.
     """
     need, parents, records = room.need, links.parents, links.bodies[i, k]
+    bodies, tool, carrier, output = given.bodies[i], given.tool[i], given.carrier, given.output
     count, first, second = parents.shape[0], 0.0, 0.0
     gravity = vector(bodies[BODY * count :])
     square, change = drive[SPEED] * drive[SPEED], drive[CHANGE]
@@ -257,10 +283,9 @@ def driving(links: Links, i: int, room: Room, answer: int) -> float:
 
 
 @inline
-def borne_force(
-    links: Links, i: int, k: int, bodies: Array, tool: Array, drive: Array, carrier: int, output: int
-) -> Vector:
+def borne_force(links: Links, i: int, k: int, given: TreeLoading, drive: Array) -> Vector:
     """Force that the frame puts on all bodies and the tool: what they need, less the useful load."""
+    bodies, tool, carrier, output = given.bodies[i], given.tool[i], given.carrier, given.output
     records, count, total = links.bodies[i, k], links.parents.shape[0], scale(-1.0, vector(drive[FORCE:]))
     gravity, square, change = vector(bodies[BODY * count :]), drive[SPEED] * drive[SPEED], drive[CHANGE]
     for b in range(count + 1):
@@ -286,11 +311,7 @@ def borne_moment(parents: Index, need: Array) -> Vector:
 def link_loads(
     links: Links,
     joints: Index,
-    bodies: Array,
-    tool: Array,
-    drive: Array,
-    carrier: int,
-    output: int,
+    given: TreeLoading,
     status: Status,
     forces: Array | None,
     frame_force: Array | None,
@@ -305,11 +326,7 @@ def link_loads(
     ----------
     links : tree and poses
     joints : (Q, PER_JOINT) what forces are given of
-    bodies : (n, 10 B + 3), per body m, centre of mass, inertia about it (xx xy xz yy yz zz), in its own axes; gravity
-    tool : (n, TOOL), mass of the tool and its place in the axes of the body ``carrier``
-    drive : (n, m or 1, PER_DRIVE): crank speed, its rate, torque on the freedom ``output``, force on the tool
-    carrier : number of the body that carries the tool
-    output : number of the freedom that the load acts on; below 0 for none
+    given : what loads the bodies
     status : (n, m), in and out; DEAD_POINT where the forces of the lines have no digits left; gives nan
     forces : (n, m, Q, 6) or None; force and moment of each joint, about its place, fixed axes
     frame_force, frame_moment : (n, 3, m) or None; on the frame, that of the drive included; needs no forces of lines
@@ -319,20 +336,19 @@ def link_loads(
     """
     room = room_for(links, joints.shape[0], 0)
     solved = forces is not None or torque is not None or inertia is not None or on_tool is not None
-    for i in range(bodies.shape[0]):
+    for i in range(status.shape[0]):
         prepare(links, i, joints, room)
         for k in range(status.shape[1]):
-            given = drive[i, k if drive.shape[1] > 1 else 0]
+            drive = drive_at(given, i, k)
             if frame_moment is not None or solved:
-                both = needed(links, i, k, bodies[i], tool[i], given, carrier, output, room)
+                both = needed(links, i, k, given, drive, room)
             if solved:
                 put_lines(links, i, k, joints, room)
                 if not solve(links, i, room) and status[i, k] == st.OK:
                     status[i, k] = st.DEAD_POINT
             good = 1.0 if status[i, k] == st.OK else math.nan
             if frame_force is not None:
-                force = borne_force(links, i, k, bodies[i], tool[i], given, carrier, output)
-                put_plane(frame_force, i, k, good, force)
+                put_plane(frame_force, i, k, good, borne_force(links, i, k, given, drive))
             if frame_moment is not None:
                 put_plane(frame_moment, i, k, good, borne_moment(links.parents, room.need))
             if forces is not None:

@@ -94,9 +94,10 @@ def _first_crossing(
 
 @inline
 def _fill(
-    utilisation: Any, looks: int, t_tau: Array, t_rho: Array, t_k: Array, moment: Array, bearings: Array, limits: Array,
+    utilisation: Any, looks: int, direction: tuple[Array, Array, Array], moment: Array, bearings: Array, limits: Array,
     status: Status, used: Array | None, permissible: Array | None, reserve: Array | None,
 ) -> None:  # fmt: skip
+    t_tau, t_rho, t_k = direction
     for i in range(t_tau.shape[0]):
         for j in range(t_tau.shape[1]):
             good = 1.0 if status[i, j] == st.OK else math.nan
@@ -143,9 +144,9 @@ def sliding_limits(
     permissible : (n, m) or None [rad]; permissible theta1 at the pose's theta2, 0 if even theta1 = 0 is too much
     reserve : (n, m) or None [rad]; permissible minus actual theta1, negative where a bearing is overloaded
     """
+    direction = t_tau, t_rho, t_k
     _fill(
-        sliding_utilisation, SLIDING_LOOKS, t_tau, t_rho, t_k, moment, bearings, limits, status, used, permissible,
-        reserve,
+        sliding_utilisation, SLIDING_LOOKS, direction, moment, bearings, limits, status, used, permissible, reserve
     )  # fmt: skip
 
 
@@ -167,7 +168,7 @@ def rolling_limits(
     As :func:`sliding_limits`, with the (n, 11) columns of :class:`kernels.effects.bearings.Rolling` and the permissible
     equivalent load as the one column of ``limits``.
     """
+    direction = t_tau, t_rho, t_k
     _fill(
-        rolling_utilisation, ROLLING_LOOKS, t_tau, t_rho, t_k, moment, bearings, limits, status, used, permissible,
-        reserve,
+        rolling_utilisation, ROLLING_LOOKS, direction, moment, bearings, limits, status, used, permissible, reserve
     )  # fmt: skip

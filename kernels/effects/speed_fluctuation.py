@@ -9,6 +9,7 @@ A motor whose torque falls with the speed answers to it: kernels/effects/motor_l
 from __future__ import annotations
 
 import math
+from typing import NamedTuple
 
 import numpy as np
 
@@ -26,6 +27,25 @@ MOST = 20000
 STILL = 1e-12
 
 
+class Uneven(NamedTuple):
+    """Steady state of a crank that turns unevenly: what comes out.
+
+    Parameters
+    ----------
+    delta, fastest, slowest, energy : (n,) (max - min)/mean, extremes of omega, the constant E
+    missed : (n,) share of the kinetic energy's scale that the highest harmonics of the excess have
+    speed, acceleration : (n, m) omega and d omega/d t = (1/2) d(omega^2)/d phi
+    """
+
+    delta: Array
+    fastest: Array
+    slowest: Array
+    energy: Array
+    missed: Array
+    speed: Array
+    acceleration: Array
+
+
 @kernel
 def speed_fluctuation(
     inertia: Array,
@@ -33,14 +53,8 @@ def speed_fluctuation(
     mean_speed: Array,
     phi: Array,
     status: Status,
-    delta: Array,
-    fastest: Array,
-    slowest: Array,
-    energy: Array,
-    speed: Array | None,
-    acceleration: Array | None,
+    found: Uneven,
     coarsest: float = RESOLVED,
-    missed: Array | None = None,
     slope: Array | None = None,
 ) -> None:
     """Compute the steady-state speed, its extremes and the degree of unevenness.
@@ -53,12 +67,10 @@ def speed_fluctuation(
     phi : (n, m) or (1, m), where speed and acceleration are wanted
     status : (n,) out; JAMMED where the machine stalls (no E above -min W), NOT_CONVERGED where N resolves too little,
         NOT_ROTATABLE where a sample is nan, INVALID_INPUT where nothing has inertia
+    found : out
     coarsest : share of the kinetic energy's scale that the highest harmonics of the excess may have; above RESOLVED for
         loads that jump, of which no grid resolves all
-    missed : (n,) out or None; that share
     slope : (n,) or None; torque that the motor gains per speed it loses, 0 for a constant torque
-    delta, fastest, slowest, energy : (n,) out; (max - min)/mean, extremes of omega, the constant E
-    speed, acceleration : (n, m) or None; omega and d omega/d t = (1/2) d(omega^2)/d phi
     """
     n = inertia.shape[1]
     half = (n + 1) // 2
@@ -74,8 +86,7 @@ def speed_fluctuation(
         energy_scale = all_jc[0] * mean_speed[i] * mean_speed[i]
         left = tail(all_wc, all_ws, energy_scale)
         code = _checked(all_jc, all_js, all_wc, left, coarsest)
-        if missed is not None:
-            missed[i] = left
+        found.missed[i] = left
         all_wc[0], all_ws[0] = 0.0, 0.0
         if slope is not None:
             all_xc[:], all_xs[:] = all_wc, all_ws
@@ -101,17 +112,14 @@ def speed_fluctuation(
                 on_grid(wc, ws, looks, fine_w)
             else:
                 code = st.JAMMED
-        status[i], energy[i] = code, e
+        status[i], found.energy[i] = code, e
         high = _extreme(jc, js, wc, ws, e, 1.0, fine_j, fine_w) if code == st.OK else math.nan
         low = _extreme(jc, js, wc, ws, e, -1.0, fine_j, fine_w) if code == st.OK else math.nan
-        fastest[i], slowest[i], delta[i] = high, low, (high - low) / mean_speed[i]
-        if speed is not None or acceleration is not None:
-            for j in range(phi.shape[1]):
-                omega, change = _speed_at(phi[row, j], jc, js, wc, ws, e)
-                if speed is not None:
-                    speed[i, j] = omega if code == st.OK else math.nan
-                if acceleration is not None:
-                    acceleration[i, j] = change if code == st.OK else math.nan
+        found.fastest[i], found.slowest[i], found.delta[i] = high, low, (high - low) / mean_speed[i]
+        for j in range(phi.shape[1]):
+            omega, change = _speed_at(phi[row, j], jc, js, wc, ws, e)
+            found.speed[i, j] = omega if code == st.OK else math.nan
+            found.acceleration[i, j] = change if code == st.OK else math.nan
 
 
 @inline

@@ -15,6 +15,7 @@ A tool whose point moves freely, on the coupler or at the tip of a rocker, puts 
 from __future__ import annotations
 
 import math
+from typing import NamedTuple
 
 from kernels import status as st
 from kernels.arithmetic.vectors import Vector, add, cross, dot, mix, norm, scale, spun, sub
@@ -27,6 +28,36 @@ from kernels.types import Array, Status
 # Columns of the data matrix: mass; point M from B along the coupler, across it, along the rocker's axis; lam; gravity;
 # piercing force, place of the fabric along lam, sense in which it lies.
 COLUMNS = 13
+
+
+class ToolLoad(NamedTuple):
+    """What is wanted of a tool; None for what is not.
+
+    Parameters
+    ----------
+    wrench : (n, m, 6) force and moment on its link, about B on the coupler, about D on the rocker, fixed axes
+    inertia : (n, m, 2) m s'^2, of a free point m |P'|^2, and its derivative by the crank angle
+    along : of :func:`tool_load` (n, m, 3), force of the coupler on the tool along lam, s', s''; of :func:`free_tool`
+        (n, m, 2), magnitude of the force on the tool and its power per unit crank speed
+    """
+
+    wrench: Array | None = None
+    inertia: Array | None = None
+    along: Array | None = None
+
+
+@inline
+def _put_wrench(out: Array | None, i: int, k: int, force: Vector, moment: Vector) -> None:
+    if out is not None:
+        for x in range(3):
+            out[i, k, x], out[i, k, 3 + x] = force[x], moment[x]
+
+
+@inline
+def _put(out: Array | None, i: int, k: int, values: tuple[float, ...]) -> None:
+    if out is not None:
+        for x in range(len(values)):
+            out[i, k, x] = values[x]
 
 
 @inline
@@ -50,9 +81,7 @@ def tool_load(
     working: Array,
     finger: Array,
     status: Status,
-    wrench: Array | None,
-    inertia: Array | None,
-    along: Array | None,
+    out: ToolLoad,
 ) -> None:
     """Compute a tool's force on the coupler, its moment about B, and the inertia that it adds to the crank's.
 
@@ -64,9 +93,7 @@ def tool_load(
     working : (n, m or 1), force F on the tool along lam; a resisting one opposes s'
     finger : (n,) DRIVEN or DRIVING
     status : (n, m), in and out, as of :func:`kernels.effects.kinetostatics.kinetostatics`; what is not OK gives nan
-    wrench : (n, m, 6) or None; force and moment about B on the coupler, fixed axes
-    inertia : (n, m, 2) or None; m s'^2 and its derivative by the crank angle
-    along : (n, m, 3) or None; force of the coupler on the tool along lam, s', s''
+    out : what is wanted
     """
     for i in range(poses.shape[0]):
         mass, lam = data[i, 0], (data[i, 4], data[i, 5], data[i, 6])
@@ -86,15 +113,10 @@ def tool_load(
             if data[i, 10] != 0.0:
                 way = speed * first
                 on_tool -= piercing(data[i, 10], data[i, 11], data[i, 12], dot(add(j.B, at), lam), way)
-            if wrench is not None:
-                force = scale(-good * on_tool, lam)
-                moment = cross(at, force)
-                for x in range(3):
-                    wrench[i, k, x], wrench[i, k, 3 + x] = force[x], moment[x]
-            if inertia is not None:
-                inertia[i, k, 0], inertia[i, k, 1] = good * mass * first * first, good * 2.0 * mass * first * second
-            if along is not None:
-                along[i, k, 0], along[i, k, 1], along[i, k, 2] = good * on_tool, good * first, good * second
+            force = scale(-good * on_tool, lam)
+            _put_wrench(out.wrench, i, k, force, cross(at, force))
+            _put(out.inertia, i, k, (good * mass * first * first, good * 2.0 * mass * first * second))
+            _put(out.along, i, k, (good * on_tool, good * first, good * second))
 
 
 @kernel
@@ -107,9 +129,7 @@ def free_tool(
     finger: Array,
     on_rocker: bool,
     status: Status,
-    wrench: Array | None,
-    inertia: Array | None,
-    along: Array | None,
+    out: ToolLoad,
 ) -> None:
     """Compute force and moment of a tool that moves freely with a point of the coupler or of the rocker; (6), (7).
 
@@ -119,10 +139,7 @@ def free_tool(
         the rocker from D along rho, tau, k; gravity
     working : (n, m or 1, 3), force F on the tool in fixed axes
     on_rocker : whether the rocker carries the tool
-    wrench : (n, m, 6) or None; force and moment on the link, about B on the coupler, about D on the rocker
-    inertia : (n, m, 2) or None; m |P'|^2 and its derivative by the crank angle
-    along : (n, m, 2) or None; magnitude of the force on the tool; its power per unit crank speed
-    poses, designs, drive, finger, status : as in :func:`tool_load`
+    poses, designs, drive, finger, status, out : as in :func:`tool_load`
     """
     for i in range(poses.shape[0]):
         mass, gravity = data[i, 0], (data[i, 4], data[i, 5], data[i, 6])
@@ -144,14 +161,6 @@ def free_tool(
             now = k if working.shape[1] > 1 else 0
             force = (working[i, now, 0], working[i, now, 1], working[i, now, 2])
             on_tool = sub(scale(mass, sub(mix(speed * speed, second, change, first), gravity)), force)
-            if wrench is not None:
-                moment = cross(at, on_tool)
-                for x in range(3):
-                    wrench[i, k, x], wrench[i, k, 3 + x] = -good * on_tool[x], -good * moment[x]
-            if inertia is not None:
-                inertia[i, k, 0], inertia[i, k, 1] = (
-                    good * mass * dot(first, first),
-                    good * 2.0 * mass * dot(first, second),
-                )
-            if along is not None:
-                along[i, k, 0], along[i, k, 1] = good * norm(on_tool), good * dot(on_tool, first)
+            _put_wrench(out.wrench, i, k, scale(-good, on_tool), scale(-good, cross(at, on_tool)))
+            _put(out.inertia, i, k, (good * mass * dot(first, first), good * 2.0 * mass * dot(first, second)))
+            _put(out.along, i, k, (good * norm(on_tool), good * dot(on_tool, first)))

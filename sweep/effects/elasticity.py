@@ -8,7 +8,7 @@ import numpy as np
 
 from kernels import status as st
 from kernels.effects.elastic_drive import driven_steady_state
-from kernels.effects.elasticity import quasi_static, steady_state
+from kernels.effects.elasticity import Steady, quasi_static, steady_state
 from kernels.types import Status
 from sweep.effects import loads
 from sweep.effects.base import Advice, DesignResult, Effect
@@ -159,8 +159,7 @@ def _solved(grid: Scene, phi: Array, last: bool) -> tuple[dict[str, Array], Stat
     A crank that turns backwards is one that turns forwards in -phi: only so do multipliers below 1 mean stability.
     """
     n, back = len(grid.designs), bool((grid.inputs["speed"] < 0.0).any())
-    status, floquet = np.empty(n, np.uint8), np.empty(n)
-    lag, elongation = (np.empty((n, phi.shape[1])) for _ in range(2))
+    found = Steady(np.empty(n, np.uint8), *(np.empty((n, phi.shape[1])) for _ in range(2)), np.empty(n))
     p, d2psi, c, reach, data = _arguments(grid)
     driven = driven_side(grid, True)
     if driven is None:
@@ -170,13 +169,13 @@ def _solved(grid: Scene, phi: Array, last: bool) -> tuple[dict[str, Array], Stat
             at = phi
             phi, (p, d2psi) = backwards(at, p, d2psi)
             varying = None if varying is None else backwards(at, varying)[1][0]
-        steady_state(p, d2psi, c, reach, data, phi, last, status, lag, elongation, floquet, varying)
+        steady_state(p, d2psi, c, reach, data, phi, last, found, varying)
     else:
         first, zeroth, right = _equation(grid, p, d2psi, data, driven)
         if back:
             phi, (p, first, zeroth, right) = backwards(phi, p, -first, zeroth, right)
-        driven_steady_state(p, first, zeroth, right, c, reach, phi, last, status, lag, elongation, floquet)
-    return {"lag_dynamic": lag, "elongation_dynamic": elongation, "floquet": floquet}, status
+        driven_steady_state(p, first, zeroth, right, c, reach, phi, last, found)
+    return {"lag_dynamic": found.eta, "elongation_dynamic": found.elongation, "floquet": found.floquet}, found.status
 
 
 def _equation(scene: Scene, p: Array, d2psi: Array, data: Array, driven: DrivenSide) -> tuple[Array, Array, Array]:

@@ -9,12 +9,12 @@ from __future__ import annotations
 import numpy as np
 
 from kernels.effects.friction import friction_loads
-from kernels.effects.kinetostatics import BODY, kinetostatics
+from kernels.effects.kinetostatics import BODY, Loading, kinetostatics
 from kernels.types import Status
 from sweep.effects import loads
 from sweep.effects.loads import FRICTION_SUFFIX, FRICTION_TEXT, Named, together
 from sweep.effects.scene import Scene, refuse
-from sweep.effects.tool import Weighs, weighs
+from sweep.effects.tool import weighs
 from sweep.families.base import Array, Columns, Parameter
 from sweep.families.poses import optional_outputs
 
@@ -144,10 +144,8 @@ def frictionless(scene: Scene, load: Array, wanted: frozenset[str], status: Stat
     on_frame = loads.frame_room(scene.shape, wanted)
     drive = _drive(scene, load)
     tool = weighs(scene, drive, inertia is not None)
-    kinetostatics(
-        *scene.records, _bodies(scene), drive, scene.inputs["finger"], status, forces, couples, inertia, tool.coupler,
-        tool.follower, *on_frame,
-    )  # fmt: skip
+    given = Loading(_bodies(scene), drive, tool.coupler, tool.follower)
+    kinetostatics(*scene.records, scene.inputs["finger"], given, status, forces, couples, inertia, *on_frame)
     if inertia is not None and tool.inertia is not None:
         inertia += tool.inertia
     if forces is not None:
@@ -167,7 +165,7 @@ def with_friction(scene: Scene, load: Array, wanted: frozenset[str], status: Sta
         (2, not wanted.isdisjoint(COUPLES_WITH_FRICTION)),
         (len(lost), not wanted.isdisjoint(lost)),
     )
-    forces, couples, given = (np.empty((*scene.shape, size)) if asked else None for size, asked in sizes)
+    forces, couples, lossy = (np.empty((*scene.shape, size)) if asked else None for size, asked in sizes)
     (contraction,) = optional_outputs((CONTRACTION,), wanted, scene.shape)
     data = np.column_stack(
         [
@@ -177,28 +175,21 @@ def with_friction(scene: Scene, load: Array, wanted: frozenset[str], status: Sta
     )
     drive = _drive(scene, load)
     tool = weighs(scene, drive, False)
-    friction_loads(
-        *scene.records, _bodies(scene), drive, data, scene.inputs["finger"], status, forces, couples, given,
-        contraction, tool.coupler, tool.follower,
-    )  # fmt: skip
+    given = Loading(_bodies(scene), drive, tool.coupler, tool.follower)
+    friction_loads(*scene.records, scene.inputs["finger"], given, data, status, forces, couples, lossy, contraction)
     columns = _vector_columns(forces, wanted, FRICTION_SUFFIX)
-    columns |= _frame(scene, drive, tool, status, wanted, FRICTION_SUFFIX)
-    for names, values in ((tuple(COUPLES_WITH_FRICTION), couples), (lost, given)):
+    columns |= _frame(scene, given, status, wanted, FRICTION_SUFFIX)
+    for names, values in ((tuple(COUPLES_WITH_FRICTION), couples), (lost, lossy)):
         columns |= loads.scalar_columns(names, values, wanted)
     return columns if contraction is None else columns | {CONTRACTION: contraction}
 
 
-def _frame(
-    scene: Scene, drive: Array, tool: Weighs, status: Status, wanted: frozenset[str], suffix: str = ""
-) -> Columns:
+def _frame(scene: Scene, given: Loading, status: Status, wanted: frozenset[str], suffix: str = "") -> Columns:
     """Wanted force and moment on the frame, which friction inside does not change; nan where the status is not OK."""
     on_frame = loads.frame_room(scene.shape, wanted, suffix)
     if all(part is None for part in on_frame):
         return {}
-    kinetostatics(
-        *scene.records, _bodies(scene), drive, scene.inputs["finger"], status, None, None, None, tool.coupler,
-        tool.follower, *on_frame,
-    )  # fmt: skip
+    kinetostatics(*scene.records, scene.inputs["finger"], given, status, None, None, None, *on_frame)
     return loads.frame_columns(on_frame, wanted, suffix)
 
 

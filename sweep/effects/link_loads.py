@@ -199,10 +199,11 @@ def _tool(scene: Scene) -> Array:
     return np.column_stack([scene.inputs["m_tool"], tip])
 
 
-def _drive(scene: Scene, load: Array) -> Array:
-    """Crank speed and its rate, load of the output link, force on the tool, (n, m or 1, 6)."""
-    force = [scene.load(p.name) for p in loads.FREE_TOOL[1:]]
-    return np.stack(np.broadcast_arrays(*scene.crank(), load, *force), axis=2)
+def _loading(scene: Scene, load: Array) -> link_loads.TreeLoading:
+    """Bodies, tool and drive in the order of the kernels."""
+    tree, force = tree_of(scene), [scene.load(p.name) for p in loads.FREE_TOOL[1:]]
+    drive = np.stack(np.broadcast_arrays(*scene.crank(), load, *force), axis=2)
+    return link_loads.TreeLoading(_bodies(scene), _tool(scene), drive, tree.carrier, tree.output)
 
 
 def _vector_columns(tree: LinkTree, forces: Array | None, wanted: frozenset[str], suffix: str = "") -> Columns:
@@ -225,13 +226,11 @@ def _reactions(scene: Scene, wanted: frozenset[str], suffix: str = "") -> Array 
 
 def _fill(scene: Scene, load: Array, status: Status, *out: Array | None) -> None:
     """Let the kernel write the wanted ones of its results, (n, ...) each, some designs after others."""
-    tree, bodies, tool, drive = tree_of(scene), _bodies(scene), _tool(scene), _drive(scene, load)
+    tree, given = tree_of(scene), _loading(scene, load)
     for rows, links in scene.links_by_parts():
+        some = given._replace(bodies=given.bodies[rows], tool=given.tool[rows], drive=given.drive[rows])
         part = (x if x is None else x[rows] for x in out)
-        link_loads.link_loads(
-            links, joint_table(tree), bodies[rows], tool[rows], drive[rows], tree.carrier, tree.output, status[rows],
-            *part,
-        )  # fmt: skip
+        link_loads.link_loads(links, joint_table(tree), some, status[rows], *part)
 
 
 def frictionless(scene: Scene, load: Array, wanted: frozenset[str], status: Status) -> Columns:
@@ -276,8 +275,8 @@ def with_friction(scene: Scene, load: Array, wanted: frozenset[str], status: Sta
     given = np.empty((*shape, number + 1)) if not wanted.isdisjoint(lost) else None
     carried = np.empty((*shape, number, 2)) if not wanted.isdisjoint(supports) else None
     link_friction.link_friction(
-        scene.links, joint_table(tree), _bodies(scene), _tool(scene), _drive(scene, load), _friction_data(scene),
-        tree.carrier, tree.output, status, forces, torque, given, carried,
+        scene.links, joint_table(tree), _loading(scene, load), _friction_data(scene), status, forces, torque, given,
+        carried,
     )  # fmt: skip
     columns = _vector_columns(tree, forces, wanted, FRICTION_SUFFIX)
     on_frame = loads.frame_room(scene.shape, wanted, FRICTION_SUFFIX)

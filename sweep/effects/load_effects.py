@@ -12,7 +12,7 @@ from functools import lru_cache, partial
 import numpy as np
 
 from kernels import status as st
-from kernels.effects.coupler import coupler_point
+from kernels.effects.coupler import CouplerMotion, coupler_point
 from sweep.effects import kinetostatics, link_loads, loads
 from sweep.effects.base import Advice, Bend, Effect, largest
 from sweep.effects.link_loads import rod, tree_of
@@ -30,9 +30,7 @@ def ball_slowness(scene: Scene) -> Array:
     """Squares of the turning of coupler against crank and against follower per unit crank speed, (n, m, 2)."""
     poses, designs = scene.records
     omega, origin = np.empty((*scene.shape, 3)), np.zeros((len(designs), 3))
-    coupler_point(
-        poses, designs, origin, scene.inputs["finger"], scene.status(), None, None, None, None, omega, None, None
-    )
+    coupler_point(poses, designs, origin, scene.inputs["finger"], scene.status(), CouplerMotion(omega=omega))
     crank, axis, turns = designs[:, None, :3], designs[:, None, 3:6], designs[:, None, 16:17]
     of_follower = turns * poses[:, :, 22:23] * axis
     return np.stack([((omega - other) ** 2).sum(axis=2) for other in (crank, of_follower)], axis=2)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from kernels.effects.coupler import centre_acceleration, coupler_point
+from kernels.effects.coupler import CouplerMotion, centre_acceleration, coupler_point
 from sweep.effects.base import Advice, Effect
 from sweep.effects.scene import Scene
 from sweep.families.base import Columns, Output, Parameter
@@ -61,7 +61,8 @@ def compute(scene: Scene, wanted: frozenset[str]) -> Columns:
     groups = [[name.format(axis=axis) for axis in "xyz"] for name, _, _ in _GROUPS.values()]
     out = [None if wanted.isdisjoint(names) else np.empty((*scene.shape, 3)) for names in groups]
     angles = None if wanted.isdisjoint(o.name for o in _EULER) else np.empty((*scene.shape, 2))
-    coupler_point(*scene.records, scene.table(_POINT), scene.inputs["finger"], status, *[*out, angles])
+    wanted_of = CouplerMotion(*out, angles)
+    coupler_point(*scene.records, scene.table(_POINT), scene.inputs["finger"], status, wanted_of)
     columns: Columns = {
         name: values[:, :, k]
         for names, values in zip(groups, out, strict=True)

@@ -7,7 +7,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from kernels.effects.tool import free_tool, tool_load
+from kernels.effects.tool import ToolLoad, free_tool, tool_load
 from sweep.effects import loads
 from sweep.effects.base import ON_LINE, ON_TIP, Effect, tool_place
 from sweep.effects.motion import CONSTRUCTION
@@ -73,14 +73,13 @@ def weighs(scene: Scene, drive: Array, reduced: bool) -> Weighs:
         return Weighs(None, None, None)
     wrench = np.empty((*scene.shape, 6))
     inertia = np.empty((*scene.shape, 2)) if reduced else None
-    poses, designs = scene.records
-    finger, status = scene.inputs["finger"], scene.status()
+    finger, status, out = scene.inputs["finger"], scene.status(), ToolLoad(wrench, inertia)
     if place == ON_LINE:
         data, force = _data(scene)
-        tool_load(poses, designs, data, drive, force, finger, status, wrench, inertia, None)
+        tool_load(*scene.records, data, drive, force, finger, status, out)
         return Weighs(wrench, None, inertia)
     data, force = _free_data(scene)
-    free_tool(poses, designs, data, drive, force, finger, place == ON_TIP, status, wrench, inertia, None)
+    free_tool(*scene.records, data, drive, force, finger, place == ON_TIP, status, out)
     return Weighs(None, wrench, inertia) if place == ON_TIP else Weighs(wrench, None, inertia)
 
 
@@ -89,17 +88,16 @@ def compute(scene: Scene, wanted: frozenset[str]) -> Columns:
     speed, change = scene.crank()
     drive = np.stack(np.broadcast_arrays(np.zeros_like(speed), speed, change), axis=2)
     status, place = scene.status(), tool_place(scene.family)
-    poses, designs = scene.records
     finger = scene.inputs["finger"]
     if place == ON_LINE:
         along = np.empty((*scene.shape, 3))
         data, force = _data(scene)
-        tool_load(poses, designs, data, drive, force, finger, status, None, None, along)
+        tool_load(*scene.records, data, drive, force, finger, status, ToolLoad(along=along))
         columns: Columns = {"tool_load": along[:, :, 0], "tool_torque": along[:, :, 0] * along[:, :, 1]}
     else:
         found = np.empty((*scene.shape, 2))
         data, force = _free_data(scene)
-        free_tool(poses, designs, data, drive, force, finger, place == ON_TIP, status, None, None, found)
+        free_tool(*scene.records, data, drive, force, finger, place == ON_TIP, status, ToolLoad(along=found))
         named = TIP_OUTPUTS if place == ON_TIP else OUTPUTS
         columns = {o.name: found[:, :, k] for k, o in enumerate(named)}
     return {name: columns[name] for name in wanted} | {"status": status}

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from kernels.effects.speed_fluctuation import speed_fluctuation
+from kernels.effects.speed_fluctuation import Uneven, speed_fluctuation
 from kernels.types import Array, Status
 
 # Odd grids: the next one is tried for designs that the one before does not resolve.
@@ -36,15 +36,11 @@ def steady(
     if (speed < 0.0).any():
         return _of_both_senses(inertia, excess, speed, slope, phi, coarsest)
     n = len(inertia)
-    unevenness, fastest, slowest, energy, missed = (np.empty(n) for _ in range(5))
-    crank_speed, acceleration = (np.empty((n, phi.shape[1])) for _ in range(2))
+    out = Uneven(*(np.empty(n) for _ in range(5)), *(np.empty((n, phi.shape[1])) for _ in range(2)))
     status = np.empty(n, np.uint8)
-    speed_fluctuation(
-        inertia, excess, speed, phi, status, unevenness, fastest, slowest, energy, crank_speed, acceleration, coarsest,
-        missed, slope,
-    )  # fmt: skip
-    found = {"unevenness": unevenness, "fastest": fastest, "slowest": slowest, "missed": missed}
-    return found | {"crank_speed": crank_speed, "crank_acceleration": acceleration}, status
+    speed_fluctuation(inertia, excess, speed, phi, status, out, coarsest, slope)
+    found = {"unevenness": out.delta, "fastest": out.fastest, "slowest": out.slowest, "missed": out.missed}
+    return found | {"crank_speed": out.speed, "crank_acceleration": out.acceleration}, status
 
 
 def _of_both_senses(

@@ -12,7 +12,7 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from kernels.arithmetic.sobol import BITS, RUN, TABLE_BITS, sobol_points
+from kernels.arithmetic.sobol import BITS, RUN, TABLE_BITS, Digits, sobol_points
 from sweep.families.base import Array
 
 INDEX_BITS = 40
@@ -89,7 +89,8 @@ class Sobol:
         low = np.arange(2 * RUN)
         # The digit above the lowest ones changes the highest of their Gray code.
         gray = (low ^ (low >> 1)) & (RUN - 1)
-        self._first_runs = np.ascontiguousarray(self._tables[:, 0, gray].reshape(dimensions, 2, RUN))
+        first_runs = np.ascontiguousarray(self._tables[:, 0, gray].reshape(dimensions, 2, RUN))
+        self._digits = Digits(first_runs, self._tables, self._shift, self._centre)
 
     def points(self, start: int, stop: int, which: Sequence[int] | None = None) -> Array:
         """Return points start to stop - 1, one row per dimension; with ``which`` of those dimensions only."""
@@ -108,9 +109,7 @@ class Sobol:
         """
         low, high = np.array(ends, np.float64).reshape(len(which), 2).T.copy()
         chosen, places = np.array(which, np.int64), np.array(columns, np.int64)
-        sobol_points(
-            start, stop, self._first_runs, self._tables, self._shift, self._centre, chosen, low, high, places, out
-        )
+        sobol_points(start, stop, self._digits, chosen, low, high, places, out)
 
     def at(self, index: NDArray[np.int64], which: Sequence[int] | None = None) -> Array:
         """Return the points of these numbers, in any order, with the same bits as `points`."""

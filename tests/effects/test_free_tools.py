@@ -11,7 +11,7 @@ import pytest
 
 import sweep
 from kernels import status as st
-from kernels.effects.tool import free_tool
+from kernels.effects.tool import ToolLoad, free_tool
 from sweep.effects import all_inputs
 from sweep.effects.scene import first_scene
 from sweep.families import family
@@ -138,7 +138,7 @@ def test_compiled_free_tool_equals_plain_python_bit_for_bit(on_rocker):
     for function in (free_tool, free_tool.py_func):
         out = [np.empty((1, 5, k)) for k in (6, 2, 2)]
         status = scene.status()
-        function(*scene.records, data, drive, force, np.zeros(1), on_rocker, status, *out)
+        function(*scene.records, data, drive, force, np.zeros(1), on_rocker, status, ToolLoad(*out))
         results.append([status, *out])
     for compiled, plain in zip(*results, strict=True):
         np.testing.assert_array_equal(compiled, plain)

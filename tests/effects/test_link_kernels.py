@@ -73,9 +73,9 @@ def test_loads_compiled_are_those_of_plain_python(monkeypatch, case, hard):
     table = d | (HARD[case] if hard else {}) | masses(name)[0] | TOOL | WEIGHT | {"speed": OMEGA}
     arguments = given_to(monkeypatch, loads_effect, "link_loads",
                          lambda: sweep.evaluate(name, table, ["drive_torque"], phi=PHI))  # fmt: skip
-    n, m, q = *arguments[7].shape, len(family(name).find(LinkTree).joints)
+    n, m, q = *arguments[3].shape, len(family(name).find(LinkTree).joints)
     shapes = ((n, m, q, 6), (n, 3, m), (n, 3, m), (n, m), (n, m, 2), (n, m, 4))
-    fast, slow = both(link_loads, arguments, 7, range(8, 14), shapes)
+    fast, slow = both(link_loads, arguments, 3, range(4, 10), shapes)
     np.testing.assert_array_equal(fast[0], slow[0])
     for one, two in zip(fast[1:], slow[1:], strict=True):
         scale = np.nanmax(np.abs(two), initial=0.0)
@@ -91,9 +91,9 @@ def test_friction_compiled_is_that_of_plain_python(monkeypatch, case, hard, mu):
     phi = PHI if mu < 1.0 else PHI[:3]
     arguments = given_to(monkeypatch, loads_effect, "link_friction",
                          lambda: sweep.evaluate(name, table, ["drive_torque_friction"], phi=phi))  # fmt: skip
-    n, m, q = *arguments[8].shape, len(family(name).find(LinkTree).joints)
+    n, m, q = *arguments[4].shape, len(family(name).find(LinkTree).joints)
     shapes = ((n, m, q, 6), (n, m), (n, m, q + 1), (n, m, q, 2))
-    fast, slow = both(link_friction, arguments, 8, range(9, 13), shapes)
+    fast, slow = both(link_friction, arguments, 4, range(5, 9), shapes)
     np.testing.assert_array_equal(fast[0], slow[0])
     if mu > 1.0 and not hard:
         assert st.JAMMED in fast[0]
@@ -109,10 +109,10 @@ def test_a_pose_off_by_rounding_of_single_precision_is_seen(monkeypatch):
     arguments = list(given_to(monkeypatch, loads_effect, "link_loads",
                               lambda: sweep.evaluate(name, table, ["drive_torque"], phi=PHI)))  # fmt: skip
     right, wrong = np.empty((1, len(PHI))), np.empty((1, len(PHI)))
-    link_loads(*arguments[:8], None, None, None, right, None, None)
-    arguments[3] = arguments[3].astype(np.float32).astype(np.float64)
-    arguments[2] = arguments[2].astype(np.float32).astype(np.float64)
-    link_loads(*arguments[:8], None, None, None, wrong, None, None)
+    link_loads(*arguments[:4], None, None, None, right, None, None)
+    given = arguments[2]
+    rounded = {name: getattr(given, name).astype(np.float32).astype(np.float64) for name in ("bodies", "tool")}
+    link_loads(*arguments[:2], given._replace(**rounded), arguments[3], None, None, None, wrong, None, None)
     assert np.abs(wrong - right).max() > VALUES * np.abs(right).max()
 
 

@@ -16,7 +16,7 @@ import pytest
 
 from kernels import status as st
 from kernels.effects import bearings, elasticity, friction, kinetostatics, permissible, pressure, speed_fluctuation
-from kernels.effects.coupler import DRIVEN, DRIVING, coupler_point
+from kernels.effects.coupler import DRIVEN, DRIVING, CouplerMotion, coupler_point
 from sweep.families import family
 from sweep.families.base import Angles
 from tests.support.oracle_rows import factor, geometry, joint_records, rows
@@ -29,12 +29,13 @@ VECTORS = ("R_A", "R_B", "R_C", "R_D", "M_A", "M_D")
 
 
 def scene_of(table, construction):
-    """Arguments of the load kernels, status last: records, bodies, drive, finger; and geometry records."""
+    """Arguments of the load kernels, status last: records, finger, what loads the links; and geometry records."""
     designs, phi = geometry([row["inputs"] for row in table])
     poses, fixed, status = joint_records(designs, phi)
     bodies = np.array([body_columns(row["inputs"]) for row in table])
     drive = np.array([[[row["inputs"][name] for name in ("M_load", "omega", "epsilon")]] for row in table])
-    return [poses, fixed, bodies, drive], np.full(len(table), CONSTRUCTIONS[construction]), status, fixed
+    finger = np.full(len(table), CONSTRUCTIONS[construction])
+    return [poses, fixed, finger, kinetostatics.Loading(bodies, drive)], status, fixed
 
 
 def body_columns(inputs):
@@ -55,9 +56,9 @@ def in_bearing_axes(got, i, designs):
 @pytest.mark.parametrize("construction", CONSTRUCTIONS)
 def test_reactions_equal_oracle(construction):
     table = [r for r in rows("kinetostatics") if r["inputs"]["construction"] == construction]
-    scene, finger, status, fixed = scene_of(table, construction)
+    scene, status, fixed = scene_of(table, construction)
     forces, couples = np.empty((*status.shape, 18)), np.empty((*status.shape, 2))
-    kinetostatics.kinetostatics(*scene, finger, status, forces, couples, None)
+    kinetostatics.kinetostatics(*scene, status, forces, couples, None)
     assert (status == st.OK).all()
     assert len(table) > 30
     for i, row in enumerate(table):
@@ -73,9 +74,9 @@ def test_reactions_equal_oracle(construction):
 def test_reduced_inertia_equals_oracle():
     """No sensitivity is tabulated for J: on the regular rows it is a sum of a dozen products of exact data."""
     table = [r for r in rows("kinetostatics", case="regular") if r["inputs"]["construction"] == "driven"]
-    scene, finger, status, _ = scene_of(table, "driven")
+    scene, status, _ = scene_of(table, "driven")
     inertia = np.empty((*status.shape, 2))
-    kinetostatics.kinetostatics(*scene, finger, status, None, None, inertia)
+    kinetostatics.kinetostatics(*scene, status, None, None, inertia)
     j_red, dj_red = inertia[:, :, 0], inertia[:, :, 1]
     for i, row in enumerate(table):
         assert float(j_red[i, 0]) == pytest.approx(float(row["expected"]["J_red"]), rel=1e-12)
@@ -86,11 +87,11 @@ def test_reduced_inertia_equals_oracle():
 @pytest.mark.parametrize("construction", CONSTRUCTIONS)
 def test_friction_equals_oracle(construction):
     table = [r for r in rows("friction") if r["inputs"]["construction"] == construction]
-    scene, finger, status, fixed = scene_of(table, construction)
+    scene, status, fixed = scene_of(table, construction)
     data = np.array([[r["inputs"]["friction"][name] for name in FRICTION] for r in table])
     forces, couples, losses = (np.empty((*status.shape, size)) for size in (18, 2, 9))
     contraction = np.empty(status.shape)
-    friction.friction_loads(*scene, data, finger, status, forces, couples, losses, contraction)
+    friction.friction_loads(*scene, data, status, forces, couples, losses, contraction)
     assert (status == st.OK).all()
     assert losses[:, :, 8].max() < friction.PASSES
     # The bound is one: no observed rate exceeds it, and it is not idle (sheet 2.1: rate/bound between 0.1 and 0.98).
@@ -118,11 +119,11 @@ def test_friction_equals_oracle(construction):
 def test_friction_reports_a_jam_instead_of_the_last_iterate():
     """Close to a dead point with a large coefficient the iteration diverges: status, and nan in every result."""
     row = rows("friction", case="regular")[0]
-    scene, finger, status, _ = scene_of([row], "driven")
+    scene, status, _ = scene_of([row], "driven")
     data = np.array([[row["inputs"]["friction"][name] for name in FRICTION]])
     data[0, 3], data[0, 7] = 3.0, 2.0 * row["inputs"]["c"]
     couples = np.empty((*status.shape, 2))
-    friction.friction_loads(*scene, data, finger, status, None, couples, None, None)
+    friction.friction_loads(*scene, data, status, None, couples, None, None)
     assert status[0, 0] == st.JAMMED
     assert np.isnan(couples).all()
 
@@ -134,7 +135,7 @@ def test_coupler_point_equals_oracle():
         poses, fixed, status = joint_records(designs, phi)
         point = np.array([[r["x"], r["y"], r["z"]] for r in table])
         out = {name: np.empty((*status.shape, 3)) for name in ("P", "dP", "ddP")}
-        coupler_point(poses, fixed, point, np.full(len(table), code), status, *out.values(), None, None, None, None)
+        coupler_point(poses, fixed, point, np.full(len(table), code), status, CouplerMotion(*out.values()))
         assert len(table) > 40
         for i, row in enumerate(table):
             assert status[i, 0] == st.OK, row["kind"]
@@ -152,7 +153,7 @@ def test_euler_angles_of_the_coupler_equal_oracle():
         poses, fixed, status = joint_records(designs, phi)
         euler, n = np.empty((*status.shape, 2)), np.empty((*status.shape, 3))
         nothing = np.zeros((len(table), 3))
-        coupler_point(poses, fixed, nothing, np.full(len(table), code), status, None, None, None, n, None, None, euler)
+        coupler_point(poses, fixed, nothing, np.full(len(table), code), status, CouplerMotion(n=n, euler=euler))
         for i, row in enumerate(table):
             # The table gives no condition for the angles: that of the point, over its distance from the pin, stands
             # for it; close to a dead point, and where coupler and finger axis nearly meet, it is large.
@@ -249,13 +250,12 @@ def test_elastic_lag_equals_oracle():
 
         grid = 2.0 * np.pi * np.arange(121) / 121
         p, d2psi = elastic_inputs(given, grid)
-        turn = np.empty(1, np.uint8)
-        eta, elongation, floquet = np.empty(phi.shape), np.empty(phi.shape), np.empty(1)
-        elasticity.steady_state(p, d2psi, c, np.ones(1), data, phi, True, turn, eta, elongation, floquet)
-        assert turn[0] in (st.OK, st.NOT_LINEAR)
+        found = elasticity.Steady(np.empty(1, np.uint8), np.empty(phi.shape), np.empty(phi.shape), np.empty(1))
+        elasticity.steady_state(p, d2psi, c, np.ones(1), data, phi, True, found)
+        assert found.status[0] in (st.OK, st.NOT_LINEAR)
         dynamic = np.array(expected["eta_dynamic"], float)
-        np.testing.assert_allclose(eta[0], dynamic, atol=1e-10 * abs(dynamic).max())
-        np.testing.assert_allclose(floquet[0], float(expected["floquet_max"]), atol=6e-7)
+        np.testing.assert_allclose(found.eta[0], dynamic, atol=1e-10 * abs(dynamic).max())
+        np.testing.assert_allclose(found.floquet[0], float(expected["floquet_max"]), atol=6e-7)
 
 
 def test_speed_fluctuation_equals_oracle():
@@ -265,9 +265,10 @@ def test_speed_fluctuation_equals_oracle():
         inertia = i["J0"] + i["J1"] * np.cos(grid - i["d1"]) + i["J2"] * np.cos(2 * grid - i["d2"])
         excess = i["M1"] * np.cos(grid - i["g1"]) + i["M2"] * np.cos(2 * grid - i["g2"])
         out = {name: np.empty(1) for name in ("delta", "omega_max", "omega_min", "E_const")}
+        found = speed_fluctuation.Uneven(*out.values(), np.empty(1), *np.empty((2, 1, grid.size)))
         status = np.empty(1, np.uint8)
         speed_fluctuation.speed_fluctuation(
-            inertia[None], excess[None], np.array([i["omega_mean"]]), grid[None], status, *out.values(), None, None
+            inertia[None], excess[None], np.array([i["omega_mean"]]), grid[None], status, found
         )
         assert status[0] == st.OK
         for name, values in out.items():

@@ -10,8 +10,8 @@ import pytest
 
 import sweep
 from kernels import status as st
-from kernels.effects.kinetostatics import kinetostatics
-from kernels.effects.tool import tool_load
+from kernels.effects.kinetostatics import Loading, kinetostatics
+from kernels.effects.tool import ToolLoad, tool_load
 from sweep.effects import extended
 from sweep.effects.scene import first_scene
 from sweep.families import family
@@ -208,9 +208,9 @@ def test_compiled_tool_equals_plain_python_bit_for_bit():
     for function, loads_of in ((tool_load, kinetostatics), (tool_load.py_func, kinetostatics.py_func)):
         out = [np.empty((1, 5, k)) for k in (6, 2, 3)]
         forces, status = np.empty((1, 5, 18)), scene.status()
-        function(*scene.records, data, drive, force, np.zeros(1), status, *out)
-        bodies = np.linspace(0.1, 0.7, 33)[None] * 1e-4
-        loads_of(*scene.records, bodies, drive, np.zeros(1), status, forces, None, None, out[0])
+        function(*scene.records, data, drive, force, np.zeros(1), status, ToolLoad(*out))
+        given = Loading(np.linspace(0.1, 0.7, 33)[None] * 1e-4, drive, out[0])
+        loads_of(*scene.records, np.zeros(1), given, status, forces, None, None)
         results.append([status, *out, forces])
     for compiled, plain in zip(*results, strict=True):
         np.testing.assert_array_equal(compiled, plain)
