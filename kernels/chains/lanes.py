@@ -15,7 +15,7 @@ from kernels.chains.look import FEWEST, FLAT, ROUGH, SHARE, fourth_difference, z
 from kernels.chains.peaks import CONSTANTS, A, B, C
 from kernels.jit import generated_inline, inline
 from kernels.types import TWO_PI as TURN
-from kernels.types import Array
+from kernels.types import Array, CosSin
 
 # Rows of BLOCK numbers: what the samples say, then the least of each later discriminant.
 SCALE_AT, ROUGHNESS, MARKS, CLOSE, _MOST, _LEAST, _FLOOR = (k * BLOCK for k in range(7))
@@ -136,7 +136,7 @@ def nearest_dip(guards: Array, slot: int, lane: int) -> float:
 
 
 def first_looker(curve: Curve, get: Helper) -> Helper:
-    """Make the function ``look(count, m, cos, sin, mode, values, guards, said, handed)`` of a curve.
+    """Make the function ``look(count, m, table, mode, values, guards, said, handed)`` of a curve.
 
     It samples the designs whose constants stand at the places 0 ... count - 1 of the list m, and writes the rows
     SCALE_AT, ROUGHNESS, MARKS, CLOSE and LOW of ``said``.  The samples stand in the rows 2 ... 33 of ``values``, the
@@ -148,9 +148,9 @@ def first_looker(curve: Curve, get: Helper) -> Helper:
     enough = (1.0 + 1e-6) * (curve.samples / TURN) ** 2
 
     def look(
-        count: int, m: Array, cos: Array, sin: Array, mode: int, values: Array, guards: Array, said: Array,
-        handed: Array,
-    ) -> None:  # fmt: skip
+        count: int, m: Array, table: CosSin, mode: int, values: Array, guards: Array, said: Array, handed: Array
+    ) -> None:
+        cos, sin = table
         for start in range(0, FEWEST, ANGLES):
             for j in range(ANGLES):
                 u, v, rows = cos[start + j], sin[start + j], handed_rows(handed, j * BLOCK, (j + 1) * BLOCK)

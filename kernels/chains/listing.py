@@ -3,10 +3,9 @@
 from __future__ import annotations
 
 import math
-from typing import Any, NamedTuple, TypeAlias
+from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from kernels import status as st
 from kernels.arithmetic.intrinsics import lowest_bit
@@ -27,35 +26,27 @@ from kernels.chains.lanes import (
     first_looker,
     nearest_dip,
 )
-from kernels.chains.look import FEWEST, GUARD_ROW, LOOKING, MOST, OPEN, SHARE, looker, samples_for
+from kernels.chains.look import (
+    FEWEST,
+    GUARD_ROW,
+    LOOKING,
+    MOST,
+    OPEN,
+    SHARE,
+    Scratch,
+    looker,
+    samples_for,
+)  # fmt: skip
 from kernels.chains.peaks import CAPACITY, CONSTANTS, MOST_PEAKS, PLACE, A, B, C, append
 from kernels.jit import generated_inline, generated_part, inline
 from kernels.types import TWO_PI as TURN
-from kernels.types import Array, Status
-
-Counts: TypeAlias = NDArray[np.int64]
+from kernels.types import Array, CosSin, Status
 
 CHUNK = FEWEST  # samples whose peaks are looked for together
 ROW = 2**62 - 1  # as `kernels.chains.peaks.PLACE`, for rows of a table
 ANGLE = 2**15 - 1  # as `kernels.chains.peaks.PLACE`, for samples and crank angles
 LINE = 8  # numbers in a line of the cache
 ABREAST = MOST + LINE  # where the samples of a block begin, behind those of one design
-
-
-class Scratch(NamedTuple):
-    """Memory of the search.
-
-    Samples of one design and of a block, discriminants of one and of the other, what a first look says; the designs of
-    a block, column by column, and where they stand in it.
-    """
-
-    values: Array
-    guards: Array
-    dips: Array
-    said: Array
-    block: Array
-    handed: Array
-    place: Counts
 
 
 @inline
@@ -72,7 +63,7 @@ def new_room(guarded: int, wide: int) -> Scratch:
     stages = max(guarded, 1)
     return Scratch(
         aligned(ABREAST + SAMPLES), aligned(stages * GUARD_ROW), aligned(stages * DIPS), aligned(LOW + stages * BLOCK),
-        aligned(wide * BLOCK), aligned(HANDED), np.zeros(BLOCK, np.int64),
+        aligned(wide * BLOCK), aligned(HANDED), np.zeros(BLOCK, np.int64), np.empty((BLOCK, 3), np.int64),
     )  # fmt: skip
 
 
@@ -100,42 +91,27 @@ def enlister(chain: Chained, of: Curve) -> Helper:
 
     It samples designs begin, ..., end - 1 and returns the length of the list, in whole vectors.
 
-    ``near`` has for each the distance of its nearest singularity, 0 for one that is left out.  ``span`` gets for each
-    the place of its first maximum, and where the others begin and end.
+    ``near`` has for each the distance of its nearest singularity, 0 for one that is left out.
     """
-    load, loaded, put, get = chain.record.load, chain.record.loaded, chain.record.put, chain.record.get
-    doubts, look, look_abreast, judge = chain.record.doubts, looker(of), first_looker(of, get), _judge(of)
+    put, get, doubts, seat = chain.record.put, chain.record.get, chain.record.doubts, _placer(chain, of)
+    look, look_abreast, judge = looker(of), first_looker(of, get), _judge(of)
     last, per_rho = chain.stages - 1, of.samples
 
     # One function without a return half way: with more the references to each array are counted, which takes time.
     def enlist(
-        designs: Array, begin: int, end: int, near: Array, cos: Array, sin: Array, made_of: Array, mode: int, m: Array,
-        span: Counts, status: Status, room: Scratch,
+        designs: Array, begin: int, end: int, near: Array, table: CosSin, made_of: Array, mode: int, m: Array,
+        status: Status, room: Scratch,
     ) -> int:  # fmt: skip
         # A magnitude is the curve times its own sign, a least value the largest of the negative curve.
         up, down = 1.0 if mode >= 0 else -1.0, 1.0 if mode > 0 else -1.0
-        values, guards, dips, said, block, handed, places = room
-        abreast, count = 0, 0
-        # Those for which the first look is enough as far as is known come first.
-        for some in range(2):
-            abreast = count
-            for i in range(begin, end):
-                distance = near[i - begin]
-                few = distance * FEWEST >= per_rho
-                if few if some == 0 else (not few) & (distance * MOST >= per_rho):
-                    places[i - begin] = count
-                    load(designs, i & ROW, block, count & PLACE)
-                    m[count + A], m[count + B], m[count + C] = made_of[i, 0], made_of[i, 1], made_of[i, 2]
-                    count += 1
-        length = (count + 7) & ~7  # whole vectors; what stands in the surplus is never read
-        for place in range(length):
-            put(m, place + CONSTANTS, loaded(block, place))
-        look_abreast((abreast + 7) & ~7, m, cos, sin, mode, values[ABREAST:], dips, said, handed)
+        (cos, sin), values, dips, said, span = table, room.values, room.dips, room.said, room.span
+        abreast, length = seat(designs, begin, end, near, made_of, m, room)
+        look_abreast(abreast, m, table, mode, values[ABREAST:], dips, said, room.handed)
         for i in range(begin, end):
             n = _enough(near[i - begin], per_rho)
             if n == 0:
                 continue
-            own = places[i - begin] & PLACE
+            own = room.place[i - begin] & PLACE
             k: Any = get(m, own + CONSTANTS)
             limits: Any = doubts(k)
             status[i] = LOOKING if limits[last] < math.inf else OPEN
@@ -145,7 +121,7 @@ def enlister(chain: Chained, of: Curve) -> Helper:
             alone, first, stride, scale, floor = status[i] == LOOKING, ABREAST + own, BLOCK, said[SCALE_AT + own], 0.0
             if alone:
                 first, stride = 0, 1
-                n, most, least, status[i] = look(k, a, b, c, n, cos, sin, mode, limits, values, guards, handed)
+                n, most, least, status[i] = look(k, a, b, c, n, table, mode, limits, room)
                 scale, floor = _counting(mode, most, least)
             if status[i] != st.OK:
                 continue
@@ -160,8 +136,8 @@ def enlister(chain: Chained, of: Curve) -> Helper:
                     if (many == 0) | ((many < MOST_PEAKS) & (length < CAPACITY)):
                         angle, at = (n - FEWEST + j - 2) & ANGLE, (first + j * stride) & ANGLE
                         sign = up if values[at] >= 0.0 else down
-                        left, z, right = sign * values[at - stride], sign * values[at], sign * values[at + stride]
-                        append(m, place, cos[angle], sin[angle], width, (j - 2) * width, left, z, right, sign, scale)
+                        three = sign * values[at - stride], sign * values[at], sign * values[at + stride]
+                        append(m, place, cos[angle], sin[angle], width, (j - 2) * width, three, sign, scale)
                         if many > 0:
                             m[place + A], m[place + B], m[place + C] = a, b, c
                             put(m, place + CONSTANTS, k)
@@ -173,6 +149,37 @@ def enlister(chain: Chained, of: Curve) -> Helper:
         return (length + 7) & ~7
 
     return generated_part(f"enlist_{of.name}", enlist)
+
+
+def _placer(chain: Chained, of: Curve) -> Helper:
+    """Make the function ``seat(designs, begin, end, near, made_of, m, room)``: which designs are sampled, and where.
+
+    It writes their constants into the list, and returns how many are sampled abreast and how many in all, in whole
+    vectors; what stands in the surplus is never read.
+    """
+    load, loaded, put, per_rho = chain.record.load, chain.record.loaded, chain.record.put, of.samples
+
+    def seat(
+        designs: Array, begin: int, end: int, near: Array, made_of: Array, m: Array, room: Scratch
+    ) -> tuple[int, int]:
+        abreast, count = 0, 0
+        # Those for which the first look is enough as far as is known come first.
+        for some in range(2):
+            abreast = count
+            for i in range(begin, end):
+                distance = near[i - begin]
+                few = distance * FEWEST >= per_rho
+                if few if some == 0 else (not few) & (distance * MOST >= per_rho):
+                    room.place[i - begin] = count
+                    load(designs, i & ROW, room.block, count & PLACE)
+                    m[count + A], m[count + B], m[count + C] = made_of[i, 0], made_of[i, 1], made_of[i, 2]
+                    count += 1
+        length = (count + 7) & ~7
+        for place in range(length):
+            put(m, place + CONSTANTS, loaded(room.block, place))
+        return (abreast + 7) & ~7, length
+
+    return generated_inline(f"seat_{of.name}", seat)
 
 
 def _judge(of: Curve) -> Helper:

@@ -8,9 +8,10 @@ difference of the samples says that they do not resolve the curve all the same, 
 from __future__ import annotations
 
 import math
-from typing import Any
+from typing import Any, NamedTuple, TypeAlias
 
 import numpy as np
+from numpy.typing import NDArray
 
 from kernels import status as st
 from kernels.arithmetic.intrinsics import largest, smallest
@@ -18,7 +19,9 @@ from kernels.chains.curves import Curve
 from kernels.chains.form import Helper
 from kernels.chains.halves import TOGETHER, handed_rows, keepers
 from kernels.jit import generated_inline, inline
-from kernels.types import TWO_PI, Array
+from kernels.types import TWO_PI, Array, CosSin
+
+Counts: TypeAlias = NDArray[np.int64]
 
 OPEN = 255  # instead of a status: nothing is decided here, a slower search is to be asked
 LOOKING = 252  # more samples are needed
@@ -30,7 +33,7 @@ FLAT = 1e-9  # a curve that varies by less of its size is left to the slower sea
 GUARD_ROW = MOST + 2
 
 
-def sampling_tables() -> tuple[Array, Array]:
+def sampling_tables() -> CosSin:
     """Cosines and sines of N equally spaced angles for N = 32, 64, ... 8192; those of N start at position N - 32."""
     counts = [FEWEST << k for k in range((MOST // FEWEST).bit_length())]
     phi = np.concatenate([np.arange(n) * (TWO_PI / n) for n in counts])
@@ -88,23 +91,40 @@ def samples_for(per_distance: float, n: int, nearest: float, needed: int) -> int
     return needed
 
 
+class Scratch(NamedTuple):
+    """Memory of the search.
+
+    Samples of one design and of a block, discriminants of one and of the other, what a first look says; the designs of
+    a block, column by column, and where they stand in it; of each where its maxima are: the first, and where the others
+    begin and end.
+    """
+
+    values: Array
+    guards: Array
+    dips: Array
+    said: Array
+    block: Array
+    handed: Array
+    place: Counts
+    span: Counts
+
+
 def looker(curve: Curve) -> Helper:
-    """Make the function ``look(k, a, b, c, n, cos, sin, mode, doubts, values, guards, handed)`` of a curve.
+    """Make the function ``look(k, a, b, c, n, table, mode, doubts, room)`` of a curve.
 
     It samples a design, n times at first, and returns the number of samples that resolve the curve, their largest and
     least, and a status: OK; NOT_ROTATABLE, where a later stage does not reach; OPEN.  The samples stand in
-    values[2 ... n + 1], closed periodically.
+    room.values[2 ... n + 1], closed periodically.
     """
     guarded, samples, take = curve.guarded, curve.samples, taker(curve)
 
     def look(
-        k: Any, a: float, b: float, c: float, n: int, cos: Array, sin: Array, mode: int, doubts: Any, values: Array,
-        guards: Array, handed: Array,
+        k: Any, a: float, b: float, c: float, n: int, table: CosSin, mode: int, doubts: Any, room: Scratch
     ) -> tuple[int, float, float, int]:  # fmt: skip
         # One way out only: with several each array's references are counted, which takes as long as the samples do.
-        code, most, least = LOOKING, 0.0, 0.0
+        code, most, least, values, guards = LOOKING, 0.0, 0.0, room.values, room.guards
         while code == LOOKING and n <= MOST:
-            take(k, a, b, c, n, cos, sin, values, guards, handed)
+            take(k, a, b, c, n, table, values, guards, room.handed)
             needed = n
             for s in range(guarded):
                 low, nearest = dips(n, guards, s * GUARD_ROW)
@@ -133,9 +153,9 @@ def taker(curve: Curve) -> Helper:
     guard_rows, keep, keep_last = keepers(curve)
 
     def take(
-        k: Any, a: float, b: float, c: float, n: int, cos: Array, sin: Array, values: Array, guards: Array,
-        handed: Array,
-    ) -> None:  # fmt: skip
+        k: Any, a: float, b: float, c: float, n: int, table: CosSin, values: Array, guards: Array, handed: Array
+    ) -> None:
+        cos, sin = table
         for start in range(0, n, TOGETHER):
             many = min(TOGETHER, n - start)
             begin, first = n - FEWEST + start, start + 2

@@ -22,7 +22,7 @@ from kernels.chains.halves import HANDED
 from kernels.chains.listing import aligned
 from kernels.chains.look import FEWEST, GUARD_ROW, LOOKING, MOST, OPEN, dips, taker
 from kernels.jit import generated, generated_inline, inline
-from kernels.types import EPS, TWO_PI, Array, Status
+from kernels.types import EPS, TWO_PI, Array, CosSin, Status
 
 PER_TARGET, PER_POWER = 1.2, 1.4  # samples times distance, per logarithm of the target: mostly enough at first
 SLOWEST = 0.3  # fall over an eighth above which the samples do not resolve the curve
@@ -36,7 +36,7 @@ NOISE = 64.0 * EPS  # share of the mean square below which an amplitude is round
 
 @lru_cache(maxsize=64)
 def mean_squares(chain: Chained, order: int, along: bool = False) -> Helper:
-    """Make the kernel ``mean(designs, opening, distance, cos, sin, made_of, target, status, found)``.
+    """Make the kernel ``mean(designs, opening, distance, table, made_of, target, status, found)``.
 
     The arguments are those of :func:`kernels.chains.search.find_extrema`; ``found`` (2, n) gets the root mean square
     and an estimate of its error, rounding included.  The status is OK, NOT_ROTATABLE, or OPEN where precise poses or
@@ -48,7 +48,7 @@ def mean_squares(chain: Chained, order: int, along: bool = False) -> Helper:
     power = 2.0 * max(order - 1, 0)
 
     def mean(
-        designs: Array, opening: Status, distance: Array, cos: Array, sin: Array, made_of: Array, target: float,
+        designs: Array, opening: Status, distance: Array, table: CosSin, made_of: Array, target: float,
         status: Status, found: Array,
     ) -> None:  # fmt: skip
         values, guards, handed = aligned(MOST + 4), aligned(max(guarded, 1) * GUARD_ROW), aligned(HANDED)
@@ -63,7 +63,7 @@ def mean_squares(chain: Chained, order: int, along: bool = False) -> Helper:
             while n * _shortened(distance[i]) < per_rho:
                 n *= 2
             while code == LOOKING and n <= MOST:
-                take(k, a, b, c, n, cos, sin, values, guards, handed)
+                take(k, a, b, c, n, table, values, guards, handed)
                 rho, code = distance[i], LOOKING if limits[last] < math.inf else OPEN
                 for s in range(guarded):
                     low, nearest = dips(n, guards, s * GUARD_ROW)
@@ -74,7 +74,7 @@ def mean_squares(chain: Chained, order: int, along: bool = False) -> Helper:
                 square, error = _trapezoid(n, values, rho, power, sums)
                 if code == LOOKING and (rho * n >= per_rho) & (error <= 2.0 * target * square):
                     root = math.sqrt(square)
-                    rounding = blur(k, a, b, n, cos, sin, values, thin) / root + EPS * (4.0 + n / ARCS) * root
+                    rounding = blur(k, a, b, n, table, values, thin) / root + EPS * (4.0 + n / ARCS) * root
                     code = OPEN
                     if rounding <= max(target, ROUGH) * root:
                         code, found[0, i], found[1, i] = st.OK, root, 0.5 * error / root + rounding
@@ -122,8 +122,8 @@ def _blur(of: Curve) -> Helper:
     """Make the function that estimates half of what rounding adds to the mean square, by some of the samples."""
     rounding = of.rounding
 
-    def blur(k: Any, a: float, b: float, n: int, cos: Array, sin: Array, values: Array, thin: Array) -> float:
-        total, begin, count = 0.0, n - FEWEST, n // THIN
+    def blur(k: Any, a: float, b: float, n: int, table: CosSin, values: Array, thin: Array) -> float:
+        (cos, sin), total, begin, count = table, 0.0, n - FEWEST, n // THIN
         us, vs, here = thin[:count], thin[FEW : FEW + count], thin[2 * FEW : 2 * FEW + count]
         for j in range(count):
             us[j], vs[j], here[j] = cos[begin + j * THIN], sin[begin + j * THIN], values[2 + j * THIN]

@@ -10,6 +10,7 @@ import math
 from typing import Any
 
 from kernels.arithmetic.intrinsics import largest
+from kernels.arithmetic.vectors import Vector
 from kernels.chains.curves import Curve
 from kernels.chains.form import STRIDE, Helper
 from kernels.curves.polynomials import rotate
@@ -34,12 +35,11 @@ _MOVED = 0.05  # by how much of that size refinement may lift a peak above the p
 
 @inline
 def append(
-    m: Array, i: int, u: float, v: float, width: float, start: float, left: float, peak: float, right: float,
-    sign: float, scale: float,
-) -> None:  # fmt: skip
-    """Put a local maximum at place i of the list: its angle, the sample there and the two beside it, times the sign."""
+    m: Array, i: int, u: float, v: float, width: float, start: float, samples: Vector, sign: float, scale: float
+) -> None:
+    """Put a local maximum at place i of the list: its angle, and the sample there between two, times the sign."""
     m[i + U], m[i + V], m[i + WIDTH], m[i + START] = u, v, width, start
-    m[i + _LEFT], m[i + _PEAK], m[i + _RIGHT] = left, peak, right
+    m[i + _LEFT], m[i + _PEAK], m[i + _RIGHT] = samples
     m[i + _SIGN], m[i + SCALE] = sign, scale
 
 

@@ -9,10 +9,8 @@ from __future__ import annotations
 
 import math
 from functools import lru_cache
-from typing import TypeAlias
 
 import numpy as np
-from numpy.typing import NDArray
 
 from kernels import status as st
 from kernels.arithmetic.intrinsics import prefetch_rows
@@ -39,9 +37,7 @@ from kernels.chains.peaks import (
 )
 from kernels.jit import generated, inline
 from kernels.types import TWO_PI as TURN
-from kernels.types import Array, Status
-
-Counts: TypeAlias = NDArray[np.int64]
+from kernels.types import Array, CosSin, Status
 
 PLAIN = 2.0**-14  # of the target: larger rounding errors are left to precise poses
 RIVALS = 64.0  # times the rounding error: peaks lower by no more may turn out the highest where it has moved them
@@ -54,7 +50,7 @@ VALUE, PHI, VALUE_ERROR, PHI_ERROR, SCALE_ROW, SPACING = range(6)
 
 @lru_cache(maxsize=64)
 def find_extrema(chain: Chained, order: int, along: bool = False) -> Helper:
-    """Make the kernel ``find(designs, opening, distance, cos, sin, made_of, mode, target, tie, status, found)``.
+    """Make the kernel ``find(designs, opening, distance, table, made_of, mode, target, tie, status, found)``.
 
     It finds one extremum over the turn of a curve of a chain, one of `kernels.chains.curves`, of that order or the
     `MARGIN`; with ``along`` of curves whose number b is 0, by fewer operations and with the same bits.
@@ -76,17 +72,18 @@ def find_extrema(chain: Chained, order: int, along: bool = False) -> Helper:
     enlist, refine, finish = enlister(chain, of), refiner(of, get), finisher(of, get)
 
     def find(
-        designs: Array, opening: Status, distance: Array, cos: Array, sin: Array, made_of: Array, mode: int,
-        target: float, tie: float, status: Status, found: Array,
+        designs: Array, opening: Status, distance: Array, table: CosSin, made_of: Array, mode: int, target: float,
+        tie: float, status: Status, found: Array,
     ) -> None:  # fmt: skip
-        m, near, span, room = aligned(rows), np.empty(BLOCK), np.empty((BLOCK, 3), np.int64), new_room(guarded, wide)
+        m, near, room = aligned(rows), np.empty(BLOCK), new_room(guarded, wide)
+        span = room.span
         rounds = 2 if target > 1e-4 else 3
         for start in range(0, designs.shape[0], BLOCK):
             end = min(start + BLOCK, designs.shape[0])
             for i in range(start, end):
                 status[i] = st.NOT_ROTATABLE if opening[i] == st.NOT_ROTATABLE else OPEN
                 near[i - start] = distance[i] if opening[i] == st.OK else 0.0
-            length = enlist(designs, start, end, near, cos, sin, made_of, mode, m, span, status, room)
+            length = enlist(designs, start, end, near, table, made_of, mode, m, status, room)
             prefetch_rows(designs, end, end + BLOCK)  # of the next block
             begin_at_vertex(length, m)
             refine(length, m, rounds)
@@ -107,7 +104,7 @@ def find_extrema(chain: Chained, order: int, along: bool = False) -> Helper:
                 rho = per_rho / (FEWEST * MORE)
                 while status[i] == UNTRUSTED and rho * MOST >= per_rho:
                     near[0] = min(rho, distance[i])
-                    length = enlist(designs, i, i + 1, near, cos, sin, made_of, mode, m, span, status, room)
+                    length = enlist(designs, i, i + 1, near, table, made_of, mode, m, status, room)
                     begin_at_vertex(length, m)
                     refine(length, m, rounds + SETTLING)
                     finish(length, m, target)

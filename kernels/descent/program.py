@@ -10,7 +10,7 @@ import numpy as np
 from kernels.descent.motion import Index
 from kernels.descent.rows import UNKNOWNS, Task
 from kernels.jit import kernel, part
-from kernels.linear.nearest_of_many import nearest_of_many
+from kernels.linear.nearest_of_many import CurveRows, Nearest, nearest_of_many
 from kernels.types import Array
 
 EXACT = 1e-11  # distance by which the point nearest to the centre may miss a row
@@ -98,10 +98,10 @@ def solve(task: Task, t: float, worth: float, q: Program, step: Array, weights: 
     for j in range(objective):
         q.right[j] = (q.right[j] + t) / task.unit
     whole = np.empty(n + 2)
+    found = Nearest(whole, q.there, weights, q.held)
     nearest_of_many(
-        q.right, q.rows, q.back, q.centre, q.low, q.high, task.turns, (NEAR, MISSED), JOINED, EXACT, whole, q.there,
-        weights, q.held,
-    )  # fmt: skip
+        CurveRows(q.right, q.rows, task.turns), q.back, q.centre, q.low, q.high, (NEAR, MISSED), JOINED, EXACT, found
+    )
     missed = 0.0
     for j in range(objective, len(weights)):
         missed = max(missed, whole[n + 1] - q.there[j])

@@ -32,7 +32,6 @@ from kernels.effects.link_loads import (
     Index,
     Room,
     TreeLoading,
-    drive_at,
     driving,
     needed,
     prepare,
@@ -200,7 +199,7 @@ def link_friction(
     for i in range(status.shape[0]):
         prepare(links, i, joints, room)
         for k in range(status.shape[1]):
-            drive = drive_at(given, i, k)
+            drive = given.drive[i, k if given.drive.shape[1] > 1 else 0]
             needed(links, i, k, given, drive, room)
             put_lines(links, i, k, joints, room)
             for which in range(number):

@@ -20,11 +20,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from kernels import status as st
-from kernels.arithmetic.vectors import Vector, add, cross, dot, mix, scale, sub, turned
+from kernels.arithmetic.vectors import Vector, add, cross, dot, mix, scale, sub
 from kernels.effects.kinetostatics import BODY, LEAST_COSINE, put_plane
 from kernels.jit import inline, kernel
 from kernels.linear.elimination import eliminate
-from kernels.linkage.bodies import DRIVEN, SLIDE, Links, Posed, latter, point, posed, put_wrench, vector
+from kernels.linkage.bodies import DRIVEN, SLIDE, Links, inertia_times, latter, point, posed, put_wrench, vector
 from kernels.types import Array, Status
 
 Index = NDArray[np.int64]
@@ -136,22 +136,6 @@ def prepare(links: Links, i: int, joints: Index, room: Room) -> None:
         room.ends[which, 1] = links.parents[body] if held else ends[line, 1]
     for which in range(room.signs.shape[1] - lines):
         _put_signs(links.parents, room.ends[which, 0], room.ends[which, 1], room.signs[:, lines + which])
-
-
-@inline
-def inertia_times(body: Posed, data: Array, a: Vector) -> Vector:
-    """Inertia tensor of a body times a vector in fixed axes."""
-    p, q, r = dot(body.x, a), dot(body.y, a), dot(body.z, a)
-    return turned(body.x, body.y, body.z, (
-        data[4] * p + data[5] * q + data[6] * r, data[5] * p + data[7] * q + data[8] * r,
-        data[6] * p + data[8] * q + data[9] * r,
-    ))  # fmt: skip
-
-
-@inline
-def drive_at(given: TreeLoading, i: int, k: int) -> Array:
-    """Speed, its rate and the loads of one pose, (PER_DRIVE,)."""
-    return given.drive[i, k if given.drive.shape[1] > 1 else 0]
 
 
 @inline
@@ -339,7 +323,7 @@ def link_loads(
     for i in range(status.shape[0]):
         prepare(links, i, joints, room)
         for k in range(status.shape[1]):
-            drive = drive_at(given, i, k)
+            drive = given.drive[i, k if given.drive.shape[1] > 1 else 0]
             if frame_moment is not None or solved:
                 both = needed(links, i, k, given, drive, room)
             if solved:

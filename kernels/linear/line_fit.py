@@ -13,6 +13,7 @@ The minimax solution is found by Stiefel's exchange on four points, started from
 from __future__ import annotations
 
 import math
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -214,21 +215,29 @@ def _couplers(b_x: Array, b_y: Array, c_x: Array, c_y: Array, bx: Array, by: Arr
     return good
 
 
+class Straightest(NamedTuple):
+    """The point that runs straightest: what comes out of :func:`line_fit`.
+
+    Parameters
+    ----------
+    xi, eta, h : (n,) coupler point in the coupler's frame and offset of the line [length]
+    deviation : (n,) largest deviation over the working part [length]
+    travel : (n,) travel along the line over all m positions [length]
+    status : (n,) OK, NOT_ASSEMBLED where a position is nan, NOT_CONVERGED where the exchange stalls or the points do
+        not determine a line (then the least-squares point is returned)
+    """
+
+    xi: Array
+    eta: Array
+    h: Array
+    deviation: Array
+    travel: Array
+    status: Status
+
+
 @kernel
 def line_fit(
-    b_x: Array,
-    b_y: Array,
-    c_x: Array,
-    c_y: Array,
-    window: Array,
-    lam: Array,
-    free_direction: bool,
-    xi: Array,
-    eta: Array,
-    h: Array,
-    deviation: Array,
-    travel: Array,
-    status: Status,
+    b_x: Array, b_y: Array, c_x: Array, c_y: Array, window: Array, lam: Array, free_direction: bool, found: Straightest
 ) -> None:
     """Compute the coupler point and line with the smallest largest deviation over the working part of the travel.
 
@@ -237,18 +246,14 @@ def line_fit(
     b_x, b_y, c_x, c_y : (n, m) positions of the coupler's two pins [length]; nan where not assembled
     window : (2,) working part as fractions of the travel along lam, counted from its smallest value
     lam : (n,) direction of the line [rad]; with ``free_direction`` replaced by the best one within 90 degrees of it
-    xi, eta, h : (n,) out, coupler point in the coupler's frame and offset of the line [length]
-    deviation : (n,) out, largest deviation over the working part [length]
-    travel : (n,) out, travel along the line over all m positions [length]
-    status : (n,) out; OK, NOT_ASSEMBLED where a position is nan, NOT_CONVERGED where the exchange stalls or the points
-        do not determine a line (then the least-squares point is returned)
+    found : out
 
     Notes
     -----
     Which positions belong to the working part depends on the point, so fit and window are repeated until they are the
     same as before, three times at most.
     """
-    m = b_x.shape[1]
+    m, (xi, eta, h, deviation, travel, status) = b_x.shape[1], found
     bx, by, dx, dy = np.empty(m), np.empty(m), np.empty(m), np.empty(m)
     along, target = np.empty(m), np.empty(m)
     inside = np.empty(m, np.bool_)

@@ -6,6 +6,7 @@ A program like the one before begins with the rows that held there.
 from __future__ import annotations
 
 import math
+from typing import NamedTuple
 
 import numpy as np
 
@@ -126,23 +127,41 @@ def _stepped(values: Array, slopes: Array, back: Array, y: Array, step: Array, t
             there[j] += step[i] * slopes[i, j]
 
 
+class CurveRows(NamedTuple):
+    """Rows of a program, ``values + step slopes >= 0``.
+
+    Parameters
+    ----------
+    values, slopes : (r,) and (n, r)
+    turns : (T, m) numbers of the rows that are one curve around its turn
+    """
+
+    values: Array
+    slopes: Array
+    turns: Index
+
+
+class Nearest(NamedTuple):
+    """What comes out of a program.
+
+    Parameters
+    ----------
+    step, there, weights : (n,), (r,) and (r,): the step, the rows after it, and their weights, none negative
+    begin : (n + 1,) in: rows that held in a program like this one, and their count first, from which it goes on: those
+        of the box count backwards from -1.  Out: those that hold in this one
+    """
+
+    step: Array
+    there: Array
+    weights: Array
+    begin: Index
+
+
 @kernel
 def nearest_of_many(
-    values: Array,
-    slopes: Array,
-    back: Array,
-    centre: Array,
-    low: Array,
-    high: Array,
-    turns: Index,
-    near: tuple[float, float],
-    rounds: int,
-    tolerance: float,
-    step: Array,
-    there: Array,
-    weights: Array,
-    begin: Index,
-) -> int:
+    of: CurveRows, back: Array, centre: Array, low: Array, high: Array, near: tuple[float, float], rounds: int,
+    tolerance: float, found: Nearest,
+) -> int:  # fmt: skip
     """Step of a quadratic program with hundreds of rows along turns, of which few matter.
 
     The step is ``back y`` with y nearest to a centre.  Rows join where they are near their bound and lowest among their
@@ -150,22 +169,20 @@ def nearest_of_many(
 
     Parameters
     ----------
-    values, slopes : (r,) and (n, r) of the rows, ``values + step slopes >= 0``
+    of : rows
     back : (n, n) the step's axes
     centre : (n,)
     low, high : (n,) and (h,) bounds of the step, of its first h elements from above
-    turns : (T, m) numbers of the rows that are one curve around its turn
     near : values from which on rows do not join at first, and by how much a row has to be missed to join later
     rounds : of joining at most
     tolerance : see :func:`kernels.linear.nearest.nearest`
-    step, there, weights : (n,), (r,) and (r,) out: the step, the rows after it, and their weights, none negative
-    begin : (n + 1,) rows that held in a program like this one, and their count first, from which it goes on: those of
-        the box count backwards from -1.  Written: those that hold in this one
+    found : out
 
     Returns
     -------
     Status of the last round, as of :func:`kernels.linear.nearest.nearest`.
     """
+    (values, slopes, turns), (step, there, weights, begin) = of, found
     n, count = slopes.shape
     boxes = n + len(high)
     rows, needs, size = np.empty((n, count + boxes)), np.empty(count + boxes), np.empty(count + boxes)

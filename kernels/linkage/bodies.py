@@ -230,3 +230,13 @@ def put_crank(
 def turned_about(axis: Vector, cos: float, sin: float, a: Vector) -> Vector:
     """Return a vector turned about a unit axis."""
     return add(mix(cos, a, sin, cross(axis, a)), scale((1.0 - cos) * dot(axis, a), axis))
+
+
+@inline
+def inertia_times(body: Posed, data: Array, a: Vector) -> Vector:
+    """Inertia tensor of a body times a vector in fixed axes."""
+    p, q, r = dot(body.x, a), dot(body.y, a), dot(body.z, a)
+    return turned(body.x, body.y, body.z, (
+        data[4] * p + data[5] * q + data[6] * r, data[5] * p + data[7] * q + data[8] * r,
+        data[6] * p + data[8] * q + data[9] * r,
+    ))  # fmt: skip

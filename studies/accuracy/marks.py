@@ -67,11 +67,11 @@ def study_mark(took: float) -> Mark:
 
 
 def _true_maxima(designs: Array) -> Callable[[], tuple[Array, Array, Array]]:
-    cos, sin = rssr.sampling_tables()
+    table = rssr.sampling_tables()
     status, found, error = np.empty(len(designs), np.uint8), np.empty(len(designs)), np.empty((3, len(designs)))
 
     def run() -> tuple[Array, Array, Array]:
-        rssr.true_maxima(designs, cos, sin, TARGET, status, None, error, None, None, found, None)
+        rssr.true_maxima(designs, table, TARGET, status, None, error, None, None, found, None)
         return found, error[1], status.astype(np.float64)
 
     return run

@@ -161,7 +161,7 @@ def true_maxima(designs: Array, wanted: frozenset[str], accuracy: Accuracy) -> C
     n, names = len(designs), ("dpsi", "d2psi", "d3psi")
     status, phi, error, phi_error = np.empty(n, np.uint8), *(np.empty((3, n)) for _ in range(3))
     most = [np.empty(n) if wanted & {f"max_abs_{x}", f"phi_max_abs_{x}"} else None for x in names]
-    rssr.true_maxima(designs, *sampling_tables(), accuracy.target, status, phi, error, phi_error, *most)
+    rssr.true_maxima(designs, sampling_tables(), accuracy.target, status, phi, error, phi_error, *most)
     columns: Columns = {"status": status}
     for order, name in enumerate(names):
         pairs = ((f"max_abs_{name}", most[order], error), (f"phi_max_abs_{name}", phi[order], phi_error))
@@ -176,7 +176,7 @@ def certified_maxima(designs: Array, wanted: frozenset[str], accuracy: Accuracy)
 
     The place of a maximum is one where its value is taken; how far it is from the exact place stays an estimate.
     """
-    from kernels.families.rssr.certify import certify_maxima  # here: only proofs wait for its import
+    from kernels.families.rssr.certify import InSeries, certify_maxima  # here: only proofs wait for its import
 
     assert accuracy.target is not None
     n = len(designs)
@@ -189,9 +189,10 @@ def certified_maxima(designs: Array, wanted: frozenset[str], accuracy: Accuracy)
         status = searched["status"].astype(np.uint8)
         value, place = (np.array(searched[key], np.float64) for key in (most, phi))
         error, far = np.full(n, np.nan), np.asarray(searched[f"err_{phi}"], np.float64)
+        alone = InSeries(np.ascontiguousarray(designs)[None], np.empty((0, n, 2)), np.zeros((n, 8)))
         certify_maxima(
-            np.ascontiguousarray(designs)[None], np.empty((0, n, 2)), np.zeros((n, 8)), np.array([(2, order)]),
-            accuracy.target, MOST_CELLS, status[None], value[None], place[None], error[None], np.empty(n),
+            alone, np.array([(2, order)]), accuracy.target, MOST_CELLS, status[None], value[None], place[None],
+            error[None], np.empty(n),
         )  # fmt: skip
         # Where the proof found a higher peak it climbed it to a thousandth of the target.
         elsewhere = np.abs(place - np.asarray(searched[phi], np.float64)) > far

@@ -64,7 +64,7 @@ class FusedCurve:
         tie = TIE if self.request.place else -1.0
         status, found = np.empty(n, np.uint8), np.empty((6, n))
         chains.find_extrema(_chained(self.forms), self.order, along)(
-            *given, *sampling_tables(), made_of, self.request.mode, target, tie, status, found
+            *given, sampling_tables(), made_of, self.request.mode, target, tie, status, found
         )
         value, phi, err, err_phi, scale, spacing = found
         if self.scale is not None:
@@ -90,7 +90,7 @@ class FusedCurve:
         n, (given, made_of, along) = len(designs), self._given(designs)
         status, found = np.empty(n, np.uint8), np.empty((2, n))
         chains.mean_squares(_chained(self.forms), self.order, along)(
-            *given, *sampling_tables(), made_of, target, status, found
+            *given, sampling_tables(), made_of, target, status, found
         )
         undecided = status == chains.OPEN
         return found[0], found[1], np.where(undecided, st.OK, status).astype(np.uint8), undecided

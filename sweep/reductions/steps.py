@@ -76,7 +76,7 @@ def _proven(
     wanted: frozenset[str],
     accuracy: Accuracy,
 ) -> Columns:
-    from kernels.families.rssr.certify import certify_maxima  # here: only proofs wait for its import
+    from kernels.families.rssr.certify import InSeries, certify_maxima  # here: only proofs wait for its import
 
     assert accuracy.target is not None
     n = len(designs)
@@ -93,7 +93,7 @@ def _proven(
     phi = np.stack([found[request].phi for request in requests])
     status, error = np.tile(searched, (len(names), 1)), np.full(value.shape, np.nan)
     certify_maxima(
-        np.stack(loops), joined, shares, np.array([known[name] for name in names], np.int64), accuracy.target,
+        InSeries(np.stack(loops), joined, shares), np.array([known[name] for name in names], np.int64), accuracy.target,
         MOST_CELLS, status, value, phi, error, np.empty(n),
     )  # fmt: skip
     columns: Columns = {"status": searched.copy()}

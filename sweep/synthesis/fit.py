@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from kernels import status as codes
-from kernels.linear.line_fit import line_fit
+from kernels.linear.line_fit import Straightest, line_fit
 from sweep.errors import InputError
 from sweep.evaluation.summaries import design_outputs
 from sweep.families import family as find_family
@@ -121,12 +121,9 @@ def _fitted(
             part[missing] = np.nan
     values = np.array([own[:, guide.parameter_names.index(name)] for name in guided.fitted])
     along, across, direction, offset = values
-    deviation, travel, found = np.empty(len(own)), np.empty(len(own)), np.empty(len(own), np.uint8)
-    line_fit(
-        parts[0], parts[1], parts[2], parts[3], limits, direction, fit.free_direction,
-        along, across, offset, deviation, travel, found,
-    )  # fmt: skip
-    return values, travel, found
+    found = Straightest(along, across, offset, *np.empty((2, len(own))), np.empty(len(own), np.uint8))
+    line_fit(parts[0], parts[1], parts[2], parts[3], limits, direction, fit.free_direction, found)
+    return values, found.travel, found.status
 
 
 def driving_outputs(family: Family) -> tuple[str, ...]:

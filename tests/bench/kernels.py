@@ -136,14 +136,14 @@ def _agree(runs: dict[str, tuple[Run, float]]) -> None:
 def _per_design(designs: np.ndarray, status: np.ndarray) -> dict[str, tuple[Run, float]]:  # type: ignore[type-arg]
     n = float(len(designs))
     most, places, errors = np.empty(len(designs)), np.empty((3, len(designs))), np.empty((3, len(designs)))
-    limits, tables = np.empty((len(designs), 7)), rssr.sampling_tables()
+    limits, table = np.empty((len(designs), 7)), rssr.sampling_tables()
     # Whether a crank turns is asked of everything; ten times the designs, for a run long enough to be timed.
     mixed = random_designs(10 * len(designs), 2)
     verdict, margin, turns, angle = np.empty(len(mixed), np.uint8), *(np.empty(len(mixed)) for _ in range(3))
 
     def true(order: int) -> Run:
         wanted = [most if k == order else None for k in (1, 2, 3)]
-        return lambda: rssr.true_maxima(designs, *tables, 1e-8, status, places, errors, None, *wanted)
+        return lambda: rssr.true_maxima(designs, table, 1e-8, status, places, errors, None, *wanted)
 
     return {
         "margin, rotatable": (lambda: rssr.margin(mixed, verdict, margin, turns, None, None, None), 10.0 * n),

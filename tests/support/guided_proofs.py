@@ -7,7 +7,7 @@ from mpmath import mp
 
 from kernels import status as st
 from kernels.families import guide
-from kernels.families.rssr.certify import certify_maxima
+from kernels.families.rssr.certify import InSeries, certify_maxima
 from sweep.families import family
 from sweep.families.guide import as_crank_rocker
 from sweep.quantities.kinds import Request
@@ -42,7 +42,7 @@ def parts(designs, rockers, couplings, last):
     joined = np.reshape([designs[:, k : k + 2] for k in couplings], (len(couplings), len(designs), 2))
     shares = np.empty((len(designs), 8))
     guide.point_shares(driven_by, shares)
-    return stages, joined, shares
+    return InSeries(stages, joined, shares)
 
 
 def rotating(name, n, seed, curves=("d2s",)):
@@ -62,7 +62,7 @@ def certify(name, designs, curves, value, phi, target=1e-8, most=1000, function=
     which = np.array([CURVES[curve] for curve in curves], np.int64)
     out = {"status": np.zeros(np.shape(value), np.uint8), "max": np.array(value, float), "phi": np.array(phi, float)}
     out |= {"error": np.full(np.shape(value), np.nan), "cells": np.empty(len(designs))}
-    function(*parts(designs, rockers, couplings, last), which, target, most, *out.values())
+    function(parts(designs, rockers, couplings, last), which, target, most, *out.values())
     return out
 
 

@@ -72,7 +72,7 @@ def maxima(designs, order, target=1e-8, *, function=rssr.true_maxima):
     out = {name: np.empty((3, n)) for name in ("phi", "error", "phi_error")}
     most, status = np.empty(n), np.empty(n, np.uint8)
     wanted = [most if k == order else None for k in (1, 2, 3)]
-    function(designs, *rssr.sampling_tables(), target, status, *out.values(), *wanted)
+    function(designs, rssr.sampling_tables(), target, status, *out.values(), *wanted)
     return {name: rows[order - 1] for name, rows in out.items()} | {"max": most, "status": status}
 
 

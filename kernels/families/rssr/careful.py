@@ -8,6 +8,7 @@ where the next derivative changes sign.  The march is repeated with half the ste
 from __future__ import annotations
 
 import math
+from typing import NamedTuple
 
 from kernels.arithmetic.intrinsics import largest
 from kernels.families.rssr.closure import EPS, closure_terms, follower, order_pair
@@ -18,20 +19,20 @@ _WIDEST = TWO_PI / 24.0
 _ATTEMPTS = 8
 
 
+class Loop(NamedTuple):
+    """Numbers of a design's closure, those of :class:`kernels.linkage.crank_closure.Reduced`."""
+
+    e: float
+    y0: float
+    ca: float
+    k0: float
+    k1: float
+    k2: float
+    w_size: float
+
+
 @inline
-def rounding(
-    order: int,
-    e: float,
-    y0: float,
-    ca: float,
-    k0: float,
-    k1: float,
-    k2: float,
-    w_size: float,
-    u: float,
-    v: float,
-    height: float,
-) -> tuple[float, float]:
+def rounding(order: int, of: Loop, u: float, v: float, height: float) -> tuple[float, float]:
     """Relative rounding errors of the transfer function of that order where it is ``height``, and of its slope.
 
     There are three sources of error.  First, the function is proportional to Delta^(1/2 - order), so a relative error
@@ -40,6 +41,7 @@ def rounding(
     closure X C - Y S + W divided by T.  Where W is a small difference of large terms, its error hardly changes Delta
     but changes the slope of Delta, and with it the slope of the function [1/rad].
     """
+    e, y0, ca, k0, k1, k2, w_size = of
     x, y, w = closure_terms(e, y0, ca, k0, k1, k2, u, v)
     # Magnitudes of the terms that X and Y are sums of: rounding is proportional to these, not to the sums.
     mx, my = abs(e) + 1.0, abs(y0) + abs(ca)
@@ -65,26 +67,14 @@ def _gap(phi: float, centre: float) -> float:
 
 @kernel
 def careful_maximum(
-    order: int,
-    e: float,
-    y0: float,
-    ca: float,
-    k0: float,
-    k1: float,
-    k2: float,
-    w_size: float,
-    phi1: float,
-    rho1: float,
-    phi2: float,
-    rho2: float,
-    target: float,
+    order: int, of: Loop, phi1: float, rho1: float, phi2: float, rho2: float, target: float
 ) -> tuple[float, float, float, float, bool]:
     """Largest |d^order psi / dphi^order|, its crank angle, errors of both, and whether two marches agreed.
 
     Parameters
     ----------
     order : 1, 2 or 3
-    e ... w_size : of :class:`Reduced`
+    of : the design
     phi1, rho1, phi2, rho2 : where Delta is smallest and how far its complex zeros are there, twice [rad]
     target : relative error wanted
     """
@@ -94,24 +84,22 @@ def careful_maximum(
     for _ in range(_ATTEMPTS):
         best, place, error, reach, missed = 0.0, 0.0, 0.0, 0.0, False
         phi, end = phi1, phi1 + TWO_PI
-        y, dy = _evaluate(order, e, y0, ca, k0, k1, k2, phi)
+        y, dy = _evaluate(order, of, phi)
         while phi < end:
             # Distance of the nearer complex zero of Delta; its imaginary part keeps the step from vanishing.
             near = min(math.hypot(rho1, _gap(phi, phi1)), math.hypot(rho2, _gap(phi, phi2)))
             following = phi + min(2.0 * fineness * _WIDEST, fineness * near)
-            y2, dy2 = _evaluate(order, e, y0, ca, k0, k1, k2, following)
+            y2, dy2 = _evaluate(order, of, following)
             if y * dy > 0.0 and y2 * dy2 <= 0.0 and max(abs(y), abs(y2)) > 0.5 * best:
                 if y * y2 < 0.0:
                     # The function changed its sign too, so the step was too long to hold one simple maximum.
                     missed = True
                 else:
-                    peak, where, bound, width = _bracketed(
-                        order, e, y0, ca, k0, k1, k2, phi, dy, following, dy2, target
-                    )
+                    peak, where, bound, width = _bracketed(order, of, phi, dy, following, dy2, target)
                     if peak > best:
                         best, place, error, reach = peak, where, bound, width
             phi, y, dy = following, y2, dy2
-        relative, _ = rounding(order, e, y0, ca, k0, k1, k2, w_size, math.cos(place), math.sin(place), best)
+        relative, _ = rounding(order, of, math.cos(place), math.sin(place), best)
         error += best * relative
         change = abs(best - before)
         if not missed and best > 0.0 and change <= 0.1 * target * best + error:
@@ -122,27 +110,14 @@ def careful_maximum(
 
 
 @inline
-def _evaluate(
-    order: int, e: float, y0: float, ca: float, k0: float, k1: float, k2: float, phi: float
-) -> tuple[float, float]:
-    p, q, j, k = follower(e, y0, ca, k0, k1, k2, math.cos(phi), math.sin(phi))
+def _evaluate(order: int, of: Loop, phi: float) -> tuple[float, float]:
+    p, q, j, k = follower(of.e, of.y0, of.ca, of.k0, of.k1, of.k2, math.cos(phi), math.sin(phi))
     return order_pair(order, p, q, j, k)
 
 
 @kernel
 def _bracketed(
-    order: int,
-    e: float,
-    y0: float,
-    ca: float,
-    k0: float,
-    k1: float,
-    k2: float,
-    lo: float,
-    f_lo: float,
-    hi: float,
-    f_hi: float,
-    target: float,
+    order: int, of: Loop, lo: float, f_lo: float, hi: float, f_hi: float, target: float
 ) -> tuple[float, float, float, float]:
     """Refine by Illinois' regula falsi, bisecting every third step; |y|, phi and bounds of their errors."""
     y, mid, bound = 0.0, lo, math.inf
@@ -151,7 +126,7 @@ def _bracketed(
         mid = 0.5 * (lo + hi) if step % 3 == 2 else (lo * f_hi - hi * f_lo) / (f_hi - f_lo)
         if not lo <= mid <= hi:
             mid = 0.5 * (lo + hi)
-        y, dy = _evaluate(order, e, y0, ca, k0, k1, k2, mid)
+        y, dy = _evaluate(order, of, mid)
         bound = abs(dy) * (hi - lo)
         if bound <= 0.01 * target * abs(y) or hi - lo <= 4.0 * EPS * abs(mid):
             break

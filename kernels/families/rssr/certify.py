@@ -5,6 +5,8 @@ docs/rssr.md, section 6.1, and docs/extrema.md, section 5.
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -17,10 +19,25 @@ from kernels.jit import kernel
 from kernels.types import Array, Status
 
 
+class InSeries(NamedTuple):
+    """Designs of K crank-rockers of which each drives the next.
+
+    Parameters
+    ----------
+    stages : (K, n, 8) columns as `PARAMETERS` of sweep/families/rssr.py, the four-bar of a guide last
+    couplings : (K - 1, n, 2) kappa and offset [rad] of each stage but the first
+    shares : (n, 8) of :func:`kernels.families.guide.point_shares`; any where no curve is of a point
+    """
+
+    stages: Stages
+    couplings: Array
+    shares: Array
+
+
 @kernel
 def certify_maxima(
-    stages: Stages, couplings: Array, shares: Array, curves: NDArray[np.int64], target: float, most: int,
-    status: Status, maximum: Array, phi: Array, error: Array, cells: Array,
+    designs: InSeries, curves: NDArray[np.int64], target: float, most: int, status: Status, maximum: Array,
+    phi: Array, error: Array, cells: Array,
 ) -> None:  # fmt: skip
     """Prove maxima of derivatives of a rocker's angle, or of the way of a point that crank-rockers in series guide.
 
@@ -30,9 +47,7 @@ def certify_maxima(
 
     Parameters
     ----------
-    stages : (K, n, 8) columns as `PARAMETERS` of sweep/families/rssr.py, the four-bar of a guide last
-    couplings : (K - 1, n, 2) kappa and offset [rad] of each stage but the first
-    shares : (n, 8) of :func:`kernels.families.guide.point_shares`; any where no curve is of a point
+    designs : n of them
     curves : (m, 2); of each curve whether it is the way along the line (0) or across it (1), or the velocity of the
         first rocker (2), and the order of its derivative by phi: 1 to 3 along, 0 to 3 across, 0 to 2 of the velocity
     target : relative error within which no other peak may be higher
@@ -42,7 +57,8 @@ def certify_maxima(
     error : (m, n) out [length], proven bound of the absolute error of ``maximum``; nan where nothing is proven
     cells : (n,) out, how many enclosures it took; 0 for what is not looked at
     """
-    n, count, rows = cells.size, stages.shape[0], stages.shape[0] * STAGE + SHARES * LANES
+    n, count = cells.size, designs.stages.shape[0]
+    rows = count * STAGE + SHARES * LANES
     numbers, design, good = np.zeros(rows), np.empty(LANES, np.int64), np.zeros(LANES)
     walk, of, jets = np.zeros(cells_of.WALK), np.zeros((curves.shape[0], cells_of.CURVE)), np.zeros(JETS)
     along, across, rate = (curves[:, 0] == 0).any(), (curves[:, 0] == 1).any(), (curves[:, 0] == 2).any()
@@ -53,7 +69,7 @@ def certify_maxima(
             cells[coming] = 0.0
             if status[0, coming] == st.OK:
                 design[lanes] = coming
-                load(lanes, numbers, stages, couplings, shares, coming)
+                load(lanes, numbers, designs.stages, designs.couplings, designs.shares, coming)
                 covering.begin(lanes, walk, of, phi, coming, most)
                 lanes += 1
             coming += 1

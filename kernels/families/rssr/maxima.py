@@ -11,6 +11,7 @@ The fused search of chains (:mod:`kernels.chains`) finds the same within 1e-11, 
 from __future__ import annotations
 
 import math
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -42,7 +43,7 @@ from kernels.families.rssr.block import (
     new_block,
     singularity_distance,
 )
-from kernels.families.rssr.careful import careful_maximum
+from kernels.families.rssr.careful import Loop, careful_maximum
 from kernels.families.rssr.closure import Array, Status
 from kernels.families.rssr.sampling import (
     ERROR,
@@ -56,6 +57,7 @@ from kernels.families.rssr.sampling import (
     REACH,
     ROUNDING,
     START,
+    Samples,
     begin_at_vertex,
     finish,
     list_marked,
@@ -72,11 +74,45 @@ from kernels.families.rssr.sampling import (
 from kernels.jit import inline, kernel
 from kernels.linkage.verdict import turning_status
 from kernels.types import TWO_PI as TURN
+from kernels.types import CosSin
 
 Counts = NDArray[np.int64]
 PER_RHO, PER_RHO_JERK = 11.0, 18.0  # samples per distance of the nearest singularity, at least
 _NONE = (math.nan, math.nan, math.nan, math.nan)
 _NEEDED = (E, Y0, CA, K0, K1, K2, W_SIZE, SA, C1, S1, C2, S2, COS, SIN, DELTA)  # what the search needs of a design
+
+
+class Search(NamedTuple):
+    """Memory of the search of one order: samples of a block and of one design, the list of maxima, where each begins.
+
+    The maxima of design i of a block are those from first[i] to first[i + 1] of the list.
+    """
+
+    grid: Array
+    size: Array
+    m: Array
+    first: Counts
+
+
+class Places(NamedTuple):
+    """Where maxima stand, and the errors of both, (3, n) each; None for what is not wanted."""
+
+    phi: Array | None
+    error: Array | None
+    phi_error: Array | None
+
+
+class Heights(NamedTuple):
+    """Maxima of the first, second and third derivative, (n,); None for what is not wanted."""
+
+    dpsi: Array | None
+    d2psi: Array | None
+    d3psi: Array | None
+
+
+@inline
+def _new_search() -> Search:
+    return Search(np.empty(GRID_SIZE), np.empty(MOST + 2), new_list(), np.empty(BLOCK + 1, np.int64))
 
 
 @inline
@@ -90,10 +126,10 @@ def _careful(at: Array, k: int, order: int, target: float) -> tuple[tuple[float,
     rho1 = math.sqrt(2.0 * at[k + DELTA] / here.curvature) if here.curvature > 0.0 else math.inf
     rise = at[k + DELTA] + max(there.value - here.value, 0.0)
     rho2 = math.sqrt(2.0 * rise / there.curvature) if there.curvature > 0.0 else math.inf
+    of = Loop(at[k + E], at[k + Y0], at[k + CA], at[k + K0], at[k + K1], at[k + K2], at[k + W_SIZE])
     best, place, error, reach, agreed = careful_maximum(
-        order, at[k + E], at[k + Y0], at[k + CA], at[k + K0], at[k + K1], at[k + K2], at[k + W_SIZE],
-        math.atan2(v, u), rho1, math.atan2(fv, fu), rho2, target,
-    )  # fmt: skip
+        order, of, math.atan2(v, u), rho1, math.atan2(fv, fu), rho2, target
+    )
     return ((best, place, error, reach) if agreed else _NONE), agreed
 
 
@@ -160,87 +196,81 @@ def _highest(begin: int, end: int, m: Array) -> tuple[float, float, float, float
 
 @inline
 def _list_maxima(
-    block: int, at: Array, cos: Array, sin: Array, grid: Array, size: Array, m: Array, first_peak: Counts,
-    per_rho: float, first: Array | None, second: Array | None,
-) -> None:  # fmt: skip
+    block: int, at: Array, table: CosSin, of: Search, per_rho: float, first: Array | None, second: Array | None
+) -> None:
     """List the local maxima of a block among its samples, or more where they are needed; those of one order."""
     count = 0
     for i in range(block):
-        first_peak[i] = count
+        of.first[i] = count
         if at[i + ACROSS] * MOST < per_rho:
             continue
         n = FEWEST
         while n * at[i + ACROSS] < per_rho:
             n *= 2
         if n == FEWEST:
-            marks = int(grid[MARKS + i])
-            count = list_marked(marks, at, i, cos, sin, grid, i, BLOCK, n, 0, m, count)
+            count = list_marked(int(of.grid[MARKS + i]), at, i, table, Samples(of.grid, i, BLOCK), n, 0, of.m, count)
         else:
-            sample(at, i, cos, sin, n, size, first, second)
-            count = list_peaks(at, i, cos, sin, n, size, m, count)
-    first_peak[block] = count
+            sample(at, i, table, n, of.size, first, second)
+            count = list_peaks(at, i, table, n, of.size, of.m, count)
+    of.first[block] = count
 
 
 @inline
-def _list_both(
-    block: int, at: Array, cos: Array, sin: Array, grid_p: Array, grid_q: Array, of_p: Array, of_q: Array, m_p: Array,
-    m_q: Array, first_p: Counts, first_q: Counts,
-) -> None:  # fmt: skip
+def _list_both(block: int, at: Array, table: CosSin, of_p: Search, of_q: Search) -> None:
     """As :func:`_list_maxima`, of the first and the second order, which share their samples."""
     count_p, count_q = 0, 0
     for i in range(block):
-        first_p[i], first_q[i] = count_p, count_q
+        of_p.first[i], of_q.first[i] = count_p, count_q
         if at[i + ACROSS] * MOST < PER_RHO:
             continue
         n = FEWEST
         while n * at[i + ACROSS] < PER_RHO:
             n *= 2
         if n == FEWEST:
-            marks_p, marks_q = int(grid_p[MARKS + i]), int(grid_q[MARKS + i])
-            count_p = list_marked(marks_p, at, i, cos, sin, grid_p, i, BLOCK, n, 0, m_p, count_p)
-            count_q = list_marked(marks_q, at, i, cos, sin, grid_q, i, BLOCK, n, 0, m_q, count_q)
+            p, q = Samples(of_p.grid, i, BLOCK), Samples(of_q.grid, i, BLOCK)
+            count_p = list_marked(int(of_p.grid[MARKS + i]), at, i, table, p, n, 0, of_p.m, count_p)
+            count_q = list_marked(int(of_q.grid[MARKS + i]), at, i, table, q, n, 0, of_q.m, count_q)
         else:
-            sample_both(at, i, cos, sin, n, of_p, of_q)
-            count_p = list_peaks(at, i, cos, sin, n, of_p, m_p, count_p)
-            count_q = list_peaks(at, i, cos, sin, n, of_q, m_q, count_q)
-    first_p[block], first_q[block] = count_p, count_q
+            sample_both(at, i, table, n, of_p.size, of_q.size)
+            count_p = list_peaks(at, i, table, n, of_p.size, of_p.m, count_p)
+            count_q = list_peaks(at, i, table, n, of_q.size, of_q.m, count_q)
+    of_p.first[block], of_q.first[block] = count_p, count_q
 
 
 @inline
 def _maxima_of(
-    start: int, block: int, at: Array, who: Counts, m: Array, first_peak: Counts, target: float,
-    status: Status, phi: Array | None, error: Array | None, phi_error: Array | None, max_abs_dpsi: Array | None,
-    max_abs_d2psi: Array | None, max_abs_d3psi: Array | None,
+    start: int, block: int, at: Array, who: Counts, of: Search, target: float, status: Status, places: Places,
+    heights: Heights,
 ) -> None:  # fmt: skip
-    """Refine the listed maxima of one transfer function of a block; exactly one of the last is given."""
-    order = 1 if max_abs_dpsi is not None else (2 if max_abs_d2psi is not None else 3)
+    """Refine the listed maxima of one transfer function of a block; exactly one height is given."""
+    m, first_peak, first, second = of.m, of.first, heights.dpsi, heights.d2psi
+    order = 1 if first is not None else (2 if second is not None else 3)
     # The parabola at the end is one more; the one maximum in hundreds that is not settled then gets another three.
     rounds = (2 if order == 1 else 3) - (1 if target > 1e-4 else 0)
     padded = (first_peak[block] + 7) & ~7  # whole vectors; what stands in the surplus is never read
     begin_at_vertex(padded, m)
-    refine(0, padded, m, rounds, max_abs_dpsi, max_abs_d2psi)
-    finish(0, padded, m, order, target, max_abs_dpsi, max_abs_d2psi, error, phi_error)
+    refine(0, padded, m, rounds, first, second)
+    finish(0, padded, m, order, target, first, second, places.error, places.phi_error)
     for i in range(block):
         begin, end = first_peak[i], first_peak[i + 1]
         worst = max(m[begin + ERROR], m[end - 1 + ERROR]) if end > begin else math.inf
         for peak in range(begin + 1, end - 1):
             worst = max(worst, m[peak + ERROR])
         if end > begin and not worst < math.inf:
-            worst = settle(begin, end, m, order, target, max_abs_dpsi, max_abs_d2psi, error, phi_error)
+            worst = settle(begin, end, m, order, target, first, second, places.error, places.phi_error)
         if worst < math.inf:
             result = _highest(begin, end, m)
         else:
             result, agreed = _careful(at, i, order, target)
             if not agreed:
                 status[start + who[i]] = st.NOT_CONVERGED
-        _put(start + who[i], order, result, phi, error, phi_error, max_abs_dpsi, max_abs_d2psi, max_abs_d3psi)
+        _put(start + who[i], order, result, *places, *heights)
 
 
 @kernel
 def true_maxima(
     designs: Array,
-    cos: Array,
-    sin: Array,
+    table: CosSin,
     target: float,
     status: Status,
     phi: Array | None,
@@ -255,7 +285,7 @@ def true_maxima(
     Parameters
     ----------
     designs : (n, 8) columns as `PARAMETERS` of sweep/families/rssr.py
-    cos, sin : :func:`sampling_tables`
+    table : :func:`sampling_tables`
     target : relative error wanted, 1e-3 ... 1e-12
     status : (n,) out; OK, NOT_ROTATABLE, UNDECIDABLE, NOT_CONVERGED or INVALID_INPUT
     phi : (3, n) out, or None [rad], crank angles in [0, 2 pi) of the maxima, of order 1, 2 and 3
@@ -268,46 +298,34 @@ def true_maxima(
     together shares reduction and samples, and has the bits that it has by itself.  The search is statistical, not
     proven; docs/rssr.md gives the number of random designs it was measured on.
     """
-    at, who, size, spare = new_block(), np.empty(BLOCK, np.int64), np.empty(MOST + 2), np.empty(MOST + 2)
-    grid, m, first_peak = np.empty(GRID_SIZE), new_list(), np.empty(BLOCK + 1, np.int64)
-    grid_q, m_q, first_q = np.empty(GRID_SIZE), new_list(), np.empty(BLOCK + 1, np.int64)
+    at, who, of, of_q = new_block(), np.empty(BLOCK, np.int64), _new_search(), _new_search()
+    places = Places(phi, error, phi_error)
     for start in range(0, designs.shape[0], BLOCK):
         count = min(BLOCK, designs.shape[0] - start)
         load_block(designs, start, count, at)
         least_delta(count, at)
         block = _keep_what_turns(start, count, at, who, status)
         for i in range(start, start + count if block < count else start):
-            _put(i, 1, _NONE, phi, error, phi_error, max_abs_dpsi, None, None)
-            _put(i, 2, _NONE, phi, error, phi_error, None, max_abs_d2psi, None)
-            _put(i, 3, _NONE, phi, error, phi_error, None, None, max_abs_d3psi)
+            _put(i, 1, _NONE, *places, max_abs_dpsi, None, None)
+            _put(i, 2, _NONE, *places, None, max_abs_d2psi, None)
+            _put(i, 3, _NONE, *places, None, None, max_abs_d3psi)
         padded = (block + 7) & ~7  # whole vectors; what stands in the surplus is never read
         singularity_distance(padded, at)
         if max_abs_dpsi is not None and max_abs_d2psi is not None:
-            sample_block_both(padded, at, cos, sin, grid, grid_q)
-            mark_peaks(padded, grid)
-            mark_peaks(padded, grid_q)
-            _list_both(block, at, cos, sin, grid, grid_q, size, spare, m, m_q, first_peak, first_q)
-            _maxima_of(
-                start, block, at, who, m_q, first_q, target, status, phi, error, phi_error, None, max_abs_d2psi, None
-            )
-            _maxima_of(
-                start, block, at, who, m, first_peak, target, status, phi, error, phi_error, max_abs_dpsi, None, None
-            )
+            sample_block_both(padded, at, table, of.grid, of_q.grid)
+            mark_peaks(padded, of.grid)
+            mark_peaks(padded, of_q.grid)
+            _list_both(block, at, table, of, of_q)
+            _maxima_of(start, block, at, who, of_q, target, status, places, Heights(None, max_abs_d2psi, None))
+            _maxima_of(start, block, at, who, of, target, status, places, Heights(max_abs_dpsi, None, None))
         elif max_abs_dpsi is not None or max_abs_d2psi is not None:
-            sample_block(padded, at, cos, sin, grid, max_abs_dpsi, max_abs_d2psi)
-            mark_peaks(padded, grid)
-            _list_maxima(
-                block, at, cos, sin, grid, size, m, first_peak, PER_RHO, max_abs_dpsi, max_abs_d2psi
-            )  # fmt: skip
-            _maxima_of(
-                start, block, at, who, m, first_peak, target, status, phi, error,
-                phi_error, max_abs_dpsi, max_abs_d2psi, None,
-            )  # fmt: skip
+            sample_block(padded, at, table, of.grid, max_abs_dpsi, max_abs_d2psi)
+            mark_peaks(padded, of.grid)
+            _list_maxima(block, at, table, of, PER_RHO, max_abs_dpsi, max_abs_d2psi)
+            heights = Heights(max_abs_dpsi, max_abs_d2psi, None)
+            _maxima_of(start, block, at, who, of, target, status, places, heights)
         if max_abs_d3psi is not None:
-            sample_block(padded, at, cos, sin, grid, None, None)
-            mark_peaks(padded, grid)
-            _list_maxima(block, at, cos, sin, grid, size, m, first_peak, PER_RHO_JERK, None, None)
-            _maxima_of(
-                start, block, at, who, m, first_peak, target, status, phi, error, phi_error, None, None,
-                max_abs_d3psi,
-            )  # fmt: skip
+            sample_block(padded, at, table, of.grid, None, None)
+            mark_peaks(padded, of.grid)
+            _list_maxima(block, at, table, of, PER_RHO_JERK, None, None)
+            _maxima_of(start, block, at, who, of, target, status, places, Heights(None, None, max_abs_d3psi))

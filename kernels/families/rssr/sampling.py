@@ -11,16 +11,18 @@ what a refined maximum must keep to be trusted.
 from __future__ import annotations
 
 import math
+from typing import NamedTuple
 
 import numpy as np
 
 from kernels.arithmetic.intrinsics import largest, lowest_bit
+from kernels.arithmetic.vectors import Vector
 from kernels.curves.polynomials import rotate
 from kernels.families.rssr.block import BLOCK, CA, K0, K1, K2, W_SIZE, Y0, E
-from kernels.families.rssr.careful import rounding
+from kernels.families.rssr.careful import Loop, rounding
 from kernels.families.rssr.closure import Array, follower
 from kernels.jit import inline, kernel
-from kernels.types import TWO_PI
+from kernels.types import TWO_PI, CosSin
 
 MOST_PEAKS = 8  # 16 samples cannot have more; a design with more goes to the careful search
 # Rows 960 bytes apart modulo 4096, so that they do not evict each other from the cache.
@@ -45,13 +47,11 @@ def new_list() -> Array:
 
 
 @inline
-def append(
-    at: Array, k: int, u: float, v: float, left: float, peak: float, right: float, n: int, sample: int, m: Array, i: int
-) -> None:
-    """Put a local maximum of design k of a block at place i: sample number ``sample`` of n and the two beside it."""
+def append(at: Array, k: int, u: float, v: float, samples: Vector, n: int, sample: int, m: Array, i: int) -> None:
+    """Put a local maximum of design k of a block at place i: sample number ``sample`` of n, in the middle of three."""
     width = TWO_PI / n
     m[i + _U], m[i + _V], m[i + START], m[i + _WIDTH] = u, v, sample * width, width
-    m[i + _LEFT], m[i + _PEAK], m[i + _RIGHT] = left, peak, right
+    m[i + _LEFT], m[i + _PEAK], m[i + _RIGHT] = samples
     m[i + _E], m[i + _Y0], m[i + _CA] = at[k + E], at[k + Y0], at[k + CA]
     m[i + _K0], m[i + _K1], m[i + _K2], m[i + _SIZE] = at[k + K0], at[k + K1], at[k + K2], at[k + W_SIZE]
 
@@ -132,8 +132,8 @@ def finish(
 @inline
 def _estimate(m: Array, i: int, order: int, peak: float, step: float, across: float) -> None:
     """Write the relative rounding error of a peak and the error of its place; ``across`` is its width."""
-    e, y0, ca, k0, k1, k2 = m[i + _E], m[i + _Y0], m[i + _CA], m[i + _K0], m[i + _K1], m[i + _K2]
-    relative, slope = rounding(order, e, y0, ca, k0, k1, k2, m[i + _SIZE], m[i + _U], m[i + _V], peak)
+    of = Loop(m[i + _E], m[i + _Y0], m[i + _CA], m[i + _K0], m[i + _K1], m[i + _K2], m[i + _SIZE])
+    relative, slope = rounding(order, of, m[i + _U], m[i + _V], peak)
     # What a step of Newton's method leaves is quadratic, the step before shows how much; that of the jerk has a slope
     # good to a thousandth.
     last = m[i + LAST]
@@ -169,19 +169,25 @@ GRID_SIZE = (FEWEST + 4) * BLOCK
 _NEVER_NEGATIVE = 2047
 
 
-def sampling_tables() -> tuple[Array, Array]:
+class Samples(NamedTuple):
+    """Samples of one design, ``stride`` apart in ``size``, the one before the first that is looked at at ``first``."""
+
+    size: Array
+    first: int
+    stride: int
+
+
+def sampling_tables() -> CosSin:
     """Cosines and sines of N equally spaced angles for N = 16, 32, ..., 1024; those of N start at position N - 16."""
     phi = np.concatenate([np.arange(n) * (2.0 * np.pi / n) for n in (16 << k for k in range(7))])
     return np.cos(phi), np.sin(phi)
 
 
 @inline
-def sample(
-    at: Array, k: int, cos: Array, sin: Array, n: int, size: Array, first: Array | None, second: Array | None
-) -> None:
+def sample(at: Array, k: int, table: CosSin, n: int, size: Array, first: Array | None, second: Array | None) -> None:
     """Compute magnitudes at n equally spaced angles into size[1 ... n], closed periodically."""
     e, y0, ca, k0, k1, k2 = at[k + E], at[k + Y0], at[k + CA], at[k + K0], at[k + K1], at[k + K2]
-    begin = (n - FEWEST) & _NEVER_NEGATIVE
+    (cos, sin), begin = table, (n - FEWEST) & _NEVER_NEGATIVE
     for i in range(n):
         p, q, j, _ = follower(e, y0, ca, k0, k1, k2, cos[begin + i], sin[begin + i])
         size[1 + i] = abs(p) if first is not None else (abs(q) if second is not None else abs(j))
@@ -189,10 +195,10 @@ def sample(
 
 
 @inline
-def sample_both(at: Array, k: int, cos: Array, sin: Array, n: int, of_p: Array, of_q: Array) -> None:
+def sample_both(at: Array, k: int, table: CosSin, n: int, of_p: Array, of_q: Array) -> None:
     """As :func:`sample`, of the first and the second order at once, which costs little more than the second alone."""
     e, y0, ca, k0, k1, k2 = at[k + E], at[k + Y0], at[k + CA], at[k + K0], at[k + K1], at[k + K2]
-    begin = (n - FEWEST) & _NEVER_NEGATIVE
+    (cos, sin), begin = table, (n - FEWEST) & _NEVER_NEGATIVE
     for i in range(n):
         p, q, _, _ = follower(e, y0, ca, k0, k1, k2, cos[begin + i], sin[begin + i])
         of_p[1 + i], of_q[1 + i] = abs(p), abs(q)
@@ -209,12 +215,10 @@ def _row(size: Array, i: int) -> Array:
 
 
 @inline
-def sample_block(
-    count: int, at: Array, cos: Array, sin: Array, size: Array, first: Array | None, second: Array | None
-) -> None:
+def sample_block(count: int, at: Array, table: CosSin, size: Array, first: Array | None, second: Array | None) -> None:
     """Sample all designs of a block at the FEWEST angles: angle i of design k stands at (i + 1) BLOCK + k."""
     for i in range(FEWEST):
-        u, v, here = cos[i], sin[i], _row(size, 1 + i)
+        u, v, here = table[0][i], table[1][i], _row(size, 1 + i)
         for k in range(count):
             e, y0, ca, k0, k1, k2 = at[k + E], at[k + Y0], at[k + CA], at[k + K0], at[k + K1], at[k + K2]
             p, q, j, _ = follower(e, y0, ca, k0, k1, k2, u, v)
@@ -222,10 +226,10 @@ def sample_block(
 
 
 @inline
-def sample_block_both(count: int, at: Array, cos: Array, sin: Array, of_p: Array, of_q: Array) -> None:
+def sample_block_both(count: int, at: Array, table: CosSin, of_p: Array, of_q: Array) -> None:
     """As :func:`sample_block`, of the first and the second order at once."""
     for i in range(FEWEST):
-        u, v, here, there = cos[i], sin[i], _row(of_p, 1 + i), _row(of_q, 1 + i)
+        u, v, here, there = table[0][i], table[1][i], _row(of_p, 1 + i), _row(of_q, 1 + i)
         for k in range(count):
             e, y0, ca, k0, k1, k2 = at[k + E], at[k + Y0], at[k + CA], at[k + K0], at[k + K1], at[k + K2]
             p, q, _, _ = follower(e, y0, ca, k0, k1, k2, u, v)
@@ -257,35 +261,32 @@ def mark_peaks(count: int, size: Array) -> None:
 
 @inline
 def _append_lowest(
-    marks: int, at: Array, k: int, cos: Array, sin: Array, size: Array, first: int, stride: int, n: int, begin: int,
-    m: Array, count: int,
-) -> None:  # fmt: skip
+    marks: int, at: Array, k: int, table: CosSin, of: Samples, n: int, begin: int, m: Array, count: int
+) -> None:
     """Append the lowest bit of ``marks``, as of :func:`list_marked`; something meaningless where there is none."""
     i = lowest_bit(marks) & 63
     angle = (n - FEWEST + begin + i) & _NEVER_NEGATIVE
-    before = (first + i * stride) & _NEVER_NEGATIVE
-    left, peak, right = size[before], size[before + stride], size[before + 2 * stride]
-    append(at, k, cos[angle], sin[angle], left, peak, right, n, begin + i, m, count & _NEVER_NEGATIVE)
+    before = (of.first + i * of.stride) & _NEVER_NEGATIVE
+    three = of.size[before], of.size[before + of.stride], of.size[before + 2 * of.stride]
+    append(at, k, table[0][angle], table[1][angle], three, n, begin + i, m, count & _NEVER_NEGATIVE)
 
 
 @inline
 def list_marked(
-    marks: int, at: Array, k: int, cos: Array, sin: Array, size: Array, first: int, stride: int, n: int, begin: int,
-    m: Array, count: int,
-) -> int:  # fmt: skip
+    marks: int, at: Array, k: int, table: CosSin, of: Samples, n: int, begin: int, m: Array, count: int
+) -> int:
     """Append the local maxima of design k that are bits of ``marks`` to the list; returns its new length.
 
-    Bit i stands for sample ``begin`` + i of n; the samples of the design stand ``stride`` apart in ``size``, the one
-    before bit 0 at ``first``.
+    Bit i stands for sample ``begin`` + i of n; the one before bit 0 is the first of ``of``.
     """
     # Nearly all designs have one such maximum or two.  Two are written in any case, without a branch that the
     # processor could guess wrong; what is too many the next design writes over.
     for _ in range(2):
-        _append_lowest(marks, at, k, cos, sin, size, first, stride, n, begin, m, count)
+        _append_lowest(marks, at, k, table, of, n, begin, m, count)
         count += 1 if marks != 0 else 0
         marks &= marks - 1
     while marks != 0:
-        _append_lowest(marks, at, k, cos, sin, size, first, stride, n, begin, m, count)
+        _append_lowest(marks, at, k, table, of, n, begin, m, count)
         count += 1
         marks &= marks - 1
     return count
@@ -303,7 +304,7 @@ def _marks(begin: int, width: int, floor: float, size: Array) -> int:
 
 
 @inline
-def list_peaks(at: Array, k: int, cos: Array, sin: Array, n: int, size: Array, m: Array, count: int) -> int:
+def list_peaks(at: Array, k: int, table: CosSin, n: int, size: Array, m: Array, count: int) -> int:
     """Append the local maxima among the samples of one design by :func:`sample`; none if there are too many."""
     most = 0.0
     for i in range(n):
@@ -311,7 +312,7 @@ def list_peaks(at: Array, k: int, cos: Array, sin: Array, n: int, size: Array, m
     length, width = count, min(n, 64)
     for begin in range(0, n, width):
         marks = _marks(begin, width, 0.6 * most, size)
-        length = list_marked(marks, at, k, cos, sin, size, begin, 1, n, begin, m, length)
+        length = list_marked(marks, at, k, table, Samples(size, begin, 1), n, begin, m, length)
         if length - count > MOST_PEAKS:
             return count
     return length

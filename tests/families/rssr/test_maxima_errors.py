@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from kernels import status as st
-from kernels.families.rssr.careful import rounding
+from kernels.families.rssr.careful import Loop, rounding
 from studies.accuracy.regions import drawn, regions, rotatable
 from sweep.families import family
 from sweep.families.base import Angles
@@ -77,8 +77,10 @@ def test_errors_of_height_and_place_hold_and_are_no_more_than_needed(designs, or
 def test_rounding_of_a_small_maximum_is_not_relative_to_it():
     """Negative control: the same pose taken for a hundred times higher has an estimate that its error exceeds."""
     height = 1e-3
-    pose = (-3.8, 1.9, -0.3, 0.4, -0.2, -0.8, 3.3, 0.6, 0.8)
-    small, large, jerk = (rounding(order, *pose, y)[0] for order, y in ((1, height), (1, 100.0 * height), (3, height)))
+    loop = Loop(-3.8, 1.9, -0.3, 0.4, -0.2, -0.8, 3.3)
+    small, large, jerk = (
+        rounding(order, loop, 0.6, 0.8, y)[0] for order, y in ((1, height), (1, 100.0 * height), (3, height))
+    )
     assert small > 5.0 * large
     assert jerk > small
 

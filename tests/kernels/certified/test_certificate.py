@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from kernels import status as st
-from kernels.families.rssr.certify import certify_maxima
+from kernels.families.rssr.certify import InSeries, certify_maxima
 from studies.accuracy.regions import regions
 from tests.kernels.certified.test_enclosure import exact_velocity
 from tests.reference.rssr import Linkage
@@ -19,7 +19,7 @@ CELLS = 1000
 def alone(designs):
     """Crank-rockers that nothing drives and that guide no point, as the kernel takes them."""
     n = len(designs)
-    return np.ascontiguousarray(designs)[None], np.empty((0, n, 2)), np.zeros((n, 8))
+    return InSeries(np.ascontiguousarray(designs)[None], np.empty((0, n, 2)), np.zeros((n, 8)))
 
 
 def certify(designs, order, place, value, target=1e-8, most=CELLS, function=certify_maxima):
@@ -28,7 +28,7 @@ def certify(designs, order, place, value, target=1e-8, most=CELLS, function=cert
     out = {"status": np.zeros(n, np.uint8), "max": np.array(value, float), "phi": np.array(place, float)}
     out |= {"error": np.full(n, np.nan), "cells": np.full(n, np.nan)}
     shared = {name: column[None] for name, column in out.items() if name != "cells"} | {"cells": out["cells"]}
-    function(*alone(designs), np.array([(2, order - 1)]), target, most, *shared.values())
+    function(alone(designs), np.array([(2, order - 1)]), target, most, *shared.values())
     return out
 
 
@@ -133,7 +133,7 @@ def test_designs_that_are_not_ok_are_left_alone():
     designs = random_designs(3, 47, rotatable=True)
     status = np.array([[st.NOT_ROTATABLE, st.UNDECIDABLE, st.INVALID_INPUT]], np.uint8)
     before, value = status.copy(), np.full((1, 3), np.nan)
-    certify_maxima(*alone(designs), np.array([(2, 1)]), 1e-8, CELLS, status, value, value, value, np.empty(3))
+    certify_maxima(alone(designs), np.array([(2, 1)]), 1e-8, CELLS, status, value, value, value, np.empty(3))
     assert (status == before).all()
     assert np.isnan(value).all()
 

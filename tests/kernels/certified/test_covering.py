@@ -135,10 +135,10 @@ def test_a_proof_does_not_depend_on_the_designs_beside_it():
     together = [np.zeros((2, n), np.uint8), value.copy(), phi.copy(), np.full((2, n), np.nan), np.empty(n)]
     together[0][:, ::7] = st.NOT_ROTATABLE
     alone = [column.copy() for column in together]
-    certify_maxima(*parts(designs, rockers, couplings, last), which, 1e-8, 1000, *together)
+    certify_maxima(parts(designs, rockers, couplings, last), which, 1e-8, 1000, *together)
     for i in range(n):
         one = [np.ascontiguousarray(column[..., i : i + 1]) for column in alone]
-        certify_maxima(*parts(designs[i : i + 1], rockers, couplings, last), which, 1e-8, 1000, *one)
+        certify_maxima(parts(designs[i : i + 1], rockers, couplings, last), which, 1e-8, 1000, *one)
         for whole, part in zip(alone, one, strict=True):
             whole[..., i : i + 1] = part
     for beside, single in zip(together, alone, strict=True):

@@ -31,7 +31,7 @@ def found(designs, along=False):
     rssr.opening(designs, opening, distance)
     status, values, made_of = np.empty(n, np.uint8), np.empty((6, n)), np.tile([1.0, 0.0, 0.0], (n, 1))
     search = chain_kernels.find_extrema(CHAIN, 2, along)
-    search(designs, opening, distance, *chain_kernels.sampling_tables(), made_of, 0, 1e-8, -1.0, status, values)
+    search(designs, opening, distance, chain_kernels.sampling_tables(), made_of, 0, 1e-8, -1.0, status, values)
     return status, values
 
 

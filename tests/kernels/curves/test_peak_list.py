@@ -15,6 +15,7 @@ from kernels.families.rssr.sampling import (
     MARKS,
     MOST_PEAKS,
     START,
+    Samples,
     list_marked,
     list_peaks,
     mark_peaks,
@@ -23,7 +24,7 @@ from kernels.families.rssr.sampling import (
 from kernels.jit import kernel
 from kernels.types import TWO_PI as TURN
 
-COS, SIN = sampling_tables()
+TABLE = sampling_tables()
 SHARE = 0.6
 
 
@@ -33,16 +34,16 @@ def _lowest(bits):
 
 
 @kernel
-def _listed_of_one(at, cos, sin, size, n, m):
-    return list_peaks(at, 0, cos, sin, n, size, m, 0)
+def _listed_of_one(at, table, size, n, m):
+    return list_peaks(at, 0, table, n, size, m, 0)
 
 
 @kernel
-def _listed_of_block(at, cos, sin, size, lengths, m):
+def _listed_of_block(at, table, size, lengths, m):
     mark_peaks(BLOCK, size)
     count = 0
     for k in range(BLOCK):
-        count = list_marked(int(size[MARKS + k]), at, k, cos, sin, size, k, BLOCK, FEWEST, 0, m, count)
+        count = list_marked(int(size[MARKS + k]), at, k, table, Samples(size, k, BLOCK), FEWEST, 0, m, count)
         lengths[k] = count
 
 
@@ -91,7 +92,7 @@ def test_peaks_of_one_design_are_those_of_a_plain_loop(n):
     for _ in range(300):
         samples = few_peaks(n, r)
         found = expected(samples)
-        count = _listed_of_one(at, COS, SIN, closed(samples), n, m)
+        count = _listed_of_one(at, TABLE, closed(samples), n, m)
         assert listed(m, 0, count, n) == found
         lengths.add(count)
     assert {0, 1, 2, 3, MOST_PEAKS} <= lengths  # too many, few, and as many as there may be
@@ -104,7 +105,7 @@ def test_peaks_of_a_block_are_those_of_a_plain_loop():
         samples = np.column_stack([few_peaks(FEWEST, r) for _ in range(BLOCK)])
         rows = grid.reshape(-1, BLOCK)
         rows[1 : FEWEST + 1], rows[0], rows[FEWEST + 1] = samples, samples[-1], samples[0]
-        _listed_of_block(at, COS, SIN, grid, lengths, m)
+        _listed_of_block(at, TABLE, grid, lengths, m)
         begin = 0
         for k in range(BLOCK):
             assert listed(m, begin, lengths[k], FEWEST) == expected(samples[:, k])
@@ -116,7 +117,7 @@ def test_a_block_of_designs_with_as_many_peaks_as_there_can_be_fits_the_list():
     at, lengths, grid, m = np.ones(ROWS * BLOCK), np.zeros(BLOCK, np.int64), np.empty(GRID_SIZE), new_list()
     rows = grid.reshape(-1, BLOCK)
     rows[1 : FEWEST + 1], rows[0], rows[FEWEST + 1] = samples[:, None], samples[-1], samples[0]
-    _listed_of_block(at, COS, SIN, grid, lengths, m)
+    _listed_of_block(at, TABLE, grid, lengths, m)
     assert lengths[-1] == BLOCK * MOST_PEAKS
     # What is written beyond the last maximum stays within its row: a group of 64 samples has 32 at most.
     assert lengths[-1] + 32 + 2 <= CAPACITY
