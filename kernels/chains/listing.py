@@ -105,6 +105,7 @@ def enlister(chain: Chained, of: Curve) -> Helper:
         # A magnitude is the curve times its own sign, a least value the largest of the negative curve.
         up, down = 1.0 if mode >= 0 else -1.0, 1.0 if mode > 0 else -1.0
         (cos, sin), values, dips, said, span = table, room.values, room.dips, room.said, room.span
+        length: int
         abreast, length = seat(designs, begin, end, near, made_of, m, room)
         look_abreast(abreast, m, table, mode, values[ABREAST:], dips, said, room.handed)
         for i in range(begin, end):

@@ -159,7 +159,8 @@ def _solved(grid: Scene, phi: Array, last: bool) -> tuple[dict[str, Array], Stat
     A crank that turns backwards is one that turns forwards in -phi: only so do multipliers below 1 mean stability.
     """
     n, back = len(grid.designs), bool((grid.inputs["speed"] < 0.0).any())
-    found = Steady(np.empty(n, np.uint8), *(np.empty((n, phi.shape[1])) for _ in range(2)), np.empty(n))
+    lag, elongation = (np.empty((n, phi.shape[1])) for _ in range(2))
+    found = Steady(np.empty(n, np.uint8), lag, elongation, np.empty(n))
     p, d2psi, c, reach, data = _arguments(grid)
     driven = driven_side(grid, True)
     if driven is None:
@@ -175,7 +176,7 @@ def _solved(grid: Scene, phi: Array, last: bool) -> tuple[dict[str, Array], Stat
         if back:
             phi, (p, first, zeroth, right) = backwards(phi, p, -first, zeroth, right)
         driven_steady_state(p, first, zeroth, right, c, reach, phi, last, found)
-    return {"lag_dynamic": found.eta, "elongation_dynamic": found.elongation, "floquet": found.floquet}, found.status
+    return {"lag_dynamic": lag, "elongation_dynamic": elongation, "floquet": found.floquet}, found.status
 
 
 def _equation(scene: Scene, p: Array, d2psi: Array, data: Array, driven: DrivenSide) -> tuple[Array, Array, Array]:

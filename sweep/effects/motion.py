@@ -61,8 +61,8 @@ def compute(scene: Scene, wanted: frozenset[str]) -> Columns:
     groups = [[name.format(axis=axis) for axis in "xyz"] for name, _, _ in _GROUPS.values()]
     out = [None if wanted.isdisjoint(names) else np.empty((*scene.shape, 3)) for names in groups]
     angles = None if wanted.isdisjoint(o.name for o in _EULER) else np.empty((*scene.shape, 2))
-    wanted_of = CouplerMotion(*out, angles)
-    coupler_point(*scene.records, scene.table(_POINT), scene.inputs["finger"], status, wanted_of)
+    motion = CouplerMotion(*(*out, angles))
+    coupler_point(*scene.records, scene.table(_POINT), scene.inputs["finger"], status, motion)
     columns: Columns = {
         name: values[:, :, k]
         for names, values in zip(groups, out, strict=True)

@@ -121,9 +121,10 @@ def _fitted(
             part[missing] = np.nan
     values = np.array([own[:, guide.parameter_names.index(name)] for name in guided.fitted])
     along, across, direction, offset = values
-    found = Straightest(along, across, offset, *np.empty((2, len(own))), np.empty(len(own), np.uint8))
+    deviation, travel = np.empty(len(own)), np.empty(len(own))
+    found = Straightest(along, across, offset, deviation, travel, np.empty(len(own), np.uint8))
     line_fit(parts[0], parts[1], parts[2], parts[3], limits, direction, fit.free_direction, found)
-    return values, found.travel, found.status
+    return values, travel, found.status
 
 
 def driving_outputs(family: Family) -> tuple[str, ...]:

@@ -134,31 +134,27 @@ def _careful(at: Array, k: int, order: int, target: float) -> tuple[tuple[float,
 
 
 @inline
-def _put(
-    i: int,
-    order: int,
-    result: tuple[float, float, float, float],
-    phi: Array | None,
-    error: Array | None,
-    phi_error: Array | None,
-    max_abs_dpsi: Array | None,
-    max_abs_d2psi: Array | None,
-    max_abs_d3psi: Array | None,
-) -> None:
+def _put(i: int, order: int, result: tuple[float, float, float, float], places: Places, heights: Heights) -> None:
     """Write height, place and the errors of both of design i, of the one order whose heights are given."""
     best, place, bound, reach = result
-    if phi is not None:
-        phi[order - 1, i] = place - TURN * np.floor(place / TURN)  # math.floor makes an integer, which nan is not
-    if error is not None:
-        error[order - 1, i] = bound
-    if phi_error is not None:
-        phi_error[order - 1, i] = reach
-    if max_abs_dpsi is not None:
-        max_abs_dpsi[i] = best
-    if max_abs_d2psi is not None:
-        max_abs_d2psi[i] = best
-    if max_abs_d3psi is not None:
-        max_abs_d3psi[i] = best
+    _put_in(places.phi, order, i, place - TURN * np.floor(place / TURN))  # math.floor makes an integer; nan is none
+    _put_in(places.error, order, i, bound)
+    _put_in(places.phi_error, order, i, reach)
+    _put_height(heights.dpsi, i, best)
+    _put_height(heights.d2psi, i, best)
+    _put_height(heights.d3psi, i, best)
+
+
+@inline
+def _put_in(out: Array | None, order: int, i: int, value: float) -> None:
+    if out is not None:
+        out[order - 1, i] = value
+
+
+@inline
+def _put_height(out: Array | None, i: int, value: float) -> None:
+    if out is not None:
+        out[i] = value
 
 
 @inline
@@ -199,42 +195,43 @@ def _list_maxima(
     block: int, at: Array, table: CosSin, of: Search, per_rho: float, first: Array | None, second: Array | None
 ) -> None:
     """List the local maxima of a block among its samples, or more where they are needed; those of one order."""
-    count = 0
+    count, (grid, size, m, first_peak) = 0, of
     for i in range(block):
-        of.first[i] = count
+        first_peak[i] = count
         if at[i + ACROSS] * MOST < per_rho:
             continue
         n = FEWEST
         while n * at[i + ACROSS] < per_rho:
             n *= 2
         if n == FEWEST:
-            count = list_marked(int(of.grid[MARKS + i]), at, i, table, Samples(of.grid, i, BLOCK), n, 0, of.m, count)
+            count = list_marked(int(grid[MARKS + i]), at, i, table, grid, Samples(i, BLOCK, n, 0), m, count)
         else:
-            sample(at, i, table, n, of.size, first, second)
-            count = list_peaks(at, i, table, n, of.size, of.m, count)
-    of.first[block] = count
+            sample(at, i, table, n, size, first, second)
+            count = list_peaks(at, i, table, n, size, m, count)
+    first_peak[block] = count
 
 
 @inline
 def _list_both(block: int, at: Array, table: CosSin, of_p: Search, of_q: Search) -> None:
     """As :func:`_list_maxima`, of the first and the second order, which share their samples."""
     count_p, count_q = 0, 0
+    (grid_p, size_p, m_p, first_p), (grid_q, size_q, m_q, first_q) = of_p, of_q
     for i in range(block):
-        of_p.first[i], of_q.first[i] = count_p, count_q
+        first_p[i], first_q[i] = count_p, count_q
         if at[i + ACROSS] * MOST < PER_RHO:
             continue
         n = FEWEST
         while n * at[i + ACROSS] < PER_RHO:
             n *= 2
         if n == FEWEST:
-            p, q = Samples(of_p.grid, i, BLOCK), Samples(of_q.grid, i, BLOCK)
-            count_p = list_marked(int(of_p.grid[MARKS + i]), at, i, table, p, n, 0, of_p.m, count_p)
-            count_q = list_marked(int(of_q.grid[MARKS + i]), at, i, table, q, n, 0, of_q.m, count_q)
+            at_fewest = Samples(i, BLOCK, n, 0)
+            count_p = list_marked(int(grid_p[MARKS + i]), at, i, table, grid_p, at_fewest, m_p, count_p)
+            count_q = list_marked(int(grid_q[MARKS + i]), at, i, table, grid_q, at_fewest, m_q, count_q)
         else:
-            sample_both(at, i, table, n, of_p.size, of_q.size)
-            count_p = list_peaks(at, i, table, n, of_p.size, of_p.m, count_p)
-            count_q = list_peaks(at, i, table, n, of_q.size, of_q.m, count_q)
-    of_p.first[block], of_q.first[block] = count_p, count_q
+            sample_both(at, i, table, n, size_p, size_q)
+            count_p = list_peaks(at, i, table, n, size_p, m_p, count_p)
+            count_q = list_peaks(at, i, table, n, size_q, m_q, count_q)
+    first_p[block], first_q[block] = count_p, count_q
 
 
 @inline
@@ -264,7 +261,7 @@ def _maxima_of(
             result, agreed = _careful(at, i, order, target)
             if not agreed:
                 status[start + who[i]] = st.NOT_CONVERGED
-        _put(start + who[i], order, result, *places, *heights)
+        _put(start + who[i], order, result, places, heights)
 
 
 @kernel
@@ -306,9 +303,9 @@ def true_maxima(
         least_delta(count, at)
         block = _keep_what_turns(start, count, at, who, status)
         for i in range(start, start + count if block < count else start):
-            _put(i, 1, _NONE, *places, max_abs_dpsi, None, None)
-            _put(i, 2, _NONE, *places, None, max_abs_d2psi, None)
-            _put(i, 3, _NONE, *places, None, None, max_abs_d3psi)
+            _put(i, 1, _NONE, places, Heights(max_abs_dpsi, None, None))
+            _put(i, 2, _NONE, places, Heights(None, max_abs_d2psi, None))
+            _put(i, 3, _NONE, places, Heights(None, None, max_abs_d3psi))
         padded = (block + 7) & ~7  # whole vectors; what stands in the surplus is never read
         singularity_distance(padded, at)
         if max_abs_dpsi is not None and max_abs_d2psi is not None:

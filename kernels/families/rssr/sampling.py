@@ -170,11 +170,12 @@ _NEVER_NEGATIVE = 2047
 
 
 class Samples(NamedTuple):
-    """Samples of one design, ``stride`` apart in ``size``, the one before the first that is looked at at ``first``."""
+    """Where samples of one design stand: ``stride`` apart, behind one at ``first``, numbers ``begin``, ... of n."""
 
-    size: Array
     first: int
     stride: int
+    n: int
+    begin: int
 
 
 def sampling_tables() -> CosSin:
@@ -261,32 +262,30 @@ def mark_peaks(count: int, size: Array) -> None:
 
 @inline
 def _append_lowest(
-    marks: int, at: Array, k: int, table: CosSin, of: Samples, n: int, begin: int, m: Array, count: int
+    marks: int, at: Array, k: int, table: CosSin, size: Array, of: Samples, m: Array, count: int
 ) -> None:
     """Append the lowest bit of ``marks``, as of :func:`list_marked`; something meaningless where there is none."""
     i = lowest_bit(marks) & 63
-    angle = (n - FEWEST + begin + i) & _NEVER_NEGATIVE
+    angle = (of.n - FEWEST + of.begin + i) & _NEVER_NEGATIVE
     before = (of.first + i * of.stride) & _NEVER_NEGATIVE
-    three = of.size[before], of.size[before + of.stride], of.size[before + 2 * of.stride]
-    append(at, k, table[0][angle], table[1][angle], three, n, begin + i, m, count & _NEVER_NEGATIVE)
+    three = size[before], size[before + of.stride], size[before + 2 * of.stride]
+    append(at, k, table[0][angle], table[1][angle], three, of.n, of.begin + i, m, count & _NEVER_NEGATIVE)
 
 
 @inline
-def list_marked(
-    marks: int, at: Array, k: int, table: CosSin, of: Samples, n: int, begin: int, m: Array, count: int
-) -> int:
+def list_marked(marks: int, at: Array, k: int, table: CosSin, size: Array, of: Samples, m: Array, count: int) -> int:
     """Append the local maxima of design k that are bits of ``marks`` to the list; returns its new length.
 
-    Bit i stands for sample ``begin`` + i of n; the one before bit 0 is the first of ``of``.
+    Bit i stands for sample ``begin`` + i.
     """
     # Nearly all designs have one such maximum or two.  Two are written in any case, without a branch that the
     # processor could guess wrong; what is too many the next design writes over.
     for _ in range(2):
-        _append_lowest(marks, at, k, table, of, n, begin, m, count)
+        _append_lowest(marks, at, k, table, size, of, m, count)
         count += 1 if marks != 0 else 0
         marks &= marks - 1
     while marks != 0:
-        _append_lowest(marks, at, k, table, of, n, begin, m, count)
+        _append_lowest(marks, at, k, table, size, of, m, count)
         count += 1
         marks &= marks - 1
     return count
@@ -312,7 +311,7 @@ def list_peaks(at: Array, k: int, table: CosSin, n: int, size: Array, m: Array, 
     length, width = count, min(n, 64)
     for begin in range(0, n, width):
         marks = _marks(begin, width, 0.6 * most, size)
-        length = list_marked(marks, at, k, table, Samples(size, begin, 1), n, begin, m, length)
+        length = list_marked(marks, at, k, table, size, Samples(begin, 1, n, begin), m, length)
         if length - count > MOST_PEAKS:
             return count
     return length

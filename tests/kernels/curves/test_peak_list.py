@@ -43,7 +43,7 @@ def _listed_of_block(at, table, size, lengths, m):
     mark_peaks(BLOCK, size)
     count = 0
     for k in range(BLOCK):
-        count = list_marked(int(size[MARKS + k]), at, k, table, Samples(size, k, BLOCK), FEWEST, 0, m, count)
+        count = list_marked(int(size[MARKS + k]), at, k, table, size, Samples(k, BLOCK, FEWEST, 0), m, count)
         lengths[k] = count
 
 
