@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from kernels import status as st
-from kernels.linear.line_fit import line_fit
+from kernels.linear.line_fit import Straightest, line_fit
 from tests.reference.line_fit import fourbar, straightest
 
 LP_TOLERANCE = 1e-7
@@ -22,7 +22,7 @@ def fit(pins, pins2, lam, window=(0.0, 1.0), free=False, function=line_fit):
     status = np.empty(n, np.uint8)
     lam = np.array(np.broadcast_to(lam, n), dtype=float)
     parts = [np.ascontiguousarray(part) for part in (pins.real, pins.imag, pins2.real, pins2.imag)]
-    function(*parts, np.array(window, dtype=float), lam, free, *out, status)
+    function(*parts, np.array(window, dtype=float), lam, free, Straightest(*out, status))
     return dict(zip(("xi", "eta", "h", "deviation", "travel"), out, strict=True)) | {"lam": lam, "status": status}
 
 

@@ -8,7 +8,7 @@ from scipy.optimize import nnls
 
 from kernels import status as st
 from kernels.linear.nearest import nearest
-from kernels.linear.nearest_of_many import nearest_of_many
+from kernels.linear.nearest_of_many import CurveRows, Nearest, nearest_of_many
 
 
 def solved(rows: np.ndarray, needs: np.ndarray, centre: np.ndarray) -> tuple[np.ndarray, np.ndarray, int]:
@@ -94,9 +94,9 @@ def stepped(
     back = np.linalg.qr(rng.standard_normal((n, n)))[0] * (1.0 + rng.random(n))
     centre, low, high = rng.standard_normal(n), np.full(n, -3.0), np.full(n - 1, 3.0)
     step, there, weights = np.empty(n), np.empty(len(values)), np.empty(len(values))
-    status = function(
-        values, slopes, back, centre, low, high, turns, (near, 1e-9), 20, 1e-13, step, there, weights, held
-    )  # type: ignore[operator]
+    found = Nearest(step, there, weights, held)
+    of = CurveRows(values, slopes, turns)
+    status = function(of, back, centre, low, high, (near, 1e-9), 20, 1e-13, found)  # type: ignore[operator]
     box = np.concatenate([back, -back[: n - 1]])
     rows = np.concatenate([back.T @ slopes, box.T], axis=1)
     whole, _, told = solved(rows, np.concatenate([-values, low, -high]), centre)
