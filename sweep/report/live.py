@@ -15,6 +15,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from kernels import status as codes
 from sweep.dataset.chunk_files import batches
 from sweep.errors import InputError
 from sweep.evaluation.curves import coordinate, motion_curves
@@ -266,7 +267,9 @@ def parallel(data: Dataset, cells: Sequence[Cells], shown: Sequence[Shown]) -> d
     if len(axes) < 2:
         return None
     objective = data.study.objective
-    rows, values = _lines(data.parts, [axis.name for axis in axes], None if objective is None else objective.output)
+    of = data.counts.get(codes.OK, 0)
+    names, best = [axis.name for axis in axes], None if objective is None else objective.output
+    rows, values = _lines(data.parts, names, best, of)
     if len(rows) < 2:
         return None
     told = np.ptp(values, axis=0) > CONSTANT * np.abs(values).max(axis=0)
@@ -283,7 +286,7 @@ def parallel(data: Dataset, cells: Sequence[Cells], shown: Sequence[Shown]) -> d
         "designs": [
             {"name": one.name, "role": one.role, "values": packed(mark)} for one, mark in zip(named, marks, strict=True)
         ],
-        "of": data.counts.get(0, len(rows)),
+        "of": of,
     }
 
 
@@ -300,10 +303,9 @@ def _axes(data: Dataset, cells: Sequence[Cells]) -> list[Quantity]:
     return [*dimensions, *(quantity(name, data.units.get(name, "")) for name in outputs)]
 
 
-def _lines(parts: Sequence[Path], names: list[str], objective: str | None) -> tuple[Array, Array]:
-    """Row numbers and values of the best and of evenly spaced feasible designs, in the order of the rows."""
-    total = sum(int(rows.size) for rows, _ in _feasible(parts, names))
-    step = max(1, -(-total // SPREAD))
+def _lines(parts: Sequence[Path], names: list[str], objective: str | None, of: int) -> tuple[Array, Array]:
+    """Row numbers and values of the best, and of others evenly spaced, among ``of`` feasible designs in row order."""
+    step = max(1, -(-of // SPREAD))
     seen = 0
     rows, values = np.empty(0), np.empty((0, len(names)))
     best_rows, best_values = rows, values
