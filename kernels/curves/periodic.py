@@ -84,13 +84,13 @@ def series(cosines: Array, sines: Array, phi: float) -> tuple[float, float]:
 
 
 @inline
-def significant(cosines: Array, sines: Array) -> int:
-    """Count the coefficients worth keeping: all behind them are rounding, below 1e-14 of the largest one."""
+def significant(cosines: Array, sines: Array, nothing: float = NOTHING) -> int:
+    """Count the coefficients worth keeping: all behind them are rounding, below a share of the largest one."""
     largest = 0.0
     for k in range(cosines.size):
         largest = max(largest, math.hypot(cosines[k], sines[k]))
     count = cosines.size
-    while count > 1 and math.hypot(cosines[count - 1], sines[count - 1]) <= NOTHING * largest:
+    while count > 1 and math.hypot(cosines[count - 1], sines[count - 1]) <= nothing * largest:
         count -= 1
     return count
 

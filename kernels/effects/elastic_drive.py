@@ -13,24 +13,12 @@ import math
 import numpy as np
 
 from kernels import status as st
-from kernels.curves.periodic import coefficients, series, tail
-from kernels.effects.elasticity import LINEAR, PHASE_STEP, RESOLVED, Steady, solve_band
+from kernels.curves.periodic import coefficients, series, significant, tail
+from kernels.effects.elasticity import LINEAR, PHASE_STEP, RESOLVED, Steady, magnus_step, modulus_of, solve_band
 from kernels.jit import inline, kernel
 from kernels.types import Array
 
 KEPT = 1e-12  # share of its largest harmonic below which a coefficient is the rounding of what it is made of
-
-
-@inline
-def _kept(cosines: Array, sines: Array) -> int:
-    """Count the harmonics of a coefficient that are more than rounding."""
-    largest = 0.0
-    for k in range(cosines.size):
-        largest = max(largest, math.hypot(cosines[k], sines[k]))
-    count = cosines.size
-    while count > 1 and math.hypot(cosines[count - 1], sines[count - 1]) <= KEPT * largest:
-        count -= 1
-    return count
 
 
 @inline
@@ -79,33 +67,10 @@ def driven_multiplier(bc: Array, bs: Array, cc: Array, cs: Array) -> float:
         half, end = step * (j + 0.5), step * (j + 1.0)
         q1, d1 = series(cc, cs, half)[0], series(bc, bs, half)[0]
         q2, d2 = series(cc, cs, end)[0], series(bc, bs, end)[0]
-        q, d = (q0 + 4.0 * q1 + q2) / 6.0, (d0 + 4.0 * d1 + d2) / 6.0
-        # A = [[0, 1], [-q, -d]]; [A1, A2 - A0] = [[-dq, -dd], [d1 dq - q1 dd, dq]].
-        dq, dd = q2 - q0, d2 - d0
-        t = step * step / 12.0
-        w11, w12 = t * dq, step + t * dd
-        w21, w22 = -step * q - t * (d1 * dq - q1 * dd), -step * d - t * dq
-        mean = 0.5 * (w11 + w22)
-        square = 0.25 * (w11 - w22) * (w11 - w22) + w12 * w21
-        root = math.sqrt(abs(square))
-        if square < 0.0:
-            even, odd = math.cos(root), math.sin(root) / root
-        else:
-            even, odd = math.cosh(root), math.sinh(root) / root if root > 1e-8 else 1.0
-        factor = math.exp(mean)
-        e11, e12 = factor * (even + odd * (w11 - mean)), factor * odd * w12
-        e21, e22 = factor * odd * w21, factor * (even + odd * (w22 - mean))
-        m11, m12, m21, m22 = (
-            e11 * m11 + e12 * m21, e11 * m12 + e12 * m22, e21 * m11 + e22 * m21, e21 * m12 + e22 * m22,
-        )  # fmt: skip
+        m11, m12, m21, m22 = magnus_step((m11, m12, m21, m22), step, (q0, q1, q2), (d0, d1, d2))
         q0, d0 = q2, d2
     # The product of the multipliers is what the mean of b alone makes of it (Liouville).
-    modulus = math.exp(-math.pi * bc[0])
-    trace, determinant = m11 + m22, modulus * modulus
-    discriminant = 0.25 * trace * trace - determinant
-    if discriminant < 0.0:
-        return modulus
-    return abs(0.5 * trace) + math.sqrt(discriminant)
+    return modulus_of(m11 + m22, math.exp(-math.pi * bc[0]))
 
 
 @kernel
@@ -137,7 +102,7 @@ def driven_steady_state(
         coefficients(c[i], turn, cc, cs)
         coefficients(p[i], turn, pc, ps)
         coefficients(r[i], turn, ec, es)
-        nb, nc = _kept(bc, bs), _kept(cc, cs)
+        nb, nc = significant(bc, bs, KEPT), significant(cc, cs, KEPT)
         driven_solution(bc[:nb], bs[:nb], cc[:nc], cs[:nc], ec, es)
         resolved = tail(ec, es, 0.0) < RESOLVED
         floquet[i] = math.nan

@@ -19,9 +19,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from kernels import status as st
+from kernels.arithmetic.vectors import Vector
 from kernels.curves.periodic import coefficients, series, significant, tail
 from kernels.jit import inline, kernel
 from kernels.types import Array, Status
+
+Matrix = tuple[float, float, float, float]  # two by two, row by row
 
 # Columns of the data matrix: inertia of the driven side J, coupler stiffness k, damping h, crank speed, torque M.
 COLUMNS = ("inertia", "stiffness", "damping", "speed", "torque")
@@ -225,34 +228,39 @@ def largest_multiplier(qc: Array, qs: Array, stiffness: float, damping: float) -
     for j in range(steps):
         q1, d1 = _rates(qc, qs, step * (j + 0.5), stiffness, damping)
         q2, d2 = _rates(qc, qs, step * (j + 1.0), stiffness, damping)
-        q, d = (q0 + 4.0 * q1 + q2) / 6.0, (d0 + 4.0 * d1 + d2) / 6.0
-        # A = [[0, 1], [-q, -d]]; [A1, A2 - A0] = [[-dq, -dd], [d1 dq - q1 dd, dq]].
-        dq, dd = q2 - q0, d2 - d0
-        t = step * step / 12.0
-        w11, w12 = t * dq, step + t * dd
-        w21, w22 = -step * q - t * (d1 * dq - q1 * dd), -step * d - t * dq
-        mean = 0.5 * (w11 + w22)
-        square = 0.25 * (w11 - w22) * (w11 - w22) + w12 * w21
-        if square < 0.0:
-            root = math.sqrt(-square)
-            even, odd = math.cos(root), math.sin(root) / root
-        else:
-            root = math.sqrt(square)
-            even, odd = math.cosh(root), math.sinh(root) / root if root > 1e-8 else 1.0
-        factor = math.exp(mean)
-        e11, e12 = factor * (even + odd * (w11 - mean)), factor * odd * w12
-        e21, e22 = factor * odd * w21, factor * (even + odd * (w22 - mean))
-        m11, m12, m21, m22 = (
-            e11 * m11 + e12 * m21, e11 * m12 + e12 * m22, e21 * m11 + e22 * m21, e21 * m12 + e22 * m22,
-        )  # fmt: skip
+        m11, m12, m21, m22 = magnus_step((m11, m12, m21, m22), step, (q0, q1, q2), (d0, d1, d2))
         q0, d0 = q2, d2
     # The product of the multipliers is what the damping alone makes of it (Liouville): exactly 1 without any.
-    modulus = math.exp(-math.pi * damping * qc[0])
-    trace, determinant = m11 + m22, modulus * modulus
-    discriminant = 0.25 * trace * trace - determinant
-    if discriminant < 0.0:
-        return modulus
-    return abs(0.5 * trace) + math.sqrt(discriminant)
+    return modulus_of(m11 + m22, math.exp(-math.pi * damping * qc[0]))
+
+
+@inline
+def magnus_step(m: Matrix, step: float, q: Vector, d: Vector) -> Matrix:
+    """Take (eta, eta') over one step of eta'' + d eta' + q eta = 0; q and d at its begin, middle and end."""
+    mean_q, mean_d = (q[0] + 4.0 * q[1] + q[2]) / 6.0, (d[0] + 4.0 * d[1] + d[2]) / 6.0
+    # A = [[0, 1], [-q, -d]]; [A1, A2 - A0] = [[-dq, -dd], [d1 dq - q1 dd, dq]].
+    dq, dd = q[2] - q[0], d[2] - d[0]
+    t = step * step / 12.0
+    w11, w12 = t * dq, step + t * dd
+    w21, w22 = -step * mean_q - t * (d[1] * dq - q[1] * dd), -step * mean_d - t * dq
+    mean = 0.5 * (w11 + w22)
+    square = 0.25 * (w11 - w22) * (w11 - w22) + w12 * w21
+    root = math.sqrt(abs(square))
+    if square < 0.0:
+        even, odd = math.cos(root), math.sin(root) / root
+    else:
+        even, odd = math.cosh(root), math.sinh(root) / root if root > 1e-8 else 1.0
+    factor = math.exp(mean)
+    e11, e12 = factor * (even + odd * (w11 - mean)), factor * odd * w12
+    e21, e22 = factor * odd * w21, factor * (even + odd * (w22 - mean))
+    return e11 * m[0] + e12 * m[2], e11 * m[1] + e12 * m[3], e21 * m[0] + e22 * m[2], e21 * m[1] + e22 * m[3]
+
+
+@inline
+def modulus_of(trace: float, modulus: float) -> float:
+    """Larger modulus of two multipliers with that sum and with the square of ``modulus`` as product."""
+    discriminant = 0.25 * trace * trace - modulus * modulus
+    return modulus if discriminant < 0.0 else abs(0.5 * trace) + math.sqrt(discriminant)
 
 
 @inline

@@ -13,7 +13,6 @@ from kernels.families.heddle import driven, four_bar
 from kernels.jit import inline, kernel
 from kernels.types import EPS, Array, Status
 
-_MOST_RODS = 4
 _MOST_STEPS = 200
 
 

@@ -65,7 +65,6 @@ class ToolSection(Section):
 
 Names = Annotated[list[str], Field(min_length=1)]
 Three = Annotated[list[Number], Field(min_length=3, max_length=3)]
-Rotation = Annotated[float, quantity("rad/s"), TEXT]
 TwoLengths = Annotated[list[Length], Field(min_length=2, max_length=2)]
 
 # Tables in which a member's own entries may stand in a table of the member's name.
