@@ -9,6 +9,7 @@ from kernels.types import Array
 from sweep.families import link_tree as poses
 from sweep.families.base import Angles, Columns, Parameter
 from sweep.families.link_tree import LinkBody, LinkJoint, LinkTree, Path
+from sweep.families.planar_trees import at_origin
 from sweep.families.rssr import FAMILY as CRANK_ROCKER
 from sweep.families.skeletons import parameter
 
@@ -173,14 +174,10 @@ def three_leads(parameters: Parameters) -> LinkTree:
         fill=fill,
         rubs=False,
         carrier=rack,
-        tip=_at_origin,
+        tip=at_origin,
     )
 
 
 def _tooth(motion: Columns) -> Path:
     rows = [[np.asarray(motion[f"{order}{x}_t"], np.float64) for x in "xy"] for order in ("", "d", "d2")]
     return Path(*(np.stack([x, y, 0.0 * x], axis=-1) for x, y in rows))
-
-
-def _at_origin(designs: Array) -> Array:
-    return np.zeros((len(designs), 3))

@@ -22,7 +22,8 @@ Parameters = tuple[Parameter, ...]
 _PSI, _CHI = ("psi", "dpsi", "d2psi"), ("chi", "dchi", "d2chi")
 
 
-def _tip_at_origin(designs: Array) -> Array:
+def at_origin(designs: Array) -> Array:
+    """Place of a tool at the origin of its body, (n, 3)."""
     return np.zeros((len(designs), 3))
 
 
@@ -148,7 +149,7 @@ def _cam_and(follower: LinkBody, joint: LinkJoint, kind: int, needs: tuple[str, 
         fill=fill,
         rubs=False,
         carrier=1,
-        tip=_tip_at_origin if kind == SLIDE else None,
+        tip=at_origin if kind == SLIDE else None,
         output=1,
         arms=((1, 0),) if kind == TURN else (),
     )
@@ -293,7 +294,7 @@ def heddle_shaft(parameters: Parameters, line: Callable[[Array], tuple[Array, Ar
         fill=fill,
         rubs=False,
         carrier=4,
-        tip=_tip_at_origin,
+        tip=at_origin,
         output=4,
         arms=((3, 3),),
     )

@@ -194,14 +194,24 @@ def certified_maxima(designs: Array, wanted: frozenset[str], accuracy: Accuracy)
             alone, np.array([(2, order)]), accuracy.target, MOST_CELLS, status[None], value[None], place[None],
             error[None], np.empty(n),
         )  # fmt: skip
-        # Where the proof found a higher peak it climbed it to a thousandth of the target.
-        elsewhere = np.abs(place - np.asarray(searched[phi], np.float64)) > far
-        far = np.where(elsewhere, np.maximum(far, np.sqrt(accuracy.target)), far)
-        for key, values, err in ((most, value, error), (phi, place, far)):
-            if key in wanted:
-                columns |= {key: values, f"err_{key}": err}
+        known = (np.asarray(searched[phi], np.float64), far)
+        columns |= proven_columns(name, wanted, accuracy.target, (value, error), place, known)
         columns["status"] = np.where(columns["status"] == st.OK, status, columns["status"])
     return columns
+
+
+def proven_columns(
+    name: str, wanted: frozenset[str], target: float, height: tuple[Array, Array], place: Array,
+    searched: tuple[Array, Array],
+) -> Columns:  # fmt: skip
+    """Wanted columns of a proven maximum: height and its bound, its place; the searched place and its error.
+
+    Where the proof found a higher peak it climbed it to a thousandth of the target.
+    """
+    before, far = searched
+    far = np.where(np.abs(place - before) > far, np.maximum(far, np.sqrt(target)), far)
+    pairs = ((f"max_abs_{name}", height), (f"phi_max_abs_{name}", (place, far)))
+    return {key: x for own, found in pairs if own in wanted for key, x in zip((own, f"err_{own}"), found, strict=True)}
 
 
 sampling_tables = lru_cache(rssr.sampling_tables)

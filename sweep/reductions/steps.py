@@ -18,6 +18,7 @@ from sweep.families.machines import Machine
 from sweep.families.names import at_stage
 from sweep.families.parts import Stage
 from sweep.families.reduction import reduction_of
+from sweep.families.rssr import proven_columns
 from sweep.quantities.dimensions import dimension_step, size_step
 from sweep.quantities.kinds import Group, Reduced, Request, requests
 from sweep.quantities.resolve import resolve
@@ -98,13 +99,9 @@ def _proven(
     )  # fmt: skip
     columns: Columns = {"status": searched.copy()}
     for j, name in enumerate(names):
-        # Where the proof found a higher peak it climbed it to a thousandth of the target.
         peak = found[requests[j]]
-        elsewhere = np.abs(phi[j] - peak.phi) > peak.err_phi
-        far = np.where(elsewhere, np.maximum(peak.err_phi, np.sqrt(accuracy.target)), peak.err_phi)
-        for key, values, err in ((f"max_abs_{name}", value[j], error[j]), (f"phi_max_abs_{name}", phi[j], far)):
-            if key in wanted:
-                columns |= {key: values, f"err_{key}": err}
+        searched_at = (peak.phi, peak.err_phi)
+        columns |= proven_columns(name, wanted, accuracy.target, (value[j], error[j]), phi[j], searched_at)
         columns["status"] = np.where(columns["status"] == st.OK, status[j], columns["status"])
     return columns
 
