@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import subprocess
+import sys
 from pathlib import Path
 from typing import Any, TypedDict, Unpack
 
@@ -17,6 +19,7 @@ from sweep.errors import InputError
 from sweep.evaluation.angles import AngleUnit, grid_in_radians
 from sweep.evaluation.cyclogram import cyclogram, table_in_degrees
 from sweep.jobs.progress import Phases
+from sweep.nights.studies import FIGURE
 from sweep.report.dataset import chosen, read_dataset
 from sweep.report.figures import house_style, save
 from sweep.report.judged import write_comparison
@@ -41,9 +44,25 @@ def report(folder: Path, others: tuple[Path, ...], out: Path | None) -> None:
     if others:
         click.echo(f"report: {write_comparison([folder, *others], out or beside(located(folder)))}")
         return
+    written(folder, out)
+
+
+def own_figures(study: Path) -> Path | None:
+    """Return the program beside a study, or in its folder, that draws figures of its own; None where there is none."""
+    program = (study if study.is_dir() else study.parent) / FIGURE
+    return program if program.exists() else None
+
+
+def written(folder: Path, out: Path | None, figures: Path | None = None) -> int:
+    """Draw a study's own figures and write the report; return the exit code of the program that draws them."""
+    code = 0
     with Phases(show=True, quiet=False) as phases:
-        written = write_report(folder, out, phases.say)
-    click.echo(f"report: {written}")
+        if figures is not None:
+            phases.say("figures")
+            code = subprocess.run([sys.executable, str(figures), str(beside(folder))], check=False).returncode
+        page = write_report(folder, out, phases.say)
+    click.echo(f"report: {page}")
+    return code
 
 
 OF_DATASETS = ("map", "front", "tolerance", "sensitivity")

@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-import subprocess
-import sys
 from pathlib import Path
 
 import click
 
 from sweep.cli.options import BACKEND, JOBS, OUT, SMOKE, STUDY
 from sweep.errors import SearchCutShort
+from sweep.jobs.progress import stages
 
 
 @click.command()
@@ -46,16 +45,18 @@ def run(
     from sweep.engine.opening import is_part  # the engine takes a second, which --help need not wait for
     from sweep.engine.run import run as run_study
     from sweep.engine.searches import stages_of
-    from sweep.jobs.progress import stages
-    from sweep.nights.studies import FIGURE
     from sweep.report.terminal import ending
     from sweep.study import load_study
 
     proof = True if certify else None
     late: SearchCutShort | None = None
     model = load_study(study, smoke=smoke)
-    figure = (study if study.is_dir() else study.parent) / FIGURE
-    after = [*(["figures"] if figure.exists() else []), "report"] if report else []
+    after: list[str] = []
+    if report:
+        from sweep.cli.report import own_figures, written  # pandas and all that draws
+
+        figures = own_figures(study)
+        after = ["report"] if figures is None else ["figures", "report"]
     with stages(*stages_of(model), *after):
         try:
             folder = run_study(
@@ -70,23 +71,7 @@ def run(
         for line in (*found.lines, *([] if report else [found.next])):
             click.echo(line)
         click.echo(f"dataset: {folder}")
-        code = _report(folder, figure if "figures" in after else None) if report else 0
+        code = written(folder, None, figures) if report else 0
     if late is not None:
         raise late
     click.get_current_context().exit(found.exit_code or code)
-
-
-def _report(folder: Path, figure: Path | None) -> int:
-    """Draw the study's own figures and write the report; return the exit code of what draws them."""
-    from sweep.dataset.files import beside
-    from sweep.jobs.progress import Phases
-    from sweep.report.page import write_report
-
-    code = 0
-    with Phases(show=True, quiet=False) as phases:
-        if figure is not None:
-            phases.say("figures")
-            code = subprocess.run([sys.executable, str(figure), str(beside(folder))], check=False).returncode
-        written = write_report(folder, None, phases.say)
-    click.echo(f"report: {written}")
-    return code
