@@ -28,11 +28,11 @@ if TYPE_CHECKING:
     from sweep.study import Study
 
 NOWHERE = (math.nan, math.nan)
-SINGLE = 1024  # for what each dimension costs
+SINGLE = 512  # for what each dimension costs
 COSTS = 8  # dimensions that are tried exact
 BINS = 41
 FAR = 2.0  # spreads of what is made from which on a bound is not drawn: it would make one bar of them
-TELLING = 0.002  # a share of mechanisms below which a dimension costs nothing that 1024 of them could tell
+TELLING = 0.004  # a share of mechanisms below which a dimension costs nothing that 512 of them could tell
 STEPS = {"length": (0.1, "0.1\u00a0mm"), "angle": (math.radians(0.1), "0.1°")}
 
 
