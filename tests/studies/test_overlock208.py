@@ -82,9 +82,9 @@ def test_most_of_what_is_made_keeps_every_limit_and_none_of_the_drawing_does(stu
     drawing = start[0].copy()
     for name, value in EXPECTED["drawing"]["design"].items():
         drawing[study.family.parameter_names.index(name)] = value
-    # mechanisms that the search did not see: of 256 their share is good to 1.4 %, one standard deviation
+    # mechanisms that the search did not see: 95 % of them, and of 1024 a share is good to 0.7 %, one standard deviation
     built, drawn = yields(problem, np.array([start[0], drawing]), study.tolerance, seed=1)
-    assert built > EXPECTED["optimum"]["share"] - 0.042
+    assert built > 0.95 - 3.0 * 0.007
     assert drawn == 0.0
 
 
