@@ -93,11 +93,8 @@ def is_complete(folder: str | Path) -> bool:
     plan = read_plan(place)
     if plan is None:
         return False
-    whole = {
-        part.index
-        for part in chunk_files.parts(place)
-        if part.identity == plan["identity"] and chunk_files.is_whole(part)
-    }
+    own = [part for part in chunk_files.parts(place) if part.identity == plan["identity"]]
+    whole = {part.index for part in own if chunk_files.is_whole(part)}
     optimum = plan.get("optimised") is not None and (beside(place) / OPTIMUM).is_file()
     front = not plan.get("pareto") or front_is_complete(beside(place) / PARETO)
     return whole == set(range(plan["chunks"])) and ((optimum and front) or not plan["optimise"])

@@ -125,7 +125,7 @@ def test_dimension_that_costs_most_is_the_one_that_the_limit_is_about() -> None:
     assert first.name == "c" and first.spread == pytest.approx(1.0, abs=1e-9)
     assert first.gain == pytest.approx(1.0 - found.share, abs=0.02) and first.gain > TELLING
     assert all(cost.spread < 1e-9 and abs(cost.gain) < 1e-9 for cost in others)
-    assert "the dimension that costs most is c: were it exact, 27" in made_sentence(found, "x")
+    assert "the dimension that costs most is c: were it exact, 28" in made_sentence(found, "x")
 
 
 def test_histogram_marks_what_misses_the_limit() -> None:

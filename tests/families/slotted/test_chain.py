@@ -45,6 +45,6 @@ def test_slotted_drives_a_crank_rocker():
 
 
 @pytest.mark.parametrize("name", ["spherical_looper", "cylindrical_looper"])
-def test_chain_refuses_a_looper_with_two_drives_and_names_the_remedy(name):
-    with pytest.raises(InputError, match="member of a machine"):
-        family(["rssr", name])
+def test_chain_refuses_a_looper_with_two_drives_before_its_end_and_names_the_remedy(name):
+    with pytest.raises(InputError, match="put it last"):
+        family(["rssr", name, "rssr"])
