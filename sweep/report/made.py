@@ -151,7 +151,7 @@ def _costs(
     limit from which all these mechanisms keep a standard deviation of theirs is kept with one dimension exact, too.
     """
     assert study.tolerance is not None
-    limits = [x for x in limits if _near(x, columns[x.output])] or [worst]
+    limits = [x for x in limits if x is worst or _near(x, columns[x.output])]
     scatter = _variance(columns, worst)
     found = []
     own = np.flatnonzero(touched(study.family, design, study.tolerance))

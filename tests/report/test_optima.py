@@ -13,7 +13,9 @@ from matplotlib.figure import Figure
 
 import sweep
 from kernels import status as codes
+from sweep.evaluation.summaries import design_outputs
 from sweep.families.names import negative
+from sweep.optimise.manufacture.tolerance import deviating
 from sweep.plot.datasets import draw_histogram
 from sweep.report.figures import LIMIT
 from sweep.report.made import TELLING, histogram, made, made_sentence
@@ -126,6 +128,18 @@ def test_dimension_that_costs_most_is_the_one_that_the_limit_is_about() -> None:
     assert first.gain == pytest.approx(1.0 - found.share, abs=0.02) and first.gain > TELLING
     assert all(cost.spread < 1e-9 and abs(cost.gain) < 1e-9 for cost in others)
     assert "the dimension that costs most is c: were it exact, 28" in made_sentence(found, "x")
+
+
+def test_dimensions_are_tried_although_the_limit_that_is_shown_is_far_and_another_is_near() -> None:
+    """All mechanisms keep both limits, so the first one is shown; the second is as near as its output scatters."""
+    far = {"swing": {"max": 3.0, "unit": "rad"}}
+    data = data_of(row("optimum", 0.5), limits=far)
+    study, design = data.study, np.array([data.optimum[name] for name in data.study.family.parameter_names], float)
+    about = deviating(study.family, design, study.tolerance, study.optimise.seed, study.tolerance.samples)
+    values = design_outputs(study.family, about, ["max_abs_d2psi"], study.accuracy)["max_abs_d2psi"]
+    near = {"max_abs_d2psi": {"max": float(values.max() + 0.5 * values.std()), "unit": "1"}}
+    found = made(data_of(row("optimum", 0.5), limits=far | near))
+    assert found.share == 1.0 and found.histogram.shown.name == "swing" and found.costs
 
 
 def test_histogram_marks_what_misses_the_limit() -> None:
