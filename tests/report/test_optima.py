@@ -137,7 +137,7 @@ def test_dimensions_are_tried_although_the_limit_that_is_shown_is_far_and_anothe
     study, design = data.study, np.array([data.optimum[name] for name in data.study.family.parameter_names], float)
     about = deviating(study.family, design, study.tolerance, study.optimise.seed, study.tolerance.samples)
     values = design_outputs(study.family, about, ["max_abs_d2psi"], study.accuracy)["max_abs_d2psi"]
-    near = {"max_abs_d2psi": {"max": float(values.max() + 0.5 * values.std()), "unit": "1"}}
+    near = {"max_abs_d2psi": {"max": float(values.max() + 0.05 * values.std()), "unit": "1"}}
     found = made(data_of(row("optimum", 0.5), limits=far | near))
     assert found.share == 1.0 and found.histogram.shown.name == "swing" and found.costs
 
