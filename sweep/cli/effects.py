@@ -116,8 +116,15 @@ def joined(rows: Iterable[tuple[str, str, str, str]]) -> Rows:
     out: Rows = []
     for (stem, unit, text), group in groupby(rows, key=vector):
         first, *others = group
-        names = [first[0], *(row[0].removeprefix(stem) for row in others)]
-        out.append((", ".join(names), unit, (text if others else first[2]) + first[3]))
+        names = ", ".join([first[0], *(row[0].removeprefix(stem) for row in others)])
+        notes: dict[str, list[str]] = {}
+        for row in (first, *others):
+            notes.setdefault(row[3], []).append(row[0].removeprefix(stem))
+        if len(notes) == 1:
+            out.append((names, unit, (text if others else first[2]) + first[3]))
+        else:  # the entries of a tensor: those off its diagonal may have either sign
+            said = "; ".join(", ".join(own) + note for note, own in notes.items())
+            out.append((names, unit, f"{text}, off its diagonal - integral x y dm; {said}"))
     return out
 
 

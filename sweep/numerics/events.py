@@ -17,7 +17,7 @@ NARROWER = 1.0 / 16.0
 WIDER = 8.0  # times the place before: between them a pole beside the nearer end leaves 2.1^-k of the k-th coefficient
 SHORTEST = 1e-11  # distance of a zero [rad] below which no pose sees what turns there
 BISECTIONS = 120  # at most; a smooth function takes some eight steps, a jump one for each bit of the angle
-GRID = 65  # places of each grid about a minimum
+GRID, GRIDS = 65, 11  # places of each grid about a minimum; of a whole turn as many grids find it to rounding
 LAST = 2.0**-48  # width of the last brackets [rad]: four times the rounding of an angle
 
 Functions: TypeAlias = Callable[[Index, Array], Array]
@@ -108,7 +108,9 @@ def bottoms(function: Callable[[Array], Array], low: Array, high: Array) -> Arra
     low, high : (k,) places on either side of the minimum
     """
     every, share = np.arange(low.size), np.linspace(0.0, 1.0, GRID)
-    while (high - low).max(initial=0.0) > LAST:
+    for _ in range(GRIDS):
+        if (high - low).max(initial=0.0) <= LAST:
+            break
         places = low[:, None] + share * (high - low)[:, None]
         least = np.argmin(function(places), axis=1)
         low, high = places[every, np.maximum(least - 1, 0)], places[every, np.minimum(least + 1, GRID - 1)]
