@@ -22,7 +22,7 @@ from sweep.families.capabilities import (
     ProvableLocus,
 )
 from sweep.families.link_tree import LinkTree
-from sweep.families.machines import Machine
+from sweep.families.machines.machine import Machine
 from sweep.families.reduction import prefixes
 from sweep.quantities.resolve import event_names
 

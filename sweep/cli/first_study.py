@@ -10,7 +10,7 @@ from itertools import pairwise
 from sweep.cli.families import described, main_outputs
 from sweep.families.base import Family, March
 from sweep.families.chain import Chain, stages_of
-from sweep.families.machines import Machine
+from sweep.families.machines.machine import Machine
 from sweep.families.names import is_flag, parts, stem
 from sweep.pages import rendered
 from sweep.study.toml import design_entries, toml

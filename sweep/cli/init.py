@@ -15,7 +15,7 @@ from sweep.cli.first_study import smoke_text, study_text
 from sweep.errors import InputError, StoreError
 from sweep.exchange.points import drawn
 from sweep.families import family as find_family
-from sweep.families.machines import Machine
+from sweep.families.machines.machine import Machine
 from sweep.study.by_member import studies_of_members
 from sweep.study.load import load_study
 from sweep.study.schema import study_schema

@@ -17,7 +17,7 @@ from sweep.effects.loads import POINT
 from sweep.engine.estimate import LEAST_KEPT, Estimate, check_budget, estimate, other_accuracies, searches
 from sweep.evaluation.summaries import output
 from sweep.families.base import Family
-from sweep.families.machines import Machine
+from sweep.families.machines.machine import Machine
 from sweep.families.names import without_minus
 from sweep.jobs.progress import Phases
 from sweep.report.quantities import number, quantity

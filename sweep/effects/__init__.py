@@ -19,12 +19,12 @@ from sweep.effects.scene import stages_of
 from sweep.errors import InputError
 from sweep.families.base import Accuracy, Family, Output, Parameter, Step, Work, of_family
 from sweep.families.chain import Chain
-from sweep.families.machines import Machine
-from sweep.families.main_shaft import ShaftTorque
+from sweep.families.machines.machine import Machine
+from sweep.families.machines.main_shaft import ShaftTorque
+from sweep.families.machines.relations import EventValue
+from sweep.families.machines.shaking import Shaking
 from sweep.families.names import stem
 from sweep.families.reduction import reduced
-from sweep.families.relations import EventValue
-from sweep.families.shaking import Shaking
 from sweep.numerics.curves import Curve
 
 # Name of each effect's entry: module and constant.  A new effect is a kernel file, an entry file and its line here.

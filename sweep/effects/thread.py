@@ -10,8 +10,17 @@ from sweep.effects.base import Effect
 from sweep.effects.scene import Scene
 from sweep.families.base import Array, Columns, Output, Parameter
 from sweep.families.capabilities import ThreadPath
+from sweep.families.machines.thread_balance import (
+    ALPHA,
+    BENDING,
+    BETA,
+    COUNT,
+    DENSITY,
+    EXPONENT,
+    REFERENCE_SPEED,
+    SHARE,
+)
 from sweep.families.poses import filled_each
-from sweep.families.thread_balance import ALPHA, BENDING, BETA, COUNT, DENSITY, EXPONENT, REFERENCE_SPEED, SHARE
 
 MM_PER_M = 1e3
 

@@ -7,7 +7,7 @@ from collections.abc import Iterable
 from sweep.effects import NAMES, applicable
 from sweep.effects.base import Placed
 from sweep.families.base import Family, Output
-from sweep.families.machines import Machine
+from sweep.families.machines.machine import Machine
 from sweep.families.names import stem
 from sweep.families.reduction import prefixes
 

@@ -8,12 +8,12 @@ from typing import NamedTuple
 from sweep.families.base import Family
 from sweep.families.capabilities import Assembly, Points
 from sweep.families.chain import Chain
-from sweep.families.machines import Machine
-from sweep.families.main_shaft import ShaftTorque
+from sweep.families.machines.machine import Machine
+from sweep.families.machines.main_shaft import ShaftTorque
+from sweep.families.machines.relations import Relation
+from sweep.families.machines.shaking import Shaking
 from sweep.families.names import parts
 from sweep.families.parts import AXES
-from sweep.families.relations import Relation
-from sweep.families.shaking import Shaking
 
 _OF_FAMILY = re.compile(r"([xyz])_([a-z][a-z_]*)")
 _OF_MACHINE = re.compile(r"([a-z][a-z_0-9]*)_([xyz])")

@@ -15,10 +15,10 @@ from sweep.evaluation.tables import design_matrix
 from sweep.families import Mechanism
 from sweep.families import family as find_family
 from sweep.families.base import Accuracy, Family
-from sweep.families.crossings import SAMPLES, Poses
-from sweep.families.machines import Machine
-from sweep.families.moments import Taking
-from sweep.families.triangles import Entering
+from sweep.families.machines.crossings import SAMPLES, Poses
+from sweep.families.machines.machine import Machine
+from sweep.families.machines.moments import Taking
+from sweep.families.machines.triangles import Entering
 from sweep.quantities.resolve import event_names
 
 if TYPE_CHECKING:

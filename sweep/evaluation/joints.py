@@ -20,7 +20,7 @@ from sweep.families.base import Angles, Array, Family
 from sweep.families.capabilities import Link, OutputLink, Points, Skeleton
 from sweep.families.chain import Chain, drive, driving_names, stages_of
 from sweep.families.frames import WHOLE, Frame
-from sweep.families.machines import Machine
+from sweep.families.machines.machine import Machine
 from sweep.families.parts import AXES, TIP, Member
 
 if TYPE_CHECKING:

@@ -26,7 +26,7 @@ from sweep.exchange.scene import pose, shown_name, turn
 from sweep.families import Mechanism
 from sweep.families import family as find_family
 from sweep.families.base import Family, Interval, Turn, equal_steps
-from sweep.families.machines import Machine
+from sweep.families.machines.machine import Machine
 from sweep.quantities.units import speed_given
 
 if TYPE_CHECKING:

@@ -22,7 +22,7 @@ from sweep.exchange.scene import Placed, extent
 from sweep.families import names
 from sweep.families.base import Angles, Array, Family
 from sweep.families.capabilities import JointRecords
-from sweep.families.machines import Machine
+from sweep.families.machines.machine import Machine
 
 METRES = {"mm": 1e-3, "m": 1.0}
 THICK = 0.008  # of a bar, of the extent of all joints

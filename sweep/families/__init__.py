@@ -12,9 +12,9 @@ from sweep.errors import InputError, choices
 from sweep.families.base import Family
 from sweep.families.chain import chain as chain_of  # the name of the module stays that of the module
 from sweep.families.check import check_family
-from sweep.families.machines import Machine
-from sweep.families.specification import Specification, built
-from sweep.families.specification import specification as specified
+from sweep.families.machines.machine import Machine
+from sweep.families.machines.specification import Specification, built
+from sweep.families.machines.specification import specification as specified
 
 NAMES = (
     "rssr",

@@ -15,7 +15,7 @@ from sweep.evaluation.cyclogram import cyclogram, table_in_degrees
 from sweep.exchange.dxf import add_tables
 from sweep.exchange.export import export
 from sweep.exchange.scene import exists, frames_of, is_spatial, over, pose, shown_name
-from sweep.families.machines import Machine
+from sweep.families.machines.machine import Machine
 from sweep.plot.drawing import draw
 from sweep.report.dataset import Dataset, chosen, read_dataset, row_of
 from sweep.report.figures import house_style, new_figure

@@ -12,7 +12,7 @@ import numpy as np
 from sweep.families.base import Family, March, Output, of_family
 from sweep.families.capabilities import Coordinates, Fixed, Points, Skeleton
 from sweep.families.chain import Chain
-from sweep.families.machines import Machine
+from sweep.families.machines.machine import Machine
 from sweep.families.parts import AXES, TIP, Member
 from sweep.quantities.dimensions import Piece
 

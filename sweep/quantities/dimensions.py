@@ -20,7 +20,7 @@ from sweep.effects import input_names
 from sweep.families.base import Accuracy, Array, Columns, Family, Output, Step, Work, of_family
 from sweep.families.capabilities import Dimensions, Skeleton
 from sweep.families.chain import Chain
-from sweep.families.machines import Machine
+from sweep.families.machines.machine import Machine
 
 Piece: TypeAlias = Callable[[Any], Any]
 """Designs (n, P), real or complex, to one number each."""

@@ -6,8 +6,8 @@ from dataclasses import KW_ONLY, dataclass
 from typing import Literal, NamedTuple, TypeAlias
 
 from sweep.families.base import Event, Family, Output
+from sweep.families.machines.relations import EventValue, Timing
 from sweep.families.reduction import Mode, Reduction
-from sweep.families.relations import EventValue, Timing
 from sweep.quantities.box import Box
 from sweep.quantities.dimensions import Size
 

@@ -14,8 +14,8 @@ from typing import Literal, TypeAlias, cast
 from sweep.errors import InputError
 from sweep.families.base import Family, Turn
 from sweep.families.capabilities import Assembly
+from sweep.families.machines.relations import EventValue, Timing
 from sweep.families.names import parts, stem, without_minus
-from sweep.families.relations import EventValue, Timing
 from sweep.quantities.dimensions import Piece
 from sweep.quantities.kinds import (
     Dimension,

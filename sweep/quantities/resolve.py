@@ -9,7 +9,7 @@ from sweep.errors import InputError, listed, nearest
 from sweep.families.base import Event, Family, Interval, Output, Turn, of_family
 from sweep.families.capabilities import Assembly
 from sweep.families.chain import Chain
-from sweep.families.machines import Machine
+from sweep.families.machines.machine import Machine
 from sweep.families.names import at_stage, parts, without_minus
 from sweep.families.parts import Member
 from sweep.families.reduction import prefixes, reduction_of, split

@@ -14,7 +14,7 @@ from sweep.errors import InputError
 from sweep.families.base import Accuracy, Array, Columns, Family, Output, Step, Work, of_family
 from sweep.families.capabilities import Assembly, CrankRockerLoop, GuidedPoint
 from sweep.families.chain import Chain, stages_of
-from sweep.families.machines import Machine
+from sweep.families.machines.machine import Machine
 from sweep.families.names import at_stage
 from sweep.families.parts import Stage
 from sweep.families.reduction import reduction_of

@@ -12,7 +12,7 @@ from sweep.dataset.chunk_files import ROWS_PER_BATCH, batches
 from sweep.dataset.files import beside, is_older, located, write_atomically
 from sweep.errors import StoreError
 from sweep.evaluation.cyclogram import cyclogram, table_in_degrees
-from sweep.families.machines import Machine
+from sweep.families.machines.machine import Machine
 from sweep.jobs.progress import Say, unsaid
 from sweep.pages import rendered
 from sweep.report import answer, front, maps, tables

@@ -12,9 +12,9 @@ import numpy as np
 from kernels.types import Array
 from sweep.errors import MeasuredRangeWarning
 from sweep.evaluation.thread.diagram import diagram
-from sweep.families.machines import Machine
-from sweep.families.sewing import RPM, Sewing
-from sweep.families.thread_balance import MEASURED_SPEED, MM_PER_M, ThreadBalance
+from sweep.families.machines.machine import Machine
+from sweep.families.machines.sewing import RPM, Sewing
+from sweep.families.machines.thread_balance import MEASURED_SPEED, MM_PER_M, ThreadBalance
 from sweep.optimise.manufacture.tolerance import deviating
 from sweep.report.dataset import Dataset
 from sweep.report.figures import LIMIT, WIDTH, new_figure

@@ -13,10 +13,10 @@ from sweep.errors import InputError
 from sweep.families import family as find_family
 from sweep.families.base import Family
 from sweep.families.capabilities import ThreadPath
-from sweep.families.machines import Machine
-from sweep.families.main_shaft import ShaftTorque
-from sweep.families.shaking import Shaking
-from sweep.families.specification import Specification
+from sweep.families.machines.machine import Machine
+from sweep.families.machines.main_shaft import ShaftTorque
+from sweep.families.machines.shaking import Shaking
+from sweep.families.machines.specification import Specification
 from sweep.quantities.resolve import output
 from sweep.study.study import Study
 

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 from sweep.effects.wanted import expanded
 from sweep.errors import StudyError
 from sweep.families.base import Accuracy, Family
-from sweep.families.specification import Specification
+from sweep.families.machines.specification import Specification
 from sweep.quantities.limits import Limit
 from sweep.study.accuracy import accuracy_table, check_proofs, read_accuracy
 from sweep.study.design import Elsewhere, check_varied, read_reference, read_space, take, taken_reference

@@ -19,7 +19,7 @@ from sweep.effects.wanted import expanded, names_of_effects
 from sweep.errors import InputError, choices, closest
 from sweep.evaluation.loads import UNITS, rod
 from sweep.families.base import Family
-from sweep.families.machines import Machine
+from sweep.families.machines.machine import Machine
 from sweep.families.names import at_stage, parts
 from sweep.numerics.curves import Curve, SeriesCurve, table_curve
 from sweep.quantities import units

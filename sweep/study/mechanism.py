@@ -11,7 +11,7 @@ from sweep.errors import InputError, choices, closest
 from sweep.families import NAMES
 from sweep.families import family as find_family
 from sweep.families.base import Family
-from sweep.families.specification import Specification, specification
+from sweep.families.machines.specification import Specification, specification
 from sweep.quantities import units
 from sweep.study.file import (
     TEXT,

@@ -13,8 +13,8 @@ from typing import TYPE_CHECKING, Any, Literal
 from sweep.effects import extended
 from sweep.families import family as find_family
 from sweep.families.base import Accuracy, Family
+from sweep.families.machines.specification import Specification
 from sweep.families.names import without_minus
-from sweep.families.specification import Specification
 from sweep.numerics.curves import Curve
 from sweep.quantities.limits import Limit as Limit
 from sweep.study.space import DesignSpace

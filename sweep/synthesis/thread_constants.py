@@ -11,7 +11,7 @@ import numpy as np
 from sweep.errors import InputError
 from sweep.evaluation.thread.rows import Sheet, columns_of
 from sweep.families.base import Array, Parameter
-from sweep.families.thread_balance import ALPHA, BENDING, BETA, COUNT, DENSITY, RADIUS, REFERENCE_SPEED
+from sweep.families.machines.thread_balance import ALPHA, BENDING, BETA, COUNT, DENSITY, RADIUS, REFERENCE_SPEED
 
 if TYPE_CHECKING:
     import pandas as pd

@@ -16,7 +16,7 @@ from sweep.effects.scene import Scene
 from sweep.families import NAMES, family
 from sweep.families.base import Angles
 from sweep.families.capabilities import JointRecords, Skeleton
-from sweep.families.shaking import shaken
+from sweep.families.machines.shaking import shaken
 from sweep.optimise.manufacture.tolerance import sensitivities
 from tests.effects.test_balance import CENTRES, GRAVITY, MASSES, OMEGA, PHI, RSSP, RSSR, TENSORS, N, full, loads
 from tests.reference.momentum import balance, body_momentum, triads

@@ -13,7 +13,7 @@ import sweep
 from sweep.cli.main import main
 from sweep.study import load_study
 from sweep.study.limits import SETTINGS
-from tests.families.test_hand_made_stitches import DESIGN, PHI, machine_of
+from tests.families.machines.test_hand_made_stitches import DESIGN, PHI, machine_of
 
 CRANK, ROD = 20.0, 70.0
 

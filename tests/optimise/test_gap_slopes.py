@@ -16,7 +16,7 @@ import pytest
 import sweep
 from sweep.families.base import Angles
 from sweep.optimise.manufacture.tolerance import sensitivities
-from tests.families.test_moments import machine_of, rows_of
+from tests.families.machines.test_moments import machine_of, rows_of
 
 STEP = 1e-100
 SIXTH = {1: 3.0 / 4.0, 2: -3.0 / 20.0, 3: 1.0 / 60.0}  # weights of central differences of sixth order

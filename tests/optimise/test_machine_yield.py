@@ -17,7 +17,7 @@ from sweep.families.base import Accuracy
 from sweep.optimise.manufacture.tolerance import deviating
 from sweep.quantities.limits import Limit, meets
 from sweep.study.study import Tolerance
-from tests.families.test_stitch_reference import ROWS, machine_of
+from tests.families.machines.test_stitch_reference import ROWS, machine_of
 from tests.reference import stitch
 
 LENGTHS, ANGLES, TILTS, PHASE = 0.03, 1e-3, 5e-4, 4e-3

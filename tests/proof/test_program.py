@@ -7,8 +7,7 @@ import pytest
 from scipy.optimize import linprog
 
 from kernels import status as st
-from kernels.boxes.branching import combined
-from kernels.boxes.program import multipliers
+from kernels.boxes.branching import combined, multipliers
 from kernels.boxes.taylor import width
 
 

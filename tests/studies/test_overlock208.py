@@ -14,7 +14,7 @@ from sweep.chunks.cascade import levels
 from sweep.evaluation.summaries import design_outputs
 from sweep.evaluation.tables import design_matrix
 from sweep.families.base import Accuracy, Work
-from sweep.families.thread_balance import ThreadBalance
+from sweep.families.machines.thread_balance import ThreadBalance
 from sweep.optimise.extrema.gradients import scalar_gradient, step_gradients
 from sweep.optimise.extrema.points import STEP
 from sweep.optimise.manufacture.robust import yields

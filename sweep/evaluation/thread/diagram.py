@@ -15,7 +15,7 @@ from sweep.evaluation.thread.rows import warn_outside
 from sweep.families import Mechanism
 from sweep.families import family as find_family
 from sweep.families.curve_features import switches
-from sweep.families.thread_balance import MEASURED_SPEED, MM_PER_M, ThreadBalance
+from sweep.families.machines.thread_balance import MEASURED_SPEED, MM_PER_M, ThreadBalance
 
 if TYPE_CHECKING:
     import pandas as pd

@@ -13,7 +13,7 @@ from sweep.evaluation.angles import in_radians
 from sweep.evaluation.tables import Parametrised, design_matrix
 from sweep.evaluation.tables import Sheet as Sheet
 from sweep.families.base import Array, Parameter
-from sweep.families.thread_balance import Range
+from sweep.families.machines.thread_balance import Range
 
 if TYPE_CHECKING:
     import pandas as pd

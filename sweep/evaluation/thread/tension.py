@@ -19,7 +19,7 @@ from sweep.errors import InputError
 from sweep.evaluation.tables import numbers
 from sweep.evaluation.thread.rows import Sheet, columns_of, frame, side_by_side, warn_outside
 from sweep.families.base import Parameter
-from sweep.families.thread_balance import (
+from sweep.families.machines.thread_balance import (
     ALPHA,
     BENDING,
     BETA,

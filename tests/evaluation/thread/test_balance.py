@@ -15,8 +15,8 @@ import sweep
 from kernels import status as st
 from sweep.errors import InputError, StudyError
 from sweep.families.base import Angles
-from sweep.families.thread_balance import GF
-from sweep.families.thread_way import bend
+from sweep.families.machines.thread_balance import GF
+from sweep.families.machines.thread_way import bend
 from sweep.study import load_study, study_from_data
 from tests.evaluation.test_machines import NEEDLE
 

@@ -12,9 +12,9 @@ from scipy.optimize import minimize_scalar
 import sweep
 from sweep.errors import InputError
 from sweep.families.base import Angles
-from sweep.families.thread_balance import GF
+from sweep.families.machines.thread_balance import GF
 from sweep.report.sewing import threads_figure
-from tests.families.test_hand_made_stitches import ARM, AT, CRANK, DESIGN, PHI, SHARE, across, machine_of
+from tests.families.machines.test_hand_made_stitches import ARM, AT, CRANK, DESIGN, PHI, SHARE, across, machine_of
 
 GUIDE, HOLE, SEAM = np.array([40.0, 3.0, 4.0]), np.array([-20.0, -4.0, 0.0]), np.array([-20.0, -5.0, 2.0])
 RELATIONS = {"cast": {"event": "a_across", "level": 0.0, "rising": False}}

@@ -10,15 +10,15 @@ import numpy as np
 
 from sweep.errors import InputError, choices
 from sweep.families.capabilities import ThreadPath
-from sweep.families.main_shaft import ShaftTorque
-from sweep.families.moments import RiseWindow, Taking
+from sweep.families.machines.main_shaft import ShaftTorque
+from sweep.families.machines.moments import RiseWindow, Taking
+from sweep.families.machines.relations import each, two
+from sweep.families.machines.sewing import Sewing
+from sweep.families.machines.thread_balance import ThreadBalance
+from sweep.families.machines.thread_way import Edge, TakeUp, Waypoint, spots
+from sweep.families.machines.tools import Blade, Needle, Seam, Spot, Tool, length, number
+from sweep.families.machines.triangles import Entering
 from sweep.families.parts import Member, vector
-from sweep.families.relations import each, two
-from sweep.families.sewing import Sewing
-from sweep.families.thread_balance import ThreadBalance
-from sweep.families.thread_way import Edge, TakeUp, Waypoint, spots
-from sweep.families.tools import Blade, Needle, Seam, Spot, Tool, length, number
-from sweep.families.triangles import Entering
 from sweep.numerics.curves import TableCurve, table_curve
 
 THREAD_KEYS = (

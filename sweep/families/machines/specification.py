@@ -14,17 +14,15 @@ from sweep.errors import InputError, choices, nearest
 from sweep.families.base import Event, Family, Output, Turn, reads_as_degrees
 from sweep.families.capabilities import OutputLink
 from sweep.families.frames import crank_axis
-from sweep.families.happenings import check_happenings
 from sweep.families.link_tree import LinkTree
-from sweep.families.machines import Machine, assemble
-from sweep.families.main_shaft import Driven, ShaftTorque
-from sweep.families.parts import Member, coupler_joints, is_planar, placement, vector
-from sweep.families.relations import Distance, EventValue, Relation, Speed, Timing, each, two
-from sweep.families.segments import Body, Gap
-from sweep.families.shafts import MOUNT_KEYS, SHAFT_KEYS, Mount, Shaft, read_mount, read_shafts
-from sweep.families.shaking import Shaken, Shaking, shaken
-from sweep.families.stitching import read_entering, read_sewing, read_taking, read_thread
-from sweep.families.tools import (
+from sweep.families.machines.happenings import check_happenings
+from sweep.families.machines.machine import Machine, assemble
+from sweep.families.machines.main_shaft import Driven, ShaftTorque
+from sweep.families.machines.relations import Distance, EventValue, Relation, Speed, Timing, each, two
+from sweep.families.machines.segments import Body, Gap
+from sweep.families.machines.shaking import Shaken, Shaking, shaken
+from sweep.families.machines.stitching import read_entering, read_sewing, read_taking, read_thread
+from sweep.families.machines.tools import (
     BLADE_KEYS,
     NEEDLE_KEYS,
     PLATE_KEYS,
@@ -35,6 +33,8 @@ from sweep.families.tools import (
     read_height,
     read_tools,
 )
+from sweep.families.parts import Member, coupler_joints, is_planar, placement, vector
+from sweep.families.shafts import MOUNT_KEYS, SHAFT_KEYS, Mount, Shaft, read_mount, read_shafts
 
 MEMBER_KEYS = ("family", "chain", "ratio", "offset", "driver", "place", "tip", "eye", *MOUNT_KEYS)
 RELATION_KINDS = (

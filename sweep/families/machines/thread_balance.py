@@ -27,7 +27,19 @@ import numpy as np
 from kernels.types import TWO_PI
 from sweep.families.base import Output, Parameter
 from sweep.families.frames import Frame
-from sweep.families.thread_way import PHI, Piece, Run, TakeUp, Waypoint, followed, laid, only, outside, spots, turned
+from sweep.families.machines.thread_way import (
+    PHI,
+    Piece,
+    Run,
+    TakeUp,
+    Waypoint,
+    followed,
+    laid,
+    only,
+    outside,
+    spots,
+    turned,
+)
 from sweep.numerics.curves import TableCurve
 
 GF = 9.80665e-3  # N

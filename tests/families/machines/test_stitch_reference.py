@@ -14,7 +14,7 @@ from kernels import status as st
 from tests.reference import stitch
 from tests.support.selection import mostly_long
 
-TABLE = json.loads((Path(__file__).parents[1] / "oracle" / "machine_open.json").read_text())["rows"]
+TABLE = json.loads((Path(__file__).parents[2] / "oracle" / "machine_open.json").read_text())["rows"]
 ROWS = [row["inputs"] for row in TABLE if row["kind"] == "moment_A" and row["case"] == "passage"]
 pytestmark = pytest.mark.slow
 MACHINES = (60, pytest.param(200, marks=pytest.mark.long))

@@ -9,8 +9,8 @@ from typing import Any, NamedTuple, TypeAlias
 import numpy as np
 
 from kernels.types import TWO_PI
-from sweep.families.segments import Point, dot, minus
-from sweep.families.tools import Spot
+from sweep.families.machines.segments import Point, dot, minus
+from sweep.families.machines.tools import Spot
 
 PHI = "phi"
 

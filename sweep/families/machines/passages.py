@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from kernels import status as st
 from kernels.types import TWO_PI, Array
 from sweep.families.base import Columns, Output, Step
-from sweep.families.crossings import (
+from sweep.families.machines.crossings import (
     TANGENT,
     Found,
     Places,
@@ -24,11 +24,11 @@ from sweep.families.crossings import (
     where_largest,
     whole,
 )
-from sweep.families.moments import Taking
-from sweep.families.thread_way import turned as turned_back
+from sweep.families.machines.moments import Taking
+from sweep.families.machines.thread_way import turned as turned_back
 
 if TYPE_CHECKING:
-    from sweep.families.machines import Machine
+    from sweep.families.machines.machine import Machine
 
 MEET = 1e-9  # rad of the tip's way: nearer axes meet, as quick poses know the place of a least distance no better
 TEXTS = {

@@ -13,9 +13,9 @@ from sweep.errors import InputError, choices
 from sweep.families.base import Output, Parameter
 from sweep.families.capabilities import OutputLink
 from sweep.families.frames import Frame
+from sweep.families.machines.relations import two
+from sweep.families.machines.segments import Body, dot, minus
 from sweep.families.parts import Member, vector
-from sweep.families.relations import two
-from sweep.families.segments import Body, dot, minus
 from sweep.families.sites import AXES, links_of
 
 NEEDLE_KEYS = ("on", "line", "sense", "scarf", "diameter", "floor", "top", "scarf_end", "eye", "point")

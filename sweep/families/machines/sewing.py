@@ -18,13 +18,13 @@ from kernels import status as st
 from kernels.types import Array, Status
 from sweep.families.base import Accuracy, Angles, Columns, Output, Parameter, Step, Work
 from sweep.families.frames import Frame
-from sweep.families.main_shaft import ShaftTorque, speed_of
-from sweep.families.moments import Taking
-from sweep.families.passages import taking_step
-from sweep.families.triangles import Entering, entering_step
+from sweep.families.machines.main_shaft import ShaftTorque, speed_of
+from sweep.families.machines.moments import Taking
+from sweep.families.machines.passages import taking_step
+from sweep.families.machines.triangles import Entering, entering_step
 
 if TYPE_CHECKING:
-    from sweep.families.machines import Machine
+    from sweep.families.machines.machine import Machine
 
 RPM = 2.0 * np.pi / 60.0
 ENDS = {

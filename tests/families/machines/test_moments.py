@@ -12,9 +12,9 @@ from mpmath import mp, mpf
 
 import sweep
 from kernels import status as st
-from sweep.families.segments import closest, triple_product
+from sweep.families.machines.segments import closest, triple_product
 
-TABLE = json.loads((Path(__file__).parents[1] / "oracle" / "machine_open.json").read_text())["rows"]
+TABLE = json.loads((Path(__file__).parents[2] / "oracle" / "machine_open.json").read_text())["rows"]
 FACTOR = 16.0
 TURN = np.arange(8192) * (2.0 * np.pi / 8192)
 

@@ -16,12 +16,12 @@ from sweep.families.capabilities import GuidedPoint, JointRecords, Skeleton, Too
 from sweep.families.curve_features import Smooth
 from sweep.families.frames import CRANKS, Frame
 from sweep.families.link_tree import LinkTree
-from sweep.families.relations import with_size
-from sweep.families.segments import cross
+from sweep.families.machines.relations import with_size
+from sweep.families.machines.segments import cross
 from sweep.families.sites import AXES
 
 if TYPE_CHECKING:
-    from sweep.families.machines import Machine
+    from sweep.families.machines.machine import Machine
 
 ORDERS = {1: "first", 2: "second"}  # in waves of one turn of the main shaft
 GRIDS = (64, 128, 256, 512, 1024)  # samples of a turn, the first that tell the orders

@@ -16,9 +16,9 @@ import numpy as np
 from kernels.types import Array
 from sweep.families.base import Output, Parameter
 from sweep.families.frames import Frame
-from sweep.families.segments import Gap, cross, dot, minus
+from sweep.families.machines.segments import Gap, cross, dot, minus
+from sweep.families.machines.tools import Blade, Needle, rate_of
 from sweep.families.sites import AXES
-from sweep.families.tools import Blade, Needle, rate_of
 
 PARALLEL = 1e-6  # of the scarf's size: what is square to the needle says no direction below
 
@@ -76,7 +76,7 @@ def _word(field: str) -> str:
 
 @dataclass(frozen=True)
 class Taking:
-    """A blade's tip in the frame of a needle, pose by pose; :mod:`sweep.families.passages` finds where it passes.
+    """A blade's tip in the frame of a needle, pose by pose; where it passes: :mod:`sweep.families.machines.passages`.
 
     ``sense`` is +1 or -1: the tip passes towards u or against it; ``window`` is where the rise may lie.
     """

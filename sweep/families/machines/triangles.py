@@ -16,13 +16,13 @@ import numpy as np
 from kernels import status as st
 from kernels.types import TWO_PI
 from sweep.families.base import Columns, Output, Parameter, Step
-from sweep.families.crossings import TANGENT, Places, Poses, moved, outputs_at, step_of, verdict, whole
 from sweep.families.frames import Frame
-from sweep.families.segments import cross, dot, minus
-from sweep.families.tools import Spot
+from sweep.families.machines.crossings import TANGENT, Places, Poses, moved, outputs_at, step_of, verdict, whole
+from sweep.families.machines.segments import cross, dot, minus
+from sweep.families.machines.tools import Spot
 
 if TYPE_CHECKING:
-    from sweep.families.machines import Machine
+    from sweep.families.machines.machine import Machine
 
 FLAT = 1e-6  # sine of the angle between two sides: what is flatter has no plane
 SIDES = {"seam": (1, 2), "thread": (2, 0), "blade": (0, 1)}  # the two corners of each, in the order around

@@ -21,7 +21,7 @@ from sweep.families.frames import Frame
 from sweep.numerics.steady_speed import ERROR, FINER, GRIDS, LEFT, PER_LEFT, steady
 
 if TYPE_CHECKING:
-    from sweep.families.machines import Machine
+    from sweep.families.machines.machine import Machine
 
 NUMBERS = {
     "unevenness": ("1", "(largest - smallest speed)/mean of the main shaft in the steady state"),

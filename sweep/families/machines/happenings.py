@@ -12,15 +12,15 @@ from kernels.status import OK
 from kernels.types import Array
 from sweep.errors import InputError, choices
 from sweep.families.base import Event, of_family
-from sweep.families.crossings import SAMPLES, Poses, moved
 from sweep.families.curve_features import Switches
-from sweep.families.moments import Taking
-from sweep.families.passages import passages
-from sweep.families.thread_balance import ThreadBalance
-from sweep.families.triangles import Entering, entries
+from sweep.families.machines.crossings import SAMPLES, Poses, moved
+from sweep.families.machines.moments import Taking
+from sweep.families.machines.passages import passages
+from sweep.families.machines.thread_balance import ThreadBalance
+from sweep.families.machines.triangles import Entering, entries
 
 if TYPE_CHECKING:
-    from sweep.families.machines import Machine
+    from sweep.families.machines.machine import Machine
 
 MOST = 65536  # designs whose events are remembered
 

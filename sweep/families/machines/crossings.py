@@ -16,7 +16,7 @@ from sweep.families.base import Accuracy, Angles, Columns, Family, Output, Step,
 from sweep.numerics.events import bottoms, zeros
 
 if TYPE_CHECKING:
-    from sweep.families.machines import Machine
+    from sweep.families.machines.machine import Machine
 
 SAMPLES = 512
 BLOCK = 256  # designs at once: their samples stay in the caches

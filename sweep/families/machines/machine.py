@@ -17,17 +17,17 @@ from sweep.families.capabilities import Assembly, Points
 from sweep.families.chain import magnitude
 from sweep.families.curve_features import of_members, on_part
 from sweep.families.frames import Frame
-from sweep.families.happenings import event_angles, switches_of_events
-from sweep.families.main_shaft import ShaftTorque, speed_of
-from sweep.families.moments import Taking
+from sweep.families.machines.happenings import event_angles, switches_of_events
+from sweep.families.machines.main_shaft import ShaftTorque, speed_of
+from sweep.families.machines.moments import Taking
+from sweep.families.machines.passages import taking_step
+from sweep.families.machines.relations import EventValue, Relation, Timing
+from sweep.families.machines.sewing import Sewing, sewing_step
+from sweep.families.machines.shaking import Shaking, orders_of
+from sweep.families.machines.triangles import Entering, entering_step
 from sweep.families.parts import AXES, EYE, TIP, Member, coordinates, coupler_joints, velocity
-from sweep.families.passages import taking_step
-from sweep.families.relations import EventValue, Relation, Timing
-from sweep.families.sewing import Sewing, sewing_step
-from sweep.families.shaking import Shaking, orders_of
 from sweep.families.sites import coordinates as coordinates_of_site
 from sweep.families.sites import made_of
-from sweep.families.triangles import Entering, entering_step
 
 
 @dataclass(frozen=True)

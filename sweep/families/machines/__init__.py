@@ -1,0 +1,1 @@
+"""Machines: members on common shafts, and the relations between them: gaps, moments of a stitch, thread, shaking."""
