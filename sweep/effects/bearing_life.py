@@ -159,8 +159,7 @@ def per_turn(scene: Scene, wanted: frozenset[str], accuracy: Accuracy, shaft: Sh
 
 
 def _of_turn(worst: Status) -> Status:
-    turns: Status = np.where(worst == st.OK, st.OK, np.maximum(worst, st.NOT_ROTATABLE)).astype(np.uint8)
-    return turns
+    return np.where(worst == st.OK, st.OK, np.maximum(worst, st.NOT_ROTATABLE)).astype(np.uint8)
 
 
 def _loads(scene: Scene, shaft: Shaft) -> tuple[Array, Array, Status]:

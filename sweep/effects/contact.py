@@ -33,20 +33,17 @@ NARROW = 3.0  # R1 over half the width of a strap's contact, from which on it co
 
 def ball_stress(force: Array, modulus: Array, radius: Array) -> Array:
     """Largest pressure of a ball on a flat wall, (10)."""
-    found: Array = np.cbrt(6.0 * force * modulus**2 / (np.pi**3 * radius**2))
-    return found
+    return np.cbrt(6.0 * force * modulus**2 / (np.pi**3 * radius**2))
 
 
 def line_stress(force: Array, modulus: Array, radius: Array, length: Array) -> Array:
     """Largest pressure of a contact along a line, (11)."""
-    found: Array = np.sqrt(force * modulus / (np.pi * length * radius))
-    return found
+    return np.sqrt(force * modulus / (np.pi * length * radius))
 
 
 def half_width(force: Array, modulus: Array, radius: Array, length: Array) -> Array:
     """Half the width of a contact along a line, (11)."""
-    found: Array = np.sqrt(4.0 * force * radius / (np.pi * length * modulus))
-    return found
+    return np.sqrt(4.0 * force * radius / (np.pi * length * modulus))
 
 
 def touching(tree: LinkTree) -> tuple[LinkJoint, ...]:

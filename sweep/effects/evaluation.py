@@ -206,8 +206,7 @@ def bends(added: Added, effects: tuple[Placed, ...]) -> list[Bends]:
 
 
 def _column(column: int, designs: Array) -> Array:
-    values: Array = designs[:, column]
-    return values
+    return designs[:, column]
 
 
 def _is_given(column: int, designs: Array) -> NDArray[np.bool_]:

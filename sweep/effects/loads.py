@@ -259,8 +259,7 @@ def scalar_columns(names: Collection[str], values: Array | None, wanted: frozens
 def magnitude(vectors: Array) -> Array:
     """Length of vectors (n, m, 3)."""
     x, y, z = vectors[:, :, 0], vectors[:, :, 1], vectors[:, :, 2]
-    length: Array = np.sqrt(x * x + y * y + z * z)
-    return length
+    return np.sqrt(x * x + y * y + z * z)
 
 
 def tip_from(scene: Scene, heights: Array) -> Array:

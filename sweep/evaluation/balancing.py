@@ -46,8 +46,7 @@ class CorrectionPlane:
         mark, across = np.array([self.mark]), np.array([self.across])
         along = np.cos(angle) * mark + np.sin(angle) * across
         square = -np.sin(angle) * mark + np.cos(angle) * across
-        found: Array = (self.ratio * speed) ** 2 * np.stack([along, square], axis=2)
-        return found
+        return (self.ratio * speed) ** 2 * np.stack([along, square], axis=2)
 
 
 class Balanced(NamedTuple):

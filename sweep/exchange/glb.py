@@ -234,8 +234,7 @@ def _product(p: Array, q: Array) -> Array:
 
 
 def _unit(values: Array) -> Array:
-    found: Array = values / np.linalg.norm(values)
-    return found
+    return values / np.linalg.norm(values)
 
 
 def _cylinder() -> tuple[Array, Array, NDArray[np.int64]]:

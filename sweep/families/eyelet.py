@@ -62,8 +62,7 @@ def thread_squared(number: int, designs: Array, angles: Angles, found: Columns) 
     """Squared length of thread from a guide to the eyelet, (n, m): near the guide it turns fast."""
     place = guide(number).at(designs)
     squares = [np.square(np.asarray(found[name], np.float64) - place[:, [k]]) for k, name in enumerate(EYELET)]
-    total: Array = squares[0] + squares[1] + squares[2]
-    return total
+    return squares[0] + squares[1] + squares[2]
 
 
 FAMILY = Family(

@@ -71,8 +71,7 @@ def tilted(rotation: Array, tilts: Array) -> Array:
 
 def product(a: Array, b: Array) -> Array:
     """Return the vector products of vectors, (..., 3)."""
-    found: Array = a[..., [1, 2, 0]] * b[..., [2, 0, 1]] - a[..., [2, 0, 1]] * b[..., [1, 2, 0]]
-    return found
+    return a[..., [1, 2, 0]] * b[..., [2, 0, 1]] - a[..., [2, 0, 1]] * b[..., [1, 2, 0]]
 
 
 def place_parameters(what: str, at: Sequence[float]) -> tuple[Parameter, ...]:

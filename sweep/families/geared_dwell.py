@@ -191,8 +191,7 @@ def epicyclic_measures(designs: Array, wanted: frozenset[str], accuracy: Accurac
 def planet_turns(designs: Array) -> Array:
     """How often the planet turns while the carrier turns once, (n,)."""
     n, mesh = (parameter(EPICYCLIC_PARAMETERS, name, designs) for name in ("n", "mesh"))
-    found: Array = np.abs(n + mesh)
-    return found
+    return np.abs(n + mesh)
 
 
 def epicyclic_planet(designs: Array, angles: Angles, motion: Columns) -> Array:

@@ -159,8 +159,7 @@ class Member:
 
     def column(self, designs: Array, name: str) -> Array:
         """Column of one of the added parameters, (n,)."""
-        column: Array = designs[:, self.columns.stop + self._place[name]]
-        return column
+        return designs[:, self.columns.stop + self._place[name]]
 
     @cached_property
     def _place(self) -> Mapping[str, int]:

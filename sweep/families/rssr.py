@@ -103,8 +103,7 @@ def ellipse(designs: Array) -> Array:
 
 def discriminant_scale(designs: Array) -> Array:
     """(2 b c)^2 of every design: the discriminant over it is the squared cosine of the pressure angle."""
-    scale: Array = (2.0 * designs[:, 1] * designs[:, 2]) ** 2
-    return scale
+    return (2.0 * designs[:, 1] * designs[:, 2]) ** 2
 
 
 def margin(designs: Array, wanted: frozenset[str], accuracy: Accuracy) -> Columns:

@@ -31,8 +31,7 @@ def parameter(parameters: tuple[Parameter, ...], name: str | None, designs: Arra
     """Column of a parameter, (n,); zeros where there is none."""
     if name is None:
         return np.zeros(len(designs))
-    column: Array = designs[:, [p.name for p in parameters].index(name)]
-    return column
+    return designs[:, [p.name for p in parameters].index(name)]
 
 
 def squared(parameters: tuple[Parameter, ...], name: str) -> DesignMap:

@@ -31,8 +31,7 @@ def at_nodes(series: Array) -> Array:
 
 def rising(x: Array) -> Array:
     """Return the Chebyshev polynomials at x (m,), lowest order first, (NODES, m)."""
-    found: Array = np.asarray(chebyshev.chebvander(x, NODES - 1).T, np.float64)
-    return found
+    return np.asarray(chebyshev.chebvander(x, NODES - 1).T, np.float64)
 
 
 def product(rows: Array, matrix: Array) -> Array:

@@ -35,14 +35,12 @@ class TableCurve:
     def __call__(self, phi: Array) -> Array:
         """Values at any angles, of the same shape."""
         start = self.phi[0]
-        found: Array = self._cubics(start + np.mod(phi - start, TWO_PI))
-        return found
+        return self._cubics(start + np.mod(phi - start, TWO_PI))
 
     def slope(self, phi: Array) -> Array:
         """Return the derivative at any angles."""
         start = self.phi[0]
-        found: Array = self._cubics(start + np.mod(phi - start, TWO_PI), 1)
-        return found
+        return self._cubics(start + np.mod(phi - start, TWO_PI), 1)
 
     @cached_property
     def _cubics(self) -> PchipInterpolator:

@@ -114,8 +114,7 @@ def bottoms(function: Callable[[Array], Array], low: Array, high: Array) -> Arra
         places = low[:, None] + share * (high - low)[:, None]
         least = np.argmin(function(places), axis=1)
         low, high = places[every, np.maximum(least - 1, 0)], places[every, np.minimum(least + 1, GRID - 1)]
-    middle: Array = 0.5 * (low + high)
-    return middle
+    return 0.5 * (low + high)
 
 
 def _inverse(x1: Array, x2: Array, x3: Array, at1: Array, at2: Array, at3: Array) -> Array:
@@ -129,8 +128,7 @@ def _inverse(x1: Array, x2: Array, x3: Array, at1: Array, at2: Array, at3: Array
         first = at1 / (at2 - at1) * (at3 / (at2 - at3))
         second = (x3 - x1) / (x2 - x1) * (at1 / (at3 - at1)) * (at2 / (at3 - at2))
         share = first + second
-    found: Array = np.where(safe & np.isfinite(share), share, 0.5)
-    return found
+    return np.where(safe & np.isfinite(share), share, 0.5)
 
 
 def near_zeros(functions: Functions, angles: Array, reach: float) -> tuple[Index, Array]:

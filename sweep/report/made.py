@@ -68,8 +68,7 @@ class Histogram:
         """Whether what falls into a bin misses the limit."""
         middle = 0.5 * (self.edges[:-1] + self.edges[1:])
         low, high = (-math.inf if self.low is None else self.low), (math.inf if self.high is None else self.high)
-        missed: NDArray[np.bool_] = (middle < low) | (middle > high)
-        return missed
+        return (middle < low) | (middle > high)
 
 
 class Made(NamedTuple):

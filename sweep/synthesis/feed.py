@@ -162,5 +162,4 @@ def _minimax(system: Array, right: Array, weights: Array) -> Array:
                     bounds=[(None, None)] * 3 + [(0.0, None)])  # fmt: skip
     if found.status != 0 or found.x is None:
         raise InputError("poses", found.message, "a linear programme with a solution", "lift_chain")
-    solution: Array = start + scale * found.x[:3]
-    return solution
+    return start + scale * found.x[:3]

@@ -171,11 +171,9 @@ def _input_angles(family: Family, designs: Array, driving: Array) -> Array:
         return driving
     last = family.stages[-1]
     assert last.kappa is not None and last.offset is not None
-    angles: Array = designs[:, last.kappa, None] * driving + designs[:, last.offset, None]
-    return angles
+    return designs[:, last.kappa, None] * driving + designs[:, last.offset, None]
 
 
 def _shares(samples: int) -> Array:
     """Return Chebyshev points from 0 to 1."""
-    share: Array = 0.5 - 0.5 * np.cos(np.linspace(0.0, np.pi, samples))
-    return share
+    return 0.5 - 0.5 * np.cos(np.linspace(0.0, np.pi, samples))

@@ -152,8 +152,7 @@ class _Problem:
     def errors(self, start: Array, x: Array) -> Array:
         """Errors of P, weighted, with the best P_h."""
         left = self.lengths(self.design(start, x)) - self.wanted
-        errors: Array = np.sqrt(self.weights) * (left - self.weights @ left)
-        return errors
+        return np.sqrt(self.weights) * (left - self.weights @ left)
 
     def slopes(self, start: Array, x: Array) -> Array:
         jacobian = np.empty((len(SOUGHT), *self.cos.shape))
@@ -161,5 +160,4 @@ class _Problem:
             self.design(start, x), self.cos, self.sin, jacobian, np.empty(self.cos.shape, np.uint8)
         )
         rates = jacobian[self.sought, 0].T
-        slopes: Array = np.sqrt(self.weights)[:, None] * (rates - self.weights @ rates)
-        return slopes
+        return np.sqrt(self.weights)[:, None] * (rates - self.weights @ rates)

@@ -162,8 +162,7 @@ def _waves(phi: Array, harmonics: int, order: int) -> Array:
     """Return cos(k phi), then sin(k phi), or their derivatives, (..., 2 harmonics)."""
     k = np.arange(1, harmonics + 1)
     angle = phi[..., None] * k + 0.5 * np.pi * order
-    found: Array = np.concatenate([np.cos(angle), np.sin(angle)], axis=-1) * np.tile(k.astype(np.float64), 2) ** order
-    return found
+    return np.concatenate([np.cos(angle), np.sin(angle)], axis=-1) * np.tile(k.astype(np.float64), 2) ** order
 
 
 def _way(ends: Array, q: Array) -> tuple[Array, Array, Array]:

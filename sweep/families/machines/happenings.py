@@ -90,8 +90,7 @@ def switches_of_events(machine: Machine) -> list[Switches]:
 
 
 def _switches(machine: Machine, designs: Array) -> Array:
-    found: Array = np.concatenate(list(event_angles(machine, designs)[0].values()), axis=1)
-    return found
+    return np.concatenate(list(event_angles(machine, designs)[0].values()), axis=1)
 
 
 @of_family

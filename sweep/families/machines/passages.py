@@ -185,5 +185,4 @@ def _following(roots: Found, taken: NDArray[np.intp]) -> NDArray[np.intp]:
     """Return of each passage the next one of its design, around the turn."""
     after = taken + 1
     same = np.append(roots.row, -1)[after] == roots.row[taken]
-    following: NDArray[np.intp] = np.where(same, after, np.searchsorted(roots.row, roots.row[taken]))
-    return following
+    return np.where(same, after, np.searchsorted(roots.row, roots.row[taken]))
