@@ -10,12 +10,12 @@ import numpy as np
 
 from kernels import status as st
 from studies.accuracy.effect_witness import Effected, known_of
+from studies.accuracy.ordinary import designs as ordinary
 from studies.accuracy.scenes import SCENES
 from studies.accuracy.subjects import moves
 from studies.accuracy.timing import per_design
 from studies.accuracy.witness import Known
 from sweep.effects import NAMES, effect, extended
-from sweep.effects.costs import designs as ordinary
 from sweep.effects.wanted import expanded
 from sweep.evaluation.summaries import design_outputs
 from sweep.families import family

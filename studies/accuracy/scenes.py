@@ -10,8 +10,8 @@ import numpy as np
 
 import sweep
 from studies.accuracy.effect_witness import Effected
+from studies.accuracy.ordinary import designs as ordinary
 from sweep.effects import extended
-from sweep.effects.costs import designs as ordinary
 from sweep.families import family
 from sweep.families.base import Turn
 from sweep.numerics.curves import table_curve

@@ -9,7 +9,7 @@ from itertools import pairwise
 
 from sweep.cli.families import described, main_outputs
 from sweep.families.base import Family, March
-from sweep.families.chain import Chain, stages_of
+from sweep.families.chain import stages_of
 from sweep.families.machines.machine import Machine
 from sweep.families.names import is_flag, parts, stem
 from sweep.pages import rendered
@@ -137,12 +137,6 @@ def mechanism_line(family: Family) -> str:
     return f'family = "{names[0]}"' if len(names) == 1 else f"chain = {json.dumps(names)}"
 
 
-def _example(family: Family) -> dict[str, float]:
-    """Return the example, of a chain those of its stages under the names of the chain."""
-    own = {f"{name}{stage.number}": x for stage in stages_of(family) for name, x in stage.family.example.items()}
-    return own if isinstance(family, Chain) else dict(family.example)
-
-
 def wanted_outputs(family: Family) -> list[str]:
     """List what a designer asks first: size of the motion, pressure angle, greatest acceleration; else any output."""
     # Of a chain first what it does as a whole, then the stages.
@@ -158,7 +152,7 @@ def wanted_outputs(family: Family) -> list[str]:
 
 def swept_names(family: Family) -> list[str]:
     """Return the first two dimensions: lengths that are not zero, or any numbers where there are none."""
-    example = _example(family)
+    example = family.example
     usable = [p for p in family.parameters if p.choices is None and example.get(p.name)]
     lengths = [p.name for p in usable if p.unit == "length"]
     return (lengths or [p.name for p in usable if p.unit in ("ratio", "none")] or [p.name for p in usable])[:SWEPT]
@@ -169,7 +163,7 @@ def design_lines(family: Family, swept: list[str], drawn: Mapping[str, float] | 
 
     Values are those of the example, or of a design that was ``drawn`` [mm, rad].
     """
-    example = _example(family) if drawn is None else drawn
+    example = family.example if drawn is None else drawn
     given = {p.unit for p in family.parameters}
     si = bool(given & {"mass", "force", "stiffness", "torque"})
     units = OTHERS | (SI if si else LENGTHS)

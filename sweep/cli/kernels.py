@@ -20,8 +20,7 @@ from sweep.engine.run import KernelStep, run
 from sweep.errors import Interrupted
 from sweep.evaluation.summaries import DEFAULT_TARGET, design_outputs, routes
 from sweep.families import family as find_family
-from sweep.families.base import Accuracy, Angles, Array, Family, March, equal_steps
-from sweep.families.chain import stages_of
+from sweep.families.base import Accuracy, Angles, Family, March, equal_steps
 from sweep.jobs.executors import executor, for_tasks
 from sweep.jobs.progress import Progress
 from sweep.jobs.signals import Stop, stop_on_signal
@@ -72,22 +71,13 @@ def _study(file: str) -> Study:
 
 def _compile_family(family: Family, outputs: Sequence[str]) -> None:
     """Compile a family's design outputs, or its poses where none are named."""
-    designs = _example(family)
+    designs = np.array([[family.example.get(p.name, p.default) for p in family.parameters]], np.float64)
     if outputs:
         design_outputs(family, designs, outputs, _accuracy(family), WHOLE_STROKE)
         return
     angles = Angles.of(equal_steps(family.domain, designs, POSES)[None])
     for one in (family, family.precise()):
         one.poses(designs, angles, frozenset(family.pose_names))
-
-
-def _example(family: Family) -> Array:
-    """Return the example of a family, or of the stages of a chain, as a design matrix."""
-    given: dict[str, float] = dict(family.example)
-    if not given:
-        given = {f"{key}{stage.number}": x for stage in stages_of(family) for key, x in stage.family.example.items()}
-    values = [given.get(p.name, p.default) for p in family.parameters]
-    return np.array([values], np.float64)
 
 
 def _accuracy(family: Family) -> Accuracy:

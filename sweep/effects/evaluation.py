@@ -5,7 +5,7 @@ What effects bring to the curves of a family between even samples is the matter 
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from functools import partial
 
@@ -17,14 +17,13 @@ from sweep.effects.base import Bend, Placed
 from sweep.effects.scene import Scene, first_scene, stages_of, take_over
 from sweep.families.base import Accuracy, Angles, Array, Columns, Family, Output, Parameter, Step
 from sweep.families.curve_features import Bends, Crossing, of_order, of_table
+from sweep.families.poses import blocks, differenced
 from sweep.numerics.curves import Curve, TableCurve
 
 # Poses per block: so many that what a block costs by itself, some milliseconds, is little for each.
 BLOCK = 32768
 # Designs per block of an effect that samples the turn itself, some hundred poses of each.
 TURNS = 32
-# Relative step of central differences: error of second order against rounding.
-DIFFERENCE = 1e-5
 
 
 @dataclass(frozen=True)
@@ -60,7 +59,9 @@ def effect_poses(
     family = added.family
     own = wanted & frozenset(family.pose_names)
     if np.iscomplexobj(designs) or np.iscomplexobj(angles.cos):
-        return _differenced(added, effects, designs, angles, wanted) | family.poses(added.own(designs), angles, own)
+        names = wanted & frozenset(o.name for placed in effects for o in placed.pose_outputs)
+        found = differenced(partial(effect_poses, added, effects), designs, angles, names) if names else {}
+        return found | family.poses(added.own(designs), angles, own)
     asked = [(placed, [name for name in placed.own if name in wanted]) for placed in effects]
     asked = [(placed, names) for placed, names in asked if names]
     last, shape = len(stages_of(family)) - 1, (len(designs), angles.cos.shape[1])
@@ -74,9 +75,10 @@ def effect_poses(
     pointwise = [pair for pair in asked if not pair[0].entry.whole_turn]
     whole = [pair for pair in asked if pair[0].entry.whole_turn]
     # A whole-turn effect solves the turn of a design once, however many poses are asked for.
-    for parts, blocks in ((pointwise, _blocks(shape, BLOCK)), (whole, _row_blocks(shape))):
-        for rows, poses in blocks if parts else ():
-            scene = added.scene(designs[rows], _part(angles, rows, poses))
+    turns = ((slice(i, i + TURNS), slice(None)) for i in range(0, shape[0], TURNS))
+    for parts, where in ((pointwise, blocks(shape, BLOCK)), (whole, turns)):
+        for rows, poses in where if parts else ():
+            scene = added.scene(designs[rows], angles.part(rows, poses))
             if bare:
                 status[rows, poses] = scene.stage(last).status()
             for placed, names in parts:
@@ -85,32 +87,6 @@ def effect_poses(
                 for name in names:
                     columns[name][rows, poses] = found[placed.own[name]]
     return columns | {"status": status}
-
-
-def _differenced(
-    added: Added, effects: tuple[Placed, ...], designs: Array, angles: Angles, wanted: frozenset[str]
-) -> Columns:
-    """Answer a complex step: effects are not analytic (norms, friction), so their derivative is a central difference.
-
-    Along the direction of the imaginary parts; measured, its relative error is about 1e-9.
-    """
-    names = wanted & frozenset(o.name for placed in effects for o in placed.pose_outputs)
-    if not names:
-        return {}
-    steps = [np.abs(x.imag) / np.maximum(np.abs(x.real), 1e-3) for x in (designs, angles.cos, angles.sin)]
-    t = DIFFERENCE / max(max(float(x.max(initial=0.0)) for x in steps), 1e-300)
-
-    # All three at once: a search asks for a few poses at a time, of which a call costs more than they do.
-    shape = len(designs), angles.cos.shape[1]
-    moves = (0.0, t, -t)
-    x = np.concatenate([designs.real + move * designs.imag for move in moves])
-    turned = (np.concatenate([np.broadcast_to(z.real + move * z.imag, shape) for move in moves]) for z in angles)
-    found = effect_poses(added, effects, x, Angles(*turned), names)
-    columns: Columns = {"status": found["status"][: shape[0]]}
-    for name in names:
-        here, ahead, behind = np.asarray(found[name], np.float64).reshape(3, *shape)
-        columns[name] = here + 1j * ((ahead - behind) / (2.0 * t))
-    return columns
 
 
 def run_design(added: Added, placed: Placed, designs: Array, wanted: frozenset[str], accuracy: Accuracy) -> Columns:
@@ -136,8 +112,8 @@ def bend_curves(added: Added, placed: Placed, bend: Bend, designs: Array, angles
     """Functions at whose zeros outputs of an effect bend, (n, m, q), block by block."""
     shape = len(designs), angles.cos.shape[1]
     found: list[Array] = []
-    for rows, poses in _blocks(shape, BLOCK):
-        scene = added.scene(designs[rows], _part(angles, rows, poses))
+    for rows, poses in blocks(shape, BLOCK):
+        scene = added.scene(designs[rows], angles.part(rows, poses))
         values = bend.curves(scene.stage(placed.stage))
         found = found or [np.empty((*shape, values.shape[2]))]
         found[0][rows, poses] = values
@@ -151,23 +127,6 @@ def on_own_columns(step: Step, own: int) -> Step:
         return step.run(np.ascontiguousarray(designs[:, :own]), wanted, accuracy)
 
     return replace(step, run=run)
-
-
-def _part(angles: Angles, rows: slice, poses: slice) -> Angles:
-    own = rows if angles.cos.shape[0] > 1 else slice(None)
-    return Angles(*(np.ascontiguousarray(x[own, poses]) for x in angles))
-
-
-def _blocks(shape: tuple[int, ...], block: int) -> Iterator[tuple[slice, slice]]:
-    rows, poses = max(1, block // max(shape[1], 1)), min(max(shape[1], 1), block)
-    for i in range(0, shape[0], rows):
-        for j in range(0, shape[1], poses):
-            yield slice(i, i + rows), slice(j, j + poses)
-
-
-def _row_blocks(shape: tuple[int, ...]) -> Iterator[tuple[slice, slice]]:
-    for i in range(0, shape[0], TURNS):
-        yield slice(i, i + TURNS), slice(None)
 
 
 def bent(effects: tuple[Placed, ...], curves: Mapping[str, Curve]) -> list[Output]:

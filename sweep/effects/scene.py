@@ -107,9 +107,8 @@ class Scene:
         n, m = self.shape
         size = max(1, PART // max(m, 1))
         for rows in (slice(start, start + size) for start in range(0, n, size)):
-            angles = Angles(*(x[rows] for x in self.angles)) if self.angles.cos.shape[0] > 1 else self.angles
             motion = {name: x[rows] for name, x in self.motion.items()}
-            yield rows, self._links(self.designs[rows], angles, motion)
+            yield rows, self._links(self.designs[rows], self.angles.part(rows), motion)
 
     def _links(self, designs: Array, angles: Angles, motion: Columns) -> Links:
         tree = self.family.find(LinkTree)
@@ -204,16 +203,15 @@ class Scene:
 
     def only(self, rows: Rows) -> Scene:
         """Keep some of the designs; the scene itself where these are all."""
-        if rows.size == len(self.designs):
-            return self
-        angles = Angles(*(x[rows] for x in self.angles)) if self.angles.cos.shape[0] > 1 else self.angles
-        given, after = {name: x[rows] for name, x in self.inputs.items()}, tuple(d.only(rows) for d in self.after)
-        return Scene(self.family, self.designs[rows], angles, given, after, curves=self.curves)
+        return self if rows.size == len(self.designs) else self._of(rows, self.angles.part(rows))
 
     def posed(self, rows: Rows, phi: Array) -> Scene:
         """Take some of the designs, each as often as wanted, at crank angles (k, m) of their own."""
+        return self._of(rows, Angles.of(phi))
+
+    def _of(self, rows: Rows, angles: Angles) -> Scene:
         given, after = {name: x[rows] for name, x in self.inputs.items()}, tuple(d.only(rows) for d in self.after)
-        return Scene(self.family, self.designs[rows], Angles.of(phi), given, after, curves=self.curves)
+        return Scene(self.family, self.designs[rows], angles, given, after, curves=self.curves)
 
     def precise(self) -> Scene:
         """Give the same scene with the most accurate poses that its families have."""

@@ -254,10 +254,6 @@ def inertial(design: Mapping[str, float], name: str, stage: str, unit: str) -> X
         )
     scale = kilograms * metres**2
     return Xml.Element(
-        "inertial", pos=_words(centre * metres), mass=repr(mass * kilograms),
-        fullinertia=_words(np.array([xx, yy, zz, xy, xz, yz]) * scale),
+        "inertial", pos=words(centre * metres), mass=repr(mass * kilograms),
+        fullinertia=words(np.array([xx, yy, zz, xy, xz, yz]) * scale),
     )  # fmt: skip
-
-
-def _words(values: Array) -> str:
-    return " ".join(repr(float(x)) for x in values)

@@ -99,6 +99,10 @@ class Angles(NamedTuple):
         """Tabulate a plain array of angles of shape (n, m) or (1, m)."""
         return cls(phi, np.cos(phi), np.sin(phi))
 
+    def part(self, rows: Any, poses: slice = slice(None)) -> Angles:
+        """Take those of some designs, or of all where they share them, at some poses."""
+        return Angles(*(np.ascontiguousarray(x[rows if len(x) > 1 else slice(None), poses]) for x in self))
+
 
 @dataclass(frozen=True)
 class Output:

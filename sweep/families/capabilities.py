@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Literal, TypeAlias
+from typing import TYPE_CHECKING, Any, Literal, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
@@ -145,45 +145,27 @@ class LimitLocus:
 
 
 @dataclass(frozen=True)
-class Searched:
-    """What a search over boxes of designs is given; lengths in one unit, angles in rad.
-
-    ``branch``; the number of the ``objective``; least ``cos2`` of the pressure angle; least and most of all ``links``;
-    the ``target`` of the objective; the ``tube``, crank angles with the least and most angle of a follower that reaches
-    it (:mod:`kernels.boxes.tube`), empty where none is known; low and high ends and known bounds of the boxes it
-    ``starts`` from; widths of the ``whole`` space; numbers of the ``free`` coordinates, and all of them as ``given``;
-    the share of the whole below which a box is not halved; the ``most`` boxes to judge.
-    """
-
-    branch: float
-    objective: int
-    cos2: float
-    links: Array
-    target: float
-    tube: Array
-    starts: tuple[Array, Array, Array]
-    whole: Array
-    free: Array
-    given: Array
-    smallest: float
-    most: int
-
-
-@dataclass(frozen=True)
 class ProvableLocus:
     """Bounds of an output can be proven for whole boxes of designs on the locus of limit positions.
 
     ``coordinates`` are what a box is made of, the swing first; ``links`` the lengths that follow and may have limits.
     ``objectives`` has the outputs that can be proven, with the numbers by which the kernels know them; ``rows`` says
-    for each kind of row what it is about.  ``explore(searched, leaves)`` fills arrays (low, high, outcome, bound,
-    kinds, theta, factors) with the boxes that were not halved; it gives their number and that of the boxes judged.
+    for each kind of row what it is about.  ``explore(question, search, leaves)`` fills arrays (low, high, outcome,
+    bound, kinds, theta, factors) with the boxes that were not halved; it gives their number and that of the boxes
+    judged.  Lengths are in one unit, angles in rad.
+
+    ``question`` : the branch; the number of the objective; the least squared cosine of the pressure angle; least and
+    most of all links; the target of the objective; the tube, crank angles with the least and most angle of a follower
+    that reaches it (:mod:`kernels.boxes.tube`), empty where none is known.  ``search`` : low and high ends and known
+    bounds of the boxes it starts from; widths of the whole space; numbers of the free coordinates, and all of them as
+    given; the share of the whole below which a box is not halved; the most boxes to judge.
     """
 
     coordinates: tuple[str, ...]
     links: tuple[str, ...]
     objectives: Mapping[str, int]
     rows: tuple[str, ...]
-    explore: Callable[[Searched, tuple[Numbers, ...]], tuple[int, int]]
+    explore: Callable[[tuple[Any, ...], tuple[Any, ...], tuple[Numbers, ...]], tuple[int, int]]
 
 
 @dataclass(frozen=True)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from functools import cached_property, partial
 from typing import Any
@@ -19,6 +19,7 @@ from sweep.families.curve_features import of_stages, on_part
 from sweep.families.frames import Frame, can_be_placed, stage_frames
 from sweep.families.names import ends_in_digit
 from sweep.families.parts import Stage
+from sweep.families.poses import blocks
 
 BLOCK = 16384  # poses per block: its ten or so arrays (1.3 MB) stay in the caches; half or four times this is slower
 
@@ -138,6 +139,7 @@ def chain(families: tuple[Family, ...]) -> Chain:
             f"{name}{s.number}": (f"{what}{s.number}", ns) for s in stages for name, (what, ns) in s.family.dear.items()
         }
         | dict(last.dear),
+        example={f"{name}{s.number}": x for s in stages for name, x in s.family.example.items()},
         precise_poses=partial(_poses, _precise(stages), named, {}) if any(f.precise_poses for f in families) else None,
         stages=stages,
     )
@@ -280,19 +282,10 @@ def _poses(
     dtype = np.result_type(designs, angles.cos)
     columns: Columns = {name: np.empty(shape, dtype) for name in wanted}
     columns["status"] = np.empty(shape, np.uint8)
-    for rows, poses in _blocks(shape):
-        of_angles = rows if angles.cos.shape[0] > 1 else slice(None)
-        part = Angles(*(np.ascontiguousarray(x[of_angles, poses]) for x in angles))
-        for name, values in _block(stages, plan, designs[rows], part, wanted).items():
+    for rows, poses in blocks(shape, BLOCK):
+        for name, values in _block(stages, plan, designs[rows], angles.part(rows, poses), wanted).items():
             columns[name][rows, poses] = values
     return columns
-
-
-def _blocks(shape: tuple[int, int]) -> Iterator[tuple[slice, slice]]:
-    rows, poses = max(1, BLOCK // shape[1]), min(shape[1], BLOCK)
-    for i in range(0, shape[0], rows):
-        for j in range(0, shape[1], poses):
-            yield slice(i, i + rows), slice(j, j + poses)
 
 
 def _block(stages: tuple[Stage, ...], plan: _Plan, designs: Array, angles: Angles, wanted: frozenset[str]) -> Columns:

@@ -10,11 +10,11 @@ from kernels.linkage.bodies import DRIVEN
 from sweep.families.base import Family, March, Turn
 from sweep.families.capabilities import Assembly, Dimensions, JointRecords, OutputLink, Points, Skeleton
 from sweep.families.link_tree import LinkTree
+from sweep.families.names import ERROR, MINUS
 from sweep.families.parameter import WORDS, is_known, of_derivative
 
 _NAME = re.compile(r"[a-z][a-z0-9_]*")
 _LETTERS = re.compile(r"[A-Za-z][A-Za-z0-9_]*")
-ERROR, MINUS = "err_", "minus_"  # what stands before the columns of errors and of negatives
 RESERVED = ("design", "status", "offset")  # and the variable of the domain, phi for a turn
 
 

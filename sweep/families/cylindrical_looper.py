@@ -84,8 +84,7 @@ def _of_both(designs: Array, angles: Angles, wanted: frozenset[str], beside: np.
     """Return poses of designs some of which have the second ball beside the axis."""
     found: Columns = {}
     for rows in (beside, ~beside):
-        own = angles if len(angles.cos) == 1 else Angles(*(np.ascontiguousarray(x[rows]) for x in angles))
-        for name, values in poses(np.ascontiguousarray(designs[rows]), own, wanted).items():
+        for name, values in poses(np.ascontiguousarray(designs[rows]), angles.part(rows), wanted).items():
             if name not in found:
                 found[name] = np.empty((len(designs), values.shape[1]), values.dtype)
             found[name][rows] = values

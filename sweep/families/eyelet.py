@@ -11,6 +11,7 @@ from kernels.types import Array
 from sweep.families.base import Angles, Columns, Family, Output, Parameter
 from sweep.families.capabilities import Fixed, Link, Points, Skeleton, ThreadPath
 from sweep.families.curve_features import Singular
+from sweep.families.outputs import ladders
 from sweep.families.planar_trees import eyelet_crank
 from sweep.families.poses import poses_of
 from sweep.families.skeletons import crank_axis, parameter
@@ -72,7 +73,7 @@ FAMILY = Family(
     position="P",
     pose_outputs=POSE_OUTPUTS,
     poses=poses,
-    derivative_of={"P": "dP", "dP": "d2P", "L": "dP"},
+    derivative_of=ladders("P", orders=2) | {"L": "dP"},
     uses_phi=False,
     example={"a": 2.0, "e": 3.0, "f": 1.0, "alpha": 0.5, "Z1": -3.0, "Z2": 4.0, "P_h": 8.0},
     capabilities=(

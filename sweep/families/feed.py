@@ -5,6 +5,7 @@ The three leads are the pin of the rocker and two eccentrics, each with a link t
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from functools import partial
 
 import numpy as np
@@ -18,7 +19,9 @@ from sweep.families.base import Accuracy, Angles, Columns, Family, Output, Param
 from sweep.families.capabilities import Arm, Dimensions, Link, Made, Points, Skeleton
 from sweep.families.curve_features import Singular
 from sweep.families.feed_trees import three_leads, two_leads
-from sweep.families.outputs import joint_outputs
+from sweep.families.outputs import joint_outputs, ladders
+from sweep.families.parts import AXES
+from sweep.families.poses import filled_all
 from sweep.families.rssr import FAMILY as CRANK_ROCKER
 from sweep.families.skeletons import COUPLER, CRANK, crank_axis, links, parameter, standing
 
@@ -96,22 +99,31 @@ FEEDING_OUTPUTS = (
     Output("crossings", "1", "passages of the plate per turn", "(11)", jumps=True),
 )
 
-_DELTA = frozenset({"discriminant"})
 _LENGTHS = [k for k, p in enumerate(PARAMETERS) if p.unit == "length"]
 
 
-def poses(designs: Array, angles: Angles, wanted: frozenset[str]) -> Columns:
+def _poses(
+    kernel: Callable[..., object], names: tuple[str, ...], taken: tuple[str, ...],
+    designs: Array, angles: Angles, wanted: frozenset[str],
+) -> Columns:  # fmt: skip
     """Compute the wanted pose outputs and status of every design at its crank angles, each (n, m)."""
-    shape = (len(designs), angles.cos.shape[1])
-    status = np.empty(shape, np.uint8)
-    outputs = np.empty((len(_POSES), *shape), np.result_type(designs, angles.cos))
-    feed.poses(designs, angles.cos, angles.sin, status, outputs)
-    return {name: x for name, x in zip(_POSES, outputs, strict=True) if name in wanted} | {"status": status}
+    given = designs, *(getattr(angles, name) for name in taken)
+    status = np.empty((len(designs), angles.cos.shape[1]), np.uint8)
+    return filled_all(kernel, given, names, wanted, status, np.result_type(*given))
 
 
-def rocker_loop(designs: Array, angles: Angles, found: Columns) -> Array:
+poses = partial(_poses, feed.poses, _POSES, ("cos", "sin"))
+
+
+def _of_chain(parameters: tuple[Parameter, ...], designs: Array, angles: Angles, *names: str) -> list[Array]:
+    """Compute outputs of the crank-rocker of the horizontal chain, (n, m) each."""
+    found = CRANK_ROCKER.poses(horizontal_chain(designs, parameters), angles, frozenset(names))
+    return [np.asarray(found[name], np.float64) for name in names]
+
+
+def rocker_loop(parameters: tuple[Parameter, ...], designs: Array, angles: Angles, found: Columns) -> Array:
     """Discriminant of the horizontal chain, (n, m)."""
-    return np.asarray(CRANK_ROCKER.poses(horizontal_chain(designs), angles, _DELTA)["discriminant"], np.float64)
+    return _of_chain(parameters, designs, angles, "discriminant")[0]
 
 
 def horizontal_chain(designs: Array, parameters: tuple[Parameter, ...] = PARAMETERS) -> Array:
@@ -123,9 +135,7 @@ def chain_joints(parameters: tuple[Parameter, ...]) -> dict[str, Made]:
     """Return crank pin and rocker ball of the horizontal chain."""
 
     def joint(name: str, designs: Array, angles: Angles, found: Columns) -> Array:
-        names = [f"{axis}_{name}" for axis in "xyz"]
-        at = CRANK_ROCKER.poses(horizontal_chain(designs, parameters), angles, frozenset(names))
-        return np.stack([np.asarray(at[one], np.float64) for one in names], axis=-1)
+        return np.stack(_of_chain(parameters, designs, angles, *(f"{axis}_{name}" for axis in AXES)), axis=-1)
 
     return {name: Made((), partial(joint, name)) for name in "bc"}
 
@@ -192,13 +202,10 @@ FAMILY = Family(
     poses=poses,
     steps=(Step("feeding", FEEDING_OUTPUTS, events, work=Work.LONG),),
     example=EXAMPLE,
-    derivative_of={
-        "psi_plus_dh": "dpsi", "dpsi": "d2psi", "chi": "dchi", "dchi": "d2chi", "x_t": "dx_t", "dx_t": "d2x_t",
-        "y_t": "dy_t", "dy_t": "d2y_t",
-    },
+    derivative_of={"psi_plus_dh": "dpsi", "dpsi": "d2psi"} | ladders("chi", "x_t", "y_t", orders=2),
     uses_phi=False,
     capabilities=(
-        Singular(rocker_loop),
+        Singular(partial(rocker_loop, PARAMETERS)),
         Singular(lift_loop, ("x_h", "y_h", "x_e", "y_e")),
         SIZES,
         two_leads(PARAMETERS),
@@ -244,19 +251,7 @@ TRIAD_OUTPUTS = (
 )
 
 
-def triad_poses(designs: Array, angles: Angles, wanted: frozenset[str]) -> Columns:
-    """Compute the wanted pose outputs and status of every design at its crank angles, each (n, m)."""
-    shape = (len(designs), angles.phi.shape[1])
-    status = np.empty(shape, np.uint8)
-    outputs = np.empty((len(triad.OUTPUTS), *shape), np.result_type(designs, angles.phi))
-    feed.triad_poses(designs, angles.phi, status, outputs)
-    return {name: x for name, x in zip(triad.OUTPUTS, outputs, strict=True) if name in wanted} | {"status": status}
-
-
-def triad_loop(designs: Array, angles: Angles, found: Columns) -> Array:
-    """Compute the discriminant of the horizontal chain of a rack on three leads, (n, m)."""
-    chain = horizontal_chain(designs, TRIAD_PARAMETERS)
-    return np.asarray(CRANK_ROCKER.poses(chain, angles, _DELTA)["discriminant"], np.float64)
+triad_poses = partial(_poses, feed.triad_poses, triad.OUTPUTS, ("phi",))
 
 
 def _columns(designs: Array, *names: str) -> list[Array]:
@@ -265,9 +260,7 @@ def _columns(designs: Array, *names: str) -> list[Array]:
 
 def rocker_pin(designs: Array, angles: Angles, found: Columns) -> Array:
     """Return H, on the arm of the horizontal chain's rocker."""
-    psi = np.asarray(
-        CRANK_ROCKER.poses(horizontal_chain(designs, TRIAD_PARAMETERS), angles, frozenset({"psi"}))["psi"], np.float64
-    )
+    (psi,) = _of_chain(TRIAD_PARAMETERS, designs, angles, "psi")
     e, arm, ahead = _columns(designs, "h_e", "rh", "dh")
     return np.stack([e + arm * np.cos(psi + ahead), arm * np.sin(psi + ahead), 0.0 * psi], axis=-1)
 
@@ -310,11 +303,9 @@ TRIAD = Family(
     pose_outputs=TRIAD_OUTPUTS,
     poses=triad_poses,
     example=TRIAD_EXAMPLE,
-    derivative_of={
-        "x_t": "dx_t", "dx_t": "d2x_t", "y_t": "dy_t", "dy_t": "d2y_t", "chi": "dchi", "dchi": "d2chi",
-    },
+    derivative_of=ladders("x_t", "y_t", "chi", orders=2),
     capabilities=(
-        Singular(triad_loop),
+        Singular(partial(rocker_loop, TRIAD_PARAMETERS)),
         Singular.where_small("determinant"),
         Dimensions(links("h_a h_b h_c rh q1 q2 q3"), optional=("rE2", "rE3")),
         three_leads(TRIAD_PARAMETERS),

@@ -94,7 +94,7 @@ FAMILY = Family(
     poses=partial(_poses, crank_rocker.poses, guide.poses),
     example={"a": 1.0, "b": 3.3, "c": 3.1, "e": 3.0, "xi": 4.2, "eta": 0.8, "branch": 1.0},
     steps=tuple(step_of(step, as_crank_rocker) for step in crank_rocker.FAMILY.steps),
-    derivative_of=ladders("psi") | {"x_m": "dx_m", "dx_m": "d2x_m", "y_m": "dy_m", "dy_m": "d2y_m"},
+    derivative_of=ladders("psi") | ladders("x_m", "y_m", orders=2),
     outward="branch",
     uses_phi=False,
     capabilities=(

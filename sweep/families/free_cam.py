@@ -11,6 +11,7 @@ from kernels.families import free_cam
 from kernels.types import Array
 from sweep.families.base import Angles, Columns, Family, March, Output, Parameter
 from sweep.families.capabilities import Link, Made, Points, Skeleton, ThreadPath
+from sweep.families.outputs import ladders
 from sweep.families.planar_trees import turning_cam
 from sweep.families.poses import poses_of
 from sweep.families.skeletons import ORIGIN, parameter, standing
@@ -85,7 +86,7 @@ FAMILY = Family(
     position="P",
     pose_outputs=tuple(replace(o, kinks=not o.jumps) for o in POSE_OUTPUTS),  # where the thread comes to lie and leaves
     poses=poses,
-    derivative_of={"P": "dP", "dP": "d2P", "L": "dP"},
+    derivative_of=ladders("P", orders=2) | {"L": "dP"},
     uses_phi=False,
     example={"a": 0.4, "X1": 0.83, "Y1": -2.08, "Z1": -3.56, "X2": 3.3, "Y2": -0.85, "Z2": 3.7},
     capabilities=(
@@ -105,14 +106,11 @@ FRICTION_PARAMETERS = (
               not_negative=True),
 )  # fmt: skip
 
+_FREE = {o.name: o for o in POSE_OUTPUTS}
 FRICTION_OUTPUTS = (
-    Output("P", "length", "thread taken up, L - P_h", "(6)"),
-    Output("L", "length", "length of thread between the guides", "(18)"),
-    Output("wrap", "rad", "angle by which the thread turns at the edge, 0 without contact", "(1)"),
-    Output("y_contact", "length", "place where the thread passes the plane of the cam, along the edge's y", "(25)"),
-    Output(
-        "contact", "1", "1 where the thread lies on the edge, 0 where it runs straight beside it", "(18)", jumps=True
-    ),
+    *(_FREE[name] for name in ("P", "L", "wrap")),
+    replace(_FREE["y_contact"], equation="(25)"),
+    _FREE["contact"],
     Output("sticking", "1", "1 where it lies where it lay before, 0 where it slides or is off", "(25)", jumps=True),
 )
 _FRICTIONLESS = len(PARAMETERS)

@@ -125,10 +125,21 @@ def _computed(
     return filled_each(kernel, given, tuple(o.name for o in provided), wanted, np.empty(len(given[0]), np.uint8))
 
 
-def planet_centre(designs: Array, angles: Angles, motion: Columns) -> Array:
-    """Return the planet's centre, (n, m, 3), in planet radii: both gears are of one size."""
-    x = parameter(PARAMETERS, "a", designs)[:, None] + 2.0 * angles.cos
-    return np.stack([x, 2.0 * angles.sin, np.zeros_like(x)], axis=-1)
+def skeleton(parameters: tuple[Parameter, ...]) -> Skeleton:
+    """Draw carrier, planet and slotted link, in planet radii; without a ratio both gears are of one size."""
+    whole = "n" in [p.name for p in parameters]
+
+    def centre(designs: Array, angles: Angles, motion: Columns) -> Array:
+        a, one = parameter(parameters, "a", designs)[:, None], np.ones((len(designs), 1))
+        n, mesh = (parameter(parameters, name, designs)[:, None] if whole else one for name in ("n", "mesh"))
+        x = a + (n + mesh) * angles.cos
+        return np.stack([x, (n + mesh) * angles.sin, np.zeros_like(x)], axis=-1)
+
+    return Skeleton(
+        {"a": standing(parameters, "a"), "d": ORIGIN},
+        (Link("carrier", ("a", "o")), Link("planet", ("o", "b")), Link("slotted link", ("d", "b"))),
+        {"o": Made((), centre)},
+    )
 
 
 FAMILY = Family(
@@ -149,11 +160,7 @@ FAMILY = Family(
         Points({"b": ("x_b", "y_b", None)}),
         OutputLink(constant(0.0, 0.0, 0.0)),
         rolling_planet(PARAMETERS),
-        Skeleton(
-            {"a": standing(PARAMETERS, "a"), "d": ORIGIN},
-            (Link("carrier", ("a", "o")), Link("planet", ("o", "b")), Link("slotted link", ("d", "b"))),
-            {"o": Made((), planet_centre)},
-        ),
+        skeleton(PARAMETERS),
     ),
     example={"k": 1.4, "a": 0.3},
 )
@@ -194,13 +201,6 @@ def planet_turns(designs: Array) -> Array:
     return np.abs(n + mesh)
 
 
-def epicyclic_planet(designs: Array, angles: Angles, motion: Columns) -> Array:
-    """Return the planet's centre, (n, m, 3), in planet radii."""
-    n, mesh, a = (parameter(EPICYCLIC_PARAMETERS, name, designs)[:, None] for name in ("n", "mesh", "a"))
-    x = a + (n + mesh) * angles.cos
-    return np.stack([x, (n + mesh) * angles.sin, np.zeros_like(x)], axis=-1)
-
-
 EPICYCLIC = Family(
     name="epicyclic_dwell",
     title="geared dwell drive with a whole gear ratio",
@@ -218,10 +218,6 @@ EPICYCLIC = Family(
         Points({"b": ("x_b", "y_b", None)}),
         OutputLink(constant(0.0, 0.0, 0.0)),
         rolling_planet(EPICYCLIC_PARAMETERS),
-        Skeleton(
-            {"a": standing(EPICYCLIC_PARAMETERS, "a"), "d": ORIGIN},
-            (Link("carrier", ("a", "o")), Link("planet", ("o", "b")), Link("slotted link", ("d", "b"))),
-            {"o": Made((), epicyclic_planet)},
-        ),
+        skeleton(EPICYCLIC_PARAMETERS),
     ),
 )

@@ -165,8 +165,7 @@ FAMILY = Family(
     position="s",
     pose_outputs=VALUE_OUTPUTS + JOINT_OUTPUTS + POINT_OUTPUTS,
     poses=poses,
-    derivative_of=ladders("s")
-    | {"dev": "ddev", "ddev": "d2dev", "x_m": "dx_m", "dx_m": "d2x_m", "y_m": "dy_m", "dy_m": "d2y_m"},
+    derivative_of=ladders("s") | ladders("dev", "x_m", "y_m", orders=2),
     outward="branch",
     uses_phi=False,
     capabilities=(

@@ -9,6 +9,7 @@ from kernels.types import EPS, Array
 from sweep.families.base import Accuracy, Angles, Columns, Family, Output, Parameter, Step, Work
 from sweep.families.capabilities import Fixed, Link, Made, Points, Skeleton, ThreadPath
 from sweep.families.curve_features import Singular
+from sweep.families.outputs import ladders
 from sweep.families.planar_trees import thread_follower
 from sweep.families.poses import poses_of
 from sweep.families.skeletons import Y, line, parameter, standing
@@ -118,7 +119,7 @@ FAMILY = Family(
     pose_outputs=(*VALUE_OUTPUTS, *PROFILE_OUTPUTS, CURVATURE, WRAP),
     poses=poses,
     steps=(Step("cam body", DESIGN_OUTPUTS, size, work=Work.LONG),),
-    derivative_of={"P": "dP", "dP": "d2P", "L": "dP", "S": "dS", "dS": "d2S"},
+    derivative_of=ladders("P", "S", orders=2) | {"L": "dP"},
     uses_phi=False,
     example={"P_h": 60.0, "X1": 3.0, "Z1": 12.0, "e": 5.0, "R0": 30.0, "A1": 10.0, "B2": 3.0},
     capabilities=(

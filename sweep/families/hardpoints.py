@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
+from dataclasses import replace
 
 import numpy as np
 
@@ -93,7 +94,7 @@ def guide(points: Mapping[str, Array]) -> FittedPose:
     lam = math.atan2(float(along @ y), float(along @ found.x))
     left = np.cos(lam) * y - np.sin(lam) * found.x
     h = float((points.get("line", points["point"]) - found.at) @ left)
-    return FittedPose(found.parameters | {"lam": lam, "h": h}, found.phi, found.at, found.z, found.x)
+    return replace(found, parameters=found.parameters | {"lam": lam, "h": h})
 
 
 def planar_slider_crank(points: Mapping[str, Array]) -> FittedPose:
@@ -116,23 +117,14 @@ def planar_slider_crank(points: Mapping[str, Array]) -> FittedPose:
 
 
 def _planar(points: Mapping[str, Array], point: Array | None) -> FittedPose:
-    a, b, c, d = (points[name] for name in ("A", "B", "C", "D"))
-    z, small = points.get("axis_A", np.array([0.0, 0.0, 1.0])), NOTHING * size(points)
-    x = _square(d - a, z, small)
-    y = np.cross(z, x)
-    crank, coupler, rocker = b - a, c - b, c - d
-    psi = math.atan2(float(rocker @ y), float(rocker @ x))
-    parameters = {
-        "a": _length(crank, small, "B", "another point than A"),
-        "b": _length(coupler, small, "C", "another point than B"),
-        "c": _length(rocker, small, "C", "another point than D"),
-        "e": float((d - a) @ x),
-        "branch": _sign(float(coupler @ (np.cos(psi) * y - np.sin(psi) * x)), small, "C"),
-    }
+    """Read a crank-rocker with parallel axes, and a point of its coupler if one is given."""
+    b, c, z = points["B"], points["C"], points.get("axis_A", np.array([0.0, 0.0, 1.0]))
+    found = crank_rocker({**points, "axis_A": z, "axis_D": z})
+    parameters = {name: found.parameters[name] for name in ("a", "b", "c", "e", "branch")}
     if point is not None:
-        along = coupler / parameters["b"]
+        along = (c - b) / parameters["b"]
         parameters |= {"xi": float((point - b) @ along), "eta": float((point - b) @ np.cross(z, along))}
-    return FittedPose(parameters, math.atan2(float(crank @ y), float(crank @ x)), a, z, x)
+    return replace(found, parameters=parameters)
 
 
 def size(points: Mapping[str, Array]) -> float:

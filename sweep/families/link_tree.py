@@ -101,9 +101,6 @@ def filled_by(kernel: Callable[..., object], needs: tuple[str, ...]) -> LinkFill
     return fill
 
 
-if TYPE_CHECKING:
-    from kernels.linkage.bodies import Links
-
 _Z = np.array([0.0, 0.0, 1.0])
 
 

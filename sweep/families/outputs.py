@@ -69,6 +69,6 @@ def joint_outputs(
     )
 
 
-def ladders(*names: str) -> dict[str, str]:
-    """Of each name and its first two derivatives the next derivative."""
-    return {f"{low}{name}": f"{high}{name}" for name in names for low, high in pairwise(_ORDERS)}
+def ladders(*names: str, orders: int = 3) -> dict[str, str]:
+    """Of each name and its derivatives, but the last of so many orders, the next derivative."""
+    return {f"{low}{name}": f"{high}{name}" for name in names for low, high in pairwise(_ORDERS[: orders + 1])}

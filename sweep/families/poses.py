@@ -14,8 +14,6 @@ that have the kernels of another one, with other symbols or in another frame, ca
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from contextlib import contextmanager
-from contextvars import ContextVar
 from dataclasses import replace
 from functools import partial, update_wrapper
 from typing import Any
@@ -64,10 +62,10 @@ def filled_each(
 
 def filled_all(
     kernel: Callable[..., object], arguments: Sequence[object], names: tuple[str, ...], wanted: frozenset[str],
-    status: Status,
+    status: Status, dtype: DTypeLike = np.float64,
 ) -> Columns:  # fmt: skip
-    """Call ``kernel(*arguments, status, out)`` of an effect, which writes all its outputs, (k, n, m)."""
-    out = np.empty((len(names), *status.shape))
+    """Call ``kernel(*arguments, status, out)``, which writes all its outputs, (k, n, m)."""
+    out = np.empty((len(names), *status.shape), dtype)
     kernel(*arguments, status, out)
     return {name: values for name, values in zip(names, out, strict=True) if name in wanted} | {"status": status}
 
@@ -124,18 +122,6 @@ MANY = 2**16  # poses of one call: dense samples, or the price of an output bein
 # for so many, less than a set takes to compile.
 PAID = 2**21
 
-_each_its_own = ContextVar("every set of outputs has machine code of its own", default=False)
-
-
-@contextmanager
-def own_code() -> Iterator[None]:
-    """Give every set of outputs machine code of its own at once: what a long study comes to, to be timed."""
-    token = _each_its_own.set(True)
-    try:
-        yield
-    finally:
-        _each_its_own.reset(token)
-
 
 class Together:
     """Poses whose kernel gives the outputs ``names``; ``poses`` calls it for exactly the wanted ones."""
@@ -156,7 +142,7 @@ class Together:
         key = wanted, np.iscomplexobj(angles.cos) or np.iscomplexobj(designs)
         count = len(designs) * angles.cos.shape[1]
         self._asked[key] = self._asked.get(key, 0) + count
-        if count >= MANY or self._asked[key] > PAID or _each_its_own.get():
+        if count >= MANY or self._asked[key] > PAID:
             return self._poses(designs, angles, wanted)
         found = self._poses(designs, angles, self._larger(*key))
         return {name: found[name] for name in (*wanted, "status")}
@@ -233,19 +219,35 @@ def differentiable(family: Family) -> Family:
 
 
 def _poses(poses: PoseFunction, designs: Array, angles: Angles, wanted: frozenset[str]) -> Columns:
-    if not (np.iscomplexobj(designs) or np.iscomplexobj(angles.phi)):
-        return poses(designs, angles, wanted)
-    parts = (designs, *angles)
-    sizes = [np.abs(x.imag) / np.maximum(np.abs(x.real), 1e-3) for x in parts]
-    step = DIFFERENCE / max(max(float(size.max(initial=0.0)) for size in sizes), 1e-300)
+    if np.iscomplexobj(designs) or np.iscomplexobj(angles.phi):
+        return differenced(poses, designs, angles, wanted)
+    return poses(designs, angles, wanted)
 
-    def moved(sign: float) -> Columns:
-        x, phi, cos, sin = (np.ascontiguousarray(part.real + sign * step * part.imag) for part in parts)
-        return poses(x, Angles(phi, cos, sin), wanted)
 
-    here, ahead, behind = moved(0.0), moved(1.0), moved(-1.0)
-    columns: Columns = {"status": here["status"]}
+def differenced(poses: PoseFunction, designs: Array, angles: Angles, wanted: frozenset[str]) -> Columns:
+    """Answer a complex step of poses that are not analytic, such as norms, friction, a march, by a central difference.
+
+    Along the direction of the imaginary parts; measured, its relative error is about 1e-9.
+    """
+    steps = [np.abs(x.imag) / np.maximum(np.abs(x.real), 1e-3) for x in (designs, angles.cos, angles.sin)]
+    t = DIFFERENCE / max(max(float(x.max(initial=0.0)) for x in steps), 1e-300)
+
+    # All three at once: a search asks for a few poses at a time, of which a call costs more than they do.
+    shape = len(designs), angles.cos.shape[1]
+    moves = (0.0, t, -t)
+    x = np.concatenate([designs.real + move * designs.imag for move in moves])
+    turned = (np.concatenate([np.broadcast_to(z.real + move * z.imag, shape) for move in moves]) for z in angles)
+    found = poses(x, Angles(*turned), wanted)
+    columns: Columns = {"status": found["status"][: shape[0]]}
     for name in wanted:
-        slope = (np.asarray(ahead[name], np.float64) - np.asarray(behind[name], np.float64)) / (2.0 * step)
-        columns[name] = np.asarray(here[name], np.float64) + 1j * slope
+        here, ahead, behind = np.asarray(found[name], np.float64).reshape(3, *shape)
+        columns[name] = here + 1j * ((ahead - behind) / (2.0 * t))
     return columns
+
+
+def blocks(shape: tuple[int, ...], size: int) -> Iterator[tuple[slice, slice]]:
+    """Cut (designs, poses) into blocks of at most ``size`` poses, so small that what they need stays in the caches."""
+    rows, poses = max(1, size // max(shape[1], 1)), min(max(shape[1], 1), size)
+    for i in range(0, shape[0], rows):
+        for j in range(0, shape[1], poses):
+            yield slice(i, i + rows), slice(j, j + poses)

@@ -5,42 +5,32 @@ The kernels of the proof are imported by it alone: whoever asks a crank-rocker f
 
 from __future__ import annotations
 
-from functools import cache
+from functools import cache, partial
 from importlib import import_module
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from kernels.types import Numbers
-from sweep.families.capabilities import ProvableLocus, Searched
+from sweep.families.capabilities import ProvableLocus
 
 if TYPE_CHECKING:
     from kernels.families.rssr.box_turn import Formulas
+
+
+def _explored(
+    coordinates: str, question: tuple[Any, ...], search: tuple[Any, ...], leaves: tuple[Numbers, ...]
+) -> tuple[int, int]:
+    """Leaves filled and boxes judged by :func:`kernels.families.rssr.proof.explore`."""
+    from kernels.families.rssr import proof
+    from kernels.families.rssr.box_problem import BoxQuestion
+
+    found = proof.explore(BoxQuestion(*question), _recorded(coordinates), *search, proof.Leaves(*leaves))
+    return int(found[0]), int(found[1])
 
 
 @cache
 def _recorded(coordinates: str) -> Formulas:
     formulas: Formulas = import_module(f"kernels.families.rssr.box_{coordinates}").recorded()
     return formulas
-
-
-def _explored(formulas: Formulas, searched: Searched, leaves: tuple[Numbers, ...]) -> tuple[int, int]:
-    """Leaves filled and boxes judged by :func:`kernels.families.rssr.proof.explore`."""
-    from kernels.families.rssr import proof
-    from kernels.families.rssr.box_problem import BoxQuestion
-
-    s = searched
-    problem = BoxQuestion(s.branch, s.objective, s.cos2, s.links, s.target, s.tube)
-    found = proof.explore(
-        problem, formulas, s.starts, s.whole, s.free, s.given, s.smallest, s.most, proof.Leaves(*leaves)
-    )
-    return int(found[0]), int(found[1])
-
-
-def _explored_by_axes(searched: Searched, leaves: tuple[Numbers, ...]) -> tuple[int, int]:
-    return _explored(_recorded("by_axes"), searched, leaves)
-
-
-def _explored_by_rocker(searched: Searched, leaves: tuple[Numbers, ...]) -> tuple[int, int]:
-    return _explored(_recorded("by_rocker"), searched, leaves)
 
 
 def _tests(lengths: tuple[str, ...]) -> tuple[str, ...]:
@@ -63,7 +53,7 @@ CRANK_ROCKER_BY_AXES = ProvableLocus(
     links=("a", "c", "b"),
     objectives=OBJECTIVES,
     rows=_tests(("a", "c", "b")),
-    explore=_explored_by_axes,
+    explore=partial(_explored, "by_axes"),
 )
 
 CRANK_ROCKER_BY_ROCKER = ProvableLocus(
@@ -71,5 +61,5 @@ CRANK_ROCKER_BY_ROCKER = ProvableLocus(
     links=("a", "e", "g", "b"),
     objectives=OBJECTIVES,
     rows=_tests(("a", "e", "g", "b")),
-    explore=_explored_by_rocker,
+    explore=partial(_explored, "by_rocker"),
 )

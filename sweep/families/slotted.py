@@ -162,7 +162,7 @@ PLANAR = Family(
     pose_outputs=PLANAR_VALUES + PLANAR_JOINTS,
     poses=planar_poses,
     example={"a": 1.0, "e": 2.2, "h": 0.3, "branch": -1.0},
-    derivative_of=ladders("psi") | {"s": "ds", "ds": "d2s"},
+    derivative_of=ladders("psi") | ladders("s", orders=2),
     uses_phi=False,
     capabilities=(
         Singular.where_small("s"),

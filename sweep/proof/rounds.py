@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, NamedTuple, TypeAlias
 
@@ -20,7 +20,6 @@ from kernels.boxes.branching import COMBINED, OPEN
 from kernels.types import Numbers
 from sweep.dataset import files
 from sweep.families.base import Array
-from sweep.families.capabilities import Searched
 from sweep.jobs.executors import Executor
 from sweep.jobs.signals import Stop
 from sweep.proof.question import Question
@@ -114,15 +113,13 @@ class Unit:
             return number, 0
         asked, provable = self.question, self.question.provable
         leaves = empty(len(mine.bound) + self.most, mine.low.shape[1])
-        searched = Searched(
-            asked.branch, provable.objectives[asked.objective], asked.cos2, asked.links, self.target,
-            asked.tube(self.target), (mine.low, mine.high, mine.bound), asked.high - asked.low, asked.free,
-            asked.given, self.smallest, self.most,
-        )  # fmt: skip
+        about = (asked.branch, provable.objectives[asked.objective], asked.cos2, asked.links, self.target)
+        question, starts = (*about, asked.tube(self.target)), (mine.low, mine.high, mine.bound)
+        search = (starts, asked.high - asked.low, asked.free, asked.given, self.smallest)
         out = tuple(getattr(leaves, n) for n in Leaves.__dataclass_fields__)
-        provable.explore(replace(searched, most=0), out)  # judges nothing, but compiles what is not compiled yet
+        provable.explore(question, (*search, 0), out)  # judges nothing, but compiles what is not compiled yet
         begin = time.thread_time()
-        filled, judged = provable.explore(searched, out)
+        filled, judged = provable.explore(question, (*search, self.most), out)
         _write(self.path(number), leaves.taken(np.arange(filled)), judged, time.thread_time() - begin)
         return number, judged
 

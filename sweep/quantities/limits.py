@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from typing import TypeVar
 
@@ -30,19 +29,6 @@ class Limit:
 def compared(name: str, values: Number) -> Number:
     """Give what limits and objectives compare: the magnitude of a swing or stroke, the value of any other output."""
     return abs(values) if by_magnitude(name) else values
-
-
-def refusals(limits: Iterable[Limit], values: Mapping[str, float]) -> list[str]:
-    """Say in words which limits a design breaks, each with its value and bound; a missing value breaks any."""
-    found = []
-    for limit in limits:
-        value = values[limit.output]
-        if meets(limit, np.array([value]))[0]:
-            continue
-        bounds = (("at least", limit.minimum), ("at most", limit.maximum))
-        words = " and ".join(f"{word} {bound:g}" for word, bound in bounds if bound is not None)
-        found.append(f"{limit.output} = {compared(limit.output, value):.4g}, {words} is asked")
-    return found
 
 
 def meets(limit: Limit, values: NDArray[np.generic]) -> NDArray[np.bool_]:

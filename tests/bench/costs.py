@@ -16,20 +16,20 @@ import numpy as np
 from kernels.status import OK
 from sweep.chunks.plan import spread_designs
 from sweep.costs import TABLE, table
-from sweep.effects import costs as effects
 from sweep.evaluation.summaries import design_outputs
 from sweep.evaluation.tables import design_matrix
 from sweep.families import family
 from sweep.families.base import Accuracy, Array, Family
 from sweep.families.capabilities import InSeries
 from sweep.families.chain import Chain
-from sweep.families.poses import own_code
 from sweep.quantities.dimensions import size_step
 from sweep.reductions.steps import POSES_EVENT, POSES_PEAK, POSES_SEARCH, certified_travel
 from sweep.study import Study, load_study
 from sweep.study.space import Axis, DesignSpace
 from sweep.synthesis.fit import fit_line
+from tests.bench import effect_costs as effects
 from tests.bench.families import ROUNDS, Run, ladder, least, margin_runs, pose_runs, sized, step_costs
+from tests.support.own_code import own_code
 
 ROOT = Path(__file__).resolve().parents[2]
 PAGE = ROOT / "docs" / "costs.md"

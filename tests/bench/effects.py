@@ -11,11 +11,12 @@ import time
 from pathlib import Path
 from typing import NamedTuple
 
+from studies.accuracy.ordinary import designs
 from sweep.effects import applicable, extended
-from sweep.effects.costs import designs, least_time
 from sweep.evaluation.summaries import design_outputs
 from sweep.families import family
 from sweep.families.base import Accuracy, Array, Family
+from tests.bench.effect_costs import least_time
 
 SAMPLES = 360
 CHUNK = 256

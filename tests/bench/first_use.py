@@ -30,7 +30,7 @@ runpy.run_module("sweep", run_name="__main__")
 """
 SCENE = """
 from sweep.effects import extended
-from sweep.effects.costs import designs
+from studies.accuracy.ordinary import designs
 from sweep.evaluation.summaries import design_outputs
 from sweep.families import family
 from sweep.families.base import Accuracy

@@ -17,8 +17,8 @@ from sweep.evaluation.summaries import design_outputs
 from sweep.evaluation.tables import design_matrix
 from sweep.families import family
 from sweep.families.base import Accuracy, Angles, Array, Family
-from sweep.families.poses import own_code
 from sweep.study import load_study
+from tests.support.own_code import own_code
 
 STUDY, DESIGNS, POSES = Path(sweep.__file__).parents[1] / "studies" / "head208", 1024, 360
 MOTION = {"needle": ("s", "ds", "d2s"), "looper": ("psi", "dpsi", "d2psi")}

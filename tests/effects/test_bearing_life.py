@@ -9,8 +9,8 @@ import pytest
 
 import sweep
 from kernels import status as st
+from studies.accuracy.ordinary import designs as bench_designs
 from sweep.effects import extended
-from sweep.effects.costs import designs as bench_designs
 from sweep.evaluation.summaries import design_outputs
 from sweep.families import family
 from sweep.families.base import Accuracy, Angles

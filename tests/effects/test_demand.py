@@ -18,8 +18,8 @@ import pytest
 import sweep.effects
 from kernels import status as st
 from kernels.effects import coupler, pressure
+from studies.accuracy.ordinary import designs as bench_designs
 from sweep.effects import applicable, called_for, extended, input_names
-from sweep.effects.costs import designs as bench_designs
 from sweep.errors import InputError
 from sweep.families import family
 from sweep.families.base import Angles

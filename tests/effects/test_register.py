@@ -8,12 +8,12 @@ from pathlib import Path
 import pytest
 from click.testing import CliRunner
 
+from studies.accuracy.ordinary import designs
 from sweep.cli import main
 from sweep.cli.effects import every_input, page
 from sweep.effects import NAMES, applicable, effect, extended, offered
 from sweep.effects.advice import closure, findings
 from sweep.effects.base import Placed
-from sweep.effects.costs import designs
 from sweep.families import NAMES as FAMILIES
 from sweep.families import family
 from sweep.families.capabilities import JointRecords, ThreadPath

@@ -11,8 +11,8 @@ import sweep
 from kernels import status as st
 from kernels.effects import bearings, permissible
 from kernels.effects.pressure import pressure_extrema
+from studies.accuracy.ordinary import designs as bench_designs
 from sweep.effects import extended
-from sweep.effects.costs import designs as bench_designs
 from sweep.families import family
 
 DENSE = 4096

@@ -12,8 +12,9 @@ import pytest
 import kernels.families.rssr
 from sweep.families import family, rssr
 from sweep.families.base import Accuracy, Angles, Array, Columns
-from sweep.families.poses import MANY, PAID, Together, own_code
+from sweep.families.poses import MANY, PAID, Together
 from sweep.reductions.sampling import turn
+from tests.support.own_code import own_code
 from tests.support.rssr_designs import random_designs
 
 TURN = Angles.of(np.linspace(0.0, 6.0, 24)[None, :])

@@ -13,9 +13,9 @@ import pytest
 
 import sweep
 from kernels import status as st
+from studies.accuracy.ordinary import designs
 from sweep.dataset.files import OPTIMUM, beside
 from sweep.effects import extended
-from sweep.effects.costs import designs
 from sweep.engine.run import run
 from sweep.evaluation.loads import curves_of
 from sweep.families import family

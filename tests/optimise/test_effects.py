@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from studies.accuracy.ordinary import CENTRE, INPUTS
 from sweep.effects import extended
-from sweep.effects.costs import CENTRE, INPUTS
 from sweep.errors import InputError
 from sweep.evaluation.summaries import design_outputs
 from sweep.families import family

@@ -11,8 +11,8 @@ from scipy.optimize import brentq
 
 import sweep
 from kernels import status as st
+from studies.accuracy.ordinary import designs
 from sweep.effects import extended
-from sweep.effects.costs import designs
 from sweep.families import family
 from sweep.numerics.events import near_zeros, sign_changes
 

@@ -10,8 +10,8 @@ import pytest
 
 import sweep
 from kernels import status as st
+from studies.accuracy.ordinary import designs
 from sweep.effects import extended
-from sweep.effects.costs import designs
 from sweep.families import family
 from sweep.families.base import Family, Output, Parameter
 from sweep.quantities.kinds import Request

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from kernels import status as st
+from studies.accuracy.ordinary import designs
 from sweep.effects import extended
-from sweep.effects.costs import designs
 from sweep.evaluation.summaries import design_outputs
 from sweep.families import family
 from sweep.families.base import Accuracy, Angles

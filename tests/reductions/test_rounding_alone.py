@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from kernels import status as st
+from studies.accuracy.ordinary import designs as ordinary
 from sweep.effects import extended
-from sweep.effects.costs import designs as ordinary
 from sweep.effects.wanted import expanded
 from sweep.evaluation.summaries import design_outputs
 from sweep.families import family

@@ -9,9 +9,9 @@ import numpy as np
 
 import sweep
 from kernels import status as st
+from studies.accuracy.ordinary import designs as ordinary
 from sweep.effects import NAMES as EFFECTS
 from sweep.effects import effect, extended
-from sweep.effects.costs import designs as ordinary
 from sweep.families import NAMES, family
 from sweep.families.base import Angles, Array, Columns, Family, March
 from sweep.reductions.sampling import on_closed_turn

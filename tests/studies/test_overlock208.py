@@ -19,9 +19,9 @@ from sweep.optimise.extrema.gradients import scalar_gradient, step_gradients
 from sweep.optimise.extrema.points import STEP
 from sweep.optimise.manufacture.robust import yields
 from sweep.optimise.starts.posing import problem_of
-from sweep.quantities.limits import refusals
 from sweep.study.load import load_study
 from sweep.synthesis.thread_law import smoothest_law
+from tests.support.refusals import refusals
 
 FOLDER = Path(sweep.__file__).parents[1] / "studies" / "overlock208"
 EXPECTED = json.loads((FOLDER / "expected.json").read_text())

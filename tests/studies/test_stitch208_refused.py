@@ -9,7 +9,8 @@ from pathlib import Path
 import pytest
 
 import sweep
-from sweep.quantities.limits import Limit, refusals
+from sweep.quantities.limits import Limit
+from tests.support.refusals import refusals
 
 RECORD = json.loads((Path(__file__).parent / "earlier" / "stitch208" / "expected.json").read_text())
 DESIGN = {name: value for name, value in RECORD["optimum"]["design"].items() if not name.endswith("_tip")}

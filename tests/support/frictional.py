@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
+from studies.accuracy.ordinary import designs as ordinary
 from sweep.effects import effect, extended
-from sweep.effects.costs import designs as ordinary
 from sweep.effects.wanted import expanded
 from sweep.evaluation.summaries import design_outputs
 from sweep.families import family

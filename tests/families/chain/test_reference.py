@@ -14,10 +14,10 @@ from kernels.chains import links as kernel
 from sweep.families import chain as chains
 from sweep.families import family
 from sweep.families.base import Angles, Family, Output, Parameter
-from sweep.families.poses import own_code
 from tests.reference import chain as naive
 from tests.reference import guide as naive_guide
 from tests.reference import rssp as naive_rssp
+from tests.support.own_code import own_code
 
 FIRST = {"a": 1.0, "b": 4.1, "c": 3.2, "e": 2.9, "f": 0.6, "g": -0.4, "alpha": 0.7, "branch": -1.0}
 SECOND = {"a": 2.2, "b": 4.6, "c": 3.9, "e": 3.1, "f": -0.3, "g": 0.5, "alpha": -0.4, "branch": 1.0}
