@@ -59,9 +59,9 @@ def effect_poses(
     family = added.family
     own = wanted & frozenset(family.pose_names)
     if np.iscomplexobj(designs) or np.iscomplexobj(angles.cos):
-        names = wanted & frozenset(o.name for placed in effects for o in placed.pose_outputs)
-        found = differenced(partial(effect_poses, added, effects), designs, angles, names) if names else {}
-        return found | family.poses(added.own(designs), angles, own)
+        of_effects = wanted & frozenset(o.name for placed in effects for o in placed.pose_outputs)
+        turned = differenced(partial(effect_poses, added, effects), designs, angles, of_effects) if of_effects else {}
+        return turned | family.poses(added.own(designs), angles, own)
     asked = [(placed, [name for name in placed.own if name in wanted]) for placed in effects]
     asked = [(placed, names) for placed, names in asked if names]
     last, shape = len(stages_of(family)) - 1, (len(designs), angles.cos.shape[1])

@@ -23,7 +23,8 @@ def _explored(
     from kernels.families.rssr import proof
     from kernels.families.rssr.box_problem import BoxQuestion
 
-    found = proof.explore(BoxQuestion(*question), _recorded(coordinates), *search, proof.Leaves(*leaves))
+    whole: Any = (BoxQuestion(*question), _recorded(coordinates), *search, proof.Leaves(*leaves))
+    found = proof.explore(*whole)
     return int(found[0]), int(found[1])
 
 
