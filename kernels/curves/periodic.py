@@ -10,6 +10,7 @@ from __future__ import annotations
 import math
 
 import numpy as np
+from numpy.typing import NDArray
 
 from kernels.jit import inline, kernel
 from kernels.types import Array
@@ -161,3 +162,64 @@ def _peak(c: Array, s: Array, sign: float, look: Array) -> float:
             high = middle
     angle = 0.5 * (low + high)
     return angle + 2.0 * math.pi if angle < 0.0 else angle
+
+
+STEPS, STILL = 6, 1e-6  # steps to a top; one that is shorter [rad] leaves an error far below rounding
+
+
+@kernel
+def climb(
+    series: NDArray[np.complex128],
+    row: NDArray[np.int64],
+    mode: int,
+    spacing: float,
+    phi: Array,
+    height: Array,
+    bend: Array,
+    still: NDArray[np.bool_],
+) -> None:
+    """Climb from places near the tops of Fourier series to the tops, by Newton's steps.
+
+    Parameters
+    ----------
+    series : (n, q, K + 1) complex coefficients of 2 K samples of q curves
+    row : (k,) which of the n
+    mode : +1 for the curve, -1 for its negative, 0 for the sum of squares of the q curves
+    spacing : longest step [rad]
+    phi : (k,) in and out, places [rad]
+    height, bend : (k,) out; what is climbed at the place, and its second derivative
+    still : (k,) out; whether the last step was short enough
+    """
+    for i in range(row.size):
+        still[i] = False
+        for _ in range(STEPS):
+            value, slope, second = _slopes(series[row[i]], phi[i], mode)
+            step = -slope / second if second < 0.0 else math.copysign(0.5 * spacing, slope)
+            step = min(max(step, -spacing), spacing)
+            phi[i] += step
+            height[i], bend[i] = value + step * (slope + 0.5 * second * step), second
+            still[i] = second < 0.0 and abs(step) < STILL
+            if still[i]:
+                break
+
+
+@inline
+def _slopes(series: NDArray[np.complex128], phi: float, mode: int) -> tuple[float, float, float]:
+    """Value with two derivatives of what is climbed, of the series (q, K + 1) at one place."""
+    height, rising, bend, last = 0.0, 0.0, 0.0, series.shape[1] - 1
+    turn = complex(math.cos(phi), math.sin(phi))
+    for part in range(series.shape[0]):
+        waves, first, second = 0j, 0j, 0j
+        for order in range(last, 0, -1):  # the small ones first
+            # the highest order of an even number of samples stands alone
+            term = (2.0 if order < last else 1.0) * series[part, order]
+            waves = (waves + term) * turn
+            first = (first + order * term) * turn
+            second = (second + order * order * term) * turn
+        value, slope, bent = series[part, 0].real + waves.real, -first.imag, -second.real
+        if mode != 0:
+            return mode * value, mode * slope, mode * bent
+        height += value * value
+        rising += 2.0 * value * slope
+        bend += 2.0 * (slope * slope + value * bent)
+    return height, rising, bend

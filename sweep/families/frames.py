@@ -30,7 +30,8 @@ class Frame(NamedTuple):
 
     def turned(self, vector: list[Any]) -> list[Any]:
         """Return components in the other frame of a vector of this one, each (n, m)."""
-        return [sum(self.rotation[:, k, j, None] * vector[j] for j in range(3)) for k in range(3)]
+        x, y, z = vector
+        return [r[:, 0, None] * x + r[:, 1, None] * y + r[:, 2, None] * z for r in np.moveaxis(self.rotation, 1, 0)]
 
     def placed(self, point: list[Any]) -> list[Any]:
         """Return coordinates in the other frame of a point of this one, each (n, m)."""
@@ -105,13 +106,13 @@ def mounted(axis: Axis, crank: Axis, sense: Any, shift: Any, turn: Any) -> Frame
     """
     sense, shift, turn = (np.atleast_1d(x)[:, None] for x in (sense, shift, turn))
     zero = np.cos(turn) * axis.zero + np.sin(turn) * product(axis.along, axis.zero)
-    rotation = _columns(zero, sense * axis.along) @ np.swapaxes(_columns(crank.zero, crank.along), 1, 2)
+    rotation = _triad(zero, sense * axis.along, -1) @ _triad(crank.zero, crank.along, -2)
     return Frame(rotation, axis.at + shift * axis.along - _times(rotation, crank.at))
 
 
-def _columns(zero: Array, along: Array) -> Array:
+def _triad(zero: Array, along: Array, axis: int) -> Array:
     zero, along = np.broadcast_arrays(zero, along)
-    return np.stack([zero, product(along, zero), along], axis=-1)
+    return np.stack([zero, product(along, zero), along], axis=axis)
 
 
 def crank_axis(family: Family, designs: Array) -> Axis | None:

@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 from kernels import status as st
 from kernels.curves import samples as scan
+from kernels.curves.periodic import climb
 from kernels.types import EPS, TWO_PI, Status
 from sweep.families.base import Angles, Array, Family
 from sweep.families.curve_features import (
@@ -178,7 +179,6 @@ FIRST, LAST = 48, 384  # samples of a series at first, and at most: what needs m
 FIRST_OF_MEAN = 32  # its error falls with the square of what the samples leave out
 FINER = 2  # times as many points show which tops of a series may be the highest
 RIVALS = 0.2  # of the range of a curve that the tops between its points may add
-STEPS, STILL = 6, 1e-6  # steps to a top; one that is shorter [rad] leaves an error far below rounding
 DOUBT = 3.0  # times what the falling coefficients say of those beyond
 
 
@@ -236,16 +236,16 @@ class Series:
         known = np.empty((rows.size, len(self.parts), 0))
         while rows.size and samples <= LAST:
             left, between = [], known.shape[2] > 0
-            for at in blocks(np.arange(rows.size), FINER * samples, 2 * len(self.parts)):
+            for at in blocks(np.arange(rows.size), samples, 2 * len(self.parts)):
                 part = rows[at]
                 columns, worst, _ = sample_turn(self.family, designs[part], samples, self.parts, between)
                 status[part] = DESIGN_STATUS[worst]
                 values = np.stack([columns[name] for name in self.parts], axis=1)
                 if between:
                     values = np.stack([known[at], values], axis=3).reshape(part.size, -1, samples)
-                series = np.fft.rfft(values) / samples
-                size = np.sqrt(np.square(values).sum(axis=1).max(axis=1))
-                err = (_beyond_mean if mean else _beyond)(np.sqrt(np.square(np.abs(series)).sum(axis=1)))
+                series = np.fft.rfft(values, norm="forward")
+                size = np.sqrt(_lengths(values).max(axis=1))
+                err = (_beyond_mean if mean else _beyond)(np.sqrt(_lengths(series.real) + _lengths(series.imag)))
                 err += 16.0 * EPS * size
                 allowed = target * (_root_mean_square(values) if mean else size)
                 done = (err <= allowed) & (status[part] == st.OK)
@@ -258,28 +258,19 @@ class Series:
         """Highest point of each series: value, place, its error, and whether it was reached."""
         mode, (count, parts, orders) = self.request.mode, turns.series.shape
         size = FINER * 2 * (orders - 1)
-        fine = np.fft.irfft(turns.series, size) * size
+        fine = np.fft.irfft(turns.series, size, norm="forward")
         square = parts > 1 or mode == 0
-        heights = np.square(fine).sum(axis=1) if square else mode * fine[:, 0]
-        top = heights.max(axis=1, keepdims=True)
-        peak = (heights >= np.roll(heights, 1, axis=1)) & (heights > np.roll(heights, -1, axis=1))
-        row, column = np.nonzero(peak & (heights >= top - RIVALS * (top - heights.min(axis=1, keepdims=True))))
+        heights = _lengths(fine) if square else mode * fine[:, 0]
+        rows, columns = np.empty((2, count * (size // 2 + 1)), np.int64)
+        listed = scan.peaks(heights, 1, 1.0 - RIVALS, None, *np.empty((2, count)), rows, columns)
+        row, column = rows[:listed], columns[:listed]
         before, here, after = (heights[row, (column + k) % size] for k in (-1, 0, 1))
-        spacing = TWO_PI / size
-        phi = spacing * (column + 0.5 * (before - after) / (before - 2.0 * here + after))
-        series, still = turns.series[row], np.zeros(row.size, bool)
-        height, bend = np.empty((2, row.size))
-        for _ in range(STEPS):
-            go = np.flatnonzero(~still)
-            if not go.size:
-                break
-            value, slope, second = _slopes(series[go], phi[go], square, mode)
-            bent = second < 0.0
-            step = np.where(bent, -slope / np.where(bent, second, 1.0), np.sign(slope) * 0.5 * spacing)
-            step = np.clip(step, -spacing, spacing)
-            phi[go] += step
-            height[go], bend[go] = value + step * (slope + 0.5 * second * step), second
-            still[go] = bent & (np.abs(step) < STILL)
+        spacing, bent = TWO_PI / size, before - 2.0 * here + after
+        apart = np.divide(0.5 * (before - after), bent, out=np.zeros_like(bent), where=bent < 0.0)
+        phi = spacing * (column + apart)
+        height, bend = np.empty((2, listed))
+        still = np.empty(listed, np.bool_)
+        climb(turns.series, row, 0 if square else mode, spacing, phi, height, bend, still)
         best = np.full(count, -1)
         scan.best_candidate(row, height, np.full(count, -np.inf), best)
         good: Mask = (best >= 0) & (np.bincount(row[~still], minlength=count) == 0)
@@ -288,6 +279,12 @@ class Series:
         off = 2.0 * (turns.size if square else 1.0) * turns.err
         err_phi = np.sqrt(2.0 * off / np.maximum(-bend[best], 1e-300))
         return value, np.mod(phi[best], TWO_PI), err_phi, good
+
+
+def _lengths(vectors: Array) -> Array:
+    """Squared lengths (n, m) of vectors (n, q, m)."""
+    found: Array = np.einsum("nqm,nqm->nm", vectors, vectors)
+    return found
 
 
 def _root_mean_square(values: Array) -> Array:
@@ -326,20 +323,6 @@ def _beyond_mean(coefficients: Array) -> Array:
     square, whole = DOUBT * 2.0 * half * last * last, np.sqrt(np.square(coefficients).sum(axis=1))
     found: Array = 0.5 * np.divide(square, whole, out=np.sqrt(square), where=whole > 0.0)
     return found
-
-
-def _slopes(series: NDArray[np.complex128], phi: Array, square: bool, mode: int) -> tuple[Array, Array, Array]:
-    """Values with two derivatives, (k,), of series (k, q, K + 1) at places; of sums of squares if ``square``."""
-    orders = np.arange(1, series.shape[2])
-    waves = np.cumprod(np.broadcast_to(np.exp(1j * phi)[:, None], (phi.size, orders.size)), axis=1)
-    turned = 2.0 * series[:, :, 1:] * waves[:, None, :]
-    turned[:, :, -1] *= 0.5  # the highest order of an even number of samples stands alone
-    value = series[:, :, 0].real + turned.real.sum(axis=2)
-    slope, second = -(orders * turned.imag).sum(axis=2), -(orders * orders * turned.real).sum(axis=2)
-    if not square:
-        return mode * value[:, 0], mode * slope[:, 0], mode * second[:, 0]
-    bend = 2.0 * (slope * slope + value * second).sum(axis=1)
-    return (value * value).sum(axis=1), 2.0 * (value * slope).sum(axis=1), bend
 
 
 def series_of(family: Family, request: Request) -> Series | None:
