@@ -23,7 +23,7 @@ from sweep.families.names import at_stage
 from sweep.numerics.curves import Curve
 
 _PER_LINK = (PER_BODY, 3, PER_LINE)
-PART = 2048  # poses of bodies at once where their loads are written design by design
+PART = 4096  # poses of bodies at once where their loads are written design by design
 
 Rows: TypeAlias = NDArray[np.intp]
 Index: TypeAlias = NDArray[np.int64]

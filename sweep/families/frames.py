@@ -39,6 +39,8 @@ class Frame(NamedTuple):
 
     def within(self, outer: Frame) -> Frame:
         """Return this frame in the one that ``outer``, in which it stands, is given in."""
+        if self is WHOLE:
+            return outer
         return Frame(outer.rotation @ self.rotation, outer.at + _times(outer.rotation, self.at))
 
     @property
@@ -90,7 +92,7 @@ def place_parameters(what: str, at: Sequence[float]) -> tuple[Parameter, ...]:
 
 
 def _times(matrix: Array, vector: Array) -> Array:
-    return np.asarray((matrix @ vector[:, :, None])[:, :, 0])
+    return np.asarray(np.einsum("nij,nj->ni", matrix, vector))
 
 
 def mounted(axis: Axis, crank: Axis, sense: Any, shift: Any, turn: Any) -> Frame:

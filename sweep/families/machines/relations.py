@@ -98,7 +98,7 @@ class Distance:
         """Return the distance and components, (n, m)."""
         a, b = self.points
         parts = [found[f"{b}_{axis}"] - found[f"{a}_{axis}"] for axis in AXES]
-        return with_size(self.name, parts)
+        return with_size(self.name, parts, wanted)
 
 
 @dataclass(frozen=True)
@@ -139,10 +139,10 @@ def _velocities(point: str) -> tuple[str, ...]:
     return tuple(f"{member}.d{own}_{axis}" for axis in AXES)
 
 
-def with_size(name: str, parts: list[Any]) -> dict[str, Any]:
-    """Return the magnitude and components."""
+def with_size(name: str, parts: list[Any], wanted: frozenset[str]) -> dict[str, Any]:
+    """Return the components, and the magnitude where it is wanted."""
     columns = {f"{name}_{axis}": part for axis, part in zip(AXES, parts, strict=True)}
-    return columns | {name: np.sqrt(parts[0] ** 2 + parts[1] ** 2 + parts[2] ** 2)}
+    return columns | ({name: np.sqrt(parts[0] ** 2 + parts[1] ** 2 + parts[2] ** 2)} if name in wanted else {})
 
 
 def two(given: tuple[str, ...], known: Sequence[str] | None, what: str, where: str) -> tuple[str, str]:

@@ -157,7 +157,8 @@ class Shaking:
                     inside = [found[name] for name in one.axis]
                     torque = found[one.named("drive_torque")]
                     moment = [total + torque * part for total, part in zip(moment, inside, strict=True)]
-        return with_size(self.name, force) | (with_size(self._moment, moment) if self._turning(wanted) else {})
+        moments = with_size(self._moment, moment, wanted) if self._turning(wanted) else {}
+        return with_size(self.name, force, wanted) | moments
 
     def _about_own(self, one: Shaken, found: Mapping[str, Any]) -> list[Any]:
         """Return the moment about the origin of the stage's frame, with the couple of the tool's guides."""
