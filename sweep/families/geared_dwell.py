@@ -101,7 +101,7 @@ def sampled_maxima(designs: Array, wanted: frozenset[str], accuracy: Accuracy) -
 
 @lru_cache(maxsize=32)
 def half_turn(samples: int) -> tuple[Array, Array]:
-    """Tabulate one turn, folded: rows 1 -+ cos(phi) and sin(phi) around phi = 0 and around phi = pi.
+    """Tabulate one turn, folded: rows 1 -+ cos(phi), sin(phi) and its square around phi = 0 and around phi = pi.
 
     phi and -phi have the same magnitudes, so half of the samples stand for all.  The last angle is repeated up to a
     multiple of 16, which the vectorised loop takes without a remainder; the grid of an odd number misses phi = pi.
@@ -112,7 +112,7 @@ def half_turn(samples: int) -> tuple[Array, Array]:
 
 def _table(quarters: np.ndarray[tuple[int], np.dtype[np.int64]], samples: int) -> Array:
     angle = quarters * (np.pi / (2 * samples))
-    rows = np.stack([2.0 * np.sin(0.5 * angle) ** 2, np.sin(angle)])
+    rows = np.stack([2.0 * np.sin(0.5 * angle) ** 2, np.sin(angle), np.sin(angle) ** 2])
     missing = -quarters.size % 16 if quarters.size else 0
     table: Array = np.pad(rows, ((0, 0), (0, missing)), mode="edge" if missing else "constant")
     table.flags.writeable = False

@@ -16,6 +16,7 @@ from kernels.linkage.outputs import write
 from kernels.types import EPS, TWO_PI, Array, Numbers, Status
 
 TOO_NEAR = 1e-50  # a pin that passes the axis nearer than this has derivatives outside float64
+FLOOR = 1e-150  # of a squared distance on a grid; its square is no less than what float64 holds
 
 
 class Half(NamedTuple):
@@ -193,14 +194,14 @@ def dense_maxima(
     Parameters
     ----------
     designs : (n, 2) columns as `PARAMETERS` of sweep/families/geared_dwell.py
-    front, back : (2, m) rows t = 1 - cos(phi), sin(phi) of the grid in [0, pi/2], and t = 1 + cos(phi), sin(phi) in
-        (pi/2, pi]; the other half of the turn is its mirror image and adds nothing
+    front, back : (3, m) rows t = 1 - cos(phi), sin(phi) and its square of the grid in [0, pi/2], and so with
+        t = 1 + cos(phi) in (pi/2, pi]; the other half of the turn is its mirror image and adds nothing
     status : (n,) out; OK, SINGULAR or INVALID_INPUT
     max_abs_dpsi, max_abs_d2psi, max_abs_d3psi : (n,) out, or None: not computed, not compiled
 
     Notes
     -----
-    D is clamped before the division, so the loop has no branch and vectorises; a design whose pin passes through the
+    D has a floor before the division, so the loop has no branch and vectorises; a design whose pin passes through the
     axis, on the grid or between its points, is nan with status SINGULAR.
     """
     for i in range(designs.shape[0]):
@@ -210,22 +211,20 @@ def dense_maxima(
             h = r.front if side == 0 else r.back
             grid = front if side == 0 else back
             for j in range(grid.shape[1]):
-                t, s = grid[0, j], grid[1, j]
-                # The pin as in closure.pin near phi = 0, written out without that one's branch, so that it vectorises.
-                ss = s * s
-                x, y = h.e - 2.0 * t + 2.0 * h.k * ss, 2.0 * s * (h.below + h.k * t)
-                square = x * x + y * y
-                least = smallest(least, square)
-                # A clamp instead of a branch; ``least`` tells that it was used.
-                square = largest(square, 1e-100)
-                per = 1.0 / square
+                t, s, ss = grid[0, j], grid[1, j], grid[2, j]
+                # Half of the pin as in closure.pin near phi = 0, written out without that one's branch, so that it
+                # vectorises.  The floor, far below every pin that counts, takes no instruction of its own.
+                x, y = 0.5 * h.e - t + h.k * ss, s * (h.below + h.k * t)
+                quarter = (x * x + FLOOR) + y * y
+                least = smallest(least, quarter)
+                per = 0.25 / quarter
                 if max_abs_dpsi is not None:
                     m1 = largest(m1, abs(1.0 - h.total * (h.e - 2.0 * t) * per))
                 if max_abs_d2psi is not None or max_abs_d3psi is not None:
                     q = h.q0 + t * (h.q1 + r.ak4 * t)
                     if max_abs_d2psi is not None:
                         # One division, not three products with a reciprocal: mostly this is asked for alone.
-                        m2 = largest(m2, abs(s * q) / (square * square))
+                        m2 = largest(m2, abs(s * q) / (quarter * quarter))
                     if max_abs_d3psi is not None:
                         q_t, d_t = h.q1 + 2.0 * r.ak4 * t, h.d1 - 2.0 * r.ak4 * t
                         q = q * per
@@ -234,13 +233,13 @@ def dense_maxima(
         code = st.OK
         if not r.valid:
             code = st.INVALID_INPUT
-        elif not r.regular or least <= 1e-100:
+        elif not r.regular or least <= 0.25 * TOO_NEAR**2:
             code = st.SINGULAR
         status[i] = code
         scale = 2.0 * abs(r.front.total) if code == st.OK else math.nan
         if max_abs_dpsi is not None:
             max_abs_dpsi[i] = m1 if code == st.OK else math.nan
         if max_abs_d2psi is not None:
-            max_abs_d2psi[i] = scale * m2
+            max_abs_d2psi[i] = 0.0625 * scale * m2
         if max_abs_d3psi is not None:
             max_abs_d3psi[i] = scale * m3
