@@ -65,7 +65,7 @@ def true_extrema(
         return _apart(family, designs, requests, target, locate, window, jumping)
     found: dict[Request, Extremum] = {}
     status = np.zeros(len(designs), np.uint8)
-    left, kinked = [], []
+    left, kinked, opened = [], [], None
     for request in requests:
         if not anywhere and panels.has_kinks(family, request, bool(jumping.any())):
             kinked.append(request)
@@ -75,7 +75,11 @@ def true_extrema(
         if curve is None:
             left.append(request)
             continue
-        quick, now, undecided = curve.extremum(designs, target)
+        if isinstance(curve, fused.FusedCurve):
+            opened = opened or curve.opened(designs)
+            quick, now, undecided = curve.extremum(designs, target, opened)
+        else:
+            quick, now, undecided = curve.extremum(designs, target)
         rows = np.flatnonzero(undecided)
         if rows.size:
             slow, now[rows] = _searched(family, designs[rows], [request], target, locate, anywhere, None, HARD)

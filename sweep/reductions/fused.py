@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import lru_cache
+from typing import TypeAlias
 
 import numpy as np
 
@@ -23,6 +24,8 @@ from sweep.reductions.refine import SHRINK, Peaks, confirmed, polished
 from sweep.reductions.sampling import Extremum, Index, Mask, pose_columns, turn
 
 sampling_tables = lru_cache(chains.sampling_tables)
+
+Opened: TypeAlias = tuple[Array, Status, Array]
 
 
 @dataclass(frozen=True)
@@ -45,13 +48,14 @@ class FusedCurve:
     made_of: DesignMap
     scale: DesignMap | None = None
 
-    def extremum(self, designs: Array, target: float) -> tuple[Extremum, Status, Mask]:
+    def extremum(self, designs: Array, target: float, opened: Opened | None = None) -> tuple[Extremum, Status, Mask]:
         """Return what is requested, of every design.
 
         Parameters
         ----------
         designs : (n, P) matrix of the whole chain
         target : relative accuracy
+        opened : what `opened` gives of these designs, for any curve of the chain, if it is known
 
         Returns
         -------
@@ -59,7 +63,7 @@ class FusedCurve:
         status : (n,) OK or NOT_ROTATABLE
         undecided : (n,) where a slower search is to be asked
         """
-        n, (given, made_of, along) = len(designs), self._given(designs)
+        n, (given, made_of, along) = len(designs), self._given(designs, opened)
         # Which of several is the highest decides on the place.
         tie = TIE if self.request.place else -1.0
         status, found = np.empty(n, np.uint8), np.empty((6, n))
@@ -87,7 +91,7 @@ class FusedCurve:
 
     def mean(self, designs: Array, target: float) -> tuple[Array, Array, Status, Mask]:
         """Return root mean squares over the turn, their errors, the status and what is undecided, as `extremum`."""
-        n, (given, made_of, along) = len(designs), self._given(designs)
+        n, (given, made_of, along) = len(designs), self._given(designs, None)
         status, found = np.empty(n, np.uint8), np.empty((2, n))
         chains.mean_squares(_chained(self.forms), self.order, along)(
             *given, sampling_tables(), made_of, target, status, found
@@ -95,18 +99,27 @@ class FusedCurve:
         undecided = status == chains.OPEN
         return found[0], found[1], np.where(undecided, st.OK, status).astype(np.uint8), undecided
 
-    def _given(self, designs: Array) -> tuple[tuple[Array, Status, Array], Array, bool]:
-        """Designs, whether and how they open, what the curve is made of, and whether it needs nothing across."""
+    def opened(self, designs: Array) -> Opened:
+        """Return what all curves of a chain have in common.
+
+        These are the designs as the kernels take them, whether the first stage turns, and the distance of its nearest
+        singularity.
+        """
         n, designs = len(designs), np.ascontiguousarray(designs)
         opening, distance = np.empty(n, np.uint8), np.empty(n)
-        opens, stage = self.forms[0].opening, stages_of(self.family)[len(self.forms) - 1]
+        opens = self.forms[0].opening
         assert opens is not None
-        made_of = np.ascontiguousarray(self.made_of(designs[:, stage.columns]))
         if (matrix := self.forms[0].matrix) is not None:
             designs = matrix(designs)
         opens(designs, opening, distance)
+        return designs, opening, distance
+
+    def _given(self, designs: Array, opened: Opened | None) -> tuple[Opened, Array, bool]:
+        """Designs and how they open, what the curve is made of, and whether it needs nothing across."""
+        stage = stages_of(self.family)[len(self.forms) - 1]
+        made_of = np.ascontiguousarray(self.made_of(designs[:, stage.columns]))
         # Positions along and across a line are often asked for together: they share a kernel, which has to be compiled.
-        return (designs, opening, distance), made_of, self.order >= 1 and not made_of[:, 1].any()
+        return opened or self.opened(designs), made_of, self.order >= 1 and not made_of[:, 1].any()
 
     def _confirm(self, designs: Array, found: Extremum, rows: Index, tolerance: Array, spacing: Array) -> None:
         """Replace extrema that rounding may have moved too far by what precise poses say, in place."""

@@ -261,8 +261,8 @@ class Series:
         fine = np.fft.irfft(turns.series, size, norm="forward")
         square = parts > 1 or mode == 0
         heights = _lengths(fine) if square else mode * fine[:, 0]
-        rows, columns = np.empty((2, count * (size // 2 + 1)), np.int64)
-        listed = scan.peaks(heights, 1, 1.0 - RIVALS, None, *np.empty((2, count)), rows, columns)
+        (scale, rough), (rows, columns) = np.empty((2, count)), np.empty((2, count * (size // 2 + 1)), np.int64)
+        listed = scan.peaks(heights, 1, 1.0 - RIVALS, None, scale, rough, rows, columns)
         row, column = rows[:listed], columns[:listed]
         before, here, after = (heights[row, (column + k) % size] for k in (-1, 0, 1))
         spacing, bent = TWO_PI / size, before - 2.0 * here + after
