@@ -32,20 +32,9 @@ class Sliding(NamedTuple):
     mu: float
 
 
-class Rolling(NamedTuple):
-    """Columns of the rolling-bearing matrix; ``axial_on`` 1 or 2 is the support that takes the axial force."""
-
-    c: float
-    z1: float
-    z2: float
-    rotation_factor: float  # V
-    radial_factor: float  # X
-    axial_factor: float  # Y
-    e_limit: float
-    exponent: float  # 3 for balls, 10/3 for rollers
-    capacity: float  # C_dyn
-    shock_factor: float  # K_b
-    axial_on: float
+# Columns of the rolling-bearing matrix: radius c of the ball joint on the rocker, supports z1 and z2 along the rocker
+# axis, rotation factor V, radial factor X, axial factor Y, e, life exponent (3 for balls, 10/3 for rollers), C_dyn,
+# shock factor K_b, and 1 or 2 for the support that takes the axial force.
 
 
 class Criteria(NamedTuple):
@@ -153,7 +142,7 @@ def rolling_bearings(
     ----------
     t_tau, t_rho, t_k : (n, m) components of the coupler direction at the rocker
     moment : (n,) resisting torque on the rocker
-    bearings : (n, 11) columns of :class:`Rolling`
+    bearings : (n, 11), see above
     status : (n, m), in and out; JAMMED at cos(theta1) <= 0
     out : (4, n, m); equivalent loads and lives of both bearings
     """
@@ -177,7 +166,7 @@ def rolling_bearings(
 
 @inline
 def equivalent_load(bearings: Array, i: int, radial: float, thrust: float) -> float:
-    """Dynamic equivalent load of a rolling bearing of :class:`Rolling`: K_b (V R) or K_b (X V R + Y F_a)."""
+    """Dynamic equivalent load of a rolling bearing: K_b (V R) or K_b (X V R + Y F_a)."""
     v, x, y, e_limit, shock = bearings[i, 3], bearings[i, 4], bearings[i, 5], bearings[i, 6], bearings[i, 9]
     load: float = v * radial if thrust <= e_limit * v * radial else x * v * radial + y * thrust
     return float(shock * load)
@@ -199,7 +188,7 @@ def bearing_loads(
     ----------
     forces : (n, m, F) joint reactions;  force, moment : columns of the force on the shaft and of its moment
     axis : (n, m or 1, 3) axis of the shaft
-    bearings : (n, 11) columns of :class:`kernels.effects.bearings.Rolling`; c is not read
+    bearings : (n, 11), see the head of this file; c is not read
     status : (n, m), in; nan where it is not OK
     out : (5, n, m); radial loads of both, axial load, equivalent loads of both
     """

@@ -5,9 +5,11 @@ linkage
 
     J w^2 eta'' + h w p^2 eta' + (k p^2 + h w p p') eta = M - J w^2 psi_0''
 
-The linkage enters only through p and psi_0''.  A slider has c = 1, a mass for J, a force for M, and eta is a length.
-The quasi-static effect is pointwise.  The steady state couples the whole turn: its Fourier coefficients solve a linear
-system with as many bands as p^2 has harmonics, two for a linkage of one crank and one follower.
+A slider has c = 1, a mass for J, a force for M, and eta is a length.  Further stages, or a tool, that the follower
+drives have an inertia and a load that depend on its angle, and so add to every coefficient.  The quasi-static effect is
+pointwise.  The steady state couples the whole turn: the equation is given as eta'' + b eta' + c eta = r, and the
+Fourier coefficients of eta solve a linear system with as many bands as b and c have harmonics, two for a linkage of one
+crank and one follower.
 """
 
 from __future__ import annotations
@@ -33,6 +35,7 @@ COLUMNS = ("inertia", "stiffness", "damping", "speed", "torque")
 LINEAR = 0.1
 RESOLVED = 1e-9
 PHASE_STEP = 0.1
+KEPT = 1e-12  # share of its largest harmonic below which a coefficient is the rounding of what it is made of
 
 
 @kernel
@@ -96,81 +99,85 @@ class Steady(NamedTuple):
 
 @kernel
 def steady_state(
-    p: Array, d2psi: Array, c: Array, reach: Array, data: Array, phi: Array, last: bool, found: Steady,
-    varying: Array | None = None,
-) -> None:  # fmt: skip
-    """Compute the periodic steady state of the lag and the largest Floquet multiplier.
+    p: Array, b: Array, c: Array, r: Array, radius: Array, reach: Array, phi: Array, last: bool, found: Steady
+) -> None:
+    """Compute the periodic steady state of the lag and the largest Floquet multiplier from coefficients on a grid.
 
     Parameters
     ----------
-    p, d2psi : (n, N) on the grid phi_j = 2 pi j / N, N odd;  c, reach : (n,), see `quasi_static`;  data : (n, 5)
+    p : (n, N) c t_tau, on the grid phi_j = 2 pi j/N, N odd
+    b, c, r : (n, N) coefficients of eta'' + b eta' + c eta = r
+    radius : (n,) c of the driven joint
+    reach : (n,), see `quasi_static`
     phi : (n, m) or (1, m), where eta and elongation are wanted
     last : whether no finer grid follows
     found : out
-    varying : (n, N) or None; what is added to the torque M on the grid
     """
     n, (status, eta, elongation, floquet) = p.shape[1], found
     half = (n + 1) // 2
-    all_qc, all_qs, all_ec, all_es = np.empty(half), np.empty(half), np.empty(half), np.empty(half)
-    square, right, turn = np.empty(n), np.empty(n), np.empty((4, half))
+    turn, bc, bs, cc, cs = np.empty((4, half)), np.empty(half), np.empty(half), np.empty(half), np.empty(half)
+    qc, qs, ec, es, square = np.empty(half), np.empty(half), np.empty(half), np.empty(half), np.empty(n)
     for i in range(p.shape[0]):
-        mass, row = data[i, 0] * data[i, 3] * data[i, 3], i if phi.shape[0] > 1 else 0
-        stiffness, damping = data[i, 1] / mass, data[i, 2] * data[i, 3] / mass
-        bad = False
+        row, bad = i if phi.shape[0] > 1 else 0, False
         for j in range(n):
             square[j] = p[i, j] * p[i, j]
-            right[j] = data[i, 4] / mass - d2psi[i, j]
-            if varying is not None:
-                right[j] += varying[i, j] / mass
-            bad = bad or not math.isfinite(square[j] * right[j])
+            bad = bad or not math.isfinite(b[i, j] + c[i, j] + r[i, j] + square[j])
         if bad:
             status[i], floquet[i] = st.NOT_ROTATABLE, math.nan
             eta[i, :], elongation[i, :] = math.nan, math.nan
             continue
-        coefficients(square, turn, all_qc, all_qs)
-        count = significant(all_qc, all_qs)
-        qc, qs = all_qc[:count], all_qs[:count]
-        coefficients(right, turn, all_ec, all_es)
-        periodic_solution(qc, qs, stiffness, damping, all_ec, all_es)
-        count = significant(all_ec, all_es)
-        ec, es = all_ec[:count], all_es[:count]
-        resolved = tail(all_ec, all_es, 0.0) < RESOLVED
-        # The multiplier asks only that p be resolved; a grid that is too coarse for the lag is left before it.
+        coefficients(b[i], turn, bc, bs)
+        coefficients(c[i], turn, cc, cs)
+        coefficients(square, turn, qc, qs)
+        coefficients(r[i], turn, ec, es)
+        nb, nc, nq = significant(bc, bs, KEPT), significant(cc, cs, KEPT), significant(qc, qs)
+        periodic_solution(bc[:nb], bs[:nb], cc[:nc], cs[:nc], ec, es)
+        resolved = tail(ec, es, 0.0) < RESOLVED
         floquet[i] = math.nan
         if resolved or last:
-            floquet[i] = largest_multiplier(qc, qs, stiffness, damping)
-        status[i] = st.OK if resolved and floquet[i] <= 1.0 else st.NOT_CONVERGED
+            floquet[i] = largest_multiplier(bc[:nb], bs[:nb], cc[:nc], cs[:nc])
+        # Without damping the multipliers are 1 exactly, and c is known to KEPT of its size.
+        status[i] = st.OK if resolved and floquet[i] <= 1.0 + 1e3 * KEPT else st.NOT_CONVERGED
         for j in range(n):
             lag = series(ec, es, 2.0 * math.pi * j / n)[0] if status[i] == st.OK else 0.0
-            if not abs(lag) <= LINEAR * reach[i] * abs(p[i, j]) / c[i]:
+            if not abs(lag) <= LINEAR * reach[i] * abs(p[i, j]) / radius[i]:
                 status[i] = st.NOT_LINEAR
         for j in range(phi.shape[1]):
             value = series(ec, es, phi[row, j])[0] if status[i] != st.NOT_CONVERGED else math.nan
             eta[i, j] = value
-            # p keeps its sign over a turn.
-            lever = math.sqrt(series(qc, qs, phi[row, j])[0])
+            # p^2 has few harmonics, and p keeps its sign over a turn.
+            lever = math.sqrt(series(qc[:nq], qs[:nq], phi[row, j])[0])
             elongation[i, j] = value * math.copysign(lever, p[i, 0])
 
 
-@kernel
-def periodic_solution(qc: Array, qs: Array, stiffness: float, damping: float, c: Array, s: Array) -> None:
-    """Solve eta'' + damping q eta' + (stiffness q + damping q'/2) eta = right for the series of eta.
+@inline
+def _harmonic(cosines: Array, sines: Array, step: int) -> complex:
+    """Complex coefficient of a series; harmonics that it does not have are zero."""
+    k = abs(step)
+    if k >= cosines.size:
+        return complex(0.0, 0.0)
+    if k == 0:
+        return complex(cosines[0], 0.0)
+    return complex(0.5 * cosines[k], -0.5 * sines[k] if step > 0 else 0.5 * sines[k])
 
-    ``qc``, ``qs`` (w + 1,) series of q;  ``c``, ``s`` (K + 1,) series of the right side in, of eta out.  Gaussian
-    elimination with row pivoting in the band of the complex coefficients -K..K.
+
+@kernel
+def periodic_solution(bc: Array, bs: Array, cc: Array, cs: Array, c: Array, s: Array) -> None:
+    """Solve eta'' + b eta' + c eta = r for the series of eta.
+
+    ``bc``, ``bs`` and ``cc``, ``cs`` series of b and c;  ``c``, ``s`` (K + 1,) series of r in, of eta out.
     """
-    order, w = c.size - 1, qc.size - 1
+    order, w = c.size - 1, max(bc.size, cc.size) - 1
     size, width = 2 * order + 1, 3 * w + 1
     band, x = np.zeros((size, width), np.complex128), np.empty(size, np.complex128)
     for row in range(size):
         m = row - order
-        x[row] = 0.5 * complex(c[abs(m)], -s[abs(m)] if m > 0 else s[abs(m)]) if m != 0 else complex(c[0], 0.0)
+        x[row] = _harmonic(c, s, m)
         for step in range(-w, w + 1):
             if 0 <= row - step < size:
-                k = abs(step)
-                q = complex(0.5 * qc[k], -0.5 * qs[k] if step > 0 else 0.5 * qs[k]) if k > 0 else complex(qc[0], 0.0)
-                # The band starts w columns left of the diagonal and has room for the rows that pivoting brings up.
-                band[row, w - step] = q * complex(stiffness, damping * (m - 0.5 * step))
+                # harmonic m of the products: b_step i (m - step) + c_step times harmonic m - step of eta
+                entry = _harmonic(bc, bs, step) * complex(0.0, float(m - step)) + _harmonic(cc, cs, step)
+                band[row, w - step] = entry
         band[row, w] -= m * m
     solve_band(band, x, w, c, s)
 
@@ -213,25 +220,23 @@ def solve_band(band: NDArray[np.complex128], x: NDArray[np.complex128], w: int, 
 
 
 @kernel
-def largest_multiplier(qc: Array, qs: Array, stiffness: float, damping: float) -> float:
-    """Largest multiplier of eta'' + damping q eta' + (stiffness q + damping q'/2) eta = 0, its modulus.
-
-    Fourth-order Magnus steps: exact for constant q, so stiff couplers need no smaller step than the phase asks for.
-    """
+def largest_multiplier(bc: Array, bs: Array, cc: Array, cs: Array) -> float:
+    """Largest modulus of the multipliers of eta'' + b eta' + c eta = 0 by Magnus steps of fourth order."""
     largest = 0.0
-    for k in range(qc.size):
-        largest += math.hypot(qc[k], qs[k])
-    steps = int(2.0 * math.pi * max(math.sqrt(stiffness * largest), float(qc.size)) / PHASE_STEP) + 1
+    for k in range(cc.size):
+        largest += math.hypot(cc[k], cs[k])
+    steps = int(2.0 * math.pi * max(math.sqrt(largest), float(max(cc.size, bc.size))) / PHASE_STEP) + 1
     step = 2.0 * math.pi / steps
     m11, m12, m21, m22 = 1.0, 0.0, 0.0, 1.0
-    q0, d0 = _rates(qc, qs, 0.0, stiffness, damping)
+    q0, d0 = series(cc, cs, 0.0)[0], series(bc, bs, 0.0)[0]
     for j in range(steps):
-        q1, d1 = _rates(qc, qs, step * (j + 0.5), stiffness, damping)
-        q2, d2 = _rates(qc, qs, step * (j + 1.0), stiffness, damping)
+        half, end = step * (j + 0.5), step * (j + 1.0)
+        q1, d1 = series(cc, cs, half)[0], series(bc, bs, half)[0]
+        q2, d2 = series(cc, cs, end)[0], series(bc, bs, end)[0]
         m11, m12, m21, m22 = magnus_step((m11, m12, m21, m22), step, (q0, q1, q2), (d0, d1, d2))
         q0, d0 = q2, d2
-    # The product of the multipliers is what the damping alone makes of it (Liouville): exactly 1 without any.
-    return modulus_of(m11 + m22, math.exp(-math.pi * damping * qc[0]))
+    # The product of the multipliers is what the mean of b alone makes of it (Liouville).
+    return modulus_of(m11 + m22, math.exp(-math.pi * bc[0]))
 
 
 @inline
@@ -261,9 +266,3 @@ def modulus_of(trace: float, modulus: float) -> float:
     """Larger modulus of two multipliers with that sum and with the square of ``modulus`` as product."""
     discriminant = 0.25 * trace * trace - modulus * modulus
     return modulus if discriminant < 0.0 else abs(0.5 * trace) + math.sqrt(discriminant)
-
-
-@inline
-def _rates(qc: Array, qs: Array, phi: float, stiffness: float, damping: float) -> tuple[float, float]:
-    value, slope = series(qc, qs, phi)
-    return stiffness * value + 0.5 * damping * slope, damping * value

@@ -23,7 +23,6 @@ from kernels.types import Array, Status
 LEAST_COSINE = 5e-7
 
 BODY = 10  # m, centre of mass (3), inertia xx xy xz yy yz zz about it, all in the body frame
-BODIES = 3 * BODY + 3  # crank, coupler, follower; gravity (3)
 LOAD, SPEED, CHANGE = 0, 1, 2  # columns of the drive: torque or force on the follower, crank speed, its rate
 
 Tensor = tuple[float, float, float, float, float, float]
@@ -45,8 +44,8 @@ class Loading(NamedTuple):
 
     Parameters
     ----------
-    bodies : (n, BODIES): per body m, centre of mass, inertia about it (body axes: crank rho_B, tau_B, u from A; coupler
-        s, n x s, n from B; follower rho, tau, k from D); gravity
+    bodies : (n, 3 BODY + 3): per body m, centre of mass, inertia about it (body axes: crank rho_B, tau_B, u from A;
+        coupler s, n x s, n from B; follower rho, tau, k from D); gravity
     drive : (n, m, 3) or (n, 1, 3): torque on the rocker about k or force on the slider along tau; crank speed; its rate
     on_coupler : (n, m, 6) or None; force and moment about B that act on the coupler besides, fixed axes
     on_follower : (n, m, 6) or None; force and moment about D that act on the follower besides, fixed axes

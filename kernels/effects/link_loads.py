@@ -31,7 +31,6 @@ Index = NDArray[np.int64]
 
 TOOL = 4  # mass of the tool; its place in the axes of the body that carries it
 SPEED, CHANGE, LOAD, FORCE = 0, 1, 2, 3  # of the drive: speed, its rate, torque on the output link, force on the tool
-PER_DRIVE = 6
 WRENCH = 6  # force, moment about the origin of the family's frame
 
 # Of a joint: its kind; the body whose joint with its parent it is, and the freedom whose axis is its own; or the first
@@ -47,7 +46,7 @@ class TreeLoading(NamedTuple):
     ----------
     bodies : (n, 10 B + 3), per body m, centre of mass, inertia about it (xx xy xz yy yz zz), in its own axes; gravity
     tool : (n, TOOL), mass of the tool and its place in the axes of the body ``carrier``
-    drive : (n, m or 1, PER_DRIVE): crank speed, its rate, torque on the freedom ``output``, force on the tool
+    drive : (n, m or 1, 6): crank speed, its rate, torque on the freedom ``output``, force on the tool
     carrier : number of the body that carries the tool
     output : number of the freedom that the load acts on; below 0 for none
     """

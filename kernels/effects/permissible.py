@@ -165,8 +165,8 @@ def rolling_limits(
 ) -> None:
     """Compute the utilisation of rolling bearings and the radial pressure angle they permit.
 
-    As :func:`sliding_limits`, with the (n, 11) columns of :class:`kernels.effects.bearings.Rolling` and the permissible
-    equivalent load as the one column of ``limits``.
+    As :func:`sliding_limits`, with the (n, 11) columns of the head of :mod:`kernels.effects.bearings` and the
+    permissible equivalent load as the one column of ``limits``.
     """
     direction = t_tau, t_rho, t_k
     _fill(

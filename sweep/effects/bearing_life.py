@@ -95,7 +95,7 @@ class Shaft:
         return scene.inputs[f"{name}{self.tail}"]
 
     def data(self, scene: Scene) -> Array:
-        """Columns of :class:`kernels.effects.bearings.Rolling`; the radius, which nothing reads here, is 0."""
+        """Columns as :mod:`kernels.effects.bearings` has them; the radius, which nothing reads here, is 0."""
         supports = (f"support_{self.name}{k}" for k in "12")
         names = (*supports, *(f"{p.name}{self.tail}" for p in CATALOGUE))
         return np.column_stack([np.zeros(len(scene.designs)), scene.table(names)])

@@ -34,12 +34,6 @@ class DrivenSide(NamedTuple):
     bend: Array
 
 
-def drives_something(scene: Scene) -> NDArray[np.bool_]:
-    """Whether each design's follower drives a mass or works against a load besides its own, (n,)."""
-    tip = _weighs(scene, scene.inputs, loads.FREE_TOOL) if tool_place(scene.family) == ON_TIP else False
-    return np.asarray(_behind_weighs(scene) | tip)
-
-
 def _behind_weighs(scene: Scene) -> NDArray[np.bool_]:
     """Whether any stage behind has a mass or a load in each design, (n,)."""
     found = np.zeros(len(scene.designs), np.bool_)

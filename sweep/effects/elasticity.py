@@ -7,12 +7,11 @@ from dataclasses import replace
 import numpy as np
 
 from kernels import status as st
-from kernels.effects.elastic_drive import driven_steady_state
 from kernels.effects.elasticity import Steady, quasi_static, steady_state
 from kernels.types import Status
 from sweep.effects import loads
 from sweep.effects.base import Advice, DesignResult, Effect
-from sweep.effects.driven import DrivenSide, driven_side, drives_something
+from sweep.effects.driven import DrivenSide, driven_side
 from sweep.effects.load_passing import LOADS, behind
 from sweep.effects.loads import SPEED
 from sweep.effects.scene import Scene, take_over
@@ -138,8 +137,8 @@ def compute_dynamic(scene: Scene, wanted: frozenset[str]) -> Columns:
 
 
 def _solve(grid: Scene, phi: Array, last: bool) -> tuple[dict[str, Array], Status]:
-    """Solve designs that drive something, and that turn backwards, each apart: no design depends on the others."""
-    kind = 2 * drives_something(grid) + (grid.inputs["speed"] < 0.0)
+    """Solve designs that turn backwards apart from the others."""
+    kind = grid.inputs["speed"] < 0.0
     kinds = np.unique(kind)
     if kinds.size <= 1:  # there may be no design at all: none that turns
         return _solved(grid, phi, last)
@@ -154,7 +153,7 @@ def _solve(grid: Scene, phi: Array, last: bool) -> tuple[dict[str, Array], Statu
 
 
 def _solved(grid: Scene, phi: Array, last: bool) -> tuple[dict[str, Array], Status]:
-    """Solve designs that all drive something or all nothing, and all turn in one sense.
+    """Solve designs that all turn in one sense.
 
     A crank that turns backwards is one that turns forwards in -phi: only so do multipliers below 1 mean stability.
     """
@@ -162,35 +161,30 @@ def _solved(grid: Scene, phi: Array, last: bool) -> tuple[dict[str, Array], Stat
     lag, elongation = (np.empty((n, phi.shape[1])) for _ in range(2))
     found = Steady(np.empty(n, np.uint8), lag, elongation, np.empty(n))
     p, d2psi, c, reach, data = _arguments(grid)
-    driven = driven_side(grid, True)
-    if driven is None:
-        varying = _varying(grid)
-        if back:
-            data[:, 3] = -data[:, 3]
-            at = phi
-            phi, (p, d2psi) = backwards(at, p, d2psi)
-            varying = None if varying is None else backwards(at, varying)[1][0]
-        steady_state(p, d2psi, c, reach, data, phi, last, found, varying)
-    else:
-        first, zeroth, right = _equation(grid, p, d2psi, data, driven)
-        if back:
-            phi, (p, first, zeroth, right) = backwards(phi, p, -first, zeroth, right)
-        driven_steady_state(p, first, zeroth, right, c, reach, phi, last, found)
+    first, zeroth, right = _equation(grid, p, d2psi, data, driven_side(grid, True))
+    if back:
+        phi, (p, first, zeroth, right) = backwards(phi, p, -first, zeroth, right)
+    steady_state(p, first, zeroth, right, c, reach, phi, last, found)
     return {"lag_dynamic": lag, "elongation_dynamic": elongation, "floquet": found.floquet}, found.status
 
 
-def _equation(scene: Scene, p: Array, d2psi: Array, data: Array, driven: DrivenSide) -> tuple[Array, Array, Array]:
+def _equation(
+    scene: Scene, p: Array, d2psi: Array, data: Array, driven: DrivenSide | None
+) -> tuple[Array, Array, Array]:
     """Factors of eta' and of eta, and the right side, over that of eta''; (3) with (5), (n, N)."""
     inertia, stiffness, damping, speed, _ = (data[:, k, None] for k in range(5))
     square = p * p
     orders = np.arange(p.shape[1] // 2 + 1)
     slope = np.fft.irfft(1j * orders * np.fft.rfft(square, axis=1), n=p.shape[1], axis=1)
-    mass = (inertia + driven.inertia) * speed * speed
-    dpsi = scene.records[0][:, :, 22]
-    first = damping * speed * square + speed * speed * driven.bend * dpsi
-    zeroth = stiffness * square + 0.5 * damping * speed * slope + driven.slope
-    load = scene.load(loads.follower(scene).load.name)
-    right = load - driven.torque - inertia * speed * speed * d2psi
+    mass = inertia * speed * speed
+    first = damping * speed * square
+    zeroth = stiffness * square + 0.5 * damping * speed * slope
+    right = scene.load(loads.follower(scene).load.name) - mass * d2psi
+    if driven is not None:
+        mass = mass + driven.inertia * speed * speed
+        first += speed * speed * driven.bend * scene.records[0][:, :, 22]
+        zeroth += driven.slope
+        right = right - driven.torque
     return first / mass, zeroth / mass, right / mass
 
 

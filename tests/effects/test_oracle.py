@@ -251,7 +251,11 @@ def test_elastic_lag_equals_oracle():
         grid = 2.0 * np.pi * np.arange(121) / 121
         p, d2psi = elastic_inputs(given, grid)
         found = elasticity.Steady(np.empty(1, np.uint8), np.empty(phi.shape), np.empty(phi.shape), np.empty(1))
-        elasticity.steady_state(p, d2psi, c, np.ones(1), data, phi, True, found)
+        inertia, stiffness, damping, omega, moment = data[0]
+        slope = np.fft.irfft(1j * np.arange(61) * np.fft.rfft(p * p), n=121)
+        mass, rubbing = inertia * omega * omega, damping * omega
+        factors = rubbing * p * p, stiffness * p * p + 0.5 * rubbing * slope, moment - mass * d2psi
+        elasticity.steady_state(p, *(x / mass for x in factors), c, np.ones(1), phi, True, found)
         assert found.status[0] in (st.OK, st.NOT_LINEAR)
         dynamic = np.array(expected["eta_dynamic"], float)
         np.testing.assert_allclose(found.eta[0], dynamic, atol=1e-10 * abs(dynamic).max())
