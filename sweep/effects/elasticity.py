@@ -93,14 +93,14 @@ def _arguments(scene: Scene) -> tuple[Array, Array, Array, Array, Array]:
     per_pose, per_design = scene.records
     c, turns = np.ascontiguousarray(per_design[:, 14]), per_design[:, 16]
     reach = np.where(turns == 1.0, 1.0, per_design[:, 13])
-    inertia, stiffness, damping, speed, load = (p.name for p in INPUTS[loads.follower(scene).name])
+    inertia, stiffness, damping, speed, load = (p.name for p in INPUTS[loads.follower_of(scene.family).name])
     data = scene.table((inertia, stiffness, damping, speed, load))
     return per_pose[:, :, 21] * c[:, None], np.ascontiguousarray(per_pose[:, :, 23]), c, reach, data
 
 
 def _varying(scene: Scene, driven: DrivenSide | None = None) -> Array | None:
     """Sum what a curve and the driven side add to the constant load, (n, m); None where the load is constant."""
-    load = loads.follower(scene).load.name
+    load = loads.follower_of(scene.family).load.name
     if load not in scene.curves and driven is None:
         return None
     added = np.broadcast_to(scene.load(load) - scene.inputs[load][:, None], scene.shape)
@@ -179,7 +179,7 @@ def _equation(
     mass = inertia * speed * speed
     first = damping * speed * square
     zeroth = stiffness * square + 0.5 * damping * speed * slope
-    right = scene.load(loads.follower(scene).load.name) - mass * d2psi
+    right = scene.load(loads.follower_of(scene.family).load.name) - mass * d2psi
     if driven is not None:
         mass = mass + driven.inertia * speed * speed
         first += speed * speed * driven.bend * scene.records[0][:, :, 22]
@@ -206,7 +206,7 @@ def _turn(scene: Scene, wanted: frozenset[str], grids: tuple[int, ...]) -> Colum
         # A multiplier is known even where the forced solution is not resolved or not linear.
         status[np.isfinite(floquet)] = st.OK
     numbers: Columns = {"floquet": floquet, "err_floquet": np.full(len(floquet), MULTIPLIER_ERROR)}
-    return per_turn(found, status, numbers, _dynamic_outputs(loads.follower(scene)), wanted)
+    return per_turn(found, status, numbers, _dynamic_outputs(loads.follower_of(scene.family)), wanted)
 
 
 def advise_static(scene: Scene) -> Advice | None:
@@ -217,7 +217,7 @@ def advise_static(scene: Scene) -> Advice | None:
     if not turning.any():
         return None
     reach = _arguments(scene)[3][turning]
-    unit = "rad" if loads.follower(scene) is loads.ROCKER else "of the coupler's length"
+    unit = "rad" if loads.follower_of(scene.family) is loads.ROCKER else "of the coupler's length"
     return Advice("quasi-static lag", lag[turning].max(axis=1) / reach, 1e-4, unit)
 
 

@@ -31,7 +31,6 @@ COUPLES_WITH_FRICTION = {
     f"drive_torque{FRICTION_SUFFIX}": ("torque", "torque that drives the crank" + FRICTION_TEXT),
 }
 CONTRACTION = "friction_contraction"
-PASSES = "friction_passes"
 
 
 def joint_forces(follower: str, suffix: str = "", text: str = "") -> Named:
@@ -105,12 +104,12 @@ def losses(kind: loads.Follower) -> Named:
     }
     supports = ("load_support_a1", "load_support_a2", "load_support_d1", "load_support_d2")
     found |= {name: ("force", f"load across the axis of the support {name[-2:]}{FRICTION_TEXT}") for name in supports}
-    return found | {PASSES: ("1", "passes of the friction iteration")}
+    return found | loads.PASSES
 
 
 def load_name(scene: Scene) -> str:
     """Name of the useful load on the follower."""
-    return loads.follower(scene).load.name
+    return loads.follower_of(scene.family).load.name
 
 
 def force_name(scene: Scene) -> str:
@@ -125,7 +124,7 @@ def _drive(scene: Scene, load: Array) -> Array:
 
 def _bodies(scene: Scene) -> Array:
     """Masses, centres, inertias and gravity in the order of the kernels."""
-    follower = loads.follower(scene)
+    follower = loads.follower_of(scene.family)
     found, ends = scene.table(follower.bodies), np.zeros((len(scene.designs), 3, 3))
     ends[:, :, 0] = scene.records[1][:, 12:15]
     for k, body in enumerate(follower.rods):
@@ -159,7 +158,7 @@ def frictionless(scene: Scene, load: Array, wanted: frozenset[str], status: Stat
 def with_friction(scene: Scene, load: Array, wanted: frozenset[str], status: Status) -> Columns:
     """Wanted quantities with friction; status JAMMED where the iteration does not contract."""
     refuse(status, together(scene, "a") | together(scene, "d"))
-    lost = tuple(losses(loads.follower(scene)))
+    lost = tuple(losses(loads.follower_of(scene.family)))
     sizes = (
         (18, loads.asked(joint_forces("", FRICTION_SUFFIX), wanted)),
         (2, not wanted.isdisjoint(COUPLES_WITH_FRICTION)),

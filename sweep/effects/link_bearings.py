@@ -17,12 +17,13 @@ from sweep.effects.bearings import CATALOGUE, REQUIRED_LIFE, permissible_load
 from sweep.effects.link_loads import SUPPORTED, friction_inputs, tree_of
 from sweep.effects.load_effects import friction_of, loads_of, tree_bends
 from sweep.effects.load_passing import compute_friction
-from sweep.effects.loads import AXES, FRICTION_SUFFIX, FRICTION_TEXT
+from sweep.effects.loads import FRICTION_SUFFIX, FRICTION_TEXT
 from sweep.effects.scene import Scene, refuse, take_over
 from sweep.families import family
 from sweep.families.base import Accuracy, Array, Columns, Output, Parameter
 from sweep.families.link_tree import LinkJoint, LinkTree
 from sweep.families.poses import filled_all
+from sweep.families.sites import AXES
 
 EQUATION = "docs/links.md (10)-(13)"
 SLIDING_FORMULAS = (

@@ -34,7 +34,6 @@ SCALARS = {
     TOOL_TORQUE: ("torque", "share of the tool in the torque about this stage's crank"),
 }
 TORQUE_WITH_FRICTION = f"drive_torque{FRICTION_SUFFIX}"
-PASSES = "friction_passes"
 SUPPORTED = ("shaft", "sleeve")
 
 
@@ -124,7 +123,7 @@ def losses(tree: LinkTree) -> Named:
         f"lost_torque_{j.name}": ("torque", f"share of the friction in the driving torque: {j.text}")
         for j in tree.joints
     }
-    return found | {PASSES: ("1", "passes of the friction iteration")}
+    return found | loads.PASSES
 
 
 def support_loads(tree: LinkTree) -> dict[str, tuple[int, int, str]]:

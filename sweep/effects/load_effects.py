@@ -209,7 +209,7 @@ def _closed_friction(kind: loads.Follower) -> Effect:
     contraction = "rho(L), bound of its rate; below 1 the solution is unique"
     outputs = _with_kinks((
         *loads.vector_outputs(vectors, equation),
-        *loads.scalar_outputs(scalars, equation, kinetostatics.PASSES),
+        *loads.scalar_outputs(scalars, equation, *loads.PASSES),
         Output(kinetostatics.CONTRACTION, "1", contraction, equation),
     ))  # fmt: skip
     return replace(
@@ -276,7 +276,7 @@ def friction_of(name: str) -> Effect:
     scalars = torque | link_loads.losses(tree) | supports
     outputs = _with_kinks((
         *loads.vector_outputs(link_loads.vectors(tree, FRICTION_SUFFIX, FRICTION_TEXT), TREE_FRICTION_EQUATION),
-        *loads.scalar_outputs(scalars, TREE_FRICTION_EQUATION, link_loads.PASSES),
+        *loads.scalar_outputs(scalars, TREE_FRICTION_EQUATION, *loads.PASSES),
     ))  # fmt: skip
     return replace(
         bare,
@@ -296,7 +296,7 @@ def friction_of(name: str) -> Effect:
         advise=partial(
             largest,
             compute=compute_friction,
-            name=link_loads.PASSES,
+            name=next(iter(loads.PASSES)),
             quantity="number of passes of the friction iteration",
             threshold=4.0,
         ),

@@ -13,13 +13,14 @@ from sweep.effects.motion import CONSTRUCTION
 from sweep.effects.scene import Scene
 from sweep.families.base import Array, Columns, Family, Output, Parameter
 from sweep.families.capabilities import JointRecords
+from sweep.families.sites import AXES
 
 FRICTION_SUFFIX, FRICTION_TEXT = "_friction", ", friction included"
-AXES = "xyz"
 GRAM = "; a gram is 1e-6"  # kilograms are what one types
 
 Named: TypeAlias = dict[str, tuple[str, str]]
 """Unit and meaning by name."""
+PASSES: Named = {"friction_passes": ("1", "passes of the friction iteration")}
 
 _FRAMES = {
     "crank": "along the crank, tangential, along its axis, from A",
@@ -184,11 +185,6 @@ LINK_TORQUE = Parameter(
 )
 ROCKER = _follower("rocker", "", _TORQUE)
 SLIDER = _follower("slider", "slider_", _FORCE)
-
-
-def follower(scene: Scene) -> Follower:
-    """Kind of follower of a scene's family."""
-    return follower_of(scene.family)
 
 
 def follower_of(family: Family) -> Follower:

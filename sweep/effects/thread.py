@@ -17,12 +17,11 @@ from sweep.families.machines.thread_balance import (
     COUNT,
     DENSITY,
     EXPONENT,
+    MM_PER_M,
     REFERENCE_SPEED,
     SHARE,
 )
 from sweep.families.poses import filled_each
-
-MM_PER_M = 1e3
 
 # Under words of their own: a take-up has symbols such as alpha for its geometry.
 BEFORE = Parameter("thread_tension", "none", "tension in front of the eyelet, gf", not_negative=True)

@@ -13,7 +13,7 @@ from sweep.families.machines.main_shaft import ShaftTorque
 from sweep.families.machines.relations import Relation
 from sweep.families.machines.shaking import Shaking
 from sweep.families.names import parts
-from sweep.families.parts import AXES
+from sweep.families.sites import AXES
 
 _OF_FAMILY = re.compile(r"([xyz])_([a-z][a-z_]*)")
 _OF_MACHINE = re.compile(r"([a-z][a-z_0-9]*)_([xyz])")

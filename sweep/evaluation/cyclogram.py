@@ -11,7 +11,7 @@ from kernels.types import TWO_PI, Array
 from sweep.errors import InputError
 from sweep.evaluation.angles import AngleUnit, in_radians
 from sweep.evaluation.summaries import design_outputs
-from sweep.evaluation.tables import design_matrix
+from sweep.evaluation.tables import one_design
 from sweep.families import Mechanism
 from sweep.families import family as find_family
 from sweep.families.base import Accuracy, Family
@@ -59,9 +59,7 @@ def cyclogram(
     import pandas as pd
 
     family = find_family(mechanism)
-    designs = design_matrix(family, in_radians(family, design, angles))[0]
-    if len(designs) != 1:
-        raise InputError("design", "several rows", "the parameters of one design", f"table of {family.name}")
+    designs = one_design(family, in_radians(family, design, angles))
     if not 0.0 < dwell < 0.5:
         raise InputError("dwell", dwell, "a share of the stroke between 0 and 0.5", "cyclogram")
     poses = Poses(family, family.precise(), designs)

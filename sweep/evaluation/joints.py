@@ -13,7 +13,7 @@ from kernels.status import OK
 from sweep.errors import InputError
 from sweep.evaluation.angles import AngleUnit, grid_in_radians, in_radians
 from sweep.evaluation.poses import check_march
-from sweep.evaluation.tables import design_matrix, numbers
+from sweep.evaluation.tables import numbers, one_design
 from sweep.families import Mechanism
 from sweep.families import family as find_family
 from sweep.families.base import Angles, Array, Family
@@ -21,7 +21,8 @@ from sweep.families.capabilities import Link, OutputLink, Points, Skeleton
 from sweep.families.chain import Chain, drive, driving_names, stages_of
 from sweep.families.frames import WHOLE, Frame
 from sweep.families.machines.machine import Machine
-from sweep.families.parts import AXES, TIP, Member
+from sweep.families.parts import TIP, Member
+from sweep.families.sites import AXES
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -153,9 +154,7 @@ def joints(mechanism: Mechanism, design: Table, phi: ArrayLike, *, angles: Angle
 def parts(mechanism: Mechanism, design: Table, phi: ArrayLike) -> list[Part]:
     """Stages of a mechanism with their joints, in the order of members and stages; arguments as of `joints`."""
     family = find_family(mechanism).precise()
-    matrix, _ = design_matrix(family, design)
-    if len(matrix) != 1:
-        raise InputError("design", f"{len(matrix)} rows", "the parameters of one design", f"table of {family.name}")
+    matrix = one_design(family, design)
     angles = np.atleast_1d(numbers(phi, "phi", "phi, position"))
     if angles.ndim != 1 or not np.isfinite(angles).all():
         raise InputError("phi", phi, "finite angles [rad], one or a plain list", "phi")
@@ -239,7 +238,9 @@ def _part(
         fixed = {name: np.tile(point.at(matrix)[0], (phi.size, 1)) for name, point in skeleton.fixed.items()}
         axes = {name: point.axis(matrix)[0] for name, point in skeleton.fixed.items() if point.axis is not None}
     if where.tip is not None:
-        moving[TIP] = _tip(family, matrix, np.asarray(found[family.position][0], np.float64), where.tip)
+        link = family.find(OutputLink)
+        assert link is not None
+        moving[TIP] = np.stack(link.carried(matrix, found[family.position], where.tip), axis=-1)[0]
     rotation, at = where.placed.rotation[0], where.placed.at[0]
     turned = {name: path @ rotation.T + at for name, path in (fixed | moving).items()}
     crank, position = (np.asarray(values[0], np.float64) for values in (angles.phi, found[family.position]))
@@ -249,13 +250,3 @@ def _part(
         {name: point.kind for name, point in skeleton.fixed.items()} if skeleton else {},
         skeleton.links if skeleton else (), status,
     )  # fmt: skip
-
-
-def _tip(family: Family, matrix: Array, angle: Array, tip: Array) -> Array:
-    """Return a point fixed to the output link, (m, 3), in the stage's frame."""
-    link = family.find(OutputLink)
-    assert link is not None
-    cos, sin, origin = np.cos(angle), np.sin(angle), link.origin(matrix)[0]
-    x, y, z = tip
-    at: Array = origin + np.stack([x * cos - y * sin, x * sin + y * cos, z + 0.0 * cos], axis=-1)
-    return at

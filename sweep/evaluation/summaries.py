@@ -20,7 +20,7 @@ from sweep.evaluation.statuses import meanings
 from sweep.evaluation.tables import design_matrix, kept_columns, plain_columns, wanted_names
 from sweep.families import Mechanism
 from sweep.families import family as find_family
-from sweep.families.base import Accuracy, Domain, Family, March
+from sweep.families.base import DEFAULT_TARGET, Accuracy, Domain, Family, March
 from sweep.families.names import error_of
 from sweep.quantities.resolve import output, output_names
 from sweep.reductions.steps import check_certifiable, proofs
@@ -32,7 +32,6 @@ if TYPE_CHECKING:
 
 __all__ = ["Route", "design_outputs", "output", "output_names", "routes", "summarise"]
 
-DEFAULT_TARGET = 1e-8
 DEFAULT_SAMPLES = 720  # of a march, which no accuracy can be asked of
 FINEST_TARGET = 1e-14
 MOST_SAMPLES = 2**20

@@ -82,6 +82,14 @@ def design_matrix(
     return matrix, extras
 
 
+def one_design(family: Parametrised, table: Table) -> Array:
+    """Check a table of one design, which is what a picture or a course of one machine needs; (1, P)."""
+    matrix, _ = design_matrix(family, table)
+    if len(matrix) != 1:
+        raise InputError("design", f"{len(matrix)} rows", "the parameters of one design", f"table of {family.name}")
+    return matrix
+
+
 def plain_columns(table: Table) -> Table:
     """Take the columns of a DataFrame out of it once, as arrays; what is no plain number stays as it is.
 

@@ -26,8 +26,6 @@ from sweep.quantities.units import UnitFault, factor
 if TYPE_CHECKING:
     import pandas as pd
 
-    from sweep.families.capabilities import Hardpoints
-
 
 TOLERANCE = 1e-4  # part of the drawing's size: coordinates given to 0.01 mm in a drawing of 100 mm
 

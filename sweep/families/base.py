@@ -181,6 +181,7 @@ class Accuracy:
         return replace(self, certify=False) if self.certify and self.proven and name not in self.proven else self
 
 
+DEFAULT_TARGET = 1e-8  # relative error of what nobody asks more or less of
 PoseFunction: TypeAlias = Callable[[Array, Angles, frozenset[str]], Columns]
 StepFunction: TypeAlias = Callable[[Array, frozenset[str], Accuracy], Columns]
 Capability = TypeVar("Capability")

@@ -6,7 +6,7 @@ served.  Nothing asks for a family's name.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any, Literal, TypeAlias
 
@@ -184,6 +184,12 @@ class OutputLink:
     """
 
     origin: DesignMap
+
+    def carried(self, designs: Array, angle: Array, point: Iterable[Any]) -> list[Array]:
+        """Return x, y, z, (n, m) each, of a point of the link, given by three numbers or columns (n, 1)."""
+        x, y, z = point
+        cos, sin, origin = np.cos(angle), np.sin(angle), self.origin(designs)
+        return [origin[:, [0]] + x * cos - y * sin, origin[:, [1]] + x * sin + y * cos, origin[:, [2]] + z + 0.0 * cos]
 
 
 @dataclass(frozen=True)

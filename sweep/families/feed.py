@@ -20,9 +20,9 @@ from sweep.families.capabilities import Arm, Dimensions, Link, Made, Points, Ske
 from sweep.families.curve_features import Singular
 from sweep.families.feed_trees import three_leads, two_leads
 from sweep.families.outputs import joint_outputs, ladders
-from sweep.families.parts import AXES
 from sweep.families.poses import filled_all
 from sweep.families.rssr import FAMILY as CRANK_ROCKER
+from sweep.families.sites import AXES
 from sweep.families.skeletons import COUPLER, CRANK, crank_axis, links, parameter, standing
 
 ROCKER = (

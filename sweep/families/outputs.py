@@ -7,7 +7,7 @@ from itertools import pairwise
 
 from sweep.families.base import Output
 from sweep.families.parameter import of_derivative
-from sweep.families.parts import AXES
+from sweep.families.sites import AXES
 
 _KINDS = ("", "velocity analogue of the ", "acceleration analogue of the ", "jerk analogue of the ")
 _ORDERS = ("", "d", "d2", "d3")

@@ -15,11 +15,10 @@ from sweep.families.base import Family, Parameter
 from sweep.families.capabilities import Coordinates, OutputLink, Points
 from sweep.families.frames import WHOLE, Frame, crank_axis, place_parameters, stage_frames, tilted
 from sweep.families.shafts import Mount
-from sweep.families.sites import Site, sites_of
+from sweep.families.sites import AXES, Site, sites_of
 
 TIP = "tip"
 EYE = "eye"  # on the coupler, the link between the points b and c
-AXES = "xyz"
 
 
 @dataclass(frozen=True)
@@ -274,10 +273,8 @@ def coordinates(
     if point == TIP:
         link = m.family.find(OutputLink)
         assert link is not None
-        x, y, z = (m.column(designs, f"{axis}_tip")[:, None] for axis in AXES)
-        angle = result[m.family.position]
-        cos, sin, origin = np.cos(angle), np.sin(angle), link.origin(own_designs)
-        local = [origin[:, [0]] + x * cos - y * sin, origin[:, [1]] + x * sin + y * cos, origin[:, [2]] + z + 0.0 * cos]
+        tip = (m.column(designs, f"{axis}_tip")[:, None] for axis in AXES)
+        local = link.carried(own_designs, result[m.family.position], tip)
     elif point == EYE:
         eye = [m.column(designs, f"{axis}_eye")[:, None] for axis, _ in zip(AXES, m.eye or (), strict=False)]
         local = _on_coupler(m, result, eye)

@@ -5,8 +5,6 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any, NamedTuple
 
-import numpy as np
-
 from kernels.types import Array
 from sweep.families.capabilities import Coordinates, DesignMap, OutputLink, Points, Skeleton
 from sweep.families.names import ends_in_digit
@@ -96,10 +94,7 @@ def coordinates(
     if site.on_link is not None:
         link = member.family.find(OutputLink)
         assert link is not None
-        origin, angle = link.origin(own), result[member.family.position]
-        x, y, z = site.on_link
-        cos, sin = np.cos(angle), np.sin(angle)
-        local = [origin[:, [0]] + x * cos - y * sin, origin[:, [1]] + x * sin + y * cos, origin[:, [2]] + z + 0.0 * cos]
+        local: list[Any] = link.carried(own, result[member.family.position], site.on_link)
     elif site.fixed is not None:
         at = site.fixed(stages[site.stage].designs(own) if stages else own)
         local = [at[:, [k]] for k in range(3)]

@@ -20,9 +20,9 @@ from sweep.families.capabilities import Assembly, Dimensions, Link, Made, Output
 from sweep.families.curve_features import Singular
 from sweep.families.link_tree import LinkBody, LinkJoint, LinkTree, filled_by
 from sweep.families.outputs import ALONG_FRAME, coordinate_outputs, joint_outputs, ladders, point_outputs
-from sweep.families.parts import AXES
 from sweep.families.planar_trees import slotted_rocker
 from sweep.families.poses import poses_of
+from sweep.families.sites import AXES
 from sweep.families.skeletons import CRANK, ORIGIN, crank_axis, links, parameter, standing
 
 PARAMETERS = (

@@ -13,7 +13,8 @@ from sweep.families.base import Family, March, Output, of_family
 from sweep.families.capabilities import Coordinates, Fixed, Points, Skeleton
 from sweep.families.chain import Chain
 from sweep.families.machines.machine import Machine
-from sweep.families.parts import AXES, TIP, Member
+from sweep.families.parts import TIP, Member
+from sweep.families.sites import AXES
 from sweep.quantities.dimensions import Piece
 
 NAMES = tuple(f"box_{axis}" for axis in AXES)

@@ -25,6 +25,11 @@ class Limit:
     minimum: float | None = None
     maximum: float | None = None
 
+    @property
+    def is_equation(self) -> bool:
+        """Whether it asks for a value, which nothing that scatters keeps."""
+        return self.minimum is not None and self.minimum == self.maximum
+
 
 def compared(name: str, values: Number) -> Number:
     """Give what limits and objectives compare: the magnitude of a swing or stroke, the value of any other output."""

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 
 from kernels import status as codes
 from sweep.dataset import files
+from sweep.optimise.local.descent import KKT
 from sweep.optimise.local.start import DIFFERS
 from sweep.proof import read_proof
 from sweep.proof.study import EVENT, proof_words
@@ -19,11 +20,9 @@ from sweep.report.tables import LimitState, fates, limit_state, limit_states, li
 
 if TYPE_CHECKING:
     from sweep.optimise.multistart.survey import Survey
-    from sweep.report.dataset import Dataset
     from sweep.report.scan import Scan
 
 
-KKT = 1e-6  # residual above which the optimiser's result is not called a local optimum
 MISSED = ("missed", "unknown")
 NEAREST = 4  # limits with room to spare that are named in the answer; the table has them all
 NO_PROOF = "This is no proof of a global optimum"

@@ -10,6 +10,7 @@ import numpy as np
 
 from kernels import status as codes
 from sweep.optimise.front.pareto import SHOWN, gaps
+from sweep.optimise.local.descent import KKT
 from sweep.quantities.limits import compared
 from sweep.report.figures import LIMIT, OPTIMUM
 from sweep.report.quantities import Quantity, change, number, quantity
@@ -19,7 +20,6 @@ if TYPE_CHECKING:
 
     from sweep.report.dataset import Dataset
 
-SETTLED = 1e-6  # KKT residual of a local optimum
 EDGES = (" at its lower bound", " at its upper bound")
 
 
@@ -86,7 +86,7 @@ def front_note(data: Dataset) -> str:
         return ""
     given, begun = len(set(data.study.pareto.bounds)), len(data.front)
     wanted = (data.study.pareto.points or given) if data.front_steps else given
-    late = int(((data.front["ended"] == "time") & ~(data.front["kkt_residual"] <= SETTLED)).sum())
+    late = int(((data.front["ended"] == "time") & ~(data.front["kkt_residual"] <= KKT)).sum())
     text = "Every row is a search of its own, a local optimum if its residual is small."
     text += f" {begun - given} of the bounds were placed where the front bends." if begun > given else ""
     text += f" Time was up before {wanted - begun} more bounds." if begun < wanted else ""
@@ -147,7 +147,7 @@ def _points(data: Dataset) -> list[dict[str, Any]]:
 
 def _state(point: dict[str, Any]) -> str:
     residual = float(point["kkt_residual"])
-    if residual <= SETTLED:
+    if residual <= KKT:
         return "settled"
     return f"{'time was up' if point['ended'] == 'time' else 'not settled'}, residual {number(residual, 2)}"
 

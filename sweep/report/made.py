@@ -79,16 +79,27 @@ class Made(NamedTuple):
     costs: tuple[Cost, ...]
 
 
-def made(data: Dataset) -> Made | None:
-    """Make the optimum many times; None without tolerances, an optimum, or a limit that leaves room."""
-    study, row = data.study, data.optimum
-    limits = [_scattering(x) for x in study.output_limits if x.minimum is None or x.minimum != x.maximum]
-    if study.tolerance is None or study.optimise is None or row is None or not limits:
+def many(data: Dataset, row: Mapping[str, Any] | None, samples: int = 0) -> tuple[Array, Array] | None:
+    """Return a design (P,) and what is made of it within the tolerances, as many as those say unless ``samples`` does.
+
+    None without tolerances, an optimisation, or a design.
+    """
+    study = data.study
+    if study.tolerance is None or study.optimise is None or row is None:
         return None
     design = np.array([float(row[name]) for name in study.family.parameter_names])
-    if not np.isfinite(design).all():
+    samples = samples or study.tolerance.samples
+    return design, deviating(study.family, design, study.tolerance, study.optimise.seed, samples)
+
+
+def made(data: Dataset) -> Made | None:
+    """Make the optimum many times; None without tolerances, an optimum, or a limit that leaves room."""
+    study = data.study
+    limits = [_scattering(limit) for limit in study.output_limits if not limit.is_equation]
+    found = many(data, data.optimum) if limits else None
+    if found is None or not np.isfinite(found[0]).all():
         return None
-    designs = deviating(study.family, design, study.tolerance, study.optimise.seed, study.tolerance.samples)
+    design, designs = found
     columns, kept = _kept(study, limits, designs)
     worst = min(limits, key=lambda limit: float(meets(limit, columns[limit.output]).mean()))
     histogram = _histogram(data, worst, columns[worst.output])
@@ -114,13 +125,11 @@ def made_sentence(found: Made | None, tolerance: str) -> str:
 
 def histogram(data: Dataset, output: str) -> Histogram | None:
     """One output of the optimum over what is made; None without tolerances or an optimum."""
-    study, row = data.study, data.optimum
-    if study.tolerance is None or study.optimise is None or row is None:
+    study, found = data.study, many(data, data.optimum)
+    if found is None:
         return None
     resolve.output(study.family, output)  # refuses a name that is none
-    design = np.array([float(row[name]) for name in study.family.parameter_names])
-    designs = deviating(study.family, design, study.tolerance, study.optimise.seed, study.tolerance.samples)
-    values = design_outputs(study.family, designs, [output], study.accuracy, study.window)[output]
+    values = design_outputs(study.family, found[1], [output], study.accuracy, study.window)[output]
     limits = [x for x in study.output_limits if x.output == output]
     # Of two limits the last one: the band around what [locus] prescribes.
     return _histogram(data, limits[-1] if limits else Limit(output, None, None), values)

@@ -22,7 +22,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
     from sweep.families.base import Array
-    from sweep.report.scan import Cells, Grid, Scan
+    from sweep.report.scan import Grid
     from sweep.study import Study
 
 

@@ -17,10 +17,10 @@ from kernels import status as codes
 from sweep.evaluation.summaries import design_outputs
 from sweep.exchange.scene import extent
 from sweep.optimise.local.kkt import AGREE
-from sweep.optimise.manufacture.tolerance import deviating
 from sweep.quantities.dimensions import sizes
 from sweep.quantities.limits import compared, meets
 from sweep.report.dataset import Dataset, Row
+from sweep.report.made import many
 from sweep.report.quantities import change, number, quantity
 from sweep.report.sketch import drawn_parts, sketch
 from sweep.report.tables import parameter_rows
@@ -236,13 +236,12 @@ def optima_sentence(data: Dataset, found: list[Group]) -> str:
 def _made(data: Dataset, row: dict[str, Any]) -> str:
     """Share of what is made within the tolerances that keeps all limits."""
     study, known = data.study, float(row.get("yield", math.nan))
-    limits = [x for x in study.output_limits if x.minimum is None or x.minimum != x.maximum]
-    if study.tolerance is None or study.optimise is None or not limits:
+    limits = [limit for limit in study.output_limits if not limit.is_equation]
+    found = many(data, row, SAMPLES) if limits else None
+    if found is None:
         return ""
     if not math.isfinite(known):
-        design = np.array([float(row[name]) for name in study.family.parameter_names])
-        designs = deviating(study.family, design, study.tolerance, study.optimise.seed, SAMPLES)
-        columns = design_outputs(study.family, designs, [x.output for x in limits], study.accuracy, study.window)
+        columns = design_outputs(study.family, found[1], [x.output for x in limits], study.accuracy, study.window)
         known = float(np.logical_and.reduce([meets(limit, columns[limit.output]) for limit in limits]).mean())
     return f"{number(100.0 * known, 3)}\u00a0% of what is made keeps all limits"
 

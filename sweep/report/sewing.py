@@ -15,9 +15,9 @@ from sweep.evaluation.thread.diagram import diagram
 from sweep.families.machines.machine import Machine
 from sweep.families.machines.sewing import RPM, Sewing
 from sweep.families.machines.thread_balance import MEASURED_SPEED, MM_PER_M, ThreadBalance
-from sweep.optimise.manufacture.tolerance import deviating
 from sweep.report.dataset import Dataset
 from sweep.report.figures import LIMIT, WIDTH, new_figure
+from sweep.report.made import many
 from sweep.report.quantities import number
 
 if TYPE_CHECKING:
@@ -68,14 +68,12 @@ class Sewn:
 
 def sewn(data: Dataset) -> Sewn | None:
     """Make the optimum many times and sew at every speed; None without tolerances or a relation that sews."""
-    study, row = data.study, data.optimum
-    if study.tolerance is None or study.optimise is None or row is None or not isinstance(study.family, Machine):
+    study = data.study
+    sewing = next((one for one in getattr(study.family, "relations", ()) if isinstance(one, Sewing)), None)
+    drawn = many(data, data.optimum) if sewing else None
+    if sewing is None or drawn is None or not isinstance(study.family, Machine):
         return None
-    sewing = next((one for one in study.family.relations if isinstance(one, Sewing)), None)
-    if sewing is None:
-        return None
-    design = np.array([float(row[name]) for name in study.family.parameter_names])
-    designs = deviating(study.family, design, study.tolerance, study.optimise.seed, study.tolerance.samples)
+    design, designs = drawn
     stated = np.array(sewing.speeds)
     speeds = np.union1d(stated, np.linspace(stated[0], stated[-1], CURVE))
     ends = sewing.ends.values()

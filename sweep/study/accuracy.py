@@ -7,11 +7,9 @@ from typing import Annotated, Any
 from pydantic import Field, PlainValidator
 
 from sweep.errors import InputError
-from sweep.families.base import Accuracy, Family
+from sweep.families.base import DEFAULT_TARGET, Accuracy, Family
 from sweep.reductions.steps import check_certifiable, proofs
 from sweep.study.file import Faults, Section
-
-DEFAULT_TARGET = 1e-8
 
 
 def _proofs(value: object) -> object:

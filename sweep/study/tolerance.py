@@ -72,7 +72,7 @@ def check_tolerance(tolerance: Tolerance | None, family: Family, limits: tuple[L
         if size > 0.0 and not any(p.unit == unit and p.choices is None for p in family.parameters):
             faults.value(("tolerance", key), size, f"nothing: {family.name} has no {key} that could deviate")
     roomy = [x.output for x in limits if x.minimum != x.maximum]
-    equal = [x.output for x in limits if x.minimum is not None and x.minimum == x.maximum and x.output not in roomy]
+    equal = [x.output for x in limits if x.is_equation and x.output not in roomy]
     if tolerance.robust is not None and equal:
         words = 'limits with room, as swing = "40 +- 0.2 deg": no mechanism that is made keeps an equation'
         faults.value(("tolerance", "robust"), ", ".join(equal), words)

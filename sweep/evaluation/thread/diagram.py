@@ -10,7 +10,7 @@ from kernels.types import TWO_PI
 from sweep.errors import InputError
 from sweep.evaluation.angles import AngleUnit, in_radians
 from sweep.evaluation.poses import evaluate
-from sweep.evaluation.tables import design_matrix
+from sweep.evaluation.tables import one_design
 from sweep.evaluation.thread.rows import warn_outside
 from sweep.families import Mechanism
 from sweep.families import family as find_family
@@ -73,11 +73,8 @@ def diagram(
     if not threads:
         raise InputError("mechanism", family.name, "a machine with threads", "thread diagram")
     given = in_radians(family, design, angles)
-    matrix = design_matrix(family, given)[0]
-    if len(matrix) != 1:
-        raise InputError("design", "several rows", "the parameters of one design", f"table of {family.name}")
     known = {o.name for thread in threads for o in thread.outputs}
-    events = switches(family, matrix, known)[0]
+    events = switches(family, one_design(family, given), known)[0]
     turn = np.arange(samples) * (TWO_PI / samples)
     phi = np.unique(np.mod(np.concatenate([turn, events - BESIDE, events + BESIDE]), TWO_PI))
     wanted = [name for t in threads for name in (f"{t.name}_{key}" for key in COLUMNS) if name in known]

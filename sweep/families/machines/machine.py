@@ -25,9 +25,9 @@ from sweep.families.machines.relations import EventValue, Relation, Timing
 from sweep.families.machines.sewing import Sewing, sewing_step
 from sweep.families.machines.shaking import Shaking, orders_of
 from sweep.families.machines.triangles import Entering, entering_step
-from sweep.families.parts import AXES, EYE, TIP, Member, coordinates, coupler_joints, velocity
+from sweep.families.parts import EYE, TIP, Member, coordinates, coupler_joints, velocity
+from sweep.families.sites import AXES, made_of
 from sweep.families.sites import coordinates as coordinates_of_site
-from sweep.families.sites import made_of
 
 
 @dataclass(frozen=True)

@@ -29,7 +29,6 @@ NUMBERS = {
     "slowest": ("rad/s", "smallest magnitude of its speed"),
 }
 SAME = 1e-12  # of the speed: gears round it
-INERTIAS = ("reduced_inertia", "dreduced_inertia")
 _RATE = {"reduced_inertia": 2, "dreduced_inertia": 3, "drive_torque": 1, "drive_torque_friction": 1}
 
 
@@ -96,7 +95,7 @@ class ShaftTorque:
             f"{self.name}_dinertia": {"dreduced_inertia"},
             f"{self.name}_friction": {"drive_torque", "drive_torque_friction"},
         }
-        speed = {o.name: {"drive_torque", *INERTIAS} for o in self.numbers}
+        speed = {o.name: {"drive_torque", "reduced_inertia", "dreduced_inertia"} for o in self.numbers}
         return set().union(*(made for name, made in (of | speed).items() if name in wanted))
 
     def needs(self, wanted: frozenset[str]) -> frozenset[str]:

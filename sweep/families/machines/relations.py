@@ -11,7 +11,7 @@ import numpy as np
 from sweep.errors import InputError, choices
 from sweep.families.base import Output, Parameter
 from sweep.families.frames import Frame
-from sweep.families.parts import AXES
+from sweep.families.sites import AXES
 
 
 class Relation(Protocol):
