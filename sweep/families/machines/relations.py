@@ -32,6 +32,15 @@ class Relation(Protocol):
     ) -> dict[str, Any]: ...
 
 
+class Given:
+    """A relation that its members settle: it has no parameters of its own."""
+
+    @property
+    def parameters(self) -> tuple[Parameter, ...]:
+        """It has none."""
+        return ()
+
+
 @dataclass(frozen=True)
 class Timing:
     """Difference of two crank angles of the main shaft, the second minus the first, in (-pi, pi].
@@ -69,7 +78,7 @@ class EventValue:
 
 
 @dataclass(frozen=True)
-class Distance:
+class Distance(Given):
     """Distance of two points; ``points`` are dotted names such as "needle.point"."""
 
     name: str
@@ -85,11 +94,6 @@ class Distance:
         )
         return size, *parts
 
-    @property
-    def parameters(self) -> tuple[Parameter, ...]:
-        """It has none of its own."""
-        return ()
-
     def needs(self, wanted: frozenset[str]) -> frozenset[str]:
         """Return coordinates of both points."""
         return frozenset(f"{point}_{axis}" for point in self.points for axis in AXES)
@@ -102,7 +106,7 @@ class Distance:
 
 
 @dataclass(frozen=True)
-class Speed:
+class Speed(Given):
     """Speed of a point in the machine's frame, or of a second point as the first one sees it.
 
     ``points`` are one or two dotted names such as "looper.tip".
@@ -116,11 +120,6 @@ class Speed:
         """The speed, per radian of the main shaft."""
         text = f"speed of {self.points[-1]}" + (f" relative to {self.points[0]}" if len(self.points) == 2 else "")
         return (Output(self.name, "length", f"{text}, per radian of the main shaft", "ours"),)
-
-    @property
-    def parameters(self) -> tuple[Parameter, ...]:
-        """It has none of its own."""
-        return ()
 
     def needs(self, wanted: frozenset[str]) -> frozenset[str]:
         """Return velocities of the points."""

@@ -12,8 +12,9 @@ from typing import Any, NamedTuple, TypeAlias
 
 import numpy as np
 
-from sweep.families.base import Output, Parameter
+from sweep.families.base import Output
 from sweep.families.frames import Frame
+from sweep.families.machines.relations import Given
 from sweep.families.sites import AXES
 
 Point: TypeAlias = Sequence[Any]
@@ -119,7 +120,7 @@ class Body:
 
 
 @dataclass(frozen=True)
-class Gap:
+class Gap(Given):
     """Least distance of two bodies, less their radii."""
 
     name: str
@@ -141,11 +142,6 @@ class Gap:
             *places,
             Output(f"{self.name}_side", "length", side, "(11)"),
         )
-
-    @property
-    def parameters(self) -> tuple[Parameter, ...]:
-        """It has none of its own."""
-        return ()
 
     def needs(self, wanted: frozenset[str]) -> frozenset[str]:
         """Return the ends of both bodies."""

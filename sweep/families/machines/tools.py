@@ -10,10 +10,10 @@ from typing import Any, TypeAlias
 import numpy as np
 
 from sweep.errors import InputError, choices
-from sweep.families.base import Output, Parameter
+from sweep.families.base import Output
 from sweep.families.capabilities import OutputLink
 from sweep.families.frames import Frame
-from sweep.families.machines.relations import two
+from sweep.families.machines.relations import Given, two
 from sweep.families.machines.segments import Body, dot, minus
 from sweep.families.parts import Member, vector
 from sweep.families.sites import AXES, links_of
@@ -168,7 +168,7 @@ Tool: TypeAlias = Needle | Blade | Seam | Plate
 
 
 @dataclass(frozen=True)
-class Height:
+class Height(Given):
     """How high a point stands above a throat plate, and above the fabric on it."""
 
     name: str
@@ -190,11 +190,6 @@ class Height:
             Output(f"{self.name}_fabric", "length", f"{text}, less the fabric's thickness", "ours"),
             Output(f"d{self.name}", "length", f"derivative of the {text} by phi of the main shaft", "ours"),
         )
-
-    @property
-    def parameters(self) -> tuple[Parameter, ...]:
-        """It has none of its own."""
-        return ()
 
     def needs(self, wanted: frozenset[str]) -> frozenset[str]:
         """Return coordinates of the point, and velocities where the derivative is wanted."""

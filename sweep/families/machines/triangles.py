@@ -15,9 +15,10 @@ import numpy as np
 
 from kernels import status as st
 from kernels.types import TWO_PI
-from sweep.families.base import Columns, Output, Parameter, Step
+from sweep.families.base import Columns, Output, Step
 from sweep.families.frames import Frame
 from sweep.families.machines.crossings import TANGENT, Places, Poses, moved, outputs_at, step_of, verdict, whole
+from sweep.families.machines.relations import Given
 from sweep.families.machines.segments import cross, dot, minus
 from sweep.families.machines.tools import Spot
 
@@ -36,7 +37,7 @@ TEXTS = {
 
 
 @dataclass(frozen=True)
-class Entering:
+class Entering(Given):
     """A tip and the plane of a triangle, pose by pose; :func:`entering_step` finds where the tip passes it.
 
     Parameters
@@ -69,11 +70,6 @@ class Entering:
             Output(f"{self.name}_dabove", "length", f"derivative of the height {of} by phi of the main shaft", "(13)"),
             *(Output(f"{self.name}_to_{side}", "length", TEXTS[f"from_{side}"], "(13)") for side in SIDES),
         )
-
-    @property
-    def parameters(self) -> tuple[Parameter, ...]:
-        """It has none of its own."""
-        return ()
 
     def needs(self, wanted: frozenset[str]) -> frozenset[str]:
         """Return coordinates of tip and corners, and velocities where the derivative is wanted."""
