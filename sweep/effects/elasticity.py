@@ -18,7 +18,7 @@ from sweep.effects.scene import Scene, take_over
 from sweep.effects.turn import at_poses, on_finer_grids, per_turn, reduction_outputs
 from sweep.families.base import Accuracy, Array, Columns, Output, Parameter
 from sweep.families.poses import optional_outputs
-from sweep.numerics.steady_speed import backwards
+from sweep.numerics.steady_speed import forwards
 
 EQUATION = "E1 (1), (2), (5), E2 (3)-(5)"
 FORMULAS = (
@@ -137,33 +137,17 @@ def compute_dynamic(scene: Scene, wanted: frozenset[str]) -> Columns:
 
 
 def _solve(grid: Scene, phi: Array, last: bool) -> tuple[dict[str, Array], Status]:
-    """Solve designs that turn backwards apart from the others."""
-    kind = grid.inputs["speed"] < 0.0
-    kinds = np.unique(kind)
-    if kinds.size <= 1:  # there may be no design at all: none that turns
-        return _solved(grid, phi, last)
-    found: dict[str, Array] = {}
-    status = np.empty(len(grid.designs), np.uint8)
-    for rows in (np.flatnonzero(kind == one) for one in kinds):
-        part, codes = _solved(grid.only(rows), np.ascontiguousarray(phi[rows] if phi.shape[0] > 1 else phi), last)
-        for name, values in part.items():
-            found.setdefault(name, np.empty((len(grid.designs), *values.shape[1:])))[rows] = values
-        status[rows] = codes
-    return found, status
-
-
-def _solved(grid: Scene, phi: Array, last: bool) -> tuple[dict[str, Array], Status]:
-    """Solve designs that all turn in one sense.
+    """Solve designs on one grid.
 
     A crank that turns backwards is one that turns forwards in -phi: only so do multipliers below 1 mean stability.
     """
-    n, back = len(grid.designs), bool((grid.inputs["speed"] < 0.0).any())
+    n, speed = len(grid.designs), grid.inputs["speed"]
     lag, elongation = (np.empty((n, phi.shape[1])) for _ in range(2))
     found = Steady(np.empty(n, np.uint8), lag, elongation, np.empty(n))
     p, d2psi, c, reach, data = _arguments(grid)
     first, zeroth, right = _equation(grid, p, d2psi, data, driven_side(grid, True))
-    if back:
-        phi, (p, first, zeroth, right) = backwards(phi, p, -first, zeroth, right)
+    first *= np.copysign(1.0, speed)[:, None]
+    phi, (p, first, zeroth, right) = forwards(speed, phi, p, first, zeroth, right)
     steady_state(p, first, zeroth, right, c, reach, phi, last, found)
     return {"lag_dynamic": lag, "elongation_dynamic": elongation, "floquet": found.floquet}, found.status
 

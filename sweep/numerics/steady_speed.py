@@ -16,13 +16,17 @@ PER_LEFT = 5.0  # a jump h leaves h/(pi K) in harmonic K and shifts the energy b
 ERROR = 1e-9
 
 
-def backwards(phi: Array, *curves: Array) -> tuple[Array, list[Array]]:
-    """Crank angles and curves on an even grid of a turn as a crank sees them that turns the other way.
+def forwards(speed: Array, phi: Array, *curves: Array) -> tuple[Array, list[Array]]:
+    """Crank angles and curves of designs as a crank sees them that turns forwards.
 
-    A turn backwards in phi is one forwards in -phi, (n, N) curves are its samples at the same grid.  Done twice it
-    gives what was there before.
+    A turn backwards in phi is one forwards in -phi.  Where ``speed`` (n,) is negative, angles (n, m) or (1, m) change
+    their sign, and (n, N) curves, samples on an even grid of the turn, are mirrored on it.
     """
-    return -phi, [np.ascontiguousarray(np.roll(y[:, ::-1], 1, axis=1)) for y in curves]
+    back = (speed < 0.0)[:, None]
+    if not back.any():
+        return phi, list(curves)
+    mirrored = [np.where(back, np.roll(y[:, ::-1], 1, axis=1), y) for y in curves]
+    return np.ascontiguousarray(np.where(back, -phi, phi)), [np.ascontiguousarray(y) for y in mirrored]
 
 
 def steady(
@@ -33,29 +37,10 @@ def steady(
     Numbers are of the magnitude of the speed.  A crank that turns backwards is one that turns forwards in -phi, where
     the torque that is left over acts the other way.
     """
-    if (speed < 0.0).any():
-        return _of_both_senses(inertia, excess, speed, slope, phi, coarsest)
-    n = len(inertia)
+    n, sense = len(inertia), np.copysign(1.0, speed)[:, None]
+    phi, (stored, left) = forwards(speed, phi, inertia, sense * excess)
     out = Uneven(*(np.empty(n) for _ in range(5)), *(np.empty((n, phi.shape[1])) for _ in range(2)))
     status = np.empty(n, np.uint8)
-    speed_fluctuation(inertia, excess, speed, phi, status, out, coarsest, slope)
+    speed_fluctuation(stored, left, np.abs(speed), phi, status, out, coarsest, slope)
     found = {"unevenness": out.delta, "fastest": out.fastest, "slowest": out.slowest, "missed": out.missed}
-    return found | {"crank_speed": out.speed, "crank_acceleration": out.acceleration}, status
-
-
-def _of_both_senses(
-    inertia: Array, excess: Array, speed: Array, slope: Array | None, phi: Array, coarsest: float
-) -> tuple[dict[str, Array], Status]:
-    """Do the same where some cranks turn backwards."""
-    found: dict[str, Array] = {}
-    status = np.empty(len(speed), np.uint8)
-    for rows, sense in ((np.flatnonzero(speed > 0.0), 1.0), (np.flatnonzero(speed < 0.0), -1.0)):
-        at, stored, left = phi[rows] if len(phi) > 1 else phi, inertia[rows], excess[rows]
-        if sense < 0.0:
-            at, (stored, left) = backwards(at, stored, -left)
-        given = None if slope is None else slope[rows]
-        part, status[rows] = steady(stored, left, sense * speed[rows], given, np.ascontiguousarray(at), coarsest)
-        for name, values in part.items():
-            turned = sense if name in ("crank_speed", "crank_acceleration") else 1.0
-            found.setdefault(name, np.empty((len(speed), *values.shape[1:])))[rows] = turned * values
-    return found, status
+    return found | {"crank_speed": sense * out.speed, "crank_acceleration": sense * out.acceleration}, status
