@@ -11,7 +11,7 @@ from sweep.families.capabilities import Fixed, Link, Made, Points, Skeleton, Thr
 from sweep.families.curve_features import Singular
 from sweep.families.outputs import ladders
 from sweep.families.planar_trees import thread_follower
-from sweep.families.poses import poses_of
+from sweep.families.poses import poses_of, together
 from sweep.families.skeletons import Y, line, parameter, standing
 
 _ORDERS = range(1, guided_cam.HARMONICS + 1)
@@ -51,12 +51,17 @@ DESIGN_OUTPUTS = (
     Output("jam_angle", "rad", "pressure angle at which the follower jams", "(13)"),
     Output("least_displacement", "length", "least displacement of the follower over the turn", "(10)"),
 )
-_poses = poses_of(guided_cam.poses, guided_cam.Outputs, {"profile": PROFILE_OUTPUTS})
+_kernel_poses = poses_of(guided_cam.poses, guided_cam.Outputs, {"profile": PROFILE_OUTPUTS})
+
+
+@together(*(o.name for o in (*VALUE_OUTPUTS, CURVATURE, *PROFILE_OUTPUTS)))
+def _poses(designs: Array, angles: Angles, wanted: frozenset[str]) -> Columns:
+    return _kernel_poses(designs, angles, wanted)
 
 
 def poses(designs: Array, angles: Angles, wanted: frozenset[str]) -> Columns:
     """Compute the wanted pose outputs and status of every design at its cam angles, each (n, m)."""
-    asked = wanted | {"S"} if WRAP.name in wanted else wanted
+    asked = wanted - {WRAP.name} | {"S"} if WRAP.name in wanted else wanted
     columns = _poses(designs, angles, asked)
     if WRAP.name in wanted:
         x1, z1, e = (designs[:, [k]] for k in (1, 2, 3))

@@ -78,6 +78,7 @@ def poses(designs: Array, angles: Angles, wanted: frozenset[str]) -> Columns:
     return _poses(designs, angles, wanted)
 
 
+@together(*rssr.Outputs._fields)
 def precise_poses(designs: Array, angles: Angles, wanted: frozenset[str]) -> Columns:
     """As :func:`poses`, with the closure in twice the working precision; for float64 only."""
     constants = np.empty((len(designs), rssr.PRECISE_COLUMNS))

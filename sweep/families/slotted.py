@@ -21,7 +21,7 @@ from sweep.families.curve_features import Singular
 from sweep.families.link_tree import LinkBody, LinkJoint, LinkTree, filled_by
 from sweep.families.outputs import ALONG_FRAME, coordinate_outputs, joint_outputs, ladders, point_outputs
 from sweep.families.planar_trees import slotted_rocker
-from sweep.families.poses import poses_of
+from sweep.families.poses import poses_of, together
 from sweep.families.sites import AXES
 from sweep.families.skeletons import CRANK, ORIGIN, crank_axis, links, parameter, standing
 
@@ -62,7 +62,13 @@ JOINT_OUTPUTS = (
     *joint_outputs({"c": "point of the driven link that guides the ball"}, "(2)", _WAYS),
 )
 
-poses = poses_of(slotted.poses, slotted.Outputs, {"joints": JOINT_OUTPUTS})
+_poses = poses_of(slotted.poses, slotted.Outputs, {"joints": JOINT_OUTPUTS})
+
+
+@together(*(o.name for o in VALUE_OUTPUTS + JOINT_OUTPUTS))
+def poses(designs: Array, angles: Angles, wanted: frozenset[str]) -> Columns:
+    """Wanted pose outputs and status of every design at its crank angles, each (n, m)."""
+    return _poses(designs, angles, wanted)
 
 
 def unit(designs: Array) -> Array:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import math
 from collections.abc import Callable, Mapping
 from dataclasses import asdict, replace
 from pathlib import Path
@@ -179,7 +180,7 @@ def optimise_study(
     kept = Kept(side / files.SEARCH if key else None, key)
     deadline = Deadline(None if study.optimise is None else study.optimise.time_budget, stop)
     problem, results, found = _drawing(study, place, deadline, jobs, say, kept)
-    nominal, settings = results[0], study.optimise
+    nominal, settings, share = results[0], study.optimise, math.nan
     if study.tolerance is not None and study.tolerance.robust is not None and settings and found.ended not in CUT:
         unlimited = replace(settings, time_budget=None)  # one deadline for all that follows
         part = kept.parts.get("insensitive")
@@ -191,12 +192,13 @@ def optimise_study(
             whole, results, study.tolerance, unlimited, deadline, jobs, more,
             lambda done, total, best: say("robust design", done, total, f"searches {AT_MOST}{best}"), kept,
         )  # fmt: skip
-        results = results if made is None else [made.result, *results]
+        if made is not None:
+            results, share = [made.result, *results], made.share
     if deadline.pulled and found.ended not in CUT:
         found = later(found)
     parts = 3 if study.tolerance is None else 4
     say("tables", 0, parts, "tables")
-    frame = _table(study, problem, results, nominal)
+    frame = _table(study, problem, results, nominal, share)
     about = {"search": json.dumps(asdict(found)), "summary": "; ".join([found.words, *found.warnings])}
     write(side / files.OPTIMUM, frame, study, about=about)
     say("tables", 1, parts, "tables")
@@ -246,8 +248,11 @@ def _drawing(
     return problem, results, found
 
 
-def _table(study: Study, problem: Problem, results: list[Result], nominal: Result) -> dict[str, Any]:
-    """Return one row per start, best first, then the reference; a robust design stands before the ``nominal`` best."""
+def _table(study: Study, problem: Problem, results: list[Result], nominal: Result, share: float) -> dict[str, Any]:
+    """Return one row per start, best first, then the reference; a robust design stands before the ``nominal`` best.
+
+    ``share`` is what is known of the first row: the mechanisms within all limits, nan if nobody has counted them.
+    """
     designs = np.array([r.design for r in results])
     roles = ["nominal" if r is nominal else "start" for r in results[1:]]
     rows: dict[str, list[Any]] = {"role": ["optimum", *roles]}
@@ -260,10 +265,10 @@ def _table(study: Study, problem: Problem, results: list[Result], nominal: Resul
         for name, value in zip(rows, last, strict=True):
             rows[name].append(value)
     if study.tolerance is not None:
-        shown = [k for k, role in enumerate(rows["role"]) if role != "start"]
-        share = np.full(len(designs), np.nan)
-        share[shown] = yields(problem, designs[shown], study.tolerance, _seed(study))
-        rows["yield"] = share.tolist()
+        rows["yield"] = [share] + [math.nan] * (len(designs) - 1)
+        shown = [k for k, role in enumerate(rows["role"]) if role != "start" and math.isnan(rows["yield"][k])]
+        for k, found in zip(shown, yields(problem, designs[shown], study.tolerance, _seed(study)), strict=True):
+            rows["yield"][k] = found
     columns: dict[str, Any] = {name: designs[:, k] for k, name in enumerate(study.family.parameter_names)}
     return {"role": rows.pop("role"), "start": rows.pop("start")} | columns | outputs(study, designs) | rows
 

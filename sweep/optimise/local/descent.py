@@ -66,12 +66,13 @@ class Descent:
 
     def _settle(self) -> None:
         """Minimise until the conditions of optimality hold; where a locus makes that slow, use the parameters."""
-        if self.best.violation <= ACTIVE and self.model.certificate(self.best).residual <= KKT:
+        if self._optimal(KKT):
             return  # it began where an earlier search had ended
         other = in_parameters(self.model.problem, self.best.design)
         for _ in range(CYCLES):
             self._rounds(slsqp.propose, relaxed=False, enough=1e-4, rounds=8)
-            self._rounds(newton.propose, relaxed=False, enough=1e-13, rounds=NEWTON if other is None else SOON)
+            if not self._optimal(1e-2 * KKT):  # into a corner of limits SLSQP gets by itself
+                self._rounds(newton.propose, relaxed=False, enough=1e-13, rounds=NEWTON if other is None else SOON)
             if self.model.certificate(self.best).residual <= KKT:
                 break
             if self.best.violation > ACTIVE:
@@ -79,6 +80,9 @@ class Descent:
             elif other is not None:
                 self._detour(other)
                 other = None
+
+    def _optimal(self, residual: float) -> bool:
+        return self.best.violation <= ACTIVE and self.model.certificate(self.best).residual <= residual
 
     def _detour(self, other: Problem) -> None:
         """Search from the present design in other coordinates, and come back with what is found there."""

@@ -92,7 +92,8 @@ def hessian(model: Model, at: State, form: Form, found: Multipliers, free: Index
     def slope(j: int, step: float) -> Array:
         moved = at.fractions.copy()
         moved[j] += step
-        points, _ = model.moved(moved, form, form.points)
+        model.check()
+        points = model.curves.follow(model.design(moved), form.points)
         return np.asarray((found.weights @ np.nan_to_num(model.jacobian(moved, form, points)))[free])
 
     if both_sides:

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from sweep.evaluation.summaries import design_outputs
+from sweep.evaluation.summaries import design_outputs, routes
 from sweep.families.base import Array
 from sweep.jobs.executors import Task
 from sweep.jobs.progress import best_words
@@ -46,9 +46,8 @@ ENDED = 3  # designs that go on after the first rounds
 HEAT = 400  # looks of each of the first rounds
 ROUNDS, CORRECTIONS = 4, 10  # of search with the room of the design before; of the number of standard deviations
 ONCE = 2  # looks that say how good a design is
-STAYED = 1e-3  # step of a design that the room and the share agree on
+STAYED = 1e-3  # scaled step of a design with which its room agrees: that is of first order, and errs by the square
 RADIUS = 0.15  # of the first rounds, in scaled variables
-SETTLED = 1e-5  # step of a round, in scaled variables
 NEARLY = 1e-4  # scaled violation of a design whose objective counts
 ALIKE = 0.02  # greatest distance in scaled variables of designs that are taken for one
 REACH, FADING = (
@@ -243,13 +242,14 @@ class _Calibrate:
                 )
                 design, spent = result.design, spent + result.looks
                 values, share = self._made(design)
-            better = share >= wanted and (best.share < wanted or result.objective < best.result.objective)
+            gained = 1.0 - result.objective / best.result.objective if best.share >= wanted else math.inf
+            better = share >= wanted and gained > 0.0
             if result.violation <= NEARLY and (better or (best.share < wanted and share > best.share)):
                 best = Robust(result, share, result.ended in CUT)
             if spent >= self.looks or (corrected and share >= wanted and not better and result.ended == "looks"):
                 break  # prices from a search that has not settled mislead the correction
             levels, saved = self._corrected(scatter, design, levels, values, reach)
-            if wanted <= share <= wanted + enough and step < STAYED and saved < SAVED:
+            if wanted <= share <= wanted + enough and step < STAYED and min(saved, gained) < SAVED:
                 break
             reach *= FADING
         nominal = Model(self.problem, Program(self.problem), best.result.design, _never)
@@ -304,7 +304,7 @@ def _approached(
         total += result.looks
         move = (problem.scaled(result.design[None, :]) - problem.scaled(design[None, :]))[0]
         step, room_of, design = float(np.abs(move).max()), design, result.design
-        if result.ended in CUT or step < SETTLED:
+        if result.ended in CUT or step < STAYED:
             break
         # The margin is exact at the design where it was taken.  A reversed step tells of oscillation in a flat valley.
         if (move * before).sum() < 0.0:
@@ -319,7 +319,12 @@ def _approached(
 
 
 def _share(problem: Problem, design: Array, tolerance: Tolerance, seed: int) -> float:
-    return float(kept(problem, deviating(problem.family, design, tolerance, seed, tolerance.samples))[1].mean())
+    """Return the share of mechanisms that keep all limits; those that miss the cheap ones are not asked for others."""
+    limits, good = bounded(problem), deviating(problem.family, design, tolerance, seed, tolerance.samples)
+    for route in routes(problem.family, [x.output for x in limits], problem.accuracy):
+        found = design_outputs(problem.family, good, route.outputs, problem.accuracy, problem.window)
+        good = good[np.logical_and.reduce([meets(x, found[x.output]) for x in limits if x.output in route.outputs])]
+    return len(good) / tolerance.samples
 
 
 def yields(problem: Problem, designs: Array, tolerance: Tolerance, seed: int) -> list[float]:
