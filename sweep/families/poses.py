@@ -140,6 +140,9 @@ class Together:
     def __call__(self, designs: Array, angles: Angles, wanted: frozenset[str]) -> Columns:
         """Wanted outputs and the status of every design at its angles, each (n, m)."""
         key = wanted, np.iscomplexobj(angles.cos) or np.iscomplexobj(designs)
+        if key[1]:  # one code for complex designs, complex angles, and both
+            whole: list[Any] = [np.ascontiguousarray(x, np.complex128) for x in (designs, *angles)]
+            designs, angles = whole[0], Angles(*whole[1:])
         count = len(designs) * angles.cos.shape[1]
         self._asked[key] = self._asked.get(key, 0) + count
         if count >= MANY or self._asked[key] > PAID:
