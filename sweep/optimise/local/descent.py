@@ -25,6 +25,7 @@ PATIENCE, AGAIN = 8, 2  # rounds of learnt curvature that may halve a violation,
 NEWTON = 240  # rounds of Newton steps: along a narrow curved valley hundreds are needed, and each gains
 SOON = 30  # of these on a locus, before the parameters are tried: near its singular places they creep
 KKT = 1e-6  # residual of a converged result
+CORNER = 1e-14  # residual of a result that no Newton round betters: SLSQP gets into corners of limits to rounding
 DEARER = 10.0  # violations become so many times where a search comes to rest outside of its limits
 DWINDLING = 1e-9  # gain of a round from which a fulfilled condition of optimality ends the search
 REMEMBERED = 48  # extrema of refused designs that stay among the rows: the next long step would meet them again
@@ -71,7 +72,7 @@ class Descent:
         other = in_parameters(self.model.problem, self.best.design)
         for _ in range(CYCLES):
             self._rounds(slsqp.propose, relaxed=False, enough=1e-4, rounds=8)
-            if not self._optimal(1e-2 * KKT):  # into a corner of limits SLSQP gets by itself
+            if not self._optimal(CORNER):
                 self._rounds(newton.propose, relaxed=False, enough=1e-13, rounds=NEWTON if other is None else SOON)
             if self.model.certificate(self.best).residual <= KKT:
                 break
