@@ -78,13 +78,13 @@ def design_matrix(
         matrix[:, k] = _checked_column(family, parameter, columns, keys)
     extras = {name: np.broadcast_to(columns[name], rows) for name in extra if name in columns}
     for name, values in extras.items():
-        _refuse(~np.isfinite(values), values, name, "a finite number")
+        refuse_rows(~np.isfinite(values), values, name, "a finite number")
     return matrix, extras
 
 
-def one_design(family: Parametrised, table: Table) -> Array:
+def one_design(family: Parametrised, table: Table, unused: Container[str] = ()) -> Array:
     """Check a table of one design, which is what a picture or a course of one machine needs; (1, P)."""
-    matrix, _ = design_matrix(family, table)
+    matrix, _ = design_matrix(family, table, unused=unused)
     if len(matrix) != 1:
         raise InputError("design", f"{len(matrix)} rows", "the parameters of one design", f"table of {family.name}")
     return matrix
@@ -201,14 +201,14 @@ def _checked_column(
     else:
         return values
     if not math.isfinite(least) or not math.isfinite(largest):
-        _refuse(~np.isfinite(values), values, p.name, "a finite number")
+        refuse_rows(~np.isfinite(values), values, p.name, "a finite number")
     if p.sign and (p.not_zero or p.wrong_sign(least)):
-        _refuse(p.wrong_sign(values), values, p.name, f"a {p.sign} {p.unit}")
+        refuse_rows(p.wrong_sign(values), values, p.name, f"a {p.sign} {p.unit}")
     if p.unit == "mass" and largest > MOST_MASS:
         allowed = f'a mass below {MOST_MASS:g} t, as bare masses are tonnes: "20 g", or 2e-5'
-        _refuse(values > MOST_MASS, values, p.name, allowed)
+        refuse_rows(values > MOST_MASS, values, p.name, allowed)
     if p.choices is not None and not (least == largest and least in p.choices):
-        _refuse(np.logical_and.reduce([values != x for x in p.choices]), values, p.name, p.choice)
+        refuse_rows(np.logical_and.reduce([values != x for x in p.choices]), values, p.name, p.choice)
     return values
 
 
@@ -276,7 +276,15 @@ def _is_number(value: Any) -> bool:
     return True
 
 
-def _refuse(bad: Any, values: Array, name: str, allowed: str) -> None:
+def index_of(table: Table, rows: int) -> pd.Index:
+    """Return the labels of a table's rows; numbers from 0 where it has none."""
+    import pandas as pd
+
+    return table.index if isinstance(table, pd.DataFrame) else pd.RangeIndex(rows)
+
+
+def refuse_rows(bad: Any, values: Array, name: str, allowed: str) -> None:
+    """Refuse the first value of a column that is ``bad``, with its row and what is allowed."""
     if np.any(bad):
         row = int(np.argmax(bad))
         value = float(values.flat[row])

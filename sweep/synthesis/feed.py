@@ -10,7 +10,7 @@ import numpy as np
 from kernels import status as st
 from kernels.families import feed as kernels
 from sweep.errors import InputError
-from sweep.evaluation.tables import design_matrix, numbers
+from sweep.evaluation.tables import numbers, one_design
 from sweep.families import family
 from sweep.families.base import Array
 
@@ -126,9 +126,7 @@ def lift_chain(
 
 
 def _given(table: Table, phi: object, other: object, name: str) -> tuple[Array, Array, Array]:
-    matrix, _ = design_matrix(family("feed"), table, unused=("phi",))
-    if len(matrix) != 1:
-        raise InputError("table", f"{len(matrix)} rows", "one design", "table of feed")
+    matrix = one_design(family("feed"), table, unused=("phi",))
     grid = np.atleast_1d(numbers(phi, "phi", "phi, position"))
     values = np.atleast_1d(numbers(other, name, f"{name}, position"))
     if values.shape != grid.shape or grid.ndim != 1:

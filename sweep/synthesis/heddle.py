@@ -10,7 +10,7 @@ import numpy as np
 from kernels import status as st
 from kernels.synthesis import heddle as kernels
 from sweep.errors import InputError
-from sweep.evaluation.tables import Sheet, design_matrix
+from sweep.evaluation.tables import Sheet, design_matrix, index_of, refuse_rows
 from sweep.families.base import Array, Parameter
 
 if TYPE_CHECKING:
@@ -109,7 +109,7 @@ def extremes(table: Table, mode: Mode = "exact") -> pd.DataFrame:
         kernels.heddle_lever_angles(_closure(matrix, found, matrix[:, 6:9]), angles, closed)
         columns |= dict(zip(("lever_angle_1", "lever_angle_2", "lever_swing"), angles.T, strict=True))
         status = np.where(status == st.OK, closed, status)
-    return _frame(columns | {"status": status}, _index(table, len(matrix)))
+    return _frame(columns | {"status": status}, index_of(table, len(matrix)))
 
 
 def rods(table: Table, mode: Mode = "exact") -> pd.DataFrame:
@@ -132,7 +132,7 @@ def rods(table: Table, mode: Mode = "exact") -> pd.DataFrame:
         as :func:`extremes`, and for a swing of pi or more.
     """
     matrix = design_matrix(_RODS, table)[0]
-    _refuse(matrix[:, 7] >= np.pi, matrix[:, 7], "swing", "an angle below pi")
+    refuse_rows(matrix[:, 7] >= np.pi, matrix[:, 7], "swing", "an angle below pi")
     found, status = _positions(matrix, mode)
     lengths, count = np.empty((len(matrix), 4)), np.empty(len(matrix), np.uint8)
     code = np.empty(len(matrix), np.uint8)
@@ -148,7 +148,7 @@ def rods(table: Table, mode: Mode = "exact") -> pd.DataFrame:
     angles[np.isnan(rod)] = np.nan
     columns = {"rod": number + 1, "BC": rod}
     columns |= dict(zip(("lever_angle_1", "lever_angle_2", "lever_swing"), angles.T, strict=True))
-    return _frame(columns | {"status": code[which]}, _index(table, len(matrix))[which])
+    return _frame(columns | {"status": code[which]}, index_of(table, len(matrix))[which])
 
 
 def shed(table: Table) -> pd.DataFrame:
@@ -171,7 +171,7 @@ def shed(table: Table) -> pd.DataFrame:
     """
     number, d1, t, stroke, reference = design_matrix(_SHED, table)[0].T
     strokes = stroke * (d1 + (number - 1.0) * t) / (d1 + (reference - 1.0) * t)
-    return _frame({"stroke": strokes}, _index(table, len(strokes)))
+    return _frame({"stroke": strokes}, index_of(table, len(strokes)))
 
 
 def arms(table: Table) -> pd.DataFrame:
@@ -193,12 +193,12 @@ def arms(table: Table) -> pd.DataFrame:
         for a missing or misspelt column, a bad number, mu_3 of a right angle or more.
     """
     matrix = design_matrix(_ARMS, table)[0]
-    _refuse(matrix[:, 4] >= 0.5 * np.pi, matrix[:, 4], "mu_3", "an angle below pi/2")
+    refuse_rows(matrix[:, 4] >= 0.5 * np.pi, matrix[:, 4], "mu_3", "an angle below pi/2")
     found, status = np.empty((len(matrix), 4)), np.empty(len(matrix), np.uint8)
     kernels.heddle_shaft_arms(matrix, found, status)
     columns = dict(zip(("O3D", "DF", "y_high", "y_low"), found.T, strict=True))
     columns |= {"asymmetry": found[:, 2] + found[:, 3]}
-    return _frame(columns | {"status": status}, _index(table, len(matrix)))
+    return _frame(columns | {"status": status}, index_of(table, len(matrix)))
 
 
 def _frame(columns: Mapping[str, np.ndarray], index: pd.Index) -> pd.DataFrame:
@@ -215,7 +215,7 @@ def _positions(matrix: Array, mode: Mode) -> tuple[Array, np.ndarray]:
     """Columns of the extreme positions by one of the two half angles, and their status."""
     if mode not in ("exact", "printed"):
         raise InputError("mode", mode, "exact or printed", "synthesis of a heddle drive")
-    _refuse(matrix[:, 3] <= matrix[:, 2], matrix[:, 3], "O1O3", "a length above O1O2")
+    refuse_rows(matrix[:, 3] <= matrix[:, 2], matrix[:, 3], "O1O3", "a length above O1O2")
     both, status = np.empty((len(matrix), 12)), np.empty(len(matrix), np.uint8)
     kernels.heddle_extremes(np.ascontiguousarray(matrix[:, :6]), both, status)
     if mode == "exact":
@@ -226,15 +226,3 @@ def _positions(matrix: Array, mode: Mode) -> tuple[Array, np.ndarray]:
 def _closure(matrix: Array, found: Array, lever: Array) -> Array:
     """Rows for the kernels: O2O3, O3C, both angles xi, and what is given of the cam lever."""
     return np.column_stack([matrix[:, 3] - matrix[:, 2], matrix[:, 4], found[:, 1], found[:, 2], lever])
-
-
-def _index(table: Table, rows: int) -> pd.Index:
-    import pandas as pd
-
-    return table.index if isinstance(table, pd.DataFrame) else pd.RangeIndex(rows)
-
-
-def _refuse(bad: np.ndarray, values: Array, name: str, allowed: str) -> None:
-    if bad.any():
-        row = int(np.argmax(bad))
-        raise InputError(name, float(values[row]), allowed, f"column {name}, row {row}")

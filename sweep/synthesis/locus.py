@@ -21,7 +21,7 @@ from kernels import synthesis as kernels
 from kernels.synthesis import acceptance
 from kernels.types import TWO_PI, Status
 from sweep.errors import InputError, nearest
-from sweep.evaluation.tables import design_matrix
+from sweep.evaluation.tables import design_matrix, refuse_rows
 from sweep.families import family as find_family
 from sweep.families.base import Array, Columns, Parameter
 
@@ -80,10 +80,7 @@ class Locus:
         """
         matrix, _ = design_matrix(self, table)
         for name, allowed, bad in self._ranges(matrix):
-            if bad.any():
-                row = int(np.argmax(bad))
-                value = float(matrix[row, self.parameter_names.index(name)])
-                raise InputError(name, value, allowed, f"column {name}, row {row}")
+            refuse_rows(bad, matrix[:, self.parameter_names.index(name)], name, allowed)
         return matrix
 
     def _ranges(self, matrix: Array) -> list[tuple[str, str, NDArray[np.bool_]]]:

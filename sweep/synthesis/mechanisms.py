@@ -18,7 +18,7 @@ from kernels.types import TWO_PI
 from sweep.errors import InputError
 from sweep.evaluation.angles import AngleUnit, in_radians, plain_names
 from sweep.evaluation.summaries import design_outputs
-from sweep.evaluation.tables import Sheet, design_matrix, parameter_units
+from sweep.evaluation.tables import Sheet, design_matrix, index_of, parameter_units, refuse_rows
 from sweep.families import family
 from sweep.families import family as find_family
 from sweep.families.base import Accuracy, Array, Parameter
@@ -30,6 +30,7 @@ if TYPE_CHECKING:
     from sweep.evaluation.tables import Table
 
 _LIMITS = ("phi_ext", "phi_fold", "psi_ext", "psi_fold", "swing", "phi0", "margin", "max_pressure_angle")
+_EXACT = Accuracy(target=1e-12)
 
 
 CENTRAL_SLOT = Sheet(
@@ -67,19 +68,15 @@ def central_slots(table: Table) -> pd.DataFrame:
 
     matrix, _ = design_matrix(CENTRAL_SLOT, table)
     phi0, e, f, alpha = matrix.T.copy()
-    bad = ~((phi0 > 0.0) & (phi0 < np.pi))
-    if bad.any():
-        row = int(np.argmax(bad))
-        raise InputError("phi0", float(phi0[row]), "an angle between 0 and pi", f"column phi0, row {row}")
+    refuse_rows(~((phi0 > 0.0) & (phi0 < np.pi)), phi0, "phi0", "an angle between 0 and pi")
     status, a = np.empty(len(matrix), np.uint8), np.empty(len(matrix))
     crank_of_phi0(phi0, e, f, alpha, status, a)
     slotted = find_family("slotted")
     given = {"a": a, "e": e, "f": f, "alpha": alpha}
     columns: dict[str, object] = {p.name: given.get(p.name, p.default or 0.0) for p in slotted.parameters}
-    index = table.index if isinstance(table, pd.DataFrame) else pd.RangeIndex(len(matrix))
-    frame = pd.DataFrame(columns, index=index)
+    frame = pd.DataFrame(columns, index=index_of(table, len(matrix)))
     alive = np.flatnonzero(status == st.OK)
-    turn = design_outputs(slotted, frame.to_numpy()[alive], list(_LIMITS), Accuracy(target=1e-12))
+    turn = design_outputs(slotted, frame.to_numpy()[alive], list(_LIMITS), _EXACT)
     status[alive] = turn["status"]
     for name in _LIMITS:
         values = np.full(len(matrix), np.nan)
@@ -89,9 +86,6 @@ def central_slots(table: Table) -> pd.DataFrame:
     limits = dict.fromkeys(_LIMITS, "rad") | {"margin": "1"}
     frame.attrs["units"] = parameter_units(slotted.parameters) | limits
     return frame
-
-
-_EXACT = Accuracy(target=1e-12)
 
 
 def synthesise(
@@ -147,7 +141,7 @@ def synthesise(
     way = locus(family, plain_names(table))
     table = in_radians(way, table, angles)
     matrix = way.read(table)
-    index = table.index if isinstance(table, pd.DataFrame) else pd.RangeIndex(len(matrix))
+    index = index_of(table, len(matrix))
     if way.has_roots and "root" not in table:
         matrix = np.repeat(matrix, 2, axis=0)
         matrix[:, -1] = np.tile([1.0, -1.0], len(matrix) // 2)
