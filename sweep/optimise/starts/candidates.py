@@ -11,10 +11,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from sweep.evaluation.routes import is_alone
 from sweep.evaluation.summaries import design_outputs
 from sweep.families.base import Accuracy, Array
-from sweep.families.machines.machine import Machine
 from sweep.families.names import is_flag, stem
 from sweep.optimise.problem.program import measured_in
 from sweep.optimise.problem.statement import Problem
@@ -209,7 +207,7 @@ def ranking(problem: Problem, designs: Array, accuracy: Accuracy = ACCURACY) -> 
     """
     limits = [limit for limit in problem.limits if not is_flag(limit.output)]
     names = problem.family.parameter_names
-    turning = _turning(problem)
+    turning = ["margin"] if margins(problem.family) else []
     groups: list[list[Any]] = [[], [], []]
     for limit in limits:
         groups[
@@ -226,10 +224,9 @@ def ranking(problem: Problem, designs: Array, accuracy: Accuracy = ACCURACY) -> 
         bad = violation[alive] > NEARLY
         merit[alive[bad]] = OUTSIDE * (left + violation[alive[bad]])
         if left == 2.0 and turning:
-            least = np.fmin.reduce([columns[name] for name in turning])
-            stuck = ~(least >= ROTATABLE_MARGIN)
+            stuck = ~(columns["margin"] >= ROTATABLE_MARGIN)
             # How far a crank is from turning is a rank only; numbers beyond this are all alike, and would overflow.
-            margin = np.maximum(np.nan_to_num(least[stuck]), -FARTHEST)
+            margin = np.maximum(np.nan_to_num(columns["margin"][stuck]), -FARTHEST)
             merit[alive[stuck]] = STUCK * (1.0 - margin)
             bad |= stuck
         alive = alive[~bad]
@@ -237,15 +234,6 @@ def ranking(problem: Problem, designs: Array, accuracy: Accuracy = ACCURACY) -> 
     objective = compared(problem.objective, values)
     merit[alive] = np.nan_to_num(objective + PRICE * np.abs(objective) * violation[alive], nan=np.inf, posinf=np.inf)
     return merit
-
-
-def _turning(problem: Problem) -> list[str]:
-    """Name the margins that say how far a design is from turning: of a machine those of the members that vary."""
-    family = problem.family
-    if isinstance(family, Machine) and all(map(is_alone, family.members)):
-        varied = [m for m in family.members if any(m.columns.start <= k < m.columns.stop for k in problem.columns)]
-        return [f"{m.name}.margin" for m in varied if margins(m.family)]
-    return ["margin"] if margins(family) else []
 
 
 def _values(problem: Problem, designs: Array, wanted: list[str], accuracy: Accuracy) -> dict[str, Array]:
