@@ -22,6 +22,7 @@ from sweep.families.chain import Chain
 from sweep.families.machines.machine import Machine
 from sweep.families.machines.main_shaft import ShaftTorque
 from sweep.families.machines.relations import EventValue
+from sweep.families.machines.sewing import Sewing
 from sweep.families.machines.shaking import Shaking
 from sweep.families.names import stem
 from sweep.families.reduction import reduced
@@ -272,8 +273,12 @@ def _asked(machine: Machine, wanted: Iterable[str]) -> set[str]:
     names |= {about for name in places for about in reduced(name, machine.domain)}
     names |= {timing.of.name for timing in asked if isinstance(timing, EventValue)}
     for relation in machine.relations:
-        numbers = relation.numbers if isinstance(relation, ShaftTorque | Shaking) else ()
-        if not names.isdisjoint(o.name for o in (*relation.outputs, *numbers)):
+        own = {o.name for o in relation.outputs}
+        if isinstance(relation, ShaftTorque | Shaking):
+            own |= {o.name for o in relation.numbers}
+        elif isinstance(relation, Sewing):
+            own |= relation.numbers.keys()
+        if not names.isdisjoint(own):
             names |= relation.needs(frozenset(names))
     return names
 

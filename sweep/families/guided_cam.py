@@ -9,9 +9,8 @@ from kernels.types import EPS, Array
 from sweep.families.base import Accuracy, Angles, Columns, Family, Output, Parameter, Step, Work
 from sweep.families.capabilities import Fixed, Link, Made, Points, Skeleton, ThreadPath
 from sweep.families.curve_features import Singular
-from sweep.families.outputs import ladders
 from sweep.families.planar_trees import thread_follower
-from sweep.families.poses import poses_of, together
+from sweep.families.poses import poses_of
 from sweep.families.skeletons import Y, line, parameter, standing
 
 _ORDERS = range(1, guided_cam.HARMONICS + 1)
@@ -51,17 +50,12 @@ DESIGN_OUTPUTS = (
     Output("jam_angle", "rad", "pressure angle at which the follower jams", "(13)"),
     Output("least_displacement", "length", "least displacement of the follower over the turn", "(10)"),
 )
-_kernel_poses = poses_of(guided_cam.poses, guided_cam.Outputs, {"profile": PROFILE_OUTPUTS})
-
-
-@together(*(o.name for o in (*VALUE_OUTPUTS, CURVATURE, *PROFILE_OUTPUTS)))
-def _poses(designs: Array, angles: Angles, wanted: frozenset[str]) -> Columns:
-    return _kernel_poses(designs, angles, wanted)
+_poses = poses_of(guided_cam.poses, guided_cam.Outputs, {"profile": PROFILE_OUTPUTS})
 
 
 def poses(designs: Array, angles: Angles, wanted: frozenset[str]) -> Columns:
     """Compute the wanted pose outputs and status of every design at its cam angles, each (n, m)."""
-    asked = wanted - {WRAP.name} | {"S"} if WRAP.name in wanted else wanted
+    asked = wanted | {"S"} if WRAP.name in wanted else wanted
     columns = _poses(designs, angles, asked)
     if WRAP.name in wanted:
         x1, z1, e = (designs[:, [k]] for k in (1, 2, 3))
@@ -124,7 +118,7 @@ FAMILY = Family(
     pose_outputs=(*VALUE_OUTPUTS, *PROFILE_OUTPUTS, CURVATURE, WRAP),
     poses=poses,
     steps=(Step("cam body", DESIGN_OUTPUTS, size, work=Work.LONG),),
-    derivative_of=ladders("P", "S", orders=2) | {"L": "dP"},
+    derivative_of={"P": "dP", "dP": "d2P", "L": "dP", "S": "dS", "dS": "d2S"},
     uses_phi=False,
     example={"P_h": 60.0, "X1": 3.0, "Z1": 12.0, "e": 5.0, "R0": 30.0, "A1": 10.0, "B2": 3.0},
     capabilities=(

@@ -233,14 +233,19 @@ def differenced(poses: PoseFunction, designs: Array, angles: Angles, wanted: fro
     Along the direction of the imaginary parts; measured, its relative error is about 1e-9.
     """
     steps = [np.abs(x.imag) / np.maximum(np.abs(x.real), 1e-3) for x in (designs, angles.cos, angles.sin)]
+    # An interval's variable may move where no cosine does; near 0 an angle is small against a turn, not against itself.
+    steps.append(np.abs(angles.phi.imag) / np.maximum(np.abs(angles.phi.real), 1.0))
     t = DIFFERENCE / max(max(float(x.max(initial=0.0)) for x in steps), 1e-300)
 
     # All three at once: a search asks for a few poses at a time, of which a call costs more than they do.
     shape = len(designs), angles.cos.shape[1]
     moves = (0.0, t, -t)
     x = np.concatenate([designs.real + move * designs.imag for move in moves])
-    turned = (np.concatenate([np.broadcast_to(z.real + move * z.imag, shape) for move in moves]) for z in angles)
-    found = poses(x, Angles(*turned), wanted)
+    if len(angles.phi) > 1 or any(map(np.iscomplexobj, angles)):  # a march takes one row, which all designs share
+        angles = Angles(
+            *(np.concatenate([np.broadcast_to(z.real + move * z.imag, shape) for move in moves]) for z in angles)
+        )
+    found = poses(x, angles, wanted)
     columns: Columns = {"status": found["status"][: shape[0]]}
     for name in wanted:
         here, ahead, behind = np.asarray(found[name], np.float64).reshape(3, *shape)

@@ -31,7 +31,8 @@ def grid_best(problem, objective, limits):
     pairs = [(b, f) for b in np.linspace(85.0, 105.0, 9) for f in np.linspace(4.0, 20.0, 9)]
     matrix = problem.rows(np.array(pairs), branch=1.0)
     columns = design_outputs(problem.family, matrix, [objective, *(x.output for x in limits)], Accuracy(target=1e-8))
-    kept = np.logical_and.reduce([columns[x.output] <= x.maximum for x in limits])
+    # Where the best of the objective is the best of the limit too, a limit between both is theirs to rounding.
+    kept = np.logical_and.reduce([columns[x.output] <= x.maximum * (1.0 + 1e-12) for x in limits])
     assert kept.any()
     return np.min(columns[objective][kept])
 

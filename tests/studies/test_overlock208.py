@@ -51,6 +51,9 @@ def test_recorded_head_keeps_every_limit_and_has_its_outputs(study):
         for limit in study.limits
     ]
     assert refusals(loose, found) == []
+    head = dict(study.space.fixed) | RECORD["design"]  # with masses and flywheel, by which the shaft turns unevenly
+    sews = sweep.summarise(study.bare, head, list(RECORD["sews"]), accuracy=1e-9).iloc[0]
+    assert sews["status"] == 0 and sews[list(RECORD["sews"])].to_dict() == pytest.approx(RECORD["sews"], rel=1e-6)
 
 
 def test_recorded_head_has_all_moments_in_its_cyclogram(study):

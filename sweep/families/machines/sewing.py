@@ -78,8 +78,9 @@ class Sewing:
         return first[0], last[0]
 
     def needs(self, wanted: frozenset[str]) -> frozenset[str]:
-        """Poses give nothing of it."""
-        return frozenset()
+        """Return what the speeds of an uneven shaft are made of: poses give nothing of it."""
+        shaft = self.shaft
+        return frozenset() if shaft is None else shaft.needs(frozenset(o.name for o in shaft.numbers))
 
     def compute(self, found: Mapping[str, Any], frames: Mapping[str, Frame], wanted: frozenset[str]) -> dict[str, Any]:
         """Poses give nothing of it."""
