@@ -3,6 +3,10 @@
 Polukhin 1971, (15)-(17), with his misprints corrected.  Only the direction of the coupler force enters: its in-plane
 part P has the tangential and radial shares cos(theta1), sin(theta1), and ``axial`` = sin(theta1) tan(theta2) is the
 axial force in units of P.  The product stays finite where theta2 does not, which is where there is no radial force.
+
+The matrix of a rolling bearing has eleven columns: radius c of the ball joint on the rocker, supports z1 and z2 along
+the shaft's axis, rotation factor V, radial factor X, axial factor Y, e, life exponent (3 for balls, 10/3 for rollers),
+dynamic load rating C_dyn, shock factor K_b, and 1 or 2 for the support that takes the axial force.
 """
 
 from __future__ import annotations
@@ -30,11 +34,6 @@ class Sliding(NamedTuple):
     kj: float  # journal factor: 1 point contact, 4/pi run-in, pi/2 new
     rt: float
     mu: float
-
-
-# Columns of the rolling-bearing matrix: radius c of the ball joint on the rocker, supports z1 and z2 along the rocker
-# axis, rotation factor V, radial factor X, axial factor Y, e, life exponent (3 for balls, 10/3 for rollers), C_dyn,
-# shock factor K_b, and 1 or 2 for the support that takes the axial force.
 
 
 class Criteria(NamedTuple):
@@ -142,7 +141,7 @@ def rolling_bearings(
     ----------
     t_tau, t_rho, t_k : (n, m) components of the coupler direction at the rocker
     moment : (n,) resisting torque on the rocker
-    bearings : (n, 11), see above
+    bearings : (n, 11), matrix of the rolling bearings, as at the head of this file
     status : (n, m), in and out; JAMMED at cos(theta1) <= 0
     out : (4, n, m); equivalent loads and lives of both bearings
     """
@@ -188,7 +187,7 @@ def bearing_loads(
     ----------
     forces : (n, m, F) joint reactions;  force, moment : columns of the force on the shaft and of its moment
     axis : (n, m or 1, 3) axis of the shaft
-    bearings : (n, 11), see the head of this file; c is not read
+    bearings : (n, 11), matrix of the rolling bearings, as at the head of this file; c is not read
     status : (n, m), in; nan where it is not OK
     out : (5, n, m); radial loads of both, axial load, equivalent loads of both
     """

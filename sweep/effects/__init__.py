@@ -273,12 +273,8 @@ def _asked(machine: Machine, wanted: Iterable[str]) -> set[str]:
     names |= {about for name in places for about in reduced(name, machine.domain)}
     names |= {timing.of.name for timing in asked if isinstance(timing, EventValue)}
     for relation in machine.relations:
-        own = {o.name for o in relation.outputs}
-        if isinstance(relation, ShaftTorque | Shaking):
-            own |= {o.name for o in relation.numbers}
-        elif isinstance(relation, Sewing):
-            own |= relation.numbers.keys()
-        if not names.isdisjoint(own):
+        numbers = relation.numbers if isinstance(relation, ShaftTorque | Shaking | Sewing) else ()
+        if not names.isdisjoint(o.name for o in (*relation.outputs, *numbers)):
             names |= relation.needs(frozenset(names))
     return names
 

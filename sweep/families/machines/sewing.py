@@ -58,8 +58,18 @@ class Sewing:
     parameters: tuple[Parameter, ...] = ()
 
     @property
-    def numbers(self) -> Mapping[str, tuple[str, int]]:
-        """Design outputs of each speed: names with what is to spare, "" for the least of all, and the speed's place."""
+    def numbers(self) -> tuple[Output, ...]:
+        """Design outputs: what is to spare at each speed."""
+        moments = ", ".join((self.taking.name, *(one.name for one in self.entering)))
+        texts = ENDS | {"": f"least room of moments {moments}"}
+        return tuple(
+            Output(name, "length", f"{texts[part]} at {self.speeds[k] / RPM:.6g} rpm; negative: it does not sew", "5.4")
+            for name, (part, k) in self.readings.items()
+        )
+
+    @property
+    def readings(self) -> Mapping[str, tuple[str, int]]:
+        """Of each design output what it tells, "" for the least room of all moments, and the place of its speed."""
         return {
             f"{self.name}_{part}{'_' if part else ''}at_{speed / RPM:.6g}": (part, k)
             for part in ("", *ENDS)
@@ -181,12 +191,6 @@ class Sewing:
 
 def sewing_step(sewing: Sewing, machine: Machine) -> Step:
     """Return the machine's route to the least room of all moments at each speed."""
-    moments = ", ".join((sewing.taking.name, *(one.name for one in sewing.entering)))
-    texts = ENDS | {"": f"least room of moments {moments}"}
-    provides = tuple(
-        Output(name, "length", f"{texts[part]} at {sewing.speeds[k] / RPM:.6g} rpm; negative: it does not sew", "5.4")
-        for name, (part, k) in sewing.numbers.items()
-    )
 
     def run(designs: Array, wanted: frozenset[str], accuracy: Accuracy) -> Columns:
         rooms, status = sewing.rooms(machine, designs, np.array(sewing.speeds), accuracy)
@@ -196,9 +200,9 @@ def sewing_step(sewing: Sewing, machine: Machine) -> Step:
         # lengths that the rooms are differences of
         most = sewing.window(machine, designs, np.array(sewing.speeds))[1].max(axis=1)
         columns: Columns = {}
-        for name, (part, k) in sewing.numbers.items():
+        for name, (part, k) in sewing.readings.items():
             room = rooms[sewing.ends.get(part, "")][:, k]
             columns |= {name: room, f"err_{name}": (np.abs(room) + most) * (accuracy.target or 0.0)}
         return columns | {"status": status}
 
-    return Step(f"sewing {sewing.name}", provides, run, work=Work.LONG, cost=lambda accuracy: 3e6)
+    return Step(f"sewing {sewing.name}", sewing.numbers, run, work=Work.LONG, cost=lambda accuracy: 3e6)
