@@ -66,6 +66,18 @@ def rack_height(path: Array, j: int, s: float) -> tuple[float, float, float]:
 
 
 @inline
+def extremes(rack: Array) -> tuple[bool, int, float, float]:
+    """Whether the rack's heights are numbers, the node where it is lowest, its greatest speed and height."""
+    known, lowest, quickest, highest = True, 0, 0.0, 0.0
+    for j in range(rack.shape[1]):
+        known = known and abs(rack[0, j]) < math.inf
+        quickest, highest = max(quickest, abs(rack[1, j])), max(highest, rack[0, j])
+        if rack[0, j] < rack[0, lowest]:
+            lowest = j
+    return known, lowest, quickest, highest
+
+
+@inline
 def _along(path: Array, j: int, s: float) -> float:
     """Place of the rack along the feed in cell j at the share s."""
     n = path.shape[1]
@@ -202,6 +214,15 @@ def _above(path: Array, foot: Foot, state: State, j: int, low: float, high: floa
 
 
 @inline
+def note(tally: Array, phi: float, mode: int) -> None:
+    """Write down what the foot does from a crank angle on, while there is room: behind the sums of the turn."""
+    k = 10 + 2 * int(tally[9])
+    tally[9] += 1.0
+    if k < tally.size:
+        tally[k], tally[k + 1] = phi, mode
+
+
+@inline
 def _record(tally: Array, path: Array, foot: Foot, state: State, j: int, low: float, high: float) -> None:
     """Add a piece of a cell to the sums of the turn: travel, and what is lost of it in flight."""
     angle, way = _above(path, foot, state, j, low, high)
@@ -236,5 +257,6 @@ def march_cell(path: Array, foot: Foot, state: State, j: int, tally: Array) -> t
             tally[0] += 1.0
             if math.isnan(tally[1]):
                 tally[1] = phi
+        note(tally, phi, following.mode)
         state, s = following, at
     return state, False

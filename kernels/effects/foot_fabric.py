@@ -13,11 +13,11 @@ from typing import NamedTuple
 import numpy as np
 
 from kernels import status as st
-from kernels.effects.foot import FLIGHT, PLATE, RACK, Foot, State, flown, held, march_cell, rack_height
+from kernels.effects.foot import FLIGHT, PLATE, RACK, Foot, State, extremes, flown, held, march_cell, note, rack_height
 from kernels.jit import inline, kernel
 from kernels.types import TWO_PI, Array, Status
 
-LYING = 1  # in place of PLATE and RACK
+LYING = 3  # in place of PLATE and RACK
 TERMS = 22  # of the power series: over a radian the next one is below 2^-53
 PARTS = 4  # of a cell at least
 MOST_PARTS = 4096  # of a cell: a fabric so stiff that it swings 650 times within a five-hundredth of a turn
@@ -166,11 +166,13 @@ def _stretch(
         tally[0] += 1.0
         if math.isnan(tally[1]):
             tally[1] = phi
+        note(tally, phi, FLIGHT)
         return State(FLIGHT, phi, y, v, phi), end
     _, slope = _value(ground, 6, end)
     tally[6] = max(tally[6], slope / piece.angle - v)
     if not math.isnan(tally[1]) and math.isnan(tally[2]):
         tally[2] = phi
+    note(tally, phi, LYING)
     return State(LYING, phi, y, v, phi), end
 
 
@@ -228,18 +230,6 @@ def _borne(path: Array, node: int, foot: Foot, fabric: Fabric, state: State, phi
 
 
 @inline
-def _extremes(rack: Array) -> tuple[bool, int, float, float]:
-    """Whether the rack's heights are numbers, the node where it is lowest, its greatest speed and height."""
-    known, lowest, quickest, highest = True, 0, 0.0, 0.0
-    for j in range(rack.shape[1]):
-        known = known and abs(rack[0, j]) < math.inf
-        quickest, highest = max(quickest, abs(rack[1, j])), max(highest, rack[0, j])
-        if rack[0, j] < rack[0, lowest]:
-            lowest = j
-    return known, lowest, quickest, highest
-
-
-@inline
 def _written(outputs: Array, i: int, tally: Array, foot: Array, most: float, settled: bool) -> None:
     """Write what the last turn has told of a foot, in the order of :data:`kernels.effects.foot.OUTPUTS`."""
     mass, speed, restitution, rigid = foot[0], foot[3], foot[4], foot[5] == 0.0 and foot[6] == 0.0
@@ -267,7 +257,9 @@ def _checked(feet: Array, known: bool, lowest: float) -> int:
 
 
 @kernel
-def march(path: Array, feet: Array, turns: int, status: Status, outputs: Array, heights: Array, forces: Array) -> None:
+def march(
+    path: Array, feet: Array, turns: int, status: Status, outputs: Array, heights: Array, forces: Array, changes: Array
+) -> None:
     """March feet over their racks for some turns and keep the last one; (4)-(16) of docs/foot.md.
 
     Parameters
@@ -284,19 +276,21 @@ def march(path: Array, feet: Array, turns: int, status: Status, outputs: Array, 
         force of the fabric while the rack stands above the plate
     heights, forces : (n, N) out; height of the foot and force between it and rack or plate at every node.  On fabric
         heights count from the unpressed fabric on the plate, so a foot that lies is below 0
+    changes : (n, 1 + 2 k) out; how often the foot begins something else in the last turn, then of the first k times the
+        crank angle, counted on over all turns, and what it does from there: PLATE, RACK, FLIGHT or LYING
 
     Notes
     -----
     A bounce with less than 1e-9 of the greatest speed of the rack is taken for the last.
     """
-    tally, work = np.empty(9), np.empty((3, TERMS))
+    tally, work = np.empty(9 + changes.shape[1]), np.empty((3, TERMS))
     for i in range(path.shape[0]):
         rack, count = path[i], path.shape[2]
         mass, stiffness, preload, speed, restitution = feet[i, 0], feet[i, 1], feet[i, 2], feet[i, 3], feet[i, 4]
         soft, damping = feet[i, 5], feet[i, 6]
         rigid, step, unit = soft == 0.0 and damping == 0.0, TWO_PI / count, mass * speed * speed
-        outputs[:, i], heights[i, :], forces[i, :] = math.nan, math.nan, math.nan
-        known, lowest, quickest, highest = _extremes(rack)
+        outputs[:, i], heights[i, :], forces[i, :], changes[i, :] = math.nan, math.nan, math.nan, math.nan
+        known, lowest, quickest, highest = extremes(rack)
         status[i] = _checked(feet[i], known, rack[0, lowest])
         if status[i] != st.OK:
             continue
@@ -345,3 +339,4 @@ def march(path: Array, feet: Array, turns: int, status: Status, outputs: Array, 
             left = moved / (1.0 - moved / before) if moved < before < math.inf else math.inf
             settled = settled and (moved <= ROUNDING * size or left <= ALIKE * size)
         _written(outputs, i, tally, feet[i], most, settled)
+        changes[i, :] = tally[9:]

@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from kernels.types import Array, Numbers
-from sweep.families.base import Angles, Columns
+from sweep.families.base import Angles, Columns, Output
 
 if TYPE_CHECKING:  # families without such kernels do not wait for them
     from kernels.chains.form import Form
@@ -216,6 +216,21 @@ class ToolPoint:
 
     point: DesignMap
     direction: DesignMap | None = None
+
+
+@dataclass(frozen=True)
+class PresserFoot:
+    """A presser foot that a rack lifts: the march over its turns that tells what it does.
+
+    ``march(designs, nodes)`` returns the columns of ``outputs``, ``status`` and the ``changes`` of
+    :func:`kernels.effects.foot_fabric.march`; the path of the rack, heights and forces of the foot at so many equal
+    crank angles, ``nodes`` where nobody asks for others.  On a feed mechanism it takes a sense besides: a crank that
+    turns backwards has the sense -1, and its angles are counted as it turns.
+    """
+
+    march: Callable[..., tuple[Columns, Array, Array, Array]]
+    nodes: int
+    outputs: tuple[Output, ...]
 
 
 @dataclass(frozen=True)

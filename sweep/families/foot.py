@@ -17,7 +17,7 @@ from kernels.status import NO_EVENT, OK
 from kernels.types import Array
 from sweep.families import feed
 from sweep.families.base import Accuracy, Angles, Columns, Family, March, Output, Parameter, Step, Work
-from sweep.families.capabilities import Fixed, Link, Made, Skeleton
+from sweep.families.capabilities import Fixed, Link, Made, PresserFoot, Skeleton
 from sweep.families.poses import guarded
 from sweep.families.skeletons import Y as UPWARDS
 from sweep.families.skeletons import parameter, standing
@@ -85,23 +85,25 @@ EVENT_OUTPUTS = (
 
 TURNS = 4
 NODES = 720
+CHANGES = 128  # of what a foot does in a turn that are told: bounces with a restitution of 0.7 need as many
 FEET = [0, 1, 2, 3, 6, 8, 9]  # columns of what the march takes
 
 
 def marched(path: Array, feet: Array) -> tuple[Columns, Array, Array]:
-    """Events, status and the heights and forces at the nodes of the last turn.
+    """Events, changes and status, and the heights and forces at the nodes of the last turn.
 
     ``feet`` (n, 7) are mass, spring, preload, speed, restitution, stiffness and damping of the fabric.
     """
     n = len(path)
     status, values = np.empty(n, np.uint8), np.empty((len(_EVENTS), n))
     heights, forces = np.empty((n, path.shape[2])), np.empty((n, path.shape[2]))
-    march(path, np.ascontiguousarray(feet), TURNS, status, values, heights, forces)
+    changes = np.empty((n, 1 + 2 * CHANGES))
+    march(path, np.ascontiguousarray(feet), TURNS, status, values, heights, forces, changes)
     columns: dict[str, Array] = dict(zip(_EVENTS, values, strict=True))
     travel = columns.pop("travel")
     with np.errstate(all="ignore"):
         columns["stitch_error"] = np.where(travel != 0.0, columns["lost_travel"] / travel, np.nan)
-    return columns | {"status": status}, heights, forces
+    return columns | {"changes": changes, "status": status}, heights, forces
 
 
 def nodes_for(poses: int) -> tuple[int, int]:
@@ -205,6 +207,7 @@ FAMILY = Family(
     example=EXAMPLE,
     analytic=False,
     capabilities=(
+        PresserFoot(on_rack, NODES, EVENT_OUTPUTS),
         Skeleton(
             {"d": standing(PARAMETERS, axis=UPWARDS, kind="slide")},
             (Link("foot", ("p",)), Link("rack", ("t",))),
@@ -221,22 +224,23 @@ _PLATE = feed.FAMILY.parameter_names.index("y_plate")
 _ROWS = [_RACK.index(name) for name in ("y_t", "dy_t", "d2y_t", "x_t", "dx_t", "d2x_t")]
 
 
-def feed_path(designs: Array, nodes: int) -> tuple[Array, np.ndarray]:
+def feed_path(designs: Array, nodes: int, sense: int = 1) -> tuple[Array, np.ndarray]:
     """Compute the tooth's path above the plate at equal crank angles, (n, 6, nodes), and the linkage's status."""
-    phi = np.arange(nodes)[None, :] * (2.0 * np.pi / nodes)
+    phi = np.arange(nodes)[None, :] * (2.0 * np.pi / nodes) * sense
     rack = np.ascontiguousarray(designs[:, :_RACK_COLUMNS])
     status, outputs = np.empty((len(designs), nodes), np.uint8), np.empty((len(_RACK), len(designs), nodes))
     feed_kernels.poses(rack, np.cos(phi), np.sin(phi), status, outputs)
     path = np.ascontiguousarray(outputs[_ROWS].transpose(1, 0, 2))
     path[:, 0] -= rack[:, _PLATE, None]
+    path[:, [1, 4]] *= sense
     # the first pose that is not ok speaks for the turn
     worst = np.take_along_axis(status, np.argmax(status != 0, axis=1)[:, None], axis=1)[:, 0]
     return path, worst
 
 
-def on_feed(designs: Array, nodes: int) -> Marched:
-    """As :func:`on_rack`, on the rack of a feed mechanism."""
-    path, linkage = feed_path(designs, nodes)
+def on_feed(designs: Array, nodes: int, sense: int = 1) -> Marched:
+    """As :func:`on_rack`, on the rack of a feed mechanism; for a crank that turns backwards, by minus its angle."""
+    path, linkage = feed_path(designs, nodes, sense)
     columns, heights, forces = marched(path, designs[:, _FEET])
     # A rack that is not assembled has no path: the linkage's status stands for what the march found invalid.
     columns["status"] = np.where(linkage != 0, linkage, columns["status"]).astype(np.uint8)
@@ -319,6 +323,7 @@ ON_FEED = Family(
     analytic=False,
     capabilities=(
         feed.SIZES,
+        PresserFoot(on_feed, NODES, EVENT_OUTPUTS),
         Skeleton(
             dict(feed.SKELETON.fixed) | {"plate": Fixed(plate, standing(FEED_PARAMETERS, axis=UPWARDS).axis, "slide")},
             (*feed.SKELETON.links, Link("foot", ("p",))),

@@ -49,7 +49,7 @@ def marched(p: dict[str, float], turns: int) -> tuple[int, np.ndarray, np.ndarra
     feet = np.array([[p[name] for name in ("m", "k", "F0", "omega", "restitution", "kf", "cf")]])
     status, outputs = np.empty(1, np.uint8), np.empty((11, 1))
     heights, forces = np.empty((1, NODES)), np.empty((1, NODES))
-    march(path_of(table, NODES), feet, turns, status, outputs, heights, forces)
+    march(path_of(table, NODES), feet, turns, status, outputs, heights, forces, np.empty((1, 257)))
     return int(status[0]), heights[0], forces[0]
 
 
@@ -141,7 +141,7 @@ def test_march_jitted_equals_plain() -> None:
     feet = np.array([[p[name] for name in ("m", "k", "F0", "omega", "restitution", "kf", "cf")]])
     path, results = path_of(table, 96), []
     for function in (march, march.py_func):
-        room = np.empty(1, np.uint8), np.empty((11, 1)), np.empty((1, 96)), np.empty((1, 96))
+        room = np.empty(1, np.uint8), np.empty((11, 1)), np.empty((1, 96)), np.empty((1, 96)), np.zeros((1, 257))
         function(path, feet, 1, *room)
         results.append(room)
     for one, other in zip(*results, strict=True):
@@ -153,7 +153,7 @@ def last_turn(p: dict[str, float], turns: int) -> dict[str, float]:
     table = np.array([[p[name] for name in ("m", "k", "F0", "omega", "Y", "p", "restitution", "X")]])
     feet = np.array([[p[name] for name in ("m", "k", "F0", "omega", "restitution", "kf", "cf")]])
     status, outputs = np.empty(1, np.uint8), np.empty((11, 1))
-    room = np.empty((1, NODES)), np.empty((1, NODES))
+    room = np.empty((1, NODES)), np.empty((1, NODES)), np.empty((1, 257))
     march(path_of(table, NODES), feet, turns, status, outputs, *room)
     assert status[0] == st.OK
     return dict(zip(OUTPUTS, outputs[:, 0], strict=True))

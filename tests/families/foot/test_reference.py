@@ -69,7 +69,7 @@ def test_foot_first_landing_of_the_march_is_the_time_of_the_closed_form():
         table = {name: [row["inputs"].get(name, 0.0)] for name in NAMES}
         designs = np.array([[table[name][0] for name in NAMES]])
         path, outputs, status = path_of(designs, NODES), np.empty((11, 1)), np.empty(1, np.uint8)
-        room = [np.empty((1, NODES)) for _ in range(2)]
+        room = [np.empty((1, size)) for size in (NODES, NODES, 257)]
         foot_fabric.march(path, rigid(designs), 1, status, outputs, *room)
         events = dict(zip(effect.OUTPUTS, outputs[:, 0], strict=True))
         flight = (events["phi_land"] - events["phi_loss"]) % (2.0 * math.pi)
@@ -206,9 +206,9 @@ def test_foot_jitted_equals_plain():
         status, closed, path = np.empty(3, np.uint8), np.empty((10, 3)), np.empty((3, 6, 96))
         call(foot.closed_forms)(designs, status, closed)
         call(foot.rack_path)(designs, path)
-        events, heights, forces = np.empty((11, 3)), np.empty((3, 96)), np.empty((3, 96))
-        call(foot_fabric.march)(path, rigid(designs), 2, status, events, heights, forces)
-        results.append((closed, path, events, heights, forces, status))
+        room = [np.empty(shape) for shape in ((11, 3), (3, 96), (3, 96), (3, 257))]
+        call(foot_fabric.march)(path, rigid(designs), 2, status, *room)
+        results.append((closed, path, *room, status))
     for one, two in zip(*results, strict=True):
         np.testing.assert_allclose(one, two, rtol=1e-12)
 
