@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from kernels.effects.foot import FLIGHT, PLATE, RACK, rack_height
 from kernels.types import TWO_PI, Array
 from sweep.errors import InputError
 from sweep.evaluation.angles import AngleUnit, in_radians
@@ -14,11 +15,14 @@ from sweep.evaluation.summaries import design_outputs
 from sweep.evaluation.tables import one_design
 from sweep.families import Mechanism
 from sweep.families import family as find_family
-from sweep.families.base import Accuracy, Family
+from sweep.families.base import Accuracy, Columns, Family, March
+from sweep.families.capabilities import PresserFoot
 from sweep.families.machines.crossings import SAMPLES, Poses
 from sweep.families.machines.machine import Machine
 from sweep.families.machines.moments import Taking
+from sweep.families.machines.pressing import Pressing
 from sweep.families.machines.triangles import Entering
+from sweep.numerics.events import zeros
 from sweep.quantities.resolve import event_names
 
 if TYPE_CHECKING:
@@ -27,6 +31,8 @@ if TYPE_CHECKING:
     from sweep.evaluation.tables import Table
 
 Row = tuple[str, str, str, float, float, float]
+AWAY = {PLATE: ("dwell", "low", 0.0), FLIGHT: ("flight", "flies", float("nan"))}  # what a foot does off the rack
+FLIGHT_ENDS = ("loss", "land")  # of a presser foot's first flight
 COLUMNS = ("member", "kind", "name", "start", "end", "size")
 UNITS = {"start": "rad", "end": "rad", "size": "length, or rad of a follower that turns"}
 
@@ -45,10 +51,11 @@ def cyclogram(
     Returns
     -------
     DataFrame
-        ``member`` ("" for what belongs to several), ``kind`` (stroke, dwell, event), ``name``, ``start`` and ``end``
-        (crank angles of the main shaft [rad]; an end below its start lies in the next turn), ``size`` (the way of the
-        follower with its sign; of a dwell its band; nan of an event).  A member that turns fully has no strokes.
-        ``attrs["units"]`` names the units
+        ``member`` ("" for what belongs to several), ``kind`` (stroke, dwell, flight, event), ``name``, ``start`` and
+        ``end`` (crank angles of the main shaft [rad]; an end below its start lies in the next turn), ``size`` (the way
+        of the follower with its sign; of a dwell its band; nan of a flight and an event).  A member that turns fully
+        has no strokes.  A presser foot has the strokes in which it follows the rack, its dwell on the plate, and its
+        flights; none of them where its turns differ.  ``attrs["units"]`` names the units
 
     Examples
     --------
@@ -64,6 +71,7 @@ def cyclogram(
         raise InputError("dwell", dwell, "a share of the stroke between 0 and 0.5", "cyclogram")
     poses = Poses(family, family.precise(), designs)
     rows = [row for member, name in _positions(family) for row in _strokes(poses, family, member, name, dwell)]
+    rows += [row for foot in _feet(family, designs) for row in _pieces(*foot)]
     rows += _events(family, designs)
     found = pd.DataFrame(rows, columns=list(COLUMNS))
     found = found.sort_values(["start", "kind"], kind="stable", ignore_index=True)
@@ -126,17 +134,65 @@ def _left(off: Callable[[float], float], phi: float, way: float) -> float:
     return float(brentq(off, inside, inside + step)) if abs(inside - phi) < TWO_PI else inside
 
 
+def _feet(family: Family, designs: Array) -> Iterator[tuple[str, Columns, Array, float]]:
+    """Yield each presser foot: its name, what its march tells, the path of its rack, its angle at that of 0."""
+    for alone in family.every(PresserFoot):
+        columns, path, _, _ = alone.march(designs, alone.nodes)
+        yield "", columns, path[0], 0.0
+    for foot in _pressings(family):
+        assert isinstance(family, Machine)
+        columns, path, ahead = foot.marched(family, designs, foot.foot.nodes)
+        yield foot.name, columns, path[0], float(ahead[0])
+
+
+def _pressings(family: Family) -> list[Pressing]:
+    return [r for r in getattr(family, "relations", ()) if isinstance(r, Pressing)]
+
+
+def _pieces(member: str, columns: Columns, path: Array, ahead: float) -> Iterator[Row]:
+    """Yield what a foot whose turns are alike does from one change to the next; on the rack from top to top.
+
+    On fabric it follows nothing that is known as exactly: its flights alone are told.
+    """
+    changes = np.asarray(columns["changes"], np.float64)[0]
+    if columns["status"][0] or not columns["settled"][0] or changes[0] > changes[1:].size // 2:
+        return
+    begins, modes = changes[1 : 1 + 2 * int(changes[0])].reshape(-1, 2).T
+    slope, step = path[1], TWO_PI / path.shape[1]
+    k = np.flatnonzero((slope > 0.0) & (np.roll(slope, -1) <= 0.0) | (slope < 0.0) & (np.roll(slope, -1) >= 0.0))
+    turns = zeros(lambda _, phi: _rack(path, phi)[1], k * step, (k + 1) * step)
+    for begin, end, mode in zip(begins, np.roll(begins, -1), modes, strict=True):
+        lasts, tops = (end - begin) % TWO_PI, np.sort((turns - begin) % TWO_PI)
+        cuts = begin + np.array([0.0, *tops[(mode == RACK) & (tops > 0.0) & (tops < lasts)], lasts])
+        for start, stop, way in zip(cuts, cuts[1:], np.diff(_rack(path, cuts)[0]), strict=False):
+            stroke = ("stroke", "rises" if way > 0.0 else "falls", float(way))
+            if mode in AWAY or mode == RACK:
+                kind, name, size = AWAY.get(int(mode), stroke)
+                yield member, kind, name, (start - ahead) % TWO_PI, (stop - ahead) % TWO_PI, size
+
+
+def _rack(path: Array, phi: Array) -> Array:
+    """Height of a rack's path (6, N) and its slope at crank angles (k,), (2, k)."""
+    cells = np.mod(phi, TWO_PI) * (path.shape[1] / TWO_PI)
+    return np.array([rack_height(path, int(x), x % 1.0)[:2] for x in cells]).reshape(-1, 2).T
+
+
 def event_angles(family: Family) -> dict[str, str]:
     """Return the output that is the crank angle of each event and moment, by its name in the cyclogram."""
     names = {event.name: event_names(family, event)[0] for event in family.events}
     relations: tuple[Any, ...] = getattr(family, "relations", ())
-    return names | {r.name: f"phi_{r.name}" for r in relations if isinstance(r, Taking | Entering)}
+    names |= {r.name: f"phi_{r.name}" for r in relations if isinstance(r, Taking | Entering)}
+    if family.find(PresserFoot) is not None:
+        names |= {end: f"phi_{end}" for end in FLIGHT_ENDS}
+    feet = [f"{foot.name}_{end}" for foot in _pressings(family) for end in FLIGHT_ENDS]
+    return names | {name: f"phi_{name}" for name in feet}
 
 
 def _events(family: Family, designs: Array) -> Iterator[Row]:
     """Yield the moments and events of the machine that happen."""
+    accuracy = Accuracy(samples=SAMPLES) if isinstance(family.domain, March) else Accuracy(target=1e-9)
     for name, place in event_angles(family).items():
-        found = design_outputs(family, designs, [place], Accuracy(target=1e-9))
+        found = design_outputs(family, designs, [place], accuracy)
         phi = float(np.asarray(found[place], np.float64)[0])
         if np.isfinite(phi):
             yield "", "event", name, phi, phi, float("nan")

@@ -117,7 +117,7 @@ def machine(
     relations : by name, each one of ``{"distance": [point, point]}``, ``{"timing": [crank angle, crank angle]}``,
         ``{"speed": [point]}`` or of the second of two points relative to the first, ``{"torque": [member, ...]}``,
         ``{"shaking": [member, ...]}``, ``{"event": pose output, "level": number, "rising": true or false}``,
-        ``{"thread": [point, take-up, ...], "stock": length, ...}`` (docs/thread.md, section 7)
+        ``{"thread": [point, take-up, ...], "stock": length, ...}`` (docs/thread.md, section 7), ``{"press": member}``
     shafts : by name, each ``at``, ``axis``, ``zero`` and, but for ``main``, ``ratio`` and ``phase``; a member then
         names its ``shaft`` with ``sense``, ``shift``, ``turn`` and ``key`` instead of its place (docs/machines.md)
     tools : by name, each a needle or a blade (docs/stitch.md), for ``{"gap": [body, body]}`` and

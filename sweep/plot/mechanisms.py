@@ -35,10 +35,11 @@ if TYPE_CHECKING:
 
 TURN = 360.0
 BAR, THIN = 0.5, 0.16  # heights of strokes and dwells, a row being 1
+FILLS = {"rises": OPTIMUM, "falls": "#a9c1df", "flies": "none", "low": QUIET, "high": QUIET}
 
 
 def cyclogram_figure(rows: pd.DataFrame, made: Mapping[str, tuple[float, float]]) -> Figure:
-    """Draw a cyclogram over one turn of the main shaft: rising strokes dark, falling ones light, dwells beneath.
+    """Draw a cyclogram over one turn: rising strokes dark, falling ones light, flights hatched, dwells beneath.
 
     Events are lines; a band about one shows between which angles [deg] ``made`` what is made has it.
     """
@@ -52,11 +53,10 @@ def cyclogram_figure(rows: pd.DataFrame, made: Mapping[str, tuple[float, float]]
             continue
         height = len(members) - 1 - members.index(member)
         start, length = math.degrees(begin), math.degrees(end - begin) % TURN
-        stroke = kind == "stroke"
-        colour = (OPTIMUM if name == "rises" else "#a9c1df") if stroke else QUIET
-        bottom = height - 0.5 * BAR if stroke else height - 0.5 * BAR - THIN - 0.04
+        bottom, high = (height - 0.5 * BAR - THIN - 0.04, THIN) if kind == "dwell" else (height - 0.5 * BAR, BAR)
         pieces = [(start, min(length, TURN - start)), (0.0, max(start + length - TURN, 0.0))]
-        axes.broken_barh(pieces, (bottom, BAR if stroke else THIN), color=colour, linewidth=0, zorder=2)
+        bars = axes.broken_barh(pieces, (bottom, high), facecolor=FILLS[name], linewidth=0, zorder=2)
+        bars.set(edgecolor=LIMIT, hatch="/////" if kind == "flight" else None)
     _events(axes, events, len(members), made)
     axes.set_yticks(range(len(members)), members[::-1])
     axes.set_ylim(-0.6, len(members) - 0.3 + 0.34 * len(events))
@@ -70,13 +70,14 @@ def _events(axes: Axes, events: pd.DataFrame, rows: int, made: Mapping[str, tupl
     for k, (name, start) in enumerate(named):
         phi, height = math.degrees(start), rows - 0.35 + 0.34 * k
         axes.plot([phi, phi], [-0.6, height], color=LIMIT, linewidth=1.0, zorder=3)
-        right = phi > 0.75 * TURN
         words = f"{name} {phi:.1f}°"
         if name in made:
             low, high = made[name]
             axes.fill_betweenx([-0.6, height], low, high, color=LIMIT, alpha=0.3, linewidth=0, zorder=1)
             words += f" ({low:.2f} to {high:.2f}°)"
-        axes.text(phi - 3 if right else phi + 3, height, words, ha="right" if right else "left", va="top", fontsize=8)
+        side, place = ("right", phi - 3) if phi > 0.75 * TURN else ("left", phi + 3)
+        clear = {"facecolor": "white", "edgecolor": "none", "pad": 0.5}  # lines of other events pass behind the words
+        axes.text(place, height, words, ha=side, va="top", fontsize=8, zorder=4, bbox=clear)
 
 
 POSES = 720
@@ -214,7 +215,7 @@ def cyclogram(
     Returns
     -------
     Axes
-        a row of bars for each member: rising strokes dark, falling ones light, dwells beneath, events as lines
+        a row of bars for each member: rising strokes dark, falling light, flights hatched, dwells beneath, events lines
 
     Examples
     --------

@@ -164,6 +164,7 @@ class RelationSection(Section):
         None, description='of a sew, between which the tip takes the loop, as ["0 mm", "0.1 mm"]'
     )
     shaft: str | None = Field(None, description="of a sew, a relation torque whose unevenness counts")
+    press: str | None = Field(None, description='the feed whose rack lifts the presser foot, a member, as "feed"')
 
 
 def flattened(data: Mapping[str, Any], members: object) -> dict[str, Any]:

@@ -21,6 +21,7 @@ from sweep.families.machines.happenings import event_angles, switches_of_events
 from sweep.families.machines.main_shaft import ShaftTorque, speed_of
 from sweep.families.machines.moments import Taking
 from sweep.families.machines.passages import taking_step
+from sweep.families.machines.pressing import Pressing
 from sweep.families.machines.relations import EventValue, Relation, Timing
 from sweep.families.machines.sewing import Sewing, sewing_step
 from sweep.families.machines.shaking import Shaking, orders_of
@@ -138,6 +139,7 @@ def _built(machine: Machine, members: tuple[Member, ...]) -> Machine:
     steps += [sewing_step(r, found) for r in machine.relations if isinstance(r, Sewing)]
     steps += [speed_of(r, found) for r in machine.relations if isinstance(r, ShaftTorque)]
     steps += [orders_of(r, found) for r in machine.relations if isinstance(r, Shaking)]
+    steps += [r.step(found) for r in machine.relations if isinstance(r, Pressing)]
     return replace(found, steps=tuple(steps))
 
 

@@ -18,6 +18,7 @@ from sweep.families.link_tree import LinkTree
 from sweep.families.machines.happenings import check_happenings
 from sweep.families.machines.machine import Machine, assemble
 from sweep.families.machines.main_shaft import Driven, ShaftTorque
+from sweep.families.machines.pressing import read_pressing
 from sweep.families.machines.relations import Distance, EventValue, Relation, Speed, Timing, each, two
 from sweep.families.machines.segments import Body, Gap
 from sweep.families.machines.shaking import Shaken, Shaking, shaken
@@ -39,7 +40,7 @@ from sweep.families.shafts import MOUNT_KEYS, SHAFT_KEYS, Mount, Shaft, read_mou
 MEMBER_KEYS = ("family", "chain", "ratio", "offset", "driver", "place", "tip", "eye", *MOUNT_KEYS)
 RELATION_KINDS = (
     "distance", "speed", "timing", "event", "value", "torque", "shaking", "thread", "gap", "take", "enter", "sew",
-    "above",
+    "above", "press",
 )  # fmt: skip
 EVENT_KEYS = ("event", "level", "rising")
 _WORD = re.compile(r"[A-Za-z][A-Za-z0-9_]*")
@@ -125,7 +126,9 @@ def built(given: Specification, find: FindFamily) -> Machine:
     tools = read_tools({name: dict(table) for name, table in given.tools}, members)
     plain = {name: dict(table) for name, table in given.relations if not {"event", "value"} & set(dict(table))}
     known: dict[str, Any] = {
-        name: _relation(name, table, members, tools) for name, table in plain.items() if "sew" not in table
+        name: read_pressing(name, table, members, find) if "press" in table else _relation(name, table, members, tools)
+        for name, table in plain.items()
+        if "sew" not in table
     }
     known |= {name: read_sewing(name, table, known) for name, table in plain.items() if "sew" in table}
     outputs = _outputs(members, tuple(known.values()))

@@ -1,0 +1,124 @@
+"""The presser foot of a machine: what a feed's rack does to it, by the angle of the main shaft; docs/foot.md.
+
+A foot has a history: it is marched over turns of its own, on the rack of the member alone.  So it gives no poses.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from kernels import status as st
+from kernels.types import TWO_PI, Array, Status
+from sweep.errors import InputError, choices
+from sweep.families.base import Accuracy, Columns, Family, Output, Parameter, Step, Work
+from sweep.families.capabilities import PresserFoot
+from sweep.families.frames import Frame
+from sweep.families.names import is_place
+from sweep.families.parts import Member
+
+if TYPE_CHECKING:
+    from sweep.families.machines.machine import Machine
+
+RACK, ON_RACK = "feed", "feed_foot"
+SPEED = {"omega": "speed"}  # as threads call it: the scene gives it
+
+
+@dataclass(frozen=True)
+class Pressing:
+    """A foot that the rack of a member lifts.
+
+    Parameters
+    ----------
+    name : stands before the names of parameters and outputs
+    rack : the member
+    lifted : how many parameters its family has of its own
+    foot : the march
+    parameters : of the foot
+    """
+
+    name: str
+    rack: str
+    lifted: int
+    foot: PresserFoot
+    parameters: tuple[Parameter, ...]
+
+    outputs: tuple[Output, ...] = ()
+
+    @property
+    def numbers(self) -> Mapping[str, Output]:
+        """Design outputs, by the name of each in the family of the foot alone."""
+        return {o.name: replace(o, name=self.named(o.name), text=f"{self.name}: {o.text}") for o in self.foot.outputs}
+
+    def named(self, output: str) -> str:
+        """Return the machine's name of an output of the foot: an angle is that of an event of the machine."""
+        return f"phi_{self.name}_{output.removeprefix('phi_')}" if is_place(output) else f"{self.name}_{output}"
+
+    def needs(self, wanted: frozenset[str]) -> frozenset[str]:
+        """Poses give nothing of it."""
+        return frozenset()
+
+    def compute(self, found: Mapping[str, Any], frames: Mapping[str, Frame], wanted: frozenset[str]) -> dict[str, Any]:
+        """Poses give nothing of it."""
+        return {}
+
+    def marched(self, machine: Machine, designs: Array, nodes: int) -> tuple[Columns, Array, Array]:
+        """Return what the march tells, the path of the rack, and the angle (n,) of both where the main shaft has 0."""
+        m, first = machine.member(self.rack), machine.parameter_names.index(self.parameters[0].name)
+        own = np.hstack([m.designs(designs)[:, : self.lifted], designs[:, first : first + len(self.parameters)]])
+        columns, path, _, _ = self.foot.march(own, nodes, m.ratio)
+        return columns, path, m.ratio * m.phase(designs)
+
+    def step(self, machine: Machine) -> Step:
+        """Return the machine's route to what the foot does."""
+
+        def run(designs: Array, wanted: frozenset[str], accuracy: Accuracy) -> Columns:
+            columns, _, ahead = self.marched(machine, designs, self.foot.nodes)
+            # an extremum read at nodes is off by four times as much as with twice as many, or both have the same node
+            finer = columns if accuracy.target is None else self.marched(machine, designs, 2 * self.foot.nodes)[0]
+            status: Status = np.array(columns["status"], np.uint8)
+            found: Columns = {}
+            for own, name in ((own, o.name) for own, o in self.numbers.items() if o.name in wanted):
+                value, other = (np.asarray(x[own], np.float64) for x in (columns, finer))
+                status[(status == st.OK) & np.isnan(value)] = st.NO_EVENT
+                found[name] = np.mod(value - ahead, TWO_PI) if is_place(own) else value
+                found[f"err_{name}"] = 2.0 * np.abs(value - np.nan_to_num(other, nan=np.inf))
+            return found | {"status": status}
+
+        outputs = tuple(self.numbers.values())
+        return Step(f"foot {self.name}", outputs, run, work=Work.LONG, cost=lambda accuracy: 2e6)
+
+
+def read_pressing(
+    name: str, table: Mapping[str, Any], members: Mapping[str, Member], find: Callable[[str | Sequence[str]], Family]
+) -> Pressing:
+    """Read a relation ``press``: the member whose rack lifts the foot.
+
+    Raises
+    ------
+    InputError
+        for another key, no member or one without such a rack, a rack that does not rise once per turn.
+    """
+    where, given = f"machine.relations.{name}", table["press"]
+    if len(table) != 1:
+        raise InputError(name, dict(table), "press alone", where)
+    if given not in members:
+        raise InputError("press", given, f"a member with a rack: {choices(str(given), members)}", where)
+    m = members[given]
+    if m.family.name != RACK:
+        raise InputError("press", given, f"a member of the family {RACK}; {given} is of {m.family.name}", where)
+    if m.driver is not None:
+        raise InputError("press", given, f"a rack that the main shaft drives, not {'.'.join(m.driver)}", where)
+    if m.ratio not in (1, -1):
+        raise InputError("press", given, f"a rack with ratio 1 or -1: {given} rises {abs(m.ratio)} times a turn", where)
+    alone, lifted = find(ON_RACK), len(m.family.parameters)
+    foot = alone.find(PresserFoot)
+    assert foot is not None
+    parameters = tuple(
+        replace(p, name=f"{name}_{SPEED.get(p.name, p.name)}", text=f"{name}: {p.text}")
+        for p in alone.parameters[lifted:]
+    )
+    return Pressing(name, given, lifted, foot, parameters)
