@@ -64,6 +64,15 @@ def test_recorded_head_has_all_moments_in_its_cyclogram(study):
     assert degrees["leaves"] < degrees["feeds"] and degrees["rests"] < degrees["pierces"]
     # Each loop is let go after the next thread was taken, and before the needle is lowest.
     assert degrees["c"] < degrees["drop"] < degrees["cast"] < 180.0
+    # The foot keeps contact: it leaves the plate with the feed's teeth and is back on it with them.
+    foot = rows[rows["member"] == "foot"].set_index("name")
+    assert sorted(foot.index) == ["falls", "low", "rises"]
+    assert foot.loc["low", ["start", "end"]].to_list() == pytest.approx(events[["rests", "feeds"]].to_list(), abs=1e-9)
+
+
+def test_foot_of_the_record_is_that_of_the_study_at_its_speed(study):
+    foot = {name: value for name, value in RECORD["design"].items() if name.startswith("foot_")}
+    assert len(foot) == 4 and foot == pytest.approx({name: dict(study.space.fixed)[name] for name in foot}, rel=1e-15)
 
 
 def test_take_ups_are_the_smoothest_with_room_for_another_head(study):
