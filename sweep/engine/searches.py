@@ -42,7 +42,8 @@ def stages_of(study: Study) -> tuple[str, ...]:
     if settings is not None:
         globally = settings.globally != "none"
         robust = study.tolerance is not None and study.tolerance.robust is not None
-        asked = {"global search": globally, "search": True, "tolerances": globally and robust, "robust design": robust}
+        asked = {"global search": globally, "starts": not globally, "search": True}
+        asked |= {"tolerances": globally and robust, "robust design": robust}
         asked |= {"tables": True, "proof": settings.prove is not None, "front": study.pareto is not None}
         found += [name for name, wanted in asked.items() if wanted]
     return tuple(found)

@@ -5,19 +5,22 @@ from __future__ import annotations
 import numpy as np
 
 from kernels import status as st
+from kernels.types import TWO_PI
 from sweep.families.base import Accuracy, Array, Columns, Family, Step
 from sweep.families.capabilities import Assembly
 from sweep.families.chain import Chain
 from sweep.families.names import is_flag
 from sweep.families.parts import Stage
 from sweep.quantities.kinds import Request
+from sweep.reductions import fused
 from sweep.reductions.extrema import true_extrema
-from sweep.reductions.sampling import DESIGN_STATUS, pose_columns
+from sweep.reductions.sampling import DESIGN_STATUS, Extremum, pose_columns, turn
 
 NAMES = ("rotatable", "margin", "max_pressure_angle")
 TRANSMISSION = "least_transmission_angle"
 # Smallest values are refined to this part of themselves: their sign is what matters.
 TARGET = 1e-10
+FEW = 16  # poses that show of most designs which do not turn that they do not
 
 
 def margin_suffixes(family: Family) -> tuple[str, ...]:
@@ -28,14 +31,18 @@ def margin_suffixes(family: Family) -> tuple[str, ...]:
     return tuple(loop.stage for loop in family.every(Assembly))
 
 
-def margins(family: Family, designs: Array, suffixes: tuple[str, ...], accuracy: Accuracy) -> Columns:
+def margins(
+    family: Family, designs: Array, suffixes: tuple[str, ...], accuracy: Accuracy, valued: bool = True
+) -> Columns:
     """Whether the stages turn fully, their smallest cos^2(pressure angle) and largest pressure angle over the turn.
 
     Parameters
     ----------
     family, designs : the (n, P) design matrix
     suffixes : which stages (see `margin_suffixes`); a later stage is only asked where the earlier ones turn
-    accuracy : handed to the families' own steps, which are preferred
+    accuracy : handed to the families' own steps, which are preferred; with ``samples`` the margin of what does not
+        turn is the least of so many poses, unless such a step or a fused kernel has it exactly
+    valued : whether that margin counts; if not, it is the least of few poses
 
     Returns
     -------
@@ -51,10 +58,11 @@ def margins(family: Family, designs: Array, suffixes: tuple[str, ...], accuracy:
     n = len(designs)
     columns: Columns = {}
     status = np.zeros(n, np.uint8)
+    looked = FEW if not valued else accuracy.samples or 0
     for suffix in suffixes:
         alive = np.flatnonzero(status == st.OK)
         with np.errstate(all="ignore"):  # what is no number, or leaves float64, has its status
-            part = _stage_margin(family, designs[alive], suffix, accuracy)
+            part = _stage_margin(family, designs[alive], suffix, accuracy, looked)
         status[alive] = part["status"]
         for name in NAMES:
             for key in (f"{name}{suffix}", f"err_{name}{suffix}"):
@@ -107,10 +115,10 @@ def own_step(family: Family, suffix: str, accuracy: Accuracy) -> tuple[Step, Sta
     return None
 
 
-def _stage_margin(family: Family, designs: Array, suffix: str, accuracy: Accuracy) -> Columns:
+def _stage_margin(family: Family, designs: Array, suffix: str, accuracy: Accuracy, looked: int) -> Columns:
     own = own_step(family, suffix, accuracy)
     if own is None:
-        return _from_poses(family, designs, suffix)
+        return _from_poses(family, designs, suffix, looked)
     step, stage = own
     found = step.run(stage.designs(designs) if stage else designs, frozenset(NAMES), accuracy)
     columns: Columns = {f"{name}{suffix}": found[name] for name in NAMES}
@@ -121,14 +129,18 @@ def _stage_margin(family: Family, designs: Array, suffix: str, accuracy: Accurac
     return columns | {"status": found["status"]}
 
 
-def _from_poses(family: Family, designs: Array, suffix: str) -> Columns:
-    """Margin from the family's discriminant, refined to its least value."""
+def _from_poses(family: Family, designs: Array, suffix: str, looked: int) -> Columns:
+    """Margin from the family's discriminant, refined to its least value but where ``looked`` poses tell enough."""
     designs = _unit_lengths(family, designs)
     loop = next(found for found in family.every(Assembly) if found.stage == suffix)
     discriminant, angle = loop.discriminant, loop.pressure_angle
     request = Request(discriminant, -1)
-    found, unknown = true_extrema(family, designs, [request], TARGET, anywhere=True)
-    least = found[request]
+    exactly = not looked or fused.curve_of(family, request, anywhere=True) is not None
+    least = Extremum.unknown(len(designs)) if exactly else _apart(family, designs, discriminant, looked)
+    turning, unknown = np.flatnonzero(np.isnan(least.value)), np.zeros(len(designs), np.uint8)
+    found, unknown[turning] = true_extrema(family, designs[turning], [request], TARGET, anywhere=True)
+    for column, values in zip(least, found[request], strict=True):
+        column[turning] = values
     known = np.isfinite(least.value)
     phi = np.where(known, least.phi, 0.0)[:, None]
     poses, state = pose_columns(family, designs, phi, (discriminant, angle))
@@ -151,6 +163,17 @@ def _from_poses(family: Family, designs: Array, suffix: str) -> Columns:
         f"err_max_pressure_angle{suffix}": np.where(turns, err_angle, np.nan),
         "status": status,
     }
+
+
+def _apart(family: Family, designs: Array, discriminant: str, looked: int) -> Extremum:
+    """Least discriminant among so many poses of designs whose links do not reach in one of them; nan for all others."""
+    least = Extremum.unknown(len(designs))
+    columns, status = pose_columns(family, designs, turn(looked).phi, (discriminant,))
+    values = np.where(status == st.NOT_ASSEMBLED, columns[discriminant], 0.0)
+    lowest = values.argmin(axis=1)
+    rows = np.flatnonzero(values.min(axis=1) < 0.0)
+    least.value[rows], least.phi[rows] = values[rows, lowest[rows]], lowest[rows] * (TWO_PI / looked)
+    return least
 
 
 def _unit_lengths(family: Family, designs: Array) -> Array:

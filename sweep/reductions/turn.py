@@ -27,11 +27,12 @@ def margin_group(family: Family, designs: Array, names: Sequence[str], accuracy:
     """Rotatability, margins and largest pressure angles; only the stages that the names need, all if there are none."""
     asked = [one for name in names if isinstance(one := resolve(family, name), Margin)]
     known = margin_suffixes(family)
+    valued = any(one.kind == "margin" for one in asked)
     if any("." in one.stage for one in asked):
-        return _of_members(family, designs, asked, known, accuracy)
+        return _of_members(family, designs, asked, known, accuracy, valued)
     last = max((known.index(one.stage) if one.stage else len(known) - 1 for one in asked), default=len(known) - 1)
     suffixes = known[: last + 1]
-    columns = margins(family, designs, suffixes, accuracy)
+    columns = margins(family, designs, suffixes, accuracy, valued)
     if suffixes != ("",) and suffixes == known:
         columns |= combined(columns, suffixes)
         suffixes = ("", *suffixes)
@@ -39,12 +40,12 @@ def margin_group(family: Family, designs: Array, names: Sequence[str], accuracy:
 
 
 def _of_members(
-    family: Family, designs: Array, asked: Sequence[Margin], known: Sequence[str], accuracy: Accuracy
+    family: Family, designs: Array, asked: Sequence[Margin], known: Sequence[str], accuracy: Accuracy, valued: bool
 ) -> Columns:
     """Margins of members of a machine under their dotted names; a chain's weakest stage speaks for the member."""
     members = {f"{one.stage.rpartition('.')[0]}." for one in asked}
     suffixes = tuple(s for s in known if any(s.startswith(member) for member in members))
-    columns = with_transmission(margins(family, designs, suffixes, accuracy), suffixes)
+    columns = with_transmission(margins(family, designs, suffixes, accuracy, valued), suffixes)
     for one in asked:
         loops = tuple(s for s in suffixes if s == one.stage or (one.stage.endswith(".") and s.startswith(one.stage)))
         found = columns if loops == (one.stage,) else with_transmission(combined(columns, loops), ("",))

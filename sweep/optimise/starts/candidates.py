@@ -5,7 +5,7 @@ Every six starts come from a sample of their own: a region that one sample misse
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from typing import Any
 
 import numpy as np
@@ -28,6 +28,7 @@ PARENTS, CHILDREN, ROUNDS = 16, 24, 12  # improved per start; samples around eac
 FARTHEST = 1e100
 RADIUS = 0.06  # of the first of these samples, in variables scaled to their bounds
 ACCURACY = Accuracy(samples=64)  # misses a peak by less than what the local search gains ...
+TURNING = Accuracy(samples=16)  # the same for margins, which rank what does not turn; those of what turns are exact
 VERIFIED, HIDDEN = Accuracy(target=1e-3), 2.0  # ... but near a pole, told by a true extremum so many times larger
 NEARLY = 0.03  # a search mends so small a violation in passing: the objective tells more
 PRICE = 3.0  # of such a violation, in objectives
@@ -63,7 +64,10 @@ def from_samples(
     return np.concatenate(found)[:count], tuple(numbers[:count])
 
 
-def sample(problem: Problem, signs: Sequence[dict[str, float]], count: int, seed: int, number: int) -> Array:
+def sample(
+    problem: Problem, signs: Sequence[dict[str, float]], count: int, seed: int, number: int,
+    stop: Callable[[], bool] = lambda: False,
+) -> Array:  # fmt: skip
     """Return diverse good designs of one Sobol sample and of what is found around the best of it, the best first.
 
     Each sample is scrambled anew, so that it has points of its own.  Half of them are drawn from beyond the bounds and
@@ -74,6 +78,7 @@ def sample(problem: Problem, signs: Sequence[dict[str, float]], count: int, seed
     problem, signs, seed : see :func:`from_samples`
     count : how many designs at most
     number : of the sample
+    stop : asked several times a second; true ends with the best so far
     """
     from scipy.stats import qmc
 
@@ -87,6 +92,8 @@ def sample(problem: Problem, signs: Sequence[dict[str, float]], count: int, seed
     points = qmc.Sobol(len(problem.variables), seed=rng)
     place, kind, merit = np.empty((0, len(problem.variables))), np.empty(0, np.intp), np.empty(0)
     for k in range(blocks):
+        if stop():
+            break
         fractions, own = _brought_in(problem, points.random(block)), k % len(bases)
         found = ranking(problem, problem.placed(bases[own], fractions))
         place = np.concatenate([place, fractions])
@@ -98,7 +105,7 @@ def sample(problem: Problem, signs: Sequence[dict[str, float]], count: int, seed
         place, kind, merit = place[best], kind[best], merit[best]
     merit = _verified(problem, bases, place, kind, merit)
     chosen, near = _parents(place, kind, merit, PARENTS * count)
-    place, merit = _improved(problem, bases, place[chosen], kind[chosen], merit[chosen], rng)
+    place, merit = _improved(problem, bases, place[chosen], kind[chosen], merit[chosen], rng, stop)
     ranked = np.argsort(merit, kind="stable")
     if near >= count:  # what was brought within the limits has to be as good as what was there
         ranked = ranked[merit[ranked] <= merit[:near].max()]
@@ -168,12 +175,15 @@ def _verified(problem: Problem, bases: list[Array], place: Array, kind: NDArray[
 
 
 def _improved(
-    problem: Problem, bases: list[Array], place: Array, kind: NDArray[np.intp], merit: Array, rng: np.random.Generator
-) -> tuple[Array, Array]:
+    problem: Problem, bases: list[Array], place: Array, kind: NDArray[np.intp], merit: Array, rng: np.random.Generator,
+    stop: Callable[[], bool],
+) -> tuple[Array, Array]:  # fmt: skip
     """Repeatedly replace each design by the best of a sample around it; without a better one the radius is halved."""
     place, merit = place.copy(), merit.copy()
     radius = np.full(len(place), RADIUS)
     for _ in range(ROUNDS):
+        if stop():
+            break
         steps = radius[:, None, None] * rng.standard_normal((len(place), CHILDREN, place.shape[1]))
         children = np.clip(place[:, None, :] + steps, 0.0, 1.0)
         values = np.empty((len(place), CHILDREN))
@@ -218,7 +228,8 @@ def ranking(problem: Problem, designs: Array, accuracy: Accuracy = ACCURACY) -> 
     violation = np.zeros(len(designs))
     for left, group in zip((3.0, 2.0, 1.0), groups, strict=True):
         wanted = list(dict.fromkeys(limit.output for limit in group)) + (turning if left == 2.0 else [])
-        columns = _values(problem, designs[alive], wanted, accuracy)
+        at = TURNING if left == 2.0 and accuracy.samples else accuracy
+        columns = _values(problem, designs[alive], wanted, at)
         for limit in group:
             violation[alive] = np.maximum(violation[alive], _missed(limit, columns[limit.output]))
         bad = violation[alive] > NEARLY

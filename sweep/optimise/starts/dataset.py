@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -13,6 +13,7 @@ from kernels import status as st
 from sweep.chunks.parameters import runs_matrix
 from sweep.dataset.chunk_files import batches, parts
 from sweep.families.base import Array, Family
+from sweep.jobs.progress import AT_MOST, Say
 from sweep.optimise.problem.statement import Problem
 from sweep.optimise.starts.candidates import ALIKE, GROUP, diverse, ranking, sample
 from sweep.quantities.limits import compared
@@ -99,24 +100,37 @@ def kinds(study: Study, problem: Problem, known: Array) -> list[dict[str, float]
     return [{names[c]: float(design[c]) for c in others} for design in chosen]
 
 
-def filled(study: Study, problem: Problem, starts: Array, count: int, seed: int) -> Array:
+def filled(
+    study: Study, problem: Problem, starts: Array, count: int, seed: int, stop: Callable[[], bool], say: Say
+) -> Array:
     """Return at most ``count`` starts: those given (k, P), then the best of samples that are not near one of them.
 
     A sample of the problem's own variables finds more than the space of the study, unless [fit] has to finish every
-    design; then designs of the space are drawn.
+    design; then designs of the space are drawn.  ``stop`` ends it with what is there, ``say`` is told of each sample.
     """
-    taken, offered = starts, _offered(study, problem, starts, count, seed)
-    while len(taken) < count and (more := next(offered, None)) is not None:
-        taken = apart(problem, taken, more, count)
+    taken, offered = starts, _offered(study, problem, starts, count, seed, stop)
+    number = 0
+    while len(taken) < count and not stop():
+        say("starts", number, 1 if study.fit else _samples(count), f"samples {AT_MOST}")
+        more = next(offered, None)
+        if more is None:
+            break
+        taken, number = apart(problem, taken, more, count), number + 1
     return taken
 
 
-def _offered(study: Study, problem: Problem, starts: Array, count: int, seed: int) -> Iterator[Array]:
+def _samples(count: int) -> int:
+    return SAMPLES * -(-count // GROUP)
+
+
+def _offered(
+    study: Study, problem: Problem, starts: Array, count: int, seed: int, stop: Callable[[], bool]
+) -> Iterator[Array]:
     """Yield designs to begin with, one sample after the other."""
     if study.fit is None:
         signs = kinds(study, problem, starts)
-        for number in range(SAMPLES * -(-count // GROUP)):
-            yield sample(problem, signs, min(count, GROUP), seed, number)
+        for number in range(_samples(count)):
+            yield sample(problem, signs, min(count, GROUP), seed, number, stop)
         return
     designs = drawn(study, count, seed)
     if len(designs):

@@ -144,7 +144,7 @@ def problem_and_starts(
         if not len(merit):
             merit = ranking(problem, designs)
         own = diverse(problem, designs, merit, count - count // 2 if sampled else count, ALIKE)
-        starts = filled(study, problem, own, count, settings.seed)
+        starts = filled(study, problem, own, count, settings.seed, stop, say)
         if len(starts) < count:
             starts = apart(problem, starts, diverse(problem, designs, merit, count, ALIKE), count)
     first = of_task(study, count, settings.seed)
