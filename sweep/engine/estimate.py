@@ -122,7 +122,7 @@ def searches(study: Study, jobs: int, known: Pilot) -> tuple[tuple[str, float, f
     from sweep.optimise.local.start import search
     from sweep.optimise.manufacture import robust
     from sweep.optimise.multistart.survey import MET
-    from sweep.optimise.starts.dataset import drawn
+    from sweep.optimise.starts.dataset import drawn, sample_seconds, samples_for
     from sweep.optimise.starts.global_starts import MADE
     from sweep.optimise.starts.posing import problem_of
 
@@ -138,6 +138,9 @@ def searches(study: Study, jobs: int, known: Pilot) -> tuple[tuple[str, float, f
     population = POPULATION_LOOKS * look
     found = [("search", settings.starts * typical, settings.starts * most)]
     globally, share = settings.globally != "none", None if study.tolerance is None else study.tolerance.robust
+    if not globally and study.fit is None and settings.starts > 1:
+        sample = sample_seconds(problem, designs[0], settings.starts)
+        found.insert(0, ("starts", 0.0 if len(known.kept) else sample, samples_for(settings.starts) * sample))
     if globally:
         found.insert(0, ("global search", MET * population, settings.populations * population))
     if study.tolerance is not None and share is not None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import math
 from dataclasses import replace
 from pathlib import Path
@@ -14,6 +15,7 @@ from sweep.families import family
 from sweep.optimise import Problem, on_locus, optimum
 from sweep.optimise.starts import candidates
 from sweep.optimise.starts.candidates import GROUP, OUTSIDE, from_samples, sample
+from sweep.optimise.starts.dataset import sample_seconds
 from sweep.optimise.starts.posing import problem_and_starts
 from sweep.study import Limit, OptimiseSettings, load_study
 
@@ -104,6 +106,29 @@ def test_samples_have_points_of_their_own_and_do_not_depend_on_their_number() ->
     np.testing.assert_array_equal(starts[6:], sample(problem, BRANCHES, 6, 3, 1))
     assert len(np.unique(starts, axis=0)) == 12
     assert from_samples(problem, BRANCHES, 7, 3)[1] == (0, 0, 0, 0, 1, 1, 1)
+
+
+def test_sample_that_is_stopped_ranks_no_further_design(monkeypatch: pytest.MonkeyPatch) -> None:
+    ranked: list[int] = []
+    rank = candidates.ranking
+
+    def counted(*given):
+        ranked.append(1)
+        return rank(*given)
+
+    monkeypatch.setattr(candidates, "ranking", counted)
+    stops = iter([False, True, True])
+    found = sample(on_locus(CORNER), BRANCHES, 2, 3, 0, lambda: next(stops))
+    assert len(found) and len(ranked) <= 2 + len(BRANCHES)  # one block, then those of it that seem good
+
+
+def test_price_of_a_sample_is_that_of_few_designs_where_they_are_dear(monkeypatch: pytest.MonkeyPatch) -> None:
+    base = from_samples(CORNER, BRANCHES, 1, 1)[0][0]
+    for step, number in ((0.1, 64), (0.001, 8192)):
+        ticks = itertools.count(step=step)
+        monkeypatch.setattr("sweep.optimise.starts.dataset.time.process_time", lambda ticks=ticks: next(ticks))
+        of_sample = (2**15 + 16 * 24 * 12) * GROUP  # designs drawn, and those of the rounds about the best of them
+        assert sample_seconds(CORNER, base, GROUP) == pytest.approx(step / number * of_sample)
 
 
 def test_two_coordinates_in_five_of_half_a_sample_are_at_bounds_but_no_angle_of_a_whole_turn() -> None:

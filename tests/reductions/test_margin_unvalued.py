@@ -15,7 +15,9 @@ from sweep.reductions.margins import FEW, own_step
 FROM_POSES = [
     name
     for name in NAMES
-    if family(name).find(Assembly) and family(name).example and own_step(family(name), "", Accuracy(target=1e-8)) is None
+    if family(name).find(Assembly)
+    and family(name).example
+    and own_step(family(name), "", Accuracy(target=1e-8)) is None
 ]
 
 

@@ -25,6 +25,7 @@ BLOCK, LEAST = 1 << 15, 1 << 12  # designs ranked together; the least number, wh
 BEYOND = 0.35  # of the width of the bounds, to either side: two coordinates in five are brought back onto a bound
 KEPT = 512  # best of the sample per start, and as many of those that miss their limits
 PARENTS, CHILDREN, ROUNDS = 16, 24, 12  # improved per start; samples around each and round
+RANKED = SAMPLED + PARENTS * CHILDREN * ROUNDS  # designs per start in all
 FARTHEST = 1e100
 RADIUS = 0.06  # of the first of these samples, in variables scaled to their bounds
 ACCURACY = Accuracy(samples=64)  # misses a peak by less than what the local search gains ...

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import time
 from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -15,7 +16,7 @@ from sweep.dataset.chunk_files import batches, parts
 from sweep.families.base import Array, Family
 from sweep.jobs.progress import AT_MOST, Say
 from sweep.optimise.problem.statement import Problem
-from sweep.optimise.starts.candidates import ALIKE, GROUP, diverse, ranking, sample
+from sweep.optimise.starts.candidates import ALIKE, GROUP, RANKED, diverse, ranking, sample
 from sweep.quantities.limits import compared
 from sweep.synthesis.fit import fit_line
 from sweep.synthesis.tasks import solve
@@ -80,6 +81,7 @@ def drawn(study: Study, count: int, seed: int) -> Array:
 
 
 LOOKED_AT = 4  # times 256 designs of a space, that tell which signs it has
+SOME, ENOUGH = (64, 256, 8192), 0.05  # designs that tell the price of a sample, until they take so long [s]
 SAMPLES = 2  # times as many as would do if no start were near another
 MOST_KINDS = 64  # combinations of signs among which a sample is shared out
 
@@ -111,7 +113,7 @@ def filled(
     taken, offered = starts, _offered(study, problem, starts, count, seed, stop)
     number = 0
     while len(taken) < count and not stop():
-        say("starts", number, 1 if study.fit else _samples(count), f"samples {AT_MOST}")
+        say("starts", number, 1 if study.fit else samples_for(count), f"samples {AT_MOST}")
         more = next(offered, None)
         if more is None:
             break
@@ -119,8 +121,25 @@ def filled(
     return taken
 
 
-def _samples(count: int) -> int:
+def samples_for(count: int) -> int:
+    """Return of how many samples so many starts are chosen at most."""
     return SAMPLES * -(-count // GROUP)
+
+
+def sample_seconds(problem: Problem, base: Array, count: int) -> float:
+    """Return what a sample for so many starts takes, measured on some of its designs; few where they are dear.
+
+    Its signs are those of the design ``base`` (P,).
+    """
+    rng, number, seconds = np.random.default_rng(0), 0, 0.0
+    for number in SOME:
+        designs = problem.placed(base, rng.random((number, len(problem.variables))))
+        begin = time.process_time()
+        ranking(problem, designs)
+        seconds = time.process_time() - begin
+        if seconds > ENOUGH:
+            break
+    return seconds / number * RANKED * min(count, GROUP)
 
 
 def _offered(
@@ -129,7 +148,7 @@ def _offered(
     """Yield designs to begin with, one sample after the other."""
     if study.fit is None:
         signs = kinds(study, problem, starts)
-        for number in range(_samples(count)):
+        for number in range(samples_for(count)):
             yield sample(problem, signs, min(count, GROUP), seed, number, stop)
         return
     designs = drawn(study, count, seed)
