@@ -136,6 +136,15 @@ def test_search_ends_when_enough_is_known() -> None:
     assert more.starts == 48 and more.unseen == pytest.approx(2 / (48 * 47))
 
 
+@pytest.mark.parametrize("jobs", [1, 2])
+def test_each_start_is_told_when_it_is_done_and_none_before_the_first(jobs: int) -> None:
+    told: list[tuple[int, int, float]] = []
+    results, _ = explore(bowl(), starts(8), ASKED, jobs=jobs, tell=lambda *now: told.append(now))
+    assert told[0] == (0, 8, math.inf)
+    assert [done for done, _, _ in told] == list(range(len(results) + 1)) and {most for _, most, _ in told} == {8}
+    assert told[-1][2] == results[0].objective
+
+
 def test_number_of_starts_does_not_depend_on_jobs() -> None:
     many, asked = starts(30), OptimiseSettings(starts=30)
     alone, one = explore(bowl(), many, asked)

@@ -73,7 +73,8 @@ def explore(
     stop : asked often; when it answers true, or at Ctrl-C, the search ends and each start in progress keeps its best
         design so far
     jobs : processes the starts are spread over, once the search turns out to be long; results do not depend on it
-    tell : called with the number of starts that are done, the most there will be, and the best value so far
+    tell : called at first and after each start, with the number that are done, the most there will be, and the best
+        value so far
     origins : see :func:`sweep.optimise.multistart.survey.survey`; with them all starts are searched
     samples : see there
 
@@ -96,6 +97,14 @@ def explore(
     refuse_dependent(problem, Program(problem), starts[:LOOKED_AT])
     end = math.inf if settings.time_budget is None else time.monotonic() + settings.time_budget
     results, ended = list[Result](), "starts"
+    seen: list[Result] = []
+
+    def told(*found: Result) -> None:
+        seen.extend(found)
+        if tell is not None:
+            tell(len(seen), len(starts), min((r.objective for r in seen if r.feasible), default=math.inf))
+
+    told()
     with _signals() as own:
 
         def asked() -> bool:
@@ -103,9 +112,7 @@ def explore(
 
         for first in range(0, len(starts), BATCH):
             numbers = list(range(first, min(first + BATCH, len(starts))))
-            results += _batch(SearchTask(problem, starts, settings.looks), numbers, results, asked, jobs)
-            if tell is not None:
-                tell(len(results), len(starts), min((r.objective for r in results if r.feasible), default=math.inf))
+            results += _batch(SearchTask(problem, starts, settings.looks), numbers, results, asked, jobs, told)
             last = numbers[-1] == len(starts) - 1
             if len(results) <= numbers[-1] or any(r.ended in CUT for r in results) or (not last and asked()):
                 ended = "time"
@@ -133,8 +140,9 @@ def _signals() -> Iterator[Stop]:
 
 
 def _batch(
-    task: SearchTask, numbers: list[int], before: Sequence[Result], asked: Callable[[], bool], jobs: int
-) -> list[Result]:
+    task: SearchTask, numbers: list[int], before: Sequence[Result], asked: Callable[[], bool], jobs: int,
+    told: Callable[[Result], None],
+) -> list[Result]:  # fmt: skip
     """Search from some starts, in this process as long as few looks were needed, then in several."""
     results: list[Result] = []
     while len(results) < len(numbers):
@@ -143,8 +151,11 @@ def _batch(
         if (results or before) and (asked() or (jobs > 1 and spent >= SERIAL_LOOKS)):
             break
         results.append(task(numbers[len(results)], asked))
+        told(results[-1])
     rest = numbers[len(results) :]
-    return results + spread_over(task, rest, asked, jobs) if rest and not asked() else results
+    if not rest or asked():
+        return results
+    return results + spread_over(task, rest, asked, jobs, lambda _, found: told(found))
 
 
 def ranked(results: list[Result]) -> list[Result]:
