@@ -44,16 +44,20 @@ class Window(NamedTuple):
 
 
 class Edges(NamedTuple):
-    """Poses at which a window begins or ends, each (k,): row of the block, angle, values there and their errors."""
+    """Poses at which a window begins or ends, each (k,): row of the block, angle, values there and their errors.
+
+    ``side`` is 0 where the follower is at the lower end of the window, 1 where it is at the upper one.
+    """
 
     row: Index
     phi: Array
     values: Array
     err: Array
+    side: Index
 
     def only(self, which: Mask) -> Edges:
         """Return some of them."""
-        return Edges(self.row[which], self.phi[which], self.values[which], self.err[which])
+        return Edges(self.row[which], self.phi[which], self.values[which], self.err[which], self.side[which])
 
 
 def edges(family: Family, designs: Array, rows: Index, window: Window, columns: dict[str, Array], pose: str) -> Edges:
@@ -72,7 +76,8 @@ def edges(family: Family, designs: Array, rows: Index, window: Window, columns: 
     """
     positions, samples = columns[family.position], columns[pose].shape[1]
     spacing, wraps = TWO_PI / samples, family.pose_output[family.position].wraps
-    row, column, level = _brackets(rows, window, positions)
+    row, column, side = _brackets(rows, window, positions)
+    level = np.where(side == 0, window.low[rows[row]], window.high[rows[row]])
     size = np.abs(positions).max(axis=1)[row]
 
     def at(which: Index, phi: Array, of: Family = family) -> tuple[Array, Array]:
@@ -90,18 +95,18 @@ def edges(family: Family, designs: Array, rows: Index, window: Window, columns: 
         + np.abs(values - exact)
         + 4.0 * EPS * np.abs(exact)
     )
-    return Edges(row, phi, exact, err)
+    return Edges(row, phi, exact, err, side)
 
 
-def _brackets(rows: Index, window: Window, positions: Array) -> tuple[Index, Index, Array]:
+def _brackets(rows: Index, window: Window, positions: Array) -> tuple[Index, Index, Index]:
+    """Row, sample before it and side of each crossing."""
     row, column = np.empty(positions.size, np.int64), np.empty(positions.size, np.int64)
     found = []
-    for level in (window.low[rows], window.high[rows]):
+    for side, level in enumerate((window.low[rows], window.high[rows])):
         count = scan.crossings(positions, level, row, column)
-        found.append((row[:count].copy(), column[:count].copy(), level[row[:count]]))
-    first, second = found
-    return (np.concatenate([first[0], second[0]]), np.concatenate([first[1], second[1]]),
-            np.concatenate([first[2], second[2]]))  # fmt: skip
+        found.append((row[:count].copy(), column[:count].copy(), np.full(count, side)))
+    first, second, sides = (np.concatenate(parts) for parts in zip(*found, strict=True))
+    return first, second, sides
 
 
 # The follower may pass a level twice between two of these; what lies between counts only if the stay is longer.
@@ -123,19 +128,16 @@ def window_angle(family: Family, designs: Array, window: Window) -> tuple[Array,
     Every crossing is refined to rounding; two crossings less than 360/512 degrees apart may be missed.
     """
     angle, err = np.full(len(designs), np.nan), np.full(len(designs), np.nan)
-    open_end = np.full(len(designs), np.inf)
     names = (family.position, family.derivative_of[family.position])
     samples, known = SAMPLES * denser(family, designs, names), np.isfinite(window.err)
     every = (rows for m in np.unique(samples[known]) for rows in blocks(np.flatnonzero(known & (samples == m)), int(m)))
     for rows in every:
         columns, _, _ = sample_turn(family, designs[rows], int(samples[rows[0]]), names)
-        above, own = np.zeros((2, rows.size)), np.zeros(rows.size)
-        for side, level in enumerate((window.low, window.high)):
-            start = columns[family.position][:, 0] >= level[rows]
-            found = edges(family, designs, rows, Window(level, open_end, window.err), columns, names[1])
-            above[side] = TWO_PI * start
-            np.subtract.at(above[side], found.row, np.sign(found.values) * found.phi)
-            size = window.err[rows[found.row]] + 8.0 * EPS * np.abs(level[rows[found.row]])
-            np.add.at(own, found.row, size / np.abs(found.values) + 4.0 * EPS * TWO_PI)
+        found = edges(family, designs, rows, window, columns, names[1])
+        levels = np.stack([window.low[rows], window.high[rows]])
+        above, own = TWO_PI * (columns[family.position][:, 0] >= levels), np.zeros(rows.size)
+        np.subtract.at(above, (found.side, found.row), np.sign(found.values) * found.phi)
+        size = window.err[rows[found.row]] + 8.0 * EPS * np.abs(levels[found.side, found.row])
+        np.add.at(own, found.row, size / np.abs(found.values) + 4.0 * EPS * TWO_PI)
         angle[rows], err[rows] = above[0] - above[1], own
     return angle, err
