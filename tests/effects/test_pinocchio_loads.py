@@ -13,6 +13,7 @@ import pytest
 import sweep
 from kernels import status as st
 from sweep.evaluation.joints import parts
+from sweep.evaluation.tables import design_matrix
 from sweep.families import family
 from sweep.families.capabilities import JointRecords
 from tests.effects.test_link_loads import GRAVITY, WEIGHT
@@ -175,12 +176,19 @@ def test_joints_of_a_linkage_bear_what_pinocchio_finds(name, tool, finger):
     judged(ours, theirs)
 
 
-def chain_model(families, design, given, tool, kappa, offset):
-    """Stages side by side, the crank of each turning with the rocker before it."""
+def axes_of_stages(families, design):
+    """Axes of the frame of each stage in that of the first, as columns."""
+    chain = family(families)
+    matrix, _ = design_matrix(chain, {n: x for n, x in design.items() if n in chain.parameter_names})
+    return [frame.rotation[0] for frame in chain.frames(matrix)]
+
+
+def chain_model(families, design, given, tool, kappa, axes):
+    """Stages in the frame of the first, the crank of each turning with the rocker before it."""
     model, ball, extra = Multibody(), [], []
     for k, part in enumerate(parts(families, design, [0.0])):
         lam = design.get(f"lam{k + 1}", 0.0)
-        hung = (*tool, np.array([np.cos(lam), np.sin(lam), 0.0])) if tool and families[k] == "guide" else None
+        hung = (*tool, axes[k] @ [np.cos(lam), np.sin(lam), 0.0]) if tool and families[k] == "guide" else None
         one, more = add_stage(model, str(k + 1), part, "rocker", given, 0.0, hung)
         ball.append(one)
         extra += more
@@ -189,7 +197,7 @@ def chain_model(families, design, given, tool, kappa, offset):
     return model.finish(), ball, on_line(extra)
 
 
-def chain_rows(model, ball, extra, turns, kappa):
+def chain_rows(model, ball, extra, turns, axes):
     theirs = []
     for turn in turns:
         balls, torque, _ = model.at(turn, SPEED, CHANGE, extra)
@@ -201,7 +209,7 @@ def chain_rows(model, ball, extra, turns, kappa):
             else:
                 u = model.axis2
                 vectors["moment_a"] = vectors["moment_a"] + (model.couples[0] - vectors["moment_a"] @ u) * u
-            row |= {f"{v}_{x}{k + 1}": f[i] for v, f in vectors.items() for i, x in enumerate("xyz")}
+            row |= {f"{v}_{x}{k + 1}": (f @ axes[k])[i] for v, f in vectors.items() for i, x in enumerate("xyz")}
         theirs.append(row)
     return theirs
 
@@ -216,13 +224,16 @@ def test_joints_of_a_chain_bear_what_pinocchio_finds(families, tool, kappa):
     table, given = bodies("rocker")
     loads = {f"{key}{k}": x for k in (1, 2) for key, x in (table | WEIGHT).items()}
     loads |= {"speed1": SPEED, "speed_change1": CHANGE}
+    axes = axes_of_stages(families, d)
+    # One field of gravity, in the frame of each stage.
+    loads |= {f"{name}2": x for name, x in zip(WEIGHT, GRAVITY @ axes[1], strict=True)}
     if tool:
         loads |= {"m_tool2": tool[0], "tool_force2": tool[1]}
     names = [f"{v}{k}" for k in (1, 2) for v in WANTED]
     ours = sweep.evaluate(families, d | loads, [*names, "drive_torque1", "drive_torque2"], phi=TURNS)
     assert (ours["status"] == st.OK).all()
-    model, ball, extra = chain_model(families, d, given, tool, kappa, 0.4)
+    model, ball, extra = chain_model(families, d, given, tool, kappa, axes)
     model.axis2 = parts(families, d, [0.0])[1].axes["a"]
-    theirs = chain_rows(model, ball, extra, TURNS, kappa)
+    theirs = chain_rows(model, ball, extra, TURNS, axes)
     judged(ours, theirs, "1")
     judged(ours, theirs, "2")

@@ -19,6 +19,7 @@ from tests.effects.test_pinocchio_loads import (
     SPEED,
     TURNS,
     WANTED,
+    axes_of_stages,
     bodies,
     chain_model,
     chain_rows,
@@ -175,9 +176,11 @@ def test_members_of_the_machine_stitch208_bear_what_pinocchio_finds():
     kept = {k: v for k, v in needle.items() if k in family(chain).parameter_names}
     start = kept.get("offset", 0.0)
     kappa = kept.get("kappa2", 1.0)
-    model, ball, extra = chain_model(chain, kept, given, (2e-4, -30.0), kappa, 0.0)
+    axes = axes_of_stages(chain, kept)
+    np.testing.assert_array_equal(axes[1], np.eye(3))  # one field of gravity is the same in both frames
+    model, ball, extra = chain_model(chain, kept, given, (2e-4, -30.0), kappa, axes)
     model.axis2 = parts(chain, kept, [0.0])[1].axes["a"]
-    theirs = chain_rows(model, ball, extra, TURNS, kappa)
+    theirs = chain_rows(model, ball, extra, TURNS, axes)
     mine = ours.rename(columns=lambda n: n.removeprefix("needle."))
     assert start == 0.0
     judged(mine, theirs, "1")
