@@ -130,6 +130,19 @@ def test_a_member_driven_by_another_is_the_chain_of_both() -> None:
         np.testing.assert_allclose(found[f"second.{name}"], alone[name], rtol=0.0, atol=1e-12 * size)
 
 
+@pytest.mark.parametrize("want", [["arm.dpsi", "arm.d3psi"], ["speed"]])
+def test_designs_that_share_what_drives_a_member_say_the_same_as_alone(want: list[str]) -> None:
+    drive = sweep.machine(
+        {"looper": "rssr", "arm": {"family": "four_bar", "driver": "looper.psi"}}, {"speed": {"speed": ["arm.m"]}}
+    )
+    arm = {"a": 1.0, "b": 3.3, "c": 3.1, "e": 3.0, "xi": 4.2, "eta": 0.8}
+    design = {f"looper.{k}": v for k, v in LOOPER.items()} | {f"arm.{k}": v for k, v in arm.items()}
+    table = pd.DataFrame([design, design | {"arm.b": 3.5}])
+    both = sweep.evaluate(drive, table, want, phi=PHI)
+    alone = [sweep.evaluate(drive, table.iloc[[k]], want, phi=PHI) for k in range(2)]
+    np.testing.assert_array_equal(both[want], pd.concat(alone)[want])
+
+
 def test_gradients_of_relations_are_those_of_differences() -> None:
     from sweep.optimise.manufacture.tolerance import sensitivities
 

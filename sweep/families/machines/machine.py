@@ -241,7 +241,7 @@ def _needs(machine: Machine, wanted: frozenset[str]) -> _Needs:
     needed -= changes
     for m in reversed(machine.members):
         needed |= {f"{m.name}.{part}" for name in needed for part in m.geared_parts(m.own(name))}
-        needed |= _driving(m, needed)
+        needed |= _driving(m, frozenset(map(m.own, needed)) - {""})
     members = tuple(_of_member(m, own) for m in machine.members if (own := frozenset(map(m.own, needed)) - {""}))
     return _Needs(members, tuple(relations), {name: columns_of.index(name) for name in inputs}, bool(changes))
 
@@ -272,13 +272,12 @@ def _whole(values: Any, shape: tuple[int, int]) -> Any:
     return values if values.shape == shape else np.array(np.broadcast_to(values, shape), order="C")
 
 
-def _driving(member: Member, needed: set[str]) -> set[str]:
+def _driving(member: Member, own: frozenset[str]) -> set[str]:
     """Name what a member's driver has to give: its output and the derivatives that the member's outputs need."""
-    own = {name for name in map(member.own, needed) if name}
     if member.driver is None or not own:
         return set()
     driver, output = member.driver
-    most = max((len(member.family.orders(name)) for name in own), default=0)
+    most = max((len(member.family.orders(name)) for name in _of_member(member, own).motion), default=0)
     names = [output]
     for _ in range(most):
         names.append(member.drives[names[-1]])
@@ -331,8 +330,10 @@ def _with_respect_to_shaft(m: Member, result: dict[str, Any], found: Mapping[str
         inner = [output]
         for _ in names:
             inner.append(m.drives[inner[-1]])
-        given: list[Any] = [np.ascontiguousarray(found[f"{driver}.{name}"]) for name in inner[1:]]
         outer: list[Any] = [result[name] for name in names]
+        # a driver that no design varies is computed once
+        whole = [np.broadcast_to(found[f"{driver}.{name}"], outer[0].shape) for name in inner[1:]]
+        given: list[Any] = [np.ascontiguousarray(rate) for rate in whole]
         missing: list[Any] = [None] * (3 - len(names))
         chain_rule(np.full(len(outer[0]), float(m.ratio)), *given, *missing, *outer, *missing)
     result |= {name: magnitude(result, parts) for name in result if (parts := m.geared_parts(name))}
