@@ -22,8 +22,10 @@ if TYPE_CHECKING:
 
 PLAN, RUNS, LOCK, BAD, OLD = "_plan.json", "_runs.jsonl", "_lock", "_bad", "_old"
 OPTIMUM, CURVES = "_optimum.parquet", "_curves.parquet"
-SENSITIVITY, TOLERANCE, PARETO = "_sensitivity.parquet", "_tolerance.parquet", "_pareto.parquet"
-PROOF = "_proof.parquet"
+SENSITIVITY, TOLERANCE, MADE = "_sensitivity.parquet", "_tolerance.parquet", "_made.parquet"
+PARETO, PROOF = "_pareto.parquet", "_proof.parquet"
+OF_OPTIMUM = (OPTIMUM, CURVES, SENSITIVITY, TOLERANCE, MADE)  # what one search writes, the optimum first
+SIDE_FILES = (*OF_OPTIMUM, PARETO, PROOF)
 SEARCH = "_search.json"  # what a search that is not over has found
 TEMPORARY = "_tmp-"
 

@@ -36,7 +36,6 @@ DEFAULT_DESIGNS = 32
 
 ANEW = "the next run moves it to _bad/ and computes it anew"
 UNSEEN = "a run takes it as finished; move it away, then the next run computes it anew"
-SIDE_FILES = (files.OPTIMUM, files.CURVES, files.SENSITIVITY, files.TOLERANCE, files.PARETO, files.PROOF)
 
 
 @dataclass(frozen=True)
@@ -222,7 +221,7 @@ def _missing(found: Verification, plan: dict[str, Any], number: int, whole: dict
 def _side_files(found: Verification, plan: dict[str, Any]) -> None:
     """Check the tables beside the chunks: the checksums of their pages, and the hashes that the plan notes."""
     place, told = files.beside(found.folder), {finding.path for finding in found.findings}
-    for path in [place / name for name in SIDE_FILES]:
+    for path in [place / name for name in files.SIDE_FILES]:
         if not path.is_file():
             if path.name in (plan.get(TABLES) or {}) and path not in told:
                 found.add(path, "not there any more", "the next run searches it anew")

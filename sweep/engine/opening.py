@@ -18,9 +18,7 @@ from sweep.study import Study
 MOST = 6  # differences that are reported
 
 # What concerns only these designs; the report about them as well.
-OWN_FILES = (
-    files.PLAN, files.OPTIMUM, files.CURVES, files.SENSITIVITY, files.TOLERANCE, files.PARETO, "report.html",
-)  # fmt: skip
+OWN_FILES = (files.PLAN, *files.OF_OPTIMUM, files.PARETO, "report.html")
 
 
 def open_plan(study: Study, folder: Path, force: bool, chunk_size: int | None = None) -> Plan:

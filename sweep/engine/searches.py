@@ -21,9 +21,6 @@ from sweep.proof.question import question_of
 from sweep.proof.rounds import Cores
 from sweep.study import Study
 
-# Files that are written together with the optimum.
-OF_OPTIMUM = (files.CURVES, files.SENSITIVITY, files.TOLERANCE)
-
 
 def search(study: Study, folder: Path, jobs: int, backend: str, progress: bool) -> None:
     """Compute those of optimum, proof and front that the study asks for."""
@@ -60,8 +57,8 @@ def _optimise(study: Study, folder: Path, jobs: int, progress: bool) -> None:
     key = optimum_key(study, note)
     place = files.beside(folder)
     found = optimise.read_survey(place / files.OPTIMUM)
-    noted = [name for name in OF_OPTIMUM if name in (note.get(TABLES) or {})]
-    whole = not altered(place, note, [files.OPTIMUM, *noted])
+    noted = [name for name in files.OF_OPTIMUM if name in (note.get(TABLES) or {})]
+    whole = not altered(place, note, {files.OPTIMUM, *noted})
     if note.get("optimised") == key and whole and (found is None or found.ended != "time"):
         return
     assert study.optimise is not None
@@ -73,7 +70,7 @@ def _optimise(study: Study, folder: Path, jobs: int, progress: bool) -> None:
             number = stop.signal_number or signal.SIGINT
             text = f"{folder}: stopped by signal {number} while optimising; run again for the whole search"
             raise Interrupted(number, text) from None
-    files.write_plan(folder, note | {"optimised": key, TABLES: digests(place, [files.OPTIMUM, *OF_OPTIMUM])})
+    files.write_plan(folder, note | {"optimised": key, TABLES: digests(place, files.OF_OPTIMUM)})
 
 
 def _raise_if_cut_short(folder: Path) -> None:

@@ -19,7 +19,6 @@ from sweep.proof import known_proof
 from sweep.study import Study
 
 REPORT, FIGURES, SURVIVORS = "report.html", "figures", "survivors.parquet"
-TABLES = (files.OPTIMUM, files.CURVES, files.SENSITIVITY, files.TOLERANCE, files.PARETO, files.PROOF)
 
 
 @dataclass(frozen=True)
@@ -65,7 +64,7 @@ def carry(study: Study, earlier: Sequence[Path], target: Path) -> Carried | None
             for path in sound:
                 link_or_copy(path, designs / path.name)
             link_or_copy(files.beside(source) / files.PLAN, target / files.PLAN)
-            for name in TABLES:
+            for name in files.SIDE_FILES:
                 path = files.beside(source) / name
                 if path.is_file() and path not in bad:
                     link_or_copy(path, target / name)
@@ -105,7 +104,7 @@ def _link_report(source: Path, target: Path) -> None:
     """Link the report and what belongs to it; what a new report would write into is copied."""
     if not (source / REPORT).is_file():
         return
-    copied = [*(source / FIGURES).glob("*.svg"), *(source / name.removeprefix("_") for name in TABLES)]
+    copied = [*(source / FIGURES).glob("*.svg"), *(source / name.removeprefix("_") for name in files.SIDE_FILES)]
     for path in (source / SURVIVORS, *copied, source / REPORT):
         if path.is_file():
             place = target / path.relative_to(source)

@@ -25,7 +25,7 @@ from sweep.jobs.signals import Deadline
 from sweep.optimise.local.kkt import CAVEAT, Result
 from sweep.optimise.local.model import Model
 from sweep.optimise.manufacture.robust import better_made, robust, yields
-from sweep.optimise.manufacture.tolerance import sensitivities, tolerance_rows
+from sweep.optimise.manufacture.tolerance import manufactured, sensitivities, tolerance_rows
 from sweep.optimise.multistart.kept import Kept, noted, result_of, survey_of
 from sweep.optimise.multistart.multistart import explore, listed, with_neighbours
 from sweep.optimise.multistart.survey import CUT, Survey, later
@@ -68,6 +68,7 @@ TEXTS = {
     "high": ("unit of the output", "2.5 % of the designs are above"),
     "missing": ("1", "share of designs without this output"),
     "within": ("1", "share of designs that keep the limits of this output; of all of them in the last row"),
+    "kept": ("", "whether what is made keeps all limits on outputs"),
 }
 
 
@@ -163,8 +164,8 @@ def optimise_study(
     Returns
     -------
     Path of ``_optimum.parquet``, whose metadata hold what the starts tell of the search (:func:`read_survey`);
-    ``_curves.parquet``, ``_sensitivity.parquet`` and, where the study has tolerances, ``_tolerance.parquet`` stand
-    beside it.  Each is written as a whole or not at all.
+    ``_curves.parquet``, ``_sensitivity.parquet`` and, where the study has tolerances, ``_tolerance.parquet`` and
+    ``_made.parquet`` stand beside it.  Each is written as a whole or not at all.
 
     Raises
     ------
@@ -196,7 +197,7 @@ def optimise_study(
             results, share = [made.result, *results], made.share
     if deadline.pulled and found.ended not in CUT:
         found = later(found)
-    parts = 3 if study.tolerance is None else 4
+    parts = 3 if study.tolerance is None else 5
     say("tables", 0, parts, "tables")
     frame = _table(study, problem, results, nominal, share)
     about = {"search": json.dumps(asdict(found)), "summary": "; ".join([found.words, *found.warnings])}
@@ -210,7 +211,10 @@ def optimise_study(
         (side / files.TOLERANCE).unlink(missing_ok=True)
     else:
         write(side / files.TOLERANCE, _by_role(study, frame, _tolerance), study)
-    if found.ended == "interrupted" or (stop is not None and stop()):
+        say("tables", 4, parts, "tables")
+    stopped = found.ended == "interrupted" or (stop is not None and stop())
+    _write_made(side / files.MADE, study, None if stopped else results[0].design)
+    if stopped or (stop is not None and stop()):
         raise KeyboardInterrupt
     if not deadline.pulled:
         kept.forget()
@@ -319,6 +323,16 @@ def _by_role(study: Study, table: dict[str, Any], rows_of: Callable[[Study, Arra
             for name, values in own.items():
                 rows.setdefault(name, []).extend(values)
     return rows
+
+
+def _write_made(path: Path, study: Study, design: Array | None) -> None:
+    """Write what is made of the optimum (P,), which takes long where there are many limits; None leaves no table."""
+    made = None if design is None else manufactured(study, design)
+    if made is None:
+        path.unlink(missing_ok=True)
+    else:
+        about = {"costs": json.dumps(made.costs)}
+        write(path, {made.output: made.values, "kept": made.kept}, study, about=about)
 
 
 def sensitivity(study: Study, design: Array) -> dict[str, list[Any]]:

@@ -163,7 +163,7 @@ def read_dataset(folder: Path) -> Dataset:
         plan |= {"counts": counts, "missed": missed}
     study = study_of(plan, folder)
     optima, curves, front = (files.beside(folder) / name for name in (files.OPTIMUM, files.CURVES, files.PARETO))
-    check_tables(folder, (files.OPTIMUM, files.CURVES, files.PARETO, files.SENSITIVITY, files.TOLERANCE))
+    check_tables(folder, (*files.OF_OPTIMUM, files.PARETO))
     chunks = chunk_files.parts(folder)
     chunk_files.check_columns(chunks)
     parts = tuple(part.path for part in chunks)

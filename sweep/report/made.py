@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
+import json
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
@@ -12,8 +13,15 @@ import numpy as np
 from sweep.dataset import files
 from sweep.evaluation.cyclogram import event_angles
 from sweep.evaluation.summaries import design_outputs
-from sweep.families.names import is_flag, judged_by, without_minus
-from sweep.optimise.manufacture.tolerance import deviating, touched
+from sweep.families.names import is_flag, without_minus
+from sweep.optimise.manufacture.tolerance import (
+    TELLING,
+    Cost,
+    Manufactured,
+    deviating,
+    limits_of_made,
+    manufactured,
+)
 from sweep.quantities import resolve
 from sweep.quantities.limits import compared, meets
 from sweep.report.dataset import Dataset
@@ -25,28 +33,11 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from sweep.families.base import Array
-    from sweep.study import Study
 
 NOWHERE = (math.nan, math.nan)
-SINGLE = 512  # for what each dimension costs
-COSTS = 8  # dimensions that are tried exact
 BINS = 41
 FAR = 2.0  # spreads of what is made from which on a bound is not drawn: it would make one bar of them
-TELLING = 0.004  # a share of mechanisms below which a dimension costs nothing that 512 of them could tell
 STEPS = {"length": (0.1, "0.1\u00a0mm"), "angle": (math.radians(0.1), "0.1°")}
-
-
-class Cost(NamedTuple):
-    """What one dimension's tolerance costs, found by making the same mechanisms with it exact.
-
-    ``spread`` is its share in the variance of the output whose limit is missed most, ``gain`` the share of mechanisms
-    that keep the limits more without it.  A design that stands at its limit gains nothing from any single dimension.
-    """
-
-    name: str
-    text: str
-    spread: float
-    gain: float
 
 
 @dataclass(frozen=True)
@@ -87,25 +78,34 @@ def many(data: Dataset, row: Mapping[str, Any] | None, samples: int = 0) -> tupl
     study = data.study
     if study.tolerance is None or study.optimise is None or row is None:
         return None
-    design = np.array([float(row[name]) for name in study.family.parameter_names])
+    design = _design(data, row)
     samples = samples or study.tolerance.samples
     return design, deviating(study.family, design, study.tolerance, study.optimise.seed, samples)
 
 
 def made(data: Dataset) -> Made | None:
-    """Make the optimum many times; None without tolerances, an optimum, or a limit that leaves room."""
-    study = data.study
-    limits = [_scattering(limit) for limit in study.output_limits if not limit.is_equation]
-    found = many(data, data.optimum) if limits else None
-    if found is None or not np.isfinite(found[0]).all():
+    """Return the yield of the optimum; None without tolerances, an optimum, or a limit that leaves room."""
+    found = _manufactured(data)
+    if found is None:
         return None
-    design, designs = found
-    columns, kept = _kept(study, limits, designs)
-    worst = min(limits, key=lambda limit: float(meets(limit, columns[limit.output]).mean()))
-    histogram = _histogram(data, worst, columns[worst.output])
-    few = {name: values[:SINGLE] for name, values in columns.items()}
-    costs = _costs(study, limits, worst, design, designs[:SINGLE], few, float(kept[:SINGLE].mean()))
-    return Made(float(kept.mean()), histogram, tuple(costs))
+    limits = [limit for limit in limits_of_made(data.study) if limit.output == found.output]
+    worst = min(limits, key=lambda limit: float(meets(limit, found.values).mean()))
+    return Made(float(found.kept.mean()), _histogram(data, worst, found.values), found.costs)
+
+
+def _manufactured(data: Dataset) -> Manufactured | None:
+    """Read what the search has noted; one of an earlier version has not, so that the optimum is made now."""
+    path = files.beside(data.folder) / files.MADE
+    if path.is_file():
+        rows, costs = files.read_table(path), json.loads(files.metadata(path)[b"costs"])
+        return Manufactured(
+            rows.columns[0], rows.iloc[:, 0].to_numpy(), rows["kept"].to_numpy(), tuple(Cost(*x) for x in costs)
+        )
+    return None if data.optimum is None else manufactured(data.study, _design(data, data.optimum))
+
+
+def _design(data: Dataset, row: Mapping[str, Any]) -> Array:
+    return np.array([float(row[name]) for name in data.study.family.parameter_names])
 
 
 def made_sentence(found: Made | None, tolerance: str) -> str:
@@ -133,66 +133,6 @@ def histogram(data: Dataset, output: str) -> Histogram | None:
     limits = [x for x in study.output_limits if x.output == output]
     # Of two limits the last one: the band around what [locus] prescribes.
     return _histogram(data, limits[-1] if limits else Limit(output, None, None), values)
-
-
-def _scattering(limit: Limit) -> Limit:
-    """Return the same limit on the number that decides it: a yes or no has no scatter that could be shown."""
-    return Limit(judged_by(limit.output), 0.0, None) if is_flag(limit.output) else limit
-
-
-def _kept(
-    study: Study, limits: list[Limit], designs: Array
-) -> tuple[dict[str, NDArray[np.generic]], NDArray[np.bool_]]:
-    names = list(dict.fromkeys(limit.output for limit in limits))
-    columns = design_outputs(study.family, designs, names, study.accuracy, study.window)
-    return columns, np.logical_and.reduce([meets(limit, columns[limit.output]) for limit in limits])
-
-
-def _costs(
-    study: Study, limits: list[Limit], worst: Limit, design: Array, designs: Array,
-    columns: dict[str, NDArray[np.generic]], before: float,
-) -> list[Cost]:  # fmt: skip
-    """Dimensions by what their tolerances cost, the dearest first: the same mechanisms with one dimension exact.
-
-    Of the mechanisms ``designs`` the ``columns`` are known, and the share ``before`` that keeps all limits.  Made exact
-    are the dimensions whose share in the variance of an output, times the share that misses its limit, is largest.  A
-    limit from which all these mechanisms keep a standard deviation of theirs is kept with one dimension exact, too.
-    """
-    assert study.tolerance is not None
-    limits = [x for x in limits if x is worst or _near(x, columns[x.output])]
-    scatter = _variance(columns, worst)
-    found = []
-    own = np.flatnonzero(touched(study.family, design, study.tolerance))
-    matters = np.zeros(len(own))
-    for limit in limits:
-        values = compared(limit.output, np.asarray(columns[limit.output], np.float64))
-        known = np.isfinite(values)
-        if not known.any():
-            continue  # no mechanism has this output, and no dimension alone gives it one
-        off, away = designs[known][:, own] - design[own], values[known] - values[known].mean()
-        along = (away @ off) ** 2 / (off**2).sum(axis=0)
-        matters += along / max(along.sum(), 1e-300) * (1.0 - float(meets(limit, columns[limit.output]).mean()))
-    for k in own[np.argsort(-matters, kind="stable")[:COSTS]]:
-        exact = designs.copy()
-        exact[:, k] = design[k]
-        parameter = study.family.parameters[k]
-        columns, kept = _kept(study, limits, exact)
-        spread = 1.0 - _variance(columns, worst) / scatter if scatter > 0.0 else 0.0
-        found.append(Cost(parameter.name, parameter.text, max(spread, 0.0), float(kept.mean()) - before))
-    return sorted(found, key=lambda cost: (-cost.gain if cost.gain >= TELLING else 0.0, -cost.spread))
-
-
-def _near(limit: Limit, column: NDArray[np.generic]) -> bool:
-    """Return whether a value misses the limit, or comes as near to it as the values scatter."""
-    room = math.sqrt(_variance({limit.output: column}, limit))
-    low, high = (None if x is None else x + d for x, d in ((limit.minimum, room), (limit.maximum, -room)))
-    return not meets(replace(limit, minimum=low, maximum=high), column).all()
-
-
-def _variance(columns: dict[str, NDArray[np.generic]], limit: Limit) -> float:
-    values = compared(limit.output, np.asarray(columns[limit.output], np.float64))
-    known = values[np.isfinite(values)]
-    return float(known.var()) if known.size else 0.0
 
 
 def _histogram(data: Dataset, limit: Limit, column: NDArray[np.generic]) -> Histogram:

@@ -237,10 +237,12 @@ def _made(data: Dataset, row: dict[str, Any]) -> str:
     """Share of what is made within the tolerances that keeps all limits."""
     study, known = data.study, float(row.get("yield", math.nan))
     limits = [limit for limit in study.output_limits if not limit.is_equation]
-    found = many(data, row, SAMPLES) if limits else None
-    if found is None:
+    if not limits:
         return ""
     if not math.isfinite(known):
+        found = many(data, row, SAMPLES)
+        if found is None:
+            return ""
         columns = design_outputs(study.family, found[1], [x.output for x in limits], study.accuracy, study.window)
         known = float(np.logical_and.reduce([meets(limit, columns[limit.output]) for limit in limits]).mean())
     return f"{number(100.0 * known, 3)}\u00a0% of what is made keeps all limits"

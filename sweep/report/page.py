@@ -9,11 +9,12 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from sweep.dataset.chunk_files import ROWS_PER_BATCH, batches
-from sweep.dataset.files import beside, is_older, located, write_atomically
+from sweep.dataset.files import OF_OPTIMUM, PARETO, beside, is_older, located, write_atomically
 from sweep.errors import StoreError
 from sweep.evaluation.cyclogram import cyclogram, table_in_degrees
 from sweep.families.machines.machine import Machine
 from sweep.jobs.progress import Say, unsaid
+from sweep.optimise.manufacture.tolerance import SINGLE, TELLING
 from sweep.pages import rendered
 from sweep.report import answer, front, maps, tables
 from sweep.report.bodies import bars
@@ -21,8 +22,6 @@ from sweep.report.dataset import Dataset, gather
 from sweep.report.figures import drawn_before, house_style, save
 from sweep.report.live import live
 from sweep.report.made import (
-    COSTS,
-    TELLING,
     event_bands,
     made,
     made_sentence,
@@ -138,8 +137,8 @@ def _as_made(data: Dataset) -> dict[str, Any]:
     told, within = made(data), tolerance_words(data)
     return {
         "made": told, "made_words": made_sentence(told, within), "tolerance": within, "spreads": spreads(data),
-        "costs": [x for x in told.costs if max(x.spread, x.gain) >= TELLING][:COSTS] if told else [],
-        "share_made": share_made(data), "slopes": slopes(data),
+        "costs": [x for x in told.costs if max(x.spread, x.gain) >= TELLING] if told else [],
+        "share_made": share_made(data), "slopes": slopes(data), "single": SINGLE,
     }  # fmt: skip
 
 
@@ -203,9 +202,9 @@ def own_figures(study: Study, folder: Path) -> list[dict[str, Any]]:
 
 
 def copy_tables(folder: Path, out: Path) -> None:
-    """Copy the optimum with its curves, sensitivities and tolerances, and the front, where the study has them."""
-    for name in ("optimum.parquet", "curves.parquet", "sensitivity.parquet", "tolerance.parquet", "pareto.parquet"):
-        source, target = beside(folder) / f"_{name}", out / name
+    """Copy the optimum with the tables about it, and the front, where the study has them."""
+    for name in (*OF_OPTIMUM, PARETO):
+        source, target = beside(folder) / name, out / name.removeprefix("_")
         if source.exists():
             shutil.copyfile(source, target)
         else:

@@ -17,14 +17,14 @@ import pyarrow.parquet as pq
 import pytest
 
 import sweep.chunks.plan
-from sweep.dataset.files import CURVES, OPTIMUM, PARETO, SENSITIVITY, TOLERANCE, beside
+from sweep.dataset.files import OF_OPTIMUM, PARETO, beside
 from sweep.engine.run import run
 from sweep.errors import LinksweepError
 from tests.optimise.test_front import TABLE
 from tests.optimise.test_study import STUDY
 from tests.support.engine_study import ROOT, SMALL_CHUNKS, write_study
 
-TABLES = (OPTIMUM, CURVES, SENSITIVITY, TOLERANCE, PARETO)
+TABLES = (*OF_OPTIMUM, PARETO)
 ROBUST = '\n[tolerance]\nlengths = "0.3 mm"\nangles = "0.2 deg"\nrobust = "95 %"\n'
 SLOW_DISK = Path(__file__).parent / "slow_disk"
 PAUSE = 0.05  # of every write of a chunk or table [s]

@@ -10,14 +10,13 @@ import numpy as np
 import pytest
 
 import sweep.optimise.study
+from sweep.dataset.files import OF_OPTIMUM
 from sweep.engine.run import run
 from sweep.optimise import optimise_study
 from sweep.optimise.local.kkt import Result
 from sweep.optimise.multistart.kept import Kept, noted, result_of
 from sweep.study import load_study
 from tests.optimise.test_robust import ROBUST
-
-FILES = ("_optimum.parquet", "_tolerance.parquet", "_sensitivity.parquet", "_curves.parquet")
 
 
 def test_search_that_was_stopped_while_designs_were_made_robust_goes_on_there(
@@ -26,7 +25,7 @@ def test_search_that_was_stopped_while_designs_were_made_robust_goes_on_there(
     (tmp_path / "study.toml").write_text(ROBUST)
     study = load_study(tmp_path)
     out = run(study, tmp_path / "designs", jobs=1)
-    whole = {name: (tmp_path / name).read_bytes() for name in FILES}
+    whole = {name: (tmp_path / name).read_bytes() for name in OF_OPTIMUM}
     file = tmp_path / "_search.json"
     assert not file.exists()
 
@@ -44,7 +43,7 @@ def test_search_that_was_stopped_while_designs_were_made_robust_goes_on_there(
     monkeypatch.setattr(sweep.optimise.study, "explore", refused)
     optimise_study(study, out, key="k")
     assert not file.exists()
-    assert {name: (tmp_path / name).read_bytes() for name in FILES} == whole
+    assert {name: (tmp_path / name).read_bytes() for name in OF_OPTIMUM} == whole
 
 
 def test_results_come_back_with_every_bit_and_a_damaged_file_is_forgotten(tmp_path: Path) -> None:

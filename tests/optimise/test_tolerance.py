@@ -11,7 +11,7 @@ import pandas as pd
 import pytest
 from scipy import stats
 
-from sweep.dataset.files import beside
+from sweep.dataset.files import MADE, beside
 from sweep.engine.run import run
 from sweep.errors import StudyError
 from sweep.evaluation.summaries import design_outputs
@@ -20,6 +20,8 @@ from sweep.families.base import Accuracy
 from sweep.optimise import Problem
 from sweep.optimise.manufacture.robust import yields
 from sweep.optimise.manufacture.tolerance import deviating, sensitivities, tolerance_rows
+from sweep.report.dataset import read_dataset
+from sweep.report.made import made
 from sweep.study import Limit, Tolerance, load_study
 from tests.optimise.test_study import STUDY
 
@@ -112,7 +114,7 @@ def test_equations_are_no_limits_of_what_is_made() -> None:
     assert yields(replace(problem, limits=(band,)), DESIGN[None, :], tolerance, 3)[0] == pytest.approx(0.5, abs=0.05)
 
 
-def test_study_writes_both_tables(tmp_path: Path) -> None:
+def test_study_writes_its_tables(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     text = STUDY.format(swing=40.0).replace("count = 8", "count = 4").replace("starts = 3", "starts = 1")
     (tmp_path / "study.toml").write_text(text + '[tolerance]\nlengths = "0.02 mm"\nangles = "0.05 deg"\n')
     study = load_study(tmp_path)
@@ -124,9 +126,20 @@ def test_study_writes_both_tables(tmp_path: Path) -> None:
     best = bands[bands.role == "optimum"].set_index("output")
     assert best.loc["max_abs_d2psi"].low < best.loc["max_abs_d2psi"].nominal < best.loc["max_abs_d2psi"].high
     assert 0.0 < best.loc["all limits"].within < 0.9  # an active limit is missed by half of what is made
+    with monkeypatch.context() as patch:
+        patch.setattr("sweep.report.made.manufactured", None)  # a report reads what the run has made
+        noted = made(read_dataset(folder))
+    (beside(folder) / MADE).unlink()  # as in a folder of an earlier version
+    anew = made(read_dataset(folder))
+    assert (noted.share, noted.costs) == (anew.share, anew.costs) and 0.0 < noted.share < 0.9 and noted.costs
+    np.testing.assert_array_equal(noted.histogram.edges, anew.histogram.edges)
+    np.testing.assert_array_equal(noted.histogram.shares, anew.histogram.shares)
+    (tmp_path / "study.toml").write_text(text + '[tolerance]\nlengths = "0.03 mm"\n')
+    run(load_study(tmp_path), folder, jobs=1)
+    assert (beside(folder) / MADE).exists()
     (tmp_path / "study.toml").write_text(text)
     run(load_study(tmp_path), folder, jobs=1)
-    assert not (beside(folder) / "_tolerance.parquet").exists()
+    assert not (beside(folder) / "_tolerance.parquet").exists() and not (beside(folder) / MADE).exists()
 
 
 @pytest.mark.parametrize(

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from pathlib import Path
 from types import SimpleNamespace
 
 import numpy as np
@@ -47,7 +48,8 @@ def data_of(*rows, **tables):
     if study.objective.output not in frame:
         frame[study.objective.output] = -frame["max_abs_d2psi"]
     optimum = frame[frame["role"] == "optimum"].iloc[0].to_dict()
-    return SimpleNamespace(study=study, reference=None, optima=frame, optimum=optimum, units={"least_link": "mm"})
+    own = {"folder": Path("nowhere"), "optima": frame, "optimum": optimum, "units": {"least_link": "mm"}}
+    return SimpleNamespace(study=study, reference=None, **own)
 
 
 def test_starts_that_ended_alike_or_in_a_mirror_are_one_optimum() -> None:
@@ -176,6 +178,6 @@ def test_histogram_of_any_output_is_to_be_had() -> None:
 def test_no_yield_without_tolerances_or_limits(missing) -> None:
     data = DATA | {missing: {}} if missing == "limits" else {k: v for k, v in DATA.items() if k != missing}
     study = study_from_data(data, "study.toml")
-    assert made(SimpleNamespace(study=study, optimum=row("optimum"), units={})) is None
+    assert made(SimpleNamespace(study=study, optimum=row("optimum"), units={}, folder=Path("nowhere"))) is None
     assert made_sentence(None, "x") == ""
     assert np.isnan(row()["yield"])

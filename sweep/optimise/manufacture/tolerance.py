@@ -4,24 +4,25 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
-from typing import TYPE_CHECKING, Any
+from dataclasses import replace
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from sweep.evaluation.summaries import design_outputs
 from sweep.families.base import Accuracy, Array, Family
-from sweep.families.names import is_flag
+from sweep.families.names import is_flag, judged_by
 from sweep.optimise.extrema.gradients import scalar_gradient, step_gradients, stepped
 from sweep.optimise.local.model import Model
 from sweep.optimise.problem.program import Program
 from sweep.optimise.problem.statement import Problem
-from sweep.quantities.limits import meets
+from sweep.quantities.limits import Limit, compared, meets
 from sweep.quantities.measures import Measure, measure
 from sweep.quantities.resolve import output as described
 
 if TYPE_CHECKING:
-    from sweep.study import Limit, Tolerance
+    from sweep.study import Study, Tolerance
 
 TIE = 1e-6  # extrema this near to the largest one (relative) share it
 DIMENSIONS = ("length", "angle", "ratio")  # a geared drive's dimensions are in planet radii
@@ -239,3 +240,107 @@ def tolerance_rows(
     for name, value in zip(rows, last, strict=True):
         rows[name].append(value)
     return rows
+
+
+SINGLE = 512  # mechanisms of those made, for what each dimension costs
+COSTS = 8  # dimensions that are tried exact
+TELLING = 0.004  # a share of mechanisms below which a dimension costs nothing that 512 of them could tell
+
+
+class Cost(NamedTuple):
+    """What one dimension's tolerance costs, found by making the same mechanisms with it exact.
+
+    ``spread`` is its share in the variance of the output whose limit is missed most, ``gain`` the share of mechanisms
+    that keep the limits more without it.  A design that stands at its limit gains nothing from any single dimension.
+    """
+
+    name: str
+    text: str
+    spread: float
+    gain: float
+
+
+class Manufactured(NamedTuple):
+    """What is made of a design: the ``output`` whose limit is missed most, its ``values`` (n,), which keep all limits.
+
+    ``costs`` are those of its dimensions, the dearest first.
+    """
+
+    output: str
+    values: NDArray[np.generic]
+    kept: NDArray[np.bool_]
+    costs: tuple[Cost, ...]
+
+
+def limits_of_made(study: Study) -> list[Limit]:
+    """Return the limits that leave room, each on the number that decides it: a yes or no has no scatter to be shown."""
+    limits = [limit for limit in study.output_limits if not limit.is_equation]
+    return [Limit(judged_by(x.output), 0.0, None) if is_flag(x.output) else x for x in limits]
+
+
+def manufactured(study: Study, design: Array) -> Manufactured | None:
+    """Make a design (P,) many times; None without tolerances, a design, or a limit that leaves room."""
+    limits = limits_of_made(study)
+    if study.tolerance is None or study.optimise is None or not limits or not np.isfinite(design).all():
+        return None
+    designs = deviating(study.family, design, study.tolerance, study.optimise.seed, study.tolerance.samples)
+    columns, kept = _kept(study, limits, designs)
+    worst = min(limits, key=lambda limit: float(meets(limit, columns[limit.output]).mean()))
+    few = {name: values[:SINGLE] for name, values in columns.items()}
+    costs = _costs(study, limits, worst, design, designs[:SINGLE], few, float(kept[:SINGLE].mean()))
+    return Manufactured(worst.output, columns[worst.output], kept, tuple(costs))
+
+
+def _kept(
+    study: Study, limits: list[Limit], designs: Array
+) -> tuple[dict[str, NDArray[np.generic]], NDArray[np.bool_]]:
+    names = list(dict.fromkeys(limit.output for limit in limits))
+    columns = design_outputs(study.family, designs, names, study.accuracy, study.window)
+    return columns, np.logical_and.reduce([meets(limit, columns[limit.output]) for limit in limits])
+
+
+def _costs(
+    study: Study, limits: list[Limit], worst: Limit, design: Array, designs: Array,
+    columns: dict[str, NDArray[np.generic]], before: float,
+) -> list[Cost]:  # fmt: skip
+    """Dimensions by what their tolerances cost, the dearest first: the same mechanisms with one dimension exact.
+
+    Of the mechanisms ``designs`` the ``columns`` are known, and the share ``before`` that keeps all limits.  Made exact
+    are the dimensions whose share in the variance of an output, times the share that misses its limit, is largest.  A
+    limit from which all these mechanisms keep a standard deviation of theirs is kept with one dimension exact, too.
+    """
+    assert study.tolerance is not None
+    limits = [x for x in limits if x is worst or _near(x, columns[x.output])]
+    scatter = _variance(columns, worst)
+    found = []
+    own = np.flatnonzero(touched(study.family, design, study.tolerance))
+    matters = np.zeros(len(own))
+    for limit in limits:
+        values = compared(limit.output, np.asarray(columns[limit.output], np.float64))
+        known = np.isfinite(values)
+        if not known.any():
+            continue  # no mechanism has this output, and no dimension alone gives it one
+        off, away = designs[known][:, own] - design[own], values[known] - values[known].mean()
+        along = (away @ off) ** 2 / (off**2).sum(axis=0)
+        matters += along / max(along.sum(), 1e-300) * (1.0 - float(meets(limit, columns[limit.output]).mean()))
+    for k in own[np.argsort(-matters, kind="stable")[:COSTS]]:
+        exact = designs.copy()
+        exact[:, k] = design[k]
+        parameter = study.family.parameters[k]
+        columns, kept = _kept(study, limits, exact)
+        spread = 1.0 - _variance(columns, worst) / scatter if scatter > 0.0 else 0.0
+        found.append(Cost(parameter.name, parameter.text, max(spread, 0.0), float(kept.mean()) - before))
+    return sorted(found, key=lambda cost: (-cost.gain if cost.gain >= TELLING else 0.0, -cost.spread))
+
+
+def _near(limit: Limit, column: NDArray[np.generic]) -> bool:
+    """Return whether a value misses the limit, or comes as near to it as the values scatter."""
+    room = math.sqrt(_variance({limit.output: column}, limit))
+    low, high = (None if x is None else x + d for x, d in ((limit.minimum, room), (limit.maximum, -room)))
+    return not meets(replace(limit, minimum=low, maximum=high), column).all()
+
+
+def _variance(columns: dict[str, NDArray[np.generic]], limit: Limit) -> float:
+    values = compared(limit.output, np.asarray(columns[limit.output], np.float64))
+    known = values[np.isfinite(values)]
+    return float(known.var()) if known.size else 0.0
