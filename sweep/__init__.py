@@ -78,10 +78,12 @@ _MODULES = {"plot": "sweep.plot", "thread": "sweep.evaluation.thread"}
 
 def __getattr__(name: str) -> Any:
     if name in _MODULES:
-        return import_module(_MODULES[name])
-    if name in _HOMES:
-        return getattr(import_module(_HOMES[name]), name)
-    raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+        globals()[name] = import_module(_MODULES[name])
+    elif name in _HOMES:
+        globals()[name] = getattr(import_module(_HOMES[name]), name)
+    else:
+        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+    return globals()[name]
 
 
 def __dir__() -> list[str]:

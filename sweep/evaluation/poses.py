@@ -96,7 +96,7 @@ def evaluate(
     index = given.index if isinstance(given, pd.DataFrame) else None
     if phi is None:
         _check_column(mechanism, extras)
-        at, head, repeats = np.ascontiguousarray(extras[variable])[:, None], {}, 1
+        at, head, repeats = extras[variable][:, None], {}, 1
     else:
         grid = _grid(mechanism, table, phi)
         at, repeats = grid[None, :], grid.size

@@ -76,8 +76,10 @@ def design_matrix(
     matrix = np.empty((rows, len(family.parameters)))
     for k, parameter in enumerate(family.parameters):
         matrix[:, k] = _checked_column(family, parameter, columns, keys)
-    extras = {name: np.broadcast_to(columns[name], rows) for name in extra if name in columns}
-    for name, values in extras.items():
+    extras = {}
+    for name in [name for name in extra if name in columns]:
+        extras[name] = values = np.empty(rows)
+        values[:] = columns[name]
         refuse_rows(~np.isfinite(values), values, name, "a finite number")
     return matrix, extras
 
@@ -285,7 +287,7 @@ def index_of(table: Table, rows: int) -> pd.Index:
 
 def refuse_rows(bad: Any, values: Array, name: str, allowed: str) -> None:
     """Refuse the first value of a column that is ``bad``, with its row and what is allowed."""
-    if np.any(bad):
+    if bad.any():
         row = int(np.argmax(bad))
         value = float(values.flat[row])
         gap = "; an empty cell is read as nan" if math.isnan(value) else ""

@@ -8,6 +8,7 @@ from __future__ import annotations
 import re
 from collections.abc import Container
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Literal
 
 import numpy as np
@@ -44,7 +45,7 @@ class Parameter:
         """Value where it is left out beside the given names; None where it must not be."""
         return 0.0 if any(self.name.replace(*pair) in given for pair in self.unless) else self.default
 
-    @property
+    @cached_property
     def sign(self) -> str:
         """What its sign may be, in a word; empty if anything."""
         words = ((self.positive, "positive"), (self.not_negative, "non-negative"), (self.not_zero, "non-zero"))

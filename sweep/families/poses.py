@@ -98,9 +98,12 @@ def poses_of(
             if wanted.isdisjoint(group):
                 rooms.append(None)
                 continue
-            room = np.empty((len(group), *shape), dtype)
-            rooms.append(room if field in of_block else room[0])
-            columns |= {name: values for name, values in zip(group, room, strict=True) if name in wanted}
+            room = np.empty((len(group), *shape) if field in of_block else shape, dtype)
+            rooms.append(room)
+            if field in of_block:
+                columns |= {name: values for name, values in zip(group, room, strict=True) if name in wanted}
+            else:
+                columns[field] = room
         kernel(designs, *(getattr(angles, name) for name in taken), status, outputs(*rooms))
         return columns | {"status": status}
 

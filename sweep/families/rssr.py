@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from functools import lru_cache, partial
+from functools import lru_cache
+from typing import Any
 
 import numpy as np
 
@@ -72,6 +73,15 @@ MOST_CELLS = 1000  # enclosures of one design before its proof is given up; 100 
 _poses = poses_of(rssr.poses, rssr.Outputs)
 
 
+def _precise(designs: Array, *given: Any) -> None:
+    constants = np.empty((len(designs), rssr.PRECISE_COLUMNS))
+    rssr.precise_constants(designs, constants)
+    rssr.precise_poses(constants, designs, *given)
+
+
+_precise_poses = poses_of(_precise, rssr.Outputs)
+
+
 @together(*rssr.Outputs._fields)
 def poses(designs: Array, angles: Angles, wanted: frozenset[str]) -> Columns:
     """Wanted pose outputs and status of every design at its crank angles, each (n, m)."""
@@ -81,9 +91,7 @@ def poses(designs: Array, angles: Angles, wanted: frozenset[str]) -> Columns:
 @together(*rssr.Outputs._fields)
 def precise_poses(designs: Array, angles: Angles, wanted: frozenset[str]) -> Columns:
     """As :func:`poses`, with the closure in twice the working precision; for float64 only."""
-    constants = np.empty((len(designs), rssr.PRECISE_COLUMNS))
-    rssr.precise_constants(designs, constants)
-    return poses_of(partial(rssr.precise_poses, constants), rssr.Outputs)(designs, angles, wanted)
+    return _precise_poses(designs, angles, wanted)
 
 
 JOINT_NEEDS = ("cos_psi", "sin_psi", "dpsi", "d2psi", "discriminant")
