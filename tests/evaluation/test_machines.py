@@ -187,6 +187,8 @@ def test_torque_on_the_shaft_is_the_sum_of_the_members() -> None:
         ({"x": "rssr", "y": {"family": "rssr", "ratio": 0.5}}, None, "whole number"),
         ({"x": {"family": "rssr", "tipp": 1}}, None, "did you mean 'tip'"),
         ({"x": {"family": "rssr", "driver": "y.psi"}}, None, "stands before"),
+        ({"x": "five_link", "y": {"family": "rssr", "driver": "x.theta"}}, None, "three derivatives"),
+        ({"x": "feed", "y": {"family": "rssr", "driver": "x.chi"}}, None, "three derivatives"),
         ({"x": {"family": "rssp", "tip": [1, 2, 3]}}, None, "output link turns"),
         ({"x": "rssr"}, {"d": {"distance": ["x.b", "x.q"]}}, "did you mean"),
         ({"x": "rssr"}, {"d": {"away": ["x.b", "x.c"]}}, "one of distance"),

@@ -32,6 +32,13 @@ MACHINES: dict[str, tuple[dict[str, object], tuple[str, ...]]] = {
         {"needle": "slider_crank", "looper": {"family": "swivel", "ratio": -2}},
         ("clearance", "looper.drive_torque_friction", "looper.force_b"),
     ),
+    "machine of a driven member": (
+        {
+            "looper": {"family": "rssr", "ratio": -2, "tip": [3.0, 1.0, 0.0]},
+            "arm": {"family": "four_bar", "driver": "looper.psi", "offset": 0.8},
+        },
+        ("clearance", "arm.d2psi", "arm.d2x_m", "arm.d2y_m", "arm.dpsi"),
+    ),
 }
 KINDS = ("ordinary", "wide", "edge", "tiny", "long", "peaky")
 PEAKS = 1440  # poses of a turn by which a design is called peaky
@@ -114,7 +121,7 @@ def _machine(name: str) -> Subject:
     return Subject(name, full, len(full.parameters), outputs, centre)
 
 
-_POINTS = {"slider_crank": "c", "swivel": "p", "cam": "r", "rssr+guide": "point"}
+_POINTS = {"slider_crank": "c", "swivel": "p", "cam": "r", "rssr+guide": "point", "four_bar": "m"}
 
 
 def _family_of(how: object) -> str:

@@ -42,6 +42,7 @@ RELATION_KINDS = (
     "distance", "speed", "timing", "event", "value", "torque", "shaking", "thread", "gap", "take", "enter", "sew",
     "above", "press",
 )  # fmt: skip
+DERIVATIVES = 3  # of the angle that drives a member: its jerk needs all of them
 EVENT_KEYS = ("event", "level", "rising")
 _WORD = re.compile(r"[A-Za-z][A-Za-z0-9_]*")
 _ENDS_IN_DIGIT = re.compile(r".*\d")
@@ -215,12 +216,26 @@ def _eye(member: Member, given: Any, where: str) -> tuple[float, ...]:
 def _driver(given: object, earlier: Mapping[str, Member], where: str) -> tuple[str, str] | None:
     if given is None or given == "shaft":
         return None
-    angles = [f"{m.name}.{o.name}" for m in earlier.values() for o in m.family.pose_outputs if o.wraps]
+    angles = [
+        f"{m.name}.{o.name}"
+        for m in earlier.values()
+        for o in m.family.pose_outputs
+        if o.wraps and _derivatives(m.family, o.name) >= DERIVATIVES
+    ]
     if given not in angles:
         known = ", ".join(["shaft", *angles])
-        raise InputError("driver", given, f"the main shaft, or an angle of a member that stands before: {known}", where)
+        allowed = f"the main shaft, or an angle with three derivatives of a member that stands before: {known}"
+        raise InputError("driver", given, allowed, where)
     member, _, output = str(given).partition(".")
     return member, output
+
+
+def _derivatives(family: Family, output: str) -> int:
+    """Return how many derivatives of an output a family gives."""
+    number = 0
+    while output in family.derivative_of:
+        output, number = family.derivative_of[output], number + 1
+    return number
 
 
 def _outputs(members: Mapping[str, Member], others: tuple[Any, ...]) -> Mapping[str, Output]:
