@@ -21,7 +21,6 @@ from sweep.costs import nanoseconds
 from sweep.effects import called_for
 from sweep.evaluation.summaries import Route, design_outputs, routes
 from sweep.families.base import Array, Columns, Work
-from sweep.families.chain import stages_of
 from sweep.families.names import error_of, parts
 from sweep.quantities.limits import Limit, meets
 from sweep.synthesis.fit import driving_outputs, fit_line
@@ -302,7 +301,7 @@ def _before_fit(study: Study, route: Route) -> bool:
     """Whether the route concerns only stages before the one that [fit] finishes, and no load that it hands back."""
     if study.fit is None:
         return False
-    last = len(stages_of(study.bare))
+    last = len(study.bare.stages)
     numbers = [parts(name).stage for name in route.outputs]
     if not all(number and int(number) < last for number in numbers):
         return False

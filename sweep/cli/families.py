@@ -17,7 +17,6 @@ from sweep.families.capabilities import (
     JointRecords,
     LimitLocus,
     OutputLink,
-    Points,
     PressureEllipse,
     ProvableLocus,
 )
@@ -35,7 +34,6 @@ CAPABILITIES = (
     (LimitLocus, "limit locus"),
     (ProvableLocus, "proven optimum"),
     (GuidedPoint, "line fit"),
-    (Points, "points"),
     (OutputLink, "tip"),
 )
 
@@ -89,13 +87,13 @@ def over(family: Family) -> str:
 
 def capability_words(family: Family) -> list[str]:
     """Say what a family can be asked for besides its motion."""
-    return [word for kind, word in CAPABILITIES if family.find(kind) is not None]
+    return [*(word for kind, word in CAPABILITIES if family.find(kind) is not None), *["points"] * bool(family.points)]
 
 
 def describe(family: Family) -> list[str]:
     """Parameters, pose outputs and design outputs of a family with their units, one per line."""
     words = ", ".join(capability_words(family))
-    points = ", ".join(name for found in family.every(Points) for name in found.at)
+    points = ", ".join(family.points)
     outputs = [output(family, name) for name in main_outputs(family)]
     lines = [f"{family.name}: {family.title}", "", f"over: {over(family)}"]
     lines += [f"can be asked for: {words}"] if words else []

@@ -9,7 +9,6 @@ from itertools import pairwise
 
 from sweep.cli.families import described, main_outputs
 from sweep.families.base import Family, March
-from sweep.families.chain import stages_of
 from sweep.families.machines.machine import Machine
 from sweep.families.names import is_flag, parts, stem
 from sweep.pages import rendered
@@ -128,7 +127,7 @@ def _place(family: Family) -> str:
 
 
 def _names(family: Family) -> list[str]:
-    return [stage.family.name for stage in stages_of(family)]
+    return [stage.family.name for stage in family.stages]
 
 
 def mechanism_line(family: Family) -> str:

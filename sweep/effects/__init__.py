@@ -15,7 +15,6 @@ from types import MappingProxyType
 
 from sweep.effects.base import CURVED, Effect, Placed
 from sweep.effects.evaluation import Added, bends, bent, effect_poses, on_own_columns, paces, piercing, run_design
-from sweep.effects.scene import stages_of
 from sweep.errors import InputError
 from sweep.families.base import Accuracy, Family, Output, Parameter, Step, Work, of_family
 from sweep.families.chain import Chain
@@ -127,11 +126,11 @@ def applicable(family: Family) -> tuple[Placed, ...]:
 
     A later stage of a chain turns unevenly; a stage whose load comes from stages behind it needs them to hand it back.
     """
-    stages = stages_of(family)
+    stages = family.stages
     found = [
-        Placed(entry, k, number, k == len(stages) - 1)
-        for k, (stage, number) in enumerate(stages)
-        for entry in serving(stage)
+        Placed(entry, k, stage.tail, k == len(stages) - 1)
+        for k, stage in enumerate(stages)
+        for entry in serving(stage.family)
         if not (k > 0 and entry.even_crank)
     ]
     return tuple(
@@ -161,11 +160,11 @@ def _effect_names(family: Family) -> frozenset[str]:
 
 def _carriers(family: Family, placed: Placed) -> list[Placed]:
     """Effects of the later stages that hand back the load of this one."""
-    stages, key = stages_of(family), placed.entry.takes_load
+    key = placed.entry.takes_load
     return [
-        Placed(entry, k, number, False)
-        for k, (stage, number) in enumerate(stages)
-        for entry in serving(stage)
+        Placed(entry, k, stage.tail, False)
+        for k, stage in enumerate(family.stages)
+        for entry in serving(stage.family)
         if key and k > placed.stage and entry.key == key
     ]
 
@@ -173,7 +172,7 @@ def _carriers(family: Family, placed: Placed) -> list[Placed]:
 def _handing(family: Family, placed: Placed) -> list[Placed]:
     """Effects of all later stages that hand back the load of this one; none if a stage cannot."""
     found = _carriers(family, placed)
-    return found if len(found) == len(stages_of(family)) - 1 - placed.stage else []
+    return found if len(found) == len(family.stages) - 1 - placed.stage else []
 
 
 def all_inputs(family: Family) -> Mapping[str, Parameter]:
@@ -181,7 +180,7 @@ def all_inputs(family: Family) -> Mapping[str, Parameter]:
     if isinstance(family, Machine):
         return {f"{m.name}.{name}": p for m in family.members for name, p in all_inputs(m.family).items()}
     # Asked at every call of the reductions; it depends on nothing but the names of the stages.
-    stages = tuple((stage.name, number) for stage, number in stages_of(family))
+    stages = tuple((stage.family.name, stage.tail) for stage in family.stages)
     if stages not in _INPUTS:
         _INPUTS[stages] = {p.name: p for p in inputs(family, applicable(family))}
     return _INPUTS[stages]
@@ -201,10 +200,8 @@ def curved_inputs(family: Family) -> tuple[str, ...]:
     """List the inputs of effects that a load over the turn can add to, for a family, a chain or a machine."""
     if isinstance(family, Machine):
         return tuple(f"{m.name}.{name}" for m in family.members for name in curved_inputs(m.family))
-    numbers = [number for _, number in stages_of(family)]
-    return tuple(
-        name for name in sorted(input_names(family)) if any(name == f"{own}{k}" for own in CURVED for k in numbers)
-    )
+    known = {f"{own}{stage.tail}" for own in CURVED for stage in family.stages}
+    return tuple(sorted(known & input_names(family)))
 
 
 def offered(family: Family) -> tuple[Output, ...]:
@@ -325,10 +322,10 @@ def inputs(family: Family, effects: Iterable[Placed]) -> tuple[Parameter, ...]:
     """
     merged: dict[str, Parameter] = {}
     users: dict[str, list[str]] = {}
-    first = stages_of(family)[0][1]
+    first = family.stages[0].tail
     for placed in effects:
         for source in (placed, *_handing(family, placed)):
-            for p in source.entry.inputs_of(stages_of(family)[source.stage][0]):
+            for p in source.entry.inputs_of(family.stages[source.stage].family):
                 name = f"{p.name}{first if p.name in _FIRST_ONLY else source.number}"
                 optional = placed.entry.may_drive_nothing and source is not placed and p.default is None
                 if name not in merged or (p.default is None and not optional):

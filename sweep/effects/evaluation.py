@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from kernels.types import Status
 from sweep.effects.base import Bend, Placed
-from sweep.effects.scene import Scene, first_scene, stages_of, take_over
+from sweep.effects.scene import Scene, first_scene, take_over
 from sweep.families.base import Accuracy, Angles, Array, Columns, Family, Output, Parameter, Step
 from sweep.families.curve_features import Bends, Crossing, of_order, of_table
 from sweep.families.poses import blocks, differenced
@@ -64,7 +64,7 @@ def effect_poses(
         return turned | family.poses(added.own(designs), angles, own)
     asked = [(placed, [name for name in placed.own if name in wanted]) for placed in effects]
     asked = [(placed, names) for placed, names in asked if names]
-    last, shape = len(stages_of(family)) - 1, (len(designs), angles.cos.shape[1])
+    last, shape = len(family.stages) - 1, (len(designs), angles.cos.shape[1])
     # Without an output of the family's own its motion is that of the scenes, pose by pose.
     bare = not own and bool(asked) and not any(placed.entry.whole_turn for placed, _ in asked)
     columns: Columns = {} if bare else family.poses(added.own(designs), angles, own)
@@ -146,10 +146,10 @@ def piercing(family: Family, added: tuple[Parameter, ...]) -> list[Crossing]:
     """Where a tool pierces: at a place of the follower of its stage."""
     columns = {p.name: len(family.parameters) + k for k, p in enumerate(added)}
     found = []
-    for stage, number in stages_of(family):
-        force, at = columns.get(f"pierce_force{number}"), columns.get(f"pierce_at{number}")
+    for stage in family.stages:
+        force, at = columns.get(f"pierce_force{stage.tail}"), columns.get(f"pierce_at{stage.tail}")
         if force is not None and at is not None:
-            position = f"{stage.position}{number}"
+            position = f"{stage.family.position}{stage.tail}"
             found.append(Crossing(position, partial(_column, at), partial(_is_given, force)))
     return found
 

@@ -17,7 +17,7 @@ from kernels.linkage.joints import PER_DESIGN, PER_POSE
 from kernels.types import Status
 from sweep.families.base import Angles, Array, Columns, Family
 from sweep.families.capabilities import JointRecords
-from sweep.families.chain import Chain, drive, driving_names
+from sweep.families.chain import drive, driving_names
 from sweep.families.link_tree import LinkTree
 from sweep.families.names import at_stage
 from sweep.numerics.curves import Curve
@@ -224,13 +224,6 @@ class Scene:
         return Scene(self.family, self.designs, angles, self.inputs, self.after, curves=self.curves)
 
 
-def stages_of(family: Family) -> tuple[tuple[Family, str], ...]:
-    """Stages of a chain with their numbers; a family alone is one stage without a number."""
-    if isinstance(family, Chain):
-        return tuple((stage.family, str(stage.number)) for stage in family.stages)
-    return ((family, ""),)
-
-
 def first_scene(
     family: Family,
     designs: Array,
@@ -242,15 +235,12 @@ def first_scene(
 
     ``given`` are the inputs by name, each (n,), ``curves`` what adds to some of them over the turn.
     """
-    if not isinstance(family, Chain):
-        return Scene(family, designs, angles, {"speed_change": 0.0 * designs[:, 0]} | given, curves=curves)
-    still = {"speed_change": 0.0 * designs[:, 0]}
-    crank = still | {name: given[f"{name}1"] for name in ("speed", "speed_change") if f"{name}1" in given}
+    still, first = {"speed_change": 0.0 * designs[:, 0]}, family.stages[0].tail
+    crank = still | {name: given[f"{name}{first}"] for name in ("speed", "speed_change") if f"{name}{first}" in given}
     parts = []
     for stage in family.stages:
-        number = str(stage.number)
-        own = {plain: x for name, x in given.items() if (plain := at_stage(name, number))}
-        over = {plain: x for name, x in curves.items() if (plain := at_stage(name, number))}
+        own = {plain: x for name, x in given.items() if (plain := at_stage(name, stage.tail))}
+        over = {plain: x for name, x in curves.items() if (plain := at_stage(name, stage.tail))}
         parts.append((stage.family, stage.designs(designs), own | crank, over))
     after = tuple(
         Driven(bare, matrix, designs[:, stage.kappa], designs[:, stage.offset], own, over)

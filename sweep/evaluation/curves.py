@@ -6,8 +6,7 @@ import re
 from typing import NamedTuple
 
 from sweep.families.base import Family
-from sweep.families.capabilities import Assembly, Points
-from sweep.families.chain import Chain
+from sweep.families.capabilities import Assembly
 from sweep.families.machines.machine import Machine
 from sweep.families.machines.main_shaft import ShaftTorque
 from sweep.families.machines.relations import Relation
@@ -61,9 +60,7 @@ def joint_curves(family: Family) -> tuple[str, ...]:
     """Return coordinates of the joints, of every stage in its own frame, of a machine's points in one frame."""
     if isinstance(family, Machine):
         return tuple(f"{m.name}.{point}_{axis}" for m in family.members for point in m.points for axis in AXES)
-    if isinstance(family, Chain):
-        return tuple(f"{name}{s.number}" for s in family.stages for name in joint_curves(s.family))
-    return tuple(name for points in family.every(Points) for at in points.at.values() for name in at if name)
+    return tuple(f"{name}{s.tail}" for s in family.stages for at in s.family.points.values() for name in at if name)
 
 
 def _ladder(family: Family, orders: int) -> list[str]:

@@ -17,12 +17,12 @@ from sweep.evaluation.tables import numbers, one_design
 from sweep.families import Mechanism
 from sweep.families import family as find_family
 from sweep.families.base import Angles, Array, Family
-from sweep.families.capabilities import Link, OutputLink, Points, Skeleton
-from sweep.families.chain import Chain, drive, driving_names, stages_of
+from sweep.families.capabilities import Link, OutputLink, skeleton_of
+from sweep.families.chain import Chain, drive, driving_names
 from sweep.families.frames import WHOLE, Frame
 from sweep.families.machines.machine import Machine
-from sweep.families.parts import TIP, Member
-from sweep.families.sites import AXES
+from sweep.families.parts import Member
+from sweep.families.sites import AXES, TIP
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -162,14 +162,14 @@ def parts(mechanism: Mechanism, design: Table, phi: ArrayLike) -> list[Part]:
     given = Angles.of(np.ascontiguousarray(angles[None, :]))
     if isinstance(family, Machine):
         return [part for member in family.members for part in _of_member(family, member, matrix, given)]
-    if not any(stage.family.find(Skeleton) or stage.family.find(Points) for stage in stages_of(family)):
+    if not any(skeleton_of(stage.family).links or stage.family.points for stage in family.stages):
         raise InputError("mechanism", family.name, "a mechanism that has joints", "joints")
     return list(_of_stages(family, matrix, given, angles, _wheres(family, matrix)))
 
 
 def _wheres(family: Family, matrix: Array) -> list[_Where]:
     """Return where the stages of a mechanism stand: in the frame of the first, where a chain says how."""
-    stages = stages_of(family)
+    stages = family.stages
     if not isinstance(family, Chain):
         return [_Where(frame=family.name)]
     names = [f"stage {stage.number} ({stage.family.name})" for stage in stages]
@@ -186,10 +186,9 @@ def _of_member(machine: Machine, member: Member, matrix: Array, angles: Angles) 
         driving = np.asarray(machine.poses(matrix, angles, frozenset({name}))[name], np.float64)
     own = Angles.of(np.ascontiguousarray(member.ratio * driving + member.phase(matrix)))
     wheres = []
-    for stage, frame in zip(stages_of(member.family), member.frames(matrix), strict=True):
-        number = str(stage.number) if isinstance(member.family, Chain) else ""
-        alone = f"{member.name} stage {number} ({stage.family.name})"
-        wheres.append(_Where(member.name, number, *(("machine", frame) if frame else (alone,))))
+    for stage, frame in zip(member.family.stages, member.frames(matrix), strict=True):
+        alone = f"{member.name} stage {stage.tail} ({stage.family.name})"
+        wheres.append(_Where(member.name, stage.tail, *(("machine", frame) if frame else (alone,))))
     if member.tip is not None:
         tip = np.array([member.column(matrix, f"{axis}_tip")[0] for axis in AXES])
         wheres[-1] = replace(wheres[-1], tip=tip)
@@ -198,7 +197,7 @@ def _of_member(machine: Machine, member: Member, matrix: Array, angles: Angles) 
 
 def _of_stages(family: Family, matrix: Array, angles: Angles, phi: Array, wheres: Sequence[_Where]) -> Iterator[Part]:
     """Yield every stage where it stands."""
-    stages = stages_of(family)
+    stages = family.stages
     status = np.zeros(phi.size, np.uint8)
     for k, stage in enumerate(stages):
         own = stage.family
@@ -213,30 +212,25 @@ def _of_stages(family: Family, matrix: Array, angles: Angles, phi: Array, wheres
 
 
 def _needed(family: Family) -> set[str]:
-    skeleton = family.find(Skeleton)
-    coordinates = {name for points in family.every(Points) for at in points.at.values() for name in at if name}
-    return coordinates | ({name for made in skeleton.made.values() for name in made.needs} if skeleton else set())
+    coordinates = {name for at in family.points.values() for name in at if name}
+    return coordinates.union(*(made.needs for made in skeleton_of(family).made.values()))
 
 
 def _part(
     family: Family, matrix: Array, angles: Angles, phi: Array, found: dict[str, Any], where: _Where, status: Any
 ) -> Part:
     """Return the joints of one stage, turned and moved into the frame of ``where``."""
-    skeleton = family.find(Skeleton)
+    skeleton = skeleton_of(family)
     moving = {
         name: np.stack([found[x][0] if x else np.zeros(phi.size) for x in at], axis=-1)
-        for points in family.every(Points)
-        for name, at in points.at.items()
+        for name, at in family.points.items()
     }
-    fixed: dict[str, Array] = {}
-    axes: dict[str, Array] = {}
-    if skeleton is not None:
-        moving |= {name: made.at(matrix, angles, found)[0] for name, made in skeleton.made.items()}
-        linked = {joint for link in skeleton.links for joint in link.joints}
+    moving |= {name: made.at(matrix, angles, found)[0] for name, made in skeleton.made.items()}
+    if linked := {joint for link in skeleton.links for joint in link.joints}:
         # What no link carries is no joint of the fixed frame: the pitch curve stands in that of the cam.
         moving = {name: path for name, path in moving.items() if name in linked}
-        fixed = {name: np.tile(point.at(matrix)[0], (phi.size, 1)) for name, point in skeleton.fixed.items()}
-        axes = {name: point.axis(matrix)[0] for name, point in skeleton.fixed.items() if point.axis is not None}
+    fixed = {name: np.tile(point.at(matrix)[0], (phi.size, 1)) for name, point in skeleton.fixed.items()}
+    axes = {name: point.axis(matrix)[0] for name, point in skeleton.fixed.items() if point.axis is not None}
     if where.tip is not None:
         link = family.find(OutputLink)
         assert link is not None
@@ -247,6 +241,5 @@ def _part(
     return Part(
         where.member, where.stage, where.frame, family, matrix[0], phi, crank, position, turned,
         {name: rotation @ axis for name, axis in axes.items()},
-        {name: point.kind for name, point in skeleton.fixed.items()} if skeleton else {},
-        skeleton.links if skeleton else (), status,
+        {name: point.kind for name, point in skeleton.fixed.items()}, skeleton.links, status,
     )  # fmt: skip

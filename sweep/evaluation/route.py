@@ -13,11 +13,10 @@ import numpy as np
 from kernels import status as st
 from kernels.types import TWO_PI
 from sweep.errors import InputError
-from sweep.families.base import Accuracy, Array, Columns, Family, Step, Work
+from sweep.families.base import Accuracy, Array, Columns, Family, Stage, Step, Work
 from sweep.families.machines.machine import Machine
 from sweep.families.machines.relations import EventValue, Timing
 from sweep.families.names import at_stage, by_magnitude, error_of
-from sweep.families.parts import Stage
 from sweep.quantities.box import ROUNDING, Box
 from sweep.quantities.kinds import Group, Reduced
 from sweep.quantities.resolve import find

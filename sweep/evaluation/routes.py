@@ -19,12 +19,12 @@ from sweep.errors import InputError
 from sweep.evaluation import route
 from sweep.evaluation.route import Part, Route, check_window, general_route, own_route
 from sweep.evaluation.statuses import explained
-from sweep.families.base import Accuracy, Array, Columns, Family, Interval, March, Step, Work, of_family
+from sweep.families.base import Accuracy, Array, Columns, Family, Interval, March, Stage, Step, Work, of_family
 from sweep.families.capabilities import Assembly
 from sweep.families.machines.machine import Machine
 from sweep.families.machines.relations import EventValue
 from sweep.families.names import error_of, is_place
-from sweep.families.parts import Member, Stage
+from sweep.families.parts import Member
 from sweep.quantities.kinds import Extent, Group, Margin, Negative, Quantity, TimingOf, group_of
 from sweep.quantities.resolve import resolve
 from sweep.reductions.margins import NAMES as MARGINS

@@ -14,7 +14,7 @@ import numpy as np
 from kernels.families import backrest
 from kernels.types import Array
 from sweep.families.base import Angles, Columns, Family, Interval, Output, Parameter
-from sweep.families.capabilities import Fixed, Link, Made, Points, Skeleton
+from sweep.families.capabilities import Fixed, Link, Made, Skeleton
 from sweep.families.poses import guarded
 from sweep.families.skeletons import ORIGIN, parameter, standing
 
@@ -264,7 +264,8 @@ def _entry(
         poses=guarded(poses),
         example=EXAMPLE | example,
         domain=beam_of(names),
-        capabilities=(Points({"axis": ("x_axis", "y_axis", None)}), skeleton(parameters, angle)),
+        points={"axis": ("x_axis", "y_axis", None)},
+        capabilities=(skeleton(parameters, angle),),
     )
 
 

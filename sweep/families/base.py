@@ -223,6 +223,10 @@ class Step:
     analytic: bool = False
 
 
+Coordinates: TypeAlias = tuple[str | None, str | None, str | None]
+"""Pose outputs that are x, y, z of a point in the family's frame; None is a coordinate 0."""
+
+
 @dataclass(frozen=True)
 class Family:
     """A mechanism family, or a chain of them, which looks the same from outside.
@@ -242,6 +246,7 @@ class Family:
         one the extended position always is
     uses_phi : False for poses that need no more than cos(phi) and sin(phi); in a chain that saves an arctangent a pose
     analytic : whether poses take complex designs and angles, for exact gradients by the complex step
+    points : named moving points
     capabilities : typed objects that effects, proofs, drawings and fits ask for (:mod:`sweep.families.capabilities`)
     example : an ordinary design, by parameter, whose poses all exist; hard inputs are made from it
     dear : for pose outputs that cost far more than the motion, what they are computed by and its cost [ns per pose],
@@ -262,6 +267,7 @@ class Family:
     outward: str = ""
     uses_phi: bool = True
     analytic: bool = True
+    points: Mapping[str, Coordinates] = field(default_factory=dict)
     capabilities: tuple[object, ...] = ()
     example: Mapping[str, float] = field(default_factory=dict)
     dear: Mapping[str, tuple[str, float]] = field(default_factory=dict)
@@ -319,9 +325,44 @@ class Family:
         """Pose outputs that are the position of a follower, with the number of its stage in a chain."""
         return {self.position: ""}
 
+    @cached_property
+    def stages(self) -> tuple[Stage, ...]:
+        """Stages of a chain; a family alone is its own only stage."""
+        return (Stage(0, self, slice(0, len(self.parameters))),)
+
     def outward_sign(self, position: str) -> str:
         """Name the sign parameter that tells extended from folded limits of a position; "" where there is none."""
         return self.outward
+
+
+@dataclass(frozen=True)
+class Stage:
+    """One mechanism of a chain: its number from 1, and where its parameters stand in the chain's design matrix.
+
+    A family alone is a stage of number 0.
+    """
+
+    number: int
+    family: Family
+    columns: slice
+    kappa: int | None = None  # columns of the coupling to the stage before; none for stage 1
+    offset: int | None = None
+    shift: int | None = None  # columns of its place on the shaft between; none where the families name no such axis
+    turn: int | None = None
+
+    @property
+    def tail(self) -> str:
+        """What follows its names: the number in a chain, nothing where it is alone."""
+        return str(self.number) if self.number else ""
+
+    @property
+    def is_placed(self) -> bool:
+        """Whether it is known where its frame stands in that of the stage before."""
+        return self.shift is not None
+
+    def designs(self, designs: Array) -> Array:
+        """Design matrix of this stage alone."""
+        return np.ascontiguousarray(designs[:, self.columns])
 
 
 Found = TypeVar("Found")

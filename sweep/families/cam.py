@@ -10,7 +10,7 @@ import numpy as np
 from kernels.families import cam
 from kernels.types import Array
 from sweep.families.base import Angles, Columns, Family, Output, Parameter
-from sweep.families.capabilities import Dimensions, Link, Made, OutputLink, Points, Skeleton
+from sweep.families.capabilities import Dimensions, Link, Made, OutputLink, Skeleton
 from sweep.families.curve_features import Switches
 from sweep.families.outputs import coordinate_outputs, ladders
 from sweep.families.planar_trees import sliding_follower, swinging_follower
@@ -100,10 +100,10 @@ FAMILY = Family(
     poses=poses,
     example={"lift": 1.0, "r0": 3.0, "e": 0.4, "law": 2.0},
     derivative_of=ladders("s"),
+    points={"r": ("x_r", "y_r", None)},
     capabilities=(
         Switches(phase_ends),
         sliding_follower(PARAMETERS),
-        Points({"r": ("x_r", "y_r", None)}),
         Skeleton({"a": ORIGIN, "d": line(follower_line)}, (Link("cam", ("a",)), Link("follower", ("r",)))),
     ),
 )

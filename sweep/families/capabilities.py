@@ -14,14 +14,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from kernels.types import Array, Numbers
-from sweep.families.base import Angles, Columns, Output
+from sweep.families.base import Angles, Columns, Family, Output
 
 if TYPE_CHECKING:  # families without such kernels do not wait for them
     from kernels.chains.form import Form
 
 DesignMap: TypeAlias = Callable[[Array], Array]
 FillFunction: TypeAlias = Callable[[Array, Angles, Columns, Array, Array], None]
-Coordinates: TypeAlias = tuple[str | None, str | None, str | None]
 
 
 @dataclass(frozen=True)
@@ -169,13 +168,6 @@ class ProvableLocus:
 
 
 @dataclass(frozen=True)
-class Points:
-    """Named moving points, each as the pose outputs of its x, y, z in the family's frame; None is a coordinate 0."""
-
-    at: Mapping[str, Coordinates]
-
-
-@dataclass(frozen=True)
 class OutputLink:
     """The link that turns about an axis parallel to z by the family's position angle.
 
@@ -274,12 +266,17 @@ class Made:
 class Skeleton:
     """What stands still in the family's frame, what else moves, and which joints each link connects.
 
-    Moving joints are those of :class:`Points` and of ``made``.  Drawings and exports are made from it.
+    Moving joints are the family's points and those of ``made``.  Drawings and exports are made from it.
     """
 
     fixed: Mapping[str, Fixed]
     links: tuple[Link, ...]
     made: Mapping[str, Made] = field(default_factory=dict)
+
+
+def skeleton_of(family: Family) -> Skeleton:
+    """Skeleton of a family; an empty one of a chain, a machine, or a mechanism without joints."""
+    return family.find(Skeleton) or Skeleton({}, ())
 
 
 @dataclass(frozen=True)

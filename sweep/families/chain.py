@@ -13,12 +13,11 @@ from kernels.chains.links import chain_rule, input_angle
 from kernels.status import OK
 from kernels.types import Array
 from sweep.errors import InputError
-from sweep.families.base import Angles, Columns, Family, Output, Parameter, Turn
-from sweep.families.capabilities import Assembly, GuidedPoint, LimitLocus, OutputLink, Points
+from sweep.families.base import Angles, Columns, Family, Output, Parameter, Stage, Turn
+from sweep.families.capabilities import Assembly, GuidedPoint, LimitLocus, OutputLink
 from sweep.families.curve_features import of_stages, on_part
 from sweep.families.frames import Frame, can_be_placed, stage_frames
 from sweep.families.names import ends_in_digit
-from sweep.families.parts import Stage
 from sweep.families.poses import blocks
 
 BLOCK = 16384  # poses per block: its ten or so arrays (1.3 MB) stay in the caches; half or four times this is slower
@@ -70,19 +69,12 @@ class _Plan:
     sizes: dict[str, tuple[str, ...]] = field(default_factory=dict)  # magnitudes, of what was composed
 
 
-def stages_of(family: Family) -> tuple[Stage, ...]:
-    """Return the stages of a chain; a family alone is its own only stage."""
-    if isinstance(family, Chain):
-        return family.stages
-    return (Stage(1, family, slice(0, len(family.parameters))),)
-
-
 def driven_guide(family: Family) -> tuple[Stage, Stage] | None:
     """Find both stages of a chain in which a crank-rocker drives a guided point; None for any other family.
 
     The crank-rocker is one whose limit positions can be prescribed (`LimitLocus`).
     """
-    if not isinstance(family, Chain) or len(family.stages) != 2:
+    if len(family.stages) != 2:
         return None
     first, last = family.stages
     if first.family.find(LimitLocus) is None or last.family.find(GuidedPoint) is None:
@@ -134,6 +126,7 @@ def chain(families: tuple[Family, ...]) -> Chain:
         outward=last.outward and f"{last.outward}{len(families)}",
         uses_phi=families[0].uses_phi,
         analytic=all(f.analytic for f in families),
+        points={name: at for name, at in last.points.items() if not ends_in_digit(name)},
         capabilities=(*(loop for stage in stages for loop in _loops(stage)), *_of_last(stages[-1]), *of_stages(stages)),
         dear={
             f"{name}{s.number}": (f"{what}{s.number}", ns) for s in stages for name, (what, ns) in s.family.dear.items()
@@ -163,13 +156,8 @@ def _loops(stage: Stage) -> list[Assembly]:
 
 
 def _of_last(stage: Stage) -> list[object]:
-    """Carry over points and output link of the last stage, whose outputs also stand without a number."""
-    links = [OutputLink(partial(on_part, stage.designs, link.origin)) for link in stage.family.every(OutputLink)]
-    own = (
-        Points({name: at for name, at in points.at.items() if not ends_in_digit(name)})
-        for points in stage.family.every(Points)
-    )
-    return [*own, *links]
+    """Carry over the output link of the last stage."""
+    return [OutputLink(partial(on_part, stage.designs, link.origin)) for link in stage.family.every(OutputLink)]
 
 
 def _numbered(families: tuple[Family, ...]) -> tuple[tuple[Stage, ...], tuple[Parameter, ...]]:

@@ -8,7 +8,7 @@ from collections.abc import Mapping
 
 from kernels.linkage.bodies import DRIVEN
 from sweep.families.base import Family, March, Turn
-from sweep.families.capabilities import Assembly, Dimensions, JointRecords, OutputLink, Points, Skeleton
+from sweep.families.capabilities import Assembly, Dimensions, JointRecords, OutputLink, Skeleton
 from sweep.families.link_tree import LinkTree
 from sweep.families.names import ERROR, MINUS
 from sweep.families.parameter import WORDS, is_known, of_derivative
@@ -73,29 +73,27 @@ def _example(family: Family) -> list[str]:
 
 
 def _drawing(family: Family) -> list[str]:
-    if family.find(Skeleton) is None:
+    skeleton, names, faults = family.find(Skeleton), set(family.pose_names), []
+    if skeleton is None:
         return [
             "no Skeleton among the capabilities: give fixed points with their axes, and links by their joints; "
             "drawings, reports and exports are made from it"
         ]
-    names, faults = set(family.pose_names), []
-    for skeleton in family.every(Skeleton):
-        moving = {point for points in family.every(Points) for point in points.at}
-        known = moving.union(skeleton.fixed, skeleton.made)
-        faults += [
-            f"link {link.name}: {joint!r} is no point: name it in Points, or in fixed or made of the Skeleton"
-            for link in skeleton.links
-            for joint in link.joints
-            if joint not in known
-        ]
-        faults += [
-            f"point {name} needs {one!r}, which is no pose output"
-            for name, made in skeleton.made.items()
-            for one in made.needs
-            if one not in names
-        ]
-        if not skeleton.links:
-            faults.append("the Skeleton has no links: name each with its joints, its pivot first")
+    known = {*family.points, *skeleton.fixed, *skeleton.made}
+    faults += [
+        f"link {link.name}: {joint!r} is no point: name it in points, or in fixed or made of the Skeleton"
+        for link in skeleton.links
+        for joint in link.joints
+        if joint not in known
+    ]
+    faults += [
+        f"point {name} needs {one!r}, which is no pose output"
+        for name, made in skeleton.made.items()
+        for one in made.needs
+        if one not in names
+    ]
+    if not skeleton.links:
+        faults.append("the Skeleton has no links: name each with its joints, its pivot first")
     return faults
 
 
@@ -126,13 +124,12 @@ def _capabilities(family: Family) -> list[str]:
     for tree in family.every(LinkTree):
         faults += [f"LinkTree needs {one!r}, which is no pose output" for one in tree.needs if one not in names]
         faults += _tree(tree)
-    for points in family.every(Points):
-        faults += [
-            f"point {point}: {one!r} is no pose output; None is a coordinate 0"
-            for point, at in points.at.items()
-            for one in at
-            if one is not None and one not in names
-        ]
+    faults += [
+        f"point {point}: {one!r} is no pose output; None is a coordinate 0"
+        for point, at in family.points.items()
+        for one in at
+        if one is not None and one not in names
+    ]
     lengths = {p.name for p in family.parameters if p.unit == "length"}
     for dimensions in family.every(Dimensions):
         faults += [f"Dimensions names {x!r}, which is no length" for x in dimensions.names if x not in lengths]

@@ -15,9 +15,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from kernels.types import TWO_PI, Array
-from sweep.families.base import Angles, Columns, Family
+from sweep.families.base import Angles, Columns, Family, Stage
 from sweep.families.capabilities import Assembly, DesignMap
-from sweep.families.parts import Member, Stage
+from sweep.families.parts import Member
 
 T = TypeVar("T")
 SingularCurve: TypeAlias = Callable[[Array, Angles], Array]

@@ -11,7 +11,7 @@ from kernels.families.cylindrical_looper.motion import links as fill_links
 from kernels.linkage.bodies import DRIVEN, FRAME, SLIDE, TURN
 from kernels.types import Array
 from sweep.families.base import Angles, Columns, Family, Output, Parameter
-from sweep.families.capabilities import Assembly, Dimensions, Link, Made, Points, Skeleton
+from sweep.families.capabilities import Assembly, Dimensions, Link, Made, Skeleton
 from sweep.families.link_tree import LinkBody, LinkJoint, LinkTree, filled_by
 from sweep.families.outputs import coordinate_outputs, joint_outputs, ladders, magnitude_outputs, point_outputs
 from sweep.families.poses import poses_of
@@ -156,12 +156,12 @@ FAMILY = Family(
         "p0x": 2.0, "p0y": 0.3, "p0z": 3.0,
     },
     uses_phi=False,
+    points={name: (f"x_{name}", f"y_{name}", f"z_{name}") for name in ("b1", "c1", "p")},
     capabilities=(
         Dimensions(links("a1 b1 c1 a2 b2")),
         LINKS,
         Assembly("discriminant1", "pressure_angle1", squared(PARAMETERS, "b1"), "1"),
         Assembly("discriminant2", "pressure_angle2", squared(PARAMETERS, "b2"), "2"),
-        Points({name: (f"x_{name}", f"y_{name}", f"z_{name}") for name in ("b1", "c1", "p")}),
         Skeleton(
             {"a1": crank_axis(PARAMETERS, "f1", "alpha1"), "d1": standing(PARAMETERS, "e1", None, "g1")},
             (

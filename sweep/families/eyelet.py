@@ -9,7 +9,7 @@ import numpy as np
 from kernels.families import eyelet
 from kernels.types import Array
 from sweep.families.base import Angles, Columns, Family, Output, Parameter
-from sweep.families.capabilities import Fixed, Link, Points, Skeleton, ThreadPath
+from sweep.families.capabilities import Fixed, Link, Skeleton, ThreadPath
 from sweep.families.curve_features import Singular
 from sweep.families.outputs import ladders
 from sweep.families.planar_trees import eyelet_crank
@@ -76,9 +76,9 @@ FAMILY = Family(
     derivative_of=ladders("P", orders=2) | {"L": "dP"},
     uses_phi=False,
     example={"a": 2.0, "e": 3.0, "f": 1.0, "alpha": 0.5, "Z1": -3.0, "Z2": 4.0, "P_h": 8.0},
+    points={"eyelet": EYELET},
     capabilities=(
         *(Singular(partial(thread_squared, number), EYELET) for number in (1, 2)),
-        Points({"eyelet": EYELET}),
         eyelet_crank(PARAMETERS),
         ThreadPath("wrap", "dP", "d2P"),
         Skeleton(

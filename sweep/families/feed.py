@@ -16,7 +16,7 @@ from kernels.families.feed.motion import EVENTS as _EVENTS
 from kernels.families.feed.motion import OUTPUTS as _POSES
 from kernels.types import EPS, Array
 from sweep.families.base import Accuracy, Angles, Columns, Family, Output, Parameter, Step, Work
-from sweep.families.capabilities import Arm, Dimensions, Link, Made, Points, Skeleton
+from sweep.families.capabilities import Arm, Dimensions, Link, Made, Skeleton
 from sweep.families.curve_features import Singular
 from sweep.families.feed_trees import three_leads, two_leads
 from sweep.families.outputs import joint_outputs, ladders
@@ -204,12 +204,12 @@ FAMILY = Family(
     example=EXAMPLE,
     derivative_of={"psi_plus_dh": "dpsi", "dpsi": "d2psi"} | ladders("chi", "x_t", "y_t", orders=2),
     uses_phi=False,
+    points={k: (f"x_{k}", f"y_{k}", None) for k in ("h", "e", "f", "t")},
     capabilities=(
         Singular(partial(rocker_loop, PARAMETERS)),
         Singular(lift_loop, ("x_h", "y_h", "x_e", "y_e")),
         SIZES,
         two_leads(PARAMETERS),
-        Points({k: (f"x_{k}", f"y_{k}", None) for k in ("h", "e", "f", "t")}),
         SKELETON,
     ),
 )  # fmt: skip
@@ -304,12 +304,12 @@ TRIAD = Family(
     poses=triad_poses,
     example=TRIAD_EXAMPLE,
     derivative_of=ladders("x_t", "y_t", "chi", orders=2),
+    points={"t": ("x_t", "y_t", None)},
     capabilities=(
         Singular(partial(rocker_loop, TRIAD_PARAMETERS)),
         Singular.where_small("determinant"),
         Dimensions(links("h_a h_b h_c rh q1 q2 q3"), optional=("rE2", "rE3")),
         three_leads(TRIAD_PARAMETERS),
-        Points({"t": ("x_t", "y_t", None)}),
         Skeleton(
             {
                 "a": crank_axis(TRIAD_PARAMETERS, "h_f", "h_alpha"), "d": standing(TRIAD_PARAMETERS, "h_e"),

@@ -7,7 +7,7 @@ from kernels.families.five_link.motion import links as fill_links
 from kernels.linkage.bodies import DRIVEN, FRAME, TURN
 from sweep.families import rssr as crank_rocker
 from sweep.families.base import Family, Output, Parameter
-from sweep.families.capabilities import Assembly, Link, OutputLink, Points, Skeleton
+from sweep.families.capabilities import Assembly, Link, OutputLink, Skeleton
 from sweep.families.link_tree import LinkBody, LinkJoint, LinkTree, filled_by
 from sweep.families.outputs import coordinate_outputs, joint_outputs, ladders
 from sweep.families.poses import poses_of
@@ -74,10 +74,10 @@ FAMILY = Family(
     derivative_of=ladders("psi"),
     outward="branch",
     uses_phi=False,
+    points={name: (f"x_{name}", f"y_{name}", f"z_{name}") for name in ("b", "h", "c")},
     capabilities=(
         CRANK_ROCKER_SIZES,
         Assembly("discriminant", "pressure_angle", crank_rocker.discriminant_scale),
-        Points({name: (f"x_{name}", f"y_{name}", f"z_{name}") for name in ("b", "h", "c")}),
         OutputLink(standing(PARAMETERS, "e").at),
         LINKS,
         Skeleton(

@@ -97,6 +97,7 @@ FAMILY = Family(
     derivative_of=ladders("psi") | ladders("x_m", "y_m", orders=2),
     outward="branch",
     uses_phi=False,
+    points={name: (f"x_{name}", f"y_{name}", None) for name in ("b", "c", "m")},
     capabilities=(
         can.Dimensions(links("a b c"), arms=(can.Arm(("xi", "eta"), ("b",)),)),
         can.Assembly("discriminant", "pressure_angle", crank_rocker.discriminant_scale),
@@ -104,7 +105,6 @@ FAMILY = Family(
         can.PressureEllipse(of_matrix(crank_rocker.ellipse, as_crank_rocker)),
         can.CrankRockerLoop(as_crank_rocker),
         replace(crank_rocker.SERIES, matrix=as_crank_rocker),
-        can.Points({name: (f"x_{name}", f"y_{name}", None) for name in ("b", "c", "m")}),
         can.OutputLink(standing(PARAMETERS, "e").at),
         can.ToolPoint(guide.tool_point),
         FOUR_BAR_POINTS,

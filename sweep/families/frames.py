@@ -4,16 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from itertools import pairwise
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from kernels.types import Array
-from sweep.families.base import Family, Parameter
-from sweep.families.capabilities import OutputLink, Skeleton
-
-if TYPE_CHECKING:
-    from sweep.families.parts import Stage
+from sweep.families.base import Family, Parameter, Stage
+from sweep.families.capabilities import OutputLink, skeleton_of
 
 CRANKS = ("a", "a1", "o2")  # what families call the joint on the axis of their first crank
 X, Z = (1.0, 0.0, 0.0), (0.0, 0.0, 1.0)
@@ -119,8 +116,8 @@ def _triad(zero: Array, along: Array, axis: int) -> Array:
 
 def crank_axis(family: Family, designs: Array) -> Axis | None:
     """Return the axis of the first crank in the family's frame; None where the family has none."""
-    skeleton = family.find(Skeleton)
-    crank = next((skeleton.fixed[name] for name in CRANKS if name in skeleton.fixed), None) if skeleton else None
+    fixed = skeleton_of(family).fixed
+    crank = next((fixed[name] for name in CRANKS if name in fixed), None)
     if crank is None or crank.axis is None or crank.kind != "axis":
         return None
     at = crank.at if crank.foot is None else crank.foot

@@ -10,7 +10,7 @@ import numpy as np
 from kernels.families import free_cam
 from kernels.types import Array
 from sweep.families.base import Angles, Columns, Family, March, Output, Parameter
-from sweep.families.capabilities import Link, Made, Points, Skeleton, ThreadPath
+from sweep.families.capabilities import Link, Made, Skeleton, ThreadPath
 from sweep.families.outputs import ladders
 from sweep.families.planar_trees import turning_cam
 from sweep.families.poses import poses_of
@@ -89,8 +89,8 @@ FAMILY = Family(
     derivative_of=ladders("P", orders=2) | {"L": "dP"},
     uses_phi=False,
     example={"a": 0.4, "X1": 0.83, "Y1": -2.08, "Z1": -3.56, "X2": 3.3, "Y2": -0.85, "Z2": 3.7},
+    points={"contact": ("X", "Y", None)},
     capabilities=(
-        Points({"contact": ("X", "Y", None)}),
         turning_cam(("P",)),
         ThreadPath("wrap", "dP", "d2P"),
         Skeleton(SKELETON_FIXED, LINKS, EDGE_POINTS),

@@ -10,7 +10,7 @@ import numpy as np
 from kernels.families import epicyclic_dwell, geared_dwell
 from kernels.types import EPS, Array
 from sweep.families.base import Accuracy, Angles, Columns, Family, Output, Parameter, Step, Work
-from sweep.families.capabilities import Link, Made, OutputLink, Points, Skeleton, constant
+from sweep.families.capabilities import Link, Made, OutputLink, Skeleton, constant
 from sweep.families.curve_features import Singular, Waves
 from sweep.families.outputs import coordinate_outputs, ladders
 from sweep.families.planar_trees import rolling_planet
@@ -155,9 +155,9 @@ FAMILY = Family(
         Step("grid", _SAMPLED_OUTPUTS, sampled_maxima, lambda accuracy: accuracy.samples is not None),
     ),
     derivative_of=ladders("psi"),
+    points={"b": ("x_b", "y_b", None)},
     capabilities=(
         Singular.where_small("x_b", "y_b"),
-        Points({"b": ("x_b", "y_b", None)}),
         OutputLink(constant(0.0, 0.0, 0.0)),
         rolling_planet(PARAMETERS),
         skeleton(PARAMETERS),
@@ -212,10 +212,10 @@ EPICYCLIC = Family(
     steps=(Step("dwell", EPICYCLIC_DWELL, epicyclic_measures, work=Work.LONG),),
     derivative_of=ladders("psi"),
     uses_phi=False,
+    points={"b": ("x_b", "y_b", None)},
     capabilities=(
         Singular.where_small("x_b", "y_b"),
         Waves(planet_turns),
-        Points({"b": ("x_b", "y_b", None)}),
         OutputLink(constant(0.0, 0.0, 0.0)),
         rolling_planet(EPICYCLIC_PARAMETERS),
         skeleton(EPICYCLIC_PARAMETERS),

@@ -173,6 +173,7 @@ FAMILY = Family(
     derivative_of=ladders("s") | ladders("dev", "x_m", "y_m", orders=2),
     outward="branch",
     uses_phi=False,
+    points={"b": ("x_b", "y_b", None), "c": ("x_c", "y_c", None), "point": ("x_m", "y_m", None)},
     capabilities=(
         can.Dimensions(links("a b c"), arms=(can.Arm(("xi", "eta"), ("b",)),)),
         can.Assembly("discriminant", "pressure_angle", crank_rocker.discriminant_scale),
@@ -191,7 +192,6 @@ FAMILY = Family(
             across={"s": "dev", "ds": "ddev", "d2s": "d2dev"},
         ),
         can.ToolPoint(tool_point, tool_direction),
-        can.Points({"b": ("x_b", "y_b", None), "c": ("x_c", "y_c", None), "point": ("x_m", "y_m", None)}),
         GUIDE_POINTS,
         can.Skeleton(
             {"a": ORIGIN, "d": standing(PARAMETERS, "e"), "line": line(guiding_line)},

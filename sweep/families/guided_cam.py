@@ -7,7 +7,7 @@ import numpy as np
 from kernels.families import guided_cam
 from kernels.types import EPS, Array
 from sweep.families.base import Accuracy, Angles, Columns, Family, Output, Parameter, Step, Work
-from sweep.families.capabilities import Fixed, Link, Made, Points, Skeleton, ThreadPath
+from sweep.families.capabilities import Fixed, Link, Made, Skeleton, ThreadPath
 from sweep.families.curve_features import Singular
 from sweep.families.planar_trees import thread_follower
 from sweep.families.poses import poses_of
@@ -121,9 +121,9 @@ FAMILY = Family(
     derivative_of={"P": "dP", "dP": "d2P", "L": "dP", "S": "dS", "dS": "d2S"},
     uses_phi=False,
     example={"P_h": 60.0, "X1": 3.0, "Z1": 12.0, "e": 5.0, "R0": 30.0, "A1": 10.0, "B2": 3.0},
+    points={"profile": ("X_P", "Y_P", None)},
     capabilities=(
         Singular.where_small("S"),
-        Points({"profile": ("X_P", "Y_P", None)}),
         thread_follower(PARAMETERS, cam_axis),
         ThreadPath(WRAP.name, "dP", "d2P"),
         Skeleton(

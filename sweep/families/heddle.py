@@ -7,7 +7,7 @@ import numpy as np
 from kernels.families import heddle
 from kernels.types import Array
 from sweep.families.base import Angles, Columns, Family, Output, Parameter
-from sweep.families.capabilities import Assembly, Dimensions, Fixed, Link, Made, Points, Skeleton
+from sweep.families.capabilities import Assembly, Dimensions, Fixed, Link, Made, Skeleton
 from sweep.families.outputs import joint_outputs, ladders
 from sweep.families.planar_trees import heddle_shaft
 from sweep.families.poses import poses_of
@@ -117,11 +117,11 @@ FAMILY = Family(
     example=EXAMPLE,
     derivative_of=ladders("chi", "y"),
     uses_phi=False,
+    points={"b": ("x_b", "y_b", None), "c": ("x_c", "y_c", None)},
     capabilities=(
         Dimensions(links("O2B BC O3C O4E"), optional=("O3D", "O4F", "DF", "EG")),
         Assembly("discriminant", "pressure_angle", squared(PARAMETERS, "BC")),
         heddle_shaft(PARAMETERS, shaft_line),
-        Points({"b": ("x_b", "y_b", None), "c": ("x_c", "y_c", None)}),
         Skeleton(
             {
                 "o2": ORIGIN, "o3": standing(PARAMETERS, "O2O3"),

@@ -164,6 +164,7 @@ FAMILY = Family(
     ),
     derivative_of=ladders("alpha"),
     uses_phi=False,
+    points={"b": ("x_b", "y_b", "z_b"), "c": ("x_c", "y_c", "z_c")},
     capabilities=(
         can.Dimensions(links("r l h")),
         can.Assembly("discriminant", "pressure_angle", crank_rocker.discriminant_scale),
@@ -175,7 +176,6 @@ FAMILY = Family(
             curves={_ours(name): known for name, known in crank_rocker.CURVES.items()},
             matrix=as_crank_rocker,
         ),
-        can.Points({"b": ("x_b", "y_b", "z_b"), "c": ("x_c", "y_c", "z_c")}),
         can.Skeleton(
             {
                 "a": standing(PARAMETERS, axis=(0.0, 0.0, -1.0), zero=Y),

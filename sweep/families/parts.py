@@ -1,4 +1,4 @@
-"""Parts of chains and machines: a stage, a member with its place in the machine's frame, and points of a member."""
+"""A member of a machine with its place in the machine's frame."""
 
 from __future__ import annotations
 
@@ -12,13 +12,9 @@ import numpy as np
 from kernels.types import Array
 from sweep.errors import InputError
 from sweep.families.base import Family, Parameter
-from sweep.families.capabilities import Coordinates, OutputLink, Points
-from sweep.families.frames import WHOLE, Frame, crank_axis, place_parameters, stage_frames, tilted
+from sweep.families.frames import Frame, crank_axis, place_parameters, stage_frames, tilted
 from sweep.families.shafts import Mount
-from sweep.families.sites import AXES, Site, sites_of
-
-TIP = "tip"
-EYE = "eye"  # on the coupler, the link between the points b and c
+from sweep.families.sites import AXES, EYE, TIP, Site, sites_of
 
 
 @dataclass(frozen=True)
@@ -97,28 +93,6 @@ def vector(value: object, where: str) -> tuple[float, float, float]:
 
 
 @dataclass(frozen=True)
-class Stage:
-    """One mechanism of a chain: its number from 1, and where its parameters stand in the chain's design matrix."""
-
-    number: int
-    family: Family
-    columns: slice
-    kappa: int | None = None  # columns of the coupling to the stage before; none for stage 1
-    offset: int | None = None
-    shift: int | None = None  # columns of its place on the shaft between; none where the families name no such axis
-    turn: int | None = None
-
-    @property
-    def is_placed(self) -> bool:
-        """Whether it is known where its frame stands in that of the stage before."""
-        return self.shift is not None
-
-    def designs(self, designs: Array) -> Array:
-        """Design matrix of this stage alone."""
-        return np.ascontiguousarray(designs[:, self.columns])
-
-
-@dataclass(frozen=True)
 class Member:
     """One mechanism of a machine.
 
@@ -186,13 +160,12 @@ class Member:
 
     def frames(self, designs: Array) -> list[Frame | None]:
         """Frames of all stages in the machine's; None where a chain does not say how they stand to each other."""
-        own, stages = self.designs(designs), getattr(self.family, "stages", ())
-        if stages and not stages[-1].is_placed:
+        own, stages = self.designs(designs), self.family.stages
+        if len(stages) > 1 and not stages[-1].is_placed:
             return [None] * (len(stages) - 1) + [self.frame(designs)]
-        inner = stage_frames(stages, own) if stages else [WHOLE]
+        inner = stage_frames(stages, own)
         if self.mount is not None:
-            family = stages[0].family if stages else self.family
-            crank = crank_axis(family, stages[0].designs(own) if stages else own)
+            crank = crank_axis(stages[0].family, stages[0].designs(own))
             assert crank is not None
             first = self.mount.frame(designs, crank, self.column(designs, "shift"), self.column(designs, "turn"))
         elif self.place.stage:
@@ -237,95 +210,20 @@ class Member:
 
     @cached_property
     def sites(self) -> Mapping[str, Site]:
-        """Joints of all stages, carried points and fixed axes, by name."""
+        """Joints of all stages, points of links, fixed axes, by name."""
         return sites_of(self)
 
     @cached_property
     def site_of(self) -> Mapping[str, str]:
-        """Of the name of each coordinate of a site, that of the site; points have their own."""
-        return {f"{name}_{axis}": name for name in self.sites if name not in self.points for axis in AXES}
+        """Of the name of each coordinate of a site, that of the site."""
+        return {f"{name}_{axis}": name for name in self.sites for axis in AXES}
 
     @cached_property
     def points(self) -> tuple[str, ...]:
         """Names of the points whose coordinates are given in the machine's frame."""
-        named = [name for points in self.family.every(Points) for name in points.at]
-        return (*named, *((TIP,) if self.tip is not None else ()), *((EYE,) if self.eye is not None else ()))
+        return (*self.family.points, *(name for name, at in ((TIP, self.tip), (EYE, self.eye)) if at is not None))
 
     @cached_property
-    def moving(self) -> Mapping[str, tuple[str | None, ...]]:
-        """Of the points whose velocity the family's outputs give, the outputs that it is made of."""
-        found: dict[str, tuple[str | None, ...]] = {}
-        rates = self.family.derivative_of
-        for name, at in ((n, at) for points in self.family.every(Points) for n, at in points.at.items()):
-            if all(x is None or x in rates for x in at):
-                found[name] = tuple(x and rates[x] for x in at)
-        on_link = [*((TIP,) if self.tip is not None else ()), *(name for name, _ in self.carried)]
-        if self.family.position in rates:
-            found |= dict.fromkeys(on_link, (rates[self.family.position],))
-        return found
-
-
-def coordinates(
-    m: Member, point: str, frame: Frame | None, designs: Array, own_designs: Array, result: Mapping[str, Any]
-) -> dict[str, Any]:
-    """Coordinates of a point in the machine's frame, (n, m), from those in the frame of the family."""
-    assert frame is not None
-    if point == TIP:
-        link = m.family.find(OutputLink)
-        assert link is not None
-        tip = (m.column(designs, f"{axis}_tip")[:, None] for axis in AXES)
-        local = link.carried(own_designs, result[m.family.position], tip)
-    elif point == EYE:
-        eye = [m.column(designs, f"{axis}_eye")[:, None] for axis, _ in zip(AXES, m.eye or (), strict=False)]
-        local = _on_coupler(m, result, eye)
-    else:
-        local = _local(m, point, result)
-    placed = frame.placed(local)
-    return {f"{point}_{axis}": part for axis, part in zip(AXES, placed, strict=True)}
-
-
-def coupler_joints(m: Member) -> tuple[Coordinates, Coordinates] | None:
-    """Coordinates of both joints of the coupler; None where the family does not give them."""
-    named = {name: at for points in m.family.every(Points) for name, at in points.at.items()}
-    return (named["b"], named["c"]) if {"b", "c"} <= set(named) else None
-
-
-def is_planar(m: Member) -> bool:
-    """Whether the coupler moves in a plane z = constant, so that its two joints tell how it stands."""
-    joints = coupler_joints(m)
-    return joints is not None and all(at[2] is None for at in joints)
-
-
-def _local(m: Member, point: str, result: Mapping[str, Any]) -> list[Any]:
-    names = next(points.at[point] for points in m.family.every(Points) if point in points.at)
-    return [result[name] if name else 0.0 for name in names]
-
-
-def _on_coupler(m: Member, result: Mapping[str, Any], eye: list[Any]) -> list[Any]:
-    """Place a point of the coupler: along it from b; of a planar one also across it, counter-clockwise, and along z."""
-    b, c = (_local(m, point, result) for point in "bc")
-    along = [end - start for start, end in zip(b, c, strict=True)]
-    length = np.sqrt(along[0] ** 2 + along[1] ** 2 + along[2] ** 2)
-    point = [start + eye[0] / length * part for start, part in zip(b, along, strict=True)]
-    if len(eye) == 1:
-        return point
-    return [point[0] - eye[1] / length * along[1], point[1] + eye[1] / length * along[0], point[2] + eye[2]]
-
-
-def velocity(m: Member, point: str, frame: Frame | None, designs: Array, result: Mapping[str, Any]) -> dict[str, Any]:
-    """Velocity analogue of a point in the machine's frame, (n, m): the frame of a member does not move."""
-    assert frame is not None
-    carried = dict(m.carried)
-    if point == TIP or point in carried:
-        x, y = (
-            carried[point][:2]
-            if point in carried
-            else (m.column(designs, name)[:, None] for name in ("x_tip", "y_tip"))
-        )
-        angle, rate = result[m.family.position], result[str(m.moving[point][0])]
-        cos, sin = np.cos(angle), np.sin(angle)
-        local = [rate * (-x * sin - y * cos), rate * (x * cos - y * sin), 0.0 * rate]
-    else:
-        local = [result[name] if name else 0.0 for name in m.moving[point]]
-    turned = frame.turned(local)
-    return {f"d{point}_{axis}": part for axis, part in zip(AXES, turned, strict=True)}
+    def moving(self) -> tuple[str, ...]:
+        """Names of the points whose velocity is given in the machine's frame."""
+        return tuple(name for name in (*self.points, *dict(self.carried)) if self.sites[name].velocity is not None)

@@ -162,6 +162,7 @@ FAMILY = Family(
     derivative_of=ladders("s"),
     outward="branch",
     uses_phi=False,
+    points={"b": ("x_b", "y_b", "z_b"), "c": ("x_c", "y_c", "z_c")},
     capabilities=(
         SLIDER_CRANK_SIZES,
         can.Assembly("discriminant", "pressure_angle", squared(PARAMETERS, "b")),
@@ -169,7 +170,6 @@ FAMILY = Family(
         can.JointRecords(joint_records, _JOINT_NEEDS, "slider"),
         can.PressureEllipse(ellipse),
         can.LimitLocus("stroke"),
-        can.Points({"b": ("x_b", "y_b", "z_b"), "c": ("x_c", "y_c", "z_c")}),
         SLIDER_CRANK_POINTS,
         can.Skeleton(
             {"a": crank_axis(PARAMETERS, "f", "alpha"), "d": standing(PARAMETERS, "e", axis=Y, kind="slide")},
@@ -259,12 +259,12 @@ PLANAR = Family(
     derivative_of=ladders("s"),
     outward="branch",
     uses_phi=False,
+    points={"b": ("x_b", "y_b", None), "c": ("x_c", "y_c", None)},
     capabilities=(
         SLIDER_CRANK_SIZES,
         can.Assembly("discriminant", "pressure_angle", squared(PLANAR_PARAMETERS, "b")),
         can.InSeries(rssp.PLANAR_FORM, CURVES, COMPONENTS, planar_opening),
         can.JointRecords(planar_joint_records, _JOINT_NEEDS, "slider"),
-        can.Points({"b": ("x_b", "y_b", None), "c": ("x_c", "y_c", None)}),
         PLANAR_SLIDER_POINTS,
         can.Skeleton({"a": ORIGIN, "d": standing(PLANAR_PARAMETERS, None, "e", axis=X, kind="slide")}, SLIDER_CRANK),
     ),

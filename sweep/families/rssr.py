@@ -298,6 +298,7 @@ FAMILY = Family(
     derivative_of=ladders("psi"),
     outward="branch",
     uses_phi=False,
+    points={"b": ("x_b", "y_b", "z_b"), "c": ("x_c", "y_c", "z_c")},
     capabilities=(
         CRANK_ROCKER_SIZES,
         can.Assembly("discriminant", "pressure_angle", discriminant_scale),
@@ -308,7 +309,6 @@ FAMILY = Family(
         can.LimitLocus("swing", sized=("c", "e", "g")),
         CRANK_ROCKER_BY_AXES,
         CRANK_ROCKER_BY_ROCKER,
-        can.Points({"b": ("x_b", "y_b", "z_b"), "c": ("x_c", "y_c", "z_c")}),
         can.OutputLink(standing(PARAMETERS, "e").at),
         CRANK_ROCKER_POINTS,
         can.Skeleton(

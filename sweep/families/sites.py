@@ -1,34 +1,47 @@
-"""Places on a member that relations and tools are about: joints of every stage, points of its output link, axes."""
+"""Places on a member that relations and tools are about: joints of all stages, fixed axes, tip, eye, blades."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from typing import TYPE_CHECKING, Any, NamedTuple
+from collections.abc import Callable, Mapping, Sequence
+from functools import partial
+from typing import TYPE_CHECKING, Any, NamedTuple, TypeAlias
+
+import numpy as np
 
 from kernels.types import Array
-from sweep.families.capabilities import Coordinates, DesignMap, OutputLink, Points, Skeleton
+from sweep.families.base import Coordinates, Stage
+from sweep.families.capabilities import DesignMap, OutputLink, skeleton_of
 from sweep.families.names import ends_in_digit
 
 if TYPE_CHECKING:
-    from sweep.families.frames import Frame
-    from sweep.families.parts import Member, Stage
+    from sweep.families.parts import Member
 
 AXES = "xyz"
+TIP = "tip"
+EYE = "eye"  # on the coupler, the link between the points b and c
+
+Vector: TypeAlias = Callable[[Array, Mapping[str, Any]], list[Any]]
+"""Of designs of the machine and pose outputs of the member x, y, z in the frame of a stage, numbers or (n, m) each."""
 
 
 class Site(NamedTuple):
     """A point or direction of one stage.
 
-    ``stage`` is its place among the stages, from 0; one of the others says what it is made of: ``moving`` pose outputs
-    of the member, ``fixed`` designs of the stage, ``on_link`` a point that turns with the output link.  A ``free``
-    vector is a direction.
+    Parameters
+    ----------
+    stage : its place among the stages, from 0
+    made_of : pose outputs of the member
+    at : what they make: where it is
+    free : whether it is a direction
+    rates, velocity : the same of its derivative by the crank angle; none where no outputs give it
     """
 
     stage: int
-    moving: Coordinates | None = None
-    fixed: DesignMap | None = None
-    on_link: tuple[float, float, float] | None = None
+    made_of: tuple[str, ...]
+    at: Vector
     free: bool = False
+    rates: tuple[str, ...] = ()
+    velocity: Vector | None = None
 
 
 def sites_of(member: Member) -> dict[str, Site]:
@@ -37,68 +50,115 @@ def sites_of(member: Member) -> dict[str, Site]:
     ``line_axis`` is the direction of the fixed axis or line ``line``.
     """
     found: dict[str, Site] = {}
-    stages = getattr(member.family, "stages", ())
-    families = [stage.family for stage in stages] or [member.family]
-    for k, family in enumerate(families):
-        for name, at in ((name, at) for points in family.every(Points) for name, at in points.at.items()):
-            for number in _numbers(stages, k, name):
-                x, y, z = (one and f"{one}{number}" for one in at)
-                found[f"{name}{number}"] = Site(k, moving=(x, y, z))
-        for name, fixed in ((name, at) for skeleton in family.every(Skeleton) for name, at in skeleton.fixed.items()):
-            for number in _numbers(stages, k, name):
-                found[f"{name}{number}"] = Site(k, fixed=fixed.at)
+    stages = member.family.stages
+    for k, stage in enumerate(stages):
+        for name, at in stage.family.points.items():
+            for tail in _tails(stages, k, name):
+                x, y, z = (one and f"{one}{tail}" for one in at)
+                found[f"{name}{tail}"] = _moving(member, k, (x, y, z))
+        for name, fixed in skeleton_of(stage.family).fixed.items():
+            for tail in _tails(stages, k, name):
+                found[f"{name}{tail}"] = Site(k, (), partial(_standing, member, stage, fixed.at))
                 if fixed.axis is not None:
-                    found[f"{name}{number}_axis"] = Site(k, fixed=fixed.axis, free=True)
-    found |= {name: Site(len(families) - 1, on_link=at) for name, at in member.carried}
-    return found
+                    axis = partial(_standing, member, stage, fixed.axis)
+                    found[f"{name}{tail}_axis"] = Site(k, (), axis, free=True)
+    if member.tip is not None:
+        found[TIP] = _on_link(member)
+    if member.eye is not None:
+        found[EYE] = _on_coupler(member)
+    return found | {name: _on_link(member, at) for name, at in member.carried}
 
 
-def _numbers(stages: Sequence[Stage], k: int, *names: str) -> list[str]:
+def _tails(stages: Sequence[Stage], k: int, *names: str) -> list[str]:
     """Return what can stand behind names of the stage of index k: its number, in the last one also nothing."""
-    if not stages:
-        return [""]
-    bare = k + 1 == len(stages) and not any(map(ends_in_digit, names))
-    return [str(k + 1)] + [""] * bare
+    tail = stages[k].tail
+    bare = tail and k + 1 == len(stages) and not any(map(ends_in_digit, names))
+    return [tail, ""] if bare else [tail]
 
 
 def links_of(member: Member) -> dict[str, tuple[str, str]]:
     """Return the links of a member as segments, the names of two sites each, where both ends have places."""
-    found, known = {}, member.sites
-    stages = getattr(member.family, "stages", ())
-    families = [stage.family for stage in stages] or [member.family]
-    for k, family in enumerate(families):
-        for link in (link for skeleton in family.every(Skeleton) for link in skeleton.links):
-            for number in _numbers(stages, k, link.name, *link.joints[:2]):
-                ends = [f"{joint}{number}" for joint in link.joints[:2]]
+    found, known, stages = {}, member.sites, member.family.stages
+    for k, stage in enumerate(stages):
+        for link in skeleton_of(stage.family).links:
+            for tail in _tails(stages, k, link.name, *link.joints[:2]):
+                ends = [f"{joint}{tail}" for joint in link.joints[:2]]
                 if len(ends) == 2 and set(ends) <= known.keys():
-                    found[f"{link.name}{number}".replace(" ", "_")] = (ends[0], ends[1])
+                    found[f"{link.name}{tail}".replace(" ", "_")] = (ends[0], ends[1])
     return found
 
 
-def made_of(member: Member, site: Site) -> set[str]:
-    """Return the pose outputs of the member that a site's coordinates are made of."""
-    if site.on_link is not None:
-        return {member.family.position}
-    return {name for name in site.moving or () if name}
+def _moving(member: Member, stage: int, at: Coordinates) -> Site:
+    """Make a point that pose outputs give, as most joints."""
+    of = member.family.derivative_of
+    known = all(x is None or x in of for x in at)
+    rates = [x and of[x] for x in at] if known else []
+    moved = partial(_read, rates) if known else None
+    return Site(stage, _named(at), partial(_read, at), rates=_named(rates), velocity=moved)
 
 
-def coordinates(
-    member: Member, name: str, frames: Sequence[Frame | None], designs: Array, result: Mapping[str, Any]
-) -> dict[str, Any]:
-    """Return coordinates or components of a site in the machine's frame, (n, m) or (n, 1)."""
-    site = member.sites[name]
-    frame = frames[site.stage]
-    assert frame is not None
-    own = member.designs(designs)
-    stages: tuple[Stage, ...] = getattr(member.family, "stages", ())
-    if site.on_link is not None:
-        link = member.family.find(OutputLink)
+def _named(names: Sequence[str | None]) -> tuple[str, ...]:
+    return tuple(name for name in names if name)
+
+
+def _read(names: Sequence[str | None], designs: Array, result: Mapping[str, Any]) -> list[Any]:
+    return [result[name] if name else 0.0 for name in names]
+
+
+def _standing(member: Member, stage: Stage, of: DesignMap, designs: Array, result: Mapping[str, Any]) -> list[Any]:
+    at = of(stage.designs(member.designs(designs)))
+    return [at[:, [k]] for k in range(3)]
+
+
+def _on_link(member: Member, fixed: tuple[float, float, float] | None = None) -> Site:
+    """Make a point that turns with the output link: the tip, whose place designs say, or one that is fixed there."""
+    family = member.family
+    link, position, rate = family.find(OutputLink), family.position, family.derivative_of.get(family.position)
+
+    def point(designs: Array) -> Sequence[Any]:
+        return fixed or [member.column(designs, f"{axis}_tip")[:, None] for axis in AXES]
+
+    def at(designs: Array, result: Mapping[str, Any]) -> list[Any]:
         assert link is not None
-        local: list[Any] = link.carried(own, result[member.family.position], site.on_link)
-    elif site.fixed is not None:
-        at = site.fixed(stages[site.stage].designs(own) if stages else own)
-        local = [at[:, [k]] for k in range(3)]
-    else:
-        local = [result[one] if one else 0.0 for one in site.moving or ()]
-    placed = frame.turned(local) if site.free else frame.placed(local)
-    return {f"{name}_{axis}": part for axis, part in zip(AXES, placed, strict=True)}
+        return link.carried(member.designs(designs), result[position], point(designs))
+
+    def velocity(designs: Array, result: Mapping[str, Any]) -> list[Any]:
+        assert rate is not None
+        x, y, _ = point(designs)
+        cos, sin, speed = np.cos(result[position]), np.sin(result[position]), result[rate]
+        return [speed * (-x * sin - y * cos), speed * (x * cos - y * sin), 0.0 * speed]
+
+    last = len(family.stages) - 1
+    if rate is None:
+        return Site(last, (position,), at)
+    return Site(last, (position,), at, rates=(position, rate), velocity=velocity)
+
+
+def coupler_joints(member: Member) -> tuple[Coordinates, Coordinates] | None:
+    """Coordinates of both joints of the coupler; None where the family does not give them."""
+    points = member.family.points
+    return (points["b"], points["c"]) if {"b", "c"} <= points.keys() else None
+
+
+def is_planar(member: Member) -> bool:
+    """Whether the coupler moves in a plane z = constant, so that its two joints tell how it stands."""
+    joints = coupler_joints(member)
+    return joints is not None and all(at[2] is None for at in joints)
+
+
+def _on_coupler(member: Member) -> Site:
+    """Make a point of the coupler: along it from b; of a planar one also across it, counter-clockwise, and along z."""
+    joints, count = coupler_joints(member), len(member.eye or ())
+    assert joints is not None
+
+    def at(designs: Array, result: Mapping[str, Any]) -> list[Any]:
+        eye = [member.column(designs, f"{axis}_eye")[:, None] for axis in AXES[:count]]
+        b, c = (_read(names, designs, result) for names in joints)
+        along = [end - start for start, end in zip(b, c, strict=True)]
+        length = np.sqrt(along[0] ** 2 + along[1] ** 2 + along[2] ** 2)
+        point = [start + eye[0] / length * part for start, part in zip(b, along, strict=True)]
+        if count == 1:
+            return point
+        return [point[0] - eye[1] / length * along[1], point[1] + eye[1] / length * along[0], point[2] + eye[2]]
+
+    return Site(len(member.family.stages) - 1, (*_named(joints[0]), *_named(joints[1])), at)

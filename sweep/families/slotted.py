@@ -16,7 +16,7 @@ from kernels.families.swivel import links as fill_swivel_links
 from kernels.linkage.bodies import DRIVEN, FRAME, SLIDE, TURN
 from kernels.types import Array
 from sweep.families.base import Angles, Columns, Family, Output, Parameter
-from sweep.families.capabilities import Assembly, Dimensions, Link, Made, OutputLink, Points, Skeleton
+from sweep.families.capabilities import Assembly, Dimensions, Link, Made, OutputLink, Skeleton
 from sweep.families.curve_features import Singular
 from sweep.families.link_tree import LinkBody, LinkJoint, LinkTree, filled_by
 from sweep.families.outputs import ALONG_FRAME, coordinate_outputs, joint_outputs, ladders, point_outputs
@@ -110,10 +110,10 @@ FAMILY = Family(
     derivative_of=ladders("psi", "rho"),
     example={"a": 1.0, "e": 2.6, "f": 0.7, "g": -0.4, "alpha": 0.6, "s": 0.5},
     uses_phi=False,
+    points={"b": ("x_b", "y_b", "z_b"), "c": ("x_c", "y_c", "z_c")},
     capabilities=(
         Dimensions(links("a"), optional=("k",)),
         Assembly("discriminant", "pressure_angle", unit),
-        Points({"b": ("x_b", "y_b", "z_b"), "c": ("x_c", "y_c", "z_c")}),
         OutputLink(standing(PARAMETERS, "e").at),
         LINKS,
         Skeleton(
@@ -170,11 +170,11 @@ PLANAR = Family(
     example={"a": 1.0, "e": 2.2, "h": 0.3, "branch": -1.0},
     derivative_of=ladders("psi") | ladders("s", orders=2),
     uses_phi=False,
+    points={"b": ("x_b", "y_b", None)},
     capabilities=(
         Singular.where_small("s"),
         Dimensions(links("a")),
         Assembly("discriminant", "pressure_angle", unit),
-        Points({"b": ("x_b", "y_b", None)}),
         OutputLink(standing(PLANAR_PARAMETERS, "e").at),
         slotted_rocker(PLANAR_PARAMETERS),
         Skeleton(
@@ -240,11 +240,11 @@ SWIVEL = Family(
     derivative_of=ladders("rho", "x_p", "y_p", "z_p"),
     example={"a": 1.0, "e": 2.6, "f": 0.7, "g": -0.4, "alpha": 0.6, "Lw": 5.0},
     uses_phi=False,
+    points={"b": ("x_b", "y_b", "z_b"), "p": ("x_p", "y_p", "z_p")},
     capabilities=(
         Singular.where_small("rho"),
         Dimensions(links("a")),
         SWIVEL_LINKS,
-        Points({"b": ("x_b", "y_b", "z_b"), "p": ("x_p", "y_p", "z_p")}),
         Skeleton(
             {
                 "a": crank_axis(SWIVEL_PARAMETERS, "f", "alpha"),

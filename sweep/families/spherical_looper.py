@@ -11,7 +11,7 @@ from kernels.families.spherical_looper import links as fill_links
 from kernels.linkage.bodies import DRIVEN, FRAME, TURN
 from kernels.types import Array
 from sweep.families.base import Family, Output, Parameter
-from sweep.families.capabilities import Arm, Assembly, Dimensions, Fixed, Link, Points, Skeleton
+from sweep.families.capabilities import Arm, Assembly, Dimensions, Fixed, Link, Skeleton
 from sweep.families.link_tree import LinkBody, LinkJoint, LinkTree, filled_by
 from sweep.families.outputs import coordinate_outputs, joint_outputs, ladders, magnitude_outputs, point_outputs
 from sweep.families.poses import poses_of
@@ -126,12 +126,12 @@ FAMILY = Family(
         "a2": 0.3, "b2": 7.0, "x2": 0.0, "y2": -4.0, "z2": -4.0, "theta2": 1.0, "beta2": 1.57, "offset2": 0.5,
     },
     uses_phi=False,
+    points={name: (f"x_{name}", f"y_{name}", f"z_{name}") for name in ("b1", "c1", "b2", "c2", "p")},
     capabilities=(
         Dimensions((*links("a1 b1 c1 a2 b2"), LOOPER), arms=(Arm(("p0x", "p0y", "p0z"), LOOPER),)),
         LINKS,
         Assembly("discriminant1", "pressure_angle1", squared(PARAMETERS, "b1"), "1"),
         Assembly("discriminant2", "pressure_angle2", squared(PARAMETERS, "b2"), "2"),
-        Points({name: (f"x_{name}", f"y_{name}", f"z_{name}") for name in ("b1", "c1", "b2", "c2", "p")}),
         Skeleton(
             {
                 "a1": crank_axis(PARAMETERS, "f1", "alpha1"),

@@ -9,12 +9,11 @@ from typing import Any
 
 import numpy as np
 
-from sweep.families.base import Family, March, Output, of_family
-from sweep.families.capabilities import Coordinates, Fixed, Points, Skeleton
-from sweep.families.chain import Chain
+from sweep.families.base import Coordinates, Family, March, Output, Stage, of_family
+from sweep.families.capabilities import Fixed, skeleton_of
 from sweep.families.machines.machine import Machine
-from sweep.families.parts import TIP, Member
-from sweep.families.sites import AXES
+from sweep.families.parts import Member
+from sweep.families.sites import AXES, TIP
 from sweep.quantities.dimensions import Piece
 
 NAMES = tuple(f"box_{axis}" for axis in AXES)
@@ -56,18 +55,18 @@ def boxes(family: Family) -> dict[str, Box]:
         whole = [box for k in range(3) if (box := _whole(family, k)) is not None]
         members = [_of_member(m, box) for m in family.members for box in boxes(m.family).values()]
         return {box.output.name: box for box in (*whole, *members)}
-    parts = [(s.family, str(s.number), s.columns) for s in family.stages] if isinstance(family, Chain) else []
-    found = [_own(*part, k) for part in parts or [(family, "", slice(None))] for k in range(3)]
+    found = [_own(stage, k) for stage in family.stages for k in range(3)]
     return {box.output.name: box for box in found if box is not None}
 
 
-def _own(family: Family, stage: str, columns: slice, axis: int) -> Box | None:
-    """Box of a family that stands alone, in its own frame."""
+def _own(of: Stage, axis: int) -> Box | None:
+    """Box of a stage, in its own frame."""
+    family, stage = of.family, of.tail
     at = {name: points[axis] for name, points in _moving(family).items()}
     curves = tuple(dict.fromkeys(f"{name}{stage}" for name in at.values() if name is not None))
     if not curves:
         return None
-    still: list[Piece] = [partial(_coordinate, fixed, axis, columns) for fixed in _standing(family)]
+    still: list[Piece] = [partial(_coordinate, fixed, axis, of.columns) for fixed in _standing(family)]
     if None in at.values():
         still.append(_nothing)
     where = f"stage {stage}: " if stage else ""
@@ -90,17 +89,15 @@ def _whole(machine: Machine, axis: int) -> Box | None:
     """Box of all members in the machine's frame; of a chain its last stage, which is what stands there."""
     curves, pairs, still = [], [], list[Piece]()
     for m in machine.members:
-        last = m.family.stages[-1].family if isinstance(m.family, Chain) else m.family
-        joints = (*_moving(last), *((TIP,) if m.tip is not None else ()))
-        if not _moving(last):
+        last = m.family.stages[-1]
+        joints = (*_moving(last.family), *((TIP,) if m.tip is not None else ()))
+        if not _moving(last.family):
             return None
         for point in joints:
             curves.append(f"{m.name}.{point}_{AXES[axis]}")
             pairs.append((f"{m.name}.max_{point}_{AXES[axis]}", f"{m.name}.min_{point}_{AXES[axis]}"))
-        stage = m.family.stages[-1] if isinstance(m.family, Chain) else None
-        columns = stage.columns if stage else slice(0, m.columns.stop - m.columns.start)
-        own = slice(m.columns.start + columns.start, m.columns.start + columns.stop)
-        still += [partial(_placed, m, fixed, axis, own) for fixed in _standing(last)]
+        own = slice(m.columns.start + last.columns.start, m.columns.start + last.columns.stop)
+        still += [partial(_placed, m, fixed, axis, own) for fixed in _standing(last.family)]
     text = (
         f"extent along {AXES[axis]} of the joints of all members over one turn of the shaft, fixed ones too, in the "
         "machine's frame; of a chain those of its last stage"
@@ -110,17 +107,14 @@ def _whole(machine: Machine, axis: int) -> Box | None:
 
 def _moving(family: Family) -> Mapping[str, Coordinates]:
     """List the moving joints of all links; none where one of them is no pose output, so that its place is not known."""
-    at = {name: points for found in family.every(Points) for name, points in found.at.items()}
-    for skeleton in family.every(Skeleton):
-        joints = [joint for link in skeleton.links for joint in link.joints if joint not in skeleton.fixed]
-        return {joint: at[joint] for joint in joints} if joints and set(joints) <= at.keys() else {}
-    return {}
+    at, skeleton = family.points, skeleton_of(family)
+    joints = [joint for link in skeleton.links for joint in link.joints if joint not in skeleton.fixed]
+    return {joint: at[joint] for joint in joints} if set(joints) <= at.keys() else {}
 
 
 def _standing(family: Family) -> Iterator[Fixed]:
     """Yield bearings and points of the frame; a line along which something slides is no joint."""
-    for skeleton in family.every(Skeleton):
-        yield from (fixed for fixed in skeleton.fixed.values() if fixed.kind != "slide")
+    yield from (fixed for fixed in skeleton_of(family).fixed.values() if fixed.kind != "slide")
 
 
 def _coordinate(fixed: Fixed, axis: int, columns: slice, designs: Any) -> Any:

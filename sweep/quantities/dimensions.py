@@ -18,8 +18,7 @@ from numpy.typing import NDArray
 from sweep.costs import nanoseconds
 from sweep.effects import input_names
 from sweep.families.base import Accuracy, Array, Columns, Family, Output, Step, Work, of_family
-from sweep.families.capabilities import Dimensions, Skeleton
-from sweep.families.chain import Chain
+from sweep.families.capabilities import Dimensions, skeleton_of
 from sweep.families.machines.machine import Machine
 
 Piece: TypeAlias = Callable[[Any], Any]
@@ -144,13 +143,10 @@ def _parts(family: Family) -> Iterator[_Part]:
             first = m.columns.start
             for part in _parts(m.family):
                 yield _Part(part.family, part.columns + first, f"{m.name}.", part.stage)
-    elif isinstance(family, Chain):
-        for stage in family.stages:
-            columns = np.arange(stage.columns.start, stage.columns.stop)
-            for part in _parts(stage.family):
-                yield _Part(part.family, columns, stage=str(stage.number))
-    elif any(p.unit == "length" for p in family.parameters):  # ratios of lengths only have no size
-        yield _Part(family, np.arange(len(family.parameters)))
+        return
+    for stage in family.stages:
+        if any(p.unit == "length" for p in stage.family.parameters):  # ratios of lengths only have no size
+            yield _Part(stage.family, np.arange(stage.columns.start, stage.columns.stop), stage=stage.tail)
 
 
 def _size(of: Output, member: str, stage: str, parts: list[_Part]) -> Size | None:
@@ -192,8 +188,7 @@ def _pivots(family: Family) -> list[Piece]:
     """Squares of the distances between the centres of all bearings of links that turn about a fixed axis."""
     return [
         partial(_apart, one.at, other.at)
-        for skeleton in family.every(Skeleton)
-        for one, other in combinations([f for f in skeleton.fixed.values() if f.kind == "axis"], 2)
+        for one, other in combinations([f for f in skeleton_of(family).fixed.values() if f.kind == "axis"], 2)
     ]
 
 

@@ -17,7 +17,7 @@ from kernels.chains.curves import MARGIN
 from kernels.types import EPS, TWO_PI, Status
 from sweep.families.base import Array, Family
 from sweep.families.capabilities import Assembly, Curve, DesignMap, InSeries
-from sweep.families.chain import Chain, stages_of
+from sweep.families.chain import Chain
 from sweep.quantities.kinds import Request
 from sweep.reductions.peak_search import TIE
 from sweep.reductions.refine import SHRINK, Peaks, confirmed, polished
@@ -116,7 +116,7 @@ class FusedCurve:
 
     def _given(self, designs: Array, opened: Opened | None) -> tuple[Opened, Array, bool]:
         """Designs and how they open, what the curve is made of, and whether it needs nothing across."""
-        stage = stages_of(self.family)[len(self.forms) - 1]
+        stage = self.family.stages[len(self.forms) - 1]
         made_of = np.ascontiguousarray(self.made_of(designs[:, stage.columns]))
         # Positions along and across a line are often asked for together: they share a kernel, which has to be compiled.
         return opened or self.opened(designs), made_of, self.order >= 1 and not made_of[:, 1].any()
@@ -173,7 +173,7 @@ def curve_of(family: Family, request: Request, anywhere: bool, mean: bool = Fals
         return None
     if anywhere:
         return _least_discriminant(family, forms, request)
-    output, last = family.pose_output[request.pose], stages_of(family)[-1]
+    output, last = family.pose_output[request.pose], family.stages[-1]
     if output.stage not in ("", str(last.number)) or (request.place and request.pose not in family.derivative_of):
         return None
     # Derivatives that carry the number of their stage are not with respect to the crank angle of the chain.
@@ -235,7 +235,7 @@ def _forms(family: Family) -> tuple[InSeries, ...] | None:
     """
     if family.precise_poses is None or family.poses is family.precise_poses:
         return None
-    forms = [stage.family.find(InSeries) for stage in stages_of(family)]
+    forms = [stage.family.find(InSeries) for stage in family.stages]
     known = tuple(form for form in forms if form is not None)
     fits = len(known) == len(forms) and known[0].opening is not None
     if len(forms) == 1:

@@ -6,11 +6,10 @@ import numpy as np
 
 from kernels import status as st
 from kernels.types import TWO_PI
-from sweep.families.base import Accuracy, Array, Columns, Family, Step
+from sweep.families.base import Accuracy, Array, Columns, Family, Stage, Step
 from sweep.families.capabilities import Assembly
 from sweep.families.chain import Chain
 from sweep.families.names import is_flag
-from sweep.families.parts import Stage
 from sweep.quantities.kinds import Request
 from sweep.reductions import fused
 from sweep.reductions.extrema import true_extrema

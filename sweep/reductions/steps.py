@@ -11,12 +11,11 @@ import numpy as np
 from kernels import status as st
 from sweep.costs import nanoseconds
 from sweep.errors import InputError
-from sweep.families.base import Accuracy, Array, Columns, Family, Output, Step, Work, of_family
+from sweep.families.base import Accuracy, Array, Columns, Family, Output, Stage, Step, Work, of_family
 from sweep.families.capabilities import Assembly, CrankRockerLoop, GuidedPoint
-from sweep.families.chain import Chain, stages_of
+from sweep.families.chain import Chain
 from sweep.families.machines.machine import Machine
 from sweep.families.names import at_stage
-from sweep.families.parts import Stage
 from sweep.families.reduction import reduction_of
 from sweep.families.rssr import proven_columns
 from sweep.quantities.dimensions import dimension_step, size_step
@@ -32,7 +31,7 @@ ORDERS = 3  # derivatives that the proof knows
 
 def certified_travel(family: Family) -> Step | None:
     """Step that proves maxima of a guided point's travel and deviation; None for a family that has none to prove."""
-    stages = stages_of(family)
+    stages = family.stages
     guided = stages[-1].family.find(GuidedPoint)
     if guided is None or any(s.family.find(CrankRockerLoop) is None for s in stages):
         return None
@@ -285,7 +284,7 @@ def _margin_ns(family: Family, suffix: str, accuracy: Accuracy) -> float:
     if found is None and loop is not None and curve_of(family, Request(loop.discriminant, -1), True) is not None:
         return int(suffix) * nanoseconds("work", "fused extremum")
     if found is None:
-        *driving, last = stages_of(family)[: int(suffix or 1)]
+        *driving, last = family.stages[: int(suffix or 1)]
         return nanoseconds("margins", last.family.name) + POSES_MARGIN * sum(pose_ns(s.family) for s in driving)
     step, stage = found
     return step_ns(stage.family if stage else family, step, accuracy)
@@ -294,16 +293,14 @@ def _margin_ns(family: Family, suffix: str, accuracy: Accuracy) -> float:
 def _stages(family: Family) -> int:
     if isinstance(family, Machine):
         return sum(_stages(member.family) for member in family.members)
-    return len(family.stages) if isinstance(family, Chain) else 1
+    return len(family.stages)
 
 
 def pose_ns(family: Family) -> float:
     """Estimated time of the motion of a pose: of a chain or a machine that of all its stages and members."""
     if isinstance(family, Machine):
         return sum(pose_ns(member.family) for member in family.members)
-    if isinstance(family, Chain):
-        return sum(pose_ns(stage.family) for stage in family.stages)
-    return nanoseconds("poses", family.name)
+    return sum(nanoseconds("poses", stage.family.name) for stage in family.stages)
 
 
 def group_order(family: Family, group: Group, names: Sequence[str]) -> tuple[Work, int]:

@@ -133,8 +133,7 @@ def plain_name(family: Family, name: str) -> str:
     if isinstance(family, Machine):
         member, own = family.split(name) or (None, name)
         return plain_name(member.family, own) if member is not None else name
-    stages = [str(stage.number) for stage in getattr(family, "stages", ())]
-    return next((plain for number in stages if (plain := at_stage(name, number))), name)
+    return next((plain for stage in family.stages if (plain := at_stage(name, stage.tail))), name)
 
 
 def _misplaced(bare: Family, key: Key, entry: object, homes: dict[str, str], faults: Faults) -> None:

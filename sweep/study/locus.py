@@ -11,7 +11,7 @@ from pydantic import Field
 from sweep.errors import InputError
 from sweep.families.base import Family, Parameter
 from sweep.families.capabilities import LimitLocus
-from sweep.families.chain import Chain, stages_of
+from sweep.families.chain import Chain
 from sweep.quantities.limits import Limit
 from sweep.study.file import Faults, Section, Size, StudyFile
 from sweep.study.parameter import Entry, missing_parameter, read_entry
@@ -35,12 +35,12 @@ def read_locus(file: StudyFile, bare: Family) -> tuple[OnLocus | None, dict[str,
 
 
 def _stage(family: Family, faults: Faults) -> OnLocus | None:
-    first = stages_of(family)[0].family
-    if first.find(LimitLocus) is None:
+    first = family.stages[0]
+    if first.family.find(LimitLocus) is None:
         known = tuple(dict.fromkeys(way.family for way in LOCI))
-        faults.value(("locus",), first.name, f"a mechanism that is or begins with {' or '.join(known)}")
+        faults.value(("locus",), first.family.name, f"a mechanism that is or begins with {' or '.join(known)}")
         return None
-    return OnLocus(first.name, "1" if isinstance(family, Chain) else "")
+    return OnLocus(first.family.name, first.tail)
 
 
 def _prescribed(locus: OnLocus, raw: Mapping[str, Any], faults: Faults, sampled: bool) -> dict[str, Entry]:

@@ -19,7 +19,7 @@ from sweep.evaluation.summaries import design_outputs
 from sweep.families import family as find_family
 from sweep.families.base import Accuracy, Angles, Array, Family
 from sweep.families.capabilities import GuidedPoint
-from sweep.families.chain import Chain, driven_guide, stages_of
+from sweep.families.chain import Chain, driven_guide
 from sweep.reductions.steps import applying_step
 
 # The deviation is a smooth function of the input: 48 Chebyshev points of a swing miss 1e-4 of its extremes, 256 of a
@@ -83,7 +83,7 @@ def fit_line(
     guided, suffix = _guided(family)
     column = {name: k for k, name in enumerate(family.parameter_names)}
     fitted = designs.copy()
-    guide = family.stages[-1].family if isinstance(family, Chain) else family
+    guide = family.stages[-1].family
     start, swing, status = _driven(family, designs) if driven is None else (*driven, np.zeros(len(designs), np.uint8))
     share = _shares(TURN_SAMPLES if guide is family else SWING_SAMPLES)
     alive = np.flatnonzero(status == codes.OK)
@@ -146,10 +146,10 @@ def driving_outputs(family: Family) -> tuple[str, ...]:
 
 def _guided(family: Family) -> tuple[GuidedPoint, str]:
     """Guided point, and what follows the names of its stage's parameters: the stage's number in a chain."""
-    last = stages_of(family)[-1]
+    last = family.stages[-1]
     guided = last.family.find(GuidedPoint)
     if guided is not None:
-        return guided, str(last.number) if isinstance(family, Chain) else ""
+        return guided, last.tail
     raise InputError("fit", family.name, "a guide, or a chain that ends in one", "mechanism")
 
 

@@ -13,7 +13,7 @@ from sweep.evaluation.joints import parts
 from sweep.exchange.scene import over
 from sweep.families import NAMES, family
 from sweep.families.base import March
-from sweep.families.capabilities import Points, Skeleton
+from sweep.families.capabilities import Skeleton
 
 DRAWN = NAMES
 PHI = np.linspace(0.0, 2.0 * math.pi, 24, endpoint=False)
@@ -230,12 +230,11 @@ def test_several_designs_and_bad_angles_are_refused():
 
 
 def test_points_without_links_are_given_and_a_mechanism_without_joints_is_refused():
-    points = family("heddle").find(Points)
-    found = sweep.joints(replace(family("heddle"), capabilities=(points,)), example("heddle"), [0.3])
+    found = sweep.joints(replace(family("heddle"), capabilities=()), example("heddle"), [0.3])
     assert set(found["joint"]) == {"b", "c"}
     assert found["x"].notna().all()
     with pytest.raises(sweep.InputError, match="that has joints"):
-        sweep.joints(replace(family("heddle"), capabilities=()), example("heddle"), [0.0])
+        sweep.joints(replace(family("heddle"), capabilities=(), points={}), example("heddle"), [0.0])
 
 
 def test_march_has_joints_in_equal_steps_of_one_turn_only():

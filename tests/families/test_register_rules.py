@@ -11,7 +11,7 @@ import pytest
 import sweep
 from sweep.families import NAMES, family
 from sweep.families.base import Event, Family, Interval, March, Output, Parameter, Step
-from sweep.families.capabilities import Assembly, Dimensions, JointRecords, Link, Made, OutputLink, Points, Skeleton
+from sweep.families.capabilities import Assembly, Dimensions, JointRecords, Link, Made, OutputLink, Skeleton
 from sweep.families.check import FamilyError, check_family
 from sweep.families.skeletons import ORIGIN
 from sweep.quantities.units import factor, internal_unit
@@ -64,7 +64,7 @@ BROKEN = {
     "no links": ({"capabilities": (Skeleton({"o": ORIGIN}, ()),)}, "has no links: name each"),
     "unknown joint": (
         {"capabilities": (Skeleton({"o": ORIGIN}, (Link("crank", ("o", "q")),)),)},
-        "'q' is no point: name it in Points",
+        "'q' is no point: name it in points",
     ),
     "point without output": (
         {"capabilities": (replace(SKELETON, made={"p": Made(("x",), lambda d, a, m: d)}),)},
@@ -141,7 +141,7 @@ BROKEN = {
         "JointRecords needs 'x', which is no pose output",
     ),
     "coordinate": (
-        {"capabilities": (SKELETON, Points({"b": ("x_b", None, None)}))},
+        {"points": {"b": ("x_b", None, None)}},
         "point b: 'x_b' is no pose output; None is a coordinate 0",
     ),
     "dimensions": ({"capabilities": (SKELETON, Dimensions((("c",),)))}, "Dimensions names 'c', which is no length"),

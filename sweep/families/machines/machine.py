@@ -13,7 +13,7 @@ from kernels.chains.links import chain_rule
 from kernels.status import OK
 from kernels.types import Array
 from sweep.families.base import Angles, Columns, Event, Family, Output, Parameter, of_family
-from sweep.families.capabilities import Assembly, Points
+from sweep.families.capabilities import Assembly
 from sweep.families.chain import magnitude
 from sweep.families.curve_features import of_members, on_part
 from sweep.families.frames import Frame
@@ -26,9 +26,8 @@ from sweep.families.machines.relations import EventValue, Relation, Timing
 from sweep.families.machines.sewing import Sewing, sewing_step
 from sweep.families.machines.shaking import Shaking, orders_of
 from sweep.families.machines.triangles import Entering, entering_step
-from sweep.families.parts import EYE, TIP, Member, coordinates, coupler_joints, velocity
-from sweep.families.sites import AXES, made_of
-from sweep.families.sites import coordinates as coordinates_of_site
+from sweep.families.parts import Member
+from sweep.families.sites import AXES
 
 
 @dataclass(frozen=True)
@@ -210,7 +209,6 @@ class _OfMember:
     member: Member
     own: frozenset[str]
     motion: frozenset[str]
-    sites: tuple[str, ...]
     placed: tuple[str, ...]
     moving: tuple[str, ...]
 
@@ -247,23 +245,21 @@ def _needs(machine: Machine, wanted: frozenset[str]) -> _Needs:
 
 
 def _of_member(m: Member, own: frozenset[str]) -> _OfMember:
+    placed = {m.site_of[name] for name in own if name in m.site_of}
+    moving = tuple(name for name in m.moving if any(f"d{name}_{axis}" in own for axis in AXES))
     motion = {name for name in own if name in m.family.pose_output}
-    motion |= {x for point in (*m.points, *dict(m.carried)) for x in _made_of(m, point, own)}
-    sites = {m.site_of[name] for name in own if name in m.site_of}
-    motion |= {x for site in sites for x in made_of(m, m.sites[site])}
+    motion |= {x for name in placed for x in m.sites[name].made_of}
+    motion |= {x for name in moving for x in m.sites[name].rates}
     motion |= {name for derivative in motion for name in m.family.orders(derivative)}
-    placed = tuple(p for p in m.points if any(f"{p}_{axis}" in own for axis in AXES))
-    moving = tuple(p for p in (*m.points, *dict(m.carried)) if any(f"d{p}_{axis}" in own for axis in AXES))
-    return _OfMember(m, own, frozenset(motion), tuple(sorted(sites)), placed, moving)
+    return _OfMember(m, own, frozenset(motion), tuple(sorted(placed)), moving)
 
 
 def _frames(machine: Machine, designs: Array) -> dict[str, Frame]:
     """Return the frames of all stages by member and number, of a member alone by its name."""
     found: dict[str, Frame] = {}
     for m in machine.members:
-        numbers = [str(stage.number) for stage in getattr(m.family, "stages", ())] or [""]
-        placed = zip(numbers, m.frames(designs), strict=True)
-        found |= {f"{m.name}{number}": frame for number, frame in placed if frame is not None}
+        placed = zip(m.family.stages, m.frames(designs), strict=True)
+        found |= {f"{m.name}{stage.tail}": frame for stage, frame in placed if frame is not None}
     return found
 
 
@@ -294,14 +290,26 @@ def _member(needs: _OfMember, designs: Array, angles: Angles, found: Mapping[str
     turned = _turned(m, phase, angles, found)
     result: dict[str, Any] = dict(m.family.poses(own_designs, turned, needs.motion))
     _with_respect_to_shaft(m, result, found)
-    frames = m.frames(designs) if needs.sites else [m.frame(designs)] if needs.placed or needs.moving else []
-    for site in needs.sites:
-        result |= coordinates_of_site(m, site, frames, designs, result)
-    for point in needs.placed:
-        result |= coordinates(m, point, frames[-1], designs, own_designs, result)
-    for point in needs.moving:
-        result |= velocity(m, point, frames[-1], designs, result)
+    if needs.placed or needs.moving:
+        result |= _placed(needs, designs, result)
     return {name: result[name] for name in (*needs.own, "status")}
+
+
+def _placed(needs: _OfMember, designs: Array, result: Mapping[str, Any]) -> dict[str, Any]:
+    """Return coordinates and velocities of places of a member in the machine's frame, which its frames do not leave."""
+    m, found = needs.member, dict[str, Any]()
+    last = len(m.family.stages) - 1
+    alone = all(m.sites[name].stage == last for name in needs.placed)
+    frames = [None] * last + [m.frame(designs)] if alone else m.frames(designs)
+    for order, names in (("", needs.placed), ("d", needs.moving)):
+        for name in names:
+            site = m.sites[name]
+            frame, vector = frames[site.stage], site.velocity if order else site.at
+            assert frame is not None and vector is not None
+            put = frame.turned if order or site.free else frame.placed
+            parts = put(vector(designs, result))
+            found |= {f"{order}{name}_{axis}": part for axis, part in zip(AXES, parts, strict=True)}
+    return found
 
 
 def _turned(m: Member, phase: Array, angles: Angles, found: Mapping[str, Any]) -> Angles:
@@ -337,14 +345,3 @@ def _with_respect_to_shaft(m: Member, result: dict[str, Any], found: Mapping[str
         missing: list[Any] = [None] * (3 - len(names))
         chain_rule(np.full(len(outer[0]), float(m.ratio)), *given, *missing, *outer, *missing)
     result |= {name: magnitude(result, parts) for name in result if (parts := m.geared_parts(name))}
-
-
-def _made_of(m: Member, point: str, own: frozenset[str]) -> set[str]:
-    """Return pose outputs that a point's coordinates and velocity are made of, as far as they are wanted."""
-    at, moves = (any(f"{of}{point}_{axis}" in own for axis in AXES) for of in ("", "d"))
-    found = {name for name in m.moving.get(point, ()) if name} if moves else set()
-    if point == TIP or point in dict(m.carried):
-        return found | ({m.family.position} if at or moves else set())
-    if point == EYE:
-        return {name for joint in coupler_joints(m) or () for name in joint if name and at}
-    return found | {name for points in m.family.every(Points) for name in points.at.get(point, ()) if name and at}

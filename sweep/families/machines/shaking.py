@@ -12,7 +12,7 @@ from kernels import status as st
 from kernels.types import EPS, TWO_PI, Array, Status
 from sweep.errors import InputError
 from sweep.families.base import Accuracy, Angles, Columns, Family, Output, Parameter, Step, Work
-from sweep.families.capabilities import GuidedPoint, JointRecords, Skeleton, ToolPoint
+from sweep.families.capabilities import GuidedPoint, JointRecords, ToolPoint, skeleton_of
 from sweep.families.curve_features import Smooth
 from sweep.families.frames import CRANKS, Frame
 from sweep.families.link_tree import LinkTree
@@ -73,8 +73,7 @@ def shaken(member: str, stage: str, family: Family, listed: Sequence[tuple[str, 
     tool = family.find(ToolPoint)
     rod = tool is not None and tool.direction is not None and family.find(GuidedPoint) is not None
     before = str(int(stage) - 1) if stage else ""
-    skeleton = family.find(Skeleton)
-    crank = next((name for name in CRANKS if skeleton and name in skeleton.fixed), "")
+    crank = next((name for name in CRANKS if name in skeleton_of(family).fixed), "")
     return Shaken(member, stage, rod, before if (member, before) in listed else "", crank)
 
 

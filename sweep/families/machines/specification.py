@@ -34,8 +34,9 @@ from sweep.families.machines.tools import (
     read_height,
     read_tools,
 )
-from sweep.families.parts import Member, coupler_joints, is_planar, placement, vector
+from sweep.families.parts import Member, placement, vector
 from sweep.families.shafts import MOUNT_KEYS, SHAFT_KEYS, Mount, Shaft, read_mount, read_shafts
+from sweep.families.sites import coupler_joints, is_planar
 
 MEMBER_KEYS = ("family", "chain", "ratio", "offset", "driver", "place", "tip", "eye", *MOUNT_KEYS)
 RELATION_KINDS = (
@@ -194,9 +195,9 @@ def _mount(table: dict[str, Any], family: Family, shafts: Mapping[str, Shaft], w
         if shafts and table.get("driver", "shaft") == "shaft":
             raise InputError("shaft", None, f"the shaft that drives it: {', '.join(shafts)}", where)
         return None
-    stages = getattr(family, "stages", ())
-    first = stages[0].family if stages else family
-    if crank_axis(first, np.ones((1, len(first.parameters)))) is None or (stages and not stages[-1].is_placed):
+    first, *_, last = (*family.stages, family.stages[-1])
+    has_axis = crank_axis(first.family, np.ones((1, len(first.family.parameters)))) is not None
+    if not has_axis or (last is not first and not last.is_placed):
         raise InputError("family", family.name, "a family with a crank axis, its stages in one frame", where)
     return read_mount(table, shafts, where)
 
@@ -321,7 +322,7 @@ def _shaft_torque(name: str, listed: list[tuple[str, str]], members: Mapping[str
     rubs = all(
         (tree := stage.find(LinkTree)) is None or tree.rubs
         for member, _ in listed
-        for stage in ([s.family for s in getattr(members[member].family, "stages", ())] or [members[member].family])
+        for stage in (s.family for s in members[member].family.stages)
     )
     return ShaftTorque(name, tuple(Driven(member, stage, members[member].ratio) for member, stage in listed), rubs)
 
@@ -330,10 +331,10 @@ def _shaken(members: Mapping[str, Member], listed: list[tuple[str, str]], where:
     """Yield the stages whose shaking is asked, each once and in a frame that is known."""
     for member, stage in listed:
         m = members[member]
-        stages = getattr(m.family, "stages", ())
+        stages = m.family.stages
         if listed.count((member, stage)) > 1:
             raise InputError("shaking", f"{member}{stage}", "every stage once", where)
-        if stages and not stages[-1].is_placed:
+        if len(stages) > 1 and not stages[-1].is_placed:
             allowed = "a chain whose stages have places. For shaking forces, give one stage and its place"
             raise InputError("shaking", f"{member}{stage}", allowed, where)
         yield shaken(member, stage, stages[int(stage) - 1].family if stage else m.family, listed)
@@ -351,5 +352,4 @@ def _gap(name: str, table: dict[str, Any], known: Mapping[str, Body], where: str
 
 
 def _stages(family: Family) -> list[str]:
-    stages = getattr(family, "stages", ())
-    return [str(stage.number) for stage in stages] or [""]
+    return [stage.tail for stage in family.stages]

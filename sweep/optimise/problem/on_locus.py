@@ -16,7 +16,6 @@ import numpy as np
 from sweep.evaluation.summaries import design_outputs
 from sweep.families.base import Accuracy, Array, Family
 from sweep.families.capabilities import LimitLocus
-from sweep.families.chain import Chain, stages_of
 from sweep.optimise.problem.statement import Problem
 from sweep.study import Limit
 from sweep.synthesis.locus import OnLocus
@@ -97,8 +96,7 @@ def on_locus(problem: Problem) -> Problem:
     problem : in the parameters themselves
     """
     family = problem.family
-    first = stages_of(family)[0].family
-    number = "1" if isinstance(family, Chain) else ""
+    first, number = family.stages[0].family, family.stages[0].tail
     locus = first.find(LimitLocus)
     if problem.coordinates is not None or locus is None:
         return problem

@@ -33,7 +33,6 @@ from kernels.descent.unknowns import LEFT_OUT, NEEDED, SOFT, WANTED
 from sweep.evaluation.summaries import design_outputs
 from sweep.families.base import Accuracy, Array
 from sweep.families.capabilities import Assembly
-from sweep.families.chain import stages_of
 from sweep.optimise.starts.linear import POSES, TURN, Elimination
 from sweep.quantities.measures import ROTATABLE_MARGIN, Measure, measure
 
@@ -72,7 +71,7 @@ class PoseRows:
     def __init__(self, linear: Elimination, signs: Sequence[dict[str, float]]) -> None:
         self.linear, problem = linear, linear.problem
         self.family, names = problem.family, problem.family.parameter_names
-        self.driver = stages_of(self.family)[0].family
+        self.driver = self.family.stages[0].family
         self.bases = np.array([problem.rows(problem.lower + 0.5 * problem.span, **choice)[0] for choice in signs])
         self.bases[:, names.index(linear.links[0])] = 1.0
         self.columns = [names.index(name) for name in linear.free]
