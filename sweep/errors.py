@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import difflib
+import math
 import re
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -242,3 +243,24 @@ def choices(word: str, known: Iterable[str]) -> str:
     """Write the names that may stand where ``word`` does, and the nearest of them."""
     names = list(known)
     return f"{listed(names)}{nearest(word, names)}"
+
+
+def known_keys(table: Mapping[str, Any], keys: Sequence[str], place: str, words: str = "") -> None:
+    """Refuse a key of a table that means nothing there; ``words`` stand before those that do."""
+    for key in table:
+        if key not in keys:
+            raise InputError(key, table[key], f"{words}{choices(key, keys)}", place)
+
+
+def number(name: str, value: Any, place: str, allowed: str = "a finite number") -> float:
+    """Return a number that a user gives; refuse what is none."""
+    if isinstance(value, bool) or not isinstance(value, int | float) or not math.isfinite(value):
+        raise InputError(name, value, allowed, place)
+    return float(value)
+
+
+def sign(name: str, value: Any, place: str, words: str) -> int:
+    """Return a sign that a user gives; ``words`` say what both mean."""
+    if value not in (1, -1) or isinstance(value, bool):
+        raise InputError(name, value, f"1 or -1: {words}", place)
+    return int(value)

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from kernels.types import Array
-from sweep.errors import InputError
+from sweep.errors import InputError, known_keys
 from sweep.families.base import Family, Parameter
 from sweep.families.frames import Frame, crank_axis, place_parameters, stage_frames, tilted
 from sweep.families.shafts import Mount
@@ -56,9 +56,7 @@ def placement(member: str, given: Placement | dict[str, Any] | None) -> Placemen
     if isinstance(given, Placement):
         return given
     where = f"machine.{member}.place"
-    for key in given:
-        if key not in ("at", "axis", "zero", "stage"):
-            raise InputError(key, given[key], "at, axis, zero, stage", where)
+    known_keys(given, ("at", "axis", "zero", "stage"), where)
     if given.get("stage", 1) != 1:
         raise InputError("stage", given["stage"], "1 for the first stage; the last one if left out", where)
     vectors = {key: vector(value, f"{where}.{key}") for key, value in given.items() if key != "stage"}

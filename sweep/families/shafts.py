@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from kernels.types import Array
-from sweep.errors import InputError, choices
+from sweep.errors import InputError, choices, number, sign
 from sweep.families.base import Parameter
 from sweep.families.frames import Axis, Frame, mounted, place_parameters, tilted
 
@@ -122,12 +122,9 @@ def read_shafts(
                 known = SHAFT_KEYS[:3] if name == MAIN else SHAFT_KEYS
                 raise InputError(key, table[key], choices(key, known), where)
         place = placed(f"shafts.{name}", {key: table[key] for key in SHAFT_KEYS[:3] if key in table})
-        ratio = table.get("ratio", 1)
-        if isinstance(ratio, bool) or not isinstance(ratio, int | float) or ratio != int(ratio) or ratio == 0:
-            raise InputError("ratio", ratio, "a whole number but 0, of turns for one of the main shaft", where)
         rotation = place.rotation
         along, zero = (tuple(rotation[:, k].tolist()) for k in (2, 0))
-        found[name] = Shaft(name, place.at, along, zero, int(ratio), _number("phase", table, where))
+        found[name] = Shaft(name, place.at, along, zero, turns(table, where), _number("phase", table, where))
     return found
 
 
@@ -146,15 +143,19 @@ def read_mount(table: Mapping[str, Any], shafts: Mapping[str, Shaft], where: str
         if key in table:
             allowed = "nothing beside shaft, which decides it: give sense, shift, turn and key"
             raise InputError(key, table[key], allowed, where)
-    sense = table.get("sense", 1)
-    if sense not in (1, -1) or isinstance(sense, bool):
-        raise InputError("sense", sense, "1 or -1: the crank axis along the shaft or against it", where)
+    sense = sign("sense", table.get("sense", 1), where, "the crank axis along the shaft or against it")
     shift, turn, angle = (_number(each, table, where) for each in MOUNT_KEYS[2:])
-    return Mount(shafts[name], int(sense), shift, turn, angle)
+    return Mount(shafts[name], sense, shift, turn, angle)
+
+
+def turns(table: Mapping[str, Any], where: str) -> int:
+    """Return how often something turns while the main shaft turns once, with the sense; from the ``ratio`` given."""
+    allowed = "a whole number but 0: the machine's turn is one of the main shaft, so choose its slowest shaft as that"
+    ratio = number("ratio", table.get("ratio", 1), where, allowed)
+    if ratio != int(ratio) or ratio == 0.0:
+        raise InputError("ratio", table["ratio"], allowed, where)
+    return int(ratio)
 
 
 def _number(key: str, table: Mapping[str, Any], where: str) -> float:
-    value = table.get(key, 0.0)
-    if isinstance(value, bool) or not isinstance(value, int | float) or not np.isfinite(value):
-        raise InputError(key, value, "a finite number, angles in rad", where)
-    return float(value)
+    return number(key, table.get(key, 0.0), where, "a finite number, angles in rad")

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 import re
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -10,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from sweep.errors import InputError, choices, nearest
+from sweep.errors import InputError, choices, known_keys, nearest, number
 from sweep.families.base import Event, Family, Output, Turn, reads_as_degrees
 from sweep.families.capabilities import OutputLink
 from sweep.families.frames import crank_axis
@@ -35,7 +34,7 @@ from sweep.families.machines.tools import (
     read_tools,
 )
 from sweep.families.parts import Member, placement, vector
-from sweep.families.shafts import MOUNT_KEYS, SHAFT_KEYS, Mount, Shaft, read_mount, read_shafts
+from sweep.families.shafts import MOUNT_KEYS, SHAFT_KEYS, Mount, Shaft, read_mount, read_shafts, turns
 from sweep.families.sites import coupler_joints, is_planar
 
 MEMBER_KEYS = ("family", "chain", "ratio", "offset", "driver", "place", "tip", "eye", *MOUNT_KEYS)
@@ -44,7 +43,6 @@ RELATION_KINDS = (
     "above", "press",
 )  # fmt: skip
 DERIVATIVES = 3  # of the angle that drives a member: its jerk needs all of them
-EVENT_KEYS = ("event", "level", "rising")
 _WORD = re.compile(r"[A-Za-z][A-Za-z0-9_]*")
 _ENDS_IN_DIGIT = re.compile(r".*\d")
 
@@ -154,25 +152,16 @@ def _member(
     name: str, table: dict[str, Any], earlier: Mapping[str, Member], shafts: Mapping[str, Shaft], find: FindFamily
 ) -> Member:
     where = f"machine.{name}"
-    for key in table:
-        if key not in MEMBER_KEYS:
-            raise InputError(key, table[key], choices(key, MEMBER_KEYS), where)
+    known_keys(table, MEMBER_KEYS, where)
     if ("family" in table) == ("chain" in table):
         raise InputError("family", table.get("family"), "either family or chain", where)
     family = find(table["family"]) if "family" in table else find(list(table["chain"]))
     if not isinstance(family.domain, Turn):
         raise InputError("family", family.name, "a family over a closed turn", where)
     mount = _mount(table, family, shafts, where)
-    ratio = table.get("ratio", 1) if mount is None else mount.ratio
-    if isinstance(ratio, bool) or not isinstance(ratio, int | float) or ratio != int(ratio) or ratio == 0:
-        allowed = (
-            "a whole number but 0: the machine's turn is one of the main shaft, so choose its slowest shaft as that"
-        )
-        raise InputError("ratio", ratio, allowed, where)
-    offset = table.get("offset", 0.0)
-    if isinstance(offset, bool) or not isinstance(offset, int | float) or not math.isfinite(offset):
-        raise InputError("offset", offset, "an angle in rad", where)
-    if reads_as_degrees(float(offset)):
+    ratio = turns(table, where) if mount is None else mount.ratio
+    offset = number("offset", table.get("offset", 0.0), where, "an angle in rad")
+    if reads_as_degrees(offset):
         raise InputError(
             "offset", offset, "an angle in rad, which this does not look like; math.radians makes it one", where
         )
@@ -182,7 +171,7 @@ def _member(
     driver = _driver(table.get("driver"), earlier, where)
     drives = {} if driver is None else dict(earlier[driver[0]].family.derivative_of)
     spot = placement(name, None if table.get("place") is None else dict(table["place"]))
-    member = Member(name, family, int(ratio), float(offset), driver, drives, spot, tip, mount=mount)
+    member = Member(name, family, ratio, offset, driver, drives, spot, tip, mount=mount)
     return member if table.get("eye") is None else replace(member, eye=_eye(member, table["eye"], f"{where}.eye"))
 
 
@@ -261,18 +250,15 @@ def _reading(name: str, table: dict[str, Any], outputs: Mapping[str, Output]) ->
 def _event(name: str, table: dict[str, Any], outputs: Mapping[str, Output]) -> Event:
     """Event where a pose output of the machine, a relation's or a member's, passes a level."""
     where = f"machine.relations.{name}"
-    for key in table:
-        if key not in EVENT_KEYS:
-            raise InputError(key, table[key], choices(key, EVENT_KEYS), where)
-    of, level, rising = table["event"], table.get("level", 0.0), table.get("rising", True)
+    known_keys(table, ("event", "level", "rising"), where)
+    of, rising = table["event"], table.get("rising", True)
     if of not in outputs:
         raise InputError("event", of, f"a pose output of the machine{nearest(str(of), outputs)}", where)
-    if isinstance(level, bool) or not isinstance(level, int | float) or not math.isfinite(level):
-        raise InputError("level", level, f"a number, in the unit of {of}", where)
+    level = number("level", table.get("level", 0.0), where, f"a number, in the unit of {of}")
     if not isinstance(rising, bool):
         raise InputError("rising", rising, "true or false", where)
     text = f"{of} passes {level:g} {'upwards' if rising else 'downwards'}"
-    return Event(name, of, text, float(level), rising)
+    return Event(name, of, text, level, rising)
 
 
 def _relation(
@@ -341,9 +327,7 @@ def _shaken(members: Mapping[str, Member], listed: list[tuple[str, str]], where:
 
 
 def _gap(name: str, table: dict[str, Any], known: Mapping[str, Body], where: str) -> Gap:
-    for key in table:
-        if key not in ("gap", "radii"):
-            raise InputError(key, table[key], "gap, radii", where)
+    known_keys(table, ("gap", "radii"), where)
     first, second = (known[one] for one in two(table["gap"], list(known), "bodies", where))
     if "radii" in table:
         a, b = (length("radii", radius, where) for radius in table["radii"])

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from sweep.errors import InputError, choices
+from sweep.errors import InputError, choices, known_keys, number, sign
 from sweep.families.capabilities import ThreadPath
 from sweep.families.machines.main_shaft import ShaftTorque
 from sweep.families.machines.moments import RiseWindow, Taking
@@ -16,7 +16,7 @@ from sweep.families.machines.relations import each, two
 from sweep.families.machines.sewing import Sewing
 from sweep.families.machines.thread_balance import ThreadBalance
 from sweep.families.machines.thread_way import Edge, TakeUp, Waypoint, spots
-from sweep.families.machines.tools import Blade, Needle, Seam, Spot, Tool, length, number
+from sweep.families.machines.tools import Blade, Needle, Seam, Spot, Tool, length
 from sweep.families.machines.triangles import Entering
 from sweep.families.parts import Member, vector
 from sweep.numerics.curves import TableCurve, table_curve
@@ -24,14 +24,11 @@ from sweep.numerics.curves import TableCurve, table_curve
 THREAD_KEYS = (
     "thread", "stock", "tension", "stiffness", "radius", "allowed", "sewn", "feeding", "drawing",
 )  # fmt: skip
-PLACE_KEYS = ("on", "held", "wrap", "fixed")
 
 
 def read_taking(name: str, table: dict[str, Any], tools: Mapping[str, Tool], where: str) -> Taking:
     """Read a relation ``take``: a needle, a blade, the sense, fields of work."""
-    for key in table:
-        if key not in ("take", "sense", "fields", "vary"):
-            raise InputError(key, table[key], "take, sense, fields, vary", where)
+    known_keys(table, ("take", "sense", "fields", "vary"), where)
     needle, blade = (tools[one] for one in two(table["take"], list(tools), "tools", where))
     if not isinstance(needle, Needle) or not isinstance(blade, Blade):
         raise InputError("take", table["take"], "a needle, then a blade", where)
@@ -39,7 +36,8 @@ def read_taking(name: str, table: dict[str, Any], tools: Mapping[str, Tool], whe
     if not isinstance(vary, bool) or (vary and "fields" not in table):
         raise InputError("vary", vary, "true or false: whether the ends of its fields are parameters", where)
     window = _rise_window(name, table["fields"], vary, where) if "fields" in table else None
-    return Taking(name, needle, blade, _sense(table, "the tip passes along n x w or against it", where), window)
+    sense = sign("sense", table.get("sense", 1), where, "the tip passes along n x w or against it")
+    return Taking(name, needle, blade, sense, window)
 
 
 def _rise_window(name: str, given: tuple[tuple[str, Any], ...], vary: bool, where: str) -> RiseWindow:
@@ -57,9 +55,7 @@ def _rise_window(name: str, given: tuple[tuple[str, Any], ...], vary: bool, wher
 
 def read_entering(name: str, table: dict[str, Any], tools: Mapping[str, Tool], where: str) -> Entering:
     """Read a relation ``enter``: what passes, a blade, the seam, the sense, a window."""
-    for key in table:
-        if key not in ("enter", "sense", "window"):
-            raise InputError(key, table[key], "enter, sense, window", where)
+    known_keys(table, ("enter", "sense", "window"), where)
     if len(table["enter"]) != 3:
         raise InputError("enter", table["enter"], "three tools: what passes, a blade, the seam", where)
     entering, blade, seam = (tools[one] for one in each(table["enter"], list(tools), "tools", where))
@@ -74,16 +70,15 @@ def read_entering(name: str, table: dict[str, Any], tools: Mapping[str, Tool], w
         start, end = (number("window", one, where) for one in table["window"])
         window = (start, end)
     corners = (Spot(blade.eye), Spot(blade.hold), Spot(at=seam.at))
-    sense = _sense(table, "the tip passes along the normal of eye, hold, seam, or against it", where)
+    words = "the tip passes along the normal of eye, hold, seam, or against it"
+    sense = sign("sense", table.get("sense", 1), where, words)
     return Entering(name, entering.working, corners, entering.radius, sense, window)
 
 
 def read_sewing(name: str, table: dict[str, Any], known: Mapping[str, Any]) -> Sewing:
     """Read a relation ``sew``: the moments, speeds, the clearance that takes a loop, the torque of the main shaft."""
     where = f"machine.relations.{name}"
-    for key in table:
-        if key not in ("sew", "speeds", "clearance", "shaft"):
-            raise InputError(key, table[key], "sew, speeds, clearance, shaft", where)
+    known_keys(table, ("sew", "speeds", "clearance", "shaft"), where)
     moments = list(each(table["sew"], list(known), "relations", where))
     taking = [known[one] for one in moments if isinstance(known[one], Taking) and known[one].window]
     entering = tuple(known[one] for one in moments if isinstance(known[one], Entering))
@@ -103,13 +98,6 @@ def read_sewing(name: str, table: dict[str, Any], known: Mapping[str, Any]) -> S
     return Sewing(name, taking[0], entering, speeds, (low, high), shaft)
 
 
-def _sense(table: Mapping[str, Any], words: str, where: str) -> int:
-    sense = table.get("sense", 1)
-    if sense not in (1, -1) or isinstance(sense, bool):
-        raise InputError("sense", sense, f"1 or -1: {words}", where)
-    return int(sense)
-
-
 def read_thread(
     name: str, table: Mapping[str, Any], members: Mapping[str, Member], tools: Mapping[str, Tool]
 ) -> ThreadBalance:
@@ -122,9 +110,7 @@ def read_thread(
         bends.
     """
     where = f"machine.relations.{name}"
-    for key in table:
-        if key not in THREAD_KEYS:
-            raise InputError(key, table[key], choices(key, THREAD_KEYS), where)
+    known_keys(table, THREAD_KEYS, where)
     path = tuple(_place(given, members, tools, where) for given in table["thread"])
     bends = _bends(path)
     if bends is None:
@@ -172,9 +158,7 @@ def _bends(path: Sequence[Waypoint]) -> int | None:
 def _place(given: Any, members: Mapping[str, Member], tools: Mapping[str, Tool], where: str) -> Waypoint:
     """Read a place of a path: a name, coordinates, or a table with either and with when it counts."""
     table = dict(given) if isinstance(given, tuple) and given and isinstance(given[0], tuple) else {"on": given}
-    for key in table:
-        if key not in PLACE_KEYS:
-            raise InputError(key, table[key], choices(key, PLACE_KEYS), f"{where}.thread")
+    known_keys(table, ("on", "held", "wrap", "fixed"), f"{where}.thread")
     held, fixed = (_events(key, table.get(key, ()), f"{where}.thread") for key in ("held", "fixed"))
     wrap = length("wrap", table.get("wrap", 0.0), f"{where}.thread")
     return Waypoint(_on(table.get("on"), members, tools, where), held, wrap, fixed)

@@ -7,9 +7,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from typing import Any, TypeAlias
 
-import numpy as np
-
-from sweep.errors import InputError, choices
+from sweep.errors import InputError, choices, known_keys, number, sign
 from sweep.families.base import Output
 from sweep.families.capabilities import OutputLink
 from sweep.families.frames import Frame
@@ -232,9 +230,7 @@ def read_tools(given: Mapping[str, Mapping[str, Any]], members: dict[str, Member
         where = f"machine.tools.{name}"
         kind = "blade" if "back" in table else "plate" if "normal" in table else "seam" if "at" in table else "needle"
         keys = {"blade": BLADE_KEYS, "seam": SEAM_KEYS, "plate": PLATE_KEYS, "needle": NEEDLE_KEYS}[kind]
-        for key in table:
-            if key not in keys:
-                raise InputError(key, table[key], f"for a {kind}, {choices(key, keys)}", where)
+        known_keys(table, keys, where, f"for a {kind}, ")
         for key in NEEDED[kind]:
             if key not in table:
                 raise InputError(key, None, f"what a {kind} needs: {', '.join(NEEDED[kind])}", where)
@@ -264,9 +260,7 @@ def _needle(name: str, table: Mapping[str, Any], members: dict[str, Member], whe
     lines = [site.removesuffix("_axis") for site, one in owner.sites.items() if one.free and not site[-1].isdigit()]
     if table["line"] not in lines:
         raise InputError("line", table["line"], f"an axis or line of it: {choices(str(table['line']), lines)}", where)
-    sense = table.get("sense", 1)
-    if sense not in (1, -1) or isinstance(sense, bool):
-        raise InputError("sense", sense, "1 or -1: the needle points along the line or against it", where)
+    sense = sign("sense", table.get("sense", 1), where, "the needle points along the line or against it")
     diameter = length("diameter", table["diameter"], where)
     top, end, eye, point = (number(key, table.get(key, 0.0), where) for key in ("top", "scarf_end", "eye", "point"))
     if not top <= end < eye < point:
@@ -308,13 +302,6 @@ def length(key: str, value: object, where: str) -> float:
     if found < 0.0:
         raise InputError(key, value, "a length that is not negative", where)
     return found
-
-
-def number(key: str, value: object, where: str) -> float:
-    """Return a number that a user gives; refuse what is none."""
-    if isinstance(value, bool) or not isinstance(value, int | float) or not np.isfinite(value):
-        raise InputError(key, value, "a finite number", where)
-    return float(value)
 
 
 def bodies(members: Mapping[str, Member], tools: Mapping[str, Tool]) -> dict[str, Body]:
