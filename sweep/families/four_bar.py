@@ -18,7 +18,7 @@ from sweep.families import rssr as crank_rocker
 from sweep.families.base import Angles, Columns, Family, Output, PoseFunction
 from sweep.families.hardpoints import FOUR_BAR_POINTS
 from sweep.families.outputs import ALONG_FRAME, coordinate_outputs, joint_outputs, ladders
-from sweep.families.poses import of_matrix, step_of
+from sweep.families.poses import step_of
 from sweep.families.skeletons import CRANK, ORIGIN, ROCKER, links, standing
 
 # a b c e; the coupler point need not be given; branch
@@ -80,11 +80,6 @@ def _poses(
     return columns
 
 
-def joint_records(designs: Array, angles: Angles, motion: Columns, per_pose: Array, per_design: Array) -> None:
-    """Fill the joint records that effects work from."""
-    crank_rocker.joint_records(as_crank_rocker(designs), angles, motion, per_pose, per_design)
-
-
 FAMILY = Family(
     name="four_bar",
     title="planar four-bar with a coupler point",
@@ -101,9 +96,7 @@ FAMILY = Family(
     capabilities=(
         can.Dimensions(links("a b c"), arms=(can.Arm(("xi", "eta"), ("b",)),)),
         can.Assembly("discriminant", "pressure_angle", crank_rocker.discriminant_scale),
-        can.JointRecords(joint_records, crank_rocker.JOINT_NEEDS, "rocker"),
-        can.PressureEllipse(of_matrix(crank_rocker.ellipse, as_crank_rocker)),
-        can.CrankRockerLoop(as_crank_rocker),
+        *crank_rocker.moving_alike(as_crank_rocker, needs=crank_rocker.JOINT_NEEDS),
         replace(crank_rocker.SERIES, matrix=as_crank_rocker),
         can.OutputLink(standing(PARAMETERS, "e").at),
         can.ToolPoint(guide.tool_point),

@@ -17,7 +17,7 @@ from sweep.families import rssr as crank_rocker
 from sweep.families.base import Angles, Columns, Family, Output, Parameter, PoseFunction
 from sweep.families.hardpoints import GUIDE_POINTS
 from sweep.families.outputs import ALONG_FRAME, coordinate_outputs, joint_outputs, ladders
-from sweep.families.poses import of_matrix, poses_of, together
+from sweep.families.poses import poses_of, together
 from sweep.families.skeletons import CRANK, ORIGIN, ROCKER, Z, line, links, parameter, standing
 
 PARAMETERS = (
@@ -90,13 +90,6 @@ def as_crank_rocker(designs: Array) -> Array:
     matrix = np.zeros((len(designs), len(crank_rocker.PARAMETERS)))
     matrix[:, :4], matrix[:, -1] = designs[:, :4], designs[:, len(PARAMETERS) - 1]
     return matrix
-
-
-def joint_records(designs: Array, angles: Angles, motion: Columns, per_pose: Array, per_design: Array) -> None:
-    """Fill the joint records that effects work from: those of the four-bar."""
-    matrix = as_crank_rocker(designs)
-    turned = crank_rocker.poses(matrix, angles, frozenset(crank_rocker.JOINT_NEEDS))
-    crank_rocker.joint_records(matrix, angles, turned, per_pose, per_design)
 
 
 def point_shares(designs: Array) -> Array:
@@ -178,9 +171,7 @@ FAMILY = Family(
         can.Dimensions(links("a b c"), arms=(can.Arm(("xi", "eta"), ("b",)),)),
         can.Assembly("discriminant", "pressure_angle", crank_rocker.discriminant_scale),
         IN_SERIES,
-        can.JointRecords(joint_records, (), "rocker"),
-        can.PressureEllipse(of_matrix(crank_rocker.ellipse, as_crank_rocker)),
-        can.CrankRockerLoop(as_crank_rocker),
+        *crank_rocker.moving_alike(as_crank_rocker),
         can.GuidedPoint(
             point_shares,
             fitted=("xi", "eta", "lam", "h"),

@@ -18,7 +18,7 @@ from sweep.families import capabilities as can
 from sweep.families import rssr as crank_rocker
 from sweep.families.base import Accuracy, Angles, Columns, Family, Output, Parameter, PoseFunction, Step
 from sweep.families.outputs import coordinate_outputs, joint_outputs, ladders
-from sweep.families.poses import move_records, of_matrix, step_of
+from sweep.families.poses import step_of
 from sweep.families.skeletons import CRANK_ROCKER, Y, links, standing
 
 PARAMETERS = (
@@ -136,16 +136,6 @@ def swing(designs: Array, wanted: frozenset[str], accuracy: Accuracy) -> Columns
     return columns
 
 
-def joint_records(designs: Array, angles: Angles, motion: Columns, per_pose: Array, per_design: Array) -> None:
-    """Fill the joint records that effects work from."""
-    matrix = as_crank_rocker(designs)
-    turned = crank_rocker.poses(matrix, angles, frozenset(crank_rocker.JOINT_NEEDS))
-    crank_rocker.joint_records(matrix, angles, turned, per_pose, per_design)
-    origin = np.zeros((len(designs), 3))
-    origin[:, 2] = designs[:, 4]
-    move_records(_FROM_CRANK_ROCKER, origin, per_pose, per_design)
-
-
 FAMILY = Family(
     name="kim_dison",
     title="spatial crank-rocker of Kim and Dison",
@@ -168,9 +158,7 @@ FAMILY = Family(
     capabilities=(
         can.Dimensions(links("r l h")),
         can.Assembly("discriminant", "pressure_angle", crank_rocker.discriminant_scale),
-        can.JointRecords(joint_records, (), "rocker"),
-        can.PressureEllipse(of_matrix(crank_rocker.ellipse, as_crank_rocker)),
-        can.CrankRockerLoop(as_crank_rocker),
+        *crank_rocker.moving_alike(as_crank_rocker, (_FROM_CRANK_ROCKER, standing(PARAMETERS, z="b").at)),
         replace(
             crank_rocker.SERIES,
             curves={_ours(name): known for name, known in crank_rocker.CURVES.items()},

@@ -14,7 +14,7 @@ from sweep.families import capabilities as can
 from sweep.families.base import Accuracy, Angles, Columns, Family, Output, Parameter, Step, Work
 from sweep.families.hardpoints import CRANK_ROCKER_POINTS
 from sweep.families.outputs import coordinate_outputs, joint_outputs, ladders
-from sweep.families.poses import optional_outputs, poses_of, together
+from sweep.families.poses import move_records, of_matrix, optional_outputs, poses_of, together
 from sweep.families.provable import CRANK_ROCKER_BY_AXES, CRANK_ROCKER_BY_ROCKER
 from sweep.families.skeletons import CRANK_ROCKER, CRANK_ROCKER_SIZES, crank_axis, standing
 
@@ -108,6 +108,29 @@ def ellipse(designs: Array) -> Array:
     out = np.empty((len(designs), 7))
     rssr.pressure_ellipse(designs, out)
     return out
+
+
+def moving_alike(
+    matrix: can.DesignMap, place: tuple[Array, can.DesignMap] | None = None, needs: tuple[str, ...] = ()
+) -> tuple[object, ...]:
+    """Return what a family that moves as a crank-rocker can be asked for: joint records, pressure ellipse, proofs.
+
+    Parameters
+    ----------
+    matrix : the crank-rocker's designs of those of the family
+    place : rotation (3, 3) and origin (n, 3) of the crank-rocker's frame in that of the family; None where it is that
+    needs : what joint records are made of, where the family has that under the crank-rocker's names
+    """
+
+    def fill(designs: Array, angles: Angles, motion: Columns, per_pose: Array, per_design: Array) -> None:
+        own = matrix(designs)
+        turned = motion if needs else poses(own, angles, frozenset(JOINT_NEEDS))
+        joint_records(own, angles, turned, per_pose, per_design)
+        if place is not None:
+            move_records(place[0], place[1](designs), per_pose, per_design)
+
+    records = can.JointRecords(fill, needs, "rocker")
+    return records, can.PressureEllipse(of_matrix(ellipse, matrix)), can.CrankRockerLoop(matrix)
 
 
 def discriminant_scale(designs: Array) -> Array:
