@@ -14,8 +14,9 @@ from numpy.typing import ArrayLike
 from kernels.types import TWO_PI
 from sweep.errors import InputError
 from sweep.evaluation.tables import Parametrised, numbers
-from sweep.families.base import Array, Domain, Parameter, reads_as_degrees
+from sweep.families.base import Array, Domain, Parameter
 from sweep.families.names import stem
+from sweep.families.parameter import reads_as_degrees
 from sweep.quantities.units import heading_factor, internal_unit, plain
 
 if TYPE_CHECKING:

@@ -13,24 +13,11 @@ from numpy.typing import NDArray
 
 from kernels.types import TWO_PI
 from kernels.types import Array as Array
+from sweep.families.parameter import Output as Output
 from sweep.families.parameter import Parameter as Parameter
 from sweep.families.parameter import Unit as Unit
 
 EndsFunction: TypeAlias = Callable[[Array], tuple[Array, Array]]
-
-TWO_TURNS, TWO_TURNS_DEG = 2.0 * TWO_PI * (1.0 + 1e-9), 720.0
-
-
-def reads_as_degrees(largest: float) -> bool:
-    """Whether crank angles, the largest of which is given, were written in degrees though rad were expected.
-
-    Crank angles may run on over many turns.  Between two turns in rad and two turns in degrees a grid whose largest
-    value is a whole or half number was written in degrees: one in rad ends at a multiple of pi.
-
-    >>> reads_as_degrees(180.0), reads_as_degrees(12.5), reads_as_degrees(62.83185)
-    (True, False, False)
-    """
-    return TWO_TURNS < abs(largest) <= TWO_TURNS_DEG and (2.0 * largest).is_integer()
 
 
 @dataclass(frozen=True)
@@ -102,45 +89,6 @@ class Angles(NamedTuple):
     def part(self, rows: Any, poses: slice = slice(None)) -> Angles:
         """Take those of some designs, or of all where they share them, at some poses."""
         return Angles(*(np.ascontiguousarray(x[rows if len(x) > 1 else slice(None), poses]) for x in self))
-
-
-@dataclass(frozen=True)
-class Output:
-    """One quantity that can be wanted: unit in SI words ("rad", "length", "1"), definition, equation of its page.
-
-    Parameters
-    ----------
-    name, unit, text, equation : as they are printed
-    jumps : it is a whole number or otherwise constant in pieces, so no slope leads an optimiser to it
-    wraps : an angle that is known only up to full turns; curves of it are made continuous
-    windowed : a deviation, of which only the part inside the window of the stroke counts where a window is given
-    stage, own : in a chain the number of the stage that gives it, and its name there
-    parts : of the magnitude of a rate, its components
-    kinks : curves of it have kinks or jumps where something reverses, as all with friction: extrema are then searched
-        for panel by panel
-    """
-
-    name: str
-    unit: str
-    text: str
-    equation: str = ""
-    jumps: bool = False
-    wraps: bool = False
-    windowed: bool = False
-    stage: str = ""
-    own: str = ""
-    kinks: bool = False
-    parts: tuple[str, ...] = ()
-
-    @property
-    def base(self) -> str:
-        """The name without the number of a stage."""
-        return self.own or self.name
-
-    def of_stage(self, number: int) -> Output:
-        """Return the same output of the stage of that number in a chain, under its name there."""
-        words = f"stage {number}: {self.text}"
-        return replace(self, name=f"{self.name}{number}", text=words, stage=str(number), own=self.name)
 
 
 @dataclass(frozen=True)

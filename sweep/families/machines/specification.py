@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from sweep.errors import InputError, choices, known_keys, nearest, number
-from sweep.families.base import Event, Family, Output, Turn, reads_as_degrees
+from sweep.families.base import Event, Family, Output, Turn
 from sweep.families.capabilities import OutputLink
 from sweep.families.frames import crank_axis
 from sweep.families.link_tree import LinkTree
@@ -33,6 +33,7 @@ from sweep.families.machines.tools import (
     read_height,
     read_tools,
 )
+from sweep.families.parameter import reads_as_degrees
 from sweep.families.parts import Member, placement, vector
 from sweep.families.shafts import MOUNT_KEYS, SHAFT_KEYS, Mount, Shaft, read_mount, read_shafts, turns
 from sweep.families.sites import coupler_joints, is_planar
