@@ -121,12 +121,12 @@ class Effect:
     title: str
     equation: str
     formulas: tuple[str, ...]
-    needs: tuple[str, ...]
-    inputs: tuple[Parameter, ...]
     outputs: tuple[Output, ...]
     compute: ComputeFunction
     called_for: str
     negligible: str
+    needs: tuple[str, ...] = ()
+    inputs: tuple[Parameter, ...] = ()
     whole_turn: bool = False
     even_crank: bool = False
     takes_load: str = ""

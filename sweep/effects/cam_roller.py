@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from functools import lru_cache, partial
 
 import numpy as np
@@ -11,11 +12,10 @@ from kernels.types import Array
 from sweep.effects.base import Effect, largest
 from sweep.effects.contact import MODULUS, line_stress
 from sweep.effects.load_effects import loads_of
-from sweep.effects.load_passing import LOADS, compute_loads
+from sweep.effects.load_passing import compute_loads
 from sweep.effects.scene import Scene, take_over
 from sweep.families import family
 from sweep.families.base import Columns, Output, Parameter
-from sweep.families.link_tree import LinkTree
 
 EQUATION = "docs/cam.md (12)-(14)"
 FORMULAS = (
@@ -71,7 +71,8 @@ def compute(scene: Scene, wanted: frozenset[str]) -> Columns:
 def roller_of(name: str) -> Effect:
     """Entry of the roller of a cam."""
     bare = loads_of(name)
-    return Effect(
+    return replace(
+        bare,
         key="C2",
         name=f"{name}_roller",
         title=f"undercutting, least radius and stress of the roller: {family(name).title}",
@@ -84,8 +85,5 @@ def roller_of(name: str) -> Effect:
         compute=compute,
         called_for="a cam that can be made, wear of the roller",
         negligible="a pitch curve whose least radius is far above the roller's",
-        takes_load=LOADS,
-        requires=LinkTree,
-        tree=bare.tree,
         advise=partial(largest, compute=compute, name="undercut", quantity="undercut", threshold=0.3),
     )

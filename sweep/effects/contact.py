@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from functools import lru_cache, partial
 
 import numpy as np
@@ -11,7 +12,7 @@ from kernels.linkage.bodies import TURN
 from kernels.types import Array, Status
 from sweep.effects.base import Effect, largest
 from sweep.effects.load_effects import loads_of, relative
-from sweep.effects.load_passing import LOADS, compute_loads
+from sweep.effects.load_passing import compute_loads
 from sweep.effects.loads import magnitude
 from sweep.effects.scene import Scene, refuse, take_over
 from sweep.families import family
@@ -123,7 +124,8 @@ def contact_of(name: str) -> Effect:
     assert tree is not None
     joints = touching(tree)
     run = partial(compute, tree=tree)
-    return Effect(
+    return replace(
+        bare,
         key="C1",
         name=f"{name}_contact",
         title=f"sliding speed, Hertz stress and p v of slots and straps: {family(name).title}",
@@ -136,9 +138,6 @@ def contact_of(name: str) -> Effect:
         compute=run,
         called_for="wear and stress of slots, eccentrics, balls",
         negligible="largest pressure below 100 MPa",
-        takes_load=LOADS,
-        requires=LinkTree,
-        tree=tree,
         advise=partial(largest, compute=run, name=f"stress_{joints[0].name}", quantity="pressure",
                        threshold=100.0, unit="MPa"),
     )  # fmt: skip

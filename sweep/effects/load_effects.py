@@ -249,7 +249,6 @@ def loads_of(name: str) -> Effect:
         title=f"joint reactions, driving torque, reduced inertia, tool: {found.title}",
         equation=TREE_EQUATION,
         formulas=TREE_FORMULAS,
-        needs=(),
         inputs=link_loads.inputs(tree),
         outputs=(
             *loads.vector_outputs(link_loads.vectors(tree) | link_loads.TOOL_VECTOR, TREE_EQUATION),

@@ -116,7 +116,6 @@ EFFECT = Effect(
         "(2) it acts on the coupler at the guided point, reversed: loads, friction, drive torque, inertia",
         _FREE,
     ),
-    needs=(),
     inputs=(*loads.GRAVITY, loads.SPEED, loads.CHANGE, CONSTRUCTION),
     tool_inputs=loads.TOOLS,
     outputs=OUTPUTS,
