@@ -12,7 +12,6 @@ Index and identity stand in the file's metadata too, so a file under another chu
 from __future__ import annotations
 
 import hashlib
-import io
 import json
 import re
 from collections.abc import Iterable, Iterator, Mapping, Sequence
@@ -27,6 +26,7 @@ from sweep.errors import InputError, StoreError
 if TYPE_CHECKING:
     import pandas as pd
     import pyarrow as pa
+    import pyarrow.parquet as pq
 
     from sweep.chunks.chunk import ChunkResult
     from sweep.chunks.plan import Plan
@@ -53,21 +53,27 @@ class Part:
     identity: str
     digest: str
 
-    def read(self) -> bytes:
-        """Return the content of the file.
+    def read(self) -> tuple[pq.ParquetFile, dict[str, Any]]:
+        """Read the file, and open what it holds; with what its metadata say (see `about`).
 
         Raises
         ------
         StoreError
             if it is damaged, or is another chunk than its name says.
         """
+        import pyarrow as pa
+
         self.check_file()
         with store_errors(self.path):
             data = self.path.read_bytes()
         if content_hash(data) != self.digest:
             raise StoreError(f"{self.path}: damaged chunk; {REMEDY}")
-        about(self, data)
-        return data
+        return _opened(self, pa.BufferReader(data))
+
+    def rows(self) -> pd.DataFrame:
+        """Return all rows, after the checks of `read`."""
+        found: pd.DataFrame = self.read()[0].read().to_pandas()
+        return found
 
     def check_file(self) -> None:
         """See that a file of a chunk's size is there, before anybody opens it: a pipe would never end.
@@ -82,35 +88,27 @@ class Part:
         if not sound:
             raise StoreError(f"{self.path}: damaged chunk; {REMEDY}")
 
-    def rows(self, columns: list[str] | None = None) -> pd.DataFrame:
-        """Return all columns or some, after the checks of `read`."""
-        import pandas as pd
 
-        return pd.read_parquet(io.BytesIO(self.read()), columns=columns)
-
-
-def about(part: Part, data: bytes | None = None) -> dict[str, Any]:
+def about(part: Part) -> dict[str, Any]:
     """Return what a chunk's metadata say of it: study, code, identity, index, range of designs, counts.
-
-    Parameters
-    ----------
-    part : the chunk
-    data : content of the file if it has been read already
 
     Raises
     ------
     StoreError
         if the metadata cannot be read, or are those of another chunk than the name says.
     """
+    part.check_file()
+    return _opened(part, part.path)[1]
+
+
+def _opened(part: Part, source: Path | pa.BufferReader) -> tuple[pq.ParquetFile, dict[str, Any]]:
     import pyarrow as pa
     import pyarrow.parquet as pq
 
-    if data is None:
-        part.check_file()
     try:
         with store_errors(part.path):
-            source = part.path if data is None else pa.BufferReader(data)
-            found = json.loads(pq.read_metadata(source).metadata[METADATA])
+            file = pq.ParquetFile(source)
+        found = json.loads(file.metadata.metadata[METADATA])
         own = found["chunk"], found["identity"]
         for key, kind in ABOUT_TYPES.items():
             if not isinstance(found[key], kind):
@@ -122,7 +120,7 @@ def about(part: Part, data: bytes | None = None) -> dict[str, Any]:
     if own != (part.index, part.identity):
         names = f"chunk {own[0]} of {own[1]} under the name of chunk {part.index} of {part.identity}"
         raise StoreError(f"{part.path}: {names}; {REMEDY}")
-    return dict(found)
+    return file, found
 
 
 def content_hash(data: bytes) -> str:
@@ -188,8 +186,8 @@ def batches(paths: Iterable[Path], columns: list[str] | None = None) -> Iterator
             yield from source.iter_batches(batch_size=ROWS_PER_BATCH, columns=columns, use_threads=False)
 
 
-def check_columns(chunks: Sequence[Part]) -> None:
-    """Refuse chunks that can be read and have not the columns of the first one.
+def check_columns(chunks: Sequence[Part], schemas: Iterable[pa.Schema] = ()) -> None:
+    """Refuse chunks that can be read and have not the columns of the first one; ``schemas`` are theirs if known.
 
     Raises
     ------
@@ -199,8 +197,8 @@ def check_columns(chunks: Sequence[Part]) -> None:
     import pyarrow.parquet as pq
 
     names: list[str] = []
-    for part in chunks:
-        found = pq.read_schema(part.path).names
+    for part, schema in zip(chunks, schemas or (pq.read_schema(part.path) for part in chunks), strict=True):
+        found = schema.names
         names = names or found
         if found != names:
             part.read()  # a damaged name is no other column
@@ -266,9 +264,6 @@ def named_counts(counts: Mapping[int, int]) -> dict[str, int]:
     return {STATUS_NAMES.get(code, str(code)): number for code, number in sorted(counts.items())}
 
 
-def units_of(part: Part) -> dict[str, str]:
+def units_of(schema: pa.Schema) -> dict[str, str]:
     """Return the unit of every column of a chunk that has one, as its field metadata say."""
-    import pyarrow.parquet as pq
-
-    schema = pq.read_schema(part.path)
     return {field.name: field.metadata[b"unit"].decode() for field in schema if b"unit" in (field.metadata or {})}

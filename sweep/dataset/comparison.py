@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import io
 import math
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, field
@@ -197,12 +196,10 @@ def _chunks(folder: Path) -> list[chunk_files.Part]:
 
 
 def _columns(chunks: Sequence[chunk_files.Part]) -> list[str]:
-    import pyarrow.parquet as pq
-
     for part in chunks:
         chunk_files.about(part)
     chunk_files.check_columns(chunks)
-    return [name for name in pq.read_schema(io.BytesIO(chunks[0].read())).names if not is_error(name)]
+    return [name for name in chunks[0].read()[0].schema_arrow.names if not is_error(name)]
 
 
 def _pieces(chunks: Iterable[chunk_files.Part], columns: list[str], stops: Iterable[float]) -> Iterator[pd.DataFrame]:
@@ -212,7 +209,8 @@ def _pieces(chunks: Iterable[chunk_files.Part], columns: list[str], stops: Itera
     rows, reached, following = pd.DataFrame({name: [] for name in columns}), 0, iter(chunks)
     for stop in stops:
         while reached < stop and (part := next(following, None)) is not None:
-            reached, more = chunk_files.about(part)["stop"], part.rows(columns)
+            file, own = part.read()
+            reached, more = own["stop"], file.read(columns).to_pandas()
             rows = pd.concat([rows, more], ignore_index=True) if len(rows) else more
         if np.any(np.diff(rows["design"].to_numpy()) <= 0):
             where = next(iter(chunks)).path.parent

@@ -135,9 +135,7 @@ def pareto(folder: str | Path, first: str, second: str) -> pd.DataFrame:
 
 def _with_units(rows: pd.DataFrame, source: Any) -> pd.DataFrame:
     """Return the rows with the units that stand in the schema."""
-    rows.attrs["units"] = {
-        field.name: field.metadata[b"unit"].decode() for field in source.schema if b"unit" in (field.metadata or {})
-    }
+    rows.attrs["units"] = chunk_files.units_of(source.schema)
     return rows
 
 

@@ -149,7 +149,7 @@ def load(folder: str | Path, units: bool = False) -> pd.DataFrame:
     >>> [name for name in sweep.load("results/press/designs", units=True) if name.startswith(("a", "max_p"))]
     ['a [mm]', 'max_pressure_angle [rad]']
     """
-    import pandas as pd
+    import pyarrow as pa
 
     place = located(folder)
     chunks = chunk_files.parts(place) if place.is_dir() else []
@@ -161,15 +161,15 @@ def load(folder: str | Path, units: bool = False) -> pd.DataFrame:
             raise StoreError(f"{place}: chunks of different studies or sources, {names}; they are not one table")
         if one.index == other.index:
             raise _twice(place, one, other)
-    frames = [part.rows() for part in chunks]
-    chunk_files.check_columns(chunks)
+    tables = [part.read()[0].read() for part in chunks]
+    chunk_files.check_columns(chunks, [table.schema for table in tables])
     missing = chunk_files.missing_chunks(place, chunks)
     if missing:
         text = f"{place}: incomplete, {len(missing)} of {len(missing) + len(chunks)} chunks are missing"
         text += f" (the first is {missing[0]}); run the study again to have them computed"
         warnings.warn(text, IncompleteWarning, stacklevel=2)
-    found = pd.concat(frames, ignore_index=True)
-    named = chunk_files.units_of(chunks[0])
+    found: pd.DataFrame = pa.concat_tables(tables).to_pandas()
+    named = chunk_files.units_of(tables[0].schema)
     if units:
         found = found.rename(
             columns={name: f"{name} [{unit}]" for name, unit in named.items() if unit not in ("", "1")}

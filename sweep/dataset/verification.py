@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import io
 import math
 from collections import Counter
 from collections.abc import Mapping
@@ -168,8 +167,6 @@ def _whole_chunks(
     found: Verification, chunks: list[chunk_files.Part], about: dict[str, Any], study: Study | None
 ) -> dict[int, chunk_files.Part]:
     """Return the chunks that are what their names say; what is wrong with the others, or with their rows, is noted."""
-    import pandas as pd
-
     whole: dict[int, chunk_files.Part] = {}
     for part in chunks:
         if part.identity != about.get("identity", part.identity):
@@ -177,7 +174,7 @@ def _whole_chunks(
             found.add(part.path, words, "the next run refuses; --force sets it aside")
             continue
         try:
-            data = part.read()
+            file, own = part.read()
         except StoreError as error:
             if isinstance(error.__cause__, OSError):
                 raise
@@ -189,9 +186,10 @@ def _whole_chunks(
             found.add(part.path, words, "the next run refuses; remove the one you do not trust")
             continue
         whole[part.index] = part
-        rows = pd.read_parquet(io.BytesIO(data))
-        found.chunks, found.rows, found.size = found.chunks + 1, found.rows + len(rows), found.size + len(data)
-        for words in row_faults(rows, chunk_files.about(part, data), about, study):
+        rows = file.read().to_pandas()
+        found.chunks, found.rows = found.chunks + 1, found.rows + len(rows)
+        found.size += part.path.stat().st_size
+        for words in row_faults(rows, own, about, study):
             found.add(part.path, words, UNSEEN)
     return whole
 
