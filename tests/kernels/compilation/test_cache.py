@@ -6,10 +6,12 @@ import os
 import subprocess
 import sys
 import textwrap
+from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
 
+from tests.support.forks import Forks
 from tests.support.selection import mostly_long
 
 SOURCES = Path(__file__).resolve().parents[3] / "kernels"
@@ -54,10 +56,25 @@ def process(tree: Path, program: str, errors: int | None = None, **environment: 
                             env=known | environment, stdout=subprocess.PIPE, stderr=errors, text=True)  # fmt: skip
 
 
+FORKS = Forks()
+
+
+@pytest.fixture(scope="module", autouse=True)
+def forks() -> Iterator[None]:
+    with FORKS:
+        yield
+
+
 def report(tree: Path, program: str = REPORT, **environment: str) -> list[str]:
-    with process(tree, program, **environment) as running:
-        found, _ = running.communicate(timeout=60)
-    assert running.returncode == 0
+    """Words that a program prints; of a process of its own where the environment decides how Python begins."""
+    if environment:
+        with process(tree, program, **environment) as running:
+            found, _ = running.communicate(timeout=60)
+        code = running.returncode
+    else:
+        cache = {"XDG_CACHE_HOME": str(tree.parents[1] / "cache")}
+        code, found = FORKS.run(textwrap.dedent(program), str(tree.parent), str(tree.parents[1]), cache)
+    assert code == 0
     return found.split()
 
 
