@@ -17,6 +17,8 @@ from sweep.dataset.files import OPTIMUM
 from tests.support.engine_study import ROOT, write_study
 from tests.support.selection import mostly_long
 
+SIGNALS = (signal.SIGINT, signal.SIGTERM)
+SIGNALLED = 128  # and the number of the signal: exit codes 130 and 143
 SECONDS = 2.0
 # A machine that has other things to do, too, needs longer for the same: so much is allowed beyond.
 SLACK = 1.0
@@ -58,8 +60,8 @@ def told(process: subprocess.Popen[str], number: int, group: bool) -> tuple[floa
     return left, errors
 
 
-@pytest.mark.parametrize(("number", "code"), [(signal.SIGINT, 130), (signal.SIGTERM, 143)])
-def test_it_leaves_while_it_compiles(tmp_path: Path, number: int, code: int) -> None:
+@pytest.mark.parametrize("number", mostly_long(SIGNALS, [signal.SIGTERM]))
+def test_it_leaves_while_it_compiles(tmp_path: Path, number: int) -> None:
     """An empty cache: the first seconds are imports and compiling."""
     study = write_study(tmp_path / "study")
     process = begun(study, tmp_path / "out", tmp_path / "cache")
@@ -68,13 +70,13 @@ def test_it_leaves_while_it_compiles(tmp_path: Path, number: int, code: int) -> 
         time.sleep(0.01)
     time.sleep(random.Random(number).uniform(0.0, 2.0))
     left, errors = told(process, number, group=False)
-    assert process.returncode == code, errors
+    assert process.returncode == SIGNALLED + number, errors
     assert left < SECONDS + SLACK and "Traceback" not in errors
 
 
-@pytest.mark.parametrize(("number", "code"), [(signal.SIGINT, 130), (signal.SIGTERM, 143)])
+@pytest.mark.parametrize("number", mostly_long(SIGNALS, [signal.SIGINT]))
 @pytest.mark.parametrize("group", mostly_long([True, False], [True]))
-def test_it_leaves_while_it_optimises_with_the_best_so_far(tmp_path: Path, number: int, code: int, group: bool) -> None:
+def test_it_leaves_while_it_optimises_with_the_best_so_far(tmp_path: Path, number: int, group: bool) -> None:
     study = write_study(tmp_path / "study", keep="feasible", count=20)
     study.write_text(study.read_text() + OPTIMISE)
     process = begun(study, tmp_path / "designs", None, "--jobs", "2")
@@ -83,14 +85,14 @@ def test_it_leaves_while_it_optimises_with_the_best_so_far(tmp_path: Path, numbe
         time.sleep(0.02)
     time.sleep(1.0)
     left, errors = told(process, number, group)
-    assert process.returncode == code, errors
+    assert process.returncode == SIGNALLED + number, errors
     assert left < SECONDS + SLACK and "Traceback" not in errors
     best = pd.read_parquet(tmp_path / OPTIMUM)
     assert best["role"].iloc[0] == "optimum" and best["max_abs_d2psi"].iloc[0] > 0.0
 
 
-@pytest.mark.parametrize(("number", "code"), [(signal.SIGINT, 130), (signal.SIGTERM, 143)])
-def test_a_signal_behind_the_work_is_told_as_one(number: int, code: int) -> None:
+@pytest.mark.parametrize("number", SIGNALS)
+def test_a_signal_behind_the_work_is_told_as_one(number: int) -> None:
     """What a process does at its very end, such as closing pools, is interrupted at once, with the code of a signal."""
     program = """
 import atexit, time
@@ -105,7 +107,7 @@ program.main()
     assert process.stdout is not None and process.stdout.readline() == "over\n"
     process.send_signal(number)
     process.communicate(timeout=20)
-    assert process.returncode == code
+    assert process.returncode == SIGNALLED + number
 
 
 def test_a_folder_that_is_not_there_any_more_is_said(tmp_path: Path) -> None:

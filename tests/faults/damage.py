@@ -67,7 +67,7 @@ def damaged_chunk(damage: Damage, ground: Ground, folder: Path, moments: random.
     chunks = sorted(designs.glob("part-*"))
     moments.shuffle(chunks)
     damage(chunks, moments)
-    whole = ground.whole[ground.plain]
+    whole = ground.whole(ground.plain)
     sound = {name: data for name, data in files(designs).items() if whole.get(name) == data}
     found = Outcome(said=read(designs))
     found.wrong += [] if found.said else ["it is read without a word"]

@@ -30,7 +30,7 @@ def _ended(ground: Ground, designs: Path, code: int, text: str, before: dict[str
 
 def limited_files(backend: str, ground: Ground, folder: Path, moments: random.Random) -> Outcome:
     """The system refuses to write a file beyond a size that some of the chunks have and some have not."""
-    sizes = sorted(len(data) for data in ground.whole[ground.plain].values())
+    sizes = sorted(len(data) for data in ground.whole(ground.plain).values())
     most = moments.randint(sizes[0] - 2000, sizes[-1] - 1)
     words = ("run", ground.plain, "--out", folder / "designs", "--backend", backend)
     process = ground.begin(
@@ -61,7 +61,7 @@ def small_disk(read_only: bool, ground: Ground, folder: Path, moments: random.Ra
     kept.mkdir()
     if not _can_mount(disk):
         return Outcome(said="no file system can be mounted here: not tried")
-    whole = sum(len(data) for data in ground.whole[ground.plain].values())
+    whole = sum(len(data) for data in ground.whole(ground.plain).values())
     size = whole * 2 if read_only else int(whole * moments.uniform(0.2, 0.9))
     designs = disk / "study" / "designs"
     words = f"{sys.executable} -m tests.faults.child {folder}/marks none run {ground.plain} --out {designs}"
@@ -82,7 +82,7 @@ def vanishing(ground: Ground, folder: Path, moments: random.Random) -> Outcome:
     if found.code == 0:
         # Who deletes chunks after the run has looked at all of them for the last time deletes a finished dataset.
         left = files(designs).items()
-        found.wrong += [] if left <= ground.whole[ground.plain].items() else ["ended well, but differs"]
+        found.wrong += [] if left <= ground.whole(ground.plain).items() else ["ended well, but differs"]
     elif found.code != 74 or "Traceback" in text:
         found.wrong.append(f"ended with {found.code}: {text[-1000:]}")
     return ground.settled(ground.plain, designs, {}, found)

@@ -10,6 +10,7 @@ import sys
 import time
 from collections.abc import Callable
 from dataclasses import dataclass, field
+from functools import cached_property
 from pathlib import Path
 from typing import Any
 
@@ -72,11 +73,14 @@ class Ground:
         self.rich.parent.mkdir(parents=True)
         self.rich.write_text(STUDY.format(swing=40) + TABLE + ROBUST)
         self.designs = {study: study.parent / "whole" / "designs" for study in (self.plain, self.rich)}
-        self.whole: dict[Path, dict[str, bytes]] = {}
-        for study, designs in self.designs.items():
-            self.resume(study, designs)
-            self.whole[study] = files(designs)
-        self.seconds = self._stages()
+        self._whole: dict[Path, dict[str, bytes]] = {}
+
+    def whole(self, study: Path) -> dict[str, bytes]:
+        """What an undisturbed run makes of a study, which is run when it is first asked for."""
+        if study not in self._whole:
+            self.resume(study, self.designs[study])
+            self._whole[study] = files(self.designs[study])
+        return self._whole[study]
 
     @staticmethod
     def resume(study: Path, designs: Path) -> None:
@@ -100,13 +104,16 @@ class Ground:
 
     def swept(self, study: Path, folder: Path, *, without: tuple[str, ...] = ()) -> Path:
         """A copy of the undisturbed dataset without some of its tables, as a run leaves it that has come so far."""
+        self.whole(study)
         shutil.copytree(beside(self.designs[study]), folder, dirs_exist_ok=True)
         for name in without:
             (folder / name).unlink(missing_ok=True)
         return folder / "designs"
 
-    def _stages(self) -> dict[str, float]:
+    @cached_property
+    def seconds(self) -> dict[str, float]:
         """How long each stage takes [s]."""
+        self.whole(self.rich)
         folder = self.folder / "stages"
         folder.mkdir()
         marks, begun = folder / "marks", dict[str, float]()
@@ -134,7 +141,7 @@ class Ground:
         left = {name: data for name, data in files(designs).items() if not damaged or name in before}
         # A front grows step by step; each version of its file is whole.
         found.lost += [n for n in before if n not in left or (left[n] != before[n] and n != PARETO)]
-        found.wrong += [f"{n} differs" for n in left if n.startswith("part-") and left[n] != self.whole[study].get(n)]
+        found.wrong += [f"{n} differs" for n in left if n.startswith("part-") and left[n] != self.whole(study).get(n)]
         for name in TABLES:
             try:
                 if name in left:
@@ -148,7 +155,7 @@ class Ground:
             found.wrong.append(f"the next run ended with {error}")
         again = {path.name: path.stat().st_mtime_ns for path in designs.glob("part-*")}
         found.lost += [f"{name} was computed again" for name in written if again.get(name) != written[name]]
-        after, whole = files(designs), self.whole[study]
+        after, whole = files(designs), self.whole(study)
         found.wrong += [f"{n} differs in the end" for n in {*after, *whole} if after.get(n) != whole.get(n)]
         found.wrong += [f"{path.name} is left" for path in beside(designs).glob("_tmp-*")]
         return found

@@ -86,7 +86,7 @@ def struck(
     if not alone(process.pid):
         found.wrong.append("a process stays behind")
     if found.code in (0, 4):
-        found.wrong += [] if stage == "report" or files(designs) == ground.whole[study] else ["ended well, but differs"]
+        found.wrong += [] if stage == "report" or files(designs) == ground.whole(study) else ["ended well, but differs"]
     elif found.code not in codes:
         found.wrong.append(f"ended with {found.code}: {text[-2000:]}")
     elif words not in found.said:

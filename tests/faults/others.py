@@ -29,7 +29,7 @@ def two_runs(ground: Ground, folder: Path, moments: random.Random) -> Outcome:
     found = Outcome(second.returncode, last_line(text))
     if second.returncode not in (0, 75) or (second.returncode == 75 and str(first.pid) not in found.said):
         found.wrong.append(f"the second ended with {second.returncode}: {text[-500:]}")
-    if first.returncode != 0 or files(designs) != ground.whole[ground.plain]:
+    if first.returncode != 0 or files(designs) != ground.whole(ground.plain):
         found.wrong.append(f"the first ended with {first.returncode}: {rest[-500:]}")
     return ground.settled(ground.plain, designs, files(designs), found)
 
@@ -50,7 +50,7 @@ def damaged_cache(damage: Damage, ground: Ground, folder: Path, moments: random.
     )  # fmt: skip
     text, _ = process.communicate(timeout=SECONDS)
     found = Outcome(process.returncode, last_line(text))
-    if process.returncode != 0 or files(folder / "designs") != ground.whole[ground.plain]:
+    if process.returncode != 0 or files(folder / "designs") != ground.whole(ground.plain):
         found.wrong.append(f"ended with {process.returncode}: {text[-1000:]}")
     return found
 

@@ -24,7 +24,7 @@ SECONDS = 900.0  # with a cold cache of kernels on a busy machine
 
 
 # Where no kernel is compiled yet, each process compiles what so many of the requests need.
-PARTS = 6
+PARTS = 3
 
 
 def begin(kind: str, first: int, stop: int, step: int, folder: Path) -> subprocess.Popen[str]:
@@ -70,8 +70,8 @@ def judged(found: dict[str, Any], folder: Path, count: int) -> Counter[str]:
 
 @pytest.mark.usefixtures("studies")
 def test_hostile_tables_end_in_an_answer_or_a_message_of_ours(count: int, tmp_path: Path) -> None:
-    for part in range(PARTS):
-        assert not told(begin("requests", part, REQUESTS, PARTS, tmp_path))["wrong"]
+    for part in range(PARTS):  # so many tables have no other requests than these
+        assert not told(begin("requests", part, min(count, REQUESTS), PARTS, tmp_path))["wrong"]
     judged(told(begin("tables", 0, count, 1, tmp_path)), tmp_path, count)
 
 

@@ -18,8 +18,11 @@ from sweep.nights import archive
 from sweep.nights.archive import HISTORY, NIGHT, read_history, read_night
 from sweep.nights.page import write_page
 from sweep.nights.studies import chosen
+from tests.nights.conftest import called
 from tests.nights.test_nightly import night, written
 from tests.support.selection import mostly_long
+
+pytestmark = pytest.mark.usefixtures("in_this_process")
 
 
 @pytest.fixture(scope="module")
@@ -27,7 +30,9 @@ def first(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, Path]:
     """A study and the folder of its first night."""
     place = tmp_path_factory.mktemp("first")
     study, into = written(place / "one"), place / "nights"
-    record, _ = night(into, [study])
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr("sweep.nights.night.call", called)
+        record, _ = night(into, [study])
     assert record.exit_code == 0
     return study, into
 

@@ -157,6 +157,7 @@ def test_a_night_whose_time_is_over_ends_with_124_and_latest_stays(
     assert (tmp_path / "nights" / "latest").readlink() == Path(first.name)
 
 
+@pytest.mark.usefixtures("in_this_process")
 def test_a_search_that_time_has_cut_short_is_said_and_made_again_the_next_night(tmp_path: Path) -> None:
     study = tmp_path / "small" / "study.toml"
     study.parent.mkdir()
@@ -231,6 +232,7 @@ def test_where_the_disk_makes_no_links_chunks_are_copied(tmp_path: Path, monkeyp
     assert not any(path.name.startswith("_tmp") for path in (tmp_path / "new").rglob("*"))
 
 
+@pytest.mark.usefixtures("in_this_process")
 def test_a_study_with_faults_fails_by_itself_and_the_others_are_computed(tmp_path: Path) -> None:
     bad = written(tmp_path / "studies" / "bad")
     (bad / "study.toml").write_text("[study]\nname = 3\n")

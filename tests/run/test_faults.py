@@ -90,13 +90,14 @@ def only_parts(folder: Path) -> bool:
     return all(p.name.startswith("part-") for p in folder.iterdir())
 
 
-@pytest.mark.parametrize(
-    ("number", "code", "backend"),
-    [(signal.SIGINT, 130, "threading"), (signal.SIGTERM, 143, "threading"), (signal.SIGINT, 130, "loky")],
-)
+BY_SIGNAL = [(signal.SIGINT, 130, "threading"), (signal.SIGTERM, 143, "threading"), (signal.SIGINT, 130, "loky")]
+
+
+@pytest.mark.parametrize("by", mostly_long(BY_SIGNAL, BY_SIGNAL[1:]))
 def test_signal_ends_run_with_its_code_and_next_run_ends_with_same_bytes(
-    path: Path, whole: dict[str, bytes], tmp_path: Path, number: int, code: int, backend: str
+    path: Path, whole: dict[str, bytes], tmp_path: Path, by: tuple[int, int, str]
 ) -> None:
+    number, code, backend = by
     out = tmp_path / "out"
     process = start(path, out, backend=backend)
     wait_for_chunks(out, 2, process)
