@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 from numbers import Real
 from typing import Literal, NamedTuple, TypeAlias
@@ -65,16 +65,17 @@ def check_window(window: tuple[float, float] | None) -> None:
         raise InputError("window", window, "two fractions of the stroke, 0 <= from < to <= 1", "design outputs")
 
 
-def own_route(family: Family, step: Step, stage: Stage | None, outputs: tuple[str, ...], accuracy: Accuracy) -> Route:
+def own_route(step: Step, stage: Stage, outputs: tuple[str, ...], accuracy: Accuracy) -> Route:
     """Make the route by a family's own step, or by one of a chain's first stage."""
-    name = f"stage {stage.number}: {step.name}" if stage else step.name
-    owner = stage.family if stage else family
-    place = [own.name for own in steps_of(owner)].index(step.name)
+    place = [own.name for own in steps_of(stage.family)].index(step.name)
     run, cost = (
-        partial(_run_step, owner, step, stage, _own_outputs(owner, step, stage, outputs)),
-        step_ns(owner, step, accuracy),
+        partial(_run_step, step, stage, _own_outputs(step, stage, outputs)),
+        step_ns(stage.family, step, accuracy),
     )
-    return Route(name, outputs, cost, run, order=(step.work, place), columns=stage.columns.stop if stage else None)
+    route = Route(step.name, outputs, cost, run, order=(step.work, place))
+    if not stage.tail:
+        return route
+    return replace(route, name=f"stage {stage.tail}: {step.name}", columns=stage.columns.stop)
 
 
 def general_route(family: Family, general: Group, effect: str, outputs: tuple[str, ...], accuracy: Accuracy) -> Route:
@@ -107,9 +108,9 @@ class _Own(NamedTuple):
     pose: str
 
 
-def _own_outputs(family: Family, step: Step, stage: Stage | None, outputs: Sequence[str]) -> tuple[_Own, ...]:
-    plain = [at_stage(name, str(stage.number)) if stage else name for name in outputs]
-    return tuple(_Own(name, own, _sharpened(family, step, own)) for name, own in zip(outputs, plain, strict=True))
+def _own_outputs(step: Step, stage: Stage, outputs: Sequence[str]) -> tuple[_Own, ...]:
+    plain = [at_stage(name, stage.tail) for name in outputs]
+    return tuple(_Own(name, own, _sharpened(stage.family, step, own)) for name, own in zip(outputs, plain, strict=True))
 
 
 def _sharpened(family: Family, step: Step, name: str) -> str:
@@ -127,10 +128,9 @@ def _sharpened(family: Family, step: Step, name: str) -> str:
 
 
 def _run_step(
-    family: Family, step: Step, stage: Stage | None, outputs: tuple[_Own, ...], designs: Array, accuracy: Accuracy,
-    window: Part,
-) -> Columns:  # fmt: skip
-    part = stage.designs(designs) if stage else designs
+    step: Step, stage: Stage, outputs: tuple[_Own, ...], designs: Array, accuracy: Accuracy, window: Part
+) -> Columns:
+    part = stage.designs(designs)
     found = step.run(part, frozenset(own.plain for own in outputs), accuracy)
     if accuracy.target is not None:
         for _, plain, pose in outputs:
@@ -138,7 +138,7 @@ def _run_step(
                 found[error_of(plain)] = accuracy.target * np.abs(np.asarray(found[plain], np.float64))
             # Rounding may have left a maximum less accurate than was asked.
             if pose and not accuracy.certify:
-                sharpen_maxima(family, step, part, pose, plain, found, accuracy.target)
+                sharpen_maxima(stage.family, step, part, pose, plain, found, accuracy.target)
     columns: Columns = {"status": found["status"]}
     for name, plain, _ in outputs:
         columns[name] = found[plain]

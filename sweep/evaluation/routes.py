@@ -152,22 +152,21 @@ def _routes(family: Family, wanted: Sequence[str], accuracy: Accuracy) -> tuple[
     own = {name: applying_step(family, name, accuracy) for name in asked}
     # The margin of a whole chain asks all stages: a first one judged by itself would take its designs from the others.
     together = any(own[name] is None and isinstance(one, Margin) and not one.stage for name, one in asked.items())
-    steps: dict[tuple[str, int], tuple[Step, Stage | None, list[str]]] = {}
+    steps: dict[tuple[str, int], tuple[Step, Stage, list[str]]] = {}
     groups: dict[tuple[Group, str], list[str]] = {}
     for name, one in asked.items():
         step, group = own[name], group_of(family, one)
         if isinstance(one, Negative | Extent | TimingOf):
             found.append(_composed(family, one, accuracy))
         elif step is not None and not (together and group == "margin"):
-            number = step[1].number if step[1] else 0
-            steps.setdefault((step[0].name, number), (*step, []))[2].append(name)
+            steps.setdefault((step[0].name, step[1].number), (*step, []))[2].append(name)
         elif group is not None:
             # Each effect by itself: one that jams or leaves its range takes nothing from the others.
             effect = beyond_motion(family, one.of).name
             groups.setdefault((group, effect), []).append(name)
         else:
             raise _unserved(family, name, accuracy)
-    found += [own_route(family, step, stage, tuple(names), accuracy) for step, stage, names in steps.values()]
+    found += [own_route(step, stage, tuple(names), accuracy) for step, stage, names in steps.values()]
     found += [general_route(family, *key, tuple(names), accuracy) for key, names in groups.items()]
     return tuple(sorted(found, key=lambda route: (*route.order, route.name)))
 

@@ -274,9 +274,14 @@ class Family:
         return {self.position: ""}
 
     @cached_property
+    def whole(self) -> Stage:
+        """The whole mechanism, as if it were the stage of a chain."""
+        return Stage(0, self, slice(0, len(self.parameters)))
+
+    @cached_property
     def stages(self) -> tuple[Stage, ...]:
         """Stages of a chain; a family alone is its own only stage."""
-        return (Stage(0, self, slice(0, len(self.parameters))),)
+        return (self.whole,)
 
     def outward_sign(self, position: str) -> str:
         """Name the sign parameter that tells extended from folded limits of a position; "" where there is none."""

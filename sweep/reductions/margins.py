@@ -8,7 +8,6 @@ from kernels import status as st
 from kernels.types import TWO_PI
 from sweep.families.base import Accuracy, Array, Columns, Family, Stage, Step
 from sweep.families.capabilities import Assembly
-from sweep.families.chain import Chain
 from sweep.families.names import is_flag
 from sweep.quantities.kinds import Request
 from sweep.reductions import fused
@@ -100,18 +99,13 @@ def with_transmission(columns: Columns, suffixes: tuple[str, ...]) -> Columns:
     return columns
 
 
-def own_step(family: Family, suffix: str, accuracy: Accuracy) -> tuple[Step, Stage | None] | None:
+def own_step(family: Family, suffix: str, accuracy: Accuracy) -> tuple[Step, Stage] | None:
     """Return the family's own exact route to the margin, if it has one; a chain's first stage turns by itself."""
-    stage = None
-    if isinstance(family, Chain):
-        if suffix != "1":
-            return None
-        stage = family.stages[0]
-        family = stage.family
-    for step in family.steps:
-        if step.applies(accuracy) and set(NAMES) <= {o.name for o in step.provides}:
-            return step, stage
-    return None
+    first = family.stages[0]
+    if first.tail and suffix != first.tail:
+        return None
+    able = (step for step in first.family.steps if step.applies(accuracy))
+    return next(((step, first) for step in able if set(NAMES) <= {o.name for o in step.provides}), None)
 
 
 def _stage_margin(family: Family, designs: Array, suffix: str, accuracy: Accuracy, looked: int) -> Columns:
@@ -119,7 +113,7 @@ def _stage_margin(family: Family, designs: Array, suffix: str, accuracy: Accurac
     if own is None:
         return _from_poses(family, designs, suffix, looked)
     step, stage = own
-    found = step.run(stage.designs(designs) if stage else designs, frozenset(NAMES), accuracy)
+    found = step.run(stage.designs(designs), frozenset(NAMES), accuracy)
     columns: Columns = {f"{name}{suffix}": found[name] for name in NAMES}
     columns[f"err_rotatable{suffix}"] = np.zeros(len(designs))
     for name in NAMES[1:]:

@@ -119,18 +119,16 @@ def steps_of(family: Family) -> tuple[Step, ...]:
     return (*family.steps, *(step for step in made if step is not None))
 
 
-def own_steps(family: Family, name: str) -> list[tuple[Step, Output, Stage | None]]:
+def own_steps(family: Family, name: str) -> list[tuple[Step, Output, Stage]]:
     """List the own routes to an output, and those of a chain's first stage, which turns as if it were alone."""
-    found: list[tuple[Step, Output, Stage | None]] = [
-        (step, o, None) for step in steps_of(family) for o in step.provides if o.name == name
-    ]
+    found = [(step, o, family.whole) for step in steps_of(family) for o in step.provides if o.name == name]
     if isinstance(family, Chain) and (own := at_stage(name, "1")):
         stage = family.stages[0]
         found += [(step, o, stage) for step in stage.family.steps for o in step.provides if o.name == own]
     return found
 
 
-def applying_step(family: Family, name: str, accuracy: Accuracy) -> tuple[Step, Stage | None] | None:
+def applying_step(family: Family, name: str, accuracy: Accuracy) -> tuple[Step, Stage] | None:
     """Own route to an output that serves this accuracy; there is one at most (tests/run/test_costs.py)."""
     able = ((step, stage) for step, _, stage in own_steps(family, name) if step.applies(accuracy.of(name)))
     return next(able, None)
@@ -287,7 +285,7 @@ def _margin_ns(family: Family, suffix: str, accuracy: Accuracy) -> float:
         *driving, last = family.stages[: int(suffix or 1)]
         return nanoseconds("margins", last.family.name) + POSES_MARGIN * sum(pose_ns(s.family) for s in driving)
     step, stage = found
-    return step_ns(stage.family if stage else family, step, accuracy)
+    return step_ns(stage.family, step, accuracy)
 
 
 def _stages(family: Family) -> int:
