@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Container, Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from types import MappingProxyType
@@ -190,6 +190,7 @@ Seconds = Annotated[float, _positive("s"), TEXT]
 Bytes = Annotated[float, _positive("B"), TEXT]
 Speed = Annotated[float, quantity("rad/s", lambda x: x != 0.0, "a non-zero number"), TEXT]
 Share = Annotated[float, quantity("1", lambda x: 0.0 < x < 1.0, 'a share above 0 and below 100 %, as "2 %"'), TEXT]
+TwoLengths = Annotated[list[Length], Field(min_length=2, max_length=2)]
 ThreeLengths = Annotated[list[Length], Field(min_length=3, max_length=3)]
 
 # Of a plain union of types pydantic reports the complaints of each one.
@@ -223,18 +224,23 @@ def read_table(model: type[S], name: str, file: StudyFile) -> S:
 def read_section(model: type[S], raw: object, key: Key, faults: Faults) -> S:
     """Read a table by its model; faulty keys are reported and left at their defaults."""
     if not isinstance(raw, dict):
-        faults.value(key, raw, f"a table with the keys {', '.join(_names(model))}")
+        faults.value(key, raw, f"a table with the keys {', '.join(_keys(model))}")
         return model()
     section = _validated(model, raw, key, faults)
-    missing_keys(model, raw, key, faults)
+    _missing_keys(model, raw, key, faults)
     return section
 
 
-def missing_keys(model: type[Section], given: Container[str], key: Key, faults: Faults) -> None:
-    """Report the required keys that are not among the given ones."""
+def _missing_keys(model: type[Section], raw: Mapping[str, Any], key: Key, faults: Faults) -> None:
+    """Report the required keys that a table and the tables within it have not."""
     for name in model.required:
-        if name not in given:
-            faults.missing((*key, name), _described(model, (name,)))
+        if name not in raw:
+            faults.missing((*key, name), _reached(model, (name,))[1])
+    for name, value in raw.items():
+        inner = _reached(model, (name,))[0]
+        for k, one in enumerate(value) if isinstance(value, list) else [(None, value)]:
+            if isinstance(one, dict):
+                _missing_keys(inner, one, (*key, name) if k is None else (*key, name, k), faults)
 
 
 def _validated(model: type[S], raw: Mapping[str, Any], key: Key, faults: Faults) -> S:
@@ -246,41 +252,38 @@ def _validated(model: type[S], raw: Mapping[str, Any], key: Key, faults: Faults)
             place = tuple(part for part in item["loc"] if part not in (ONE, LIST, TABLE))
             bad.add(place[0])
             if item["type"] == "extra_forbidden":
-                faults.unknown((*key, *place), _names(_model_at(model, place[:-1])))
+                faults.unknown((*key, *place), _keys(_reached(model, place[:-1])[0]))
             else:
                 own = item.get("ctx", {}) if item["type"] == QUANTITY else {}
-                faults.value((*key, *place), item["input"], own.get("words") or _described(model, place))
+                faults.value((*key, *place), item["input"], own.get("words") or _reached(model, place)[1])
         return model.model_validate({name: value for name, value in raw.items() if name not in bad})
 
 
-def _names(model: type[Section]) -> list[str]:
-    return [field.alias or name for name, field in model.model_fields.items()]
+def _keys(model: type[Section]) -> dict[str, Any]:
+    """Return the fields of a model by the keys that a file has for them."""
+    return {field.alias or name: field for name, field in model.model_fields.items()}
 
 
-def _field(model: type[Section], name: str | int) -> Any:
-    return next((f for attribute, f in model.model_fields.items() if (f.alias or attribute) == name), None)
+def _reached(model: type[Section], place: Key) -> tuple[type[Section], str]:
+    """Find the model of the table at a place, and the description of the innermost key that a model knows.
 
-
-def _described(model: type[Section], place: Key) -> str:
-    """Find the description of the innermost named key at this place."""
-    named = [k for k, part in enumerate(place) if isinstance(part, str)]
-    inner = _model_at(model, place[: named[-1]])
-    return str(_field(inner, place[named[-1]]).description)
-
-
-def _model_at(model: type[Section], place: Key) -> type[Section]:
-    """Find the model of the table at this place: the one named in the annotation of each key on the way."""
+    What stands under names of the user's, or is no table, has the model without keys.
+    """
+    words = ""
     for part in place:
         if isinstance(part, str):
-            model = _table_in(_field(model, part).annotation)
-    return model
+            field = _keys(model).get(part)
+            model = Section if field is None else _table_in(field.annotation)
+            words = words if field is None else str(field.description)
+    return model, words
 
 
 def _table_in(annotation: Any) -> type[Section]:
+    """Find the model that an annotation names; the one without keys if it names none."""
     stack = [annotation]
     while stack:
         candidate = stack.pop()
         if isinstance(candidate, type) and issubclass(candidate, Section):
             return candidate
         stack += get_args(candidate)
-    raise TypeError(f"{annotation!r} holds no table")
+    return Section

@@ -265,12 +265,9 @@ class SceneSection(Section):
 
 def read_window(window: WindowTable | None, faults: Faults) -> tuple[float, float] | None:
     """Read the part of the stroke in which deviations count, from 0 to 1; None where the file has none."""
-    if window is None:
+    if window is None or window.low is None or window.high is None:
         return None
     low, high = window.low, window.high
-    if low is None or high is None:
-        faults.missing(("scene", "window", "from" if low is None else "to"), "a fraction of the stroke, 0 to 1")
-        return None
     if not low < high:
         faults.value(("scene", "window", "to"), high, f"a fraction greater than from = {low:g}")
     return low, high

@@ -24,6 +24,7 @@ from sweep.study.file import (
     Section,
     StudyFile,
     ThreeLengths,
+    TwoLengths,
     quantity,
     read_section,
 )
@@ -65,7 +66,6 @@ class ToolSection(Section):
 
 Names = Annotated[list[str], Field(min_length=1)]
 Three = Annotated[list[Number], Field(min_length=3, max_length=3)]
-TwoLengths = Annotated[list[Length], Field(min_length=2, max_length=2)]
 
 # Tables in which a member's own entries may stand in a table of the member's name.
 BY_MEMBER = (("design",), ("bodies",), ("loads",), ("limits",), ("reference", "design"))

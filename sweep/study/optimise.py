@@ -15,7 +15,6 @@ from sweep.study.study import OptimiseSettings, ProveSettings
 class ProveTable(Section):
     """Table ``optimise.prove``."""
 
-    required = ("gap",)
     gap: Share = Field(0.01, description='a share as a text, as "1 %"', json_schema_extra={"default": "1 %"})
     boxes: Annotated[int, Field(ge=64, le=10**9)] = Field(1_000_000, description="a whole number, 64 to 10^9")
     smallest: Share = Field(

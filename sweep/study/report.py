@@ -10,7 +10,7 @@ from pydantic import Field
 
 from sweep.errors import choices
 from sweep.families.base import Family
-from sweep.study.file import Bytes, Number, Seconds, Section, StudyFile, missing_keys
+from sweep.study.file import Bytes, Number, Seconds, Section, StudyFile
 
 
 class StudySection(Section):
@@ -58,7 +58,7 @@ class ReportSection(Section):
 
 
 def check_report(report: ReportSection, file: StudyFile, family: Family, prescribed: Iterable[str]) -> None:
-    """Report incomplete figures, and curves over other parameters than those of the study.
+    """Report figures with a folder in their names, and curves over other parameters than those of the study.
 
     ``prescribed`` are the outputs that [locus] prescribes.
     """
@@ -66,11 +66,9 @@ def check_report(report: ReportSection, file: StudyFile, family: Family, prescri
     given = [name for table in ("design", "bodies", "loads") for name in file.free_table(table) or ()]
     parameters = [*prescribed, *(name for name in given if name in known)]
     for k, figure in enumerate(report.figures):
-        missing_keys(FigureTable, figure.model_fields_set, ("report", "figures", k), faults)
         if figure.file is not None and not re.fullmatch(r"[\w-]+\.svg", figure.file):
             faults.value(("report", "figures", k, "file"), figure.file, "letters, digits, - and _, ending in .svg")
     for k, curve in enumerate(report.curves):
-        missing_keys(CurveTable, curve.model_fields_set, ("report", "curves", k), faults)
         for key, axis in (("x", curve.x), ("y", curve.y)):
             if axis is not None and axis not in parameters:
                 allowed = f"one of {choices(axis, parameters)}"

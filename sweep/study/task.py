@@ -2,16 +2,20 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import MISSING, fields
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any, TypeGuard
+
+from pydantic import BeforeValidator, Field, conlist, create_model
+from pydantic_core import PydanticCustomError
 
 from sweep.effects import extended
 from sweep.errors import InputError, StudyError, choices
 from sweep.families import family
+from sweep.families.base import Parameter
 from sweep.quantities import units
-from sweep.study.file import Faults, Key, StudyFile
+from sweep.study.file import QUANTITY, Faults, Number, Section, StudyFile, TwoLengths, quantity, read_section
 from sweep.study.toml import key_lines, read_toml, toml_text
 from sweep.synthesis import tasks
 from sweep.synthesis.tasks.driven import SlotPosition
@@ -34,6 +38,32 @@ ANGLES = ("swing", "phi0", "alpha", "alpha2", "max_pressure_angle", "dwell", "dp
           "end_direction")  # fmt: skip
 RATIOS = ("ratio", "coupler", "offset", "f2_ratio", "size")
 WORDS = ("objective", "adjusted", "limit", "kappa", "branch", "second")
+BEARINGS = ("min_theta1_reserve", "min_theta1_reserve_rolling")
+
+
+def _range(internal: str) -> BeforeValidator:
+    """Return what reads a range with its unit as its ends in the internal unit."""
+
+    def read(value: object) -> tuple[float, float]:
+        table = value if isinstance(value, dict) else {}
+        low, high = table.get("from"), table.get("to")
+        if not {*table} <= {"from", "to", "unit"} or not _is_number(low) or not _is_number(high):
+            raise ValueError("no range")
+        try:
+            factor = units.factor(str(table.get("unit", "1")), internal)
+        except units.UnitFault as fault:
+            raise PydanticCustomError(QUANTITY, "{words}", {"words": str(fault)}) from None
+        return float(low) * factor, float(high) * factor
+
+    return BeforeValidator(read)
+
+
+def _is_number(raw: object) -> TypeGuard[float]:
+    """Tell whether it is a number that a float holds with room to spare; nan is none."""
+    return isinstance(raw, int | float) and not isinstance(raw, bool) and -1e100 <= raw <= 1e100
+
+
+Bounds = dict[str, Annotated[tuple[float, float], _range("mm")]]
 
 
 def load_task(path: str | Path) -> SynthesisTask:
@@ -78,16 +108,14 @@ def read_task(raw: object, faults: Faults) -> SynthesisTask | None:
     if not isinstance(kind, str) or kind not in KINDS:
         faults.value(("task", "kind"), kind, choices(str(kind), KINDS))
         return None
-    known = {f.name: f for f in fields(KINDS[kind]) if f.init}
-    for name in raw:
-        if name not in known and name != "kind":
-            faults.unknown(("task", name), known)
-    given = {name: _entry(kind, name, raw[name], ("task", name), faults) for name in known if name in raw}
-    for name, field in known.items():
-        if name not in raw and field.default is MISSING and field.default_factory is MISSING:
-            faults.missing(("task", name), _needed(name))
+    given = read_section(task_model(kind), raw, ("task",), faults).model_dump(exclude_unset=True, exclude={"kind"})
     if len(faults.lines) > before:
         return None
+    for name, value in given.items():
+        if name in ("positions", "settings"):
+            given[name] = tuple(RECORDS[kind](**{"swing": None} | one if kind == "task3" else one) for one in value)
+        elif isinstance(value, list):
+            given[name] = tuple(value)
     try:
         problem: SynthesisTask = KINDS[kind](**given)
     except InputError as error:
@@ -118,102 +146,52 @@ def read_study_task(file: StudyFile, mechanism: object) -> SynthesisTask | None:
     return task
 
 
-def _needed(name: str) -> str:
-    if name in ("positions", "settings"):
-        return "a list of tables"
-    if name == "drive":
-        return "a table with the parameters of rssr"
-    if name in WORDS:
-        return "a word, see docs/tasks.md"
+def task_model(kind: str) -> type[Section]:
+    """Return the model of [task] for a kind of task: a key for each field of the task's class."""
+    own = [f for f in fields(KINDS[kind]) if f.init]
+    needed = [f.name for f in own if f.default is MISSING and f.default_factory is MISSING]
+    return _table(kind, {"kind": (Any, "")} | {f.name: _key(kind, f.name) for f in own}, needed)
+
+
+def _table(name: str, keys: Mapping[str, tuple[Any, str]], required: Iterable[str] = ()) -> type[Section]:
+    """Return the model of a table of these keys, each with its type and what it may hold."""
+    own: dict[str, Any] = {key: (kind | None, Field(None, description=words)) for key, (kind, words) in keys.items()}
+    model = create_model(name, __base__=Section, **own)
+    model.required = tuple(required)
+    return model
+
+
+def _key(kind: str, name: str) -> tuple[Any, str]:
+    """Return the type of a key of a task, and what it may hold."""
     unit = _unit(name)
-    form = f'{{ from = ..., to = ..., unit = "{unit}" }}: ' if name.endswith("_range") else ""
-    return form + units.example(unit)
+    if name in WORDS:
+        return Any, "a word, see docs/tasks.md"
+    if name in ("positions", "settings"):
+        record = RECORDS[kind]
+        needed = () if record is Setting else record._fields
+        return conlist(_table(name, {x: _number(_unit(x)) for x in record._fields}, needed)), "a list of tables"
+    if name == "drive":
+        return _inputs(name, family("rssr").parameters), "a table with the parameters of rssr"
+    if name == "bearings":
+        return _inputs(name, extended(family("rssr"), BEARINGS).parameters), "a table with inputs of the bearings"
+    if name == "bounds":
+        return Bounds, 'a table of { from = ..., to = ..., unit = "mm" }'
+    if name.endswith("_range"):
+        words = f'{{ from = ..., to = ..., unit = "{unit}" }}: {units.example(unit)}'
+        return Annotated[tuple[float, float], _range(unit)], words
+    if name in ("start", "end"):
+        return TwoLengths, 'two lengths, as ["0 mm", "12 mm"]'
+    return _number(unit)
 
 
 def _unit(name: str) -> str:
     base = name.removesuffix("_range")
-    if base in ANGLES:
-        return "rad"
-    return "1" if base in RATIOS else "mm"
+    return "rad" if base in ANGLES else "1" if base in RATIOS else "mm"
 
 
-def _entry(kind: str, name: str, raw: object, key: Key, faults: Faults) -> Any:
-    if name in WORDS:
-        return raw
-    if name in ("positions", "settings"):
-        return _records(RECORDS[kind], raw, key, faults)
-    if name == "drive":
-        unit_of = {p.name: units.internal_unit(p.unit) for p in family("rssr").parameters}
-        table = _table(raw, key, unit_of, faults)
-        return {k: _number(v, unit_of[k], (*key, k), faults) for k, v in table.items()}
-    if name == "bearings":
-        known = extended(family("rssr"), ["min_theta1_reserve", "min_theta1_reserve_rolling"]).parameters
-        unit_of = {p.name: units.internal_unit(p.unit) for p in known}
-        return {k: _number(v, unit_of[k], (*key, k), faults) for k, v in _table(raw, key, unit_of, faults).items()}
-    if name == "bounds":
-        if not isinstance(raw, dict):
-            faults.value(key, raw, 'a table of { from = ..., to = ..., unit = "mm" }')
-            return {}
-        return {k: _range(v, "mm", (*key, k), faults) for k, v in raw.items()}
-    if name.endswith("_range"):
-        return _range(raw, _unit(name), key, faults)
-    if name in ("start", "end"):
-        if not isinstance(raw, list) or len(raw) != 2:
-            faults.value(key, raw, 'two lengths, as ["0 mm", "12 mm"]')
-            return (0.0, 0.0)
-        return tuple(_number(x, "mm", (*key, k), faults) for k, x in enumerate(raw))
-    return _number(raw, _unit(name), key, faults)
+def _number(unit: str) -> tuple[Any, str]:
+    return Number if unit == "1" else Annotated[float, quantity(unit)], units.example(unit)
 
 
-def _records(record: Any, raw: object, key: Key, faults: Faults) -> tuple[Any, ...]:
-    if not isinstance(raw, list):
-        faults.value(key, raw, f"a list of tables with {', '.join(record._fields)}")
-        return ()
-    found = []
-    for k, one in enumerate(raw):
-        place = (*key, k)
-        table = _table(one, place, record._fields, faults)
-        values = {n: _number(x, _unit(n), (*place, n), faults) for n, x in table.items()}
-        if record is Setting:
-            values.setdefault("swing", None)
-        for name in record._fields:
-            if name not in values and name not in record._field_defaults:
-                faults.missing((*place, name), units.example(_unit(name)))
-                values[name] = 0.0
-        found.append(record(**values))
-    return tuple(found)
-
-
-def _table(raw: object, key: Key, known: Any, faults: Faults) -> dict[str, Any]:
-    if not isinstance(raw, dict):
-        faults.value(key, raw, f"a table with {', '.join(known)}")
-        return {}
-    for name in raw:
-        if name not in known:
-            faults.unknown((*key, name), known)
-    return {name: value for name, value in raw.items() if name in known}
-
-
-def _range(raw: object, internal: str, key: Key, faults: Faults) -> tuple[float, float]:
-    table = _table(raw, key, ("from", "to", "unit"), faults)
-    if set(table) - {"unit"} != {"from", "to"} or not all(_plain(table[end]) for end in ("from", "to")):
-        faults.value(key, raw, f'{{ from = ..., to = ..., unit = "{internal}" }} with two numbers')
-        return (0.0, 0.0)
-    factor = faults.factor(str(table.get("unit", "1")), internal, (*key, "unit"))
-    if factor is None:
-        return (0.0, 0.0)
-    return float(table["from"]) * factor, float(table["to"]) * factor
-
-
-def _number(raw: object, internal: str, key: Key, faults: Faults) -> Any:
-    if isinstance(raw, str):
-        return faults.number(raw, internal, key) or 0.0
-    if not _plain(raw) or internal != "1":
-        faults.value(key, raw, units.example(internal))
-        return 0.0
-    return float(raw)  # type: ignore[arg-type]
-
-
-def _plain(raw: object) -> bool:
-    """Tell whether it is a number that a float holds with room to spare; nan is none."""
-    return isinstance(raw, int | float) and not isinstance(raw, bool) and -1e100 <= raw <= 1e100
+def _inputs(name: str, parameters: Iterable[Parameter]) -> type[Section]:
+    return _table(name, {p.name: _number(units.internal_unit(p.unit)) for p in parameters})

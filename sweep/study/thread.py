@@ -23,7 +23,6 @@ from sweep.study.file import (
     Section,
     StudyFile,
     ThreeLengths,
-    missing_keys,
     quantity,
     read_section,
 )
@@ -102,16 +101,12 @@ def read_threads(file: StudyFile) -> dict[str, dict[str, Any]] | None:
 def _relation(section: ThreadSection, key: Key, faults: Faults) -> dict[str, Any]:
     found = section.model_dump(exclude_none=True, exclude={"allowed"})
     found["thread"] = found.pop("path", [])
-    for k, place in enumerate(section.path or ()):
-        if isinstance(place, ThreadPlaceTable):
-            missing_keys(ThreadPlaceTable, place.model_fields_set, (*key, "path", k), faults)
     if section.allowed is not None:
         found["allowed"] = _allowed(section.allowed, (*key, "allowed"), faults)
     return found
 
 
 def _allowed(table: AllowedTable, key: Key, faults: Faults) -> dict[str, list[float]]:
-    missing_keys(AllowedTable, table.model_fields_set, key, faults)
     columns = {}
     for name, unit, internal in (("phi", table.angle, "rad"), ("values", table.unit or "mm", "mm")):
         factor = faults.factor(unit, internal, (*key, "angle" if name == "phi" else "unit"))
