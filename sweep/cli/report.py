@@ -22,9 +22,8 @@ from sweep.jobs.progress import Phases
 from sweep.nights.studies import FIGURE
 from sweep.report.dataset import chosen, read_dataset
 from sweep.report.figures import house_style, save
-from sweep.report.judged import write_comparison
 from sweep.report.made import event_bands, with_bands
-from sweep.report.page import write_report
+from sweep.report.page import write_comparison, write_report
 
 
 @click.command()

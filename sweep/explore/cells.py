@@ -16,7 +16,6 @@ from sweep.errors import InputError
 from sweep.explore.hand import Hand
 from sweep.families.base import Array
 from sweep.quantities.limits import compared
-from sweep.report.quantities import quantity
 
 MOST_BINS, NOWHERE = 64, 255
 Places: TypeAlias = NDArray[np.uint8]
@@ -55,7 +54,7 @@ def cells(
     objective = hand.study.objective
     merit = objective.output if objective is not None else "design"
     names = dict.fromkeys([*chain.from_iterable(pairs), *ranges])
-    shown = {name: quantity(name, hand.data.units.get(name, "")) for name in names}
+    shown = {name: hand.data.shown(name) for name in names}
     columns = {name: _column(hand.folder, merit, name) for name in shown}
     design = _column(hand.folder, merit, "design").values
     kept = np.ones(design.size, np.bool_)

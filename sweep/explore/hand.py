@@ -16,7 +16,7 @@ from sweep.families.base import Array, Family, Parameter
 from sweep.families.names import is_flag
 from sweep.optimise.starts.dataset import drawn
 from sweep.report.dataset import Dataset, Row, chosen, read_dataset, row_of, without_rows
-from sweep.report.judged import judged
+from sweep.report.page import judged
 from sweep.report.quantities import quantity
 from sweep.study import Study
 from sweep.study.load import study_from_data

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from sweep.errors import InputError
 from sweep.report import maps
-from sweep.report.dataset import gather, read_dataset, shown_objective
+from sweep.report.dataset import gather, read_dataset
 from sweep.report.figures import LIMIT, NARROW, OPTIMUM, QUIET, REFERENCE, house_style, new_figure
 from sweep.report.made import Histogram, histogram, slopes, spreads, tolerance_words
 
@@ -59,7 +59,7 @@ def map(folder: str | Path, x: str | None = None, y: str | None = None) -> NDArr
     with house_style():
         figure = maps.design_map(data, found, cells, None if pair is None else (str(pair[0]), str(pair[1])))
     drawn = _drawn(figure, folder, "a study that sweeps a parameter and has feasible designs")
-    return np.array(drawn.axes[: 1 if data.study.objective is None else 2], dtype=object)
+    return np.array(drawn.axes[: 1 if data.objective is None else 2], dtype=object)
 
 
 def front(folder: str | Path) -> Axes:
@@ -177,7 +177,7 @@ def sensitivity(folder: str | Path) -> Axes:
     3
     """
     data = read_dataset(Path(folder))
-    ranked, objective = slopes(data), shown_objective(data)
+    ranked, objective = slopes(data), data.objective
     ranked = [slope for slope in ranked if slope.largest > SEEN * ranked[0].largest]
     if not ranked or objective is None:
         raise InputError("folder", str(folder), "a dataset with an optimum and its sensitivities", "plot")

@@ -17,9 +17,8 @@ from sweep.exchange.export import export
 from sweep.exchange.scene import exists, frames_of, is_spatial, over, pose, shown_name
 from sweep.families.machines.machine import Machine
 from sweep.plot.drawing import draw
-from sweep.report.dataset import Dataset, chosen, read_dataset, row_of
+from sweep.report.dataset import Dataset, as_result, chosen, read_dataset, row_of
 from sweep.report.figures import house_style, new_figure
-from sweep.report.judged import as_result
 from sweep.report.quantities import number, quantity, rpm
 from sweep.report.tables import limit_states, parameter_rows
 
@@ -118,7 +117,7 @@ def _cyclogram(data: Dataset) -> list[Table]:
     family, row = data.study.family, data.result
     if row is None or not isinstance(family, Machine):
         return []
-    turn = table_in_degrees(cyclogram(family, {name: row[name] for name in family.parameter_names}, angles="rad"))
+    turn = table_in_degrees(cyclogram(family, data.design(row), angles="rad"))
     events: Iterable[tuple[str, str, str, float, float, float]] = turn.itertuples(index=False, name=None)
     lines = [
         (f"{member} {name}".strip(), kind, f"{number(start, 4)}°", "" if kind == "event" else f"{number(end, 4)}°")

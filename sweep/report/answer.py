@@ -41,9 +41,8 @@ def answer(data: Dataset, found: Scan, further: Sequence[str] = ()) -> list[str]
     if data.optimum is not None and int(data.optimum.get("status", 0)) == codes.LIMIT_EXCEEDED:
         sentences.append("No design was found that keeps all limits; what follows is the nearest one found.")
         who = "The nearest design"
-    objective = data.study.objective
-    if objective is not None:
-        sentences.append(_headline(data, who, objective.output))
+    if data.objective is not None:
+        sentences.append(_headline(data, who, data.objective))
     second = data.second
     if second is not None and _is_number(data.result, second):
         sentences.append(_comparison(data, second))
@@ -65,9 +64,8 @@ def answer(data: Dataset, found: Scan, further: Sequence[str] = ()) -> list[str]
     return [s for s in sentences if s]
 
 
-def _headline(data: Dataset, who: str, name: str) -> str:
-    shown = quantity(name, data.units.get(name, ""))
-    value, old = value_of(data.result, name), value_of(data.reference, name)
+def _headline(data: Dataset, who: str, shown: Quantity) -> str:
+    value, old = value_of(data.result, shown.name), value_of(data.reference, shown.name)
     article = "an" if shown.words[0] in "aeiou" else "a"
     text = f"{who} has {article} {shown.words} of {_with_speed(data, shown, value)}"
     if data.reference is None:
@@ -80,7 +78,7 @@ def _headline(data: Dataset, who: str, name: str) -> str:
 
 
 def _comparison(data: Dataset, name: str) -> str:
-    shown = quantity(name, data.units.get(name, ""))
+    shown = data.shown(name)
     value, old = value_of(data.result, name), value_of(data.reference, name)
     text = f"Its {shown.words} is {_with_speed(data, shown, value)}"
     difference = change(shown, value, old)
@@ -121,17 +119,16 @@ def _edge_sentence(data: Dataset) -> list[str]:
 def not_achieved(data: Dataset, found: Scan) -> list[str]:
     """Say what is not reached: limits that are missed, an optimiser that did not settle or lost a better design."""
     faults = [f"{s.shown.words}: {s.value} instead of {s.bound}" for s in limit_states(data) if s.state in MISSED]
-    objective = data.study.objective
+    objective = data.objective
     if data.optimum is not None:
         residual = value_of(data.optimum, "kkt_residual")
         if not residual <= KKT:
             late = data.optimum.get("ended") == "time"
             faults.append(f"the optimiser {'had no time left to settle' if late else 'did not settle'}")
         if objective is not None and found.best_row:
-            best, value = found.best_row[objective.output], value_of(data.optimum, objective.output)
-            if not compared(objective.output, value) <= compared(objective.output, best) + 1e-6 * abs(best):
-                shown = quantity(objective.output, data.units.get(objective.output, ""))
-                faults.append(f"the optimiser ended behind the best design of the sweep, {shown.show(best)}")
+            best, value = found.best_row[objective.name], value_of(data.optimum, objective.name)
+            if not compared(objective.name, value) <= compared(objective.name, best) + 1e-6 * abs(best):
+                faults.append(f"the optimiser ended behind the best design of the sweep, {objective.show(best)}")
     return [f"Not achieved: {'; '.join(faults)}."] if faults else []
 
 
@@ -139,12 +136,12 @@ def _against_reference(data: Dataset) -> list[str]:
     """Say where the reference is better, and which limits it misses itself."""
     if data.reference is None:
         return []
-    criteria = [data.study.objective.output if data.study.objective is not None else None, data.second]
+    criteria = [None if data.objective is None else data.objective.name, data.second]
     worse = []
     for name in filter(None, criteria):
         value, old = value_of(data.result, name), value_of(data.reference, name)
         if compared(name, value) > compared(name, old) + 1e-9 * abs(old):
-            worse.append(quantity(name, data.units.get(name, "")).words)
+            worse.append(data.shown(name).words)
     missed = []
     for limit in data.study.limits:
         state = limit_state(limit, data.reference, None, limited(data, limit.output), frozenset())
@@ -160,12 +157,11 @@ def _sweep_sentences(data: Dataset, found: Scan) -> list[str]:
     feasible = found.feasible
     share = number(100.0 * feasible / max(data.designs, 1), 3)
     text = f"Of {_count(data.designs)} designs in the sweep {_count(feasible)} ({share} %) meet all limits"
-    objective = data.study.objective
-    if objective is None or data.optimum is None or not found.best_row:
+    shown = data.objective
+    if shown is None or data.optimum is None or not found.best_row:
         return [text + "."]
-    shown = quantity(objective.output, data.units.get(objective.output, ""))
-    best = found.best_row[objective.output]
-    return [f"{text}; the best of them has {shown.symbol} = {shown.show(best)}, from where the optimiser went on."]
+    best = shown.show(found.best_row[shown.name])
+    return [f"{text}; the best of them has {shown.symbol} = {best}, from where the optimiser went on."]
 
 
 def search_warnings(data: Dataset) -> list[str]:

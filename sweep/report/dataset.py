@@ -57,6 +57,19 @@ class Dataset:
     best: Row | None = None
     computed_reference: Row | None = None
 
+    def shown(self, name: str) -> Quantity:
+        """Return a column as it is shown."""
+        return quantity(name, self.units.get(name, ""))
+
+    @property
+    def objective(self) -> Quantity | None:
+        """The objective as it is shown; None where the study has none."""
+        return None if self.study.objective is None else self.shown(self.study.objective.output)
+
+    def design(self, row: Row) -> dict[str, float]:
+        """Return the parameters of the mechanism out of a row."""
+        return {name: float(row[name]) for name in self.study.family.parameter_names}
+
     @property
     def counts(self) -> dict[int, int]:
         """Designs by status, those that were not kept included."""
@@ -124,8 +137,8 @@ class Dataset:
         """
         if self.study.pareto is not None:
             return None if self.study.pareto.at_least else self.study.pareto.output
-        objective = self.study.objective
-        others = [name for name in self.study.want if objective is None or name != objective.output]
+        objective = self.objective
+        others = [name for name in self.study.want if objective is None or name != objective.name]
         ranked = [name for name in others if "dev" in stem(name) and not is_place(name)]
         ranked += [name for name in others if is_largest(name, magnitude=True)]
         ranked += [name for name in others if is_largest(name)]
@@ -139,8 +152,7 @@ class Dataset:
     def _role(self, role: str) -> Row | None:
         if self.optima is None:
             return None
-        rows = self.optima[self.optima["role"] == role]
-        return {str(name): value for name, value in rows.iloc[0].items()} if len(rows) else None
+        return next(iter(records(self.optima[self.optima["role"] == role])), None)
 
 
 def read_dataset(folder: Path) -> Dataset:
@@ -276,7 +288,7 @@ def chosen(folder: str | Path, design: str | int | None = None) -> Chosen:
         raise InputError(
             "design", design or "result", f"one this dataset has, of {', '.join(ROLES)}, or a row", str(folder)
         )
-    return _chosen(data, {name: float(row[name]) for name in data.study.family.parameter_names})
+    return _chosen(data, row)
 
 
 def _row(folder: Path, number: int) -> Chosen:
@@ -284,23 +296,21 @@ def _row(folder: Path, number: int) -> Chosen:
     rows = store.load(folder)
     if not 0 <= number < len(rows):
         raise InputError("design", number, f"a row from 0 to {len(rows) - 1}", str(folder))
-    row = _with_defaults(data.study, rows.iloc[[number]]).iloc[0]
-    return _chosen(data, {name: float(row[name]) for name in data.study.family.parameter_names})
+    return _chosen(data, records(_with_defaults(data.study, rows.iloc[[number]]))[0])
 
 
-def _chosen(data: Dataset, design: dict[str, float]) -> Chosen:
-    return Chosen(data.study.family, design, data.study.speed)
+def _chosen(data: Dataset, row: Row) -> Chosen:
+    return Chosen(data.study.family, data.design(row), data.study.speed)
 
 
-def objective_of(study: Study) -> str | None:
-    """Output that is to be small, if the study names one."""
-    return None if study.objective is None else study.objective.output
+def as_result(data: Dataset, row: Row) -> Dataset:
+    """Return a study with a design in the place of its result."""
+    return replace(data, best=row, optima=None, computed_reference=None)
 
 
-def shown_objective(data: Dataset) -> Quantity | None:
-    """Objective as it is shown."""
-    name = objective_of(data.study)
-    return None if name is None else quantity(name, data.units.get(name, ""))
+def records(frame: pd.DataFrame) -> list[dict[str, Any]]:
+    """Return the rows of a table, each by the names of its columns."""
+    return [{str(name): value for name, value in row.items()} for row in frame.to_dict("records")]
 
 
 def marked(data: Dataset) -> dict[str, Any]:
@@ -313,7 +323,7 @@ def gather(folder: Path) -> tuple[Dataset, Scan, list[Cells]]:
     """Read a dataset, go once through its rows, and compute what an optimiser would have left."""
     data = read_dataset(folder)
     cells = divided_axes(data.study, data.counts.get(codes.OK, 0))
-    objective = objective_of(data.study)
+    objective = None if data.objective is None else data.objective.name
     larger = data.study.pareto is not None and data.study.pareto.at_least
     found = scan(data.parts, cells, objective, data.against if objective is not None else None, larger)
     found.best_row |= _absent(data.study, found.best_row) if found.best_row else {}

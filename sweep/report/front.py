@@ -12,13 +12,12 @@ from kernels import status as codes
 from sweep.optimise.front.pareto import SHOWN, gaps
 from sweep.optimise.local.descent import KKT
 from sweep.quantities.limits import compared
+from sweep.report.dataset import Dataset, records
 from sweep.report.figures import LIMIT, OPTIMUM
-from sweep.report.quantities import Quantity, change, number, quantity
+from sweep.report.quantities import Quantity, change, number
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
-
-    from sweep.report.dataset import Dataset
 
 EDGES = (" at its lower bound", " at its upper bound")
 
@@ -132,17 +131,13 @@ def draw_front(axes: Axes, data: Dataset) -> None:
 
 
 def _quantities(data: Dataset) -> tuple[Quantity | None, Quantity | None]:
-    if data.study.pareto is None or data.study.objective is None or data.front is None:
+    if data.study.pareto is None or data.front is None:
         return None, None
-    names = data.study.objective.output, data.study.pareto.output
-    first, second = (quantity(name, data.units.get(name, "")) for name in names)
-    return first, second
+    return data.objective, data.shown(data.study.pareto.output)
 
 
 def _points(data: Dataset) -> list[dict[str, Any]]:
-    if data.front is None:
-        return []
-    return [{str(k): v for k, v in row.items()} for row in data.front.to_dict("records")]
+    return [] if data.front is None else records(data.front)
 
 
 def _state(point: dict[str, Any]) -> str:
@@ -157,7 +152,7 @@ def _given_way(data: Dataset, relaxation: str) -> str:
     words = []
     for part in filter(None, relaxation.split("; ")):
         name, _, size = part.rpartition(" by ")
-        shown = quantity(name, data.units.get(name, ""))
+        shown = data.shown(name)
         words.append(f"{shown.words} by {shown.show(abs(float(size)), 3)}")
     return "; ".join(words)
 

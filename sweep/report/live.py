@@ -155,7 +155,7 @@ def moving(data: Dataset, shown: Sequence[Shown]) -> dict[str, Any] | None:
 def _motion(data: Dataset, shown: Shown, names: list[str]) -> Motion:
     """Return a design from its lowest position on, as the static figure has it."""
     family = data.study.family
-    design = {name: float(shown.row[name]) for name in family.parameter_names}
+    design = data.design(shown.row)
     matrix = np.array([list(design.values())])
     phi = equal_steps(family.domain, matrix, POSES)
     found = family.poses(matrix, Angles.of(phi[None, :]), frozenset([*names, family.position]))
@@ -187,7 +187,7 @@ def _placed(family: Family, design: dict[str, float], phi: Array, order: NDArray
 
 def _panel(data: Dataset, name: str, motions: list[Motion]) -> dict[str, Any]:
     """One curve: words, unit, limits, the range that its panel shows."""
-    shown = quantity(name, data.units.get(name, ""))
+    shown = data.shown(name)
     speed = data.study.speed
     windowed = name == "dev" and data.study.window is not None
     values = np.concatenate([m.curves[name][m.inside if windowed else np.ones(POSES, np.bool_)] for m in motions])
@@ -213,7 +213,7 @@ def _panel(data: Dataset, name: str, motions: list[Motion]) -> dict[str, Any]:
 
 
 def _design(data: Dataset, motion: Motion, factor: float) -> dict[str, Any]:
-    shown = {name: quantity(name, data.units.get(name, "")) for name in motion.curves}
+    shown = {name: data.shown(name) for name in motion.curves}
     return {
         "name": motion.shown.name,
         "role": motion.shown.role,
@@ -266,9 +266,9 @@ def parallel(data: Dataset, cells: Sequence[Cells], shown: Sequence[Shown]) -> d
     axes = _axes(data, cells)
     if len(axes) < 2:
         return None
-    objective = data.study.objective
+    objective = data.objective
     of = data.counts.get(codes.OK, 0)
-    names, best = [axis.name for axis in axes], None if objective is None else objective.output
+    names, best = [axis.name for axis in axes], None if objective is None else objective.name
     rows, values = _lines(data.parts, names, best, of)
     if len(rows) < 2:
         return None
@@ -280,7 +280,7 @@ def parallel(data: Dataset, cells: Sequence[Cells], shown: Sequence[Shown]) -> d
     marks = [[float(one.row.get(axis.name, np.nan)) * axis.factor for axis in axes] for one in named]
     return {
         "axes": [{"name": axis.name, "symbol": axis.symbol, "unit": axis.unit} for axis in axes],
-        "objective": next((k for k, axis in enumerate(axes) if objective and axis.name == objective.output), -1),
+        "objective": next((k for k, axis in enumerate(axes) if objective and axis.name == objective.name), -1),
         "rows": rows.tolist(),
         "values": packed(values * [axis.factor for axis in axes]),
         "designs": [
@@ -300,7 +300,7 @@ def _axes(data: Dataset, cells: Sequence[Cells]) -> list[Quantity]:
     told = [name for name in dict.fromkeys([*objective, *second, *limits]) if name in stored and not is_flag(name)]
     outputs = told[:OUTPUTS]
     dimensions = [limited(data, cell.name) for cell in cells][:DIMENSIONS]
-    return [*dimensions, *(quantity(name, data.units.get(name, "")) for name in outputs)]
+    return [*dimensions, *(data.shown(name) for name in outputs)]
 
 
 def _lines(parts: Sequence[Path], names: list[str], objective: str | None, of: int) -> tuple[Array, Array]:

@@ -24,7 +24,7 @@ from sweep.optimise.manufacture.tolerance import (
 )
 from sweep.quantities import resolve
 from sweep.quantities.limits import compared, meets
-from sweep.report.dataset import Dataset
+from sweep.report.dataset import Dataset, records
 from sweep.report.quantities import Quantity, number, quantity
 from sweep.study import Limit
 
@@ -179,7 +179,7 @@ class Spread(NamedTuple):
 def spreads(data: Dataset) -> list[Spread]:
     """Distributions of the outputs of the optimum; empty where the study names no tolerances."""
     return [
-        Spread(quantity(str(row["output"]), data.units.get(str(row["output"]), "")),
+        Spread(data.shown(str(row["output"])),
                *(float(row[key]) for key in ("nominal", "low", "mean", "high", "within")))
         for row in _optimum_rows(data, files.TOLERANCE)
         if row["output"] != "all limits" and not is_flag(str(row["output"]))
@@ -239,17 +239,18 @@ class Slope(NamedTuple):
 
 def slopes(data: Dataset) -> list[Slope]:
     """Dimensions by how much they change the objective, the most telling first."""
-    if data.study.objective is None:
+    objective = data.objective
+    if objective is None:
         return []
     known = {p.name: p for p in data.study.family.parameters}
     ranked = []
     for row in _optimum_rows(data, files.SENSITIVITY):
         name, value = str(row["parameter"]), abs(float(row["value"]))
-        if row["output"] != data.study.objective.output or not value > 0.0 or math.isnan(row["growing"]):
+        if row["output"] != objective.name or not value > 0.0 or math.isnan(row["growing"]):
             continue
         step, words = STEPS.get(known[name].unit if name in known else "", (0.1, "0.1"))
         share = 100.0 * step / value
-        share = -share if without_minus(data.study.objective.output) else share  # shown as what is made large
+        share = -share if without_minus(objective.name) else share  # shown as what is made large
         text = known[name].text if name in known else ""
         ranked.append(Slope(name, text, words, share * row["growing"], -share * row["shrinking"]))
     return sorted(ranked, key=lambda slope: -slope.largest)
@@ -261,4 +262,4 @@ def _optimum_rows(data: Dataset, file: str) -> list[dict[str, Any]]:
     if not path.exists():
         return []
     frame = files.read_table(path)
-    return [{str(k): v for k, v in row.items()} for row in frame[frame["role"] == "optimum"].to_dict("records")]
+    return records(frame[frame["role"] == "optimum"])

@@ -11,10 +11,10 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from sweep.quantities.limits import compared
-from sweep.report.dataset import Dataset, marked, shown_objective
+from sweep.report.dataset import Dataset, marked
 from sweep.report.figures import LIMIT, OPTIMUM, QUIET, REFERENCE, WIDTH, new_figure
 from sweep.report.front import draw_front
-from sweep.report.quantities import Quantity, quantity
+from sweep.report.quantities import Quantity
 from sweep.report.scan import Cells, Scan, most_telling
 
 if TYPE_CHECKING:
@@ -215,7 +215,7 @@ def design_map(data: Dataset, found: Scan, cells: list[Cells], pair: tuple[str, 
     """Show what the best design of each cell attains over one or two axes, by default the most telling pair."""
     by_name = {c.name: c for c in cells}
     marks = {role: row for role, row in marked(data).items() if row is not None}
-    shown = shown_objective(data)
+    shown = data.objective
     if pair is None:
         if shown is None and found.feasible == data.designs:
             return None  # all of one colour
@@ -236,11 +236,11 @@ def design_map(data: Dataset, found: Scan, cells: list[Cells], pair: tuple[str, 
 
 def trade_off(data: Dataset, found: Scan) -> Figure | None:
     """Draw the objective against a second criterion, with the front where one was searched."""
-    study, shown = data.study, shown_objective(data)
+    study, shown = data.study, data.objective
     against = data.against
     if shown is None or against is None or not (len(found.scatter) or data.front is not None):
         return None
-    second = quantity(against, data.units.get(against, ""))
+    second = data.shown(against)
     first, other = shown.name, second.name
     marks = {role: row for role, row in marked(data).items() if row is not None}
     at = {role: (compared(first, float(r[first])), compared(other, float(r[other]))) for role, r in marks.items()}
@@ -251,7 +251,7 @@ def trade_off(data: Dataset, found: Scan) -> Figure | None:
 
 def axis_quantity(data: Dataset, name: str) -> Quantity:
     """Return a swept parameter under its own name, in the unit a designer reads."""
-    shown = quantity(name, data.units.get(name, ""))
+    shown = data.shown(name)
     return replace(shown, symbol=name, words=data.definitions.get(name, name))
 
 

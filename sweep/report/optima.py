@@ -19,7 +19,7 @@ from sweep.exchange.scene import extent
 from sweep.optimise.local.kkt import AGREE
 from sweep.quantities.dimensions import sizes
 from sweep.quantities.limits import compared, meets
-from sweep.report.dataset import Dataset, Row
+from sweep.report.dataset import Dataset, Row, records
 from sweep.report.made import many
 from sweep.report.quantities import change, number, quantity
 from sweep.report.sketch import drawn_parts, sketch
@@ -52,15 +52,13 @@ class Group:
 
 def groups(data: Dataset) -> list[Group]:
     """Different optima: the answer, the best on paper, then the others by their objective; empty without a search."""
-    objective = data.study.objective
-    if data.optima is None or objective is None:
+    if data.optima is None or data.objective is None:
         return []
     kept = data.optima[(data.optima["role"] != "reference") & (data.optima["status"] == codes.OK)]
-    rows = [{str(key): value for key, value in row.items()} for row in kept.to_dict("records")]
-    order = {"optimum": 0, "nominal": 1}
-    rows.sort(key=lambda row: (order.get(row["role"], 2), float(compared(objective.output, row[objective.output]))))
+    rows, name, order = records(kept), data.objective.name, {"optimum": 0, "nominal": 1}
+    rows.sort(key=lambda row: (order.get(row["role"], 2), float(compared(name, row[name]))))
     places = _places(data, rows)
-    values = [float(row[objective.output]) for row in rows]
+    values = [float(row[name]) for row in rows]
     leaders: list[int] = []
     count, mirrored = dict.fromkeys(range(len(rows)), 0), dict.fromkeys(range(len(rows)), 0)
     for k, row in enumerate(rows):
@@ -139,23 +137,16 @@ def _of_front(data: Dataset) -> list[Shown]:
     if data.front is None or pareto is None:
         return []
     side = "at least" if pareto.at_least else "at most"
-    shown = quantity(pareto.output, data.units.get(pareto.output, ""))
-    rows = [_row(row) for row in data.front.to_dict("records") if int(row["status"]) == codes.OK]
+    shown = data.shown(pareto.output)
+    rows = records(data.front[data.front["status"] == codes.OK])
     chosen = sorted({round(k) for k in np.linspace(0, len(rows) - 1, min(OFFERED, len(rows)))})
     names = [f"{shown.symbol} {side} {shown.show(float(rows[k]['bound']), 3)}" for k in chosen]
     return [Shown(name, "front", _objective(data, rows[k]), rows[k]) for name, k in zip(names, chosen, strict=True)]
 
 
-def _row(row: Any) -> dict[str, Any]:
-    return {str(key): value for key, value in row.items()}
-
-
 def _objective(data: Dataset, row: Row) -> str:
-    objective = data.study.objective
-    if objective is None or objective.output not in row:
-        return ""
-    shown = quantity(objective.output, data.units.get(objective.output, ""))
-    return f"{shown.symbol} = {shown.show(float(row[objective.output]), 4)}"
+    shown = data.objective
+    return f"{shown.symbol} = {shown.show(float(row[shown.name]), 4)}" if shown and shown.name in row else ""
 
 
 CARDS = 6  # are shown
@@ -184,18 +175,17 @@ class Optimum:
 
 def optima(data: Dataset, found: list[Group]) -> list[Optimum]:
     """Cards of the first few, with pictures to one scale; none where there is only one."""
-    objective, own = data.study.objective, data.study.bare.parameter_names
+    shown, own = data.objective, data.study.bare.parameter_names
     tilts = {name for name in own if name.endswith("_tilt")}  # only what is made is tilted
-    if len(found) < 2 or objective is None:
+    if len(found) < 2 or shown is None:
         return []
     found = found[:CARDS]
     drawn = [drawn_parts(data.study.family, group.row) for group in found]
     span = max((extent([one.part for one in placed]) for placed in drawn if placed), default=0.0)
-    shown = quantity(objective.output, data.units.get(objective.output, ""))
-    best = float(found[0].row[objective.output])
+    best = float(found[0].row[shown.name])
     cards = []
     for k, (group, placed) in enumerate(zip(found, drawn, strict=True)):
-        value = float(group.row[objective.output])
+        value = float(group.row[shown.name])
         lines = parameter_rows(data, group.row, 4)
         title = group.title(k)
         cards.append(
@@ -216,13 +206,12 @@ def optima(data: Dataset, found: list[Group]) -> list[Optimum]:
 
 def optima_sentence(data: Dataset, found: list[Group]) -> str:
     """How many different optima there are, for the answer."""
-    objective = data.study.objective
-    if len(found) < 2 or objective is None:
+    shown = data.objective
+    if len(found) < 2 or shown is None:
         return ""
-    shown = quantity(objective.output, data.units.get(objective.output, ""))
-    value, best = (float(group.row[objective.output]) for group in (found[1], found[0]))
+    value, best = (float(group.row[shown.name]) for group in (found[1], found[0]))
     difference = change(shown, value, best)
-    same = sum(abs(float(group.row[objective.output]) - best) <= AGREE * abs(best) for group in found)
+    same = sum(abs(float(group.row[shown.name]) - best) <= AGREE * abs(best) for group in found)
     text = f"The search ended in {len(found)} structurally different optima"
     text += f", {same} of them in the best basin, whose values agree" if same > 1 else ""
     row = found[1].row

@@ -1,4 +1,4 @@
-"""The page: gathers figures, tables and sentences and sets them with the template."""
+"""The pages: figures, tables and sentences of a dataset set with a template, and several results side by side."""
 
 from __future__ import annotations
 
@@ -8,19 +8,20 @@ from datetime import date
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from kernels import status as codes
 from sweep.dataset.chunk_files import ROWS_PER_BATCH, batches
 from sweep.dataset.files import OF_OPTIMUM, PARETO, beside, is_older, located, write_atomically
-from sweep.errors import StoreError
+from sweep.errors import InputError, StoreError
 from sweep.evaluation.cyclogram import cyclogram, table_in_degrees
+from sweep.evaluation.statuses import meaning
 from sweep.families.machines.machine import Machine
 from sweep.jobs.progress import Say, unsaid
 from sweep.optimise.manufacture.tolerance import SINGLE, TELLING
 from sweep.pages import rendered
 from sweep.report import answer, front, maps, tables
-from sweep.report.bodies import bars
-from sweep.report.dataset import Dataset, gather
+from sweep.report.dataset import Dataset, Row, as_result, chosen, gather, read_dataset, row_of
 from sweep.report.figures import drawn_before, house_style, save
-from sweep.report.live import live
+from sweep.report.live import embedded, live, moving, scripts_of
 from sweep.report.made import (
     event_bands,
     made,
@@ -31,11 +32,11 @@ from sweep.report.made import (
     tolerance_words,
     with_bands,
 )
-from sweep.report.optima import CARDS, groups, optima, optima_sentence
+from sweep.report.optima import CARDS, Shown, groups, optima, optima_sentence
 from sweep.report.quantities import number, rpm
 from sweep.report.scan import Cells, Scan, most_telling
 from sweep.report.sewing import diagram_of_dataset, sewn, threads_figure
-from sweep.report.sketch import dimensioned, drawn_parts, sketch
+from sweep.report.sketch import bars, dimensioned, drawn_parts, sketch
 
 if TYPE_CHECKING:
     from markupsafe import Markup
@@ -43,6 +44,7 @@ if TYPE_CHECKING:
     from sweep.study import Study
 
 
+COMPARISON = "comparison.html"
 STEPS = 4  # of a report: rows, figures, optima and yield, page
 MOST_VALUES = 9  # dimensions that stand in the sketch with their values; of more only the names
 
@@ -187,7 +189,7 @@ def _cyclogram(data: Dataset, events: Mapping[str, tuple[float, float]], out: Pa
     row, family = data.result, data.study.family
     if row is None or not isinstance(family, Machine):
         return []
-    found = table_in_degrees(cyclogram(family, {name: row[name] for name in family.parameter_names}, angles="rad"))
+    found = table_in_degrees(cyclogram(family, data.design(row), angles="rad"))
     with_bands(found, events).to_csv(out / "cyclogram.csv", index=False, float_format="%.4f")
     return list(found.itertuples(index=False, name=None))
 
@@ -234,3 +236,85 @@ def write_survivors(parts: Sequence[Path], target: Path) -> None:
 
 def _default(folder: Path) -> Path:
     return folder / "_report" if is_older(folder) else beside(folder)
+
+
+def judged(data: Dataset, rows: Sequence[Row], names: Sequence[str]) -> dict[str, Any]:
+    """Return what a page shows of designs under their names; the first one is in hand, the others beside it."""
+    seen = [as_result(data, row) for row in rows]
+    roles = ["result", *(f"pin pin-{k}" for k in range(1, len(rows)))]
+    shown = [Shown(name, role, status_words(row), row) for name, role, row in zip(names, roles, rows, strict=True)]
+    outputs, limits = [tables.output_rows(one) for one in seen], [tables.limit_states(one) for one in seen]
+    motion = moving(data, shown)
+    return {
+        "status": [status_words(row) for row in rows],
+        "motion": motion and motion | {"ghosts": list(range(1, len(rows)))},
+        "outputs": [
+            {"name": same[0].name, "symbol": same[0].symbol, "text": same[0].text,
+             "values": [one.value for one in same], "fast": [one.fast for one in same]}
+            for same in zip(*outputs, strict=True)
+        ],
+        "limits": [
+            {"name": same[0].shown.name, "symbol": same[0].shown.symbol, "bound": same[0].bound,
+             "values": [one.value for one in same], "states": [one.state for one in same],
+             "slack": [one.slack for one in same]}
+            for same in zip(*limits, strict=True)
+        ],
+    }  # fmt: skip
+
+
+def status_words(row: Row) -> str:
+    """Say why a design has no values; empty where it has."""
+    code = int(row.get("status", codes.OK))
+    return "" if code == codes.OK else meaning(code)
+
+
+def write_comparison(folders: Sequence[Path], out: Path) -> Path:
+    """Write a page with the results of several datasets side by side, all judged by the study of the first.
+
+    Raises
+    ------
+    InputError
+        for datasets of other mechanisms, or without a result.
+    StoreError
+        if the page cannot be written.
+    """
+    data = read_dataset(folders[0])
+    names = _names([read_dataset(folder).study.name for folder in folders], folders)
+    found = [chosen(folder) for folder in folders]
+    own = data.study.bare.parameter_names
+    for folder, one in zip(folders, found, strict=True):
+        if not set(own) <= set(one.design):
+            allowed = f"a dataset of the mechanism of {folders[0]}: {', '.join(own)}"
+            raise InputError("folder", str(folder), allowed, "report")
+    first = found[0].design
+    rows = [row_of(data.study, first | {name: one.design[name] for name in own}) for one in found]
+    compared = judged(data, rows, names)
+    lines = [tables.parameter_rows(as_result(data, row)) for row in rows]
+    text = rendered(
+        COMPARISON,
+        names=names,
+        folders=[str(folder) for folder in folders],
+        study=data.study,
+        dimensions=sorted(map(_values, zip(*lines, strict=True)), key=lambda line: len(set(line[2])) == 1),
+        motion_data=embedded(compared["motion"]) if compared["motion"] else "",
+        axis=compared["motion"]["axis"] if compared["motion"] else "",
+        scripts=scripts_of(compared["motion"]),
+        **{key: compared[key] for key in ("outputs", "limits", "status")},
+    )
+    try:
+        out.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise StoreError(f"report {out}: cannot be written: {error}") from error
+    write_atomically(out / COMPARISON, text.encode())
+    return out / COMPARISON
+
+
+def _names(studies: Sequence[str], folders: Sequence[Path]) -> list[str]:
+    """Call results by their studies; by their folders where these are the same."""
+    if len({*studies}) == len(studies):
+        return list(studies)
+    return [str(folder.parent.name if folder.name == "designs" else folder.name) for folder in folders]
+
+
+def _values(same: Sequence[tables.ParameterRow]) -> tuple[str, str, list[str]]:
+    return same[0].name, same[0].text, [row.value for row in same]

@@ -159,7 +159,7 @@ def diagram_of_dataset(data: Dataset) -> pd.DataFrame | None:
         return None
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", MeasuredRangeWarning)  # the picture shows how far the law of speed was measured
-        return diagram(family, {name: row[name] for name in family.parameter_names}, angles="rad")
+        return diagram(family, data.design(row), angles="rad")
 
 
 def threads_figure(turn: pd.DataFrame) -> Figure:

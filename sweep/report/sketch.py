@@ -1,4 +1,7 @@
-"""The mechanism as a sketch in the page: one position in full, others faint, paths, joints, and dimensions in place."""
+"""The mechanism in the page: a sketch with its dimensions in place, and bodies that are bars between their joints.
+
+One position is drawn in full, others faint, with paths and joints.
+"""
 
 from __future__ import annotations
 
@@ -6,7 +9,7 @@ import math
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from itertools import combinations
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
@@ -25,6 +28,9 @@ from sweep.exchange.scene import (
 )
 from sweep.families.base import Array, Family
 from sweep.pages import rendered
+from sweep.report.dataset import Dataset
+from sweep.report.quantities import quantity
+from sweep.report.tables import value_of
 
 if TYPE_CHECKING:
     from markupsafe import Markup
@@ -164,3 +170,42 @@ def _write(taken: list[tuple[float, float, str, str]], x: float, y: float, words
         ):
             taken.append((*here, words, kind))
             return
+
+
+class Bar(NamedTuple):
+    """A bar with what it has, in words: its centre from its first joint, its inertia across and along it."""
+
+    name: str
+    kind: str
+    mass: str
+    centre: str
+    across: str
+    along: str
+
+
+def bars(data: Dataset) -> list[Bar]:
+    """Return the bars that have a mass, in the order of the mechanism."""
+    family, row = data.study.family, data.result
+    rods = [name for name in family.parameter_names if f".{name}".rpartition(".")[2].startswith("rod_")]
+    rods = [name for name in rods if row is not None and value_of(row, name) == 1.0]
+    if row is None or not rods:
+        return []
+    placed = drawn_parts(family, {name: value_of(row, name) for name in family.parameter_names})
+    pose, lengths = first_pose([one.part for one in placed]) if placed else 0, {}
+    for part in (one.part for one in placed):
+        for link in (link for link in part.links if len(link.joints) > 1):
+            first, second = (part.joints[name][pose] for name in link.joints[:2])
+            lengths[(part.member, f"{link.name.replace(' ', '_')}{part.stage}")] = float(np.linalg.norm(second - first))
+    found = []
+    for name in rods:
+        member, dot, own = name.rpartition(".")
+        body = own.removeprefix("rod_")
+        given = {word: value_of(row, f"{member}{dot}{word}_{body}") for word in ("m", "line_mass", "gyration")}
+        length = lengths.get((member, body), np.nan)
+        mass, thick = given["m"] + given["line_mass"] * length, given["gyration"] ** 2
+        if mass > 0.0:
+            values = (("m", "t", mass), ("com", "mm", 0.5 * length), ("j", "t*mm^2", mass * (length**2 / 12.0 + thick)),
+                      ("j", "t*mm^2", 2.0 * mass * thick))  # fmt: skip
+            words = [quantity(word, unit).show(value) for word, unit, value in values]
+            found.append(Bar(f"{member}{dot}{body}", "exact" if thick else "slender", *words))
+    return found

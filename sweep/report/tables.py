@@ -44,7 +44,7 @@ class LimitState:
 
 def limited(data: Dataset, name: str) -> Quantity:
     """Return an output under a limit; a parameter keeps its own name."""
-    shown = quantity(name, data.units.get(name, ""))
+    shown = data.shown(name)
     return replace(shown, symbol=name, words=name) if name in data.study.family.parameter_names else shown
 
 
@@ -159,10 +159,10 @@ class Fate:
 def output_rows(data: Dataset) -> list[OutputRow]:
     """Wanted outputs in designer's units, the objective first."""
     study = data.study
-    objective = [study.objective.output] if study.objective is not None else []
+    objective = [data.objective.name] if data.objective is not None else []
     rows = []
     for name in dict.fromkeys([*objective, *study.want]):
-        shown = quantity(name, data.units.get(name, ""))
+        shown = data.shown(name)
         value, other = value_of(data.result, name), value_of(data.reference, name)
         flag = is_flag(name)
         rows.append(

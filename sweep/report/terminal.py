@@ -24,7 +24,6 @@ from sweep.optimise.multistart.survey import started
 from sweep.quantities.limits import compared
 from sweep.report.answer import proof_sentence, search_words, survey_warnings
 from sweep.report.dataset import Dataset, read_dataset
-from sweep.report.quantities import quantity
 from sweep.report.tables import bound_words, limit_states, limited
 from sweep.synthesis.fit import fit_line
 
@@ -82,16 +81,14 @@ def ending(folder: Path) -> Ending:
 
 
 def _best_of_sweep(data: Dataset, feasible: int) -> str:
-    objective = data.study.objective
-    if objective is None or not feasible:
+    shown = data.objective
+    if shown is None or not feasible:
         return ""
     best = math.inf
     for path in data.parts:
-        values = _column(path, objective.output)
-        best = min(best, float(np.min(compared(objective.output, values), initial=math.inf)))
+        best = min(best, float(np.min(compared(shown.name, _column(path, shown.name)), initial=math.inf)))
     if not math.isfinite(best):
         return ""
-    shown = quantity(objective.output, data.units.get(objective.output, ""))
     return f", the best with {shown.words} {shown.show(best)}"
 
 
@@ -105,10 +102,9 @@ def _column(path: Path, name: str) -> Any:
 
 
 def _optimum(data: Dataset) -> list[str]:
-    objective = data.study.objective
-    assert objective is not None and data.optimum is not None
-    shown = quantity(objective.output, data.units.get(objective.output, ""))
-    value = float(data.optimum[objective.output])
+    shown = data.objective
+    assert shown is not None and data.optimum is not None
+    value = float(data.optimum[shown.name])
     fast = shown.at_speed(value, data.study.speed)
     active = [s for s in limit_states(data) if s.state == "active"]
     held = [f"{s.shown.words} ({s.bound})" for s in active]

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 from sweep.dataset.reading import best
 from sweep.dataset.store import load
 from sweep.errors import InputError, StoreError
-from sweep.report.dataset import Dataset, objective_of, read_dataset
+from sweep.report.dataset import Dataset, read_dataset
 from sweep.report.quantities import quantity
 
 if TYPE_CHECKING:
@@ -75,9 +75,8 @@ def write_workbook(folder: str | Path, path: str | Path) -> Path:
 
 def _designs(data: Dataset) -> pd.DataFrame:
     """Read the designs within all limits, the best first."""
-    objective = objective_of(data.study)
-    if objective is not None:
-        return best(data.folder, objective, MOST_ROWS)
+    if data.objective is not None:
+        return best(data.folder, data.objective.name, MOST_ROWS)
     rows = load(data.folder)
     return rows[rows["status"] == 0].head(MOST_ROWS)
 

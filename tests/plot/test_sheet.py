@@ -13,8 +13,7 @@ import sweep
 from sweep.cli import main
 from sweep.exchange.scene import pose
 from sweep.plot.sheet import LINES, _rows, tables_of, write_sheet
-from sweep.report.dataset import chosen, read_dataset
-from sweep.report.judged import as_result, row_of
+from sweep.report.dataset import as_result, chosen, read_dataset, row_of
 from sweep.study import study_from_data
 
 STUDY = {

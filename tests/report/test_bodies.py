@@ -7,10 +7,9 @@ import math
 import pytest
 
 import sweep
-from sweep.report.bodies import bars
-from sweep.report.dataset import read_dataset
-from sweep.report.judged import as_result
+from sweep.report.dataset import as_result, read_dataset
 from sweep.report.page import write_report
+from sweep.report.sketch import bars
 from sweep.study import study_from_data
 
 STEEL = {"material": "steel", "section": "12 mm round"}
