@@ -12,7 +12,8 @@ import click
 
 from sweep.cli.families import complete_families, family_names
 from sweep.cli.first_study import smoke_text, study_text
-from sweep.errors import InputError, StoreError
+from sweep.dataset.files import unwritable
+from sweep.errors import InputError
 from sweep.exchange.points import drawn
 from sweep.families import family as find_family
 from sweep.families.machines.machine import Machine
@@ -99,12 +100,10 @@ def _write(folder: Path, files: dict[str, str]) -> None:
     """Make a folder, which must not be there yet, with files."""
     if folder.exists():
         raise InputError("NAME", folder.name, f"a folder that is not there yet; {folder} is", "command line")
-    try:
+    with unwritable(folder):
         folder.mkdir(parents=True)
         for file, text in files.items():
             (folder / file).write_text(text, encoding="utf-8")
-    except OSError as error:
-        raise StoreError(f"{folder}: cannot be written: {error.strerror}") from error
 
 
 def _machine(members: tuple[str, ...]) -> Machine | None:
@@ -131,10 +130,8 @@ def schema(out: Path | None) -> None:
     if out is None:
         click.echo(_current_schema(), nl=False)
         return
-    try:
+    with unwritable(f"--out {out}"):
         out.write_text(_current_schema(), encoding="utf-8")
-    except OSError as error:
-        raise StoreError(f"--out {out}: cannot be written: {error.strerror}") from error
 
 
 def schema_text(found: dict[str, Any]) -> str:

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import os
-from contextlib import suppress
 from pathlib import Path
 
 import click
@@ -13,7 +11,8 @@ from pyarrow import csv
 
 from sweep.cli.families import complete_families, complete_outputs, family_names
 from sweep.cli.options import ANGLES
-from sweep.errors import InputError, StoreError
+from sweep.dataset.files import replacing
+from sweep.errors import InputError
 from sweep.evaluation.angles import AngleUnit
 from sweep.evaluation.poses import evaluate
 from sweep.evaluation.summaries import summarise
@@ -181,15 +180,8 @@ def write_table(frame: pd.DataFrame, out: Path | None) -> None:
     if out is None:
         click.echo(frame.to_csv(index=False), nl=False)
         return
-    partial = out.with_name(f"_tmp-{os.getpid()}-{out.name}")
-    try:
+    with replacing(out) as partial:
         if out.suffix.lower() == ".parquet":
             frame.to_parquet(partial, index=False)
         else:
             frame.to_csv(partial, index=False)
-        partial.replace(out)
-    except OSError as error:
-        raise StoreError(f"--out {out}: cannot be written: {error}") from error
-    finally:
-        with suppress(OSError):  # a disk that can only be read has refused already
-            partial.unlink(missing_ok=True)

@@ -20,7 +20,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from kernels import status as codes
-from sweep.dataset.files import beside, is_older, read_plan, store_errors, write_atomically
+from sweep.dataset.files import beside, read_plan, store_errors, write_atomically
 from sweep.errors import InputError, StoreError
 
 if TYPE_CHECKING:
@@ -153,11 +153,10 @@ def parts(folder: Path) -> list[Part]:
 def listing(folder: Path) -> tuple[list[Part], list[Path]]:
     """Return the chunks of a folder by their names, in design order, and what lies there besides; nothing is opened.
 
-    A hidden file is nobody's data; in a dataset of an earlier version nor is one that begins with an underscore.
+    A hidden file is nobody's data.
     """
-    apart = "._" if is_older(folder) else "."
     with store_errors(folder):
-        entries = sorted(path for path in folder.iterdir() if path.name[0] not in apart) if folder.is_dir() else []
+        entries = sorted(path for path in folder.iterdir() if path.name[0] != ".") if folder.is_dir() else []
     chunks = {path: part for path in entries if (part := part_of(path)) is not None}
     ordered = sorted(chunks.values(), key=lambda part: (part.index, part.path.name))
     return ordered, [path for path in entries if path not in chunks]

@@ -42,7 +42,7 @@ CLOSED = (errno.ELOOP, errno.EACCES, errno.EPERM, errno.ENOTDIR, errno.EROFS, er
 
 # The key under which a plan carries the hash of everything else that it says.
 OWN_HASH = "hash"
-# What a plan says at least, and as what; earlier versions wrote no hash of it.
+# What a plan says at least, and as what.
 PLAN_TYPES: Mapping[str, type] = {
     "identity": str, "chunks": int, "chunk_size": int, "name": str, "chunk_data": dict, "optimise": bool,
 }  # fmt: skip
@@ -56,22 +56,12 @@ def located(folder: str | Path) -> Path:
 
 
 def beside(folder: Path) -> Path:
-    """Return the folder of plan, log, lock, optimum and report of a folder of designs: see `outside`.
+    """Return the folder of plan, log, lock, optimum and report of a folder of designs.
 
-    A dataset of an earlier version keeps these files where it has them, among the chunks.
+    It is the parent of a folder called ``designs``, and ``<folder>.meta`` next to any other.
     """
-    return folder if is_older(folder) else outside(folder)
-
-
-def outside(folder: Path) -> Path:
-    """Return the parent of a folder called ``designs``, and ``<folder>.meta`` next to any other."""
     place = folder.resolve() if folder.is_symlink() or folder.name in ("", "..") else folder
     return place.parent if place.name == DESIGNS else place.with_name(place.name + SUFFIX)
-
-
-def is_older(folder: Path) -> bool:
-    """Return whether an earlier version wrote this dataset, with its plan among the chunks."""
-    return (folder / PLAN).is_file()
 
 
 @contextlib.contextmanager
@@ -86,6 +76,28 @@ def store_errors(place: Path) -> Iterator[None]:
             raise StoreError(f"{where}: a link that leads to no folder; remove it, or take another folder") from error
         text = f"{where}: {error.strerror or error}; finished chunks are kept, {remedy}"
         raise StoreError(text) from error
+
+
+@contextlib.contextmanager
+def unwritable(place: Path | str) -> Iterator[None]:
+    """Turn what the operating system reports of a file for other programs into a :class:`StoreError`."""
+    try:
+        yield
+    except OSError as error:
+        raise StoreError(f"{place}: cannot be written: {error}") from error
+
+
+@contextlib.contextmanager
+def replacing(path: Path) -> Iterator[Path]:
+    """Yield a name beside a file: what is written there takes the file's name as a whole, or nothing is left."""
+    partial = path.with_name(f"{TEMPORARY}{os.getpid()}-{path.name}")
+    try:
+        with unwritable(path):
+            yield partial
+            partial.replace(path)
+    finally:
+        with contextlib.suppress(OSError):  # a disk that can only be read has refused already
+            partial.unlink(missing_ok=True)
 
 
 def write_atomically(path: Path, data: bytes, where: Path | None = None) -> None:

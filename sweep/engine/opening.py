@@ -10,9 +10,7 @@ from typing import Any
 
 from sweep.chunks.plan import NOT_IN_CHUNKS, Plan, make_plan
 from sweep.dataset import chunk_files, files, store
-from sweep.dataset.files import TABLES, outside
-from sweep.dataset.lock import locked
-from sweep.errors import InputError
+from sweep.dataset.files import TABLES
 from sweep.study import Study
 
 MOST = 6  # differences that are reported
@@ -109,32 +107,6 @@ def _set_foreign_aside(folder: Path, plan: Plan, others: tuple[str, ...]) -> Non
 def old_name() -> str:
     """Return the name under which data are set aside now."""
     return f"{files.OLD}/{time.strftime('%Y%m%d-%H%M%S')}"
-
-
-def refuse_or_clear_older(folder: Path, force: bool) -> None:
-    """Refuse or set aside a dataset of an earlier version, whose plan and optimum lie among its chunks.
-
-    Raises
-    ------
-    InputError
-        if there is one; with ``force`` it is set aside, every file of it.
-    """
-    if not files.is_older(folder):
-        return
-    if not force:
-        allowed = (
-            "a dataset of this version. sweep.load, sweep report and sweep compare read this one as it is; "
-            "choose another folder with --out, or set it aside with --force"
-        )
-        raise InputError("dataset", "one of an earlier version, with its plan among the chunks", allowed, str(folder))
-    with locked(folder), files.store_errors(folder):
-        target = outside(folder) / old_name()
-        target.mkdir(parents=True, exist_ok=True)
-        # The plan goes last: until then it is an older dataset, also for a run that begins after a kill.
-        for path in sorted(folder.iterdir(), key=lambda path: path.name == files.PLAN):
-            if path.name != files.LOCK:
-                path.replace(target / path.name)
-    (folder / files.LOCK).unlink(missing_ok=True)
 
 
 def plan_note(study: Study, folder: Path, plan: Plan) -> dict[str, Any]:

@@ -28,7 +28,7 @@ from sweep.chunks.plan import Plan
 from sweep.dataset import files, store
 from sweep.dataset.lock import locked
 from sweep.engine.estimate import check_budget, estimate
-from sweep.engine.opening import is_part, known_folder, open_plan, part_range, plan_note, refuse_or_clear_older
+from sweep.engine.opening import is_part, known_folder, open_plan, part_range, plan_note
 from sweep.engine.searches import refuse_unprovable, search, stages_of
 from sweep.engine.worker import ChunkTask, Done
 from sweep.errors import Interrupted, StoreError, TimeUsedUp, WorkerDied
@@ -159,7 +159,6 @@ def run(
             chunk_size = None if force else _within_budget(model, jobs, lambda k, of: phases.say("planning", k, of))
         default = Path("results", *(["smoke"] if smoke else []), model.name, files.DESIGNS)
         folder = default if out is None else files.located(out)
-        refuse_or_clear_older(folder, force)
         said = command(model, folder, smoke, accuracy, certify)
         with locked(folder), logged(folder, said, jobs, backend) as end, at_work(place):
             computed = _sweep(model, folder, jobs, place, force, chunk_size, progress)

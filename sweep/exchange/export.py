@@ -7,14 +7,14 @@ from __future__ import annotations
 
 import csv
 import math
-import os
 from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from sweep.errors import InputError, StoreError
+from sweep.dataset.files import replacing
+from sweep.errors import InputError
 from sweep.evaluation.angles import AngleUnit, grid_in_radians, in_radians
 from sweep.evaluation.curves import motion_curves
 from sweep.evaluation.poses import evaluate
@@ -170,14 +170,8 @@ def export(
     design = in_radians(find_family(mechanism), design, angles)
     phi = float(np.asarray(grid_in_radians("phi", "rad", phi, angles)))
     write = _writer(kind, mechanism, design, phi, poses, unit, speed)
-    partial = target.with_name(f"_tmp-{os.getpid()}-{target.name}")
-    try:
+    with replacing(target) as partial:
         write(partial)
-        partial.replace(target)
-    except OSError as error:
-        raise StoreError(f"{target}: cannot be written: {error}") from error
-    finally:
-        partial.unlink(missing_ok=True)
     return target
 
 

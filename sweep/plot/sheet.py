@@ -10,7 +10,8 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from sweep.errors import InputError, StoreError
+from sweep.dataset.files import unwritable
+from sweep.errors import InputError
 from sweep.evaluation.cyclogram import cyclogram, table_in_degrees
 from sweep.exchange.dxf import add_tables
 from sweep.exchange.export import export
@@ -70,14 +71,12 @@ def write_sheet(folder: str | Path, design: str | int | None, path: str | Path, 
     if not exists(parts):
         raise InputError("mechanism", found.family.name, "one whose joints are known, docs/frames.md", "export")
     tables = tables_of(as_result(data, row_of(data.study, found.design)), pose(found.family, found.design, phi))
-    try:
+    with unwritable(target):
         if target.suffix.lower() == ".dxf":
             export(found.family, found.design, target, "dxf", phi=phi, angles="rad")
             add_tables(target, tables)
         else:
             _draw(data, parts, tables, target)
-    except OSError as error:
-        raise StoreError(f"{target}: cannot be written: {error}") from error
     return target
 
 

@@ -10,8 +10,8 @@ from typing import TYPE_CHECKING, Any
 
 from kernels import status as codes
 from sweep.dataset.chunk_files import ROWS_PER_BATCH, batches
-from sweep.dataset.files import OF_OPTIMUM, PARETO, beside, is_older, located, write_atomically
-from sweep.errors import InputError, StoreError
+from sweep.dataset.files import OF_OPTIMUM, PARETO, beside, located, replacing, unwritable, write_atomically
+from sweep.errors import InputError
 from sweep.evaluation.cyclogram import cyclogram, table_in_degrees
 from sweep.evaluation.statuses import meaning
 from sweep.families.machines.machine import Machine
@@ -72,7 +72,7 @@ def write_report(folder: str | Path, out: str | Path | None = None, say: Say = u
         if the report cannot be written.
     """
     place = located(folder)
-    return _write(place, _default(place) if out is None else Path(out), say)
+    return _write(place, beside(place) if out is None else Path(out), say)
 
 
 def _write(folder: Path, out: Path, say: Say) -> Path:
@@ -80,7 +80,7 @@ def _write(folder: Path, out: Path, say: Say) -> Path:
     say("report", 0, STEPS, "steps")
     data, found, cells = gather(folder)
     several = groups(data)
-    try:
+    with unwritable(f"report {out}"):
         out.mkdir(parents=True, exist_ok=True)
         say("report", 1, STEPS, "steps")
         figures = draw(data, found, cells, out / "figures")
@@ -129,8 +129,6 @@ def _write(folder: Path, out: Path, say: Say) -> Path:
         )
         write_atomically(out / "report.html", text.encode())
         say("report", STEPS, STEPS, "steps")
-    except OSError as error:
-        raise StoreError(f"report {out}: cannot be written: {error}") from error
     return out / "report.html"
 
 
@@ -222,8 +220,7 @@ def write_survivors(parts: Sequence[Path], target: Path) -> None:
     if not parts:
         return
     schema = pq.read_schema(parts[0])
-    partial = target.with_name(f"_tmp-{target.name}")
-    with pq.ParquetWriter(partial, schema, compression="zstd") as writer:
+    with replacing(target) as partial, pq.ParquetWriter(partial, schema, compression="zstd") as writer:
         kept: list[pa.RecordBatch] = []
         for batch in batches(parts):
             kept.append(batch.filter(pc.equal(batch["status"], 0)))
@@ -231,11 +228,6 @@ def write_survivors(parts: Sequence[Path], target: Path) -> None:
                 writer.write_table(pa.Table.from_batches(kept, schema))
                 kept = []
         writer.write_table(pa.Table.from_batches(kept, schema))
-    partial.replace(target)
-
-
-def _default(folder: Path) -> Path:
-    return folder / "_report" if is_older(folder) else beside(folder)
 
 
 def judged(data: Dataset, rows: Sequence[Row], names: Sequence[str]) -> dict[str, Any]:
@@ -301,10 +293,8 @@ def write_comparison(folders: Sequence[Path], out: Path) -> Path:
         scripts=scripts_of(compared["motion"]),
         **{key: compared[key] for key in ("outputs", "limits", "status")},
     )
-    try:
+    with unwritable(f"report {out}"):
         out.mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        raise StoreError(f"report {out}: cannot be written: {error}") from error
     write_atomically(out / COMPARISON, text.encode())
     return out / COMPARISON
 

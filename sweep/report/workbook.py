@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-import os
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from sweep.dataset.files import replacing
 from sweep.dataset.reading import best
 from sweep.dataset.store import load
-from sweep.errors import InputError, StoreError
+from sweep.errors import InputError
 from sweep.report.dataset import Dataset, read_dataset
 from sweep.report.quantities import quantity
 
@@ -47,29 +47,20 @@ def write_workbook(folder: str | Path, path: str | Path) -> Path:
     data = read_dataset(Path(folder))
     sheets = {"designs": _designs(data), "optimum": data.optima, "curves": data.curves}
     kept = {name: frame for name, frame in sheets.items() if frame is not None}
-    partial = target.with_name(f"_tmp-{os.getpid()}-{target.name}")
+    written = {name: _headed(data, frame) for name, frame in kept.items()} | {"definitions": _definitions(data, kept)}
     try:
         import openpyxl
-
-        book = openpyxl.Workbook(write_only=True)
-        for name, frame in [
-            *((n, _headed(data, f)) for n, f in kept.items()),
-            ("definitions", _definitions(data, kept)),
-        ]:
-            sheet = book.create_sheet(name)
-            sheet.freeze_panes = "B2"
-            for row in [list(frame), *frame.astype(object).where(frame.notna(), None).to_numpy().tolist()]:
-                sheet.append(row)
-        book.save(partial)
-        partial.replace(target)
     except ModuleNotFoundError as error:
-        raise InputError(
-            "format", "xlsx", "pip install 'linksweep[excel]' first: openpyxl is missing", "export"
-        ) from error
-    except OSError as error:
-        raise StoreError(f"{target}: cannot be written: {error}") from error
-    finally:
-        partial.unlink(missing_ok=True)
+        allowed = "pip install 'linksweep[excel]' first: openpyxl is missing"
+        raise InputError("format", "xlsx", allowed, "export") from error
+    book = openpyxl.Workbook(write_only=True)
+    for name, frame in written.items():
+        sheet = book.create_sheet(name)
+        sheet.freeze_panes = "B2"
+        for row in [list(frame), *frame.astype(object).where(frame.notna(), None).to_numpy().tolist()]:
+            sheet.append(row)
+    with replacing(target) as partial:
+        book.save(partial)
     return target
 
 

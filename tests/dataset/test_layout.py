@@ -110,31 +110,17 @@ def test_a_link_to_the_folder_is_the_folder(made: Path, copy: Path, tmp_path: Pa
     assert beside(tmp_path / "link") == copy.parent.resolve() and sweep.is_complete(tmp_path / "link")
 
 
-def test_dataset_of_an_earlier_version_is_read_and_reported(made: Path, tmp_path: Path) -> None:
-    old = older(made, tmp_path / "old")
-    pd.testing.assert_frame_equal(sweep.load(old), sweep.load(made))
-    assert sweep.is_complete(old)
-    found = sweep.compare(old, made)
-    assert not found.rows_changed and not found.values_changed
-    done = CliRunner().invoke(main, ["report", str(old)])
-    assert done.exit_code == 0 and (old / "_report" / "report.html").is_file(), done.output
-    chunk_files.parts(old)[1].path.unlink()
-    with pytest.warns(IncompleteWarning, match="incomplete, 1 of"):
-        sweep.load(old)
-
-
-def test_dataset_of_an_earlier_version_is_not_continued_but_set_aside_by_force(
+def test_dataset_of_an_earlier_version_is_read_and_refused_with_a_clear_word(
     study: Study, made: Path, tmp_path: Path
 ) -> None:
     old = older(made, tmp_path / "designs")
-    files = {path.name for path in old.iterdir()} - {LOCK}
-    with pytest.raises(InputError, match="earlier version"):
+    pd.testing.assert_frame_equal(sweep.load(old), sweep.load(made))
+    before = {path.name for path in old.iterdir()}
+    with pytest.raises(InputError, match="take another folder with --out"):
         sweep.run(study, old, jobs=1)
-    assert {path.name for path in old.iterdir()} - {LOCK} == files
-    sweep.run(study, old, jobs=1, force=True)
-    assert sweep.is_complete(old) and {path.name.split("-")[0] for path in old.iterdir()} == {"part"}
-    (aside,) = (tmp_path / OLD).iterdir()
-    assert {path.name for path in aside.iterdir()} == files
+    assert {path.name for path in old.iterdir()} == before
+    done = CliRunner().invoke(main, ["report", str(old)])
+    assert done.exit_code == 2 and "a dataset folder, with a readable _plan.json" in done.output
 
 
 def test_forced_new_data_do_not_keep_the_old_report(study: Study, copy: Path, tmp_path: Path) -> None:
