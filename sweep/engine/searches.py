@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import signal
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -15,7 +16,7 @@ from sweep.dataset.files import TABLES, altered, digests, metadata
 from sweep.errors import Interrupted, SearchCutShort
 from sweep.jobs.executors import Executor, Here, executor
 from sweep.jobs.progress import Phases, Progress
-from sweep.jobs.signals import stop_on_signal
+from sweep.jobs.signals import Stop, stop_on_signal
 from sweep.proof import Proof, known_proof, prove_study
 from sweep.proof.question import question_of
 from sweep.proof.rounds import Cores
@@ -51,6 +52,17 @@ def optimum_key(study: Study, note: Mapping[str, Any]) -> str:
     return f"{note['identity']}-{study.fingerprint[:12]}-{plans.optimiser_hash()}"
 
 
+@contextmanager
+def _stoppable(folder: Path, words: str) -> Iterator[Stop]:
+    """Let a signal set the flag within this context, and say what it has stopped."""
+    with stop_on_signal() as stop:
+        try:
+            yield stop
+        except KeyboardInterrupt:
+            number = stop.signal_number or signal.SIGINT
+            raise Interrupted(number, f"{folder}: stopped by signal {number} while {words}") from None
+
+
 def _optimise(study: Study, folder: Path, jobs: int, progress: bool) -> None:
     """Run the optimiser unless its result for these very sources is there already, whole."""
     note = files.read_plan(folder) or {}
@@ -63,13 +75,8 @@ def _optimise(study: Study, folder: Path, jobs: int, progress: bool) -> None:
         return
     assert study.optimise is not None
     files.write_plan(folder, note | {"optimised": None})
-    with stop_on_signal() as stop, Phases(progress) as phases:
-        try:
-            optimise.optimise_study(study, folder, lambda: bool(stop), jobs, phases.say, key)
-        except KeyboardInterrupt:
-            number = stop.signal_number or signal.SIGINT
-            text = f"{folder}: stopped by signal {number} while optimising; run again for the whole search"
-            raise Interrupted(number, text) from None
+    with _stoppable(folder, "optimising; run again for the whole search") as stop, Phases(progress) as phases:
+        optimise.optimise_study(study, folder, lambda: bool(stop), jobs, phases.say, key)
     files.write_plan(folder, note | {"optimised": key, TABLES: digests(place, files.OF_OPTIMUM)})
 
 
@@ -96,13 +103,8 @@ def _front(study: Study, folder: Path, jobs: int, progress: bool) -> None:
     if files.PARETO in known and (damaged or metadata(place / files.PARETO).get(b"key") != key.encode()):
         del known[files.PARETO]  # it belongs to a finished front: the new one grows step by step
         files.write_plan(folder, note | {TABLES: known})
-    with stop_on_signal() as stop, Phases(progress) as phases:
-        try:
-            optimise.front_study(study, folder, key, lambda: bool(stop), jobs, phases.say)
-        except KeyboardInterrupt:
-            number = stop.signal_number or signal.SIGINT
-            text = f"{folder}: stopped by signal {number} while searching the front; run again to continue"
-            raise Interrupted(number, text) from None
+    with _stoppable(folder, "searching the front; run again to continue") as stop, Phases(progress) as phases:
+        optimise.front_study(study, folder, key, lambda: bool(stop), jobs, phases.say)
     if digests(place, [files.PARETO]).items() - known.items():
         files.write_plan(folder, note | {TABLES: known | digests(place, [files.PARETO])})
 
@@ -152,16 +154,12 @@ def _proven(study: Study, folder: Path, jobs: int, backend: str, progress: bool)
     """Judge the boxes, on as many cores as there are workers."""
     assert study.optimise is not None and study.optimise.prove is not None
     boxes = study.optimise.prove.boxes
-    with stop_on_signal() as stop, Progress("proof", boxes, 0, progress, unit="boxes") as shown:
+    words = "proving; run again to continue"
+    with _stoppable(folder, words) as stop, Progress("proof", boxes, 0, progress, unit="boxes") as shown:
 
         def tell(judged: int, expected: int) -> None:
             shown.expect(expected)
             shown.advance(judged - shown.done)
 
         where: Executor = Here() if jobs == 1 else executor(backend, jobs)
-        try:
-            return prove_study(study, folder, Cores(where, jobs, stop), tell)
-        except KeyboardInterrupt:
-            number = stop.signal_number or signal.SIGINT
-            text = f"{folder}: stopped by signal {number} while proving; run again to continue"
-            raise Interrupted(number, text) from None
+        return prove_study(study, folder, Cores(where, jobs, stop), tell)

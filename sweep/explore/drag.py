@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 
 import numpy as np
+from scipy.optimize import least_squares
 
 from sweep.errors import InputError
 from sweep.evaluation.joints import Part, parts
@@ -13,7 +14,8 @@ from sweep.explore.hand import Hand
 from sweep.families.base import Array, Turn
 
 STEP = 1e-6  # of differences: a part of the mechanism's size, or rad
-ROUNDS, HALVINGS = 3, 5
+ROUNDS = 8
+LEAST = 1e-3  # of its length a dimension keeps that has to be positive
 STAY = 0.05  # weight of the joints that should stay beside the one that is dragged
 LITTLE = 1e-4  # weight of a change of a dimension by the mechanism's size
 
@@ -59,21 +61,13 @@ def dragged(
     goal = flat.copy()
     goal[names.index(place)] = to
 
-    def off(x: Array) -> Array:
-        return (weight[:, None] * (_flat(joints(x)) - goal) / size).ravel()
+    def off(changes: Array) -> Array:
+        apart = weight[:, None] * (_flat(joints(x + changes * scale)) - goal) / size
+        return np.append(apart.ravel(), LITTLE * changes)
 
-    here = off(x)
-    for _ in range(ROUNDS):
-        slopes = np.column_stack([(off(x + STEP * scale * e) - here) / STEP for e in np.eye(x.size)])
-        table = np.vstack([slopes, LITTLE * np.eye(x.size)])
-        step = np.linalg.lstsq(table, np.append(-here, np.zeros(x.size)), rcond=None)[0] * scale
-        for half in range(HALVINGS):
-            tried = x + 0.5**half * step
-            if (tried[positive] > 0.0).all() and np.linalg.norm(after := off(tried)) < np.linalg.norm(here):
-                x, here = tried, after
-                break
-        else:
-            break
+    low = np.where(positive, -(1.0 - LEAST) * x / scale, -np.inf)
+    changes = least_squares(off, np.zeros(x.size), bounds=(low, np.inf), diff_step=STEP, max_nfev=ROUNDS).x
+    x = x + changes * scale
     return dict(zip(free, x[:-1].tolist(), strict=True)), float(x[-1])
 
 

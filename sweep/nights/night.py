@@ -20,7 +20,6 @@ from sweep.nights.archive import (
     StudyRecord,
     append_history,
     read_history,
-    read_night,
     write_night,
 )
 from sweep.nights.carry import REPORT, Carried, carry
@@ -185,7 +184,7 @@ class _Night:
         reported = (target / REPORT).is_file()
         designs = target / files.DESIGNS
         chunks = len(chunk_files.parts(designs))
-        values, units = self.figures(study, target, carried)
+        values, units = figures(study, designs)
         base = self.base(study.name)
         found = Changes(0, ())
         if base is not None and not (carried and carried.whole and carried.night == base.name):
@@ -208,16 +207,6 @@ class _Night:
             report=reported,
             message="; ".join(filter(None, [cut, "" if reported else f"no report: {message}"])),
         )
-
-    def figures(
-        self, study: Study, target: Path, carried: Carried | None
-    ) -> tuple[Mapping[str, float], Mapping[str, str]]:
-        """Return headline figures; those of linked data are known."""
-        if carried and carried.whole:
-            known = read_night(self.settings.into / carried.night)
-            if known is not None and study.name in known.studies and known.studies[study.name].figures:
-                return known.studies[study.name].figures, known.studies[study.name].units
-        return figures(study, target / files.DESIGNS)
 
     def base(self, name: str) -> Path | None:
         """Return the last good night that has this study whole."""
