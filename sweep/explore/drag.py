@@ -66,7 +66,9 @@ def dragged(
         return np.append(apart.ravel(), LITTLE * changes)
 
     low = np.where(positive, -(1.0 - LEAST) * x / scale, -np.inf)
-    changes = least_squares(off, np.zeros(x.size), bounds=(low, np.inf), diff_step=STEP, max_nfev=ROUNDS).x
+    changes = least_squares(
+        off, np.zeros(x.size), bounds=(low, np.inf), diff_step=np.full(x.size, STEP), max_nfev=ROUNDS
+    ).x
     x = x + changes * scale
     return dict(zip(free, x[:-1].tolist(), strict=True)), float(x[-1])
 

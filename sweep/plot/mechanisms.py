@@ -23,7 +23,7 @@ from sweep.families.base import Array, Family, Interval
 from sweep.plot.drawing import COLOURS, mechanism_figure
 from sweep.quantities.units import speed_given
 from sweep.report.figures import LIMIT, OPTIMUM, QUIET, REFERENCE, WIDTH, crank_axis, house_style, new_figure
-from sweep.report.live import is_angle, turns_fully
+from sweep.report.live import lowest
 from sweep.report.quantities import quantity
 
 if TYPE_CHECKING:
@@ -155,7 +155,7 @@ def _panels(
         for axes in every[len(names) :]:
             axes.set_axis_off()
         given = every[: len(names)]
-    lowest = "" if any(rotates(turn, family.position) for turn in turns.values()) else " from the lowest position"
+    free = any(lowest(family.position, turn[family.position].to_numpy(float))[1] for turn in turns.values())
     for axes, name in zip(given, names, strict=True):
         shown = quantity(name, family.pose_output[name].unit.replace("length", unit))
         for (design, turn), colour in zip(turns.items(), cycle(COLOURS)):
@@ -167,7 +167,7 @@ def _panels(
             scale = shown.speed_scale * speed**shown.order / shown.factor
             twin = axes.secondary_yaxis("right", functions=(lambda v, k=scale: v * k, lambda v, k=scale: v / k))
             twin.set_ylabel(shown.speed_unit)
-        crank_axis(axes, f"crank angle{lowest} [°]")
+        crank_axis(axes, "crank angle [°]" if free else "crank angle from the lowest position [°]")
     if len(turns) > 1:
         given[0].legend()
     return np.array(given, dtype=object)
@@ -176,25 +176,15 @@ def _panels(
 def aligned_turn(turn: pd.DataFrame, name: str, position: str) -> tuple[Array, Array]:
     """One closed turn that starts where the position is smallest; the position itself counts from there."""
     phi, values = turn["phi"].to_numpy(float), turn[name].to_numpy(float)
-    path = turn[position].to_numpy(float)
-    if is_angle(position):
-        path = np.unwrap(path)
+    path, free, start = lowest(position, turn[position].to_numpy(float))
     if name == position:
         values = path
-    if rotates(turn, position):
+    if free:
         full = np.copysign(2.0 * np.pi, path[-1] - path[0]) if name == position else 0.0
         return np.append(phi, 2.0 * np.pi), np.append(values, values[0] + full)
-    start = int(np.nanargmin(path)) if np.isfinite(path).any() else 0
     order = np.r_[start : phi.size, 0:start]
     values = values[order] - (values[start] if name == position else 0.0)
     return np.append(np.mod(phi[order] - phi[start], 2.0 * np.pi), 2.0 * np.pi), np.append(values, values[0])
-
-
-def rotates(turn: pd.DataFrame, position: str) -> bool:
-    """Whether the follower itself turns fully, so that it has no lowest position."""
-    if not is_angle(position):
-        return False
-    return turns_fully(np.unwrap(turn[position].to_numpy(float)))
 
 
 def cyclogram(

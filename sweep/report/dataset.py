@@ -137,8 +137,8 @@ class Dataset:
         """
         if self.study.pareto is not None:
             return None if self.study.pareto.at_least else self.study.pareto.output
-        objective = self.objective
-        others = [name for name in self.study.want if objective is None or name != objective.name]
+        objective = self.study.objective
+        others = [name for name in self.study.want if objective is None or name != objective.output]
         ranked = [name for name in others if "dev" in stem(name) and not is_place(name)]
         ranked += [name for name in others if is_largest(name, magnitude=True)]
         ranked += [name for name in others if is_largest(name)]

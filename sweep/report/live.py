@@ -80,14 +80,18 @@ def in_window(path: Array, window: tuple[float, float]) -> NDArray[np.bool_]:
     return (fraction >= window[0]) & (fraction <= window[1])
 
 
-def is_angle(position: str) -> bool:
-    """Whether a position is a follower's angle, known up to full turns."""
-    return stem(position) == "psi"
+def lowest(position: str, path: Array) -> tuple[Array, bool, int]:
+    """Find from where the curves of a follower begin: at its lowest position, unless it turns fully.
 
-
-def turns_fully(path: Array) -> bool:
-    """Whether an unwrapped angle over one turn of the crank makes a turn itself."""
-    return bool(abs(path[-1] - path[0]) > 0.9 * 2.0 * np.pi)
+    Returns
+    -------
+    path, bool, int
+        without the jumps of an angle; whether the follower makes a turn itself; the pose, 0 of what makes one.
+    """
+    angle = stem(position) == "psi"
+    path = np.unwrap(path) if angle else path
+    free = angle and bool(abs(path[-1] - path[0]) > 0.9 * 2.0 * np.pi)
+    return path, free, int(np.nanargmin(path)) if not free and np.isfinite(path).any() else 0
 
 
 def limit_values(name: str, limits: tuple[Limit, ...]) -> list[float]:
@@ -160,15 +164,12 @@ def _motion(data: Dataset, shown: Shown, names: list[str]) -> Motion:
     phi = equal_steps(family.domain, matrix, POSES)
     found = family.poses(matrix, Angles.of(phi[None, :]), frozenset([*names, family.position]))
     path = np.asarray(found[family.position][0], np.float64)
-    closed = not isinstance(family.domain, Interval)
-    if closed and is_angle(family.position):
-        path = np.unwrap(path)
-    free = closed and is_angle(family.position) and turns_fully(path)
-    counted = closed and not free and bool(np.isfinite(path).any())
-    start = int(np.nanargmin(path)) if counted else 0
+    closed, free, start = not isinstance(family.domain, Interval), False, 0
+    if closed:
+        path, free, start = lowest(family.position, path)
     order = np.roll(np.arange(POSES), -start)
     curves = {name: np.asarray(found[name][0], np.float64)[order] for name in names}
-    curves[family.position] = path[order] - (path[start] if counted else 0.0)
+    curves[family.position] = path[order] - (path[start] if closed and not free else 0.0)
     window = data.study.window
     inside = np.zeros(POSES, np.bool_) if window is None else in_window(curves[family.position], window)
     return Motion(shown, phi[order], free, curves, inside, _placed(family, design, phi, order))

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 from pathlib import Path
-from types import SimpleNamespace
 
 import numpy as np
 import pandas as pd
@@ -18,6 +18,7 @@ from sweep.evaluation.summaries import design_outputs
 from sweep.families.names import negative
 from sweep.optimise.manufacture.tolerance import deviating
 from sweep.plot.datasets import draw_histogram
+from sweep.report.dataset import without_rows
 from sweep.report.figures import LIMIT
 from sweep.report.made import TELLING, histogram, made, made_sentence
 from sweep.report.optima import groups, optima, optima_sentence, shown_designs
@@ -47,9 +48,7 @@ def data_of(*rows, **tables):
     frame = pd.DataFrame(rows)
     if study.objective.output not in frame:
         frame[study.objective.output] = -frame["max_abs_d2psi"]
-    optimum = frame[frame["role"] == "optimum"].iloc[0].to_dict()
-    own = {"folder": Path("nowhere"), "optima": frame, "optimum": optimum, "units": {"least_link": "mm"}}
-    return SimpleNamespace(study=study, reference=None, **own)
+    return replace(without_rows(study), folder=Path("nowhere"), optima=frame, units={"least_link": "mm"})
 
 
 def test_starts_that_ended_alike_or_in_a_mirror_are_one_optimum() -> None:
@@ -81,7 +80,6 @@ def test_optima_of_what_is_made_large_come_largest_first() -> None:
 def test_designs_to_look_at_are_the_cards_in_the_same_order() -> None:
     large = DATA | {"objective": {"maximise": "max_abs_d2psi"}}
     data = data_of(row("optimum", 0.9), row(value=0.5, b=60.0), row(value=0.7, c=25.0), row(value=0.5, b=60.1), **large)
-    data.result, data.result_name, data.front, data.reference = data.optimum, "optimum", None, None
     found = groups(data)
     shown = shown_designs(data, found)
     assert [one.name for one in shown] == [group.title(k) for k, group in enumerate(found)]
@@ -178,6 +176,6 @@ def test_histogram_of_any_output_is_to_be_had() -> None:
 def test_no_yield_without_tolerances_or_limits(missing) -> None:
     data = DATA | {missing: {}} if missing == "limits" else {k: v for k, v in DATA.items() if k != missing}
     study = study_from_data(data, "study.toml")
-    assert made(SimpleNamespace(study=study, optimum=row("optimum"), units={}, folder=Path("nowhere"))) is None
+    assert made(replace(without_rows(study), folder=Path("nowhere"), optima=pd.DataFrame([row("optimum")]))) is None
     assert made_sentence(None, "x") == ""
     assert np.isnan(row()["yield"])

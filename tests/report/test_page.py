@@ -17,11 +17,11 @@ import sweep
 from sweep import run
 from sweep.dataset import files
 from sweep.errors import InputError, StoreError
-from sweep.plot.mechanisms import aligned_turn, rotates
+from sweep.plot.mechanisms import aligned_turn
 from sweep.report.answer import answer, searched
 from sweep.report.dataset import gather, marked
 from sweep.report.figures import house_style
-from sweep.report.live import in_window
+from sweep.report.live import in_window, lowest
 from sweep.report.maps import design_map, map_figure, overlays
 from sweep.report.page import write_report
 from sweep.report.quantities import quantity
@@ -259,11 +259,11 @@ def test_axes_of_the_map_are_what_the_sweep_itself_set() -> None:
 def test_follower_that_turns_is_not_cut_at_its_lowest_position() -> None:
     phi = np.arange(72) * (2.0 * np.pi / 72)
     turning = pd.DataFrame({"phi": phi, "psi": np.angle(np.exp(1j * (phi + 0.3 * np.sin(phi))))})
-    assert rotates(turning, "psi")
+    assert lowest("psi", turning["psi"].to_numpy())[1]
     angle, psi = aligned_turn(turning, "psi", "psi")
     np.testing.assert_allclose(psi, angle + 0.3 * np.sin(angle), atol=1e-12)
     rocking = pd.DataFrame({"phi": phi, "psi": np.angle(np.exp(1j * (3.0 - np.cos(phi - 1.0))))})
-    assert not rotates(rocking, "psi")
+    assert not lowest("psi", rocking["psi"].to_numpy())[1]
     angle, psi = aligned_turn(rocking, "psi", "psi")
     assert psi[0] == psi.min() == 0.0
     np.testing.assert_allclose(np.ptp(psi), 2.0, atol=2e-3)

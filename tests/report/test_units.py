@@ -3,14 +3,13 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from types import SimpleNamespace
 
 import numpy as np
 import pandas as pd
 import pytest
 
 from kernels import status as codes
-from sweep.report.dataset import gather
+from sweep.report.dataset import Dataset, gather, without_rows
 from sweep.report.front import front_rows
 from sweep.report.maps import trade_off
 from sweep.report.page import write_report
@@ -34,14 +33,15 @@ def test_masses_inertias_and_lives_are_in_g_kg_mm2_and_hours(name, unit, stored,
     assert quantity(name, unit).show(stored) == words
 
 
-def front_of(side: str, status: int = codes.OK) -> SimpleNamespace:
+def front_of(side: str, status: int = codes.OK) -> Dataset:
     pareto = {"output": "max_pressure_angle1", side: {"values": [30.0, 40.0], "unit": "deg"}}
     study = study_from_data(DATA | {"pareto": pareto}, "study.toml")
     point = {"bound": np.radians(40.0), "max_abs_d2s": 8.0, "max_pressure_angle1": np.radians(40.0), "status": status}
     point |= {"relaxation": "max_pressure_angle1 by 0.010098; stroke by 0.2", "active": "", "kkt_residual": 0.0}
     units = {"max_pressure_angle1": "rad", "stroke": "mm", "max_abs_d2s": "mm"}
     front = pd.DataFrame([point | {"ended": "converged"}])
-    return SimpleNamespace(study=study, front=front, optimum={"max_abs_d2s": 8.0}, units=units)
+    optima = pd.DataFrame([{"role": "optimum", "max_abs_d2s": 8.0}])
+    return replace(without_rows(study), front=front, optima=optima, units=units)
 
 
 def test_what_gives_way_is_said_in_the_unit_of_its_table() -> None:
