@@ -17,7 +17,6 @@ import numpy as np
 from kernels.cache_folder import cache_root
 from sweep.cli.families import main_outputs
 from sweep.engine.run import KernelStep, run
-from sweep.errors import Interrupted
 from sweep.evaluation.summaries import design_outputs, routes
 from sweep.families import family as find_family
 from sweep.families.base import DEFAULT_TARGET, Accuracy, Angles, Family, March, equal_steps
@@ -121,8 +120,7 @@ def compile_parts(parts: Sequence[Part], jobs: int, stop: Stop, advance: Callabl
     place = for_tasks(executor("loky", jobs), len(parts))
     for _ in place.outcomes(Compile(tuple(parts)), iter(range(len(parts))), jobs, stop):
         advance(1)
-    if stop.signal_number is not None:
-        raise Interrupted(stop.signal_number, "stopped by a signal; what is compiled is kept, run again to continue")
+    stop.raise_if_signalled("compiling", "what is compiled is")
 
 
 @click.command()

@@ -10,7 +10,7 @@ from sweep.cli.options import BACKEND, JOBS
 from sweep.errors import InputError
 from sweep.nights import Settings
 from sweep.nights import nightly as run_night
-from sweep.quantities.units import factor, split
+from sweep.quantities.units import read
 
 
 @click.command()
@@ -45,8 +45,7 @@ def nightly(
     study was slower twice in a row, 74 if the disk refused; with a study's own code if its run failed.
     """
     try:
-        number, unit = split(budget, "s")
-        seconds = number * factor(unit, "s")
+        seconds = read(budget, "s")
     except ValueError as error:
         raise InputError("--budget", budget, f"a time such as 6h or 90 min ({error})", "nightly") from None
     settings = Settings(into, seconds, keep, jobs, backend, smoke, on_change)

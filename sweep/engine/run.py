@@ -31,7 +31,7 @@ from sweep.engine.estimate import check_budget, estimate
 from sweep.engine.opening import is_part, known_folder, open_plan, part_range, plan_note
 from sweep.engine.searches import refuse_unprovable, search, stages_of
 from sweep.engine.worker import ChunkTask, Done
-from sweep.errors import Interrupted, StoreError, TimeUsedUp, WorkerDied
+from sweep.errors import StoreError, TimeUsedUp, WorkerDied
 from sweep.jobs.executors import Executor, at_work, executor, for_tasks
 from sweep.jobs.progress import Phases, Progress, stages
 from sweep.jobs.signals import Stop, stop_on_signal
@@ -214,10 +214,7 @@ def _compile(study: Study, jobs: int, phases: Phases) -> None:
                 ready = executor("loky", jobs).outcomes(step, reversed(range(k + 1, count)), jobs, stop)
                 for done, _ in enumerate(ready, k + 2):
                     phases.say("compiling", done, count)
-            if stop.signal_number is not None:
-                raise Interrupted(
-                    stop.signal_number, "stopped by a signal; what is compiled is kept, run again to continue"
-                )
+            stop.raise_if_signalled("compiling", "what is compiled is")
             jobs = 1  # the rest is loaded
 
 
@@ -240,7 +237,7 @@ def _sweep(
         plan: Plan | None = None
         with stop.raising():  # a pilot may have to compile
             plan = open_plan(study, folder, force, chunk_size)
-        _raise_if_signalled(stop, folder)
+        stop.raise_if_signalled(folder, "finished chunks are")
         assert plan is not None
         for _ in range(ROUNDS + 1):
             finished = store.finished_chunks(folder, plan, lambda done, of: phases.say(reading, done, of, "chunks"))
@@ -252,7 +249,7 @@ def _sweep(
             computed += _compute(task, missing, jobs, place, stop, force, progress)
         else:
             raise StoreError(f"{folder}: somebody removes or damages chunks while this run writes them; run again")
-        _raise_if_signalled(stop, folder)
+        stop.raise_if_signalled(folder, "finished chunks are")
     counts, missed = store.totals(folder)
     note = plan_note(study, folder, plan) | {"counts": counts, "missed": missed, "complete": not is_part(folder)}
     files.write_plan(folder, note)
@@ -277,7 +274,7 @@ def _compute(
             shown.advance(result.designs)
     if failure is not None:
         raise failure
-    _raise_if_signalled(stop, folder)
+    stop.raise_if_signalled(folder, "finished chunks are")
     if results < len(missing):
         left = f"{len(missing) - results} of {plan.chunks} chunks to go"
         way_out = "finished chunks are kept, run again to continue, or force it to have no limit"
@@ -296,11 +293,5 @@ def _results(
     try:
         yield from for_tasks(place, len(missing)).outcomes(task, todo, jobs, stop)
     except WorkerDied as error:
-        _raise_if_signalled(stop, task.folder)
+        stop.raise_if_signalled(task.folder, "finished chunks are")
         raise WorkerDied(f"{task.folder}: {error}; finished chunks are kept, run again to continue") from error
-
-
-def _raise_if_signalled(stop: Stop, folder: Path) -> None:
-    if stop.signal_number is not None:
-        text = f"{folder}: stopped by signal {stop.signal_number}; finished chunks are kept, run again to continue"
-        raise Interrupted(stop.signal_number, text)

@@ -15,7 +15,7 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
 from types import FrameType
 
-from sweep.errors import LinksweepError
+from sweep.errors import Interrupted, LinksweepError
 
 SIGNALS = (signal.SIGINT, signal.SIGTERM)
 
@@ -56,6 +56,12 @@ class Stop:
         if self._raises:
             sys.unraisablehook = _say_nothing
             raise KeyboardInterrupt
+
+    def raise_if_signalled(self, what: object, kept: str) -> None:
+        """Raise :class:`Interrupted` if a signal has set the flag; the words say what it stopped, and what is kept."""
+        if self.signal_number is not None:
+            text = f"{what}: stopped by signal {self.signal_number}; {kept} kept, run again to continue"
+            raise Interrupted(self.signal_number, text)
 
     @contextmanager
     def raising(self) -> Iterator[None]:

@@ -129,6 +129,18 @@ def split(text: str, internal: str) -> tuple[float, str]:
     return float(match[1]), match[2]
 
 
+def read(text: str, internal: str) -> float:
+    """Read a text such as "7000 rpm" in the internal unit.
+
+    Raises
+    ------
+    UnitFault
+        as of :func:`split`, or for a unit of another kind.
+    """
+    number, unit = split(text, internal)
+    return number * factor(unit, internal)
+
+
 def _parsed(text: str) -> tuple[float, Counter[str]]:
     """Return a product of known symbols with small whole exponents: its size in base units, and their powers."""
     parts = re.split(r"\s*([*/])\s*", text.strip())

@@ -12,6 +12,7 @@ from kernels import status as codes
 from sweep.chunks.plan import PARAMETER_UNITS
 from sweep.dataset import chunk_files, files, store
 from sweep.dataset.files import check_tables
+from sweep.dataset.verification import study_of
 from sweep.errors import InputError
 from sweep.evaluation.statuses import meaning
 from sweep.evaluation.summaries import design_outputs, output
@@ -21,7 +22,6 @@ from sweep.families.names import is_largest, is_place, stem
 from sweep.optimise import Survey, read_survey
 from sweep.report.quantities import Quantity, quantity
 from sweep.report.scan import Cells, Scan, divided_axes, scan
-from sweep.study.load import study_from_data
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -225,12 +225,6 @@ def _absent(study: Study, known: Container[str]) -> dict[str, float]:
     # A dataset without a choice that later versions have is one in which it was not taken.
     defaults = {p.name: 0.0 if p.unless else p.default for p in study.family.parameters if p.name not in known}
     return {name: value for name, value in defaults.items() if value is not None}
-
-
-def study_of(plan: Mapping[str, Any], folder: Path) -> Study:
-    """Study a dataset answers, from its plan; its title and question stand there under ``about``."""
-    about = plan.get("about", {"name": plan["name"]})
-    return study_from_data({**plan["data"], "study": about}, files.beside(folder) / files.PLAN)
 
 
 def field_metadata(files: Sequence[Path]) -> tuple[dict[str, str], dict[str, str]]:

@@ -72,8 +72,7 @@ class Faults:
     def number(self, text: str, internal: str, key: Key) -> float | None:
         """Read a text such as "7000 rpm" in the internal unit; None with a fault for what is no such quantity."""
         try:
-            number, unit = units.split(text, internal)
-            return number * units.factor(unit, internal)
+            return units.read(text, internal)
         except units.UnitFault as fault:
             self.value(key, text, str(fault))
             return None
@@ -162,8 +161,7 @@ def quantity(internal: str, allowed: Callable[[float], bool] = lambda x: True, k
         if not isinstance(value, str):
             raise ValueError("no text")
         try:
-            number, unit = units.split(value, internal)
-            number *= units.factor(unit, internal)
+            number = units.read(value, internal)
         except units.UnitFault as fault:
             raise PydanticCustomError(QUANTITY, "{words}", {"words": str(fault)}) from None
         if not allowed(number):
