@@ -201,13 +201,26 @@ LengthOrPlace = Annotated[Annotated[Length, Tag(ONE)] | Annotated[ThreeLengths, 
 Lengths = Annotated[Annotated[Length, Tag(ONE)] | Annotated[list[Length], Tag(LIST)], KIND]
 
 
+def _as_written(schema: dict[str, Any], model: type[Section]) -> None:
+    """Give the JSON schema of a table the keys that it must have, and leave out titles, docstrings, empty defaults."""
+    schema.pop("title", None)
+    schema.pop("description", None)
+    schema |= {"required": list(model.required)} if model.required else {}
+    for key in schema.get("properties", {}).values():
+        key.pop("title", None)
+        if key.get("default") in (None, [], ""):
+            key.pop("default", None)
+
+
 class Section(BaseModel):
     """A table of the file; what each key may hold is its ``description``, which messages quote.
 
     ``required`` keys are optional to pydantic, so that the others are read all the same.
     """
 
-    model_config = ConfigDict(extra="forbid", strict=True, frozen=True, populate_by_name=False)
+    model_config = ConfigDict(
+        extra="forbid", strict=True, frozen=True, populate_by_name=False, json_schema_extra=_as_written
+    )
     required: ClassVar[tuple[str, ...]] = ()
 
 

@@ -8,6 +8,8 @@ from __future__ import annotations
 
 from typing import Any, TypeAlias
 
+from pydantic.json_schema import GenerateJsonSchema, JsonSchemaValue
+
 from sweep.effects import input_names
 from sweep.families import NAMES, family
 from sweep.families.base import Family, Parameter
@@ -91,37 +93,15 @@ def _described(p: Parameter) -> str:
 
 
 def _model(model: type[Section], definitions: Schema) -> Schema:
-    """Return the schema of one table as a file writes it: without null, with the keys that it must have."""
-    raw = model.model_json_schema(by_alias=True)
-    for name, inner in raw.pop("$defs", {}).items():
-        definitions[name] = _cleaned(inner) | _required(_sections()[name])
-    found: Schema = _cleaned(raw) | _required(model)
+    """Return the schema of one table as a file writes it."""
+    template = "#/definitions/{model}"
+    found: Schema = model.model_json_schema(by_alias=True, ref_template=template, schema_generator=_WithoutNull)
+    definitions |= found.pop("$defs", {})
     return found
 
 
-def _required(model: type[Section]) -> Schema:
-    return {"required": list(model.required)} if model.required else {}
+class _WithoutNull(GenerateJsonSchema):
+    """TOML has no null: what is None in a model is left out of a file."""
 
-
-def _sections() -> dict[str, type[Section]]:
-    return {model.__name__: model for model in Section.__subclasses__()}
-
-
-def _cleaned(raw: Any) -> Any:
-    """Leave out titles, empty defaults, null as a type, and docstrings that only say where a table stands."""
-    if isinstance(raw, list):
-        return [_cleaned(item) for item in raw]
-    if not isinstance(raw, dict):
-        return raw.replace("#/$defs/", "#/definitions/") if isinstance(raw, str) else raw
-    found = {
-        key: {name: _cleaned(inner) for name, inner in value.items()} if key == "properties" else _cleaned(value)
-        for key, value in raw.items()
-        if key != "title" and not (key == "default" and value in (None, [], ""))
-    }
-    if "properties" in found:
-        found.pop("description", None)
-    kinds = [kind for kind in found.get("anyOf", ()) if kind != {"type": "null"}]
-    if len(kinds) == 1:
-        del found["anyOf"]
-        return kinds[0] | found
-    return found | ({"anyOf": kinds} if kinds else {})
+    def nullable_schema(self, schema: Any) -> JsonSchemaValue:
+        return self.generate_inner(schema["schema"])
