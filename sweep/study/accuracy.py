@@ -4,12 +4,12 @@ from __future__ import annotations
 
 from typing import Annotated, Any
 
-from pydantic import Field, PlainValidator
+from pydantic import PlainValidator
 
 from sweep.errors import InputError
 from sweep.families.base import DEFAULT_TARGET, Accuracy, Family
 from sweep.reductions.steps import check_certifiable, proofs
-from sweep.study.file import Faults, Section
+from sweep.study.file import Faults, Section, holds
 
 
 def _proofs(value: object) -> object:
@@ -22,12 +22,10 @@ def _proofs(value: object) -> object:
 class AccuracySection(Section):
     """Table [accuracy]."""
 
-    target: Annotated[float, Field(ge=1e-14, le=0.1)] | None = Field(None, description="a relative error, 1e-14 to 0.1")
-    samples: Annotated[int, Field(ge=8, le=2**20)] | None = Field(
-        None, description="a whole number of crank angles, 8 to 1048576"
-    )
-    certify: Annotated[bool | list[str], PlainValidator(_proofs, json_schema_input_type=bool | list[str])] = Field(
-        False, description="true or false, or a list of the wanted maxima to prove"
+    target: float | None = holds("a relative error, 1e-14 to 0.1", ge=1e-14, le=0.1)
+    samples: int | None = holds("a whole number of crank angles, 8 to 1048576", ge=8, le=2**20)
+    certify: Annotated[bool | list[str], PlainValidator(_proofs, json_schema_input_type=bool | list[str])] = holds(
+        "true or false, or a list of the wanted maxima to prove", False
     )
 
 

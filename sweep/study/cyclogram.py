@@ -3,32 +3,25 @@
 from __future__ import annotations
 
 import math
-from typing import Annotated, Any
-
-from pydantic import Field
+from typing import Any
 
 from sweep.errors import InputError
 from sweep.families.base import Family
 from sweep.quantities.limits import Limit
 from sweep.quantities.resolve import output as design_output
 from sweep.quantities.units import internal_unit
-from sweep.study.file import Faults, Key, Section, StudyFile, read_section
+from sweep.study.file import Faults, Key, Section, StudyFile, TwoTexts, holds, read_section
 
-Window = Annotated[list[str], Field(min_length=2, max_length=2)]
 ENDS = {"ext": "phi_ext", "fold": "phi_fold", "duration": "phi0"}
 
 
 class StrokeSection(Section):
     """Table ``cyclogram.<member>``: of its stroke from the folded to the extended position."""
 
-    ext: Window | None = Field(
-        None, description='when the stroke ends, extended, from and to, as ["170 deg", "190 deg"]'
-    )
-    fold: Window | None = Field(None, description='when it ends, folded, as ["350 deg", "359 deg"]')
-    duration: Window | None = Field(
-        None, description='from the one to the other, least and most, as ["170 deg", "190 deg"]'
-    )
-    size: Window | None = Field(None, description='least and most stroke or swing, as ["24 mm", "25 mm"]')
+    ext: TwoTexts | None = holds('when the stroke ends, extended, from and to, as ["170 deg", "190 deg"]')
+    fold: TwoTexts | None = holds('when it ends, folded, as ["350 deg", "359 deg"]')
+    duration: TwoTexts | None = holds('from the one to the other, least and most, as ["170 deg", "190 deg"]')
+    size: TwoTexts | None = holds('least and most stroke or swing, as ["24 mm", "25 mm"]')
 
 
 def limits_of_cyclogram(file: StudyFile, family: Family) -> list[Limit]:

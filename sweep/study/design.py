@@ -11,13 +11,11 @@ import math
 from collections.abc import Collection, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Annotated, Any, Literal
-
-from pydantic import Field
+from typing import Any, Literal
 
 from sweep.families.base import Family
 from sweep.quantities.units import internal_unit
-from sweep.study.file import Faults, Key, Section, Seed, StudyFile, read_section
+from sweep.study.file import Faults, Key, Section, Seed, StudyFile, holds, read_section
 from sweep.study.parameter import Entry, forms, missing_parameter, read_entry
 from sweep.study.sobol import DIMENSIONS
 from sweep.study.space import Axis, DesignSpace
@@ -32,16 +30,16 @@ class SampleTable(Section):
     """Table ``design.sample``."""
 
     required = ("kind", "n")
-    kind: Literal["sobol"] | None = Field(None, description='"sobol"')
-    n: Annotated[int, Field(ge=1, le=2**40)] | None = Field(None, description="a whole number, 1 to 2^40")
-    seed: Seed = Field(0, description="a whole number, 0 or greater")
+    kind: Literal["sobol"] | None = holds('"sobol"')
+    n: int | None = holds("a whole number, 1 to 2^40", ge=1, le=2**40)
+    seed: Seed = holds("a whole number, 0 or greater", 0)
 
 
 class ReferenceSection(Section):
     """Table [reference]."""
 
     required = ("design",)
-    design: dict[str, Any] | None = Field(None, description="a table of the parameters of one design")
+    design: dict[str, Any] | None = holds("a table of the parameters of one design")
 
 
 @dataclass(frozen=True)

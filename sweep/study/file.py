@@ -188,6 +188,8 @@ Seconds = Annotated[float, _positive("s"), TEXT]
 Bytes = Annotated[float, _positive("B"), TEXT]
 Speed = Annotated[float, quantity("rad/s", lambda x: x != 0.0, "a non-zero number"), TEXT]
 Share = Annotated[float, quantity("1", lambda x: 0.0 < x < 1.0, 'a share above 0 and below 100 %, as "2 %"'), TEXT]
+Three = Annotated[list[Number], Field(min_length=3, max_length=3)]
+TwoTexts = Annotated[list[str], Field(min_length=2, max_length=2)]
 TwoLengths = Annotated[list[Length], Field(min_length=2, max_length=2)]
 ThreeLengths = Annotated[list[Length], Field(min_length=3, max_length=3)]
 
@@ -199,6 +201,11 @@ KIND = Discriminator(
 Place = Annotated[Annotated[str, Tag(ONE)] | Annotated[ThreeLengths, Tag(LIST)], KIND]
 LengthOrPlace = Annotated[Annotated[Length, Tag(ONE)] | Annotated[ThreeLengths, Tag(LIST)], KIND]
 Lengths = Annotated[Annotated[Length, Tag(ONE)] | Annotated[list[Length], Tag(LIST)], KIND]
+
+
+def holds(words: str, default: Any = None, **more: Any) -> Any:
+    """Declare a key that may be left out, and say what it may hold; ``more`` is as of pydantic's ``Field``."""
+    return Field(default, description=words, **more)
 
 
 def _as_written(schema: dict[str, Any], model: type[Section]) -> None:

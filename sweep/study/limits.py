@@ -7,8 +7,6 @@ import re
 from collections.abc import Mapping
 from typing import Any, NamedTuple
 
-from pydantic import Field
-
 from sweep.errors import InputError, choices
 from sweep.families.base import Family, Output
 from sweep.families.names import is_flag
@@ -16,7 +14,7 @@ from sweep.quantities import units
 from sweep.quantities.limits import Limit
 from sweep.quantities.resolve import output as design_output
 from sweep.study.cyclogram import limits_of_cyclogram
-from sweep.study.file import Faults, Key, Number, Section, StudyFile, read_section
+from sweep.study.file import Faults, Key, Number, Section, StudyFile, holds, read_section
 from sweep.study.locus import prescribed_limits
 from sweep.study.parameter import Entry
 
@@ -77,9 +75,9 @@ _SIDE = re.compile("([<>=\u2264\u2265]+)\\s*(.*)", re.DOTALL)
 class LimitEntry(Section):
     """Entry ``limits.x = { min, max, unit }``."""
 
-    min: Number | None = Field(None, description="a finite number, its unit in the key unit")
-    max: Number | None = Field(None, description="a finite number, its unit in the key unit")
-    unit: str | None = Field(None, description='a unit as a text, as "deg"')
+    min: Number | None = holds("a finite number, its unit in the key unit")
+    max: Number | None = holds("a finite number, its unit in the key unit")
+    unit: str | None = holds('a unit as a text, as "deg"')
 
 
 def read_output_name(family: Family, name: str, key: Key, faults: Faults) -> Output | None:

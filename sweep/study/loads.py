@@ -23,7 +23,7 @@ from sweep.families.machines.machine import Machine
 from sweep.families.names import at_stage, parts
 from sweep.numerics.curves import Curve, SeriesCurve, table_curve
 from sweep.quantities import units
-from sweep.study.file import Faults, Fraction, Key, Number, Section, Speed, StudyFile, read_section
+from sweep.study.file import Faults, Fraction, Key, Number, Section, Speed, StudyFile, TwoTexts, holds, read_section
 from sweep.study.limits import read_output_name
 
 OF_SCENE = ("speed", "speed_change")
@@ -35,23 +35,20 @@ FORMS = (
 )
 ROD = '{ material = "steel", section = "6 mm round", inertia = "exact" }'
 Numbers = Annotated[list[Number], Field(max_length=MOST_POINTS)]
-Names = Annotated[list[str], Field(min_length=2, max_length=2)]
 
 
 class CurveSection(Section):
     """Table ``loads.<name>`` of a load that changes over the turn."""
 
-    file: str | None = Field(None, description='the name of a CSV or Parquet file beside the study, as "load.csv"')
-    columns: Names | None = Field(
-        None, description='two names of columns, as ["angle", "force"]; the first two if left out'
-    )
-    phi: Numbers | None = Field(None, description="a list of rising crank angles within one turn, in the unit of angle")
-    angle: str = Field("deg", description='the unit of the angles, as "deg"')
-    values: Numbers | None = Field(None, description="a list of numbers in the unit of unit, one for each angle")
-    mean: Number | None = Field(None, description="a finite number")
-    cos: Numbers | None = Field(None, description="a list of numbers: the factors of cos(phi), cos(2 phi) ...")
-    sin: Numbers | None = Field(None, description="a list of numbers: the factors of sin(phi), sin(2 phi) ...")
-    unit: str | None = Field(None, description='a unit as a text, as "N"')
+    file: str | None = holds('the name of a CSV or Parquet file beside the study, as "load.csv"')
+    columns: TwoTexts | None = holds('two names of columns, as ["angle", "force"]; the first two if left out')
+    phi: Numbers | None = holds("a list of rising crank angles within one turn, in the unit of angle")
+    angle: str = holds('the unit of the angles, as "deg"', "deg")
+    values: Numbers | None = holds("a list of numbers in the unit of unit, one for each angle")
+    mean: Number | None = holds("a finite number")
+    cos: Numbers | None = holds("a list of numbers: the factors of cos(phi), cos(2 phi) ...")
+    sin: Numbers | None = holds("a list of numbers: the factors of sin(phi), sin(2 phi) ...")
+    unit: str | None = holds('a unit as a text, as "N"')
 
 
 TABLE, SERIES = ("phi", "values"), ("mean", "cos", "sin")
@@ -251,16 +248,16 @@ class WindowTable(Section):
     """Table ``scene.window``."""
 
     required = ("from", "to")
-    low: Fraction | None = Field(None, alias="from", description="a fraction of the stroke, 0 to 1")
-    high: Fraction | None = Field(None, alias="to", description="a fraction of the stroke, 0 to 1")
+    low: Fraction | None = holds("a fraction of the stroke, 0 to 1", alias="from")
+    high: Fraction | None = holds("a fraction of the stroke, 0 to 1", alias="to")
 
 
 class SceneSection(Section):
     """Table [scene]."""
 
-    speed: Speed | None = Field(None, description='a speed of rotation as a text, as "7000 rpm"')
-    want: list[str] = Field([], description="a list of names of design outputs")
-    window: WindowTable | None = Field(None, description="{ from = 0.0, to = 0.6 }, fractions of the stroke")
+    speed: Speed | None = holds('a speed of rotation as a text, as "7000 rpm"')
+    want: list[str] = holds("a list of names of design outputs", [])
+    window: WindowTable | None = holds("{ from = 0.0, to = 0.6 }, fractions of the stroke")
 
 
 def read_window(window: WindowTable | None, faults: Faults) -> tuple[float, float] | None:

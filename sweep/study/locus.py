@@ -6,14 +6,13 @@ from collections.abc import Mapping
 from typing import Any, Literal
 
 import numpy as np
-from pydantic import Field
 
 from sweep.errors import InputError
 from sweep.families.base import Family, Parameter
 from sweep.families.capabilities import LimitLocus
 from sweep.families.chain import Chain
 from sweep.quantities.limits import Limit
-from sweep.study.file import Faults, Section, Size, StudyFile
+from sweep.study.file import Faults, Section, Size, StudyFile, holds
 from sweep.study.parameter import Entry, missing_parameter, read_entry
 from sweep.study.space import Axis
 from sweep.synthesis.fit import LineFit
@@ -117,8 +116,8 @@ def _values(entry: Entry) -> np.ndarray[tuple[int], np.dtype[np.float64]]:
 class FitSection(Section):
     """Table [fit]."""
 
-    stroke: Size | None = Field(None, description='a length as a text, as "24.5 mm"')
-    direction: Literal["free", "given"] = Field("free", description='"free" or "given"')
+    stroke: Size | None = holds('a length as a text, as "24.5 mm"')
+    direction: Literal["free", "given"] = holds('"free" or "given"', "free")
 
 
 def read_fit(section: FitSection, file: StudyFile, family: Family) -> LineFit | None:

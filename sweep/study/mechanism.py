@@ -23,8 +23,10 @@ from sweep.study.file import (
     Number,
     Section,
     StudyFile,
+    Three,
     ThreeLengths,
     TwoLengths,
+    holds,
     quantity,
     read_section,
 )
@@ -33,39 +35,30 @@ from sweep.study.file import (
 class ToolSection(Section):
     """Table ``tools.<name>``: a needle, a blade with a back, or a seam that stands still."""
 
-    on: str | None = Field(None, description='a moving point of a needle, as "needle.point"; a member of a blade')
-    line: str | None = Field(None, description='the line that the needle lies along, as "line"')
-    sense: int | None = Field(None, description="1 or -1: the needle points along the line or against it")
-    scarf: Annotated[list[Number], Field(min_length=3, max_length=3)] | None = Field(
-        None, description="a direction [x, y, z] of the machine's frame, out of the scarf"
+    on: str | None = holds('a moving point of a needle, as "needle.point"; a member of a blade')
+    line: str | None = holds('the line that the needle lies along, as "line"')
+    sense: int | None = holds("1 or -1: the needle points along the line or against it")
+    scarf: Three | None = holds("a direction [x, y, z] of the machine's frame, out of the scarf")
+    diameter: Length | None = holds('of the needle above the scarf, as "0.75 mm"')
+    floor: Length | None = holds("from the needle's axis to the floor of the scarf; half the diameter")
+    top: Length | None = holds("from the guided point to where the needle begins; negative: above it")
+    scarf_end: Length | None = holds("from the guided point to the upper end of the scarf")
+    eye: LengthOrPlace | None = holds(
+        "from the guided point to the upper edge of the needle's eye; of a blade three lengths as tip"
     )
-    diameter: Length | None = Field(None, description='of the needle above the scarf, as "0.75 mm"')
-    floor: Length | None = Field(
-        None, description="from the needle's axis to the floor of the scarf; half the diameter"
+    point: Length | None = holds("from the guided point to the needle's point")
+    tip: ThreeLengths | None = holds("three lengths along, across, along the axis of the output link")
+    back: ThreeLengths | None = holds("the other end of the blade, as tip")
+    hold: ThreeLengths | None = holds("where the blade holds a loop, or meets the plane of the seam, as tip")
+    at: ThreeLengths | None = holds(
+        "of the last stitch, or a point of the throat plate, three lengths in the machine's frame"
     )
-    top: Length | None = Field(None, description="from the guided point to where the needle begins; negative: above it")
-    scarf_end: Length | None = Field(None, description="from the guided point to the upper end of the scarf")
-    eye: LengthOrPlace | None = Field(
-        None, description="from the guided point to the upper edge of the needle's eye; of a blade three lengths as tip"
-    )
-    point: Length | None = Field(None, description="from the guided point to the needle's point")
-    tip: ThreeLengths | None = Field(None, description="three lengths along, across, along the axis of the output link")
-    back: ThreeLengths | None = Field(None, description="the other end of the blade, as tip")
-    hold: ThreeLengths | None = Field(
-        None, description="where the blade holds a loop, or meets the plane of the seam, as tip"
-    )
-    at: ThreeLengths | None = Field(
-        None, description="of the last stitch, or a point of the throat plate, three lengths in the machine's frame"
-    )
-    radius: Length | None = Field(None, description='of the blade as a capsule, as "0.4 mm"; 0 if left out')
-    normal: Annotated[list[Number], Field(min_length=3, max_length=3)] | None = Field(
-        None, description="of a throat plate, a direction [x, y, z] of the machine's frame, up from it"
-    )
-    fabric: Length | None = Field(None, description='of a throat plate, thickness of what lies on it, as "2 mm"')
+    radius: Length | None = holds('of the blade as a capsule, as "0.4 mm"; 0 if left out')
+    normal: Three | None = holds("of a throat plate, a direction [x, y, z] of the machine's frame, up from it")
+    fabric: Length | None = holds('of a throat plate, thickness of what lies on it, as "2 mm"')
 
 
 Names = Annotated[list[str], Field(min_length=1)]
-Three = Annotated[list[Number], Field(min_length=3, max_length=3)]
 
 # Tables in which a member's own entries may stand in a table of the member's name.
 BY_MEMBER = (("design",), ("bodies",), ("loads",), ("limits",), ("reference", "design"))
@@ -74,97 +67,84 @@ BY_MEMBER = (("design",), ("bodies",), ("loads",), ("limits",), ("reference", "d
 class MechanismSection(Section):
     """Table [mechanism]."""
 
-    family: str | None = Field(None, description="the name of a family")
-    chain: Annotated[list[str], Field(min_length=1)] | None = Field(None, description="a list of names of families")
+    family: str | None = holds("the name of a family")
+    chain: list[str] | None = holds("a list of names of families", min_length=1)
 
 
 class PlaceTable(Section):
     """Table ``machine.<member>.place``."""
 
-    at: ThreeLengths | None = Field(None, description='three lengths, as ["0 mm", "30 mm", "12 mm"]')
-    axis: Three | None = Field(None, description="a direction [x, y, z]: the member's z")
-    zero: Three | None = Field(None, description="a direction [x, y, z]: the member's x")
-    stage: int | None = Field(None, description="of a chain, 1 where its first stage stands there; else its last")
+    at: ThreeLengths | None = holds('three lengths, as ["0 mm", "30 mm", "12 mm"]')
+    axis: Three | None = holds("a direction [x, y, z]: the member's z")
+    zero: Three | None = holds("a direction [x, y, z]: the member's x")
+    stage: int | None = holds("of a chain, 1 where its first stage stands there; else its last")
 
 
 class ShaftSection(Section):
     """Table ``shafts.<name>``."""
 
-    at: ThreeLengths | None = Field(None, description='a point of the axis, as ["0 mm", "30 mm", "12 mm"]')
-    axis: Three | None = Field(None, description="its direction [x, y, z]")
-    zero: Three | None = Field(None, description="the direction [x, y, z] of its mark at angle 0")
-    ratio: int | None = Field(None, description="whole turns for one of the main shaft, with the sense, not 0")
-    phase: Angle | None = Field(None, description='its angle where that of the main shaft is 0, as "30 deg"')
+    at: ThreeLengths | None = holds('a point of the axis, as ["0 mm", "30 mm", "12 mm"]')
+    axis: Three | None = holds("its direction [x, y, z]")
+    zero: Three | None = holds("the direction [x, y, z] of its mark at angle 0")
+    ratio: int | None = holds("whole turns for one of the main shaft, with the sense, not 0")
+    phase: Angle | None = holds('its angle where that of the main shaft is 0, as "30 deg"')
 
 
 class MemberSection(Section):
     """Table ``machine.<member>``."""
 
-    family: str | None = Field(None, description="the name of a family")
-    chain: Names | None = Field(None, description="a list of names of families")
-    ratio: int | None = Field(None, description="a whole number of turns of its crank for one of what drives it, not 0")
-    offset: Angle | None = Field(None, description='an angle with its unit, as "180 deg"')
-    driver: str | None = Field(None, description='"shaft", or an angle of an earlier member, as "needle.psi1"')
-    place: PlaceTable | None = Field(None, description="{ at = [...], axis = [...], zero = [...] }")
-    shaft: str | None = Field(None, description="the shaft that its crank sits on, one of [shafts]")
-    sense: int | None = Field(None, description="1 or -1: its crank axis along the shaft or against it")
-    shift: Length | None = Field(None, description='place of its origin along the shaft, as "12 mm"')
-    turn: Angle | None = Field(None, description='angle of its frame about the shaft, as "90 deg"')
-    key: Angle | None = Field(None, description='angle of its crank on the shaft, as "15 deg"')
-    tip: ThreeLengths | None = Field(
-        None, description='three lengths along, across, along the axis, as ["30 mm", "0 mm", "2 mm"]'
-    )
-    eye: ThreeLengths | None = Field(
-        None, description='three lengths along the coupler, across it, along its axes, as ["30 mm", "0 mm", "0 mm"]'
+    family: str | None = holds("the name of a family")
+    chain: Names | None = holds("a list of names of families")
+    ratio: int | None = holds("a whole number of turns of its crank for one of what drives it, not 0")
+    offset: Angle | None = holds('an angle with its unit, as "180 deg"')
+    driver: str | None = holds('"shaft", or an angle of an earlier member, as "needle.psi1"')
+    place: PlaceTable | None = holds("{ at = [...], axis = [...], zero = [...] }")
+    shaft: str | None = holds("the shaft that its crank sits on, one of [shafts]")
+    sense: int | None = holds("1 or -1: its crank axis along the shaft or against it")
+    shift: Length | None = holds('place of its origin along the shaft, as "12 mm"')
+    turn: Angle | None = holds('angle of its frame about the shaft, as "90 deg"')
+    key: Angle | None = holds('angle of its crank on the shaft, as "15 deg"')
+    tip: ThreeLengths | None = holds('three lengths along, across, along the axis, as ["30 mm", "0 mm", "2 mm"]')
+    eye: ThreeLengths | None = holds(
+        'three lengths along the coupler, across it, along its axes, as ["30 mm", "0 mm", "0 mm"]'
     )
 
 
 class RelationSection(Section):
     """Table ``relations.<name>``."""
 
-    distance: Names | None = Field(None, description='two points, as ["needle.point", "looper.tip"]')
-    timing: Names | None = Field(None, description='two crank angles, as ["needle.phi_ext", "phi_min_clearance"]')
-    speed: Names | None = Field(None, description='one or two points, as ["looper.tip"]')
-    event: str | None = Field(None, description='a pose output, as "clearance" or "looper.tip_x"')
-    level: str | Number | None = Field(None, description='what it passes, in its unit, as "1 mm"; 0 if left out')
-    rising: bool | None = Field(None, description="true or false: whether it passes upwards; true if left out")
-    value: Names | None = Field(None, description='a pose output and a crank angle, as ["pace", "phi_arrive"]')
-    gap: Names | None = Field(None, description='two bodies, links or tools, as ["needle.rocker1", "blade"]')
-    radii: TwoLengths | None = Field(None, description='of a gap, the radius of each body, as ["4 mm", "3 mm"]')
-    take: Names | None = Field(None, description='a needle and a blade of [tools], as ["thin", "blade"]')
-    enter: Names | None = Field(
-        None, description='what passes, a blade and the seam of [tools], as ["thin", "upper", "seam"]'
+    distance: Names | None = holds('two points, as ["needle.point", "looper.tip"]')
+    timing: Names | None = holds('two crank angles, as ["needle.phi_ext", "phi_min_clearance"]')
+    speed: Names | None = holds('one or two points, as ["looper.tip"]')
+    event: str | None = holds('a pose output, as "clearance" or "looper.tip_x"')
+    level: str | Number | None = holds('what it passes, in its unit, as "1 mm"; 0 if left out')
+    rising: bool | None = holds("true or false: whether it passes upwards; true if left out")
+    value: Names | None = holds('a pose output and a crank angle, as ["pace", "phi_arrive"]')
+    gap: Names | None = holds('two bodies, links or tools, as ["needle.rocker1", "blade"]')
+    radii: TwoLengths | None = holds('of a gap, the radius of each body, as ["4 mm", "3 mm"]')
+    take: Names | None = holds('a needle and a blade of [tools], as ["thin", "blade"]')
+    enter: Names | None = holds('what passes, a blade and the seam of [tools], as ["thin", "upper", "seam"]')
+    above: Names | None = holds('a needle, blade or moving point and a plate of [tools], as ["thin", "plate"]')
+    sense: int | None = holds(
+        "1 or -1: of a take along n x w of the needle or against it, of an enter the triangle's normal",
     )
-    above: Names | None = Field(
-        None, description='a needle, blade or moving point and a plate of [tools], as ["thin", "plate"]'
+    fields: dict[str, TwoLengths] | None = holds(
+        'of a take, the least and most rise of each field of work, { slow = ["1.5 mm", "3 mm"] }'
     )
-    sense: int | None = Field(
-        None,
-        description="1 or -1: of a take along n x w of the needle or against it, of an enter the triangle's normal",
+    vary: bool | None = holds("of a take, true or false: whether the ends of its fields are parameters of the machine")
+    window: list[Angle] | None = holds(
+        'of an enter, from and to, as ["200 deg", "300 deg"]', min_length=2, max_length=2
     )
-    fields: dict[str, TwoLengths] | None = Field(
-        None, description='of a take, the least and most rise of each field of work, { slow = ["1.5 mm", "3 mm"] }'
+    settings: str | None = holds('of a take, a real machine whose settings are limits: "juki-mo-104d"')
+    torque: Names | None = holds('members, as ["needle", "looper"]')
+    shaking: Names | None = holds('members, as ["needle", "looper"]')
+    sew: Names | None = holds('a moment A, and any of B and C, as ["a", "b", "c"]')
+    speeds: list[Annotated[float, quantity("rad/s"), TEXT]] | None = holds(
+        'of a sew, as ["500 rpm", "8500 rpm"], growing', min_length=1
     )
-    vary: bool | None = Field(
-        None, description="of a take, true or false: whether the ends of its fields are parameters of the machine"
-    )
-    window: Annotated[list[Angle], Field(min_length=2, max_length=2)] | None = Field(
-        None, description='of an enter, from and to, as ["200 deg", "300 deg"]'
-    )
-    settings: str | None = Field(
-        None, description='of a take, a real machine whose settings are limits: "juki-mo-104d"'
-    )
-    torque: Names | None = Field(None, description='members, as ["needle", "looper"]')
-    shaking: Names | None = Field(None, description='members, as ["needle", "looper"]')
-    sew: Names | None = Field(None, description='a moment A, and any of B and C, as ["a", "b", "c"]')
-    speeds: Annotated[list[Annotated[float, quantity("rad/s"), TEXT]], Field(min_length=1)] | None = Field(
-        None, description='of a sew, as ["500 rpm", "8500 rpm"], growing'
-    )
-    clearance: TwoLengths | None = Field(
-        None, description='of a sew, between which the tip takes the loop, as ["0 mm", "0.1 mm"]'
-    )
-    shaft: str | None = Field(None, description="of a sew, a relation torque whose unevenness counts")
-    press: str | None = Field(None, description='the feed whose rack lifts the presser foot, a member, as "feed"')
+    clearance: TwoLengths | None = holds('of a sew, between which the tip takes the loop, as ["0 mm", "0.1 mm"]')
+    shaft: str | None = holds("of a sew, a relation torque whose unevenness counts")
+    press: str | None = holds('the feed whose rack lifts the presser foot, a member, as "feed"')
 
 
 def flattened(data: Mapping[str, Any], members: object) -> dict[str, Any]:

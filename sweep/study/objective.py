@@ -3,9 +3,7 @@
 from __future__ import annotations
 
 import math
-from typing import Annotated, Any, cast
-
-from pydantic import Field
+from typing import Any, cast
 
 from sweep.errors import InputError
 from sweep.families.base import Family, Output, Parameter, Unit
@@ -13,7 +11,7 @@ from sweep.families.names import negative, without_minus
 from sweep.quantities.limits import Limit
 from sweep.quantities.measures import measure
 from sweep.quantities.resolve import output
-from sweep.study.file import Faults, Key, Seconds, Section, StudyFile
+from sweep.study.file import Faults, Key, Seconds, Section, StudyFile, holds
 from sweep.study.limits import read_output_name
 from sweep.study.optimise import OptimiseSection
 from sweep.study.parameter import read_entry
@@ -24,8 +22,8 @@ from sweep.study.study import ParetoSettings
 class ObjectiveSection(Section):
     """Table [objective]."""
 
-    minimise: str | None = Field(None, description="the name of a design output")
-    maximise: str | None = Field(None, description="the name of a design output")
+    minimise: str | None = holds("the name of a design output")
+    maximise: str | None = holds("the name of a design output")
 
     @property
     def goal(self) -> str | None:
@@ -93,12 +91,12 @@ class ParetoSection(Section):
     """Table [pareto]; at_most and at_least are read like parameters."""
 
     required = ("output",)
-    output: str | None = Field(None, description="the name of a design output, not the objective")
+    output: str | None = holds("the name of a design output, not the objective")
     at_most: Any = None
     at_least: Any = None
-    points: Annotated[int, Field(ge=2, le=64)] | None = Field(None, description="a whole number, 2 to 64")
-    starts: Annotated[int, Field(ge=0, le=1000)] = Field(2, description="a whole number, 0 to 1000")
-    time_budget: Seconds | None = Field(None, description='a time as a text, as "60 s"')
+    points: int | None = holds("a whole number, 2 to 64", ge=2, le=64)
+    starts: int = holds("a whole number, 0 to 1000", 2, ge=0, le=1000)
+    time_budget: Seconds | None = holds('a time as a text, as "60 s"')
 
 
 def read_pareto(

@@ -2,39 +2,37 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Literal
-
-from pydantic import Field
+from typing import Literal
 
 from sweep.families.base import Family
 from sweep.families.chain import driven_guide
-from sweep.study.file import Seconds, Section, Seed, Share, StudyFile
+from sweep.study.file import Seconds, Section, Seed, Share, StudyFile, holds
 from sweep.study.study import OptimiseSettings, ProveSettings
 
 
 class ProveTable(Section):
     """Table ``optimise.prove``."""
 
-    gap: Share = Field(0.01, description='a share as a text, as "1 %"', json_schema_extra={"default": "1 %"})
-    boxes: Annotated[int, Field(ge=64, le=10**9)] = Field(1_000_000, description="a whole number, 64 to 10^9")
-    smallest: Share = Field(
-        1e-7, description='a share of every range as a text, as "0.1 %"', json_schema_extra={"default": "0.00001 %"}
+    gap: Share = holds('a share as a text, as "1 %"', 0.01, json_schema_extra={"default": "1 %"})
+    boxes: int = holds("a whole number, 64 to 10^9", 1_000_000, ge=64, le=10**9)
+    smallest: Share = holds(
+        'a share of every range as a text, as "0.1 %"', 1e-7, json_schema_extra={"default": "0.00001 %"}
     )
-    time: Seconds | None = Field(None, description='a time as a text, as "60 s"')
+    time: Seconds | None = holds('a time as a text, as "60 s"')
 
 
 class OptimiseSection(Section):
     """Table [optimise]."""
 
-    starts: Annotated[int, Field(ge=1, le=100_000)] = Field(20, description="a whole number, 1 to 100000")
-    seed: Seed = Field(0, description="a whole number, 0 or greater")
-    unseen: Share | None = Field(None, description='a share as a text, as "2 %"')
-    looks: Annotated[int, Field(ge=100, le=10_000_000)] = Field(20_000, description="a whole number, 100 to 10000000")
-    time_budget: Seconds | None = Field(None, description='a time as a text, as "60 s"')
-    variables: Literal["parameters", "locus"] | None = Field(None, description='"parameters" or "locus"')
-    globally: Literal["none", "proportions"] = Field("none", alias="global", description='"none" or "proportions"')
-    populations: Annotated[int, Field(ge=1, le=10_000)] = Field(40, description="a whole number, 1 to 10000")
-    prove: ProveTable | None = Field(None, description='{ gap = "1 %", boxes = 1000000, time = "10 min" }')
+    starts: int = holds("a whole number, 1 to 100000", 20, ge=1, le=100_000)
+    seed: Seed = holds("a whole number, 0 or greater", 0)
+    unseen: Share | None = holds('a share as a text, as "2 %"')
+    looks: int = holds("a whole number, 100 to 10000000", 20_000, ge=100, le=10_000_000)
+    time_budget: Seconds | None = holds('a time as a text, as "60 s"')
+    variables: Literal["parameters", "locus"] | None = holds('"parameters" or "locus"')
+    globally: Literal["none", "proportions"] = holds('"none" or "proportions"', "none", alias="global")
+    populations: int = holds("a whole number, 1 to 10000", 40, ge=1, le=10_000)
+    prove: ProveTable | None = holds('{ gap = "1 %", boxes = 1000000, time = "10 min" }')
 
 
 def read_optimise(section: OptimiseSection) -> OptimiseSettings:

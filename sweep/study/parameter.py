@@ -4,13 +4,11 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from typing import Annotated, Any, Literal, TypeAlias
-
-from pydantic import Field
+from typing import Any, Literal, TypeAlias
 
 from sweep.families.base import Parameter
 from sweep.quantities import units
-from sweep.study.file import Count, Faults, Key, Number, Section, read_section
+from sweep.study.file import Count, Faults, Key, Number, Section, holds, read_section
 from sweep.study.space import Axis
 
 Entry: TypeAlias = Axis | float
@@ -20,27 +18,27 @@ class RangeEntry(Section):
     """Entry ``design.x = { from, to, count, unit, scale }``."""
 
     required = ("from", "to")
-    low: Number | None = Field(None, alias="from", description="a finite number, its unit in the key unit")
-    high: Number | None = Field(None, alias="to", description="a finite number, its unit in the key unit")
-    count: Count | None = Field(None, description="a whole number, 1 to 1000000")
-    unit: str | None = Field(None, description='a unit as a text, as "mm"')
-    scale: Literal["linear", "log"] = Field("linear", description='"linear" or "log"')
+    low: Number | None = holds("a finite number, its unit in the key unit", alias="from")
+    high: Number | None = holds("a finite number, its unit in the key unit", alias="to")
+    count: Count | None = holds("a whole number, 1 to 1000000")
+    unit: str | None = holds('a unit as a text, as "mm"')
+    scale: Literal["linear", "log"] = holds('"linear" or "log"', "linear")
 
 
 class ListEntry(Section):
     """Entry ``design.x = { values, unit }``."""
 
-    values: Annotated[list[Number], Field(min_length=1, max_length=1_000_000)] | None = Field(
-        None, description="a list of 1 to 1000000 finite numbers, their unit in the key unit"
+    values: list[Number] | None = holds(
+        "a list of 1 to 1000000 finite numbers, their unit in the key unit", min_length=1, max_length=1_000_000
     )
-    unit: str | None = Field(None, description='a unit as a text, as "mm"')
+    unit: str | None = holds('a unit as a text, as "mm"')
 
 
 class FixedEntry(Section):
     """Entry ``design.x = { value, unit }``."""
 
-    value: Number | None = Field(None, description="a finite number, its unit in the key unit")
-    unit: str | None = Field(None, description='a unit as a text, as "mm"')
+    value: Number | None = holds("a finite number, its unit in the key unit")
+    unit: str | None = holds('a unit as a text, as "mm"')
 
 
 def missing_parameter(p: Parameter) -> str:

@@ -10,51 +10,45 @@ from pydantic import Field
 
 from sweep.errors import choices
 from sweep.families.base import Family
-from sweep.study.file import Bytes, Number, Seconds, Section, StudyFile
+from sweep.study.file import Bytes, Number, Seconds, Section, StudyFile, holds
+
+Pair = Annotated[list[Number], Field(min_length=2, max_length=2)]
 
 
 class StudySection(Section):
     """Table [study]."""
 
     required = ("name",)
-    name: str | None = Field(
-        None, pattern="^[a-z0-9][a-z0-9-]*$", max_length=64, description="a plain word of a-z, 0-9 and '-'"
-    )
-    title: str = Field("", description="a text")
-    question: str = Field("", description="a text")
-    taken: list[str] = Field([], description="filled in: which designs come from other studies, with their hash")
+    name: str | None = holds("a plain word of a-z, 0-9 and '-'", pattern="^[a-z0-9][a-z0-9-]*$", max_length=64)
+    title: str = holds("a text", "")
+    question: str = holds("a text", "")
+    taken: list[str] = holds("filled in: which designs come from other studies, with their hash", [])
 
 
 class CurveTable(Section):
     """Table ``report.curves``."""
 
     required = ("label", "x", "y", "points")
-    label: str | None = Field(None, description="a text")
-    x: str | None = Field(None, description="the name of a swept parameter")
-    y: str | None = Field(None, description="the name of a swept parameter")
-    points: Annotated[list[Annotated[list[Number], Field(min_length=2, max_length=2)]], Field(min_length=2)] | None = (
-        Field(None, description="a list of two or more points [x, y] in the units of the two axes")
-    )
+    label: str | None = holds("a text")
+    x: str | None = holds("the name of a swept parameter")
+    y: str | None = holds("the name of a swept parameter")
+    points: list[Pair] | None = holds("a list of two or more points [x, y] in the units of the two axes", min_length=2)
 
 
 class FigureTable(Section):
     """Table ``report.figures``."""
 
     required = ("file", "title", "caption")
-    file: str | None = Field(None, description="the name of an SVG file without a folder")
-    title: str | None = Field(None, description="a text")
-    caption: str | None = Field(None, description="a text")
+    file: str | None = holds("the name of an SVG file without a folder")
+    title: str | None = holds("a text")
+    caption: str | None = holds("a text")
 
 
 class ReportSection(Section):
     """Table [report]."""
 
-    curves: list[CurveTable] = Field(
-        [], description='a list of { label = "...", x = "k", y = "a", points = [[1, 1], [9, 9]] }'
-    )
-    figures: list[FigureTable] = Field(
-        [], description='a list of { file = "atlas.svg", title = "...", caption = "..." }'
-    )
+    curves: list[CurveTable] = holds('a list of { label = "...", x = "k", y = "a", points = [[1, 1], [9, 9]] }', [])
+    figures: list[FigureTable] = holds('a list of { file = "atlas.svg", title = "...", caption = "..." }', [])
 
 
 def check_report(report: ReportSection, file: StudyFile, family: Family, prescribed: Iterable[str]) -> None:
@@ -78,13 +72,13 @@ def check_report(report: ReportSection, file: StudyFile, family: Family, prescri
 class OutputSection(Section):
     """Table [output]."""
 
-    keep: Literal["feasible", "all"] = Field("feasible", description='"feasible" or "all"')
-    dtype: Literal["float32", "float64"] = Field("float64", description='"float32" or "float64"')
-    curves: Literal["optimum", "none"] = Field("optimum", description='"optimum" or "none"')
+    keep: Literal["feasible", "all"] = holds('"feasible" or "all"', "feasible")
+    dtype: Literal["float32", "float64"] = holds('"float32" or "float64"', "float64")
+    curves: Literal["optimum", "none"] = holds('"optimum" or "none"', "optimum")
 
 
 class BudgetSection(Section):
     """Table [budget]."""
 
-    disk: Bytes = Field(20e9, description='a size as a text, as "20 GB"', json_schema_extra={"default": "20 GB"})
-    time: Seconds = Field(3600.0, description='a time as a text, as "60 s"', json_schema_extra={"default": "1 h"})
+    disk: Bytes = holds('a size as a text, as "20 GB"', 20e9, json_schema_extra={"default": "20 GB"})
+    time: Seconds = holds('a time as a text, as "60 s"', 3600.0, json_schema_extra={"default": "1 h"})

@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import Annotated, Any
 
 import numpy as np
-from pydantic import Field, Tag
+from pydantic import Tag
 
 from sweep.study.file import (
     KIND,
@@ -23,35 +23,33 @@ from sweep.study.file import (
     Section,
     StudyFile,
     ThreeLengths,
+    TwoTexts,
+    holds,
     quantity,
     read_section,
 )
-
-Events = Annotated[list[str], Field(min_length=2, max_length=2)]
 
 
 class AllowedTable(Section):
     """Table ``thread.<name>.allowed``."""
 
     required = ("phi", "values", "unit")
-    phi: Annotated[list[Number], Field(min_length=2)] | None = Field(
-        None, description="a list of rising angles of the main shaft within one turn, in the unit of angle"
+    phi: list[Number] | None = holds(
+        "a list of rising angles of the main shaft within one turn, in the unit of angle", min_length=2
     )
-    angle: str = Field("deg", description='the unit of the angles, as "deg"')
-    values: Annotated[list[Number], Field(min_length=2)] | None = Field(
-        None, description="a list of numbers: the most surplus at each angle"
-    )
-    unit: str | None = Field(None, description='a unit as a text, as "mm"')
+    angle: str = holds('the unit of the angles, as "deg"', "deg")
+    values: list[Number] | None = holds("a list of numbers: the most surplus at each angle", min_length=2)
+    unit: str | None = holds('a unit as a text, as "mm"')
 
 
 class ThreadPlaceTable(Section):
     """A place of ``thread.<name>.path`` that counts between two events only, or has a bend of its own."""
 
     required = ("on",)
-    on: Place | None = Field(None, description='a name or three lengths, as "low" or ["10 mm", "0 mm", "40 mm"]')
-    held: Events | None = Field(None, description='two events, as ["a", "cast"]: the thread runs over it between them')
-    wrap: Angle | None = Field(None, description='an angle by which it is bent there besides, as "152.2 deg"')
-    fixed: Events | None = Field(None, description="two events between which the thread does not slide there")
+    on: Place | None = holds('a name or three lengths, as "low" or ["10 mm", "0 mm", "40 mm"]')
+    held: TwoTexts | None = holds('two events, as ["a", "cast"]: the thread runs over it between them')
+    wrap: Angle | None = holds('an angle by which it is bent there besides, as "152.2 deg"')
+    fixed: TwoTexts | None = holds("two events between which the thread does not slide there")
 
 
 PathPlace = Annotated[
@@ -63,23 +61,19 @@ class ThreadSection(Section):
     """Table ``thread.<name>``."""
 
     required = ("path",)
-    path: list[PathPlace] | None = Field(
-        None,
-        description='a list of places, as ["lever", ["10 mm", "0 mm", "40 mm"], "needle.point", '
-        '{ on = "low", held = ["a", "b"] }]',
+    path: list[PathPlace] | None = holds(
+        'a list of places, as ["lever", ["10 mm", "0 mm", "40 mm"], "needle.point", { on = "low", held = ["a", "b"] }]',
     )
-    stock: Length | None = Field(None, description='a length as a text, as "120 mm"')
-    tension: Annotated[float, quantity("N"), TEXT] | None = Field(
-        None, description='a force as a text, as "20 gf" or "0.2 N"'
+    stock: Length | None = holds('a length as a text, as "120 mm"')
+    tension: Annotated[float, quantity("N"), TEXT] | None = holds('a force as a text, as "20 gf" or "0.2 N"')
+    stiffness: Annotated[float, quantity("N/mm"), TEXT] | None = holds(
+        'a force over a length as a text, as "50 gf/mm" or "0.5 N/mm"'
     )
-    stiffness: Annotated[float, quantity("N/mm"), TEXT] | None = Field(
-        None, description='a force over a length as a text, as "50 gf/mm" or "0.5 N/mm"'
-    )
-    radius: Lengths | None = Field(None, description='a length as a text, as "0.5 mm", or a list of one for each bend')
-    allowed: AllowedTable | None = Field(None, description='{ phi = [...], values = [...], unit = "mm" }')
-    sewn: Length | None = Field(None, description='what a stitch takes, a length as a text, as "6 mm"')
-    feeding: Events | None = Field(None, description='two events, as ["feeds", "rests"]: it is sewn in between them')
-    drawing: Events | None = Field(None, description="two events between which it comes from the bobbin")
+    radius: Lengths | None = holds('a length as a text, as "0.5 mm", or a list of one for each bend')
+    allowed: AllowedTable | None = holds('{ phi = [...], values = [...], unit = "mm" }')
+    sewn: Length | None = holds('what a stitch takes, a length as a text, as "6 mm"')
+    feeding: TwoTexts | None = holds('two events, as ["feeds", "rests"]: it is sewn in between them')
+    drawing: TwoTexts | None = holds("two events between which it comes from the bobbin")
 
 
 def read_threads(file: StudyFile) -> dict[str, dict[str, Any]] | None:

@@ -5,12 +5,10 @@ from __future__ import annotations
 from collections.abc import Mapping
 from fnmatch import fnmatchcase
 
-from pydantic import Field
-
 from sweep.errors import nearest
 from sweep.families.base import Family
 from sweep.quantities.limits import Limit
-from sweep.study.file import Faults, Section, Share, Size, StudyFile, Width
+from sweep.study.file import Faults, Section, Share, Size, StudyFile, Width, holds
 from sweep.study.study import Tolerance
 
 UNITS = {"length": "mm", "angle": "rad"}
@@ -19,13 +17,11 @@ UNITS = {"length": "mm", "angle": "rad"}
 class ToleranceSection(Section):
     """Table [tolerance]."""
 
-    lengths: Size | None = Field(None, description='a length as a text, as "0.02 mm"')
-    angles: Width | None = Field(None, description='an angle as a text, as "0.05 deg"')
-    robust: Share | None = Field(None, description='a share as a text, as "95 %"')
-    samples: int | None = Field(None, description="a power of two: mechanisms that say the share")
-    own: dict[str, str] = Field(
-        {}, description='of what a pattern names, as { "*.key" = "0.1 deg", "*_tilt" = "0 deg" }'
-    )
+    lengths: Size | None = holds('a length as a text, as "0.02 mm"')
+    angles: Width | None = holds('an angle as a text, as "0.05 deg"')
+    robust: Share | None = holds('a share as a text, as "95 %"')
+    samples: int | None = holds("a power of two: mechanisms that say the share")
+    own: dict[str, str] = holds('of what a pattern names, as { "*.key" = "0.1 deg", "*_tilt" = "0 deg" }', {})
 
 
 def read_tolerance(section: ToleranceSection, file: StudyFile, family: Family) -> Tolerance | None:
