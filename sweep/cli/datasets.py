@@ -7,7 +7,7 @@ from pathlib import Path
 
 import click
 
-from sweep.cli.options import FOLDER, OUT, SMOKE, STUDY
+from sweep.cli.options import FOLDER, IS_FOLDER, OUT, SMOKE, STUDY
 from sweep.dataset.comparison import compare as compare_datasets
 from sweep.dataset.files import DESIGNS
 from sweep.dataset.verification import verify as verify_dataset
@@ -38,8 +38,8 @@ def verify(folder: Path, designs: int) -> None:
 
 
 @click.command()
-@click.argument("old", type=click.Path(exists=True, file_okay=False, path_type=Path))
-@click.argument("new", type=click.Path(exists=True, file_okay=False, path_type=Path))
+@click.argument("old", type=IS_FOLDER)
+@click.argument("new", type=IS_FOLDER)
 @click.option(
     "--rtol", type=float, default=0.0, help="Relative change of a value that counts as none; default: any bit."
 )

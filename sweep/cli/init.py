@@ -12,6 +12,7 @@ import click
 
 from sweep.cli.families import complete_families, family_names
 from sweep.cli.first_study import smoke_text, study_text
+from sweep.cli.options import A_FILE, A_FOLDER, IS_FILE, IS_THERE
 from sweep.dataset.files import unwritable
 from sweep.errors import InputError
 from sweep.exchange.points import drawn
@@ -37,22 +38,17 @@ NAME = re.compile(r"[a-z0-9][a-z0-9-]{0,63}")
 )
 @click.option(
     "--points",
-    type=click.Path(exists=True, dir_okay=False, path_type=Path),
+    type=IS_FILE,
     help="Of --family: the points of a drawing, as of `sweep points`; the study is about that design.",
 )
 @click.option("--unit", default="mm", show_default=True, help="Of the coordinates in --points.")
 @click.option(
     "--from-cyclogram",
     "cyclogram",
-    type=click.Path(exists=True, path_type=Path),
+    type=IS_THERE,
     help="A study of a machine with [cyclogram]: studies NAME-MEMBER of its members, in the order of design.",
 )
-@click.option(
-    "--into",
-    type=click.Path(file_okay=False, path_type=Path),
-    default=Path(),
-    help="Where the folder NAME is made; default: here.",
-)
+@click.option("--into", type=A_FOLDER, default=Path(), help="Where the folder NAME is made; default: here.")
 def init(
     name: str, family: str | None, members: tuple[str, ...], points: Path | None, unit: str, cyclogram: Path | None,
     into: Path,
@@ -124,7 +120,7 @@ def _machine(members: tuple[str, ...]) -> Machine | None:
 
 
 @click.command()
-@click.option("--out", type=click.Path(dir_okay=False, path_type=Path), help="A file; default: standard output.")
+@click.option("--out", type=A_FILE, help="A file; default: standard output.")
 def schema(out: Path | None) -> None:
     """Write the JSON schema of study files, by which editors complete and check them."""
     if out is None:

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import click
 
-from sweep.cli.options import BACKEND, JOBS
+from sweep.cli.options import A_FOLDER, BACKEND, IS_THERE, JOBS
 from sweep.errors import InputError
 from sweep.nights import Settings
 from sweep.nights import nightly as run_night
@@ -14,9 +14,9 @@ from sweep.quantities.units import read
 
 
 @click.command()
-@click.argument("studies", nargs=-1, required=True, type=click.Path(exists=True, path_type=Path))
+@click.argument("studies", nargs=-1, required=True, type=IS_THERE)
 @click.option(
-    "--into", type=click.Path(file_okay=False, path_type=Path), default=Path("nights"), show_default=True,
+    "--into", type=A_FOLDER, default=Path("nights"), show_default=True,
     help="Folder of the nights.",
 )  # fmt: skip
 @click.option("--budget", default="6h", show_default=True, help="Time for the whole night, such as 6h or 90 min.")

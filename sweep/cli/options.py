@@ -6,11 +6,16 @@ from pathlib import Path
 
 import click
 
-STUDY = click.argument("study", type=click.Path(exists=True, path_type=Path))
-FOLDER = click.argument("folder", type=click.Path(exists=True, file_okay=False, path_type=Path))
-OUT = click.option(
-    "--out", type=click.Path(file_okay=False, path_type=Path), help="Dataset folder; default results/<study>/designs."
-)
+# What is there already, and what may be made.
+IS_FILE = click.Path(exists=True, dir_okay=False, path_type=Path)
+IS_FOLDER = click.Path(exists=True, file_okay=False, path_type=Path)
+IS_THERE = click.Path(exists=True, path_type=Path)
+A_FILE = click.Path(dir_okay=False, path_type=Path)
+A_FOLDER = click.Path(file_okay=False, path_type=Path)
+
+STUDY = click.argument("study", type=IS_THERE)
+FOLDER = click.argument("folder", type=IS_FOLDER)
+OUT = click.option("--out", type=A_FOLDER, help="Dataset folder; default results/<study>/designs.")
 JOBS = click.option("--jobs", type=click.IntRange(min=1), default=2, show_default=True, help="Workers.")
 BACKEND = click.option(
     "--backend",

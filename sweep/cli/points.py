@@ -8,7 +8,7 @@ import click
 import pandas as pd
 
 from sweep.cli.families import complete_families
-from sweep.cli.options import DESIGN, FOLDER
+from sweep.cli.options import A_FILE, DESIGN, FOLDER, IS_FILE
 from sweep.cli.tables import checked_format, write_table
 from sweep.dataset.files import beside, located
 from sweep.evaluation.angles import grid_in_radians
@@ -24,7 +24,7 @@ from sweep.study.toml import design_entries, toml
 from sweep.synthesis.tasks import solve
 
 OF_DATASETS = ("xlsx", "pdf", "svg", "dxf")  # what takes more than a design: its study
-FILE = click.argument("file", type=click.Path(exists=True, dir_okay=False, path_type=Path))
+FILE = click.argument("file", type=IS_FILE)
 
 
 @click.command()
@@ -33,7 +33,7 @@ FILE = click.argument("file", type=click.Path(exists=True, dir_okay=False, path_
 @click.option("--part", default="", help="Of a file with several: `stage 1`, the member's name, or both.")
 @click.option("--unit", default="mm", show_default=True, help="Of the coordinates; a heading `x [inch]` says it, too.")
 @click.option("--tolerance", type=float, help="Largest residual as a part of the drawing's size; default 1e-4.")
-@click.option("--out", type=click.Path(dir_okay=False, path_type=Path), help="A table for `sweep eval`: one design.")
+@click.option("--out", type=A_FILE, help="A table for `sweep eval`: one design.")
 def points(family: str, file: Path, part: str, unit: str, tolerance: float | None, out: Path | None) -> None:
     """Find the dimensions of FAMILY from the points of a drawing: FILE.csv with the columns name, x, y, z.
 
@@ -61,9 +61,7 @@ def points(family: str, file: Path, part: str, unit: str, tolerance: float | Non
 @FOLDER
 @DESIGN
 @click.option("--format", "kind", required=True, type=click.Choice([*dict.fromkeys([*FORMATS, *OF_DATASETS])]))
-@click.option(
-    "--out", type=click.Path(dir_okay=False, path_type=Path), help="Default: export/DESIGN.ending beside FOLDER."
-)
+@click.option("--out", type=A_FILE, help="Default: export/DESIGN.ending beside FOLDER.")
 @click.option("--phi", type=float, default=0.0, show_default=True, help="Crank angle of the drawn position [rad].")
 @click.option("--poses", type=click.IntRange(min=3), default=120, show_default=True, help="Steps of a turn.")
 def export(folder: Path, design: str | None, kind: str, out: Path | None, phi: float, poses: int) -> None:

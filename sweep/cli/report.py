@@ -12,7 +12,7 @@ import pandas as pd
 
 import sweep.plot as plot
 from sweep.cli.families import family_names
-from sweep.cli.options import ANGLES, FOLDER
+from sweep.cli.options import A_FILE, A_FOLDER, ANGLES, FOLDER, IS_FILE, IS_FOLDER
 from sweep.cli.tables import read_table
 from sweep.dataset.files import beside, located
 from sweep.errors import InputError
@@ -28,8 +28,8 @@ from sweep.report.page import write_comparison, write_report
 
 @click.command()
 @FOLDER
-@click.argument("others", nargs=-1, type=click.Path(exists=True, file_okay=False, path_type=Path))
-@click.option("--out", type=click.Path(file_okay=False, path_type=Path), help="Default: beside the chunks.")
+@click.argument("others", nargs=-1, type=IS_FOLDER)
+@click.option("--out", type=A_FOLDER, help="Default: beside the chunks.")
 def report(folder: Path, others: tuple[Path, ...], out: Path | None) -> None:
     """Write report.html, figures and tables about a dataset.
 
@@ -85,13 +85,8 @@ class Options(TypedDict):
 @click.command()
 @click.argument("what", type=click.Choice([*OF_DESIGNS, *OF_DATASETS]))
 @click.argument("source")
-@click.argument("table", required=False, type=click.Path(exists=True, dir_okay=False, path_type=Path))
-@click.option(
-    "--out",
-    required=True,
-    type=click.Path(dir_okay=False, path_type=Path),
-    help="A .svg, .png or .pdf file; of cyclogram also a .csv table.",
-)
+@click.argument("table", required=False, type=IS_FILE)
+@click.option("--out", required=True, type=A_FILE, help="A .svg, .png or .pdf file; of cyclogram also a .csv table.")
 @click.option(
     "--design",
     help="Of a dataset: optimum, reference, best, or the number of a row; of motion several, as a,b.",

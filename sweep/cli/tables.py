@@ -10,7 +10,7 @@ import pandas as pd
 from pyarrow import csv
 
 from sweep.cli.families import complete_families, complete_outputs, family_names
-from sweep.cli.options import ANGLES
+from sweep.cli.options import A_FILE, ANGLES, IS_FILE
 from sweep.dataset.files import replacing
 from sweep.errors import InputError
 from sweep.evaluation.angles import AngleUnit
@@ -19,7 +19,7 @@ from sweep.evaluation.summaries import summarise
 
 FORMATS = (".parquet", ".csv")
 FAMILY = click.argument("family", shell_complete=complete_families)
-TABLE = click.argument("table", type=click.Path(exists=True, dir_okay=False, path_type=Path))
+TABLE = click.argument("table", type=IS_FILE)
 WANT = click.option(
     "--want",
     multiple=True,
@@ -27,9 +27,7 @@ WANT = click.option(
     shell_complete=complete_outputs,
     help="Outputs, separated by commas; see `sweep families FAMILY`.",
 )
-OUT = click.option(
-    "--out", type=click.Path(dir_okay=False, path_type=Path), help="A .parquet or .csv file; default: CSV to stdout."
-)
+OUT = click.option("--out", type=A_FILE, help="A .parquet or .csv file; default: CSV to stdout.")
 KEEP = click.option(
     "--keep", multiple=True, help="Columns of TABLE to repeat in the result, separated by commas; `all` for every one."
 )
