@@ -12,16 +12,7 @@ from typing import Any
 from sweep.dataset import chunk_files, files, store
 from sweep.errors import InputError, LinksweepError, StoreError, TimeUsedUp, WorkerDied
 from sweep.nights import archive
-from sweep.nights.archive import (
-    WORDS,
-    Journal,
-    NightRecord,
-    State,
-    StudyRecord,
-    append_history,
-    read_history,
-    write_night,
-)
+from sweep.nights.archive import Journal, NightRecord, State, StudyRecord
 from sweep.nights.carry import REPORT, Carried, carry
 from sweep.nights.changes import Changes, changes, figures, slower
 from sweep.nights.page import write_page
@@ -89,7 +80,7 @@ class _Night:
         self.settings, self.earlier, self.folder = settings, earlier, folder
         self.good = archive.good_nights(settings.into)[::-1]
         self.journal = Journal(folder, say)
-        self.history = read_history(settings.into, lambda words: self.journal.note("history", words))
+        self.history = archive.read_history(settings.into, lambda words: self.journal.note("history", words))
         self.begin = time.monotonic()
 
     @property
@@ -121,7 +112,7 @@ class _Night:
         verdict = _verdict(result)
         self.journal.note("end", verdict, exit_code=result.exit_code, good=result.good)
         if result.exit_code and self.settings.on_change is not None:
-            text = (self.folder / WORDS).read_text(encoding="utf-8")
+            text = (self.folder / archive.WORDS).read_text(encoding="utf-8")
             fault = notify(self.settings.on_change, self.folder, result.exit_code, text)
             self.journal.note("told", f"--on-change {fault or 'ran'}", fault=fault)
         return result
@@ -129,8 +120,8 @@ class _Night:
     def written(self, records: Mapping[str, StudyRecord], code: int) -> NightRecord:
         """Write the record of this night down."""
         result = NightRecord(self.folder.name, time.monotonic() - self.begin, code, records)
-        write_night(self.folder, result)
-        append_history(self.settings.into, result)
+        archive.write_night(self.folder, result)
+        archive.append_history(self.settings.into, result)
         return result
 
     def interrupted(self, studies: list[Chosen], records: Mapping[str, StudyRecord], code: int) -> None:

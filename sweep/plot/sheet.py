@@ -12,13 +12,11 @@ import numpy as np
 
 from sweep.dataset.files import unwritable
 from sweep.errors import InputError
-from sweep.evaluation.cyclogram import cyclogram, table_in_degrees
 from sweep.exchange.dxf import add_tables
 from sweep.exchange.export import export
 from sweep.exchange.scene import exists, frames_of, is_spatial, over, pose, shown_name
-from sweep.families.machines.machine import Machine
 from sweep.plot.drawing import draw
-from sweep.report.dataset import Dataset, as_result, chosen, read_dataset, row_of
+from sweep.report.dataset import Dataset, as_result, chosen, cyclogram_of, read_dataset, row_of
 from sweep.report.figures import house_style, new_figure
 from sweep.report.quantities import number, quantity, rpm
 from sweep.report.tables import limit_states, parameter_rows
@@ -113,10 +111,9 @@ def tables_of(data: Dataset, parts: Sequence[Part]) -> list[Table]:
 
 
 def _cyclogram(data: Dataset) -> list[Table]:
-    family, row = data.study.family, data.result
-    if row is None or not isinstance(family, Machine):
+    turn = cyclogram_of(data)
+    if turn is None:
         return []
-    turn = table_in_degrees(cyclogram(family, data.design(row), angles="rad"))
     events: Iterable[tuple[str, str, str, float, float, float]] = turn.itertuples(index=False, name=None)
     lines = [
         (f"{member} {name}".strip(), kind, f"{number(start, 4)}°", "" if kind == "event" else f"{number(end, 4)}°")

@@ -14,10 +14,12 @@ from sweep.dataset import chunk_files, files, store
 from sweep.dataset.files import check_tables
 from sweep.dataset.verification import study_of
 from sweep.errors import InputError
+from sweep.evaluation.cyclogram import cyclogram, table_in_degrees
 from sweep.evaluation.statuses import meaning
 from sweep.evaluation.summaries import design_outputs, output
 from sweep.evaluation.tables import design_matrix
 from sweep.families.base import Family
+from sweep.families.machines.machine import Machine
 from sweep.families.names import is_largest, is_place, stem
 from sweep.optimise import Survey, read_survey
 from sweep.report.quantities import Quantity, quantity
@@ -305,6 +307,13 @@ def as_result(data: Dataset, row: Row) -> Dataset:
 def records(frame: pd.DataFrame) -> list[dict[str, Any]]:
     """Return the rows of a table, each by the names of its columns."""
     return [{str(name): value for name, value in row.items()} for row in frame.to_dict("records")]
+
+
+def cyclogram_of(data: Dataset) -> pd.DataFrame | None:
+    """Return the cyclogram of the result of a machine, angles in degrees; None of anything else."""
+    if data.result is None or not isinstance(data.study.family, Machine):
+        return None
+    return table_in_degrees(cyclogram(data.study.family, data.design(data.result), angles="rad"))
 
 
 def marked(data: Dataset) -> dict[str, Any]:

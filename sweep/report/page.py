@@ -12,14 +12,12 @@ from kernels import status as codes
 from sweep.dataset.chunk_files import ROWS_PER_BATCH, batches
 from sweep.dataset.files import OF_OPTIMUM, PARETO, beside, located, replacing, unwritable, write_atomically
 from sweep.errors import InputError
-from sweep.evaluation.cyclogram import cyclogram, table_in_degrees
 from sweep.evaluation.statuses import meaning
-from sweep.families.machines.machine import Machine
 from sweep.jobs.progress import Say, unsaid
 from sweep.optimise.manufacture.tolerance import SINGLE, TELLING
 from sweep.pages import rendered
 from sweep.report import answer, front, maps, tables
-from sweep.report.dataset import Dataset, Row, as_result, chosen, gather, read_dataset, row_of
+from sweep.report.dataset import Dataset, Row, as_result, chosen, cyclogram_of, gather, read_dataset, row_of
 from sweep.report.figures import drawn_before, house_style, save
 from sweep.report.live import embedded, live, moving, scripts_of
 from sweep.report.made import (
@@ -184,10 +182,9 @@ def _cyclogram(data: Dataset, events: Mapping[str, tuple[float, float]], out: Pa
 
     The file says besides where the ``events`` of what is made lie.
     """
-    row, family = data.result, data.study.family
-    if row is None or not isinstance(family, Machine):
+    found = cyclogram_of(data)
+    if found is None:
         return []
-    found = table_in_degrees(cyclogram(family, data.design(row), angles="rad"))
     with_bands(found, events).to_csv(out / "cyclogram.csv", index=False, float_format="%.4f")
     return list(found.itertuples(index=False, name=None))
 
