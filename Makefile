@@ -113,7 +113,7 @@ bench: $(VENV)/dev  ## ns per sample against numpy and C; what everything takes,
 
 docs: $(VENV)/dev  ## make docs/effects.md and docs/study.schema.json from the register
 	$(SWEEP) effects --markdown > docs/effects.md
-	$(SWEEP) schema --out docs/study.schema.json
+	$(SWEEP) schema > docs/study.schema.json
 
 site: $(VENV)/dev  ## the docs as a site, into build/site; no network
 	NO_MKDOCS_2_WARNING=1 $(BIN)/mkdocs build

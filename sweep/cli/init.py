@@ -12,7 +12,7 @@ import click
 
 from sweep.cli.families import complete_families, family_names
 from sweep.cli.first_study import smoke_text, study_text
-from sweep.cli.options import A_FILE, A_FOLDER, IS_FILE, IS_THERE
+from sweep.cli.options import A_FOLDER, IS_FILE, IS_THERE
 from sweep.dataset.files import unwritable
 from sweep.errors import InputError
 from sweep.exchange.points import drawn
@@ -87,7 +87,7 @@ def init(
     design = None if points is None or family is None else drawn(family, points, unit=unit).parameters
     files = {"study.toml": study_text(name, mechanism, seen, design), "smoke.toml": smoke_text(mechanism)}
     if shared is None:
-        files[SCHEMA] = _current_schema()
+        files[SCHEMA] = schema_text(study_schema())
     _write(folder, files)
     click.echo(f"study: {folder / 'study.toml'}\nnext: sweep check {folder}")
 
@@ -120,14 +120,9 @@ def _machine(members: tuple[str, ...]) -> Machine | None:
 
 
 @click.command()
-@click.option("--out", type=A_FILE, help="A file; default: standard output.")
-def schema(out: Path | None) -> None:
+def schema() -> None:
     """Write the JSON schema of study files, by which editors complete and check them."""
-    if out is None:
-        click.echo(_current_schema(), nl=False)
-        return
-    with unwritable(f"--out {out}"):
-        out.write_text(_current_schema(), encoding="utf-8")
+    click.echo(schema_text(study_schema()), nl=False)
 
 
 def schema_text(found: dict[str, Any]) -> str:
@@ -144,10 +139,6 @@ def schema_text(found: dict[str, Any]) -> str:
             lines = "[\n  " + ",\n  ".join(json.dumps(x, ensure_ascii=False) for x in value) + "\n ]"
         parts.append(f"{json.dumps(key)}: {lines}")
     return "{\n " + ",\n ".join(parts) + "\n}\n"
-
-
-def _current_schema() -> str:
-    return schema_text(study_schema())
 
 
 def _shared_schema(into: Path) -> Path | None:
