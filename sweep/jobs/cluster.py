@@ -13,7 +13,6 @@ import uuid
 from collections.abc import Callable, Iterator
 from concurrent.futures import FIRST_COMPLETED, CancelledError, Future, wait
 from contextlib import suppress
-from types import TracebackType
 from typing import TYPE_CHECKING, Any, TypeVar
 
 from sweep.errors import InputError, WorkerDied
@@ -50,9 +49,7 @@ class Dask:
     def __enter__(self) -> Dask:
         return self
 
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
+    def __exit__(self, *_: object) -> None:
         client, cluster, self._client, self._cluster = self._client, self._cluster, None, None
         for one in (client, cluster):
             if one is not None:
@@ -92,10 +89,10 @@ class Dask:
                 self._client = Client(self._cluster or self.address, timeout=CONNECT_SECONDS)
                 self._client.wait_for_workers(1, timeout=FIRST_WORKER_SECONDS)
             except RuntimeError as error:
-                self.__exit__(None, None, None)
+                self.__exit__()
                 raise WorkerDied(f"the processes of a Dask cluster did not come up ({error})") from error
             except (OSError, ValueError, TimeoutError) as error:
-                self.__exit__(None, None, None)
+                self.__exit__()
                 where = self.address or "this machine"
                 raise InputError("backend", f"dask={where}", f"a scheduler with workers ({error})", "run") from error
         sys.stderr.write(f"linksweep: Dask dashboard at {self._client.dashboard_link}\n")

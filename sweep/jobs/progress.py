@@ -9,7 +9,6 @@ import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from contextvars import ContextVar
-from types import TracebackType
 from typing import TYPE_CHECKING, Never, TextIO, TypeAlias
 
 if TYPE_CHECKING:
@@ -105,9 +104,7 @@ class Progress:
             self.ticker.start()
         return self
 
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
+    def __exit__(self, *_: object) -> None:
         self.over.set()
         if self.ticker is not None:
             self.ticker.join()
@@ -202,9 +199,7 @@ class Phases:
     def __enter__(self) -> Phases:
         return self
 
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
+    def __exit__(self, *_: object) -> None:
         self.end()
 
     def say(self, label: str, done: int = 0, total: int = 0, unit: str = "steps") -> None:
@@ -221,5 +216,5 @@ class Phases:
     def end(self) -> None:
         """Note that the present piece is finished."""
         if self.now is not None:
-            self.now.__exit__(None, None, None)
+            self.now.__exit__()
             self.now = None
