@@ -14,7 +14,7 @@ from sweep.proof import read_proof
 from sweep.proof.study import EVENT, proof_words
 from sweep.quantities.limits import compared
 from sweep.report.dataset import Dataset, Row
-from sweep.report.front import front_sentence
+from sweep.report.front import Front
 from sweep.report.quantities import Quantity, change, number, quantity, rpm
 from sweep.report.tables import LimitState, fates, limit_state, limit_states, limited, parameter_rows, value_of
 
@@ -58,7 +58,8 @@ def answer(data: Dataset, found: Scan, further: Sequence[str] = ()) -> list[str]
     )
     sentences += _edge_sentence(data)
     sentences += _sweep_sentences(data, found)
-    sentences.append(front_sentence(data))
+    front = Front.of(data)
+    sentences.append(front.sentence() if front else "")
     sentences += _against_reference(data)
     sentences += not_achieved(data, found)
     return [s for s in sentences if s]

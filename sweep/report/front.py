@@ -19,6 +19,8 @@ from sweep.report.quantities import Quantity, change, number
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
+    from sweep.study import ParetoSettings
+
 EDGES = (" at its lower bound", " at its upper bound")
 
 
@@ -35,109 +37,102 @@ class FrontRow:
     held: str
 
 
-def front_rows(data: Dataset) -> list[FrontRow]:
-    """Front, the loosest bound first; empty where the study asks for none."""
-    objective, second = _quantities(data)
-    if objective is None or second is None or data.study.pareto is None:
-        return []
-    side = "at least" if data.study.pareto.at_least else "at most"
-    best = math.nan if data.optimum is None else float(data.optimum[objective.name])
-    rows = []
-    for point in _points(data):
-        value, missed = float(point[objective.name]), int(point["status"]) == codes.LIMIT_EXCEEDED
-        rows.append(
-            FrontRow(
-                bound=f"{side} {second.show(float(point['bound']))}",
-                value="–" if missed else objective.show(value),
-                fast="" if missed else objective.at_speed(value, data.study.speed),
-                change="" if missed else change(objective, value, best),
-                second="–" if missed else second.show(compared(second.name, float(point[second.name]))),
-                state="no design found" if missed else _state(point),
-                held=_given_way(data, str(point["relaxation"])) if missed else _held(str(point["active"]), second.name),
+@dataclass(frozen=True)
+class Front:
+    """The front of a dataset: what is set against what, and a point for each bound, the loosest first."""
+
+    data: Dataset
+    objective: Quantity
+    second: Quantity
+    settings: ParetoSettings
+    points: list[dict[str, Any]]
+
+    @classmethod
+    def of(cls, data: Dataset) -> Front | None:
+        """Return the front of a dataset; None where none was searched."""
+        settings, objective = data.study.pareto, data.objective
+        if settings is None or objective is None or data.front is None:
+            return None
+        return cls(data, objective, data.shown(settings.output), settings, records(data.front))
+
+    @property
+    def side(self) -> str:
+        """Which side of its bounds the second output keeps."""
+        return "at least" if self.settings.at_least else "at most"
+
+    def rows(self) -> list[FrontRow]:
+        """Return every bound with the least objective within it."""
+        objective, second, optimum = self.objective, self.second, self.data.optimum
+        best = math.nan if optimum is None else float(optimum[objective.name])
+        rows = []
+        for point in self.points:
+            value, missed = float(point[objective.name]), _missed(point)
+            relaxed, active = str(point["relaxation"]), str(point["active"])
+            rows.append(
+                FrontRow(
+                    bound=f"{self.side} {second.show(float(point['bound']))}",
+                    value="–" if missed else objective.show(value),
+                    fast="" if missed else objective.at_speed(value, self.data.study.speed),
+                    change="" if missed else change(objective, value, best),
+                    second="–" if missed else second.show(compared(second.name, float(point[second.name]))),
+                    state="no design found" if missed else _state(point),
+                    held=_given_way(self.data, relaxed) if missed else _held(active, second.name),
+                )
             )
+        return rows
+
+    def sentence(self) -> str:
+        """Return what the ends of the front say; nothing where there are none."""
+        objective, second = self.objective, self.second
+        points = [point for point in self.points if not _missed(point)]
+        if len(points) < 2:
+            return ""
+        loose, tight = (
+            f"{objective.show(float(p[objective.name]))} with {self.side} {second.show(float(p['bound']))}"
+            for p in (points[0], points[-1])
         )
-    return rows
+        return f"The {objective.words} against the {second.words}: {loose}, {tight}."
+
+    def note(self) -> str:
+        """Say how much of the front was searched."""
+        given, begun = len(set(self.settings.bounds)), len(self.points)
+        wanted = (self.settings.points or given) if self.data.front_steps else given
+        late = sum(p["ended"] == "time" and not p["kkt_residual"] <= KKT for p in self.points)
+        text = "Every row is a search of its own, a local optimum if its residual is small."
+        text += f" {begun - given} of the bounds were placed where the front bends." if begun > given else ""
+        text += f" Time was up before {wanted - begun} more bounds." if begun < wanted else ""
+        text += self._gap()
+        rows = f"{late} row{'s' if late > 1 else ''}"
+        return text + (f" In {rows} time was up before the search had ended." if late else "")
+
+    def _gap(self) -> str:
+        """Say where the front is least known, if that is worth a word."""
+        objective, second, points = self.objective.name, self.second, self.points
+        reached = [float(p["bound"]) if _missed(p) else compared(second.name, float(p[second.name])) for p in points]
+        values = [math.nan if _missed(p) else float(p[objective]) for p in points]
+        bounds = np.array([float(p["bound"]) for p in points])
+        found = gaps(bounds, np.array(reached), np.array(values))
+        if not found or found[0].area < SHOWN:
+            return ""
+        ends = f"{second.show(reached[found[0].number], 4)} and {second.show(float(bounds[found[0].number + 1]), 4)}"
+        count = self.settings.points or len(points)
+        return f" It is least known between {ends}: pareto.points, now {count}, places further bounds there."
+
+    def draw(self, axes: Axes) -> None:
+        """Draw the front as a curve through its designs, and the bounds within which none was found."""
+        both, good = (self.objective, self.second), [p for p in self.points if not _missed(p)]
+        if good:
+            x, y = (np.array([compared(q.name, float(p[q.name])) * q.factor for p in good]) for q in both)
+            label = f"front ({len(good)})"
+            axes.plot(x, y, color=OPTIMUM, linewidth=1.6, marker="o", markersize=5, zorder=4, label=label)
+        missed = [float(p["bound"]) * self.second.factor for p in self.points if _missed(p)]
+        for k, bound in enumerate(missed):
+            words = "bounds without a design" if k == 0 else None
+            axes.axhline(bound, color=LIMIT, linewidth=0.8, linestyle=(0, (6, 4)), label=words)
 
 
-def front_names(data: Dataset) -> tuple[str, str]:
-    """Symbols of the objective and the second output."""
-    objective, second = _quantities(data)
-    return (objective.symbol, second.symbol) if objective is not None and second is not None else ("", "")
-
-
-def front_sentence(data: Dataset) -> str:
-    """Return what the ends of the front say; nothing where there are none."""
-    objective, second = _quantities(data)
-    points = [point for point in _points(data) if int(point["status"]) != codes.LIMIT_EXCEEDED]
-    if objective is None or second is None or data.study.pareto is None or len(points) < 2:
-        return ""
-    side = "at least" if data.study.pareto.at_least else "at most"
-    loose, tight = (
-        f"{objective.show(float(p[objective.name]))} with {side} {second.show(float(p['bound']))}"
-        for p in (points[0], points[-1])
-    )
-    return f"The {objective.words} against the {second.words}: {loose}, {tight}."
-
-
-def front_note(data: Dataset) -> str:
-    """How much of the front was searched."""
-    if data.study.pareto is None or data.front is None:
-        return ""
-    given, begun = len(set(data.study.pareto.bounds)), len(data.front)
-    wanted = (data.study.pareto.points or given) if data.front_steps else given
-    late = int(((data.front["ended"] == "time") & ~(data.front["kkt_residual"] <= KKT)).sum())
-    text = "Every row is a search of its own, a local optimum if its residual is small."
-    text += f" {begun - given} of the bounds were placed where the front bends." if begun > given else ""
-    text += f" Time was up before {wanted - begun} more bounds." if begun < wanted else ""
-    text += _gap(data)
-    return text + (f" In {late} row{'s' if late > 1 else ''} time was up before the search had ended." if late else "")
-
-
-def _gap(data: Dataset) -> str:
-    """Say where the front is least known, if that is worth a word."""
-    objective, second = _quantities(data)
-    points = _points(data)
-    if objective is None or second is None or data.study.pareto is None:
-        return ""
-    missed = [int(point["status"]) == codes.LIMIT_EXCEEDED for point in points]
-    reached = [
-        float(p["bound"]) if m else compared(second.name, float(p[second.name]))
-        for p, m in zip(points, missed, strict=True)
-    ]
-    values = [math.nan if m else float(p[objective.name]) for p, m in zip(points, missed, strict=True)]
-    bounds = np.array([float(point["bound"]) for point in points])
-    found = gaps(bounds, np.array(reached), np.array(values))
-    if not found or found[0].area < SHOWN:
-        return ""
-    ends = f"{second.show(reached[found[0].number], 4)} and {second.show(float(bounds[found[0].number + 1]), 4)}"
-    count = data.study.pareto.points or len(points)
-    return f" It is least known between {ends}: pareto.points, now {count}, places further bounds there."
-
-
-def draw_front(axes: Axes, data: Dataset) -> None:
-    """Draw the front as a curve through its designs, and the bounds within which none was found."""
-    objective, second = _quantities(data)
-    if objective is None or second is None:
-        return
-    points = _points(data)
-    good = [p for p in points if int(p["status"]) != codes.LIMIT_EXCEEDED]
-    if good:
-        x, y = (np.array([compared(q.name, float(p[q.name])) * q.factor for p in good]) for q in (objective, second))
-        axes.plot(x, y, color=OPTIMUM, linewidth=1.6, marker="o", markersize=5, zorder=4, label=f"front ({len(good)})")
-    missed = [float(p["bound"]) * second.factor for p in points if p not in good]
-    for k, bound in enumerate(missed):
-        label = "bounds without a design" if k == 0 else None
-        axes.axhline(bound, color=LIMIT, linewidth=0.8, linestyle=(0, (6, 4)), label=label)
-
-
-def _quantities(data: Dataset) -> tuple[Quantity | None, Quantity | None]:
-    if data.study.pareto is None or data.front is None:
-        return None, None
-    return data.objective, data.shown(data.study.pareto.output)
-
-
-def _points(data: Dataset) -> list[dict[str, Any]]:
-    return [] if data.front is None else records(data.front)
+def _missed(point: dict[str, Any]) -> bool:
+    return int(point["status"]) == codes.LIMIT_EXCEEDED
 
 
 def _state(point: dict[str, Any]) -> str:

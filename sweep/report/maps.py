@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
-from functools import partial
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -13,7 +12,7 @@ import numpy as np
 from sweep.quantities.limits import compared
 from sweep.report.dataset import Dataset, marked
 from sweep.report.figures import LIMIT, OPTIMUM, QUIET, REFERENCE, WIDTH, new_figure
-from sweep.report.front import draw_front
+from sweep.report.front import Front
 from sweep.report.quantities import Quantity
 from sweep.report.scan import Cells, Scan, most_telling
 
@@ -245,8 +244,8 @@ def trade_off(data: Dataset, found: Scan) -> Figure | None:
     marks = {role: row for role, row in marked(data).items() if row is not None}
     at = {role: (compared(first, float(r[first])), compared(other, float(r[other]))) for role, r in marks.items()}
     bound = next((limit.maximum for limit in study.limits if limit.output == second.name), None)
-    drawn = None if data.front is None else partial(draw_front, data=data)
-    return trade_off_figure(found, shown, second, at, bound, drawn)
+    front = Front.of(data)
+    return trade_off_figure(found, shown, second, at, bound, None if front is None else front.draw)
 
 
 def axis_quantity(data: Dataset, name: str) -> Quantity:

@@ -16,9 +16,10 @@ from sweep.evaluation.statuses import meaning
 from sweep.jobs.progress import Say, unsaid
 from sweep.optimise.manufacture.tolerance import SINGLE, TELLING
 from sweep.pages import rendered
-from sweep.report import answer, front, maps, tables
+from sweep.report import answer, maps, tables
 from sweep.report.dataset import Dataset, Row, as_result, chosen, cyclogram_of, gather, read_dataset, row_of
 from sweep.report.figures import drawn_before, house_style, save
+from sweep.report.front import Front
 from sweep.report.live import embedded, live, moving, scripts_of
 from sweep.report.made import (
     event_bands,
@@ -109,9 +110,7 @@ def _write(folder: Path, out: Path, say: Say) -> Path:
             fates=tables.fates(data, found),
             errors=tables.error_rows(data, found),
             provenance=tables.provenance(data),
-            front=front.front_rows(data),
-            front_names=front.front_names(data),
-            front_note=front.front_note(data),
+            front=Front.of(data),
             optima=optima(data, several),
             optima_left=max(len(several) - CARDS, 0),
             sewn=stitch,

@@ -23,7 +23,7 @@ from sweep.errors import Interrupted, StudyError
 from sweep.optimise import front_study
 from sweep.optimise.front.study import saved, within
 from sweep.report.dataset import read_dataset
-from sweep.report.front import front_note
+from sweep.report.front import Front
 from sweep.report.page import write_report
 from sweep.study import ParetoSettings, Study, load_study
 from tests.optimise.test_study import STUDY
@@ -188,7 +188,7 @@ def test_points_are_placed_and_the_report_says_so(whole: tuple[Study, Path], tmp
     assert front is not None and front.complete and front.given == 2 and len(front.bounds) == 4
     write_plan(folder, (read_plan(folder) or {}) | {TABLES: {}})  # the front is not that of the study that was run
     data = replace(read_dataset(folder), study=study)
-    assert "2 of the bounds were placed where the front bends" in front_note(data)
+    assert "2 of the bounds were placed where the front bends" in Front.of(data).note()
 
 
 @pytest.mark.parametrize(

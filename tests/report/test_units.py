@@ -10,7 +10,7 @@ import pytest
 
 from kernels import status as codes
 from sweep.report.dataset import Dataset, gather, without_rows
-from sweep.report.front import front_rows
+from sweep.report.front import Front
 from sweep.report.maps import trade_off
 from sweep.report.page import write_report
 from sweep.report.quantities import quantity
@@ -45,7 +45,7 @@ def front_of(side: str, status: int = codes.OK) -> Dataset:
 
 
 def test_what_gives_way_is_said_in_the_unit_of_its_table() -> None:
-    (row,) = front_rows(front_of("at_most", codes.LIMIT_EXCEEDED))
+    (row,) = Front.of(front_of("at_most", codes.LIMIT_EXCEEDED)).rows()
     assert row.held == "largest pressure angle of stage 1 by 0.579°; stroke by 0.2\u00a0mm"
 
 
