@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from sweep.errors import InputError
-from sweep.exchange.scene import Placed, extent, shown_name
+from sweep.exchange.scene import Placed, extent, frames_of, shown_name
 from sweep.families.base import Array
 
 if TYPE_CHECKING:
@@ -60,8 +60,7 @@ def write_dxf(placed: list[Placed], path: Path, unit: str) -> None:
         document.layers.add(layer, color=colour)
     space = document.modelspace()
     right, first = 0.0, True
-    for frame in dict.fromkeys(one.part.frame for one in placed):
-        same = [one.part for one in placed if one.part.frame == frame]
+    for same in frames_of([one.part for one in placed]).values():
         size = extent(same)
         points = np.vstack([path for part in same for path in part.joints.values()])
         spatial = float(np.ptp(points[:, 2])) > 1e-9 * size

@@ -112,8 +112,7 @@ def pose(mechanism: Mechanism, design: Table, phi: float) -> list[Part]:
 def side_by_side(found: Sequence[Part]) -> list[Placed]:
     """Place the parts of one frame together, and each further frame beside those before it, along x."""
     placed, right = [], math.nan
-    for frame in dict.fromkeys(part.frame for part in found):
-        same = [part for part in found if part.frame == frame]
+    for same in frames_of(found).values():
         points = np.vstack([path for part in same for path in part.joints.values()])
         low, high = float(np.nanmin(points[:, 0])), float(np.nanmax(points[:, 0]))
         along = 0.0 if math.isnan(right) else right + GAP * extent(same) - low

@@ -94,13 +94,11 @@ class Server:
         }  # fmt: skip
         routes = [Route(f"{place}/", page)]
         routes += [Route(f"{place}/{name}", _json(what), methods=["POST"]) for name, what in asked.items()]
-        routes += [Route(f"{place}/{name}", what, methods=["POST"]) for name, what in self._others().items()]
+        others = {"improve": self._improve, "export": self._export}
+        routes += [Route(f"{place}/{name}", what, methods=["POST"]) for name, what in others.items()]
         wrong = dict.fromkeys((LinksweepError, KeyError, TypeError, ValueError), _refused)
         routed = Starlette(routes=routes, exception_handlers=wrong)
         return checked
-
-    def _others(self) -> dict[str, Callable[..., Any]]:
-        return {"improve": self._improve, "export": self._export}
 
     def _is_ours(self, request: Request) -> bool:
         """Whether a request knows the token, names this server, and comes from its own page or from no page at all.

@@ -3,9 +3,8 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Any, TypeAlias
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -13,6 +12,7 @@ from kernels import status as codes
 from sweep.evaluation.statuses import meaning
 from sweep.families.names import error_of, is_flag, is_place, without_minus
 from sweep.quantities.limits import compared, meets
+from sweep.report.dataset import Row
 from sweep.report.quantities import Quantity, change, number, quantity
 
 if TYPE_CHECKING:
@@ -21,7 +21,6 @@ if TYPE_CHECKING:
     from sweep.study import Limit, Study
 
 
-Row: TypeAlias = Mapping[str, Any]
 ACTIVE = 1e-5  # a limit is called active if the optimum is this near to it, relative to its size
 
 
