@@ -6,6 +6,7 @@ import json
 import math
 from collections.abc import Iterator, Mapping
 from itertools import pairwise
+from typing import Any
 
 from sweep.cli.families import described, main_outputs
 from sweep.families.base import Family, March
@@ -60,16 +61,12 @@ def study_text(name: str, family: Family, schema: str, drawn: Mapping[str, float
 
 def smoke_text(family: Family) -> str:
     """Return the tiny version beside it."""
-    tables = {"design": swept_names(family)}
+    few = {"count": 2}
+    design: dict[str, Any] = dict.fromkeys(swept_names(family), few)
     if isinstance(family, Machine):
-        tables = {f"design.{m.name}": _swept_of(family, m.name) for m in family.members}
-    lines = [
-        x
-        for table, names in tables.items()
-        if names
-        for x in (f"[{table}]", *(f"{n} = {{ count = 2 }}" for n in names))
-    ]
-    return "\n".join(["# The same question with few designs.", *lines, ""])
+        swept = {m.name: _swept_of(family, m.name) for m in family.members}
+        design = {name: dict.fromkeys(names, few) for name, names in swept.items() if names}
+    return f"# The same question with few designs.\n{toml({'design': design})}"
 
 
 def _machine_text(name: str, machine: Machine, schema: str) -> str:
