@@ -6,7 +6,6 @@ import json
 import os
 import re
 from pathlib import Path
-from typing import Any
 
 import click
 
@@ -87,7 +86,7 @@ def init(
     design = None if points is None or family is None else drawn(family, points, unit=unit).parameters
     files = {"study.toml": study_text(name, mechanism, seen, design), "smoke.toml": smoke_text(mechanism)}
     if shared is None:
-        files[SCHEMA] = schema_text(study_schema())
+        files[SCHEMA] = schema_text()
     _write(folder, files)
     click.echo(f"study: {folder / 'study.toml'}\nnext: sweep check {folder}")
 
@@ -122,23 +121,12 @@ def _machine(members: tuple[str, ...]) -> Machine | None:
 @click.command()
 def schema() -> None:
     """Write the JSON schema of study files, by which editors complete and check them."""
-    click.echo(schema_text(study_schema()), nl=False)
+    click.echo(schema_text(), nl=False)
 
 
-def schema_text(found: dict[str, Any]) -> str:
-    """Return a schema as it stands in a file: a line for each table, each family and each definition."""
-    parts = []
-    for key, value in found.items():
-        lines = json.dumps(value, ensure_ascii=False)
-        if isinstance(value, dict):
-            lines = ",\n  ".join(
-                f"{json.dumps(name)}: {json.dumps(x, ensure_ascii=False)}" for name, x in value.items()
-            )
-            lines = f"{{\n  {lines}\n }}"
-        elif isinstance(value, list):
-            lines = "[\n  " + ",\n  ".join(json.dumps(x, ensure_ascii=False) for x in value) + "\n ]"
-        parts.append(f"{json.dumps(key)}: {lines}")
-    return "{\n " + ",\n ".join(parts) + "\n}\n"
+def schema_text() -> str:
+    """Return the schema as it stands in a file."""
+    return json.dumps(study_schema(), indent=1, ensure_ascii=False) + "\n"
 
 
 def _shared_schema(into: Path) -> Path | None:
