@@ -176,8 +176,7 @@ def pilot(study: Study, tell: Callable[[int, int], None] = lambda _, __: None) -
     count = study.space.count
     number = min(PILOT_MOST, max(count // PILOT_SHARE, min(PILOT_LEAST, count)))
     length = min(PILOT_LENGTH, -(-number // PILOT_PARTS))
-    golden = (math.sqrt(5.0) - 1.0) / 2.0
-    starts = sorted({int((k * golden) % 1.0 * (count - length + 1)) for k in range(number // length)})
+    starts = _spread(number // length, count - length + 1)
     many = -(-len(starts) // PILOT_PARTS)
     parts = [starts[k : k + many] for k in range(0, len(starts), many)]
     asked = _telling(study)
@@ -232,11 +231,15 @@ def _seconds(study: Study, shares: Sequence[float]) -> float:
     return seconds + CALL_SECONDS * calls
 
 
+def _spread(number: int, count: int) -> list[int]:
+    """Choose about so many of the numbers below ``count``, spread over them; the same at every call."""
+    golden = (math.sqrt(5.0) - 1.0) / 2.0
+    return sorted({int((k * golden) % 1.0 * count) for k in range(number)})
+
+
 def spread_designs(study: Study, number: int) -> Array:
     """Return about that many designs spread over the space, (n, P); fewer where [locus] finds no mechanism for some."""
-    count = study.space.count
-    golden = (math.sqrt(5.0) - 1.0) / 2.0
-    starts = sorted({int((k * golden) % 1.0 * count) for k in range(number)})
+    starts = _spread(number, study.space.count)
     matrix, status = runs_matrix(study, [(start, start + 1) for start in starts])
     found: Array = matrix[status == OK]
     return found
@@ -249,11 +252,10 @@ def feasible_designs(study: Study, number: int) -> tuple[Array, int]:
     locus, as those of the sweep.
     """
     count, tried = study.space.count, 0
-    golden = (math.sqrt(5.0) - 1.0) / 2.0
     kept = np.empty((0, len(study.family.parameters)))
     for many in TRIED:
         runs = -(-count // RUN)
-        chosen = range(runs) if count <= many else sorted({int((k * golden) % 1.0 * runs) for k in range(many // RUN)})
+        chosen = range(runs) if count <= many else _spread(many // RUN, runs)
         designs, status = runs_matrix(study, [(k * RUN, min((k + 1) * RUN, count)) for k in chosen])
         cascade = Cascade(study, keep=False)
         cascade.feed(np.arange(len(designs)), designs, status)
