@@ -14,7 +14,7 @@ from sweep.cli.families import aligned, main_outputs
 from sweep.cli.options import SMOKE, STUDY
 from sweep.effects.advice import findings, left_out, tree
 from sweep.effects.loads import POINT
-from sweep.engine.estimate import LEAST_KEPT, Estimate, check_budget, estimate, other_accuracies, searches
+from sweep.engine.estimate import LEAST_KEPT, Estimate, check_budget, duration, estimate, other_accuracies, searches
 from sweep.evaluation.summaries import output
 from sweep.families.base import Family
 from sweep.families.machines.machine import Machine
@@ -275,13 +275,3 @@ def size(count: float) -> str:
         if count >= scale:
             return f"{count / scale:.3g} {unit}"
     return f"{count:.0f} bytes"
-
-
-def duration(seconds: float) -> str:
-    """Return a time, in words."""
-    for below, unit in ((1e-6, "ns"), (1e-3, "us"), (1.0, "ms")):
-        if 0.0 < seconds < below:
-            return f"{float(f'{seconds / below * 1e3:.3g}'):g} {unit}"
-    if seconds < 120.0:
-        return f"{seconds:.2g} s"
-    return f"{seconds / 60.0:.3g} min" if seconds < 7200.0 else f"{seconds / 3600.0:.3g} h"

@@ -206,7 +206,7 @@ def check_budget(study: Study, cost: Estimate) -> None:
     """
     over = []
     if cost.seconds > study.budget.seconds:
-        over.append(f"time about {_time(cost.seconds)}; allowed: {_time(study.budget.seconds)} (budget.time)")
+        over.append(f"time about {duration(cost.seconds)}; allowed: {duration(study.budget.seconds)} (budget.time)")
     if cost.disk_bytes > study.budget.disk_bytes:
         allowed = study.budget.disk_bytes
         over.append(f"disk about {cost.disk_bytes / 1e9:.3g} GB; allowed: {allowed / 1e9:.3g} GB (budget.disk)")
@@ -216,7 +216,11 @@ def check_budget(study: Study, cost: Estimate) -> None:
         raise BudgetError(f"{study.path}: over the budget with {size}: {'; '.join(over)}; {way_out}")
 
 
-def _time(seconds: float) -> str:
+def duration(seconds: float) -> str:
+    """Return a time, in words."""
+    for below, unit in ((1e-6, "ns"), (1e-3, "us"), (1.0, "ms")):
+        if 0.0 < seconds < below:
+            return f"{float(f'{seconds / below * 1e3:.3g}'):g} {unit}"
     if seconds < 120.0:
-        return f"{seconds:.3g} s"
+        return f"{seconds:.2g} s"
     return f"{seconds / 60.0:.3g} min" if seconds < 7200.0 else f"{seconds / 3600.0:.3g} h"
