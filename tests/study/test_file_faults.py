@@ -8,6 +8,8 @@ import pytest
 
 from sweep.errors import StudyError
 from sweep.study import load_study
+from sweep.study.file import Faults, read_section
+from sweep.study.mechanism import RelationSection
 from tests.study.test_faults import RIGHT, faults_of
 
 
@@ -65,3 +67,11 @@ def test_a_fault_is_told_of_the_file_it_stands_in(tmp_path: Path) -> None:
     places = [" ".join(fault.split()[:2]).rstrip(":") for fault in caught.value.faults]
     line = RIGHT.count("\n", 0, RIGHT.index("starts = 10")) + 1
     assert places == [f"study.toml:{line}: optimise.starts", "smoke.toml:3: design.h", "smoke.toml:2: design.c.count"]
+
+
+def test_a_fault_under_a_name_of_the_users_is_told_by_the_key_above_it() -> None:
+    wrong = {"fields": {"slow": 1}}
+    faults = Faults({"study.toml": {"relations": {"a": wrong}}})
+    read_section(RelationSection, wrong, ("relations", "a"), faults)
+    (line,) = faults.lines
+    assert line.startswith("study.toml: relations.a.fields.slow = 1; allowed: of a take, the least and most rise")
