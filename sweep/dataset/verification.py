@@ -21,7 +21,7 @@ from sweep.errors import InputError, LinksweepError, StoreError
 from sweep.families.base import Columns
 from sweep.families.names import is_error
 from sweep.study import Study
-from sweep.study.load import study_from_data
+from sweep.study.load import study_of
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -152,16 +152,10 @@ def verify(folder: str | Path, designs: int = DEFAULT_DESIGNS) -> Verification:
     return found
 
 
-def study_of(plan: Mapping[str, Any], folder: Path) -> Study:
-    """Return the study that a dataset answers, from its plan; title and question stand there under ``about``."""
-    data, about = plan.get("data") or plan["chunk_data"], plan.get("about") or {"name": plan["name"]}
-    return study_from_data({**data, "study": about}, files.beside(folder) / files.PLAN)
-
-
 def _study(found: Verification, plan: dict[str, Any]) -> Study | None:
     """Return the study the dataset answers; None, with a note, if this version does not understand it."""
     try:
-        return study_of(plan, found.folder)
+        return study_of(plan, files.beside(found.folder) / files.PLAN)
     except LinksweepError as error:
         found.notes.append(f"the study cannot be read by this version, so parameters are not checked: {error}")
         return None

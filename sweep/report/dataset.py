@@ -12,7 +12,6 @@ from kernels import status as codes
 from sweep.chunks.plan import PARAMETER_UNITS
 from sweep.dataset import chunk_files, files, store
 from sweep.dataset.files import check_tables
-from sweep.dataset.verification import study_of
 from sweep.errors import InputError
 from sweep.evaluation.cyclogram import cyclogram, table_in_degrees
 from sweep.evaluation.statuses import meaning
@@ -24,6 +23,7 @@ from sweep.families.names import is_largest, is_place, stem
 from sweep.optimise import Survey, read_survey
 from sweep.report.quantities import Quantity, quantity
 from sweep.report.scan import Cells, Scan, divided_axes, scan
+from sweep.study.load import study_of
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -175,7 +175,7 @@ def read_dataset(folder: Path) -> Dataset:
     if not plan.get("complete"):  # killed after the last chunk, before the totals were noted
         counts, missed = store.totals(folder)
         plan |= {"counts": counts, "missed": missed}
-    study = study_of(plan, folder)
+    study = study_of(plan, files.beside(folder) / files.PLAN)
     optima, curves, front = (files.beside(folder) / name for name in (files.OPTIMUM, files.CURVES, files.PARETO))
     check_tables(folder, (*files.OF_OPTIMUM, files.PARETO))
     chunks = chunk_files.parts(folder)

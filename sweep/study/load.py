@@ -75,6 +75,18 @@ def study_from_data(data: Mapping[str, Any], path: str | Path) -> Study:
     return _build(data, Path(path), {Path(path).name: data})
 
 
+def study_of(plan: Mapping[str, Any], path: Path) -> Study:
+    """Return the study that a dataset answers, from its plan in ``path``; its title stands there under ``about``.
+
+    Raises
+    ------
+    StudyError
+        as :func:`load_study`.
+    """
+    data, about = plan.get("data") or plan["chunk_data"], plan.get("about") or {"name": plan["name"]}
+    return study_from_data({**data, "study": about}, path)
+
+
 def with_accuracy(study: Study, target: float | None = None, certify: bool | Sequence[str] | None = None) -> Study:
     """Return the same study with another relative error of its extrema, or with or without the proof of its maxima.
 
