@@ -14,6 +14,7 @@ from sweep.families.names import error_of
 from sweep.numerics.events import zeros
 from sweep.quantities.resolve import event_names
 from sweep.reductions.resolution import denser
+from sweep.reductions.rounding import shaken
 from sweep.reductions.sampling import DESIGN_STATUS, Index, blocks, pose_columns, sample_turn, variable
 
 START, LIMIT = 256, 16384  # samples of the first look, and those beyond which a design is given up
@@ -110,5 +111,5 @@ def _root(
     slope = np.abs((high - low) / (right - left))
     phi = zeros(off, left, right)
     left_over = np.abs(off(np.arange(phi.size), phi))
-    rounding = 8.0 * EPS * (np.abs(event.level) + left_over + slope)
+    rounding = 8.0 * EPS * (np.abs(event.level) + left_over + slope) + shaken(family, designs, phi, event.of)
     return np.mod(phi, TWO_PI), (left_over + rounding) / np.maximum(slope, 1e-300) + 8.0 * EPS

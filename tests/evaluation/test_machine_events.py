@@ -6,13 +6,18 @@ to 1e-9 of a length of some 100.
 
 from __future__ import annotations
 
+from pathlib import Path
+
+import mpmath as mp
 import numpy as np
 import pytest
 
 import sweep
 from sweep.errors import StudyError
-from sweep.study import study_from_data
+from sweep.study import load_study, study_from_data
 from tests.evaluation.test_machines import LOOPER, TABLE, two
+from tests.reference import spherical_looper
+from tests.reference.space import exact
 
 MEMBERS = {
     "needle": ["rssr", "guide"],
@@ -221,3 +226,36 @@ def test_pressure_angle_of_a_member_with_two_stages_can_be_searched() -> None:
     both = own.merge(alone, on="parameter")
     assert len(both) == len(alone) > 10
     np.testing.assert_allclose(both["growing_x"], both["growing_y"], rtol=1e-9, atol=1e-12)
+
+
+# Design 10372 of studies/looper-sphere, whose looper comes within 0.5 mm of a needle 60 mm away from the origin.
+GOES_ALONG = {
+    "a1": 4.603196346747248, "b1": 35.072, "c1": 22.656, "e1": 28.058, "f1": 28.355, "g1": -8.831,
+    "alpha1": 1.5707963267948966, "branch1": -1.0, "o": 19.517, "delta": 1.285, "gamma": 5.3027, "c0x": 7.319,
+    "c0y": 16.241, "c0z": -6.796, "p0x": -8.883336635011608, "p0y": 20.84001539041491, "p0z": 30.9230679501075,
+    "a2": 7.410353096877263, "b2": 59.953, "x2": 0.0, "y2": 45.018, "z2": 0.0, "theta2": 1.5707963267948966,
+    "beta2": 1.5707963267948966, "offset2": 1.419343745708947, "branch2": 1.0,
+}  # fmt: skip
+PLACE = {"offset": 4.095310633472646, "x_at": 40.76227666369813, "y_at": -25.469502725522137, "z_at": -37.5966759953173}
+
+
+def test_error_of_an_event_covers_the_rounding_of_what_the_level_is_passed_by() -> None:
+    """A small distance of places far out is known no better than these; the error was that of the level alone."""
+    machine = load_study(Path(sweep.__file__).parents[1] / "studies" / "looper-sphere").bare
+    table = {"needle.a": 12.25, "needle.b": 60.0} | {f"looper.{k}": x for k, x in (GOES_ALONG | PLACE).items()}
+    found = sweep.summarise(machine, table, ["phi_arrive"], accuracy=1e-8).iloc[0]
+    start = float(found["phi_arrive"])
+    pose = sweep.evaluate("spherical_looper", GOES_ALONG, ["psi", "chi"], phi=[start + PLACE["offset"]]).iloc[0]
+    near = {name: mp.mpf(float(pose[name])) for name in ("psi", "chi")}
+    offset, *at = exact(PLACE.values())
+
+    def off(phi: mp.mpf) -> mp.mpf:
+        needle = 12.25 * mp.cos(phi) + mp.sqrt(60**2 - (12.25 * mp.sin(phi)) ** 2)  # down x, its lowest at 0
+        tip = spherical_looper.position(exact(GOES_ALONG.values()), phi + offset, near)
+        x, y, z = at[0] + tip["x_p"], at[1] + tip["z_p"], at[2] - tip["y_p"]  # its axis is y of the machine
+        return mp.sqrt((x - needle) ** 2 + y**2 + z**2) - mp.mpf("0.5")
+
+    with mp.workdps(100):
+        true = mp.findroot(off, (mp.mpf(start), mp.mpf(start) + mp.mpf(10) ** -12), tol=mp.mpf(10) ** -30)
+        error = abs(float(mp.mpf(start) - true))
+    assert error <= found["err_phi_arrive"] < 1e-12
