@@ -94,7 +94,7 @@ def _least(call: Any) -> float:
 def compared(label: str, requirements: list[str]) -> dict[str, Any]:
     """Run the oracle tables and the measurement in one environment."""
     python = environment(label, requirements)
-    tables = ran(python, "-m", "pytest", "-q", "-p", "no:cacheprovider", *TABLES)
+    tables = ran(python, "-m", "pytest", "-p", "no:cacheprovider", *TABLES)
     numbers = ran(python, "-m", "tests.bench.versions", "--measure")
     if numbers.returncode:
         raise SystemExit(f"{label}: {numbers.stderr}")
