@@ -4,18 +4,19 @@ from __future__ import annotations
 
 import math
 from collections import namedtuple
-from typing import NamedTuple
+from typing import NamedTuple, TypeAlias
 
 import numpy as np
 
 from kernels import status as st
 from kernels.arithmetic.complex_step import arctan2, magnitude
 from kernels.arithmetic.intrinsics import largest, smallest
-from kernels.jit import inline, kernel, kernel_fused
+from kernels.jit import inline, inline_fused, kernel, kernel_fused
 from kernels.linkage.outputs import write
 from kernels.types import EPS, TWO_PI, Array, Numbers, Status
 
 TOO_NEAR = 1e-50  # a pin that passes the axis nearer than this has derivatives outside float64
+Most: TypeAlias = tuple[float, float, float, float]
 FLOOR = 1e-150  # of a squared distance on a grid; its square is no less than what float64 holds
 
 
@@ -179,6 +180,38 @@ def poses(designs: Numbers, phi: Numbers, cos_phi: Numbers, sin_phi: Numbers, st
                     write(out.d3psi, i, j, 2.0 * h.total * bend / (square * square))
 
 
+@inline_fused
+def _reduced(
+    h: Half, ak4: float, polynomial: bool, grid: Array, j: int, wanted: tuple[Array | None, ...], most: Most
+) -> Most:
+    """Take a place of the grid into the least D and the largest derivatives, of those that are wanted."""
+    dpsi, d2psi, d3psi = wanted
+    least, m1, m2, m3 = most
+    t, s, ss = grid[0, j], grid[1, j], grid[2, j]
+    if polynomial:
+        square = (h.e * h.e + FLOOR) + t * (h.d1 - ak4 * t)
+    else:
+        # As in `pin` near phi = 0, without that one's branch.
+        twice = 2.0 * h.k
+        x, y = h.e - (t + t) + twice * ss, s * (2.0 * h.below + twice * t)
+        square = (x * x + FLOOR) + y * y
+        least = smallest(least, square)
+    per = 1.0 / square
+    if dpsi is not None:
+        m1 = largest(m1, abs(1.0 - h.total * (h.e - 2.0 * t) * per))
+    if d2psi is not None or d3psi is not None:
+        q = h.q0 + t * (h.q1 + ak4 * t)
+        if d2psi is not None:
+            # One division, not three products with a reciprocal: mostly this is asked for alone.
+            m2 = largest(m2, abs(s * q) / (square * square))
+        if d3psi is not None:
+            q_t, d_t = h.q1 + 2.0 * ak4 * t, h.d1 - 2.0 * ak4 * t
+            q = q * per
+            bend = (1.0 - t) * q + ss * (q_t - 2.0 * q * d_t) * per
+            m3 = largest(m3, abs(bend) * per)
+    return least, m1, m2, m3
+
+
 @kernel_fused
 def dense_maxima(
     designs: Array,
@@ -201,45 +234,39 @@ def dense_maxima(
 
     Notes
     -----
-    D has a floor before the division, so the loop has no branch and vectorises; a design whose pin passes through the
+    D has a floor before the division, so the loops have no branch and vectorise; a design whose pin passes through the
     axis, on the grid or between its points, is nan with status SINGULAR.
+
+    For a >= 0 D is taken from its polynomial, which takes half the work of the pin's coordinates and loses no digits
+    there: D = (1 - t) e^2 + t (4 + (a + k)^2) + 4 a k t (1 - t) is a sum of what is not negative.  It vanishes at the
+    ends alone, so nothing has to be looked for in between.
     """
+    wanted = max_abs_dpsi, max_abs_d2psi, max_abs_d3psi
     for i in range(designs.shape[0]):
         r = reduce_design(designs, i)
-        least, m1, m2, m3 = 1e300, 0.0, 0.0, 0.0
-        for side in range(2):
-            h = r.front if side == 0 else r.back
-            grid = front if side == 0 else back
-            for j in range(grid.shape[1]):
-                t, s, ss = grid[0, j], grid[1, j], grid[2, j]
-                # Half of the pin as in closure.pin near phi = 0, written out without that one's branch, so that it
-                # vectorises.  The floor, far below every pin that counts, takes no instruction of its own.
-                x, y = 0.5 * h.e - t + h.k * ss, s * (h.below + h.k * t)
-                quarter = (x * x + FLOOR) + y * y
-                least = smallest(least, quarter)
-                per = 0.25 / quarter
-                if max_abs_dpsi is not None:
-                    m1 = largest(m1, abs(1.0 - h.total * (h.e - 2.0 * t) * per))
-                if max_abs_d2psi is not None or max_abs_d3psi is not None:
-                    q = h.q0 + t * (h.q1 + r.ak4 * t)
-                    if max_abs_d2psi is not None:
-                        # One division, not three products with a reciprocal: mostly this is asked for alone.
-                        m2 = largest(m2, abs(s * q) / (quarter * quarter))
-                    if max_abs_d3psi is not None:
-                        q_t, d_t = h.q1 + 2.0 * r.ak4 * t, h.d1 - 2.0 * r.ak4 * t
-                        q = q * per
-                        bend = (1.0 - t) * q + ss * (q_t - 2.0 * q * d_t) * per
-                        m3 = largest(m3, abs(bend) * per)
+        most = (1e300, 0.0, 0.0, 0.0)
+        # A loop to each case and half: where one loop chooses, it is compiled with all constants of both.
+        if r.ak4 >= 0.0:
+            for j in range(front.shape[1]):
+                most = _reduced(r.front, r.ak4, True, front, j, wanted, most)
+            for j in range(back.shape[1]):
+                most = _reduced(r.back, r.ak4, True, back, j, wanted, most)
+        else:
+            for j in range(front.shape[1]):
+                most = _reduced(r.front, r.ak4, False, front, j, wanted, most)
+            for j in range(back.shape[1]):
+                most = _reduced(r.back, r.ak4, False, back, j, wanted, most)
+        least, m1, m2, m3 = most
         code = st.OK
         if not r.valid:
             code = st.INVALID_INPUT
-        elif not r.regular or least <= 0.25 * TOO_NEAR**2:
+        elif not r.regular or least <= TOO_NEAR**2:
             code = st.SINGULAR
         status[i] = code
         scale = 2.0 * abs(r.front.total) if code == st.OK else math.nan
         if max_abs_dpsi is not None:
             max_abs_dpsi[i] = m1 if code == st.OK else math.nan
         if max_abs_d2psi is not None:
-            max_abs_d2psi[i] = 0.0625 * scale * m2
+            max_abs_d2psi[i] = scale * m2
         if max_abs_d3psi is not None:
             max_abs_d3psi[i] = scale * m3

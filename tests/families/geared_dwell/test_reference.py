@@ -120,6 +120,19 @@ def test_sampled_maxima_are_those_of_the_poses_on_the_same_grid(samples):
         np.testing.assert_allclose(alone[name], got[name], rtol=1e-14)
 
 
+@pytest.mark.parametrize("gap", [1e-3, 1e-7, 1e-11])
+def test_sampled_maxima_keep_their_digits_where_the_pin_passes_near_the_axis(gap):
+    """At phi = 0 (a = k - 2) and at pi (a = k + 2), for a >= 0, where squared distances come from their polynomial."""
+    table = [(k, k + side + sign * gap) for k in (2.5, 4.0) for side in (-2.0, 2.0) for sign in (1.0, -1.0)]
+    got = step("grid", table, MAXIMA, Accuracy(samples=24))
+    with mp.workdps(50):
+        for row, (k, a) in enumerate(table):
+            grid = [derivatives(k, a, 2 * mp.pi * i / 24) for i in range(13)]
+            for order, name in enumerate(MAXIMA):
+                true = max(abs(values[order]) for values in grid)
+                assert abs(got[name][row] - true) <= 16 * 2.0**-53 * true  # 6 were found, 10 by the coordinates
+
+
 def test_true_maxima_bound_the_sampled_ones_and_are_met_by_many_samples():
     rng = np.random.default_rng(2)
     table = np.stack([rng.uniform(1.0, 3.0, 300), rng.uniform(0.1, 0.9, 300)], axis=1)
