@@ -11,15 +11,14 @@ from kernels.arithmetic.intrinsics import largest, smallest
 from kernels.chains.curves import Curve
 from kernels.chains.form import BLOCK, Helper
 from kernels.chains.halves import TOGETHER, handed_rows, keepers
-from kernels.chains.look import FEWEST, FLAT, ROUGH, SHARE, fourth_difference, zero_beside
+from kernels.chains.look import FEWEST, FLAT, ROUGH, SHARE, Counts, fourth_difference, zero_beside
 from kernels.chains.peaks import CONSTANTS, A, B, C
 from kernels.jit import generated_inline, inline
 from kernels.types import TWO_PI as TURN
 from kernels.types import Array, CosSin
 
 # Rows of BLOCK numbers: what the samples say, then the least of each later discriminant.
-SCALE_AT, ROUGHNESS, MARKS, CLOSE, _MOST, _LEAST, _FLOOR = (k * BLOCK for k in range(7))
-LOW = 7 * BLOCK
+SCALE_AT, ROUGHNESS, CLOSE, _MOST, _LEAST, _FLOOR, MARKS, _MARKS_TOO, LOW = (k * BLOCK for k in range(9))
 RESOLVED, UNRESOLVED, FLAT_CURVE = 0.0, 1.0, 2.0  # what ROUGHNESS says
 ANGLES = TOGETHER // BLOCK  # crank angles together
 AT_ONCE = 4  # samples: so a row is fetched less often
@@ -49,7 +48,7 @@ def _close(count: int, rows: Array, first: int, beyond: int) -> None:
 def _spread(count: int, values: Array, said: Array, mode: int) -> None:
     """Write what counts as the size of each curve, and whether the samples resolve it."""
     fourth, most, least = _row(said, ROUGHNESS // BLOCK), _row(said, _MOST // BLOCK), _row(said, _LEAST // BLOCK)
-    scale, floor = _row(said, SCALE_AT // BLOCK), _row(said, _FLOOR // BLOCK)
+    scale = _row(said, SCALE_AT // BLOCK)
     for i in range(count):
         fourth[i], most[i], least[i] = 0.0, -1e300, 1e300
     for j in range(0, FEWEST, AT_ONCE):
@@ -65,17 +64,20 @@ def _spread(count: int, values: Array, said: Array, mode: int) -> None:
     for i in range(count):
         size, varies = max(most[i], -least[i]), most[i] - least[i]
         scale[i] = size if mode == 0 else varies
-        floor[i] = SHARE * size if mode == 0 else (most[i] if mode > 0 else -least[i]) - (1.0 - SHARE) * varies
         rough = UNRESOLVED if fourth[i] > ROUGH * scale[i] else RESOLVED
         fourth[i] = rough if varies > FLAT * size else FLAT_CURVE
 
 
 @inline
-def _mark(count: int, values: Array, said: Array, up: float, down: float) -> None:
+def _mark(count: int, values: Array, said: Array, which: int, mode: int) -> None:
     """Mark the local maxima that count, as a sum of powers of two."""
-    floor, marks = _row(said, _FLOOR // BLOCK), _row(said, MARKS // BLOCK)
+    floor, marks = _row(said, _FLOOR // BLOCK), _row(said, MARKS // BLOCK + which)
+    most, least, scale = _row(said, _MOST // BLOCK), _row(said, _LEAST // BLOCK), _row(said, SCALE_AT // BLOCK)
+    # A magnitude is the curve times its own sign, a least value the largest of the negative curve.
+    up, down = 1.0 if mode >= 0 else -1.0, 1.0 if mode > 0 else -1.0
     for i in range(count):
-        marks[i] = 0.0
+        best = most[i] if mode > 0 else -least[i]
+        floor[i], marks[i] = SHARE * scale[i] if mode == 0 else best - (1.0 - SHARE) * scale[i], 0.0
     mark = 1.0
     for j in range(1, FEWEST + 1, AT_ONCE):
         at0, at1, at2 = _row(values, j), _row(values, j + 1), _row(values, j + 2)
@@ -136,11 +138,11 @@ def nearest_dip(guards: Array, slot: int, lane: int) -> float:
 
 
 def first_looker(curve: Curve, get: Helper) -> Helper:
-    """Make the function ``look(count, m, table, mode, values, guards, said, handed)`` of a curve.
+    """Make the function ``look(count, m, table, modes, values, guards, said, handed)`` of a curve.
 
     It samples the designs whose constants stand at the places 0 ... count - 1 of the list m, and writes the rows
-    SCALE_AT, ROUGHNESS, MARKS, CLOSE and LOW of ``said``.  The samples stand in the rows 2 ... 33 of ``values``, the
-    discriminants in the rows 1 ... 32 of each later stage in ``guards``.
+    SCALE_AT, ROUGHNESS, CLOSE, MARKS (one of each mode) and LOW of ``said``.  The samples stand in the rows 2 ... 33 of
+    ``values``, the discriminants in the rows 1 ... 32 of each later stage in ``guards``.
     """
     guarded, drive, sample, hand, take = curve.guarded, curve.drive, curve.sample, curve.hand, curve.take
     guard_rows, keep, keep_last = keepers(curve)
@@ -148,7 +150,7 @@ def first_looker(curve: Curve, get: Helper) -> Helper:
     enough = (1.0 + 1e-6) * (curve.samples / TURN) ** 2
 
     def look(
-        count: int, m: Array, table: CosSin, mode: int, values: Array, guards: Array, said: Array, handed: Array
+        count: int, m: Array, table: CosSin, modes: Counts, values: Array, guards: Array, said: Array, handed: Array
     ) -> None:
         cos, sin = table
         for start in range(0, FEWEST, ANGLES):
@@ -173,8 +175,8 @@ def first_looker(curve: Curve, get: Helper) -> Helper:
         for slot in range(guarded):
             _close(count, guards, slot * (FEWEST + 2), 1)
             _dip(count, guards, said, slot, enough)
-        _spread(count, values, said, mode)
-        # A magnitude is the curve times its own sign, a least value the largest of the negative curve.
-        _mark(count, values, said, 1.0 if mode >= 0 else -1.0, 1.0 if mode > 0 else -1.0)
+        _spread(count, values, said, modes[0])
+        for which in range(modes.size):
+            _mark(count, values, said, which, modes[which])
 
     return generated_inline(f"look_abreast_{curve.name}", look)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -33,6 +33,7 @@ from kernels.chains.look import (
     MOST,
     OPEN,
     SHARE,
+    Counts,
     Scratch,
     looker,
     samples_for,
@@ -63,7 +64,8 @@ def new_room(guarded: int, wide: int) -> Scratch:
     stages = max(guarded, 1)
     return Scratch(
         aligned(ABREAST + SAMPLES), aligned(stages * GUARD_ROW), aligned(stages * DIPS), aligned(LOW + stages * BLOCK),
-        aligned(wide * BLOCK), aligned(HANDED), np.zeros(BLOCK, np.int64), np.empty((BLOCK, 3), np.int64),
+        aligned(wide * BLOCK), aligned(HANDED), np.zeros(BLOCK, np.int64), np.zeros(BLOCK, np.int64),
+        np.empty((2, BLOCK, 3), np.int64),
     )  # fmt: skip
 
 
@@ -86,70 +88,112 @@ def _counting(mode: int, most: float, least: float) -> tuple[float, float]:
     return scale, (most if mode > 0 else -least) - (1.0 - SHARE) * scale
 
 
+class Sampled(NamedTuple):
+    """Samples of designs: whether taken of one alone, how many; of one alone their largest and least."""
+
+    alone: bool
+    n: int
+    most: float
+    least: float
+
+
 def enlister(chain: Chained, of: Curve) -> Helper:
     """Make the part ``enlist(designs, begin, end, near, ...)``, which lists the local maxima of some designs.
 
-    It samples designs begin, ..., end - 1 and returns the length of the list, in whole vectors.
+    It samples designs begin, ..., end - 1 once for all modes and returns the length of the list, in whole vectors.
 
     ``near`` has for each the distance of its nearest singularity, 0 for one that is left out.
     """
-    put, get, doubts, seat = chain.record.put, chain.record.get, chain.record.doubts, _placer(chain, of)
+    get, doubts, seat, gather = chain.record.get, chain.record.doubts, _placer(chain, of), _gatherer(chain, of)
     look, look_abreast, judge = looker(of), first_looker(of, get), _judge(of)
     last, per_rho = chain.stages - 1, of.samples
 
     # One function without a return half way: with more the references to each array are counted, which takes time.
     def enlist(
-        designs: Array, begin: int, end: int, near: Array, table: CosSin, made_of: Array, mode: int, m: Array,
+        designs: Array, begin: int, end: int, near: Array, table: CosSin, made_of: Array, modes: Counts, m: Array,
         status: Status, room: Scratch,
     ) -> int:  # fmt: skip
-        # A magnitude is the curve times its own sign, a least value the largest of the negative curve.
-        up, down = 1.0 if mode >= 0 else -1.0, 1.0 if mode > 0 else -1.0
-        (cos, sin), values, dips, said, span = table, room.values, room.dips, room.said, room.span
+        values, dips, said, place, needed = room.values, room.dips, room.said, room.place, room.needed
         length: int
         abreast, length = seat(designs, begin, end, near, made_of, m, room)
-        look_abreast(abreast, m, table, mode, values[ABREAST:], dips, said, room.handed)
+        look_abreast(abreast, m, table, modes, values[ABREAST:], dips, said, room.handed)
         for i in range(begin, end):
             n = _enough(near[i - begin], per_rho)
-            if n == 0:
-                continue
-            own = room.place[i - begin] & PLACE
-            k: Any = get(m, own + CONSTANTS)
-            limits: Any = doubts(k)
-            status[i] = LOOKING if limits[last] < math.inf else OPEN
-            if n == FEWEST and status[i] == LOOKING:
-                n, status[i] = judge(limits, own, dips, said)
-            a, b, c = made_of[i, 0], made_of[i, 1], made_of[i, 2]
-            alone, first, stride, scale, floor = status[i] == LOOKING, ABREAST + own, BLOCK, said[SCALE_AT + own], 0.0
-            if alone:
-                first, stride = 0, 1
-                n, most, least, status[i] = look(k, a, b, c, n, table, mode, limits, room)
-                scale, floor = _counting(mode, most, least)
-            if status[i] != st.OK:
-                continue
-            # The first maximum stands where the constants are already.
-            many, begun, width = 0, length, TURN / n
-            for chunk in range(2, n + 2, CHUNK):
-                peaks = _peaks(chunk, values, up, down, floor) if alone else int(said[MARKS + own])
-                while peaks != 0:
-                    j = chunk + (lowest_bit(peaks) & PLACE)
-                    peaks &= peaks - 1
-                    place = (own if many == 0 else length) & PLACE
-                    if (many == 0) | ((many < MOST_PEAKS) & (length < CAPACITY)):
-                        angle, at = (n - FEWEST + j - 2) & ANGLE, (first + j * stride) & ANGLE
-                        sign = up if values[at] >= 0.0 else down
-                        three = sign * values[at - stride], sign * values[at], sign * values[at + stride]
-                        append(m, place, cos[angle], sin[angle], width, (j - 2) * width, three, sign, scale)
-                        if many > 0:
-                            m[place + A], m[place + B], m[place + C] = a, b, c
-                            put(m, place + CONSTANTS, k)
-                    length += 0 if many == 0 else 1
-                    many += 1
-            span[i - begin, 0], span[i - begin, 1], span[i - begin, 2] = own, begun, length
-            if many == 0 or many > MOST_PEAKS or length > CAPACITY:
-                status[i], length = OPEN, begun
+            if n > 0:
+                own = place[i - begin] & PLACE
+                limits: Any = doubts(get(m, own + CONSTANTS))
+                code = LOOKING if limits[last] < math.inf else OPEN
+                if n == FEWEST and code == LOOKING:
+                    n, code = judge(limits, own, dips, said)
+                needed[i - begin] = n
+                for which in range(modes.size):
+                    status[which, i] = code
+        few = Sampled(False, FEWEST, 0.0, 0.0)
+        for which in range(modes.size):
+            length = gather(0, end - begin, few, which, modes[which], table, m, status[which, begin:end], length, room)
+        for i in range(begin, end):
+            if status[0, i] == LOOKING:
+                k: Any = get(m, (place[i - begin] & PLACE) + CONSTANTS)
+                a, b, c = made_of[i, 0], made_of[i, 1], made_of[i, 2]
+                # What a largest and a least value need is the same.
+                n, most, least, code = look(k, a, b, c, needed[i - begin], table, modes[0], doubts(k), room)
+                by_itself = Sampled(True, n, most, least)
+                for which in range(modes.size):
+                    status[which, i], only = code, status[which, begin:end]
+                    lane = i - begin
+                    length = gather(lane, lane + 1, by_itself, which, modes[which], table, m, only, length, room)
         return (length + 7) & ~7
 
     return generated_part(f"enlist_{of.name}", enlist)
+
+
+def _gatherer(chain: Chained, of: Curve) -> Helper:
+    """Make the function ``gather(begin, end, at, which, mode, table, m, status, length, room)``.
+
+    It appends to the list the maxima of those designs of a block whose status is OK, and returns its length.
+    """
+    get, put = chain.record.get, chain.record.put
+
+    def gather(
+        begin: int, end: int, at: Sampled, which: int, mode: int, table: CosSin, m: Array, status: Status, length: int,
+        room: Scratch,
+    ) -> int:  # fmt: skip
+        # A magnitude is the curve times its own sign, a least value the largest of the negative curve.
+        up, down = 1.0 if mode >= 0 else -1.0, 1.0 if mode > 0 else -1.0
+        (cos, sin), values, said, span, width = table, room.values, room.said, room.span, TURN / at.n
+        for i in range(begin, end):
+            if status[i] != st.OK:
+                continue
+            own = room.place[i] & PLACE
+            first, stride, scale, floor = ABREAST + own, BLOCK, said[SCALE_AT + own], 0.0
+            if at.alone:
+                first, stride = 0, 1
+                scale, floor = _counting(mode, at.most, at.least)
+            # The first maximum of the first mode stands where the constants are already.
+            many, begun, seats = 0, length, 1 - which
+            for chunk in range(2, at.n + 2, CHUNK):
+                marked = said[MARKS + which * BLOCK + own]
+                peaks = _peaks(chunk, values, up, down, floor) if at.alone else int(marked)
+                while peaks != 0:
+                    j = chunk + (lowest_bit(peaks) & PLACE)
+                    peaks &= peaks - 1
+                    place = (own if many < seats else length) & PLACE
+                    if (many < seats) | ((many < MOST_PEAKS) & (length < CAPACITY)):
+                        angle, here = (at.n - FEWEST + j - 2) & ANGLE, (first + j * stride) & ANGLE
+                        sign = up if values[here] >= 0.0 else down
+                        three = sign * values[here - stride], sign * values[here], sign * values[here + stride]
+                        append(m, place, cos[angle], sin[angle], width, (j - 2) * width, three, sign, scale)
+                        if many >= seats:
+                            m[place + A], m[place + B], m[place + C] = m[own + A], m[own + B], m[own + C]
+                            put(m, place + CONSTANTS, get(m, own + CONSTANTS))
+                    length += 0 if many < seats else 1
+                    many += 1
+            span[which, i, 0], span[which, i, 1], span[which, i, 2] = own if seats else begun, begun + which, length
+            if many == 0 or many > MOST_PEAKS or length > CAPACITY:
+                status[i], length = OPEN, begun
+        return length
+
+    return generated_inline(f"gather_{of.name}", gather)
 
 
 def _placer(chain: Chained, of: Curve) -> Helper:

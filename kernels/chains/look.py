@@ -22,6 +22,7 @@ from kernels.jit import generated_inline, inline
 from kernels.types import TWO_PI, Array, CosSin
 
 Counts: TypeAlias = NDArray[np.int64]
+Spans: TypeAlias = NDArray[np.int64]
 
 OPEN = 255  # instead of a status: nothing is decided here, a slower search is to be asked
 LOOKING = 252  # more samples are needed
@@ -95,8 +96,8 @@ class Scratch(NamedTuple):
     """Memory of the search.
 
     Samples of one design and of a block, discriminants of one and of the other, what a first look says; the designs of
-    a block, column by column, and where they stand in it; of each where its maxima are: the first, and where the others
-    begin and end.
+    a block, column by column, where they stand in it and how many samples each needs; of each mode and design where
+    its maxima are: the first, and where the others begin and end.
     """
 
     values: Array
@@ -106,7 +107,8 @@ class Scratch(NamedTuple):
     block: Array
     handed: Array
     place: Counts
-    span: Counts
+    needed: Counts
+    span: Spans
 
 
 def looker(curve: Curve) -> Helper:

@@ -15,10 +15,10 @@ import numpy as np
 from kernels import status as st
 from kernels.arithmetic.intrinsics import prefetch_rows
 from kernels.chains.chain import Chained
-from kernels.chains.curves import MARGIN, curve
+from kernels.chains.curves import MARGIN, Curve, curve
 from kernels.chains.form import BLOCK, STRIDE, Helper
 from kernels.chains.listing import aligned, enlister, new_room
-from kernels.chains.look import FEWEST, MOST, OPEN
+from kernels.chains.look import FEWEST, MOST, OPEN, Counts, Spans
 from kernels.chains.peaks import (
     CONSTANTS,
     ERROR,
@@ -35,7 +35,7 @@ from kernels.chains.peaks import (
     finisher,
     refiner,
 )
-from kernels.jit import generated, inline
+from kernels.jit import generated, generated_inline, inline
 from kernels.types import TWO_PI as TURN
 from kernels.types import Array, CosSin, Status
 
@@ -50,18 +50,19 @@ VALUE, PHI, VALUE_ERROR, PHI_ERROR, SCALE_ROW, SPACING = range(6)
 
 @lru_cache(maxsize=64)
 def find_extrema(chain: Chained, order: int, along: bool = False) -> Helper:
-    """Make the kernel ``find(designs, opening, distance, table, made_of, mode, target, tie, status, found)``.
+    """Make the kernel ``find(designs, opening, distance, table, made_of, modes, target, tie, status, found)``.
 
-    It finds one extremum over the turn of a curve of a chain, one of `kernels.chains.curves`, of that order or the
+    It finds extrema over the turn of a curve of a chain, one of `kernels.chains.curves`, of that order or the
     `MARGIN`; with ``along`` of curves whose number b is 0, by fewer operations and with the same bits.
 
     Its arguments: designs (n, P); opening (n,), OK where the first stage turns, NOT_ROTATABLE where it does not;
     distance (n,) [rad] of its nearest singularity from the real axis; `sampling_tables`; made_of (n, 3), the numbers a,
-    b, c of the curve; mode: 0 for the largest magnitude, +1 for the largest value, -1 for the least; target: relative
-    error wanted, of the magnitude or of the curve's range; tie: share of that size by which no other peak may come near
-    the highest one, negative where it does not matter which of two is higher.  Then out: status (n,), and found (6, n)
-    with the rows VALUE; PHI, its crank angle in [0, 2 pi); estimates of the errors of both; SCALE, what the target is
-    relative to; SPACING of the samples [rad].
+    b, c of the curve; modes (w,): 0 for the largest magnitude, +1 for the largest value, -1 for the least, or both of
+    the last, which share samples and have the bits that each has by itself; target: relative error wanted, of the
+    magnitude or of the curve's range; tie: share of that size by which no other peak may come near the highest one,
+    negative where it does not matter which of two is higher.  Then out: status (w, n), and found (6, w, n) with the
+    rows VALUE; PHI, its crank angle in [0, 2 pi); estimates of the errors of both; SCALE, what the target is relative
+    to; SPACING of the samples [rad].
 
     The status is OK; ROUNDED, where rounding may have moved a single highest peak by more than its share of the target;
     NOT_ROTATABLE, where a stage does not reach; OPEN, where nothing is decided.  With the last two the others are nan.
@@ -70,53 +71,68 @@ def find_extrema(chain: Chained, order: int, along: bool = False) -> Helper:
     get, rows = chain.record.get, CONSTANTS + chain.record.numbers * STRIDE
     per_rho, guarded, wide, allowed = of.samples, of.guarded, chain.record.wide, 1.0 if order == MARGIN else PLAIN
     enlist, refine, finish = enlister(chain, of), refiner(of, get), finisher(of, get)
+    decide = _decider(of, refine, finish, allowed)
 
     def find(
-        designs: Array, opening: Status, distance: Array, table: CosSin, made_of: Array, mode: int, target: float,
+        designs: Array, opening: Status, distance: Array, table: CosSin, made_of: Array, modes: Counts, target: float,
         tie: float, status: Status, found: Array,
     ) -> None:  # fmt: skip
         m, near, room = aligned(rows), np.empty(BLOCK), new_room(guarded, wide)
-        span = room.span
         rounds = 2 if target > 1e-4 else 3
         for start in range(0, designs.shape[0], BLOCK):
             end = min(start + BLOCK, designs.shape[0])
             for i in range(start, end):
-                status[i] = st.NOT_ROTATABLE if opening[i] == st.NOT_ROTATABLE else OPEN
+                for which in range(modes.size):
+                    status[which, i] = st.NOT_ROTATABLE if opening[i] == st.NOT_ROTATABLE else OPEN
                 near[i - start] = distance[i] if opening[i] == st.OK else 0.0
-            length = enlist(designs, start, end, near, table, made_of, mode, m, status, room)
+            length = enlist(designs, start, end, near, table, made_of, modes, m, status, room)
             prefetch_rows(designs, end, end + BLOCK)  # of the next block
             begin_at_vertex(length, m)
             refine(length, m, rounds)
             finish(length, m, target)
-            for i in range(start, end):
-                if status[i] != st.OK:
-                    continue
-                own, low, high = span[i - start, 0], span[i - start, 1], span[i - start, 2]
-                if not _trusted(own, low, high, m):
-                    for slot in range(low - 1, high):
-                        peak = (own if slot < low else slot) & PLACE
-                        if not m[peak + ERROR] < math.inf:  # a flat top, which Newton's method climbs slowly
-                            refine(1, m[peak:], SETTLING)
-                            finish(1, m[peak:], target)
-                status[i] = _decide(own, low, high, m, mode, allowed, target, tie, i, found)
+            for which in range(modes.size):
+                decide(start, end, m, room.span[which], modes[which], target, tie, status[which], found[:, which])
             # Now the list is free for those, one by one, whose tops were not single ones between their samples.
-            for i in range(start, end):
-                rho = per_rho / (FEWEST * MORE)
-                while status[i] == UNTRUSTED and rho * MOST >= per_rho:
-                    near[0] = min(rho, distance[i])
-                    length = enlist(designs, i, i + 1, near, table, made_of, mode, m, status, room)
-                    begin_at_vertex(length, m)
-                    refine(length, m, rounds + SETTLING)
-                    finish(length, m, target)
-                    if status[i] == st.OK:
-                        own, low, high = span[0, 0], span[0, 1], span[0, 2]
-                        status[i] = _decide(own, low, high, m, mode, allowed, target, tie, i, found)
-                    rho /= MORE
-                status[i] = OPEN if status[i] == UNTRUSTED else status[i]
-                if status[i] != st.OK and status[i] != ROUNDED:
-                    found[:, i] = math.nan
+            for which in range(modes.size):
+                one, code, into = modes[which : which + 1], status[which : which + 1], found[:, which]
+                for i in range(start, end):
+                    rho = per_rho / (FEWEST * MORE)
+                    while code[0, i] == UNTRUSTED and rho * MOST >= per_rho:
+                        near[0] = min(rho, distance[i])
+                        length = enlist(designs, i, i + 1, near, table, made_of, one, m, code, room)
+                        begin_at_vertex(length, m)
+                        refine(length, m, rounds + SETTLING)
+                        finish(length, m, target)
+                        if code[0, i] == st.OK:
+                            own, low, high = room.span[0, 0, 0], room.span[0, 0, 1], room.span[0, 0, 2]
+                            code[0, i] = _decide(own, low, high, m, one[0], allowed, target, tie, i, into)
+                        rho /= MORE
+                    code[0, i] = OPEN if code[0, i] == UNTRUSTED else code[0, i]
+                    if code[0, i] != st.OK and code[0, i] != ROUNDED:
+                        into[:, i] = math.nan
 
     return generated(f"find_{of.name}", find)
+
+
+def _decider(of: Curve, refine: Helper, finish: Helper, allowed: float) -> Helper:
+    """Make the function ``decide(start, end, m, span, mode, target, tie, status, found)``, of one mode."""
+
+    def decide(
+        start: int, end: int, m: Array, span: Spans, mode: int, target: float, tie: float, status: Status, found: Array
+    ) -> None:
+        for i in range(start, end):
+            if status[i] != st.OK:
+                continue
+            own, low, high = span[i - start, 0], span[i - start, 1], span[i - start, 2]
+            if not _trusted(own, low, high, m):
+                for slot in range(low - 1, high):
+                    peak = (own if slot < low else slot) & PLACE
+                    if not m[peak + ERROR] < math.inf:  # a flat top, which Newton's method climbs slowly
+                        refine(1, m[peak:], SETTLING)
+                        finish(1, m[peak:], target)
+            status[i] = _decide(own, low, high, m, mode, allowed, target, tie, i, found)
+
+    return generated_inline(f"decide_{of.name}", decide)
 
 
 @inline

@@ -67,6 +67,8 @@ def true_extrema(
     status = np.zeros(len(designs), np.uint8)
     left, kinked, opened = [], [], None
     for request in requests:
+        if request in found:
+            continue
         if not anywhere and panels.has_kinks(family, request, bool(jumping.any())):
             kinked.append(request)
             continue
@@ -77,15 +79,18 @@ def true_extrema(
             continue
         if isinstance(curve, fused.FusedCurve):
             opened = opened or curve.opened(designs)
-            quick, now, undecided = curve.extremum(designs, target, opened)
+            opposite = request._replace(mode=-request.mode)
+            alike = (request, opposite) if request.mode != 0 and opposite in requests else (request,)
+            answers = dict(zip(alike, curve.extrema(alike, designs, target, opened), strict=True))
         else:
-            quick, now, undecided = curve.extremum(designs, target)
-        rows = np.flatnonzero(undecided)
-        if rows.size:
-            slow, now[rows] = _searched(family, designs[rows], [request], target, locate, anywhere, None, HARD)
-            for column, values in zip(quick, slow[request], strict=True):
-                column[rows] = values
-        found[request], status = quick, np.where(status == st.OK, now, status)
+            answers = {request: curve.extremum(designs, target)}
+        for one, (quick, now, undecided) in answers.items():
+            rows = np.flatnonzero(undecided)
+            if rows.size:
+                slow, now[rows] = _searched(family, designs[rows], [one], target, locate, anywhere, None, HARD)
+                for column, values in zip(quick, slow[one], strict=True):
+                    column[rows] = values
+            found[one], status = quick, np.where(status == st.OK, now, status)
     if kinked:
         cut, now = panels.extrema(family, designs, kinked, target, locate)
         found |= cut

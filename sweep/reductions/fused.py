@@ -26,6 +26,7 @@ from sweep.reductions.sampling import Extremum, Index, Mask, pose_columns, turn
 sampling_tables = lru_cache(chains.sampling_tables)
 
 Opened: TypeAlias = tuple[Array, Status, Array]
+Found: TypeAlias = tuple[Extremum, Status, Mask]
 
 
 @dataclass(frozen=True)
@@ -48,46 +49,57 @@ class FusedCurve:
     made_of: DesignMap
     scale: DesignMap | None = None
 
-    def extremum(self, designs: Array, target: float, opened: Opened | None = None) -> tuple[Extremum, Status, Mask]:
-        """Return what is requested, of every design.
+    def extremum(self, designs: Array, target: float, opened: Opened | None = None) -> Found:
+        """Return what is requested, of every design; as `extrema`."""
+        return self.extrema((self.request,), designs, target, opened)[0]
+
+    def extrema(
+        self, requests: tuple[Request, ...], designs: Array, target: float, opened: Opened | None = None
+    ) -> list[Found]:
+        """Return one extremum of every design, or the largest and the least value, which share their samples.
 
         Parameters
         ----------
+        requests : of this curve, alike but for their modes: one, or those of modes +1 and -1
         designs : (n, P) matrix of the whole chain
         target : relative accuracy
         opened : what `opened` gives of these designs, for any curve of the chain, if it is known
 
         Returns
         -------
-        extremum : nan where the status is not OK or nothing is decided
+        extremum : of each request, nan where the status is not OK or nothing is decided
         status : (n,) OK or NOT_ROTATABLE
         undecided : (n,) where a slower search is to be asked
         """
         n, (given, made_of, along) = len(designs), self._given(designs, opened)
         # Which of several is the highest decides on the place.
         tie = TIE if self.request.place else -1.0
-        status, found = np.empty(n, np.uint8), np.empty((6, n))
+        modes = np.array([request.mode for request in requests])
+        status, found = np.empty((modes.size, n), np.uint8), np.empty((6, modes.size, n))
         chains.find_extrema(_chained(self.forms), self.order, along)(
-            *given, sampling_tables(), made_of, self.request.mode, target, tie, status, found
+            *given, sampling_tables(), made_of, modes, target, tie, status, found
         )
-        value, phi, err, err_phi, scale, spacing = found
+        value, phi, err, err_phi, scale, spacing = found.reshape(6, -1)
+        many = np.concatenate([designs] * modes.size) if modes.size > 1 else designs
         if self.scale is not None:
-            factor = self.scale(designs)
+            factor = self.scale(many)
             value, err, scale = value * factor, err * factor, scale * factor
-        extremum = Extremum(value, phi, err, err_phi)
-        rounded = np.flatnonzero(status == chains.ROUNDED)
+        extremum, codes = Extremum(value, phi, err, err_phi), status.ravel()
+        rounded = np.flatnonzero(codes == chains.ROUNDED)
         if rounded.size:
-            self._confirm(designs, extremum, rounded, target * scale[rounded], spacing[rounded])
+            self._confirm(many, extremum, rounded, modes[rounded // n], target * scale[rounded], spacing[rounded])
         if self.request.place:
-            top = np.flatnonzero((status == st.OK) | (status == chains.ROUNDED))
+            top = np.flatnonzero((codes == st.OK) | (codes == chains.ROUNDED))
             slope, known = self.family.derivative_of[self.request.pose], (phi[top], err_phi[top])
-            places, err_phi[top] = polished(self.family, designs[top], slope, *known)
+            places, err_phi[top] = polished(self.family, many[top], slope, *known)
             phi[top] = np.mod(places, TWO_PI)
         undecided = status == chains.OPEN
         # A discriminant is known also where the links do not reach, which is for the slower search to say.
         if self.order == MARGIN:
             undecided |= status == st.NOT_ROTATABLE
-        return extremum, np.where(undecided | (status == chains.ROUNDED), st.OK, status).astype(np.uint8), undecided
+        status = np.where(undecided | (status == chains.ROUNDED), st.OK, status).astype(np.uint8)
+        each = (Extremum(*(column[k * n : (k + 1) * n] for column in extremum)) for k in range(modes.size))
+        return list(zip(each, status, undecided, strict=True))
 
     def mean(self, designs: Array, target: float) -> tuple[Array, Array, Status, Mask]:
         """Return root mean squares over the turn, their errors, the status and what is undecided, as `extremum`."""
@@ -121,13 +133,15 @@ class FusedCurve:
         # Positions along and across a line are often asked for together: they share a kernel, which has to be compiled.
         return opened or self.opened(designs), made_of, self.order >= 1 and not made_of[:, 1].any()
 
-    def _confirm(self, designs: Array, found: Extremum, rows: Index, tolerance: Array, spacing: Array) -> None:
+    def _confirm(
+        self, designs: Array, found: Extremum, rows: Index, modes: Index, tolerance: Array, spacing: Array
+    ) -> None:
         """Replace extrema that rounding may have moved too far by what precise poses say, in place."""
-        precise, pose, mode = self.family.precise(), self.request.pose, self.request.mode
+        precise, pose = self.family.precise(), self.request.pose
         phi = found.phi[rows]
         there = self._precisely(precise, designs[rows], phi)
-        sign = np.where(there[pose] < 0.0, -1.0, 1.0) if mode == 0 else np.full(rows.size, float(mode))
-        height = np.abs(found.value[rows]) if mode == 0 else mode * found.value[rows]
+        sign = np.where(modes != 0, modes, np.where(there[pose] < 0.0, -1.0, 1.0))
+        height = np.where(modes != 0, modes * found.value[rows], np.abs(found.value[rows]))
         blur = found.err[rows]
 
         def sample(active: Index, phi: Array) -> Array:
@@ -136,7 +150,7 @@ class FusedCurve:
 
         peaks = Peaks(phi.copy(), height, found.err_phi[rows], blur, height, spacing, SHRINK * spacing)
         peaks = confirmed(sample, peaks, tolerance, np.full(rows.size, np.inf), blur, sign * there[pose])
-        found.value[rows] = -peaks.height if mode == -1 else peaks.height
+        found.value[rows] = np.where(modes < 0, -peaks.height, peaks.height)
         found.phi[rows], found.err_phi[rows] = np.mod(peaks.phi, TWO_PI), peaks.err_phi
         moved = np.flatnonzero(peaks.phi != phi)
         if moved.size:

@@ -87,3 +87,18 @@ def test_needles_that_stand_twice_at_one_end_are_left_to_no_slower_search():
         tops &= higher >= higher.max(axis=1)[:, None] - 1e-4 * np.ptp(s, axis=1)[:, None]
         twice += int((tops.sum(axis=1) > 1).sum())
     assert twice > 10  # so the case is met
+
+
+@pytest.mark.parametrize(("of", "pose", "place"), [(RSSR, "d2psi", False), (NEEDLE, "s", False), (NEEDLE, "ds", True)])
+def test_a_largest_and_a_least_value_share_samples_and_keep_their_bits(of, pose, place):
+    """Among the designs are those that do not turn, that need more samples, and that precise poses confirm."""
+    designs = random_designs(2000, 7) if of is RSSR else needle_drives(3000, 7)
+    both = (Request(pose, 1, place=place), Request(pose, -1, place=place))
+    together = fused.curve_of(of, both[0], False).extrema(both, designs, 1e-10)
+    for request, (found, status, undecided) in zip(both, together, strict=True):
+        alone, status_alone, undecided_alone = fused.curve_of(of, request, False).extremum(designs, 1e-10)
+        assert {st.OK, st.NOT_ROTATABLE} <= set(status) and np.isfinite(found.value).sum() > 100
+        np.testing.assert_array_equal(status, status_alone)
+        np.testing.assert_array_equal(undecided, undecided_alone)
+        for column, expected in zip(found, alone, strict=True):
+            np.testing.assert_array_equal(column, expected)

@@ -285,8 +285,8 @@ def test_jitted_kernels_give_the_bits_of_their_python_bodies(monkeypatch):
     search, searched, table = chain_kernels.find_extrema(chain, 2), [], chain_kernels.sampling_tables()
     made_of = np.tile([1.0, 0.0, 0.0], (6, 1))
     for function in (search, search.py_func):
-        status, found = np.empty(6, np.uint8), np.empty((6, 6))
-        function(few, opening, distance, table, made_of, 0, 1e-8, -1.0, status, found)
+        status, found = np.empty((2, 6), np.uint8), np.empty((6, 2, 6))
+        function(few, opening, distance, table, made_of, np.array([1, -1]), 1e-8, -1.0, status, found)
         searched.append((status, found))
     for a, b in (*zip(*results, strict=True), *zip(*searched, strict=True)):
         np.testing.assert_array_equal(a, b)

@@ -29,10 +29,11 @@ def found(designs, along=False):
     n = len(designs)
     opening, distance = np.empty(n, np.uint8), np.empty(n)
     rssr.opening(designs, opening, distance)
-    status, values, made_of = np.empty(n, np.uint8), np.empty((6, n)), np.tile([1.0, 0.0, 0.0], (n, 1))
+    status, values, made_of = np.empty((1, n), np.uint8), np.empty((6, 1, n)), np.tile([1.0, 0.0, 0.0], (n, 1))
     search = chain_kernels.find_extrema(CHAIN, 2, along)
-    search(designs, opening, distance, chain_kernels.sampling_tables(), made_of, 0, 1e-8, -1.0, status, values)
-    return status, values
+    modes = np.array([0])
+    search(designs, opening, distance, chain_kernels.sampling_tables(), made_of, modes, 1e-8, -1.0, status, values)
+    return status[0], values[:, 0]
 
 
 def test_the_power_of_two_below_is_that_of_frexp_and_has_no_call():
