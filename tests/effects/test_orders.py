@@ -88,8 +88,8 @@ def test_shaking_is_paid_for_in_torque():
     problem = Problem(full, ("y.key",), np.zeros(1), np.full(1, np.pi), fixed, "rms_f", (), None, Accuracy(target=1e-9))
     low, high = grid["rms_t"].min(), grid["rms_t"].max()
     bounds = (high, 0.5 * (low + high), low + 0.1 * (high - low))
-    starts = problem.rows(np.linspace(0.2, 3.0, 8)[:, None])
-    front = pareto(problem, ParetoSettings("rms_t", bounds, False, 8, None, None), starts)
+    starts = problem.rows(np.linspace(0.2, 3.0, 4)[:, None])
+    front = pareto(problem, ParetoSettings("rms_t", bounds, False, 4, None, None), starts)
     for bound, result in zip(bounds, front, strict=True):
         allowed = grid[grid["rms_t"] <= bound * (1.0 + 1e-9)]
         assert result.status == st.OK
