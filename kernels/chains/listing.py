@@ -104,8 +104,8 @@ def enlister(chain: Chained, of: Curve) -> Helper:
 
     ``near`` has for each the distance of its nearest singularity, 0 for one that is left out.
     """
-    get, doubts, seat, gather = chain.record.get, chain.record.doubts, _placer(chain, of), _gatherer(chain, of)
-    look, look_abreast, judge = looker(of), first_looker(of, get), _judge(of)
+    get, doubts, seat, gather = chain.record.get, chain.record.doubts, _placer(chain), _gatherer(chain)
+    look, look_abreast, guarded = looker(of), first_looker(of, get), of.guarded
     last, per_rho = chain.stages - 1, of.samples
 
     # One function without a return half way: with more the references to each array are counted, which takes time.
@@ -115,7 +115,7 @@ def enlister(chain: Chained, of: Curve) -> Helper:
     ) -> int:  # fmt: skip
         values, dips, said, place, needed = room.values, room.dips, room.said, room.place, room.needed
         length: int
-        abreast, length = seat(designs, begin, end, near, made_of, m, room)
+        abreast, length = seat(designs, begin, end, near, per_rho, made_of, m, room)
         look_abreast(abreast, m, table, modes, values[ABREAST:], dips, said, room.handed)
         for i in range(begin, end):
             n = _enough(near[i - begin], per_rho)
@@ -124,7 +124,7 @@ def enlister(chain: Chained, of: Curve) -> Helper:
                 limits: Any = doubts(get(m, own + CONSTANTS))
                 code = LOOKING if limits[last] < math.inf else OPEN
                 if n == FEWEST and code == LOOKING:
-                    n, code = judge(limits, own, dips, said)
+                    n, code = _judge(limits, own, dips, said, guarded, per_rho)
                 needed[i - begin] = n
                 for which in range(modes.size):
                     status[which, i] = code
@@ -147,7 +147,7 @@ def enlister(chain: Chained, of: Curve) -> Helper:
     return generated_part(f"enlist_{of.name}", enlist)
 
 
-def _gatherer(chain: Chained, of: Curve) -> Helper:
+def _gatherer(chain: Chained) -> Helper:
     """Make the function ``gather(begin, end, at, which, mode, table, m, status, length, room)``.
 
     It appends to the list the maxima of those designs of a block whose status is OK, and returns its length.
@@ -193,19 +193,19 @@ def _gatherer(chain: Chained, of: Curve) -> Helper:
                 status[i], length = OPEN, begun
         return length
 
-    return generated_inline(f"gather_{of.name}", gather)
+    return generated_inline(f"gather_{chain.record.name}", gather)
 
 
-def _placer(chain: Chained, of: Curve) -> Helper:
-    """Make the function ``seat(designs, begin, end, near, made_of, m, room)``: which designs are sampled, and where.
+def _placer(chain: Chained) -> Helper:
+    """Make the function ``seat(designs, begin, end, near, per_rho, ...)``: which designs are sampled, and where.
 
     It writes their constants into the list, and returns how many are sampled abreast and how many in all, in whole
     vectors; what stands in the surplus is never read.
     """
-    load, loaded, put, per_rho = chain.record.load, chain.record.loaded, chain.record.put, of.samples
+    load, loaded, put = chain.record.load, chain.record.loaded, chain.record.put
 
     def seat(
-        designs: Array, begin: int, end: int, near: Array, made_of: Array, m: Array, room: Scratch
+        designs: Array, begin: int, end: int, near: Array, per_rho: float, made_of: Array, m: Array, room: Scratch
     ) -> tuple[int, int]:
         abreast, count = 0, 0
         # Those for which the first look is enough as far as is known come first.
@@ -224,32 +224,28 @@ def _placer(chain: Chained, of: Curve) -> Helper:
             put(m, place + CONSTANTS, loaded(room.block, place))
         return (abreast + 7) & ~7, length
 
-    return generated_inline(f"seat_{of.name}", seat)
+    return generated_inline(f"seat_{chain.record.name}", seat)
 
 
-def _judge(of: Curve) -> Helper:
-    """Make the function ``judge(limits, lane, dips, said)``: how many samples a design needs by its first look.
+@inline
+def _judge(limits: Any, lane: int, dips: Array, said: Array, guarded: int, samples: float) -> tuple[int, int]:
+    """How many samples a design needs by its first look.
 
     Its status is that of :func:`kernels.chains.look.looker`; LOOKING if more are needed than the first 32.
     """
-    guarded, samples = of.guarded, of.samples
-
-    def judge(limits: Any, lane: int, dips: Array, said: Array) -> tuple[int, int]:
-        code, n = LOOKING, FEWEST
-        for slot in range(guarded):
-            low = said[LOW + slot * BLOCK + lane]
-            if code == LOOKING and not low > limits[slot + 1]:
-                code = st.NOT_ROTATABLE if low < -limits[slot + 1] else OPEN
-            if code == LOOKING and said[CLOSE + lane] != 0.0:
-                n = samples_for(samples, FEWEST, nearest_dip(dips, slot, lane), n)
-        rough = said[ROUGHNESS + lane]
-        if code == LOOKING and rough == FLAT_CURVE:
-            code = OPEN
-        elif code == LOOKING and rough == UNRESOLVED:
-            n = max(n, 2 * FEWEST)
-        return n, st.OK if code == LOOKING and n == FEWEST else code
-
-    return generated_inline(f"judge_{of.name}", judge)
+    code, n = LOOKING, FEWEST
+    for slot in range(guarded):
+        low = said[LOW + slot * BLOCK + lane]
+        if code == LOOKING and not low > limits[slot + 1]:
+            code = st.NOT_ROTATABLE if low < -limits[slot + 1] else OPEN
+        if code == LOOKING and said[CLOSE + lane] != 0.0:
+            n = samples_for(samples, FEWEST, nearest_dip(dips, slot, lane), n)
+    rough = said[ROUGHNESS + lane]
+    if code == LOOKING and rough == FLAT_CURVE:
+        code = OPEN
+    elif code == LOOKING and rough == UNRESOLVED:
+        n = max(n, 2 * FEWEST)
+    return n, st.OK if code == LOOKING and n == FEWEST else code
 
 
 @inline

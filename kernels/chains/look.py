@@ -127,26 +127,33 @@ def looker(curve: Curve) -> Helper:
         code, most, least, values, guards = LOOKING, 0.0, 0.0, room.values, room.guards
         while code == LOOKING and n <= MOST:
             take(k, a, b, c, n, table, values, guards, room.handed)
-            needed = n
-            for s in range(guarded):
-                low, nearest = dips(n, guards, s * GUARD_ROW)
-                if code == LOOKING and not low > doubts[s + 1]:
-                    code = st.NOT_ROTATABLE if low < -doubts[s + 1] else OPEN
-                needed = samples_for(samples, n, nearest, needed)
-            fourth, most, least = _spread(n, values)
-            size = max(most, -least)
-            scale = size if mode == 0 else most - least
-            if fourth > ROUGH * scale:
-                needed = max(needed, 2 * n)
-            if code == LOOKING and not most - least > FLAT * size:
-                code = OPEN
-            elif code == LOOKING and needed == n:
-                code = st.OK
-            elif code == LOOKING:
-                n = needed
+            n, most, least, code = _resolved(n, values, guards, mode, doubts, guarded, samples)
         return n, most, least, OPEN if code == LOOKING else code
 
     return generated_inline(f"look_{curve.name}", look)
+
+
+@inline
+def _resolved(
+    n: int, values: Array, guards: Array, mode: int, doubts: Any, guarded: int, samples: float
+) -> tuple[int, float, float, int]:
+    """How many samples n samples ask for, the largest and least of these, and a status: LOOKING if n are too few."""
+    code, needed = LOOKING, n
+    for s in range(guarded):
+        low, nearest = dips(n, guards, s * GUARD_ROW)
+        if code == LOOKING and not low > doubts[s + 1]:
+            code = st.NOT_ROTATABLE if low < -doubts[s + 1] else OPEN
+        needed = samples_for(samples, n, nearest, needed)
+    fourth, most, least = _spread(n, values)
+    size = max(most, -least)
+    scale = size if mode == 0 else most - least
+    if fourth > ROUGH * scale:
+        needed = max(needed, 2 * n)
+    if code == LOOKING and not most - least > FLAT * size:
+        code = OPEN
+    elif code == LOOKING and needed == n:
+        code = st.OK
+    return needed if code == LOOKING else n, most, least, code
 
 
 def taker(curve: Curve) -> Helper:
