@@ -93,6 +93,9 @@ def _end(begin: float, outcome: str, text: str) -> dict[str, Any]:
     return {"event": "end", "outcome": outcome, "seconds": round(time.monotonic() - begin, 3), "text": text}
 
 
+# So many steps of a sweep are as soon compiled one after the other: to begin a process costs 3 s of processor time.
+ALIKE = 4
+
 # How often chunks that were removed or damaged during the run are computed again.
 ROUNDS = 3
 
@@ -201,15 +204,17 @@ class KernelStep:
 def _compile(study: Study, jobs: int, phases: Phases) -> None:
     """Load or compile every kernel the study needs; once one had to be compiled, those behind it are in processes.
 
-    The last, of the descents, take longest to compile and come first there.
+    The last, of the descents, take longest to compile and come first there.  A few steps of a sweep share most of what
+    they need, and are compiled here.
     """
     step = KernelStep(study)
     count = step.count
+    few = ALIKE if count == len(asked_outputs(study)) else 1
     for k in range(count):
         phases.say("compiling", k, count)
         with install_recorder("numba:compile") as compiled:
             step(k)
-        if compiled.buffer and min(jobs, os.cpu_count() or 1, count - k - 1) > 1:
+        if compiled.buffer and min(jobs, os.cpu_count() or 1) > 1 and count - k - 1 > few:
             with stop_on_signal() as stop:
                 ready = executor("loky", jobs).outcomes(step, reversed(range(k + 1, count)), jobs, stop)
                 for done, _ in enumerate(ready, k + 2):
