@@ -102,8 +102,9 @@ class Called(types.Dispatcher):
 
     def get_call_type(self, context: Any, args: Any, kws: Any) -> Any:
         """Type a call."""
-        plain: Callable[[Any], Any] = types.unliteral
-        return super().get_call_type(context, tuple(map(plain, args)), {name: plain(of) for name, of in kws.items()})
+        # Not numba's unliteral, which makes the types of large tuples anew.
+        plain = tuple(of.literal_type if isinstance(of, types.Literal) else of for of in args)
+        return super().get_call_type(context, plain, kws)
 
 
 register_model(Called)(models.OpaqueModel)
