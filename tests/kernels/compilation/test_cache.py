@@ -2,89 +2,13 @@
 
 from __future__ import annotations
 
-import os
 import subprocess
-import sys
-import textwrap
-from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
 
-from tests.support.forks import Forks
+from tests.support.kernel_tree import HELPER, KERNEL, REPORT, edit, process, report
 from tests.support.selection import mostly_long
-
-SOURCES = Path(__file__).resolve().parents[3] / "kernels"
-HELPER = """
-from kernels.jit import inline
-
-STEP = {step}
-
-
-@inline
-def shifted(x: float) -> float:
-    return x + STEP
-"""
-KERNEL = """
-from kernels.jit import kernel
-from kernels.helper import shifted
-
-
-@kernel
-def run(x):
-    return shifted(x)
-"""
-REPORT = "from kernels.loop import run; print(run(1.0), len(run.stats.cache_hits), type(run._cache).__name__)"
-
-
-@pytest.fixture
-def tree(tmp_path: Path) -> Path:
-    """A package of two kernels around the house's decorators, with a cache folder of its own."""
-    package = tmp_path / "tree" / "kernels"
-    package.mkdir(parents=True)
-    for path in (SOURCES / "__init__.py", *(SOURCES / name for name in ("jit.py", "cache.py", "cache_folder.py"))):
-        (package / path.name).write_text(path.read_text())
-    (package / "loop.py").write_text(KERNEL)
-    (package / "helper.py").write_text(HELPER.format(step=1))
-    return package
-
-
-def process(tree: Path, program: str, errors: int | None = None, **environment: str) -> subprocess.Popen[str]:
-    known = os.environ | {"XDG_CACHE_HOME": str(tree.parents[1] / "cache"), "PYTHONPATH": str(tree.parent)}
-    known |= {"PYTHONDONTWRITEBYTECODE": "", "NUMBA_DISABLE_JIT": "0"}
-    return subprocess.Popen([sys.executable, "-c", textwrap.dedent(program)], cwd=tree.parents[1],
-                            env=known | environment, stdout=subprocess.PIPE, stderr=errors, text=True)  # fmt: skip
-
-
-FORKS = Forks()
-
-
-@pytest.fixture(scope="module", autouse=True)
-def forks() -> Iterator[None]:
-    with FORKS:
-        yield
-
-
-def report(tree: Path, program: str = REPORT, **environment: str) -> list[str]:
-    """Words that a program prints; of a process of its own where the environment decides how Python begins."""
-    if environment:
-        with process(tree, program, **environment) as running:
-            found, _ = running.communicate(timeout=60)
-        code = running.returncode
-    else:
-        cache = {"XDG_CACHE_HOME": str(tree.parents[1] / "cache")}
-        code, found = FORKS.run(textwrap.dedent(program), str(tree.parent), str(tree.parents[1]), cache)
-    assert code == 0
-    return found.split()
-
-
-def edit(tree: Path, step: int, same_time: bool = False) -> None:
-    """Write the helper anew; a step of two digits changes its size, so Python sees it within the same second too."""
-    helper = tree / "helper.py"
-    before = helper.stat()
-    helper.write_text(HELPER.format(step=step))
-    if same_time:
-        os.utime(helper, ns=(before.st_atime_ns, before.st_mtime_ns))
 
 
 def test_code_is_compiled_once_and_found_again(tree: Path) -> None:
@@ -275,86 +199,6 @@ def test_of_processes_that_need_the_same_one_compiles_it_and_the_others_wait_for
 def test_where_nothing_can_be_written_kernels_run_all_the_same(tree: Path, tmp_path: Path) -> None:
     (tmp_path / "file").touch()
     assert report(tree, XDG_CACHE_HOME=str(tmp_path / "file")) == ["2.0", "0", "NullCache"]
-
-
-PAYLOAD = """
-import hashlib, pathlib, pickle, sys
-
-class Planted:
-    def __reduce__(self):
-        return exec, ("import pathlib; pathlib.Path({mark!r}).touch()",)
-
-(root,) = (pathlib.Path({cache!r}) / "linksweep" / "kernels").iterdir()
-for path in root.rglob("*.nb[ic]"):
-    data = pickle.dumps(Planted())
-    path.write_bytes(hashlib.sha256(path.relative_to(root).as_posix().encode() + bytes(1) + data).digest() + data)
-"""
-
-
-def planted(tree: Path) -> tuple[Path, Path]:
-    """A cache whose files do something when they are loaded; the folder, and what they leave behind."""
-    report(tree)
-    cache, mark = tree.parents[1] / "cache", tree.parents[1] / "ran"
-    subprocess.run([sys.executable, "-c", PAYLOAD.format(mark=str(mark), cache=str(cache))], check=True)
-    return cache / "linksweep" / "kernels", mark
-
-
-def test_cache_folders_are_closed_to_others(tree: Path) -> None:
-    report(tree, REPORT)
-    root = tree.parents[1] / "cache" / "linksweep" / "kernels"
-    (version,) = root.iterdir()
-    assert all(folder.stat().st_mode & 0o777 == 0o700 for folder in (version, root, root.parent, root.parent.parent))
-
-
-def test_what_lies_in_a_cache_is_run(tree: Path) -> None:
-    """The reason for the tests below: a planted file in a folder that is trusted does what it likes."""
-    _, mark = planted(tree)
-    with process(tree, REPORT, PYTHONWARNINGS="ignore") as running:
-        running.communicate(timeout=60)
-    assert mark.exists()
-
-
-@pytest.mark.parametrize("level", mostly_long(["kernels", "linksweep", "cache"], ["cache"]))
-def test_a_cache_that_others_may_write_to_is_not_used(tree: Path, tmp_path: Path, level: str) -> None:
-    root, mark = planted(tree)
-    {"kernels": root, "linksweep": root.parent, "cache": root.parent.parent}[level].chmod(0o777)
-    temporary = tmp_path / "temporary"
-    temporary.mkdir()
-    for hits in ("0", "1"):  # the private one in its place is kept and found again
-        with process(tree, REPORT, TMPDIR=str(temporary), errors=subprocess.PIPE) as running:
-            found, said = running.communicate(timeout=60)
-        assert running.returncode == 0 and found.split() == ["2.0", hits, "KernelCache"]
-        assert not mark.exists(), "planted code ran"
-        (line,) = said.splitlines()
-        assert "others may write to" in line and str(temporary) in line
-    (private,) = temporary.iterdir()
-    assert private.stat().st_mode & 0o777 == 0o700
-
-
-def test_a_cache_of_another_user_is_not_used(tree: Path, tmp_path: Path) -> None:
-    """To whom the folder belongs cannot be changed by everybody who runs the tests, but who asks can."""
-    _, mark = planted(tree)
-    program = f"""
-    import os
-    uid = os.getuid()
-    os.getuid = lambda: uid + 12345
-    {REPORT}
-    """
-    with process(tree, program, TMPDIR=str(tmp_path), errors=subprocess.PIPE) as running:
-        found, said = running.communicate(timeout=60)
-    assert found.split() == ["2.0", "0", "KernelCache"] and not mark.exists()
-    assert "belongs to another user" in said
-
-
-def test_a_private_folder_that_somebody_took_is_not_used_either(tree: Path, tmp_path: Path) -> None:
-    root, _ = planted(tree)
-    root.chmod(0o777)
-    taken = tmp_path / f"linksweep-{os.getuid()}"
-    taken.mkdir()
-    taken.chmod(0o777)
-    with process(tree, REPORT, TMPDIR=str(tmp_path), errors=subprocess.PIPE) as running:
-        found, said = running.communicate(timeout=60)
-    assert found.split() == ["2.0", "0", "KernelCache"] and not list(taken.iterdir()), said
 
 
 def test_where_there_are_no_locks_it_is_said_once_and_nothing_is_kept(tree: Path) -> None:
