@@ -10,9 +10,7 @@ leaves it aside and kernels use numba's own cache inside that folder.
 from __future__ import annotations
 
 import hashlib
-import os
 import pickle
-import time
 from collections.abc import Callable
 from contextlib import suppress
 from functools import cache
@@ -23,18 +21,10 @@ from numba.core.caching import CompileResultCacheImpl, FunctionCache, IndexDataC
 
 from kernels.cache_folder import CACHE_DIR, SOURCES, locked, resolved, writable
 
-try:
-    from fcntl import LOCK_EX, LOCK_NB, LOCK_UN, lockf
-except ImportError:  # Windows
-    lockf = None  # type: ignore[assignment]
-
 # What reading a file that is not whole raises (numba does not wait for its files to reach the disk), and one that names
 # what this process does not know: an argument's type of a module that only the writer had.
 DAMAGED = (EOFError, ImportError, AttributeError)
 HASH_BYTES = hashlib.sha256().digest_size
-# How long a process waits for another that compiles what it needs, and how often it looks [s].  One that stands still
-# must not hold up the others for ever.
-PATIENCE, GLANCE = 300.0, 0.02
 
 
 class _Locator:
@@ -118,20 +108,8 @@ def _processor(codegen: Any) -> Any:
     return codegen.magic_tuple()
 
 
-@cache
-def _turns() -> int:
-    """Open the file whose bytes stand for what is compiled, each locked by the process that does it.
-
-    It stays open: a process that closes it, or dies, gives its locks back.
-    """
-    return os.open(CACHE_DIR / "_compiling", os.O_RDWR | os.O_CREAT, 0o600)
-
-
 class KernelCache(FunctionCache):
-    """numba's cache of one function, in our folder.
-
-    Of processes that need the same at the same time one compiles it, and the others wait for that and load it.
-    """
+    """numba's cache of one function, in our folder."""
 
     _impl_class = _Implementation
 
@@ -139,11 +117,6 @@ class KernelCache(FunctionCache):
         super().__init__(function)
         base, stamp = self._impl.filename_base, self._impl.locator.get_source_stamp()
         self._cache_file = _CheckedFile(self._cache_path, base, stamp)
-
-    def _turn(self, sig: Any, how: int) -> None:
-        """Lock or free the byte of a signature; OSError where another process has it, or there are no locks."""
-        name = hashlib.sha256(f"{self._cache_path} {self._impl.filename_base} {sig}".encode())
-        lockf(_turns(), how, 1, int.from_bytes(name.digest()[:7]))
 
     def _index_key(self, sig: Any, codegen: Any) -> Any:
         """Tell machine code apart by signature, processor and byte code.
@@ -155,23 +128,6 @@ class KernelCache(FunctionCache):
         return sig, _processor(codegen), hashlib.sha256(code).hexdigest()
 
     def load_overload(self, sig: Any, target_context: Any) -> Any:
-        """Load the machine code of one signature, or None: then it is for the caller to compile it."""
-        found, end = self._load(sig, target_context), time.monotonic() + PATIENCE
-        while found is None and lockf is not None and time.monotonic() < end:
-            try:
-                self._turn(sig, LOCK_EX | LOCK_NB)
-            except BlockingIOError:
-                time.sleep(GLANCE)
-                continue
-            except OSError:
-                break  # without locks nobody waits
-            found = self._load(sig, target_context)  # what was kept just before
-            if found is not None:
-                self._turn(sig, LOCK_UN)
-            break
-        return found
-
-    def _load(self, sig: Any, target_context: Any) -> Any:
         """Load the machine code of one signature, or None; files that cannot be read are emptied."""
         try:
             return super().load_overload(sig, target_context)
@@ -185,8 +141,6 @@ class KernelCache(FunctionCache):
         # A disk that is full takes no code; what was compiled serves this process all the same.
         with suppress(OSError, *DAMAGED), locked():
             super().save_overload(sig, data)
-        with suppress(OSError, TypeError):  # as `load_overload`
-            self._turn(sig, LOCK_UN)
 
 
 def keep(dispatcher: Any) -> None:

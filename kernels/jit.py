@@ -24,9 +24,8 @@ from types import FunctionType
 from typing import Any, TypeVar, cast
 
 import numba
-from numba import types
 from numba.core.event import Listener, register
-from numba.extending import models, register_model, typeof_impl
+from numba.extending import typeof_impl
 
 from kernels.cache_folder import CACHE_DIR, may_keep, say, writable
 
@@ -80,11 +79,6 @@ class Helper:
         return _compiled(self.py_func, no_cpython_wrapper=True, **self.targetoptions)
 
     @cached_property
-    def called(self) -> Any:
-        """The type that numba gives it."""
-        return Called(self.for_kernels)
-
-    @cached_property
     def _for_python(self) -> Callable[..., Any]:
         return cast(Callable[..., Any], numba.njit(**self.targetoptions)(self.py_func))
 
@@ -93,27 +87,10 @@ class Helper:
         return self._for_python(*args)
 
 
-class Called(types.Dispatcher):
-    """numba's type of a helper in the kernels that call it.
-
-    numba would compile a function once more for each number that is written in a call of it, or that a variable begins
-    with.  A helper takes such a number as any other; where it is folded in, LLVM sees the number.
-    """
-
-    def get_call_type(self, context: Any, args: Any, kws: Any) -> Any:
-        """Type a call."""
-        # Not numba's unliteral, which makes the types of large tuples anew.
-        plain = tuple(of.literal_type if isinstance(of, types.Literal) else of for of in args)
-        return super().get_call_type(context, plain, kws)
-
-
-register_model(Called)(models.OpaqueModel)
-
-
 @typeof_impl.register(Helper)
 def _type_of_helper(helper: Helper, context: Any) -> Any:
     """Let numba see the function for kernels wherever one of them names the helper."""
-    return helper.called
+    return typeof_impl(helper.for_kernels, context)
 
 
 def _helper(function: F, **options: Any) -> F:

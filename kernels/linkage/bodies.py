@@ -73,7 +73,7 @@ class Posed(NamedTuple):
 @inline
 def posed(body: Array) -> Posed:
     """Read the record of a body, (PER_BODY,)."""
-    # Written out: slices cost their bounds.
+    # Written out: slices cost their bounds, and numba compiles a helper anew for every literal index.
     return Posed(
         (body[0], body[1], body[2]), (body[3], body[4], body[5]), (body[6], body[7], body[8]),
         (body[9], body[10], body[11]), (body[12], body[13], body[14]), (body[15], body[16], body[17]),

@@ -45,6 +45,7 @@ class Joints(NamedTuple):
 @inline
 def read(poses: Array, designs: Array) -> Joints:
     """Joints of one pose from its record ``poses`` (PER_POSE,) and its design's record ``designs`` (PER_DESIGN,)."""
+    # Written out: numba compiles a helper anew for every literal index it is called with.
     return Joints(
         (poses[0], poses[1], poses[2]),
         (poses[3], poses[4], poses[5]),

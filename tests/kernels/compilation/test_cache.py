@@ -161,41 +161,6 @@ def test_processes_that_compile_at_the_same_time_do_not_mix_their_signatures(tre
     assert report(tree, f"{again}; print(len(run.stats.cache_hits))") == ["2.0", "(2+0j)", "2"]
 
 
-@pytest.mark.parametrize(("patience", "hits"), [(60.0, "1"), (0.1, "0")])
-def test_of_processes_that_need_the_same_one_compiles_it_and_the_others_wait_for_a_while(
-    tree: Path, tmp_path: Path, patience: float, hits: str
-) -> None:
-    begun = tmp_path / "begun"
-    slow = f"""
-    import pathlib, time
-    from numba.core.event import Listener, register
-    from kernels.loop import run
-
-    class Slow(Listener):
-        def on_start(self, event):
-            pathlib.Path({str(begun)!r}).touch()
-            time.sleep(3.0)
-
-        def on_end(self, event):
-            pass
-
-    register("numba:compile", Slow())
-    run(1.0)
-    """
-    other = f"""
-    import pathlib, time
-    import kernels.cache
-    kernels.cache.PATIENCE = {patience}
-    from kernels.loop import run
-    while not pathlib.Path({str(begun)!r}).exists():
-        time.sleep(0.01)
-    print(run(1.0), len(run.stats.cache_hits))
-    """
-    with process(tree, slow) as first:
-        assert report(tree, other) == ["2.0", hits]
-        assert first.wait(60) == 0
-
-
 def test_where_nothing_can_be_written_kernels_run_all_the_same(tree: Path, tmp_path: Path) -> None:
     (tmp_path / "file").touch()
     assert report(tree, XDG_CACHE_HOME=str(tmp_path / "file")) == ["2.0", "0", "NullCache"]
