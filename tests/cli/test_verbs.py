@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import subprocess
 import sys
 from pathlib import Path
@@ -329,3 +330,6 @@ def test_page_about_the_command_line_names_every_verb_and_option() -> None:
         for parameter in verb.params:
             for option in parameter.opts if parameter.param_type_name == "option" else ():
                 assert option in page, f"{name} {option}"
+        row = re.search(rf"^\| `{name} ([^`]*)`", page, flags=re.MULTILINE)
+        known = {option for parameter in verb.params for option in (*parameter.opts, *parameter.secondary_opts)}
+        assert row is not None and set(re.findall(r"--[a-z-]+", row[1])) <= known, name
