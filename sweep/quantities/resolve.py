@@ -4,12 +4,13 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-from sweep.effects import elsewhere, offered
+from sweep.effects import elsewhere, extended, offered
 from sweep.errors import InputError, listed, nearest
 from sweep.families.base import Event, Family, Interval, Output, Turn, of_family
 from sweep.families.capabilities import Assembly
 from sweep.families.chain import Chain
 from sweep.families.machines.machine import Machine
+from sweep.families.machines.relations import EventValue, Timing
 from sweep.families.names import at_stage, parts, without_minus
 from sweep.families.parts import Member
 from sweep.families.reduction import prefixes, reduction_of, split
@@ -133,10 +134,30 @@ def _of_machine(machine: Machine, name: str) -> Quantity | None:
         return _of_member(machine, name, *member)
     timing = next((t for t in machine.timings if t.name == name), None)
     if timing is not None:
-        return TimingOf(timing.output, timing)
+        return _timing(machine, timing)
     # A machine has no limit positions of its own: those are its members'.
     found = _margin(machine, name) or _event(machine, name) or _reduction(machine, name)
     return found or _from_dimensions(machine, name)
+
+
+def _timing(machine: Machine, timing: Timing | EventValue) -> TimingOf:
+    """Find what a timing gives; refuse one of anything but crank angles at which something happens."""
+    begins = f"{machine.domain.name}_"
+    others = [t.name for t in machine.timings]
+    for place in timing.places:
+        angle = place not in others and place.rpartition(".")[2].startswith(begins)
+        if not angle or find(machine, place) is None:
+            known = [name for name in output_names(machine) if name.rpartition(".")[2].startswith(begins)]
+            kind = "value" if isinstance(timing, EventValue) else "timing"
+            allowed = f"a crank angle that is a design output, {begins}...{nearest(place, known)}"
+            raise InputError(kind, place, allowed, f"machine.relations.{timing.name}")
+    return TimingOf(timing.output, timing)
+
+
+def check_timings(machine: Family) -> None:
+    """Refuse timings of what are no crank angles, whether they are asked for or not."""
+    for timing in machine.timings if isinstance(machine, Machine) else ():
+        resolve(extended(machine, [timing.name]), timing.name)
 
 
 def _of_member(machine: Machine, name: str, member: Member, own: str) -> Quantity | None:

@@ -13,6 +13,7 @@ from sweep.families import family as find_family
 from sweep.families.base import Family
 from sweep.families.machines.specification import Specification, specification
 from sweep.quantities import units
+from sweep.quantities.resolve import check_timings
 from sweep.study.file import (
     TEXT,
     Angle,
@@ -261,7 +262,9 @@ def _machine(
         if len(faults.lines) > before:
             return None
         given = specification(members, relations, shafts, tools)
-        return given, find_family(given)
+        machine = find_family(given)
+        check_timings(machine)
+        return given, machine
     except InputError as error:
         place: Key = tuple(error.place.removeprefix("machine.").split(".")) if error.place != "machine" else ()
         if place[:1] == ("relations",) and place[1:] and place[1] in threads:
@@ -270,8 +273,11 @@ def _machine(
         if place[:1] in (("shafts",), ("tools",)):
             faults.value(place if place[-1] == error.name else (*place, error.name), error.value, error.allowed)
             return None
-        key = place if place[:1] == ("relations",) else ("machine", *place)
-        faults.value(key if place[:1] == ("relations",) else (*key, error.name), error.value, error.allowed)
+        if place[:1] == ("relations",):
+            of = relations.get(str(place[-1]), {})
+            faults.value((*place, error.name) if error.name in of else place, error.value, error.allowed)
+            return None
+        faults.value(("machine", *place, error.name), error.value, error.allowed)
         return None
 
 

@@ -6,7 +6,9 @@ to 1e-9 of a length of some 100.
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from pathlib import Path
+from types import MappingProxyType
 
 import mpmath as mp
 import numpy as np
@@ -180,14 +182,35 @@ def test_what_is_no_event_or_speed_is_refused_with_the_remedy(relations: dict, w
         sweep.machine(MEMBERS, relations)
 
 
-def study_with(**event: object) -> object:
+@pytest.mark.parametrize(
+    ("given", "wrong", "word"),
+    [
+        ({"timing": ["needle.stroke", "phi_arrive"]}, "timing = 'needle.stroke'", ""),
+        ({"timing": ["phi_arrive", "phi_leav"]}, "timing = 'phi_leav'", "did you mean 'phi_leave'"),
+        ({"timing": ["x", "phi_arrive"]}, "timing = 'x'", ""),
+        ({"value": ["pace", "min_clearance"]}, "value = 'min_clearance'", "did you mean 'phi_min_clearance'"),
+    ],
+)
+def test_timing_of_what_is_no_crank_angle_is_refused(given: dict, wrong: str, word: str) -> None:
+    machine = sweep.machine(MEMBERS, RELATIONS | {"x": given})
+    with pytest.raises(sweep.InputError, match=f"machine.relations.x: {wrong}; allowed: a crank angle.*{word}"):
+        sweep.summarise(machine, TABLE, ["x"], accuracy=1e-8)
+
+
+def test_study_file_with_a_timing_of_what_is_no_crank_angle_names_its_key() -> None:
+    more = {"stay": {"timing": ["phi_arrive", "phi_leav"]}}
+    with pytest.raises(StudyError, match="relations.stay.timing = 'phi_leav'; allowed: a crank angle"):
+        study_with(more, event="looper.tip_y", level="2 cm")
+
+
+def study_with(more: Mapping[str, object] = MappingProxyType({}), /, **event: object) -> object:
     fixed = {
         name: (f"{value} {'rad' if name.startswith(('alpha', 'offset')) else 'mm'}") for name, value in LOOPER.items()
     }
     data = {
         "study": {"name": "x"},
         "machine": {"looper": {"family": "rssr", "tip": ["30 mm", "0 mm", "0 mm"]}},
-        "relations": {"arrive": event},
+        "relations": {"arrive": event, **more},
         "scene": {"want": ["phi_arrive"]},
         "design": {"looper": {k: v for k, v in fixed.items() if k != "branch"}},
     }
