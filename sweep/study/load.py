@@ -17,7 +17,7 @@ from sweep.study.accuracy import accuracy_table, check_proofs, read_accuracy
 from sweep.study.design import Elsewhere, check_varied, read_reference, read_space, take, taken_reference
 from sweep.study.file import Faults, StudyFile
 from sweep.study.limits import read_limits
-from sweep.study.loads import Inputs, read_inputs, read_window, speeds, tables_of_inputs, with_effects
+from sweep.study.loads import Inputs, check_unused, read_inputs, read_window, speeds, tables_of_inputs, with_effects
 from sweep.study.locus import RATIOS, read_fit, read_locus
 from sweep.study.mechanism import flattened, read_mechanism
 from sweep.study.objective import check_goal, check_objective, check_steady, read_pareto
@@ -158,6 +158,7 @@ def _study(
     faults, objective, goal = file.faults, sections.objective, sections.objective.goal
     named = [*(file.free_table("limits") or ()), *(x for x in (goal, sections.pareto.output) if x)]
     family = with_effects(file, bare, named, (inputs := read_inputs(file, bare)).curves)
+    check_unused(file, bare, family, inputs)
     fit = read_fit(sections.fit, file, family)
     take(file, bare, fitted := () if fit is None else fit.parameters(family))
     locus, prescribed = read_locus(file, bare)

@@ -13,7 +13,7 @@ from typing import Annotated, Any
 import numpy as np
 from pydantic import Field
 
-from sweep.effects import curved_inputs, extended, input_names
+from sweep.effects import all_inputs, curved_inputs, extended, input_names
 from sweep.effects.base import STUDY_LOADS
 from sweep.effects.wanted import expanded, names_of_effects
 from sweep.errors import InputError, choices, closest
@@ -25,6 +25,7 @@ from sweep.numerics.curves import Curve, SeriesCurve, table_curve
 from sweep.quantities import units
 from sweep.study.file import Faults, Fraction, Key, Number, Section, Speed, StudyFile, TwoTexts, holds, read_section
 from sweep.study.limits import read_output_name
+from sweep.study.parameter import read_entry
 
 OF_SCENE = ("speed", "speed_change")
 MOST_POINTS = 100_000
@@ -114,6 +115,15 @@ def tables_of_inputs(file: StudyFile, bare: Family, family: Family, inputs: Inpu
     design = file.free_table("design") or {}
     added = [name for name in family.parameter_names if name not in bare.parameter_names and name not in design]
     return {name: inputs.tables.get(name, home(bare, name)) for name in added}
+
+
+def check_unused(file: StudyFile, bare: Family, family: Family, inputs: Inputs) -> None:
+    """Report faults of inputs that no wanted effect takes: they describe the machine, and count once one does."""
+    design = file.free_table("design") or {}
+    for name, entry in inputs.raw.items():
+        if name not in family.parameter_names:
+            key: Key = (inputs.tables[name], name)
+            read_entry(all_inputs(bare)[name], entry, key, file.faults, sampled="sample" in design)
 
 
 def home(family: Family, name: str) -> str:

@@ -233,3 +233,11 @@ tool_force = { mean = -2.0, cos = [1.0], unit = "N" }
     assert set(study.curves) == {"needle.tool_force"}
     assert study.space.fixed["needle.m_tool"] == pytest.approx(25e-6)
     assert study_from_data(study.data, study.path).fingerprint == study.fingerprint
+
+
+def test_inputs_that_nothing_wanted_takes_are_read_all_the_same(tmp_path):
+    unused = 'mu_a2 = "60 kg*mm^2"\nsupport_a22 = "1 N"\nradius_b2 = "3 mm"\n'
+    found = faults(tmp_path, f"{HEAD}[bodies]{BODIES}{unused}")
+    assert "bodies.mu_a2 = '60 kg*mm^2'; allowed: a number" in found
+    assert "bodies.support_a22 = '1 N'; allowed:" in found
+    assert "radius_b2" not in found
