@@ -12,7 +12,7 @@ from pyarrow import csv
 from sweep.cli.families import complete_families, complete_outputs, family_names
 from sweep.cli.options import A_FILE, ANGLES, IS_FILE
 from sweep.dataset.files import replacing
-from sweep.errors import InputError
+from sweep.errors import InputError, MissingInput, listed
 from sweep.evaluation.angles import AngleUnit
 from sweep.evaluation.poses import evaluate
 from sweep.evaluation.summaries import summarise
@@ -65,15 +65,15 @@ def evaluate_table(
     whole = 2.0 * np.pi if angles != "deg" else 360.0
     phi = None if poses is None else np.arange(poses) * (whole / poses)
     designs = read_table(table)
-    has_phi = any(str(name).split("[")[0].strip() == "phi" for name in designs.columns)
+    names = [str(name).split("[")[0].strip() for name in designs.columns]
+    has_phi = "phi" in names
     if poses is None and not has_phi:
-        raise InputError(
-            "column", "phi", "a column phi [rad], or --poses N for N crank angles over the turn", str(table)
-        )
+        needed = "a column phi [rad], or --poses N for N crank angles over the turn"
+        raise MissingInput("phi", f"{needed}; found {listed(names)}", str(table))
     if poses is not None and has_phi:
         raise InputError("--poses", poses, f"either --poses or a column phi in {table}, not both", "command line")
-    names, chosen = family_names(family), kept(keep)
-    write_table(evaluate(names, designs, wanted(want), phi, keep=chosen, status_text=status_text, angles=angles), out)
+    parts, chosen = family_names(family), kept(keep)
+    write_table(evaluate(parts, designs, wanted(want), phi, keep=chosen, status_text=status_text, angles=angles), out)
 
 
 @click.command("summarise")
@@ -170,7 +170,8 @@ def read_table(path: Path) -> pd.DataFrame:
     except InputError:
         raise
     except Exception as error:  # damaged metadata end in whatever pandas meets first
-        raise InputError("table", path.name, f"readable {suffix[1:]} ({error})", str(path)) from error
+        first = next(iter(str(error).splitlines()), type(error).__name__)  # a schema may follow
+        raise InputError("table", path.name, f"readable {suffix[1:]} ({first})", str(path)) from error
 
 
 def write_table(frame: pd.DataFrame, out: Path | None) -> None:

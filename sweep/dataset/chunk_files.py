@@ -193,10 +193,8 @@ def check_columns(chunks: Sequence[Part], schemas: Iterable[pa.Schema] = ()) -> 
     StoreError
         for the first such chunk, with the columns that differ.
     """
-    import pyarrow.parquet as pq
-
     names: list[str] = []
-    for part, schema in zip(chunks, schemas or (pq.read_schema(part.path) for part in chunks), strict=True):
+    for part, schema in zip(chunks, schemas or map(_schema, chunks), strict=True):
         found = schema.names
         names = names or found
         if found != names:
@@ -205,6 +203,18 @@ def check_columns(chunks: Sequence[Part], schemas: Iterable[pa.Schema] = ()) -> 
             raise StoreError(
                 f"{part.path}: other columns than {chunks[0].path.name} ({apart}); move it away, then run again"
             )
+
+
+def _schema(part: Part) -> pa.Schema:
+    import pyarrow as pa
+    import pyarrow.parquet as pq
+
+    part.check_file()
+    try:
+        with store_errors(part.path):
+            return pq.read_schema(part.path)
+    except (pa.ArrowException, ValueError) as error:
+        raise StoreError(f"{part.path}: damaged chunk; {REMEDY}") from error
 
 
 def missing_chunks(folder: Path, chunks: list[Part]) -> list[int]:

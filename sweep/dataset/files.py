@@ -288,7 +288,7 @@ def check_tables(folder: Path, names: Iterable[str]) -> None:
         for the first such table.
     """
     place = beside(folder)
-    for name in altered(place, read_plan(folder) or {}, [name for name in names if (place / name).is_file()]):
+    for name in altered(place, read_plan(folder) or {}, [name for name in names if (place / name).exists()]):
         text = "not as its search has written it; run the study again to have it searched anew"
         raise StoreError(f"{place / name}: {text}")
 

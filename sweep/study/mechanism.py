@@ -274,8 +274,8 @@ def _machine(
             faults.value(place if place[-1] == error.name else (*place, error.name), error.value, error.allowed)
             return None
         if place[:1] == ("relations",):
-            of = relations.get(str(place[-1]), {})
-            faults.value((*place, error.name) if error.name in of else place, error.value, error.allowed)
+            own = relations.get(str(place[-1]), {})
+            faults.value((*place, error.name) if error.name in own else place, error.value, error.allowed)
             return None
         faults.value(("machine", *place, error.name), error.value, error.allowed)
         return None

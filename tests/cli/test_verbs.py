@@ -128,7 +128,7 @@ def test_summarise_passes_accuracy_and_window(tmp_path: Path) -> None:
         (("geared_dwell", "{table}", "--want", "psi", "--out", "{tmp}/none/x.csv"), "a file in a folder that exists"),
         (("geared_dwell", "{tmp}/bad.csv", "--want", "psi"), "column k, row 1: k = 'x'; allowed: a number"),
         (("geared_dwell", "{tmp}/nan.csv", "--want", "psi"), "column k, row 1: k = nan; allowed: a finite number"),
-        (("geared_dwell", "{tmp}/nophi.csv", "--want", "psi"), "a column phi [rad], or --poses N"),
+        (("geared_dwell", "{tmp}/nophi.csv", "--want", "psi"), "phi is missing; needed: a column phi [rad], or --p"),
         (("geared_dwell", "{tmp}/empty.csv", "--want", "psi"), "readable csv"),
         (("geared_dwell", "{tmp}/fake.parquet", "--want", "psi"), "readable parquet"),
         (("geared_dwell", "{tmp}/german.csv", "--want", "psi"), "values between commas, with decimal points"),

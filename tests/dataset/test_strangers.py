@@ -156,6 +156,15 @@ def test_what_stands_in_place_of_a_chunk_is_damage_and_computed_anew(
     assert chunk_bytes(dataset) == chunk_bytes(whole[1])
 
 
+@pytest.mark.parametrize("kind", ["text", "folder", "pipe"])
+def test_one_chunk_more_that_is_none_is_damage_for_the_report_too(dataset: Path, kind: str) -> None:
+    first = chunk_files.parts(dataset)[0].path
+    path = dataset / first.name.replace("part-000000", "part-000099")
+    {"text": lambda path: path.write_text("{}"), **IN_PLACE}[kind](path)
+    with pytest.raises(StoreError, match=f"{path.name}: damaged chunk"):
+        write_report(dataset)
+
+
 def test_a_name_that_is_no_text_is_shown(dataset: Path) -> None:
     with open(os.fsencode(dataset) + b"/\xff.parquet", "wb"):  # noqa: PTH123 - a path of bytes
         pass
@@ -208,6 +217,12 @@ def test_a_table_beside_the_chunks_that_was_changed_is_refused(tmp_path: Path, n
     for read in readers if name == files.OPTIMUM else readers[:1]:  # no front is compared
         with pytest.raises(StoreError, match=rf"{name}: not as its search has written it; run the study again"):
             read(folder)
+    if name == files.OPTIMUM:  # a folder in place of what the search has written beside it
+        table.write_bytes((before.parent / name).read_bytes())
+        (files.beside(folder) / files.SENSITIVITY).unlink(missing_ok=True)
+        (files.beside(folder) / files.SENSITIVITY).mkdir()
+        with pytest.raises(StoreError, match=f"{files.SENSITIVITY}: not as its search has written it"):
+            write_report(folder)
 
 
 def test_a_link_in_place_of_the_folder_that_leads_nowhere_is_said(whole: tuple[Path, Path], dataset: Path) -> None:

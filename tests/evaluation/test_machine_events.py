@@ -199,7 +199,7 @@ def test_timing_of_what_is_no_crank_angle_is_refused(given: dict, wrong: str, wo
 
 def test_study_file_with_a_timing_of_what_is_no_crank_angle_names_its_key() -> None:
     more = {"stay": {"timing": ["phi_arrive", "phi_leav"]}}
-    with pytest.raises(StudyError, match="relations.stay.timing = 'phi_leav'; allowed: a crank angle"):
+    with pytest.raises(StudyError, match=r"relations\.stay\.timing = 'phi_leav'; allowed: a crank angle"):
         study_with(more, event="looper.tip_y", level="2 cm")
 
 
