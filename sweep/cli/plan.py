@@ -98,12 +98,12 @@ def _optimiser(study: Study) -> list[str]:
         return []
     from sweep.optimise.multistart.survey import MET, wanted
 
-    settings, populations = study.optimise, study.optimise.globally != "none"
-    share = 100.0 * wanted(settings, populations)
+    settings = study.optimise
+    share = 100.0 * wanted(settings)
     unlikely = f"better optima are unlikely (under {share:g} %) and " if share < 100.0 else ""
     most = f"at most {settings.starts} starts of {settings.looks} looks"
-    if populations:
-        most = f"{settings.starts} starts of {settings.looks} looks from at most {settings.populations} populations"
+    if settings.by_populations:
+        most = f"at most {settings.populations} populations, with starts of {settings.looks} looks"
     return [f"optimiser: {most}, fewer once {unlikely}the best was found {MET} times{_brake(settings.time_budget)}"]
 
 

@@ -121,8 +121,8 @@ def searches(study: Study, jobs: int, known: Pilot) -> tuple[tuple[str, float, f
     from sweep.optimise.front import pareto
     from sweep.optimise.local.start import search
     from sweep.optimise.manufacture import robust
-    from sweep.optimise.multistart.survey import MET
-    from sweep.optimise.starts.dataset import drawn, sample_seconds, samples_for
+    from sweep.optimise.multistart.survey import MET, TOGETHER
+    from sweep.optimise.starts.dataset import SAMPLES, drawn, sample_seconds
     from sweep.optimise.starts.global_starts import MADE
     from sweep.optimise.starts.posing import problem_of
 
@@ -135,19 +135,21 @@ def searches(study: Study, jobs: int, known: Pilot) -> tuple[tuple[str, float, f
     spent = search(0, problem, designs[0], lambda: False, TRIED_LOOKS).looks
     look = (time.process_time() - begin) / max(spent, 1) / jobs
     typical, most = min(settings.looks, TYPICAL_LOOKS) * look, settings.looks * look
-    population = POPULATION_LOOKS * look
-    found = [("search", settings.starts * typical, settings.starts * most)]
-    globally, share = settings.globally != "none", None if study.tolerance is None else study.tolerance.robust
-    if not globally and study.fit is None and settings.starts > 1:
-        sample = sample_seconds(problem, designs[0], settings.starts)
-        found.insert(0, ("starts", 0.0 if len(known.kept) else sample, samples_for(settings.starts) * sample))
-    if globally:
-        found.insert(0, ("global search", MET * population, settings.populations * population))
+    share = None if study.tolerance is None else study.tolerance.robust
+    population = POPULATION_LOOKS * look if settings.by_populations else 0.0
+    if settings.by_populations:
+        found = [("search", MET * (population + typical), settings.populations * (population + 2.0 * most))]
+    else:
+        sampled = study.fit is None and settings.starts > 1
+        sample = sample_seconds(problem, designs[0], settings.starts) if sampled else 0.0
+        some = 0.0 if len(known.kept) else sample
+        all_of_them = -(-SAMPLES * settings.starts // TOGETHER) * sample
+        found = [("search", some + settings.starts * typical, all_of_them + settings.starts * most)]
     if study.tolerance is not None and share is not None:
         # A robust search uses up its allowed looks: 9 to 14 s of each start and 33 to 41 s of each end were measured,
         # samples included, where 1600 and 4000 looks take 14 and 36 s.
         first = robust.TRIED * robust.ROUNDS * min(robust.HEAT, settings.looks) * look
-        whole = first + robust.ENDED * most + MADE * population * globally
+        whole = first + robust.ENDED * most + MADE * population
         found.append(("tolerances", whole, 2.0 * whole))
     if study.pareto is not None:
         count = pareto.searches(study.pareto)

@@ -38,10 +38,8 @@ def stages_of(study: Study) -> tuple[str, ...]:
     """Name the stages of a run in their order, as its progress does."""
     found, settings = ["compiling", "planning", study.name], study.optimise
     if settings is not None:
-        globally = settings.globally != "none"
         robust = study.tolerance is not None and study.tolerance.robust is not None
-        asked = {"global search": globally, "starts": not globally, "search": True}
-        asked |= {"tolerances": globally and robust, "robust design": robust}
+        asked = {"search": True, "tolerances": settings.by_populations and robust, "robust design": robust}
         asked |= {"tables": True, "proof": settings.prove is not None, "front": study.pareto is not None}
         found += [name for name, wanted in asked.items() if wanted]
     return tuple(found)

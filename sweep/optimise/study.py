@@ -234,11 +234,13 @@ def _drawing(
             [result_of(r) for r in part["results"]],
             survey_of(part["survey"]),
         )
-    settings, (problem, starts, origins) = problem_and_starts(study, place, deadline, jobs, say)
-    settings = replace(settings, time_budget=None)
-    results, found = explore(
-        problem, starts, settings, deadline, jobs,
-        lambda done, most, best: say("search", done, most, f"starts {AT_MOST}{best_words(best)}"), origins,
+    problem, groups = problem_and_starts(study, place, deadline, jobs)
+    assert study.optimise is not None
+    settings = replace(study.optimise, time_budget=None)
+    unit = "populations" if settings.by_populations else "starts"
+    results, found, problem = explore(
+        problem, groups, settings, deadline, jobs,
+        lambda done, most, best: say("search", done, most, f"{unit} {AT_MOST}{best_words(best)}"),
     )  # fmt: skip
     catalogue = listed(study)
     if catalogue and found.ended not in CUT:

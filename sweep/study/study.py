@@ -59,10 +59,10 @@ class OptimiseSettings:
     ``variables`` is "locus" for what [locus] prescribes, "parameters" for the links, None for what suits the study.
     ``unseen`` is the estimated share of unseen basins below which no more starts are made once the best basin was met
     often enough; None asks for 2 % of starts, and of populations for the best basin alone.
-    ``looks`` are the designs each start may look at; with ``globally`` = "proportions" starts come from a
-    search over what is not linear, by at most ``populations`` that know nothing of each other.  ``time_budget`` [s] is
-    an emergency brake: what it stops says so, and no result that was not stopped depends on it.  ``prove`` asks for a
-    proof that nothing in the space is better.
+    ``looks`` are the designs each start may look at; with ``globally`` = "proportions" starts are ends of populations
+    of descents over what is not linear, at most ``populations`` that know nothing of each other.  ``time_budget`` [s]
+    is an emergency brake: what it stops says so, and no result that was not stopped depends on it.  ``prove`` asks for
+    a proof that nothing in the space is better.
     """
 
     starts: int = 20
@@ -74,6 +74,11 @@ class OptimiseSettings:
     globally: Literal["none", "proportions"] = "none"
     populations: int = 40
     prove: ProveSettings | None = None
+
+    @property
+    def by_populations(self) -> bool:
+        """Whether starts are ends of populations of descents."""
+        return self.globally == "proportions"
 
 
 @dataclass(frozen=True)

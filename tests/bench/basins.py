@@ -10,18 +10,17 @@ from collections.abc import Iterator, Sequence
 from dataclasses import asdict, dataclass
 from pathlib import Path
 
-import numpy as np
-
 from studies.accuracy.machine import description
 from sweep.optimise.local.kkt import AGREE
-from sweep.optimise.multistart.survey import enough, settled, wanted
+from sweep.optimise.local.start import search
 from sweep.optimise.starts.dataset import drawn, kinds
-from sweep.optimise.starts.global_starts import searched
+from sweep.optimise.starts.global_starts import holding
 from sweep.optimise.starts.linear import elimination
 from sweep.optimise.starts.populations import population
 from sweep.optimise.starts.posing import problem_of
 from sweep.study import Study
 from tests.support.needle208_record import FOLDER, record
+from tests.support.starts import populations_ended_at
 
 SEEDS = 5
 LEAST = {"record": None, "record_8mm": 8.0}  # shortest link of stage 2 [mm], by the name of the design in expected.json
@@ -62,15 +61,15 @@ def most(study: Study) -> int:
 def told(study: Study, rows: Sequence[Row]) -> bool:
     """Whether the populations of a seed are enough, by the study's own rule."""
     assert study.optimise is not None
-    values = [row.value if np.isfinite(row.value) else np.inf for row in rows]
-    return len(rows) >= most(study) or enough(values, wanted(study.optimise, True)) is not None
+    known = [[row.value for row in rows[:n]] for n in range(1, len(rows) + 1)]
+    return len(rows) >= most(study) or any(populations_ended_at(some, study.optimise).enough for some in known)
 
 
 def fewest(study: Study) -> int:
     """Populations that the rule asks for at least, whatever they end at: those that all end at one value."""
     assert study.optimise is not None
-    numbers = range(1, most(study))
-    return next((n for n in numbers if settled([1.0] * n, wanted(study.optimise, True))), most(study))
+    each = ([1.0] * n for n in range(1, most(study)))
+    return next((len(some) for some in each if populations_ended_at(some, study.optimise).enough), most(study))
 
 
 def hit(row: Row) -> bool:
@@ -95,7 +94,7 @@ def populations(problem: str, seed: int, rows: Sequence[Row]) -> Iterator[Row]:
         times = [time.process_time()]
         bred = population(linear, signs, (seed, len(found)))
         times.append(time.process_time())
-        end = searched(study, own, bred.designs[:1], study.optimise, lambda: False, 1)[0]
+        end = search(0, holding(study, own, bred.designs[:1]), bred.designs[0], lambda: False, study.optimise.looks)
         times.append(time.process_time())
         found.append(
             Row(

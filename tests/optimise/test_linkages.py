@@ -16,8 +16,9 @@ from sweep.optimise import Problem, minimise
 from sweep.optimise.local import newton
 from sweep.optimise.local.model import Model
 from sweep.optimise.problem.program import Program
-from sweep.optimise.starts.candidates import diverse, from_sample
+from sweep.optimise.starts.samples import diverse
 from sweep.study import Limit, OptimiseSettings
+from tests.support.starts import from_sample
 
 ONCE = OptimiseSettings(starts=1)
 RSSR = family("rssr")

@@ -19,9 +19,10 @@ from sweep.families.base import Accuracy
 from sweep.optimise import Problem, minimise, on_locus, optimise_study, optimum
 from sweep.optimise.local.model import Model
 from sweep.optimise.problem.program import Program
-from sweep.optimise.starts.candidates import from_sample, ranking
+from sweep.optimise.starts.samples import ranking
 from sweep.study import Limit, OptimiseSettings, load_study
 from tests.support.specifications import specifications
+from tests.support.starts import from_sample
 
 RSSR, RSSP = family("rssr"), family("rssp")
 BRANCHES = ({"branch": 1.0}, {"branch": -1.0})
@@ -113,7 +114,7 @@ def test_problems_without_equations_stay_as_they_are():
     assert Limit("a", 0.4, 0.4) in held.limits, "a link that follows and is given becomes an equation"
 
 
-def test_candidates_are_those_of_their_seed_and_ranked_by_what_they_are_worth():
+def test_starts_are_those_of_their_seed_and_ranked_by_what_they_are_worth():
     along = on_locus(sized())
     first, again, other = (from_sample(along, BRANCHES, 4, seed) for seed in (1, 1, 2))
     assert first.tobytes() == again.tobytes() != other.tobytes()

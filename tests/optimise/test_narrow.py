@@ -15,6 +15,7 @@ from sweep.optimise import Problem, optimum, read_survey
 from sweep.optimise.starts.posing import problem_and_starts
 from sweep.study import Limit, OptimiseSettings, load_study
 from tests.support.selection import mostly_long
+from tests.support.starts import gathered
 
 NARROW = """
 [study]
@@ -78,6 +79,7 @@ def test_starts_are_filled_up_to_the_number_asked_with_both_signs(tmp_path: Path
     (tmp_path / "study.toml").write_text(NARROW.replace("starts = 20", "starts = 8"))
     study = load_study(tmp_path)
     folder = run(replace(study, optimise=None, objective=study.objective), tmp_path / "designs", jobs=1)
-    _, (problem, starts, _) = problem_and_starts(study, folder)
+    problem, groups = problem_and_starts(study, folder)
+    starts, _ = gathered(groups)
     assert len(starts) == 8
     assert set(starts[:, problem.family.parameter_names.index("branch")]) == {-1.0, 1.0}

@@ -20,6 +20,7 @@ from sweep.families.base import Angles
 from sweep.optimise import Problem, explore, minimise
 from sweep.optimise.local.start import search
 from sweep.optimise.multistart.parallel import SearchTask, spread_over
+from sweep.optimise.multistart.survey import in_groups
 from sweep.study import Limit, OptimiseSettings
 from tests.support.optimise_family import FAMILY, poses
 
@@ -75,7 +76,7 @@ def test_work_left_to_the_processes_may_be_left_at_any_time(problem: Problem, mo
 
 def test_brake_leaves_only_whole_or_marked_starts_and_says_so(problem: Problem) -> None:
     starts = problem.rows(np.repeat(STARTS, 20, axis=0))
-    _, found = explore(problem, starts, OptimiseSettings(starts=80, time_budget=1e-9))
+    found = explore(problem, in_groups(starts), OptimiseSettings(starts=80, time_budget=1e-9)).survey
     assert found.ended == "time" and found.warnings[0].startswith("time ran out: 0 of 80 starts")
 
 

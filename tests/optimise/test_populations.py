@@ -5,7 +5,6 @@ from __future__ import annotations
 import itertools
 import json
 import math
-from dataclasses import replace
 from functools import partial
 from pathlib import Path
 
@@ -21,15 +20,16 @@ from sweep.families.base import Angles
 from sweep.families.capabilities import Assembly
 from sweep.optimise.local.kkt import Result
 from sweep.optimise.manufacture.curve_margins import curve_derivatives
+from sweep.optimise.multistart import parallel
 from sweep.optimise.multistart.multistart import explore
 from sweep.optimise.starts import global_starts, populations
 from sweep.optimise.starts.dataset import drawn, kinds
-from sweep.optimise.starts.global_starts import from_populations, searched
+from sweep.optimise.starts.global_starts import from_populations
 from sweep.optimise.starts.linear import POSES, TURN, Elimination, elimination
 from sweep.optimise.starts.populations import Bred, Size, bred
 from sweep.optimise.starts.pose_rows import Descents, PoseRows
 from sweep.optimise.starts.posing import problem_of
-from sweep.study import study_from_data
+from sweep.study import Study, study_from_data
 from tests.support.needle208_record import record
 
 EXPECTED = json.loads((Path(__file__).parents[2] / "studies" / "needle208" / "expected.json").read_text())["record"]
@@ -255,25 +255,28 @@ def test_populations_are_made_until_they_tell_enough(monkeypatch: pytest.MonkeyP
         made.append(seed[1])
         return Bred(known, np.array([1.0 + seed[1]]), 0)
 
-    def led(*rest: object) -> list[Result]:
+    def led(number: int, *rest: object) -> Result:
         value = values[made[-1]]
         status = st.OK if math.isfinite(value) else st.LIMIT_EXCEEDED
-        return [Result(0, known[0], value, 0.0, 0.0, 0.0, (), {}, {}, {}, status, "converged")]
+        return Result(number, known[0], value, 0.0, 0.0, 0.0, (), {}, {}, {}, status, "converged")
 
     monkeypatch.setattr(populations, "population", numbered)
-    monkeypatch.setattr(global_starts, "searched", led)
+    monkeypatch.setattr(parallel, "search", led)
     study = record(8.0, starts=4, populations=9, seed=3)
     known = drawn(study, 1, 3)
     problem = problem_of(study, known)
+
+    def searched(study: Study, jobs: int) -> list[int]:
+        made.clear()
+        groups = from_populations(study, problem, known[:0], np.empty(0), lambda: False, jobs)
+        assert study.optimise is not None
+        explore(problem, groups, study.optimise, jobs=jobs)
+        return made
+
     # None is begun beyond what is enough, whatever the number of workers.
     for jobs in (1, 2, 64):
-        made.clear()
-        from_populations(study, study.optimise, problem, known[:0], np.empty(0), lambda: False, jobs)
-        assert made == [0, 1, 2, 3, 4, 5, 6]
-    made.clear()
-    few = replace(study.optimise, populations=3)
-    from_populations(study, few, problem, known[:0], np.empty(0), lambda: False, 1)
-    assert made == [0, 1, 2]
+        assert searched(study, jobs) == [0, 1, 2, 3, 4, 5, 6]
+    assert searched(record(8.0, starts=4, populations=3, seed=3), 1) == [0, 1, 2]
 
 
 def test_populations_in_threads_are_those_of_one_thread() -> None:
@@ -283,24 +286,25 @@ def test_populations_in_threads_are_those_of_one_thread() -> None:
         same(*(next(bred(linear, SIGNS, 1, 5, jobs=jobs, size=tiny)) for jobs in (1, 3)))
 
 
-def test_starts_are_the_best_of_every_population_then_others(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_starts_are_the_best_end_of_every_population_and_another(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(global_starts, "bred", partial(bred, size=SMALL))
-    study = record(8.0, starts=4, populations=2, seed=3, looks=100)
-    assert study.optimise is not None
-    known = drawn(study, 1, 3)
+    study = record(8.0, starts=6, populations=2, seed=3, looks=100)
+    known = drawn(study, 4, 3)
     problem = problem_of(study, known)
-    begun = from_populations(study, study.optimise, problem, known[:0], np.empty(0), lambda: False, 1)
+    own, *groups = from_populations(study, problem, known, np.arange(len(known), dtype=float), lambda: False, 1)
+    assert own.counted == 0 and (own.designs == known[:1]).all()
     linear = elimination(problem)
     assert linear is not None
-    found = list(bred(linear, kinds(study, begun.problem, known[:0]), 2, 3, size=SMALL))
-    assert begun.origins is not None and begun.origins[:2] == (0, 1) and len(begun.starts) == 4
-    ends = [one.designs[0] for one in found]
-    settled = [searched(study, problem, end[None, :], study.optimise, lambda: False, 1)[0].design for end in ends]
-    np.testing.assert_array_equal(begun.starts[:2], settled)
+    found = list(bred(linear, kinds(study, problem, known[:1]), 2, 3, size=SMALL))
     worth = {one.designs[k].tobytes(): one.worth[k] for one in found for k in range(len(one.worth))}
-    values = sorted(worth[start.tobytes()] for start in begun.starts[2:])
+    for number, (group, one) in enumerate(zip(groups, found, strict=True)):
+        assert (group.source, group.counted, len(group.designs)) == (number, 1, 2)
+        np.testing.assert_array_equal(group.designs[0], one.designs[0])
+    values = sorted(worth[start.tobytes()] for group in groups for start in group.designs[1:])
     assert all(high > low * 1.001 for low, high in itertools.pairwise(values))
-    inside = begun.problem.scaled(begun.starts)
+    last = groups[-1]
+    assert last.problem is not None
+    inside = last.problem.scaled(np.concatenate([group.designs for group in groups]))
     assert ((inside >= -1e-9) & (inside <= 1.0 + 1e-9)).all(axis=1).sum() >= 3
 
 
@@ -315,7 +319,7 @@ def test_three_populations_of_any_seed_find_the_record(seed: int) -> None:
     assert study.optimise is not None
     known = drawn(study, 24, seed)
     problem = problem_of(study, known)
-    begun = from_populations(study, study.optimise, problem, known[:0], np.empty(0), lambda: False, 2)
-    results, found = explore(begun.problem, begun.starts, study.optimise, None, 2, None, begun.origins)
+    groups = from_populations(study, problem, known[:0], np.empty(0), lambda: False, 2)
+    results, found, _ = explore(problem, groups, study.optimise, jobs=2)
     assert results[0].feasible and results[0].objective == pytest.approx(RECORD, rel=1e-6)
     assert found.best >= 1

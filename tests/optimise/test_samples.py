@@ -13,11 +13,13 @@ import pytest
 from sweep.engine.run import run
 from sweep.families import family
 from sweep.optimise import Problem, on_locus, optimum
-from sweep.optimise.starts import candidates
-from sweep.optimise.starts.candidates import GROUP, OUTSIDE, from_samples, sample
+from sweep.optimise.multistart.survey import TOGETHER
+from sweep.optimise.starts import samples as sampling
 from sweep.optimise.starts.dataset import sample_seconds
 from sweep.optimise.starts.posing import problem_and_starts
+from sweep.optimise.starts.samples import OUTSIDE, sample
 from sweep.study import Limit, OptimiseSettings, load_study
+from tests.support.starts import from_sample, gathered
 
 BRANCHES = [{"branch": 1.0}, {"branch": -1.0}]
 # The best design stands at the lower bounds of e and f and near the upper one of alpha; of 800 000 designs between the
@@ -80,12 +82,12 @@ def test_nearly_every_sample_reaches_a_basin_at_several_bounds(monkeypatch: pyte
     problem = on_locus(CORNER)
 
     def samples(seeds: range) -> list[int]:
-        found = [from_samples(problem, BRANCHES, 4 * GROUP, seed) for seed in seeds]
+        found = [gathered(sampling.samples(problem, BRANCHES, 4 * TOGETHER, seed)) for seed in seeds]
         return [len({numbers[k] for k in np.flatnonzero(met(problem, starts))}) for starts, numbers in found]
 
     assert sum(samples(range(2))) >= 6  # of eight
     # Between the bounds alone, and from what keeps the limits alone, hardly any does.
-    monkeypatch.setattr(candidates, "BEYOND", 0.0)
+    monkeypatch.setattr(sampling, "BEYOND", 0.0)
     assert sum(samples(range(2))) <= 2
 
 
@@ -93,47 +95,48 @@ def test_study_whose_sweep_is_large_has_starts_from_samples_too(tmp_path: Path) 
     (tmp_path / "study.toml").write_text(STUDY)
     study = load_study(tmp_path)
     folder = run(replace(study, optimise=None), tmp_path / "designs", jobs=1)
-    _, (problem, starts, _) = problem_and_starts(study, folder)
+    problem, groups = problem_and_starts(study, folder)
+    starts, _ = gathered(groups)
     assert len(starts) == 24
     assert not met(problem, starts[:12]).any() and met(problem, starts[12:]).any()
 
 
 def test_samples_have_points_of_their_own_and_do_not_depend_on_their_number() -> None:
     problem = on_locus(CORNER)
-    starts, numbers = from_samples(problem, BRANCHES, 12, 3)
+    starts, numbers = gathered(sampling.samples(problem, BRANCHES, 12, 3))
     assert numbers == (0,) * 6 + (1,) * 6
-    np.testing.assert_array_equal(starts[:6], from_samples(problem, BRANCHES, 6, 3)[0])
+    np.testing.assert_array_equal(starts[:6], from_sample(problem, BRANCHES, 6, 3))
     np.testing.assert_array_equal(starts[6:], sample(problem, BRANCHES, 6, 3, 1))
     assert len(np.unique(starts, axis=0)) == 12
-    assert from_samples(problem, BRANCHES, 7, 3)[1] == (0, 0, 0, 0, 1, 1, 1)
+    assert gathered(sampling.samples(problem, BRANCHES, 7, 3))[1] == (0, 0, 0, 0, 1, 1, 1)
 
 
 def test_sample_that_is_stopped_ranks_no_further_design(monkeypatch: pytest.MonkeyPatch) -> None:
     ranked: list[int] = []
-    rank = candidates.ranking
+    rank = sampling.ranking
 
     def counted(*given):
         ranked.append(1)
         return rank(*given)
 
-    monkeypatch.setattr(candidates, "ranking", counted)
+    monkeypatch.setattr(sampling, "ranking", counted)
     stops = iter([False, True, True])
     found = sample(on_locus(CORNER), BRANCHES, 2, 3, 0, lambda: next(stops))
     assert len(found) and len(ranked) <= 2 + len(BRANCHES)  # one block, then those of it that seem good
 
 
 def test_price_of_a_sample_is_that_of_few_designs_where_they_are_dear(monkeypatch: pytest.MonkeyPatch) -> None:
-    base = from_samples(CORNER, BRANCHES, 1, 1)[0][0]
+    base = from_sample(CORNER, BRANCHES, 1, 1)[0]
     for step, number in ((0.1, 64), (0.001, 8192)):
         ticks = itertools.count(step=step)
         monkeypatch.setattr("sweep.optimise.starts.dataset.time.process_time", lambda ticks=ticks: next(ticks))
-        of_sample = (2**15 + 16 * 24 * 12) * GROUP  # designs drawn, and those of the rounds about the best of them
-        assert sample_seconds(CORNER, base, GROUP) == pytest.approx(step / number * of_sample)
+        of_sample = (2**15 + 16 * 24 * 12) * TOGETHER  # designs drawn, and those of the rounds about the best of them
+        assert sample_seconds(CORNER, base, TOGETHER) == pytest.approx(step / number * of_sample)
 
 
 def test_two_coordinates_in_five_of_half_a_sample_are_at_bounds_but_no_angle_of_a_whole_turn() -> None:
     problem = on_locus(CORNER)
-    drawn = candidates._brought_in(problem, np.random.default_rng(1).random((20_000, 5)))
+    drawn = sampling._brought_in(problem, np.random.default_rng(1).random((20_000, 5)))
     ends = ((drawn == 0.0) | (drawn == 1.0)).mean(axis=0)
     # 0.7 of a width of 1.7, in half of the sample
     np.testing.assert_allclose(ends[:4], 0.35 / 1.7, atol=0.01)
@@ -145,12 +148,12 @@ def test_half_of_what_is_improved_misses_the_limits_and_stands_apart() -> None:
     place = rng.random((400, 2))
     kind = np.zeros(400, np.intp)
     merit = np.where(place[:, 0] < 0.5, 1.0 + place[:, 1], OUTSIDE * (2.0 + place[:, 1]))
-    chosen, near = candidates._parents(place, kind, merit, 16)
+    chosen, near = sampling._parents(place, kind, merit, 16)
     assert len(chosen) == len(set(chosen.tolist())) == 16 and near == 8
     assert (place[chosen[:8], 0] < 0.5).all() and (place[chosen[8:], 0] >= 0.5).all()
     gaps = np.linalg.norm(place[chosen[8:], None] - place[None, chosen], axis=2)
     assert gaps[gaps > 0.0].min() > 0.05
     # Where nothing misses the limits, all of them keep these.
-    chosen, near = candidates._parents(place, kind, 1.0 + place[:, 1], 16)
+    chosen, near = sampling._parents(place, kind, 1.0 + place[:, 1], 16)
     assert len(chosen) == 16 and near == 8
     assert math.isfinite(merit[chosen].max())

@@ -10,24 +10,13 @@ import numpy as np
 import pytest
 
 from kernels import status as st
-from sweep.optimise import Problem, Result, Survey, explore
-from sweep.optimise.multistart.multistart import BATCH
-from sweep.optimise.multistart.survey import enough, settled, survey, wanted, with_basins
+from sweep.optimise import Survey, explore
+from sweep.optimise.multistart.survey import TOGETHER, Group, in_groups, survey, wanted, with_basins
 from sweep.study import OptimiseSettings, load_study
 from tests.optimise.test_study import STUDY
-from tests.support.optimise_family import FAMILY
+from tests.support.starts import bowl, populations_ended_at, result
 
 ASKED = OptimiseSettings(starts=20)
-
-
-def bowl() -> Problem:
-    return Problem(FAMILY, ("p", "q"), -4 * np.ones(2), 4 * np.ones(2), {}, "max_abs_bowl")
-
-
-def result(start: int, objective: float, status: int = st.OK, ended: str = "converged") -> Result:
-    return Result(
-        start, np.zeros(4), objective, 0.0, 0.0, 0.0, (), {}, {}, {}, status, ended
-    )  # fmt: skip
 
 
 def starts(count: int) -> np.ndarray:
@@ -42,60 +31,67 @@ def test_values_within_a_ten_thousandth_are_one_basin_and_infeasible_ends_are_no
 
 def test_unseen_share_is_the_larger_of_good_turing_and_boender_rinnooy_kan() -> None:
     values = [1.0] * 6 + [2.0] * 3 + [3.0]
-    found = survey(bowl(), starts(10), [result(k, x) for k, x in enumerate(values)], ASKED, "starts")
+    found = survey(bowl(), [Group(starts(10))], [result(k, x) for k, x in enumerate(values)], ASKED, "starts")
     # One of ten was met once; 3 * 4 / (10 * 9) is larger.
     assert (found.basins, found.best) == (3, 6) and found.unseen == pytest.approx(12 / 90)
     assert found.words == "3 basins met, the best 6 times, estimated unseen 13 %"
     singles = [result(k, 1.0 if k < 8 else float(k)) for k in range(12)]
-    assert survey(bowl(), starts(12), singles, ASKED, "starts").unseen == pytest.approx(4 / 12)
+    assert survey(bowl(), [Group(starts(12))], singles, ASKED, "starts").unseen == pytest.approx(4 / 12)
 
 
-def test_of_a_global_search_the_best_end_counts_alone() -> None:
-    values = [1.0, 1.0, 1.0, 2.0, 3.0, 4.0, 5.0]
-    ends = [result(k, x) for k, x in enumerate(values)]
-    # Three searches, all of which ended in the best basin; their other ends, and a start of the sweep, do not count.
-    found = survey(bowl(), starts(7), ends, replace(ASKED, unseen=0.02), "starts", (0, 1, 2, 0, 1, 2, -1))
+POPULATIONS = replace(ASKED, globally="proportions", populations=50)
+
+
+def test_of_a_population_the_best_end_counts_alone() -> None:
+    values = [9.0, 1.0, 2.0, 1.0, 3.0, 1.0, 4.0]
+    ends, some = [result(k, x) for k, x in enumerate(values)], starts(7)
+    # Three populations, all of which ended in the best basin; their other ends, and a start of the sweep, do not count.
+    groups = [Group(some[:1], counted=0), *(Group(some[k : k + 2], k, 1) for k in (1, 3, 5))]
+    found = survey(bowl(), groups, ends, replace(POPULATIONS, unseen=0.02), "starts")
     assert (found.basins, found.best, found.starts) == (1, 3, 7) and found.unseen == pytest.approx(2 / 6)
     assert found.populations == 3 and not found.enough
     assert found.words == "1 basin met by 3 populations, the best 3 times, estimated unseen 33 %"
     asked = "the share of unseen basins is estimated at 33 %, not the 2 % asked: more populations may find a better one"
     assert found.warnings[-1] == asked
-    twice = survey(bowl(), starts(7), ends, ASKED, "starts", (0, 0, 0, 1, 1, 1, -1))
-    assert (twice.basins, twice.best) == (2, 1) and twice.unseen == 1.0
+    assert survey(bowl(), groups, ends, POPULATIONS, "starts").enough
+    twice = survey(bowl(), groups, ends[:5], POPULATIONS, "starts")
+    assert (twice.basins, twice.best) == (1, 2) and twice.unseen == 1.0 and not twice.enough
 
 
 def test_starts_of_different_samples_are_distinct_wherever_they_stand() -> None:
     alike = np.tile(starts(1), (12, 1)) + 1e-4 * np.arange(12)[:, None] * np.array([1.0, 1.0, 0.0, 0.0])
     ends = [result(k, 1.0) for k in range(12)]
-    together = survey(bowl(), alike, ends, ASKED, "starts")
+    together = survey(bowl(), [Group(alike)], ends, ASKED, "starts")
     assert together.best == 1 and not together.enough
-    apart = survey(bowl(), alike, ends, ASKED, "starts", samples=[k // 4 for k in range(12)])
+    samples = [Group(alike[4 * k : 4 * k + 4], k) for k in range(3)]
+    apart = survey(bowl(), samples, ends, ASKED, "starts")
     assert apart.best == 3 and apart.enough
-    found, told = explore(bowl(), alike, ASKED, samples=[k // 4 for k in range(12)])
+    found, told, _ = explore(bowl(), samples, ASKED)
     assert (len(found), told.best, told.ended) == (12, 3, "enough")
 
 
 def test_populations_are_enough_by_the_same_rule_as_starts() -> None:
+    def settled(values: list[float], share: float = 0.02) -> bool:
+        return populations_ended_at(values, replace(ASKED, unseen=share)).enough
+
     # One basin: 2 / (11 * 10) is below 2 %; two: 6 / (18 * 17); three: 12 / (25 * 24) is 2 %.
-    assert settled([1.0] * 11, 0.02) and not settled([1.0] * 10, 0.02)
-    assert settled([1.0] * 16 + [1.1] * 2, 0.02) and not settled([1.0] * 15 + [1.1] * 2, 0.02)
-    assert settled([1.0] * 19 + [1.1] * 3 + [1.2] * 3, 0.02) and not settled([1.0] * 18 + [1.1] * 3 + [1.2] * 3, 0.02)
+    assert settled([1.0] * 11) and not settled([1.0] * 10)
+    assert settled([1.0] * 16 + [1.1] * 2) and not settled([1.0] * 15 + [1.1] * 2)
+    assert settled([1.0] * 19 + [1.1] * 3 + [1.2] * 3) and not settled([1.0] * 18 + [1.1] * 3 + [1.2] * 3)
     # Values that nearly agree are one basin; what was met once is a share of 1/25; the best has to be met three times.
-    assert settled([1.0] * 8 + [1.1, 1.10001, 1.09999, 1.10002] + [1.0] * 6, 0.02)
-    assert not settled([1.0] * 22 + [1.1] * 2 + [1.2], 0.02)
-    assert not settled([1.0] * 2 + [1.1] * 23, 0.02)
-    assert not settled([], 0.02) and not settled([1.0], 1.0)
-
-
-def test_first_populations_that_tell_enough_decide_whatever_the_later_ones_end_at() -> None:
-    assert enough([1.0] * 20 + [0.5], 0.02) == 11
-    assert enough([1.0] * 10, 0.02) is None
+    assert settled([1.0] * 8 + [1.1, 1.10001, 1.09999, 1.10002] + [1.0] * 6)
+    assert not settled([1.0] * 22 + [1.1] * 2 + [1.2])
+    assert not settled([1.0] * 2 + [1.1] * 23)
+    assert not settled([]) and not settled([1.0], 1.0)
     # Without a share the best basin decides, and what is not feasible is no end.
-    assert enough([1.1, 1.0, 1.1, 1.0, math.inf, 1.1, 1.0, 0.9], 1.0) == 7
-    assert enough([1.0, math.inf, 1.0], 1.0) is None and enough([], 1.0) is None
-    study, own = OptimiseSettings(), OptimiseSettings(unseen=0.05)
-    assert [wanted(study, populations) for populations in (False, True)] == [0.02, 1.0]
-    assert [wanted(own, populations) for populations in (False, True)] == [0.05, 0.05]
+    values = [1.1, 1.0, 1.1, 1.0, math.inf, 1.1, 1.0]
+    assert settled(values, 1.0) and not settled(values[:-1], 1.0)
+    assert not settled([1.0, math.inf, 1.0], 1.0) and not settled([], 1.0)
+
+
+def test_share_of_unseen_basins_that_ends_a_search_is_that_of_its_starts_or_the_one_asked() -> None:
+    assert [wanted(settings) for settings in (ASKED, POPULATIONS)] == [0.02, 1.0]
+    assert [wanted(replace(settings, unseen=0.05)) for settings in (ASKED, POPULATIONS)] == [0.05, 0.05]
 
 
 def test_unseen_share_is_no_smaller_than_what_random_searches_leave() -> None:
@@ -105,8 +101,7 @@ def test_unseen_share_is_no_smaller_than_what_random_searches_leave() -> None:
     for _ in range(1000):
         volumes = rng.dirichlet(np.ones(6))
         ends = rng.choice(6, 18, p=volumes)
-        found = survey(bowl(), starts(18), [result(k, 1.0 + x) for k, x in enumerate(ends)], ASKED, "starts",
-                       tuple(range(18)))  # fmt: skip
+        found = survey(bowl(), [Group(starts(18))], [result(k, 1.0 + x) for k, x in enumerate(ends)], ASKED, "starts")
         estimated.append(found.unseen)
         happened.append(1.0 - volumes[np.unique(ends)].sum())
     assert np.mean(estimated) >= np.mean(happened)
@@ -115,31 +110,32 @@ def test_unseen_share_is_no_smaller_than_what_random_searches_leave() -> None:
 def test_starts_beside_each_other_count_once() -> None:
     close = np.repeat(starts(1), 12, axis=0) + np.linspace(0.0, 1e-3, 12)[:, None] * [1, 1, 0, 0]
     ends = [result(k, 1.0) for k in range(12)]
-    assert survey(bowl(), close, ends, ASKED, "starts").best == 1
-    assert not survey(bowl(), close, ends, ASKED, "starts").enough
-    assert survey(bowl(), starts(12), ends, ASKED, "starts").enough
+    assert survey(bowl(), [Group(close)], ends, ASKED, "starts").best == 1
+    assert not survey(bowl(), [Group(close)], ends, ASKED, "starts").enough
+    assert survey(bowl(), [Group(starts(12))], ends, ASKED, "starts").enough
 
 
 def test_one_start_or_none_feasible_says_nothing_of_the_rest() -> None:
-    assert survey(bowl(), starts(1), [result(0, 1.0)], ASKED, "starts").unseen == 1.0
-    nothing = survey(bowl(), starts(2), [result(k, 1.0, st.LIMIT_EXCEEDED) for k in range(2)], ASKED, "starts")
+    assert survey(bowl(), [Group(starts(1))], [result(0, 1.0)], ASKED, "starts").unseen == 1.0
+    nothing = survey(bowl(), [Group(starts(2))], [result(k, 1.0, st.LIMIT_EXCEEDED) for k in range(2)], ASKED, "starts")
     assert nothing.unseen == 1.0 and nothing.basins == 0 and "none of 2 starts became feasible" in nothing.words
 
 
 def test_search_ends_when_enough_is_known() -> None:
     many = starts(50)
-    results, found = explore(bowl(), many, replace(ASKED, starts=50))
+    results, found, _ = explore(bowl(), in_groups(many), replace(ASKED, starts=50))
     # One basin, met by 12 starts: 2 / (12 * 11) is below 2 %, 2 / (6 * 5) is not.
-    assert found.ended == "enough" and len(results) == found.starts == 12 == 2 * BATCH
+    assert found.ended == "enough" and len(results) == found.starts == 12 == 2 * TOGETHER
     assert found.warnings == ()
-    _, more = explore(bowl(), many, replace(ASKED, starts=50, unseen=1e-3))
+    _, more, _ = explore(bowl(), in_groups(many), replace(ASKED, starts=50, unseen=1e-3))
     assert more.starts == 48 and more.unseen == pytest.approx(2 / (48 * 47))
 
 
 @pytest.mark.parametrize("jobs", [1, 2])
 def test_each_start_is_told_when_it_is_done_and_none_before_the_first(jobs: int) -> None:
     told: list[tuple[int, int, float]] = []
-    results, _ = explore(bowl(), starts(8), ASKED, jobs=jobs, tell=lambda *now: told.append(now))
+    asked = replace(ASKED, starts=8)
+    results = explore(bowl(), in_groups(starts(8)), asked, jobs=jobs, tell=lambda *now: told.append(now)).results
     assert told[0] == (0, 8, math.inf)
     assert [done for done, _, _ in told] == list(range(len(results) + 1)) and {most for _, most, _ in told} == {8}
     assert told[-1][2] == results[0].objective
@@ -147,17 +143,17 @@ def test_each_start_is_told_when_it_is_done_and_none_before_the_first(jobs: int)
 
 def test_number_of_starts_does_not_depend_on_jobs() -> None:
     many, asked = starts(30), OptimiseSettings(starts=30)
-    alone, one = explore(bowl(), many, asked)
-    together, two = explore(bowl(), many, asked, jobs=2)
+    alone, one, _ = explore(bowl(), in_groups(many), asked)
+    together, two, _ = explore(bowl(), in_groups(many), asked, jobs=2)
     assert one == two and [r.objective for r in alone] == [r.objective for r in together]
 
 
 def test_warnings_name_what_was_not_reached() -> None:
-    found = Survey(4, 20, 4, 2, 1, 0.5, 0.02, "starts")
+    found = Survey(4, 20, 2, 1, 0.5, 0.02, "starts")
     assert found.warnings[0] == "only 4 starts of the 20 asked: no more were found in the design space"
     assert (found.shortcomings, found.doubts) == (found.warnings[:1], found.warnings[1:])
     assert "1 of the 3 distinct valleys" in found.warnings[1] and "estimated at 50 %, not the 2 %" in found.warnings[1]
-    late = replace(found, offered=12, ended="time", starts=5, asked=12)
+    late = replace(found, ended="time", starts=5, asked=12)
     assert late.warnings == ("time ran out: 5 of 12 starts",)
 
 
@@ -165,7 +161,7 @@ def test_signs_have_basins_of_their_own() -> None:
     both = starts(6)
     both[3:, 3] = -1.0
     ends = [result(k, 1.0 if k < 4 else 2.0) for k in range(6)]
-    found = survey(bowl(), both, ends, ASKED, "starts")
+    found = survey(bowl(), [Group(both)], ends, ASKED, "starts")
     assert found.kinds == (("branch = -1", 3, 2), ("branch = 1", 3, 1))
     assert math.isclose(found.unseen, 6 / 30)
 

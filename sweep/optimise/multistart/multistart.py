@@ -8,10 +8,11 @@ from __future__ import annotations
 import math
 import signal
 import time
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import replace
-from typing import TYPE_CHECKING
+from itertools import chain
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
@@ -21,21 +22,28 @@ from sweep.jobs.signals import Stop, stop_on_signal
 from sweep.optimise.local.kkt import Result
 from sweep.optimise.local.model import refuse_dependent
 from sweep.optimise.multistart.parallel import SearchTask, spread_over
-from sweep.optimise.multistart.survey import CUT, Survey, survey, with_basins
+from sweep.optimise.multistart.survey import CUT, Group, Survey, counted, in_groups, most_counted, survey, with_basins
 from sweep.optimise.problem.on_locus import on_locus
 from sweep.optimise.problem.program import Program
 from sweep.optimise.problem.statement import PLACE, Problem
-from sweep.optimise.starts.candidates import from_sample, from_samples
+from sweep.optimise.starts.samples import samples
 
 if TYPE_CHECKING:
     from sweep.study import OptimiseSettings, Study
 
-BATCH = 6  # starts between two looks at whether more are needed: the same for any number of jobs
 LOOKED_AT = 3  # starts at which equations are looked at
 SERIAL_LOOKS = 800  # of a search before processes are worth their start, about a second
 ROUNDS = 12  # steps from catalogue value to catalogue value, each of at most two searches per parameter
 GAIN = 1e-9  # relative, of a step that counts
 Tell = Callable[[int, int, float], None]
+
+
+class Search(NamedTuple):
+    """What a search has found: results, best first, what they tell of it, and the problem with its final bounds."""
+
+    results: list[Result]
+    survey: Survey
+    problem: Problem
 
 
 def minimise(
@@ -47,41 +55,11 @@ def minimise(
 ) -> list[Result]:
     """Return the smallest objective under the limits; one result per start that was begun, best first.
 
-    Parameters, results and errors are those of :func:`explore`.
-    """
-    return explore(problem, starts, settings, stop, jobs)[0]
-
-
-def explore(
-    problem: Problem,
-    starts: Array,
-    settings: OptimiseSettings,
-    stop: Callable[[], bool] | None = None,
-    jobs: int = 1,
-    tell: Tell | None = None,
-    origins: Sequence[int] | None = None,
-    samples: Sequence[int] | None = None,
-) -> tuple[list[Result], Survey]:
-    """Search from one start after the other until enough is known of the basins.
-
     Parameters
     ----------
     problem : what to minimise
     starts : (k, P) designs; their signs are kept, their variables are the starting points
-    settings : ``looks`` are allowed to each start; starts end when ``unseen`` and the best basin are as asked (see
-        :class:`sweep.optimise.multistart.survey.Survey`); ``time_budget`` [s] or None is an emergency deadline
-    stop : asked often; when it answers true, or at Ctrl-C, the search ends and each start in progress keeps its best
-        design so far
-    jobs : processes the starts are spread over, once the search turns out to be long; results do not depend on it
-    tell : called at first and after each start, with the number that are done, the most there will be, and the best
-        value so far
-    origins : see :func:`sweep.optimise.multistart.survey.survey`; with them all starts are searched
-    samples : see there
-
-    Returns
-    -------
-    Feasible results by objective, then infeasible ones by violation; and what they tell of the search.  The same
-    starts give the same results to the bit on any machine, busy or not, unless it was stopped.
+    settings, stop, jobs : as for :func:`explore`
 
     Raises
     ------
@@ -93,16 +71,52 @@ def explore(
     starts = np.atleast_2d(np.asarray(starts, dtype=np.float64))
     if starts.size == 0 or starts.shape[1] != len(problem.family.parameters):
         raise InputError("starts", starts.shape, f"at least one row of {len(problem.family.parameters)} values", PLACE)
-    # Unknown names and equations that say the same are refused here, not in a worker.
-    refuse_dependent(problem, Program(problem), starts[:LOOKED_AT])
+    return explore(problem, in_groups(starts), settings, stop, jobs).results
+
+
+def explore(
+    problem: Problem,
+    groups: Iterable[Group],
+    settings: OptimiseSettings,
+    stop: Callable[[], bool] | None = None,
+    jobs: int = 1,
+    tell: Tell | None = None,
+) -> Search:
+    """Search from one group of starts after the other until enough is known of the basins.
+
+    Parameters
+    ----------
+    problem : what to minimise
+    groups : of starts, each of which is asked for when those before it have been searched from
+    settings : ``looks`` are allowed to each start; groups end when ``unseen`` and the best basin are as asked (see
+        :class:`sweep.optimise.multistart.survey.Survey`); ``time_budget`` [s] or None is an emergency deadline
+    stop : asked often; when it answers true, or at Ctrl-C, the search ends and each start in progress keeps its best
+        design so far
+    jobs : processes the starts are spread over, once the search turns out to be long; results do not depend on it
+    tell : called at first and after each start, with the number of starts (or populations) that are done, the most
+        there will be, and the best value so far
+
+    Returns
+    -------
+    Feasible results by objective, then infeasible ones by violation; none without a start.  The same
+    groups give the same results to the bit on any machine, busy or not, unless it was stopped.
+
+    Raises
+    ------
+    InputError
+        if a name of the problem is unknown, or two equations say the same
+    WorkerDied
+        if a worker process was killed.
+    """
     end = math.inf if settings.time_budget is None else time.monotonic() + settings.time_budget
-    results, ended = list[Result](), "starts"
+    begun, results, ended = list[Group](), list[Result](), "starts"
     seen: list[Result] = []
 
     def told(*found: Result) -> None:
         seen.extend(found)
         if tell is not None:
-            tell(len(seen), len(starts), min((r.objective for r in seen if r.feasible), default=math.inf))
+            best = min((r.objective for r in seen if r.feasible), default=math.inf)
+            tell(_done(begun, seen), most_counted(settings), best)
 
     told()
     with _signals() as own:
@@ -110,23 +124,37 @@ def explore(
         def asked() -> bool:
             return time.monotonic() >= end or bool(own) or (stop is not None and stop())
 
-        for first in range(0, len(starts), BATCH):
-            numbers = list(range(first, min(first + BATCH, len(starts))))
-            results += _batch(SearchTask(problem, starts, settings.looks), numbers, results, asked, jobs, told)
-            last = numbers[-1] == len(starts) - 1
-            if len(results) <= numbers[-1] or any(r.ended in CUT for r in results) or (not last and asked()):
+        for group in groups:
+            first = len(results)
+            begun.append(group)
+            problem = group.problem or problem
+            if not first:  # unknown names and equations that say the same are refused here, not in a worker
+                refuse_dependent(problem, Program(problem), group.designs[:LOOKED_AT])
+            numbers = list(range(first, first + len(group.designs)))
+            task = SearchTask(problem, group.designs, settings.looks, first)
+            results += _batch(task, numbers, results, asked, jobs, told)
+            if len(results) <= numbers[-1] or any(r.ended in CUT for r in results):
                 ended = "time"
                 break
-            if origins is None and survey(problem, starts, results, settings, "", samples=samples).enough:
+            if survey(problem, begun, results, settings, "").enough:
                 ended = "enough"
                 break
+        else:
+            if asked() and _done(begun, seen) < most_counted(settings):
+                ended = "time"
     if own.signal_number is not None:
         results = [replace(r, ended="interrupted") if r.ended == "time" else r for r in results]
         if own.signal_number == signal.SIGTERM:
             signal.raise_signal(signal.SIGTERM)
     if ended == "time" and (own.signal_number is not None or any(r.ended == "interrupted" for r in results)):
         ended = "interrupted"
-    return ranked(results), survey(problem, starts, results, settings, ended, origins, samples)
+    return Search(ranked(results), survey(problem, begun, results, settings, ended), problem)
+
+
+def _done(begun: Sequence[Group], results: Sequence[Result]) -> int:
+    """Return how many of the starts that count are over."""
+    counts = counted(begun)
+    return sum(counts[r.start] for r in results)
 
 
 @contextmanager
@@ -195,19 +223,29 @@ def optimum(
     InputError
         if there is no start, or a name of the problem is unknown.
     """
-    searched = on_locus(problem)
-    starts, samples = from_samples(searched, signs, settings.starts, settings.seed)
-    results: list[Result] = []
-    if len(starts) or searched is problem:
-        results, _ = explore(searched, starts, settings, stop, jobs, samples=samples)
-    if searched is problem or any(result.feasible for result in results):
-        return results
-    near = [result.design for result in results[:1]]
-    starts = from_sample(problem, signs, settings.starts, settings.seed)
-    others = minimise(problem, np.array([*near, *starts]), settings, stop, jobs)
-    # The equations give way, or the bounds of the links do: the smaller relaxation is the answer.
-    first = 1 + max((result.start for result in results), default=-1)
-    return ranked([*results, *(replace(result, start=first + result.start) for result in others)])
+    along = on_locus(problem)
+    results = _sampled(along, signs, settings, stop, jobs)
+    if along is not problem and not any(result.feasible for result in results):
+        # The equations give way, or the bounds of the links do: the smaller relaxation is the answer.
+        others = _sampled(problem, signs, settings, stop, jobs, [result.design for result in results[:1]])
+        first = 1 + max((result.start for result in results), default=-1)
+        results = ranked([*results, *(replace(result, start=first + result.start) for result in others)])
+    if not results:
+        raise InputError("starts", 0, "bounds between which there is a design", PLACE)
+    return results
+
+
+def _sampled(
+    problem: Problem,
+    signs: Sequence[dict[str, float]],
+    settings: OptimiseSettings,
+    stop: Callable[[], bool] | None,
+    jobs: int,
+    near: Sequence[Array] = (),
+) -> list[Result]:
+    """Search from some designs, then from samples."""
+    own = samples(problem, signs, settings.starts, settings.seed, stop or (lambda: False))
+    return explore(problem, chain(in_groups(np.array(near)), own), settings, stop, jobs).results
 
 
 def listed(study: Study) -> dict[str, Array]:

@@ -49,15 +49,16 @@ class _Checked(Generic[T]):
 
 @dataclass(frozen=True)
 class SearchTask:
-    """Search from one of the starts."""
+    """Search from one of the starts, the first of which has the number ``first``."""
 
     problem: Problem
     starts: Array
     allowed: float
+    first: int = 0
 
     def __call__(self, number: int, should_stop: Callable[[], bool]) -> Result:
         """Return the result from that start."""
-        return search(number, self.problem, self.starts[number], should_stop, self.allowed)
+        return search(number, self.problem, self.starts[number - self.first], should_stop, self.allowed)
 
 
 def spread_over(

@@ -1,12 +1,12 @@
-"""How far a search can be relied upon: the basins its starts ended in, and the estimated share of unseen ones."""
+"""When a search ends and how far it can be relied upon: basins its starts ended in, estimated share of unseen ones."""
 
 from __future__ import annotations
 
 import math
 from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
@@ -17,10 +17,41 @@ from sweep.optimise.problem.statement import Problem
 if TYPE_CHECKING:
     from sweep.study import OptimiseSettings
 
+TOGETHER = 6  # starts between two looks at whether more are needed
 MET = 3  # distinct starts that have to end in the best basin
-UNSEEN = 0.02  # share of basins that starts may leave unseen, unless a study asks for another
+UNSEEN = 0.02  # share of basins that starts may leave unseen, unless a study asks for another; of populations all
 DISTINCT = 0.05  # of the average distance of two random designs: nearer starts are not distinct
 CUT = ("time", "interrupted")  # how a start ends that was not searched to its end
+
+
+class Group(NamedTuple):
+    """Starts that are searched from together.
+
+    Parameters
+    ----------
+    designs : (k, P), the best first
+    source : the sample or population that they come from, -1 for all others.  Starts of different sources are distinct
+        wherever they stand, since these know nothing of each other; those of one source where they stand apart.
+    counted : the first so many tell which basins there are; the others are searched from and do not count.  A
+        population has chosen its ends itself, so its best one counts alone.  None counts all.
+    problem : with bounds that hold the designs, where they are not those of the search
+    """
+
+    designs: Array
+    source: int = -1
+    counted: int | None = None
+    problem: Problem | None = None
+
+
+def in_groups(starts: Array) -> Iterator[Group]:
+    """Yield starts (k, P) in groups of at most six, which are the same for any number of jobs."""
+    for first in range(0, len(starts), TOGETHER):
+        yield Group(starts[first : first + TOGETHER])
+
+
+def counted(groups: Sequence[Group]) -> list[bool]:
+    """Return for each start of some groups whether it counts."""
+    return [group.counted is None or k < group.counted for group in groups for k in range(len(group.designs))]
 
 
 @dataclass(frozen=True)
@@ -30,21 +61,19 @@ class Survey:
     Parameters
     ----------
     starts : starts that were searched to their end
-    asked : the most starts that the study allows
-    offered : starts that there were
+    asked : the most starts, or populations, that the study allows
     basins : different values the feasible ones ended at; values within 1e-4 count as one basin
-    best : starts from distinct valleys or distinct samples that ended in the best basin
+    best : distinct starts that ended in the best basin
     unseen : estimated share of basins, by their volume, that no start has met; 1 where no start became feasible
     wanted : what ``unseen`` should fall below
     ended : "enough" where the rule was fulfilled, "starts" where none was left, "time" or "interrupted"
     kinds : starts and basins for each combination of signs, as ``(("branch = 1", 7, 3), ...)``
     late : whether all starts were searched, and time ran out over what follows them
-    populations : global searches that were counted, each with its best end; 0 where starts were counted
+    populations : those that were counted, each with its best end; 0 where starts were counted
     """
 
     starts: int
     asked: int
-    offered: int
     basins: int
     best: int
     unseen: float
@@ -80,10 +109,10 @@ class Survey:
         found = []
         if self.ended in CUT:
             why = "time ran out" if self.ended == "time" else "interrupted"
-            of = started(min(self.asked, self.offered))
+            of = f"{self.starts} starts" if self.populations else f"{self.starts} of {started(self.asked)}"
             after = "; not all that follows them, neighbouring values and robust designs, was" if self.late else ""
-            found.append(f"{why}: {self.starts} of {of}{after}")
-        elif self.starts < self.asked and not self.enough:
+            found.append(f"{why}: {of}{after}")
+        elif not self.populations and self.starts < self.asked and not self.enough:
             found.append(
                 f"only {started(self.starts)} of the {self.asked} asked: no more were found in the design space"
             )
@@ -106,27 +135,17 @@ class Survey:
 
 
 def survey(
-    problem: Problem,
-    starts: Array,
-    results: Sequence[Result],
-    settings: OptimiseSettings,
-    ended: str,
-    origins: Sequence[int] | None = None,
-    samples: Sequence[int] | None = None,
+    problem: Problem, groups: Sequence[Group], results: Sequence[Result], settings: OptimiseSettings, ended: str
 ) -> Survey:
     """Return what the results of a search tell of it.
 
     Parameters
     ----------
     problem : whose variables tell how far two starts are apart
-    starts : (k, P) all starts that were offered
+    groups : the starts, which are numbered one group after the other
     results : of those that were begun, in any order
     settings : the number of starts asked, and the share of unseen basins that is allowed
     ended : how the search ended
-    origins : (k,) number of the global search that each start comes from, -1 for none; without them every start stands
-        for itself.  Of one global search the best result counts, and no other: it has chosen its ends itself.
-    samples : (k,) number of the sample that each start comes from.  Starts of different samples are distinct wherever
-        they stand: the samples know nothing of each other.
 
     Notes
     -----
@@ -136,39 +155,30 @@ def survey(
     Populations are drawn at random: they differ by their seeds alone.
     """
     whole = [r for r in results if r.ended not in CUT]
-    numbered = with_basins(whole)
-    drawn = numbered if origins is None else _best_of_each(numbered, origins)
-    met = Counter(r.basin for r in drawn if r.basin)
-    ends = [r.start for r in drawn if r.basin == 1]
-    best = _distinct(problem, starts, ends, samples) if origins is None else len(ends)
-    share = wanted(settings, origins is not None)
+    none = np.empty((0, len(problem.family.parameters)))
+    numbered, starts = with_basins(whole), np.concatenate([none, *(group.designs for group in groups)])
+    source = [group.source for group in groups for _ in group.designs]
+    counts = counted(groups)
+    known = [r for r in numbered if r.basin and counts[r.start]]
+    met = Counter(r.basin for r in known)
+    best = _distinct(problem, starts, [r.start for r in known if r.basin == 1], source)
+    populations = met.total() if settings.by_populations else 0
     return Survey(
-        len(whole), settings.starts, len(starts), len(met), best, _unseen(met), share, ended,
-        _kinds(problem, starts, numbered), populations=0 if origins is None else met.total(),
+        len(whole), most_counted(settings), len(met), best, _unseen(met), wanted(settings), ended,
+        _kinds(problem, starts, numbered), populations=populations,
     )  # fmt: skip
 
 
-def wanted(settings: OptimiseSettings, populations: bool) -> float:
+def most_counted(settings: OptimiseSettings) -> int:
+    """Return how many starts, or populations, are counted at most."""
+    return settings.populations if settings.by_populations else settings.starts
+
+
+def wanted(settings: OptimiseSettings) -> float:
     """Share of unseen basins below which a search ends: of populations the best basin alone decides unless asked."""
     if settings.unseen is not None:
         return settings.unseen
-    return 1.0 if populations else UNSEEN
-
-
-def settled(values: Sequence[float], share: float) -> bool:
-    """Whether populations that ended at these values suffice: the rule of :class:`Survey`."""
-    met = Counter(basins(values))
-    return Survey(len(values), len(values), len(values), len(met), met[1], _unseen(met), share, "").enough
-
-
-def enough(values: Sequence[float], share: float) -> int | None:
-    """Return how many of the first populations suffice; None where all of them do not.
-
-    Values are infinite where nothing feasible was found.  What later populations have ended at does not matter, so the
-    answer does not depend on how many are made at a time.
-    """
-    known = [[x for x in values[:n] if math.isfinite(x)] for n in range(len(values) + 1)]
-    return next((n for n, first in enumerate(known) if settled(first, share)), None)
+    return 1.0 if settings.by_populations else UNSEEN
 
 
 def basins(values: Sequence[float]) -> list[int]:
@@ -179,15 +189,6 @@ def basins(values: Sequence[float]) -> list[int]:
             number, first = number + 1, values[k]
         numbers[k] = number
     return numbers
-
-
-def _best_of_each(ranked: Sequence[Result], origins: Sequence[int]) -> list[Result]:
-    """Return the best result of every global search, of results in the order of their basins."""
-    found: dict[int, Result] = {}
-    for r in ranked:
-        if r.basin and origins[r.start] >= 0:
-            found.setdefault(origins[r.start], r)
-    return list(found.values())
 
 
 def later(found: Survey) -> Survey:
@@ -209,9 +210,8 @@ def _unseen(met: Counter[int]) -> float:
     return min(1.0, max(once / n, w * (w + 1) / (n * (n - 1)))) if n > 1 else 1.0
 
 
-def _distinct(problem: Problem, starts: Array, numbers: list[int], samples: Sequence[int] | None) -> int:
-    """Return how many of some starts stand in distinct valleys, or come from distinct samples."""
-    of = samples or [0] * len(starts)
+def _distinct(problem: Problem, starts: Array, numbers: list[int], source: Sequence[int]) -> int:
+    """Return how many of some starts stand in distinct valleys, or come from distinct sources."""
     place = problem.scaled(starts)
     others = [c for c in range(starts.shape[1]) if c not in problem.columns]
     least = DISTINCT * math.sqrt(place.shape[1] / 6.0)
@@ -219,7 +219,7 @@ def _distinct(problem: Problem, starts: Array, numbers: list[int], samples: Sequ
     for k in sorted(numbers):
         near = (
             np.linalg.norm(place[k] - place[j]) < least
-            and of[k] == of[j]
+            and source[k] == source[j]
             and np.array_equal(starts[k, others], starts[j, others])
             for j in taken
         )

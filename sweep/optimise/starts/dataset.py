@@ -14,9 +14,9 @@ from kernels import status as st
 from sweep.chunks.parameters import runs_matrix
 from sweep.dataset.chunk_files import batches, parts
 from sweep.families.base import Array, Family
-from sweep.jobs.progress import AT_MOST, Say
+from sweep.optimise.multistart.survey import TOGETHER, Group, in_groups
 from sweep.optimise.problem.statement import Problem
-from sweep.optimise.starts.candidates import ALIKE, GROUP, RANKED, diverse, ranking, sample
+from sweep.optimise.starts.samples import ALIKE, RANKED, diverse, ranking, samples
 from sweep.quantities.limits import compared
 from sweep.synthesis.fit import fit_line
 from sweep.synthesis.tasks import solve
@@ -102,28 +102,52 @@ def kinds(study: Study, problem: Problem, known: Array) -> list[dict[str, float]
     return [{names[c]: float(design[c]) for c in others} for design in chosen]
 
 
-def filled(
-    study: Study, problem: Problem, starts: Array, count: int, seed: int, stop: Callable[[], bool], say: Say
-) -> Array:
-    """Return at most ``count`` starts: those given (k, P), then the best of samples that are not near one of them.
+def swept_and_sampled(
+    study: Study, problem: Problem, designs: Array, merit: Array, stop: Callable[[], bool]
+) -> Iterator[Group]:
+    """Yield groups of starts: what does the study's [task], the diverse best of the sweep, and the best of samples.
+
+    On the locus half of the starts come from samples in any case: they cost next to nothing there, and reach the
+    bounds, where a sweep may have no design at all.  Where no row of the dataset is feasible, the first half are the
+    best of random designs.
+
+    Parameters
+    ----------
+    study, problem : what is searched
+    designs, merit : (k, P) of the sweep, and what they are worth (k,), empty where none is feasible
+    stop : true ends it
+    """
+    assert study.optimise is not None
+    count, seed = study.optimise.starts, study.optimise.seed
+    sampled = not len(merit) or (problem.coordinates is not None and study.fit is None)
+    worth = merit if len(merit) else ranking(problem, designs)
+    own = diverse(problem, designs, worth, count - count // 2 if sampled else count, ALIKE)
+    begun = np.concatenate([of_task(study, count, seed), own])[:count]
+    yield from in_groups(begun)
+    offered = _offered(study, problem, designs, worth, begun, stop)
+    while len(begun) < count and not stop() and (more := next(offered, None)) is not None:
+        taken = apart(problem, begun, more.designs, count)
+        if len(taken) > len(begun):
+            yield more._replace(designs=taken[len(begun) :])
+        begun = taken
+
+
+def _offered(
+    study: Study, problem: Problem, designs: Array, worth: Array, begun: Array, stop: Callable[[], bool]
+) -> Iterator[Group]:
+    """Yield what more there is to begin with.
 
     A sample of the problem's own variables finds more than the space of the study, unless [fit] has to finish every
-    design; then designs of the space are drawn.  ``stop`` ends it with what is there, ``say`` is told of each sample.
+    design; then designs of the space are drawn.  In the end the sweep's designs are taken as near as they stand.
     """
-    taken, offered = starts, _offered(study, problem, starts, count, seed, stop)
-    number = 0
-    while len(taken) < count and not stop():
-        say("starts", number, 1 if study.fit else samples_for(count), f"samples {AT_MOST}")
-        more = next(offered, None)
-        if more is None:
-            break
-        taken, number = apart(problem, taken, more, count), number + 1
-    return taken
-
-
-def samples_for(count: int) -> int:
-    """Return of how many samples so many starts are chosen at most."""
-    return SAMPLES * -(-count // GROUP)
+    assert study.optimise is not None
+    count, seed = study.optimise.starts, study.optimise.seed
+    if study.fit is None:
+        yield from samples(problem, kinds(study, problem, begun), SAMPLES * count, seed, stop)
+    else:
+        more = drawn(study, count, seed)
+        yield Group(diverse(problem, more, ranking(problem, more), count) if len(more) else more)
+    yield Group(diverse(problem, designs, worth, count, ALIKE))
 
 
 def sample_seconds(problem: Problem, base: Array, count: int) -> float:
@@ -139,21 +163,7 @@ def sample_seconds(problem: Problem, base: Array, count: int) -> float:
         seconds = time.process_time() - begin
         if seconds > ENOUGH:
             break
-    return seconds / number * RANKED * min(count, GROUP)
-
-
-def _offered(
-    study: Study, problem: Problem, starts: Array, count: int, seed: int, stop: Callable[[], bool]
-) -> Iterator[Array]:
-    """Yield designs to begin with, one sample after the other."""
-    if study.fit is None:
-        signs = kinds(study, problem, starts)
-        for number in range(samples_for(count)):
-            yield sample(problem, signs, min(count, GROUP), seed, number, stop)
-        return
-    designs = drawn(study, count, seed)
-    if len(designs):
-        yield diverse(problem, designs, ranking(problem, designs), count)
+    return seconds / number * RANKED * min(count, TOGETHER)
 
 
 def apart(problem: Problem, starts: Array, more: Array, count: int) -> Array:

@@ -17,9 +17,9 @@ from numpy.typing import NDArray
 from kernels.descent.descents import LOCKED
 from sweep.families.base import Array
 from sweep.optimise.local.kkt import AGREE
-from sweep.optimise.starts.candidates import spread
 from sweep.optimise.starts.linear import Elimination, turned_into
 from sweep.optimise.starts.pose_rows import Descents, Index, PoseRows
+from sweep.optimise.starts.samples import spread
 
 PARENTS = 40  # best ends, no two of them alike, from which a generation is made: as many of all signs
 TRIES, STRANGERS = 64, 256  # of every child, the best of which descends; of one half of which is at random

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -10,16 +10,15 @@ import numpy as np
 
 from sweep.errors import InputError
 from sweep.families.base import Array, Parameter
-from sweep.jobs.progress import Say, unsaid
 from sweep.optimise.multistart.multistart import listed
+from sweep.optimise.multistart.survey import Group
 from sweep.optimise.problem.on_locus import LocusCoordinates
 from sweep.optimise.problem.statement import Problem
-from sweep.optimise.starts.candidates import ALIKE, diverse, ranking
-from sweep.optimise.starts.dataset import apart, best_rows, drawn, filled, of_task
-from sweep.optimise.starts.global_starts import Begun, descend_once, from_populations, holding
+from sweep.optimise.starts.dataset import best_rows, drawn, swept_and_sampled
+from sweep.optimise.starts.global_starts import descend_once, from_populations, holding
 
 if TYPE_CHECKING:
-    from sweep.study import OptimiseSettings, Study
+    from sweep.study import Study
 
 WHOLE_TURN = 2.0 * np.pi - 1e-9
 SHORTEST = 0.02  # of its upper limit is a length without a lower one
@@ -112,7 +111,7 @@ def _bounds(study: Study, name: str, designs: Array) -> tuple[float, float] | No
 def _limited(study: Study, name: str) -> tuple[float, float] | None:
     """Return the limits of a guide's length, which are its bounds where proportions are searched globally."""
     limits = [x for x in study.parameter_limits if x.output == name and x.maximum is not None]
-    if not _globally(study) or not limits:
+    if not _by_populations(study) or not limits:
         return None
     high = min(x.maximum for x in limits if x.maximum is not None)
     return max((x.minimum for x in limits if x.minimum is not None), default=SHORTEST * high), high
@@ -123,34 +122,19 @@ def _prescribed(study: Study) -> tuple[Parameter, ...]:
 
 
 def problem_and_starts(
-    study: Study, folder: Path, stop: Callable[[], bool] = lambda: False, jobs: int = 1, say: Say = unsaid
-) -> tuple[OptimiseSettings, Begun]:
-    """Return settings, problem and starts: the diverse best of the dataset, filled up from samples if too few.
+    study: Study, folder: Path, stop: Callable[[], bool] = lambda: False, jobs: int = 1
+) -> tuple[Problem, Iterator[Group]]:
+    """Return the problem of a study and its starts, group by group, each of which is made when it is asked for.
 
-    On the locus half of the starts come from samples in any case.  Where no row of the dataset is feasible, the first
-    half are the best of random designs.  The mechanisms that do the study's [task] come before all others.  With
-    ``optimise.global = "proportions"`` five of six starts come from the search over proportions instead, in ``jobs``
-    processes; ``stop`` ends it early.
+    With ``optimise.global = "proportions"`` they are ends of populations, whose descents run in ``jobs`` threads;
+    otherwise they come from the dataset and from samples.  ``stop`` ends it early.
     """
     if study.optimise is None:
         raise InputError("optimise", None, "an [optimise] section", str(study.path))
-    settings, (designs, merit, problem) = study.optimise, _known(study, folder)
-    count, origins, starts = settings.starts, None, designs[:0]
-    if _globally(study):
-        problem, starts, origins = from_populations(study, settings, problem, designs, merit, stop, jobs, say)
-    else:
-        # On the locus samples cost next to nothing, and reach the bounds, where a sweep may have no design at all.
-        sampled = not len(merit) or (problem.coordinates is not None and study.fit is None)
-        if not len(merit):
-            merit = ranking(problem, designs)
-        own = diverse(problem, designs, merit, count - count // 2 if sampled else count, ALIKE)
-        starts = filled(study, problem, own, count, settings.seed, stop, say)
-        if len(starts) < count:
-            starts = apart(problem, starts, diverse(problem, designs, merit, count, ALIKE), count)
-    first = of_task(study, count, settings.seed)
-    kept = max(len(starts), len(first))
-    origins = None if origins is None else ((-1,) * len(first) + origins)[:kept]
-    return settings, Begun(problem, np.concatenate([first, starts])[:kept], origins)
+    designs, merit, problem = _known(study, folder)
+    if study.optimise.by_populations:
+        return problem, from_populations(study, problem, designs, merit, stop, jobs)
+    return problem, swept_and_sampled(study, problem, designs, merit, stop)
 
 
 def compile_descents(study: Study) -> None:
@@ -175,7 +159,7 @@ def problem_of_dataset(study: Study, folder: Path, found: Array) -> Problem:
         if nothing can change, or neither rows nor a sample give a design.
     """
     problem = _known(study, folder)[2]
-    return holding(study, problem, found) if _globally(study) else problem
+    return holding(study, problem, found) if _by_populations(study) else problem
 
 
 def _known(study: Study, folder: Path) -> tuple[Array, Array, Problem]:
@@ -194,5 +178,5 @@ def _known(study: Study, folder: Path) -> tuple[Array, Array, Problem]:
     return designs, merit, problem_of(study, designs)
 
 
-def _globally(study: Study) -> bool:
-    return study.optimise is not None and study.optimise.globally == "proportions"
+def _by_populations(study: Study) -> bool:
+    return study.optimise is not None and study.optimise.by_populations

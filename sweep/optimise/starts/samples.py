@@ -5,7 +5,7 @@ Every six starts come from a sample of their own: a region that one sample misse
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from typing import Any
 
 import numpy as np
@@ -14,12 +14,12 @@ from numpy.typing import NDArray
 from sweep.evaluation.summaries import design_outputs
 from sweep.families.base import Accuracy, Array
 from sweep.families.names import is_flag, stem
+from sweep.optimise.multistart.survey import TOGETHER, Group
 from sweep.optimise.problem.program import measured_in
 from sweep.optimise.problem.statement import Problem
 from sweep.quantities.limits import compared
 from sweep.quantities.measures import ROTATABLE_MARGIN, margins
 
-GROUP = 6  # starts of one sample: as many as a search begins together
 SAMPLED = 1 << 15  # designs per start: on a locus they cost a third of a microsecond each
 BLOCK, LEAST = 1 << 15, 1 << 12  # designs ranked together; the least number, where there are many signs
 BEYOND = 0.35  # of the width of the bounds, to either side: two coordinates in five are brought back onto a bound
@@ -38,31 +38,27 @@ ALIKE = 0.02  # of the average distance of two random designs: nearer designs of
 OUTSIDE, STUCK = 1e100, 1e200  # above every objective: misses its limits, does not turn
 
 
-def from_sample(problem: Problem, signs: Sequence[dict[str, float]], count: int, seed: int) -> Array:
-    """Return the starts of :func:`from_samples` alone."""
-    return from_samples(problem, signs, count, seed)[0]
-
-
-def from_samples(
-    problem: Problem, signs: Sequence[dict[str, float]], count: int, seed: int
-) -> tuple[Array, tuple[int, ...]]:
-    """Return at most ``count`` good designs, and the number of the sample that each comes from.
-
-    Up to six designs come from one sample, the best first; then those of the next sample follow.  Same arguments, same
-    designs.
+def samples(
+    problem: Problem, signs: Sequence[dict[str, float]], count: int, seed: int, stop: Callable[[], bool] = lambda: False
+) -> Iterator[Group]:
+    """Yield at most ``count`` good designs, those of one sample after the other; same arguments, same designs.
 
     Parameters
     ----------
     problem : what is to be minimised
     signs : combinations of the parameters that are not varied (branches); each sample is shared out among them
-    count : how many at most
+    count : how many at most, as many of each sample, up to six
     seed : of the samples
+    stop : true ends a sample that has been begun with the best so far; there is no further one
     """
-    number = -(-count // GROUP)
+    number = -(-count // TOGETHER)
     size = -(-count // number)
-    found = [sample(problem, signs, size, seed, k) for k in range(number)]
-    numbers = [k for k, designs in enumerate(found) for _ in designs]
-    return np.concatenate(found)[:count], tuple(numbers[:count])
+    for k in range(number):
+        if k and stop():
+            return
+        designs = sample(problem, signs, size, seed, k, stop)[: count - k * size]
+        if len(designs):
+            yield Group(designs, k)
 
 
 def sample(
@@ -76,7 +72,7 @@ def sample(
 
     Parameters
     ----------
-    problem, signs, seed : see :func:`from_samples`
+    problem, signs, seed : see :func:`samples`
     count : how many designs at most
     number : of the sample
     stop : asked several times a second; true ends with the best so far
@@ -93,7 +89,7 @@ def sample(
     points = qmc.Sobol(len(problem.variables), seed=rng)
     place, kind, merit = np.empty((0, len(problem.variables))), np.empty(0, np.intp), np.empty(0)
     for k in range(blocks):
-        if stop():
+        if k and stop():
             break
         fractions, own = _brought_in(problem, points.random(block)), k % len(bases)
         found = ranking(problem, problem.placed(bases[own], fractions))
