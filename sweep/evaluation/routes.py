@@ -78,6 +78,7 @@ def design_outputs(
     designs, n = np.ascontiguousarray(designs), len(designs)
     status = np.zeros(n, np.uint8)
     columns: Columns = {}
+    turns = not isinstance(family.domain, Interval)
     ways = routes(family, wanted, accuracy)
     kinds = {route.general for route in ways if route.general}
     if accuracy.samples is not None and kinds and "margin" not in kinds and margin_suffixes(family):
@@ -96,12 +97,14 @@ def design_outputs(
             found = route.run(of_these, accuracy, window)
             for name in with_errors(route.outputs, accuracy):
                 columns[name] = _spread(found[name], alive, n)
+                if turns and is_place(name):  # np.mod makes 2 pi of a tiny negative angle
+                    columns[name] = np.where(columns[name] == TWO_PI, 0.0, columns[name])
             now = found["status"].astype(np.uint8)
             if alive is None:
                 status = now
             else:
                 status[alive] = np.where(status[alive] == st.OK, now, status[alive])
-        if isinstance(family.domain, Interval):
+        if not turns:
             status[status == st.NOT_ROTATABLE] = st.NOT_ASSEMBLED  # there is no crank that could turn
         chosen = {name: columns[name] for name in with_errors(wanted, accuracy)}
         return explained(chosen | {"status": status}, dict.fromkeys(wanted))

@@ -176,3 +176,11 @@ def test_limit_angles_are_those_of_the_poses_in_line(names, own_steps, monkeypat
             at_pi = np.abs(np.abs(pose[f"psi{stage}"]) - np.pi) < 1e-6
             assert error[~at_pi].max() < 1e-6
             assert (frame.loc[ok, angle] > -np.pi).all() and (frame.loc[ok, angle] <= np.pi).all()
+
+
+def test_angle_that_rounds_to_a_whole_turn_is_the_beginning_of_it() -> None:
+    """An inverted slider-crank without offset is fastest at the crank angle 0; many searches end just below it."""
+    rng = np.random.default_rng(1)
+    table = {"a": rng.uniform(5.0, 15.0, 200), "e": rng.uniform(40.0, 60.0, 200), "h": 0.0}
+    found = sweep.summarise("inverted_slider_crank", table, ["phi_max_abs_dpsi"], accuracy=1e-8)["phi_max_abs_dpsi"]
+    assert ((found >= 0.0) & (found < 2.0 * np.pi)).all() and (found == 0.0).sum() > 20
