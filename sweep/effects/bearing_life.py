@@ -21,6 +21,7 @@ from sweep.effects.turn import chosen
 from sweep.families.base import Accuracy, Array, Columns, Output
 from sweep.families.capabilities import Assembly
 from sweep.families.poses import filled_all
+from sweep.numerics.curves import TableCurve
 from sweep.numerics.events import sign_changes, with_events
 from sweep.numerics.quadrature import integrate
 from sweep.numerics.singularities import crowded, singularities, turn_edges
@@ -189,6 +190,22 @@ def _switches(scene: Scene, shaft: Shaft) -> Array:
     return np.stack([shaft.turning(scene), axial, np.abs(axial) - limit], axis=2)
 
 
+def _pierced(scene: Scene) -> list[Array]:
+    """Compute what changes its sign where a tool begins or ceases to pierce, and its load jumps, (k, m, 2) each."""
+    found = []
+    for which, inputs in enumerate((scene.inputs, *(driven.inputs for driven in scene.after))):
+        if "pierce_force" not in inputs:
+            continue
+        stage = scene.stage(which)
+        position, rate = stage.family.position, stage.family.derivative_of[stage.family.position]
+        poses = stage.family.poses(stage.designs, stage.angles, frozenset({position, rate}))
+        place, speed = (np.asarray(poses[name], np.float64) for name in (position, rate))
+        driving = 1.0 if stage.rates is None else stage.rates[0]
+        both = np.stack([place - inputs["pierce_at"][:, None], speed * driving], axis=2)
+        found.append(np.where(inputs["pierce_force"][:, None, None] != 0.0, both, 1.0))
+    return found
+
+
 def formula(scene: Scene, shaft: Shaft) -> Array:
     """Compute what changes its sign where an equivalent load has a kink or jumps, (n, m, 2)."""
     return _switches(scene, shaft)[:, :, 1:]
@@ -218,7 +235,8 @@ def _refined(scene: Scene, rows: Rows, size: Array, target: float, shaft: Shaft)
         return np.where(bad[:, None, None], np.nan, _integrands(load, way, size[which], exponent[which]))
 
     def switches(which: Rows, phi: Array) -> Array:
-        return _switches(scene.posed(rows[which], phi), shaft)
+        posed = scene.posed(rows[which], phi)
+        return np.concatenate([_switches(posed, shaft), *_pierced(posed)], axis=2)
 
     families = [scene.family, *(driven.family for driven in scene.after)]
     curves = [
@@ -229,6 +247,8 @@ def _refined(scene: Scene, rows: Rows, size: Array, target: float, shaft: Shaft)
     near = singularities(curves, rows.size)
     places = sign_changes(switches, crowded(near, LOOK))
     edges = with_events(turn_edges(near, PANEL), *places)
+    points = np.array([phi for curve in scene.every_curve if isinstance(curve, TableCurve) for phi in curve.phi])
+    edges = with_events(edges, np.repeat(np.arange(rows.size), points.size), np.tile(points % TWO_PI, rows.size))
     # The mean load is a root of order p, so it is as accurate as the integrals at least where p >= 2.
     found = integrate(integrands, edges, 0.25 * target)
     turns = _of_turn(status)

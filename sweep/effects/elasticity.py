@@ -109,7 +109,7 @@ def _varying(scene: Scene, driven: DrivenSide | None = None) -> Array | None:
 
 def compute_static(scene: Scene, wanted: frozenset[str]) -> Columns:
     """Wanted pointwise quantities; status NOT_LINEAR where the deflection is no longer small."""
-    outputs = optional_outputs(_KERNEL_NAMES, wanted, scene.shape)
+    scene, outputs = scene.even(), optional_outputs(_KERNEL_NAMES, wanted, scene.shape)
     lag, displacement, ratio = outputs
     status = scene.status()
     p, d2psi, c, reach, data = _arguments(scene)
@@ -141,7 +141,7 @@ def _solve(grid: Scene, phi: Array, last: bool) -> tuple[dict[str, Array], Statu
 
     A crank that turns backwards is one that turns forwards in -phi: only so do multipliers below 1 mean stability.
     """
-    n, speed = len(grid.designs), grid.inputs["speed"]
+    grid, n, speed = grid.even(), len(grid.designs), grid.inputs["speed"]
     lag, elongation = (np.empty((n, phi.shape[1])) for _ in range(2))
     found = Steady(np.empty(n, np.uint8), lag, elongation, np.empty(n))
     p, d2psi, c, reach, data = _arguments(grid)

@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from kernels.effects import link_friction, link_loads
+from kernels.linkage.bodies import SLIDE
 from kernels.types import Status
 from sweep.effects import loads
 from sweep.effects.loads import FRICTION_SUFFIX, FRICTION_TEXT, Named, together
@@ -81,9 +82,16 @@ def rods_of(tree: LinkTree) -> dict[int, tuple[int, int]]:
 
 def inputs(tree: LinkTree) -> tuple[Parameter, ...]:
     """All inputs of the loads of a tree."""
-    load = (loads.LINK_TORQUE,) if tree.output >= 0 else ()
-    tip = loads.TIP if tree.tip is None else ()
-    return (*body_inputs(tree), *loads.GRAVITY, *loads.FREE_TOOL, *tip, *load, loads.SPEED, loads.CHANGE)
+    load, tip = useful(tree), loads.TIP if tree.tip is None else ()
+    own = () if load is None else (load,)
+    return (*body_inputs(tree), *loads.GRAVITY, *loads.FREE_TOOL, *tip, *own, loads.SPEED, loads.CHANGE)
+
+
+def useful(tree: LinkTree) -> Parameter | None:
+    """Return the useful load: a torque on an output link that turns, a force on one that slides; None without one."""
+    if tree.output < 0:
+        return None
+    return loads.LINK_FORCE if tree.freedoms[tree.output][1] == SLIDE else loads.LINK_TORQUE
 
 
 def friction_inputs(joint: LinkJoint) -> tuple[Parameter, ...]:
@@ -151,7 +159,8 @@ def rod(tree: LinkTree, joint: LinkJoint) -> int:
 
 def load_name(scene: Scene) -> str | None:
     """Name of the useful load on the output link; None where the tree has no such link."""
-    return loads.LINK_TORQUE.name if tree_of(scene).output >= 0 else None
+    load = useful(tree_of(scene))
+    return None if load is None else load.name
 
 
 def force_name(scene: Scene) -> str:

@@ -180,9 +180,9 @@ def _follower(name: str, prefix: str, load: Parameter) -> Follower:
     return Follower(name, prefix, load, tuple(p.name for p in bodies), rods, parameters)
 
 
-LINK_TORQUE = Parameter(
-    "load_torque", "torque", "torque on the output link about its axis; a resisting one opposes dpsi", default=0.0
-)
+# On the output link of a tree of links that turns, and on one that slides.
+LINK_TORQUE = replace(_TORQUE, text="torque on the output link about its axis; a resisting one opposes dpsi")
+LINK_FORCE = replace(_FORCE, text="force on the output link along its guide; a resisting one opposes its derivative")
 ROCKER = _follower("rocker", "", _TORQUE)
 SLIDER = _follower("slider", "slider_", _FORCE)
 

@@ -192,10 +192,17 @@ class Scene:
         return constant if curve is None else constant + curve(self._first.angles.phi)
 
     @property
-    def smooth(self) -> bool:
-        """Whether no load of this stage or a later one is given over the turn, or jumps while a tool pierces."""
-        piercing = "pierce_force" in self.inputs and bool(self.inputs["pierce_force"].any())
-        return not self.curves and not piercing and (self.driven is None or self.driven.smooth)
+    def pierces(self) -> NDArray[np.bool_]:
+        """Whether a tool of this stage or a later one pierces in a design, so that a load jumps, (n,)."""
+        found: NDArray[np.bool_] = np.zeros(len(self.designs), np.bool_)
+        for inputs in (self.inputs, *(driven.inputs for driven in self.after)):
+            found = found | (inputs["pierce_force"] != 0.0) if "pierce_force" in inputs else found
+        return found
+
+    @property
+    def every_curve(self) -> tuple[Curve, ...]:
+        """Loads over the turn of this stage and of those behind it."""
+        return (*self.curves.values(), *(curve for driven in self.after for curve in driven.curves.values()))
 
     @property
     def _first(self) -> Scene:
@@ -212,6 +219,14 @@ class Scene:
     def _of(self, rows: Rows, angles: Angles) -> Scene:
         given, after = {name: x[rows] for name, x in self.inputs.items()}, tuple(d.only(rows) for d in self.after)
         return Scene(self.family, self.designs[rows], angles, given, after, curves=self.curves)
+
+    def even(self) -> Scene:
+        """Give the scene of a crank that keeps its speed, for what presumes one; itself where it does."""
+        if not self.inputs["speed_change"].any():
+            return self
+        still = {"speed_change": np.zeros(len(self.designs))}
+        after = tuple(driven._replace(inputs=driven.inputs | still) for driven in self.after)
+        return Scene(self.family, self.designs, self.angles, self.inputs | still, after, curves=self.curves)
 
     def precise(self) -> Scene:
         """Give the same scene with the most accurate poses that its families have."""

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import replace
 from functools import partial
 
@@ -86,19 +87,31 @@ def _solve(rubs: bool, finest: int, grid: Scene, phi: Array, last: bool) -> tupl
 
 def samples(grid: Scene) -> tuple[Array, Array]:
     """Reduced inertia and torque excess J'w^2/2 - M_drive(w, 0): weights and load reduced to the crank."""
-    even = grid.inputs | {"speed_change": np.zeros(len(grid.designs))}
-    after = tuple(d._replace(inputs=d.inputs | {"speed_change": even["speed_change"]}) for d in grid.after)
-    turning = Scene(grid.family, grid.designs, grid.angles, even, after, curves=grid.curves)
-    found = compute_loads(turning, _NEEDED)
+    found = compute_loads(grid.even(), _NEEDED)
     inertia, slope, drive = (np.asarray(found[name], np.float64) for name in _NEEDED_NAMES)
     speed = grid.inputs["speed"][:, None]
     return inertia + grid.inputs["flywheel"][:, None], 0.5 * slope * speed * speed - drive
 
 
 def _grids(scene: Scene, rubs: bool) -> tuple[int, ...]:
-    if rubs:
-        return RUBBING
-    return GRIDS if scene.smooth else GRIDS + FINER
+    """Return the grids to be tried: no coarser ones than show what loads do over the turn."""
+    if scene.pierces.any():
+        return FINER[-1:]
+    curves = scene.every_curve
+    grids = RUBBING if rubs else GRIDS + FINER if curves else GRIDS
+    least = max((curve.samples for curve in curves), default=0.0)
+    return tuple(size for size in grids if size >= least) or grids[-1:]
+
+
+def _apart(scene: Scene, run: Callable[[Scene], Columns]) -> Columns:
+    """Run designs whose tool pierces apart from the others: their grids are nobody else's."""
+    pierces = scene.pierces
+    groups = [rows for rows in (np.flatnonzero(~pierces), np.flatnonzero(pierces)) if rows.size]
+    parts = [run(scene.only(rows)) for rows in groups] or [run(scene)]
+    if len(parts) == 1:
+        return parts[0]
+    order = np.argsort(np.concatenate(groups))
+    return {name: np.concatenate([part[name] for part in parts])[order] for name in parts[0]}
 
 
 def _solved(scene: Scene, phi: Array, rubs: bool) -> tuple[dict[str, Array], Status, tuple[int, ...]]:
@@ -110,12 +123,20 @@ def _solved(scene: Scene, phi: Array, rubs: bool) -> tuple[dict[str, Array], Sta
 
 def compute(scene: Scene, wanted: frozenset[str], rubs: bool = False) -> Columns:
     """Speed and acceleration of the crank at the wanted angles."""
+    return _apart(scene, partial(_compute, wanted=wanted, rubs=rubs))
+
+
+def _compute(scene: Scene, wanted: frozenset[str], rubs: bool) -> Columns:
     found, status, _ = _solved(scene, scene.angles.phi, rubs)
     return at_poses(scene, found, status, wanted)
 
 
 def turn(scene: Scene, wanted: frozenset[str], accuracy: Accuracy, rubs: bool = False) -> Columns:
     """Unevenness, extreme speeds and the reductions of speed and acceleration."""
+    return _apart(scene, partial(_turn, wanted=wanted, rubs=rubs))
+
+
+def _turn(scene: Scene, wanted: frozenset[str], rubs: bool) -> Columns:
     finest, suffix = _grids(scene, rubs)[-1], SUFFIX[rubs]
     found, status, grids = _solved(scene, scene.on_grid(finest).angles.phi, rubs)
     columns: Columns = {f"{name}{suffix}": found[f"{name}{suffix}"] for name in ("unevenness", "fastest", "slowest")}

@@ -7,6 +7,7 @@ import numpy as np
 from kernels.effects.thread import capstan, thread_contour, thread_speed
 from kernels.types import Status
 from sweep.effects.base import Effect
+from sweep.effects.loads import CHANGE
 from sweep.effects.scene import Scene
 from sweep.families.base import Array, Columns, Output, Parameter
 from sweep.families.capabilities import ThreadPath
@@ -36,6 +37,7 @@ CONTOUR_INPUTS = (
 )  # fmt: skip
 SPEED_INPUTS = (
     Parameter("speed", "speed", "speed of the crank"),
+    CHANGE,
     Parameter("thread_speed_ref", "none", "speed at which the tension is known, mm/s; reported 1230", positive=True,
               default=MM_PER_M * float(REFERENCE_SPEED.default or 0.0)),
     Parameter("thread_speed_share", "none", SHARE.text, default=SHARE.default),

@@ -18,6 +18,9 @@ from kernels.types import TWO_PI, Array
 from sweep.families.base import Angles, Columns, Family, Stage
 from sweep.families.capabilities import Assembly, DesignMap
 from sweep.families.parts import Member
+from sweep.numerics.curves import PER_GAP
+
+NARROWEST = 1e-9  # angles [rad] that are nearer to each other are one
 
 T = TypeVar("T")
 SingularCurve: TypeAlias = Callable[[Array, Angles], Array]
@@ -136,6 +139,15 @@ def crossed(family: Family, designs: Array) -> NDArray[np.bool_]:
     for known in family.every(Crossing):
         found = found | known.matters(designs)
     return found
+
+
+def least_samples(family: Family, designs: Array, outputs: Collection[str]) -> Array:
+    """Return even samples of a turn, (n,), of which some lie on each wave and between known angles; inf if it jumps."""
+    angles = np.sort(switches(family, designs, outputs), axis=1)
+    gaps = np.diff(np.concatenate([angles, angles[:, :1] + TWO_PI], axis=1), axis=1)
+    narrowest = np.where(gaps > NARROWEST, gaps, TWO_PI).min(axis=1, initial=TWO_PI)
+    least = PER_GAP * np.maximum(TWO_PI / narrowest, waves(family, designs))
+    return np.where(crossed(family, designs), np.inf, least)
 
 
 def bends(family: Family, output: str) -> tuple[Bends, ...]:

@@ -13,6 +13,7 @@ from kernels.types import TWO_PI, Array
 if TYPE_CHECKING:
     from scipy.interpolate import PchipInterpolator
 
+PER_GAP = 4.0  # samples between two points of a table, or on a wave
 AROUND = 3  # points of the next and the last turn: the slope at a point depends on its two neighbours alone
 
 
@@ -36,6 +37,11 @@ class TableCurve:
         """Values at any angles, of the same shape."""
         start = self.phi[0]
         return self._cubics(start + np.mod(phi - start, TWO_PI))
+
+    @property
+    def samples(self) -> float:
+        """So many even samples of a turn that some lie between any two of its points."""
+        return PER_GAP * TWO_PI / float(np.diff([*self.phi, self.phi[0] + TWO_PI]).min())
 
     def slope(self, phi: Array) -> Array:
         """Return the derivative at any angles."""
@@ -61,6 +67,11 @@ class SeriesCurve:
     mean: float = 0.0
     cos: tuple[float, ...] = ()
     sin: tuple[float, ...] = ()
+
+    @property
+    def samples(self) -> float:
+        """So many even samples of a turn that some lie on each of its waves."""
+        return PER_GAP * max(len(self.cos), len(self.sin))
 
     def __call__(self, phi: Array) -> Array:
         """Values at any angles, of the same shape."""

@@ -11,6 +11,7 @@ import pytest
 
 import sweep
 from kernels import status as st
+from sweep.effects import extended
 from sweep.families import family
 from sweep.families.link_tree import LinkTree
 from tests.reference.linked import POSES, READERS, Z
@@ -130,6 +131,22 @@ def turn(case, extra=None, wanted=(), drop=()):
     poses = sweep.evaluate(name, table | (extra or {}), [*POSES[name], *wanted], phi=PHI)
     assert (poses["status"] == st.OK).all()
     return name, d, poses
+
+
+@pytest.mark.parametrize(
+    ("name", "unit"),
+    [("cam", "force"), ("guided_cam", "force"), ("heddle", "force"), ("cam_lever", "torque"), ("slotted", "torque"),
+     ("geared_dwell", "torque"), ("epicyclic_dwell", "torque"), ("inverted_slider_crank", "torque")],
+)  # fmt: skip
+def test_the_useful_load_of_an_output_link_is_a_force_where_that_slides_and_a_torque_where_it_turns(name, unit):
+    bare = family(name)
+    rate, load = bare.derivative_of[bare.position], f"load_{unit}"
+    (own,) = (p for p in extended(bare, ["drive_torque"]).parameters if p.name.startswith("load_"))
+    assert (own.name, own.unit) == (load, unit)
+    row = {p.name: p.default for p in bare.parameters if p.default is not None} | dict(bare.example) | {"speed": -OMEGA}
+    idle, loaded = (sweep.evaluate(name, row | {load: x}, ["drive_torque", rate], phi=PHI) for x in (0.0, 700.0))
+    power = 700.0 * idle[rate]
+    np.testing.assert_allclose(idle.drive_torque - loaded.drive_torque, power, atol=1e-12 * np.abs(power).max())
 
 
 @pytest.mark.parametrize("case", DESIGNS)

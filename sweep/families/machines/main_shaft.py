@@ -16,7 +16,7 @@ from kernels import status as st
 from kernels.effects.speed_fluctuation import RESOLVED
 from kernels.types import Array, Status
 from sweep.families.base import Accuracy, Angles, Columns, Output, Parameter, Step, Work
-from sweep.families.curve_features import Smooth
+from sweep.families.curve_features import Smooth, least_samples
 from sweep.families.frames import Frame
 from sweep.numerics.steady_speed import ERROR, FINER, GRIDS, LEFT, PER_LEFT, steady
 
@@ -153,20 +153,20 @@ def _numbers(shaft: ShaftTorque, machine: Machine, designs: Array) -> dict[str, 
     apart = np.any(np.abs(theirs - speed) > SAME * np.abs(speed), axis=0)
     found: dict[str, Any] = {key: np.full(len(designs), np.nan) for key in (*NUMBERS, "missed")}
     status: Status = np.full(len(designs), st.NOT_CONVERGED, np.uint8)
-    rows = np.arange(len(designs))
+    least, finest = least_samples(machine, designs, (shaft.name,)), FINER[-1]
     for size in (*GRIDS, *FINER):
+        rows = np.flatnonzero((status == st.NOT_CONVERGED) & ((least <= size) | (size == finest)))
+        if not rows.size:
+            continue
         inertia, excess, poses = _samples(shaft, machine, designs[rows], speed[rows], size)
         motor = slope[rows] if slope[rows].any() else None
-        coarsest = LEFT if size == FINER[-1] else RESOLVED
+        coarsest = LEFT if size == finest else RESOLVED
         part, codes = steady(inertia, excess, speed[rows], motor, np.zeros((1, 1)), coarsest)
         np.copyto(codes, poses, where=poses != st.OK)
         codes[apart[rows]] = st.INVALID_INPUT
         for key in found:
             found[key][rows] = np.where(codes == st.OK, part[key], np.nan)
         status[rows] = codes
-        rows = rows[codes == st.NOT_CONVERGED]
-        if not rows.size:
-            break
     return found | {"status": status}
 
 

@@ -13,7 +13,7 @@ from kernels.types import EPS, TWO_PI, Array, Status
 from sweep.errors import InputError
 from sweep.families.base import Accuracy, Angles, Columns, Family, Output, Parameter, Step, Work
 from sweep.families.capabilities import GuidedPoint, JointRecords, ToolPoint, skeleton_of
-from sweep.families.curve_features import Smooth
+from sweep.families.curve_features import Smooth, least_samples
 from sweep.families.frames import CRANKS, Frame
 from sweep.families.link_tree import LinkTree
 from sweep.families.machines.relations import with_size
@@ -175,8 +175,12 @@ def orders_of(shaking: Shaking, machine: Machine) -> Step:
         asked = [o.name for o in shaking.numbers if o.name in wanted]
         found: dict[str, Array] = {f"{e}{name}": np.full(len(designs), np.nan) for name in asked for e in ("", "err_")}
         status: Status = np.full(len(designs), st.NOT_CONVERGED, np.uint8)
-        rows = np.arange(len(designs))
-        for samples in GRIDS if accuracy.samples is None else (accuracy.samples,):
+        grids = GRIDS if accuracy.samples is None else (accuracy.samples,)
+        least = least_samples(machine, designs, asked)
+        for samples in grids:
+            rows = np.flatnonzero((status == st.NOT_CONVERGED) & ((least <= samples) | (samples == grids[-1])))
+            if not rows.size:
+                continue
             codes, amplitudes = _amplitudes(shaking, machine, designs[rows], asked, samples)
             settled = np.ones(rows.size, np.bool_)
             for name, (value, err, size) in amplitudes.items():
@@ -184,9 +188,6 @@ def orders_of(shaking: Shaking, machine: Machine) -> Step:
                 settled &= (accuracy.target is None) | (err <= (accuracy.target or 0.0) * size)
             done = settled | (codes != st.OK)
             status[rows[done]] = codes[done]
-            rows = rows[~done]
-            if not rows.size:
-                break
         return found | {"status": status}
 
     return Step(f"orders of {shaking.name}", shaking.numbers, run, work=Work.LONG, cost=_cost)

@@ -1,0 +1,107 @@
+"""Loads that act over less of the turn than two samples span: lives and the speed over the turn see them.
+
+References are dense sums of pose outputs, which attain the load where it acts.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+import sweep
+from kernels import status as st
+
+GUIDE = {"a": 11.0, "b": 40.0, "c": 45.0, "e": 38.0, "xi": 75.0, "eta": 12.0, "lam": 1.4, "h": 5.0}
+SPEED = 300.0
+LIGHT = {"m_crank": 2e-4, "m_coupler": 1e-4, "m_rocker": 1e-4, "j_crank_zz": 0.2, "m_tool": 1e-5, "speed": SPEED}
+BEARING = {"support_d1": -20.0, "support_d2": 30.0, "radial_factor": 0.56, "axial_factor": 1.5, "e_limit": 0.3,
+           "dynamic_capacity": 6000.0}  # fmt: skip
+N = 400_000
+PHI = 2.0 * np.pi * (np.arange(N) + 0.37) / N
+
+
+def pierced(share, force=4000.0):
+    """A needle drive whose tool enters the fabric that share of the stroke before its turning point."""
+    ends = sweep.summarise("guide", GUIDE, ["max_s", "min_s"], accuracy=1e-10)
+    top, stroke = ends.max_s[0], ends.max_s[0] - ends.min_s[0]
+    return GUIDE | LIGHT | {"pierce_force": force, "pierce_at": top - share * stroke, "pierce_sense": 1.0}
+
+
+def speed_of(inertia, excess):
+    """Speed over the turn, from the balance of energy on even samples."""
+    work = np.cumsum(excess - excess.mean()) * 2.0 * np.pi / len(excess)
+    energy = 0.5 * inertia.mean() * SPEED**2
+    for _ in range(60):
+        omega = np.sqrt(2.0 * (energy + work) / inertia)
+        energy *= 1.0 + 2.0 * (np.mean(1.0 / omega) * SPEED - 1.0)
+    return omega
+
+
+@pytest.mark.parametrize("share", [1e-2, 1e-3, 1e-4])
+def test_unevenness_counts_a_tool_that_pierces_just_before_its_turning_point(share):
+    table = pierced(share)
+    poses = sweep.evaluate("guide", table, ["drive_torque", "reduced_inertia", "dreduced_inertia"], phi=PHI)
+    inertia, torque = poses.reduced_inertia.to_numpy(), poses.drive_torque.to_numpy()
+    omega = speed_of(inertia, 0.5 * poses.dreduced_inertia.to_numpy() * SPEED**2 - torque)
+    machine = sweep.machine({"needle": "guide"}, {"shaft": {"torque": ["needle"]}})
+    of_machine = {f"needle.{name}": value for name, value in table.items()}
+    for mechanism, given, name in (("guide", table, ""), (machine, of_machine, "shaft_")):
+        found = sweep.summarise(mechanism, given, [f"{name}unevenness"], accuracy=1e-6)
+        assert found["status"][0] == st.OK
+        off = abs(found[f"{name}unevenness"][0] - np.ptp(omega) / SPEED)
+        assert off <= found[f"err_{name}unevenness"][0]
+        # A grid that does not see the tool at all says 1e-9.
+        assert found[f"err_{name}unevenness"][0] < 0.02
+
+
+def test_unevenness_counts_a_short_load_of_a_table():
+    table = GUIDE | LIGHT
+    loads = {"load_torque": ([0.0, 1.96, 1.98, 2.0, 6.0], [0.0, 0.0, 40000.0, 0.0, 0.0])}
+    wanted = ["drive_torque", "reduced_inertia", "dreduced_inertia"]
+    poses = sweep.evaluate("guide", table, wanted, phi=PHI, loads=loads)
+    excess = 0.5 * poses.dreduced_inertia.to_numpy() * SPEED**2 - poses.drive_torque.to_numpy()
+    omega = speed_of(poses.reduced_inertia.to_numpy(), excess)
+    found = sweep.summarise("guide", table, ["unevenness"], accuracy=1e-6, loads=loads)
+    assert abs(found["unevenness"][0] - np.ptp(omega) / SPEED) <= found["err_unevenness"][0] + 1e-6
+
+
+@pytest.mark.parametrize("table", [True, False], ids=["table", "tool"])
+def test_mean_loads_of_bearings_count_short_loads(table):
+    loads = {"load_torque": ([0.0, 0.497, 0.5, 0.503, 6.0], [0.0, 0.0, 40000.0, 0.0, 0.0])} if table else None
+    row = (GUIDE | LIGHT if table else pierced(1e-5, 40_000.0)) | BEARING
+    found = sweep.summarise("guide", row, ["mean_load_d1", "mean_load_d2"], accuracy=1e-8, loads=loads)
+    poses = sweep.evaluate("guide", row, ["equivalent_load_d1", "equivalent_load_d2"], phi=PHI, loads=loads)
+    four_bar = {name: value for name, value in GUIDE.items() if name not in ("lam", "h")}
+    way = np.abs(sweep.evaluate("four_bar", four_bar, ["dpsi"], phi=PHI).dpsi.to_numpy())
+    for k in "12":
+        dense = np.average(poses[f"equivalent_load_d{k}"].to_numpy() ** 3.0, weights=way) ** (1.0 / 3.0)
+        # A jump falls between two of the dense poses.
+        assert found[f"mean_load_d{k}"][0] == pytest.approx(dense, rel=1e-3)
+        assert found[f"err_mean_load_d{k}"][0] <= 1e-8 * dense
+
+
+@pytest.mark.parametrize("share", [1e-2, 1e-3, 1e-4])
+def test_orders_of_shaking_count_a_tool_that_pierces_just_before_its_turning_point(share):
+    machine = sweep.machine({"needle": "guide"}, {"shaking": {"shaking": ["needle"]}})
+    row = {f"needle.{name}": value for name, value in pierced(share, 4e4).items()}
+    found = sweep.summarise(machine, row, ["shaking_order1"], accuracy=1e-6)
+    poses = sweep.evaluate(machine, row, ["shaking_x", "shaking_y"], phi=PHI)
+    waves = np.mean([poses[f"shaking_{x}"] * np.exp(-1j * PHI) for x in "xy"], axis=1)
+    dense = np.sqrt(2.0) * np.linalg.norm(waves)
+    # No number of samples resolves a jump: the status says so, or the error is kept.
+    off = abs(found.shaking_order1[0] - dense)
+    assert found["status"][0] == st.NOT_CONVERGED
+    assert off <= found.err_shaking_order1[0]
+
+
+def test_the_speed_of_a_design_has_its_bits_beside_one_whose_tool_pierces():
+    row = pierced(0.05, 400.0)
+    wanted = ["unevenness", "max_crank_acceleration", "phi_max_crank_speed", "rms_crank_speed"]
+    rows = {name: [value] * 3 for name, value in row.items()} | {"pierce_force": [0.0, 400.0, 0.0]}
+    together = sweep.summarise("guide", rows, wanted, accuracy=1e-6)
+    poses = sweep.evaluate("guide", rows, ["crank_acceleration"], phi=PHI[:5])
+    for k, force in enumerate(rows["pierce_force"]):
+        alone = sweep.summarise("guide", row | {"pierce_force": force}, wanted, accuracy=1e-6)
+        np.testing.assert_array_equal(together.iloc[k], alone.iloc[0])
+        one = sweep.evaluate("guide", row | {"pierce_force": force}, ["crank_acceleration"], phi=PHI[:5])
+        assert poses[poses.design == k].crank_acceleration.tolist() == one.crank_acceleration.tolist()
