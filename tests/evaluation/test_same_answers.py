@@ -11,6 +11,8 @@ from functools import cache
 import numpy as np
 import pytest
 
+from studies.accuracy.ordinary import designs as ordinary
+from sweep.effects import extended
 from sweep.evaluation.summaries import design_outputs
 from sweep.families import NAMES, family
 from sweep.families.base import Accuracy, March
@@ -67,6 +69,18 @@ def test_an_answer_does_not_depend_on_company(name):
         again, beside = pool.map(lambda given: found(full, given, names), (designs, designs[order]))
     assert_same(again, whole)
     assert_same(beside, whole, order)
+
+
+@pytest.mark.parametrize(
+    ("name", "other"),
+    [("slotted", "load_support_d1"), ("swivel", "life_a1"), ("five_link", "sliding_utilisation_b")],
+)
+def test_an_error_does_not_depend_on_the_inputs_of_other_effects(name, other):
+    """What rounding the inputs does was found with signs that the number of inputs decided."""
+    alone, beside = (extended(family(name), wanted) for wanted in (["force_b"], ["force_b", other]))
+    designs = ordinary(beside, 6)
+    own = designs[:, [beside.parameter_names.index(p) for p in alone.parameter_names]]
+    assert_same(found(alone, own, ["rms_force_b"]), found(beside, designs, ["rms_force_b"]))
 
 
 @pytest.mark.parametrize("want", ["rms_d2psi", "rms_d3psi", "max_abs_d3psi"])
