@@ -93,6 +93,13 @@ class Measure:
         return self.kind.startswith("phi") or self.kind == "difference"
 
     @property
+    def is_least(self) -> bool:
+        """Whether it is the least of several values, each of which bounds it from above."""
+        if self.kind == "minus":
+            return not self.parts[0].is_least
+        return (self.kind in ("min", "least")) == (self.sign > 0.0)
+
+    @property
     def follows_angles(self) -> bool:
         """Whether its slopes need those of crank angles."""
         return self.is_angle or any(part.follows_angles for part in self.parts)

@@ -11,6 +11,7 @@ import pandas as pd
 import pytest
 from scipy import stats
 
+from kernels import status as st
 from sweep.dataset.files import MADE, beside
 from sweep.engine.run import run
 from sweep.errors import StudyError
@@ -27,6 +28,31 @@ from tests.optimise.test_study import STUDY
 
 RSSR = family("rssr")
 DESIGN = np.array([25.0, 100.0, 60.0, 100.0, 5.0, 10.0, 0.35, 1.0])
+NOWHERE = """
+[study]
+name = "nowhere"
+[mechanism]
+family = "rssr"
+[locus]
+swing = "60 deg"
+phi0 = "195 deg"
+phi_ext = { from = 164.301, to = 194.301, unit = "deg" }
+[design]
+sample = { kind = "sobol", n = 30000, seed = 57 }
+e = "100 mm"
+f = { from = -60, to = 60, unit = "mm" }
+g = "0 mm"
+alpha = "90 deg"
+[limits]
+rotatable = true
+a = { min = 3, unit = "mm" }
+[objective]
+minimise = "max_pressure_angle"
+[optimise]
+starts = 2
+[tolerance]
+lengths = "0.05 mm"
+"""
 OUTPUTS = ("max_abs_d2psi", "max_pressure_angle", "swing", "phi0", "stroke_ratio", "margin", "min_dpsi")
 
 
@@ -46,6 +72,21 @@ def test_sensitivities_are_the_slopes_of_design_outputs() -> None:
             assert found == pytest.approx(slope, rel=1e-6, abs=1e-8 * np.abs(x).max()), (parameter, output)
 
 
+def test_shared_extrema_have_the_slopes_of_both_sides_whether_least_or_largest() -> None:
+    """A central slider-crank is as bad at 90 as at 270 degrees: with an offset the sine of its angle is (a + |e|)/b."""
+    crank, rod = 10.0, 25.0
+    across = 1.0 / math.sqrt(rod * rod - crank * crank)
+    known = {
+        "margin": -2.0 * crank / (rod * rod), "minus_margin": 2.0 * crank / (rod * rod),
+        "max_pressure_angle": across, "minus_max_pressure_angle": -across, "least_transmission_angle": -across,
+    }  # fmt: skip
+    table = pd.DataFrame(sensitivities(family("slider_crank"), np.array([crank, rod, 0.0, 1.0]), tuple(known)))
+    for output, growing in known.items():
+        row = table[(table.parameter == "e") & (table.output == output)].iloc[0]
+        assert row.growing == pytest.approx(growing, rel=1e-12), output
+        assert row.shrinking == pytest.approx(-growing, rel=1e-12), output
+
+
 def test_planar_mechanism_has_its_alpha_and_offsets_in_second_order_only() -> None:
     planar = np.array([25.0, 100.0, 60.0, 100.0, 0.0, 0.0, 0.0, 1.0])
     table = pd.DataFrame(sensitivities(RSSR, planar, ("max_abs_d2psi", "swing")))
@@ -58,6 +99,15 @@ def test_output_that_does_not_exist_has_no_slope() -> None:
     stuck = np.array([80.0, 30.0, 40.0, 100.0, 0.0, 0.0, 0.0, 1.0])
     table = pd.DataFrame(sensitivities(RSSR, stuck, ("max_abs_d2psi",)))
     assert table.value.isna().all() and table.growing.isna().all()
+
+
+def test_design_without_links_has_no_slopes_and_ends_no_study(tmp_path: Path) -> None:
+    assert sensitivities(RSSR, np.where(DESIGN == 60.0, math.nan, DESIGN), OUTPUTS)["growing"] == []
+    (tmp_path / "study.toml").write_text(NOWHERE)
+    folder = run(load_study(tmp_path), tmp_path / "out", jobs=1)
+    best = pd.read_parquet(beside(folder) / "_optimum.parquet").iloc[0]
+    assert math.isnan(best.a) and best.status == st.LIMIT_EXCEEDED
+    assert len(pd.read_parquet(beside(folder) / "_sensitivity.parquet")) == 0
 
 
 def test_deviating_designs_have_the_tolerance_as_three_standard_deviations() -> None:

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from sweep.evaluation.summaries import design_outputs
 from sweep.families.base import Accuracy, Array, Family
-from sweep.families.names import is_flag, judged_by
+from sweep.families.names import MINUS, is_flag, judged_by, without_minus
 from sweep.optimise.extrema.gradients import scalar_gradient, step_gradients, stepped
 from sweep.optimise.local.model import Model
 from sweep.optimise.problem.program import Program
@@ -37,7 +37,7 @@ def sensitivities(
     They are dx/dp = dx/dy dy/dp, where y is the inner value.
 
     A maximum that several extrema share has two derivatives: the largest of their gradients where the dimension grows,
-    the smallest where it shrinks.  A corner optimum has them of opposite signs.
+    the smallest where it shrinks; a shared minimum the other way round.  A corner optimum has them of opposite signs.
 
     Parameters
     ----------
@@ -50,7 +50,7 @@ def sensitivities(
     -------
     Rows ``parameter``, ``output``, ``value``, ``growing`` and ``shrinking`` (per internal unit of the parameter: mm,
     rad or 1), nan where the output does not exist.  Derivatives are exact to rounding (docs/internals/optimiser.md,
-    Gradients).  An output that is constant in pieces, such as a count, has none: it has no rows.
+    Gradients).  An output that is constant in pieces, such as a count, has no rows, and a design with a nan has none.
     """
     there = ~_absent(family, design)
     varied = [k for k, p in enumerate(family.parameters) if p.unit in DIMENSIONS and there[k]]
@@ -68,6 +68,7 @@ def sensitivities(
     def problem(output: str) -> Problem:
         return Problem(family, names, place - 0.5 * span, place + 0.5 * span, fixed, output, (), window, accuracy)
 
+    asked = asked if np.isfinite(design).all() else []  # [locus] may have no links for it
     found = _plain_ends(problem, design, [name for name in asked if _is_plain(family, name, window)])
     for output in asked:
         value, low, high = found[output] if output in found else _ends(problem(output), design)
@@ -109,11 +110,12 @@ def _plain_ends(
 
 
 def _ends(problem: Problem, design: Array) -> tuple[float, Array, Array]:
-    """Return the objective, and the smallest and largest gradient of the extrema that share it.
-
-    Gradients are by scaled variables.
-    """
+    """Return the objective and its gradients by scaled variables, where each of these shrinks and where it grows."""
     program = Program(problem)
+    if program.objective.is_least:  # what its extrema bound from above is its negative
+        opposite = without_minus(problem.objective) or f"{MINUS}{problem.objective}"
+        value, low, high = _ends(replace(problem, objective=opposite), design)
+        return -value, -low, -high
     model = Model(problem, program, design, lambda: False)
     state = model.state(problem.scaled(design[None, :])[0])
     value = program.value(program.objective, state.form, model.curves, state.design, state.atoms)
