@@ -54,11 +54,11 @@ def cells(
     objective = hand.study.objective
     merit = objective.output if objective is not None else "design"
     names = dict.fromkeys([*chain.from_iterable(pairs), *ranges])
-    shown = {name: hand.data.shown(name) for name in names}
-    columns = {name: _column(hand.folder, merit, name) for name in shown}
+    columns = {name: _column(hand.folder, merit, name) for name in names}
+    shown = {name: hand.data.shown(name) for name in columns}
     design = _column(hand.folder, merit, "design").values
     kept = np.ones(design.size, np.bool_)
-    for name, ends in ranges.items():
+    for name, ends in dict(ranges).items():
         low, high = sorted(float(end) / shown[name].factor for end in ends)
         room = 1e-9 * (columns[name].high - columns[name].low)
         kept &= (columns[name].values >= low - room) & (columns[name].values <= high + room)

@@ -93,6 +93,8 @@ class Hand:
         InputError
             for a name that is no dimension, or a value that is no number or out of range.
         """
+        if not isinstance(given, Mapping):
+            raise InputError("design", given, "dimensions by their names", "explore")
         for name, value in given.items():
             if name not in self.first:
                 allowed = f"{', '.join(self.first)}{nearest(name, self.first)}"

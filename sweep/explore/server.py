@@ -96,7 +96,7 @@ class Server:
         routes += [Route(f"{place}/{name}", _json(what), methods=["POST"]) for name, what in asked.items()]
         others = {"improve": self._improve, "export": self._export}
         routes += [Route(f"{place}/{name}", what, methods=["POST"]) for name, what in others.items()]
-        wrong = dict.fromkeys((LinksweepError, KeyError, TypeError, ValueError), _refused)
+        wrong = dict.fromkeys((LinksweepError, KeyError, OverflowError, TypeError, ValueError), _refused)
         routed = Starlette(routes=routes, exception_handlers=wrong)
         return checked
 
@@ -197,7 +197,10 @@ def _needed() -> None:
 
 async def _asked(request: Request) -> dict[str, Any]:
     body = await request.body()
-    found = json.loads(body) if len(body) <= MOST_BYTES else None
+    try:
+        found = json.loads(body) if len(body) <= MOST_BYTES else None
+    except RecursionError:  # brackets within brackets
+        found = None
     if not isinstance(found, dict):
         raise ValueError(f"a JSON object of at most {MOST_BYTES} bytes")
     return found

@@ -64,6 +64,26 @@ def test_bad_questions_are_told_what_is_wrong(address, content, words):
     assert code == 422 and words in json.loads(text)["error"]
 
 
+@pytest.mark.parametrize(
+    ("what", "content", "words"),
+    [
+        ("answer", {"designs": ["x"], "names": ["x"]}, "dimensions by their names"),
+        ("save", {"as": "study", "design": [1], "free": {}}, "dimensions by their names"),
+        ("cells", {"pairs": [["a", 5]], "bins": 20}, "allowed: design"),
+        ("cells", {"pairs": [["a", "b"]], "bins": 20, "ranges": "a"}, "dictionary"),
+        ("design", {"number": float("inf")}, "infinity"),
+    ],
+)
+def test_what_is_of_another_kind_is_no_error_of_the_server(address, what, content, words):
+    code, text = refused(address, what, content)
+    assert code == 422 and words in json.loads(text)["error"]
+
+
+def test_a_question_of_brackets_alone_is_refused(address):
+    with pytest.raises(HTTPError, match="422"):
+        urlopen(Request(address + "answer", b"[" * 50_000))
+
+
 def test_strangers_get_nothing(address):
     question = {"designs": [DESIGN], "names": ["x"]}
     own = urlparse(address)
