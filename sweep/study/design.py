@@ -13,6 +13,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, Literal
 
+from sweep.errors import choices
 from sweep.families.base import Family
 from sweep.quantities.units import internal_unit
 from sweep.study.file import Faults, Key, Section, Seed, StudyFile, holds, read_section
@@ -199,11 +200,10 @@ def take(file: StudyFile, family: Family, elsewhere: Collection[str]) -> None:
             assert table is not None
             member = name.removesuffix(FROM)
             source, pinned = table.pop(name), table.pop(f"{member}{HASH}", None)
-            if not isinstance(source, str) or not source or Path(source).name != source:
-                file.faults.value((*key, name), source, "the name of a study whose folder stands beside this one")
-                continue
             design = _accepted(file, (*key, name), source)
             if design is None:
+                for missing in (p.name for p in family.parameters if p.name.startswith(member)):
+                    file.faults.excuse((*key, missing))
                 continue
             own = fingerprint(design)
             if pinned is not None and pinned != own:
@@ -234,14 +234,19 @@ def _table(data: Mapping[str, Any], key: tuple[str, ...]) -> dict[str, Any] | No
     return found if isinstance(found, dict) else None
 
 
-def _accepted(file: StudyFile, key: Key, source: str) -> dict[str, float] | None:
+def _accepted(file: StudyFile, key: Key, source: object) -> dict[str, float] | None:
     """Return the design of the accepted optimum of a study; None with its fault."""
+    if not isinstance(source, str) or not source or Path(source).name != source:
+        file.faults.value(key, source, "the name of a study whose folder stands beside this one")
+        return None
     path = file.path.resolve().parent.parent / source / ACCEPTED
     try:
         design = json.loads(path.read_text(encoding="utf-8"))["optimum"]["design"]
         return {str(name): float(x) for name, x in design.items()}
-    except (OSError, ValueError, KeyError, TypeError, AttributeError) as fault:
-        file.faults.value(key, source, f"a study with an accepted optimum.design in {source}/{ACCEPTED}: {fault!r}")
+    except (OSError, ValueError, KeyError, TypeError, AttributeError):
+        others = [beside.parent.name for beside in sorted(path.parent.parent.glob(f"*/{ACCEPTED}"))]
+        allowed = f"a study with an accepted optimum.design in {source}/{ACCEPTED}; beside this one have such a file: "
+        file.faults.value(key, source, allowed + (choices(source, others) or "none"))
         return None
 
 

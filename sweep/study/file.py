@@ -57,6 +57,10 @@ class Faults:
         """Tell whether a key that is missing stands there with a spelling mistake, which was reported."""
         return key in self._misspelt
 
+    def excuse(self, key: Key) -> None:
+        """Let a key be missing: that it is follows from a fault that was reported."""
+        self._misspelt.add(key)
+
     def unknown(self, key: Key, known: Iterable[str], what: str = "key") -> None:
         """Report a key that nobody reads, with the nearest right one."""
         names = list(known)

@@ -160,7 +160,7 @@ def forms(p: Parameter, number: object = None) -> str:
     if internal == "1":
         return "a number"
     shown, usual = 40.0 if number is None else number, _usual(internal)
-    article = "an" if p.unit == "angle" else "a"
+    article = "an" if p.unit[0] in "aeiou" else "a"
     return f'{article} {p.unit} with its unit, as "{shown} {usual}" or {{ value = {shown}{_unit_form(p)} }}'
 
 

@@ -64,10 +64,14 @@ def test_a_hash_that_is_not_the_accepted_one_is_refused_with_the_one_that_is(tmp
 
 @pytest.mark.parametrize(
     ("source", "words"),
-    [("needle209", "needle209/expected.json"), ("../needle208", "beside this one"), ("", "beside this one")],
+    [
+        ("needle209", "needle209/expected.json; .*did you mean 'needle208'"),
+        ("../needle208", "beside this one"),
+        ("", "beside this one"),
+    ],
 )
 def test_a_study_that_is_not_there_is_named(tmp_path, source, words):
-    with pytest.raises(StudyError, match=rf"design.from = .*{words}"):
+    with pytest.raises(StudyError, match=rf"1 fault\n.*design.from = .*{words}"):
         near(tmp_path, ALONE.replace("needle208", source))
 
 
