@@ -125,7 +125,9 @@ def read_reference(
     own = (*bare.parameter_names, *other.prescribed)
     fixed = {} if space is None else space.fixed
     given = {**other.given, **{name: value for name, value in fixed.items() if name not in own}}
-    _check_names(family, raw, key, faults, tuple(given))
+    # Of a space with faults nobody knows which inputs it fixes.
+    scene = tuple(name for name in family.parameter_names if name not in own) if space is None else tuple(given)
+    _check_names(family, raw, key, faults, scene)
     defaults = {p.name: p.left_out(raw) for p in family.parameters}
     values = {name: value for name, value in defaults.items() if value is not None} | given
     for parameter in family.parameters:

@@ -241,3 +241,11 @@ def test_inputs_that_nothing_wanted_takes_are_read_all_the_same(tmp_path):
     assert "bodies.mu_a2 = '60 kg*mm^2'; allowed: a number" in found
     assert "bodies.support_a22 = '1 N'; allowed:" in found
     assert "radius_b2" not in found
+
+
+def test_a_fault_of_the_space_is_none_of_the_reference_that_takes_its_bodies(tmp_path):
+    fixed = BODIES.replace('{ values = [10, 20], unit = "g" }', '"10 g"')
+    design = HEAD[HEAD.index("a1 =") :].replace('{ from = 10, to = 14, count = 3, unit = "mm" }', '"12 mm"')
+    text = f"{HEAD}[bodies]{fixed}[reference.design]\n{design}"
+    assert load(tmp_path, text).reference["m_tool2"] == pytest.approx(25e-6)
+    assert faults(tmp_path, text.replace('b1 = "60 mm"', "b1 = 60", 1)).count("\n") == 0
