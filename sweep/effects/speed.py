@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from kernels import status as st
 from kernels.effects.speed_fluctuation import RESOLVED
-from kernels.types import Status
+from kernels.types import EPS, Status
 from sweep.effects import load_effects, loads
 from sweep.effects.base import Advice, DesignResult, Effect
 from sweep.effects.load_passing import FRICTION, LOADS, compute_friction, compute_loads
@@ -45,6 +45,7 @@ MOTOR = Parameter(
 
 RUBBING = (129, *FINER[1:])  # friction has kinks where the follower turns back: few designs end on the first grid
 LEFT_OF_CURVE = 1e-4  # and of a curve: more than this is a jump, beside which a series overshoots
+ROUNDED = 1024.0 * EPS  # of speed^2 that rounding makes of no acceleration; seen 324
 SUFFIX = ("", FRICTION_SUFFIX)  # of the outputs, by whether the joints rub
 _NEEDED_NAMES = ("reduced_inertia", "dreduced_inertia", "drive_torque")
 _NEEDED = frozenset(_NEEDED_NAMES)
@@ -150,7 +151,7 @@ def _turn(scene: Scene, wanted: frozenset[str], rubs: bool) -> Columns:
     change = f"crank_acceleration{suffix}"
     size = np.abs(found[change]).max(axis=1)
     ratio = np.divide(fastest**2, size, out=one.copy(), where=size > 0.0)
-    of_change = np.maximum(known, PER_LEFT * found[f"missed{suffix}"] * ratio)
+    of_change = np.maximum(known, (PER_LEFT * found[f"missed{suffix}"] + ROUNDED) * ratio)
     return per_turn(found, status, columns, _outputs(suffix, ""), wanted, limit, known, {change: of_change})
 
 

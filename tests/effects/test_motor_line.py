@@ -199,3 +199,17 @@ def test_quasi_static_lag_sees_a_load_over_the_turn_as_it_sees_a_constant():
     more = sweep.evaluate("rssr", table | {"load_torque": -400.0}, wanted, phi=PHI)
     np.testing.assert_allclose(wave.lag - constant.lag, (more.lag - constant.lag) * np.cos(PHI), atol=1e-15)
     assert np.abs(wave.lag_dynamic - constant.lag_dynamic).max() > 1e-5
+
+
+def test_the_error_of_an_acceleration_that_is_zero_tells_its_rounding():
+    """Without weights nothing changes the speed of a lone crank."""
+    random, n = np.random.default_rng(0), 100
+    crank = {"a": 2.0, "e": 3.0, "f": 1.0, "alpha": 0.5, "Z1": -3.0, "Z2": 4.0, "P_h": 8.0}
+    table = {name: np.full(n, value) for name, value in crank.items()}
+    table |= {"speed": np.exp(random.uniform(1.0, 6.0, n)), "m_crank": random.uniform(1e-4, 1e-3, n)}
+    table |= {"com_crank_x": random.uniform(-1.0, 1.0, n), "j_crank_zz": random.uniform(1e-4, 1e-2, n)}
+    found = sweep.summarise("eyelet", table, ["max_abs_crank_acceleration", "rms_crank_acceleration"], accuracy=1e-6)
+    assert (found.status == st.OK).all()
+    for name in ("max_abs_crank_acceleration", "rms_crank_acceleration"):
+        assert (found[name] <= found[f"err_{name}"]).all()
+        assert (found[f"err_{name}"] < 1e-12 * table["speed"] ** 2).all()
