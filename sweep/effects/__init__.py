@@ -23,7 +23,7 @@ from sweep.families.machines.main_shaft import ShaftTorque
 from sweep.families.machines.relations import EventValue
 from sweep.families.machines.sewing import Sewing
 from sweep.families.machines.shaking import Shaking
-from sweep.families.names import stem
+from sweep.families.names import at_stage, stem
 from sweep.families.reduction import reduced
 from sweep.numerics.curves import Curve
 
@@ -281,7 +281,7 @@ def with_effects(family: Family, effects: tuple[Placed, ...], curves: Mapping[st
     if not effects:
         return family
     added = Added(family, inputs(family, effects), curves)
-    own = len(family.parameters)
+    own, feeling = len(family.parameters), partial(_felt, family, effects)
     steps = tuple(
         Step(
             name=placed.name,
@@ -297,18 +297,29 @@ def with_effects(family: Family, effects: tuple[Placed, ...], curves: Mapping[st
     return replace(
         family,
         parameters=(*family.parameters, *added.inputs),
-        pose_outputs=(*family.pose_outputs, *bent(effects, curves)),
+        pose_outputs=(*family.pose_outputs, *bent(effects, curves, feeling)),
         poses=partial(effect_poses, added, effects),
         precise_poses=precise,
         steps=(*(on_own_columns(step, own) for step in family.steps), *steps),
         capabilities=(
             *family.capabilities,
-            *paces(curves),
-            *piercing(family, added.inputs),
+            *paces(curves, feeling),
+            *piercing(family, added.inputs, feeling),
             *bends(added, effects),
         ),
         dear={o.name: (placed.name, placed.entry.ns_per_pose) for placed in effects for o in placed.pose_outputs},
     )
+
+
+def _felt(family: Family, effects: tuple[Placed, ...], name: str) -> frozenset[str]:
+    """Names of the pose outputs of the effects that take an input, a later stage's through what that hands back."""
+
+    def takes(source: Placed) -> bool:
+        own = at_stage(name, source.number) if source.number else name
+        return any(p.name == own for p in source.entry.inputs_of(family.stages[source.stage].family))
+
+    found = (placed for placed in effects if any(map(takes, (placed, *_handing(family, placed)))))
+    return frozenset(o.name for placed in found for o in placed.pose_outputs)
 
 
 def _design_ns(entry: Effect, accuracy: Accuracy) -> float:

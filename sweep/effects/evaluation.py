@@ -5,9 +5,10 @@ What effects bring to the curves of a family between even samples is the matter 
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from functools import partial
+from typing import TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
@@ -129,20 +130,29 @@ def on_own_columns(step: Step, own: int) -> Step:
     return replace(step, run=run)
 
 
-def bent(effects: tuple[Placed, ...], curves: Mapping[str, Curve]) -> list[Output]:
+Feeling: TypeAlias = Callable[[str], frozenset[str]]
+"""Names of the pose outputs of effects that an input enters."""
+
+
+def bent(effects: tuple[Placed, ...], curves: Mapping[str, Curve], feeling: Feeling) -> list[Output]:
     """Pose outputs of effects: between the points of a table of loads they may have a narrow peak."""
-    tables = any(isinstance(curve, TableCurve) for curve in curves.values())
+    tables = [feeling(name) for name, curve in curves.items() if isinstance(curve, TableCurve)]
+    felt = frozenset().union(*tables)
     found = [o for placed in effects for o in placed.pose_outputs]
-    return [replace(o, kinks=not (o.wraps or o.jumps)) for o in found] if tables else found
+    return [replace(o, kinks=not (o.wraps or o.jumps)) if o.name in felt else o for o in found]
 
 
-def paces(curves: Mapping[str, Curve]) -> list[object]:
+def paces(curves: Mapping[str, Curve], feeling: Feeling) -> list[object]:
     """Where the tables among loads bend, and how many waves the series have."""
-    of = curves.values()
-    return [of_table(c.phi) if isinstance(c, TableCurve) else of_order(max(len(c.cos), len(c.sin))) for c in of]
+    return [
+        of_table(c.phi, feeling(name))
+        if isinstance(c, TableCurve)
+        else of_order(max(len(c.cos), len(c.sin)), feeling(name))
+        for name, c in curves.items()
+    ]
 
 
-def piercing(family: Family, added: tuple[Parameter, ...]) -> list[Crossing]:
+def piercing(family: Family, added: tuple[Parameter, ...], feeling: Feeling) -> list[Crossing]:
     """Where a tool pierces: at a place of the follower of its stage."""
     columns = {p.name: len(family.parameters) + k for k, p in enumerate(added)}
     found = []
@@ -150,7 +160,8 @@ def piercing(family: Family, added: tuple[Parameter, ...]) -> list[Crossing]:
         force, at = columns.get(f"pierce_force{stage.tail}"), columns.get(f"pierce_at{stage.tail}")
         if force is not None and at is not None:
             position = f"{stage.family.position}{stage.tail}"
-            found.append(Crossing(position, partial(_column, at), partial(_is_given, force)))
+            felt = feeling(f"pierce_force{stage.tail}")
+            found.append(Crossing(position, partial(_column, at), partial(_is_given, force), felt))
     return found
 
 

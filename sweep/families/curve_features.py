@@ -30,10 +30,12 @@ SingularCurve: TypeAlias = Callable[[Array, Angles], Array]
 class Waves:
     """How many waves, or turns of the fastest part, one turn of the crank holds: ``count(designs)``, (n,).
 
-    A wave as fast as the samples stand would look like a constant to all of them.
+    A wave as fast as the samples stand would look like a constant to all of them.  ``of`` names the pose outputs that
+    have these waves; None: all of them.
     """
 
     count: DesignMap
+    of: frozenset[str] | None = None
 
 
 @dataclass(frozen=True)
@@ -79,11 +81,13 @@ class Crossing:
     """Outputs jump where the pose output ``of`` passes ``level(designs)``, (n,), in designs that it ``matters`` for.
 
     A tool that pierces is loaded from there to its turning point: perhaps for less of the turn than two samples span.
+    ``felt`` names the pose outputs that may jump.
     """
 
     of: str
     level: DesignMap
     matters: Callable[[Array], NDArray[np.bool_]]
+    felt: frozenset[str]
 
 
 @dataclass(frozen=True)
@@ -112,10 +116,10 @@ class Smooth:
     parts: tuple[str, ...]
 
 
-def waves(family: Family, designs: Array) -> Array:
-    """How many waves one turn holds at least, (n,)."""
+def waves(family: Family, designs: Array, outputs: Collection[str]) -> Array:
+    """How many waves of some pose outputs one turn holds at least, (n,)."""
     most = np.ones(len(designs))
-    for fast in family.every(Waves):
+    for fast in (known for known in family.every(Waves) if known.of is None or not known.of.isdisjoint(outputs)):
         count = np.abs(fast.count(designs))
         most = np.fmax(most, np.where(np.isfinite(count), count, 1.0))
     return most
@@ -133,10 +137,15 @@ def switches(family: Family, designs: Array, outputs: Collection[str]) -> Array:
     return np.where(np.isfinite(angles), angles, 0.0)
 
 
-def crossed(family: Family, designs: Array) -> NDArray[np.bool_]:
-    """Which designs have outputs that jump where a pose output passes a level, (n,)."""
+def crossings(family: Family, outputs: Collection[str]) -> list[Crossing]:
+    """Return what tells where one of some pose outputs jumps as another one passes a level."""
+    return [known for known in family.every(Crossing) if not known.felt.isdisjoint(outputs)]
+
+
+def crossed(family: Family, designs: Array, outputs: Collection[str]) -> NDArray[np.bool_]:
+    """Which designs have one of some pose outputs that jumps where another one passes a level, (n,)."""
     found: NDArray[np.bool_] = np.zeros(len(designs), np.bool_)
-    for known in family.every(Crossing):
+    for known in crossings(family, outputs):
         found = found | known.matters(designs)
     return found
 
@@ -146,8 +155,8 @@ def least_samples(family: Family, designs: Array, outputs: Collection[str]) -> A
     angles = np.sort(switches(family, designs, outputs), axis=1)
     gaps = np.diff(np.concatenate([angles, angles[:, :1] + TWO_PI], axis=1), axis=1)
     narrowest = np.where(gaps > NARROWEST, gaps, TWO_PI).min(axis=1, initial=TWO_PI)
-    least = PER_GAP * np.maximum(TWO_PI / narrowest, waves(family, designs))
-    return np.where(crossed(family, designs), np.inf, least)
+    least = PER_GAP * np.maximum(TWO_PI / narrowest, waves(family, designs, outputs))
+    return np.where(crossed(family, designs, outputs), np.inf, least)
 
 
 def bends(family: Family, output: str) -> tuple[Bends, ...]:
@@ -172,14 +181,14 @@ def _measured(family: Family, known: Singular, designs: Array, angles: Angles) -
     return known.curve(designs, angles, {name: found[name] for name in known.needs})
 
 
-def of_table(phi: Sequence[float]) -> Switches:
-    """Switches at the points of a table that all designs share."""
-    return Switches(partial(_alike, np.array(phi, np.float64)))
+def of_table(phi: Sequence[float], of: frozenset[str]) -> Switches:
+    """Switches of pose outputs at the points of a table that all designs share."""
+    return Switches(partial(_alike, np.array(phi, np.float64)), of)
 
 
-def of_order(order: int) -> Waves:
-    """Waves of a Fourier series of that order."""
-    return Waves(partial(_many, float(order)))
+def of_order(order: int, of: frozenset[str]) -> Waves:
+    """Waves of pose outputs under a Fourier series of that order."""
+    return Waves(partial(_many, float(order)), of)
 
 
 def of_stages(stages: Sequence[Stage]) -> list[object]:
@@ -198,13 +207,24 @@ def of_stages(stages: Sequence[Stage]) -> list[object]:
     return found
 
 
-def of_members(members: Sequence[Member]) -> list[object]:
-    """Return what the members of a machine bring in: their ratios, and the switches of those that the shaft drives."""
+def of_members(members: Sequence[Member], sums: frozenset[str]) -> list[object]:
+    """Return what the members of a machine bring in: their ratios, and the switches of those that the shaft drives.
+
+    ``sums`` are the pose outputs that are sums over members, and feel what an output of one of them does.
+    """
     found: list[object] = [Waves(partial(_of_member, tuple(members)))]
     for m in members:
         if m.driver is None:
-            found += [Switches(partial(_on_shaft, m, known.angles)) for known in m.family.every(Switches)]
-        found += [_of_part(m, known) for known in m.family.every(Crossing)]
+            found += [
+                Switches(partial(_on_shaft, m, known.angles), _named(m, known.of, sums))
+                for known in m.family.every(Switches)
+            ]
+            found += [
+                Waves(partial(_geared, m, known.count), _named(m, known.of, sums))
+                for known in m.family.every(Waves)
+                if known.of is not None
+            ]
+        found += [_of_part(m, known, sums) for known in m.family.every(Crossing)]
         found += [_of_shaft(m, known) for known in m.family.every(Bends) if m.driver is None]
         for known in m.family.every(Singular):
             if known.needs:
@@ -213,9 +233,19 @@ def of_members(members: Sequence[Member]) -> list[object]:
     return found
 
 
-def _of_part(member: Member, known: Crossing) -> Crossing:
+def _of_part(member: Member, known: Crossing, sums: frozenset[str]) -> Crossing:
     level, matters = partial(on_part, member.designs, known.level), partial(on_part, member.designs, known.matters)
-    return Crossing(f"{member.name}.{known.of}", level, matters)
+    return Crossing(f"{member.name}.{known.of}", level, matters, _named(member, known.felt, sums) or frozenset())
+
+
+def _named(member: Member, names: frozenset[str] | None, sums: frozenset[str]) -> frozenset[str] | None:
+    """Names of a member's pose outputs in the machine, and the sums over members; None for all stays None."""
+    return None if names is None else frozenset(f"{member.name}.{name}" for name in names) | sums
+
+
+def _geared(member: Member, count: DesignMap, designs: Array) -> Array:
+    found: Array = abs(member.ratio) * count(member.designs(designs))
+    return found
 
 
 def _of_shaft(member: Member, known: Bends) -> Bends:
@@ -252,14 +282,14 @@ def _renamed(
 def _of_chain(stages: tuple[Stage, ...], designs: Array) -> Array:
     total = np.ones(len(designs))
     for stage in stages:
-        total = total * waves(stage.family, stage.designs(designs))
+        total = total * waves(stage.family, stage.designs(designs), ())
     return total
 
 
 def _of_member(members: tuple[Member, ...], designs: Array) -> Array:
     total: dict[str, Array] = {}
     for m in members:
-        own: Array = abs(m.ratio) * waves(m.family, m.designs(designs))
+        own: Array = abs(m.ratio) * waves(m.family, m.designs(designs), ())
         total[m.name] = own if m.driver is None else own * total[m.driver[0]]
     most: Array = np.maximum.reduce([np.ones(len(designs)), *total.values()])
     return most

@@ -60,11 +60,21 @@ def true_extrema(
     difference of its samples exceeds a tenth of their size, if they stand wider than a twelfth of the distance of the
     nearest complex zero of a discriminant, or if refinement moved the peak by more than 5 % of its height.
     """
-    jumping = np.zeros(len(designs), np.bool_) if anywhere else crossed(family, designs)
-    if jumping.any() and not jumping.all():
-        return _apart(family, designs, requests, target, locate, window, jumping)
     found: dict[Request, Extremum] = {}
     status = np.zeros(len(designs), np.uint8)
+    alike: dict[bytes, list[Request]] = {}
+    for request in requests:
+        jumps = crossed(family, designs, () if anywhere else (request.pose,))
+        alike.setdefault(jumps.tobytes(), []).append(request)
+    if len(alike) > 1:
+        for some in alike.values():
+            part, now = true_extrema(family, designs, some, target, locate=locate, anywhere=anywhere, window=window)
+            found |= part
+            status = np.where(status == st.OK, now, status)
+        return _blanked(found, status), status
+    jumping = crossed(family, designs, () if anywhere else [request.pose for request in requests])
+    if jumping.any() and not jumping.all():
+        return _apart(family, designs, requests, target, locate, window, jumping)
     left, kinked, opened = [], [], None
     for request in requests:
         if request in found:
@@ -80,8 +90,8 @@ def true_extrema(
         if isinstance(curve, fused.FusedCurve):
             opened = opened or curve.opened(designs)
             opposite = request._replace(mode=-request.mode)
-            alike = (request, opposite) if request.mode != 0 and opposite in requests else (request,)
-            answers = dict(zip(alike, curve.extrema(alike, designs, target, opened), strict=True))
+            both = (request, opposite) if request.mode != 0 and opposite in requests else (request,)
+            answers = dict(zip(both, curve.extrema(both, designs, target, opened), strict=True))
         else:
             answers = {request: curve.extremum(designs, target)}
         for one, (quick, now, undecided) in answers.items():
@@ -99,12 +109,17 @@ def true_extrema(
         slow, now = _searched(family, designs, left, target, locate, anywhere, window)
         found |= slow
         status = np.where(status == st.OK, now, status)
+    return _blanked(found, status), status
+
+
+def _blanked(found: dict[Request, Extremum], status: Status) -> dict[Request, Extremum]:
+    """Take the extrema of designs away, in place, of which nothing is known."""
     lost = (status != st.OK) & (status != st.NOT_CONVERGED)
     if lost.any():
         for extremum in found.values():
             for column in extremum:
                 column[lost] = np.nan
-    return found, status
+    return found
 
 
 def _apart(

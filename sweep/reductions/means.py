@@ -74,7 +74,7 @@ def _of_one(family: Family, designs: Array, pose: str, target: float) -> tuple[A
     if curve is None:
         return _refined(family, designs, pose, target)
     mean, err, status, undecided = curve.mean(designs, target)
-    rows = np.flatnonzero(undecided | crossed(family, designs))
+    rows = np.flatnonzero(undecided | crossed(family, designs, (pose,)))
     if rows.size:
         mean[rows], err[rows], status[rows] = _refined(family, designs[rows], pose, target)
     return mean, err, status
@@ -85,7 +85,7 @@ def _refined(family: Family, designs: Array, pose: str, target: float) -> tuple[
     mean, err, status, top = _on_turn(family.precise(), designs, pose)
     output = family.pose_output[pose]
     # What jumps, bends or waves is cut there.
-    cut = crossed(family, designs) | (denser(family, designs, (pose,)) > 1.0) | output.kinks | output.jumps
+    cut = crossed(family, designs, (pose,)) | (denser(family, designs, (pose,)) > 1.0) | output.kinks | output.jumps
     even = KNOWN if switching(family, (pose,)) and pose not in family.dear else EVEN
     alive = np.flatnonzero(status == st.OK)
     for rows in np.split(alive, range(PANELS_AT_ONCE, alive.size, PANELS_AT_ONCE)):

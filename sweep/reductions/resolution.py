@@ -19,11 +19,11 @@ from kernels.types import EPS, TWO_PI, Status
 from sweep.families.base import Angles, Array, Family
 from sweep.families.curve_features import (
     Bends,
-    Crossing,
     Singular,
     SingularCurve,
     Smooth,
     bends,
+    crossings,
     singular_curves,
     switches,
     switching,
@@ -51,7 +51,7 @@ def denser(family: Family, designs: Array, outputs: Collection[str], near: Singu
     Between two switches stand several samples, in a wave at least half of what else stands in a turn, and 12 in the
     distance of a singularity that the samples themselves would not see.
     """
-    factor = np.maximum(waves(family, designs) / PER_WAVE, 1.0)
+    factor = np.maximum(waves(family, designs, outputs) / PER_WAVE, 1.0)
     angles = np.sort(switches(family, designs, outputs), axis=1)
     if angles.shape[1] > 1:
         gaps = np.concatenate([np.diff(angles, axis=1), angles[:, :1] + TWO_PI - angles[:, -1:]], axis=1)
@@ -115,7 +115,7 @@ def ends(family: Family, designs: Array, even: int, looks: int, output: str) -> 
     edges = np.tile(np.linspace(0.0, TWO_PI, even + 1), (n, 1))
     known = switches(family, designs, (output,))
     edges = with_events(edges, np.repeat(np.arange(n), known.shape[1]), known.ravel())
-    fast = np.ceil(waves(family, designs) / PER_PANEL).astype(np.int64)  # even ends of so many panels
+    fast = np.ceil(waves(family, designs, (output,)) / PER_PANEL).astype(np.int64)  # even ends of so many panels
     more = np.repeat(np.arange(n), np.where(fast > even, fast, 0))
     place = np.arange(more.size) - np.searchsorted(more, more)
     edges = with_events(edges, more, TWO_PI * place / fast[more])
@@ -147,16 +147,16 @@ def events(family: Family, designs: Array, looks: int, outputs: Collection[str])
 
 def _passed(family: Family, designs: Array, outputs: Collection[str], looked: Array) -> tuple[Index, Array]:
     """Return designs and angles where an output passes its level or a speed passes zero, as seen at ``looked``."""
-    crossings = family.every(Crossing)
+    passed_levels = crossings(family, outputs)
     # What reverses is felt by friction and loads, of effects; a family knows its own kinks.
     speeds = () if family.dear.keys().isdisjoint(outputs) else reversing(family)
-    if not speeds and not crossings:
+    if not speeds and not passed_levels:
         return np.zeros(0, np.intp), np.zeros(0)
-    names = list(dict.fromkeys([*speeds, *(crossing.of for crossing in crossings)]))
+    names = list(dict.fromkeys([*speeds, *(crossing.of for crossing in passed_levels)]))
 
     def functions(rows: Index, phi: Array) -> Array:
         columns, _ = pose_columns(family, designs[rows], phi, names)
-        passed = [columns[crossing.of] - crossing.level(designs[rows])[:, None] for crossing in crossings]
+        passed = [columns[crossing.of] - crossing.level(designs[rows])[:, None] for crossing in passed_levels]
         return np.nan_to_num(np.stack([*(columns[name] for name in speeds), *passed], axis=2))
 
     return sign_changes(functions, looked)

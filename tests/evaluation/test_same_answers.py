@@ -11,6 +11,7 @@ from functools import cache
 import numpy as np
 import pytest
 
+import sweep
 from studies.accuracy.ordinary import designs as ordinary
 from sweep.effects import extended
 from sweep.evaluation.summaries import design_outputs
@@ -81,6 +82,30 @@ def test_an_error_does_not_depend_on_the_inputs_of_other_effects(name, other):
     designs = ordinary(beside, 6)
     own = designs[:, [beside.parameter_names.index(p) for p in alone.parameter_names]]
     assert_same(found(alone, own, ["rms_force_b"]), found(beside, designs, ["rms_force_b"]))
+
+
+DRIVE = {"a": 11.0, "b": 40.0, "c": 45.0, "e": 38.0, "xi": 75.0, "eta": 12.0, "lam": 1.4, "h": 5.0}
+HEAVY = {"m_crank": 2e-4, "m_coupler": 1e-4, "m_rocker": 1e-4, "m_tool": 1e-5, "speed": 300.0, "x_point": 7.0}
+LOADS = {
+    "tool": ({"pierce_force": 400.0, "pierce_at": 60.0}, {}),
+    "table": ({}, {"tool_force": ([0.0, 1.98, 2.0, 2.02, 6.0], [0.0, 0.0, 50.0, 0.0, 0.0])}),
+    "series": ({}, {"tool_force": {"mean": 0.0, "cos": [0.0] * 63 + [50.0]}}),
+}
+
+
+@pytest.mark.parametrize("kind", LOADS)
+@pytest.mark.parametrize("output", ["d2s", "d2x_p", "omega_z", "shaking_estimate_x"])
+def test_what_feels_no_load_has_its_bits_beside_loads(output, kind):
+    """Tools that pierce and loads over the turn once cut the turn for all curves of the same question."""
+    more, loads = LOADS[kind]
+    for mechanism, dot in (("guide", ""), (sweep.machine({"needle": {"family": "guide", "ratio": -2}}), "needle.")):
+        row = {f"{dot}{name}": value for name, value in (DRIVE | HEAVY | more).items()}
+        wanted = [f"{kind}_{dot}{output}" for kind in ("max_abs", "phi_max", "rms")]
+        alone = sweep.summarise(mechanism, row, wanted, accuracy=TARGET)
+        given = {f"{dot}{name}": load for name, load in loads.items()}
+        beside = sweep.summarise(mechanism, row, [*wanted, f"max_{dot}force_d"], accuracy=TARGET, loads=given)
+        names = [*wanted, *map(error_of, wanted)]
+        assert alone[names].iloc[0].tolist() == beside[names].iloc[0].tolist()
 
 
 @pytest.mark.parametrize("want", ["rms_d2psi", "rms_d3psi", "max_abs_d3psi"])

@@ -115,6 +115,7 @@ def _built(machine: Machine, members: tuple[Member, ...]) -> Machine:
     outputs += [o for relation in machine.relations for o in relation.outputs]
     derivative_of |= {name: rate for r in machine.relations for name, rate in getattr(r, "rates", {}).items()}
     loops = tuple(_loop(m, loop) for m in placed for loop in m.family.every(Assembly))
+    sums = [r for r in machine.relations if isinstance(r, Shaking | ShaftTorque)]
     found = replace(
         machine,
         title=" and ".join(f"{m.name} ({m.family.title})" for m in placed),
@@ -124,13 +125,13 @@ def _built(machine: Machine, members: tuple[Member, ...]) -> Machine:
         derivative_of=derivative_of,
         outward="",
         analytic=all(m.family.analytic for m in placed),
-        capabilities=(*loops, *of_members(placed)),
+        capabilities=(*loops, *of_members(placed, frozenset(o.name for r in sums for o in r.outputs))),
         dear={f"{m.name}.{k}": (f"{m.name}.{what}", ns) for m in placed for k, (what, ns) in m.family.dear.items()},
         members=tuple(placed),
     )
     found = replace(found, poses=partial(_poses, found))  # events of a thread are looked for on poses of the others
     precise = partial(_precise_poses, found) if any(m.family.precise_poses for m in placed) else None
-    smooth = (one for r in machine.relations if isinstance(r, Shaking | ShaftTorque) for one in r.smooth)
+    smooth = (one for r in sums for one in r.smooth)
     known = (*found.capabilities, *switches_of_events(found), *smooth)
     found = replace(found, poses=partial(_poses, found), precise_poses=precise, capabilities=known)
     steps = [taking_step(r, found) for r in machine.relations if isinstance(r, Taking)]

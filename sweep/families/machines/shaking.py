@@ -176,7 +176,7 @@ def orders_of(shaking: Shaking, machine: Machine) -> Step:
         found: dict[str, Array] = {f"{e}{name}": np.full(len(designs), np.nan) for name in asked for e in ("", "err_")}
         status: Status = np.full(len(designs), st.NOT_CONVERGED, np.uint8)
         grids = GRIDS if accuracy.samples is None else (accuracy.samples,)
-        least = least_samples(machine, designs, asked)
+        least = least_samples(machine, designs, [name.rpartition("_order")[0] for name in asked])
         for samples in grids:
             rows = np.flatnonzero((status == st.NOT_CONVERGED) & ((least <= samples) | (samples == grids[-1])))
             if not rows.size:

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from kernels.types import TWO_PI
 from sweep.families.base import Array, Family, Interval
-from sweep.families.curve_features import Crossing, Singular, Switches, Waves, crossed, switches
+from sweep.families.curve_features import Singular, Switches, Waves, crossed, crossings, switches
 from sweep.reductions.resolution import FEWEST, denser, events
 
 STATIONARY, CROSSING, STATIC, EDGE = 0, 1, 2, 4  # how a point is held; 3 is PASSING of sweep.optimise.extrema.scanned
@@ -128,13 +128,13 @@ def may_bend(family: Family, outputs: tuple[str, ...]) -> bool:
     """Return whether some of the pose outputs have kinks or jumps in some design."""
     if isinstance(family.domain, Interval):
         return False
-    return bool(family.every(Crossing)) or any(_bends(family, name) for name in outputs)
+    return bool(crossings(family, outputs)) or any(_bends(family, name) for name in outputs)
 
 
 def bending(family: Family, design: Array, outputs: tuple[str, ...]) -> list[int]:
     """Return the numbers of the pose outputs that have kinks or jumps in this design."""
-    jumps = bool(crossed(family, design[None, :])[0])
-    return [n for n, name in enumerate(outputs) if jumps or _bends(family, name)]
+    one = design[None, :]
+    return [n for n, name in enumerate(outputs) if crossed(family, one, (name,))[0] or _bends(family, name)]
 
 
 def edges(family: Family, design: Array, outputs: Collection[str]) -> tuple[Array, Array]:
