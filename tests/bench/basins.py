@@ -16,7 +16,7 @@ from sweep.optimise.local.start import search
 from sweep.optimise.starts.dataset import drawn, kinds
 from sweep.optimise.starts.global_starts import holding
 from sweep.optimise.starts.linear import elimination
-from sweep.optimise.starts.populations import population
+from sweep.optimise.starts.populations import breed
 from sweep.optimise.starts.posing import problem_of
 from sweep.study import Study
 from tests.support.needle208_record import FOLDER, record
@@ -92,7 +92,7 @@ def populations(problem: str, seed: int, rows: Sequence[Row]) -> Iterator[Row]:
     found = list(rows)
     while not told(study, found):
         times = [time.process_time()]
-        bred = population(linear, signs, (seed, len(found)))
+        bred = breed(linear, signs, (seed, len(found)))
         times.append(time.process_time())
         end = search(0, holding(study, own, bred.designs[:1]), bred.designs[0], lambda: False, study.optimise.looks)
         times.append(time.process_time())

@@ -34,7 +34,7 @@ signs = [{"branch1": 1.0, "branch2": 1.0, "kappa2": 1.0}]
 size = populations.Size(sampled=1 << 13, first=6, later=4, generations=1)
 for tolerance in (None, study.tolerance):
     linear = elimination(problem_of(study, drawn(study, 1, 208)), tolerance)
-    print(populations.population(linear, signs, (7, 0), size=size).designs.tobytes().hex())
+    print(populations.breed(linear, signs, (7, 0), size=size).designs.tobytes().hex())
 """
 # What numpy and OpenBLAS would choose on other processors: sums in another order, so other last bits on the way.
 OTHERS = [

@@ -26,7 +26,7 @@ from sweep.optimise.starts import global_starts, populations
 from sweep.optimise.starts.dataset import drawn, kinds
 from sweep.optimise.starts.global_starts import from_populations
 from sweep.optimise.starts.linear import POSES, TURN, Elimination, elimination
-from sweep.optimise.starts.populations import Bred, Size, bred
+from sweep.optimise.starts.populations import Population, Size
 from sweep.optimise.starts.pose_rows import Descents, PoseRows
 from sweep.optimise.starts.posing import problem_of
 from sweep.study import Study, study_from_data
@@ -223,7 +223,7 @@ def test_children_are_the_best_of_many_tries(rows: PoseRows, monkeypatch: pytest
 SMALL = Size(sampled=1 << 13, first=12, later=6, generations=1, heat=4, steps=8)
 
 
-def same(one: Bred, other: Bred) -> None:
+def same(one: Population, other: Population) -> None:
     np.testing.assert_array_equal(one.designs, other.designs)
     np.testing.assert_array_equal(one.worth, other.worth)
     assert one.looks == other.looks
@@ -231,8 +231,8 @@ def same(one: Bred, other: Bred) -> None:
 
 def test_populations_are_those_of_their_seed_and_number() -> None:
     linear = eliminated(8.0)
-    first, second = bred(linear, SIGNS, 2, 5, size=SMALL)
-    same(next(bred(linear, SIGNS, 1, 5, size=SMALL)), first)
+    first, second = populations.populations(linear, SIGNS, 2, 5, size=SMALL)
+    same(next(populations.populations(linear, SIGNS, 1, 5, size=SMALL)), first)
     assert not np.array_equal(first.designs, second.designs)
     assert (np.diff(first.worth) > 0.0).all() and len(first.worth) >= 4
     names = linear.problem.family.parameter_names
@@ -243,7 +243,7 @@ def test_populations_are_those_of_their_seed_and_number() -> None:
     np.testing.assert_allclose(found["max_abs_d2s"][good], first.worth[good], rtol=0.05)
     np.testing.assert_allclose(found["stroke"].abs()[good], 24.5, rtol=0.02)
     assert (first.designs[:, names.index("a2")][good] >= 8.0 * 0.98).all()
-    assert not list(bred(linear, SIGNS, 2, 5, stop=lambda: True))
+    assert not list(populations.populations(linear, SIGNS, 2, 5, stop=lambda: True))
 
 
 def test_populations_are_made_until_they_tell_enough(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -251,16 +251,16 @@ def test_populations_are_made_until_they_tell_enough(monkeypatch: pytest.MonkeyP
     values = [1.1, 1.0, 1.1, 1.0, math.inf, 1.1, 1.0, 0.9, 0.9]
     made = list[int]()
 
-    def numbered(linear: object, signs: object, seed: tuple[int, int], *rest: object) -> Bred:
+    def numbered(linear: object, signs: object, seed: tuple[int, int], *rest: object) -> Population:
         made.append(seed[1])
-        return Bred(known, np.array([1.0 + seed[1]]), 0)
+        return Population(known, np.array([1.0 + seed[1]]), 0)
 
     def led(number: int, *rest: object) -> Result:
         value = values[made[-1]]
         status = st.OK if math.isfinite(value) else st.LIMIT_EXCEEDED
         return Result(number, known[0], value, 0.0, 0.0, 0.0, (), {}, {}, {}, status, "converged")
 
-    monkeypatch.setattr(populations, "population", numbered)
+    monkeypatch.setattr(populations, "breed", numbered)
     monkeypatch.setattr(parallel, "search", led)
     study = record(8.0, starts=4, populations=9, seed=3)
     known = drawn(study, 1, 3)
@@ -283,11 +283,11 @@ def test_populations_in_threads_are_those_of_one_thread() -> None:
     tiny = SMALL._replace(sampled=1 << 11, first=4, generations=1, later=4, steps=5)
     for robust in (False, True):
         linear = eliminated(8.0, robust)
-        same(*(next(bred(linear, SIGNS, 1, 5, jobs=jobs, size=tiny)) for jobs in (1, 3)))
+        same(*(next(populations.populations(linear, SIGNS, 1, 5, jobs=jobs, size=tiny)) for jobs in (1, 3)))
 
 
 def test_starts_are_the_best_end_of_every_population_and_another(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(global_starts, "bred", partial(bred, size=SMALL))
+    monkeypatch.setattr(global_starts, "populations", partial(populations.populations, size=SMALL))
     study = record(8.0, starts=6, populations=2, seed=3, looks=100)
     known = drawn(study, 4, 3)
     problem = problem_of(study, known)
@@ -295,7 +295,7 @@ def test_starts_are_the_best_end_of_every_population_and_another(monkeypatch: py
     assert own.counted == 0 and (own.designs == known[:1]).all()
     linear = elimination(problem)
     assert linear is not None
-    found = list(bred(linear, kinds(study, problem, known[:1]), 2, 3, size=SMALL))
+    found = list(populations.populations(linear, kinds(study, problem, known[:1]), 2, 3, size=SMALL))
     worth = {one.designs[k].tobytes(): one.worth[k] for one in found for k in range(len(one.worth))}
     for number, (group, one) in enumerate(zip(groups, found, strict=True)):
         assert (group.source, group.counted, len(group.designs)) == (number, 1, 2)

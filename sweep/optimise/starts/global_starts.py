@@ -15,7 +15,7 @@ from sweep.optimise.multistart.survey import Group
 from sweep.optimise.problem.statement import Problem
 from sweep.optimise.starts.dataset import kinds, of_task
 from sweep.optimise.starts.linear import NEEDED, Elimination, elimination, widened
-from sweep.optimise.starts.populations import TINY, bred
+from sweep.optimise.starts.populations import TINY, populations
 from sweep.optimise.starts.samples import ALIKE, diverse
 
 if TYPE_CHECKING:
@@ -55,7 +55,7 @@ def from_populations(
         yield Group(begun, counted=0)
     found, values = begun[:0], list[float]()
     signs = kinds(study, problem, own)
-    for number, one in enumerate(bred(linear, signs, settings.populations, settings.seed, stop, jobs)):
+    for number, one in enumerate(populations(linear, signs, settings.populations, settings.seed, stop, jobs)):
         if len(one.worth):
             ends = [0, *_apart(one.worth, [*values, one.worth[0]], 1)]
             found = np.concatenate([found, one.designs[ends]])
@@ -101,7 +101,7 @@ def insensitive(
     designs, worth, what = none, np.empty(0), "tolerances"
     linear = _linear(study, problem, study.tolerance)
     say(what, 0, MADE, "populations")
-    for number, one in enumerate(bred(linear, signs, MADE, settings.seed + OTHER_SEED, stop, jobs), 1):
+    for number, one in enumerate(populations(linear, signs, MADE, settings.seed + OTHER_SEED, stop, jobs), 1):
         designs, worth = np.concatenate([designs, one.designs]), np.concatenate([worth, one.worth])
         say(what, number, MADE, f"populations{best_words(worth.min(initial=math.inf))}")
     found = designs[_apart(worth, [], BEGUN)]
@@ -111,7 +111,7 @@ def insensitive(
 def descend_once(study: Study, problem: Problem) -> None:
     """Run a tiny population of descents, so that their kernels are compiled or loaded."""
     signs = kinds(study, problem, np.empty((0, len(problem.family.parameters))))
-    for _ in bred(_linear(study, problem), signs, 1, 0, size=TINY):
+    for _ in populations(_linear(study, problem), signs, 1, 0, size=TINY):
         pass
 
 

@@ -51,7 +51,7 @@ FULL = Size()
 TINY = Size(1 << 10, 4, 0, 0, 1, 2)  # a few of its samples turn: enough to compile what descends
 
 
-class Bred(NamedTuple):
+class Population(NamedTuple):
     """Ends of a population, no two alike and the best first: designs (k, P), what they are worth (k,), and looks."""
 
     designs: Array
@@ -67,14 +67,14 @@ class _End(NamedTuple):
     swing: float = 0.0
 
 
-def population(
+def breed(
     linear: Elimination,
     signs: Sequence[dict[str, float]],
     seed: tuple[int, int],
     stop: Callable[[], bool] = lambda: False,
     jobs: int = 1,
     size: Size = FULL,
-) -> Bred:
+) -> Population:
     """Return the ends of generations of descents from one seed, each descended from in ``jobs`` threads."""
     rows, rng = PoseRows(linear, signs), np.random.default_rng(seed)
     ends, looks = list[_End](), 0
@@ -91,10 +91,10 @@ def population(
         ends, looks = ends + found, looks + spent
     best = _parents(ends, PARENTS, ~rows.driving)[:PARENTS]
     designs = np.array([end.design for end in best]).reshape(-1, len(rows.family.parameters))
-    return Bred(turned_into(linear.problem, designs), np.array([end.worth for end in best]), looks)
+    return Population(turned_into(linear.problem, designs), np.array([end.worth for end in best]), looks)
 
 
-def bred(
+def populations(
     linear: Elimination,
     signs: Sequence[dict[str, float]],
     most: int,
@@ -102,7 +102,7 @@ def bred(
     stop: Callable[[], bool] = lambda: False,
     jobs: int = 1,
     size: Size = FULL,
-) -> Iterator[Bred]:
+) -> Iterator[Population]:
     """Breed independent populations, one after the other, as long as the caller asks for more.
 
     Parameters
@@ -118,7 +118,7 @@ def bred(
     for number in range(most):
         if stop():
             return
-        yield population(linear, signs, (seed, number), stop, jobs, size)
+        yield breed(linear, signs, (seed, number), stop, jobs, size)
 
 
 def _sampled(rows: PoseRows, rng: np.random.Generator, size: Size, jobs: int) -> tuple[Array, Index, Array]:
