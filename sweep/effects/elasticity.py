@@ -175,10 +175,14 @@ def _equation(
 def turn(scene: Scene, wanted: frozenset[str], accuracy: Accuracy) -> Columns:
     """Floquet multiplier and reductions of lag and elongation, on finer grids for the designs that need them."""
     columns = _turn(scene, wanted, GRIDS)
-    late = np.flatnonzero(columns["status"] == st.NOT_CONVERGED)
+    unseen = (scene.least_samples > GRIDS[-1]) & (wanted != {"floquet"})
+    late = np.flatnonzero((columns["status"] == st.NOT_CONVERGED) | unseen)
     if late.size:
         for name, values in _turn(scene.only(late), wanted, FINER).items():
-            columns[name][late] = values
+            before = columns[name][late]
+            # A multiplier that is known stays: it is the same asked alone and beside the lag.
+            kept = np.isfinite(before) & name.endswith("floquet")
+            columns[name][late] = np.where(kept, before, values)
     return columns
 
 

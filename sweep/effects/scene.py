@@ -208,6 +208,12 @@ class Scene:
     def _first(self) -> Scene:
         return self if self.before is None else self.before._first
 
+    @property
+    def least_samples(self) -> Array:
+        """So many even samples of a turn show what the loads do, (n,); inf where a tool pierces, and one jumps."""
+        least = max((curve.samples for curve in self.every_curve), default=0.0)
+        return np.where(self.pierces, np.inf, least)
+
     def only(self, rows: Rows) -> Scene:
         """Keep some of the designs; the scene itself where these are all."""
         return self if rows.size == len(self.designs) else self._of(rows, self.angles.part(rows))

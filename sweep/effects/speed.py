@@ -95,13 +95,9 @@ def samples(grid: Scene) -> tuple[Array, Array]:
 
 
 def _grids(scene: Scene, rubs: bool) -> tuple[int, ...]:
-    """Return the grids to be tried: no coarser ones than show what loads do over the turn."""
-    if scene.pierces.any():
-        return FINER[-1:]
-    curves = scene.every_curve
-    grids = RUBBING if rubs else GRIDS + FINER if curves else GRIDS
-    least = max((curve.samples for curve in curves), default=0.0)
-    return tuple(size for size in grids if size >= least) or grids[-1:]
+    if rubs:
+        return RUBBING
+    return GRIDS + FINER if scene.pierces.any() or scene.every_curve else GRIDS
 
 
 def _apart(scene: Scene, run: Callable[[Scene], Columns]) -> Columns:

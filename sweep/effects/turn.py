@@ -25,20 +25,21 @@ Solver: TypeAlias = Callable[[Scene, Array, bool], tuple[dict[str, Array], Statu
 def on_finer_grids(scene: Scene, phi: Array, grids: Sequence[int], solve: Solver) -> tuple[dict[str, Array], Status]:
     """Solve every design on the first of the ``grids`` that resolves it.
 
-    ``phi`` is (n, m) or (1, m); what ``solve`` calls NOT_CONVERGED is tried again on the next grid.
+    ``phi`` is (n, m) or (1, m); what ``solve`` calls NOT_CONVERGED is tried again on the next grid.  A grid that does
+    not show what the loads do is left out, but for the last one.
     """
     found: dict[str, Array] = {}
     status: Status = np.full(len(scene.designs), st.NOT_CONVERGED, np.uint8)
-    rows = np.arange(len(scene.designs))
+    least = np.minimum(scene.least_samples, grids[-1])
     for size in grids:
+        rows = np.flatnonzero((status == st.NOT_CONVERGED) & (least <= size))
+        if not rows.size and (found or len(scene.designs)):
+            continue
         own = np.ascontiguousarray(phi[rows] if phi.shape[0] > 1 else phi)
         part, codes = solve(scene.only(rows).on_grid(size), own, size == grids[-1])
         for name, values in part.items():
             found.setdefault(name, np.empty((len(scene.designs), *values.shape[1:])))[rows] = values
         status[rows] = codes
-        rows = rows[codes == st.NOT_CONVERGED]
-        if rows.size == 0:
-            break
     return found, status
 
 

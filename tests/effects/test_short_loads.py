@@ -80,6 +80,24 @@ def test_mean_loads_of_bearings_count_short_loads(table):
         assert found[f"err_mean_load_d{k}"][0] <= 1e-8 * dense
 
 
+@pytest.mark.parametrize("half", [0.003, 0.03, 0.8])
+def test_the_steady_state_of_an_elastic_coupler_counts_a_short_load_of_a_table_or_says_nothing(half):
+    row = {"a": 20.0, "b": 95.0, "c": 60.0, "e": 70.0, "f": 12.0, "g": 8.0, "alpha": 1.2, "driven_inertia": 0.5,
+           "stiffness": 2e4, "damping": 0.01, "speed": 90.0}  # fmt: skip
+    loads = {"load_torque": ([0.0, 1.0 - half, 1.0, 1.0 + half, 6.2], [0.0, 0.0, 40000.0, 0.0, 0.0])}
+    found = sweep.summarise("rssr", row, ["max_abs_lag_dynamic"], accuracy=1e-6, loads=loads)
+    still = sweep.summarise("rssr", row, ["max_abs_lag_dynamic", "floquet"], accuracy=1e-6)
+    assert still["status"][0] == st.OK
+    # A coupler this stiff follows the load: without it the lag is a sixth at most.
+    counted = found.max_abs_lag_dynamic[0] > 6.0 * still.max_abs_lag_dynamic[0]
+    assert counted if found["status"][0] == st.OK else found["status"][0] == st.NOT_CONVERGED
+    beside = sweep.summarise("rssr", row, ["max_abs_lag_dynamic", "floquet"], accuracy=1e-6, loads=loads)
+    alone = sweep.summarise("rssr", row, ["floquet"], accuracy=1e-6, loads=loads)
+    assert alone["status"][0] == st.OK
+    assert beside.floquet[0] == alone.floquet[0]
+    assert abs(alone.floquet[0] - still.floquet[0]) <= alone.err_floquet[0]
+
+
 @pytest.mark.parametrize("share", [1e-2, 1e-3, 1e-4])
 def test_orders_of_shaking_count_a_tool_that_pierces_just_before_its_turning_point(share):
     machine = sweep.machine({"needle": "guide"}, {"shaking": {"shaking": ["needle"]}})
