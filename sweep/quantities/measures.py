@@ -104,6 +104,16 @@ class Measure:
         """Whether its slopes need those of crank angles."""
         return self.is_angle or any(part.follows_angles for part in self.parts)
 
+    def refused(self, minimum: float | None, maximum: float | None) -> str:
+        """Say what bounds an inner value can stand for, where it cannot for these; "" where it can."""
+        if self.kind == "minus":
+            return self.parts[0].refused(*(x if x is None else -x for x in (maximum, minimum)))
+        low, high = (0.0 if x is None else x for x in (minimum, maximum))
+        if self.inner == "ratio" and min(low, high) < 0.0:
+            return "ratios of 0 or more"
+        right = 0.0 <= low < 0.5 * math.pi and (maximum is None or 0.0 < high < 0.5 * math.pi)
+        return "angles between 0 and 90 deg" if self.inner in ("pressure", "transmission") and not right else ""
+
     def to_inner(self, value: float) -> float:
         """Inner value that stands for a value of the output."""
         if self.kind == "minus":

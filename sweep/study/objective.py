@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from typing import Any, cast
 
 from sweep.errors import InputError
@@ -74,6 +73,19 @@ def check_steady(file: StudyFile, family: Family, objective: ObjectiveSection, l
                 "in scene.want, or leave out [optimise] and let the sweep alone decide"
             )
             file.faults.value(key, shown, allowed)
+    for limit in limits:
+        allowed = _followed(family, limit)
+        if allowed:
+            shown = written.get(limit.output, limit.output)
+            file.faults.value(("limits", limit.output), shown, f"{allowed}, as [optimise] is given")
+
+
+def _followed(family: Family, limit: Limit) -> str:
+    """Say what bounds the optimiser can follow, where it cannot follow these."""
+    try:
+        return measure(family, limit.output).refused(limit.minimum, limit.maximum)
+    except InputError:  # reported where the name stands
+        return ""
 
 
 def _jumps(family: Family, name: str) -> bool:
@@ -169,7 +181,8 @@ def _searchable(family: Family, output: Output, bounds: tuple[float, ...], side:
     if found.inner == "rotatable" or output.jumps:
         faults.value(("pareto", "output"), output.name, "a quantity that changes steadily")
         return False
-    if found.inner in ("pressure", "transmission") and not all(0.0 < bound < 0.5 * math.pi for bound in bounds):
-        faults.value(("pareto", side), list(bounds), "angles between 0 and 90 deg")
-        return False
-    return True
+    ends = [(bound, None) if side == "at_least" else (None, bound) for bound in bounds]
+    allowed = next((words for low, high in ends if (words := found.refused(low, high))), "")
+    if allowed:
+        faults.value(("pareto", side), list(bounds), allowed)
+    return not allowed

@@ -1,4 +1,4 @@
-"""Outputs that are constant in pieces: wanted beside an optimiser they are computed, aimed at they are refused."""
+"""Outputs that are constant in pieces, and bounds that an optimiser cannot follow: refused beside one, not alone."""
 
 from __future__ import annotations
 
@@ -7,7 +7,9 @@ import pytest
 
 from sweep.dataset.files import OPTIMUM, SENSITIVITY, beside
 from sweep.engine.run import run
-from sweep.errors import StudyError
+from sweep.errors import InputError, StudyError
+from sweep.optimise import Problem
+from sweep.optimise.problem.program import Program
 from sweep.report.page import write_report
 from sweep.study import load_study
 
@@ -66,3 +68,22 @@ def test_count_that_is_aimed_at_is_refused_with_the_remedy(tmp_path, change, mes
 def test_count_limits_a_sweep_alone(tmp_path) -> None:
     alone = STUDY.replace('swing = ">= 20 deg"', 'pressure_extrema = "<= 2"').replace("[optimise]\nstarts = 1\n", "")
     assert study_of(tmp_path, alone).optimise is None
+
+
+@pytest.mark.parametrize(
+    ("limit", "allowed"),
+    [
+        ("max_pressure_angle = { max = 100, unit = 'deg' }", "angles between 0 and 90 deg"),
+        ("max_pressure_angle = { min = 10, max = 100, unit = 'deg' }", "angles between 0 and 90 deg"),
+        ("minus_least_transmission_angle = { min = -100, unit = 'deg' }", "angles between 0 and 90 deg"),
+        ("stroke_ratio = { min = -1 }", "ratios of 0 or more"),
+    ],
+)
+def test_bound_that_the_optimiser_cannot_follow_is_told_with_its_line(tmp_path, limit, allowed) -> None:
+    """What it follows of 100 degrees, -cos^2, is that of 80: such a bound was held as one of 80, or divided by zero."""
+    text = STUDY.replace('swing = ">= 20 deg"', limit)
+    with pytest.raises(StudyError, match=f"1 fault\n  study.toml:17: limits.{limit.split()[0]} = .*{allowed}"):
+        study_of(tmp_path, text)
+    study = study_of(tmp_path, text.replace("[optimise]\nstarts = 1\n", ""))
+    with pytest.raises(InputError, match=allowed):
+        Program(Problem(study.family, ("a",), [8.0], [12.0], {}, "max_abs_d2psi", study.limits))

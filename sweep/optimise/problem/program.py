@@ -75,17 +75,9 @@ class Program:
                 if limit.maximum is not None or limit.minimum not in (1, 1.0, True):
                     raise InputError(limit.output, (limit.minimum, limit.maximum), "at least 1 (it turns)", PLACE)
                 continue  # required of every design without being asked
+            if allowed := found.refused(limit.minimum, limit.maximum):
+                raise InputError(limit.output, (limit.minimum, limit.maximum), allowed, PLACE)
             sides = [None if side is None else found.to_inner(float(side)) for side in (limit.minimum, limit.maximum)]
-            if (
-                found.inner == "pressure"
-                and limit.minimum is None
-                and not 0.0 < float(limit.maximum or 0) < math.pi / 2
-            ):
-                raise InputError(limit.output, limit.maximum, "an angle between 0 and pi/2", PLACE)
-            if found.inner == "transmission" and not all(
-                side is None or 0.0 < float(side) < math.pi / 2 for side in (limit.minimum, limit.maximum)
-            ):
-                raise InputError(limit.output, (limit.minimum, limit.maximum), "angles between 0 and pi/2", PLACE)
             given = problem.allowances.get(limit.output)
             raised, lowered = (_moving(found, b, given, s) for b, s in ((limit.minimum, 1.0), (limit.maximum, -1.0)))
             self.requirements.append(Requirement(found, sides[0], sides[1], raised, lowered))
