@@ -54,8 +54,8 @@ class Faults:
             self._add(key, f"{spelled(key)} is missing; needed: {needed}")
 
     def misspelt(self, key: Key) -> bool:
-        """Tell whether a key that is missing stands there with a spelling mistake, which was reported."""
-        return key in self._misspelt
+        """Tell whether a missing key, or its table, stands there with a spelling mistake, which was reported."""
+        return any(key[:k] in self._misspelt for k in range(1, len(key) + 1))
 
     def excuse(self, key: Key) -> None:
         """Let a key be missing: that it is follows from a fault that was reported."""

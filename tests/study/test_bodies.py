@@ -249,3 +249,8 @@ def test_a_fault_of_the_space_is_none_of_the_reference_that_takes_its_bodies(tmp
     text = f"{HEAD}[bodies]{fixed}[reference.design]\n{design}"
     assert load(tmp_path, text).reference["m_tool2"] == pytest.approx(25e-6)
     assert faults(tmp_path, text.replace('b1 = "60 mm"', "b1 = 60", 1)).count("\n") == 0
+
+
+def test_a_misspelt_table_of_bodies_is_one_fault(tmp_path):
+    found = faults(tmp_path, f"{HEAD}[bodys]{BODIES}")
+    assert found.count("\n") == 0 and "bodys: unknown table" in found and "did you mean 'bodies'" in found
