@@ -17,9 +17,9 @@ from tests.support.optimise_family import FAMILY
 ONCE = OptimiseSettings(starts=1)
 
 
-def problem(objective, limits=(), variables=("p", "q"), low=-4.0, high=4.0, **kwargs):
+def problem(objective, limits=(), variables=("p", "q"), low=-4.0, high=4.0, rest=0.0, **kwargs):
     n = len(variables)
-    fixed = {name: 0.0 for name in ("p", "q", "r") if name not in variables}
+    fixed = {name: rest for name in ("p", "q", "r") if name not in variables}
     return Problem(FAMILY, variables, np.full(n, low), np.full(n, high), fixed, objective, limits, **kwargs)
 
 
@@ -146,6 +146,9 @@ def test_few_samples_do_not_hide_a_peak():
         ({"variables": ("p", "branch")}, "branch"),
         ({"variables": ("p", "p")}, "each once"),
         ({"low": 5.0}, "lower below upper"),
+        ({"limits": (Limit("max_bowl", None, math.inf),)}, "max_bowl = .*finite bounds, None for a side without one"),
+        ({"limits": (Limit("max_bowl", math.nan, 2.0),)}, "max_bowl = .*finite bounds"),
+        ({"rest": math.nan}, "r = nan; allowed: a finite number"),
         ({"window": (0.6, 0.2)}, "window"),
     ],
 )

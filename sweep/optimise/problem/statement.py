@@ -43,7 +43,7 @@ class Problem:
     Raises
     ------
     InputError
-        for an unknown or doubled name, a sign among the variables, bounds that are not finite or not in order.
+        for an unknown or doubled name, a sign among the variables, a number that is not finite, bounds not in order.
     """
 
     family: Family
@@ -75,6 +75,13 @@ class Problem:
         for name, low, high in zip(self.variables, self.lower, self.upper, strict=True):
             if not (np.isfinite(low) and np.isfinite(high) and low < high):
                 raise InputError(name, (float(low), float(high)), "finite bounds, lower below upper", PLACE)
+        for name, value in self.fixed.items():
+            if not np.isfinite(value):
+                raise InputError(name, value, "a finite number", PLACE)
+        for limit in self.limits:
+            if not np.isfinite([x for x in (limit.minimum, limit.maximum) if x is not None]).all():
+                allowed = "finite bounds, None for a side without one"
+                raise InputError(limit.output, (limit.minimum, limit.maximum), allowed, PLACE)
         for name in self.given:
             if name not in self.variables and name not in self.fixed:
                 raise InputError(name, None, "a variable or a fixed value", PLACE)
