@@ -228,12 +228,8 @@ def _drawing(
     part = kept.parts.get("drawing")
     if part is not None:
         problem = problem_of_dataset(study, place, np.empty((0, len(study.family.parameters))))
-        lower, upper = (np.array(part[name]) for name in ("lower", "upper"))
-        return (
-            replace(problem, lower=lower, upper=upper),
-            [result_of(r) for r in part["results"]],
-            survey_of(part["survey"]),
-        )
+        problem = replace(problem, lower=np.array(part["lower"]), upper=np.array(part["upper"]))
+        return problem, [result_of(r) for r in part["results"]], survey_of(part["survey"])
     problem, groups = problem_and_starts(study, place, deadline, jobs)
     assert study.optimise is not None
     settings = replace(study.optimise, time_budget=None)

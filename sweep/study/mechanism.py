@@ -269,7 +269,8 @@ def _machine(
         place: Key = tuple(error.place.removeprefix("machine.").split(".")) if error.place != "machine" else ()
         if place[:1] == ("relations",) and place[1:] and place[1] in threads:
             key = _key_of_thread(error)
-            faults.value(("thread", place[1], key), data["thread"][place[1]].get(key, error.value), error.allowed)
+            written = error.value if key == "path" else data["thread"][place[1]].get(key, error.value)
+            faults.value(("thread", place[1], key), written, error.allowed)
             return None
         if place[:1] in (("shafts",), ("tools",)):
             faults.value(place if place[-1] == error.name else (*place, error.name), error.value, error.allowed)

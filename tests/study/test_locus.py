@@ -22,6 +22,7 @@ from sweep.chunks.chunk import compute_chunk
 from sweep.dataset.files import beside
 from sweep.engine.run import run
 from sweep.errors import StudyError
+from sweep.optimise.starts.dataset import drawn
 from sweep.optimise.starts.posing import problem_of
 from sweep.study import Study, load_study
 from sweep.study.study import Limit
@@ -243,3 +244,35 @@ def test_a_band_has_room_on_both_sides(band, refused, tmp_path):
         return
     with pytest.raises(StudyError, match=r"limits\.swing = .*; allowed: nothing here: \[locus\] prescribes it; with"):
         study_of(tmp_path, text)
+
+
+@pytest.mark.parametrize(("limit", "ends"), [("max = 20", (None, 20.0)), ("min = 9000", (9000.0, None))])
+def test_link_that_no_design_gives_its_limits_has_bounds_within_them(tmp_path, limit, ends):
+    """Couplers of the sampled designs reach from 30 to some thousand mm."""
+    text = """
+[study]
+name = "far"
+[mechanism]
+family = "rssr"
+[locus]
+swing = { from = 45, to = 70, unit = "deg" }
+phi0 = { from = 165, to = 195, unit = "deg" }
+phi_ext = { from = 0, to = 360, unit = "deg" }
+[design]
+sample = { kind = "sobol", n = 2000 }
+e = { from = 5, to = 25, unit = "mm" }
+f = { from = 30, to = 50, unit = "mm" }
+g = { from = -20, to = 20, unit = "mm" }
+alpha = "90 deg"
+[limits]
+b = { LIMIT, unit = "mm" }
+[objective]
+minimise = "max_abs_d2psi"
+[optimise]
+"""
+    (tmp_path / "study.toml").write_text(text.replace("LIMIT", limit))
+    study = load_study(tmp_path)
+    problem = problem_of(study, drawn(study, 4, 0), on_locus=False)
+    k = problem.variables.index("b")
+    low, high = float(problem.lower[k]), float(problem.upper[k])
+    assert 0.0 < low < high and all(given in (None, end) for given, end in zip(ends, (low, high), strict=True))

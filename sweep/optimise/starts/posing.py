@@ -101,10 +101,16 @@ def _bounds(study: Study, name: str, designs: Array) -> tuple[float, float] | No
             low, high = low - np.pi, high + np.pi
     else:
         return None
+    least, most, width = low, high, high - low
     for limit in study.parameter_limits:
         if limit.output == name:
             low = low if limit.minimum is None else max(low, limit.minimum)
             high = high if limit.maximum is None else min(high, limit.maximum)
+    if name in (*study.made, *study.rescaled):  # of what is made perhaps no design comes near the limits
+        if high <= least:
+            low = max(high - width, SHORTEST * high) if parameter.positive else high - width
+        elif low >= most:
+            high = low + width
     return low, high
 
 

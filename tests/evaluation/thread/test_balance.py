@@ -230,7 +230,7 @@ def test_study_has_its_threads_in_its_units(tmp_path):
         (
             '["1 mm", "0.5 mm"]',
             '["1 mm"]',
-            "thread.upper.radius = (1.0,); allowed: one number, or one for each of the 2",
+            "thread.upper.radius = ['1 mm']; allowed: one number, or one for each of the 2",
         ),
         ('"20 gf"', '"20 mm"', "thread.upper.tension = '20 mm'; allowed: a force"),
         ('stock = "15 cm"', 'stok = "15 cm"', "thread.upper.stok: unknown key"),
