@@ -123,7 +123,7 @@ def searches(study: Study, jobs: int, known: Pilot) -> tuple[tuple[str, float, f
     from sweep.optimise.manufacture import robust
     from sweep.optimise.multistart.survey import MET, TOGETHER
     from sweep.optimise.starts.dataset import SAMPLES, drawn, sample_seconds
-    from sweep.optimise.starts.global_starts import MADE
+    from sweep.optimise.starts.global_starts import MADE, SWEPT
     from sweep.optimise.starts.posing import problem_of
 
     designs = known.kept if len(known.kept) else drawn(study, 1, settings.seed)
@@ -138,7 +138,8 @@ def searches(study: Study, jobs: int, known: Pilot) -> tuple[tuple[str, float, f
     share = None if study.tolerance is None else study.tolerance.robust
     population = POPULATION_LOOKS * look if settings.by_populations else 0.0
     if settings.by_populations:
-        found = [("search", MET * (population + typical), settings.populations * (population + 2.0 * most))]
+        own, most_of_all = settings.starts // SWEPT, settings.populations * (population + 2.0 * most)
+        found = [("search", MET * (population + 2.0 * typical) + own * typical, most_of_all + own * most)]
     else:
         sampled = study.fit is None and settings.starts > 1
         sample = sample_seconds(problem, designs[0], settings.starts) if sampled else 0.0
