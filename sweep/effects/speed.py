@@ -139,16 +139,18 @@ def _turn(scene: Scene, wanted: frozenset[str], rubs: bool) -> Columns:
     columns: Columns = {f"{name}{suffix}": found[f"{name}{suffix}"] for name in ("unevenness", "fastest", "slowest")}
     one, fastest = np.ones(len(scene.designs)), found[f"fastest{suffix}"]
     known = np.maximum(ERROR, PER_LEFT * found[f"missed{suffix}"])
-    error = known * fastest
-    relative = {"unevenness": found[f"slowest{suffix}"], "fastest": one, "slowest": one}
-    columns |= {f"err_{name}{suffix}": error / size for name, size in relative.items()}
+    # What is missed of the energy is a share of the largest: of a slow speed it is a larger share.
+    steep = fastest / found[f"slowest{suffix}"]
+    size = {"unevenness": steep / np.abs(scene.inputs["speed"]), "fastest": one, "slowest": steep}
+    columns |= {f"err_{name}{suffix}": known * fastest * share for name, share in size.items()}
     limit = RESOLVED if grids == GRIDS else LEFT_OF_CURVE
     # What is missed of the torque is a share of J omega^2: of a small acceleration it is a larger share.
     change = f"crank_acceleration{suffix}"
     size = np.abs(found[change]).max(axis=1)
     ratio = np.divide(fastest**2, size, out=one.copy(), where=size > 0.0)
     of_change = np.maximum(known, (PER_LEFT * found[f"missed{suffix}"] + ROUNDED) * ratio)
-    return per_turn(found, status, columns, _outputs(suffix, ""), wanted, limit, known, {change: of_change})
+    known_of = {change: of_change, f"crank_speed{suffix}": known * steep}
+    return per_turn(found, status, columns, _outputs(suffix, ""), wanted, limit, known, known_of)
 
 
 def _friction_loss(grid: Scene, slope: Array) -> tuple[Array, Status]:

@@ -123,3 +123,31 @@ def test_the_speed_of_a_design_has_its_bits_beside_one_whose_tool_pierces():
         np.testing.assert_array_equal(together.iloc[k], alone.iloc[0])
         one = sweep.evaluate("guide", row | {"pierce_force": force}, ["crank_acceleration"], phi=PHI[:5])
         assert poses[poses.design == k].crank_acceleration.tolist() == one.crank_acceleration.tolist()
+
+
+@pytest.mark.parametrize("half", [0.1, 0.2])
+def test_the_error_of_a_crank_that_nearly_stops_grows_with_its_slowness(half):
+    row = {"a": 2.0, "e": 3.0, "f": 1.0, "alpha": 0.5, "Z1": -3.0, "Z2": 4.0, "P_h": 8.0, "m_crank": 0.0,
+           "j_crank_zz": 1e-3, "speed": 70.0}  # fmt: skip
+    at = [0.0, 2.0 - half, 2.0, 2.0 + half, 5.0]
+    unit = {"tool_force_x": (at, [0.0, 0.0, 1.0, 0.0, 0.0])}
+    excess = -sweep.evaluate("eyelet", row, ["drive_torque"], phi=PHI, loads=unit).drive_torque.to_numpy()
+    work = (np.cumsum(excess - excess.mean()) - 0.5 * (excess - excess.mean())) * 2.0 * np.pi / N
+    # The energy that is left at the slowest place makes it a thousandth of the fastest; the force follows.
+    omega = np.sqrt(work - work.min() + np.ptp(work) / (1000.0**2 - 1.0))
+    scale = row["speed"] * np.mean(1.0 / omega)
+    omega *= scale
+    force = {"tool_force_x": (at, [0.0, 0.0, 0.5 * row["j_crank_zz"] * scale**2, 0.0, 0.0])}
+    slowest, uneven = omega.min(), np.ptp(omega) / row["speed"]
+    dense = {"slowest": slowest, "fastest": omega.max(), "unevenness": uneven}
+    curve = {"min_crank_speed": slowest, "max_crank_speed": omega.max(), "range_crank_speed": np.ptp(omega)}
+    machine = sweep.machine({"eye": "eyelet"}, {"shaft": {"torque": ["eye"]}})
+    of_shaft = {f"eye.{name}": value for name, value in row.items()}
+    of_turn = {f"shaft_{name}": value for name, value in dense.items()}
+    in_machine = {f"eye.{name}": load for name, load in force.items()}
+    questions = (("eyelet", row, dense | curve, force), (machine, of_shaft, of_turn, in_machine))
+    for mechanism, table, expected, loads in questions:
+        found = sweep.summarise(mechanism, table, list(expected), accuracy=1e-6, loads=loads).iloc[0]
+        assert found["status"] == st.OK
+        for name, value in expected.items():
+            assert abs(found[name] - value) <= found[f"err_{name}"], name

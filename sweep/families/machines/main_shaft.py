@@ -128,10 +128,12 @@ def speed_of(shaft: ShaftTorque, machine: Machine) -> Step:
     def run(designs: Array, wanted: frozenset[str], accuracy: Accuracy) -> Columns:
         found = _numbers(shaft, machine, designs)
         known = np.maximum(ERROR, PER_LEFT * found.pop("missed"))
-        size = {"unevenness": found["slowest"]} | dict.fromkeys(("fastest", "slowest"), np.ones(len(designs)))
+        # What is missed of the energy is a share of the largest: of a slow speed it is a larger share.
+        mean, steep = found.pop("mean"), found["fastest"] / found["slowest"]
+        size = {"unevenness": steep / mean, "fastest": np.ones(len(designs)), "slowest": steep}
         status = found.pop("status")
         columns = {f"{shaft.name}_{key}": values for key, values in found.items()}
-        columns |= {f"err_{shaft.name}_{key}": known * found["fastest"] / size[key] for key in found}
+        columns |= {f"err_{shaft.name}_{key}": known * found["fastest"] * size[key] for key in found}
         return {name: x for name, x in columns.items() if name.removeprefix("err_") in wanted} | {"status": status}
 
     return Step(f"speed of {shaft.name}", shaft.numbers, run, work=Work.LONG, cost=_cost)
@@ -167,7 +169,7 @@ def _numbers(shaft: ShaftTorque, machine: Machine, designs: Array) -> dict[str, 
         for key in found:
             found[key][rows] = np.where(codes == st.OK, part[key], np.nan)
         status[rows] = codes
-    return found | {"status": status}
+    return found | {"status": status, "mean": np.abs(speed)}
 
 
 def _samples(
