@@ -138,8 +138,8 @@ def searches(study: Study, jobs: int, known: Pilot) -> tuple[tuple[str, float, f
     share = None if study.tolerance is None else study.tolerance.robust
     population = POPULATION_LOOKS * look if settings.by_populations else 0.0
     if settings.by_populations:
-        own, most_of_all = settings.starts // SWEPT, settings.populations * (population + 2.0 * most)
-        found = [("search", MET * (population + 2.0 * typical) + own * typical, most_of_all + own * most)]
+        every = settings.populations * (population + 2.0 * most) + settings.starts // SWEPT * most
+        found = [("search", MET * (population + 2.0 * typical), every)]
     else:
         sampled = study.fit is None and settings.starts > 1
         sample = sample_seconds(problem, designs[0], settings.starts) if sampled else 0.0

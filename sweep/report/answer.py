@@ -198,7 +198,7 @@ def search_sentence(data: Dataset, found: Scan) -> str:
     head = "The" if proof_sentence(data) else f"{NO_PROOF}: the"
     text = f"{head} optimiser started from {starts} {kind}design{'s' if starts != 1 else ''}"
     populations = 0 if data.survey is None else data.survey.populations
-    text += f", ends of {populations} global searches and designs of the sweep" if populations else " of the sweep"
+    text += f", most of them ends of {populations} populations" if populations else " of the sweep"
     if math.isfinite(agree) and not populations:  # of those the survey tells more
         text += f", {number(agree)} of which ended at this value"
     if data.survey is not None:

@@ -291,8 +291,12 @@ def test_starts_are_the_best_end_of_every_population_and_another(monkeypatch: py
     study = record(8.0, starts=6, populations=2, seed=3, looks=100)
     known = drawn(study, 4, 3)
     problem = problem_of(study, known)
-    own, *groups = from_populations(study, problem, known, np.arange(len(known), dtype=float), lambda: False, 1)
+    merit = 1e3 + np.arange(len(known))  # worse than every end: searched from where populations do not settle
+    *groups, own = from_populations(study, problem, known, merit, lambda: False, 1)
     assert own.counted == 0 and (own.designs == known[:1]).all()
+    first, better, *_ = from_populations(study, problem, known, merit - 1e3, lambda: False, 1)
+    np.testing.assert_array_equal(first.designs, groups[0].designs)
+    np.testing.assert_array_equal(better.designs, own.designs)
     linear = elimination(problem)
     assert linear is not None
     found = list(populations.populations(linear, kinds(study, problem, known[:1]), 2, 3, size=SMALL))

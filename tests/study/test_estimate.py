@@ -141,7 +141,7 @@ def test_price_of_what_follows_counts_every_search(monkeypatch, jobs):
     designs, _ = design_matrix(study.family, study.reference)
     found = {name: (typical, most) for name, typical, most in searches(study, jobs, SimpleNamespace(kept=designs))}
     assert list(found) == ["search", "tolerances", "tables and report"]
-    # A population and the searches from two of its ends; those from two designs of the sweep.
-    assert found["search"] == pytest.approx(((3 * (30.0 + 6.0) + 6.0) / jobs, (40 * (30.0 + 80.0) + 80.0) / jobs))
+    # A population and the searches from two of its ends; those from two designs of the sweep where they are needed.
+    assert found["search"] == pytest.approx((3 * (30.0 + 6.0) / jobs, (40 * (30.0 + 80.0) + 80.0) / jobs))
     whole = (4 * 16.0 + 3 * 40.0 + 3 * 30.0) / jobs
     assert found["tolerances"] == pytest.approx((whole, 2.0 * whole))

@@ -30,9 +30,10 @@ ANOTHER = 1e-3  # share of a value by which that of another basin differs
 def from_populations(
     study: Study, problem: Problem, designs: Array, merit: Array, stop: Callable[[], bool], jobs: int
 ) -> Iterator[Group]:
-    """Yield groups of starts: a few designs of the sweep, then the best end of each population, and another one.
+    """Yield groups of starts: the best end of each population, and another one.
 
-    A population counts by the local optimum of its best end: at fixed poses one basin looks like several.
+    A population counts by the local optimum of its best end: at fixed poses one basin looks like several.  A few
+    designs of the sweep follow where one is better than these ends, or where populations do not settle.
 
     Parameters
     ----------
@@ -49,11 +50,10 @@ def from_populations(
     assert study.optimise is not None
     settings, linear = study.optimise, _linear(study, problem)
     first = of_task(study, settings.starts, settings.seed)
+    if len(first):
+        yield Group(first, counted=0)
     own = diverse(problem, designs, merit, settings.starts // SWEPT, ALIKE) if len(merit) else first[:0]
-    begun = np.concatenate([first, own])
-    if len(begun):
-        yield Group(begun, counted=0)
-    found, values = begun[:0], list[float]()
+    found, values = first[:0], list[float]()
     signs = kinds(study, problem, own)
     for number, one in enumerate(populations(linear, signs, settings.populations, settings.seed, stop, jobs)):
         if len(one.worth):
@@ -61,7 +61,12 @@ def from_populations(
             found = np.concatenate([found, one.designs[ends]])
             values += one.worth[ends].tolist()
             yield Group(one.designs[ends], number, 1, holding(study, problem, found))
-    if not len(begun) and not len(found):
+        if len(own) and merit.min() < min(values, default=math.inf):
+            yield Group(own, counted=0)
+            own = own[:0]
+    if len(own):
+        yield Group(own, counted=0)
+    elif not len(merit) and not len(first) and not len(found):
         allowed = "proportions with which the mechanism turns"
         raise InputError("design space", study.space.count, allowed, str(study.path))
 
