@@ -87,7 +87,7 @@ def edited(tmp_path, old, new):
 
 
 def test_a_missing_input_is_a_fault_that_names_the_effects(tmp_path):
-    with pytest.raises(StudyError, match=r"design\.m_coupler is missing.*kinetostatics, friction"):
+    with pytest.raises(StudyError, match=r"bodies\.m_coupler is missing.*kinetostatics, friction"):
         load_study(edited(tmp_path, 'm_coupler = "14 g"\n', ""))
 
 
