@@ -23,8 +23,12 @@ def parts(name: str) -> Parts:
     Parts(member='needle', stem='phi0', stage='1')
     >>> parts("swing")
     Parts(member='', stem='swing', stage='')
+    >>> parts("minus_needle.stroke")
+    Parts(member='needle', stem='minus_stroke', stage='')
     """
     member, _, rest = name.rpartition(".")
+    if member.startswith(MINUS):  # the negative is no swing, stroke or flag, in a machine as alone
+        member, rest = member.removeprefix(MINUS), f"{MINUS}{rest}"
     if rest == "phi0" or rest.endswith("_phi0"):
         return Parts(member, rest, "")
     stem, stage = re.fullmatch(r"(.*?)(\d*)", rest, re.DOTALL).groups()  # type: ignore[union-attr]

@@ -168,6 +168,18 @@ def test_a_straightness_in_a_window_is_that_of_summarise_beside_a_tool_that_pier
     assert (found.ended, found.status) == ("converged", st.OK)
 
 
+def test_the_largest_stroke_of_a_member_is_that_of_its_longest_crank() -> None:
+    """Without an offset the stroke is twice the crank; its negative has no magnitude to be compared by."""
+    two = family(sweep.machine({"needle": "slider_crank", "looper": {"family": "slider_crank", "ratio": 2}}))
+    fixed = {"needle.b": 30.0, "needle.a": 5.0, "needle.e": 0.0, "looper.b": 30.0, "looper.e": 0.0}
+    box = np.array([5.0]), np.array([9.0])
+    problem = Problem(two, ("looper.a",), *box, fixed, "minus_looper.stroke", (Limit("needle.stroke", None, 11.0),))
+    signs = {"needle.branch": 1.0, "looper.branch": -1.0}
+    found = minimise(problem, problem.rows(np.array([[6.0]]), **signs), ONCE)[0]
+    assert (found.ended, found.status) == ("converged", st.OK)
+    assert found.objective == pytest.approx(-18.0, rel=1e-12)
+
+
 def blind(monkeypatch: pytest.MonkeyPatch) -> None:
     """Let the search look at its poses alone, as if no family knew of phases and edges."""
     monkeypatch.setattr(points, "poses_needed", lambda family, design, outputs: 0)
