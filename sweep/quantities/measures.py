@@ -201,7 +201,7 @@ def _measure(family: Family, name: str, asked: Quantity, window: tuple[float, fl
             ratio: Inner = "ratio" if kind == "stroke_ratio" else "same"
             return Measure(name, LIMIT_KINDS[kind], (curve(family, asked.of),), ratio)
         case Reduced(reduction=reduction, extreme=True):
-            inside = window if family.pose_output[asked.of].windowed and reduction.modes == (0,) else None
+            inside = window if family.pose_output[asked.of].windowed else None
             return Measure(name, cast(Kind, reduction.kind), (curve(family, asked.of, inside),))
         case Extent(box=box):
             numbers = tuple(f"{name}, still {k}" for k in range(len(box.still)))

@@ -168,6 +168,26 @@ def test_a_straightness_in_a_window_is_that_of_summarise_beside_a_tool_that_pier
     assert (found.ended, found.status) == ("converged", st.OK)
 
 
+@pytest.mark.parametrize("objective", ["range_dev", "max_dev", "minus_min_dev", "minus_max_dev", "min_dev"])
+def test_every_reduction_of_a_deviation_counts_in_the_window_alone(objective: str) -> None:
+    """The least of a scan of one dimension, each design at dense poses, is no lower than what the search ends at."""
+    row, window = loaded("guide", ["dev"]), (0.3, 0.8)
+    varied = around(row, {"eta": 0.3})
+    found, said = search("guide", row, varied, objective, window=window)
+    assert_confirmed(found, said, objective)
+    assert (found.ended, found.status) == ("converged", st.OK)
+    scan = {name: np.full(61, x) for name, x in row.items()} | {"eta": np.linspace(*varied["eta"][1:], 61)}
+    poses = sweep.evaluate("guide", scan, ["s", "dev"], phi=np.arange(2880) * (2.0 * np.pi / 2880))
+    s, dev = (poses[name].to_numpy().reshape(61, -1) for name in ("s", "dev"))
+    share = (s - s.min(axis=1, keepdims=True)) / np.ptp(s, axis=1, keepdims=True)
+    inside = (share >= window[0]) & (share <= window[1])
+    most, least = np.where(inside, dev, -np.inf).max(axis=1), np.where(inside, dev, np.inf).min(axis=1)
+    values = {"range_dev": most - least, "max_dev": most, "min_dev": least}
+    reached = (-1.0 if objective.startswith("minus_") else 1.0) * values[objective.removeprefix("minus_")]
+    step = np.abs(np.diff(dev, axis=1)).max()  # an edge of the window, of which a range has two, lies between two poses
+    assert found.objective == pytest.approx(reached.min(), abs=2.0 * step)
+
+
 def test_the_largest_stroke_of_a_member_is_that_of_its_longest_crank() -> None:
     """Without an offset the stroke is twice the crank; its negative has no magnitude to be compared by."""
     two = family(sweep.machine({"needle": "slider_crank", "looper": {"family": "slider_crank", "ratio": 2}}))

@@ -44,7 +44,7 @@ def sensitivities(
     family : of the design
     design : (P,)
     outputs : names of design outputs; swing and stroke count by magnitude, whether it turns (``rotatable``) is left out
-    window : part of the stroke in which ``max_abs_dev`` counts
+    window : part of the stroke in which deviations from a line count
 
     Returns
     -------

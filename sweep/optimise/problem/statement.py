@@ -33,7 +33,7 @@ class Problem:
     objective : design output to be minimised, or a parameter
     limits : ``Limit(output, minimum, maximum)``, also of parameters that follow from others; equal minimum and maximum
         make an equation.  That every stage assembles over the whole turn is demanded without being asked.
-    window : part of the stroke in which ``max_abs_dev`` counts, as fractions from the smallest position
+    window : part of the stroke in which deviations from a line count, as fractions from the smallest position
     accuracy : relative error to which the extrema over the turn are verified (``target``), or the number of poses per
         turn they are looked for on (``samples``)
     coordinates : variables that are no parameters, and what follows from them; None varies parameters alone
