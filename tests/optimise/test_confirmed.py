@@ -168,6 +168,20 @@ def test_a_straightness_in_a_window_is_that_of_summarise_beside_a_tool_that_pier
     assert (found.ended, found.status) == ("converged", st.OK)
 
 
+@pytest.mark.parametrize("objective", ["max_abs_d2alpha", "max_abs_dalpha", "max_abs_epsilon3", "max_abs_omega3"])
+@pytest.mark.parametrize("coupler", [28.0, 32.3, 37.7])
+def test_a_rocker_that_stands_still_is_found(objective: str, coupler: float) -> None:
+    """Its ball stays on the crank's axis, at b + z from the crank: h^2 = a^2 + z^2, l^2 = r^2 + (b + z)^2."""
+    row = {"r": 10.0, "l": coupler, "h": 21.0, "a": 20.0, "b": 30.0, "branch": -1.0}
+    varied = around(row, {"l": 1.0, "h": 1.5})
+    found, _ = search("kim_dison", row, varied, objective)
+    assert (found.ended, found.status) == ("converged", st.OK)
+    assert 0.0 <= found.objective < 1e-14  # of values near 1: nothing but rounding
+    length, rocker = found.design[1], found.design[2]
+    z = np.sqrt(length**2 - 100.0) - 30.0
+    assert rocker == pytest.approx(math.hypot(20.0, z), rel=1e-12)
+
+
 @pytest.mark.parametrize("objective", ["range_dev", "max_dev", "minus_min_dev", "minus_max_dev", "min_dev"])
 def test_every_reduction_of_a_deviation_counts_in_the_window_alone(objective: str) -> None:
     """The least of a scan of one dimension, each design at dense poses, is no lower than what the search ends at."""

@@ -109,6 +109,8 @@ def _relaxation(program: Program, values: dict[str, float], state: State) -> dic
 
 TARGET = 1e-9  # relative error of the outputs that are compared, unless the problem asks for another
 DIGITS = 1e-8  # of a value: what the search's own extrema may be off by beside that
+NOTHING = 1e-12  # of what an objective amounts to between the bounds: rounding leaves less where it vanishes
+ACROSS = (0.001, 0.01, 0.1, 0.5, 1.0)  # ways to either corner of the bounds at which it is looked at
 DIFFERS = "differs"  # how a start ended whose extrema are not those of summarise
 
 
@@ -136,6 +138,8 @@ def confirmed(problem: Problem, program: Program, found: Result) -> Result:
     true = _summarised(problem, found, tuple(asked))
     apart = {name: _apart(asked[name], own[name], value) for name, (value, _) in true.items()}
     other = {name: value for name, (value, err) in true.items() if not apart[name] <= err}
+    if program.objective.name in other and _vanishes(problem, found, other[program.objective.name]):
+        other.pop(program.objective.name)
     far = [name for name in other if not apart[name] <= true[name][1] + DIGITS * _size(asked[name], true[name][0])]
     kept = replace(
         found,
@@ -143,6 +147,16 @@ def confirmed(problem: Problem, program: Program, found: Result) -> Result:
         values=found.values | {name: value for name, value in other.items() if name in found.values},
     )
     return _differing(problem, kept, {name: (other[name], apart[name]) for name in far}) if far else kept
+
+
+def _vanishes(problem: Problem, found: Result, true: float) -> bool:
+    """Tell whether the objective is nothing but rounding, which has no digits that could agree, nor certain extrema."""
+    place, shares = problem.scaled(found.design[None, :])[0], np.array(ACROSS)[:, None]
+    designs = problem.placed(found.design, np.concatenate([place + shares * (end - place) for end in (0.0, 1.0)]))
+    designs = designs[np.isfinite(designs).all(axis=1)]
+    columns = design_outputs(problem.family, designs, (problem.objective,), problem.accuracy, problem.window)
+    amount = np.abs(np.asarray(columns[problem.objective], np.float64)).max(initial=0.0, where=columns["status"] == st.OK)
+    return abs(found.objective) <= NOTHING * amount and not abs(true) > NOTHING * amount
 
 
 def _differing(problem: Problem, kept: Result, far: dict[str, tuple[float, float]]) -> Result:
