@@ -228,3 +228,13 @@ def test_equations_that_say_the_same_are_refused_by_name() -> None:
         minimise(twice, starts, OptimiseSettings(looks=3))
     with pytest.raises(InputError, match="stroke_ratio"):  # what the locus holds by construction says it already
         optimum(twice, [{"branch": -1.0}], OptimiseSettings(starts=2))
+
+
+def test_an_equation_that_no_variable_changes_is_refused_as_such() -> None:
+    """A planar crank-rocker's swing does not depend on where along the axes its planes are."""
+    fixed = {"a": 1.0, "b": 4.0, "c": 3.0, "e": 3.5, "alpha": 0.0, "f": 0.0, "branch": 1.0}
+    equation = (Limit("swing", 0.8, 0.8),)
+    box = np.array([-1.0]), np.array([1.0])
+    problem = Problem(family("rssr"), ("g",), *box, fixed, "max_abs_d2psi", equation)
+    with pytest.raises(InputError, match="swing'; allowed: an equation of what some variable changes"):
+        minimise(problem, problem.rows(np.zeros((1, 1))), OptimiseSettings(looks=3))

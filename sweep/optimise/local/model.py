@@ -239,6 +239,8 @@ def refuse_dependent(problem: Problem, program: Program, starts: Array) -> None:
                 common = _dependent(rows, names) & (set(names) if common is None else common)
     if common:
         allowed = "equations of which none follows from the others or from what is held anyway: leave one out"
+        if len(common) == 1:
+            allowed = "an equation of what some variable changes: leave it out, or vary a parameter that it depends on"
         raise InputError("limits", " and ".join(sorted(common)), allowed, PLACE)
 
 
