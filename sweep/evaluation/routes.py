@@ -25,7 +25,7 @@ from sweep.families.machines.machine import Machine
 from sweep.families.machines.relations import EventValue
 from sweep.families.names import error_of, is_place
 from sweep.families.parts import Member
-from sweep.quantities.kinds import Extent, Group, Margin, Negative, Quantity, TimingOf, group_of
+from sweep.quantities.kinds import Extent, Group, LargestLength, Margin, Negative, Quantity, TimingOf, group_of
 from sweep.quantities.resolve import resolve
 from sweep.reductions.margins import NAMES as MARGINS
 from sweep.reductions.margins import combined, margin_suffixes, margins, with_transmission
@@ -228,7 +228,8 @@ def _of_members(
     margin: list[str] = []
     for name, one in asked.items():
         member = machine.split(name)
-        if member is not None and is_alone(member[0]) and not _is_of_point(member[0], one):
+        free = isinstance(one, LargestLength)  # of how the member is driven
+        if member is not None and (free or (is_alone(member[0]) and not _is_of_point(member[0], one))):
             own[member[0].name].append(member[1])
         elif isinstance(one, Margin) and member is None:
             margin.append(name)

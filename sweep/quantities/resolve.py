@@ -174,6 +174,8 @@ def _of_member(machine: Machine, name: str, member: Member, own: str) -> Quantit
         case Extent() | Dimension():
             whole = _from_dimensions(machine, name)
             return replace(whole, output=named) if whole is not None else OwnOutput(named, of_part=True)
+        case LargestLength(lengths=longest):
+            return LargestLength(named, tuple(f"{member.name}.{length}" for length in longest))
         case _:
             return point or OwnOutput(named, of_part=True)
 

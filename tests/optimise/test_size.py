@@ -52,6 +52,21 @@ def test_inputs_of_effects_are_no_lengths_of_the_mechanism() -> None:
     assert len(loaded.parameters) > 8 and lengths(loaded) == ("a", "b", "c", "e", "f", "g")
 
 
+@pytest.mark.parametrize("ratio", [1, 2, -3])
+def test_size_of_a_member_does_not_depend_on_its_gear(ratio: int) -> None:
+    """A drive on a geared shaft, of a given swing, is as small as the same drive alone."""
+    machine = sweep.machine({"needle": "slider_crank", "looper": {"family": "rssr", "ratio": ratio}})
+    alone, starts = linkage("size")
+    fixed = {"needle.a": 5.0, "needle.b": 30.0, "looper.f": -0.3, "looper.g": 0.2, "looper.alpha": 0.5}
+    variables = tuple(f"looper.{name}" for name in alone.variables)
+    limit = Limit("looper.swing", 0.8, 0.8)
+    problem = Problem(family(machine), variables, LOW, HIGH, fixed, "looper.size", (limit,))
+    rows = problem.rows(starts[:, [0, 1, 2, 3]], **{"needle.branch": 1.0, "looper.branch": 1.0})
+    best = minimise(problem, rows, OptimiseSettings())[0]
+    assert (best.ended, best.status) == ("converged", st.OK)
+    assert best.objective == pytest.approx(minimise(alone, starts, OptimiseSettings())[0].objective, rel=1e-9)
+
+
 def test_ratios_have_no_size() -> None:
     with pytest.raises(InputError, match="size"):
         sweep.summarise("geared_dwell", {"k": [1.2], "a": [1.0]}, ["size"])
