@@ -155,7 +155,8 @@ def _vanishes(problem: Problem, found: Result, true: float) -> bool:
     designs = problem.placed(found.design, np.concatenate([place + shares * (end - place) for end in (0.0, 1.0)]))
     designs = designs[np.isfinite(designs).all(axis=1)]
     columns = design_outputs(problem.family, designs, (problem.objective,), problem.accuracy, problem.window)
-    amount = np.abs(np.asarray(columns[problem.objective], np.float64)).max(initial=0.0, where=columns["status"] == st.OK)
+    known = np.asarray(columns[problem.objective], np.float64)[columns["status"] == st.OK]
+    amount = float(np.abs(known).max(initial=0.0))
     return abs(found.objective) <= NOTHING * amount and not abs(true) > NOTHING * amount
 
 

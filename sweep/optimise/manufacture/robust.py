@@ -242,7 +242,8 @@ class _Calibrate:
                 )
                 design, spent = result.design, spent + result.looks
                 values, share = self._made(design)
-            gained = 1.0 - result.objective / best.result.objective if best.share >= wanted else math.inf
+            value = best.result.objective  # negative where an output is to be large
+            gained = (value - result.objective) / (abs(value) or 1.0) if best.share >= wanted else math.inf
             better = share >= wanted and gained > 0.0
             if result.violation <= NEARLY and (better or (best.share < wanted and share > best.share)):
                 best = Robust(result, share, result.ended in CUT)
