@@ -89,6 +89,36 @@ def _along(path: Array, j: int, s: float) -> float:
 
 
 @inline
+def quintic(path: Array, row: int, j: int, at: float, size: float, out: Array) -> None:
+    """Compute coefficients (6,) of the path in cell j by x, with the cell's share = at + size x; (4)."""
+    n = path.shape[1]
+    h, j, k = TWO_PI / n, j % n, (j + 1) % n
+    p0, m0, c0 = path[row, j], path[row + 1, j] * h, path[row + 2, j] * h * h
+    p1, m1, c1 = path[row, k], path[row + 1, k] * h, path[row + 2, k] * h * h
+    d, e, f = p1 - p0 - m0 - 0.5 * c0, m1 - m0 - c0, c1 - c0
+    out[0], out[1], out[2] = p0, m0, 0.5 * c0
+    out[3], out[4], out[5] = 10.0 * d - 4.0 * e + 0.5 * f, -15.0 * d + 7.0 * e - f, 6.0 * d - 3.0 * e + 0.5 * f
+    # about the share ``at``: Horner's scheme, again and again
+    for k in range(5):
+        for i in range(4, k - 1, -1):
+            out[i] += at * out[i + 1]
+    factor = 1.0
+    for i in range(6):
+        out[i] *= factor
+        factor *= size
+
+
+@inline
+def power_series(series: Array, count: int, x: float) -> tuple[float, float]:
+    """Return a power series and its derivative at x."""
+    y, slope = series[count - 1], 0.0
+    for i in range(count - 2, -1, -1):
+        slope = slope * x + y
+        y = y * x + series[i]
+    return y, slope
+
+
+@inline
 def flown(foot: Foot, state: State, phi: float) -> tuple[float, float]:
     """Height and speed of the flying foot at a crank angle; (6)."""
     t = phi - state.since
@@ -211,6 +241,32 @@ def _above(path: Array, foot: Foot, state: State, j: int, low: float, high: floa
     elif two < 0.0 < one:
         high = _root(path, foot, state, j, low, high, 0)
     return (high - low) * (TWO_PI / path.shape[1]), _along(path, j, high) - _along(path, j, low)
+
+
+@kernel
+def edge_force(path: Array, foot: Foot, j: int, forces: Array) -> float:
+    """Force over m omega^2 on a foot that follows the rack where that passes the plate in cell j, else 0; (5).
+
+    It follows where the node on the rack's side has a force.
+    """
+    k = (j + 1) % path.shape[1]
+    if (path[0, j] > 0.0) == (path[0, k] > 0.0) or forces[j if path[0, j] > 0.0 else k] == 0.0:
+        return 0.0
+    s = _root(path, foot, State(PLATE, 0.0, 0.0, 0.0, 0.0), j, 0.0, 1.0, 0)
+    return held(foot, 0.0, rack_height(path, j, s)[2])
+
+
+@inline
+def written(outputs: Array, i: int, tally: Array, foot: Array, most: float, settled: bool) -> None:
+    """Write what the last turn has told of a foot, in the order of :data:`kernels.effects.foot.OUTPUTS`."""
+    mass, speed, restitution, rigid = foot[0], foot[3], foot[4], foot[5] == 0.0 and foot[6] == 0.0
+    unit = mass * speed * speed
+    outputs[0, i], outputs[1, i], outputs[2, i] = tally[0], tally[1] % TWO_PI, tally[2] % TWO_PI
+    outputs[3, i], outputs[4, i], outputs[5, i] = tally[3], tally[4], tally[5]
+    outputs[6, i] = tally[6] * speed
+    outputs[7, i] = mass * (1.0 + restitution) * tally[6] * speed if rigid else 0.0
+    outputs[8, i] = unit * tally[8] if tally[8] < math.inf else math.nan
+    outputs[9, i], outputs[10, i] = most, 1.0 if settled else 0.0
 
 
 @inline

@@ -13,7 +13,23 @@ from typing import NamedTuple
 import numpy as np
 
 from kernels import status as st
-from kernels.effects.foot import FLIGHT, PLATE, RACK, Foot, State, extremes, flown, held, march_cell, note, rack_height
+from kernels.effects.foot import (
+    FLIGHT,
+    PLATE,
+    RACK,
+    Foot,
+    State,
+    edge_force,
+    extremes,
+    flown,
+    held,
+    march_cell,
+    note,
+    power_series,
+    quintic,
+    rack_height,
+    written,
+)  # fmt: skip
 from kernels.jit import inline, kernel
 from kernels.types import TWO_PI, Array, Status
 
@@ -22,6 +38,8 @@ TERMS = 22  # of the power series: over a radian the next one is below 2^-53
 PARTS = 4  # of a cell at least
 MOST_PARTS = 4096  # of a cell: a fabric so stiff that it swings 650 times within a five-hundredth of a turn
 _HALVINGS = 60
+_SECTIONS = 40  # golden ones: a peak's place to 4e-9 of a piece, its height to rounding
+_GOLDEN = 0.6180339887498949
 _MOST_EVENTS = 64
 ALIKE = 1e-6  # share of the height of foot or rack by which turns that are alike may differ
 ROUNDING = 2.0**-36  # share of it by which a foot that repeats itself comes back elsewhere, with angles of many turns
@@ -46,36 +64,6 @@ class Piece(NamedTuple):
 
 
 @inline
-def _quintic(path: Array, row: int, j: int, at: float, size: float, out: Array) -> None:
-    """Compute coefficients (6,) of the path in cell j by x, with the cell's share = at + size x; (4)."""
-    n = path.shape[1]
-    h, j, k = TWO_PI / n, j % n, (j + 1) % n
-    p0, m0, c0 = path[row, j], path[row + 1, j] * h, path[row + 2, j] * h * h
-    p1, m1, c1 = path[row, k], path[row + 1, k] * h, path[row + 2, k] * h * h
-    d, e, f = p1 - p0 - m0 - 0.5 * c0, m1 - m0 - c0, c1 - c0
-    out[0], out[1], out[2] = p0, m0, 0.5 * c0
-    out[3], out[4], out[5] = 10.0 * d - 4.0 * e + 0.5 * f, -15.0 * d + 7.0 * e - f, 6.0 * d - 3.0 * e + 0.5 * f
-    # about the share ``at``: Horner's scheme, again and again
-    for k in range(5):
-        for i in range(4, k - 1, -1):
-            out[i] += at * out[i + 1]
-    factor = 1.0
-    for i in range(6):
-        out[i] *= factor
-        factor *= size
-
-
-@inline
-def _value(series: Array, count: int, x: float) -> tuple[float, float]:
-    """Return a power series and its derivative at x."""
-    y, slope = series[count - 1], 0.0
-    for i in range(count - 2, -1, -1):
-        slope = slope * x + y
-        y = y * x + series[i]
-    return y, slope
-
-
-@inline
 def _motion(foot: Foot, fabric: Fabric, y: float, v: float, angle: float, ground: Array, series: Array) -> None:
     """Compute power series (TERMS,) of a foot that presses on the fabric, by the share of the piece; (13)."""
     drag, pull = fabric.damping * angle, (foot.kappa * foot.kappa + fabric.stiffness) * angle * angle
@@ -92,7 +80,7 @@ def _motion(foot: Foot, fabric: Fabric, y: float, v: float, angle: float, ground
 @inline
 def _press(fabric: Fabric, ground: Array, y: float, v: float, x: float, angle: float) -> tuple[float, float]:
     """Force of the fabric, and how deep the foot stands in it, for a foot at height y with speed v; (14)."""
-    g, slope = _value(ground, 6, x)
+    g, slope = power_series(ground, 6, x)
     return fabric.stiffness * (g - y) + fabric.damping * (slope / angle - v), g - y
 
 
@@ -105,7 +93,7 @@ def _look(
         y, v = flown(foot, state, piece.begin + x * piece.angle)
         force, depth = _press(fabric, ground, y, v, x, piece.angle)
         return -min(force, depth * fabric.stiffness), y, v
-    y, slope = _value(series, TERMS, x)
+    y, slope = power_series(series, TERMS, x)
     force, _ = _press(fabric, ground, y, slope / piece.angle, x, piece.angle)
     return force, y, slope / piece.angle
 
@@ -131,6 +119,37 @@ def _event(foot: Foot, fabric: Fabric, state: State, piece: Piece, ground: Array
 
 
 @kernel
+def _borne_between(
+    foot: Foot, fabric: Fabric, state: State, piece: Piece, ground: Array, series: Array, end: float, tally: Array
+) -> None:
+    """Take the least and the greatest force on the first share of a piece into the tally; the foot lies there.
+
+    The force jumps where the ground does, so the piece's begin counts.  Over a radian of the swing it has one extreme
+    at most between the ends: golden sections find it where a parabola has its own there, or nearly so.
+    """
+    first = _look(foot, fabric, state, piece, ground, series, 0.0)[0]
+    middle = _look(foot, fabric, state, piece, ground, series, 0.5 * end)[0]
+    last = _look(foot, fabric, state, piece, ground, series, end)[0]
+    bend = first - 2.0 * middle + last
+    least, most = min(first, middle, last), max(first, middle, last)
+    beats = most + abs(bend) > tally[7] or (piece.on_rack and least - abs(bend) < tally[8])
+    if beats and abs(first - last) < 3.0 * abs(bend):
+        low, high, sense = 0.0, end, math.copysign(1.0, bend)
+        for _ in range(_SECTIONS):
+            one, two = high - _GOLDEN * (high - low), low + _GOLDEN * (high - low)
+            at_one = _look(foot, fabric, state, piece, ground, series, one)[0]
+            at_two = _look(foot, fabric, state, piece, ground, series, two)[0]
+            if sense * at_one < sense * at_two:
+                high = two
+            else:
+                low = one
+            least, most = min(least, at_one, at_two), max(most, at_one, at_two)
+    tally[7] = max(tally[7], most)
+    if piece.on_rack:
+        tally[8] = min(tally[8], max(least, 0.0))
+
+
+@kernel
 def _stretch(
     path: Array, foot: Foot, fabric: Fabric, state: State, piece: Piece, work: Array, tally: Array
 ) -> tuple[State, float]:
@@ -141,25 +160,26 @@ def _stretch(
     ground, along, series = work[0], work[1], work[2]
     size = piece.high - piece.low
     if piece.on_rack:
-        _quintic(path, 0, piece.j, piece.low, size, ground)
+        quintic(path, 0, piece.j, piece.low, size, ground)
     else:
         ground[:6] = 0.0
     if state.mode == LYING:
         _motion(foot, fabric, state.y, state.v, piece.angle, ground, series)
     end = _event(foot, fabric, state, piece, ground, series)
     ended, end = end <= 1.0, min(end, 1.0)
-    off, y, v = _look(foot, fabric, state, piece, ground, series, end)
+    _, y, v = _look(foot, fabric, state, piece, ground, series, end)
     phi = piece.begin + end * piece.angle
     if piece.on_rack:
-        _quintic(path, 3, piece.j, piece.low, size, along)
-        way = _value(along, 6, end)[0] - along[0]
+        quintic(path, 3, piece.j, piece.low, size, along)
+        way = power_series(along, 6, end)[0] - along[0]
         tally[5] += way
         if state.mode == FLIGHT:
             tally[3] += end * piece.angle
             tally[4] += way
-        tally[8] = min(tally[8], max(off, 0.0) if state.mode == LYING else 0.0)
+        if state.mode == FLIGHT:
+            tally[8] = min(tally[8], 0.0)
     if state.mode == LYING:
-        tally[7] = max(tally[7], off)
+        _borne_between(foot, fabric, state, piece, ground, series, end, tally)
     if not ended:
         return (State(LYING, phi, y, v, phi) if state.mode == LYING else state), 1.0
     if state.mode == LYING:
@@ -168,7 +188,7 @@ def _stretch(
             tally[1] = phi
         note(tally, phi, FLIGHT)
         return State(FLIGHT, phi, y, v, phi), end
-    _, slope = _value(ground, 6, end)
+    _, slope = power_series(ground, 6, end)
     tally[6] = max(tally[6], slope / piece.angle - v)
     if not math.isnan(tally[1]) and math.isnan(tally[2]):
         tally[2] = phi
@@ -227,19 +247,6 @@ def _borne(path: Array, node: int, foot: Foot, fabric: Fabric, state: State, phi
         y, bend = (path[0, node], path[2, node]) if state.mode == RACK else (0.0, 0.0)
         force = held(foot, y, bend)
     return y, force
-
-
-@inline
-def _written(outputs: Array, i: int, tally: Array, foot: Array, most: float, settled: bool) -> None:
-    """Write what the last turn has told of a foot, in the order of :data:`kernels.effects.foot.OUTPUTS`."""
-    mass, speed, restitution, rigid = foot[0], foot[3], foot[4], foot[5] == 0.0 and foot[6] == 0.0
-    unit = mass * speed * speed
-    outputs[0, i], outputs[1, i], outputs[2, i] = tally[0], tally[1] % TWO_PI, tally[2] % TWO_PI
-    outputs[3, i], outputs[4, i], outputs[5, i] = tally[3], tally[4], tally[5]
-    outputs[6, i] = tally[6] * speed
-    outputs[7, i] = mass * (1.0 + restitution) * tally[6] * speed if rigid else 0.0
-    outputs[8, i] = unit * tally[8] if tally[8] < math.inf else math.nan
-    outputs[9, i], outputs[10, i] = most, 1.0 if settled else 0.0
 
 
 @inline
@@ -331,12 +338,12 @@ def march(
             for j in range(count):
                 if rack[0, j] > 0.0:
                     tally[8] = min(tally[8], held(foot, rack[0, j], rack[2, j]))
-                most = max(most, forces[i, j])
+                most = max(most, forces[i, j], unit * edge_force(rack, foot, j, forces[i]))
         else:
             # A foot that lies still rises and sinks on its fabric.  Turns are alike once it comes back where it was.
             # What it moves by shrinks like a geometric series; its sum is what all later turns will differ by.
             moved, size = _apart(state, first, spring), max(-rest, highest)
             left = moved / (1.0 - moved / before) if moved < before < math.inf else math.inf
             settled = settled and (moved <= ROUNDING * size or left <= ALIKE * size)
-        _written(outputs, i, tally, feet[i], most, settled)
+        written(outputs, i, tally, feet[i], most, settled)
         changes[i, :] = tally[9:]

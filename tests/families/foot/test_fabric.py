@@ -112,6 +112,26 @@ def test_foot_on_fabric_lies_pressed_in_where_the_rack_is_away() -> None:
     assert got.force[lowest] == pytest.approx(p["F0"] * p["kf"] / (p["k"] + p["kf"]), rel=1e-6)
 
 
+@pytest.mark.parametrize("zeta", [1.0, 3.0])
+@pytest.mark.parametrize("kf", [1e6, 1e7])
+def test_the_greatest_force_of_a_damped_fabric_is_the_blow_at_entry(kf: float, zeta: float) -> None:
+    """The foot lies still until then: the force of rest, and the damper at the speed of the rack."""
+    p = HEAVY | {"omega": 100.0, "kf": kf, "cf": 2.0 * zeta * math.sqrt(kf * HEAVY["m"])}
+    got = sweep.summarise("foot", p, ["most_force", "flights", "v_entry"]).iloc[0]
+    assert got.flights == 0.0
+    assert got.most_force == pytest.approx(p["F0"] * kf / (p["k"] + kf) + p["cf"] * got.v_entry, rel=1e-9)
+
+
+@pytest.mark.parametrize("kf", [5e7, 2e8])
+def test_the_greatest_force_of_a_stiff_fabric_lies_between_the_ends_of_parts(kf: float) -> None:
+    p = HEAVY | {"kf": kf}
+    got = sweep.summarise("foot", p, ["most_force"]).iloc[0]
+    dense = sweep.evaluate("foot", p, ["force"], phi=2.0 * math.pi * np.arange(64 * NODES) / (64 * NODES))
+    # poses stand so near that they miss a share of (swing between two)^2/8 of the peak at most
+    missed = (math.sqrt(kf / p["m"]) / p["omega"] * 2.0 * math.pi / (64 * NODES)) ** 2 / 8.0
+    assert got.most_force == pytest.approx(dense.force.max(), rel=2.0 * missed)
+
+
 def test_fabric_at_another_speed_scales_with_its_square() -> None:
     names = ["flights", "phi_loss", "phi_land", "lost_angle"]
     p = HEAVY | {"kf": 5e4, "cf": 20.0}

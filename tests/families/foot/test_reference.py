@@ -249,3 +249,10 @@ def test_loads_are_the_momentum_of_the_foot_and_the_work_of_its_rack() -> None:
     np.testing.assert_allclose(found.drive_torque, np.where(above, found.force * 1.5e-3 * np.cos(phi), 0.0), atol=1e-12)
     # entry and leaving fall between nodes: a node's share of the largest torque is left
     assert abs(found.drive_torque.mean()) < found.drive_torque.abs().max() / 720
+
+
+@pytest.mark.parametrize("omega", [300.0, 400.0])
+def test_the_greatest_force_counts_the_jump_where_the_rack_passes_the_plate(omega):
+    got = sweep.summarise("foot", HEAVY | {"F0": 8.0, "p": -1e-3, "omega": omega}, ["most_force", "N_at_entry"]).iloc[0]
+    # the rack's curvature is interpolated there
+    assert got.most_force == pytest.approx(got.N_at_entry, rel=1e-7)
