@@ -66,8 +66,10 @@ def _outputs(joint: LinkJoint) -> tuple[Output, ...]:
     name, text = joint.name, joint.text
     return (
         Output(f"sliding_{name}", "length/time", f"sliding speed: {text}", EQUATION),
-        Output(f"stress_{name}", "pressure", f"largest pressure of the contact (Hertz): {text}", EQUATION),
-        Output(f"pv_{name}", "pressure*length/time", f"mean pressure times sliding speed: {text}", EQUATION),
+        Output(f"stress_{name}", "pressure", f"largest pressure of the contact (Hertz): {text}", EQUATION, kinks=True),
+        Output(
+            f"pv_{name}", "pressure*length/time", f"mean pressure times sliding speed: {text}", EQUATION, kinks=True
+        ),
     )
 
 
