@@ -17,6 +17,7 @@ from kernels import status as codes
 from sweep.evaluation.summaries import design_outputs
 from sweep.families.names import negative
 from sweep.optimise.manufacture.tolerance import deviating
+from sweep.pages import rendered
 from sweep.plot.datasets import draw_histogram
 from sweep.report.dataset import without_rows
 from sweep.report.figures import LIMIT
@@ -140,6 +141,16 @@ def test_dimensions_are_tried_although_the_limit_that_is_shown_is_far_and_anothe
     near = {"max_abs_d2psi": {"max": float(values.max() + 0.05 * values.std()), "unit": "1"}}
     found = made(data_of(row("optimum", 0.5), limits=far | near))
     assert found.share == 1.0 and found.histogram.shown.name == "swing" and found.costs
+
+
+def test_page_of_an_output_that_nothing_made_has_shows_empty_bins() -> None:
+    data = data_of(row("optimum", 0.5))
+    seen = made(data).histogram
+    nothing = replace(seen, shares=np.zeros_like(seen.shares), within=0.0)
+    names = {"study": data.study, "made_words": "", "tolerance": "", "number": lambda *x: str(x[0]), "costs": (), "sewn": None}
+    with np.errstate(all="raise"):
+        text = rendered("made.html", made={"histogram": nothing}, **names)
+    assert text.count('height="0.0"') == len(nothing.shares)
 
 
 def test_histogram_marks_what_misses_the_limit() -> None:
