@@ -147,9 +147,9 @@ def test_page_of_an_output_that_nothing_made_has_shows_empty_bins() -> None:
     data = data_of(row("optimum", 0.5))
     seen = made(data).histogram
     nothing = replace(seen, shares=np.zeros_like(seen.shares), within=0.0)
-    names = {"study": data.study, "made_words": "", "tolerance": "", "number": lambda *x: str(x[0]), "costs": (), "sewn": None}
+    empty = {"made_words": "", "tolerance": "", "costs": (), "sewn": None}
     with np.errstate(all="raise"):
-        text = rendered("made.html", made={"histogram": nothing}, **names)
+        text = rendered("made.html", made={"histogram": nothing}, study=data.study, number=lambda *x: x[0], **empty)
     assert text.count('height="0.0"') == len(nothing.shares)
 
 
