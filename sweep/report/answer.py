@@ -198,7 +198,8 @@ def search_sentence(data: Dataset, found: Scan) -> str:
     head = "The" if proof_sentence(data) else f"{NO_PROOF}: the"
     text = f"{head} optimiser started from {starts} {kind}design{'s' if starts != 1 else ''}"
     populations = 0 if data.survey is None else data.survey.populations
-    text += f", most of them ends of {populations} populations" if populations else " of the sweep"
+    some = "most of them " if starts > 2 * populations else ""  # at most two of a population, the others of the sweep
+    text += f", {some}ends of {populations} populations" if populations else " of the sweep"
     if math.isfinite(agree) and not populations:  # of those the survey tells more
         text += f", {number(agree)} of which ended at this value"
     if data.survey is not None:
