@@ -162,7 +162,8 @@ def _sweep_sentences(data: Dataset, found: Scan) -> list[str]:
     if shown is None or data.optimum is None or not found.best_row:
         return [text + "."]
     best = shown.show(found.best_row[shown.name])
-    return [f"{text}; the best of them has {shown.symbol} = {best}, from where the optimiser went on."]
+    on = "" if data.survey is not None and data.survey.populations else ", from where the optimiser went on"
+    return [f"{text}; the best of them has {shown.symbol} = {best}{on}."]
 
 
 def search_warnings(data: Dataset) -> list[str]:
