@@ -92,8 +92,9 @@ def _found(taking: Taking, poses: Poses, samples: int, wanted: frozenset[str]) -
     row, phi = roots.row[taken], roots.phi[taken]
     passage = whole(n, row, phi)
     after = whole(n, row, roots.phi[_following(roots, taken)])
-    low = _last(stops, depths, largest(stops.row, depths, n), passage)
-    top = _last(stops, -depths, largest(stops.row, -depths, n), low)
+    size = np.abs(poses.designs).max(axis=1)
+    low = _last(stops, depths, size, passage)
+    top = _last(stops, -depths, size, low)
     places: Places = {"at": passage, "after": after, "low": low, "top": low - np.mod(low - top, TWO_PI)}
     places["far"] = where_largest(extremes, -sense * across, n)
     lag = np.mod(extremes.phi - passage[extremes.row], TWO_PI)
@@ -169,13 +170,15 @@ class _Tip:
         return np.bincount(extremes.row, near, len(designs)) > 0
 
 
-def _last(stops: Found, depth: Array, deepest: Array, phi: Array) -> Array:
+def _last(stops: Found, depth: Array, size: Array, phi: Array) -> Array:
     """Return where the needle is lowest; of several such places, alike to rounding, the last one before ``phi``.
 
-    A guide whose own dead point is passed on the way down and up is lowest twice.
+    A guide whose own dead point is passed on the way down and up is lowest twice, and one that turns twice.  Depths are
+    differences of coordinates of that ``size``, (n,).
     """
     lag = np.mod(np.where(np.isnan(phi), TWO_PI, phi)[stops.row] - stops.phi, TWO_PI)
-    lag[depth < deepest[stops.row] - TANGENT * np.abs(deepest[stops.row])] = np.inf
+    deepest = largest(stops.row, depth, size.size)
+    lag[depth < (deepest - TANGENT * (np.abs(deepest) + size))[stops.row]] = np.inf
     found, order = np.full(deepest.size, np.nan), np.argsort(-lag, kind="stable")
     found[stops.row[order]] = stops.phi[order]
     return found

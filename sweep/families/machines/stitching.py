@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 
+from kernels.types import TWO_PI
 from sweep.errors import InputError, choices, known_keys, number, sign
 from sweep.families.capabilities import ThreadPath
 from sweep.families.machines.main_shaft import ShaftTorque
@@ -21,6 +22,7 @@ from sweep.families.machines.triangles import Entering
 from sweep.families.parts import Member, vector
 from sweep.numerics.curves import TableCurve, table_curve
 
+ROUNDED = 1e-9  # rad: 30 deg to 390 deg, each rounded, is a whole turn
 THREAD_KEYS = (
     "thread", "stock", "tension", "stiffness", "radius", "allowed", "sewn", "feeding", "drawing",
 )  # fmt: skip
@@ -68,7 +70,7 @@ def read_entering(name: str, table: dict[str, Any], tools: Mapping[str, Tool], w
         if not isinstance(table["window"], tuple) or len(table["window"]) != 2:
             raise InputError("window", table["window"], "two crank angles, from and to", where)
         start, end = (number("window", one, where) for one in table["window"])
-        window = (start, end)
+        window = (start, end) if end - start < TWO_PI - ROUNDED else None
     corners = (Spot(blade.eye), Spot(blade.hold), Spot(at=seam.at))
     words = "the tip passes along the normal of eye, hold, seam, or against it"
     sense = sign("sense", table.get("sense", 1), where, words)

@@ -9,8 +9,10 @@ from __future__ import annotations
 
 import math
 
+import numpy as np
 import pandas as pd
 import pytest
+from scipy.spatial.transform import Rotation
 
 import sweep
 from kernels import status as st
@@ -82,6 +84,24 @@ def test_reversed_running_passes_at_the_opposite_angle_in_the_other_sense():
     assert backwards["phi_a"] == pytest.approx(2.0 * math.pi - plain["phi_a"], abs=1e-12)
     for name in ("a_rise", "a_clearance", "a_above_eye", "a_directness"):
         assert backwards[name] == pytest.approx(plain[name], abs=1e-12), name
+
+
+@pytest.mark.parametrize(("turn", "ahead"), [((1.0, -0.7, 0.2), CRANK), ((0.1, 2.0, 0.4), 11.999), ((0, 0, 1), 0)])
+def test_of_two_lowest_places_the_last_one_counts_wherever_the_machine_stands(turn, ahead):
+    """The needle goes down twice in a turn; put ``ahead`` along itself its lowest depth is a small difference."""
+    rotation = Rotation.from_rotvec(turn)
+
+    def place(at, *axes):
+        axis, zero = rotation.apply(axes).tolist()
+        return {"at": rotation.apply(np.add(at, [ahead, 3.0, 50.0])).tolist(), "axis": axis, "zero": zero}
+
+    looper = {"family": "slotted", "offset": -0.5 * math.pi - PHI, "place": place(AT, [1.0, 0.0, 0.0], [0.0, 1.0, 0.0])}
+    needle = {"family": "guide", "ratio": 2, "place": place([0.0, 0.0, 0.0], [0.0, 0.0, 1.0], [1.0, 0.0, 0.0])}
+    long = {"scarf": rotation.apply([0.0, 0.0, 1.0]).tolist(), "top": -60.0, "point": 60.0}
+    got = found(machine_of(members={"needle": needle, "looper": looper}, needle=long), ["phi_a", "a_lag", "a_gauge"])
+    assert got["a_lag"] == pytest.approx(got["phi_a"] - 0.5 * math.pi, abs=1e-12) and got["a_lag"] < math.pi
+    turned = SHARE * math.cos(PHI)
+    assert got["a_gauge"] == pytest.approx(-AT[1] - ARM * turned / math.hypot(1.0, turned), abs=1e-11)
 
 
 def test_a_tip_that_touches_the_line_is_undecided():
@@ -172,6 +192,13 @@ def test_needle_enters_a_triangle_made_by_hand():
     back = found(entering({"enter": ["thin", "still", "seam"], "sense": 1}), ENTERED, DESIGN | UPPER)
     assert back["phi_c"] == pytest.approx(5.0 * math.pi / 3.0, abs=1e-12)
     assert back["status"] == st.WRONG_SIDE and back["c_from_thread"] == pytest.approx(5.0 - aside, abs=1e-12)
+
+
+@pytest.mark.parametrize("window", [(0.0, 360.0), (-180.0, 180.0), (30.0, 390.0), (100.0, 700.0)])
+def test_a_window_of_a_whole_turn_holds_every_angle(window):
+    table = {"enter": ["thin", "still", "seam"], "sense": -1, "window": [math.radians(end) for end in window]}
+    got = found(entering(table), ENTERED, DESIGN | UPPER)
+    assert got["status"] == st.OK and got["phi_c"] == pytest.approx(math.pi / 3.0, abs=1e-12)
 
 
 def test_loopers_tip_enters_a_triangle_made_by_hand():
