@@ -36,6 +36,7 @@ EDGE = 2.0**17  # times EPS of the size: what a curve that rises by six sizes a 
 CROWD = 48  # panels of one curve beyond which rounding alone is halved
 ALLOWED = 1.0 / 32.0  # of the target: what two successive polynomials may differ by
 AGAIN = 8.0  # times that difference is claimed: poses see a kink between them as low as that
+STEADY = 10.0 * AGAIN  # times EPS of a value: what is claimed at most of a curve that is level but for its rounding
 SLOPE = 2.0 * (NODES - 1) ** 2  # of a polynomial bounded by 1 on a panel of width 1 (Markov)
 
 
@@ -134,7 +135,9 @@ def _block(
             near = nearest(family, designs[rows[top.row]], MATTERS)
             order = np.full(top.row.size, order_of(family, request.pose))
             rounding += singular_share(near, top.phi, order) * np.abs(top.value)
-        late = (top.err > target * size[top.row]) & (top.err > rounding)
+        # the size of a level curve is rounding, and no target for its error
+        allowed = np.maximum(target * size[top.row], STEADY * EPS * np.abs(top.value))
+        late = (top.err > allowed) & (top.err > rounding)
         status[top.row[late]] = np.where(status[top.row[late]] == st.OK, st.NOT_CONVERGED, status[top.row[late]])
         at = rows[top.row]
         answer.value[at] = -top.value if request.mode == -1 else top.value

@@ -123,8 +123,8 @@ class ThreadBalance:
             ]
         if self.allowed is not None:
             found.append(("excess", "length", f"surplus of thread {who} beyond what is allowed"))
-        bends = bool(self.happens)
-        return tuple(Output(f"{who}_{key}", unit, text, EQUATION, kinks=bends) for key, unit, text in found)
+        kinks = {key for key, *_ in found} if self.happens else {"tension"} if self.moves or self.stiffness else set()
+        return tuple(Output(f"{who}_{key}", unit, text, EQUATION, kinks=key in kinks) for key, unit, text in found)
 
     @property
     def parameters(self) -> tuple[Parameter, ...]:
