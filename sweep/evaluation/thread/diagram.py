@@ -74,10 +74,10 @@ def diagram(
         raise InputError("mechanism", family.name, "a machine with threads", "thread diagram")
     given = in_radians(family, design, angles)
     known = {o.name for thread in threads for o in thread.outputs}
-    events = switches(family, one_design(family, given), known)[0]
+    wanted = [name for t in threads for name in (f"{t.name}_{key}" for key in COLUMNS) if name in known]
+    events = switches(family, one_design(family, given), wanted)[0]
     turn = np.arange(samples) * (TWO_PI / samples)
     phi = np.unique(np.mod(np.concatenate([turn, events - BESIDE, events + BESIDE]), TWO_PI))
-    wanted = [name for t in threads for name in (f"{t.name}_{key}" for key in COLUMNS) if name in known]
     found = evaluate(family, given, wanted, phi=phi).drop(columns="design")
     found["demand"] = sum(found[f"{t.name}_demand"] for t in threads)
     found.attrs["units"]["demand"] = found.attrs["units"][f"{threads[0].name}_demand"]

@@ -12,7 +12,7 @@ from kernels.status import OK
 from kernels.types import Array
 from sweep.errors import InputError, choices
 from sweep.families.base import Event, of_family
-from sweep.families.curve_features import Switches
+from sweep.families.curve_features import Switches, of_table
 from sweep.families.machines.crossings import SAMPLES, Poses, moved
 from sweep.families.machines.moments import Taking
 from sweep.families.machines.passages import passages
@@ -35,7 +35,7 @@ def happenings(machine: Machine) -> dict[str, Happening]:
 
 
 def check_happenings(machine: Machine) -> None:
-    """Refuse a thread whose path changes at something that is no event of the machine.
+    """Refuse a thread whose path changes at something that is no event, or at one of a thread that changes at events.
 
     Raises
     ------
@@ -43,11 +43,16 @@ def check_happenings(machine: Machine) -> None:
         that names the thread and the nearest right name.
     """
     every = _every(machine)
-    for thread in (r for r in machine.relations if isinstance(r, ThreadBalance)):
+    threads = [r for r in machine.relations if isinstance(r, ThreadBalance)]
+    changing = {output.name for thread in threads if thread.happens for output in thread.outputs}
+    for thread in threads:
+        place = f"machine.relations.{thread.name}"
         for name in thread.happens:
             if name not in every:
-                place = f"machine.relations.{thread.name}"
                 raise InputError("thread", name, f"events and moments: {choices(name, every)}", place)
+            if (of := getattr(every[name], "of", "")) in changing:
+                allowed = f"events of what does not change at events itself, as {of} does"
+                raise InputError("thread", name, allowed, place)
 
 
 def _every(machine: Machine) -> dict[str, Happening]:
@@ -82,11 +87,12 @@ def event_angles(machine: Machine, designs: Array) -> tuple[dict[str, Any], NDAr
     return {f"phi_{name}": phi[:, [k]] for k, name in enumerate(events)}, table[:, -1].astype(np.uint8)
 
 
-def switches_of_events(machine: Machine) -> list[Switches]:
-    """Return where curves of threads have kinks and jumps."""
+def switches_of_threads(machine: Machine) -> list[Switches]:
+    """Return where curves of threads have kinks and jumps: at events, and at the points of what is allowed."""
     threads = [r for r in machine.relations if isinstance(r, ThreadBalance)]
+    tables = [of_table(r.allowed.phi, frozenset({f"{r.name}_excess"})) for r in threads if r.allowed]
     of = frozenset(output.name for thread in threads for output in thread.outputs)
-    return [Switches(partial(_switches, machine), of)] if happenings(machine) else []
+    return [*tables, Switches(partial(_switches, machine), of)] if happenings(machine) else tables
 
 
 def _switches(machine: Machine, designs: Array) -> Array:
@@ -100,16 +106,18 @@ def _known(machine: Any) -> dict[bytes, Array]:
 
 @of_family
 def _columns(machine: Any) -> NDArray[np.intp]:
-    """Return the columns of the members that the events depend on."""
+    """Return the columns of the members, shafts and relations that the events depend on."""
     needs: set[str] = set()
     for event in happenings(machine).values():
         of = {event.of} if isinstance(event, Event) else set(event.rates)
-        made = [r.needs(frozenset(of)) for r in machine.relations if not of.isdisjoint(o.name for o in r.outputs)]
-        needs |= of.union(*made)
+        made = [r for r in machine.relations if not of.isdisjoint(o.name for o in r.outputs)]
+        needs |= of.union(*(r.needs(frozenset(of)) for r in made), (p.name for r in made for p in r.parameters))
     names = {name.partition(".")[0] for name in needs}
     for m in reversed(machine.members):
         if m.name in names and m.driver is not None:
             names.add(m.driver[0])
+        if m.name in names and m.mount is not None:
+            names.update(p.name for p in m.mount.shaft.parameters)
     return np.flatnonzero([name.partition(".")[0] in names for name in machine.parameter_names])
 
 

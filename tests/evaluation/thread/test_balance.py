@@ -159,6 +159,43 @@ def test_most_surplus_is_allowed_over_the_turn_and_its_place_is_found():
     assert found.range_upper_surplus[0] == pytest.approx(np.ptp(fine.upper_surplus), abs=1e-5)
 
 
+@pytest.mark.parametrize("width", [0.05, 0.002])
+def test_a_notch_in_what_is_allowed_is_not_missed(width):
+    """Between the points of its table the curve is smooth: Gauss on each piece knows its mean to rounding."""
+    points = [0.0, 1.0, 1.0 + width, 1.0 + 2.0 * width]
+    thread = {"thread": [STOP, "drive.eye", HOLE], "allowed": {"phi": points, "values": [6.0, 6.0, -30.0, 6.0]}}
+    made = sweep.machine({"drive": {"family": "four_bar", "eye": [12.0, 5.0, 3.0]}}, {"upper": thread})
+    table = {"drive.a": 10.0, "drive.b": 40.0, "drive.c": 30.0, "drive.e": 38.0}
+    found = sweep.summarise(made, table, ["max_upper_excess", "rms_upper_excess"], accuracy=1e-8).iloc[0]
+    x, weights = np.polynomial.legendre.leggauss(80)
+    square, most = 0.0, -np.inf
+    for start, end in pairwise([*points, 2.0 * np.pi]):
+        at = start + 0.5 * (end - start) * (x + 1.0)
+        square += 0.5 * (end - start) * weights @ poses(made, ["upper_excess"], table, at).upper_excess.to_numpy() ** 2
+        most = max(most, poses(made, ["upper_excess"], table, np.linspace(start, end, 400)).upper_excess.max())
+    assert found.rms_upper_excess == pytest.approx(math.sqrt(square / (2.0 * np.pi)), rel=1e-8)
+    assert most <= found.max_upper_excess + 1e-12 and found.max_upper_excess < most + 0.1 * width
+    assert found.status == st.OK
+
+
+@pytest.mark.parametrize(("changes", "speed"), [({"stock": 257.5, "stiffness": 0.1}, 0.0), ({}, 700.0)])
+def test_extremes_of_the_tension_at_its_kinks_keep_the_accuracy(changes, speed):
+    """It has kinks where the thread becomes slack, and where its speed leaves the measured range."""
+    table = {"drive.a": 10.0, "drive.b": 40.0, "drive.c": 30.0, "drive.e": 38.0, "upper_speed": speed}
+    table |= {"drive.xi": 12.0, "drive.eta": 5.0, "drive.lam": 0.3, "drive.h": 0.0}
+    thread = {"thread": [STOP, "drive.point", HOLE], "tension": 0.2, "radius": 2.4} | changes
+    made = sweep.machine({"drive": "guide"}, {"upper": thread})
+    found = sweep.summarise(made, table, ["min_upper_tension", "max_upper_tension"], accuracy=1e-8).iloc[0]
+    size = 1e-8 * found.max_upper_tension
+    assert found.status == st.OK and max(found.err_min_upper_tension, found.err_max_upper_tension) <= size
+    for name, sign in (("min_upper_tension", -1.0), ("max_upper_tension", 1.0)):
+        phi = np.linspace(0.0, 2.0 * np.pi, 2001)
+        for _ in range(4):  # ever closer to the pose that is beyond all others
+            tension = sign * poses(made, ["upper_tension"], table, phi).upper_tension
+            phi = phi[tension.argmax()] + (phi[1] - phi[0]) * np.linspace(-1.0, 1.0, 201)
+        assert found[name] == pytest.approx(sign * tension.max(), abs=2.0 * size), name
+
+
 @pytest.mark.parametrize(
     ("changes", "word"),
     [

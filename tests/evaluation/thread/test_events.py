@@ -141,6 +141,40 @@ def test_complex_designs_move_the_events_too():
         np.testing.assert_allclose(np.imag(tiny) / 1e-100, (ahead - behind) / 2e-6, atol=1e-6, err_msg=name)
 
 
+@pytest.mark.parametrize("tension", [0.2, 0.4711534586397418, 0.1234])
+def test_a_tension_that_nothing_changes_is_known(tension):
+    events = {"sewn": 4.0, "feeding": ["cast", "a"], "drawing": ["a", "cast"]}
+    made = machine(thread=[GUIDE.tolist(), "thin"], tension=tension, **events)
+    wanted = ["min_upper_tension", "max_upper_tension", "range_upper_tension"]
+    found = sweep.summarise(made, DESIGN, wanted, accuracy=1e-9).iloc[0]
+    assert found["status"] == 0 and found[wanted].tolist() == pytest.approx([tension, tension, 0.0], abs=1e-15)
+
+
+def test_events_of_several_designs_follow_the_phase_and_the_place_of_their_shafts():
+    """Turned ahead by 1 rad, the shaft of all that moves does everything 1 rad earlier."""
+    relations = {"up": {"event": "drive.eye_x", "level": 9.0}, "down": {"event": "drive.eye_x", "level": 9.0}}
+    relations["down"]["rising"] = False
+    relations["upper"] = {"thread": [HOLE.tolist(), {"on": "drive.eye", "held": ["up", "down"]}, SEAM.tolist()]}
+    drive = {"family": "four_bar", "eye": [12.0, 5.0, 0.0], "shaft": "side"}
+    made = sweep.machine({"drive": drive}, relations, shafts={"main": {}, "side": {"phase": 0.3}})
+    design = {"drive.a": 10.0, "drive.b": 40.0, "drive.c": 30.0, "drive.e": 38.0}
+    rows, phi = {name: [x] * 3 for name, x in design.items()}, np.linspace(0.0, 5.2, 40)
+    rows |= {"side_phase": [0.3, 1.3, 1.3], "side_x_at": [0.0, 0.0, 3.0]}
+    found = sweep.evaluate(made, rows, ["upper_needed", "drive.eye_x"], phi=np.concatenate([phi, phi + 1.0]))
+    needed, eye = (found[name].to_numpy().reshape(3, 2, 40) for name in ("upper_needed", "drive.eye_x"))
+    np.testing.assert_allclose(needed[1, 0], needed[0, 1], rtol=1e-12)
+    short = math.dist(HOLE, SEAM)
+    np.testing.assert_array_equal(needed > short + 1e-9, eye > 9.0)
+    assert (needed[1] != needed[2]).any()
+
+
+def test_a_path_that_changes_at_an_event_of_one_that_changes_is_refused():
+    relations = {"upper": {"thread": PATH}, "tight": {"event": "upper_surplus", "level": -90.0}}
+    relations["lower"] = {"thread": [GUIDE.tolist(), {"on": HOLE.tolist(), "held": ["tight", "cast"]}, SEAM.tolist()]}
+    with pytest.raises(InputError, match="lower: thread = 'tight'; allowed: events of what does not change at events"):
+        machine_of(RELATIONS | relations)
+
+
 def test_rigid_guides_draw_the_stitch_up_to_the_greatest_demand():
     """What passes the tensioner, if thread does so when it is taut alone, is the running maximum of all that is asked.
 
