@@ -29,7 +29,7 @@ LENGTH = Parameter("contact_length_r", "length", "length of the roller on the ca
 OUTPUTS = (
     Output("undercut", "1", "curvature of the pitch curve times the roller; from 1 on it is undercut", EQUATION),
     Output("profile_curvature", "1/length", "curvature of the cam's profile, positive where it is convex", EQUATION),
-    Output("stress_r", "pressure", "largest pressure between roller and cam (Hertz)", EQUATION),
+    Output("stress_r", "pressure", "largest pressure between roller and cam (Hertz)", EQUATION, kinks=True),
 )
 
 
