@@ -165,7 +165,8 @@ def events(designs: Array, wanted: frozenset[str], accuracy: Accuracy) -> Column
         errors = {
             "phi_entry": angle, "phi_leave": angle, "feed_angle": angle, "entry_speed": height + angle * size,
             "leave_speed": height + angle * size, "stitch_length": height + angle * size, "rise": height,
-            "flatness": height / columns["rise"] + (height + angle * size) / np.abs(columns["stitch_length"]) + 1e-10,
+            "flatness": height / columns["rise"] + (height + angle * size) / np.abs(columns["stitch_length"])
+            + columns.pop("area_error"),
             "crossings": 0.0 * angle,
         }  # fmt: skip
     for name, error in errors.items():

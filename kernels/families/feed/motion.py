@@ -152,14 +152,15 @@ def lift_rows(designs: Array, cos_phi: Array, sin_phi: Array, chi: Array, status
 
 SAMPLES = 256
 _MOST_STEPS = 100  # a bound, so that the loop always ends
-_PANELS = 16
+_PANELS, _MOST_PANELS = 16, 4096
+_AREA_SETTLED = 1e-10  # of the area when the panels are halved: what 8 points a panel leave then is rounding
 # Gauss-Legendre, 8 points: abscissae and weights of the positive half
 _NODES = (0.1834346424956498, 0.5255324099163290, 0.7966664774136267, 0.9602898564975363)
 _WEIGHTS = (0.3626837833783620, 0.3137066458778873, 0.2223810344533745, 0.1012285362903763)
 
 EVENTS = (
     "phi_entry", "phi_leave", "feed_angle", "entry_speed", "leave_speed", "stitch_length", "rise", "flatness",
-    "crossings",
+    "crossings", "area_error",
 )  # fmt: skip
 
 
@@ -199,17 +200,27 @@ def _passage(r: Reduced, low: float, high: float, f_low: float, f_high: float, o
 
 
 @inline
-def _between(r: Reduced, entry: float, leave: float) -> tuple[float, float]:
-    """Greatest height between two crank angles, and the area under the path there."""
-    rise, area = 0.0, 0.0
-    width = (leave - entry) / _PANELS
-    for k in range(_PANELS):
+def _area(r: Reduced, entry: float, leave: float, panels: int) -> float:
+    """Area under the path between two crank angles, by Gauss's rule on so many panels."""
+    area, width = 0.0, (leave - entry) / panels
+    for k in range(panels):
         middle = entry + (k + 0.5) * width
         for n in range(4):
             for side in (-1.0, 1.0):
                 phi = middle + side * 0.5 * width * _NODES[n]
                 tooth, _ = tooth_at(r, math.cos(phi), math.sin(phi))
                 area += 0.5 * width * _WEIGHTS[n] * (tooth.y - r.plate) * tooth.x1
+    return area
+
+
+@inline
+def _between(r: Reduced, entry: float, leave: float) -> tuple[float, float, float]:
+    """Greatest height between two crank angles, the area under the path there, and its last change."""
+    rise, panels, area, change = 0.0, _PANELS, _area(r, entry, leave, _PANELS), math.inf
+    while change > _AREA_SETTLED * abs(area) and panels < _MOST_PANELS:
+        panels *= 2
+        finer = _area(r, entry, leave, panels)
+        area, change = finer, abs(finer - area)
     # the top is where the slope falls through zero: exact, where the largest of the samples would lie below it
     before, f_before = entry, _height(r, entry, 1)
     steps = 4 * _PANELS
@@ -221,7 +232,7 @@ def _between(r: Reduced, entry: float, leave: float) -> tuple[float, float]:
             top = _passage(r, before, phi, f_before, f, 1) if f < 0.0 else phi
             rise = max(rise, _height(r, top, 0))
         before, f_before = phi, f
-    return rise, area
+    return rise, area, change
 
 
 @kernel
@@ -234,7 +245,8 @@ def feeding(designs: Array, status: Status, outputs: Array) -> None:
     ----------
     designs : (n, 23) columns as `PARAMETERS` of sweep/families/feed.py
     status : (n,) out; OK, NO_EVENT (the tooth never passes the plate), that of the first pose that is not assembled
-    outputs : (9, n) out in the order of :data:`EVENTS` [rad, length, length per rad]; nan where the status is not OK
+    outputs : (10, n) out in the order of :data:`EVENTS` [rad, length, length per rad], the error of the area in that
+        of the flatness; nan where the status is not OK
 
     Notes
     -----
@@ -244,7 +256,7 @@ def feeding(designs: Array, status: Status, outputs: Array) -> None:
     step = TWO_PI / SAMPLES
     for i in range(designs.shape[0]):
         r = reduce_design(designs, i)
-        for k in range(9):
+        for k in range(len(EVENTS)):
             outputs[k, i] = math.nan
         worst = st.OK if r.valid else st.INVALID_INPUT
         for j in range(SAMPLES):
@@ -275,8 +287,9 @@ def feeding(designs: Array, status: Status, outputs: Array) -> None:
         leave = _passage(r, last * step, (last + 1) * step, heights[last % SAMPLES], heights[(last + 1) % SAMPLES], 0)
         one, _ = tooth_at(r, math.cos(entry), math.sin(entry))
         two, _ = tooth_at(r, math.cos(leave), math.sin(leave))
-        rise, area = _between(r, entry, leave)
+        rise, area, change = _between(r, entry, leave)
         stitch = two.x - one.x
         outputs[0, i], outputs[1, i], outputs[2, i] = entry % TWO_PI, leave % TWO_PI, leave - entry
         outputs[3, i], outputs[4, i], outputs[5, i] = one.y1 * r.unit, two.y1 * r.unit, stitch * r.unit
         outputs[6, i], outputs[7, i] = rise * r.unit, area / (rise * stitch)
+        outputs[9, i] = change / abs(rise * stitch)
