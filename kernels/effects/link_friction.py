@@ -68,6 +68,13 @@ def _moved(a: Vector, b: Vector) -> Vector:
 
 
 @inline
+def _lever(kind: int, data: Array) -> float:
+    """Friction radius of a joint; of a shaft that rubs at its collar alone the thrust radius."""
+    bare = kind == SHAFT and data[RADIUS] == 0.0
+    return float(data[THRUST] if bare else data[RADIUS])
+
+
+@inline
 def direction(
     links: Links, i: int, k: int, joint: Index, ends: Index, place: Vector, data: Array, speed: float
 ) -> tuple[Vector, Vector, float]:
@@ -75,7 +82,7 @@ def direction(
     records, lines, axis = links.bodies[i, k], links.lines[i, k], vector(links.axes[i, k, max(joint[FREEDOM], 0)])
     one, two = _rates(records[max(ends[0], 0)], ends[0]), _rates(records[max(ends[1], 0)], ends[1])
     rod, slender, kind = posed(records[max(joint[ROD], 0)]).x, joint[ROD], joint[KIND]
-    rubs, radius = data[MU], data[RADIUS]
+    rubs, radius = data[MU], _lever(kind, data)
     sense = math.copysign(1.0, speed) if speed != 0.0 else 0.0
     turn, slip = _moved(one.omega, two.omega), (0.0, 0.0, 0.0)
     if slender >= 0:
@@ -116,11 +123,12 @@ def _put_parts(links: Links, i: int, k: int, joints: Index, friction: Array, roo
 @inline
 def _sizes(joint: Index, data: Array, part: Array) -> tuple[float, float, float]:
     """Load of a joint that friction is proportional to, (9), and the loads of its two supports across the axis."""
-    kind, radius, thrust = joint[KIND], data[RADIUS], data[THRUST] * abs(part[6])
+    kind, lever, thrust = joint[KIND], _lever(joint[KIND], data), data[THRUST] * abs(part[6])
     first, other = norm(vector(part)), norm(latter(part))
-    share = thrust / radius if kind == SHAFT and radius > 0.0 else 0.0
+    share = thrust / lever if kind == SHAFT and lever > 0.0 else 0.0
     held = 1.0 if kind in (SHAFT, GUIDE) else 0.0
-    return first + other + share, held * first, held * other
+    across = first + other if kind != SHAFT or data[RADIUS] > 0.0 else 0.0
+    return across + share, held * first, held * other
 
 
 @inline

@@ -237,6 +237,15 @@ def test_without_coefficients_friction_changes_nothing_and_steep_ones_jam(case):
     assert steep["drive_torque_friction"].isna().equals(steep["status"] != st.OK)
 
 
+def test_a_collar_rubs_where_the_friction_radius_of_its_shaft_is_zero():
+    """Friction is continuous as the radius goes to 0: the collar's share was lost at 0 itself."""
+    names = ["lost_torque_a", "lost_torque_d", "drive_torque_friction"]
+    both = [turn("five_link", rubbing("five_link") | {"radius_a": x, "radius_d": x}, names)[2] for x in (0.0, 1e-9)]
+    for name in names:
+        np.testing.assert_allclose(both[0][name], both[1][name], atol=1e-7 * np.abs(both[1][name]).max())
+    assert both[0]["lost_torque_a"].min() > 0.0
+
+
 def test_a_tenth_of_a_percent_of_the_tool_is_seen():
     _, d, poses = turn("spherical_looper", {"m_tool": 0.8008}, vectors("spherical_looper"))
     found, joints, _, _ = needed("spherical_looper", poses, d)
