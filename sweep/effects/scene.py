@@ -73,7 +73,11 @@ class Scene:
     def motion(self) -> Columns:
         """Pose outputs of the family that its joint records, or its links, and the next stage's crank are made of."""
         tree = self.family.find(LinkTree)
-        needs = {*(self._joints.needs if tree is None else tree.needs), *(self._gears if self.after else ())}
+        needs = set(self._gears if self.after else ())
+        if tree is not None:
+            needs.update(tree.needs)
+        elif self._joints.moved is None:
+            needs.update(self._joints.needs)
         if self.after:
             needs |= driving_names(self.family, self.after[0].family)
         return self.family.poses(self.designs, self.angles, frozenset(needs))
@@ -87,7 +91,11 @@ class Scene:
     def records(self) -> tuple[Array, Array]:
         """Joint records per pose (n, m, PER_POSE) and per design (n, PER_DESIGN); see :mod:`kernels.linkage.joints`."""
         per_pose, per_design = np.empty((*self.shape, PER_POSE)), np.empty((len(self.designs), PER_DESIGN))
-        self._joints.fill(self.designs, self.angles, self.motion, per_pose, per_design)
+        motion, moved = self.motion, self._joints.moved
+        if moved is not None:
+            run = moved[self.family.poses is self.family.precise_poses]
+            motion = run(self.designs, self.angles, frozenset(self._joints.needs))
+        self._joints.fill(self.designs, self.angles, motion, per_pose, per_design)
         return per_pose, per_design
 
     @cached_property

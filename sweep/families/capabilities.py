@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from kernels.types import Array, Numbers
-from sweep.families.base import Angles, Columns, Family, Output
+from sweep.families.base import Angles, Columns, Family, Output, PoseFunction
 
 if TYPE_CHECKING:  # families without such kernels do not wait for them
     from kernels.chains.form import Form
@@ -49,12 +49,13 @@ class JointRecords:
 
     ``fill(designs, angles, motion, per_pose, per_design)`` writes the records that :mod:`kernels.linkage.joints`
     describes, from the pose outputs ``needs`` in ``motion``, in the frame of the family.  ``follower`` is what the
-    coupler drives.
+    coupler drives.  ``moved`` gives these outputs where the family has them not: plain poses and precise ones.
     """
 
     fill: FillFunction
     needs: tuple[str, ...]
     follower: Literal["rocker", "slider"]
+    moved: tuple[PoseFunction, PoseFunction] | None = None
 
 
 @dataclass(frozen=True)

@@ -120,7 +120,8 @@ def _capabilities(family: Family) -> list[str]:
     if "discriminant" in names and family.find(Assembly) is None:
         faults.append("a discriminant without an Assembly: say what divides it (rotatability needs it)")
     for records in family.every(JointRecords):
-        faults += [f"JointRecords needs {one!r}, which is no pose output" for one in records.needs if one not in names]
+        missing = [one for one in records.needs if one not in names and records.moved is None]
+        faults += [f"JointRecords needs {one!r}, which is no pose output" for one in missing]
     for tree in family.every(LinkTree):
         faults += [f"LinkTree needs {one!r}, which is no pose output" for one in tree.needs if one not in names]
         faults += _tree(tree)

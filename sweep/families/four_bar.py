@@ -96,7 +96,7 @@ FAMILY = Family(
     capabilities=(
         can.Dimensions(links("a b c"), arms=(can.Arm(("xi", "eta"), ("b",)),)),
         can.Assembly("discriminant", "pressure_angle", crank_rocker.discriminant_scale),
-        *crank_rocker.moving_alike(as_crank_rocker, needs=crank_rocker.JOINT_NEEDS),
+        *crank_rocker.moving_alike(as_crank_rocker, itself=True),
         replace(crank_rocker.SERIES, matrix=as_crank_rocker),
         can.OutputLink(standing(PARAMETERS, "e").at),
         can.ToolPoint(guide.tool_point),

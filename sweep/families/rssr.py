@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from functools import lru_cache
+from functools import lru_cache, partial
 from typing import Any
 
 import numpy as np
@@ -11,7 +11,7 @@ from kernels import status as st
 from kernels.families import rssr
 from kernels.types import Array
 from sweep.families import capabilities as can
-from sweep.families.base import Accuracy, Angles, Columns, Family, Output, Parameter, Step, Work
+from sweep.families.base import Accuracy, Angles, Columns, Family, Output, Parameter, PoseFunction, Step, Work
 from sweep.families.hardpoints import CRANK_ROCKER_POINTS
 from sweep.families.outputs import coordinate_outputs, joint_outputs, ladders
 from sweep.families.poses import move_records, of_matrix, optional_outputs, poses_of, together
@@ -111,7 +111,7 @@ def ellipse(designs: Array) -> Array:
 
 
 def moving_alike(
-    matrix: can.DesignMap, place: tuple[Array, can.DesignMap] | None = None, needs: tuple[str, ...] = ()
+    matrix: can.DesignMap, place: tuple[Array, can.DesignMap] | None = None, itself: bool = False
 ) -> tuple[object, ...]:
     """Return what a family that moves as a crank-rocker can be asked for: joint records, pressure ellipse, proofs.
 
@@ -119,17 +119,19 @@ def moving_alike(
     ----------
     matrix : the crank-rocker's designs of those of the family
     place : rotation (3, 3) and origin (n, 3) of the crank-rocker's frame in that of the family; None where it is that
-    needs : what joint records are made of, where the family has that under the crank-rocker's names
+    itself : whether the family has what joint records are made of, under the crank-rocker's names
     """
 
     def fill(designs: Array, angles: Angles, motion: Columns, per_pose: Array, per_design: Array) -> None:
-        own = matrix(designs)
-        turned = motion if needs else poses(own, angles, frozenset(JOINT_NEEDS))
-        joint_records(own, angles, turned, per_pose, per_design)
+        joint_records(matrix(designs), angles, motion, per_pose, per_design)
         if place is not None:
             move_records(place[0], place[1](designs), per_pose, per_design)
 
-    records = can.JointRecords(fill, needs, "rocker")
+    def turned(run: PoseFunction, designs: Array, angles: Angles, wanted: frozenset[str]) -> Columns:
+        return run(matrix(designs), angles, wanted)
+
+    moved = None if itself else (partial(turned, poses), partial(turned, precise_poses))
+    records = can.JointRecords(fill, JOINT_NEEDS, "rocker", moved)
     return records, can.PressureEllipse(of_matrix(ellipse, matrix)), can.CrankRockerLoop(matrix)
 
 

@@ -193,3 +193,28 @@ def test_a_later_stage_has_no_effect_that_presumes_an_even_crank():
     later = {p.entry.name for p in placed if p.stage == 1}
     assert {"kinetostatics", "friction", "pressure", "coupler", "sliding_limits"} <= later
     assert not later & {"speed_fluctuation", "elasticity", "dynamic_elasticity", "bearing_life", "rolling_limits"}
+
+
+HAIR = {
+    "guide": {"a": 0.8509678590883607, "b": 1.1532450556674578, "c": 2.554389923782584, "e": -2.85666711612713},
+    "kim_dison": {"a": 0.8668281274052625, "b": 1.286063656625761, "c": 1.3895069454107167, "e": -0.6370909584595257,
+                  "f": -2.184882172876774, "alpha": 0.5 * np.pi},
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("name", HAIR)
+def test_mean_loads_a_hair_from_a_change_point_are_those_of_the_crank_rocker(name):
+    """The margin is 1e-8: loads were made of plain poses there, and off by 100 times their error."""
+    plain = {"f": 0.0, "g": 0.0, "alpha": 0.0} | HAIR[name]
+    own = {"r": "a", "l": "b", "h": "c", "a": "e", "b": "f"} if name == "kim_dison" else {x: x for x in "abce"}
+    row = {ours: plain[theirs] for ours, theirs in own.items()} | {"branch": -1.0 if name == "kim_dison" else 1.0}
+    row |= {"xi": 1.0, "eta": 0.3, "lam": 0.4, "h": 0.0} if name == "guide" else {}
+    bodies = {"m_crank": 0.3, "m_coupler": 0.5, "m_rocker": 0.7, "load_torque": 3.0, "speed": OMEGA}
+    wanted = ["rms_force_c", "rms_drive_torque"]
+    found, known = (
+        sweep.summarise(family, table | bodies, wanted, accuracy=1e-8).iloc[0]
+        for family, table in ((name, row), ("rssr", plain | {"branch": 1.0}))
+    )
+    assert found["status"] == known["status"] == st.OK
+    for output in wanted:
+        assert abs(found[output] - known[output]) <= found[f"err_{output}"] + known[f"err_{output}"], output
