@@ -111,6 +111,16 @@ def test_finished_steps_are_not_searched_again(
         run(other, copied(folder, tmp_path / "other"), jobs=1)
 
 
+def test_a_front_that_is_flat_before_all_its_points_is_finished(whole: tuple[Study, Path], tmp_path: Path) -> None:
+    """Its run ended with "stopped by signal 2", each time anew."""
+    study, folder = whole
+    assert study.pareto is not None
+    flat = replace(study, pareto=replace(study.pareto, bounds=(1.5, 1.55), points=5))
+    path = beside(run(flat, copied(folder, tmp_path / "flat"), jobs=1)) / PARETO
+    front = saved(path, pq.read_schema(path).metadata[b"key"].decode())
+    assert front is not None and front.filled and front.complete and len(front.bounds) == 2
+
+
 def test_other_bounds_keep_designs_and_optimum(whole: tuple[Study, Path], tmp_path: Path) -> None:
     study, folder = whole
     again = copied(folder, tmp_path / "again")

@@ -85,7 +85,7 @@ def front_study(
     starts = _starts(study, settings, problem, place, optimum)
     kept, begin = front, time.monotonic()
     for best in advance(problem, settings, front, starts, stop, jobs):
-        kept = best if best.taken > kept.taken else kept
+        kept = best if best.complete or best.taken > kept.taken else kept
         say("front", kept.taken, many, "steps")
         _write(path, study, settings, best, key, kept)
     late = settings.time_budget is not None and time.monotonic() - begin >= settings.time_budget
