@@ -78,15 +78,15 @@ def vector(value: object, where: str) -> tuple[float, float, float]:
     InputError
         for anything else.
     """
-    allowed = "three finite numbers [x, y, z]"
+    allowed, name = "three finite numbers [x, y, z]", where.rpartition(".")[2]
     if not isinstance(value, Sequence | np.ndarray) or isinstance(value, str) or len(value) != 3:
-        raise InputError(where, value, allowed, where)
+        raise InputError(name, value, allowed, where)
     try:
         x, y, z = (float(part) for part in value)
     except (TypeError, ValueError):
-        raise InputError(where, value, allowed, where) from None
+        raise InputError(name, value, allowed, where) from None
     if not np.isfinite([x, y, z]).all():
-        raise InputError(where, value, allowed, where)
+        raise InputError(name, value, allowed, where)
     return x, y, z
 
 

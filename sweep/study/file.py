@@ -198,13 +198,17 @@ TwoLengths = Annotated[list[Length], Field(min_length=2, max_length=2)]
 ThreeLengths = Annotated[list[Length], Field(min_length=3, max_length=3)]
 
 # Of a plain union of types pydantic reports the complaints of each one.
-ONE, LIST, TABLE = "<one>", "<list>", "<table>"
+ONE, WORD, LIST, TABLE = "<one>", "<word>", "<list>", "<table>"
 KIND = Discriminator(
     lambda value: LIST if isinstance(value, list) else TABLE if isinstance(value, dict | Section) else ONE
 )
 Place = Annotated[Annotated[str, Tag(ONE)] | Annotated[ThreeLengths, Tag(LIST)], KIND]
 LengthOrPlace = Annotated[Annotated[Length, Tag(ONE)] | Annotated[ThreeLengths, Tag(LIST)], KIND]
 Lengths = Annotated[Annotated[Length, Tag(ONE)] | Annotated[list[Length], Tag(LIST)], KIND]
+TextOrNumber = Annotated[
+    Annotated[str, Tag(WORD)] | Annotated[Number, Tag(ONE)],
+    Discriminator(lambda value: WORD if isinstance(value, str) else ONE),
+]
 
 
 def holds(words: str, default: Any = None, **more: Any) -> Any:
@@ -271,7 +275,7 @@ def _validated(model: type[S], raw: Mapping[str, Any], key: Key, faults: Faults)
     except ValidationError as error:
         bad: set[str | int] = set()
         for item in error.errors(include_url=False):
-            place = tuple(part for part in item["loc"] if part not in (ONE, LIST, TABLE))
+            place = tuple(part for part in item["loc"] if part not in (ONE, WORD, LIST, TABLE))
             bad.add(place[0])
             if item["type"] == "extra_forbidden":
                 faults.unknown((*key, *place), _keys(_reached(model, place[:-1])[0]))

@@ -51,8 +51,12 @@ SETTINGS = {
 def limits_of_settings(file: StudyFile) -> list[Limit]:
     """Return the limits of every relation that names the settings of a machine, and report a name that is none."""
     found = []
-    for relation, name in _named(file.data.get("relations")).items():
+    for relation, table in _settled(file.data.get("relations")).items():
         key: Key = ("relations", relation, "settings")
+        name = table["settings"]
+        if "take" not in table:
+            file.faults.value(key, name, "nothing here: settings are limits of a relation take")
+            continue
         setting = SETTINGS.get(name) if isinstance(name, str) else None
         if setting is None:
             file.faults.value(key, name, choices(str(name), SETTINGS))
@@ -62,9 +66,9 @@ def limits_of_settings(file: StudyFile) -> list[Limit]:
     return found
 
 
-def _named(relations: Any) -> dict[str, Any]:
+def _settled(relations: Any) -> dict[str, dict[str, Any]]:
     tables = relations.items() if isinstance(relations, dict) else ()
-    return {name: table["settings"] for name, table in tables if isinstance(table, dict) and "settings" in table}
+    return {name: table for name, table in tables if isinstance(table, dict) and "settings" in table}
 
 
 UPPER, LOWER = ("<=", "\u2264"), (">=", "\u2265")

@@ -11,7 +11,7 @@ from sweep.errors import InputError, choices, closest
 from sweep.families import NAMES
 from sweep.families import family as find_family
 from sweep.families.base import Family
-from sweep.families.machines.specification import Specification, specification
+from sweep.families.machines.specification import RELATION_KINDS, Specification, specification
 from sweep.quantities import units
 from sweep.quantities.resolve import check_timings
 from sweep.study.file import (
@@ -21,9 +21,9 @@ from sweep.study.file import (
     Key,
     Length,
     LengthOrPlace,
-    Number,
     Section,
     StudyFile,
+    TextOrNumber,
     Three,
     ThreeLengths,
     TwoLengths,
@@ -118,7 +118,7 @@ class RelationSection(Section):
     timing: Names | None = holds('two crank angles, as ["needle.phi_ext", "phi_min_clearance"]')
     speed: Names | None = holds('one or two points, as ["looper.tip"]')
     event: str | None = holds('a pose output, as "clearance" or "looper.tip_x"')
-    level: str | Number | None = holds('what it passes, in its unit, as "1 mm"; 0 if left out')
+    level: TextOrNumber | None = holds('what it passes, in its unit, as "1 mm"; 0 if left out')
     rising: bool | None = holds("true or false: whether it passes upwards; true if left out")
     value: Names | None = holds('a pose output and a crank angle, as ["pace", "phi_arrive"]')
     gap: Names | None = holds('two bodies, links or tools, as ["needle.rocker1", "blade"]')
@@ -268,19 +268,27 @@ def _machine(
     except InputError as error:
         place: Key = tuple(error.place.removeprefix("machine.").split(".")) if error.place != "machine" else ()
         if place[:1] == ("relations",) and place[1:] and place[1] in threads:
-            key = _key_of_thread(error)
-            written = error.value if key == "path" else data["thread"][place[1]].get(key, error.value)
-            faults.value(("thread", place[1], key), written, error.allowed)
+            part = _key_of_thread(error)
+            written = error.value if part == "path" else data["thread"][place[1]].get(part, error.value)
+            faults.value(("thread", place[1], part), written, error.allowed)
             return None
-        if place[:1] in (("shafts",), ("tools",)):
-            faults.value(place if place[-1] == error.name else (*place, error.name), error.value, error.allowed)
-            return None
+        name = "" if place[-1:] == (error.name,) else error.name
         if place[:1] == ("relations",):
             own = relations.get(str(place[-1]), {})
-            faults.value((*place, error.name) if error.name in own else place, error.value, error.allowed)
-            return None
-        faults.value(("machine", *place, error.name), error.value, error.allowed)
+            name = name if name in own else next((kind for kind in RELATION_KINDS if kind in own), "")
+        key = place if place[:1] in (("relations",), ("shafts",), ("tools",)) else ("machine", *place)
+        key = (*key, name) if name else key
+        faults.value(key, _written(data, key, error.value), error.allowed)
         return None
+
+
+def _written(data: Any, key: Key, value: object) -> object:
+    """Return what stands in the file, with its unit; of several names the faulty one alone."""
+    for part in () if isinstance(value, str) else key:
+        if not isinstance(data, Mapping) or part not in data:
+            return value
+        data = data[part]
+    return value if isinstance(value, str) else data
 
 
 def _key_of_thread(error: InputError) -> str:

@@ -102,7 +102,10 @@ def _relation(section: ThreadSection, key: Key, faults: Faults) -> dict[str, Any
 
 def _allowed(table: AllowedTable, key: Key, faults: Faults) -> dict[str, list[float]]:
     columns = {}
-    for name, unit, internal in (("phi", table.angle, "rad"), ("values", table.unit or "mm", "mm")):
+    for name, unit, internal in (
+        ("phi", table.angle, "rad"),
+        ("values", "mm" if table.unit is None else table.unit, "mm"),
+    ):
         factor = faults.factor(unit, internal, (*key, "angle" if name == "phi" else "unit"))
         columns[name] = ((factor or 1.0) * np.array(getattr(table, name) or (), np.float64)).tolist()
     return columns

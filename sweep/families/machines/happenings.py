@@ -48,11 +48,12 @@ def check_happenings(machine: Machine) -> None:
     for thread in threads:
         place = f"machine.relations.{thread.name}"
         for name in thread.happens:
+            key = next((key for key in ("feeding", "drawing") if name in getattr(thread, key)), "thread")
             if name not in every:
-                raise InputError("thread", name, f"events and moments: {choices(name, every)}", place)
+                raise InputError(key, name, f"events and moments: {choices(name, every)}", place)
             if (of := getattr(every[name], "of", "")) in changing:
                 allowed = f"events of what does not change at events itself, as {of} does"
-                raise InputError("thread", name, allowed, place)
+                raise InputError(key, name, allowed, place)
 
 
 def _every(machine: Machine) -> dict[str, Happening]:

@@ -48,7 +48,7 @@ def _rise_window(name: str, given: tuple[tuple[str, Any], ...], vary: bool, wher
     for field, ends in given:
         if not isinstance(ends, tuple) or len(ends) != 2:
             raise InputError("fields", ends, "of each field the least and the most rise", where)
-        least, most = (length(name, end, where) for end in ends)
+        least, most = (length("fields", end, where) for end in ends)
         fields.append((field, least, most))
     if not fields:
         raise InputError("fields", {}, "at least one field with the least and the most rise", where)
@@ -86,7 +86,7 @@ def read_sewing(name: str, table: dict[str, Any], known: Mapping[str, Any]) -> S
     entering = tuple(known[one] for one in moments if isinstance(known[one], Entering))
     if len(taking) != 1 or len(entering) + 1 != len(moments):
         raise InputError("sew", table["sew"], "one moment A with fields of work (take), any of B and C (enter)", where)
-    speeds = tuple(length("speeds", speed, where) for speed in table.get("speeds", ()))
+    speeds = tuple(length("speeds", speed, where, "a speed") for speed in table.get("speeds", ()))
     if len(speeds) < 2 or any(b <= a for a, b in pairwise(speeds)):
         raise InputError("speeds", table.get("speeds"), "speeds of the main shaft, growing, at least two", where)
     given = table.get("clearance", (0.0, 0.1))
@@ -118,7 +118,10 @@ def read_thread(
     if bends is None:
         allowed = "points and take-ups in order, two points at least in a row; each row begins and ends with a point"
         raise InputError("thread", table["thread"], f"{allowed} over which it always runs, as between blades", where)
-    tension, stiffness, sewn = (length(key, table.get(key, 0.0), where) for key in ("tension", "stiffness", "sewn"))
+    tension, stiffness, sewn = (
+        length(key, table.get(key, 0.0), where, what)
+        for key, what in (("tension", "a force"), ("stiffness", "a force over a length"), ("sewn", "a length"))
+    )
     given = table.get("radius", 1.0)
     radii = tuple(length("radius", x, where) for x in (given if isinstance(given, tuple) else (given,) * bends))
     if len(radii) != bends:
@@ -162,7 +165,7 @@ def _place(given: Any, members: Mapping[str, Member], tools: Mapping[str, Tool],
     table = dict(given) if isinstance(given, tuple) and given and isinstance(given[0], tuple) else {"on": given}
     known_keys(table, ("on", "held", "wrap", "fixed"), f"{where}.thread")
     held, fixed = (_events(key, table.get(key, ()), f"{where}.thread") for key in ("held", "fixed"))
-    wrap = length("wrap", table.get("wrap", 0.0), f"{where}.thread")
+    wrap = length("wrap", table.get("wrap", 0.0), f"{where}.thread", "an angle")
     return Waypoint(_on(table.get("on"), members, tools, where), held, wrap, fixed)
 
 
@@ -189,7 +192,7 @@ def _on(given: Any, members: Mapping[str, Member], tools: Mapping[str, Tool], wh
 
 
 def _events(key: str, given: Any, where: str) -> tuple[str, ...]:
-    if not isinstance(given, tuple) or len(given) not in (0, 2) or not all(isinstance(end, str) for end in given):
+    if not isinstance(given, tuple) or len({*given}) not in (0, 2) or not all(isinstance(end, str) for end in given):
         raise InputError(key, given, "two events or moments by name, from and to", where)
     return given
 

@@ -267,6 +267,8 @@ def _needle(name: str, table: Mapping[str, Any], members: dict[str, Member], whe
         raise InputError("eye", eye, "top <= scarf_end < eye < point", where)
     floor = length("floor", table["floor"], where) if "floor" in table else 0.5 * diameter
     scarf = vector(table["scarf"], f"{where}.scarf")
+    if not any(scarf):
+        raise InputError("scarf", scarf, "a direction", where)
     return Needle(
         name,
         str(table["on"]),
@@ -296,11 +298,11 @@ def _blade(name: str, table: Mapping[str, Any], members: dict[str, Member], wher
     return Blade(name, tip, back, radius, eye, hold)
 
 
-def length(key: str, value: object, where: str) -> float:
-    """Return a length that a user gives; refuse what is none."""
+def length(key: str, value: object, where: str, what: str = "a length") -> float:
+    """Return a length, or ``what`` it is, that a user gives; refuse what is none or negative."""
     found = number(key, value, where)
     if found < 0.0:
-        raise InputError(key, value, "a length that is not negative", where)
+        raise InputError(key, value, f"{what} that is not negative", where)
     return found
 
 

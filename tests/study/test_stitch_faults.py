@@ -1,0 +1,54 @@
+"""Faults of tools, relations and threads of a stitch name the key of the file, what stands there and what may."""
+
+from __future__ import annotations
+
+import tomllib
+from pathlib import Path
+
+import pytest
+
+from sweep.errors import StudyError
+from sweep.study import study_from_data
+
+STUDY = Path(__file__).parents[2] / "studies" / "overlock208" / "study.toml"
+LEVEL = 'what it passes, in its unit, as "1 mm"; 0 if left out'
+
+
+@pytest.mark.parametrize(
+    ("place", "value", "line"),
+    [
+        ("relations.cast.level", {}, f"relations.cast.level = {{}}; allowed: {LEVEL}"),
+        ("relations.cast.level", [1], f"relations.cast.level = [1]; allowed: {LEVEL}"),
+        ("relations.a.take", ["thin", "lo"], "relations.a.take = 'lo'; allowed: tools: thin, low"),
+        ("relations.apart.gap", ["low", "hig"], "relations.apart.gap = 'hig'; allowed: bodies: thin, low"),
+        (
+            "relations.a.fields",
+            {"x": ["-1 mm", "2 mm"]},
+            "relations.a.fields = {'x': ['-1 mm', '2 mm']}; allowed: a length",
+        ),
+        ("relations.b.settings", "juki-mo-104d", "relations.b.settings = 'juki-mo-104d'; allowed: nothing here"),
+        (
+            "relations.sews.speeds",
+            ["-5 rpm", "4 rpm"],
+            "relations.sews.speeds = ['-5 rpm', '4 rpm']; allowed: a speed that",
+        ),
+        ("tools.low.eye", "-5 mm", "tools.low.eye = '-5 mm'; allowed: three finite numbers [x, y, z]"),
+        ("tools.thin.diameter", "-5 mm", "tools.thin.diameter = '-5 mm'; allowed: a length that is not negative"),
+        ("tools.thin.scarf", [0, 0, 0], "tools.thin.scarf = [0, 0, 0]; allowed: a direction"),
+        ("thread.top.tension", "-5 gf", "thread.top.tension = '-5 gf'; allowed: a force that is not negative"),
+        ("thread.top.feeding", ["a", "x"], "thread.top.feeding = ['a', 'x']; allowed: events and moments: a, b, c"),
+        ("thread.top.feeding", ["a", "a"], "thread.top.feeding = ['a', 'a']; allowed: two events or moments"),
+        ("thread.top.allowed.unit", "", "thread.top.allowed.unit = ''; allowed: a length, in mm"),
+    ],
+)
+def test_a_fault_names_its_key_its_value_and_what_is_allowed(place, value, line):
+    data = tomllib.loads(STUDY.read_text())
+    *tables, key = place.split(".")
+    table = data
+    for name in tables:
+        table = table[name]
+    table[key] = value
+    with pytest.raises(StudyError) as error:
+        study_from_data(data, STUDY)
+    (fault,) = error.value.faults
+    assert fault.partition(": ")[2].startswith(line)
