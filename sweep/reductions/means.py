@@ -41,7 +41,7 @@ def mean_squares(family: Family, designs: Array, names: Sequence[str], accuracy:
     Parameters
     ----------
     family, designs : the (n, P) design matrix of any family
-    names : ``rms_x`` of pose outputs x
+    names : ``rms_x`` of pose outputs x, ``member.rms_x`` of one of a member
     accuracy : dense grid, or relative error
 
     Returns
@@ -50,7 +50,7 @@ def mean_squares(family: Family, designs: Array, names: Sequence[str], accuracy:
         the names and ``err_<name>`` (nan on samples), each (n,), and ``status``: as of extrema, NOT_CONVERGED where
         panels do not settle the value; it stays, with its error.  Errors include the rounding of the poses.
     """
-    n, poses = len(designs), [name.removeprefix(PREFIX) for name in names]
+    n, poses = len(designs), [name.removeprefix(PREFIX).replace(f".{PREFIX}", ".") for name in names]
     if accuracy.samples is not None:
         means, status = _on_grid(family, designs, accuracy.samples, poses)
         unknown = {f"err_{name}": np.full(n, np.nan) for name in names}

@@ -115,6 +115,24 @@ def test_phase_turns_the_places_and_ratio_the_derivatives() -> None:
     assert fast["looper.swing"][0] == pytest.approx(slow["swing"][0], rel=1e-8)
 
 
+@pytest.mark.parametrize("how", [{"accuracy": 1e-9}, {"samples": 1024}])
+def test_means_of_geared_and_driven_members_and_of_points_are_those_of_their_poses(how: dict) -> None:
+    members = {"looper": {"family": "rssr", "ratio": 2, "tip": [30.0, 1.0, -2.0]}}
+    members |= {
+        "behind": {"family": "rssr", "driver": "looper.psi"},
+        "plain": {"family": "rssr", "tip": [3.0, 1.0, 2.0]},
+    }
+    machine = sweep.machine(members)
+    table = {f"{member}.{k}": x for member in members for k, x in LOOPER.items()}
+    turn = np.arange(4096) * (2.0 * np.pi / 4096)  # all curves are smooth: even samples know their means to rounding
+    for pose in ("looper.d2psi", "looper.tip_x", "behind.dpsi", "plain.tip_y", "plain.dpsi"):
+        member, _, own = pose.partition(".")
+        name = f"{member}.rms_{own}"
+        found = sweep.summarise(machine, table, [name], **how).iloc[0]
+        values = sweep.evaluate(machine, table, [pose], phi=turn)[pose].to_numpy()
+        assert found["status"] == 0 and found[name] == pytest.approx(np.sqrt(np.mean(values**2)), rel=1e-8), pose
+
+
 def test_a_member_driven_by_another_is_the_chain_of_both() -> None:
     members = {"first": "rssr", "second": {"family": "guide", "driver": "first.psi", "offset": 1.8}}
     names = ["a1", "b1", "c1", "e1", "f1", "g1", "alpha1", "branch1"]
