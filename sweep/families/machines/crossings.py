@@ -28,6 +28,7 @@ Places: TypeAlias = dict[str, Any]
 
 Find: TypeAlias = Callable[["Poses", int, frozenset[str]], Places]
 Read: TypeAlias = Callable[["Machine", Any, Places, frozenset[str]], Columns]
+"""Outputs, ``status``, and ``steep``: of how many roundings of a coordinate the outputs are, see `steepness`."""
 
 
 @dataclass
@@ -68,8 +69,9 @@ def step_of(name: str, provides: Sequence[Output], machine: Machine, find: Find,
         samples = accuracy.samples or SAMPLES
         parts = [block(designs[k : k + BLOCK], wanted, samples) for k in range(0, max(len(designs), 1), BLOCK)]
         found: Columns = {key: np.concatenate([part[key] for part in parts]) for key in parts[0]}
+        steep = np.asarray(found.pop("steep"), np.float64)
         if accuracy.target is not None:
-            rounded = TANGENT * np.abs(designs).max(axis=1, initial=0.0)
+            rounded = TANGENT * steep * np.abs(designs).max(axis=1, initial=0.0)
             found |= {f"err_{key}": np.maximum(np.abs(found[key]) * accuracy.target, rounded) for key in wanted}
         return found
 
@@ -77,6 +79,16 @@ def step_of(name: str, provides: Sequence[Output], machine: Machine, find: Find,
         return 2000.0 * (accuracy.samples or SAMPLES)
 
     return Step(f"passage {name}", tuple(provides), run, work=Work.LONG, cost=cost, analytic=machine.analytic)
+
+
+def steepness(speed: Any, *slopes: Any) -> Array:
+    """Return by how much what is read at roots is off for each unit of what vanishes there, (n,), not below 1.
+
+    A root moves by one over its slope, and with it what changes at that ``speed``.
+    """
+    fast = np.maximum(np.real(speed), 1.0)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        return np.asarray(np.fmax.reduce([np.ones(len(fast)), *(fast / np.abs(np.real(x)) for x in slopes)]))
 
 
 def outputs_at(

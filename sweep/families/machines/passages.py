@@ -19,6 +19,7 @@ from sweep.families.machines.crossings import (
     largest,
     moved,
     outputs_at,
+    steepness,
     step_of,
     verdict,
     where_largest,
@@ -148,6 +149,7 @@ def _read(taking: Taking, machine: Machine, designs: Any, places: Places, wanted
         values["free"] = np.where(np.real(free) + radii > MEET * np.real(speed["near"]), free, np.real(free))
     status[np.real(side["at"]) <= 0.0] = st.WRONG_SIDE
     columns: Columns = {f"phi_{name}": angles["at"], f"count_{name}": places["count"], "status": status}
+    columns["steep"] = steepness(np.fmax(np.real(speed["at"]), np.real(speed["after"])), turned["at"], turned["after"])
     return columns | {f"{name}_{key}": value for key, value in values.items()}
 
 

@@ -3,8 +3,8 @@
 The thread runs over places of the machine in order, from the tensioner to the stitch, straight from one to the next.
 Over some of them it runs between two events only: from where a blade takes its loop to where it lets it go.  A take-up
 among them (an eyelet, a cam) takes up P more thread than at its zero.  With the length needed by all straight pieces,
-what is sewn in since the turn began, what is drawn from the bobbin since then, and the stock, the thread between
-tensioner and stitch that nothing has taken up,
+what is sewn in and what is drawn from the bobbin since either began, between 0 and 2 pi of the main shaft, and the
+stock, the thread between tensioner and stitch that nothing has taken up,
 
     demand = needed + sewn - drawn,     given = stock - sum of P,     surplus = given - demand          (10), (11)
 
@@ -201,7 +201,7 @@ class ThreadBalance:
         return {f"{self.name}_{key}": values for key, values in columns.items()}
 
     def _passed(self, when: str, found: Mapping[str, Any]) -> tuple[Any, Any]:
-        """Return the thread that has passed since the turn began, of ``NAME_sewn`` each turn, and its derivative."""
+        """Return the thread that has passed since it began to in the turn, ``NAME_sewn`` each, and its derivative."""
         ends: tuple[str, ...] = getattr(self, when)
         if not ends:
             return 0.0, 0.0

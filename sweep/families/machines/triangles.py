@@ -17,7 +17,17 @@ from kernels import status as st
 from kernels.types import TWO_PI
 from sweep.families.base import Columns, Output, Step
 from sweep.families.frames import Frame
-from sweep.families.machines.crossings import TANGENT, Places, Poses, moved, outputs_at, step_of, verdict, whole
+from sweep.families.machines.crossings import (
+    TANGENT,
+    Places,
+    Poses,
+    moved,
+    outputs_at,
+    steepness,
+    step_of,
+    verdict,
+    whole,
+)
 from sweep.families.machines.relations import Given
 from sweep.families.machines.segments import cross, dot, minus
 from sweep.families.machines.tools import Spot
@@ -130,7 +140,8 @@ def _found(entering: Entering, poses: Poses, samples: int, wanted: frozenset[str
     found = verdict(status, np.bincount(extremes.row, near, n) > 0, count, ways)
     taken = np.flatnonzero(inside & right & (found[roots.row] == st.OK))
     place = whole(n, roots.row[taken], roots.phi[taken])
-    return {"at": place, "count": np.where(status == st.OK, count, np.nan), "status": found}
+    places = {"at": place, "count": np.where(status == st.OK, count, np.nan), "status": found}
+    return places | {"fastest": np.abs(slope).max(axis=1)}
 
 
 def _read(entering: Entering, machine: Machine, designs: Any, places: Places, wanted: frozenset[str]) -> Columns:
@@ -144,7 +155,7 @@ def _read(entering: Entering, machine: Machine, designs: Any, places: Places, wa
     least = np.minimum.reduce(distances) - entering.radius
     columns: Columns = {f"phi_{name}": at, f"count_{name}": places["count"], f"{name}_margin": least}
     columns |= {f"{name}_from_{side}": one for side, one in zip(SIDES, distances, strict=True)}
-    columns[f"{name}_pace"] = float(entering.sense) * turned
+    columns[f"{name}_pace"], columns["steep"] = float(entering.sense) * turned, steepness(places["fastest"], turned)
     status[np.real(least) <= -entering.radius] = st.WRONG_SIDE
     status[np.isfinite(places["at"]) & np.isnan(least)] = st.NO_TRIANGLE
     return columns | {"status": status}

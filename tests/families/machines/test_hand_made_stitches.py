@@ -116,6 +116,26 @@ def test_a_tip_that_touches_the_line_is_undecided():
         assert found(near, ["phi_a"])["status"] in status
 
 
+@pytest.mark.parametrize("apart", [1e-6, 1e-8, 1e-10, 1e-12])
+def test_errors_of_a_passage_that_nearly_touches_are_those_of_its_root(apart):
+    """The angle moves by the rounding of coordinates over the slope across, and with it all that is read there."""
+    shift = found(machine_of(), ["a_reach"])["a_reach"] - apart
+    long = {"top": -100.0, "scarf_end": -50.0, "eye": 100.0, "point": 200.0}
+    machine = machine_of(at=(AT[0], AT[1] + shift, AT[2]), needle=long)
+    names = ["phi_a", "a_clearance", "a_above_eye", "a_rise", "a_directness"]
+    got = sweep.summarise(machine, DESIGN, names, accuracy=1e-12).iloc[0]
+    low, high = (np.longdouble(got["phi_a"]) + way * 0.5 * math.sqrt(apart / 40.0) for way in (-1.0, 1.0))
+    for _ in range(70):
+        middle = 0.5 * (low + high)
+        turned = SHARE * np.cos(middle + np.longdouble(-0.5 * math.pi - PHI))
+        off = np.longdouble(AT[1] + shift) + ARM * turned / np.sqrt(1.0 + turned**2) - CRANK * np.sin(middle)
+        low, high = (middle, high) if off < 0.0 else (low, middle)
+    poses = sweep.evaluate(machine, DESIGN, ["a_side", "a_height", "a_depth", "a_dacross", "a_speed"], phi=[float(low)])
+    side, height, depth, dacross, speed = poses.loc[0, ["a_side", "a_height", "a_depth", "a_dacross", "a_speed"]]
+    for name, value in zip(names, (low, side - 0.375, 100.0 - height, CRANK - depth, dacross / speed), strict=True):
+        assert abs(got[name] - value) <= got[f"err_{name}"] <= 1e-3 * math.sqrt(1e-12 / apart), name
+
+
 def test_the_gap_counts_from_the_needles_top_to_its_lowest_point_only():
     machine = machine_of({"whole": {"gap": ["thin", "blade"]}})
     got = found(machine, ["a_free", "min_whole", "phi_min_whole"])
