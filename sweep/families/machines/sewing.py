@@ -143,10 +143,14 @@ class Sewing:
         a = taking_step(self.taking, machine).run(designs, frozenset(names), accuracy)
         rise, clearance, above, below = (np.asarray(a[key], np.float64) for key in names)
         found = {"rise": rise, name: np.minimum.reduce([clearance - least, most - clearance, above, below])}
+        parts = {name: a}
         for one in self.entering:
             margin = f"{one.name}_margin"
-            part = entering_step(one, machine).run(designs, frozenset({margin}), accuracy)
-            found[one.name] = np.asarray(part[margin], np.float64)
+            parts[one.name] = entering_step(one, machine).run(designs, frozenset({margin}), accuracy)
+            found[one.name] = np.asarray(parts[one.name][margin], np.float64)
+        for key, part in parts.items():
+            lost = (status == st.OK) & np.isnan(found[key])
+            status[lost] = part["status"][lost]
         return found
 
     def _unevenness(self, machine: Machine, designs: Array, accuracy: Accuracy) -> tuple[Array, Array, Status]:
@@ -158,7 +162,7 @@ class Sewing:
         column = machine.parameter_names.index(self.shaft.driven[0].named("speed"))
         mean = np.abs(designs[:, column]) / abs(self.shaft.driven[0].ratio)
         slow, fast = (np.asarray(found[key], np.float64) / mean for key in names)
-        return slow, fast, np.asarray(found["status"], np.uint8)
+        return slow, fast, np.array(found["status"], np.uint8)
 
     def _lag(self, machine: Machine) -> tuple[str, str, int, int] | None:
         """Return lag and rate of the output of A's looper, and the columns of its phase and speed; None without lag."""

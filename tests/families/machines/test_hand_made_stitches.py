@@ -299,6 +299,15 @@ def test_fields_that_vary_leave_a_window_or_none_design_by_design():
     assert text_of_room(machine).endswith("its window, which slow and loose and fast and thick leave")
 
 
+def test_what_does_not_sew_says_which_fault_its_moment_has():
+    fields = {"slow and loose": [1.5, 3.0], "fast and thick": [1.0, 2.5]}
+    sews = {"sew": ["a"], "speeds": [50.0 * math.pi, 100.0 * math.pi]}
+    for sense, status in ((1, st.OK), (-1, st.WRONG_WAY)):
+        machine = machine_of({"a": {"take": ["thin", "blade"], "sense": sense, "fields": fields}, "sews": sews})
+        got = found(machine, ["sews_at_1500"])
+        assert got["status"] == status and math.isnan(got["sews_at_1500"]) == (status != st.OK)
+
+
 def test_fields_vary_only_where_there_are_some():
     with pytest.raises(InputError, match="whether the ends of its fields are parameters"):
         machine_of({"a": {"take": ["thin", "blade"], "vary": True}})
