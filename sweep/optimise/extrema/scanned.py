@@ -200,7 +200,7 @@ def discriminant_scale(discriminant: Any, pressure_angle: Any) -> Any:
     """
     angle = pressure_angle.real
     distance = np.where(np.isfinite(angle), np.abs(angle - 0.5), np.inf)
-    best = np.argmin(distance, axis=1)[:, None]
-    cos = np.cos(np.take_along_axis(pressure_angle, best, axis=1))
+    best = np.arange(len(angle)), np.argmin(distance, axis=1)
+    cos = np.cos(pressure_angle[best])
     with np.errstate(invalid="ignore"):  # where nothing assembles the scale is nan, and so is all that needs it
-        return np.take_along_axis(discriminant, best, axis=1) / (cos * cos)
+        return (discriminant[best] / (cos * cos))[:, None]

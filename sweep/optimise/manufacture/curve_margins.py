@@ -38,10 +38,7 @@ class CurveMargin:
     def at(self, designs: Any, phi: Array) -> Any:
         """Return the margin (n, m) of designs (n, P), which may carry the imaginary step, at crank angles (m,)."""
         moved = designs[:, list(self.columns)] - self.place
-        room = trigonometric_sum(self.constant + moved.real @ self.slopes.T, phi)
-        if np.iscomplexobj(moved):
-            return room + 1j * trigonometric_sum(moved.imag @ self.slopes.T, phi)
-        return room
+        return trigonometric_sum(self.constant + moved @ self.slopes.T, phi)
 
     def slope(self, design: Array, phi: Array) -> Array:
         """Return the derivative (m,) of the margin of one design (P,) by the crank angle."""
@@ -94,21 +91,21 @@ def _around(problem: Problem, design: Array) -> tuple[Array, Array]:
     return designs, np.stack([designs[1 : n + 1, k] - designs[n + 1 :, k] for k in problem.columns], axis=1)
 
 
-def trigonometric_sum(coefficients: Array, phi: Array, derivative: bool = False) -> Array:
+def trigonometric_sum(coefficients: Any, phi: Array, derivative: bool = False) -> Any:
     """Sum ``c_0 + sum over k of (c_(2k-1) cos k phi + c_2k sin k phi)`` or its derivative by phi, (n, m).
 
     Parameters
     ----------
-    coefficients : (n, 2 K + 1)
+    coefficients : (n, 2 K + 1), which may carry the imaginary step
     phi : (m,) angles in rad
     derivative : whether the derivative is wanted
     """
     k = np.arange(1, coefficients.shape[1] // 2 + 1)
-    cos, sin = np.cos(np.outer(k, phi)), np.sin(np.outer(k, phi))
+    powers = np.exp(1j * phi)[None, :].repeat(len(k), axis=0).cumprod(axis=0)  # quicker than their cosines
     along, aside = coefficients[:, 1::2], coefficients[:, 2::2]
     if derivative:
-        return np.asarray((k * aside) @ cos - (k * along) @ sin, np.float64)
-    return np.asarray(coefficients[:, :1] + along @ cos + aside @ sin, np.float64)
+        return (k * aside) @ powers.real - (k * along) @ powers.imag
+    return coefficients[:, :1] + along @ powers.real + aside @ powers.imag
 
 
 def curves_with_margin(problem: Problem) -> dict[str, str]:
