@@ -20,7 +20,7 @@ from sweep.effects.scene import Scene, take_over
 from sweep.effects.turn import at_poses, on_finer_grids, per_turn, reduction_outputs
 from sweep.families import family
 from sweep.families.base import Accuracy, Array, Columns, Output, Parameter
-from sweep.numerics.steady_speed import ERROR, FINER, GRIDS, LEFT, PER_LEFT, steady
+from sweep.numerics.steady_speed import FINER, GRIDS, LEFT, PER_LEFT, steady
 
 EQUATION = "D4 (1)-(4)"
 FORMULAS = (
@@ -138,17 +138,18 @@ def _turn(scene: Scene, wanted: frozenset[str], rubs: bool) -> Columns:
     found, status, grids = _solved(scene, scene.on_grid(finest).angles.phi, rubs)
     columns: Columns = {f"{name}{suffix}": found[f"{name}{suffix}"] for name in ("unevenness", "fastest", "slowest")}
     one, fastest = np.ones(len(scene.designs)), found[f"fastest{suffix}"]
-    known = np.maximum(ERROR, PER_LEFT * found[f"missed{suffix}"])
+    known = found[f"energy_error{suffix}"]
     # What is missed of the energy is a share of the largest: of a slow speed it is a larger share.
     steep = fastest / found[f"slowest{suffix}"]
     size = {"unevenness": steep / np.abs(scene.inputs["speed"]), "fastest": one, "slowest": steep}
     columns |= {f"err_{name}{suffix}": known * fastest * share for name, share in size.items()}
     limit = RESOLVED if grids == GRIDS else LEFT_OF_CURVE
     # What is missed of the torque is a share of J omega^2: of a small acceleration it is a larger share.
+    torque = found[f"torque_error{suffix}"] if grids == GRIDS else PER_LEFT * found[f"missed{suffix}"]
     change = f"crank_acceleration{suffix}"
     size = np.abs(found[change]).max(axis=1)
     ratio = np.divide(fastest**2, size, out=one.copy(), where=size > 0.0)
-    of_change = np.maximum(known, (PER_LEFT * found[f"missed{suffix}"] + ROUNDED) * ratio)
+    of_change = np.maximum(known, (torque + ROUNDED) * ratio)
     known_of = {change: of_change, f"crank_speed{suffix}": known * steep}
     return per_turn(found, status, columns, _outputs(suffix, ""), wanted, limit, known, known_of)
 

@@ -18,7 +18,7 @@ from kernels.types import Array, Status
 from sweep.families.base import Accuracy, Angles, Columns, Output, Parameter, Step, Work
 from sweep.families.curve_features import Smooth, least_samples
 from sweep.families.frames import Frame
-from sweep.numerics.steady_speed import ERROR, FINER, GRIDS, LEFT, PER_LEFT, steady
+from sweep.numerics.steady_speed import FINER, GRIDS, LEFT, steady
 
 if TYPE_CHECKING:
     from sweep.families.machines.machine import Machine
@@ -127,7 +127,7 @@ def speed_of(shaft: ShaftTorque, machine: Machine) -> Step:
 
     def run(designs: Array, wanted: frozenset[str], accuracy: Accuracy) -> Columns:
         found = _numbers(shaft, machine, designs)
-        known = np.maximum(ERROR, PER_LEFT * found.pop("missed"))
+        known = found.pop("energy_error")
         # What is missed of the energy is a share of the largest: of a slow speed it is a larger share.
         mean, steep = found.pop("mean"), found["fastest"] / found["slowest"]
         size = {"unevenness": steep / mean, "fastest": np.ones(len(designs)), "slowest": steep}
@@ -144,7 +144,7 @@ def _cost(accuracy: Accuracy) -> float:
 
 
 def _numbers(shaft: ShaftTorque, machine: Machine, designs: Array) -> dict[str, Any]:
-    """Return unevenness, extreme speeds, what the grid misses and the status, (n,), on the first grid that resolves."""
+    """Return unevenness, extreme speeds, error of the energy and status, (n,), on the first grid that resolves."""
     names, first = list(machine.parameter_names), shaft.driven[0]
     designs = np.array(designs, np.float64)
     for one in shaft.driven:
@@ -153,7 +153,7 @@ def _numbers(shaft: ShaftTorque, machine: Machine, designs: Array) -> dict[str, 
     slope = designs[:, names.index(f"{shaft.name}_motor_slope")]
     theirs = np.stack([designs[:, names.index(one.named("speed"))] / one.ratio for one in shaft.driven])
     apart = np.any(np.abs(theirs - speed) > SAME * np.abs(speed), axis=0)
-    found: dict[str, Any] = {key: np.full(len(designs), np.nan) for key in (*NUMBERS, "missed")}
+    found: dict[str, Any] = {key: np.full(len(designs), np.nan) for key in (*NUMBERS, "energy_error")}
     status: Status = np.full(len(designs), st.NOT_CONVERGED, np.uint8)
     least, finest = least_samples(machine, designs, (shaft.name,)), FINER[-1]
     for size in (*GRIDS, *FINER):
