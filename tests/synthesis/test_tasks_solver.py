@@ -81,6 +81,15 @@ def test_what_cannot_be_met_is_infeasible_with_the_smallest_miss():
     assert solve(EngineeringMethod(0.9, 3.3, 1.0, 1.0, 1.3, (-3.0, 3.0), max_pressure_angle=0.3))[0].feasible is False
 
 
+@pytest.mark.parametrize("second", ["guide", "slider_crank"])
+def test_starts_that_end_nowhere_are_replaced(second):
+    directions = {"start_direction": -0.5, "end_direction": 0.1}
+    task = Task6(drive=DRIVE, start=(0.0, 0.0), end=(1.0, 0.2), **directions, second=second)
+    found = solve(task, candidates=256, starts=2)  # the two most promising candidates end at no mechanism
+    assert found[0].feasible
+    assert len(found) <= 2
+
+
 def test_same_seed_same_answer():
     one, two = (solve(Task4(0.7, 3.0, 1.0), candidates=256, starts=3) for _ in range(2))
     assert [s.unknowns for s in one] == [s.unknowns for s in two]

@@ -20,6 +20,7 @@ SHARE = 0.8  # poses with less than this part of the largest magnitude do not bo
 ROUNDS = 24
 WIDEST = 0.15  # first radius of a step, in units of the box
 MET = 1e-9  # largest residual and violation of a feasible solution
+PATIENCE = 4  # times as many starts are refined at most where not all of them end at a feasible solution
 
 
 class _Value(NamedTuple):
@@ -70,24 +71,28 @@ def solve(problem: SynthesisTask, *, candidates: int = 4096, starts: int = 6, se
     ----------
     problem : one of the tasks
     candidates : points of the box tried first
-    starts : of them refined, kept apart from each other
+    starts : of them refined, kept apart from each other, until so many have ended at a feasible solution; at most four
+        times as many are tried
     seed : of the sequence; the same seed gives the same answer
 
     Returns
     -------
     list of Solution
-        different local solutions, feasible ones first, each group by its objective.  Empty if no candidate gave a
-        mechanism at all.
+        different local solutions, at most ``starts``, feasible ones first, each group by its objective.  Empty if no
+        candidate gave a mechanism at all.
 
     Notes
     -----
     Local solutions from many starts: no proof that the best one found is the best there is.
     """
     scaled = _Scaled(problem)
-    begun = _starts(scaled, candidates, starts, seed)
-    ended = [_refined(scaled, z) for z in begun]
+    ended: list[Array] = []
+    for z in _starts(scaled, candidates, starts, seed):
+        if sum(_feasible(scaled.rows(end)) for end in ended) == starts:
+            break
+        ended.append(_refined(scaled, z))
     solutions = [_solution(problem, scaled, z) for z in _distinct(scaled, ended)]
-    return sorted(solutions, key=lambda s: (not s.feasible, s.objective if s.feasible else _miss(s)))
+    return sorted(solutions, key=lambda s: (not s.feasible, s.objective if s.feasible else _miss(s)))[:starts]
 
 
 def _miss(solution: Solution) -> float:
@@ -119,7 +124,7 @@ def _starts(scaled: _Scaled, candidates: int, starts: int, seed: int) -> list[Ar
         z = points[index]
         if all(_distance(scaled, z, other) > apart for other in chosen):
             chosen.append(z)
-        if len(chosen) == starts:
+        if len(chosen) == PATIENCE * starts:
             break
     return chosen
 
@@ -135,6 +140,11 @@ def _violation(value: _Value) -> Array:
     return worst
 
 
+def _feasible(value: _Value) -> bool:
+    """Tell whether one point is a mechanism that meets equations and limits."""
+    return bool(np.isfinite(value.curve).all() and _violation(value)[0] <= MET)
+
+
 def _bounds(scaled: _Scaled, z: Array) -> tuple[Array, Array]:
     return np.where(scaled.periodic, z - 0.5, 0.0), np.where(scaled.periodic, z + 0.5, 1.0)
 
@@ -142,9 +152,9 @@ def _bounds(scaled: _Scaled, z: Array) -> tuple[Array, Array]:
 def _refined(scaled: _Scaled, z: Array) -> Array:
     z = _restored(scaled, z)
     value = scaled.rows(z)
-    best = float(np.abs(value.curve).max())
-    if not np.isfinite(best) or _violation(value)[0] > MET:
+    if not _feasible(value):
         return z
+    best = float(np.abs(value.curve).max())
     # Poses that have once been near the largest magnitude stay in the program, so a step cannot overlook them twice.
     used, radius = np.zeros(value.curve.shape[1], np.bool_), WIDEST
     for _ in range(ROUNDS):
@@ -152,8 +162,7 @@ def _refined(scaled: _Scaled, z: Array) -> Array:
         following = _restored(scaled, _descended(scaled, z, best, used, radius))
         value = scaled.rows(following)
         height = float(np.abs(value.curve).max())
-        kept = np.isfinite(height) and _violation(value)[0] <= MET
-        gain = best - height if kept else -np.inf
+        gain = best - height if _feasible(value) else -np.inf
         if gain > 0.0:
             z, best = following, height
         else:
@@ -248,11 +257,9 @@ def _solution(problem: SynthesisTask, scaled: _Scaled, z: Array) -> Solution:
     x = scaled.real(z)
     found = problem.evaluate(x[None, :])
     value = _Value(found.equations, found.limits, found.curve)
-    height = float(np.abs(found.curve).max())
-    feasible = bool(np.isfinite(height) and _violation(value)[0] <= MET)
     return Solution(
-        feasible,
-        height,
+        _feasible(value),
+        float(np.abs(found.curve).max()),
         _named([u.name for u in problem.unknowns], x),
         {name: float(column[0]) for name, column in found.results.items()},
         _named(problem.equations, found.equations[0]),
