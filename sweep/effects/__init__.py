@@ -297,7 +297,7 @@ def with_effects(family: Family, effects: tuple[Placed, ...], curves: Mapping[st
     return replace(
         family,
         parameters=(*family.parameters, *added.inputs),
-        pose_outputs=(*family.pose_outputs, *bent(effects, curves, feeling)),
+        pose_outputs=(*family.pose_outputs, *bent(family, effects, curves, feeling)),
         poses=partial(effect_poses, added, effects),
         precise_poses=precise,
         steps=(*(on_own_columns(step, own) for step in family.steps), *steps),

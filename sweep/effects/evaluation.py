@@ -17,6 +17,7 @@ from kernels.types import Status
 from sweep.effects.base import Bend, Placed
 from sweep.effects.scene import Scene, first_scene, take_over
 from sweep.families.base import Accuracy, Angles, Array, Columns, Family, Output, Parameter, Step
+from sweep.families.capabilities import ThreadPath
 from sweep.families.curve_features import Bends, Crossing, of_order, of_table
 from sweep.families.poses import blocks, differenced
 from sweep.numerics.curves import Curve, TableCurve
@@ -134,10 +135,15 @@ Feeling: TypeAlias = Callable[[str], frozenset[str]]
 """Names of the pose outputs of effects that an input enters."""
 
 
-def bent(effects: tuple[Placed, ...], curves: Mapping[str, Curve], feeling: Feeling) -> list[Output]:
-    """Pose outputs of effects: between the points of a table of loads they may have a narrow peak."""
-    tables = [feeling(name) for name, curve in curves.items() if isinstance(curve, TableCurve)]
-    felt = frozenset().union(*tables)
+def bent(family: Family, effects: tuple[Placed, ...], curves: Mapping[str, Curve], feeling: Feeling) -> list[Output]:
+    """Pose outputs of effects: between the points of a table of loads they may have a narrow peak.
+
+    Where a thread comes to lie on its take-up and leaves it, what is made of it jumps as it does.
+    """
+    felt = frozenset().union(*(feeling(name) for name, curve in curves.items() if isinstance(curve, TableCurve)))
+    path = family.find(ThreadPath)
+    if path is not None and family.pose_output[path.wrap].kinks:
+        felt |= {o.name for placed in effects if placed.entry.requires is ThreadPath for o in placed.pose_outputs}
     found = [o for placed in effects for o in placed.pose_outputs]
     return [replace(o, kinks=not (o.wraps or o.jumps)) if o.name in felt else o for o in found]
 

@@ -185,7 +185,8 @@ def _on(given: Any, members: Mapping[str, Member], tools: Mapping[str, Tool], wh
     for m in members.values():
         known |= {f"{m.name}.{point}": Spot(f"{m.name}.{point}") for point in m.points}
         if (path := m.family.find(ThreadPath)) is not None:
-            known[m.name] = TakeUp(f"{m.name}.{path.taken}", f"{m.name}.{path.wrap}")
+            kinks = m.family.pose_output[path.wrap].kinks
+            known[m.name] = TakeUp(f"{m.name}.{path.taken}", f"{m.name}.{path.wrap}", kinks)
     if given not in known:
         raise InputError("thread", given, f"points, take-ups: {choices(given, list(known))}", where)
     return known[given]

@@ -123,7 +123,11 @@ class ThreadBalance:
             ]
         if self.allowed is not None:
             found.append(("excess", "length", f"surplus of thread {who} beyond what is allowed"))
-        kinks = {key for key, *_ in found} if self.happens else {"tension"} if self.moves or self.stiffness else set()
+        kinks = {"tension"} if self.moves or self.stiffness else set()
+        if any(isinstance(place.on, TakeUp) and place.on.kinks for place in self.path):
+            kinks |= {"given", "surplus", "excess", "wrap", "tension"}
+        if self.happens:
+            kinks = {key for key, *_ in found}
         return tuple(Output(f"{who}_{key}", unit, text, EQUATION, kinks=key in kinks) for key, unit, text in found)
 
     @property

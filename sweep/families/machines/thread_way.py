@@ -17,10 +17,14 @@ PHI = "phi"
 
 @dataclass(frozen=True)
 class TakeUp:
-    """A take-up in the path: the dotted pose outputs of the thread it takes up and of its wrap angle."""
+    """A take-up in the path: the dotted pose outputs of the thread it takes up and of its wrap angle.
+
+    ``kinks`` tells whether these have kinks and jumps, as where the thread comes to lie on a bare edge.
+    """
 
     taken: str
     wrap: str
+    kinks: bool = False
 
 
 @dataclass(frozen=True)

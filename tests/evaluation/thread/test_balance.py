@@ -196,6 +196,28 @@ def test_extremes_of_the_tension_at_its_kinks_keep_the_accuracy(changes, speed):
         assert found[name] == pytest.approx(sign * tension.max(), abs=2.0 * size), name
 
 
+EDGE = {"a": 0.3862972320083632, "X1": -0.7938025818599606, "Y1": -3.561063343973213, "Z1": -2.016207720436983}
+EDGE |= {"X2": 1.7028389336647864, "Y2": -1.1151966263861868, "Z2": 2.5652392940996886, "P_h": 5.190297446276568}
+
+
+@pytest.mark.parametrize("output", ["t_wrap", "t_surplus", "edge.tension", "edge.eyelet_force"])
+def test_extremes_of_a_thread_on_a_bare_edge_are_found_where_it_comes_to_lie_and_leaves(output):
+    """Its wrap jumps where the shortest way passes from one side of the edge to the other."""
+    thread = {"thread": ["edge", [0.0, 30.0, 5.0], [9.0, -20.0, 0.0]], "stock": 90.0}
+    made = sweep.machine({"edge": "free_cam"}, {"t": thread})
+    table = {f"edge.{name}": x for name, x in EDGE.items()}
+    table |= {"edge.thread_tension": 20.0, "edge.eyelet_radius": 1.0, "edge.mu_eyelet": 0.4} if "edge" in output else {}
+    member, dot, own = output.rpartition(".")
+    name = f"{member}{dot}max_{own}"
+    found = sweep.summarise(made, table, [name], accuracy=1e-8).iloc[0]
+    phi = np.linspace(0.0, 2.0 * np.pi, 4001)
+    for _ in range(4):
+        values = poses(made, [output], table, phi)[output]
+        phi = phi[values.argmax()] + (phi[1] - phi[0]) * np.linspace(-1.0, 1.0, 201)
+    assert found.status == st.OK and found[name] == pytest.approx(values.max(), rel=1e-8)
+    assert found[f"err_{name}"] <= 1.01e-8 * found[name]
+
+
 @pytest.mark.parametrize(
     ("changes", "word"),
     [
