@@ -71,9 +71,15 @@ def smoothest_law(phi: ArrayLike, demand: ArrayLike, allowed: ArrayLike, harmoni
     from scipy.optimize import linprog
 
     at, need = numbers(phi, "phi", "phi").ravel(), numbers(demand, "demand", "demand").ravel()
-    slack = np.broadcast_to(numbers(allowed, "allowed", "allowed"), need.shape)
-    if at.shape != need.shape:
-        raise InputError("demand", f"{need.size} values", f"as many as phi, {at.size}", "thread law")
+    slack = numbers(allowed, "allowed", "allowed").ravel()
+    for name, values in (("phi", at), ("demand", need), ("allowed", slack)):
+        if values.size != at.size and (name, values.size) != ("allowed", 1):
+            raise InputError(name, f"{values.size} values", f"as many as phi, {at.size}", "thread law")
+        if not np.isfinite(values).all() or not values.size:
+            raise InputError(name, values.tolist()[:3], "finite numbers", "thread law")
+    if harmonics < 1:
+        raise InputError("harmonics", harmonics, "a whole number above 0", "thread law")
+    slack = np.broadcast_to(slack, need.shape)
     waves, curving = _waves(at, harmonics, 0), _waves(at, harmonics, 2)
     one, none = np.ones((at.size, 1)), np.zeros((at.size, 1))
     # unknowns: the coefficients, the stock, the largest |P''|, and by how much the slack is exceeded

@@ -33,6 +33,20 @@ def test_law_of_a_demand_with_corners_is_smoother_the_more_slack_it_has():
         smoothest_law(PHI, demand, 0.01, harmonics=8)
 
 
+@pytest.mark.parametrize(
+    ("changes", "words"),
+    [
+        ({"allowed": [1.0, 2.0]}, "allowed = '2 values'; allowed: as many as phi, 240"),
+        ({"demand": np.full(240, np.nan)}, "demand = .*; allowed: finite numbers"),
+        ({"phi": [], "demand": []}, "phi = .*; allowed: finite numbers"),
+        ({"harmonics": -1}, "harmonics = -1; allowed: a whole number above 0"),
+    ],
+)
+def test_what_is_no_demand_is_named(changes, words):
+    with pytest.raises(InputError, match=words):
+        smoothest_law(**{"phi": PHI, "demand": LAW(PHI), "allowed": 1.0} | changes)
+
+
 def test_derivatives_of_a_law_are_those_of_its_differences():
     h = 1e-5
     for order in (0, 1):
