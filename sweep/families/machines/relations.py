@@ -144,6 +144,16 @@ def with_size(name: str, parts: list[Any], wanted: frozenset[str]) -> dict[str, 
     return columns | ({name: np.sqrt(parts[0] ** 2 + parts[1] ** 2 + parts[2] ** 2)} if name in wanted else {})
 
 
+def once(names: Sequence[str]) -> None:
+    """Refuse an output or parameter that two relations have: one would be read where the other is meant."""
+    seen: set[str] = set()
+    for name in names:
+        if name in seen:
+            allowed = "an output or parameter of one relation alone: rename one of both"
+            raise InputError("relation", name, allowed, "machine.relations")
+        seen.add(name)
+
+
 def two(given: tuple[str, ...], known: Sequence[str] | None, what: str, where: str) -> tuple[str, str]:
     """Return two names out of what a user gives, of those that are known if any are."""
     if len(given) != 2:

@@ -18,7 +18,7 @@ from sweep.families.machines.happenings import check_happenings
 from sweep.families.machines.machine import Machine, assemble
 from sweep.families.machines.main_shaft import Driven, ShaftTorque
 from sweep.families.machines.pressing import read_pressing
-from sweep.families.machines.relations import Distance, EventValue, Relation, Speed, Timing, each, two
+from sweep.families.machines.relations import Distance, EventValue, Relation, Speed, Timing, each, once, two
 from sweep.families.machines.segments import Body, Gap
 from sweep.families.machines.shaking import Shaken, Shaking, shaken
 from sweep.families.machines.stitching import read_entering, read_sewing, read_taking, read_thread
@@ -146,6 +146,10 @@ def built(given: Specification, find: FindFamily) -> Machine:
     title = ", ".join(f"{m.name}: {m.family.name}" for m in members.values())
     machine = assemble(f"machine ({title})", tuple(members.values()), relations)
     check_happenings(machine)
+    every = [output for relation in machine.relations for output in relation.outputs]
+    every += [output for step in machine.steps for output in step.provides] + [t.output for t in machine.timings]
+    places = [f"{word}_{event.name}" for event in machine.events for word in ("phi", "count")]
+    once([*machine.parameter_names, *(output.name for output in every), *places])
     return machine
 
 

@@ -299,6 +299,13 @@ def test_fields_that_vary_leave_a_window_or_none_design_by_design():
     assert text_of_room(machine).endswith("its window, which slow and loose and fast and thick leave")
 
 
+@pytest.mark.parametrize("name", ["a_gap", "a_side", "a_free"])
+def test_two_relations_with_one_output_are_refused(name):
+    """What the moment reads of its own gap and coordinates would be those of the other relation."""
+    with pytest.raises(InputError, match=f"relation = '{name}'; allowed: an output or parameter of one relation alone"):
+        machine_of({name: {"gap": ["needle.rocker", "blade"]}})
+
+
 def test_what_does_not_sew_says_which_fault_its_moment_has():
     fields = {"slow and loose": [1.5, 3.0], "fast and thick": [1.0, 2.5]}
     sews = {"sew": ["a"], "speeds": [50.0 * math.pi, 100.0 * math.pi]}
