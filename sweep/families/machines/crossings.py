@@ -11,6 +11,7 @@ from numpy.polynomial.polynomial import polyder, polyval
 from numpy.typing import NDArray
 
 from kernels import status as st
+from kernels.curves import samples as scan
 from kernels.types import TWO_PI, Array
 from sweep.families.base import Accuracy, Angles, Columns, Family, Output, Step, Work
 from sweep.numerics.events import bottoms, zeros
@@ -18,7 +19,7 @@ from sweep.numerics.events import bottoms, zeros
 if TYPE_CHECKING:
     from sweep.families.machines.machine import Machine
 
-SAMPLES = 512
+SAMPLES, MOST = 512, 16384  # of a turn, and those beyond which an event is given up
 BLOCK = 256  # designs at once: their samples stay in the caches
 TANGENT = 64.0 * 2.0**-53  # of the coordinates that a distance is a difference of
 NEAR = 1e-3  # of a sample's step: a polynomial that is so near is trusted in its slope
@@ -181,15 +182,27 @@ class Poses:
         found = np.mod(np.where((polished > left[k]) & (polished < right[k]), polished, found), TWO_PI)
         return Found(row, found).take(np.lexsort((found, row)))
 
-    def first(self, name: str, level: float, sense: float) -> tuple[NDArray[np.uint8], Array]:
-        """Return status and where an output first passes a level in a sense, each (n,); nan where it does not."""
-        status, (values,) = self.samples([name], SAMPLES)
+    def first(self, name: str, level: float, sense: float, count: int = SAMPLES) -> tuple[NDArray[np.uint8], Array]:
+        """Return status and where an output first passes a level in a sense, each (n,); nan where it does not.
+
+        Designs whose samples may touch the level between two of them have twice as many, as events by themselves.
+        """
+        status, (values,) = self.samples([name], count)
         off = sense * (values - level)
         passes = (off < 0.0) & (np.roll(off, -1, axis=1) >= 0.0)
         row = np.flatnonzero(passes.any(axis=1))
-        start = passes[row].argmax(axis=1) * (TWO_PI / SAMPLES)
-        found = whole(len(off), row, self._root(row, start, start + TWO_PI / SAMPLES, name, values, level))
-        return np.where((status == st.OK) & np.isnan(found), st.NO_EVENT, status).astype(np.uint8), found
+        start = passes[row].argmax(axis=1) * (TWO_PI / count)
+        found = whole(len(off), row, self._root(row, start, start + TWO_PI / count, name, values, level))
+        status = np.where((status == st.OK) & np.isnan(found), st.NO_EVENT, status).astype(np.uint8)
+        touching = np.zeros(len(off), np.bool_)
+        scan.grazes(values, np.full(len(off), level), touching)
+        row = np.flatnonzero(touching)
+        if row.size and count < MOST:
+            denser = Poses(self.quick, self.precise, self.designs[row])
+            status[row], found[row] = denser.first(name, level, sense, 2 * count)
+        elif row.size:
+            status[row] = st.NOT_CONVERGED
+        return status, found
 
     def _root(
         self, row: NDArray[np.intp], left: Array, right: Array, name: str, values: Array, level: float = 0.0

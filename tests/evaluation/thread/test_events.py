@@ -168,6 +168,23 @@ def test_events_of_several_designs_follow_the_phase_and_the_place_of_their_shaft
     assert (needed[1] != needed[2]).any()
 
 
+@pytest.mark.parametrize("above", [1e-2, 1e-4, 1e-6])
+def test_a_path_changes_where_its_event_first_happens_however_short_it_lasts(above):
+    """The lower of two humps rises above the level for less than the 512 samples of the turn are apart."""
+    members = {"drive": {"family": "four_bar", "eye": [12.0, 5.0, 0.0], "offset": 0.0041}}
+    members["other"] = {"family": "guide", "ratio": 2, "offset": 0.0082, "place": {"at": [5.0, 40.0, 3.0]}}
+    design = {f"{m}.{name}": x for m in members for name, x in {"a": 10.0, "b": 40.0, "c": 30.0, "e": 38.0}.items()}
+    design |= {"other.xi": 12.0, "other.eta": 5.0, "other.lam": 0.3, "other.h": 0.0}
+    relations = {"far": {"distance": ["drive.eye", "other.point"]}}
+    relations |= {"up": {"event": "far", "level": 43.41908231 - above}, "down": {"event": "drive.eye_x", "level": 9.0}}
+    path = [HOLE.tolist(), {"on": "drive.eye", "held": ["up", "down"]}, SEAM.tolist()]
+    made = sweep.machine(members, relations | {"upper": {"thread": path}})
+    found = sweep.summarise(made, design, ["phi_up", "count_up"], accuracy=1e-8).iloc[0]
+    assert found["status"] == 0 and found["count_up"] == 2 and 0.6 < found["phi_up"] < 0.7
+    before, behind = poses(made, ["needed"], found["phi_up"] + np.array([-1e-6, 1e-6]), design)[0]
+    assert before == pytest.approx(math.dist(HOLE, SEAM), rel=1e-12) and behind > before + 1.0
+
+
 def test_a_path_that_changes_at_an_event_of_one_that_changes_is_refused():
     relations = {"upper": {"thread": PATH}, "tight": {"event": "upper_surplus", "level": -90.0}}
     relations["lower"] = {"thread": [GUIDE.tolist(), {"on": HOLE.tolist(), "held": ["tight", "cast"]}, SEAM.tolist()]}
