@@ -79,12 +79,13 @@ def export(folder: Path, design: str | None, kind: str, out: Path | None, phi: f
     if kind == "xlsx":
         click.echo(f"xlsx: {write_workbook(folder, out or _place(folder, 'results.xlsx'))}")
         return
-    grid_in_radians("phi", "rad", phi, None)  # --phi is in rad, whatever the design is
+    found = chosen(folder, design)
+    domain = found.family.domain
+    grid_in_radians(domain.name, domain.unit, phi, None)  # an angle is in rad, whatever the design is
     if kind in OF_DATASETS:
         target = out or _place(folder, f"{design or 'result'}.{kind}")
         click.echo(f"{kind}: {write_sheet(folder, design, target, phi)}")
         return
-    found = chosen(folder, design)
     if out is None:
         name = f"{design or 'result'}{'-law' if kind == 'law' else ''}{FORMATS[kind][0]}"
         out = _place(folder, name)

@@ -152,7 +152,8 @@ def _of_one(what: str, source: str, table: Path | None, options: Options) -> Any
         "mechanism": {"phi": options["phi"], "view": options["view"], "positions": options["positions"]},
     }
     if table is None:
-        grid_in_radians("phi", "rad", options["phi"], None)  # a design out of a folder is in rad, --phi may not be
+        domain = mechanism.domain
+        grid_in_radians(domain.name, domain.unit, options["phi"], None)  # a design out of a folder is in rad
     if what == "cyclogram":
         known[what] = {"made": _made(source, table, options)}
     unit: AngleUnit | None = "rad" if table is None else options["angles"]

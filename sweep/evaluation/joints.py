@@ -135,7 +135,7 @@ def joints(mechanism: Mechanism, design: Table, phi: ArrayLike, *, angles: Angle
         name: [] for name in ("member", "stage", "frame", "joint", "kind", "phi", "x", "y", "z", "status")
     }
     family = find_family(mechanism)
-    phi = grid_in_radians("phi", "rad", phi, angles)
+    phi = grid_in_radians(family.domain.name, family.domain.unit, phi, angles)
     for part in parts(mechanism, in_radians(family, design, angles), phi):
         m = part.phi.size
         for name, path in part.joints.items():

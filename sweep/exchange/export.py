@@ -80,7 +80,7 @@ def write_law(
     texts = {o.name: o.text for o in family.pose_outputs} | {domain.name: text}
     columns = {domain.name: angles}
     if speed is not None and not isinstance(domain, Interval):
-        columns["t"] = (angles - phi) / speed
+        columns["t"] = (angles - angles[0]) / speed
         units["t"], texts["t"] = "s", "time"
     columns |= {name: found[name].to_numpy(np.float64) for name in names}
     columns["status"] = found["status"].to_numpy()
@@ -130,7 +130,8 @@ def export(
         ``dxf`` a drawing with front view, and side and top view of spatial stages; ``mjcf`` a model for MuJoCo;
         ``law`` the motion over one turn with units (.csv or .parquet).  If left out, the ending of the file says it:
         .csv is hardpoints, .xml is mjcf
-    phi : angle of the driving shaft in the drawn position, where a turn begins [rad]
+    phi : angle of the driving shaft in the drawn position, where a turn begins [rad]; over an interval the value of its
+        variable
     poses : steps of a turn
     unit : what a length of the design is, "mm" or "m"
     speed : of the driving shaft [rad/s], or a text such as "7000 rpm": gives the law a column of time and the animation
@@ -167,8 +168,9 @@ def export(
     speed = speed_given(speed)
     if speed is not None and not (math.isfinite(speed) and speed > 0.0):
         raise InputError("speed", speed, "a positive number of rad/s", "export")
-    design = in_radians(find_family(mechanism), design, angles)
-    phi = float(np.asarray(grid_in_radians("phi", "rad", phi, angles)))
+    family = find_family(mechanism)
+    design = in_radians(family, design, angles)
+    phi = float(np.asarray(grid_in_radians(family.domain.name, family.domain.unit, phi, angles)))
     write = _writer(kind, mechanism, design, phi, poses, unit, speed)
     with replacing(target) as partial:
         write(partial)
@@ -198,9 +200,10 @@ def _numbers(design: Table) -> dict[str, float]:
     columns: Mapping[Any, Any] = design if isinstance(design, Mapping) else {key: design[key] for key in design}
     found = {}
     for key, value in columns.items():
-        one = value.iloc[0] if hasattr(value, "iloc") else value[0] if isinstance(value, list | tuple) else value
-        if isinstance(one, int | float):
-            found[str(key)] = float(one)
+        try:
+            found[str(key)] = float(np.ravel(value)[0])
+        except (TypeError, ValueError):
+            continue  # a column of words is none of the model
     return found
 
 

@@ -234,7 +234,7 @@ def mechanism(
     Parameters
     ----------
     mechanism, design : as of :func:`sweep.joints`
-    phi : angle of the driving shaft [rad]
+    phi : angle of the driving shaft [rad]; over an interval the value of its variable
     view : "space", from a corner with z upwards, or "xy", "zy", "xz"; if left out "space" for what is spatial
     positions : that are drawn at equal steps over the turn; the first stands out.  The report draws 8
     unit : the length unit of the design, for the axes
@@ -254,8 +254,9 @@ def mechanism(
     """
     if view is not None and view != "space" and view not in VIEWS:
         raise InputError("view", view, f"space, {', '.join(VIEWS)}", "plot")
-    design = in_radians(find_family(mechanism), design, angles)
-    start = float(np.asarray(grid_in_radians("phi", "rad", phi, angles), np.float64))
+    family = find_family(mechanism)
+    design = in_radians(family, design, angles)
+    start = float(np.asarray(grid_in_radians(family.domain.name, family.domain.unit, phi, angles), np.float64))
     found = over(mechanism, design, start, 180)
     if not exists(found):
         raise InputError("design", dict(found[0].parameters), "one with a pose in which all its joints exist", "plot")

@@ -132,13 +132,23 @@ def test_columns_of_others_keep_their_headers():
     assert found["mass [kg]"][0] == 3.0
 
 
-def test_variable_that_is_no_angle_may_be_large():
+def test_variable_that_is_no_angle_may_be_large(tmp_path):
     example = dict(family("backrest").example)
     lengths = [p.name for p in family("backrest").parameters if p.unit == "length"]
     assert family("backrest").domain.unit == "length" and lengths
     with pytest.raises(sweep.InputError, match="column psi"):
         sweep.evaluate("backrest", example | {"psi": 86.0}, "K_couple", phi=[0.3])
     assert "does not look" not in str(sweep.evaluate("backrest", example, "K_couple", phi=[180.0])["status"])
+    in_mm = {name: 1000.0 * value if name in lengths else value for name, value in example.items()}
+    turned = [p.name for p in family("backrest").parameters if p.unit == "angle"]
+    degrees = {name: math.degrees(value) if name in turned else value for name, value in in_mm.items()}
+    plain = sweep.joints("backrest", in_mm, 262.5)
+    assert set(plain["phi"]) == {262.5} and (plain["status"] == 0).all()
+    said = sweep.joints("backrest", degrees, 262.5, angles="deg")
+    np.testing.assert_allclose(said[["phi", "x", "y"]], plain[["phi", "x", "y"]], rtol=1e-9, atol=1e-9)
+    file = sweep.export("backrest", degrees, tmp_path / "rest.csv", phi=262.5, angles="deg")
+    np.testing.assert_allclose(pd.read_csv(file)["x"][: len(plain)], plain["x"], rtol=1e-9, atol=1e-9)
+    assert len(sweep.plot.mechanism("backrest", in_mm, phi=262.5)) == 1
 
 
 @pytest.mark.parametrize("name", NAMES)

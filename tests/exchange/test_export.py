@@ -235,6 +235,24 @@ def shift_of(part, machine, design):
     return one.shift
 
 
+@pytest.mark.parametrize(
+    "given",
+    [
+        lambda design: pd.DataFrame([design]),
+        lambda design: {name: np.array([value]) for name, value in design.items()},
+        lambda design: {name: np.int64(value) if isinstance(value, int) else value for name, value in design.items()},
+    ],
+    ids=["DataFrame", "arrays", "numpy"],
+)
+def test_mujoco_gets_masses_of_any_table(given, tmp_path):
+    design = scaled("rssr") | {"finger": 1, "m_crank": 1, "j_crank_zz": 500}
+    texts = [
+        sweep.export("rssr", one, tmp_path / f"{k}.xml").read_text()
+        for k, one in enumerate((design, given(design), scaled("rssr")))
+    ]
+    assert texts[0] == texts[1] != texts[2]
+
+
 def test_mujoco_is_refused_where_there_is_no_such_linkage_and_for_a_mass_without_inertia(tmp_path):
     with pytest.raises(sweep.InputError, match="crank, coupler and rocker"):
         sweep.export("slotted", scaled("slotted"), tmp_path / "m.xml")
@@ -313,6 +331,13 @@ def test_law_has_units_in_its_headings_and_its_metadata(tmp_path):
     assert schema.field("s").metadata[b"unit"] == b"mm"
     assert schema.field("s").metadata[b"definition"].startswith(b"slider displacement")
     np.testing.assert_array_equal(pd.read_parquet(file)["d2s"], poses["d2s"])
+
+
+def test_time_of_a_march_is_from_0_wherever_a_turn_begins(tmp_path):
+    design = scaled("free_cam_friction")
+    options = {"poses": 48, "speed": 10.0, "phi": 0.5}
+    table = pd.read_csv(sweep.export("free_cam_friction", design, tmp_path / "law.csv", "law", **options))
+    np.testing.assert_allclose(table["t [s]"], table["phi [rad]"] / 10.0, rtol=1e-15)
 
 
 @pytest.mark.parametrize("name", mostly_long(NAMES, NAMES[::3]))
