@@ -10,7 +10,7 @@ import numpy as np
 from kernels import status as st
 from kernels.families import feed as kernels
 from sweep.errors import InputError
-from sweep.evaluation.tables import numbers, one_design
+from sweep.evaluation.tables import numbers, one_design, refuse_rows
 from sweep.families import family
 from sweep.families.base import Array
 
@@ -104,6 +104,7 @@ def lift_chain(
     share = np.ones_like(grid) if weights is None else numbers(weights, "weights", "weights, position")
     if grid.size < 3 or share.shape != grid.shape:
         raise InputError("poses", grid.size, "at least 3, with as many weights", "lift_chain")
+    refuse_rows(~(np.isfinite(share) & (share >= 0.0)), share, "weights", "finite numbers that are not negative")
     if norm not in ("squares", "largest"):
         raise InputError("norm", norm, "squares or largest", "lift_chain")
     status, rows = _rows(matrix, grid, angles)
@@ -129,6 +130,8 @@ def _given(table: Table, phi: object, other: object, name: str) -> tuple[Array, 
     matrix = one_design(family("feed"), table, unused=("phi",))
     grid = np.atleast_1d(numbers(phi, "phi", "phi, position"))
     values = np.atleast_1d(numbers(other, name, f"{name}, position"))
+    for column, found in (("phi", grid), (name, values)):
+        refuse_rows(~np.isfinite(found), found, column, "a finite number")
     if values.shape != grid.shape or grid.ndim != 1:
         raise InputError(name, f"{values.size} values", f"one for each crank angle, {grid.size}", name)
     return matrix, grid, values

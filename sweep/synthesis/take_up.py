@@ -15,7 +15,7 @@ import numpy as np
 
 from kernels.families import eyelet
 from sweep.errors import InputError
-from sweep.evaluation.tables import design_matrix, numbers, parameter_units
+from sweep.evaluation.tables import design_matrix, numbers, parameter_units, refuse_rows
 from sweep.families import family
 from sweep.families.base import Array
 
@@ -84,10 +84,14 @@ def fit_eyelet(
     if not angles.size == wanted.size == share.size:
         allowed = f"as many values as phi, {angles.size}"
         raise InputError("P", f"{wanted.size} and {share.size} weights", allowed, "wanted points")
+    for name, values in (("phi", angles), ("P", wanted)):
+        refuse_rows(~np.isfinite(values), values, name, "a finite number")
     for name in fixed:
         if name not in SOUGHT:
             raise InputError("fixed", name, f"of {', '.join(SOUGHT)}", "fit_eyelet")
     sought = [k for k, name in enumerate(SOUGHT) if name not in fixed]
+    if not sought:
+        raise InputError("fixed", ", ".join(fixed), f"not all of {', '.join(SOUGHT)}", "fit_eyelet")
     if angles.size <= len(sought):
         raise InputError("phi", f"{angles.size} points", f"more than the {len(sought)} unknowns", "wanted points")
     if not (np.isfinite(share).all() and (share >= 0.0).all() and share.sum() > 0.0):

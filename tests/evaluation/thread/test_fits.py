@@ -129,7 +129,10 @@ def test_best_fit_of_a_thread_no_eyelet_takes_up_has_no_better_neighbour():
     ("changed", "message"),
     [
         ({"fixed": ("b",)}, "fixed = 'b'"),
+        ({"fixed": ("a", "e", "f", "alpha", "Z1", "Z2", "phi_h")}, "not all of a, e"),
         ({"weights": -np.ones(40)}, "weights"),
+        ({"P": np.where(PHI > 1.0, np.nan, 0.0)}, "P = nan"),
+        ({"phi": np.where(PHI > 1.0, np.inf, PHI)}, "phi = inf"),
         ({"P": np.zeros(3)}, "as many values as phi, 40"),
         ({"phi": PHI[:5], "P": np.zeros(5)}, "more than the 7 unknowns"),
     ],

@@ -353,4 +353,11 @@ def test_lift_chain_refuses_what_does_not_fix_the_dimensions():
         refinement.lift_chain(p, [0.0, 0.0, 0.0], [0.1, 0.1, 0.1])
     with pytest.raises(InputError, match="phi"):
         refinement.lift_chain(p | {"h_a": 9.0}, [0.0, 1.0, 2.0], [0.1, 0.2, 0.1])
+    for name, phi, chi, weights in (
+        ("phi", [0.0, np.inf, 2.0], [0.1, 0.2, 0.1], None),
+        ("chi", [0.0, 1.0, 2.0], [0.1, np.nan, 0.1], None),
+        ("weights", [0.0, 1.0, 2.0], [0.1, 0.2, 0.1], [1.0, np.nan, 1.0]),
+    ):
+        with pytest.raises(InputError, match=f"column {name}, row 1"):
+            refinement.lift_chain(p, phi, chi, weights=weights)
     assert np.isnan(refinement.rack_angles(p, [0.0], [1e3])).all()
