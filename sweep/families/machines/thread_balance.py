@@ -29,6 +29,7 @@ from sweep.families.base import Output, Parameter
 from sweep.families.frames import Frame
 from sweep.families.machines.thread_way import (
     PHI,
+    Edge,
     Piece,
     Run,
     TakeUp,
@@ -126,6 +127,8 @@ class ThreadBalance:
         kinks = {"tension"} if self.moves or self.stiffness else set()
         if any(isinstance(place.on, TakeUp) and place.on.kinks for place in self.path):
             kinks |= {"given", "surplus", "excess", "wrap", "tension"}
+        if any(isinstance(place.on, Edge) for place in self.path):  # over which it slides, not beyond an end
+            kinks |= {"wrap", "tension", "rate", "velocity"}
         if self.happens:
             kinks = {key for key, *_ in found}
         return tuple(Output(f"{who}_{key}", unit, text, EQUATION, kinks=key in kinks) for key, unit, text in found)

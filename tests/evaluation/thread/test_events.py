@@ -126,6 +126,18 @@ def test_extremes_of_the_surplus_are_found_at_the_jumps():
     np.testing.assert_array_equal(grid["demand"], grid["upper_demand"])
 
 
+@pytest.mark.parametrize("name", ["min_upper_rate", "max_upper_rate"])
+def test_the_rate_over_a_blade_keeps_the_accuracy_where_the_thread_comes_to_its_end(name):
+    made = machine(thread=[[-73.8, 11.0, -1.6], "blade", [-56.5, 11.9, 6.7]])
+    found = sweep.summarise(made, DESIGN, [name], accuracy=1e-8).iloc[0]
+    sign, phi = -1.0 if name.startswith("min") else 1.0, np.linspace(0.0, TURN, 4001)
+    for _ in range(4):
+        values = sign * poses(made, ["rate"], phi)[0]
+        phi = phi[values.argmax()] + (phi[1] - phi[0]) * np.linspace(-1.0, 1.0, 201)
+    assert found["status"] == 0 and found[f"err_{name}"] <= 1e-8 * 46.0  # from the least to the largest
+    assert sign * found[name] == pytest.approx(values.max(), rel=1e-8)
+
+
 def test_complex_designs_move_the_events_too():
     made = machine(sewn=4.0, feeding=["cast", "a"], drawing=["a", "cast"])
     row = np.array([[DESIGN.get(p.name, p.default) for p in made.parameters]])
