@@ -45,15 +45,15 @@ class Moved:
         """Take in some rows; ``places`` (n,) are their names."""
         a, b = np.asarray(old, np.float64), np.asarray(new, np.float64)
         self.missing += int((np.isnan(a) != np.isnan(b)).sum())
+        size = np.maximum(np.abs(a), np.abs(b))
         with np.errstate(invalid="ignore"):
             absolute = np.where(a == b, 0.0, np.abs(a - b))
-        size = np.maximum(np.abs(a), np.abs(b))
-        # nan against a number is no distance; it is counted above
-        far = absolute > rtol * size
+            # nan against a number is no distance, it is counted above; an infinite one is far by any measure
+            far = (absolute > rtol * size) | np.isinf(absolute)
         self.changed += int(far.sum())
         self.places += [str(place) for place in places[far][: NAMED - len(self.places)]]
         if far.any():
-            relative = np.where(far, absolute / np.where(size > 0.0, size, 1.0), 0.0)
+            relative = np.where(far, absolute / np.where((size > 0.0) & np.isfinite(size), size, 1.0), 0.0)
             worst = int(relative.argmax())
             if relative[worst] >= self.relative:
                 self.relative, self.where = float(relative[worst]), f"{self.kind} {places[worst]}".strip()

@@ -82,6 +82,20 @@ def test_a_changed_value_is_found_with_its_size_and_design(study: Study, dataset
     assert code == 10 and "swing: 2 values changed, at most by" in text
 
 
+@pytest.mark.parametrize("rtol", [0.0, 1e-6])
+@pytest.mark.filterwarnings("error")
+def test_a_value_that_became_infinite_is_found(study: Study, dataset: Path, tmp_path: Path, rtol: float) -> None:
+    rows = sweep.load(dataset)
+    row = rows.index[rows["status"] == 0][7]
+    rows.loc[row, "swing"] = np.inf
+    other = written(study, rows, tmp_path / "new")
+    found = sweep.compare(dataset, other, rtol)
+    swing = found.moved["swing"]
+    assert (found.exit_code, swing.changed, swing.absolute, swing.relative) == (10, 1, np.inf, np.inf)
+    assert swing.where == f"design {rows['design'][row]}"
+    assert sweep.compare(other, other, rtol).exit_code == 0
+
+
 @pytest.mark.parametrize("change", ["nan", "status", "old only", "new only"])
 def test_changed_rows_are_found(study: Study, dataset: Path, tmp_path: Path, change: str) -> None:
     rows = sweep.load(dataset)
