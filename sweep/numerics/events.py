@@ -92,8 +92,10 @@ def zeros(function: Callable[[Index, Array], Array], low: Array, high: Array) ->
         found[left] = np.where(np.abs(at1) < np.abs(at2), x1, x2)
         least = LAST / np.maximum(np.abs(x2 - x1), LAST)
         share = np.clip(_inverse(x1, x2, x3, at1, at2, at3), least, 1.0 - least)
-        more = (least < 0.5) & (at != 0.0)
-        left, share, x1, x2, at1, at2 = (y[more] for y in (left, share, x1, x2, at1, at2))
+        # after a zero too: a function that stays zero from there on may jump where it begins to
+        more = least < 0.5
+        left = left[more]
+        share, x1, x2, at1, at2 = (y[more] for y in (share, x1, x2, at1, at2))
     return found
 
 

@@ -18,7 +18,7 @@ Index: TypeAlias = NDArray[np.intp]
 Mask: TypeAlias = NDArray[np.bool_]
 
 Integrand: TypeAlias = Callable[[Index, Index, Array], Array]
-"""``f(rows, origins, x)``: values (k, 15, q) of the curves ``rows`` (k,) at ``x`` (k, 15); ``origins`` (k,) are the
+"""``f(rows, origins, x)``: values (k, 17, q) of the curves ``rows`` (k,) at ``x`` (k, 17); ``origins`` (k,) are the
 first panels in which these lie."""
 
 # Kronrod's extension of the Gauss rule of seven points (Piessens et al., QUADPACK, 1983): nodes and both weights on
@@ -35,6 +35,11 @@ _GAUSS = (0.0, 0.129484966168869693270611432679082, 0.0, 0.279705391489276667901
 NODES = np.array([*(-x for x in _NODES), 0.0, *_NODES[::-1]])
 KRONROD = np.array([*_KRONROD, 0.209482141084727828012999174891714, *_KRONROD[::-1]])
 GAUSS = np.array([*_GAUSS, 0.417959183673469387755102040816327, *_GAUSS[::-1]])
+# Beyond the last nodes a jump or a kink is not seen: values just inside both ends are compared with what the polynomial
+# through all nodes has there.  They do not enter the integral.
+_END = 1.0 - 2.0**-30
+PROBED = np.array([-_END, *NODES, _END])
+_THERE = np.array([np.prod([(_END - x) / (node - x) for x in NODES if x != node]) for node in NODES])
 
 PASSES = 60  # halvings of a first panel, after which a jump between two doubles is all that can be left
 MOST = 4096  # panels of one curve
@@ -82,8 +87,9 @@ def integrate(function: Integrand, edges: Array, target: float) -> Integrals:
 
     Notes
     -----
-    Errors are QUADPACK's (200 |K - G|/spread)^1.5 spread of the difference of both rules on each panel, summed.  What
-    does not shrink as panels are halved is rounding of the curve, and stays in the error.
+    Errors are QUADPACK's (200 |K - G|/spread)^1.5 spread of the difference of both rules on each panel, and what a jump
+    or a kink beyond its last nodes may hide, summed.  What does not shrink as panels are halved is rounding of the
+    curve, and stays in the error.
     """
     n, p = edges.shape[0], edges.shape[1] - 1
     row, origin = np.repeat(np.arange(n), p), np.tile(np.arange(p), n)
@@ -147,8 +153,9 @@ def _weighted(weights: Array, values: Array) -> Array:
 
 def _evaluated(function: Integrand, row: Index, origin: Index, low: Array, high: Array) -> _Panels:
     half = 0.5 * (high - low)
-    x = (0.5 * (low + high))[:, None] + half[:, None] * NODES
-    y = function(row, origin, x)
+    x = (0.5 * (low + high))[:, None] + half[:, None] * PROBED
+    every = function(row, origin, x)
+    y = every[:, 1:-1]
     value = half[:, None] * _weighted(KRONROD, y)
     coarse = half[:, None] * _weighted(GAUSS, y)
     mean = _weighted(KRONROD, y)[:, None, :] / 2.0
@@ -157,4 +164,6 @@ def _evaluated(function: Integrand, row: Index, origin: Index, low: Array, high:
     sharp = np.minimum(200.0 * off / np.maximum(spread, 1e-300), 1.0) ** 1.5 * spread
     err = np.where(spread > 0.0, np.maximum(np.minimum(sharp, spread), 0.0), off)
     err = np.maximum(err, 8.0 * EPS * half[:, None] * _weighted(KRONROD, np.abs(y)))
+    apart = np.abs(every[:, -1] - _weighted(_THERE, y)) + np.abs(every[:, 0] - _weighted(_THERE[::-1], y))
+    err += np.nan_to_num((1.0 - NODES[-1]) * half[:, None] * apart)
     return _Panels(row, origin, low, high, value, err, np.zeros((row.size, 1)))
