@@ -31,7 +31,7 @@ FILE = click.argument("file", type=IS_FILE)
 @click.argument("family", shell_complete=complete_families)
 @FILE
 @click.option("--part", default="", help="Of a file with several: `stage 1`, the member's name, or both.")
-@click.option("--unit", default="mm", show_default=True, help="Of the coordinates; a heading `x [inch]` says it, too.")
+@click.option("--unit", default="mm", show_default=True, help="Of a file that says none, as a heading `x [inch]` does.")
 @click.option("--tolerance", type=float, help="Largest residual as a part of the drawing's size; default 1e-4.")
 @click.option("--out", type=A_FILE, help="A table for `sweep eval`: one design.")
 def points(family: str, file: Path, part: str, unit: str, tolerance: float | None, out: Path | None) -> None:

@@ -14,7 +14,8 @@ import numpy as np
 
 from sweep.errors import InputError, MissingInput, choices
 from sweep.evaluation.joints import parts
-from sweep.exchange.dxf import NAMED, ezdxf_or_refuse
+from sweep.evaluation.tables import numbers
+from sweep.exchange.dxf import NAMED, UNITS, ezdxf_or_refuse
 from sweep.families import NAMES
 from sweep.families import family as find_family
 from sweep.families.base import Array, Family
@@ -108,20 +109,14 @@ def from_points(family: str, *, tolerance: float = TOLERANCE, **points: Sequence
 
 
 def drawn(family: str, file: Path, part: str = "", unit: str = "mm", tolerance: float = TOLERANCE) -> PlacedDesign:
-    """Mechanism of a file of points, as `from_points` finds it, in mm; coordinates are in ``unit``.
+    """Mechanism of a file of points, as `from_points` finds it, in mm; ``unit`` is that of a file that says none.
 
     Raises
     ------
     InputError
-        as `read_points` and `from_points`; for an unknown unit.
+        as `read_points` and `from_points`.
     """
-    try:
-        scale = factor(unit, "mm")
-    except UnitFault as fault:
-        raise InputError("--unit", unit, str(fault), str(file)) from None
-    found = read_points(file, reader_of(family), part=part)
-    given = {name: at if name.startswith("axis_") else [scale * x for x in at] for name, at in found.items()}
-    return from_points(family, tolerance=tolerance, **given)
+    return from_points(family, tolerance=tolerance, **read_points(file, reader_of(family), part=part, unit=unit))
 
 
 def reader_of(family: str) -> Hardpoints:
@@ -192,24 +187,31 @@ Points: TypeAlias = dict[str, list[float]]
 Groups: TypeAlias = dict[str, Points]
 
 
-def read_points(file: Path, reader: Hardpoints | None = None, *, part: str = "") -> Points:
-    """Return points of one stage or member by name, in the unit of the file.
+def read_points(file: Path, reader: Hardpoints | None = None, *, part: str = "", unit: str = "mm") -> Points:
+    """Return points of one stage or member by name [mm].
 
     Parameters
     ----------
-    file : .csv with the columns name, x, y, z, or `x [inch]` and so on, which are brought to mm (others are not looked
-        at); or .csv, .dxf, .glb of ``sweep export``
+    file : .csv with the columns name, x, y, z, or `x [inch]` and so on (others are not looked at); or .csv, .dxf, .glb
+        of ``sweep export``, which say their unit
     reader : what of an exported file is wanted; everything if left out.  A table written by hand is not filtered, so
         that a wrong name is found
     part : "stage 2", "needle", "needle stage 1"; may be left out where the file has one part only
+    unit : of coordinates whose file does not say it
 
     Raises
     ------
     InputError
-        for a file that is none of these, a missing column, a name that stands twice, a part that is not there.
+        for a file that is none of these, a missing column, a name that stands twice, a part that is not there, an
+        unknown unit.
     """
+    try:
+        scale = factor(unit, "mm")
+    except UnitFault as fault:
+        raise InputError("--unit", unit, str(fault), str(file)) from None
     readers: dict[str, Callable[[Path], tuple[Groups, bool]]] = {".dxf": _of_dxf, ".glb": _of_glb}
-    groups, exported = readers.get(file.suffix.lower(), _of_csv)(file)
+    reads = readers.get(file.suffix.lower())
+    groups, exported = _of_csv(file, scale) if reads is None else reads(file)
     if not part and len(groups) > 1:
         raise InputError("part", None, f"one of {', '.join(groups)}: name it with --part", str(file))
     if part and part not in groups:
@@ -220,14 +222,14 @@ def read_points(file: Path, reader: Hardpoints | None = None, *, part: str = "")
     return {name: at for name, at in found.items() if name in (*reader.needs, *reader.may)}
 
 
-def _of_csv(file: Path) -> tuple[Groups, bool]:
+def _of_csv(file: Path, scale: float) -> tuple[Groups, bool]:
     import pandas as pd
 
     try:
         table: pd.DataFrame = pd.read_csv(file, comment="#", skipinitialspace=True, dtype={"stage": str, "member": str})
     except (ValueError, OSError) as error:
         raise InputError("file", file.name, f"a CSV table ({error})", str(file)) from error
-    table = _in_mm(table.rename(columns=str.strip), file)
+    table = _in_mm(table.rename(columns=str.strip), file, scale)
     for column in ("name", "x", "y", "z"):
         if column not in table:
             raise InputError("column", column, "the columns name, x, y, z", str(file))
@@ -248,14 +250,18 @@ def _of_csv(file: Path) -> tuple[Groups, bool]:
 _HEADED = re.compile(r"([xyz])\s*\[(.+)\]")
 
 
-def _in_mm(table: pd.DataFrame, file: Path) -> pd.DataFrame:
-    """Bring coordinates whose headings name a unit, as `x [inch]`, to mm; others keep the unit they are in."""
+def _in_mm(table: pd.DataFrame, file: Path, scale: float) -> pd.DataFrame:
+    """Bring coordinates to mm: from the unit of their heading, as `x [inch]`, of an export's column, else by scale."""
+    exported = {"member", "stage", "frame", "unit"} <= set(table)
+    for axis in {"x", "y", "z"} & set(table):
+        factors = table["unit"].map({"m": 1e3}).fillna(1.0) if exported else scale
+        table[axis] = factors * numbers(table[axis], axis, f"{file}, row")
     for heading in list(table.columns):
         found = _HEADED.fullmatch(heading)
         if found is None:
             continue
         try:
-            table[found[1]] = table.pop(heading) * factor(found[2].strip(), "mm")
+            table[found[1]] = factor(found[2].strip(), "mm") * numbers(table.pop(heading), heading, f"{file}, row")
         except UnitFault as fault:
             raise InputError("column", heading, str(fault), str(file)) from None
     return table
@@ -274,17 +280,18 @@ def _of_dxf(file: Path) -> tuple[Groups, bool]:
     """Named points and axes of the front views, whose third coordinate is kept."""
     ezdxf = ezdxf_or_refuse()
     try:
-        space = ezdxf.readfile(file).modelspace()
+        document = ezdxf.readfile(file)
     except (OSError, ezdxf.DXFStructureError) as error:
         raise InputError("file", file.name, f"a DXF drawing ({error})", str(file)) from error
+    scale = 1e3 if document.header["$INSUNITS"] == UNITS["m"] else 1.0
     groups: Groups = {}
-    for entity in space.query("POINT LINE"):
+    for entity in document.modelspace().query("POINT LINE"):
         if not entity.has_xdata(NAMED):
             continue
         label, name = (value for code, value in entity.get_xdata(NAMED) if code == 1000)
         line = entity.dxftype() == "LINE"
         at = entity.dxf.end - entity.dxf.start if line else entity.dxf.location
-        groups.setdefault(label, {})[name] = [float(x) for x in at]
+        groups.setdefault(label, {})[name] = [scale * float(x) for x in at]
     if not groups:
         raise InputError("file", file.name, "a drawing with named points, by sweep export", str(file))
     return groups, True
@@ -300,13 +307,15 @@ def _of_glb(file: Path) -> tuple[Groups, bool]:
     if document.get("asset", {}).get("generator") != "linksweep":
         raise InputError("file", file.name, "a model by sweep export", str(file))
     nodes = document["nodes"]
+    root = nodes[document["scenes"][0]["nodes"][0]]
+    millimetres = 1e3 * root["scale"][0]
     groups: Groups = {}
-    for group in (nodes[k] for k in nodes[document["scenes"][0]["nodes"][0]]["children"]):
+    for group in (nodes[k] for k in root["children"]):
         points = groups.setdefault("" if group["name"] == "stage" else group["name"], {})
         for node in (nodes[k] for k in group["children"]):
             if node["name"].startswith("axis_"):
                 x, y, z, w = node["rotation"]
                 points[node["name"]] = [2.0 * (x * z + w * y), 2.0 * (y * z - w * x), 1.0 - 2.0 * (x * x + y * y)]
             elif "mesh" in node:
-                points[node["name"]] = np.add(node["translation"], group["translation"]).tolist()
+                points[node["name"]] = (millimetres * np.add(node["translation"], group["translation"])).tolist()
     return groups, True

@@ -289,6 +289,14 @@ def test_exports_are_read_back_as_the_design(name, kind, tmp_path):
 
 
 @pytest.mark.parametrize("kind", PRECISION)
+def test_exports_in_metres_are_read_back_in_mm(kind, tmp_path):
+    file = sweep.export("rssr", scaled("rssr", 0.001 * MM), tmp_path / f"points.{kind}", unit="m")
+    found = sweep.from_points("rssr", **read_points(file, reader_of("rssr")))
+    for key, value in scaled("rssr").items():
+        assert found.parameters[key] == pytest.approx(value, abs=10.0 * PRECISION[kind]), key
+
+
+@pytest.mark.parametrize("kind", PRECISION)
 def test_verb_reads_one_stage_of_an_exported_chain(kind, tmp_path):
     file = sweep.export(["rssr", "guide"], chain_design(), tmp_path / f"chain.{kind}")
     for name, part in (("rssr", "stage 1"), ("guide", "stage 2")):

@@ -215,13 +215,18 @@ def test_verb_reads_a_table_of_points_and_writes_a_design(tmp_path):
     done = CliRunner().invoke(main, ["eval", "rssr", str(out), "--want", "psi"])
     assert float(done.output.splitlines()[1].split(",")[0]) == pytest.approx(math.radians(151.69924423), abs=1e-9)
     inches = [f"{name},{x / 25.4!r},{y / 25.4!r},{z / 25.4!r}" for name, (x, y, z) in HARDPOINTS.items()]
-    for head, options in (("name,x,y,z", ["--unit", "inch"]), ("name,x [inch],y [inch],z [inch]", [])):
+    headed = "name,x [inch],y [inch],z [inch]"
+    for head, options in (("name,x,y,z", ["--unit", "inch"]), (headed, []), (headed, ["--unit", "inch"])):
         file.write_text("\n".join([head, *inches]) + "\n")
         again = tomllib.loads(CliRunner().invoke(main, ["points", "rssr", str(file), *options]).output)["design"]
         b = float(again["b"].removesuffix(" mm"))
         assert b == pytest.approx(1219.6310917650, abs=1e-9) and again["alpha"] == "-90 deg"
     done = CliRunner().invoke(main, ["points", "rssr", str(file), "--unit", "kg"])
     assert done.exit_code == 2 and "a length, in mm" in done.output
+    for head in ("name,x,y,z", headed):
+        file.write_text(f"{head}\nA,0,0,0\nB,0,0,2 mm\n")
+        done = CliRunner().invoke(main, ["points", "rssr", str(file)])
+        assert done.exit_code == 2 and "row 1: z" in done.output and "'2 mm'; allowed: a number" in done.output
     file.write_text("name,x,y\nA,0,0\n")
     done = CliRunner().invoke(main, ["points", "rssr", str(file)])
     assert done.exit_code == 2 and "the columns name, x, y, z" in done.output
