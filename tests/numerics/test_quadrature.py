@@ -111,6 +111,17 @@ def test_no_jump_hides_beyond_the_last_nodes_of_a_panel(panels, target):
     assert (off <= found.err[:, 0] + 1e-13).all()
 
 
+@pytest.mark.parametrize(("panels", "target"), [(4, 1e-5), (4, 1e-9), (16, 1e-9)])
+def test_no_kink_hides_where_both_rules_agree(panels, target):
+    """Of 4000 places of a kink 7 to 10 % had errors far above what was said, 3 % of them in the middle of panels."""
+    place = np.random.default_rng(0).uniform(0.0, 2.0 * np.pi, 4000)
+    edges = np.tile(np.linspace(0.0, 2.0 * np.pi, panels + 1), (place.size, 1))
+    found = integrate(lambda rows, origins, x: np.abs(x - place[rows, None])[:, :, None], edges, target)
+    assert found.settled.all()
+    off = np.abs(found.value[:, 0] - 0.5 * (place**2 + (2.0 * np.pi - place) ** 2))
+    assert (off <= found.err[:, 0] + 1e-13).all()
+
+
 def test_where_a_function_begins_to_be_zero_is_found_to_rounding():
     """A thread that leaves its cam feeds nothing from there on: the search ended at any place beyond."""
     place = np.random.default_rng(1).uniform(0.1, 0.9, 1000)
