@@ -103,7 +103,7 @@ def quantity(name: str, unit: str) -> Quantity:
         return replace(shown, name=name, factor=-shown.factor, speed_scale=-shown.speed_scale)
     if is_error(name):
         shown = quantity(without_error(name), unit)
-        return Quantity(name, f"error of {shown.symbol}", f"error of the {shown.words}", shown.unit, shown.factor)
+        return Quantity(name, f"error of {shown.symbol}", f"error of the {shown.words}", shown.unit, abs(shown.factor))
     if member := parts(name).member:
         shown = quantity(name.removeprefix(f"{member}."), unit)
         return replace(shown, name=name, symbol=f"{shown.symbol} {member}", words=f"{shown.words} of the {member}")

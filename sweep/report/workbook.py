@@ -79,7 +79,8 @@ def _headed(data: Dataset, frame: pd.DataFrame) -> pd.DataFrame:
         for name in map(str, frame.select_dtypes("number"))
         if data.units.get(name)
     }
-    scaled = {name: frame[name] * of.factor for name, of in shown.items() if of.factor != 1.0}
+    # The heading is the name that the dataset has: what is made large stays the negative that it is there.
+    scaled = {name: frame[name] * abs(of.factor) for name, of in shown.items() if abs(of.factor) != 1.0}
     return frame.assign(**scaled).rename(columns={n: f"{n} [{of.unit}]" for n, of in shown.items() if of.unit})
 
 

@@ -10,10 +10,12 @@ import pandas as pd
 import pytest
 from click.testing import CliRunner
 
+import sweep
 from sweep.cli import main
 from sweep.dataset.reading import best
 from sweep.errors import InputError
 from sweep.report.workbook import write_workbook
+from sweep.study import study_from_data
 from tests.support.report_dataset import write_dataset
 
 
@@ -40,6 +42,29 @@ def test_definitions_name_every_column_once_with_its_unit(folder: Path, tmp_path
     assert about.index.is_unique
     assert {name.split(" [")[0] for sheet in sheets.values() for name in sheet} == set(about.index)
     assert about.loc["max_abs_d2s", "unit"] == "mm/rad²" and "d2s" in about.loc["max_abs_d2s", "definition"]
+
+
+def test_what_is_made_large_stays_negative_under_its_name_and_its_error_positive(tmp_path: Path) -> None:
+    study = study_from_data(
+        {
+            "study": {"name": "bars", "title": "Four-bars"},
+            "mechanism": {"family": "four_bar"},
+            "scene": {"want": ["least_transmission_angle"]},
+            "design": {
+                "a": {"from": 8.0, "to": 12.0, "count": 5, "unit": "mm"},
+                "b": "35 mm",
+                "c": "30 mm",
+                "e": "32 mm",
+            },
+            "objective": {"maximise": "least_transmission_angle"},
+            "accuracy": {"target": 1e-8},
+        },
+        "study.toml",
+    )
+    stored = sweep.load(sweep.run(study, out=tmp_path / "designs", jobs=1))
+    found = pd.read_excel(write_workbook(tmp_path / "designs", tmp_path / "bars.xlsx")).sort_values("design")
+    for name in ("minus_least_transmission_angle", "err_minus_least_transmission_angle"):
+        np.testing.assert_allclose(found[f"{name} [°]"], np.degrees(stored[name]), rtol=1e-6)  # err_ is float32
 
 
 def test_command_writes_it_beside_the_designs(folder: Path) -> None:
