@@ -43,6 +43,7 @@ from kernels.jit import generated_inline, generated_part, inline
 from kernels.types import TWO_PI as TURN
 from kernels.types import Array, CosSin, Status
 
+ZERO = np.int64(0)  # a plain one in a call is a type of its own, for which `gather` would be compiled once more
 CHUNK = FEWEST  # samples whose peaks are looked for together
 ROW = 2**62 - 1  # as `kernels.chains.peaks.PLACE`, for rows of a table
 ANGLE = 2**15 - 1  # as `kernels.chains.peaks.PLACE`, for samples and crank angles
@@ -130,7 +131,9 @@ def enlister(chain: Chained, of: Curve) -> Helper:
                     status[which, i] = code
         few = Sampled(False, FEWEST, 0.0, 0.0)
         for which in range(modes.size):
-            length = gather(0, end - begin, few, which, modes[which], table, m, status[which, begin:end], length, room)
+            length = gather(
+                ZERO, end - begin, few, which, modes[which], table, m, status[which, begin:end], length, room
+            )
         for i in range(begin, end):
             if status[0, i] == LOOKING:
                 k: Any = get(m, (place[i - begin] & PLACE) + CONSTANTS)

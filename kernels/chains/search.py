@@ -42,7 +42,9 @@ from kernels.types import Array, CosSin, Status
 PLAIN = 2.0**-14  # of the target: larger rounding errors are left to precise poses
 RIVALS = 64.0  # times the rounding error: peaks lower by no more may turn out the highest where it has moved them
 LEVEL = 2.0**-4  # of the target: rounding errors up to which tops as high as each other need no precise poses
-SETTLING = 8  # more steps for a maximum that is not trusted after the usual ones
+# A part is compiled once more for a plain number that is written into its call, a type of its own: these are not.
+ONE = np.int64(1)
+SETTLING = np.int64(8)  # more steps for a maximum that is not trusted after the usual ones
 MORE = 4  # times as many samples for a design of which a maximum is not trusted even so
 ROUNDED, UNTRUSTED = 254, 253  # instead of a status; the first see `find_extrema`
 VALUE, PHI, VALUE_ERROR, PHI_ERROR, SCALE_ROW, SPACING = range(6)
@@ -128,8 +130,8 @@ def _decider(of: Curve, refine: Helper, finish: Helper, allowed: float) -> Helpe
                 for slot in range(low - 1, high):
                     peak = (own if slot < low else slot) & PLACE
                     if not m[peak + ERROR] < math.inf:  # a flat top, which Newton's method climbs slowly
-                        refine(1, m[peak:], SETTLING)
-                        finish(1, m[peak:], target)
+                        refine(ONE, m[peak:], SETTLING)
+                        finish(ONE, m[peak:], target)
             status[i] = _decide(own, low, high, m, mode, allowed, target, tie, i, found)
 
     return generated_inline(f"decide_{of.name}", decide)
