@@ -15,7 +15,7 @@ from sweep.effects.driven import DrivenSide, driven_side
 from sweep.effects.load_passing import LOADS, behind
 from sweep.effects.loads import SPEED
 from sweep.effects.scene import Scene, take_over
-from sweep.effects.turn import at_poses, on_finer_grids, per_turn, reduction_outputs
+from sweep.effects.turn import RESOLVED, at_poses, on_finer_grids, per_turn, reduction_outputs
 from sweep.families.base import Accuracy, Array, Columns, Output, Parameter
 from sweep.families.poses import optional_outputs
 from sweep.numerics.steady_speed import forwards
@@ -141,21 +141,63 @@ def _solve(grid: Scene, phi: Array, last: bool) -> tuple[dict[str, Array], Statu
 
     A crank that turns backwards is one that turns forwards in -phi: only so do multipliers below 1 mean stability.
     """
-    grid, n, speed = grid.even(), len(grid.designs), grid.inputs["speed"]
+    grid, speed, size = grid.even(), grid.inputs["speed"], grid.shape[1]
+    _, _, c, reach, _ = _arguments(grid)
+    equation = _equation(grid)
+    found, status = _steady(equation, speed, c, reach, phi, last)
+    found["missed"] = np.zeros(len(speed))
+    bent = np.flatnonzero(grid.least_samples > 0.0)
+    if bent.size:
+        part, own = grid.only(bent), phi[bent] if phi.shape[0] > 1 else phi
+        fine = _equation(part.on_grid(3 * (-(-FINER[-1] // size) | 1) * size))
+        given = equation[0][bent], speed[bent], c[bent], reach[bent]
+        # Each third sample, begun at two places: a jump halfway between samples is so in one of them at most.
+        (whole, codes), *thirds = (_bent(fine, *taken, given, own, last) for taken in ((0, 1), (0, 3), (1, 3)))
+        lag = whole["lag_dynamic"]
+        change, most = (np.abs(x).max(axis=-1) for x in ([y["lag_dynamic"] - lag for y, _ in thirds], lag))
+        for _, other in thirds:
+            take_over(codes, np.where(other == st.NOT_CONVERGED, other, st.OK))
+        whole["missed"] = np.divide(change.max(axis=0), most, out=np.zeros(bent.size), where=most > 0.0)
+        for name in ("lag_dynamic", "elongation_dynamic"):
+            whole[name][codes == st.NOT_CONVERGED] = np.nan
+        status[bent] = codes
+        for name, values in whole.items():
+            found[name][bent] = values
+    return found, status
+
+
+def _bent(
+    fine: list[Array], start: int, step: int, given: tuple[Array, ...], phi: Array, last: bool
+) -> tuple[dict[str, Array], Status]:
+    """Solve under loads with kinks or jumps, of which a grid would fold what it does not carry into the rest.
+
+    ``fine`` is the equation on a finer grid, of whose samples from ``start`` on each of ``step`` are taken.
+    """
+    p, speed, c, reach = given
+    n, size = fine[0].shape[1], p.shape[1]
+    turn = np.exp(-2j * np.pi * start / n * np.arange(size // 2 + 1)) * (step * size / n)
+    smooth = [
+        np.fft.irfft(np.fft.rfft(y[:, start::step], axis=1)[:, : size // 2 + 1] * turn, n=size, axis=1)
+        for y in fine[1:]
+    ]
+    return _steady([p, *smooth], speed, c, reach, phi, last)
+
+
+def _steady(
+    equation: list[Array], speed: Array, c: Array, reach: Array, phi: Array, last: bool
+) -> tuple[dict[str, Array], Status]:
+    n = len(speed)
     lag, elongation = (np.empty((n, phi.shape[1])) for _ in range(2))
     found = Steady(np.empty(n, np.uint8), lag, elongation, np.empty(n))
-    p, d2psi, c, reach, data = _arguments(grid)
-    first, zeroth, right = _equation(grid, p, d2psi, data, driven_side(grid, True))
-    first *= np.copysign(1.0, speed)[:, None]
-    phi, (p, first, zeroth, right) = forwards(speed, phi, p, first, zeroth, right)
-    steady_state(p, first, zeroth, right, c, reach, phi, last, found)
+    phi, (p, first, zeroth, right) = forwards(speed, phi, *equation)
+    steady_state(p, first * np.copysign(1.0, speed)[:, None], zeroth, right, c, reach, phi, last, found)
     return {"lag_dynamic": lag, "elongation_dynamic": elongation, "floquet": found.floquet}, found.status
 
 
-def _equation(
-    scene: Scene, p: Array, d2psi: Array, data: Array, driven: DrivenSide | None
-) -> tuple[Array, Array, Array]:
-    """Factors of eta' and of eta, and the right side, over that of eta''; (3) with (5), (n, N)."""
+def _equation(scene: Scene) -> list[Array]:
+    """Give p, the factors of eta' and of eta, and the right side, over the factor of eta''; (3) with (5), (n, N)."""
+    p, d2psi, _, _, data = _arguments(scene)
+    driven = driven_side(scene, True)
     inertia, stiffness, damping, speed, _ = (data[:, k, None] for k in range(5))
     square = p * p
     orders = np.arange(p.shape[1] // 2 + 1)
@@ -169,7 +211,7 @@ def _equation(
         first += speed * speed * driven.bend * scene.records[0][:, :, 22]
         zeroth += driven.slope
         right = right - driven.torque
-    return first / mass, zeroth / mass, right / mass
+    return [p, first / mass, zeroth / mass, right / mass]
 
 
 def turn(scene: Scene, wanted: frozenset[str], accuracy: Accuracy) -> Columns:
@@ -194,7 +236,8 @@ def _turn(scene: Scene, wanted: frozenset[str], grids: tuple[int, ...]) -> Colum
         # A multiplier is known even where the forced solution is not resolved or not linear.
         status[np.isfinite(floquet)] = st.OK
     numbers: Columns = {"floquet": floquet, "err_floquet": np.full(len(floquet), MULTIPLIER_ERROR)}
-    return per_turn(found, status, numbers, _dynamic_outputs(loads.follower_of(scene.family)), wanted)
+    known = np.maximum(found["missed"], RESOLVED)
+    return per_turn(found, status, numbers, _dynamic_outputs(loads.follower_of(scene.family)), wanted, known=known)
 
 
 def advise_static(scene: Scene) -> Advice | None:
