@@ -15,7 +15,7 @@ from sweep.families.base import Array, Turn
 
 STEP = 1e-6  # of differences: a part of the mechanism's size, or rad
 ROUNDS = 8
-LEAST = 1e-3  # of its length a dimension keeps that has to be positive
+LEAST = 1e-3  # of its length a dimension keeps that may not be negative
 STAY = 0.05  # weight of the joints that should stay beside the one that is dragged
 LITTLE = 1e-4  # weight of a change of a dimension by the mechanism's size
 
@@ -61,15 +61,20 @@ def dragged(
     goal = flat.copy()
     goal[names.index(place)] = to
 
-    def off(changes: Array) -> Array:
-        apart = weight[:, None] * (_flat(joints(x + changes * scale)) - goal) / size
-        return np.append(apart.ravel(), LITTLE * changes)
+    steps = np.diag(scale)
+    # What a small step takes apart keeps its value: the sides of a second four-bar that has no lengths.
+    steady = [bool(np.isfinite(_flat(joints(x + STEP * step))).all()) for step in steps]
+    steps = steps[steady]
 
-    low = np.where(positive, -(1.0 - LEAST) * x / scale, -np.inf)
+    def off(changes: Array) -> Array:
+        apart = weight[:, None] * (_flat(joints(x + changes @ steps)) - goal) / size
+        return np.append(np.nan_to_num(apart.ravel(), nan=1.0), LITTLE * changes)  # far off where it comes apart
+
+    low = np.where(positive, -(1.0 - LEAST) * x / scale, -np.inf)[steady]
     changes = least_squares(
-        off, np.zeros(x.size), bounds=(low, np.inf), diff_step=np.full(x.size, STEP), max_nfev=ROUNDS
+        off, np.zeros(len(steps)), bounds=(low, np.inf), diff_step=np.full(len(steps), STEP), max_nfev=ROUNDS
     ).x
-    x = x + changes * scale
+    x = x + changes @ steps
     return dict(zip(free, x[:-1].tolist(), strict=True)), float(x[-1])
 
 

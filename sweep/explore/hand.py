@@ -36,7 +36,10 @@ PINS = 3
 
 @dataclass(frozen=True)
 class Range:
-    """A dimension of the page; ``factor`` turns the stored value into ``unit``, ``swept`` says that the study does."""
+    """A dimension of the page; ``factor`` turns the stored value into ``unit``, ``swept`` says that the study does.
+
+    ``positive`` says that it may not be negative.
+    """
 
     name: str
     text: str
@@ -76,13 +79,14 @@ class Hand:
         shown = quantity(p.name, self.data.units.get(p.name, PARAMETER_UNITS[p.unit]))
         value, swept = self.first[p.name], p.name in self.study.space.bounds
         reach = REACH * (abs(value) or 1.0) if p.unit != "angle" else math.pi
-        ends = (0.0 if p.positive else value - reach, value + reach)
+        positive = p.positive or p.not_negative
+        ends = (0.0 if positive else value - reach, value + reach)
         low, high = self.study.space.bounds.get(p.name, ends)
         low, high = (min(low, value), max(high, value)) if low < high else ends
         low = value * (1.0 - REACH) if p.positive and low <= 0.0 else low
         return Range(
             p.name, p.text, shown.unit, shown.factor, low, high, tuple(p.choices or ()),
-            swept and low < high, p.positive,
+            swept and low < high, positive,
         )  # fmt: skip
 
     def design(self, given: Mapping[str, object]) -> dict[str, float]:

@@ -12,6 +12,8 @@ import pytest
 import sweep
 from sweep.cli.explore import in_hand
 from sweep.errors import InputError
+from sweep.evaluation.joints import parts
+from sweep.explore.drag import dragged
 from sweep.explore.server import Server
 from sweep.study import study_from_data
 
@@ -55,3 +57,19 @@ def test_without_the_packages_the_extra_is_named(monkeypatch, folder):
     monkeypatch.setattr(builtins, "__import__", missing)
     with pytest.raises(InputError, match=r"pip install 'linksweep\[explore\]'"):
         Server(in_hand(str(folder)))
+
+
+def test_dragging_keeps_what_a_step_would_take_apart_or_make_negative():
+    hand = in_hand("heddle")  # its second four-bar has no lengths
+    (part,) = parts(hand.family, hand.first, 0.5)
+    to = part.joints["c"][0, :2] + 1.0
+    moved, phi = dragged(hand, hand.first, 0.5, ("", "C"), to)
+    (part,) = parts(hand.family, {**hand.first, **moved}, phi)
+    np.testing.assert_allclose(part.joints["c"][0, :2], to, atol=0.1)
+    assert moved["O3D"] == 0.0 and next(one for one in hand.ranges if one.name == "O3D").low == 0.0
+    hand = in_hand("feed_triad")
+    (part,) = parts(hand.family, hand.first, 0.5)
+    for name in ("e2", "e3"):  # far towards the eccentric's other side
+        to = 3.0 * part.joints[f"l{name[1]}"][0, :2] - 2.0 * part.joints[name][0, :2]
+        moved, _ = dragged(hand, hand.first, 0.5, ("", name.upper()), to)
+        assert moved["rE2"] >= 0.0 and moved["rE3"] >= 0.0
