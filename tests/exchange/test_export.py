@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-import tomllib
 
 import ezdxf
 import mujoco
@@ -13,12 +12,9 @@ import pyarrow.parquet as pq
 import pygltflib
 import pytest
 import trimesh
-from click.testing import CliRunner
 
 import sweep
-from sweep.cli import main
 from sweep.evaluation.joints import parts
-from sweep.exchange.points import read_points, reader_of
 from sweep.exchange.scene import over, turn
 from sweep.families import NAMES, family
 from sweep.families.base import Interval, March
@@ -268,62 +264,6 @@ def test_mujoco_is_refused_where_there_is_no_such_linkage_and_for_a_mass_without
     with pytest.raises(sweep.InputError, match="mjcf of looper"):
         sweep.export({"needle": "rssp", "looper": "slotted"}, machine, tmp_path / "m.xml")
     assert not list(tmp_path.iterdir())
-
-
-PRECISION = {
-    "csv": 1e-11,
-    "dxf": 1e-10,
-    "glb": 2e-3,
-}  # glb: float32 of 300 mm, less what the common perpendicular costs
-
-
-@pytest.mark.parametrize("kind", PRECISION)
-@pytest.mark.parametrize("name", ["rssr", "rssp", "four_bar", "guide", "slider_crank"])
-def test_exports_are_read_back_as_the_design(name, kind, tmp_path):
-    design, bound = scaled(name), PRECISION[kind]
-    file = sweep.export(name, design, tmp_path / f"points.{kind}", phi=0.3)
-    found = sweep.from_points(name, **read_points(file, reader_of(name)))
-    for key, value in design.items():
-        assert found.parameters[key] == pytest.approx(value, abs=bound), key
-    assert found.phi == pytest.approx(0.3, abs=bound)
-
-
-@pytest.mark.parametrize("kind", PRECISION)
-def test_exports_in_metres_are_read_back_in_mm(kind, tmp_path):
-    file = sweep.export("rssr", scaled("rssr", 0.001 * MM), tmp_path / f"points.{kind}", unit="m")
-    found = sweep.from_points("rssr", **read_points(file, reader_of("rssr")))
-    for key, value in scaled("rssr").items():
-        assert found.parameters[key] == pytest.approx(value, abs=10.0 * PRECISION[kind]), key
-
-
-@pytest.mark.parametrize("kind", PRECISION)
-def test_verb_reads_one_stage_of_an_exported_chain(kind, tmp_path):
-    file = sweep.export(["rssr", "guide"], chain_design(), tmp_path / f"chain.{kind}")
-    for name, part in (("rssr", "stage 1"), ("guide", "stage 2")):
-        done = CliRunner().invoke(main, ["points", name, str(file), "--part", part])
-        assert done.exit_code == 0, done.output
-        a = tomllib.loads(done.output)["design"]["a"].removesuffix(" mm")
-        assert float(a) == pytest.approx(scaled(name)["a"], abs=1e-4)
-    for options in ([], ["--part", "stage 3"]):
-        done = CliRunner().invoke(main, ["points", "rssr", str(file), *options])
-        assert done.exit_code == 2 and "one of stage 1, stage 2" in done.output
-
-
-def test_files_of_other_programs_are_refused_as_points(tmp_path):
-    drawing = ezdxf.new()
-    drawing.modelspace().add_point((0.0, 0.0, 0.0))
-    drawing.saveas(tmp_path / "other.dxf")
-    (tmp_path / "text.dxf").write_text("no drawing")
-    trimesh.creation.box().export(tmp_path / "other.glb")
-    (tmp_path / "text.glb").write_text("no model")
-    (tmp_path / "empty.csv").write_text("name,x,y,z\n")
-    (tmp_path / "twice.csv").write_text("name,x,y,z\nA,0,0,0\nA,1,0,0\n")
-    for name, match in (
-        ("other.dxf", "named points"), ("text.dxf", "a DXF drawing"), ("other.glb", "by sweep export"),
-        ("text.glb", "by sweep export"), ("empty.csv", "a row for each point"), ("twice.csv", "each name once"),
-    ):  # fmt: skip
-        with pytest.raises(sweep.InputError, match=match):
-            read_points(tmp_path / name)
 
 
 def test_law_has_units_in_its_headings_and_its_metadata(tmp_path):
