@@ -152,8 +152,7 @@ def _of_one(what: str, source: str, table: Path | None, options: Options) -> Any
         "mechanism": {"phi": options["phi"], "view": options["view"], "positions": options["positions"]},
     }
     if table is None:
-        domain = mechanism.domain
-        grid_in_radians(domain.name, domain.unit, options["phi"], None)  # a design out of a folder is in rad
+        grid_in_radians(mechanism.domain.name, mechanism.domain.unit, options["phi"], None)  # a folder is in rad
     if what == "cyclogram":
         known[what] = {"made": _made(source, table, options)}
     unit: AngleUnit | None = "rad" if table is None else options["angles"]
