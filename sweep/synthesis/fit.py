@@ -22,8 +22,8 @@ from sweep.families.capabilities import GuidedPoint
 from sweep.families.chain import Chain, driven_guide
 from sweep.reductions.steps import applying_step
 
-# The deviation is a smooth function of the input: 48 Chebyshev points of a swing miss 1e-4 of its extremes, 256 of a
-# whole turn 4e-4 at most (48: up to 2e-2), which is far below what the optimiser moves afterwards.
+# The deviation is a smooth function of the input: 48 Chebyshev points of a swing miss 1e-4 of its extremes as a rule,
+# 5e-3 at worst, 256 of a whole turn 4e-4 (48: up to 2e-2): far below what the optimiser moves afterwards.
 SWING_SAMPLES, TURN_SAMPLES = 48, 256
 SWING_ACCURACY = Accuracy(target=1e-6)
 SWING = ("psi_ext", "swing")
