@@ -124,18 +124,26 @@ def _put_derivatives(
             write(out.d3psi, i, j, t3 - 3.0 * (r2 * t1 + t2 * r1) + 2.0 * (3.0 * r1 * r1 - t1 * t1) * t1)
 
 
-HALVINGS = 60
+HALVINGS = 90  # k next to 1 dwells over some 1e-8, whose last digits they reach too
 STEPS = 64  # per turn of the pin while the end of the band is looked for
 
 
 @inline
-def _output(k: float, a: float, arm: float, mesh: float, phi: float) -> tuple[float, float]:
-    """Output angle, and its velocity analogue times the squared distance of the pin from the output axis."""
-    x = arm * math.cos(phi) - mesh * k * math.cos(arm * phi) + a
-    y = arm * math.sin(phi) - k * math.sin(arm * phi)
-    x1 = -arm * math.sin(phi) + mesh * k * arm * math.sin(arm * phi)
-    y1 = arm * math.cos(phi) - k * arm * math.cos(arm * phi)
-    return math.atan2(y, x), x * y1 - y * x1
+def _output(k: float, front: float, arm: float, mesh: float, phi: float) -> tuple[float, float, float]:
+    """Output angle, its velocity analogue times the squared distance of the pin from the output axis, the pin's y.
+
+    ``front`` is the pin's x at phi = 0.  No terms cancel for k next to 1 and small angles: L - sin(L phi)/sin(phi) is a
+    sum of squares.
+    """
+    lag = 0.0
+    for j in range(int(arm) // 2):
+        lag += 4.0 * math.sin((0.5 * (arm - 1.0) - j) * phi) ** 2
+    y = math.sin(phi) * lag - (k - 1.0) * math.sin(arm * phi)
+    x = front + 2.0 * (mesh * k * math.sin(0.5 * arm * phi) ** 2 - arm * math.sin(0.5 * phi) ** 2)
+    x1 = arm * (mesh * k * math.sin(arm * phi) - math.sin(phi))
+    closing = 2.0 * math.sin(0.5 * (arm + 1.0) * phi) * math.sin(0.5 * (arm - 1.0) * phi)
+    y1 = arm * (closing - (k - 1.0) * math.cos(arm * phi))
+    return math.atan2(y, x), x * y1 - y * x1, y
 
 
 @kernel
@@ -159,7 +167,11 @@ def dwell_measures(designs: Array, status: Status, dwell_angle: Array, deviation
         valid = 0.0 < k < 1e30 and abs(a) < 1e30 and mesh * mesh == 1.0
         valid = valid and arm >= 1.0 and n <= MOST_TEETH and n == math.floor(n)
         code = st.OK if valid else st.INVALID_INPUT
-        if valid and not arm - mesh * k + a > 0.0:
+        rough = a - mesh * k
+        back = rough - a
+        # with the rounding error of a - mesh k
+        front = (rough + arm) + ((a - (rough - back)) - (mesh * k + back))
+        if valid and not front > 0.0:
             code = st.NO_DWELL
         none = 0.0 if code == st.OK else math.nan
         dwell_angle[i], deviation[i], band[i] = none, none, none
@@ -168,7 +180,7 @@ def dwell_measures(designs: Array, status: Status, dwell_angle: Array, deviation
             low, high = 0.0, math.pi / arm
             for _ in range(HALVINGS):
                 phi = 0.5 * (low + high)
-                if arm * math.sin(phi) < k * math.sin(arm * phi):
+                if _output(k, front, arm, mesh, phi)[2] < 0.0:
                     low = phi
                 else:
                     high = phi
@@ -176,14 +188,14 @@ def dwell_measures(designs: Array, status: Status, dwell_angle: Array, deviation
             low, high = 0.0, returned
             for _ in range(HALVINGS):
                 phi = 0.5 * (low + high)
-                if _output(k, a, arm, mesh, phi)[1] < 0.0:
+                if _output(k, front, arm, mesh, phi)[1] < 0.0:
                     low = phi
                 else:
                     high = phi
-            most = -_output(k, a, arm, mesh, 0.5 * (low + high))[0]
+            most = -_output(k, front, arm, mesh, 0.5 * (low + high))[0]
             step = 2.0 * math.pi / (arm * STEPS)
             low = returned
-            while low + step < math.pi and _output(k, a, arm, mesh, low + step)[0] < most:
+            while low + step < math.pi and _output(k, front, arm, mesh, low + step)[0] < most:
                 low += step
             high = low + step
             if not 0.0 < most < 0.5 * math.pi or high > math.pi:
@@ -192,7 +204,7 @@ def dwell_measures(designs: Array, status: Status, dwell_angle: Array, deviation
             else:
                 for _ in range(HALVINGS):
                     phi = 0.5 * (low + high)
-                    if _output(k, a, arm, mesh, phi)[0] < most:
+                    if _output(k, front, arm, mesh, phi)[0] < most:
                         low = phi
                     else:
                         high = phi

@@ -235,6 +235,22 @@ def test_epicyclic_dwell_measures_are_what_the_curve_shows():
         assert end == pytest.approx(measures.dwell_deviation[k], rel=1e-12)
 
 
+def test_epicyclic_dwell_measures_keep_their_digits_at_short_dwells():
+    # equal gears have closed forms; they were 4e-5 off at k = 1 + 1e-12, with 1e-8 asked
+    table = {
+        "k": [1.0 + 1e-12, 1.0 + 1e-8, 1.0 + 9.239517300141387e-07, 1.1],
+        "a": [0.3, -0.9, -0.999999076, 3.0999999],
+    }
+    measures = ["dwell_angle", "dwell_deviation", "dwell_band"]
+    own, other = (sweep.summarise(f, table, measures, accuracy=1e-9) for f in ("epicyclic_dwell", "geared_dwell"))
+    np.testing.assert_allclose(own[measures], other[measures], rtol=1e-14)
+    # (5) for k next to 1: L phi^3 (L^2 - 1)/6 = (k - 1) L phi
+    table = {"k": 1.0 + 2.0**-36, "a": 0.2, "n": [3.0, 8.0, 64.0], "mesh": [1.0, -1.0, 1.0]}
+    arm = np.array([4.0, 7.0, 65.0])
+    found = sweep.summarise("epicyclic_dwell", table, measures, accuracy=1e-9)
+    np.testing.assert_allclose(found.dwell_angle, 2.0 * np.sqrt(6.0 * 2.0**-36 / (arm**2 - 1.0)), rtol=1e-9)
+
+
 def test_epicyclic_cross_slide_has_the_published_dwell():
     # N. D. Thang: a ring of 4 planet radii, tracer at 11/30 of one: a square whose corners lie at phi = 0, 90 deg ...
     phi = np.linspace(-0.25 * math.pi, 0.75 * math.pi, 200001)
