@@ -15,9 +15,9 @@ from kernels.effects.bearings import equivalent_load, in_plane, sliding_criteria
 from kernels.jit import inline, kernel
 from kernels.types import EPS, Array, Status
 
-# Looks for the first crossing.  Mean pressures rise with theta1 all the way (R/cos, thrust/cos rise, the arm over cos
-# falls), so one bracket holds; an equivalent load may step down once, where it changes to its second formula.
-SLIDING_LOOKS, ROLLING_LOOKS = 1, 16
+# Mean pressures rise with theta1 all the way (R/cos, thrust/cos rise, the arm over cos falls): one bracket holds.  An
+# equivalent load may step down once, where it changes to its second formula, and rises on both sides.
+BEFORE = 1.0 - 1e-12  # of the step: where the first formula holds surely
 STEPS = 100
 
 
@@ -55,22 +55,41 @@ def _spare(utilisation: Any, bearings: Array, limits: Array, i: int, moment: flo
 
 
 @inline
+def _step(bearings: Array, i: int, tan2: float) -> float:
+    """Return tan(theta1/2) at which an equivalent load changes to its second formula; 0 if it never does."""
+    z1, z2, share = bearings[i, 1], bearings[i, 2], bearings[i, 6] * bearings[i, 3]
+    if tan2 == 0.0:
+        return 0.0
+    z = z2 if bearings[i, 10] == 1.0 else z1
+    arm = share * (bearings[i, 0] + z / tan2)
+    rest = (z2 - z1) * (z2 - z1) - arm * arm
+    if not rest > 0.0:
+        return 0.0
+    tan1 = share * abs(z / tan2) / math.sqrt(rest)
+    half: float = tan1 / (1.0 + math.hypot(1.0, tan1))
+    return half
+
+
+@inline
 def _first_crossing(
-    utilisation: Any, looks: int, bearings: Array, limits: Array, i: int, moment: float, tan2: float
+    utilisation: Any, step: float, bearings: Array, limits: Array, i: int, moment: float, tan2: float
 ) -> float:
-    """Largest theta1 from 0 on with utilisation <= 1 all the way; 0 if there is none."""
+    """Largest theta1 from 0 on with utilisation <= 1 all the way; 0 if there is none.
+
+    ``step`` is the tan(theta1/2) at which it may step down, 0 if it does nowhere.
+    """
     # In half = tan(theta1/2) there is no sine to call; what is spare falls through zero at the crossing.
     low, high, at_high = 0.0, 1.0, -1.0
     at_low = _spare(utilisation, bearings, limits, i, moment, 0.0, tan2)
     if at_low < 0.0:
         return 0.0
-    for k in range(1, looks):
-        half = k / looks
+    if step > 0.0:
+        half = step * BEFORE
         value = _spare(utilisation, bearings, limits, i, moment, half, tan2)
         if value < 0.0:
             high, at_high = half, value
-            break
-        low, at_low = half, value
+        else:
+            low, at_low = half, value
     side, before, half = 0, math.inf, low
     for _ in range(STEPS):
         # Regula falsi that halves the value of an end which stays (Illinois), in the bracket always.
@@ -94,7 +113,7 @@ def _first_crossing(
 
 @inline
 def _fill(
-    utilisation: Any, looks: int, direction: tuple[Array, Array, Array], moment: Array, bearings: Array, limits: Array,
+    utilisation: Any, rolls: bool, direction: tuple[Array, Array, Array], moment: Array, bearings: Array, limits: Array,
     status: Status, used: Array | None, permissible: Array | None, reserve: Array | None,
 ) -> None:  # fmt: skip
     t_tau, t_rho, t_k = direction
@@ -112,7 +131,8 @@ def _fill(
             if permissible is not None or reserve is not None:
                 # theta2 stands still where there is no radial force; any axial force then permits no radial angle.
                 tan2 = along / rho if rho != 0.0 else (math.copysign(1e300, along) if along != 0.0 else 0.0)
-                limit = _first_crossing(utilisation, looks, bearings, limits, i, moment[i], tan2)
+                step = _step(bearings, i, tan2) if rolls else 0.0
+                limit = _first_crossing(utilisation, step, bearings, limits, i, moment[i], tan2)
                 if permissible is not None:
                     permissible[i, j] = good * limit
                 if reserve is not None:
@@ -146,7 +166,7 @@ def sliding_limits(
     """
     direction = t_tau, t_rho, t_k
     _fill(
-        sliding_utilisation, SLIDING_LOOKS, direction, moment, bearings, limits, status, used, permissible, reserve
+        sliding_utilisation, False, direction, moment, bearings, limits, status, used, permissible, reserve
     )  # fmt: skip
 
 
@@ -170,5 +190,5 @@ def rolling_limits(
     """
     direction = t_tau, t_rho, t_k
     _fill(
-        rolling_utilisation, ROLLING_LOOKS, direction, moment, bearings, limits, status, used, permissible, reserve
+        rolling_utilisation, True, direction, moment, bearings, limits, status, used, permissible, reserve
     )  # fmt: skip

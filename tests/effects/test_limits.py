@@ -101,6 +101,29 @@ def test_a_plane_linkage_at_its_best_angle_permits_what_its_neighbours_do():
     assert found[0] > 0.1
 
 
+def test_a_rolling_bearing_permits_no_angle_beyond_one_that_overloads_it_before_its_load_steps_down():
+    """With X + Y e below 1 the equivalent load steps down where the axial load passes e V R."""
+    torque, z1, z2, e = 1000.0, -5.0, 30.0, 0.2
+    row = RSSR | {
+        "resisting_torque": torque, "support_d1": z1, "support_d2": z2, "radial_factor": 0.2, "axial_factor": 0.3,
+        "e_limit": e, "required_life": 2e6 * np.pi / OMEGA, "speed": OMEGA, "dynamic_capacity": 1.0,
+    }  # fmt: skip
+    poses = sweep.evaluate("rssr", row, ["t_rho", "t_k"], phi=PHI)
+    axial = row["c"] * (poses.t_k / poses.t_rho).to_numpy()
+    with np.errstate(invalid="ignore"):
+        step = e * z2 / np.sqrt(((z2 - z1) * axial / row["c"]) ** 2 - (e * (z2 + axial)) ** 2)
+    square = 0.999**2 * (z2**2 + ((z2 + axial) * step) ** 2)
+    # Tangents of theta1 at which the load is 0.999 of that at the step, of bearings 1 and 2.
+    with np.errstate(invalid="ignore"):
+        first, second = (np.sqrt(square - z**2) / np.abs(z + axial) for z in (z2, z1))
+    known = first < second
+    assert known.sum() > 20
+    capacity = torque / (row["c"] * (z2 - z1)) * np.sqrt(square[known])
+    table = row | {"phi": PHI[known], "dynamic_capacity": capacity}
+    found = sweep.evaluate("rssr", table, ["permissible_theta1_rolling"]).permissible_theta1_rolling
+    np.testing.assert_allclose(found, np.arctan(first[known]), rtol=1e-9)
+
+
 @pytest.mark.parametrize(("output", "wrong"), [
     ("load_support_d1", {"support_d2": -20.0}), ("force_c_friction", {"support_a1": -60.0}),
     ("radial_load_d1", {"support_d2": -20.0}), ("life_d1", {"support_d2": -20.0}),
