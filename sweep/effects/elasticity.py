@@ -157,7 +157,9 @@ def _solve(grid: Scene, phi: Array, last: bool) -> tuple[dict[str, Array], Statu
         change, most = (np.abs(x).max(axis=-1) for x in ([y["lag_dynamic"] - lag for y, _ in thirds], lag))
         for _, other in thirds:
             take_over(codes, np.where(other == st.NOT_CONVERGED, other, st.OK))
-        whole["missed"] = np.divide(change.max(axis=0), most, out=np.zeros(bent.size), where=most > 0.0)
+        over = np.fft.rfft(fine[-1], axis=1)[:, size // 2 + 1 :] * (2.0 / fine[-1].shape[1])
+        dropped = (np.abs(over) / (size // 2 + 1 + np.arange(over.shape[1])) ** 2).sum(axis=1)
+        whole["missed"] = np.divide(change.max(axis=0) + dropped, most, out=np.zeros(bent.size), where=most > 0.0)
         for name in ("lag_dynamic", "elongation_dynamic"):
             whole[name][codes == st.NOT_CONVERGED] = np.nan
         status[bent] = codes
