@@ -145,7 +145,9 @@ def _turn(scene: Scene, wanted: frozenset[str], rubs: bool) -> Columns:
     columns |= {f"err_{name}{suffix}": known * fastest * share for name, share in size.items()}
     limit = RESOLVED if grids == GRIDS else LEFT_OF_CURVE
     # What is missed of the torque is a share of J omega^2: of a small acceleration it is a larger share.
-    torque = found[f"torque_error{suffix}"] if grids == GRIDS else PER_LEFT * found[f"missed{suffix}"]
+    torque = found[f"torque_error{suffix}"]
+    if grids != GRIDS:
+        torque = np.maximum(torque, PER_LEFT * found[f"missed{suffix}"])
     change = f"crank_acceleration{suffix}"
     size = np.abs(found[change]).max(axis=1)
     ratio = np.divide(fastest**2, size, out=one.copy(), where=size > 0.0)
