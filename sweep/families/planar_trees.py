@@ -88,7 +88,8 @@ def rolling_planet(parameters: Parameters) -> LinkTree:
     """Carrier, planet that rolls on a fixed gear, and the slotted link in which its pin slides.
 
     Teeth press along the tangent of the pitch circles, ours: a pressure angle of the teeth adds a radial force that the
-    carrier bears.  Where ``parameters`` name no fixed gear, it is of one size with the planet.
+    carrier bears.  Where ``parameters`` name no fixed gear, it is of one size with the planet.  Lengths of these
+    families are in planet radii, so loads are those of a planet of radius 1 mm.
     """
     whole = "n" in [p.name for p in parameters]
 
@@ -111,9 +112,9 @@ def rolling_planet(parameters: Parameters) -> LinkTree:
 
     return LinkTree(
         bodies=(
-            LinkBody("carrier", "along the carrier, tangential, along its axis, from A"),
-            LinkBody("planet", "along the arm of the pin, across it, along its axis, from O"),
-            LinkBody("link", "along the slot, across it, along its axis, from D"),
+            LinkBody("carrier", "along the carrier, tangential, along its axis, from A; planet radius 1 mm"),
+            LinkBody("planet", "along the arm of the pin, across it, along its axis, from O; planet radius 1 mm"),
+            LinkBody("link", "along the slot, across it, along its axis, from D; planet radius 1 mm"),
         ),
         joints=(
             _bearing("carrier"),
