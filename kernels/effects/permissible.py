@@ -15,8 +15,7 @@ from kernels.effects.bearings import equivalent_load, in_plane, sliding_criteria
 from kernels.jit import inline, kernel
 from kernels.types import EPS, Array, Status
 
-# Mean pressures rise with theta1 all the way (R/cos, thrust/cos rise, the arm over cos falls): one bracket holds.  An
-# equivalent load may step down once, where it changes to its second formula, and rises on both sides.
+# Mean pressures rise with theta1 all the way: one bracket holds.  An equivalent load rises on both sides of its step.
 BEFORE = 1.0 - 1e-12  # of the step: where the first formula holds surely
 STEPS = 100
 
@@ -58,26 +57,17 @@ def _spare(utilisation: Any, bearings: Array, limits: Array, i: int, moment: flo
 def _step(bearings: Array, i: int, tan2: float) -> float:
     """Return tan(theta1/2) at which an equivalent load changes to its second formula; 0 if it never does."""
     z1, z2, share = bearings[i, 1], bearings[i, 2], bearings[i, 6] * bearings[i, 3]
-    if tan2 == 0.0:
-        return 0.0
     z = z2 if bearings[i, 10] == 1.0 else z1
-    arm = share * (bearings[i, 0] + z / tan2)
-    rest = (z2 - z1) * (z2 - z1) - arm * arm
-    if not rest > 0.0:
-        return 0.0
-    tan1 = share * abs(z / tan2) / math.sqrt(rest)
-    half: float = tan1 / (1.0 + math.hypot(1.0, tan1))
-    return half
+    rest = (z2 - z1) ** 2 - (share * (bearings[i, 0] + z / tan2)) ** 2 if tan2 != 0.0 else 0.0
+    tan1: float = share * abs(z / tan2) / math.sqrt(rest) if rest > 0.0 else 0.0
+    return tan1 / (1.0 + math.hypot(1.0, tan1))
 
 
 @inline
 def _first_crossing(
     utilisation: Any, step: float, bearings: Array, limits: Array, i: int, moment: float, tan2: float
 ) -> float:
-    """Largest theta1 from 0 on with utilisation <= 1 all the way; 0 if there is none.
-
-    ``step`` is the tan(theta1/2) at which it may step down, 0 if it does nowhere.
-    """
+    """Largest theta1 from 0 on with utilisation <= 1 all the way; 0 if there is none.  ``step``: see :func:`_step`."""
     # In half = tan(theta1/2) there is no sine to call; what is spare falls through zero at the crossing.
     low, high, at_high = 0.0, 1.0, -1.0
     at_low = _spare(utilisation, bearings, limits, i, moment, 0.0, tan2)
@@ -165,9 +155,7 @@ def sliding_limits(
     reserve : (n, m) or None [rad]; permissible minus actual theta1, negative where a bearing is overloaded
     """
     direction = t_tau, t_rho, t_k
-    _fill(
-        sliding_utilisation, False, direction, moment, bearings, limits, status, used, permissible, reserve
-    )  # fmt: skip
+    _fill(sliding_utilisation, False, direction, moment, bearings, limits, status, used, permissible, reserve)
 
 
 @kernel
@@ -189,6 +177,4 @@ def rolling_limits(
     permissible equivalent load as the one column of ``limits``.
     """
     direction = t_tau, t_rho, t_k
-    _fill(
-        rolling_utilisation, True, direction, moment, bearings, limits, status, used, permissible, reserve
-    )  # fmt: skip
+    _fill(rolling_utilisation, True, direction, moment, bearings, limits, status, used, permissible, reserve)
