@@ -11,7 +11,7 @@ The fused search of chains (:mod:`kernels.chains`) finds the same within 1e-11, 
 from __future__ import annotations
 
 import math
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -78,6 +78,8 @@ from kernels.types import CosSin
 
 Counts = NDArray[np.int64]
 PER_RHO, PER_RHO_JERK = 11.0, 18.0  # samples per distance of the nearest singularity, at least
+# A helper is compiled once more for a plain number that is written into its call, a type of its own: this is none.
+_ZERO: Any = np.int64(0)
 _NONE = (math.nan, math.nan, math.nan, math.nan)
 _NEEDED = (E, Y0, CA, K0, K1, K2, W_SIZE, SA, C1, S1, C2, S2, COS, SIN, DELTA)  # what the search needs of a design
 
@@ -195,7 +197,7 @@ def _list_maxima(
     block: int, at: Array, table: CosSin, of: Search, per_rho: float, first: Array | None, second: Array | None
 ) -> None:
     """List the local maxima of a block among its samples, or more where they are needed; those of one order."""
-    count, (grid, size, m, first_peak) = 0, of
+    count, (grid, size, m, first_peak) = _ZERO, of
     for i in range(block):
         first_peak[i] = count
         if at[i + ACROSS] * MOST < per_rho:
@@ -214,7 +216,7 @@ def _list_maxima(
 @inline
 def _list_both(block: int, at: Array, table: CosSin, of_p: Search, of_q: Search) -> None:
     """As :func:`_list_maxima`, of the first and the second order, which share their samples."""
-    count_p, count_q = 0, 0
+    count_p, count_q = _ZERO, _ZERO
     (grid_p, size_p, m_p, first_p), (grid_q, size_q, m_q, first_q) = of_p, of_q
     for i in range(block):
         first_p[i], first_q[i] = count_p, count_q
@@ -246,8 +248,8 @@ def _maxima_of(
     rounds = (2 if order == 1 else 3) - (1 if target > 1e-4 else 0)
     padded = (first_peak[block] + 7) & ~7  # whole vectors; what stands in the surplus is never read
     begin_at_vertex(padded, m)
-    refine(0, padded, m, rounds, first, second)
-    finish(0, padded, m, order, target, first, second, places.error, places.phi_error)
+    refine(_ZERO, padded, m, rounds, first, second)
+    finish(_ZERO, padded, m, order, target, first, second, places.error, places.phi_error)
     for i in range(block):
         begin, end = first_peak[i], first_peak[i + 1]
         worst = max(m[begin + ERROR], m[end - 1 + ERROR]) if end > begin else math.inf

@@ -11,7 +11,7 @@ what a refined maximum must keep to be trusted.
 from __future__ import annotations
 
 import math
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -143,6 +143,9 @@ def _estimate(m: Array, i: int, order: int, peak: float, step: float, across: fl
     m[i + REACH] = left * abs(step) + 4.0 * across * (relative + across * slope) + _TURNED
 
 
+_AGAIN: Any = np.int64(3)  # more steps; a plain number in the call would have `refine` compiled once more
+
+
 @kernel
 def settle(
     begin: int, end: int, m: Array, order: int, target: float, first: Array | None, second: Array | None,
@@ -155,7 +158,7 @@ def settle(
     worst = 0.0
     for i in range(begin, end):
         if not m[i + ERROR] < math.inf:
-            refine(i, i + 1, m, 3, first, second)
+            refine(i, i + 1, m, _AGAIN, first, second)
             finish(i, i + 1, m, order, target, first, second, error, phi_error)
         worst = max(worst, m[i + ERROR])
     return worst
