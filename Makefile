@@ -143,8 +143,8 @@ bench-extrema: $(VENV)/dev  ## errors and times of the search for true extrema, 
 bench-enclosures: $(VENV)/dev  ## Taylor models of the proofs against intervals and balls, as in docs/proof.md; about 2 minutes
 	$(BIN)/python -m tests.bench.enclosures
 
-bench-first-use: $(VENV)/dev  ## from an empty cache of kernels to the first number; caches of its own, about 2 minutes
-	$(BIN)/python -m tests.bench.first_use
+bench-first-use: $(VENV)/dev  ## from an empty cache of kernels to the first number; caches of its own, about 2 minutes; AGAINST=FOLDER takes turns with another checkout
+	$(BIN)/python -m tests.bench.first_use $(if $(AGAINST),--against $(AGAINST))
 
 bench-scene: $(VENV)/dev  ## all effects on 10^5 designs x 360 angles: rate, its parts, memory; about 5 minutes
 	$(BIN)/python -m tests.bench.effects

@@ -4,11 +4,14 @@ Three programs, each in a process of its own with a cache folder of its own: the
 version of the study needle208; every effect of the crank-rocker in one scene.  Each runs twice, with the cache empty
 and full.
 Processor time of the process and of those that it begins, imports included, and wall time: where one process compiles
-ahead of the other, a study takes more of the first than of the second.
+ahead of the other, a study takes more of the first than of the second.  ``--against FOLDER`` takes turns with another
+checkout, in the same environment, and prints how many times as long ours takes; a program that the other does not know
+is left out.  Both need their sources compiled (``python -m compileall``), or Python's own compiling counts too.
 """
 
 from __future__ import annotations
 
+import argparse
 import os
 import subprocess
 import sys
@@ -39,11 +42,10 @@ names = tuple(name for names in wants().values() for name in names)
 full = extended(family("rssr"), names)
 design_outputs(full, designs(full, 4), names, Accuracy(samples=360))
 """
-# What each may take from an empty cache [s of processor time].
 PROGRAMS = {
-    "first number of summarise": (SUMMARISE, 8.0),
-    "tiny version of needle208": (NEEDLE, 15.0),
-    "scene with every effect": (SCENE, 25.0),
+    "first number of summarise": SUMMARISE,
+    "tiny version of needle208": NEEDLE,
+    "scene with every effect": SCENE,
 }
 
 
@@ -55,14 +57,14 @@ class Use(NamedTuple):
     memory: float
 
 
-def used(program: str, cache: Path) -> Use:
-    """Run a program with this cache folder."""
-    environment = os.environ | {"XDG_CACHE_HOME": str(cache)}
+def used(program: str, cache: Path, root: Path = ROOT) -> Use:
+    """Run a program of the checkout ``root`` with this cache folder."""
+    environment = os.environ | {"XDG_CACHE_HOME": str(cache), "PYTHONPATH": str(root)}
     begin = time.monotonic()
     with (
         tempfile.TemporaryDirectory() as out,
         subprocess.Popen(
-            [sys.executable, "-c", program, out], cwd=ROOT, env=environment,
+            [sys.executable, "-c", program, out], cwd=root, env=environment,
             stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL,
         ) as running,
     ):  # fmt: skip
@@ -74,17 +76,42 @@ def used(program: str, cache: Path) -> Use:
     return Use(usage.ru_utime + usage.ru_stime, wall, usage.ru_maxrss / 1024.0)
 
 
+class Uses(NamedTuple):
+    """First use of a program from an empty and from a full cache, and how many kernels and parts it leaves there."""
+
+    cold: Use
+    warm: Use
+    kept: int
+
+
+def first_and_second(program: str, root: Path = ROOT) -> Uses:
+    """Run a program of a checkout twice, with a cache folder of its own."""
+    with tempfile.TemporaryDirectory() as folder:
+        cold = used(program, Path(folder), root)
+        kept = sum(1 for _ in Path(folder).rglob("*.nbc"))
+        return Uses(cold, used(program, Path(folder), root), kept)
+
+
 def main() -> None:
     """Print the table."""
-    heads = f"{'asked':>6}{'empty':>14}{'full':>14}{'kernels and parts':>19}{'memory, empty':>15}"
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--against", type=Path, help="another checkout, to take turns with")
+    other = parser.parse_args().against
+    heads = f"{'empty':>14}{'full':>14}{'kernels and parts':>19}{'memory, empty':>15}"
     print(f"{'processor time / wall time [s]':32}{heads}")
-    for name, (program, asked) in PROGRAMS.items():
-        with tempfile.TemporaryDirectory() as folder:
-            cold = used(program, Path(folder))
-            kept = sum(1 for _ in Path(folder).rglob("*.nbc"))
-            warm = used(program, Path(folder))
-        times = "".join(f"{f'{use.seconds:.1f} / {use.wall:.1f}':>14}" for use in (cold, warm))
-        print(f"{name:32}{asked:6.0f}{times}{kept:19}{cold.memory:12.0f} MB")
+    for name, program in PROGRAMS.items():
+        own = first_and_second(program)
+        times = "".join(f"{f'{use.seconds:.1f} / {use.wall:.1f}':>14}" for use in (own.cold, own.warm))
+        print(f"{name:32}{times}{own.kept:19}{own.cold.memory:12.0f} MB")
+        if other is None:
+            continue
+        try:
+            theirs = first_and_second(program, other.resolve())
+        except RuntimeError:
+            print(f"{'':32}{'unknown there':>14}")
+            continue
+        pairs = zip((own.cold, own.warm), (theirs.cold, theirs.warm), strict=True)
+        print(f"{'  times that of the other':32}" + "".join(f"{a.seconds / b.seconds:14.2f}" for a, b in pairs))
 
 
 if __name__ == "__main__":
