@@ -137,7 +137,7 @@ def _careful(at: Array, k: int, order: int, target: float) -> tuple[tuple[float,
 
 @inline
 def _put(i: int, order: int, result: tuple[float, float, float, float], places: Places, heights: Heights) -> None:
-    """Write height, place and the errors of both of design i, of the one order whose heights are given."""
+    """Write height, place and the errors of both of design i, of one order, to the heights that are given."""
     best, place, bound, reach = result
     _put_in(places.phi, order, i, place - TURN * np.floor(place / TURN))  # math.floor makes an integer; nan is none
     _put_in(places.error, order, i, bound)
@@ -298,16 +298,15 @@ def true_maxima(
     proven; docs/rssr.md gives the number of random designs it was measured on.
     """
     at, who, of, of_q = new_block(), np.empty(BLOCK, np.int64), _new_search(), _new_search()
-    places = Places(phi, error, phi_error)
+    places, asked = Places(phi, error, phi_error), Heights(max_abs_dpsi, max_abs_d2psi, max_abs_d3psi)
     for start in range(0, designs.shape[0], BLOCK):
         count = min(BLOCK, designs.shape[0] - start)
         load_block(designs, start, count, at)
         least_delta(count, at)
         block = _keep_what_turns(start, count, at, who, status)
         for i in range(start, start + count if block < count else start):
-            _put(i, 1, _NONE, places, Heights(max_abs_dpsi, None, None))
-            _put(i, 2, _NONE, places, Heights(None, max_abs_d2psi, None))
-            _put(i, 3, _NONE, places, Heights(None, None, max_abs_d3psi))
+            for order in range(1, 4):
+                _put(i, order, _NONE, places, asked)
         padded = (block + 7) & ~7  # whole vectors; what stands in the surplus is never read
         singularity_distance(padded, at)
         if max_abs_dpsi is not None and max_abs_d2psi is not None:
