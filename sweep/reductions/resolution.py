@@ -126,23 +126,31 @@ def ends(family: Family, designs: Array, even: int, looks: int, output: str) -> 
     angles = crowded(near.only(close), LOOK)
     edges = with_events(edges, *_passed(family, designs, (output,), _looked(n, looks, close, angles)))
     for bent in bends(family, output):
-
-        def bending(rows: Index, phi: Array, bent: Bends = bent) -> Array:
-            return np.nan_to_num(bent.curves(designs[rows], Angles.of(phi)))
-
-        looked = _looked(n, BENDING, close, angles)
-        places = near_zeros(bending, looked, CLOSE) if bent.squares else sign_changes(bending, looked)
-        edges = with_events(edges, *places)
+        edges = with_events(edges, *_bent(bent, designs, _looked(n, BENDING, close, angles)))
     return edges
 
 
 def events(family: Family, designs: Array, looks: int, outputs: Collection[str]) -> tuple[Index, Array]:
-    """Return designs (k,) and angles (k,) where a pose output passes its level, or a follower reverses.
+    """Return designs (k,) and angles (k,) where a pose output passes its level, a follower reverses, or a curve bends.
 
     They are looked for between ``looks`` even samples of the turn, as far as ``outputs`` depend on them.
     """
-    even = np.arange(looks) * (TWO_PI / looks)
-    return _passed(family, designs, outputs, np.tile(even, (len(designs), 1)))
+    looked = np.tile(np.arange(looks) * (TWO_PI / looks), (len(designs), 1))
+    found = [_passed(family, designs, outputs, looked)]
+    # Beside what nearly vanishes a curve is steep, and has no kink.
+    known = dict.fromkeys(bent for output in outputs for bent in bends(family, output) if not bent.squares)
+    found += [_bent(bent, designs, looked) for bent in known]
+    rows, phi = (np.concatenate(parts) for parts in zip(*found, strict=True))
+    return rows, phi
+
+
+def _bent(bent: Bends, designs: Array, looked: Array) -> tuple[Index, Array]:
+    """Return designs and angles where functions pass zero at which curves bend, as seen at ``looked``."""
+
+    def bending(rows: Index, phi: Array) -> Array:
+        return np.nan_to_num(bent.curves(designs[rows], Angles.of(phi)))
+
+    return near_zeros(bending, looked, CLOSE) if bent.squares else sign_changes(bending, looked)
 
 
 def _passed(family: Family, designs: Array, outputs: Collection[str], looked: Array) -> tuple[Index, Array]:

@@ -11,12 +11,13 @@ from numpy.typing import NDArray
 from kernels.status import OK
 from kernels.types import Array
 from sweep.errors import InputError, choices
-from sweep.families.base import Event, of_family
-from sweep.families.curve_features import Switches, of_table
+from sweep.families.base import Angles, Event, of_family
+from sweep.families.curve_features import Bends, Switches, of_table
 from sweep.families.machines.crossings import SAMPLES, Poses, moved
 from sweep.families.machines.moments import Taking
 from sweep.families.machines.passages import passages
 from sweep.families.machines.thread_balance import ThreadBalance
+from sweep.families.machines.thread_way import PHI
 from sweep.families.machines.triangles import Entering, entries
 
 if TYPE_CHECKING:
@@ -86,6 +87,21 @@ def event_angles(machine: Machine, designs: Array) -> tuple[dict[str, Any], NDAr
         names = [event.of if isinstance(event, Event) else next(iter(event.rates)) for event in events.values()]
         phi = moved(machine, designs, phi, names)
     return {f"phi_{name}": phi[:, [k]] for k, name in enumerate(events)}, table[:, -1].astype(np.uint8)
+
+
+def bends_of_threads(machine: Machine) -> list[Bends]:
+    """Return where tensions and rates of threads have kinks between events."""
+    threads = [r for r in machine.relations if isinstance(r, ThreadBalance) and r.bent]
+    return [Bends(frozenset(f"{r.name}_{name}" for name in r.bent), partial(_bending, machine, r)) for r in threads]
+
+
+def _bending(machine: Machine, thread: ThreadBalance, designs: Array, angles: Angles) -> Array:
+    own = {output.name for output in thread.outputs} & {f"{thread.name}_{name}" for name in ("surplus", "velocity")}
+    places = {name for name in thread.needs(frozenset(own)) if not name.startswith("phi_")}
+    found = {PHI: angles.phi} | machine.poses(designs, angles, frozenset(own | places))
+    found |= event_angles(machine, designs)[0] if thread.happens else {}
+    curves: Array = thread.bending(found)
+    return curves
 
 
 def switches_of_threads(machine: Machine) -> list[Switches]:

@@ -17,7 +17,7 @@ from sweep.families.capabilities import Assembly
 from sweep.families.chain import magnitude
 from sweep.families.curve_features import of_members, on_part
 from sweep.families.frames import Frame
-from sweep.families.machines.happenings import event_angles, switches_of_threads
+from sweep.families.machines.happenings import bends_of_threads, event_angles, switches_of_threads
 from sweep.families.machines.main_shaft import ShaftTorque, speed_of
 from sweep.families.machines.moments import Taking
 from sweep.families.machines.passages import taking_step
@@ -132,7 +132,7 @@ def _built(machine: Machine, members: tuple[Member, ...]) -> Machine:
     found = replace(found, poses=partial(_poses, found))  # events of a thread are looked for on poses of the others
     precise = partial(_precise_poses, found) if any(m.family.precise_poses for m in placed) else None
     smooth = (one for r in sums for one in r.smooth)
-    known = (*found.capabilities, *switches_of_threads(found), *smooth)
+    known = (*found.capabilities, *switches_of_threads(found), *bends_of_threads(found), *smooth)
     found = replace(found, poses=partial(_poses, found), precise_poses=precise, capabilities=known)
     steps = [taking_step(r, found) for r in machine.relations if isinstance(r, Taking)]
     steps += [entering_step(r, found) for r in machine.relations if isinstance(r, Entering)]

@@ -20,6 +20,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from itertools import groupby
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -36,6 +37,7 @@ from sweep.families.machines.thread_way import (
     Waypoint,
     followed,
     laid,
+    on_blades,
     only,
     outside,
     spots,
@@ -124,14 +126,19 @@ class ThreadBalance:
             ]
         if self.allowed is not None:
             found.append(("excess", "length", f"surplus of thread {who} beyond what is allowed"))
-        kinks = {"tension"} if self.moves or self.stiffness else set()
+        kinks = set(self.bent)
         if any(isinstance(place.on, TakeUp) and place.on.kinks for place in self.path):
             kinks |= {"given", "surplus", "excess", "wrap", "tension"}
-        if any(isinstance(place.on, Edge) for place in self.path):  # over which it slides, not beyond an end
-            kinks |= {"wrap", "tension", "rate", "velocity"}
         if self.happens:
             kinks = {key for key, *_ in found}
         return tuple(Output(f"{who}_{key}", unit, text, EQUATION, kinks=key in kinks) for key, unit, text in found)
+
+    @property
+    def bent(self) -> frozenset[str]:
+        """What has a kink where one of :meth:`bending` passes zero."""
+        if any(isinstance(place.on, Edge) for place in self.path):  # over which it slides, not beyond an end
+            return frozenset(("wrap", "tension", "rate", "velocity"))
+        return frozenset(("tension",) if self.moves or self.stiffness else ())
 
     @property
     def parameters(self) -> tuple[Parameter, ...]:
@@ -176,20 +183,18 @@ class ThreadBalance:
         phi, (moving, bent) = found[PHI], self._asked(wanted)
         needed, rate, taken = 0.0 * phi, 0.0 * phi, 0.0 * phi
         wraps: list[tuple[Waypoint, Any, Piece]] = []
-        run: list[Waypoint] = []
-        for place in (*self.path, None):
-            if place is not None and not isinstance(place.on, TakeUp):
-                run.append(place)
-                continue
-            if run:
+        for up, places in groupby(self.path, _is_take_up):
+            run = list(places)
+            if not up:
                 pieces = laid(run, found, moving)
                 length, change, bends = followed(pieces, moving, bent)
                 needed, rate = needed + length, rate + change
                 wraps += zip(run[1:-1], bends, pieces[1:-1], strict=True) if bent else ()
-            if place is not None and isinstance(place.on, TakeUp):
+                continue
+            for place in run:
+                assert isinstance(place.on, TakeUp)
                 taken = taken + found[place.on.taken]
                 wraps += [(place, found[place.on.wrap], Piece((), (), None))] if bent else []
-            run = []
         sewn, sewing = self._passed("feeding", found)
         drawn, drawing = self._passed("drawing", found)
         given, demand = found[f"{self.name}_stock"] - taken, needed + sewn - drawn
@@ -206,6 +211,22 @@ class ThreadBalance:
             pull = self.tension - self.stiffness * columns["surplus"]
             columns["tension"] = self._tension(pull * self._hurried(columns, found), sliding)
         return {f"{self.name}_{key}": values for key, values in columns.items()}
+
+    def bending(self, found: Mapping[str, Any]) -> Any:
+        """Return what passes zero where the tension or the rate has a kink, (n, m, q); ``found`` as of `compute`.
+
+        The thread becomes slack, its speed leaves the measured range, or it comes to the end of a blade.
+        """
+        curves: list[Any] = []
+        if self.stiffness:
+            curves.append(self.tension - self.stiffness * found[f"{self.name}_surplus"])
+        if self.moves:
+            speed = found[f"{self.name}_velocity"] / MM_PER_M
+            curves += [speed - way * limit for limit in MEASURED_SPEED[2:] for way in (-1.0, 1.0)]
+        for up, run in groupby(self.path, _is_take_up):
+            for place in () if up else on_blades(list(run), found):
+                curves += [place, place - 1.0]
+        return np.stack(np.broadcast_arrays(*curves), axis=2)
 
     def _passed(self, when: str, found: Mapping[str, Any]) -> tuple[Any, Any]:
         """Return the thread that has passed since it began to in the turn, ``NAME_sewn`` each, and its derivative."""
@@ -241,6 +262,10 @@ class ThreadBalance:
             grown = np.expm1(beta * 180.0 / np.pi * wrap)
             pull = pull * (1.0 + grown) + (bending / (radius + own) ** 2 + alpha * radius / beta) * grown
         return GF * pull
+
+
+def _is_take_up(place: Waypoint) -> bool:
+    return isinstance(place.on, TakeUp)
 
 
 def _over(curve: TableCurve, phi: Any) -> Any:

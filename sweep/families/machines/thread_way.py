@@ -112,6 +112,16 @@ def laid(run: Sequence[Waypoint], found: Mapping[str, Any], moving: bool) -> lis
     return pieces
 
 
+def on_blades(run: Sequence[Waypoint], found: Mapping[str, Any]) -> list[Any]:
+    """Return where along the lines of the blades of a run, 0 and 1 at their ends, the way would be shortest."""
+    pieces = laid(run, found, False)
+    return [
+        _shortest(beside(pieces, k, -1).at, beside(pieces, k, 1).at, *(spot.position(found) for spot in spots(place)))
+        for k, place in enumerate(run)
+        if isinstance(place.on, Edge)
+    ]
+
+
 def beside(pieces: Sequence[Piece], k: int, step: int) -> Piece:
     """Return the place before or after one, of those that the thread runs over; the ends it always does."""
     piece = pieces[k + step]
@@ -142,8 +152,16 @@ def followed(pieces: Sequence[Piece], moving: bool, bent: bool) -> tuple[Any, An
 def nearest_way(p: Point, q: Point, start: Point, end: Point) -> Any:
     """Return where along a segment, 0 to 1, the way from p over it to q is shortest, (14).
 
-    Turned about the segment's line into one plane, on either side of it, p and q see each other straight across it.
     The length is convex along the line, so beyond an end the end is nearest.
+    """
+    t = _shortest(p, q, start, end)
+    return np.where(np.real(t) < 0.0, 0.0, np.where(np.real(t) > 1.0, 1.0, t))
+
+
+def _shortest(p: Point, q: Point, start: Point, end: Point) -> Any:
+    """Return where along a line the way from p over it to q is shortest.
+
+    Turned about the line into one plane, on either side of it, p and q see each other straight across it.
     """
     d = minus(end, start)
     square = dot(d, d)
@@ -154,8 +172,7 @@ def nearest_way(p: Point, q: Point, start: Point, end: Point) -> Any:
         away.append(np.sqrt(dot(off, off)))
     both = away[0] + away[1]
     t = np.where(both == 0.0, 0.5 * (feet[0] + feet[1]), 0.0)
-    t = t + (feet[0] * away[1] + feet[1] * away[0]) / np.where(both == 0.0, 1.0, both)
-    return np.where(np.real(t) < 0.0, 0.0, np.where(np.real(t) > 1.0, 1.0, t))
+    return t + (feet[0] * away[1] + feet[1] * away[0]) / np.where(both == 0.0, 1.0, both)
 
 
 def bend(before: Point, after: Point) -> Any:

@@ -30,6 +30,7 @@ from sweep.optimise.extrema.scanned import (
     extrema,
     followed,
     may_bend,
+    overtopped,
     passages,
     poses_needed,
     tops,
@@ -169,15 +170,16 @@ class Curves:
         for n in bent:
             values = self.curve(self.series[n], there)[0].reshape(sides.shape)
             rows += tops(n, sides, which, values, self.curve(self.series[n], columns)[0])
+        at_edges = Points.of(rows)
+        at_edges = replace(at_edges, value=self.values(design[None, :], at_edges)[0])
         # A top beside an edge stands for the edge; from elsewhere none may end lower than it began.
         own = np.isin(points.series, bent)
         fell = own & (points.sense * (found.value - points.value) > 0.0)
         phi = np.where(fell, found.phi, points.phi)
-        beside = own & (distances(sides.mean(axis=0), phi) <= np.where(fell, stride, NEIGHBOUR))
+        reach = np.where(fell | overtopped(points, at_edges, stride), stride, NEIGHBOUR)
+        beside = own & (distances(sides.mean(axis=0), phi) <= reach)
         held = replace(found, how=np.full(len(found), STATIC)).take(fell & ~beside)
-        kept = Points.joined(points.take(~fell & ~beside), held)
-        at_edges = Points.of(rows)
-        return Points.joined(kept, replace(at_edges, value=self.values(design[None, :], at_edges)[0]))
+        return Points.joined(Points.joined(points.take(~fell & ~beside), held), at_edges)
 
     def curve(self, series: Series, columns: dict[str, Any]) -> Any:
         """Return values of a series (n, m) out of pose outputs on a set of angles."""

@@ -5,7 +5,7 @@ from __future__ import annotations
 import itertools
 import math
 from collections.abc import Collection, Sequence
-from typing import Any, TypeAlias
+from typing import TYPE_CHECKING, Any, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,6 +14,9 @@ from kernels.types import TWO_PI
 from sweep.families.base import Array, Family, Interval
 from sweep.families.curve_features import Singular, Switches, Waves, crossed, crossings, switches
 from sweep.reductions.resolution import FEWEST, denser, events
+
+if TYPE_CHECKING:
+    from sweep.optimise.extrema.points import Points
 
 STATIONARY, CROSSING, STATIC, EDGE = 0, 1, 2, 4  # how a point is held; 3 is PASSING of sweep.optimise.extrema.scanned
 
@@ -140,7 +143,8 @@ def bending(family: Family, design: Array, outputs: tuple[str, ...]) -> list[int
 def edges(family: Family, design: Array, outputs: Collection[str]) -> tuple[Array, Array]:
     """Return crank angles just before and just behind every edge of some curves, (2, k) [rad], and what each is, (k,).
 
-    The latter is 1 + j for the end j of those known beforehand, 1/2 where a level is passed or a follower reverses.
+    The latter is 1 + j for the end j of those known beforehand, 1/2 where a level is passed, a follower reverses, or
+    something passes zero at which the curves bend.
     """
     known = switches(family, design[None, :], outputs)[0]
     found = events(family.precise(), design[None, :], LOOKS, outputs)[1]
@@ -180,6 +184,17 @@ def followed(family: Family, designs: Array, phi: Array, level: Array, outputs: 
 def distances(edges: Array, phi: Array) -> Array:
     """Return the distance of every crank angle (k,) from the nearest of some edges [rad]."""
     return np.asarray(np.abs(_way(phi, edges[:, None])).min(axis=0, initial=math.pi), np.float64)
+
+
+def overtopped(points: Points, at_edges: Points, stride: float) -> NDArray[np.bool_]:
+    """Tell which points have an edge within a stride that is as high: Newton's steps towards a kink end beside it."""
+    found = np.zeros(len(points), np.bool_)
+    for k in range(len(at_edges)):
+        edge = at_edges.take([k])
+        near = (points.series == edge.series) & (points.sense == edge.sense)
+        near &= distances(edge.phi, points.phi) <= stride
+        found |= near & (points.sense * (edge.value - points.value) >= 0.0)
+    return found
 
 
 def _way(start: Array, end: Array) -> Array:
