@@ -35,9 +35,10 @@ from sweep.families.machines.thread_way import (
     Run,
     TakeUp,
     Waypoint,
+    beside,
     followed,
     laid,
-    on_blades,
+    nearest_way,
     only,
     outside,
     spots,
@@ -224,8 +225,7 @@ class ThreadBalance:
             speed = found[f"{self.name}_velocity"] / MM_PER_M
             curves += [speed - way * limit for limit in MEASURED_SPEED[2:] for way in (-1.0, 1.0)]
         for up, run in groupby(self.path, _is_take_up):
-            for place in () if up else on_blades(list(run), found):
-                curves += [place, place - 1.0]
+            curves += [] if up else _past_ends(tuple(run), found)
         return np.stack(np.broadcast_arrays(*curves), axis=2)
 
     def _passed(self, when: str, found: Mapping[str, Any]) -> tuple[Any, Any]:
@@ -266,6 +266,17 @@ class ThreadBalance:
 
 def _is_take_up(place: Waypoint) -> bool:
     return isinstance(place.on, TakeUp)
+
+
+def _past_ends(run: Run, found: Mapping[str, Any]) -> list[Any]:
+    """Return how far along each blade of a run, from either end, the way over its line is shortest."""
+    pieces, past = laid(run, found, False), []
+    for k, place in enumerate(run):
+        if isinstance(place.on, Edge):
+            ends = (spot.position(found) for spot in spots(place))
+            along = nearest_way(beside(pieces, k, -1).at, beside(pieces, k, 1).at, *ends)
+            past += [along, along - 1.0]
+    return past
 
 
 def _over(curve: TableCurve, phi: Any) -> Any:

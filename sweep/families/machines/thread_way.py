@@ -105,21 +105,13 @@ def laid(run: Sequence[Waypoint], found: Mapping[str, Any], moving: bool) -> lis
         if isinstance(place.on, Edge):
             tip, back = pieces[k], place.on.back.position(found)
             t = nearest_way(beside(pieces, k, -1).at, beside(pieces, k, 1).at, tip.at, back)
+            # the length is convex along the line: beyond an end the end is nearest
+            t = np.where(np.real(t) < 0.0, 0.0, np.where(np.real(t) > 1.0, 1.0, t))
             on = [a + t * (b - a) for a, b in zip(tip.at, back, strict=True)]
             # of a shortest way the place on the blade does not count in its derivative, the blade's own motion does
             ends = zip(tip.rate, place.on.back.velocity(found), strict=True) if moving else ()
             pieces[k] = tip._replace(at=on, rate=[a + t * (b - a) for a, b in ends])
     return pieces
-
-
-def on_blades(run: Sequence[Waypoint], found: Mapping[str, Any]) -> list[Any]:
-    """Return where along the lines of the blades of a run, 0 and 1 at their ends, the way would be shortest."""
-    pieces = laid(run, found, False)
-    return [
-        _shortest(beside(pieces, k, -1).at, beside(pieces, k, 1).at, *(spot.position(found) for spot in spots(place)))
-        for k, place in enumerate(run)
-        if isinstance(place.on, Edge)
-    ]
 
 
 def beside(pieces: Sequence[Piece], k: int, step: int) -> Piece:
@@ -150,16 +142,7 @@ def followed(pieces: Sequence[Piece], moving: bool, bent: bool) -> tuple[Any, An
 
 
 def nearest_way(p: Point, q: Point, start: Point, end: Point) -> Any:
-    """Return where along a segment, 0 to 1, the way from p over it to q is shortest, (14).
-
-    The length is convex along the line, so beyond an end the end is nearest.
-    """
-    t = _shortest(p, q, start, end)
-    return np.where(np.real(t) < 0.0, 0.0, np.where(np.real(t) > 1.0, 1.0, t))
-
-
-def _shortest(p: Point, q: Point, start: Point, end: Point) -> Any:
-    """Return where along a line the way from p over it to q is shortest.
+    """Return where along the line of a segment, 0 and 1 at its ends, the way from p over it to q is shortest, (14).
 
     Turned about the line into one plane, on either side of it, p and q see each other straight across it.
     """
