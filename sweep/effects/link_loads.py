@@ -83,7 +83,7 @@ def rods_of(tree: LinkTree) -> dict[int, tuple[int, int]]:
 def inputs(tree: LinkTree) -> tuple[Parameter, ...]:
     """All inputs of the loads of a tree."""
     load, tip = useful(tree), loads.TIP if tree.tip is None else ()
-    own = () if load is None else (load,)
+    own = tuple(p for p in (load, tree.unit) if p is not None)
     return (*body_inputs(tree), *loads.GRAVITY, *loads.FREE_TOOL, *tip, *own, loads.SPEED, loads.CHANGE)
 
 

@@ -101,14 +101,14 @@ class Scene:
     @cached_property
     def links(self) -> Links:
         """Bodies of the family and their poses; see :mod:`kernels.linkage.bodies`."""
-        return self._links(self.designs, self.angles, self.motion)
+        return self._links(slice(None), self.angles, self.motion)
 
     @cached_property
     def still_links(self) -> Links:
         """The bodies at the first pose of each design that is assembled, (n, 1): what stands still in them is seen."""
         at = np.arange(len(self.designs))[:, None], (np.asarray(self.motion["status"]) != st.OK).argmin(axis=1)[:, None]
         angles = Angles(*(np.broadcast_to(x, self.shape)[at] for x in self.angles))
-        return self._links(self.designs, angles, {name: x[at] for name, x in self.motion.items()})
+        return self._links(slice(None), angles, {name: x[at] for name, x in self.motion.items()})
 
     def links_by_parts(self) -> Iterator[tuple[slice, Links]]:
         """Yield the bodies of some designs after others, so few that their poses stay in the cache."""
@@ -116,9 +116,9 @@ class Scene:
         size = max(1, PART // max(m, 1))
         for rows in (slice(start, start + size) for start in range(0, n, size)):
             motion = {name: x[rows] for name, x in self.motion.items()}
-            yield rows, self._links(self.designs[rows], self.angles.part(rows), motion)
+            yield rows, self._links(rows, self.angles.part(rows), motion)
 
-    def _links(self, designs: Array, angles: Angles, motion: Columns) -> Links:
+    def _links(self, rows: slice, angles: Angles, motion: Columns) -> Links:
         tree = self.family.find(LinkTree)
         if tree is None:
             raise TypeError(f"{self.family.name} has no tree of links")
@@ -126,9 +126,13 @@ class Scene:
         bodies, axes, lines = (np.empty((*shape, k, per)) for k, per in zip(every, _PER_LINK, strict=True))
         parents = np.array(tree.parents, np.int64)
         pairs = (np.array(given, np.int64).reshape(-1, 2) for given in (tree.freedoms, tree.ends))
-        freedoms, ends = (np.tile(pair, (len(designs), 1, 1)) for pair in pairs)
+        freedoms, ends = (np.tile(pair, (shape[0], 1, 1)) for pair in pairs)
         found = Links(parents, freedoms, ends, bodies, axes, lines)
-        tree.fill(designs, angles, motion, found)
+        tree.fill(self.designs[rows], angles, motion, found)
+        if tree.unit is not None:
+            unit = self.inputs[tree.unit.name][rows, None, None, None]
+            for lengths in (bodies[..., :9], bodies[..., 24:], lines[..., :3]):
+                lengths *= unit
         return found
 
     @cached_property

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Literal, NamedTuple, TypeAlias
 import numpy as np
 
 from kernels.types import Array
-from sweep.families.base import Angles, Columns
+from sweep.families.base import Angles, Columns, Parameter
 from sweep.families.capabilities import DesignMap
 from sweep.families.frames import product
 
@@ -75,6 +75,7 @@ class LinkTree:
     output : number of the freedom that is the family's position, on which a load acts; -1 where no load does
     rubs : whether its joints have dimensions for friction and bearings
     arms : numbers of bodies without a second joint, each with the line whose point is their end
+    unit : input that is the length in which the family's dimensions, and what ``fill`` writes, are; None where it is mm
     """
 
     bodies: tuple[LinkBody, ...]
@@ -89,6 +90,7 @@ class LinkTree:
     output: int = -1
     rubs: bool = True
     arms: tuple[tuple[int, int], ...] = ()
+    unit: Parameter | None = None
 
 
 def filled_by(kernel: Callable[..., object], needs: tuple[str, ...]) -> LinkFill:

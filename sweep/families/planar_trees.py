@@ -89,7 +89,7 @@ def rolling_planet(parameters: Parameters) -> LinkTree:
 
     Teeth press along the tangent of the pitch circles, ours: a pressure angle of the teeth adds a radial force that the
     carrier bears.  Where ``parameters`` name no fixed gear, it is of one size with the planet.  Lengths of these
-    families are in planet radii, so loads are those of a planet of radius 1 mm.
+    families are in planet radii: loads have the radius as an input.
     """
     whole = "n" in [p.name for p in parameters]
 
@@ -112,9 +112,9 @@ def rolling_planet(parameters: Parameters) -> LinkTree:
 
     return LinkTree(
         bodies=(
-            LinkBody("carrier", "along the carrier, tangential, along its axis, from A; planet radius 1 mm"),
-            LinkBody("planet", "along the arm of the pin, across it, along its axis, from O; planet radius 1 mm"),
-            LinkBody("link", "along the slot, across it, along its axis, from D; planet radius 1 mm"),
+            LinkBody("carrier", "along the carrier, tangential, along its axis, from A"),
+            LinkBody("planet", "along the arm of the pin, across it, along its axis, from O"),
+            LinkBody("link", "along the slot, across it, along its axis, from D"),
         ),
         joints=(
             _bearing("carrier"),
@@ -131,6 +131,7 @@ def rolling_planet(parameters: Parameters) -> LinkTree:
         rubs=False,
         carrier=2,
         output=2,
+        unit=Parameter("planet_radius", "length", "radius of the planet, unit of k and a", positive=True, default=1.0),
     )
 
 

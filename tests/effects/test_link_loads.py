@@ -149,6 +149,29 @@ def test_the_useful_load_of_an_output_link_is_a_force_where_that_slides_and_a_to
     np.testing.assert_allclose(idle.drive_torque - loaded.drive_torque, power, atol=1e-12 * np.abs(power).max())
 
 
+@pytest.mark.parametrize("name", ["geared_dwell", "epicyclic_dwell"])
+def test_loads_of_a_planet_of_any_radius_are_those_of_1_mm_brought_to_its_size(name):
+    """A length counts R times, a force too where masses and times stay, a torque R^2 times, a pressure 1/R times."""
+    radius, shape = 12.0, dict(family(name).example)
+    own = {"m_carrier": 1e-4, "m_planet": 2e-4, "com_planet_x": 3.0, "j_planet_zz": 2e-3, "m_link": 1e-4}
+    own |= {"m_tool": 1e-5, "tool_x": 40.0, "tool_force_y": -2.0, "gravity_y": -9810.0, "load_torque": 50.0}
+    own |= {"speed": 300.0, "flywheel": 0.5}
+    own |= {"contact_radius_b": 2.0, "contact_length_b": 5.0, "contact_modulus": 1e5}
+    powers = {"com_planet_x": 1, "j_planet_zz": 2, "tool_x": 1, "tool_force_y": 1, "gravity_y": 1, "load_torque": 2}
+    powers |= {"flywheel": 2, "contact_radius_b": 1, "contact_length_b": 1, "contact_modulus": -1}
+    small = {key: value / radius ** powers.get(key, 0) for key, value in own.items()}
+    of = {"force_b": 1, "force_teeth": 1, "shaking_force": 1, "drive_torque": 2, "reduced_inertia": 2, "crank_speed": 0}
+    of |= {"sliding_b": 1, "stress_b": -1}
+    sized = sweep.evaluate(name, shape | own | {"planet_radius": radius}, list(of), phi=PHI)
+    of_one = sweep.evaluate(name, shape | small, list(of), phi=PHI)
+    for output, power in of.items():
+        expected = of_one[output] * radius**power
+        np.testing.assert_allclose(sized[output], expected, atol=1e-12 * np.abs(expected).max(), err_msg=output)
+    still = {"load_torque": 700.0, "planet_radius": radius, "speed": 1.0}
+    poses = sweep.evaluate(name, shape | still, ["force_b", "x_b", "y_b"], phi=PHI)
+    np.testing.assert_allclose(poses.force_b * radius * np.hypot(poses.x_b, poses.y_b), 700.0, rtol=1e-12)
+
+
 @pytest.mark.parametrize("case", DESIGNS)
 def test_joints_of_every_body_balance_its_momentum(case):
     load = -4000.0 if family(case.split()[0]).find(LinkTree).output >= 0 and "looper" not in case else 0.0
