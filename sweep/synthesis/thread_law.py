@@ -21,6 +21,7 @@ if TYPE_CHECKING:
 DIRECTIONS = 720  # around the straight thread, in which the edge is looked for
 ROUNDS = 20  # of Newton's method from there
 TIGHT = 1e-9  # of the slack: below it a law counts as one within
+LEAST = 1e-3  # of the demand's range that a slack counts as, where it is the unit of length
 
 
 @dataclass(frozen=True)
@@ -79,7 +80,9 @@ def smoothest_law(phi: ArrayLike, demand: ArrayLike, allowed: ArrayLike, harmoni
             raise InputError(name, values.tolist()[:3], "finite numbers", "thread law")
     if harmonics < 1:
         raise InputError("harmonics", harmonics, "a whole number above 0", "thread law")
-    slack = np.broadcast_to(slack, need.shape)
+    # The program's tolerances are those of numbers about 1.
+    unit, least = max(float(np.abs(slack).max()), LEAST * float(np.ptp(need))) or 1.0, float(slack.min())
+    need, slack = need / unit, np.broadcast_to(slack / unit, need.shape)
     waves, curving = _waves(at, harmonics, 0), _waves(at, harmonics, 2)
     one, none = np.ones((at.size, 1)), np.zeros((at.size, 1))
     # unknowns: the coefficients, the stock, the largest |P''|, and by how much the slack is exceeded
@@ -97,12 +100,12 @@ def smoothest_law(phi: ArrayLike, demand: ArrayLike, allowed: ArrayLike, harmoni
         cost = np.zeros(free + 2)
         cost[goal] = 1.0
         found: Any = linprog(cost, rows, right, bounds=[(None, None)] * free + [(0.0, None), (0.0, most)])
-        if most is None and found.x[-1] > TIGHT * max(float(slack.max()), 1e-3):
-            words = f"{found.x[-1]:.4g} more, or more than {harmonics} harmonics"
-            raise InputError("allowed", float(slack.min()), words, "thread law")
-    x = found.x
-    surplus = x[free - 1] - waves @ x[: free - 1] - need
-    spare = float(np.minimum(surplus, slack - surplus).min())
+        if most is None and found.x[-1] > TIGHT:
+            words = f"{unit * found.x[-1]:.4g} more, or more than {harmonics} harmonics"
+            raise InputError("allowed", least, words, "thread law")
+    surplus = found.x[free - 1] - waves @ found.x[: free - 1] - need
+    spare = unit * float(np.minimum(surplus, slack - surplus).min())
+    x = unit * found.x
     return ThreadLaw(x[:harmonics], x[harmonics : 2 * harmonics], float(x[free - 1]), float(x[free]), spare)
 
 

@@ -33,6 +33,18 @@ def test_law_of_a_demand_with_corners_is_smoother_the_more_slack_it_has():
         smoothest_law(PHI, demand, 0.01, harmonics=8)
 
 
+@pytest.mark.parametrize("unit", [2.0**-27, 1e-5, 2.0**20])
+def test_law_is_the_same_in_any_unit_of_length(unit):
+    """At 1e-5 the program's tolerance of 1e-7 let the surplus leave its slack by half a percent of that."""
+    demand = np.abs(PHI - np.pi)
+    law = smoothest_law(PHI, demand, 0.4, harmonics=8)
+    other = smoothest_law(PHI, unit * demand, unit * 0.4, harmonics=8)
+    assert other.largest == pytest.approx(unit * law.largest, rel=1e-9)
+    assert other.spare >= -1e-12 * unit
+    with pytest.raises(InputError, match="more, or more than 8 harmonics"):
+        smoothest_law(PHI, unit * demand, unit * 0.01, harmonics=8)
+
+
 @pytest.mark.parametrize(
     ("changes", "words"),
     [
