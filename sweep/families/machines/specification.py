@@ -124,6 +124,9 @@ def built(given: Specification, find: FindFamily) -> Machine:
         if not _WORD.fullmatch(name) or name in members:
             raise InputError("member", name, "a plain word, each once", "machine")
         members[name] = _member(name, dict(table), members, shafts, find)
+    for name, _ in given.tools:
+        if not _WORD.fullmatch(name) or name in members:
+            raise InputError("tool", name, "a plain word that is no member", "machine.tools")
     tools = read_tools({name: dict(table) for name, table in given.tools}, members)
     plain = {name: dict(table) for name, table in given.relations if not {"event", "value"} & set(dict(table))}
     known: dict[str, Any] = {

@@ -306,6 +306,13 @@ def test_two_relations_with_one_output_are_refused(name):
         machine_of({name: {"gap": ["needle.rocker", "blade"]}})
 
 
+@pytest.mark.parametrize("name", ["looper", "needle.rocker", "two words"])
+def test_a_tool_with_the_name_of_a_member_or_a_link_is_refused(name):
+    """A thread over it would run over the member, and a gap to the link would be one to the tool."""
+    with pytest.raises(InputError, match=f"tool = '{name}'; allowed: a plain word that is no member"):
+        machine_of(tools={name: {"at": [0.0, 0.0, 0.0]}})
+
+
 def test_what_does_not_sew_says_which_fault_its_moment_has():
     fields = {"slow and loose": [1.5, 3.0], "fast and thick": [1.0, 2.5]}
     sews = {"sew": ["a"], "speeds": [50.0 * math.pi, 100.0 * math.pi]}
