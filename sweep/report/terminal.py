@@ -112,14 +112,26 @@ def _optimum(data: Dataset) -> list[str]:
     held += [w for w in words if w.endswith(" bound") and w.split()[0] not in {s.shown.name for s in active}]
     made = float(data.optimum.get("yield", math.nan))
     asked = None if data.study.tolerance is None else data.study.tolerance.robust
-    wanted = f", {100.0 * asked:g} % asked" if asked is not None else ""
-    if asked is not None and int(data.optimum.get("agree", 1)) > 1:
-        wanted += f", met by {data.optimum['agree']} searches"
+    ended, agree = str(data.optimum.get("ended")), int(data.optimum.get("agree", 1))
     return [
         f"optimum: {shown.words} {shown.show(value)}{f' ({fast})' if fast else ''}",
-        f"held back by: {held_back(held, str(data.optimum.get('ended')))}",
-        *([f"as it is made: {100.0 * made:.1f} % within all limits{wanted}"] if math.isfinite(made) else []),
+        f"held back by: {held_back(held, ended)}",
+        *([f"as it is made: {share_words(made, asked, ended, agree)}"] if math.isfinite(made) else []),
     ]
+
+
+def share_words(made: float, asked: float | None, ended: str, agree: int = 1) -> str:
+    """Return what share of what is made keeps all limits, how much was asked, and why it is less."""
+    if asked is None or made >= asked:
+        text = f"{100.0 * made:.1f} % within all limits"
+    else:
+        text = f"{math.floor(1e4 * made) / 1e2:.2f} % within all limits"
+    if asked is None:
+        return text
+    text += f", {100.0 * asked:g} % asked"
+    if made < asked:
+        return f"{text}: not reached{', the looks of its search ended before' if ended == 'looks' else ''}"
+    return f"{text}, met by {agree} searches" if agree > 1 else text
 
 
 def held_back(held: list[str], ended: str) -> str:

@@ -11,7 +11,7 @@ from click.testing import CliRunner
 
 from sweep.cli import main
 from sweep.report.page import write_report
-from sweep.report.terminal import held_back
+from sweep.report.terminal import held_back, share_words
 from tests.optimise.test_study import STUDY
 
 
@@ -52,6 +52,14 @@ def test_an_optimum_is_in_the_open_only_if_its_search_has_settled() -> None:
     assert held_back(["swing"], "converged") == "swing"
     assert held_back([], "looks") == "the number of looks, which ended its search"
     assert held_back(["swing"], "looks") == "swing; the number of looks, which ended its search"
+
+
+def test_a_share_that_is_less_than_what_was_asked_says_so_and_why() -> None:
+    assert share_words(0.9993, None, "looks") == "99.9 % within all limits"
+    assert share_words(0.9997, 0.9996, "looks", 2) == "100.0 % within all limits, 99.96 % asked, met by 2 searches"
+    missed = "99.95 % within all limits, 99.96 % asked: not reached"  # cut, not rounded: 99.96 of 99.96 would be none
+    assert share_words(0.99959, 0.9996, "converged") == missed
+    assert share_words(0.99959, 0.9996, "looks") == f"{missed}, the looks of its search ended before"
 
 
 def test_no_feasible_design_ends_with_4_and_says_which_limit_gives_way(tmp_path: Path) -> None:
