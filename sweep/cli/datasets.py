@@ -40,9 +40,7 @@ def verify(folder: Path, designs: int) -> None:
 @click.command()
 @click.argument("old", type=IS_FOLDER)
 @click.argument("new", type=IS_FOLDER)
-@click.option(
-    "--rtol", type=float, default=0.0, help="Relative change of a value that counts as none; default: any bit."
-)
+@click.option("--rtol", type=float, default=0.0, help="Relative change of a value that counts as none; default 0.")
 @click.option(
     "--slower", type=float, default=1.5, show_default=True, help="How many times as long the new run may take."
 )

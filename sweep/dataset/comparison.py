@@ -144,7 +144,7 @@ def compare(old: str | Path, new: str | Path, rtol: float = 0.0, slower: float =
     Parameters
     ----------
     old, new : folders that ``sweep run`` left behind
-    rtol : relative change of a value that counts as none; 0 compares the bits
+    rtol : relative change of a value that counts as none; with 0 values have to be equal, as 0 and -0 are
     slower : how many times as long the new run may take
 
     Returns

@@ -94,7 +94,7 @@ FEEDING_OUTPUTS = (
     Output("entry_speed", "length", "dy_t at entry, per radian: times the speed it is that of the impact", "(12)"),
     Output("leave_speed", "length", "dy_t at leaving, per radian", "(12)"),
     Output("stitch_length", "length", "way of the tooth along the feed from entry to leaving, signed", "(13)"),
-    Output("rise", "length", "greatest height of the tooth above the plate", "(14)"),
+    Output("rise", "length", "greatest height of the tooth above the plate from entry to leaving", "(14)"),
     Output("flatness", "1", "area under the path over rise times stitch length: 1 for a rectangle", "(14)"),
     Output("crossings", "1", "passages of the plate per turn", "(11)", jumps=True),
 )
