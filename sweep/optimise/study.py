@@ -79,7 +79,7 @@ def certificates(results: list[Result]) -> dict[str, list[Any]]:
         "kkt_residual": [r.kkt_residual for r in results],
         "gap": [r.gap for r in results],
         "active": ["; ".join(r.active) for r in results],
-        "relaxation": ["; ".join(f"{k} by {v:.6g}" for k, v in r.relaxation.items()) for r in results],
+        "relaxation": [r.given_way for r in results],
         "agree": [r.agree for r in results],
         "basin": [r.basin for r in results],
         "ended": [r.ended for r in results],

@@ -11,6 +11,7 @@ import numpy as np
 from kernels import status as codes
 from sweep.optimise.front.pareto import SHOWN, gaps
 from sweep.optimise.local.descent import KKT
+from sweep.optimise.local.kkt import NO_VALUE
 from sweep.quantities.limits import compared
 from sweep.report.dataset import Dataset, records
 from sweep.report.figures import LIMIT, OPTIMUM
@@ -146,9 +147,9 @@ def _given_way(data: Dataset, relaxation: str) -> str:
     """Say by how much limits would have to give way, in the units of the table."""
     words = []
     for part in filter(None, relaxation.split("; ")):
-        name, _, size = part.rpartition(" by ")
+        name, _, size = part.partition(" ")
         shown = data.shown(name)
-        words.append(f"{shown.words} by {shown.show(abs(float(size)), 3)}")
+        words.append(f"{shown.words} {size if size == NO_VALUE else f'by {shown.show(abs(float(size[3:])), 3)}'}")
     return "; ".join(words)
 
 

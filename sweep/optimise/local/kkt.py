@@ -17,6 +17,7 @@ ACTIVE = 1e-6  # a row within this of its bound (scaled) may carry a multiplier
 EDGE = 1e-10  # a variable within this of its bound, as a fraction of the bounds, may carry a multiplier
 AGREE = 1e-4  # starts whose objective is within this of the best agree
 
+NO_VALUE = "has no value"  # of an output that a design does not have, as it does not turn
 CAVEAT = (
     "The conditions hold at a local optimum; starts that agree make a better one less likely, they do not exclude it: "
     "this is no proof of a global optimum."
@@ -123,6 +124,13 @@ class Result:
         """What results are ordered by: feasible ones by their objective, then the others by their violation."""
         value = self.objective if self.feasible else self.violation
         return not self.feasible, math.inf if math.isnan(value) else value
+
+    @property
+    def given_way(self) -> str:
+        """``relaxation`` in words."""
+        return "; ".join(
+            f"{name} {NO_VALUE if math.isnan(short) else f'by {short:.6g}'}" for name, short in self.relaxation.items()
+        )
 
 
 def in_words(labels: tuple[Label, ...], found: Multipliers, variables: tuple[str, ...]) -> dict[str, float]:
