@@ -287,7 +287,7 @@ def ordered_routes(study: Study) -> tuple[Route, ...]:
     Where only feasible designs count, effects and what is long are for those that keep all limits, unless limits are
     on them.
     """
-    found = routes(study.family, study.want, study.accuracy)
+    found = routes(study.family, study.want, study.accuracy, study.window is not None)
     limited = {limit.output for limit in study.tested_limits}
 
     def place(route: Route) -> tuple[bool, bool]:

@@ -13,7 +13,7 @@ from sweep.chunks.plan import Pilot, choose_chunk_size, describe_columns, pilot,
 from sweep.errors import BudgetError
 from sweep.evaluation.summaries import FEWEST_SAMPLES, FINEST_TARGET, MOST_SAMPLES
 from sweep.families.names import is_error, is_flag
-from sweep.reductions.steps import certified_names
+from sweep.reductions.steps import certified_names, is_windowed
 from sweep.study.load import study_from_data, with_accuracy
 from sweep.study.study import Study
 
@@ -184,7 +184,11 @@ def neighbours(study: Study) -> tuple[tuple[str, Study], ...]:
     if target is not None:
         digits = (("one digit less", 10.0 * target), ("one digit more", 0.1 * target))
         found = [(words, with_accuracy(study, t)) for words, t in digits if FINEST_TARGET <= t <= COARSEST_TARGET]
-        provable = [name for name in certified_names(study.family) if name in study.want]
+        provable = [
+            name
+            for name in certified_names(study.family)
+            if name in study.want and not (study.window and is_windowed(study.family, name))
+        ]
         if study.accuracy.certify:
             found.append(("without the proof", with_accuracy(study, certify=False)))
         elif provable:

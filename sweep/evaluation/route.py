@@ -78,10 +78,12 @@ def own_route(step: Step, stage: Stage, outputs: tuple[str, ...], accuracy: Accu
     return replace(route, name=f"stage {stage.tail}: {step.name}", columns=stage.columns.stop)
 
 
-def general_route(family: Family, general: Group, effect: str, outputs: tuple[str, ...], accuracy: Accuracy) -> Route:
+def general_route(
+    family: Family, general: Group, effect: str, outputs: tuple[str, ...], accuracy: Accuracy, windowed: bool
+) -> Route:
     """Make the route by a general reduction over poses."""
     run = partial(_run_general, family, general, outputs)
-    cost = group_ns(family, general, outputs, accuracy)
+    cost = group_ns(family, general, outputs, accuracy, windowed)
     order = group_order(family, general, outputs)
     return Route(f"{general} {effect}".rstrip(), outputs, cost, run, general, order)
 

@@ -124,34 +124,36 @@ def with_errors(wanted: Sequence[str], accuracy: Accuracy) -> list[str]:
     return [*wanted, *map(error_of, wanted)] if accuracy.target is not None else list(wanted)
 
 
-def routes(family: Family, wanted: Sequence[str], accuracy: Accuracy) -> tuple[Route, ...]:
+def routes(family: Family, wanted: Sequence[str], accuracy: Accuracy, windowed: bool = False) -> tuple[Route, ...]:
     """Choose what will be computed and how, in order; each route's outputs can be asked of `design_outputs` alone.
+
+    With ``windowed`` the times are those in a window.
 
     Raises
     ------
     InputError
         for an unknown name, or an accuracy that the family's domain or the output does not serve.
     """
-    known, key, prices = _known(family), (tuple(wanted), accuracy), costs.table()
+    known, key, prices = _known(family), (tuple(wanted), accuracy, windowed), costs.table()
     if key not in known or known[key][0] is not prices:
-        known[key] = prices, _routes(family, wanted, accuracy)
+        known[key] = prices, _routes(family, wanted, accuracy, windowed)
     return known[key][1]
 
 
 @of_family
-def _known(family: Family) -> dict[tuple[tuple[str, ...], Accuracy], tuple[Any, tuple[Route, ...]]]:
+def _known(family: Family) -> dict[tuple[tuple[str, ...], Accuracy, bool], tuple[Any, tuple[Route, ...]]]:
     """Remember routes with the prices they have: they are asked the same for every chunk of a sweep."""
     return {}
 
 
-def _routes(family: Family, wanted: Sequence[str], accuracy: Accuracy) -> tuple[Route, ...]:
+def _routes(family: Family, wanted: Sequence[str], accuracy: Accuracy, windowed: bool) -> tuple[Route, ...]:
     if isinstance(family.domain, March) and accuracy.target is not None:
         allowed = "samples=: a pose depends on those before it, so values exist on the grid that is marched only"
         raise InputError("accuracy", accuracy.target, allowed, f"design outputs of {family.name}")
     asked = {name: resolve(family, name) for name in dict.fromkeys(wanted)}
     found: list[Route] = []
     if isinstance(family, Machine):
-        found, asked = _of_members(family, asked, accuracy)
+        found, asked = _of_members(family, asked, accuracy, windowed)
     own = {name: applying_step(family, name, accuracy) for name in asked}
     # The margin of a whole chain asks all stages: a first one judged by itself would take its designs from the others.
     together = any(own[name] is None and isinstance(one, Margin) and not one.stage for name, one in asked.items())
@@ -160,7 +162,7 @@ def _routes(family: Family, wanted: Sequence[str], accuracy: Accuracy) -> tuple[
     for name, one in asked.items():
         step, group = own[name], group_of(family, one)
         if isinstance(one, Negative | Extent | TimingOf):
-            found.append(_composed(family, one, accuracy))
+            found.append(_composed(family, one, accuracy, windowed))
         elif step is not None and not (together and group == "margin"):
             steps.setdefault((step[0].name, step[1].number), (*step, []))[2].append(name)
         elif group is not None:
@@ -170,7 +172,7 @@ def _routes(family: Family, wanted: Sequence[str], accuracy: Accuracy) -> tuple[
         else:
             raise _unserved(family, name, accuracy)
     found += [own_route(step, stage, tuple(names), accuracy) for step, stage, names in steps.values()]
-    found += [general_route(family, *key, tuple(names), accuracy) for key, names in groups.items()]
+    found += [general_route(family, *key, tuple(names), accuracy, windowed) for key, names in groups.items()]
     return tuple(sorted(found, key=lambda route: (*route.order, route.name)))
 
 
@@ -184,7 +186,7 @@ def _unserved(family: Family, name: str, accuracy: Accuracy) -> InputError:
     return InputError("output", name, allowed, f"design outputs of {family.name}")
 
 
-def _composed(family: Family, asked: Negative | Extent | TimingOf, accuracy: Accuracy) -> Route:
+def _composed(family: Family, asked: Negative | Extent | TimingOf, accuracy: Accuracy, windowed: bool) -> Route:
     """Make the route to an output made of others; it costs what those do."""
     name, order = asked.output.name, (Work.SEARCH, 0)
     of: Sequence[str]
@@ -204,7 +206,7 @@ def _composed(family: Family, asked: Negative | Extent | TimingOf, accuracy: Acc
                 title, compose = f"value {name}", partial(route.value_at, family, timing)
             else:
                 title, compose = f"timing {name}", partial(route.difference, timing)
-    cost = sum(route.ns_per_design for route in routes(family, of, accuracy))
+    cost = sum(route.ns_per_design for route in routes(family, of, accuracy, windowed))
     whole = isinstance(asked, Extent)  # an extent is about the whole motion; the window is for deviations only
     return Route(title, (name,), cost, partial(_run_composed, family, of, compose, whole), order=order)
 
@@ -216,7 +218,7 @@ def _run_composed(
 
 
 def _of_members(
-    machine: Machine, asked: dict[str, Quantity], accuracy: Accuracy
+    machine: Machine, asked: dict[str, Quantity], accuracy: Accuracy, windowed: bool
 ) -> tuple[list[Route], dict[str, Quantity]]:
     """Make the routes of members by themselves and of the machine's margins, and keep what is left.
 
@@ -237,7 +239,7 @@ def _of_members(
             left[name] = one
     found: list[Route] = []
     for m in machine.members:
-        for inner in routes(m.family, own[m.name], accuracy):
+        for inner in routes(m.family, own[m.name], accuracy, windowed):
             names = tuple(f"{m.name}.{name}" for name in inner.outputs)
             run = partial(_of_member, m, inner)
             found.append(Route(f"{m.name}: {inner.name}", names, inner.ns_per_design, run, order=inner.order))

@@ -19,7 +19,7 @@ from sweep.families.names import at_stage
 from sweep.families.reduction import reduction_of
 from sweep.families.rssr import proven_columns
 from sweep.quantities.dimensions import dimension_step, size_step
-from sweep.quantities.kinds import Group, Reduced, Request, requests
+from sweep.quantities.kinds import Group, Reduced, Request, WindowAngle, requests
 from sweep.quantities.resolve import resolve
 from sweep.reductions.extrema import true_extrema
 from sweep.reductions.fused import curve_of
@@ -194,7 +194,7 @@ def check_certifiable(family: Family, wanted: Sequence[str], accuracy: Accuracy,
         found = resolve(family, name)  # unknown names end here
         if not isinstance(found, Reduced) or not found.extreme:
             continue
-        cut = windowed and family.pose_output[found.of].windowed
+        cut = windowed and is_windowed(family, name)
         if cut or applying_step(family, name, accuracy) is None:
             why = f"{name} in a window" if cut else name
             raise InputError(
@@ -202,6 +202,11 @@ def check_certifiable(family: Family, wanted: Sequence[str], accuracy: Accuracy,
             )
     if not set(names) & set(wanted):
         raise InputError("certify", True, f"{allowed}; none of them is wanted", f"design outputs of {family.name}")
+
+
+def is_windowed(family: Family, name: str) -> bool:
+    """Tell whether an output counts in the window alone, where a window is given."""
+    return any(request.windowed for request in requests(family, resolve(family, name), True))
 
 
 # Poses per design on average: of a margin, a mean, an event, of a search without its peaks, per refined extremum.
@@ -247,7 +252,7 @@ def _beyond(family: Family) -> dict[str, Beyond]:
     return found
 
 
-def group_ns(family: Family, group: Group, names: Sequence[str], accuracy: Accuracy) -> float:
+def group_ns(family: Family, group: Group, names: Sequence[str], accuracy: Accuracy, windowed: bool = False) -> float:
     """Estimated time of a general route [ns per design], made of measured times of poses and of searches."""
     stages, pose = _stages(family), pose_ns(family)
     if group == "margin":
@@ -255,16 +260,19 @@ def group_ns(family: Family, group: Group, names: Sequence[str], accuracy: Accur
     asked = [resolve(family, name) for name in names]
     if group == "events":
         return POSES_EVENT * pose + nanoseconds("work", "event") * len(asked)
-    requested = {r for one in asked for r in requests(family, one, False)}
+    requested = {r for one in asked for r in requests(family, one, windowed)}
     # What effects add is paid once per effect and pose, and far outweighs the motion.
     effects = sum({(name, ns): ns for name, _, ns in (beyond_motion(family, one.of) for one in asked)}.values())
     if accuracy.samples is not None or group == "means":
         scans = len(asked) if group == "means" else len(requested)
         return (accuracy.samples or POSES_MEAN) * (pose + nanoseconds("work", "scan") * scans + effects)
     assert accuracy.target is not None
-    quick = {request for request in requested if curve_of(family, request, False) is not None}
+    quick = {r for r in requested if not r.windowed and curve_of(family, r, False) is not None}
     fused = _stages(family) * nanoseconds("work", "fused extremum") * len(quick)
     fused += POSES_PLACE * pose * sum(request.place for request in quick)
+    # The ends of a window are found as events are.
+    cuts = sum(r.windowed for r in requested) + sum(isinstance(one, WindowAngle) for one in asked)
+    fused += (POSES_EVENT * pose + nanoseconds("work", "event")) * cuts
     if quick == requested:
         return fused
     peaks = (0.5 - np.log10(accuracy.target) / 16.0) * len(requested - quick)

@@ -9,6 +9,8 @@ from types import SimpleNamespace
 
 import pytest
 
+from sweep.chunks.cascade import ordered_routes
+from sweep.costs import nanoseconds
 from sweep.engine.estimate import check_budget, estimate, other_accuracies, searches
 from sweep.errors import BudgetError
 from sweep.evaluation.tables import design_matrix
@@ -129,6 +131,41 @@ def test_twice_the_samples_cost_nearly_twice(tmp_path: Path) -> None:
 )
 def test_no_price_is_named_for_what_cannot_be_asked(tmp_path: Path, accuracy: str, left: list[str]) -> None:
     assert [words for words, _ in other_accuracies(with_accuracy(tmp_path, accuracy), 1)] == left
+
+
+WINDOWED = """
+[study]
+name = "window"
+[mechanism]
+family = "guide"
+[scene]
+want = [WANTED]
+window = { from = 0.1, to = 0.7 }
+[design]
+a = "10 mm"
+b = { from = 24, to = 26, count = 3, unit = "mm" }
+c = "25 mm"
+e = "20 mm"
+xi = "50 mm"
+eta = "0 mm"
+lam = "90 deg"
+h = "0 mm"
+"""
+
+
+@pytest.mark.parametrize(("wanted", "proven"), [('"max_abs_dev", "max_abs_d2s"', [PROOF]), ('"max_abs_dev"', [])])
+def test_no_proof_is_priced_of_what_counts_in_a_window_alone(tmp_path: Path, wanted: str, proven: list[str]) -> None:
+    (tmp_path / "study.toml").write_text(WINDOWED.replace("WANTED", wanted))
+    found = [words for words, _ in other_accuracies(load_study(tmp_path), 1)]
+    assert found == ["one digit less", "one digit more", *proven]
+
+
+@pytest.mark.parametrize(("wanted", "windows"), [("max_abs_dev", 1), ("range_dev", 2), ("window_angle", 1)])
+def test_ends_of_a_window_have_the_price_of_events(tmp_path: Path, wanted: str, windows: int) -> None:
+    # Without them a sweep was said to take a hundredth of its time; a window's search costs more than its ends alone.
+    (tmp_path / "study.toml").write_text(WINDOWED.replace("WANTED", f'"{wanted}"'))
+    (route,) = ordered_routes(load_study(tmp_path))
+    assert windows * nanoseconds("work", "event") < route.ns_per_design < 4 * windows * nanoseconds("work", "event")
 
 
 @pytest.mark.parametrize("jobs", [1, 2])
