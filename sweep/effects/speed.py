@@ -25,7 +25,8 @@ from sweep.numerics.steady_speed import FINER, GRIDS, LEFT, PER_LEFT, steady
 EQUATION = "D4 (1)-(4)"
 FORMULAS = (
     "(1) W(phi) = primitive of drive minus load torque, its mean removed; drive torque constant",
-    "(2) omega = sqrt(2 (E + W)/J), E from 2 pi/omega_mean = integral of d phi/omega; eps = d(omega^2)/d phi/2",
+    "(2) omega = sqrt(2 (E + W)/J), E from 2 pi/omega_mean = integral of d phi/omega; eps = d(omega^2)/d phi/2,",
+    "    at a pose from the torques there: J eps = M_drive - M_load - J' omega^2/2",
     "(3) unevenness = (omega_max - omega_min)/omega_mean;",
     "    estimate [max - min of W - (J - mean J) omega^2/2]/(mean J omega^2)",
     "(4) motor line: d(J omega^2/2)/d phi = X + M - motor_slope (omega - omega_mean), X the excess of loads, M from",
@@ -81,7 +82,12 @@ def _solve(rubs: bool, finest: int, grid: Scene, phi: Array, last: bool) -> tupl
         lost, jammed = _friction_loss(grid, slope)
         excess = excess - lost
     coarsest = LEFT if last and finest > GRIDS[-1] else RESOLVED
-    found, status = steady(inertia, excess, grid.inputs["speed"], motor, phi, coarsest)
+    mean = grid.inputs["speed"]
+    found, status = steady(inertia, excess, mean, motor, phi, coarsest)
+    found["even_torque"] = -excess.mean(axis=1)
+    if motor is not None:  # over the turn it gives what the loads take
+        turning, _ = steady(inertia, excess, mean, motor, grid.angles.phi, coarsest)
+        found["even_torque"] += slope * (turning["crank_speed"].mean(axis=1) - mean)
     np.copyto(status, jammed, where=jammed != st.OK)
     return found, status
 
@@ -125,7 +131,26 @@ def compute(scene: Scene, wanted: frozenset[str], rubs: bool = False) -> Columns
 
 def _compute(scene: Scene, wanted: frozenset[str], rubs: bool) -> Columns:
     found, status, _ = _solved(scene, scene.angles.phi, rubs)
+    change = f"crank_acceleration{SUFFIX[rubs]}"
+    if change in wanted:
+        speed, even = (found[f"{name}{SUFFIX[rubs]}"] for name in ("crank_speed", "even_torque"))
+        found[change] = _balanced(scene, speed, found[change], even, rubs)
     return at_poses(scene, found, status, wanted)
+
+
+def _balanced(scene: Scene, speed: Array, change: Array, even: Array, rubs: bool) -> Array:
+    """Acceleration from the balance of torques at each pose: beside kinks of the loads a series of samples is off.
+
+    ``even`` (n,) is the motor's torque at the mean speed; ``change`` is the acceleration that friction is taken at.
+    """
+    loads = compute_loads(scene.even(), _NEEDED)
+    inertia, slope, drive = (np.asarray(loads[name], np.float64) for name in _NEEDED_NAMES)
+    mean, motor, flywheel = (scene.inputs[name][:, None] for name in ("speed", "motor_slope", "flywheel"))
+    left = even[:, None] - motor * (speed - mean) - drive + 0.5 * slope * (mean * mean - speed * speed)
+    if rubs:
+        left = left - _lost(scene, speed, change, np.zeros(len(mean), np.uint8))
+    found: Array = left / (inertia + flywheel)
+    return found
 
 
 def turn(scene: Scene, wanted: frozenset[str], accuracy: Accuracy, rubs: bool = False) -> Columns:
