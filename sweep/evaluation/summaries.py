@@ -68,8 +68,8 @@ def summarise(
         those before (a march) has no true extrema: 720 samples if neither is given
     certify : prove that no peak of the wanted maxima was missed, or of those named (docs/extrema.md, section 5); their
         ``err_`` are then bounds instead of estimates
-    window : ``max_abs_dev`` and the other reductions of ``dev`` count only poses whose position lies between these
-        fractions of the stroke, measured from its smallest position; default the whole turn
+    window : ``max_abs_dev`` and the other extrema of ``dev`` count only poses whose position lies between these
+        fractions of the stroke, measured from its smallest position; default the whole turn, as always of ``rms_dev``
     keep : columns of the table that the result repeats in front: names, or True for all of them
     status_text : add a column ``status_text``, the meaning of ``status`` in words
     angles : the unit of angles in ``table``, "rad" or "deg"; a header such as ``alpha [deg]`` says it of one column.

@@ -273,6 +273,10 @@ class Family:
         """Pose outputs that are the position of a follower, with the number of its stage in a chain."""
         return {self.position: ""}
 
+    def follower(self, pose: str) -> str:
+        """Name the position of the follower that a pose output belongs to."""
+        return self.position
+
     @cached_property
     def whole(self) -> Stage:
         """The whole mechanism, as if it were the stage of a chain."""

@@ -130,7 +130,7 @@ def _apart(
     found = {request: Extremum.unknown(len(designs)) for request in requests}
     status = np.zeros(len(designs), np.uint8)
     for rows in (np.flatnonzero(apart), np.flatnonzero(~apart)):
-        part = None if window is None else Window(*(column[rows] for column in window))
+        part = None if window is None else window.only(rows)
         some, status[rows] = true_extrema(family, designs[rows], requests, target, locate=locate, window=part)
         for request, extremum in some.items():
             for column, values in zip(found[request], extremum, strict=True):

@@ -116,7 +116,7 @@ class Search:
         self.status = np.zeros(n, np.uint8)
         # A discriminant is a smooth function whatever its sign; the motion is not where it vanishes.
         self.guards = [] if self.anywhere else list(discriminants(self.family))
-        position = [self.family.position] if self.window is not None else []
+        position = [self.window.position] if self.window is not None else []
         self.names = list(dict.fromkeys([*(r.pose for r in self.requests), *position, *self.guards]))
         # Samples that each request still needs of each design; 0 once it is found.
         self.near = nearest(self.family, self.designs, MATTERS) if self.family.every(Singular) else None
@@ -181,8 +181,8 @@ class Search:
             values = columns[request.pose]
             allowed = None
             if self.window is not None and request.windowed:
-                allowed = self.window.holds(rows, columns[self.family.position])
-                needed[number, self.window.grazed(rows, columns[self.family.position])] = 2 * samples
+                allowed = self.window.holds(rows, columns[self.window.position])
+                needed[number, self.window.grazed(rows, columns[self.window.position])] = 2 * samples
             scale, rough = np.empty(rows.size), np.empty(rows.size)
             row, column = (np.empty(rows.size * (samples // 2 + 1), np.int64) for _ in range(2))
             count = scan.peaks(values, request.mode, SHARE, allowed, scale, rough, row, column)
@@ -312,7 +312,7 @@ class Search:
         """Drop the peaks outside the window; its edges are candidates too."""
         assert self.window is not None
         poses, _ = pose_columns(self.family, self.designs[rows[row]], peaks.phi[:, None], self.names)
-        inside = self.window.holds(rows[row], poses[self.family.position])[:, 0]
+        inside = self.window.holds(rows[row], poses[self.window.position])[:, 0]
         edge = edges(self.family, self.designs, rows, self.window, columns, request.pose)
         edge = edge.only(resolved[edge.row])
         height = np.abs(edge.values) if request.mode == 0 else request.mode * edge.values

@@ -78,35 +78,35 @@ def limits_and_reductions(
     asked = [resolve(family, name) for name in names]
     windowed = part is not None
     wanted = list(dict.fromkeys(r for one in asked for r in requests(family, one, windowed)))
-    window, status = None, np.zeros(len(designs), np.uint8)
+    status = np.zeros(len(designs), np.uint8)
     found: Found = {}
-    if part is not None and any(r.windowed for r in wanted):
-        ends = [Request(family.position, 1), Request(family.position, -1)]
-        found, status = _extrema(family, designs, ends, accuracy, None)
-        most, least = (found[r] for r in ends)
-        err = np.maximum(most.err, least.err) if accuracy.target is not None else np.zeros(len(designs))
-        window = Window.of_stroke(least.value, most.value, err, part)
-        wanted = [r for r in wanted if r not in ends]
-    more, now = _extrema(family, designs, wanted, accuracy, window)
+    for position in dict.fromkeys(family.follower(r.pose) for r in wanted if r.windowed):
+        ends = [Request(position, 1), Request(position, -1)]
+        more, now = _extrema(family, designs, [r for r in ends if r not in found], accuracy, None)
+        found, status = found | more, np.where(status == st.OK, now, status)
+        inside = [r for r in wanted if r.windowed and family.follower(r.pose) == position]
+        more, now = _extrema(family, designs, inside, accuracy, _window(position, found, accuracy, part))
+        found, status = found | more, np.where(status == st.OK, now, status)
+    more, now = _extrema(family, designs, [r for r in wanted if r not in found], accuracy, None)
+    found |= more
     columns: Columns = {"status": np.where(status == st.OK, now, status).astype(np.uint8)}
     for name, one in zip(names, asked, strict=True):
         if isinstance(one, WindowAngle):
-            columns[name], columns[f"err_{name}"] = _stay(family, designs, one, found | more, accuracy, part)
+            window = _window(one.of, found, accuracy, part)
+            columns[name], columns[f"err_{name}"] = window_angle(family, designs, window)
             continue
-        value, err_value = _value(family, designs, one, found | more, windowed)
+        value, err_value = _value(family, designs, one, found, windowed)
         columns[name], columns[f"err_{name}"] = value, err_value
     return columns
 
 
-def _stay(
-    family: Family, designs: Array, one: WindowAngle, found: Found, accuracy: Accuracy, part: tuple[float, float] | None
-) -> tuple[Array, Array]:
+def _window(position: str, found: Found, accuracy: Accuracy, part: tuple[float, float] | None) -> Window:
+    """Return the window of a follower whose ends are found."""
     if part is None:
         raise InputError("window", None, f"two fractions of the stroke, as {STAY.name} is wanted", "design outputs")
-    most, least = (found[r] for r in requests(family, one, False))
-    err = np.maximum(most.err, least.err) if accuracy.target is not None else np.zeros(len(designs))
-    err = np.where(np.isfinite(most.value), err, np.nan)
-    return window_angle(family, designs, Window.of_stroke(least.value, most.value, err, part))
+    most, least = found[Request(position, 1)], found[Request(position, -1)]
+    err = np.maximum(most.err, least.err) if accuracy.target is not None else np.zeros(most.value.size)
+    return Window.of_stroke(position, least.value, most.value, np.where(np.isfinite(most.value), err, np.nan), part)
 
 
 def _extrema(

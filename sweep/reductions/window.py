@@ -17,19 +17,24 @@ BESIDE = 1e-5  # [rad] of the difference quotient that tells how a value changes
 
 
 class Window(NamedTuple):
-    """Positions between which poses count, of every design, each (n,), and how far they may be wrong."""
+    """Positions between which poses count, of every design, each (n,), their error, and the output that they are of."""
 
     low: Array
     high: Array
     err: Array
+    position: str
 
     @classmethod
-    def of_stroke(cls, least: Array, most: Array, err: Array, part: tuple[float, float]) -> Window:
+    def of_stroke(cls, position: str, least: Array, most: Array, err: Array, part: tuple[float, float]) -> Window:
         """Part (fractions of the stroke, from the smallest position) of a motion between two positions."""
         # A fraction 0 or 1 is open: rounding of the extreme position must not cut off the pose that reaches it.
         low = least + part[0] * (most - least) if part[0] > 0.0 else np.full(least.size, -np.inf)
         high = least + part[1] * (most - least) if part[1] < 1.0 else np.full(least.size, np.inf)
-        return cls(low, high, err)
+        return cls(low, high, err, position)
+
+    def only(self, rows: Index | Mask) -> Window:
+        """Return that of some of the designs."""
+        return Window(self.low[rows], self.high[rows], self.err[rows], self.position)
 
     def holds(self, rows: Index, positions: Array) -> Mask:
         """Whether the positions (k, m) of the designs ``rows`` (k,) lie in the window."""
@@ -74,15 +79,15 @@ def edges(family: Family, designs: Array, rows: Index, window: Window, columns: 
     -----
     The error is what is left of the position's error, and the error of the stroke's ends, carried over by the slope.
     """
-    positions, samples = columns[family.position], columns[pose].shape[1]
-    spacing, wraps = TWO_PI / samples, family.pose_output[family.position].wraps
+    positions, samples = columns[window.position], columns[pose].shape[1]
+    spacing, wraps = TWO_PI / samples, family.pose_output[window.position].wraps
     row, column, side = _brackets(rows, window, positions)
     level = np.where(side == 0, window.low[rows[row]], window.high[rows[row]])
     size = np.abs(positions).max(axis=1)[row]
 
     def at(which: Index, phi: Array, of: Family = family) -> tuple[Array, Array]:
-        poses, _ = pose_columns(of, designs[rows[row[which]]], phi, (family.position, pose))
-        off = poses[family.position] - level[which, None]
+        poses, _ = pose_columns(of, designs[rows[row[which]]], phi, (window.position, pose))
+        off = poses[window.position] - level[which, None]
         return poses[pose], off - TWO_PI * np.round(off / TWO_PI) if wraps else off
 
     every = np.arange(row.size)
@@ -128,14 +133,14 @@ def window_angle(family: Family, designs: Array, window: Window) -> tuple[Array,
     Every crossing is refined to rounding; two crossings less than 360/512 degrees apart may be missed.
     """
     angle, err = np.full(len(designs), np.nan), np.full(len(designs), np.nan)
-    names = (family.position, family.derivative_of[family.position])
+    names = (window.position, family.derivative_of[window.position])
     samples, known = SAMPLES * denser(family, designs, names), np.isfinite(window.err)
     every = (rows for m in np.unique(samples[known]) for rows in blocks(np.flatnonzero(known & (samples == m)), int(m)))
     for rows in every:
         columns, _, _ = sample_turn(family, designs[rows], int(samples[rows[0]]), names)
         found = edges(family, designs, rows, window, columns, names[1])
         levels = np.stack([window.low[rows], window.high[rows]])
-        above, own = TWO_PI * (columns[family.position][:, 0] >= levels), np.zeros(rows.size)
+        above, own = TWO_PI * (columns[window.position][:, 0] >= levels), np.zeros(rows.size)
         np.subtract.at(above, (found.side, found.row), np.sign(found.values) * found.phi)
         size = window.err[rows[found.row]] + 8.0 * EPS * np.abs(levels[found.side, found.row])
         np.add.at(own, found.row, size / np.abs(found.values) + 4.0 * EPS * TWO_PI)

@@ -56,6 +56,11 @@ class Machine(Family):
         """Positions of all members' followers."""
         return {f"{m.name}.{p}": f"{m.name}.{stage}" for m in self.members for p, stage in m.family.positions.items()}
 
+    def follower(self, pose: str) -> str:
+        """Name the position of the follower of the member that a pose output belongs to."""
+        found = self.split(pose)
+        return self.position if found is None else f"{found[0].name}.{found[0].family.position}"
+
     def outward_sign(self, position: str) -> str:
         """Return the sign parameter of the member whose position it is."""
         found = self.split(position)

@@ -66,12 +66,13 @@ def gradients(curves: Curves, designs: Any, points: Points, places: bool) -> tup
         values[passing] = 0.0
     if (points.how == EDGE).any():
         _at_edges(curves, designs, points, values, moves)
-    edges = points.how == CROSSING
-    low, high = curves.stroke(points) if edges.any() else (-1, -1)
-    if low >= 0:
-        place = curves.positions(designs, points)
-        level = points.level[edges]
-        target = place[:, [low]] + level * (place[:, [high]] - place[:, [low]])
+    crossing = points.how == CROSSING
+    place = curves.positions(designs, points) if crossing.any() else np.zeros((0, 0))
+    for n in np.unique(points.series[crossing]):
+        edges, (low, high) = crossing & (points.series == n), curves.stroke(points, n)
+        if low < 0:
+            continue
+        target = place[:, [low]] + points.level[edges] * (place[:, [high]] - place[:, [low]])
         moves[edges] = (-(place[:, edges] - target).imag / STEP / points.pace[edges]).T
         values[edges] += points.slope[edges, None] * moves[edges]
     return values, moves

@@ -36,7 +36,7 @@ from sweep.optimise.extrema.scanned import (
     tops,
 )
 from sweep.optimise.problem.statement import Problem
-from sweep.quantities.measures import Series
+from sweep.quantities.measures import Series, curve
 from sweep.reductions.sampling import on_closed_turn
 
 Index: TypeAlias = NDArray[np.intp]
@@ -104,11 +104,12 @@ class Curves:
     def __init__(self, problem: Problem, series: tuple[Series, ...], places: bool = False) -> None:
         self.problem = problem
         self.family = on_closed_turn(differentiable(problem.family))
-        position = Series(self.family.position, wrapped=self.family.pose_output[self.family.position].wraps)
-        if any(s.window is not None for s in series) and position not in series:
-            series = (*series, position)
-        self.series = series
-        self.position = series.index(position) if position in series else -1
+        followers = [curve(self.family, self.family.follower(s.output)) for s in series if s.window is not None]
+        self.series = series = (*series, *(s for s in dict.fromkeys(followers) if s not in series))
+        # Of each series that of the position which says where its window is; -1 for none.
+        known = {s: n for n, s in enumerate(series) if s in followers}
+        known |= {s: known[p] for s, p in zip((s for s in series if s.window is not None), followers, strict=True)}
+        self.position: Index = np.array([known.get(s, -1) for s in series], np.intp)
         names = {s.output for s in series} | {s.pressure for s in series if s.pressure}
         self.wanted = frozenset(names)
         self.places = places
@@ -194,9 +195,9 @@ class Curves:
         room = self.problem.curve_margins.get(self.series[n].output)
         return np.zeros((len(designs), len(phi))) if room is None else room.at(designs, phi)
 
-    def stroke(self, points: Points) -> tuple[int, int]:
-        """Return the points with the smallest and the largest position."""
-        own = np.flatnonzero((points.series == self.position) & np.isin(points.how, (STATIONARY, EDGE)))
+    def stroke(self, points: Points, n: int) -> tuple[int, int]:
+        """Return the points with the smallest and the largest position of the follower whose stroke cuts series n."""
+        own = np.flatnonzero((points.series == self.position[n]) & np.isin(points.how, (STATIONARY, EDGE)))
         low, high = own[points.sense[own] < 0], own[points.sense[own] > 0]
         if not len(low) or not len(high):
             return -1, -1
@@ -263,9 +264,8 @@ class Curves:
         return out
 
     def positions(self, designs: Any, points: Points) -> Any:
-        """Return the position of the follower (n, K) at the points' crank angles."""
-        number = np.full(len(points), self.position)
-        return self.values(designs, replace(points, series=number, value=np.zeros(len(points))))
+        """Return the position of the follower whose stroke cuts each point's series, (n, K), at the crank angles."""
+        return self.values(designs, replace(points, series=self.position[points.series], value=np.zeros(len(points))))
 
     def _angles(self, points: Points) -> Array:
         """Return the points' angles, then a few that tell the scale of a discriminant where the points cannot."""
@@ -281,7 +281,7 @@ class Curves:
     def _local(
         self, design: Array, phi: Array, points: Points, owners: list[tuple[Series, Index]]
     ) -> tuple[Array, Array, Array, Array, Array]:
-        """Return slope and curvature of each point's output, slope and value of the position, (K,) each."""
+        """Return slope and curvature of each point's output, slope and value of its position, (K,) each."""
         three = np.concatenate([phi - NEIGHBOUR, phi, phi + NEIGHBOUR])
         columns = self.poses(design[None, :], three + 1j * STEP)
         k = len(phi)
@@ -293,29 +293,27 @@ class Curves:
                 room = self.problem.curve_margins[s.output].slope(design, three).reshape(3, k)
                 slopes[:, own] += points.sense[own] * room[:, own]
         curvature = (slopes[2] - slopes[0]) / (2.0 * NEIGHBOUR)
-        if self.position < 0:
-            return slopes[1], curvature, np.zeros(k), np.zeros(k), value
-        place = columns[self.series[self.position].output][0, k : 2 * k]
+        place = np.zeros(k, np.complex128)
+        for n in np.unique(self.position[self.position >= 0]):
+            cut = self.position[points.series] == n
+            place[cut] = columns[self.series[n].output][0, k : 2 * k][cut]
         return slopes[1], curvature, place.imag / STEP, place.real, value
 
     def _approach_edges(self, points: Points, phi: Array, place: Array, pace: Array, move: Array) -> None:
-        edges = points.how == CROSSING
-        if not edges.any():
-            return
-        low, high = self.stroke(points)
-        if low < 0:
-            return
-        base, level = place[low], points.level[edges]
-        target = base + level * (place[high] - base)
-        move[edges] = -(place[edges] - target) / pace[edges]
+        for n in np.unique(points.series[points.how == CROSSING]):
+            edges = (points.how == CROSSING) & (points.series == n)
+            low, high = self.stroke(points, n)
+            if low >= 0:
+                target = place[low] + points.level[edges] * (place[high] - place[low])
+                move[edges] = -(place[edges] - target) / pace[edges]
 
     def _inside(self, n: int, design: Array, phi: Array, columns: dict[str, Any], points: Points) -> list[Row]:
         """Return the extrema inside the window of series n, and both senses at every crossing of the window's edges."""
         series = self.series[n]
-        low, high = self.stroke(points)
+        low, high = self.stroke(points, n)
         if series.window is None or low < 0:
             return []
-        s = self.curve(self.series[self.position], columns)[0]
+        s = self.curve(self.series[self.position[n]], columns)[0]
         share = (s - points.value[low]) / (points.value[high] - points.value[low])
         x = self.curve(series, columns)[0]
         rows = []
