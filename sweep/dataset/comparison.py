@@ -150,7 +150,7 @@ def compare(old: str | Path, new: str | Path, rtol: float = 0.0, slower: float =
     Returns
     -------
     Comparison
-        Parameters, outputs and status of every design, and the optimum and the reference if both studies optimise.
+        Parameters, outputs and status of every design, and of optimum and reference if both studies optimise.
         Error estimates are no results and are left out.  Times are those of all runs into a folder together, and are
         compared only if both ended complete and one took 5 s or more.
 
@@ -245,6 +245,10 @@ def _compare_optima(result: Comparison, old: Path, new: Path, rtol: float) -> No
     for role in ROLES:
         if not all(role in table.index for table in tables):
             continue
+        before, after = (table.to_dict("index")[role].get("status") for table in tables)
+        if before != after:
+            result.status_changed += 1
+            result.notes += (f"status of the {role}: {before} before, {after} now",)
         for name in [name for name in result.moved if all(name in table.columns for table in tables)]:
             before, after = (np.array([table.loc[role, name]], np.float64) for table in tables)
             moved = Moved(f"{name} of the {role}", kind="")

@@ -168,9 +168,7 @@ def slower(name: str, seconds: float, history: Sequence[NightRecord]) -> Changes
 
 
 def _far(old: float, new: float, rtol: float) -> bool:
-    if math.isnan(old) or math.isnan(new):
-        return math.isnan(old) != math.isnan(new)
-    return bool(abs(old - new) > rtol * max(abs(old), abs(new)))
+    return not (math.isclose(old, new, rel_tol=rtol) or (math.isnan(old) and math.isnan(new)))
 
 
 def _role(path: Path, role: str) -> pd.Series[Any] | None:

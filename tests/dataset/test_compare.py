@@ -151,6 +151,16 @@ def test_optima_are_compared(study: Study, dataset: Path, tmp_path: Path) -> Non
     assert found.exit_code == 10 and found.moved["swing of the optimum"].absolute == 0.5
 
 
+def test_an_optimum_that_no_longer_keeps_its_limits_is_found(study: Study, dataset: Path, tmp_path: Path) -> None:
+    rows = sweep.load(dataset)
+    old, new = (written(study, rows, tmp_path / name) for name in ("old", "new"))
+    optimum = pd.DataFrame({"role": ["optimum", "reference"], "swing": [1.0, 3.0], "status": [0, 0]})
+    optimum.to_parquet(files.beside(old) / files.OPTIMUM)
+    optimum.assign(status=[5, 0]).to_parquet(files.beside(new) / files.OPTIMUM)
+    found = sweep.compare(old, new)
+    assert found.exit_code == 11 and "status of the optimum: 0 before, 5 now" in found.lines()
+
+
 def test_other_code_another_study_and_an_unfinished_one_are_said(study: Study, dataset: Path, tmp_path: Path) -> None:
     other = written(study, sweep.load(dataset), tmp_path / "new")
     files.write_plan(other, (files.read_plan(other) or {}) | {"code": "x", "study": "y", "complete": False})

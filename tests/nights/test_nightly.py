@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import errno
 import json
+import math
 import os
 import shutil
 import subprocess
@@ -311,3 +312,7 @@ def test_optimum_and_dimension_that_moved_are_named(tmp_path: Path) -> None:
     assert (found.code, found.moved) == (10, ("max_abs_dP",))
     assert [line.split(":")[0] for line in found.lines] == ["optimum moved", "optimum moved in its dimensions"]
     assert found.lines[1].split(": ")[1].startswith("a 30 -> 30.3")
+    row.assign(max_abs_dP=math.inf).to_parquet(tmp_path / "new" / "_optimum.parquet")
+    assert changes(study, *places).moved == ("max_abs_dP",)
+    row.assign(status=5).to_parquet(tmp_path / "new" / "_optimum.parquet")
+    assert changes(study, *places).code == 11
