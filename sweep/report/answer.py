@@ -126,11 +126,29 @@ def not_achieved(data: Dataset, found: Scan) -> list[str]:
         if not residual <= KKT:
             late = data.optimum.get("ended") == "time"
             faults.append(f"the optimiser {'had no time left to settle' if late else 'did not settle'}")
+        asked = None if data.study.tolerance is None else data.study.tolerance.robust
+        made = value_of(data.optimum, "yield")
+        if asked is not None and made < asked:
+            faults.append(f"as it is made: {share_words(made, asked, str(data.optimum.get('ended')))}")
         if objective is not None and found.best_row:
             best, value = found.best_row[objective.name], value_of(data.optimum, objective.name)
             if not compared(objective.name, value) <= compared(objective.name, best) + 1e-6 * abs(best):
                 faults.append(f"the optimiser ended behind the best design of the sweep, {objective.show(best)}")
     return [f"Not achieved: {'; '.join(faults)}."] if faults else []
+
+
+def share_words(made: float, asked: float | None, ended: str, agree: int = 1) -> str:
+    """Return what share of what is made keeps all limits, how much was asked, and why it is less."""
+    if asked is None or made >= asked:
+        text = f"{100.0 * made:.1f} % within all limits"
+    else:
+        text = f"{math.floor(1e4 * made) / 1e2:.2f} % within all limits"
+    if asked is None:
+        return text
+    text += f", {100.0 * asked:g} % asked"
+    if made < asked:
+        return f"{text}: not reached{', the looks of its search ended before' if ended == 'looks' else ''}"
+    return f"{text}, met by {agree} searches" if agree > 1 else text
 
 
 def _against_reference(data: Dataset) -> list[str]:

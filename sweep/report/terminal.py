@@ -22,7 +22,7 @@ from sweep.optimise import read_survey
 from sweep.optimise.local.descent import KKT
 from sweep.optimise.multistart.survey import started
 from sweep.quantities.limits import compared
-from sweep.report.answer import proof_sentence, search_words, survey_warnings
+from sweep.report.answer import proof_sentence, search_words, share_words, survey_warnings
 from sweep.report.dataset import Dataset, read_dataset
 from sweep.report.tables import bound_words, limit_states, limited
 from sweep.synthesis.fit import fit_line
@@ -118,20 +118,6 @@ def _optimum(data: Dataset) -> list[str]:
         f"held back by: {held_back(held, ended)}",
         *([f"as it is made: {share_words(made, asked, ended, agree)}"] if math.isfinite(made) else []),
     ]
-
-
-def share_words(made: float, asked: float | None, ended: str, agree: int = 1) -> str:
-    """Return what share of what is made keeps all limits, how much was asked, and why it is less."""
-    if asked is None or made >= asked:
-        text = f"{100.0 * made:.1f} % within all limits"
-    else:
-        text = f"{math.floor(1e4 * made) / 1e2:.2f} % within all limits"
-    if asked is None:
-        return text
-    text += f", {100.0 * asked:g} % asked"
-    if made < asked:
-        return f"{text}: not reached{', the looks of its search ended before' if ended == 'looks' else ''}"
-    return f"{text}, met by {agree} searches" if agree > 1 else text
 
 
 def held_back(held: list[str], ended: str) -> str:

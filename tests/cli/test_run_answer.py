@@ -10,8 +10,9 @@ import pytest
 from click.testing import CliRunner
 
 from sweep.cli import main
+from sweep.report.answer import share_words
 from sweep.report.page import write_report
-from sweep.report.terminal import held_back, share_words
+from sweep.report.terminal import held_back
 from tests.optimise.test_study import STUDY
 
 

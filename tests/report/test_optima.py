@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from dataclasses import replace
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pandas as pd
@@ -19,6 +20,7 @@ from sweep.families.names import negative
 from sweep.optimise.manufacture.tolerance import deviating
 from sweep.pages import rendered
 from sweep.plot.datasets import draw_histogram
+from sweep.report.answer import not_achieved
 from sweep.report.dataset import without_rows
 from sweep.report.figures import LIMIT
 from sweep.report.made import TELLING, histogram, made, made_sentence
@@ -190,3 +192,12 @@ def test_no_yield_without_tolerances_or_limits(missing) -> None:
     assert made(replace(without_rows(study), folder=Path("nowhere"), optima=pd.DataFrame([row("optimum")]))) is None
     assert made_sentence(None, "x") == ""
     assert np.isnan(row()["yield"])
+
+
+@pytest.mark.parametrize(("share", "reached"), [(0.9312, False), (0.9512, True)])
+def test_a_share_that_was_asked_and_not_reached_is_told(share, reached) -> None:
+    best = row("optimum", ended="looks", kkt_residual=1e-9, least_link=12.0, max_pressure_angle=1.0) | {"yield": share}
+    data = data_of(best, tolerance=DATA["tolerance"] | {"robust": "95 %"})
+    missed = "93.12 % within all limits, 95 % asked: not reached, the looks of its search ended before"
+    told = [] if reached else [f"Not achieved: as it is made: {missed}."]
+    assert not_achieved(data, SimpleNamespace(best_row=None)) == told
