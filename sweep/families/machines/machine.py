@@ -154,21 +154,14 @@ def _outputs(placed: list[Member]) -> list[Output]:
         replace(o, name=f"{m.name}.{o.name}", own=f"{m.name}.{o.base}") for m in placed for o in m.family.pose_outputs
     ]
     for m in placed:
-        outputs += [
-            Output(f"{m.name}.{point}_{axis}", "length", f"{m.name}: {axis} of {point}, machine's frame", "ours")
-            for point in m.points
-            for axis in AXES
-        ]
-        outputs += [
-            Output(
-                f"{m.name}.d{point}_{axis}",
-                "length",
-                f"{m.name}: velocity analogue of {point} along {axis}, machine's frame",
-                "ours",
-            )
-            for point in m.moving
-            for axis in AXES
-        ]
+        for rate, points, what in (("", m.points, ""), ("d", m.moving, "velocity analogue, ")):
+            outputs += [
+                Output(
+                    f"{m.name}.{rate}{p}_{axis}", "length", f"{m.name}: {what}{axis} of {p}, machine's frame", "ours"
+                )
+                for p in points
+                for axis in AXES
+            ]
     return outputs
 
 
