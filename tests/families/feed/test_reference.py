@@ -314,3 +314,16 @@ def test_triad_jitted_equals_plain():
         results.append((status, out))
     for one, two in zip(*results, strict=True):
         np.testing.assert_array_equal(one, two)
+
+
+def test_rise_is_that_of_the_stay_that_feeds_where_a_shorter_one_reaches_higher():
+    rack = {"h_a": 0.522, "h_b": 3.368, "h_c": 2.079, "h_e": 2.497, "h_sigma": -1.0, "rh": 0.5644, "dh": -0.4279}
+    rack |= {"xE": 2.862, "yE": 0.7761, "rE": 0.2249, "dE": 1.0429, "q": 2.0262, "fx": -1.9517, "fy": 0.3416}
+    rack |= {"tx": -0.4583, "ty": 1.5281, "y_plate": 1.4528, "bar_branch": -1.0}
+    names = ["phi_entry", "feed_angle", "rise", "crossings", "max_y_t"]
+    got = sweep.summarise("feed", rack, names, accuracy=1e-9).iloc[0]
+    phi = got.phi_entry + got.feed_angle * np.linspace(0.0, 1.0, 4001)
+    heights = sweep.evaluate("feed", rack, ["y_t"], phi=phi).y_t - rack["y_plate"]
+    # a step misses (feed_angle/8000)^2/2 of the bend at most
+    assert got.rise == pytest.approx(heights.max(), abs=1e-6)
+    assert got.crossings == 4.0 and got.max_y_t - rack["y_plate"] > got.rise + 0.05
