@@ -114,8 +114,7 @@ def _brackets(rows: Index, window: Window, positions: Array) -> tuple[Index, Ind
     return first, second, sides
 
 
-# The follower may pass a level twice between two of these; what lies between counts only if the stay is longer.
-SAMPLES = 512
+SAMPLES, MOST = 512, 16384  # of the first look, and of the last one at what may pass a level twice between two of them
 
 
 def window_angle(family: Family, designs: Array, window: Window) -> tuple[Array, Array]:
@@ -130,19 +129,24 @@ def window_angle(family: Family, designs: Array, window: Window) -> tuple[Array,
     -----
     The angle above a level is the sum of the angles where the follower goes down through it, less those where it goes
     up, plus a turn if it starts above.  Between two levels it is what is above the lower and not above the upper one.
-    Every crossing is refined to rounding; two crossings less than 360/512 degrees apart may be missed.
+    Every crossing is refined to rounding.  Samples are doubled where a parabola through three of them leaves room for
+    two crossings between; what the last ones leave open is part of the error.
     """
     angle, err = np.full(len(designs), np.nan), np.full(len(designs), np.nan)
     names = (window.position, family.derivative_of[window.position])
-    samples, known = SAMPLES * denser(family, designs, names), np.isfinite(window.err)
-    every = (rows for m in np.unique(samples[known]) for rows in blocks(np.flatnonzero(known & (samples == m)), int(m)))
-    for rows in every:
-        columns, _, _ = sample_turn(family, designs[rows], int(samples[rows[0]]), names)
-        found = edges(family, designs, rows, window, columns, names[1])
-        levels = np.stack([window.low[rows], window.high[rows]])
-        above, own = TWO_PI * (columns[window.position][:, 0] >= levels), np.zeros(rows.size)
-        np.subtract.at(above, (found.side, found.row), np.sign(found.values) * found.phi)
-        size = window.err[rows[found.row]] + 8.0 * EPS * np.abs(levels[found.side, found.row])
-        np.add.at(own, found.row, size / np.abs(found.values) + 4.0 * EPS * TWO_PI)
-        angle[rows], err[rows] = above[0] - above[1], own
+    samples, pending = SAMPLES * denser(family, designs, names), np.isfinite(window.err)
+    while pending.any():
+        count = int(samples[pending].min())
+        for rows in blocks(np.flatnonzero(pending & (samples == count)), count):
+            columns, _, _ = sample_turn(family, designs[rows], count, names)
+            touching = window.grazed(rows, columns[window.position])
+            found = edges(family, designs, rows, window, columns, names[1])
+            levels = np.stack([window.low[rows], window.high[rows]])
+            above = TWO_PI * (columns[window.position][:, 0] >= levels)
+            own = np.where(touching, 2.0 * TWO_PI / count, 0.0)
+            np.subtract.at(above, (found.side, found.row), np.sign(found.values) * found.phi)
+            size = window.err[rows[found.row]] + 8.0 * EPS * np.abs(levels[found.side, found.row])
+            np.add.at(own, found.row, size / np.abs(found.values) + 4.0 * EPS * TWO_PI)
+            angle[rows], err[rows] = above[0] - above[1], own
+            samples[rows], pending[rows] = 2 * count, touching & (count < MOST)
     return angle, err

@@ -38,6 +38,23 @@ def test_is_the_share_of_poses_in_the_window(window):
     assert (found.err_window_angle < 1e-4).all()
 
 
+@pytest.mark.parametrize("part", [1e-6, 1e-7, 1e-10])
+@pytest.mark.parametrize("upper", [False, True])
+def test_stay_shorter_than_a_step_of_the_first_samples_is_found(part, upper):
+    window = (1.0 - part, 1.0) if upper else (0.0, part)
+    want = ["window_angle", "swing", "phi_ext", "phi_fold"]
+    found = sweep.summarise("rssr", ROCKERS, want, accuracy=1e-12, window=window)
+    # Extended is the larger angle where branch is +1.
+    at_ext = upper == (np.array(ROCKERS["branch"]) > 0.0)
+    offset = np.linspace(-0.01, 0.01, 2 * POSES + 1)
+    for k, row in found.iterrows():
+        phi = offset + (row.phi_ext if at_ext[k] else row.phi_fold)
+        psi = sweep.evaluate("rssr", {n: x[k] for n, x in ROCKERS.items()}, "psi", phi=phi).psi.to_numpy()
+        off = np.abs(psi - (psi.max() if upper else psi.min()))
+        counted = (off <= part * abs(row.swing)).mean() * (offset[-1] - offset[0])
+        assert row.window_angle == pytest.approx(counted, abs=row.err_window_angle + 2e-6), k
+
+
 def test_one_of_them_passes_the_cut_of_the_angle():
     phi = np.linspace(0.0, 2.0 * np.pi, 721)
     psi = sweep.evaluate("rssr", ROCKERS, "psi", phi=phi).psi.to_numpy().reshape(-1, phi.size)
