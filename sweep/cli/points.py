@@ -106,15 +106,22 @@ NOTHING = 4  # as of `sweep run`: no design within the limits
 
 @click.command()
 @click.argument("file", type=click.Path(path_type=Path))
-@click.option("--candidates", default=4096, show_default=True, type=click.IntRange(min=16), help="Points tried first.")
+@click.option(
+    "--candidates",
+    default=4096,
+    show_default=True,
+    type=click.IntRange(min=16),
+    help="Points of each sample tried first.",
+)
 @click.option(
     "--starts", default=6, show_default=True, type=click.IntRange(min=1), help="Of them, how many are refined."
 )
-@click.option("--seed", default=0, show_default=True, type=click.IntRange(min=0), help="Of the points.")
+@click.option("--samples", default=12, show_default=True, type=click.IntRange(min=1), help="How many at most.")
+@click.option("--seed", default=0, show_default=True, type=click.IntRange(min=0), help="Of the samples.")
 @click.option("--out", type=click.Path(path_type=Path), help="The mechanisms as a table: .csv or .parquet.")
-def task(file: Path, candidates: int, starts: int, seed: int, out: Path | None) -> None:
+def task(file: Path, candidates: int, starts: int, samples: int, seed: int, out: Path | None) -> None:
     """Answer the [task] table of FILE (docs/tasks.md): mechanisms, the best first, lengths in mm, angles in rad."""
-    solutions = solve(load_task(file), candidates=candidates, starts=starts, seed=seed)
+    solutions = solve(load_task(file), candidates=candidates, starts=starts, samples=samples, seed=seed)
     for solution in solutions:
         click.echo(str(solution))
     if not solutions:

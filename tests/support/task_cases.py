@@ -34,7 +34,7 @@ STAGE_BOUNDS = {"b1": (0.3, 8.0), "c1": (0.3, 5.0)}
 @cache
 def best(problem):
     """The best solution; problems are frozen, so each is solved once."""
-    solutions = solve(problem.build(), candidates=2048, starts=2)
+    solutions = solve(problem.build(), candidates=2048, starts=2, samples=1)
     assert solutions
     assert solutions[0].feasible, str(solutions[0])
     return solutions[0]

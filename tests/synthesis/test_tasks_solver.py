@@ -23,6 +23,7 @@ from sweep.synthesis.tasks import (
     solve,
 )
 from sweep.synthesis.tasks.problem import Candidates, Unknown
+from tests.support.task_cases import TASK3
 
 DRIVE = {"a": 0.4, "b": 1.8, "c": 1.2, "e": 1.5, "f": 1.2, "g": 1.0, "alpha": 1.3, "branch": -1.0}
 FRAME = {"phi0": 3.2, "e": 1.0, "g": 1.0, "alpha": 1.3, "f_range": (-3.0, 3.0)}
@@ -82,16 +83,22 @@ def test_what_cannot_be_met_is_infeasible_with_the_smallest_miss():
 
 
 @pytest.mark.parametrize("second", ["guide", "slider_crank"])
-def test_starts_that_end_nowhere_are_replaced(second):
+def test_a_sample_that_ends_nowhere_is_not_the_last(second):
     directions = {"start_direction": -0.5, "end_direction": 0.1}
     task = Task6(drive=DRIVE, start=(0.0, 0.0), end=(1.0, 0.2), **directions, second=second)
-    found = solve(task, candidates=256, starts=2)  # the two most promising candidates end at no mechanism
+    found = solve(task, candidates=256, starts=2)  # those of the first sample end at no mechanism
     assert found[0].feasible
     assert len(found) <= 2
 
 
+def test_an_objective_that_one_sample_met_is_not_the_least():
+    least = [solve(TASK3.build(), samples=1, seed=seed)[0].objective for seed in range(8)]
+    assert max(least) > 1.005 * min(least)  # a neighbouring basin
+    assert solve(TASK3.build())[0].objective == pytest.approx(min(least), rel=1e-6)
+
+
 def test_same_seed_same_answer():
-    one, two = (solve(Task4(0.7, 3.0, 1.0), candidates=256, starts=3) for _ in range(2))
+    one, two = (solve(Task4(0.7, 3.0, 1.0), candidates=256, starts=3, samples=2) for _ in range(2))
     assert [s.unknowns for s in one] == [s.unknowns for s in two]
 
 
@@ -104,7 +111,7 @@ def test_no_candidate_gives_no_solution():
 
 
 def test_solution_reads_as_text():
-    text = str(solve(Task4(0.7, 3.0, 1.0), candidates=256, starts=3)[0])
+    text = str(solve(Task4(0.7, 3.0, 1.0), candidates=256, starts=3, samples=2)[0])
     assert text.startswith("feasible, objective ")
     assert "pressure angle" in text
 

@@ -26,6 +26,7 @@ if TYPE_CHECKING:
 
 KEPT = 100_000  # best rows of a dataset that are looked at
 SCREENED = 256  # designs of a study's space per start where a dataset gives none
+TASK_SAMPLES = 4  # of a [task]: its mechanisms are starts only
 
 
 def best_rows(family: Family, objective: str, folder: Path) -> tuple[Array, Array]:
@@ -57,7 +58,7 @@ def of_task(study: Study, count: int, seed: int) -> Array:
     if study.task is None:
         return np.empty((0, len(names)))
 
-    found = solve(study.task, starts=count, seed=seed)
+    found = solve(study.task, starts=count, samples=TASK_SAMPLES, seed=seed)
     default = {p.name: p.default for p in study.family.parameters}
     rows = [default | {n: x for n, x in s.mechanism.items() if n in names} | dict(study.space.fixed) for s in found]
     rows = [row for row in rows if None not in (row[name] for name in names)]

@@ -1,4 +1,4 @@
-"""Solves a task: candidates from a low-discrepancy sequence, equations by least squares, the objective on its epigraph.
+"""Solves a task: candidates from low-discrepancy sequences, equations by least squares, the objective on its epigraph.
 
 The objective, a largest magnitude over many poses, has kinks; minimising t under -t <= curve <= t has none.  Gradients
 are central differences, all rows in one call of the problem, whose kernels are vectorised.
@@ -20,7 +20,8 @@ SHARE = 0.8  # poses with less than this part of the largest magnitude do not bo
 ROUNDS = 24
 WIDEST = 0.15  # first radius of a step, in units of the box
 MET = 1e-9  # largest residual and violation of a feasible solution
-PATIENCE = 4  # times as many starts are refined at most where not all of them end at a feasible solution
+ENOUGH, ALIKE = 4, 1e-4  # samples that end at the best objective, to this share of it: no more are needed
+APART = 1e-2  # of the box: nearer solutions are one
 
 
 class _Value(NamedTuple):
@@ -64,16 +65,18 @@ class _Scaled:
         return _Value(*here), _Value(*slopes)
 
 
-def solve(problem: SynthesisTask, *, candidates: int = 4096, starts: int = 6, seed: int = 0) -> list[Solution]:
+def solve(
+    problem: SynthesisTask, *, candidates: int = 4096, starts: int = 6, samples: int = 12, seed: int = 0
+) -> list[Solution]:
     """Mechanisms that do a task, the best first.
 
     Parameters
     ----------
     problem : one of the tasks
-    candidates : points of the box tried first
-    starts : of them refined, kept apart from each other, until so many have ended at a feasible solution; at most four
-        times as many are tried
-    seed : of the sequence; the same seed gives the same answer
+    candidates : points of each sample of the box
+    starts : of each sample refined, kept apart from each other
+    samples : at most, which know nothing of each other; no more follow when four have ended at the best objective
+    seed : of the samples; the same seed gives the same answer
 
     Returns
     -------
@@ -86,13 +89,21 @@ def solve(problem: SynthesisTask, *, candidates: int = 4096, starts: int = 6, se
     Local solutions from many starts: no proof that the best one found is the best there is.
     """
     scaled = _Scaled(problem)
-    ended: list[Array] = []
-    for z in _starts(scaled, candidates, starts, seed):
-        if sum(_feasible(scaled.rows(end)) for end in ended) == starts:
-            break
-        ended.append(_refined(scaled, z))
-    solutions = [_solution(problem, scaled, z) for z in _distinct(scaled, ended)]
-    return sorted(solutions, key=lambda s: (not s.feasible, s.objective if s.feasible else _miss(s)))[:starts]
+    solutions: list[Solution] = []
+    best: list[float] = []
+    while len(best) < samples and not _met(best):
+        ends = [_refined(scaled, z) for z in _starts(scaled, candidates, starts, (seed, len(best)))]
+        found = [_solution(problem, scaled, z) for z in ends]
+        best.append(min((s.objective for s in found if s.feasible), default=np.inf))
+        solutions += found
+    solutions.sort(key=lambda s: (not s.feasible, s.objective if s.feasible else _miss(s)))
+    return _distinct(scaled, solutions)[:starts]
+
+
+def _met(best: list[float]) -> bool:
+    """Tell whether enough samples ended at the best objective of all."""
+    least = min(best, default=np.inf) * (1.0 + ALIKE)
+    return sum(height <= least < np.inf for height in best) >= ENOUGH
 
 
 def _miss(solution: Solution) -> float:
@@ -100,12 +111,12 @@ def _miss(solution: Solution) -> float:
     return max(worst, max((-s for s in solution.limits.values()), default=0.0))
 
 
-def _starts(scaled: _Scaled, candidates: int, starts: int, seed: int) -> list[Array]:
+def _starts(scaled: _Scaled, candidates: int, starts: int, seed: tuple[int, int]) -> list[Array]:
     from scipy.stats import qmc
 
     k = scaled.low.size
     power = int(np.ceil(np.log2(candidates)))
-    points = qmc.Sobol(k, seed=seed).random_base2(power)
+    points = qmc.Sobol(k, seed=np.random.default_rng(seed)).random_base2(power)
     miss, height = np.empty(len(points)), np.empty(len(points))
     for start in range(0, len(points), BLOCK):
         rows = slice(start, start + BLOCK)
@@ -124,7 +135,7 @@ def _starts(scaled: _Scaled, candidates: int, starts: int, seed: int) -> list[Ar
         z = points[index]
         if all(_distance(scaled, z, other) > apart for other in chosen):
             chosen.append(z)
-        if len(chosen) == PATIENCE * starts:
+        if len(chosen) == starts:
             break
     return chosen
 
@@ -245,12 +256,14 @@ def _descended(scaled: _Scaled, z: Array, top: float, used: NDArray[np.bool_], r
     return point if np.isfinite(point).all() else z
 
 
-def _distinct(scaled: _Scaled, points: list[Array]) -> list[Array]:
-    kept: list[Array] = []
-    for z in points:
-        if all(_distance(scaled, z, other) > 1e-5 for other in kept):
-            kept.append(z)
-    return kept
+def _distinct(scaled: _Scaled, solutions: list[Solution]) -> list[Solution]:
+    """Return the solutions that are not near one before them."""
+    places = [(np.array([*s.unknowns.values()]) - scaled.low) / scaled.span for s in solutions]
+    kept: list[int] = []
+    for k in range(len(places)):
+        if all(_distance(scaled, places[k], places[other]) > APART for other in kept):
+            kept.append(k)
+    return [solutions[k] for k in kept]
 
 
 def _solution(problem: SynthesisTask, scaled: _Scaled, z: Array) -> Solution:
