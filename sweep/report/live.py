@@ -162,7 +162,8 @@ def _motion(data: Dataset, shown: Shown, names: list[str]) -> Motion:
     design = data.design(shown.row)
     matrix = np.array([list(design.values())])
     phi = equal_steps(family.domain, matrix, POSES)
-    found = family.poses(matrix, Angles.of(phi[None, :]), frozenset([*names, family.position]))
+    cut = next((family.follower(o.name) for o in family.pose_outputs if o.windowed), family.position)
+    found = family.poses(matrix, Angles.of(phi[None, :]), frozenset([*names, family.position, cut]))
     path = np.asarray(found[family.position][0], np.float64)
     closed, free, start = not isinstance(family.domain, Interval), False, 0
     if closed:
@@ -171,7 +172,8 @@ def _motion(data: Dataset, shown: Shown, names: list[str]) -> Motion:
     curves = {name: np.asarray(found[name][0], np.float64)[order] for name in names}
     curves[family.position] = path[order] - (path[start] if closed and not free else 0.0)
     window = data.study.window
-    inside = np.zeros(POSES, np.bool_) if window is None else in_window(curves[family.position], window)
+    working = curves[cut] if cut in curves else np.asarray(found[cut][0], np.float64)[order]
+    inside = np.zeros(POSES, np.bool_) if window is None else in_window(working, window)
     return Motion(shown, phi[order], free, curves, inside, _placed(family, design, phi, order))
 
 
@@ -190,7 +192,7 @@ def _panel(data: Dataset, name: str, motions: list[Motion]) -> dict[str, Any]:
     """One curve: words, unit, limits, the range that its panel shows."""
     shown = data.shown(name)
     speed = data.study.speed
-    windowed = name == "dev" and data.study.window is not None
+    windowed = data.study.window is not None and data.study.family.pose_output[name].windowed
     values = np.concatenate([m.curves[name][m.inside if windowed else np.ones(POSES, np.bool_)] for m in motions])
     values = values[np.isfinite(values)]
     low, high = (float(values.min()), float(values.max())) if values.size else (0.0, 0.0)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import base64
 import builtins
 import tomllib
 from pathlib import Path
@@ -14,6 +15,7 @@ from sweep.cli.explore import in_hand
 from sweep.errors import InputError
 from sweep.evaluation.joints import parts
 from sweep.explore.drag import dragged
+from sweep.explore.hand import of_study
 from sweep.explore.server import Server
 from sweep.study import study_from_data
 
@@ -73,3 +75,20 @@ def test_dragging_keeps_what_a_step_would_take_apart_or_make_negative():
         to = 3.0 * part.joints[f"l{name[1]}"][0, :2] - 2.0 * part.joints[name][0, :2]
         moved, _ = dragged(hand, hand.first, 0.5, ("", name.upper()), to)
         assert moved["rE2"] >= 0.0 and moved["rE3"] >= 0.0
+
+
+def test_window_is_shaded_where_the_guided_member_is_in_it():
+    rocker = {"a": "10 mm", "b": "40 mm", "c": "25 mm", "e": "35 mm", "f": "0 mm", "g": "0 mm", "alpha": "20 deg"}
+    guide = {"a": "10 mm", "b": "25 mm", "c": "25 mm", "e": "20 mm", "xi": "50 mm", "eta": "3 mm", "lam": "80 deg"}
+    data = {
+        "study": {"name": "shade"},
+        "machine": {"looper": {"family": "rssr"}, "needle": {"family": "guide"}},
+        "scene": {"want": ["needle.max_abs_dev"], "window": {"from": 0.1, "to": 0.7}},
+        "design": {"looper": rocker, "needle": guide | {"h": {"from": 0, "to": 1, "count": 2, "unit": "mm"}}},
+    }
+    hand = of_study(study_from_data(data, "study.toml"))
+    design = hand.answer([hand.first], ["in hand"])["motion"]["designs"][0]
+    s = np.frombuffer(base64.b64decode(design["curves"]["needle.s"]), "<f4")
+    share = (s - s.min()) / np.ptp(s)
+    shaded = np.concatenate([np.arange(first, last + 1) for first, last in design["shaded"]])
+    np.testing.assert_array_equal(shaded, np.flatnonzero((share >= 0.1) & (share <= 0.7)))
