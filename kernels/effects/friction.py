@@ -37,6 +37,7 @@ TOLERANCE = 1e-14
 PASSES = 200
 STALLED = 5
 LEAP = 10  # every so many passes the rest of the geometric series is gone at once (Aitken)
+STRAIGHT = 0.9  # squared cosine of the angle between two steps, below which they are no geometric series
 STILL = 2.0**-44  # relative angular velocity of a ball joint below this share of its links' is rounding
 ANSWER = 20  # the six vectors of :func:`kernels.effects.kinetostatics.store_forces`, finger couple, driving torque
 
@@ -249,7 +250,8 @@ def _settled(
         least = step
         further = 1.0
         if count % LEAP == 0 and not converged:
-            further, least = _leap(dx * dx0 + dy * dy0 + dz * dz0, dx0 * dx0 + dy0 * dy0 + dz0 * dz0), math.inf
+            square, size = dx0 * dx0 + dy0 * dy0 + dz0 * dz0, dx * dx + dy * dy + dz * dz
+            further, least = leap(dx * dx0 + dy * dy0 + dz * dz0, square, size), math.inf
         x, y, z = max(x + further * dx, 0.0), max(y + further * dy, 0.0), max(z + further * dz, 0.0)
         dx0, dy0, dz0 = dx, dy, dz
     return Couples(x, y, z, size_b, size_c, t_d, count, converged)
@@ -305,12 +307,13 @@ def _contraction(answers: Array, m: Array, f: Friction, axis: Vector, units: Vec
 
 
 @inline
-def _leap(along: float, square: float) -> float:
+def leap(along: float, square: float, size: float) -> float:
     """Sum what remains of a geometric series of steps, in units of the next one: 1/(1 - q) with q = along/square.
 
-    It is 1, the plain step, where the steps do not shrink.
+    It is 1, the plain step, where the steps do not shrink, or turn: those are no such series.
     """
-    return square / (square - along) if abs(along) < square else 1.0
+    straight = along < 0.0 or along * along > STRAIGHT * square * size
+    return square / (square - along) if abs(along) < square and straight else 1.0
 
 
 @inline

@@ -17,7 +17,7 @@ import numpy as np
 
 from kernels import status as st
 from kernels.arithmetic.vectors import Vector, add, cross, dot, mix, norm, scale, sub
-from kernels.effects.friction import LEAP, PASSES, STALLED, STILL, TOLERANCE, support_forces, unit_vector
+from kernels.effects.friction import LEAP, PASSES, STALLED, STILL, TOLERANCE, leap, support_forces, unit_vector
 from kernels.effects.link_loads import (
     CONTACT,
     FREEDOM,
@@ -149,7 +149,7 @@ def _settled(joints: Index, friction: Array, parts: Array, loads: Array, new: Ar
         loads[which], steps[0, which] = 0.0, 0.0
     while passes < 0 and stalled < STALLED and count < PASSES:
         count += 1
-        change, step, along, square = 0.0, 0.0, 0.0, 0.0
+        change, step, along, square, whole = 0.0, 0.0, 0.0, 0.0, 0.0
         for which in range(joints.shape[0]):
             _sum(parts[which], loads, part[:PART])
             new[which] = _sizes(joints[which], friction[which], part)[0]
@@ -161,6 +161,7 @@ def _settled(joints: Index, friction: Array, parts: Array, loads: Array, new: Ar
                 step = max(step, mu * abs(apart))
                 along += apart * before
                 square += before * before
+                whole += apart * apart
         # The last digits wander: a change at rounding level is convergence, not a stall.
         if math.isfinite(step) and (change <= TOLERANCE or (count > 3 and change < 1e-12 and change >= last)):
             passes = count
@@ -169,8 +170,7 @@ def _settled(joints: Index, friction: Array, parts: Array, loads: Array, new: Ar
         stalled = 0 if step < least else stalled + 1
         least, further = step, 1.0
         if count % LEAP == 0 and passes < 0:
-            # the rest of a geometric series of steps, in units of the next one; the plain step where none shrinks
-            further, least = square / (square - along) if abs(along) < square else 1.0, math.inf
+            further, least = leap(along, square, whole), math.inf
         for which in range(joints.shape[0]):
             loads[which] = max(loads[which] + further * (new[which] - loads[which]), 0.0)
     return passes

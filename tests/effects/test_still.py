@@ -1,4 +1,4 @@
-"""Small corners of the effects: joints at rest, and steady states of stiff couplers near a dead point."""
+"""Small corners of the effects: joints at rest, strong friction, steady states of stiff couplers near a dead point."""
 
 from __future__ import annotations
 
@@ -14,6 +14,15 @@ MACHINE = {"m_crank": 2e-4, "m_coupler": 1e-4, "m_rocker": 3e-4, "j_rocker_zz": 
            "load_torque": -900.0, "support_a1": -30.0, "support_a2": -60.0, "support_d1": -20.0,
            "support_d2": 30.0}  # fmt: skip
 RUBBING = {f"mu_{k}": 0.1 for k in "abcd"} | {f"radius_{k}": 5.0 for k in "abcd"}
+# Its approximations spiral: the error shrinks to 0.6 of itself per pass, and each step turns from the last.
+SPIRALLING = {
+    "a": 11.45, "b": 47.0, "e": 5.9, "branch": -1.0, "m_crank": 6e-5, "m_coupler": 1.93e-4, "com_coupler_y": 16.0,
+    "com_coupler_z": 3.9, "j_coupler_xz": -0.01, "j_coupler_yz": -0.001, "j_coupler_zz": 0.05, "m_slider": 1.98e-4,
+    "com_slider_x": -8.541, "com_slider_y": 10.0, "com_slider_z": 0.7, "gravity_x": 5000.0, "gravity_y": 1600.0,
+    "gravity_z": 3000.0, "load_force": -33.1, "mu_a": 1.0, "radius_a": 2.0, "mu_b": 0.1, "radius_b": 0.0,
+    "mu_c": 2.116, "radius_c": 5.75, "mu_d": 1.095, "support_a1": -20.0, "support_a2": 40.0, "support_d1": -25.0,
+    "support_d2": 40.0, "speed": 221.0, "phi": 2.981,
+}  # fmt: skip
 # Margin 0.008 to 0.03.
 NEAR_DEAD = {"a": 14.0, "b": 37.7, "c": 20.0, "e": 32.0, "f": 2.0, "g": -1.0, "alpha": 0.3}
 
@@ -28,6 +37,16 @@ def test_ball_joint_whose_links_turn_together_has_no_friction():
     assert (poses.ball_couple_b > 1.0).all()
     without = sweep.evaluate("rssr", PLANAR | MACHINE | RUBBING | {"mu_c": 0.0}, wanted, phi=phi)
     np.testing.assert_array_equal(poses[wanted], without[wanted])
+
+
+def test_friction_that_contracts_is_not_called_jammed_where_its_steps_turn():
+    """Steps that turn are no geometric series: every tenth pass was thrown a thousand steps too far."""
+    wanted = ["friction_contraction", "ball_couple_c", "force_c_friction", "slide_friction", "load_support_d1",
+              "load_support_d2"]  # fmt: skip
+    (row,) = sweep.evaluate("slider_crank", SPIRALLING, wanted).itertuples()
+    assert row.status == st.OK and row.friction_contraction < 1.0
+    assert row.ball_couple_c == pytest.approx(2.116 * 5.75 * row.force_c_friction, rel=1e-12)
+    assert abs(row.slide_friction) == pytest.approx(1.095 * (row.load_support_d1 + row.load_support_d2), rel=1e-12)
 
 
 def test_friction_has_both_of_its_limits_beside_a_joint_at_rest():
