@@ -11,6 +11,7 @@ from kernels.families import free_cam
 from kernels.types import Array
 from sweep.families.base import Angles, Columns, Family, March, Output, Parameter
 from sweep.families.capabilities import Link, Made, Skeleton, ThreadPath
+from sweep.families.curve_features import Bends
 from sweep.families.outputs import ladders
 from sweep.families.planar_trees import turning_cam
 from sweep.families.poses import poses_of
@@ -67,6 +68,23 @@ def turned(x: Array, y: Array, angles: Angles) -> Array:
     return np.stack([x, y, 0.0 * x], axis=-1)
 
 
+def straight(designs: Array) -> Array:
+    """Return the point of the plane of the cam through which the straight line between the guides passes, (n, 3)."""
+    guides = (np.stack([parameter(PARAMETERS, f"{axis}{k}", designs) for axis in "XYZ"], axis=1) for k in (1, 2))
+    first, second = guides
+    point: Array = first + (second - first) * (first[:, 2:] / (first[:, 2:] - second[:, 2:]))
+    return point
+
+
+def depth(designs: Array, angles: Angles) -> Array:
+    """Return how far that point is within the material of the cam, (n, m, 1): the thread comes to lie where it is 0."""
+    place = straight(designs)[:, None, :]
+    x = place[..., 0] * angles.cos + place[..., 1] * angles.sin
+    y = place[..., 1] * angles.cos - place[..., 0] * angles.sin
+    within: Array = x - parameter(PARAMETERS, "a", designs)[:, None] * y * y
+    return within[..., None]
+
+
 SKELETON_FIXED = {
     "a": ORIGIN,
     "n1": standing(PARAMETERS, "X1", "Y1", "Z1", axis=None, kind="point"),
@@ -93,6 +111,7 @@ FAMILY = Family(
     capabilities=(
         turning_cam(("P",)),
         ThreadPath("wrap", "dP", "d2P"),
+        Bends(frozenset(o.name for o in POSE_OUTPUTS), depth),
         Skeleton(SKELETON_FIXED, LINKS, EDGE_POINTS),
     ),
 )
@@ -133,10 +152,7 @@ def contact_place(designs: Array, angles: Angles, found: Columns) -> Array:
     """Place where the thread passes the plane of the cam: on the edge, or on the line between the guides."""
     y, on = (np.asarray(found[name], np.float64) for name in ("y_contact", "contact"))
     at = turned(parameter(PARAMETERS, "a", designs)[:, None] * y * y, y, angles)
-    guides = (np.stack([parameter(PARAMETERS, f"{axis}{k}", designs) for axis in "XYZ"], axis=1) for k in (1, 2))
-    first, second = (guide[:, None, :] for guide in guides)
-    straight = first + (second - first) * (first[..., 2:] / (first[..., 2:] - second[..., 2:]))
-    return np.where(on[..., None] == 1.0, at, straight)
+    return np.where(on[..., None] == 1.0, at, straight(designs)[:, None, :])
 
 
 WITH_FRICTION = Family(

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from scipy.optimize import brentq
 
 import sweep
 from kernels import status as st
@@ -67,6 +68,22 @@ def test_the_mean_of_a_jerk_that_jumps_is_that_of_its_closed_form(rise):
     exact = np.sqrt((TURN**4 / 2.0) * (rise**-5.0 + 1.57**-5.0) / TURN)
     assert found["status"] == st.OK
     assert abs(found["rms_d3s"] - exact) <= found["err_rms_d3s"] <= 1e-4 * exact
+
+
+@pytest.mark.parametrize("distance", [1.3e-4, 1e-3])
+def test_a_thread_that_comes_to_lie_beside_a_guide_next_to_the_plane_of_the_cam_has_its_peak(distance):
+    cam = {"a": 0.576, "X1": 0.1513, "Y1": 0.8186, "Z1": distance, "X2": 0.3376, "Y2": 0.9163, "Z2": -7.37}
+    share = distance / (distance + 7.37)
+    x, y = 0.1513 + share * (0.3376 - 0.1513), 0.8186 + share * (0.9163 - 0.8186)
+
+    def depth(phi):  # of the straight line between the guides in the material
+        return x * np.cos(phi) + y * np.sin(phi) - 0.576 * (y * np.cos(phi) - x * np.sin(phi)) ** 2
+
+    begins = brentq(depth, 0.0, 1.0)
+    near = begins + np.geomspace(1e-9, 0.1, 4000)
+    found = summary("free_cam", cam, ["max_abs_d2P", "max_d2P"])
+    assert_largest(found, "d2P", curve("free_cam", cam, "d2P", near))
+    assert abs(found["max_d2P"] - found["max_abs_d2P"]) <= found["err_max_d2P"]
 
 
 @pytest.mark.parametrize(("n", "mesh"), [(31.0, 1.0), (35.0, 1.0), (53.0, -1.0), (63.0, 1.0)])
