@@ -59,13 +59,14 @@ def save(figure: Figure, path: Path) -> Saved:
 
 
 def smaller(text: str) -> str:
-    """Write an SVG in less: hundredths of a point, no indents, and each style that is there several times once.
+    """Write an SVG in less: hundredths of a point, no indents, no empty groups, and each style once.
 
     Letters stay what they are: only numbers within tags are places.
     """
     text = re.sub(r"<[^>]*>", lambda tag: re.sub(r"(\d\.\d\d)\d+", r"\1", tag[0]), re.sub(r"\n\s+", "\n", text))
-    styles = {style: f"s{k}" for k, style in enumerate(dict.fromkeys(re.findall(r' style="([^"]*)"/>', text)))}
-    text = re.sub(r' style="([^"]*)"/>', lambda m: f' class="{styles[m[1]]}"/>', text)
+    text = re.sub(r'<g id="[^"]*"/>\n| transform="rotate\(-0 [^"]*\)"', "", text)
+    styles = {style: f"s{k}" for k, style in enumerate(dict.fromkeys(re.findall(r' style="([^"]*)"', text)))}
+    text = re.sub(r' style="([^"]*)"', lambda m: f' class="{styles[m[1]]}"', text)
     rules = " ".join(f".{name} {{{style}}}" for style, name in styles.items())
     return re.sub(r"(<svg[^>]*>)", rf"\1\n<style>{rules}</style>", text, count=1)
 
