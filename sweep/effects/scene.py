@@ -130,7 +130,8 @@ class Scene:
         found = Links(parents, freedoms, ends, bodies, axes, lines)
         tree.fill(self.designs[rows], angles, motion, found)
         if tree.unit is not None:
-            unit = self.inputs[tree.unit.name][rows, None, None, None]
+            default = np.full(len(self.designs), tree.unit.default)  # of a family by itself, which has no inputs
+            unit = self.inputs.get(tree.unit.name, default)[rows, None, None, None]
             for lengths in (bodies[..., :9], bodies[..., 24:], lines[..., :3]):
                 lengths *= unit
         return found
