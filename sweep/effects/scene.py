@@ -132,6 +132,7 @@ class Scene:
         if tree.unit is not None:
             default = np.full(len(self.designs), tree.unit.default)  # of a family by itself, which has no inputs
             unit = self.inputs.get(tree.unit.name, default)[rows, None, None, None]
+            # Origins with their rates, joints, and points of lines; see PER_BODY and PER_LINE.
             for lengths in (bodies[..., :9], bodies[..., 24:], lines[..., :3]):
                 lengths *= unit
         return found
