@@ -57,12 +57,12 @@ _kernel_poses = poses_of(guide.poses, guide.Outputs, {"joints": JOINT_OUTPUTS})
 _kernel_precise_poses = poses_of(guide.precise_poses, guide.Outputs, {"joints": JOINT_OUTPUTS})
 
 
-@together(*(o.name for o in VALUE_OUTPUTS + JOINT_OUTPUTS))
+@together(VALUE_OUTPUTS, JOINT_OUTPUTS)
 def _motion(designs: Array, angles: Angles, wanted: frozenset[str]) -> Columns:
     return _kernel_poses(designs, angles, wanted)
 
 
-@together(*(o.name for o in VALUE_OUTPUTS + JOINT_OUTPUTS))
+@together(VALUE_OUTPUTS, JOINT_OUTPUTS)
 def _precise_motion(designs: Array, angles: Angles, wanted: frozenset[str]) -> Columns:
     return _kernel_precise_poses(designs, angles, wanted)
 

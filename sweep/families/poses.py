@@ -3,9 +3,10 @@
 A kernel of poses is compiled for every set of outputs that it gives: what is not in the set is not in the machine code.
 That takes a quarter of a second per set, and a study with an optimum asks for dozens of sets, most of them on a few
 thousand poses.  So in :class:`Together` a set on few poses is taken from a larger one, and gets machine code of its own
-as soon as it is asked for on many.  The larger set is that of all outputs.  Where arguments are complex, which takes
-longer to compile, it is the first set that was asked for, as long as that will do: who wants slopes asks for all curves
-first.  The bits are the same.
+as soon as it is asked for on many.  The larger set is that of all values, and of the joints too where one of them is
+wanted: a loop that writes all of these is not vector code, and takes up to five times as long.  Where arguments are
+complex, which takes longer to compile, the larger set is the first that was asked for, as long as that will do: who
+wants slopes asks for all curves first.  The bits are the same.
 
 Families that take no complex numbers answer a complex step by central differences (:func:`differentiable`).  Families
 that have the kernels of another one, with other symbols or in another frame, carry its steps and records over.
@@ -13,7 +14,7 @@ that have the kernels of another one, with other symbols or in another frame, ca
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import replace
 from functools import partial, update_wrapper
 from typing import Any
@@ -127,12 +128,13 @@ PAID = 2**21
 
 
 class Together:
-    """Poses whose kernel gives the outputs ``names``; ``poses`` calls it for exactly the wanted ones."""
+    """Poses whose kernel gives ``values`` and ``joints``; ``poses`` calls it for exactly the wanted ones."""
 
-    def __init__(self, poses: PoseFunction, names: Sequence[str]) -> None:
+    def __init__(self, poses: PoseFunction, values: Iterable[str], joints: Iterable[str]) -> None:
         update_wrapper(self, poses)
         self._poses = poses
-        self._all = frozenset(names)
+        self._values = frozenset(values)
+        self._all = self._values.union(joints)
         self._asked: dict[tuple[frozenset[str], bool], int] = {}
         self._first: frozenset[str] | None = None  # set that was asked for with complex arguments
 
@@ -155,14 +157,16 @@ class Together:
 
     def _larger(self, wanted: frozenset[str], is_complex: bool) -> frozenset[str]:
         """Set that a set on few poses is taken from."""
-        if is_complex and self._first is None:
-            self._first = wanted
-        return self._first if is_complex and self._first is not None and wanted <= self._first else self._all
+        if is_complex:
+            if self._first is None:
+                self._first = wanted
+            return self._first if wanted <= self._first else self._all
+        return self._values if wanted <= self._values else self._all
 
 
-def together(*names: str) -> Callable[[PoseFunction], PoseFunction]:
+def together(values: Iterable[Output], joints: Iterable[Output]) -> Callable[[PoseFunction], PoseFunction]:
     """Decorate poses whose kernel gives these outputs."""
-    return lambda poses: Together(poses, names)
+    return lambda poses: Together(poses, (o.name for o in values), (o.name for o in joints))
 
 
 # Where a record per pose and one per design have points (kernels/linkage/joints.py); the other vectors are directions.

@@ -31,14 +31,15 @@ PARAMETERS = (
 
 # Of joints in the frame of the rocker.
 WAYS = ("along the common perpendicular of the axes", "across it and the rocker axis", "along the rocker axis")
-POSE_OUTPUTS = (
+VALUE_OUTPUTS = (
     *coordinate_outputs(
         "psi", "rad", "rocker angle in (-pi, pi]", "(2*)", "(3)", "(4)", "(5)", circle="the rocker angle"
     ),
     Output("discriminant", "length^4", "A1^2 + A2^2 - A3^2; the links reach where it is not negative", "(2)"),
     Output("pressure_angle", "rad", "between the coupler force and the velocity of its joint on the rocker", "(13)"),
-    *joint_outputs({"b": "crank pin", "c": "rocker ball"}, "section 1", WAYS),
 )
+JOINT_OUTPUTS = joint_outputs({"b": "crank pin", "c": "rocker ball"}, "section 1", WAYS)
+POSE_OUTPUTS = VALUE_OUTPUTS + JOINT_OUTPUTS
 
 MARGIN_OUTPUTS = (
     Output("rotatable", "1", "whether the crank turns fully; exact", "(14)"),
@@ -82,13 +83,13 @@ def _precise(designs: Array, *given: Any) -> None:
 _precise_poses = poses_of(_precise, rssr.Outputs)
 
 
-@together(*rssr.Outputs._fields)
+@together(VALUE_OUTPUTS, JOINT_OUTPUTS)
 def poses(designs: Array, angles: Angles, wanted: frozenset[str]) -> Columns:
     """Wanted pose outputs and status of every design at its crank angles, each (n, m)."""
     return _poses(designs, angles, wanted)
 
 
-@together(*rssr.Outputs._fields)
+@together(VALUE_OUTPUTS, JOINT_OUTPUTS)
 def precise_poses(designs: Array, angles: Angles, wanted: frozenset[str]) -> Columns:
     """As :func:`poses`, with the closure in twice the working precision; for float64 only."""
     return _precise_poses(designs, angles, wanted)

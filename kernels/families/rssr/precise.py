@@ -151,7 +151,8 @@ def precise_poses(
             write(out.y_c, i, j, -designs[i, 2] * (branch * s[0]))
             write(out.z_c, i, j, designs[i, 5] if has_angle else math.nan)
             if out.pressure_angle is not None:
-                across = math.hypot(two.subtract(rho, w)[0], z[0])
+                inward = two.subtract(rho, w)[0]
+                across = math.sqrt(inward * inward + z[0] * z[0])  # of hypot the loop would not become vector code
                 write(out.pressure_angle, i, j, math.atan2(across, t[0]) if has_angle else math.nan)
             if out.dpsi is not None or out.d2psi is not None or out.d3psi is not None:
                 # d from the crank pin to the ball; dy and dz (which is z) are negative
