@@ -57,7 +57,7 @@ _kernel_poses = poses_of(guide.poses, guide.Outputs, {"joints": JOINT_OUTPUTS})
 _kernel_precise_poses = poses_of(guide.precise_poses, guide.Outputs, {"joints": JOINT_OUTPUTS})
 
 
-@together(VALUE_OUTPUTS, JOINT_OUTPUTS)
+@together(VALUE_OUTPUTS + JOINT_OUTPUTS)
 def _motion(designs: Array, angles: Angles, wanted: frozenset[str]) -> Columns:
     return _kernel_poses(designs, angles, wanted)
 

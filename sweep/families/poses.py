@@ -3,10 +3,10 @@
 A kernel of poses is compiled for every set of outputs that it gives: what is not in the set is not in the machine code.
 That takes a quarter of a second per set, and a study with an optimum asks for dozens of sets, most of them on a few
 thousand poses.  So in :class:`Together` a set on few poses is taken from a larger one, and gets machine code of its own
-as soon as it is asked for on many.  The larger set is that of all values, and of the joints too where one of them is
-wanted: a loop that writes all of these is not vector code, and takes up to five times as long.  Where arguments are
-complex, which takes longer to compile, the larger set is the first that was asked for, as long as that will do: who
-wants slopes asks for all curves first.  The bits are the same.
+as soon as it is asked for on many.  The larger set is that of all outputs; in twice the working precision that of all
+values, with the joints only where one of them is wanted: a loop that writes all of these is not vector code, and takes
+five times as long.  Where arguments are complex, which takes longer to compile, it is the first set that was asked for,
+as long as that will do: who wants slopes asks for all curves first.  The bits are the same.
 
 Families that take no complex numbers answer a complex step by central differences (:func:`differentiable`).  Families
 that have the kernels of another one, with other symbols or in another frame, carry its steps and records over.
@@ -14,7 +14,7 @@ that have the kernels of another one, with other symbols or in another frame, ca
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import replace
 from functools import partial, update_wrapper
 from typing import Any
@@ -128,13 +128,12 @@ PAID = 2**21
 
 
 class Together:
-    """Poses whose kernel gives ``values`` and ``joints``; ``poses`` calls it for exactly the wanted ones."""
+    """Poses whose kernel gives each of the ``sets``, every one within the next; ``poses`` calls it for any."""
 
-    def __init__(self, poses: PoseFunction, values: Iterable[str], joints: Iterable[str]) -> None:
+    def __init__(self, poses: PoseFunction, sets: Sequence[frozenset[str]]) -> None:
         update_wrapper(self, poses)
         self._poses = poses
-        self._values = frozenset(values)
-        self._all = self._values.union(joints)
+        self._sets = sets
         self._asked: dict[tuple[frozenset[str], bool], int] = {}
         self._first: frozenset[str] | None = None  # set that was asked for with complex arguments
 
@@ -160,13 +159,14 @@ class Together:
         if is_complex:
             if self._first is None:
                 self._first = wanted
-            return self._first if wanted <= self._first else self._all
-        return self._values if wanted <= self._values else self._all
+            return self._first if wanted <= self._first else self._sets[-1]
+        return next(names for names in self._sets if wanted <= names)
 
 
-def together(values: Iterable[Output], joints: Iterable[Output]) -> Callable[[PoseFunction], PoseFunction]:
-    """Decorate poses whose kernel gives these outputs."""
-    return lambda poses: Together(poses, (o.name for o in values), (o.name for o in joints))
+def together(*outputs: Sequence[Output]) -> Callable[[PoseFunction], PoseFunction]:
+    """Decorate poses whose kernel gives these outputs; few poses give all up to the last of them that is wanted."""
+    sets = [frozenset(o.name for part in outputs[: k + 1] for o in part) for k in range(len(outputs))]
+    return lambda poses: Together(poses, sets)
 
 
 # Where a record per pose and one per design have points (kernels/linkage/joints.py); the other vectors are directions.

@@ -83,7 +83,7 @@ def _precise(designs: Array, *given: Any) -> None:
 _precise_poses = poses_of(_precise, rssr.Outputs)
 
 
-@together(VALUE_OUTPUTS, JOINT_OUTPUTS)
+@together(POSE_OUTPUTS)
 def poses(designs: Array, angles: Angles, wanted: frozenset[str]) -> Columns:
     """Wanted pose outputs and status of every design at its crank angles, each (n, m)."""
     return _poses(designs, angles, wanted)

@@ -65,7 +65,7 @@ JOINT_OUTPUTS = (
 _poses = poses_of(slotted.poses, slotted.Outputs, {"joints": JOINT_OUTPUTS})
 
 
-@together(VALUE_OUTPUTS, JOINT_OUTPUTS)
+@together(VALUE_OUTPUTS + JOINT_OUTPUTS)
 def poses(designs: Array, angles: Angles, wanted: frozenset[str]) -> Columns:
     """Wanted pose outputs and status of every design at its crank angles, each (n, m)."""
     return _poses(designs, angles, wanted)
