@@ -33,12 +33,12 @@ class Recorded:
         return {name: np.zeros(shape) for name in wanted} | {"status": np.zeros(shape, np.uint8)}
 
 
-def recorded() -> tuple[Together, list[frozenset[str]]]:
+def recorded(*sets: str) -> tuple[Together, list[frozenset[str]]]:
     def own(designs: Array, angles: Angles, wanted: frozenset[str]) -> Columns:
         return poses(designs, angles, wanted)
 
     poses = Recorded()
-    return Together(own, ("a", "b", "c")), poses.asked
+    return Together(own, [frozenset(names) for names in sets or ("abc",)]), poses.asked
 
 
 def angles(count: int) -> Angles:
@@ -52,6 +52,21 @@ def test_few_poses_take_all_outputs_and_give_the_wanted_ones() -> None:
     poses, asked = recorded()
     assert set(poses(ONE, angles(MANY - 1), A)) == {"a", "status"}
     assert asked == [ALL]
+
+
+def test_few_poses_take_the_first_set_that_has_what_is_wanted() -> None:
+    poses, asked = recorded("ab", "abc")
+    for wanted in ("a", "ab", "c"):
+        assert set(poses(ONE, angles(4), frozenset(wanted))) == {*wanted, "status"}
+    assert asked == [frozenset("ab"), frozenset("ab"), ALL]
+
+
+def test_precise_poses_of_few_designs_leave_the_joints_out_where_none_is_wanted() -> None:
+    precise = rssr.precise_poses
+    assert isinstance(precise, Together)
+    values = precise._larger(frozenset({"d2psi"}), False)
+    assert "pressure_angle" in values and "x_b" not in values
+    assert precise._larger(frozenset({"x_b"}), False) == frozenset(kernels.families.rssr.Outputs._fields)
 
 
 def test_a_call_on_many_poses_computes_what_it_asks_for_alone() -> None:
