@@ -28,6 +28,8 @@ WRITE_SECONDS_PER_CHUNK = 5e-3
 PACKED_RESULT, PACKED_ERROR = 0.78, 0.4
 SAMPLED_VALUE_BYTES = 7.0
 OTHER_BYTES_PER_ROW = 0.5
+# Of a column in a chunk besides its values: 457 to 496 in the footer, with name and definition, and 94 to 137 in pages.
+BYTES_PER_COLUMN = 600.0
 
 # Python, numpy, pandas, pyarrow and the compiled kernels.
 BASE_MEMORY_BYTES = 350e6
@@ -86,9 +88,10 @@ def estimate(
     chunk_size = choose_chunk_size(study, found)
     designs = study.space.count
     kept = 1.0 if study.output.keep == "all" else max(found.feasible, LEAST_KEPT)
+    columns = describe_columns(study)
     results = sum(
         np.dtype(column.dtype).itemsize * (PACKED_ERROR if is_error(column.name) else PACKED_RESULT)
-        for column in describe_columns(study)
+        for column in columns
         if column.role == "output" and not is_flag(column.name)
     )
     sampled = len(study.space.axes) * SAMPLED_VALUE_BYTES if study.space.kind == "sobol" else 0.0
@@ -103,7 +106,8 @@ def estimate(
         jobs=jobs,
         kept=kept,
         memory_bytes=BASE_MEMORY_BYTES + jobs * COPIES_OF_A_CHUNK * min(chunk_size, designs) * row_bytes(study),
-        disk_bytes=designs * kept * (OTHER_BYTES_PER_ROW + sampled + results),
+        disk_bytes=designs * kept * (OTHER_BYTES_PER_ROW + sampled + results)
+        + chunks * len(columns) * BYTES_PER_COLUMN,
         seconds=work / (1.0 if jobs == 1 else jobs * THREAD_EFFICIENCY),
         optimise_seconds=None if study.optimise is None else study.optimise.time_budget,
     )

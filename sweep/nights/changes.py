@@ -9,6 +9,8 @@ from pathlib import Path
 from statistics import median
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
+
 from sweep.dataset import files
 from sweep.dataset.comparison import LEAST_SECONDS, ROWS_CHANGED, SLOWER, VALUES_CHANGED, compare
 from sweep.dataset.reading import best
@@ -24,6 +26,8 @@ if TYPE_CHECKING:
 ROUNDING = {"float64": 1e-12, "float32": 1e-6}
 # Objective and dimensions of an optimum: the search ends within these relative changes, in a flat valley at the second.
 OBJECTIVE_RTOL, DIMENSION_RTOL = 1e-6, 1e-4
+# Bounds that a front places follow what designs reach and repeat as dimensions do, here of the range of bounds; a gap
+# that gets one is 1/256 wide (`sweep.optimise.front.pareto.NARROWEST`), so none is taken for another.
 # Slower is what took so many times the median of the nights before, twice in a row; fewer nights tell nothing.
 SLOWER_FACTOR, LEAST_NIGHTS, MOST_NIGHTS = 1.5, 3, 7
 
@@ -127,17 +131,27 @@ def _front(study: Study, old: Path, new: Path) -> tuple[list[str], list[str]]:
     paths = [files.beside(folder) / files.PARETO for folder in (old, new)]
     if study.objective is None or study.pareto is None or not all(path.is_file() for path in paths):
         return [], []
-    name = study.objective.output
-    tables = [files.read_table(path).drop_duplicates("bound") for path in paths]
-    before, after = (dict(zip(t["bound"].tolist(), t[name].tolist(), strict=True)) for t in tables)
-    shared = [bound for bound in before if bound in after]
-    found = [f"front: {len(before)} bounds before, {len(after)} now"] if len(before) != len(after) else []
-    far = [bound for bound in shared if _far(before[bound], after[bound], OBJECTIVE_RTOL)]
-    if far:
-        worst = max(far, key=lambda bound: abs(after[bound] - before[bound]))
+    name, bound = study.objective.output, study.pareto.output
+    tables = [files.read_table(path).drop_duplicates("bound").sort_values("bound") for path in paths]
+    at, values = (tables[0][column].to_numpy() for column in ("bound", name))
+    now, then = (tables[1][column].to_numpy() for column in ("bound", name))
+    near = np.abs(now - at[:, None]).argmin(axis=1)
+    apart = np.abs(now[near] - at)
+    pairs = apart <= DIMENSION_RTOL * np.ptp(at)
+    found = []
+    if not len(at) == len(now) == pairs.sum():
+        found.append(f"front: {len(at)} bounds before, {len(now)} now, {pairs.sum()} of them the same")
+    # From one bound to the other a front goes no steeper than to the neighbours; of equal bounds this allows nothing.
+    slopes = np.nan_to_num(np.abs(np.diff(values) / np.diff(at)))
+    steepest = np.maximum(np.append(slopes, 0.0), np.append(0.0, slopes))
+    allowed = OBJECTIVE_RTOL * np.fmax(np.abs(values), np.abs(then[near])) + steepest * apart
+    moved = np.abs(then[near] - values)
+    far = np.flatnonzero(pairs & ~(moved <= allowed) & ~(np.isnan(values) & np.isnan(then[near])))
+    if far.size:
+        worst = far[np.nan_to_num(moved[far], nan=np.inf).argmax()]
         found.append(
-            f"front moved at {len(far)} of {len(shared)} bounds, most at {study.pareto.output} = {worst:g}: "
-            f"{name} {before[worst]:.8g} -> {after[worst]:.8g}"
+            f"front moved at {far.size} of {pairs.sum()} bounds, most at {bound} = {at[worst]:g}: "
+            f"{name} {values[worst]:.8g} -> {then[near[worst]]:.8g}"
         )
     return found, []
 

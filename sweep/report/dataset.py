@@ -325,10 +325,13 @@ def marked(data: Dataset) -> dict[str, Any]:
 def gather(folder: Path) -> tuple[Dataset, Scan, list[Cells]]:
     """Read a dataset, go once through its rows, and compute what an optimiser would have left."""
     data = read_dataset(folder)
-    cells = divided_axes(data.study, data.counts.get(codes.OK, 0))
+    feasible = data.counts.get(codes.OK, 0)
+    cells = divided_axes(data.study, feasible)
     objective = None if data.objective is None else data.objective.name
     larger = data.study.pareto is not None and data.study.pareto.at_least
-    found = scan(data.parts, cells, objective, data.against if objective is not None else None, larger)
+    second = data.against if objective is not None else None
+    total = sum(data.counts.values()) if data.study.output.keep == "all" else feasible
+    found = scan(data.parts, cells, objective, second, larger, total)
     found.best_row |= _absent(data.study, found.best_row) if found.best_row else {}
     data = replace(data, best=found.best_row or None)
     if data.optima is None and data.study.reference is not None:

@@ -121,7 +121,12 @@ def divided_axes(study: Study, feasible: int) -> list[Cells]:
 
 
 def scan(
-    parts: Sequence[Path], cells: Sequence[Cells], objective: str | None, second: str | None, larger: bool = False
+    parts: Sequence[Path],
+    cells: Sequence[Cells],
+    objective: str | None,
+    second: str | None,
+    larger: bool = False,
+    total: int = 0,
 ) -> Scan:
     """Read every part of the dataset once.
 
@@ -131,6 +136,7 @@ def scan(
     cells : divided axes; every pair of them gets a grid
     objective, second : output columns, smaller is better; None where the study has none
     larger : more of the second is better
+    total : about how many rows there are, of which the picture of points shows every so many
     """
     sense = -1.0 if larger else 1.0
     found = Scan()
@@ -139,7 +145,7 @@ def scan(
     for x, y in combinations(cells, 2):
         shape = (y.weights.size, x.weights.size)
         found.grids[x.name, y.name] = Grid(np.full(shape, np.inf), np.zeros(shape))
-    stride = max(1, _row_count(parts) // SCATTER_POINTS)
+    stride = max(1, total // SCATTER_POINTS)
     best, samples = np.inf, []
     for rows in batches(parts):
         names = list(rows.schema.names)
@@ -220,9 +226,3 @@ def most_telling(found: Scan) -> tuple[str, str] | None:
         share = grid.count / max(float(grid.count.max()), 1.0)
         scores[pair] = float(filled.std()), float(share.std())
     return max(scores, key=lambda pair: scores[pair]) if scores else None
-
-
-def _row_count(parts: Sequence[Path]) -> int:
-    import pyarrow.parquet as pq
-
-    return sum(pq.read_metadata(part).num_rows for part in parts)

@@ -28,6 +28,7 @@ from sweep.dataset import chunk_files, files
 from sweep.dataset.chunk_files import content_hash
 from sweep.dataset.lock import locked
 from sweep.errors import InputError, LinksweepError, LinksweepWarning, LockedError, StoreError, WorkerDied
+from sweep.report.dataset import gather
 from sweep.report.page import write_report
 from tests.support.engine_study import ROOT, SMALL_CHUNKS, chunk_bytes, write_study
 from tests.support.selection import mostly_long
@@ -163,6 +164,20 @@ def test_one_chunk_more_that_is_none_is_damage_for_the_report_too(dataset: Path,
     {"text": lambda path: path.write_text("{}"), **IN_PLACE}[kind](path)
     with pytest.raises(StoreError, match=f"{path.name}: damaged chunk"):
         write_report(dataset)
+
+
+def test_rows_of_a_report_open_a_chunk_three_times(dataset: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Once to see that it is whole, once for its columns, once for its rows."""
+    opened, begin = [], pq.ParquetFile.__init__
+
+    def counted(self: pq.ParquetFile, source: object, *more: Any, **named: Any) -> None:
+        opened.append(source)
+        begin(self, source, *more, **named)
+
+    monkeypatch.setattr(pq.ParquetFile, "__init__", counted)
+    gather(dataset)
+    chunks = len(chunk_files.parts(dataset))
+    assert chunks > 1 and len(opened) == 3 * chunks + 1  # units and definitions stand in the first
 
 
 def test_a_name_that_is_no_text_is_shown(dataset: Path) -> None:

@@ -10,8 +10,10 @@ import shutil
 import subprocess
 import sys
 from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 
+import pandas as pd
 import pytest
 
 import sweep
@@ -23,7 +25,7 @@ from sweep.nights.archive import NightRecord, StudyRecord, write_night
 from sweep.nights.carry import carry
 from sweep.nights.changes import changes
 from sweep.nights.studies import chosen, in_order
-from sweep.study import load_study
+from sweep.study import ParetoSettings, load_study
 from tests.faults.ground import SLOW_DISK
 from tests.optimise.test_study import STUDY as OPTIMUM
 
@@ -316,3 +318,33 @@ def test_optimum_and_dimension_that_moved_are_named(tmp_path: Path) -> None:
     assert changes(study, *places).moved == ("max_abs_dP",)
     row.assign(status=5).to_parquet(tmp_path / "new" / "_optimum.parquet")
     assert changes(study, *places).code == 11
+
+
+def front_lines(folder: Path, old: dict[float, float], new: dict[float, float]) -> tuple[str, ...]:
+    """What a night says of two fronts, each the objective by its bounds."""
+    study = load_study(written(folder / "one"))
+    places = [sweep.run(study, folder / name / "designs", jobs=1) for name in ("old", "new")]
+    for place, front in zip(places, (old, new), strict=True):
+        rows = pd.DataFrame({"bound": front.keys(), "max_abs_dP": front.values()})
+        rows.to_parquet(files.beside(place) / files.PARETO)
+    return changes(replace(study, pareto=ParetoSettings("range_P", (1.0, 2.0))), *places).lines
+
+
+BETWEEN = 1.5 + 1e-7  # a placed bound follows what its neighbours reach
+
+
+@pytest.mark.parametrize(
+    ("new", "said"),
+    [
+        ({1.0: 4.0, BETWEEN: 3.0 - 1e-7, 2.0: 2.0}, []),  # on the same front
+        ({1.0: 4.0, BETWEEN: 3.1, 2.0: 2.0}, ["front moved at 1 of 3 bounds, most at range_P = 1.5"]),
+        ({1.0: 4.0, 1.5: 3.0 + 1e-5, 2.0: math.nan}, ["front moved at 2 of 3 bounds, most at range_P = 2"]),
+        ({1.0: 4.0, 1.6: 2.8, 2.0: 2.0}, ["front: 3 bounds before, 3 now, 2 of them the same"]),
+        ({1.0: 4.0, 2.0: 2.0}, ["front: 3 bounds before, 2 now, 2 of them the same"]),
+    ],
+)
+def test_fronts_are_compared_at_bounds_that_differ_as_little_as_searches_do(
+    tmp_path: Path, new: dict[float, float], said: list[str]
+) -> None:
+    lines = front_lines(tmp_path, {1.0: 4.0, 1.5: 3.0, 2.0: 2.0}, new)
+    assert [line.split(": max_abs_dP")[0] for line in lines] == said

@@ -70,7 +70,7 @@ def test_front_and_scatter_come_from_all_parts(parts: tuple[list[Path], pd.DataF
 def test_scatter_is_thinned_evenly(parts: tuple[list[Path], pd.DataFrame], monkeypatch: pytest.MonkeyPatch) -> None:
     files, table = parts
     monkeypatch.setattr(module, "SCATTER_POINTS", 400)
-    found = scan(files, [], "stroke", "other")
+    found = scan(files, [], "stroke", "other", total=len(table))
     taken = table.iloc[:: len(table) // 400]
     expected = taken.loc[taken.status == 0, ["stroke", "other"]].abs().to_numpy(float)
     np.testing.assert_array_equal(found.scatter, expected)

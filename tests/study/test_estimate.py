@@ -68,13 +68,14 @@ def test_two_workers_take_half_the_time_and_more_memory(tmp_path: Path) -> None:
 def test_dropping_infeasible_designs_saves_disk(tmp_path: Path) -> None:
     some, everything = estimate(study(tmp_path), 2), estimate(study(tmp_path, keep="all"), 2)
     assert everything.kept == 1.0
-    assert some.disk_bytes == pytest.approx(some.kept * everything.disk_bytes)
+    assert some.disk_bytes == pytest.approx(some.kept * everything.disk_bytes, rel=0.2)
 
 
-def test_disk_estimate_is_close_to_that_of_a_run(tmp_path: Path) -> None:
+@pytest.mark.parametrize("count", [400, 2])  # of a small study most lies in the footer, per column
+def test_disk_estimate_is_close_to_that_of_a_run(tmp_path: Path, count: int) -> None:
     from sweep.engine.run import run
 
-    question = study(tmp_path, 400)
+    question = study(tmp_path, count)
     expected = estimate(question, 2)
     folder = run(question, tmp_path / "designs")
     size = sum(part.stat().st_size for part in folder.glob("part-*"))
