@@ -14,7 +14,17 @@ from importlib import import_module
 from types import MappingProxyType
 
 from sweep.effects.base import CURVED, Effect, Placed
-from sweep.effects.evaluation import Added, bends, bent, effect_poses, on_own_columns, paces, piercing, run_design
+from sweep.effects.evaluation import (
+    Added,
+    bends,
+    bent,
+    effect_poses,
+    fingers,
+    on_own_columns,
+    paces,
+    piercing,
+    run_design,
+)
 from sweep.errors import InputError
 from sweep.families.base import Accuracy, Family, Output, Parameter, Step, Work, of_family
 from sweep.families.chain import Chain
@@ -306,6 +316,7 @@ def with_effects(family: Family, effects: tuple[Placed, ...], curves: Mapping[st
             *paces(curves, feeling),
             *piercing(family, added.inputs, feeling),
             *bends(added, effects),
+            *fingers(added, feeling),
         ),
         dear={o.name: (placed.name, placed.entry.ns_per_pose) for placed in effects for o in placed.pose_outputs},
     )

@@ -13,12 +13,13 @@ from typing import TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
+from kernels.effects.coupler import DRIVING
 from kernels.types import Status
 from sweep.effects.base import Bend, Placed
 from sweep.effects.scene import Scene, first_scene, take_over
 from sweep.families.base import Accuracy, Angles, Array, Columns, Family, Output, Parameter, Step
 from sweep.families.capabilities import ThreadPath
-from sweep.families.curve_features import Bends, Crossing, of_order, of_table
+from sweep.families.curve_features import Bends, Crossing, Singular, of_order, of_table
 from sweep.families.poses import blocks, differenced
 from sweep.numerics.curves import Curve, TableCurve
 
@@ -26,6 +27,8 @@ from sweep.numerics.curves import Curve, TableCurve
 BLOCK = 32768
 # Designs per block of an effect that samples the turn itself, some hundred poses of each.
 TURNS = 32
+# Of the joint records (kernels/linkage/joints.py): the crank axis u, and the direction s of the coupler.
+_CRANK_AXIS, _ALONG_COUPLER = slice(0, 3), slice(6, 9)
 
 
 @dataclass(frozen=True)
@@ -179,6 +182,31 @@ def bends(added: Added, effects: tuple[Placed, ...]) -> list[Bends]:
             of = frozenset(name for name, own in placed.own.items() if own in bend.outputs)
             found += [Bends(of, partial(bend_curves, precise, placed, bend), bend.squares)] if of else []
     return found
+
+
+def fingers(added: Added, feeling: Feeling) -> list[Singular]:
+    """Where a finger in the ball joint of the crank holds the coupler: next to the crank axis it turns it at once."""
+    precise, own = replace(added, family=added.family.precise()), len(added.family.parameters)
+    columns = {p.name: own + k for k, p in enumerate(added.inputs)}
+    names = [f"finger{stage.tail}" for stage in added.family.stages]
+    return [
+        Singular(partial(_finger_sine, precise, k, columns[name]), of=feeling(name))
+        for k, name in enumerate(names)
+        if name in columns
+    ]
+
+
+def _finger_sine(added: Added, stage: int, column: int, designs: Array, angles: Angles, _: Columns) -> Array:
+    """Squared sine of the angle between coupler and crank axis of a stage, (n, m); 1 without a finger at the crank."""
+    held = np.flatnonzero(designs[:, column] == DRIVING)
+    square = np.ones((len(designs), angles.cos.shape[1]))
+    for rows, poses in blocks((held.size, square.shape[1]), BLOCK):
+        some = held[rows]
+        part = Angles(*(np.broadcast_to(x, square.shape)[some, poses] for x in angles))
+        per_pose, per_design = added.scene(designs[some], part).stage(stage).records
+        across = np.cross(per_design[:, None, _CRANK_AXIS], per_pose[:, :, _ALONG_COUPLER])
+        square[some, poses] = (across * across).sum(axis=2)
+    return square
 
 
 def _column(column: int, designs: Array) -> Array:

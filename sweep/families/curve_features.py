@@ -44,11 +44,13 @@ class Singular:
 
     Near a complex zero of it lies a narrow peak, whose width is the distance of that zero from the real angles.
     ``curve(designs, angles, found)`` gives its values, (n, m), from the pose outputs ``needs``.  As the motion has to
-    exist all over the turn, what it is where the links do not reach does not count.
+    exist all over the turn, what it is where the links do not reach does not count.  ``of`` names the pose outputs that
+    have the peak; None: all of them.
     """
 
     curve: Callable[[Array, Angles, Columns], Array]
     needs: tuple[str, ...] = ()
+    of: frozenset[str] | None = None
 
     @classmethod
     def where_small(cls, *names: str) -> Singular:
@@ -164,10 +166,15 @@ def bends(family: Family, output: str) -> tuple[Bends, ...]:
     return tuple(known for known in family.every(Bends) if output in known.of)
 
 
-def singular_curves(family: Family) -> Sequence[SingularCurve]:
-    """Functions of designs (n, P) and angles whose complex zeros are the motion's singularities."""
+def singular(family: Family, outputs: Collection[str]) -> tuple[Singular, ...]:
+    """Return what tells where one of some pose outputs has a narrow peak, beside the discriminants."""
+    return tuple(known for known in family.every(Singular) if known.of is None or not known.of.isdisjoint(outputs))
+
+
+def singular_curves(family: Family, outputs: Collection[str]) -> Sequence[SingularCurve]:
+    """Functions of designs (n, P) and angles whose complex zeros are the singularities of some pose outputs."""
     loops = [Singular(_only, (loop.discriminant,)) for loop in family.every(Assembly)]
-    return [partial(_measured, family, known) for known in (*loops, *family.every(Singular))]
+    return [partial(_measured, family, known) for known in (*loops, *singular(family, outputs))]
 
 
 def _only(designs: Array, angles: Angles, found: Columns) -> Array:
@@ -230,6 +237,8 @@ def of_members(members: Sequence[Member], sums: frozenset[str]) -> list[object]:
             if known.needs:
                 names = {name: f"{m.name}.{name}" for name in known.needs}
                 found.append(Singular(partial(_renamed, m.designs, names, known.curve), tuple(names.values())))
+            elif m.driver is None:
+                found.append(Singular(partial(_turned, m, known.curve), of=_named(m, known.of, sums)))
     return found
 
 
@@ -253,10 +262,10 @@ def _of_shaft(member: Member, known: Bends) -> Bends:
     return Bends(names, partial(_turned, member, known.curves), known.squares)
 
 
-def _turned(member: Member, curves: Callable[[Array, Angles], Array], designs: Array, angles: Angles) -> Array:
+def _turned(member: Member, curves: Callable[..., Array], designs: Array, angles: Angles, *found: Columns) -> Array:
     """Functions of a member that the main shaft drives, at angles of the main shaft."""
     phase = member.phase(designs)
-    return curves(member.designs(designs), Angles.of(member.ratio * angles.phi + phase[:, None]))
+    return curves(member.designs(designs), Angles.of(member.ratio * angles.phi + phase[:, None]), *found)
 
 
 def _alike(angles: Array, designs: Array) -> Array:

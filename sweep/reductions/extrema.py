@@ -14,7 +14,7 @@ import numpy as np
 from kernels import status as st
 from kernels.types import Status
 from sweep.families.base import Array, Family
-from sweep.families.curve_features import crossed
+from sweep.families.curve_features import crossed, singular
 from sweep.quantities.kinds import Request
 from sweep.reductions import fused, panels, peak_search
 from sweep.reductions.peak_search import LIMIT
@@ -62,10 +62,10 @@ def true_extrema(
     """
     found: dict[Request, Extremum] = {}
     status = np.zeros(len(designs), np.uint8)
-    alike: dict[bytes, list[Request]] = {}
+    alike: dict[tuple[object, ...], list[Request]] = {}
     for request in requests:
         jumps = crossed(family, designs, () if anywhere else (request.pose,))
-        alike.setdefault(jumps.tobytes(), []).append(request)
+        alike.setdefault((jumps.tobytes(), *singular(family, (request.pose,))), []).append(request)
     if len(alike) > 1:
         for some in alike.values():
             part, now = true_extrema(family, designs, some, target, locate=locate, anywhere=anywhere, window=window)

@@ -89,7 +89,7 @@ def _refined(family: Family, designs: Array, pose: str, target: float) -> tuple[
     even = KNOWN if switching(family, (pose,)) and pose not in family.dear else EVEN
     alive = np.flatnonzero(status == st.OK)
     for rows in np.split(alive, range(PANELS_AT_ONCE, alive.size, PANELS_AT_ONCE)):
-        near = nearest(family, designs[rows], NEAR)
+        near = nearest(family, designs[rows], (pose,), NEAR)
         open_ = cut[rows] | (near.rho.min(axis=1, initial=FAR) < NEAR) | ~(err[rows] <= target * mean[rows])
         edges, rows = turn_edges(near.only(np.flatnonzero(open_)), PANEL), rows[open_]
         if not rows.size:

@@ -19,7 +19,7 @@ from kernels import status as st
 from kernels.curves import samples as scan
 from kernels.types import EPS, TWO_PI, Status
 from sweep.families.base import Array, Family
-from sweep.families.curve_features import Bends, Singular, bends
+from sweep.families.curve_features import Bends, bends, singular
 from sweep.numerics.chebyshev import DENSE, NODES, at_nodes, basis, product, rising, summits
 from sweep.quantities.kinds import Request
 from sweep.reductions.resolution import MATTERS, ends, nearest
@@ -131,8 +131,8 @@ def _block(
         panels = _fitted(row, low, high, values, request.mode)
         top, size = _climbed(family, designs[rows], panels, request, target, locate or request.place)
         rounding = _rounding(guards, poses, good, row, top, family.precise_poses is not None)
-        if family.every(Singular):
-            near = nearest(family, designs[rows[top.row]], MATTERS)
+        if singular(family, (request.pose,)):
+            near = nearest(family, designs[rows[top.row]], (request.pose,), MATTERS)
             order = np.full(top.row.size, order_of(family, request.pose))
             rounding += singular_share(near, top.phi, order) * np.abs(top.value)
         # the size of a level curve is rounding, and no target for its error

@@ -11,7 +11,7 @@ from kernels import status as st
 from kernels.curves import samples as scan
 from kernels.types import EPS, TWO_PI, Status
 from sweep.families.base import Array, Family
-from sweep.families.curve_features import Singular
+from sweep.families.curve_features import singular
 from sweep.numerics.singularities import Singularities
 from sweep.quantities.kinds import Request
 from sweep.reductions.refine import (
@@ -44,6 +44,7 @@ LIMIT = 32768  # samples beyond which a design is given up as NOT_CONVERGED
 SHARE = 0.6  # a peak below this share of the best sample is not refined
 ROUGH = 0.1  # fourth difference of samples against their size, above which they do not resolve the curve
 PER_SINGULARITY = 12.0  # samples per distance of the nearest complex singularity
+NARROWEST = 2.0 * PER_SINGULARITY / LIMIT  # such a distance [rad] below which panels resolve a peak with fewer poses
 BREAKING = 512  # samples from which on what is still rough may be a jump
 DISAGREEMENT = 0.05  # between the peak guessed from the samples and the refined one
 RIVALS = 1e-3  # peaks lower than the best by no more of its size may turn out the highest
@@ -119,13 +120,19 @@ class Search:
         position = [self.window.position] if self.window is not None else []
         self.names = list(dict.fromkeys([*(r.pose for r in self.requests), *position, *self.guards]))
         # Samples that each request still needs of each design; 0 once it is found.
-        self.near = nearest(self.family, self.designs, MATTERS) if self.family.every(Singular) else None
+        curves = [request.pose for request in self.requests]
+        sharp = bool(singular(self.family, curves))
+        self.near = nearest(self.family, self.designs, curves, MATTERS) if sharp else None
         fewest = (START * denser(self.family, self.designs, self.names, self.near)).astype(np.int64)
         self.undone = np.tile(fewest, (len(self.requests), 1))
-        self.torn = np.zeros(self.undone.shape, np.bool_)  # curves that jump: panels are to search them
+        self.torn = np.zeros(self.undone.shape, np.bool_)  # curves that jump, or nearly so: panels are to search them
         if self.near is not None and not self.anywhere:
             broken(self.family, self.designs, self.near, self.status)
             self.undone[:, self.status != st.OK] = 0
+            steep = (self.near.rho.min(axis=1) < NARROWEST) & (self.status == st.OK)
+            apart = [not (r.windowed or self.family.pose_output[r.pose].wraps) for r in self.requests]
+            self.torn[np.ix_(apart, steep)] = True
+            self.undone[self.torn] = 0
 
     def needed(self, rows: Index) -> Index:
         """Fewest samples that a request of these designs still needs, 0 where all are found."""

@@ -19,11 +19,11 @@ from kernels.types import EPS, TWO_PI, Status
 from sweep.families.base import Angles, Array, Family
 from sweep.families.curve_features import (
     Bends,
-    Singular,
     SingularCurve,
     Smooth,
     bends,
     crossings,
+    singular,
     singular_curves,
     switches,
     switching,
@@ -58,20 +58,20 @@ def denser(family: Family, designs: Array, outputs: Collection[str], near: Singu
         # Two switches in one place are one.
         shortest = np.where(gaps > 1e-9, gaps, TWO_PI).min(axis=1)
         factor = np.maximum(factor, TWO_PI / (SHARES * shortest))
-    if family.every(Singular):
-        near = nearest(family, designs, MATTERS) if near is None else near
+    if singular(family, outputs):
+        near = nearest(family, designs, outputs, MATTERS) if near is None else near
         rho = near.rho.min(axis=1)
         factor = np.where(rho < FAR, np.maximum(factor, PER_SINGULARITY / (FEWEST * rho)), factor)
     found: Array = np.exp2(np.ceil(np.log2(np.minimum(factor, MOST))))
     return found
 
 
-def nearest(family: Family, designs: Array, within: float = FAR) -> Singularities:
-    """Nearest singularities of a family's designs, from its most accurate poses.
+def nearest(family: Family, designs: Array, outputs: Collection[str], within: float = FAR) -> Singularities:
+    """Nearest singularities of some pose outputs of a family's designs, from its most accurate poses.
 
     Those farther away than ``within`` [rad] are as good as even samples show them.
     """
-    curves = singular_curves(family.precise())
+    curves = singular_curves(family.precise(), outputs)
 
     def of_rows(some: Index, curve: SingularCurve) -> Curve:
         return lambda rows, phi: curve(designs[some[rows]], Angles.of(phi))
@@ -119,7 +119,7 @@ def ends(family: Family, designs: Array, even: int, looks: int, output: str) -> 
     more = np.repeat(np.arange(n), np.where(fast > even, fast, 0))
     place = np.arange(more.size) - np.searchsorted(more, more)
     edges = with_events(edges, more, TWO_PI * place / fast[more])
-    near = nearest(family, designs)
+    near = nearest(family, designs, (output,))
     close = np.flatnonzero(near.rho.min(axis=1, initial=FAR) < CLOSE)
     about = crowded(near.only(close), 1.0)
     edges = with_events(edges, np.repeat(close, about.shape[1]), about.ravel())

@@ -206,7 +206,7 @@ def precise_maxima(family: Family, designs: Array, pose: str, phi: Array, target
         return np.abs(found) if name == pose else found
 
     every = np.arange(phi.size)
-    near = nearest(family, designs)
+    near = nearest(family, designs, (pose,))
     angles = crowded(near, SPACING)
     values = measured(every, angles)
     highest = values.max(axis=1)
