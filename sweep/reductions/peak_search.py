@@ -344,7 +344,7 @@ class Search:
         found.err[rows[has]] = err
         moved = np.zeros(rows.size)
         moved[has] = np.abs(peaks.height[chosen] - peaks.guess[chosen])
-        if self.family.precise_poses is None and (self.locate or request.place):
+        if self.locate or request.place:
             chosen = first_of_equals(row, peaks, chosen)
         phi, err_phi = peaks.phi[chosen], peaks.err_phi[chosen]
         slope = self.family.derivative_of.get(request.pose)
