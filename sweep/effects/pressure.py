@@ -31,8 +31,8 @@ OUTPUTS = (
     Output(
         "theta1", "rad", "radial pressure angle at the follower, tan = radial/tangential; across the slide", EQUATION
     ),
-    Output("theta2", "rad", "axial pressure angle at the follower, tan = axial/radial", EQUATION),
-    Output("theta3", "rad", "axial pressure angle at the crank", EQUATION),
+    Output("theta2", "rad", "axial pressure angle at the follower, tan = axial/radial", EQUATION, kinks=True),
+    Output("theta3", "rad", "axial pressure angle at the crank", EQUATION, kinks=True),
 )
 _NAMES = tuple(o.name for o in OUTPUTS)
 

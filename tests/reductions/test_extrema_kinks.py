@@ -6,13 +6,16 @@ import numpy as np
 import pytest
 
 from kernels import status as st
+from sweep.effects import extended
 from sweep.evaluation.summaries import design_outputs
+from sweep.families import family
 from sweep.families.base import Accuracy, Array, Family, Output, Parameter
 from sweep.families.names import error_of
 from sweep.quantities.kinds import Request
 from sweep.reductions import panels
 from sweep.reductions.sampling import pose_columns
 from tests.support.frictional import FAMILIES, dense, frictional
+from tests.support.rssr_designs import random_designs
 
 TARGET = 1e-6
 # A grid attains its values up to the rounding of two ways to one pose.
@@ -146,3 +149,18 @@ def test_a_curve_that_is_all_noise_is_not_converged_and_its_error_says_so():
     assert (status == st.NOT_CONVERGED).all()
     assert (np.abs(value - 1.0) <= 1.1e-6).all()
     assert ((err > 1e-9) & (err < 1e-4)).all()
+
+
+@pytest.mark.parametrize("target", [1e-2, 1e-3, 1e-4])
+def test_means_of_angles_that_jump_say_what_they_miss(target):
+    """From one end of a right angle to the other: the squares have a kink there, in no known place."""
+    wanted = ["rms_theta2", "rms_theta3"]
+    full = extended(family("rssr"), wanted)
+    designs = random_designs(200, 3, rotatable=True)
+    matrix = np.column_stack([designs, np.zeros((len(designs), len(full.parameters) - designs.shape[1]))])
+    got, true = found(full, matrix, wanted, target), found(full, matrix, wanted, 1e-9)
+    sure = (got["status"] == st.OK) & (true["status"] == st.OK)
+    assert sure.sum() > 150
+    for name in wanted:
+        off = np.abs(got[name] - true[name])[sure]
+        assert (off <= (got[error_of(name)] + true[error_of(name)])[sure]).all()
