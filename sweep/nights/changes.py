@@ -135,6 +135,8 @@ def _front(study: Study, old: Path, new: Path) -> tuple[list[str], list[str]]:
     tables = [files.read_table(path).drop_duplicates("bound").sort_values("bound") for path in paths]
     at, values = (tables[0][column].to_numpy() for column in ("bound", name))
     now, then = (tables[1][column].to_numpy() for column in ("bound", name))
+    if not (at.size and now.size):
+        return ([f"front: {at.size} bounds before, {now.size} now"] if at.size != now.size else []), []
     near = np.abs(now - at[:, None]).argmin(axis=1)
     apart = np.abs(now[near] - at)
     pairs = apart <= DIMENSION_RTOL * np.ptp(at)

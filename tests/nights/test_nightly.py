@@ -341,6 +341,7 @@ BETWEEN = 1.5 + 1e-7  # a placed bound follows what its neighbours reach
         ({1.0: 4.0, 1.5: 3.0 + 1e-5, 2.0: math.nan}, ["front moved at 2 of 3 bounds, most at range_P = 2"]),
         ({1.0: 4.0, 1.6: 2.8, 2.0: 2.0}, ["front: 3 bounds before, 3 now, 2 of them the same"]),
         ({1.0: 4.0, 2.0: 2.0}, ["front: 3 bounds before, 2 now, 2 of them the same"]),
+        ({}, ["front: 3 bounds before, 0 now"]),
     ],
 )
 def test_fronts_are_compared_at_bounds_that_differ_as_little_as_searches_do(
