@@ -14,17 +14,7 @@ from importlib import import_module
 from types import MappingProxyType
 
 from sweep.effects.base import CURVED, Effect, Placed
-from sweep.effects.evaluation import (
-    Added,
-    bends,
-    bent,
-    effect_poses,
-    fingers,
-    on_own_columns,
-    paces,
-    piercing,
-    run_design,
-)
+from sweep.effects.evaluation import Added, bent, effect_poses, features, on_own_columns, run_design
 from sweep.errors import InputError
 from sweep.families.base import Accuracy, Family, Output, Parameter, Step, Work, of_family
 from sweep.families.chain import Chain
@@ -311,13 +301,7 @@ def with_effects(family: Family, effects: tuple[Placed, ...], curves: Mapping[st
         poses=partial(effect_poses, added, effects),
         precise_poses=precise,
         steps=(*(on_own_columns(step, own) for step in family.steps), *steps),
-        capabilities=(
-            *family.capabilities,
-            *paces(curves, feeling),
-            *piercing(family, added.inputs, feeling),
-            *bends(added, effects),
-            *fingers(added, feeling),
-        ),
+        capabilities=(*family.capabilities, *features(added, effects, feeling)),
         dear={o.name: (placed.name, placed.entry.ns_per_pose) for placed in effects for o in placed.pose_outputs},
     )
 

@@ -209,6 +209,12 @@ def _finger_sine(added: Added, stage: int, column: int, designs: Array, angles: 
     return square
 
 
+def features(added: Added, effects: tuple[Placed, ...], feeling: Feeling) -> list[object]:
+    """Return what effects and loads bring to curves between even samples."""
+    pierced = piercing(added.family, added.inputs, feeling)
+    return [*paces(added.curves, feeling), *pierced, *bends(added, effects), *fingers(added, feeling)]
+
+
 def _column(column: int, designs: Array) -> Array:
     return designs[:, column]
 

@@ -36,7 +36,16 @@ from sweep.reductions.rounding import (
     singular_share,
     tells,
 )
-from sweep.reductions.sampling import DESIGN_STATUS, Extremum, Index, Mask, discriminants, pose_columns, sample_turn
+from sweep.reductions.sampling import (
+    DESIGN_STATUS,
+    Extremum,
+    Index,
+    Mask,
+    discriminants,
+    jumps,
+    pose_columns,
+    sample_turn,
+)
 from sweep.reductions.window import Window, edges
 
 START = 32  # samples of the first look
@@ -50,9 +59,6 @@ DISAGREEMENT = 0.05  # between the peak guessed from the samples and the refined
 RIVALS = 1e-3  # peaks lower than the best by no more of its size may turn out the highest
 NEVER = 2**40  # more samples than are ever needed
 CLOSE = 0.1  # distance of a singularity [rad] from which on it is measured what rounding does
-JUMPS = 32  # of a turn; a curve with more is not resolved
-STEP = 1.0 / 60.0  # of the curve's size; smaller steps are left to the samples
-SHARPER = 6.0  # times the differences beside it
 TIE = 1e-10  # to which peaks are told apart where their places are wanted
 
 
@@ -67,29 +73,6 @@ class Candidates(NamedTuple):
     def only(self, which: Index | Mask) -> Candidates:
         """Return some of them."""
         return Candidates(self.request[which], self.row[which], self.column[which], self.sign[which])
-
-
-def jumps(values: Array, size: Array, rough: float) -> Mask:
-    """Tell which rows of samples jump, and are resolved apart from that.
-
-    Friction changes its direction where the follower reverses, an angle of a direction leaps by pi: no number of
-    samples resolves such a place.
-
-    Parameters
-    ----------
-    values : (n, m) equidistant samples of whole turns;  size : (n,) of the curves
-    rough : fourth difference against the size above which samples do not resolve a curve
-    """
-    step = np.abs(np.roll(values, -1, axis=1) - values)
-    beside = np.maximum.reduce([np.roll(step, k, axis=1) for k in (-2, -1, 1, 2)])
-    between = (step > STEP * size[:, None]) & (step > SHARPER * beside)
-    near = np.logical_or.reduce([np.roll(between, k, axis=1) for k in (-1, 0, 1, 2)])
-    left, right = (np.roll(values, k, axis=1) + np.roll(values, -k, axis=1) for k in (1, 2))
-    fourth = np.abs(right - 4.0 * left + 6.0 * values)
-    smooth = np.where(near, 0.0, fourth).max(axis=1) <= rough * size
-    count = between.sum(axis=1)
-    found: Mask = smooth & (count > 0) & (count <= JUMPS)
-    return found
 
 
 @dataclass

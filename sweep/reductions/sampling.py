@@ -132,3 +132,31 @@ class Extremum(NamedTuple):
 DESIGN_STATUS = np.arange(256, dtype=np.uint8)
 DESIGN_STATUS[st.NOT_ASSEMBLED] = st.NOT_ROTATABLE
 DESIGN_STATUS[st.DEAD_POINT] = st.UNDECIDABLE
+
+
+JUMPS = 32  # of a turn; a curve with more is not resolved
+STEP = 1.0 / 60.0  # of the curve's size; smaller steps are left to the samples
+SHARPER = 6.0  # times the differences beside it
+
+
+def jumps(values: Array, size: Array, rough: float) -> Mask:
+    """Tell which rows of samples jump, and are resolved apart from that.
+
+    Friction changes its direction where the follower reverses, an angle of a direction leaps by pi: no number of
+    samples resolves such a place.
+
+    Parameters
+    ----------
+    values : (n, m) equidistant samples of whole turns;  size : (n,) of the curves
+    rough : fourth difference against the size above which samples do not resolve a curve
+    """
+    step = np.abs(np.roll(values, -1, axis=1) - values)
+    beside = np.maximum.reduce([np.roll(step, k, axis=1) for k in (-2, -1, 1, 2)])
+    between = (step > STEP * size[:, None]) & (step > SHARPER * beside)
+    near = np.logical_or.reduce([np.roll(between, k, axis=1) for k in (-1, 0, 1, 2)])
+    left, right = (np.roll(values, k, axis=1) + np.roll(values, -k, axis=1) for k in (1, 2))
+    fourth = np.abs(right - 4.0 * left + 6.0 * values)
+    smooth = np.where(near, 0.0, fourth).max(axis=1) <= rough * size
+    count = between.sum(axis=1)
+    found: Mask = smooth & (count > 0) & (count <= JUMPS)
+    return found

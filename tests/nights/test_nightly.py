@@ -325,8 +325,7 @@ def front_lines(folder: Path, old: dict[float, float], new: dict[float, float]) 
     study = load_study(written(folder / "one"))
     places = [sweep.run(study, folder / name / "designs", jobs=1) for name in ("old", "new")]
     for place, front in zip(places, (old, new), strict=True):
-        rows = pd.DataFrame({"bound": front.keys(), "max_abs_dP": front.values()})
-        rows.to_parquet(files.beside(place) / files.PARETO)
+        pd.DataFrame({"bound": front, "max_abs_dP": front.values()}).to_parquet(files.beside(place) / files.PARETO)
     return changes(replace(study, pareto=ParetoSettings("range_P", (1.0, 2.0))), *places).lines
 
 

@@ -47,7 +47,7 @@ def test_maxima_near_change_points_are_those_of_brute_force_within_their_errors(
 
 def test_singularities_are_where_the_margin_is_least() -> None:
     designs = near_change_points(500, 3)
-    near, exact = nearest(RSSR, designs), margins(designs)
+    near, exact = nearest(RSSR, designs, ("psi",)), margins(designs)
     closest = np.argmin(near.rho, axis=1)[:, None]
     places = np.take_along_axis(near.phi, closest, axis=1)[:, 0]
     rho = np.take_along_axis(near.rho, closest, axis=1)[:, 0]
@@ -59,7 +59,7 @@ def test_singularities_are_where_the_margin_is_least() -> None:
 
 def test_crowded_angles_stand_no_wider_than_a_share_of_the_distance() -> None:
     designs = near_change_points(200, 4)
-    near = nearest(RSSR, designs)
+    near = nearest(RSSR, designs, ("psi",))
     angles = crowded(near, 0.25)
     gaps = np.diff(np.concatenate([angles, angles[:, :1] + 2.0 * np.pi], axis=1), axis=1)
     middle = angles + 0.5 * gaps

@@ -50,9 +50,7 @@ def best_rows(family: Family, objective: str, folder: Path) -> tuple[Array, Arra
 def of_task(study: Study, count: int, seed: int) -> Array:
     """Return designs of the study that do its [task], the best first, (k, P).
 
-    There are at most ``count``, and none without a task.
-
-    A parameter that the study gives as a number keeps it.
+    There are at most ``count``, and none without a task.  A parameter that the study gives as a number keeps it.
     """
     names = study.family.parameter_names
     if study.task is None:
