@@ -325,7 +325,7 @@ def front_lines(folder: Path, old: dict[float, float], new: dict[float, float]) 
     study = load_study(written(folder / "one"))
     places = [sweep.run(study, folder / name / "designs", jobs=1) for name in ("old", "new")]
     for place, front in zip(places, (old, new), strict=True):
-        pd.DataFrame({"bound": front, "max_abs_dP": front.values()}).to_parquet(files.beside(place) / files.PARETO)
+        pd.DataFrame(front.items(), columns=["bound", "max_abs_dP"]).to_parquet(files.beside(place) / files.PARETO)
     return changes(replace(study, pareto=ParetoSettings("range_P", (1.0, 2.0))), *places).lines
 
 
