@@ -317,7 +317,10 @@ class Search:
         has, found = which >= 0, self.found[request]
         chosen = which[has]
         found.value[rows[has]] = peaks.height[chosen] * (-1.0 if request.mode == -1 else 1.0)
-        err = peaks.err_height[chosen]
+        ceiling = np.full(rows.size, -np.inf)
+        np.maximum.at(ceiling, row, peaks.height + peaks.err_height)
+        # A top that is known less well may be higher.
+        err = np.maximum(peaks.err_height[chosen], ceiling[has] - peaks.height[chosen])
         if self.family.precise_poses is None and chosen.size:
             # Badly scaled designs lose digits before any discriminant is formed of them.
             off = shaken(self.family, self.designs[rows[has]], peaks.phi[chosen], request.pose)
