@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from kernels.jit import inline, kernel
-from kernels.types import Array
+from kernels.types import EPS, Array
 
 NOTHING = 1e-14  # share of the largest coefficient that the rotations' drift leaves in the others
 
@@ -110,7 +110,7 @@ def tail(cosines: Array, sines: Array, size: float) -> float:
 
 FINER = 8  # looks per harmonic before a peak is refined
 BISECTIONS = 54
-MISSED = 0.1  # share of the range by which samples miss a top at most: half a step of the highest harmonic takes 0.076
+LEVEL = 16.0 * EPS  # of the size: differences that say nothing
 
 
 @kernel
@@ -147,27 +147,37 @@ def turn_extremes(
 
 
 @inline
+def _climbed(c: Array, s: Array, sign: float, low: float, high: float) -> float:
+    """Find the top between two crank angles by bisection."""
+    for _ in range(BISECTIONS):
+        middle = 0.5 * (low + high)
+        if sign * series(c, s, middle)[1] > 0.0:
+            low = middle
+        else:
+            high = middle
+    return 0.5 * (low + high)
+
+
+@inline
 def _peak(c: Array, s: Array, sign: float, look: Array) -> float:
-    """Find the crank angle in [0, 2 pi) where sign times the series is largest, by bisection from the samples."""
-    step, most, least = 2.0 * math.pi / look.size, -math.inf, math.inf
-    for j in range(look.size):
-        most, least = max(most, sign * look[j]), min(least, sign * look[j])
-    floor, highest, where = most - MISSED * (most - least), -math.inf, 0.0
-    for j in range(look.size):
-        here = sign * look[j]
-        if here < floor or here < sign * look[j - 1] or here < sign * look[(j + 1) % look.size]:
+    """Find the crank angle in [0, 2 pi) where sign times the series is largest, from samples that may be next to it."""
+    step, n, best, size = 2.0 * math.pi / look.size, look.size, 0, 0.0
+    for j in range(n):
+        best = j if sign * look[j] > sign * look[best] else best
+        size = max(size, abs(look[j]))
+    where = _climbed(c, s, sign, step * (best - 1), step * (best + 1))
+    highest = sign * series(c, s, where)[0]
+    for j in range(n):
+        before, here, after = sign * look[j - 1], sign * look[j], sign * look[(j + 1) % n]
+        fall = 2.0 * here - before - after
+        if j == best or here < before or here < after or not fall > 0.0:
             continue
-        low, high = step * (j - 1), step * (j + 1)
-        for _ in range(BISECTIONS):
-            middle = 0.5 * (low + high)
-            if sign * series(c, s, middle)[1] > 0.0:
-                low = middle
-            else:
-                high = middle
-        angle = 0.5 * (low + high)
-        top = sign * series(c, s, angle)[0]
-        if top > highest:
-            highest, where = top, angle
+        # Twice what a parabola adds is more than any top has; a level curve has tops of rounding alone.
+        if here + 0.25 * (after - before) * (after - before) / fall > highest + LEVEL * size:
+            angle = _climbed(c, s, sign, step * (j - 1), step * (j + 1))
+            top = sign * series(c, s, angle)[0]
+            if top > highest:
+                highest, where = top, angle
     return where + 2.0 * math.pi if where < 0.0 else where
 
 
