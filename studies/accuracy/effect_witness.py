@@ -103,7 +103,8 @@ def of_samples(given: Effected, wanted: tuple[str, ...]) -> dict[str, Known]:
 def _is_nothing(given: Effected, pose: str) -> bool:
     """Whether a pose output is rounding alone, as the moment in a pin of a plane mechanism: no digit of it is right."""
     (values,) = given.poses((pose,), LOOKED_AT)
-    return bool(rounding_alone(given.full, given.designs, pose, values, np.ones(len(values), np.bool_)).any())
+    size, looked_at = np.abs(values).max(axis=1), np.ones(len(values), np.bool_)
+    return bool(rounding_alone(given.full, given.designs, pose, values, size, looked_at).any())
 
 
 def pressure(given: Effected, samples: int) -> dict[str, Array]:

@@ -80,7 +80,7 @@ def roller_of(name: str) -> Effect:
         formulas=FORMULAS,
         needs=(bare.name,),
         inputs=(*bare.inputs, ROLLER, LENGTH, MODULUS),
-        only_for={LENGTH.name: ("stress_r",)},
+        only_for={p.name: ("stress_r",) for p in (*bare.inputs, LENGTH, MODULUS)},
         outputs=OUTPUTS,
         compute=compute,
         called_for="a cam that can be made, wear of the roller",

@@ -84,6 +84,8 @@ class SeriesCurve:
 
 Curve: TypeAlias = TableCurve | SeriesCurve
 
+SEAM = 1e-9  # between both ends of a turn: of angles [rad], and of values against the largest
+
 
 def table_curve(phi: Array, values: Array) -> TableCurve:
     """Curve of a table, its points in any order of the turn.
@@ -91,7 +93,7 @@ def table_curve(phi: Array, values: Array) -> TableCurve:
     Parameters
     ----------
     phi : (n,) angles [rad]; the point of the seam may stand twice, at both ends
-    values : (n,)
+    values : (n,); at the seam those of a sine differ by their rounding
 
     Raises
     ------
@@ -103,8 +105,8 @@ def table_curve(phi: Array, values: Array) -> TableCurve:
         raise ValueError("as many angles as values")
     if not (np.isfinite(phi).all() and np.isfinite(values).all()):
         raise ValueError("finite numbers")
-    whole = phi.size > 1 and abs(phi[-1] - phi[0] - TWO_PI) < 1e-9
-    if whole and values[0] != values[-1]:
+    whole = phi.size > 1 and abs(phi[-1] - phi[0] - TWO_PI) < SEAM
+    if whole and abs(values[-1] - values[0]) > SEAM * np.abs(values).max():
         raise ValueError("the same value at both ends of the turn")
     if whole:
         phi, values = phi[:-1], values[:-1]

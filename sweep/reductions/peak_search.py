@@ -179,8 +179,9 @@ class Search:
             row, column = row[:count], column[:count]
             if request.mode != 0:
                 measure_constants(values, scale, rough)
-            elif samples >= BREAKING and self.family.precise_poses is None:
-                alone[number] = rounding_alone(self.family, self.designs[rows], request.pose, values, rough > ROUGH)
+            if samples >= BREAKING:
+                given = self.family.precise(), self.designs[rows], request.pose
+                alone[number] = rounding_alone(*given, values, scale, rough > ROUGH)
                 rough[alone[number]] = 0.0
             if samples >= BREAKING and allowed is None and (rough > ROUGH).any():
                 torn = jumps(values, scale, ROUGH)

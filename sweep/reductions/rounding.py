@@ -18,6 +18,7 @@ from sweep.reductions.sampling import Index, Mask, blocks, pose_columns
 
 TRIES = 3
 ALONE = 0.1  # change of a curve's highest sample, against itself, by rounding the inputs: nothing is known of it then
+FAINT = 1e-10  # range against size from which on the rounding of a signed curve is looked at
 CONSTANT = 64.0 * EPS  # of its size: a curve that varies by no more tells nothing but rounding
 
 
@@ -104,24 +105,26 @@ def shaken(family: Family, designs: Array, phi: Array, name: str) -> Array:
     return found
 
 
-def rounding_alone(family: Family, designs: Array, pose: str, values: Array, rough: Mask) -> Mask:
+def rounding_alone(family: Family, designs: Array, pose: str, values: Array, scale: Array, rough: Mask) -> Mask:
     """Return which of the rough curves are rounding alone, such as the moment in a pin whose forces lie in one plane.
 
     No denser samples resolve them.  Where the inputs are rounded otherwise they are other curves: the error of their
-    largest magnitude is as large as itself.
+    largest magnitude is as large as itself.  So is that of a signed extremum as the range, where forces cancel, as the
+    shaking force of a balanced linkage does, or leave one that turns with the crank.
 
     Parameters
     ----------
     family, designs, pose : the (n, P) design matrix, and the pose output
     values : (n, m) samples of one turn
-    rough : (n,) which of them the samples do not resolve
+    scale : (n,) largest magnitude of each curve, of signed extrema its range
+    rough : (n,) which of them the samples do not resolve; of signed extrema faint ranges are looked at too
     """
     found = np.zeros(len(designs), np.bool_)
-    which = np.flatnonzero(rough)
+    which = np.flatnonzero(rough | (scale < FAINT * np.abs(values).max(axis=1)))
     if which.size:
         top = np.abs(values[which]).argmax(axis=1)
         off = shaken(family, designs[which], top * (TWO_PI / values.shape[1]), pose)
-        found[which] = off >= ALONE * np.abs(values[which, top])
+        found[which] = off >= ALONE * scale[which]
     return found
 
 

@@ -8,6 +8,7 @@ import pytest
 import sweep
 from kernels import status as st
 from sweep.effects.contact import ball_stress, half_width, line_stress
+from sweep.errors import InputError
 from tests.reference.momentum import derivative
 
 N = 256
@@ -131,6 +132,16 @@ def test_curvature_is_that_of_the_pitch_curve_and_the_profile_lies_a_roller_insi
     np.testing.assert_allclose(found["profile_curvature"], 1.0 / radius, rtol=1e-8)
     p0 = np.sqrt(found["force_r"] * MODULUS / (np.pi * 8.0) * (1.0 / radius + 1.0 / 5.0))
     np.testing.assert_allclose(found["stress_r"], p0, rtol=1e-8)
+
+
+@pytest.mark.parametrize("name", CAMS)
+def test_shape_of_the_profile_asks_for_no_speed_and_no_mass(name):
+    shape, moving = CAMS[name] | {"roller": 5.0}, {"speed": OMEGA, "contact_length_r": 8.0}
+    wanted = ["max_undercut", "max_profile_curvature"]
+    alone = sweep.summarise(name, shape, wanted, accuracy=1e-8)
+    assert alone.equals(sweep.summarise(name, shape | moving, wanted, accuracy=1e-8))
+    with pytest.raises(InputError, match="speed is missing"):
+        sweep.summarise(name, shape, ["max_stress_r"], accuracy=1e-8)
 
 
 def test_a_roller_too_large_undercuts_the_profile_and_is_told():

@@ -62,6 +62,13 @@ def test_a_table_of_both_ends_of_the_turn_is_that_without_the_second():
     assert table_curve(phi, values) == table_curve(phi[:-1], values[:-1])
 
 
+def test_a_sine_over_the_whole_turn_is_a_table_although_it_ends_beside_its_beginning():
+    phi = np.linspace(0.0, 2.0 * np.pi, 73)
+    torque = -7.5e6 * np.sin(3.0 * phi)
+    assert torque[-1] != torque[0]
+    assert table_curve(phi, torque) == table_curve(phi[:-1], torque[:-1])
+
+
 @pytest.mark.parametrize(
     ("phi", "values"),
     [

@@ -25,6 +25,12 @@ TABLE = {"a": [1.0], "b": [3.0], "c": [2.0], "e": [3.5], "f": [0.1], "g": [0.2],
         ("strok", None),
         ("max_pressure_angle1", "max_pressure_angle"),
         ("range_Psi", "range_psi"),
+        ("transmission_angle", "least_transmission_angle"),
+        ("min_transmission_angle", "least_transmission_angle"),
+        ("stroke", "swing"),
+        ("quick_return_ratio", "stroke_ratio"),
+        ("max_torque", "max_abs_drive_torque"),
+        ("coefficient_of_fluctuation", "unevenness"),
     ],
 )
 def test_unknown_output_is_refused_with_the_nearest_name(name, nearest):

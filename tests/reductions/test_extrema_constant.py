@@ -54,3 +54,26 @@ def test_tension_that_a_back_rest_holds_is_found_to_its_rounding():
     for name in names[:2]:
         assert (np.abs(found[name] - table["K0"]) <= found[f"err_{name}"] + 1e-13 * table["K0"]).all()
     assert (found.range_K_couple <= 1e-13 * table["K0"]).all()
+
+
+def balanced_four_bar(beside):
+    """Counterweights after Berkof and Lowen on crank and rocker; the crank's stands ``beside`` its place [mm]."""
+    a, b, c, m_crank, m_coupler, m_rocker = 20.0, 60.0, 50.0, 4e-4, 3e-4, 5e-4
+    coupler = 28.0 * np.exp(0.35j)
+    crank, rocker = -m_coupler * a * (1.0 - coupler / b) / m_crank, -m_coupler * c * (coupler / b) / m_rocker
+    masses = {"m_crank": m_crank, "m_coupler": m_coupler, "m_rocker": m_rocker, "speed": 300.0}
+    centres = {"com_crank_x": crank.real + beside, "com_crank_y": crank.imag, "com_coupler_x": coupler.real}
+    centres |= {"com_coupler_y": coupler.imag, "com_rocker_x": rocker.real, "com_rocker_y": rocker.imag}
+    return {"a": a, "b": b, "c": c, "e": 55.0} | masses | centres
+
+
+@pytest.mark.parametrize("beside", [0.0, 1e-9, 1e-3, 1.0])
+def test_shaking_force_of_a_balanced_four_bar_is_that_of_its_crank_alone(beside):
+    """What is left turns with the crank: its size is the same all over the turn, its components are not."""
+    names = ["max_shaking_force", "min_shaking_force", "max_abs_shaking_force", "range_shaking_force"]
+    found = sweep.summarise("four_bar", balanced_four_bar(beside), names, accuracy=TARGET)
+    assert (found.status == st.OK).all()
+    for name, true in zip(names, [36.0 * beside] * 3 + [0.0], strict=True):
+        # Some hundred roundings of the inertia force that the pin of the coupler has, 540 N.
+        assert abs(found[name][0] - true) <= found[f"err_{name}"][0] + 1e-13 * 540.0
+        assert found[f"err_{name}"][0] <= 1e-12 * 540.0
