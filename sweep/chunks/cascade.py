@@ -19,6 +19,7 @@ from kernels import status as codes
 from sweep.chunks.parameters import completed
 from sweep.costs import nanoseconds
 from sweep.effects import called_for
+from sweep.evaluation.routes import GOES_ON
 from sweep.evaluation.summaries import Route, design_outputs, routes
 from sweep.families.base import Array, Columns, Work
 from sweep.families.names import error_of, parts
@@ -35,11 +36,6 @@ BATCH_SECONDS = 0.1
 FEWEST = 64
 # Measured: the time [s] that a call of a route takes even for a few designs.
 CALL_SECONDS = 1e-3
-
-# With these one output is missing or rough, the others are worth having where all rows are kept.
-PARTIAL = (
-    codes.NOT_OSCILLATING, codes.NOT_CONVERGED, codes.JAMMED, codes.NOT_LINEAR, codes.SINGULAR, codes.INVALID_INPUT,
-)  # fmt: skip
 
 
 class Dropped(Exception):
@@ -130,7 +126,7 @@ class Cascade:
         self.levels = levels(self.study)
         self._waiting: list[list[Batch]] = [[] for _ in self.levels]
         self._left: list[Batch] = []
-        self._go_on = np.isin(np.arange(256), (codes.OK, *PARTIAL) if self.study.output.keep == "all" else (codes.OK,))
+        self._go_on = GOES_ON if self.study.output.keep == "all" else np.arange(256) == codes.OK
         self.reached = [0] * len(self.levels)
         self.counts = np.zeros(256, np.int64)
         self.missed = Counter()

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from kernels import status as st
-from kernels.types import TWO_PI
+from kernels.types import TWO_PI, Status
 from sweep import costs
 from sweep.errors import InputError
 from sweep.evaluation import route
@@ -80,17 +80,13 @@ def design_outputs(
     columns: Columns = {}
     turns = not isinstance(family.domain, Interval)
     ways = routes(family, wanted, accuracy)
-    kinds = {route.general for route in ways if route.general}
-    if accuracy.samples is not None and kinds and "margin" not in kinds and margin_suffixes(family):
-        # Refinement meets a dead point between samples, a plain grid does not.
-        if isinstance(family, Machine):
-            found = _margins(family, designs, accuracy, None)  # of the members by themselves, by their own steps
-        else:
-            found = margin_group(family, designs, (), accuracy)
-        status = found["status"].astype(np.uint8)
+    # Refinement meets a dead point between samples, a plain grid does not.
+    known = accuracy.samples is None or any(route.general == "margin" for route in ways) or not margin_suffixes(family)
     with np.errstate(all="ignore"):  # what leaves float64 has a status in the end
         for route in ways:
             assert route.run is not None
+            if route.general and not known:  # quicker outputs of what does not turn, as its margin, are there by now
+                status, known = np.where(status == st.OK, _turning(family, designs, accuracy), status), True
             # A follower that turns fully has no limit positions, or no dwell, but extrema it has; one that jams moves.
             alive = np.flatnonzero(GOES_ON[status]) if status.any() else None  # None is all of them
             of_these = designs if alive is None or alive.size == n else designs[alive]
@@ -108,6 +104,15 @@ def design_outputs(
             status[status == st.NOT_ROTATABLE] = st.NOT_ASSEMBLED  # there is no crank that could turn
         chosen = {name: columns[name] for name in with_errors(wanted, accuracy)}
         return explained(chosen | {"status": status}, dict.fromkeys(wanted))
+
+
+def _turning(family: Family, designs: Array, accuracy: Accuracy) -> Status:
+    """Return the status of the margin: of a machine's members by themselves, by their own steps."""
+    if isinstance(family, Machine):
+        found = _margins(family, designs, accuracy, None)
+    else:
+        found = margin_group(family, designs, (), accuracy)
+    return found["status"].astype(np.uint8)
 
 
 def _spread(values: NDArray[np.generic], rows: Index | None, n: int) -> NDArray[np.generic]:

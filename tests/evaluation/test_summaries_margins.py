@@ -52,6 +52,18 @@ def test_negative_margin_is_the_discriminant_over_its_scale(mechanism, make):
     assert (found["margin"][no] <= sampled[no] + 1e-12).all()
 
 
+@pytest.mark.parametrize(("name", "beside"), [("rssr", "max_psi"), ("four_bar", "max_x_m"), ("guide", "max_abs_dev")])
+def test_margin_on_samples_is_that_of_the_margin_alone_whatever_is_asked_beside_it(name, beside):
+    """Whether the crank turns is looked for before poses are sampled; that took the margin from what does not turn."""
+    design = {"a": [25.0, 25.0], "b": [30.0, 60.0], "c": [30.0, 50.0], "e": [60.0, 40.0]}
+    rest = {p.name: 0.0 for p in family(name).parameters if p.default is None and p.name not in design}
+    alone = sweep.summarise(name, design | rest, ["margin"], samples=64)
+    both = sweep.summarise(name, design | rest, [beside, "margin"], samples=64)
+    assert alone.margin[0] < 0.0 < alone.margin[1]
+    np.testing.assert_array_equal(both.margin, alone.margin)
+    assert both.status.tolist() == [st.NOT_ROTATABLE, st.OK] and np.isnan(both[beside][0])
+
+
 @pytest.mark.parametrize(
     ("name", "more"),
     [

@@ -25,7 +25,7 @@ from sweep.evaluation.tables import design_matrix
 from sweep.families import family
 from sweep.families.base import Accuracy, Array, Columns, Family
 from sweep.quantities.limits import meets
-from sweep.study import Limit, OutputSettings, Study, load_study
+from sweep.study import Limit, OutputSettings, Study, load_study, study_from_data
 from tests.support.engine_study import CHUNK, SMALL_CHUNKS, chunk_bytes, write_study
 
 ROOT = Path(__file__).parents[2]
@@ -314,3 +314,16 @@ def test_bad_argument_is_named(study: Study, tmp_path: Path, argument: str, valu
     with pytest.raises(InputError, match=argument):
         run(study, tmp_path / "out", **{argument: value})  # type: ignore[arg-type]
     assert not (tmp_path / "out").exists()
+
+
+def test_row_that_lacks_an_output_has_all_others_where_all_rows_are_kept() -> None:
+    """As `summarise` has them: what has no dwell, or no event, has its extrema."""
+    scene = {"want": ["dwell_angle", "max_abs_d2psi", "rms_dpsi"]}
+    design = {"k": {"values": [0.5, 1.0]}, "a": {"values": [0.6, 4.0]}}
+    asked = {"study": {"name": "dwell"}, "mechanism": {"family": "geared_dwell"}, "scene": scene, "design": design}
+    study = study_from_data(asked | {"accuracy": {"samples": 64}, "output": {"keep": "all"}}, Path("study.toml"))
+    rows = compute_chunk(study, 0, 4).columns
+    direct = sweep.summarise("geared_dwell", {"k": rows["k"], "a": rows["a"]}, study.want, samples=64)
+    assert rows["status"].tolist() == [codes.OK, codes.NO_DWELL] * 2
+    for name in (*study.want, "status"):
+        np.testing.assert_array_equal(rows[name], direct[name], err_msg=name)
