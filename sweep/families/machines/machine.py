@@ -24,7 +24,7 @@ from sweep.families.machines.passages import taking_step
 from sweep.families.machines.pressing import Pressing
 from sweep.families.machines.relations import EventValue, Relation, Timing
 from sweep.families.machines.sewing import Sewing, sewing_step
-from sweep.families.machines.shaking import Shaking, orders_of
+from sweep.families.machines.shaking import Shaking, frame_key, orders_of
 from sweep.families.machines.triangles import Entering, entering_step
 from sweep.families.parts import Member
 from sweep.families.sites import AXES
@@ -118,7 +118,7 @@ def _built(machine: Machine, members: tuple[Member, ...]) -> Machine:
         f"{m.name}.{name}": f"{m.name}.{of}" for m in placed for name, of in m.family.derivative_of.items()
     }
     outputs += [o for relation in machine.relations for o in relation.outputs]
-    derivative_of |= {name: rate for r in machine.relations for name, rate in getattr(r, "rates", {}).items()}
+    derivative_of |= {name: rate for r in machine.relations for name, rate in r.rates.items()}
     loops = tuple(_loop(m, loop) for m in placed for loop in m.family.every(Assembly))
     sums = [r for r in machine.relations if isinstance(r, Shaking | ShaftTorque)]
     found = replace(
@@ -189,7 +189,8 @@ def _poses(machine: Machine, designs: Array, angles: Angles, wanted: frozenset[s
         columns = _member(needs, designs, angles, found)
         np.copyto(status, columns.pop("status"), where=status == OK)
         found |= {f"{needs.member.name}.{name}": values for name, values in columns.items()}
-    frames = _frames(machine, designs) if any(isinstance(r, Shaking) for r in asked.relations) else {}
+    if any(isinstance(r, Shaking) for r in asked.relations):
+        found |= _frames(machine, designs)
     found["phi"] = angles.phi
     if asked.events:
         events, code = event_angles(machine, designs)
@@ -197,7 +198,7 @@ def _poses(machine: Machine, designs: Array, angles: Angles, wanted: frozenset[s
         found |= events
     found |= {name: designs[:, [column]] for name, column in asked.inputs.items()}
     for relation in asked.relations:
-        found |= relation.compute(found, frames, wanted)
+        found |= relation.compute(found, wanted)
     return {name: _whole(found[name], shape) for name in wanted} | {"status": status}
 
 
@@ -254,11 +255,11 @@ def _of_member(m: Member, own: frozenset[str]) -> _OfMember:
 
 
 def _frames(machine: Machine, designs: Array) -> dict[str, Frame]:
-    """Return the frames of all stages by member and number, of a member alone by its name."""
+    """Return the frames of all stages, under the keys that shaking reads them by."""
     found: dict[str, Frame] = {}
     for m in machine.members:
         placed = zip(m.family.stages, m.frames(designs), strict=True)
-        found |= {f"{m.name}{stage.tail}": frame for stage, frame in placed if frame is not None}
+        found |= {frame_key(f"{m.name}{stage.tail}"): frame for stage, frame in placed if frame is not None}
     return found
 
 

@@ -17,7 +17,7 @@ from kernels.effects.speed_fluctuation import RESOLVED
 from kernels.types import Array, Status
 from sweep.families.base import Accuracy, Angles, Columns, Output, Parameter, Step, Work
 from sweep.families.curve_features import Smooth, least_samples
-from sweep.families.frames import Frame
+from sweep.families.machines.relations import Relation
 from sweep.numerics.steady_speed import FINER, GRIDS, LEFT, steady
 
 if TYPE_CHECKING:
@@ -46,13 +46,12 @@ class Driven:
 
 
 @dataclass(frozen=True)
-class ShaftTorque:
+class ShaftTorque(Relation):
     """What drives the main shaft: the torque on it, by its name, and what else turns there.
 
     ``rubs`` says that friction of all members is known.
     """
 
-    name: str
     driven: tuple[Driven, ...]
     rubs: bool
 
@@ -102,7 +101,7 @@ class ShaftTorque:
         """Return what of all members the wanted outputs are sums of, and the acceleration where a flywheel feels it."""
         return frozenset(one.named(name) for one in self.driven for name in self._made_of(wanted))
 
-    def compute(self, found: Mapping[str, Any], frames: Mapping[str, Frame], wanted: frozenset[str]) -> dict[str, Any]:
+    def compute(self, found: Mapping[str, Any], wanted: frozenset[str]) -> dict[str, Any]:
         """Return the wanted sums, (n, m)."""
         flywheel, first = found[f"{self.name}_flywheel"], self.driven[0]
         columns = {}

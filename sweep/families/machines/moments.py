@@ -15,7 +15,7 @@ import numpy as np
 
 from kernels.types import Array
 from sweep.families.base import Output, Parameter
-from sweep.families.frames import Frame
+from sweep.families.machines.relations import Relation
 from sweep.families.machines.segments import Gap, cross, dot, minus
 from sweep.families.machines.tools import Blade, Needle, rate_of
 from sweep.families.sites import AXES
@@ -75,13 +75,12 @@ def _word(field: str) -> str:
 
 
 @dataclass(frozen=True)
-class Taking:
+class Taking(Relation):
     """A blade's tip in the frame of a needle, pose by pose; where it passes: :mod:`sweep.families.machines.passages`.
 
     ``sense`` is +1 or -1: the tip passes towards u or against it; ``window`` is where the rise may lie.
     """
 
-    name: str
     needle: Needle
     blade: Blade
     sense: int
@@ -136,7 +135,7 @@ class Taking:
             names.append(self.blade.back)
         return frozenset(f"{name}_{axis}" for name in names for axis in AXES)
 
-    def compute(self, found: Mapping[str, Any], frames: Mapping[str, Frame], wanted: frozenset[str]) -> dict[str, Any]:
+    def compute(self, found: Mapping[str, Any], wanted: frozenset[str]) -> dict[str, Any]:
         """Return the wanted outputs, (n, m); nan where the scarf lies along the needle."""
         point, tip, line = (_vector(found, name) for name in (self.needle.on, self.blade.tip, self.needle.line))
         n = [self.needle.sense * x for x in line]
@@ -148,7 +147,7 @@ class Taking:
         w = [x / size for x in w]
         u = cross(n, w)
         own = {name for name in wanted if name.startswith(f"{self.name}_")}
-        columns = self.gap.compute(found, frames, frozenset()) if self.gap.name in wanted else {}
+        columns = self.gap.compute(found, frozenset()) if self.gap.name in wanted else {}
         for moving, d in ((False, ""), (True, "d")):
             names = {what: f"{self.name}_{d}{what}" for what in ("across", "side", "height", "depth", "speed")}
             if own.isdisjoint(names.values()) and not (moving and f"{self.name}_speed" in own):

@@ -16,7 +16,7 @@ from kernels.types import TWO_PI, Array, Status
 from sweep.errors import InputError, choices
 from sweep.families.base import Accuracy, Columns, Family, Output, Parameter, Step, Work
 from sweep.families.capabilities import PresserFoot
-from sweep.families.frames import Frame
+from sweep.families.machines.relations import Relation
 from sweep.families.names import is_place
 from sweep.families.parts import Member
 
@@ -28,7 +28,7 @@ SPEED = {"omega": "speed"}  # as threads call it: the scene gives it
 
 
 @dataclass(frozen=True)
-class Pressing:
+class Pressing(Relation):
     """A foot that the rack of a member lifts.
 
     Parameters
@@ -37,16 +37,18 @@ class Pressing:
     rack : the member
     lifted : how many parameters its family has of its own
     foot : the march
-    parameters : of the foot
+    of_foot : its parameters
     """
 
-    name: str
     rack: str
     lifted: int
     foot: PresserFoot
-    parameters: tuple[Parameter, ...]
+    of_foot: tuple[Parameter, ...]
 
-    outputs: tuple[Output, ...] = ()
+    @property
+    def parameters(self) -> tuple[Parameter, ...]:
+        """Those of the foot."""
+        return self.of_foot
 
     @property
     def numbers(self) -> Mapping[str, Output]:
@@ -56,14 +58,6 @@ class Pressing:
     def named(self, output: str) -> str:
         """Return the machine's name of an output of the foot: an angle is that of an event of the machine."""
         return f"phi_{self.name}_{output.removeprefix('phi_')}" if is_place(output) else f"{self.name}_{output}"
-
-    def needs(self, wanted: frozenset[str]) -> frozenset[str]:
-        """Poses give nothing of it."""
-        return frozenset()
-
-    def compute(self, found: Mapping[str, Any], frames: Mapping[str, Frame], wanted: frozenset[str]) -> dict[str, Any]:
-        """Poses give nothing of it."""
-        return {}
 
     def marched(self, machine: Machine, designs: Array, nodes: int) -> tuple[Columns, Array, Array]:
         """Return what the march tells, the path of the rack, and the angle (n,) of both where the main shaft has 0."""

@@ -4,41 +4,43 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any, Protocol
+from typing import Any
 
 import numpy as np
 
 from sweep.errors import InputError, choices
 from sweep.families.base import Output, Parameter
-from sweep.families.frames import Frame
 from sweep.families.sites import AXES
 
 
-class Relation(Protocol):
-    """A quantity of several members: pose outputs made of theirs."""
+@dataclass(frozen=True)
+class Relation:
+    """A quantity of several members; by itself it has no pose outputs and no parameters."""
+
+    name: str
 
     @property
-    def name(self) -> str: ...  # noqa: D102
-    @property
-    def outputs(self) -> tuple[Output, ...]: ...  # noqa: D102
-
-    @property
-    def parameters(self) -> tuple[Parameter, ...]: ...  # noqa: D102
-
-    def needs(self, wanted: frozenset[str]) -> frozenset[str]: ...  # noqa: D102
-
-    def compute(  # noqa: D102
-        self, found: Mapping[str, Any], frames: Mapping[str, Frame], wanted: frozenset[str]
-    ) -> dict[str, Any]: ...
-
-
-class Given:
-    """A relation that its members settle: it has no parameters of its own."""
+    def outputs(self) -> tuple[Output, ...]:
+        """Its pose outputs, made of those of the members."""
+        return ()
 
     @property
     def parameters(self) -> tuple[Parameter, ...]:
-        """It has none."""
+        """Parameters of the machine that it adds."""
         return ()
+
+    @property
+    def rates(self) -> Mapping[str, str]:
+        """Of each pose output that has one its derivative by the angle of the main shaft."""
+        return {}
+
+    def needs(self, wanted: frozenset[str]) -> frozenset[str]:
+        """Return the pose outputs of members that the wanted outputs are made of."""
+        return frozenset()
+
+    def compute(self, found: Mapping[str, Any], wanted: frozenset[str]) -> dict[str, Any]:
+        """Return the wanted outputs, (n, m), from those of the members."""
+        return {}
 
 
 @dataclass(frozen=True)
@@ -78,10 +80,9 @@ class EventValue:
 
 
 @dataclass(frozen=True)
-class Distance(Given):
+class Distance(Relation):
     """Distance of two points; ``points`` are dotted names such as "needle.point"."""
 
-    name: str
     points: tuple[str, str]
 
     @property
@@ -98,7 +99,7 @@ class Distance(Given):
         """Return coordinates of both points."""
         return frozenset(f"{point}_{axis}" for point in self.points for axis in AXES)
 
-    def compute(self, found: Mapping[str, Any], frames: Mapping[str, Frame], wanted: frozenset[str]) -> dict[str, Any]:
+    def compute(self, found: Mapping[str, Any], wanted: frozenset[str]) -> dict[str, Any]:
         """Return the distance and components, (n, m)."""
         a, b = self.points
         parts = [found[f"{b}_{axis}"] - found[f"{a}_{axis}"] for axis in AXES]
@@ -106,13 +107,12 @@ class Distance(Given):
 
 
 @dataclass(frozen=True)
-class Speed(Given):
+class Speed(Relation):
     """Speed of a point in the machine's frame, or of a second point as the first one sees it.
 
     ``points`` are one or two dotted names such as "looper.tip".
     """
 
-    name: str
     points: tuple[str, ...]
 
     @property
@@ -125,7 +125,7 @@ class Speed(Given):
         """Return velocities of the points."""
         return frozenset(velocity for point in self.points for velocity in _velocities(point))
 
-    def compute(self, found: Mapping[str, Any], frames: Mapping[str, Frame], wanted: frozenset[str]) -> dict[str, Any]:
+    def compute(self, found: Mapping[str, Any], wanted: frozenset[str]) -> dict[str, Any]:
         """Return the speed, (n, m)."""
         parts = [found[name] for name in _velocities(self.points[-1])]
         if len(self.points) == 2:

@@ -13,8 +13,7 @@ from typing import Any, NamedTuple, TypeAlias
 import numpy as np
 
 from sweep.families.base import Output
-from sweep.families.frames import Frame
-from sweep.families.machines.relations import Given
+from sweep.families.machines.relations import Relation
 from sweep.families.sites import AXES
 
 Point: TypeAlias = Sequence[Any]
@@ -120,10 +119,9 @@ class Body:
 
 
 @dataclass(frozen=True)
-class Gap(Given):
+class Gap(Relation):
     """Least distance of two bodies, less their radii."""
 
-    name: str
     bodies: tuple[Body, Body]
 
     @property
@@ -147,7 +145,7 @@ class Gap(Given):
         """Return the ends of both bodies."""
         return self.bodies[0].needs | self.bodies[1].needs
 
-    def compute(self, found: Mapping[str, Any], frames: Mapping[str, Frame], wanted: frozenset[str]) -> dict[str, Any]:
+    def compute(self, found: Mapping[str, Any], wanted: frozenset[str]) -> dict[str, Any]:
         """Return the gap, where it is, and the side, (n, m)."""
         (p1, q1), (p2, q2) = (body.segment(found) for body in self.bodies)
         nearest = closest(p1, q1, p2, q2)

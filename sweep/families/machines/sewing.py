@@ -10,17 +10,17 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from kernels import status as st
 from kernels.types import Array, Status
-from sweep.families.base import Accuracy, Angles, Columns, Output, Parameter, Step, Work
-from sweep.families.frames import Frame
+from sweep.families.base import Accuracy, Angles, Columns, Output, Step, Work
 from sweep.families.machines.main_shaft import ShaftTorque, speed_of
 from sweep.families.machines.moments import Taking
 from sweep.families.machines.passages import taking_step
+from sweep.families.machines.relations import Relation
 from sweep.families.machines.triangles import Entering, entering_step
 
 if TYPE_CHECKING:
@@ -34,7 +34,7 @@ ENDS = {
 
 
 @dataclass(frozen=True)
-class Sewing:
+class Sewing(Relation):
     """Moments that a machine has to keep at several speeds.
 
     Parameters
@@ -47,15 +47,11 @@ class Sewing:
     shaft : torque of the main shaft whose unevenness counts; None for an even one
     """
 
-    name: str
     taking: Taking
     entering: tuple[Entering, ...]
     speeds: tuple[float, ...]
     clearance: tuple[float, float]
     shaft: ShaftTorque | None = None
-
-    outputs: tuple[Output, ...] = ()
-    parameters: tuple[Parameter, ...] = ()
 
     @property
     def numbers(self) -> tuple[Output, ...]:
@@ -91,10 +87,6 @@ class Sewing:
         """Return what the speeds of an uneven shaft are made of: poses give nothing of it."""
         shaft = self.shaft
         return frozenset() if shaft is None else shaft.needs(frozenset(o.name for o in shaft.numbers))
-
-    def compute(self, found: Mapping[str, Any], frames: Mapping[str, Frame], wanted: frozenset[str]) -> dict[str, Any]:
-        """Poses give nothing of it."""
-        return {}
 
     def binding(self, machine: Machine, design: Array) -> tuple[tuple[str, float], tuple[str, float]]:
         """Return which fields set the least and the most rise of a design (P,) that suits all, each with that rise."""

@@ -27,7 +27,7 @@ import numpy as np
 
 from kernels.types import TWO_PI
 from sweep.families.base import Output, Parameter
-from sweep.families.frames import Frame
+from sweep.families.machines.relations import Relation
 from sweep.families.machines.thread_way import (
     PHI,
     Edge,
@@ -79,7 +79,7 @@ MEASURED_SPEED = Range("v", "m/s", 0.08, 7.4)
 
 
 @dataclass(frozen=True)
-class ThreadBalance:
+class ThreadBalance(Relation):
     """Thread needed, given, left over; its tension at the stitch.
 
     Parameters
@@ -96,7 +96,6 @@ class ThreadBalance:
     moves : whether the velocities of all its points are known
     """
 
-    name: str
     path: Run
     stock: float = 0.0
     tension: float = 0.0
@@ -179,7 +178,7 @@ class ThreadBalance:
         pulls = "tension" in own
         return self.moves and (pulls or not own.isdisjoint(("rate", "velocity"))), pulls or "wrap" in own
 
-    def compute(self, found: Mapping[str, Any], frames: Mapping[str, Frame], wanted: frozenset[str]) -> dict[str, Any]:
+    def compute(self, found: Mapping[str, Any], wanted: frozenset[str]) -> dict[str, Any]:
         """Return the outputs, (n, m); ``found`` has the main shaft's angle and events as "phi...", and parameters."""
         phi, (moving, bent) = found[PHI], self._asked(wanted)
         needed, rate, taken = 0.0 * phi, 0.0 * phi, 0.0 * phi

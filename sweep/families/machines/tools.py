@@ -10,8 +10,7 @@ from typing import Any, TypeAlias
 from sweep.errors import InputError, choices, known_keys, number, sign
 from sweep.families.base import Output
 from sweep.families.capabilities import OutputLink
-from sweep.families.frames import Frame
-from sweep.families.machines.relations import Given, two
+from sweep.families.machines.relations import Relation, two
 from sweep.families.machines.segments import Body, dot, minus
 from sweep.families.parts import Member, vector
 from sweep.families.sites import AXES, links_of
@@ -166,10 +165,9 @@ Tool: TypeAlias = Needle | Blade | Seam | Plate
 
 
 @dataclass(frozen=True)
-class Height(Given):
+class Height(Relation):
     """How high a point stands above a throat plate, and above the fabric on it."""
 
-    name: str
     of: str
     spot: Spot
     plate: Plate
@@ -193,7 +191,7 @@ class Height(Given):
         """Return coordinates of the point, and velocities where the derivative is wanted."""
         return frozenset(self.spot.needs(f"d{self.name}" in wanted))
 
-    def compute(self, found: Mapping[str, Any], frames: Mapping[str, Frame], wanted: frozenset[str]) -> dict[str, Any]:
+    def compute(self, found: Mapping[str, Any], wanted: frozenset[str]) -> dict[str, Any]:
         """Return the wanted outputs, (n, m)."""
         normal = list(self.plate.normal)
         height = dot(minus(self.spot.position(found), list(self.plate.at)), normal)

@@ -16,7 +16,6 @@ import numpy as np
 from kernels import status as st
 from kernels.types import TWO_PI
 from sweep.families.base import Columns, Output, Step
-from sweep.families.frames import Frame
 from sweep.families.machines.crossings import (
     TANGENT,
     Places,
@@ -28,7 +27,7 @@ from sweep.families.machines.crossings import (
     verdict,
     whole,
 )
-from sweep.families.machines.relations import Given
+from sweep.families.machines.relations import Relation
 from sweep.families.machines.segments import cross, dot, minus
 from sweep.families.machines.tools import Spot
 
@@ -47,7 +46,7 @@ TEXTS = {
 
 
 @dataclass(frozen=True)
-class Entering(Given):
+class Entering(Relation):
     """A tip and the plane of a triangle, pose by pose; :func:`entering_step` finds where the tip passes it.
 
     Parameters
@@ -59,7 +58,6 @@ class Entering(Given):
     window : from, to: crank angles of the main shaft between which it is looked for, modulo a turn; the whole turn
     """
 
-    name: str
     tip: Spot
     corners: tuple[Spot, Spot, Spot]
     radius: float
@@ -86,7 +84,7 @@ class Entering(Given):
         moving = f"{self.name}_dabove" in wanted
         return frozenset().union(*(spot.needs(moving) for spot in (self.tip, *self.corners)))
 
-    def compute(self, found: Mapping[str, Any], frames: Mapping[str, Frame], wanted: frozenset[str]) -> dict[str, Any]:
+    def compute(self, found: Mapping[str, Any], wanted: frozenset[str]) -> dict[str, Any]:
         """Return the wanted outputs, (n, m); nan where the corners lie in one line."""
         tip, *corners = (spot.position(found) for spot in (self.tip, *self.corners))
         first, second, reach = (minus(point, corners[0]) for point in (corners[1], corners[2], tip))
