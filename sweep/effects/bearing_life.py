@@ -17,10 +17,9 @@ from sweep.effects.bearings import CATALOGUE, SUPPORTS
 from sweep.effects.load_effects import KINETOSTATICS
 from sweep.effects.load_passing import reactions
 from sweep.effects.scene import Rows, Scene, refuse
-from sweep.effects.turn import chosen
 from sweep.families.base import Accuracy, Array, Columns, Output
 from sweep.families.capabilities import Assembly
-from sweep.families.poses import filled_all
+from sweep.families.poses import chosen, filled_all
 from sweep.numerics.curves import TableCurve
 from sweep.numerics.events import sign_changes, with_events
 from sweep.numerics.quadrature import integrate

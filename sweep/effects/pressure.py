@@ -10,10 +10,9 @@ from kernels.effects.pressure import directions, pressure_extrema
 from kernels.types import Status
 from sweep.effects.base import DesignResult, Effect, largest, no_poses
 from sweep.effects.scene import Scene
-from sweep.effects.turn import chosen
 from sweep.families.base import Accuracy, Array, Columns, Output
 from sweep.families.capabilities import PressureEllipse
-from sweep.families.poses import filled_each
+from sweep.families.poses import chosen, filled_each
 
 EQUATION = "P2, P3 (1)-(3)"
 FORMULAS = (

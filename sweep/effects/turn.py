@@ -13,6 +13,7 @@ from kernels.curves.periodic import turn_extremes
 from kernels.types import Status
 from sweep.effects.scene import Scene, take_over
 from sweep.families.base import Array, Columns, Output, Turn
+from sweep.families.poses import chosen
 from sweep.families.reduction import REDUCTIONS
 
 RESOLVED = 1e-9
@@ -110,8 +111,3 @@ def reductions(
         columns[f"{base}_{name}"] = np.where(status == st.OK, value, np.nan)
         columns[f"err_{base}_{name}"] = error
     return columns
-
-
-def chosen(columns: Columns, wanted: frozenset[str], status: Status) -> Columns:
-    """Wanted outputs with their errors, and the status."""
-    return {name: x for name, x in columns.items() if name.removeprefix("err_") in wanted} | {"status": status}

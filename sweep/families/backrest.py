@@ -15,7 +15,7 @@ from kernels.families import backrest
 from kernels.types import Array
 from sweep.families.base import Angles, Columns, Family, Interval, Output, Parameter
 from sweep.families.capabilities import Fixed, Link, Made, Skeleton
-from sweep.families.poses import guarded
+from sweep.families.poses import chosen, guarded
 from sweep.families.skeletons import ORIGIN, parameter, standing
 
 FRAME = (
@@ -139,7 +139,7 @@ def solved(matrix: Array, modes: np.ndarray, angles: Angles, wanted: frozenset[s
             found |= dict(zip(group, block, strict=True))
     if DRIFT.name in wanted:
         found[DRIFT.name] = found["K_couple"] - matrix[:, _COLUMNS.index("K0"), None]
-    return {name: x for name, x in found.items() if name in wanted} | {"status": status}
+    return chosen(found, wanted, status)
 
 
 def mode_of(mode: backrest.Mode, designs: Array) -> np.ndarray:

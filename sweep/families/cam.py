@@ -15,7 +15,7 @@ from sweep.families.curve_features import Switches
 from sweep.families.outputs import coordinate_outputs, ladders
 from sweep.families.planar_trees import sliding_follower, swinging_follower
 from sweep.families.poses import poses_of
-from sweep.families.skeletons import ORIGIN, X, line, links, parameter, standing
+from sweep.families.skeletons import ORIGIN, X, dimensions, line, links, parameter, standing
 
 PHASES = (
     Parameter("rise", "angle", "cam angle of the rise", positive=True, default=0.5 * np.pi),
@@ -62,7 +62,7 @@ def with_kinks(outputs: tuple[Output, ...]) -> tuple[Output, ...]:
 
 def phase_ends(designs: Array) -> Array:
     """Cam angles at which a phase, or a piece of the modified sine, ends; of a Fourier table 0 (n, 8)."""
-    rise, dwell, fall, start, kind = (parameter(PARAMETERS, name, designs)[:, None] for name in _LAW)
+    rise, dwell, fall, start, kind = dimensions(PARAMETERS, designs, *_LAW)
     shares = np.array([0.0, 0.125, 0.875, 1.0])
     ends = np.concatenate([start + rise * shares, start + rise + dwell + fall * shares], axis=1)
     return np.where(kind == cam.FOURIER, 0.0, ends)
@@ -77,7 +77,7 @@ def poses(designs: Array, angles: Angles, wanted: frozenset[str]) -> Columns:
     found = _profile(designs, angles, wanted | ({"s"} if of_roller else set()))
     if of_roller:
         s: Any = found["s"] if "s" in wanted else found.pop("s")
-        r0, e = (parameter(PARAMETERS, name, designs)[:, None] for name in ("r0", "e"))
+        r0, e = dimensions(PARAMETERS, designs, "r0", "e")
         with np.errstate(invalid="ignore"):  # an offset beyond the prime circle has its status
             places = {"x_r": np.sqrt((r0 - e) * (r0 + e)) + s, "y_r": -e + 0.0 * s}
         found |= {name: places[name] for name in of_roller}
@@ -134,7 +134,7 @@ lever_poses = poses_of(cam.lever_poses, cam.LeverOutputs, angles="phi")
 def roller(designs: Array, angles: Angles, motion: Columns) -> Array:
     """Return the roller's centre in the fixed frame, (n, m, 3)."""
     psi = np.asarray(motion["psi"], np.float64)
-    e, c = (parameter(LEVER_PARAMETERS, name, designs)[:, None] for name in ("e", "c"))
+    e, c = dimensions(LEVER_PARAMETERS, designs, "e", "c")
     return np.stack([e + c * np.cos(psi), c * np.sin(psi), np.zeros_like(psi)], axis=-1)
 
 

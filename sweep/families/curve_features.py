@@ -23,6 +23,7 @@ from sweep.numerics.curves import PER_GAP
 NARROWEST = 1e-9  # angles [rad] that are nearer to each other are one
 
 T = TypeVar("T")
+Feature = TypeVar("Feature", "Waves", "Switches", "Singular")
 SingularCurve: TypeAlias = Callable[[Array, Angles], Array]
 
 
@@ -118,10 +119,15 @@ class Smooth:
     parts: tuple[str, ...]
 
 
+def _about(family: Family, kind: type[Feature], outputs: Collection[str]) -> list[Feature]:
+    """Return what a family says of that kind about one of some pose outputs, or about all."""
+    return [known for known in family.every(kind) if known.of is None or not known.of.isdisjoint(outputs)]
+
+
 def waves(family: Family, designs: Array, outputs: Collection[str]) -> Array:
     """How many waves of some pose outputs one turn holds at least, (n,)."""
     most = np.ones(len(designs))
-    for fast in (known for known in family.every(Waves) if known.of is None or not known.of.isdisjoint(outputs)):
+    for fast in _about(family, Waves, outputs):
         count = np.abs(fast.count(designs))
         most = np.fmax(most, np.where(np.isfinite(count), count, 1.0))
     return most
@@ -129,7 +135,7 @@ def waves(family: Family, designs: Array, outputs: Collection[str]) -> Array:
 
 def switching(family: Family, outputs: Collection[str]) -> list[Switches]:
     """Return what tells at which crank angles one of some pose outputs switches."""
-    return [known for known in family.every(Switches) if known.of is None or not known.of.isdisjoint(outputs)]
+    return _about(family, Switches, outputs)
 
 
 def switches(family: Family, designs: Array, outputs: Collection[str]) -> Array:
@@ -166,9 +172,9 @@ def bends(family: Family, output: str) -> tuple[Bends, ...]:
     return tuple(known for known in family.every(Bends) if output in known.of)
 
 
-def singular(family: Family, outputs: Collection[str]) -> tuple[Singular, ...]:
+def singular(family: Family, outputs: Collection[str]) -> list[Singular]:
     """Return what tells where one of some pose outputs has a narrow peak, beside the discriminants."""
-    return tuple(known for known in family.every(Singular) if known.of is None or not known.of.isdisjoint(outputs))
+    return _about(family, Singular, outputs)
 
 
 def singular_curves(family: Family, outputs: Collection[str]) -> Sequence[SingularCurve]:

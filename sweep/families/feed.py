@@ -20,10 +20,10 @@ from sweep.families.capabilities import Arm, Dimensions, Link, Made, Skeleton
 from sweep.families.curve_features import Singular
 from sweep.families.feed_trees import three_leads, two_leads
 from sweep.families.outputs import joint_outputs, ladders
-from sweep.families.poses import filled_all
+from sweep.families.poses import chosen, filled_all
 from sweep.families.rssr import FAMILY as CRANK_ROCKER
 from sweep.families.sites import AXES
-from sweep.families.skeletons import COUPLER, CRANK, crank_axis, links, parameter, standing
+from sweep.families.skeletons import COUPLER, CRANK, crank_axis, dimensions, links, parameter, standing
 
 ROCKER = (
     Parameter("h_a", "length", "horizontal chain: crank", positive=True),
@@ -146,7 +146,7 @@ CHAIN_LINKS = (CRANK, COUPLER, Link("rocker", ("d", "c", "h")))
 def lift_loop(designs: Array, angles: Angles, found: Columns) -> Array:
     """Return Heron's product of the triangle H, E, F, (n, m): 16 times its squared area."""
     x_h, y_h, x_e, y_e = (np.asarray(found[name], np.float64) for name in ("x_h", "y_h", "x_e", "y_e"))
-    q, fx, fy = (parameter(PARAMETERS, name, designs)[:, None] for name in ("q", "fx", "fy"))
+    q, fx, fy = dimensions(PARAMETERS, designs, "q", "fx", "fy")
     w, f = np.hypot(x_h - x_e, y_h - y_e), np.hypot(fx, fy)
     product: Array = ((w + f) - q) * ((w + f) + q) * (q - (w - f)) * (q + (w - f))
     return product
@@ -169,9 +169,7 @@ def events(designs: Array, wanted: frozenset[str], accuracy: Accuracy) -> Column
             + columns.pop("area_error"),
             "crossings": 0.0 * angle,
         }  # fmt: skip
-    for name, error in errors.items():
-        columns[f"err_{name}"] = error
-    return {name: x for name, x in columns.items() if name.removeprefix("err_") in wanted} | {"status": status}
+    return chosen(columns | {f"err_{name}": error for name, error in errors.items()}, wanted, status)
 
 
 EXAMPLE = {
@@ -255,14 +253,10 @@ TRIAD_OUTPUTS = (
 triad_poses = partial(_poses, feed.triad_poses, triad.OUTPUTS, ("phi",))
 
 
-def _columns(designs: Array, *names: str) -> list[Array]:
-    return [parameter(TRIAD_PARAMETERS, name, designs)[:, None] for name in names]
-
-
 def rocker_pin(designs: Array, angles: Angles, found: Columns) -> Array:
     """Return H, on the arm of the horizontal chain's rocker."""
     (psi,) = _of_chain(TRIAD_PARAMETERS, designs, angles, "psi")
-    e, arm, ahead = _columns(designs, "h_e", "rh", "dh")
+    e, arm, ahead = dimensions(TRIAD_PARAMETERS, designs, "h_e", "rh", "dh")
     return np.stack([e + arm * np.cos(psi + ahead), arm * np.sin(psi + ahead), 0.0 * psi], axis=-1)
 
 
@@ -270,7 +264,9 @@ def eccentric(number: int) -> Made:
     """Centre of an eccentric."""
 
     def at(designs: Array, angles: Angles, found: Columns) -> Array:
-        x, y, radius, ahead = _columns(designs, *(f"{name}{number}" for name in ("xE", "yE", "rE", "dE")))
+        x, y, radius, ahead = dimensions(
+            TRIAD_PARAMETERS, designs, *(f"{name}{number}" for name in ("xE", "yE", "rE", "dE"))
+        )
         turn = angles.phi + ahead
         return np.stack([x + radius * np.cos(turn), y + radius * np.sin(turn), 0.0 * turn], axis=-1)
 
@@ -282,7 +278,7 @@ def rack_joint(number: int) -> Made:
 
     def at(designs: Array, angles: Angles, found: Columns) -> Array:
         x, y, chi = (np.asarray(found[name], np.float64) for name in ("x_t", "y_t", "chi"))
-        along, across = _columns(designs, f"f{number}x", f"f{number}y")
+        along, across = dimensions(TRIAD_PARAMETERS, designs, f"f{number}x", f"f{number}y")
         cos, sin = np.cos(chi), np.sin(chi)
         return np.stack([x + along * cos - across * sin, y + along * sin + across * cos, 0.0 * chi], axis=-1)
 

@@ -11,7 +11,7 @@ from sweep.families.base import Angles, Columns, Parameter
 from sweep.families.link_tree import LinkBody, LinkJoint, LinkTree, Path
 from sweep.families.planar_trees import at_origin
 from sweep.families.rssr import FAMILY as CRANK_ROCKER
-from sweep.families.skeletons import parameter
+from sweep.families.skeletons import dimensions
 
 Parameters = tuple[Parameter, ...]
 _SPIN = ("psi", "dpsi", "d2psi")
@@ -31,36 +31,31 @@ _FREEDOMS = ((CRANK, DRIVEN), (COUPLER, TURN), (COUPLER, TURN), (ROCKER, TURN))
 _ENDS = ((COUPLER, ROCKER),) * 3
 
 
-def _get(parameters: Parameters, designs: Array, *names: str) -> list[Array]:
-    return [parameter(parameters, name, designs)[:, None] for name in names]
-
-
 def _horizontal(parameters: Parameters, designs: Array, angles: Angles, links: Links) -> Path:
     """Write crank, coupler and rocker; return the pin H of the rack on the rocker's arm."""
-    shape = (len(designs), links.bodies.shape[1])
-    a, c, e, f, g, alpha, arm, ahead, sigma = _get(
+    a, c, e, f, g, alpha, arm, ahead, sigma = dimensions(
         parameters, designs, "h_a", "h_c", "h_e", "h_f", "h_g", "h_alpha", "rh", "dh", "h_sigma"
     )
     chain = np.column_stack([designs[:, :7], sigma[:, 0]])
     psi = poses.turning(CRANK_ROCKER.poses(chain, angles, frozenset(_SPIN)), *_SPIN)
-    centre = poses.standing_at(shape, 0.0, f * np.sin(alpha), f * np.cos(alpha))
-    crank = Path(*(np.broadcast_to(x, (*shape, 3)) for x in poses.crank_arm(angles, alpha, a)))
+    centre = poses.standing_at(links, 0.0, f * np.sin(alpha), f * np.cos(alpha))
+    crank = poses.crank_arm(links, angles, alpha, a)
     poses.put_crank(links, CRANK, 0, centre, crank)
-    pivot = poses.standing_at(shape, e, 0.0, g)
+    pivot = poses.standing_at(links, e, 0.0, g)
     ball = pivot.plus(psi.arm(c))
     poses.put_between(links, COUPLER, centre.plus(crank), ball)
-    links.axes[:, :, 1:3] = links.bodies[:, :, COUPLER, 18:24].reshape(*shape, 2, 3)
+    links.axes[:, :, 1:3] = links.bodies[:, :, COUPLER, 18:24].reshape(*links.bodies.shape[:2], 2, 3)
     poses.put_about(links, ROCKER, pivot, psi)
     poses.turn_about_z(links, 3)
     poses.put_ball(links, 0, ball.at)
-    return poses.standing_at(shape, e, 0.0, 0.0).plus(psi.arm(arm * np.cos(ahead), arm * np.sin(ahead)))
+    return poses.standing_at(links, e).plus(psi.arm(arm * np.cos(ahead), arm * np.sin(ahead)))
 
 
 def _eccentric(parameters: Parameters, designs: Array, angles: Angles, links: Links, body: int, which: str) -> Path:
     """Write an eccentric, whose freedom has the number after that of the body; return its centre."""
-    x, y, radius, ahead = _get(parameters, designs, *(f"{name}{which}" for name in ("xE", "yE", "rE", "dE")))
-    turned = poses.crank_angle(angles, len(designs), ahead=ahead)
-    centre = poses.standing_at((len(designs), links.bodies.shape[1]), x, y, 0.0)
+    x, y, radius, ahead = dimensions(parameters, designs, *(f"{name}{which}" for name in ("xE", "yE", "rE", "dE")))
+    turned = poses.crank_angle(links, angles, ahead=ahead)
+    centre = poses.standing_at(links, x, y)
     poses.put_about(links, body, centre, turned)
     poses.turn_about_z(links, body + 1)
     return centre.plus(turned.arm(radius))
@@ -77,14 +72,14 @@ def two_leads(parameters: Parameters) -> LinkTree:
     """Rack on the pin of the rocker and the coupler of the lift eccentric; a tool stands at the tooth."""
 
     def at_tooth(designs: Array) -> Array:
-        tx, ty, number, pitch = _get(parameters, designs, "tx", "ty", "tooth", "pitch")
+        tx, ty, number, pitch = dimensions(parameters, designs, "tx", "ty", "tooth", "pitch")
         return np.column_stack([tx + number * pitch, ty, 0.0 * ty])
 
     def fill(designs: Array, angles: Angles, motion: Columns, links: Links) -> None:
         h = _horizontal(parameters, designs, angles, links)
         e = _eccentric(parameters, designs, angles, links, ECCENTRIC, "")
         chi = poses.turning(motion, "chi", "dchi", "d2chi")
-        f = h.plus(chi.arm(*_get(parameters, designs, "fx", "fy")))
+        f = h.plus(chi.arm(*dimensions(parameters, designs, "fx", "fy")))
         poses.put_between(links, 4, e, f)
         poses.put_about(links, 5, h, chi)
         poses.turn_about_z(links, 5, 6)
@@ -134,7 +129,7 @@ def three_leads(parameters: Parameters) -> LinkTree:
         starts += [_eccentric(parameters, designs, angles, links, ECCENTRIC + k, str(2 + k)) for k in (0, 1)]
         tooth = _tooth(motion)
         chi = poses.turning(motion, "chi", "dchi", "d2chi")
-        ends = [tooth.plus(chi.arm(*_get(parameters, designs, f"f{k}x", f"f{k}y"))) for k in (1, 2, 3)]
+        ends = [tooth.plus(chi.arm(*dimensions(parameters, designs, f"f{k}x", f"f{k}y"))) for k in (1, 2, 3)]
         for k in (0, 1, 2):
             poses.put_between(links, links_from + k, starts[k], ends[k])
         # the rack hangs on link 1, its tooth is the origin of its axes

@@ -18,7 +18,7 @@ from kernels.types import Array
 from sweep.families import feed
 from sweep.families.base import Accuracy, Angles, Columns, Family, March, Output, Parameter, Step, Work
 from sweep.families.capabilities import Fixed, Link, Made, PresserFoot, Skeleton
-from sweep.families.poses import guarded
+from sweep.families.poses import chosen, guarded
 from sweep.families.skeletons import Y as UPWARDS
 from sweep.families.skeletons import parameter, standing
 
@@ -112,13 +112,12 @@ def nodes_for(poses: int) -> tuple[int, int]:
     return poses * apart, apart
 
 
-def chosen(columns: Columns, wanted: frozenset[str]) -> Columns:
+def happening(columns: Columns, wanted: frozenset[str]) -> Columns:
     """Wanted columns and the status: NO_EVENT where one of them is about an event that does not happen."""
-    found = {name: x for name, x in columns.items() if name in wanted}
     status = np.array(columns["status"], np.uint8)
-    for values in found.values():
-        status[(status == OK) & np.isnan(values)] = NO_EVENT
-    return found | {"status": status}
+    for name in wanted:
+        status[(status == OK) & np.isnan(columns[name])] = NO_EVENT
+    return chosen(columns, wanted, status)
 
 
 def pose_columns(designs: Array, path: Array, heights: Array, forces: Array, apart: int) -> Columns:
@@ -159,7 +158,7 @@ def _poses(
     columns, path, heights, forces = run(designs, nodes)
     found = pose_columns(designs[:, feet], path, heights, forces, apart)
     status = np.repeat(np.asarray(columns["status"], np.uint8)[:, None], angles.phi.shape[1], axis=1)
-    return {name: x for name, x in found.items() if name in wanted} | {"status": status}
+    return chosen(found, wanted, status)
 
 
 def closed(designs: Array, wanted: frozenset[str], accuracy: Accuracy) -> Columns:
@@ -167,14 +166,14 @@ def closed(designs: Array, wanted: frozenset[str], accuracy: Accuracy) -> Column
     status, values = np.empty(len(designs), np.uint8), np.empty((len(_CLOSED), len(designs)))
     foot.closed_forms(designs, status, values)
     columns: Columns = dict(zip(_CLOSED, values, strict=True))
-    return chosen(columns | {"status": status}, wanted)
+    return happening(columns | {"status": status}, wanted)
 
 
 def _events(
     run: Callable[[Array, int], Marched], designs: Array, wanted: frozenset[str], accuracy: Accuracy
 ) -> Columns:
     """Find loss of contact, landing, impacts and what they cost, of the last turn marched."""
-    return chosen(run(designs, NODES)[0], wanted)
+    return happening(run(designs, NODES)[0], wanted)
 
 
 def foot_place(designs: Array, angles: Angles, found: Columns) -> Array:
@@ -262,7 +261,7 @@ def contact(designs: Array, wanted: frozenset[str], accuracy: Accuracy) -> Colum
     with np.errstate(all="ignore"):
         springs = np.where(rising, (-unit[:, None] * path[:, 2] - preload[:, None]) / height, 0.0)
     softest = np.where(known & (preload >= least), np.maximum(springs.max(axis=1), 0.0), np.nan)
-    return chosen({"k_min_contact": softest, "F0_min_contact": least, "status": status}, wanted)
+    return happening({"k_min_contact": softest, "F0_min_contact": least, "status": status}, wanted)
 
 
 def feeding(designs: Array, wanted: frozenset[str], accuracy: Accuracy) -> Columns:

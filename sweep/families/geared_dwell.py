@@ -15,8 +15,8 @@ from sweep.families.capabilities import Link, Made, OutputLink, Skeleton, consta
 from sweep.families.curve_features import Singular, Waves
 from sweep.families.outputs import coordinate_outputs, ladders
 from sweep.families.planar_trees import rolling_planet
-from sweep.families.poses import filled_each, poses_of
-from sweep.families.skeletons import ORIGIN, parameter, standing
+from sweep.families.poses import chosen, filled_each, poses_of
+from sweep.families.skeletons import ORIGIN, dimensions, parameter, standing
 
 PARAMETERS = (
     Parameter("k", "ratio", "distance of the pin from the planet centre, in planet radii", positive=True),
@@ -135,8 +135,8 @@ def skeleton(parameters: tuple[Parameter, ...]) -> Skeleton:
     whole = "n" in [p.name for p in parameters]
 
     def centre(designs: Array, angles: Angles, motion: Columns) -> Array:
-        a, one = parameter(parameters, "a", designs)[:, None], np.ones((len(designs), 1))
-        n, mesh = (parameter(parameters, name, designs)[:, None] if whole else one for name in ("n", "mesh"))
+        (a,) = dimensions(parameters, designs, "a")
+        n, mesh = dimensions(parameters, designs, "n", "mesh") if whole else (np.ones_like(a), np.ones_like(a))
         x = a + (n + mesh) * angles.cos
         return np.stack([x, (n + mesh) * angles.sin, np.zeros_like(x)], axis=-1)
 
@@ -196,8 +196,7 @@ def epicyclic_measures(designs: Array, wanted: frozenset[str], accuracy: Accurac
     n = len(designs)
     status, values = np.empty(n, np.uint8), [np.empty(n) for _ in EPICYCLIC_DWELL]
     epicyclic_dwell.dwell_measures(designs, status, *values)
-    columns: Columns = {o.name: x for o, x in zip(EPICYCLIC_DWELL, values, strict=True) if o.name in wanted}
-    return columns | {"status": status}
+    return chosen({o.name: x for o, x in zip(EPICYCLIC_DWELL, values, strict=True)}, wanted, status)
 
 
 def planet_turns(designs: Array) -> Array:

@@ -25,19 +25,13 @@ def crank_rocker(points: Mapping[str, Array]) -> FittedPose:
     """Dimensions of a spatial crank-rocker from A, axis_A, B, C, D, axis_D."""
     a, b, c, d, u, z = (points[name] for name in ("A", "B", "C", "D", "axis_A", "axis_D"))
     small = NOTHING * size(points)
-    across = np.cross(z, u)
-    sine = float(np.linalg.norm(across))
-    if sine > PARALLEL:
-        x = across / sine
-        x = -x if float((d - a) @ x) < -small else x
+    x, e, crossed = _common_perpendicular(d - a, u, z, small)
+    y = np.cross(z, x)
+    if crossed:
         sin, cos = float(np.cross(u, z) @ x), float(u @ z)
-        y = np.cross(z, x)
         f = -float((d - a) @ y) / sin
     else:
-        x, sin, cos, f = _square(d - a, z, small), 0.0, math.copysign(1.0, float(u @ z)), 0.0
-        y = np.cross(z, x)
-    e = float((d - a) @ x)
-    e = 0.0 if abs(e) <= small else e
+        sin, cos, f = 0.0, math.copysign(1.0, float(u @ z)), 0.0
     crank, rocker, coupler = b - a, c - d, c - b
     phi = math.atan2(float(crank @ np.cross(u, x)), float(crank @ x))
     psi = math.atan2(float(rocker @ y), float(rocker @ x))
@@ -56,24 +50,16 @@ def slider_crank(points: Mapping[str, Array]) -> FittedPose:
     a, b, c, u, y = (points[name] for name in ("A", "B", "C", "axis_A", "axis_D"))
     d = points.get("D", c)
     small = NOTHING * size(points)
-    across = np.cross(y, u)
-    cosine = float(np.linalg.norm(across))
-    if cosine > PARALLEL:
-        x = across / cosine
-        x = -x if float((d - a) @ x) < -small else x
-        z = np.cross(x, y)
-        f = -float((d - a) @ z) / float(u @ z)
-    else:
-        x, f = _square(d - a, y, small), 0.0
-        z = np.cross(x, y)
-    e = float((d - a) @ x)
+    x, e, crossed = _common_perpendicular(d - a, u, y, small)
+    z = np.cross(x, y)
+    f = -float((d - a) @ z) / float(u @ z) if crossed else 0.0
     crank, coupler = b - a, c - b
     lengths = {
         "a": _length(crank - (crank @ u) * u, small, "B", "a point off the crank axis"),
         "b": _length(coupler, small, "C", "another point than B"),
     }
-    alpha = math.atan2(float(u @ y), float(u @ z) if cosine > PARALLEL else 0.0)
-    offsets = {"e": 0.0 if abs(e) <= small else e, "f": f, "alpha": alpha}
+    alpha = math.atan2(float(u @ y), float(u @ z) if crossed else 0.0)
+    offsets = {"e": e, "f": f, "alpha": alpha}
     phi = math.atan2(float(crank @ np.cross(u, x)), float(crank @ x))
     return FittedPose(lengths | offsets | {"branch": _sign(float(coupler @ y), small, "C")}, phi, a - f * u, z, x)
 
@@ -131,6 +117,20 @@ def size(points: Mapping[str, Array]) -> float:
     """Largest extent of the points."""
     places = np.array([point for name, point in points.items() if not name.startswith("axis_")])
     return float(np.ptp(places, axis=0).max())
+
+
+def _common_perpendicular(way: Array, first: Array, second: Array, small: float) -> tuple[Array, float, bool]:
+    """Direction and length of the common perpendicular of two axes, and whether they are not parallel.
+
+    ``way`` leads from a point of the first axis to one of the second.
+    """
+    across = np.cross(second, first)
+    sine = float(np.linalg.norm(across))
+    crossed = sine > PARALLEL
+    x = across / sine if crossed else _square(way, second, small)
+    x = -x if float(way @ x) < -small else x
+    length = float(way @ x)
+    return x, 0.0 if abs(length) <= small else length, crossed
 
 
 def _square(vector: Array, axis: Array, small: float) -> Array:

@@ -18,7 +18,7 @@ from sweep.families import capabilities as can
 from sweep.families import rssr as crank_rocker
 from sweep.families.base import Accuracy, Angles, Columns, Family, Output, Parameter, PoseFunction, Step
 from sweep.families.outputs import coordinate_outputs, joint_outputs, ladders
-from sweep.families.poses import step_of
+from sweep.families.poses import chosen, step_of
 from sweep.families.skeletons import CRANK_ROCKER, Y, links, standing
 
 PARAMETERS = (
@@ -129,11 +129,10 @@ def swing(designs: Array, wanted: frozenset[str], accuracy: Accuracy) -> Columns
         "alpha_at_phipi": [np.where(first, x[:, fold], x[:, ext]) for x in (values, errors)],
         "swing": [np.abs(values[:, whole]), errors[:, whole]],
     }
-    columns: Columns = {"status": status}
-    for name, (value, error) in found.items():
-        if name in wanted:
-            columns |= {name: value, f"err_{name}": error} if accuracy.target is not None else {name: value}
-    return columns
+    columns = {name: value for name, (value, _) in found.items()}
+    if accuracy.target is not None:
+        columns |= {f"err_{name}": error for name, (_, error) in found.items()}
+    return chosen(columns, wanted, status)
 
 
 FAMILY = Family(

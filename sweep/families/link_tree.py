@@ -142,9 +142,9 @@ def _stacked(x: Array, y: Array) -> Array:
     return np.stack([x, y, np.zeros_like(x + y)], axis=-1)
 
 
-def crank_angle(angles: Angles, n: int, per: Array | float = 1.0, ahead: Array | float = 0.0) -> Turning:
-    """Return ``per`` times the crank angle plus ``ahead``, (n, 1) each, for n designs."""
-    phi = np.broadcast_to(np.arctan2(angles.sin, angles.cos), (n, angles.cos.shape[1]))
+def crank_angle(links: Links, angles: Angles, per: Array | float = 1.0, ahead: Array | float = 0.0) -> Turning:
+    """Return ``per`` times the crank angle plus ``ahead``, (n, 1) each, at every pose of the bodies."""
+    phi = np.broadcast_to(np.arctan2(angles.sin, angles.cos), links.bodies.shape[:2])
     return Turning(per * phi + ahead, np.ones_like(phi) * per, np.zeros_like(phi))
 
 
@@ -158,19 +158,21 @@ def sliding(motion: Columns, names: tuple[str, str, str], way: tuple[float, floa
     return Path(*(np.asarray(motion[name], np.float64)[..., None] * np.array(way) for name in names))
 
 
-def standing_at(shape: tuple[int, int], *coordinates: Array | float) -> Path:
-    """Return a fixed point, from coordinates that are numbers or (n, 1)."""
-    at = np.stack([np.broadcast_to(np.asarray(x, np.float64), shape) for x in coordinates], axis=-1)
+def standing_at(links: Links, x: Array | float = 0.0, y: Array | float = 0.0, z: Array | float = 0.0) -> Path:
+    """Return a fixed point at every pose of the bodies, from coordinates that are numbers or (n, 1)."""
+    shape = links.bodies.shape[:2]
+    at = np.stack([np.broadcast_to(np.asarray(part, np.float64), shape) for part in (x, y, z)], axis=-1)
     return Path(at, np.zeros_like(at), np.zeros_like(at))
 
 
-def crank_arm(angles: Angles, alpha: Array, length: Array) -> Path:
+def crank_arm(links: Links, angles: Angles, alpha: Array, length: Array) -> Path:
     """Return the arm of a crank about the axis (0, sin alpha, cos alpha), from X; ``alpha`` and ``length`` (n, 1)."""
     second = np.stack([0.0 * alpha, np.cos(alpha), -np.sin(alpha)], axis=-1)
     first, length = np.array([1.0, 0.0, 0.0]), length[..., None]
     cos, sin = angles.cos[..., None], angles.sin[..., None]
     at = length * (cos * first + sin * second)
-    return Path(at, length * (cos * second - sin * first), -at)
+    path = at, length * (cos * second - sin * first), -at
+    return Path(*(np.broadcast_to(part, (*links.bodies.shape[:2], 3)) for part in path))
 
 
 def put_about(links: Links, body: int, at: Path, turned: Turning) -> None:

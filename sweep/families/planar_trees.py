@@ -16,19 +16,18 @@ from kernels.types import Array
 from sweep.families import link_tree as poses
 from sweep.families.base import Angles, Columns, Parameter
 from sweep.families.link_tree import LinkBody, LinkFill, LinkJoint, LinkTree, Path, Turning
-from sweep.families.skeletons import X, Y, Z, parameter
+from sweep.families.skeletons import X, Y, Z, dimensions, parameter
 
 Parameters = tuple[Parameter, ...]
 _PSI, _CHI = ("psi", "dpsi", "d2psi"), ("chi", "dchi", "d2chi")
 
 
+_GUIDE = LinkJoint("d", "guide of the follower", "sleeve", "frame on the follower", body=1, freedom=1)
+
+
 def at_origin(designs: Array) -> Array:
     """Place of a tool at the origin of its body, (n, 3)."""
     return np.zeros((len(designs), 3))
-
-
-def _column(parameters: Parameters, designs: Array, name: str) -> Array:
-    return parameter(parameters, name, designs)[:, None]
 
 
 def _cam_body(text: str = "cam") -> LinkBody:
@@ -41,7 +40,7 @@ def _bearing(text: str) -> LinkJoint:
 
 def _put_cam(angles: Angles, links: Links, at: Path) -> None:
     """Write a cam on the driven shaft, at the angle of that."""
-    poses.put_about(links, 0, at, poses.crank_angle(angles, len(links.bodies)))
+    poses.put_about(links, 0, at, poses.crank_angle(links, angles))
     poses.turn_about_z(links, 0)
 
 
@@ -49,12 +48,11 @@ def slotted_rocker(parameters: Parameters) -> LinkTree:
     """Crank, rocker with a slot, and the block in it that turns on the crank pin."""
 
     def fill(designs: Array, angles: Angles, motion: Columns, links: Links) -> None:
-        shape = (len(designs), links.bodies.shape[1])
-        a, e, h = (_column(parameters, designs, name) for name in ("a", "e", "h"))
+        a, e, h = dimensions(parameters, designs, "a", "e", "h")
         turned = poses.turning(motion, *_PSI)
-        crank = poses.crank_angle(angles, shape[0])
-        poses.put_about(links, 0, poses.standing_at(shape, 0.0, 0.0, 0.0), crank)
-        poses.put_about(links, 1, poses.standing_at(shape, e, 0.0, 0.0), turned)
+        crank = poses.crank_angle(links, angles)
+        poses.put_about(links, 0, poses.standing_at(links), crank)
+        poses.put_about(links, 1, poses.standing_at(links, e), turned)
         pin = crank.arm(a)
         poses.put_about(links, 2, pin, turned)
         poses.turn_about_z(links, 0, 1)
@@ -94,16 +92,15 @@ def rolling_planet(parameters: Parameters) -> LinkTree:
     whole = "n" in [p.name for p in parameters]
 
     def fill(designs: Array, angles: Angles, motion: Columns, links: Links) -> None:
-        shape = (len(designs), links.bodies.shape[1])
-        k, a = (_column(parameters, designs, name) for name in ("k", "a"))
-        n, mesh = (_column(parameters, designs, name) if whole else np.ones_like(k) for name in ("n", "mesh"))
-        turned, carrier = poses.turning(motion, *_PSI), poses.crank_angle(angles, shape[0])
-        axis = poses.standing_at(shape, a, 0.0, 0.0)
+        k, a = dimensions(parameters, designs, "k", "a")
+        n, mesh = dimensions(parameters, designs, "n", "mesh") if whole else (np.ones_like(k), np.ones_like(k))
+        turned, carrier = poses.turning(motion, *_PSI), poses.crank_angle(links, angles)
+        axis = poses.standing_at(links, a)
         poses.put_about(links, 0, axis, carrier)
         centre = axis.plus(carrier.arm(n + mesh))
-        planet = poses.crank_angle(angles, shape[0], mesh * (n + mesh), np.where(mesh > 0.0, np.pi, 0.0))
+        planet = poses.crank_angle(links, angles, mesh * (n + mesh), np.where(mesh > 0.0, np.pi, 0.0))
         poses.put_about(links, 1, centre, planet)
-        poses.put_about(links, 2, poses.standing_at(shape, 0.0, 0.0, 0.0), turned)
+        poses.put_about(links, 2, poses.standing_at(links), turned)
         poses.turn_about_z(links, 0, 1, 2)
         ray = carrier.arm(np.ones_like(a)).at
         poses.put_line(links, 0, axis.at + n[..., None] * ray, np.cross(Z, ray))
@@ -161,29 +158,26 @@ def sliding_follower(parameters: Parameters) -> LinkTree:
     """Cam and the follower that its roller lifts along x."""
 
     def fill(designs: Array, angles: Angles, motion: Columns, links: Links) -> None:
-        shape = (len(designs), links.bodies.shape[1])
-        r0, e = (_column(parameters, designs, name) for name in ("r0", "e"))
-        foot = poses.standing_at(shape, np.sqrt(r0 * r0 - e * e), -e, 0.0)
+        r0, e = dimensions(parameters, designs, "r0", "e")
+        foot = poses.standing_at(links, np.sqrt(r0 * r0 - e * e), -e)
         roller = foot.plus(poses.sliding(motion, ("s", "ds", "d2s"), X))
-        _put_cam(angles, links, poses.standing_at(shape, 0.0, 0.0, 0.0))
+        _put_cam(angles, links, poses.standing_at(links))
         poses.put_shifted(links, 1, roller)
         links.axes[:, :, 1] = X
         poses.put_line(links, 0, roller.at, np.cross(Z, roller.v - np.cross(Z, roller.at)))
 
     follower = LinkBody("follower", "along the lift, to the left of it, along the cam's axis, from the roller")
-    guide = LinkJoint("d", "guide of the follower", "sleeve", "frame on the follower", body=1, freedom=1)
-    return _cam_and(follower, guide, SLIDE, ("s", "ds", "d2s"), fill)
+    return _cam_and(follower, _GUIDE, SLIDE, ("s", "ds", "d2s"), fill)
 
 
 def swinging_follower(parameters: Parameters) -> LinkTree:
     """Cam and the lever that its roller swings."""
 
     def fill(designs: Array, angles: Angles, motion: Columns, links: Links) -> None:
-        shape = (len(designs), links.bodies.shape[1])
-        c, e = (_column(parameters, designs, name) for name in ("c", "e"))
-        turned, pivot = poses.turning(motion, *_PSI), poses.standing_at(shape, e, 0.0, 0.0)
+        c, e = dimensions(parameters, designs, "c", "e")
+        turned, pivot = poses.turning(motion, *_PSI), poses.standing_at(links, e)
         roller = pivot.plus(turned.arm(c))
-        _put_cam(angles, links, poses.standing_at(shape, 0.0, 0.0, 0.0))
+        _put_cam(angles, links, poses.standing_at(links))
         poses.put_about(links, 1, pivot, turned)
         poses.turn_about_z(links, 1)
         poses.put_line(links, 0, roller.at, np.cross(Z, roller.v - np.cross(Z, roller.at)))
@@ -197,10 +191,9 @@ def thread_follower(parameters: Parameters, cam_axis: Callable[[Array], Array]) 
     """Cam of a thread take-up and the follower that it pushes along y into the thread; that pulls as a tool's force."""
 
     def fill(designs: Array, angles: Angles, motion: Columns, links: Links) -> None:
-        shape = (len(designs), links.bodies.shape[1])
         axis = cam_axis(designs)
-        centre = poses.standing_at(shape, axis[:, [0]], axis[:, [1]], axis[:, [2]])
-        foot = poses.standing_at(shape, _column(parameters, designs, "e"), 0.0, 0.0)
+        centre = poses.standing_at(links, axis[:, [0]], axis[:, [1]], axis[:, [2]])
+        foot = poses.standing_at(links, *dimensions(parameters, designs, "e"))
         end = foot.plus(poses.sliding(motion, ("S", "dS", "d2S"), Y))
         _put_cam(angles, links, centre)
         poses.put_shifted(links, 1, end)
@@ -208,15 +201,14 @@ def thread_follower(parameters: Parameters, cam_axis: Callable[[Array], Array]) 
         poses.put_line(links, 0, end.at, np.cross(Z, end.v - np.cross(Z, end.at - centre.at)))
 
     follower = LinkBody("follower", "along x, along its way, along the cam's axis, from its end")
-    guide = LinkJoint("d", "guide of the follower", "sleeve", "frame on the follower", body=1, freedom=1)
-    return _cam_and(follower, guide, SLIDE, ("S", "dS", "d2S"), fill)
+    return _cam_and(follower, _GUIDE, SLIDE, ("S", "dS", "d2S"), fill)
 
 
 def turning_cam(needs: tuple[str, ...]) -> LinkTree:
     """Cam alone, whose bare edge carries a thread."""
 
     def fill(designs: Array, angles: Angles, motion: Columns, links: Links) -> None:
-        _put_cam(angles, links, poses.standing_at((len(designs), links.bodies.shape[1]), 0.0, 0.0, 0.0))
+        _put_cam(angles, links, poses.standing_at(links))
 
     return LinkTree(
         (_cam_body(),), (_bearing("cam"),), (FRAME,), ((0, DRIVEN),), (), needs, fill, carrier=0, rubs=False
@@ -227,11 +219,9 @@ def eyelet_crank(parameters: Parameters) -> LinkTree:
     """Crank with an eyelet at its end, in which the thread pulls as a tool's force."""
 
     def fill(designs: Array, angles: Angles, motion: Columns, links: Links) -> None:
-        shape = (len(designs), links.bodies.shape[1])
-        a, f, alpha = (_column(parameters, designs, name) for name in ("a", "f", "alpha"))
-        centre = poses.standing_at(shape, 0.0, f * np.sin(alpha), f * np.cos(alpha))
-        arm = poses.crank_arm(angles, alpha, a)
-        poses.put_crank(links, 0, 0, centre, Path(*(np.broadcast_to(x, (*shape, 3)) for x in arm)))
+        a, f, alpha = dimensions(parameters, designs, "a", "f", "alpha")
+        centre = poses.standing_at(links, 0.0, f * np.sin(alpha), f * np.cos(alpha))
+        poses.put_crank(links, 0, 0, centre, poses.crank_arm(links, angles, alpha, a))
 
     body = LinkBody("crank", "along the crank, tangential, along its axis, from A")
     tip = partial(_on_crank, parameters)
@@ -250,15 +240,15 @@ def heddle_shaft(parameters: Parameters, line: Callable[[Array], tuple[Array, Ar
     """
 
     def fill(designs: Array, angles: Angles, motion: Columns, links: Links) -> None:
-        shape = (len(designs), links.bodies.shape[1])
-        get = partial(_column, parameters, designs)
-        lever, bell = poses.crank_angle(angles, shape[0]), poses.turning(motion, *_CHI)
-        o2, o3 = poses.standing_at(shape, 0.0, 0.0, 0.0), poses.standing_at(shape, get("O2O3"), 0.0, 0.0)
-        o4 = poses.standing_at(shape, get("O2O3") + get("O3O4"), 0.0, 0.0)
-        b, c = lever.arm(get("O2B")), o3.plus(bell.arm(get("O3C")))
+        lever, bell = poses.crank_angle(links, angles), poses.turning(motion, *_CHI)
+        first, second, o2b, o3c, o4e, rod, middle = dimensions(
+            parameters, designs, "O2O3", "O3O4", "O2B", "O3C", "O4E", "EG", "chi_mid"
+        )
+        o2, o3, o4 = (poses.standing_at(links, x) for x in (0.0, first, first + second))
+        b, c = lever.arm(o2b), o3.plus(bell.arm(o3c))
         lam = _shaft_lever(parameters, designs, motion)
         at = line(designs)[0]
-        shaft = poses.standing_at(shape, at[:, [0]], 0.0, 0.0).plus(poses.sliding(motion, ("y", "dy", "d2y"), Y))
+        shaft = poses.standing_at(links, at[:, [0]]).plus(poses.sliding(motion, ("y", "dy", "d2y"), Y))
         poses.put_about(links, 0, o2, lever)
         poses.put_between(links, 1, b, c)
         poses.put_about(links, 2, o3, bell)
@@ -267,9 +257,9 @@ def heddle_shaft(parameters: Parameters, line: Callable[[Array], tuple[Array, Ar
         poses.turn_about_z(links, 0, 1, 2, 3)
         links.axes[:, :, 4] = Y
         poses.put_pin(links, 0, c.at)
-        end = o4.plus(lam.arm(get("O4E"))).at
-        _put_link(parameters, designs, links, (o3.at, o4.at), (bell.angle - get("chi_mid"), lam.angle))
-        poses.put_line(links, 3, end, np.where((get("EG") > 0.0)[..., None], end - shaft.at, np.array(Y)))
+        end = o4.plus(lam.arm(o4e)).at
+        _put_link(parameters, designs, links, (o3.at, o4.at), (bell.angle - middle, lam.angle))
+        poses.put_line(links, 3, end, np.where((rod > 0.0)[..., None], end - shaft.at, np.array(Y)))
 
     return LinkTree(
         bodies=(
@@ -304,7 +294,7 @@ def heddle_shaft(parameters: Parameters, line: Callable[[Array], tuple[Array, Ar
 
 def _shaft_lever(parameters: Parameters, designs: Array, motion: Columns) -> Turning:
     """Return the turning of the shaft lever: of its rates the family gives those of the shaft, (7)."""
-    arm, heddle, slide = (_column(parameters, designs, name) for name in ("O4E", "EG", "x_s"))
+    arm, heddle, slide = dimensions(parameters, designs, "O4E", "EG", "x_s")
     lam, first, second = (np.asarray(motion[name], np.float64) for name in ("lam", "dy", "d2y"))
     x, y = arm * np.cos(lam), arm * np.sin(lam)
     z = np.where(heddle > 0.0, x - slide, 0.0)
@@ -320,9 +310,7 @@ def _put_link(
     parameters: Parameters, designs: Array, links: Links, pivots: tuple[Array, Array], angles: tuple[Array, Array]
 ) -> None:
     """Write the line of the link between bell crank and shaft lever, at their angles from mid-stroke."""
-    first, second, frame, arm, side = (
-        _column(parameters, designs, name) for name in ("O3D", "O4F", "O3O4", "O4E", "side_F")
-    )
+    first, second, frame, arm, side = dimensions(parameters, designs, "O3D", "O4F", "O3O4", "O4E", "side_F")
     bare = (first == 0.0) & (second == 0.0)
     ends = []
     for pivot, length, angle in zip(pivots, (first, second), angles, strict=True):

@@ -50,6 +50,11 @@ def guarded(poses: PoseFunction) -> PoseFunction:
     return safe
 
 
+def chosen(columns: Mapping[str, Any], wanted: frozenset[str], status: Status) -> Columns:
+    """Return the wanted ones of some outputs, their errors, and the status."""
+    return {name: x for name, x in columns.items() if name.removeprefix("err_") in wanted} | {"status": status}
+
+
 def filled_each(
     kernel: Callable[..., object], arguments: Sequence[object], names: tuple[str, ...], wanted: frozenset[str],
     status: Status,
@@ -68,7 +73,7 @@ def filled_all(
     """Call ``kernel(*arguments, status, out)``, which writes all its outputs, (k, n, m)."""
     out = np.empty((len(names), *status.shape), dtype)
     kernel(*arguments, status, out)
-    return {name: values for name, values in zip(names, out, strict=True) if name in wanted} | {"status": status}
+    return chosen(dict(zip(names, out, strict=True)), wanted, status)
 
 
 def poses_of(

@@ -18,7 +18,7 @@ from sweep.families import capabilities as can
 from sweep.families.base import Accuracy, Angles, Columns, Family, Output, Parameter, PoseFunction, Step
 from sweep.families.hardpoints import PLANAR_SLIDER_POINTS, SLIDER_CRANK_POINTS
 from sweep.families.outputs import coordinate_outputs, joint_outputs, ladders
-from sweep.families.poses import move_records, poses_of, step_of
+from sweep.families.poses import chosen, move_records, poses_of, step_of
 from sweep.families.skeletons import ORIGIN, SLIDER_CRANK, SLIDER_CRANK_SIZES, X, Y, crank_axis, squared, standing
 
 PARAMETERS = (
@@ -86,7 +86,7 @@ def margins(designs: Array, wanted: frozenset[str], accuracy: Accuracy) -> Colum
         "err_margin": err_square + 8.0 * EPS,
         "err_max_pressure_angle": err_angle,
     }
-    return _chosen(columns, wanted, status)
+    return chosen(columns, wanted, status)
 
 
 def limit_positions(designs: Array, wanted: frozenset[str], accuracy: Accuracy) -> Columns:
@@ -115,11 +115,7 @@ def limit_positions(designs: Array, wanted: frozenset[str], accuracy: Accuracy) 
         "err_stroke_ratio": err_phi0 * (1.0 + ratio) ** 2 / (2.0 * np.pi),
         "err_stroke": stroke * ((err_ext + err_fold) * (2.0 / between + ca / distances) + 16.0 * EPS),
     }
-    return _chosen(columns, wanted, status)
-
-
-def _chosen(columns: Columns, wanted: frozenset[str], status: NDArray[np.uint8]) -> Columns:
-    return {name: out for name, out in columns.items() if name.removeprefix("err_") in wanted} | {"status": status}
+    return chosen(columns, wanted, status)
 
 
 _JOINT_NEEDS = ("s", "ds", "d2s", "discriminant")

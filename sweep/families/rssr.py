@@ -14,7 +14,7 @@ from sweep.families import capabilities as can
 from sweep.families.base import Accuracy, Angles, Columns, Family, Output, Parameter, PoseFunction, Step, Work
 from sweep.families.hardpoints import CRANK_ROCKER_POINTS
 from sweep.families.outputs import coordinate_outputs, joint_outputs, ladders
-from sweep.families.poses import move_records, of_matrix, optional_outputs, poses_of, together
+from sweep.families.poses import chosen, move_records, of_matrix, optional_outputs, poses_of, together
 from sweep.families.provable import CRANK_ROCKER_BY_AXES, CRANK_ROCKER_BY_ROCKER
 from sweep.families.skeletons import CRANK_ROCKER, CRANK_ROCKER_SIZES, crank_axis, standing
 
@@ -158,20 +158,10 @@ def margin(designs: Array, wanted: frozenset[str], accuracy: Accuracy) -> Column
         needed |= {"margin", "rotatable"}
     least, turns, angle, error, angle_error = optional_outputs(names, frozenset(needed), (n,))
     rssr.margin(designs, status, least, turns, angle, None, error, angle_error)
-    columns: Columns = {"status": status}
-    if turns is not None and "rotatable" in wanted:
-        columns["rotatable"] = turns == 1.0
-    if least is not None and "margin" in wanted:
-        columns["margin"] = least
-    if angle is not None:
-        columns["max_pressure_angle"] = angle
-    if accuracy.target is not None and "rotatable" in wanted:
-        columns["err_rotatable"] = np.zeros(n)
-    if error is not None and "margin" in wanted:
-        columns["err_margin"] = error
-    if angle_error is not None:
-        columns["err_max_pressure_angle"] = angle_error
-    return columns
+    columns = {"rotatable": None if turns is None else turns == 1.0, "margin": least, "max_pressure_angle": angle}
+    if accuracy.target is not None:
+        columns |= {"err_rotatable": np.zeros(n), "err_margin": error, "err_max_pressure_angle": angle_error}
+    return chosen({name: x for name, x in columns.items() if x is not None}, wanted, status)
 
 
 def limits(designs: Array, wanted: frozenset[str], accuracy: Accuracy) -> Columns:
@@ -180,13 +170,10 @@ def limits(designs: Array, wanted: frozenset[str], accuracy: Accuracy) -> Column
     status, values = np.empty(n, np.uint8), np.empty((n, len(rssr.LIMIT_NAMES)))
     errors = np.empty_like(values) if accuracy.target is not None else None
     rssr.limits(designs, status, values, errors)
-    columns: Columns = {"status": status}
-    for k, name in enumerate(rssr.LIMIT_NAMES):
-        if name in wanted:
-            columns[name] = np.ascontiguousarray(values[:, k])
-            if errors is not None:
-                columns[f"err_{name}"] = np.ascontiguousarray(errors[:, k])
-    return columns
+    columns = dict(zip(rssr.LIMIT_NAMES, np.ascontiguousarray(values.T), strict=True))
+    if errors is not None:
+        columns |= zip((f"err_{name}" for name in rssr.LIMIT_NAMES), np.ascontiguousarray(errors.T), strict=True)
+    return chosen(columns, wanted, status)
 
 
 def true_maxima(designs: Array, wanted: frozenset[str], accuracy: Accuracy) -> Columns:

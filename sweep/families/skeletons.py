@@ -34,6 +34,11 @@ def parameter(parameters: tuple[Parameter, ...], name: str | None, designs: Arra
     return designs[:, [p.name for p in parameters].index(name)]
 
 
+def dimensions(parameters: tuple[Parameter, ...], designs: Array, *names: str) -> list[Array]:
+    """Values of some parameters, (n, 1) each, beside poses (n, m)."""
+    return [parameter(parameters, name, designs)[:, None] for name in names]
+
+
 def squared(parameters: tuple[Parameter, ...], name: str) -> DesignMap:
     """Square of a parameter, (n,), such as the coupler's that makes a discriminant a squared cosine."""
     return lambda designs: np.square(parameter(parameters, name, designs))

@@ -23,7 +23,7 @@ from sweep.families.outputs import ALONG_FRAME, coordinate_outputs, joint_output
 from sweep.families.planar_trees import slotted_rocker
 from sweep.families.poses import poses_of, together
 from sweep.families.sites import AXES
-from sweep.families.skeletons import CRANK, ORIGIN, crank_axis, links, parameter, standing
+from sweep.families.skeletons import CRANK, ORIGIN, crank_axis, dimensions, links, standing
 
 PARAMETERS = (
     Parameter("a", "length", "crank", positive=True),
@@ -156,7 +156,7 @@ planar_poses = poses_of(inverted_slider_crank.poses, inverted_slider_crank.Outpu
 def slot_foot(designs: Array, angles: Angles, motion: Columns) -> Array:
     """Foot of the rocker pivot on the slot, (n, m, 3): ``h`` from the pivot, square to the slot."""
     psi = np.asarray(motion["psi"], np.float64)
-    h, e = (parameter(PLANAR_PARAMETERS, name, designs)[:, None] for name in ("h", "e"))
+    h, e = dimensions(PLANAR_PARAMETERS, designs, "h", "e")
     return np.stack([e - h * np.sin(psi), h * np.cos(psi), np.zeros_like(psi)], axis=-1)
 
 

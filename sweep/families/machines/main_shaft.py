@@ -18,6 +18,7 @@ from kernels.types import Array, Status
 from sweep.families.base import Accuracy, Angles, Columns, Output, Parameter, Step, Work
 from sweep.families.curve_features import Smooth, least_samples
 from sweep.families.machines.relations import Relation
+from sweep.families.poses import chosen
 from sweep.numerics.steady_speed import FINER, GRIDS, LEFT, steady
 
 if TYPE_CHECKING:
@@ -131,9 +132,9 @@ def speed_of(shaft: ShaftTorque, machine: Machine) -> Step:
         mean, steep = found.pop("mean"), found["fastest"] / found["slowest"]
         size = {"unevenness": steep / mean, "fastest": np.ones(len(designs)), "slowest": steep}
         status = found.pop("status")
-        columns = {f"{shaft.name}_{key}": values for key, values in found.items()}
+        columns: Columns = {f"{shaft.name}_{key}": values for key, values in found.items()}
         columns |= {f"err_{shaft.name}_{key}": known * found["fastest"] * size[key] for key in found}
-        return {name: x for name, x in columns.items() if name.removeprefix("err_") in wanted} | {"status": status}
+        return chosen(columns, wanted, status)
 
     return Step(f"speed of {shaft.name}", shaft.numbers, run, work=Work.LONG, cost=_cost)
 
