@@ -19,10 +19,7 @@ from sweep.errors import InputError
 from sweep.families.base import Accuracy, Family, Output, Parameter, Step, Work, of_family
 from sweep.families.chain import Chain
 from sweep.families.machines.machine import Machine
-from sweep.families.machines.main_shaft import ShaftTorque
 from sweep.families.machines.relations import EventValue
-from sweep.families.machines.sewing import Sewing
-from sweep.families.machines.shaking import Shaking
 from sweep.families.names import at_stage, stem
 from sweep.families.reduction import reduced
 from sweep.numerics.curves import Curve
@@ -270,8 +267,7 @@ def _asked(machine: Machine, wanted: Iterable[str]) -> set[str]:
     names |= {about for name in places for about in reduced(name, machine.domain)}
     names |= {timing.of.name for timing in asked if isinstance(timing, EventValue)}
     for relation in machine.relations:
-        numbers = relation.numbers if isinstance(relation, ShaftTorque | Shaking | Sewing) else ()
-        if not names.isdisjoint(o.name for o in (*relation.outputs, *numbers)):
+        if not names.isdisjoint(o.name for o in (*relation.outputs, *relation.numbers)):
             names |= relation.needs(frozenset(names))
     return names
 

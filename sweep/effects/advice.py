@@ -113,9 +113,9 @@ def findings(bare: Family, full: Family, designs: Array, wanted: Iterable[str]) 
     given = {name: np.full(len(designs), x) for name, x in defaults.items() if x is not None} | columns
     found = []
     for placed in applicable(bare):
-        if placed.entry.advise is None or any(p.default is None and p.name not in columns for p in needs[placed.name]):
+        if any(p.default is None and p.name not in columns for p in needs[placed.name]):
             continue
-        advice = placed.entry.advise(first_scene(bare, own, angles, given).stage(placed.stage))
+        advice = placed.entry.advice(first_scene(bare, own, angles, given).stage(placed.stage))
         if advice is not None:
             found.append(Finding(placed.name, placed.name in computed, advice))
     return found

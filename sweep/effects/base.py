@@ -75,6 +75,24 @@ AdviceFunction: TypeAlias = Callable[[Scene], Advice | None]
 
 
 @dataclass(frozen=True)
+class Largest:
+    """Rule of negligibility: the largest magnitude of the output ``name`` over the turn tells, called ``quantity``."""
+
+    name: str
+    quantity: str
+    threshold: float
+    unit: str = ""
+
+    def advice(self, compute: ComputeFunction, scene: Scene) -> Advice | None:
+        """Apply it to the designs whose output is known all the way; None where there is no such design."""
+        found = np.abs(np.asarray(compute(scene, frozenset({self.name}))[self.name], np.float64))
+        turning = np.isfinite(found).all(axis=1)
+        if not turning.any():
+            return None
+        return Advice(self.quantity, found[turning].max(axis=1), self.threshold, self.unit)
+
+
+@dataclass(frozen=True)
 class Bend:
     """Functions of the crank angle at whose zeros some pose outputs of an effect have kinks, jumps or narrow peaks.
 
@@ -112,8 +130,8 @@ class Effect:
     life, not the largest (:func:`sweep.effects.wanted.expanded`). ``tree`` is the tree of links of the one family
     that it is for, if any; ``carried_at`` the place of a tool that a family must have, if any. ``only_for`` are the
     outputs that need an input, by the input, where not all do: it is no input where none of these is wanted.
-    ``bends`` are where curves of outputs have kinks. ``advise(scene)`` applies the rule of negligibility to some
-    designs over a turn; None where none turns.
+    ``bends`` are where curves of outputs have kinks. ``advise`` is the rule of negligibility, ``advise(scene)`` applies
+    it to some designs over a turn and gives None where none turns.
     """
 
     key: str
@@ -132,7 +150,7 @@ class Effect:
     takes_load: str = ""
     may_drive_nothing: bool = False
     design_result: DesignResult | None = None
-    advise: AdviceFunction | None = None
+    advise: AdviceFunction | Largest | None = None
     requires: type = JointRecords
     tool_inputs: tuple[tuple[Parameter, ...], ...] = ((), (), ())
     least: tuple[str, ...] = ()
@@ -154,6 +172,17 @@ class Effect:
         own = self.tree is None or family.find(LinkTree) is self.tree
         own = own and self.carried_at in (None, tool_place(family))
         return family.find(self.requires) is not None and follows and own
+
+    def advice(self, scene: Scene) -> Advice | None:
+        """Apply the rule of negligibility to designs over a turn; None without a rule, or where none turns."""
+        if isinstance(self.advise, Largest):
+            return self.advise.advice(self.compute, scene)
+        return None if self.advise is None else self.advise(scene)
+
+    @property
+    def design_outputs(self) -> tuple[Output, ...]:
+        """Outputs per design."""
+        return self.design_result.outputs if self.design_result else ()
 
     @cached_property
     def families(self) -> tuple[str, ...]:
@@ -210,7 +239,7 @@ class Placed:
     @property
     def design_outputs(self) -> tuple[Output, ...]:
         """Design outputs under all the names they have."""
-        return self._numbered(self.entry.design_result.outputs if self.entry.design_result else ())
+        return self._numbered(self.entry.design_outputs)
 
     @property
     def outputs(self) -> tuple[Output, ...]:
@@ -220,7 +249,7 @@ class Placed:
     @cached_property
     def own(self) -> dict[str, str]:
         """The effect's own names of its outputs by the names they have here."""
-        names = [o.name for o in (*self.entry.outputs, *_design(self.entry))]
+        names = [o.name for o in (*self.entry.outputs, *self.entry.design_outputs)]
         found = {f"{name}{self.number}": name for name in names}
         return found | {name: name for name in names if self._stands_alone(name)}
 
@@ -234,19 +263,6 @@ class Placed:
         return self.last and not (self.number and ends_in_digit(name))
 
 
-def _design(entry: Effect) -> tuple[Output, ...]:
-    return entry.design_result.outputs if entry.design_result else ()
-
-
 def no_poses(scene: Scene, wanted: frozenset[str]) -> Columns:
     """Give the motion's status alone, for an effect that has no outputs per pose."""
     return {"status": scene.status()}
-
-
-def largest(
-    scene: Scene, compute: ComputeFunction, name: str, quantity: str, threshold: float, unit: str = ""
-) -> Advice | None:
-    """Advice from the largest magnitude of one output, of the designs where it is known all the way."""
-    found = np.abs(np.asarray(compute(scene, frozenset({name}))[name], np.float64))
-    turning = np.isfinite(found).all(axis=1)
-    return Advice(quantity, found[turning].max(axis=1), threshold, unit) if turning.any() else None

@@ -9,7 +9,7 @@ from functools import partial
 import numpy as np
 
 from kernels.effects import bearings, permissible
-from sweep.effects.base import Bend, ComputeFunction, Effect, largest
+from sweep.effects.base import Bend, ComputeFunction, Effect, Largest
 from sweep.effects.loads import SPEED, together
 from sweep.effects.pressure import components
 from sweep.effects.scene import Scene, refuse
@@ -157,8 +157,6 @@ def _effect(
     name: str, title: str, inputs: tuple[Parameter, ...], results: tuple[Output, ...], compute: ComputeFunction,
     bends: tuple[Bend, ...], kind: str = "",
 ) -> Effect:  # fmt: skip
-    words = f"utilisation of the {kind} bearings"
-    advise = partial(largest, compute=compute, name=f"{kind}_utilisation", quantity=words, threshold=0.5)
     return Effect(
         key="B1",
         name=name,
@@ -175,7 +173,7 @@ def _effect(
         even_crank=SPEED in inputs,
         least=tuple(o.name for o in results if o.name.startswith(("life", "permissible", "theta1_reserve"))),
         bends=bends,
-        advise=advise if kind else None,
+        advise=Largest(f"{kind}_utilisation", f"utilisation of the {kind} bearings", 0.5) if kind else None,
     )
 
 

@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from functools import lru_cache, partial
+from functools import lru_cache
 
 import numpy as np
 
 from kernels import status as st
 from kernels.types import Array
-from sweep.effects.base import Effect, largest
+from sweep.effects.base import Effect, Largest
 from sweep.effects.contact import MODULUS, line_stress
 from sweep.effects.load_effects import loads_of
 from sweep.effects.load_passing import compute_loads
@@ -85,5 +85,5 @@ def roller_of(name: str) -> Effect:
         compute=compute,
         called_for="a cam that can be made, wear of the roller",
         negligible="a pitch curve whose least radius is far above the roller's",
-        advise=partial(largest, compute=compute, name="undercut", quantity="undercut", threshold=0.3),
+        advise=Largest("undercut", "undercut", 0.3),
     )

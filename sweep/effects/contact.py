@@ -10,7 +10,7 @@ import numpy as np
 from kernels import status as st
 from kernels.linkage.bodies import TURN
 from kernels.types import Array, Status
-from sweep.effects.base import Effect, largest
+from sweep.effects.base import Effect, Largest
 from sweep.effects.load_effects import loads_of, relative
 from sweep.effects.load_passing import compute_loads
 from sweep.effects.loads import magnitude
@@ -125,7 +125,6 @@ def contact_of(name: str) -> Effect:
     tree = bare.tree
     assert tree is not None
     joints = touching(tree)
-    run = partial(compute, tree=tree)
     return replace(
         bare,
         key="C1",
@@ -137,9 +136,8 @@ def contact_of(name: str) -> Effect:
         inputs=(*bare.inputs, MODULUS, *(p for joint in joints for p in _inputs(joint))),
         only_for={p.name: tuple(o.name for o in _outputs(joint)) for joint in joints for p in _inputs(joint)},
         outputs=tuple(o for joint in joints for o in _outputs(joint)),
-        compute=run,
+        compute=partial(compute, tree=tree),
         called_for="wear and stress of slots, eccentrics, balls",
         negligible="largest pressure below 100 MPa",
-        advise=partial(largest, compute=run, name=f"stress_{joints[0].name}", quantity="pressure",
-                       threshold=100.0, unit="MPa"),
-    )  # fmt: skip
+        advise=Largest(f"stress_{joints[0].name}", "pressure", 100.0, "MPa"),
+    )

@@ -224,12 +224,8 @@ def frame_room(shape: tuple[int, int], wanted: frozenset[str], suffix: str = "")
 
 def frame_columns(on_frame: tuple[Array | None, Array | None], wanted: frozenset[str], suffix: str = "") -> Columns:
     """Wanted magnitudes and components of force and moment on the frame, (n, 3, m) or None each."""
-    columns: Columns = {}
-    for name, vector in zip(frame(suffix), on_frame, strict=True):
-        if vector is not None:
-            columns |= {f"{name}_{a}": vector[:, k] for k, a in enumerate(AXES) if f"{name}_{a}" in wanted}
-            columns |= {name: np.sqrt(np.square(vector).sum(axis=1))} if name in wanted else {}
-    return columns
+    named = zip(frame(suffix), on_frame, strict=True)
+    return vector_columns({name: np.moveaxis(x, 1, 2) for name, x in named if x is not None}, wanted)
 
 
 def asked(names: Collection[str], wanted: frozenset[str]) -> bool:

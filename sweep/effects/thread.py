@@ -22,7 +22,7 @@ from sweep.families.machines.thread_balance import (
     REFERENCE_SPEED,
     SHARE,
 )
-from sweep.families.poses import filled_each
+from sweep.families.poses import chosen, filled_each
 
 # Under words of their own: a take-up has symbols such as alpha for its geometry.
 BEFORE = Parameter("thread_tension", "none", "tension in front of the eyelet, gf", not_negative=True)
@@ -116,7 +116,7 @@ def speed(scene: Scene, wanted: frozenset[str]) -> Columns:
         data = scene.table(("thread_speed_ref", "thread_speed_share", "thread_speed_exponent"))
         thread_speed(of_thread, data, status, ratio)
         columns["speed_ratio"] = ratio
-    return {name: columns[name] for name in wanted} | {"status": status}
+    return chosen(columns, wanted, status)
 
 
 CONTOUR = Effect(

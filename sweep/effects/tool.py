@@ -8,12 +8,14 @@ from typing import NamedTuple
 import numpy as np
 
 from kernels.effects.tool import ToolLoad, free_tool, tool_load
+from kernels.types import Status
 from sweep.effects import loads
 from sweep.effects.base import ON_LINE, ON_TIP, Effect, tool_place
 from sweep.effects.motion import CONSTRUCTION
 from sweep.effects.scene import Scene
 from sweep.families.base import Array, Columns, Output
 from sweep.families.capabilities import JointRecords, ToolPoint
+from sweep.families.poses import chosen
 
 EQUATION = "docs/tool.md (1), (2), (6)"
 _SHARE = "in the torque about this stage's crank"
@@ -73,14 +75,19 @@ def weighs(scene: Scene, drive: Array, reduced: bool) -> Weighs:
         return Weighs(None, None, None)
     wrench = np.empty((*scene.shape, 6))
     inertia = np.empty((*scene.shape, 2)) if reduced else None
-    finger, status, out = scene.inputs["finger"], scene.status(), ToolLoad(wrench, inertia)
+    _fill(scene, drive, scene.status(), ToolLoad(wrench, inertia))
+    return Weighs(None, wrench, inertia) if place == ON_TIP else Weighs(wrench, None, inertia)
+
+
+def _fill(scene: Scene, drive: Array, status: Status, out: ToolLoad) -> None:
+    """Let the kernel of a tool on a line, or of one that moves freely, write its results."""
+    place, finger = tool_place(scene.family), scene.inputs["finger"]
     if place == ON_LINE:
         data, force = _data(scene)
         tool_load(*scene.records, data, drive, force, finger, status, out)
-        return Weighs(wrench, None, inertia)
-    data, force = _free_data(scene)
-    free_tool(*scene.records, data, drive, force, finger, place == ON_TIP, status, out)
-    return Weighs(None, wrench, inertia) if place == ON_TIP else Weighs(wrench, None, inertia)
+    else:
+        data, force = _free_data(scene)
+        free_tool(*scene.records, data, drive, force, finger, place == ON_TIP, status, out)
 
 
 def compute(scene: Scene, wanted: frozenset[str]) -> Columns:
@@ -88,19 +95,13 @@ def compute(scene: Scene, wanted: frozenset[str]) -> Columns:
     speed, change = scene.crank()
     drive = np.stack(np.broadcast_arrays(np.zeros_like(speed), speed, change), axis=2)
     status, place = scene.status(), tool_place(scene.family)
-    finger = scene.inputs["finger"]
-    if place == ON_LINE:
-        along = np.empty((*scene.shape, 3))
-        data, force = _data(scene)
-        tool_load(*scene.records, data, drive, force, finger, status, ToolLoad(along=along))
-        columns: Columns = {"tool_load": along[:, :, 0], "tool_torque": along[:, :, 0] * along[:, :, 1]}
-    else:
-        found = np.empty((*scene.shape, 2))
-        data, force = _free_data(scene)
-        free_tool(*scene.records, data, drive, force, finger, place == ON_TIP, status, ToolLoad(along=found))
-        named = TIP_OUTPUTS if place == ON_TIP else OUTPUTS
-        columns = {o.name: found[:, :, k] for k, o in enumerate(named)}
-    return {name: columns[name] for name in wanted} | {"status": status}
+    along = np.empty((*scene.shape, 3 if place == ON_LINE else 2))
+    _fill(scene, drive, status, ToolLoad(along=along))
+    load, torque = along[:, :, 0], along[:, :, 1]
+    if place == ON_LINE:  # the kernel gives the way per radian instead of the torque
+        torque = load * torque
+    first, second = TIP_OUTPUTS if place == ON_TIP else OUTPUTS
+    return chosen({first.name: load, second.name: torque}, wanted, status)
 
 
 _FREE = "(6) a tool that moves freely with its point P: its load is |m_tool (a_P - gravity) - tool_force|"

@@ -48,8 +48,7 @@ def at_poses(scene: Scene, found: dict[str, Array], turn: Status, wanted: frozen
     """Curves of a whole-turn effect at the scene's poses; a turn that is not OK speaks for all of them."""
     status = scene.status()
     take_over(status, np.broadcast_to(turn[:, None], status.shape))
-    columns: Columns = {name: found[name] for name in wanted}
-    return columns | {"status": status}
+    return chosen(found, wanted, status)
 
 
 def per_turn(

@@ -51,7 +51,7 @@ class Pressing(Relation):
         return self.of_foot
 
     @property
-    def numbers(self) -> Mapping[str, Output]:
+    def by_output_of_foot(self) -> Mapping[str, Output]:
         """Design outputs, by the name of each in the family of the foot alone."""
         return {o.name: replace(o, name=self.named(o.name), text=f"{self.name}: {o.text}") for o in self.foot.outputs}
 
@@ -75,14 +75,14 @@ class Pressing(Relation):
             finer = columns if accuracy.target is None else self.marched(machine, designs, 2 * self.foot.nodes)[0]
             status: Status = np.array(columns["status"], np.uint8)
             found: Columns = {}
-            for own, name in ((own, o.name) for own, o in self.numbers.items() if o.name in wanted):
+            for own, name in ((own, o.name) for own, o in self.by_output_of_foot.items() if o.name in wanted):
                 value, other = (np.asarray(x[own], np.float64) for x in (columns, finer))
                 status[(status == st.OK) & np.isnan(value)] = st.NO_EVENT
                 found[name] = np.mod(value - ahead, TWO_PI) if is_place(own) else value
                 found[f"err_{name}"] = 2.0 * np.abs(value - np.nan_to_num(other, nan=np.inf))
             return found | {"status": status}
 
-        outputs = tuple(self.numbers.values())
+        outputs = tuple(self.by_output_of_foot.values())
         return Step(f"foot {self.name}", outputs, run, work=Work.LONG, cost=lambda accuracy: 2e6)
 
 

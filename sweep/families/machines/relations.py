@@ -25,6 +25,11 @@ class Relation:
         return ()
 
     @property
+    def numbers(self) -> tuple[Output, ...]:
+        """Its own design outputs whose members need effects."""
+        return ()
+
+    @property
     def parameters(self) -> tuple[Parameter, ...]:
         """Parameters of the machine that it adds."""
         return ()
