@@ -36,19 +36,16 @@ _COMMON = (
 SLIDING_INPUTS = (
     *_COMMON,
     Parameter("journal_diameter", "length", "diameter of both journals", positive=True),
-    Parameter("journal_length1", "length", "length of journal 1", positive=True),
-    Parameter("journal_length2", "length", "length of journal 2", positive=True),
+    *(Parameter(f"journal_length{k}", "length", f"length of journal {k}", positive=True) for k in (1, 2)),
     Parameter("collar_diameter", "length", "outer diameter of the thrust collar", positive=True),
     Parameter("journal_factor", "ratio", "1 point contact, 4/pi run-in, pi/2 new", default=1.0, positive=True),
     Parameter("thrust_radius_d", "length", "mean thrust radius of the collar", default=0.0, not_negative=True),
     Parameter("mu_d", "ratio", "coefficient of friction of the rocker bearing", not_negative=True),
 )
 SLIDING_OUTPUTS = (
-    Output("journal_load1", "force", "radial load of journal 1", EQUATION),
-    Output("journal_load2", "force", "radial load of journal 2", EQUATION),
+    *(Output(f"journal_load{k}", "force", f"radial load of journal {k}", EQUATION) for k in (1, 2)),
     Output("thrust_load", "force", "axial load of the collar", EQUATION),
-    Output("journal_pressure1", "pressure", "mean pressure of journal 1", EQUATION),
-    Output("journal_pressure2", "pressure", "mean pressure of journal 2", EQUATION),
+    *(Output(f"journal_pressure{k}", "pressure", f"mean pressure of journal {k}", EQUATION) for k in (1, 2)),
     Output("collar_pressure", "pressure", "mean pressure of the collar", EQUATION),
 )
 CATALOGUE = (
@@ -63,10 +60,8 @@ CATALOGUE = (
 )
 ROLLING_INPUTS = (*_COMMON, *CATALOGUE)
 ROLLING_OUTPUTS = (
-    Output("equivalent_load1", "force", "equivalent load of rolling bearing 1", EQUATION),
-    Output("equivalent_load2", "force", "equivalent load of rolling bearing 2", EQUATION),
-    Output("life1", "1", "L10 of bearing 1 at this load, in 10^6 turns", EQUATION),
-    Output("life2", "1", "L10 of bearing 2 at this load, in 10^6 turns", EQUATION),
+    *(Output(f"equivalent_load{k}", "force", f"equivalent load of rolling bearing {k}", EQUATION) for k in (1, 2)),
+    *(Output(f"life{k}", "1", f"L10 of bearing {k} at this load, in 10^6 turns", EQUATION) for k in (1, 2)),
 )
 
 

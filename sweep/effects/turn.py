@@ -11,10 +11,11 @@ import numpy as np
 from kernels import status as st
 from kernels.curves.periodic import turn_extremes
 from kernels.types import Status
-from sweep.effects.scene import Scene, take_over
+from sweep.effects.scene import Rows, Scene, take_over
 from sweep.families.base import Array, Columns, Output, Turn
 from sweep.families.poses import chosen
 from sweep.families.reduction import REDUCTIONS
+from sweep.numerics.grids import on_first_grid
 
 RESOLVED = 1e-9
 NONE: Mapping[str, Array] = MappingProxyType({})
@@ -29,19 +30,12 @@ def on_finer_grids(scene: Scene, phi: Array, grids: Sequence[int], solve: Solver
     ``phi`` is (n, m) or (1, m); what ``solve`` calls NOT_CONVERGED is tried again on the next grid.  A grid that does
     not show what the loads do is left out, but for the last one.
     """
-    found: dict[str, Array] = {}
-    status: Status = np.full(len(scene.designs), st.NOT_CONVERGED, np.uint8)
-    least = np.minimum(scene.least_samples, grids[-1])
-    for size in grids:
-        rows = np.flatnonzero((status == st.NOT_CONVERGED) & (least <= size))
-        if not rows.size and (found or len(scene.designs)):
-            continue
+
+    def on_grid(rows: Rows, size: int) -> tuple[dict[str, Array], Status]:
         own = np.ascontiguousarray(phi[rows] if phi.shape[0] > 1 else phi)
-        part, codes = solve(scene.only(rows).on_grid(size), own, size == grids[-1])
-        for name, values in part.items():
-            found.setdefault(name, np.empty((len(scene.designs), *values.shape[1:])))[rows] = values
-        status[rows] = codes
-    return found, status
+        return solve(scene.only(rows).on_grid(size), own, size == grids[-1])
+
+    return on_first_grid(scene.least_samples, grids, on_grid)
 
 
 def at_poses(scene: Scene, found: dict[str, Array], turn: Status, wanted: frozenset[str]) -> Columns:

@@ -39,12 +39,19 @@ ROCKER = (
 SIGMA = Parameter("h_sigma", "sign", "horizontal chain: assembly mode, sign of dF/dpsi", default=1.0,
                   choices=(-1.0, 1.0))  # fmt: skip
 
+
+def _eccentric(number: str, words: str) -> tuple[Parameter, ...]:
+    return (
+        Parameter(f"xE{number}", "length", f"{words}: centre of turning, along x"),
+        Parameter(f"yE{number}", "length", f"{words}: centre of turning, along y"),
+        Parameter(f"rE{number}", "length", f"{words}: eccentricity", not_negative=True),
+        Parameter(f"dE{number}", "angle", f"{words}: ahead of the crank"),
+    )
+
+
 PARAMETERS = (
     *ROCKER,
-    Parameter("xE", "length", "lift eccentric: centre of turning, along x"),
-    Parameter("yE", "length", "lift eccentric: centre of turning, along y"),
-    Parameter("rE", "length", "lift eccentric: eccentricity", not_negative=True),
-    Parameter("dE", "angle", "lift eccentric: ahead of the crank"),
+    *_eccentric("", "lift eccentric"),
     Parameter("q", "length", "lift coupler", positive=True),
     Parameter("fx", "length", "joint F of the lift coupler, along the rack from H"),
     Parameter("fy", "length", "joint F of the lift coupler, across the rack from H"),
@@ -214,19 +221,10 @@ FAMILY = Family(
 )  # fmt: skip
 
 
-def _eccentric(number: int) -> tuple[Parameter, ...]:
-    return (
-        Parameter(f"xE{number}", "length", f"eccentric {number}: centre of turning, along x"),
-        Parameter(f"yE{number}", "length", f"eccentric {number}: centre of turning, along y"),
-        Parameter(f"rE{number}", "length", f"eccentric {number}: eccentricity", not_negative=True),
-        Parameter(f"dE{number}", "angle", f"eccentric {number}: ahead of the crank"),
-    )
-
-
 TRIAD_PARAMETERS = (
     *ROCKER,
-    *_eccentric(2),
-    *_eccentric(3),
+    *_eccentric("2", "eccentric 2"),
+    *_eccentric("3", "eccentric 3"),
     *(
         Parameter(f"f{k}{axis}", "length", f"joint of link {k}, {word} the rack from the tooth")
         for k in (1, 2, 3)

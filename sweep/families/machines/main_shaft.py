@@ -11,6 +11,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from kernels import status as st
 from kernels.effects.speed_fluctuation import RESOLVED
@@ -19,6 +20,7 @@ from sweep.families.base import Accuracy, Angles, Columns, Output, Parameter, St
 from sweep.families.curve_features import Smooth, least_samples
 from sweep.families.machines.relations import Relation
 from sweep.families.poses import chosen
+from sweep.numerics.grids import on_first_grid
 from sweep.numerics.steady_speed import FINER, GRIDS, LEFT, steady
 
 if TYPE_CHECKING:
@@ -153,22 +155,17 @@ def _numbers(shaft: ShaftTorque, machine: Machine, designs: Array) -> dict[str, 
     slope = designs[:, names.index(f"{shaft.name}_motor_slope")]
     theirs = np.stack([designs[:, names.index(one.named("speed"))] / one.ratio for one in shaft.driven])
     apart = np.any(np.abs(theirs - speed) > SAME * np.abs(speed), axis=0)
-    found: dict[str, Any] = {key: np.full(len(designs), np.nan) for key in (*NUMBERS, "energy_error")}
-    status: Status = np.full(len(designs), st.NOT_CONVERGED, np.uint8)
-    least, finest = least_samples(machine, designs, (shaft.name,)), FINER[-1]
-    for size in (*GRIDS, *FINER):
-        rows = np.flatnonzero((status == st.NOT_CONVERGED) & ((least <= size) | (size == finest)))
-        if not rows.size:
-            continue
+
+    def on_grid(rows: NDArray[np.intp], size: int) -> tuple[dict[str, Array], Status]:
         inertia, excess, poses = _samples(shaft, machine, designs[rows], speed[rows], size)
         motor = slope[rows] if slope[rows].any() else None
-        coarsest = LEFT if size == finest else RESOLVED
+        coarsest = LEFT if size == FINER[-1] else RESOLVED
         part, codes = steady(inertia, excess, speed[rows], motor, np.zeros((1, 1)), coarsest)
         np.copyto(codes, poses, where=poses != st.OK)
         codes[apart[rows]] = st.INVALID_INPUT
-        for key in found:
-            found[key][rows] = np.where(codes == st.OK, part[key], np.nan)
-        status[rows] = codes
+        return {key: np.where(codes == st.OK, part[key], np.nan) for key in (*NUMBERS, "energy_error")}, codes
+
+    found, status = on_first_grid(least_samples(machine, designs, (shaft.name,)), (*GRIDS, *FINER), on_grid)
     return found | {"status": status, "mean": np.abs(speed)}
 
 

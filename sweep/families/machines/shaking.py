@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from kernels import status as st
 from kernels.types import EPS, TWO_PI, Array, Status
@@ -19,6 +20,7 @@ from sweep.families.link_tree import LinkTree
 from sweep.families.machines.relations import Relation, with_size
 from sweep.families.machines.segments import cross
 from sweep.families.sites import AXES
+from sweep.numerics.grids import on_first_grid
 
 if TYPE_CHECKING:
     from sweep.families.machines.machine import Machine
@@ -177,21 +179,18 @@ def orders_of(shaking: Shaking, machine: Machine) -> Step:
 
     def run(designs: Array, wanted: frozenset[str], accuracy: Accuracy) -> Columns:
         asked = [o.name for o in shaking.numbers if o.name in wanted]
-        found: dict[str, Array] = {f"{e}{name}": np.full(len(designs), np.nan) for name in asked for e in ("", "err_")}
-        status: Status = np.full(len(designs), st.NOT_CONVERGED, np.uint8)
-        grids = GRIDS if accuracy.samples is None else (accuracy.samples,)
         least = least_samples(machine, designs, [name.rpartition("_order")[0] for name in asked])
-        for samples in grids:
-            rows = np.flatnonzero((status == st.NOT_CONVERGED) & ((least <= samples) | (samples == grids[-1])))
-            if not rows.size:
-                continue
+
+        def on_grid(rows: NDArray[np.intp], samples: int) -> tuple[dict[str, Array], Status]:
             codes, amplitudes = _amplitudes(shaking, machine, designs[rows], asked, samples)
-            settled = np.ones(rows.size, np.bool_)
+            found: dict[str, Array] = {}
             for name, (value, err, size) in amplitudes.items():
-                found[name][rows], found[f"err_{name}"][rows] = value, err
-                settled &= (accuracy.target is None) | (err <= (accuracy.target or 0.0) * size)
-            done = settled | (codes != st.OK)
-            status[rows[done]] = codes[done]
+                found |= {name: value, f"err_{name}": err}
+                if accuracy.target is not None:
+                    codes[(codes == st.OK) & ~(err <= accuracy.target * size)] = st.NOT_CONVERGED
+            return found, codes
+
+        found, status = on_first_grid(least, GRIDS if accuracy.samples is None else (accuracy.samples,), on_grid)
         return found | {"status": status}
 
     return Step(f"orders of {shaking.name}", shaking.numbers, run, work=Work.LONG, cost=_cost)
