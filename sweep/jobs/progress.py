@@ -18,10 +18,8 @@ FIRST_SECONDS = 2.0  # of silence at the beginning
 LINE_SECONDS = 10.0
 TICK_SECONDS = 0.5
 TICKER = "linksweep: progress"
-ENOUGH, ALIKE = (
-    0.1,
-    2,
-)  # share, and number, of what is to be done from which the remaining time is known to a factor of two
+# Share, and number, of what is to be done from which the remaining time is known to a factor of two.
+ENOUGH, ALIKE = 0.1, 2
 SCALED = 10_000  # numbers from which a bar counts in thousands and millions
 BAR = "{desc}: {n_fmt} of {total_fmt}{unit} [{elapsed}]"  # where it is not
 AT_MOST = "at most"  # in what is counted: its total is a maximum, of which no share and no remaining time is known

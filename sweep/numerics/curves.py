@@ -54,9 +54,8 @@ class TableCurve:
 
         rounds = -(-AROUND // len(self.phi))
         phi = np.concatenate([np.array(self.phi) + k * TWO_PI for k in range(-rounds, rounds + 2)])
-        with np.errstate(
-            over="ignore"
-        ):  # next to a level piece a reciprocal slope may be infinite: the slope is 0 then
+        # Next to a level piece a reciprocal slope may be infinite: the slope is 0 then.
+        with np.errstate(over="ignore"):
             return PchipInterpolator(phi, np.tile(self.values, 2 * rounds + 2), extrapolate=False)
 
 

@@ -269,14 +269,12 @@ def _table(study: Study, problem: Problem, results: list[Result], nominal: Resul
     if study.tolerance is not None:
         rows["yield"] = [share] + [math.nan] * (len(designs) - 1)
         shown = [k for k, role in enumerate(rows["role"]) if role != "start" and math.isnan(rows["yield"][k])]
-        for k, found in zip(shown, yields(problem, designs[shown], study.tolerance, _seed(study)), strict=True):
+        assert study.optimise is not None
+        shares = yields(problem, designs[shown], study.tolerance, study.optimise.seed)
+        for k, found in zip(shown, shares, strict=True):
             rows["yield"][k] = found
     columns: dict[str, Any] = {name: designs[:, k] for k, name in enumerate(study.family.parameter_names)}
     return {"role": rows.pop("role"), "start": rows.pop("start")} | columns | outputs(study, designs) | rows
-
-
-def _seed(study: Study) -> int:
-    return 0 if study.optimise is None else study.optimise.seed
 
 
 def _reference(study: Study, problem: Problem) -> tuple[Array, float]:

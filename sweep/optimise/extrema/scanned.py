@@ -42,9 +42,8 @@ def extrema(
     before, after, middle = np.roll(x, 1), np.roll(x, -1), 0.5 * (top + bottom)
     peak = counts & (sense * x > sense * before) & (sense * x >= sense * after)
     if inside is None:
-        peak &= (
-            sense * (x - middle) >= 0.0
-        )  # in a window all extrema count: a refused step cannot add the extrema of its design
+        # In a window all extrema count: a refused step cannot add the extrema of its design.
+        peak &= sense * (x - middle) >= 0.0
     return [(n, float(phi[j]), sense, STATIONARY, math.nan, float(x[j])) for j in np.flatnonzero(peak)]
 
 

@@ -28,7 +28,7 @@ from sweep.optimise.manufacture.margins import (
     risk_allocation,
     with_margins,
 )
-from sweep.optimise.manufacture.tolerance import deviating
+from sweep.optimise.manufacture.tolerance import deviating, within_limits
 from sweep.optimise.multistart.kept import Kept, noted, result_of
 from sweep.optimise.multistart.parallel import spread_over
 from sweep.optimise.multistart.survey import CUT
@@ -50,10 +50,8 @@ STAYED = 1e-3  # scaled step of a design with which its room agrees: that is of 
 RADIUS = 0.15  # of the first rounds, in scaled variables
 NEARLY = 1e-4  # scaled violation of a design whose objective counts
 ALIKE = 0.02  # greatest distance in scaled variables of designs that are taken for one
-REACH, FADING = (
-    0.6,
-    0.7,
-)  # distance of two limits' numbers of standard deviations in the first correction; of later ones
+REACH = 0.6  # distance of two limits' numbers of standard deviations in the first correction
+FADING = 0.7  # of that distance, from one correction to the next
 LEAP, AMPLE = 1.0, 4.0  # of a correction at most; standard deviations that hardly anything exceeds
 SAVED = 2e-6  # of the objective that another share-out should save, below which it is as good as it gets
 ENOUGH = 0.0005  # by so much the sampled share may exceed the wanted one; 0.003 cost 0.02 % of acceleration
@@ -70,13 +68,8 @@ class Robust:
 
 def kept(problem: Problem, designs: Array) -> tuple[dict[str, Array], NDArray[np.bool_]]:
     """Return limited outputs of designs (n, P), and which designs keep all limits on outputs."""
-    limits = bounded(problem)
-    names = list(dict.fromkeys([x.output for x in limits] + [problem.objective]))
-    found = design_outputs(problem.family, designs, names, problem.accuracy, problem.window)
-    good = np.ones(len(designs), dtype=np.bool_)
-    for limit in limits:
-        good &= meets(limit, found[limit.output])
-    return {name: compared(name, np.asarray(found[name], np.float64)) for name in names}, good
+    found, good = within_limits(problem, bounded(problem), designs, problem.objective)
+    return {name: compared(name, np.asarray(x, np.float64)) for name, x in found.items()}, good
 
 
 def _begun(results: Sequence[Result], more: Array | None) -> tuple[list[Array], list[int]]:

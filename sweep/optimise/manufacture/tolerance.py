@@ -221,9 +221,7 @@ def tolerance_rows(
         [design[None, :], deviating(family, design, tolerance, seed, min(SAMPLES, tolerance.samples))]
     )
     columns: dict[str, Any] = design_outputs(family, designs, list(outputs), accuracy, window)
-    rows: dict[str, list[Any]] = {
-        name: [] for name in ("output", "nominal", "mean", "low", "high", "missing", "within")
-    }
+    rows: list[tuple[Any, ...]] = []
     everything = np.ones(len(designs) - 1, dtype=np.bool_)
     for output in outputs:
         values = np.asarray(columns[output], np.float64)
@@ -235,13 +233,10 @@ def tolerance_rows(
         within = float(np.logical_and.reduce(own).mean()) if own else math.nan
         mean = float(known.mean()) if len(known) else math.nan
         missing = 1.0 - len(known) / len(everything)
-        row = (output, float(values[0]), mean, float(low), float(high), missing, within)
-        for name, value in zip(rows, row, strict=True):
-            rows[name].append(value)
-    last = ("all limits", *[math.nan] * 5, float(everything.mean()) if limits else math.nan)
-    for name, value in zip(rows, last, strict=True):
-        rows[name].append(value)
-    return rows
+        rows.append((output, float(values[0]), mean, float(low), float(high), missing, within))
+    rows.append(("all limits", *[math.nan] * 5, float(everything.mean()) if limits else math.nan))
+    names = ("output", "nominal", "mean", "low", "high", "missing", "within")
+    return {name: list(column) for name, column in zip(names, zip(*rows, strict=True), strict=True)}
 
 
 SINGLE = 512  # mechanisms of those made, for what each dimension costs
@@ -286,19 +281,21 @@ def manufactured(study: Study, design: Array) -> Manufactured | None:
     if study.tolerance is None or study.optimise is None or not limits or not np.isfinite(design).all():
         return None
     designs = deviating(study.family, design, study.tolerance, study.optimise.seed, study.tolerance.samples)
-    columns, kept = _kept(study, limits, designs)
+    columns, kept = within_limits(study, limits, designs)
     worst = min(limits, key=lambda limit: float(meets(limit, columns[limit.output]).mean()))
     few = {name: values[:SINGLE] for name, values in columns.items()}
     costs = _costs(study, limits, worst, design, designs[:SINGLE], few, float(kept[:SINGLE].mean()))
     return Manufactured(worst.output, columns[worst.output], kept, tuple(costs))
 
 
-def _kept(
-    study: Study, limits: list[Limit], designs: Array
+def within_limits(
+    of: Study | Problem, limits: Sequence[Limit], designs: Array, *more: str
 ) -> tuple[dict[str, NDArray[np.generic]], NDArray[np.bool_]]:
-    names = list(dict.fromkeys(limit.output for limit in limits))
-    columns = design_outputs(study.family, designs, names, study.accuracy, study.window)
-    return columns, np.logical_and.reduce([meets(limit, columns[limit.output]) for limit in limits])
+    """Return outputs of designs (n, P) that are limited, ``more`` of them, and which designs keep all limits, (n,)."""
+    names = list(dict.fromkeys([*(limit.output for limit in limits), *more]))
+    columns = design_outputs(of.family, designs, names, of.accuracy, of.window)
+    met = [np.ones(len(designs), np.bool_), *(meets(limit, columns[limit.output]) for limit in limits)]
+    return {name: columns[name] for name in names}, np.logical_and.reduce(met)
 
 
 def _costs(
@@ -329,7 +326,7 @@ def _costs(
         exact = designs.copy()
         exact[:, k] = design[k]
         parameter = study.family.parameters[k]
-        columns, kept = _kept(study, limits, exact)
+        columns, kept = within_limits(study, limits, exact)
         spread = 1.0 - _variance(columns, worst) / scatter if scatter > 0.0 else 0.0
         found.append(Cost(parameter.name, parameter.text, max(spread, 0.0), float(kept.mean()) - before))
     return sorted(found, key=lambda cost: (-cost.gain if cost.gain >= TELLING else 0.0, -cost.spread))
