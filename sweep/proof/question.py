@@ -68,7 +68,8 @@ class Question:
             return np.zeros((0, 9))
         least, longest = self.least_coupler, self._longest_rocker()
         found = tube(*motion, target)
-        wide = np.tan(0.5 * (found[:, HIGH] - found[:, LOW]))
+        # from half a turn on the tube holds the other mode wherever that is
+        wide = np.tan(0.5 * np.minimum(found[:, HIGH] - found[:, LOW], np.pi))
         blurred = ~(wide * (least + longest) < least * np.sqrt(self.cos2) * WEAKER)
         found[blurred, LOW], found[blurred, HIGH] = -np.inf, np.inf
         return found

@@ -60,6 +60,7 @@ def sides(question: dict[str, Any], theta: float) -> tuple[arb, arb]:
         back = 2 * arb.pi() - phi0
         ends = [stroke - farthest(arb(theta) - phi0, stroke, back, most, sign) for sign in (1, -1)]
     coupler, rocker = arb(question["links"]["b"][0]), arb(known["c"] if "c" in known else question["links"]["c"][1])
+    assert ends[1] - ends[0] < arb.pi()
     assert ((ends[1] - ends[0]) / 2).tan() * (coupler + rocker) < coupler * arb(question["cos2"]).sqrt()
     return (ends[0], ends[1]) if known["swing"] > 0 else (-ends[1], -ends[0])
 
