@@ -17,7 +17,7 @@ from sweep.effects.bearings import CATALOGUE, SUPPORTS
 from sweep.effects.load_effects import KINETOSTATICS
 from sweep.effects.load_passing import reactions
 from sweep.effects.scene import Rows, Scene, refuse
-from sweep.families.base import Accuracy, Array, Columns, Output
+from sweep.families.base import Accuracy, Array, Columns, Output, floats
 from sweep.families.capabilities import Assembly
 from sweep.families.poses import chosen, filled_all
 from sweep.numerics.curves import TableCurve
@@ -166,7 +166,7 @@ def _loads(scene: Scene, shaft: Shaft) -> tuple[Array, Array, Status]:
     """Equivalent loads of both bearings (n, m, 2), rate of travel (n, m), worst status of each design."""
     names = load_names(shaft.name)[3:]
     found = shaft.loads(scene, frozenset(names))
-    load = np.stack([np.asarray(found[name], np.float64) for name in names], axis=2)
+    load = np.stack(floats(found, *names), axis=2)
     return load, np.abs(shaft.turning(scene)), np.asarray(found["status"].max(axis=1), np.uint8)
 
 
@@ -183,7 +183,7 @@ def _switches(scene: Scene, shaft: Shaft) -> Array:
     """
     names = load_names(shaft.name)[:3]
     found = shaft.loads(scene, frozenset(names))
-    first, second, axial = (np.asarray(found[name], np.float64) for name in names)
+    first, second, axial = floats(found, *names)
     radial = np.where(shaft.given(scene, "axial_support")[:, None] == 1.0, first, second)
     limit = (shaft.given(scene, "e_limit") * shaft.given(scene, "rotation_factor"))[:, None] * radial
     return np.stack([shaft.turning(scene), axial, np.abs(axial) - limit], axis=2)
@@ -197,8 +197,7 @@ def _pierced(scene: Scene) -> list[Array]:
             continue
         stage = scene.stage(which)
         position, rate = stage.family.position, stage.family.derivative_of[stage.family.position]
-        poses = stage.family.poses(stage.designs, stage.angles, frozenset({position, rate}))
-        place, speed = (np.asarray(poses[name], np.float64) for name in (position, rate))
+        place, speed = stage.family.values(stage.designs, stage.angles, position, rate)
         driving = 1.0 if stage.rates is None else stage.rates[0]
         both = np.stack([place - inputs["pierce_at"][:, None], speed * driving], axis=2)
         found.append(np.where(inputs["pierce_force"][:, None, None] != 0.0, both, 1.0))
@@ -219,7 +218,7 @@ def squares(scene: Scene, shaft: Shaft) -> Array:
 
 def _discriminant(scene: Scene, rows: Rows, stage: int, name: str, which: Rows, phi: Array) -> Array:
     posed = scene.posed(rows[which], phi).stage(stage)
-    return np.asarray(posed.family.poses(posed.designs, posed.angles, frozenset([name]))[name], np.float64)
+    return posed.family.values(posed.designs, posed.angles, name)[0]
 
 
 def _refined(scene: Scene, rows: Rows, size: Array, target: float, shaft: Shaft) -> tuple[Array, Array, Status]:

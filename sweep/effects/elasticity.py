@@ -16,7 +16,7 @@ from sweep.effects.load_passing import LOADS, behind
 from sweep.effects.loads import SPEED
 from sweep.effects.scene import Scene, take_over
 from sweep.effects.turn import RESOLVED, at_poses, on_finer_grids, per_turn, reduction_outputs
-from sweep.families.base import Accuracy, Array, Columns, Output, Parameter
+from sweep.families.base import Accuracy, Array, Columns, Output, Parameter, floats
 from sweep.families.poses import optional_outputs
 from sweep.numerics.steady_speed import forwards
 
@@ -257,7 +257,7 @@ def advise_static(scene: Scene) -> Advice | None:
 def advise_dynamic(scene: Scene) -> Advice | None:
     """Estimate max|eta_qs''/nu^2|/max|eta_qs|; dynamics adds 0.7 to 2.8 times this share to the lag."""
     found = compute_static(scene.on_grid(GRIDS[-1]), frozenset({"lag", "frequency_ratio"}))
-    lag, ratio = (np.asarray(found[name], np.float64) for name in ("lag", "frequency_ratio"))
+    lag, ratio = floats(found, "lag", "frequency_ratio")
     turning = np.isfinite(lag).all(axis=1)
     if not turning.any():
         return None

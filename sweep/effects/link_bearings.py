@@ -20,7 +20,7 @@ from sweep.effects.load_passing import compute_friction
 from sweep.effects.loads import FRICTION_SUFFIX, FRICTION_TEXT
 from sweep.effects.scene import Scene, refuse, take_over
 from sweep.families import family
-from sweep.families.base import Accuracy, Array, Columns, Output, Parameter
+from sweep.families.base import Accuracy, Array, Columns, Output, Parameter, floats
 from sweep.families.link_tree import LinkJoint, LinkTree
 from sweep.families.poses import filled_all
 from sweep.families.sites import AXES
@@ -105,7 +105,7 @@ def sliding(scene: Scene, wanted: frozenset[str]) -> Columns:
         first, second = (np.ascontiguousarray(loads[name], np.float64) for name in supports[joint.name])
         along = np.zeros(scene.shape)
         if joint.kind == "shaft":
-            force = np.stack([np.asarray(loads[name], np.float64) for name in axial[joint.name]], axis=2)
+            force = np.stack(floats(loads, *axial[joint.name]), axis=2)
             along = (force * _axis(scene, joint)).sum(axis=2)
             refuse(
                 status, scene.inputs[f"collar_diameter_{joint.name}"] <= scene.inputs[f"journal_diameter_{joint.name}"]
@@ -170,7 +170,7 @@ def rolling(scene: Scene, wanted: frozenset[str]) -> Columns:
         found = _shaft(tree, joint).loads(scene, own - {used} | pair)
         take_over(status, found.pop("status"))
         if used in own:
-            larger = np.maximum(*(np.asarray(found[name], np.float64) for name in names[3:5]))
+            larger = np.maximum(*floats(found, *names[3:5]))
             found[used] = larger / permissible_load(scene, f"_{joint.name}")
         columns |= {name: found[name] for name in own}
     return columns | {"status": status}

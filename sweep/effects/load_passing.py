@@ -16,7 +16,7 @@ from kernels.types import Status
 from sweep.effects import kinetostatics, link_loads, loads
 from sweep.effects.base import tool_place
 from sweep.effects.scene import Scene, take_over
-from sweep.families.base import Array, Columns, Family, Parameter
+from sweep.families.base import Array, Columns, Family, Parameter, floats
 from sweep.families.capabilities import JointRecords
 from sweep.families.link_tree import LinkTree
 
@@ -132,7 +132,7 @@ def _route_of(scene: Scene) -> Route:
 
 def _carried(scene: Scene, handed_back: Columns) -> dict[str, Array]:
     """Inertia of the later stages reduced to this crank, and its derivative."""
-    inertia, slope = (np.asarray(handed_back[name], np.float64) for name in INERTIAS)
+    inertia, slope = floats(handed_back, *INERTIAS)
     first, second = scene.gear
     both = first * first * inertia, 2.0 * first * second * inertia + first**3 * slope
     return dict(zip(INERTIAS, both, strict=True))

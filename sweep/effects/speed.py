@@ -19,7 +19,7 @@ from sweep.effects.loads import FRICTION_SUFFIX, FRICTION_TEXT
 from sweep.effects.scene import Scene, take_over
 from sweep.effects.turn import at_poses, on_finer_grids, per_turn, reduction_outputs
 from sweep.families import family
-from sweep.families.base import Accuracy, Array, Columns, Output, Parameter
+from sweep.families.base import Accuracy, Array, Columns, Output, Parameter, floats
 from sweep.numerics.steady_speed import FINER, GRIDS, LEFT, PER_LEFT, steady
 
 EQUATION = "D4 (1)-(4)"
@@ -95,7 +95,7 @@ def _solve(rubs: bool, finest: int, grid: Scene, phi: Array, last: bool) -> tupl
 def samples(grid: Scene) -> tuple[Array, Array]:
     """Reduced inertia and torque excess J'w^2/2 - M_drive(w, 0): weights and load reduced to the crank."""
     found = compute_loads(grid.even(), _NEEDED)
-    inertia, slope, drive = (np.asarray(found[name], np.float64) for name in _NEEDED_NAMES)
+    inertia, slope, drive = floats(found, *_NEEDED_NAMES)
     speed = grid.inputs["speed"][:, None]
     return inertia + grid.inputs["flywheel"][:, None], 0.5 * slope * speed * speed - drive
 
@@ -144,7 +144,7 @@ def _balanced(scene: Scene, speed: Array, change: Array, even: Array, rubs: bool
     ``even`` (n,) is the motor's torque at the mean speed; ``change`` is the acceleration that friction is taken at.
     """
     loads = compute_loads(scene.even(), _NEEDED)
-    inertia, slope, drive = (np.asarray(loads[name], np.float64) for name in _NEEDED_NAMES)
+    inertia, slope, drive = floats(loads, *_NEEDED_NAMES)
     mean, motor, flywheel = (scene.inputs[name][:, None] for name in ("speed", "motor_slope", "flywheel"))
     left = even[:, None] - motor * (speed - mean) - drive + 0.5 * slope * (mean * mean - speed * speed)
     if rubs:

@@ -9,7 +9,7 @@ from kernels.types import Status
 from sweep.effects.base import Effect
 from sweep.effects.loads import CHANGE
 from sweep.effects.scene import Scene
-from sweep.families.base import Array, Columns, Output, Parameter
+from sweep.families.base import Array, Columns, Output, Parameter, floats
 from sweep.families.capabilities import ThreadPath
 from sweep.families.machines.thread_balance import (
     ALPHA,
@@ -105,7 +105,7 @@ def speed(scene: Scene, wanted: frozenset[str]) -> Columns:
     """Speed and acceleration of the thread, and the ratio of tensions that the speed makes."""
     path = _path(scene)
     found = scene.family.poses(scene.designs, scene.angles, frozenset({path.rate, path.rate2}))
-    first, second = (np.asarray(found[name], np.float64) for name in (path.rate, path.rate2))
+    first, second = floats(found, path.rate, path.rate2)
     turning, change = scene.crank()
     status = np.array(found["status"], np.uint8)
     of_thread = np.ascontiguousarray(first * turning)

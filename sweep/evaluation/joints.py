@@ -183,7 +183,7 @@ def _of_member(machine: Machine, member: Member, matrix: Array, angles: Angles) 
     driving = angles.phi
     if member.driver is not None:
         name = ".".join(member.driver)
-        driving = np.asarray(machine.poses(matrix, angles, frozenset({name}))[name], np.float64)
+        (driving,) = machine.values(matrix, angles, name)
     own = Angles.of(np.ascontiguousarray(member.ratio * driving + member.phase(matrix)))
     wheres = []
     for stage, frame in zip(member.family.stages, member.frames(matrix), strict=True):

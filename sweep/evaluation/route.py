@@ -13,7 +13,7 @@ import numpy as np
 from kernels import status as st
 from kernels.types import TWO_PI
 from sweep.errors import InputError
-from sweep.families.base import Accuracy, Array, Columns, Family, Stage, Step, Work
+from sweep.families.base import Accuracy, Array, Columns, Family, Stage, Step, Work, floats
 from sweep.families.machines.machine import Machine
 from sweep.families.machines.relations import EventValue, Timing
 from sweep.families.names import at_stage, by_magnitude, error_of
@@ -168,7 +168,7 @@ def extent(box: Box, designs: Array, found: Columns, accuracy: Accuracy) -> Colu
     errors: Array = np.zeros(len(designs))
     for which, take in ((0, np.maximum), (1, np.minimum)):
         names = [pair[which] for pair in box.reductions]
-        values = [np.asarray(found[name], np.float64) for name in names]
+        values = floats(found, *names)
         ends.append(take.reduce([*values, *still]))  # nan where a joint's extremum is: its status says why
         if accuracy.target is not None:
             errors = errors + np.maximum.reduce([np.asarray(found[error_of(name)], np.float64) for name in names])
@@ -181,7 +181,7 @@ def extent(box: Box, designs: Array, found: Columns, accuracy: Accuracy) -> Colu
 
 def difference(timing: Timing, designs: Array, found: Columns, accuracy: Accuracy) -> Columns:
     """Give the difference of two crank angles, in (-pi, pi]."""
-    first, second = (np.asarray(found[name], np.float64) for name in timing.places)
+    first, second = floats(found, *timing.places)
     apart = second - first
     columns: Columns = {timing.name: apart - TWO_PI * np.ceil((apart - np.pi) / TWO_PI), "status": found["status"]}
     if accuracy.target is not None:

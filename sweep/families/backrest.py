@@ -13,7 +13,7 @@ import numpy as np
 
 from kernels.families import backrest
 from kernels.types import Array
-from sweep.families.base import Angles, Columns, Family, Interval, Output, Parameter
+from sweep.families.base import Angles, Columns, Family, Interval, Output, Parameter, floats
 from sweep.families.capabilities import Fixed, Link, Made, Skeleton
 from sweep.families.poses import chosen, guarded
 from sweep.families.skeletons import ORIGIN, parameter, standing
@@ -184,7 +184,7 @@ def skeleton(parameters: tuple[Parameter, ...], angle: str) -> Skeleton:
         """Make a point of the plane: ``at(column, designs, rho, *needs)`` gives its x and y, each (n, m)."""
 
         def place(designs: Array, angles: Angles, found: Columns) -> Array:
-            values = (np.asarray(found[name], np.float64) for name in needs)
+            values = floats(found, *needs)
             x, y = at(lambda name: column(name, designs), angles.phi, *values)
             return np.stack([x, y, 0.0 * x], axis=-1)
 

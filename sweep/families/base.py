@@ -74,6 +74,11 @@ def equal_steps(domain: Domain, designs: Array, poses: int) -> Array:
 Columns: TypeAlias = dict[str, NDArray[np.generic]]
 
 
+def floats(columns: Mapping[str, NDArray[np.generic]], *names: str) -> list[Array]:
+    """Return some columns as float64 numbers."""
+    return [np.asarray(columns[name], np.float64) for name in names]
+
+
 class Angles(NamedTuple):
     """Input angles with their cosines and sines; each (n, m), or (1, m) when shared by all designs."""
 
@@ -224,6 +229,10 @@ class Family:
     def precise(self) -> Family:
         """Give the same family with the most accurate poses it has: for single poses, not for sweeps."""
         return self if self.precise_poses is None else self._precise
+
+    def values(self, designs: Array, angles: Angles, *names: str) -> list[Array]:
+        """Return some pose outputs, (n, m) each, without their status."""
+        return floats(self.poses(designs, angles, frozenset(names)), *names)
 
     @cached_property
     def _precise(self) -> Family:

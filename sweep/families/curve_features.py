@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from kernels.types import TWO_PI, Array
-from sweep.families.base import Angles, Columns, Family, Stage
+from sweep.families.base import Angles, Columns, Family, Stage, floats
 from sweep.families.capabilities import Assembly, DesignMap
 from sweep.families.parts import Member
 from sweep.numerics.curves import PER_GAP
@@ -58,7 +58,7 @@ class Singular:
         """Make the sum of the squares of pose outputs: where they nearly vanish something turns or moves at once."""
 
         def curve(designs: Array, angles: Angles, found: Columns) -> Array:
-            values = np.stack([np.asarray(found[name], np.float64) for name in names])
+            values = np.stack(floats(found, *names))
             # To one size by a power of two: the square of a determinant of large lengths leaves float64.
             power = np.frexp(np.fmax.reduce(np.abs(values), axis=(0, 2)))[1]
             squared: Array = np.square(np.ldexp(values, -power[:, None])).sum(axis=0)

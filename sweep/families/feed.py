@@ -15,7 +15,7 @@ from kernels.families.feed import triad
 from kernels.families.feed.motion import EVENTS as _EVENTS
 from kernels.families.feed.motion import OUTPUTS as _POSES
 from kernels.types import EPS, Array
-from sweep.families.base import Accuracy, Angles, Columns, Family, Output, Parameter, Step, Work
+from sweep.families.base import Accuracy, Angles, Columns, Family, Output, Parameter, Step, Work, floats
 from sweep.families.capabilities import Arm, Dimensions, Link, Made, Skeleton
 from sweep.families.curve_features import Singular
 from sweep.families.feed_trees import three_leads, two_leads
@@ -124,8 +124,7 @@ poses = partial(_poses, feed.poses, _POSES, ("cos", "sin"))
 
 def _of_chain(parameters: tuple[Parameter, ...], designs: Array, angles: Angles, *names: str) -> list[Array]:
     """Compute outputs of the crank-rocker of the horizontal chain, (n, m) each."""
-    found = CRANK_ROCKER.poses(horizontal_chain(designs, parameters), angles, frozenset(names))
-    return [np.asarray(found[name], np.float64) for name in names]
+    return CRANK_ROCKER.values(horizontal_chain(designs, parameters), angles, *names)
 
 
 def rocker_loop(parameters: tuple[Parameter, ...], designs: Array, angles: Angles, found: Columns) -> Array:
@@ -152,7 +151,7 @@ CHAIN_LINKS = (CRANK, COUPLER, Link("rocker", ("d", "c", "h")))
 
 def lift_loop(designs: Array, angles: Angles, found: Columns) -> Array:
     """Return Heron's product of the triangle H, E, F, (n, m): 16 times its squared area."""
-    x_h, y_h, x_e, y_e = (np.asarray(found[name], np.float64) for name in ("x_h", "y_h", "x_e", "y_e"))
+    x_h, y_h, x_e, y_e = floats(found, "x_h", "y_h", "x_e", "y_e")
     q, fx, fy = dimensions(PARAMETERS, designs, "q", "fx", "fy")
     w, f = np.hypot(x_h - x_e, y_h - y_e), np.hypot(fx, fy)
     product: Array = ((w + f) - q) * ((w + f) + q) * (q - (w - f)) * (q + (w - f))
@@ -275,7 +274,7 @@ def rack_joint(number: int) -> Made:
     """Joint of a link on the rack."""
 
     def at(designs: Array, angles: Angles, found: Columns) -> Array:
-        x, y, chi = (np.asarray(found[name], np.float64) for name in ("x_t", "y_t", "chi"))
+        x, y, chi = floats(found, "x_t", "y_t", "chi")
         along, across = dimensions(TRIAD_PARAMETERS, designs, f"f{number}x", f"f{number}y")
         cos, sin = np.cos(chi), np.sin(chi)
         return np.stack([x + along * cos - across * sin, y + along * sin + across * cos, 0.0 * chi], axis=-1)

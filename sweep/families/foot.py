@@ -16,7 +16,7 @@ from kernels.families.foot import OUTPUTS as _CLOSED
 from kernels.status import NO_EVENT, OK
 from kernels.types import Array
 from sweep.families import feed
-from sweep.families.base import Accuracy, Angles, Columns, Family, March, Output, Parameter, Step, Work
+from sweep.families.base import Accuracy, Angles, Columns, Family, March, Output, Parameter, Step, Work, floats
 from sweep.families.capabilities import Fixed, Link, Made, PresserFoot, Skeleton
 from sweep.families.poses import chosen, guarded
 from sweep.families.skeletons import Y as UPWARDS
@@ -253,7 +253,7 @@ def contact(designs: Array, wanted: frozenset[str], accuracy: Accuracy) -> Colum
     path, status = feed_path(designs, NODES)
     rack = np.ascontiguousarray(designs[:, :_RACK_COLUMNS])
     ends = feed.events(rack, frozenset(("phi_entry", "phi_leave")), accuracy)
-    places = np.stack([np.asarray(ends[name], np.float64) for name in ("phi_entry", "phi_leave")], axis=1)
+    places = np.stack(floats(ends, "phi_entry", "phi_leave"), axis=1)
     known = np.asarray(np.isfinite(places).all(axis=1))
     bend = feed.poses(rack, Angles.of(np.where(known[:, None], places, 0.0)), frozenset(("d2y_t",)))["d2y_t"]
     least = np.where(known, unit * np.maximum(-np.asarray(bend, np.float64).min(axis=1), 0.0), np.nan)
@@ -270,8 +270,7 @@ def feeding(designs: Array, wanted: frozenset[str], accuracy: Accuracy) -> Colum
 
 
 def _rack(designs: Array, angles: Angles, *names: str) -> list[Array]:
-    found = feed.poses(np.ascontiguousarray(designs[:, :_RACK_COLUMNS]), angles, frozenset(names))
-    return [np.asarray(found[name], np.float64) for name in names]
+    return feed.FAMILY.values(np.ascontiguousarray(designs[:, :_RACK_COLUMNS]), angles, *names)
 
 
 def of_rack(joint: str) -> Made:

@@ -9,7 +9,7 @@ import numpy as np
 
 from kernels.families import free_cam
 from kernels.types import Array
-from sweep.families.base import Angles, Columns, Family, March, Output, Parameter
+from sweep.families.base import Angles, Columns, Family, March, Output, Parameter, floats
 from sweep.families.capabilities import Link, Made, Skeleton, ThreadPath
 from sweep.families.curve_features import Bends
 from sweep.families.outputs import ladders
@@ -150,7 +150,7 @@ def sliding_poses(designs: Array, angles: Angles, wanted: frozenset[str]) -> Col
 
 def contact_place(designs: Array, angles: Angles, found: Columns) -> Array:
     """Place where the thread passes the plane of the cam: on the edge, or on the line between the guides."""
-    y, on = (np.asarray(found[name], np.float64) for name in ("y_contact", "contact"))
+    y, on = floats(found, "y_contact", "contact")
     at = turned(parameter(PARAMETERS, "a", designs)[:, None] * y * y, y, angles)
     return np.where(on[..., None] == 1.0, at, straight(designs)[:, None, :])
 

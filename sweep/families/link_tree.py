@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Literal, NamedTuple, TypeAlias
 import numpy as np
 
 from kernels.types import Array
-from sweep.families.base import Angles, Columns, Parameter
+from sweep.families.base import Angles, Columns, Parameter, floats
 from sweep.families.capabilities import DesignMap
 from sweep.families.frames import product
 
@@ -97,7 +97,7 @@ def filled_by(kernel: Callable[..., object], needs: tuple[str, ...]) -> LinkFill
     """Fill by a kernel(designs, cos, sin, motion, out) that takes the pose outputs ``needs`` in one array."""
 
     def fill(designs: Array, angles: Angles, motion: Columns, out: Links) -> None:
-        given = np.stack([np.asarray(motion[name], np.float64) for name in needs])
+        given = np.stack(floats(motion, *needs))
         kernel(designs, angles.cos, angles.sin, given, out)
 
     return fill
@@ -150,7 +150,7 @@ def crank_angle(links: Links, angles: Angles, per: Array | float = 1.0, ahead: A
 
 def turning(motion: Columns, *names: str) -> Turning:
     """Return an angle and its derivatives out of pose outputs."""
-    return Turning(*(np.asarray(motion[name], np.float64) for name in names))
+    return Turning(*floats(motion, *names))
 
 
 def sliding(motion: Columns, names: tuple[str, str, str], way: tuple[float, float, float]) -> Path:

@@ -14,7 +14,7 @@ import numpy as np
 from kernels.linkage.bodies import DRIVEN, FRAME, SLIDE, TURN, Links
 from kernels.types import Array
 from sweep.families import link_tree as poses
-from sweep.families.base import Angles, Columns, Parameter
+from sweep.families.base import Angles, Columns, Parameter, floats
 from sweep.families.link_tree import LinkBody, LinkFill, LinkJoint, LinkTree, Path, Turning
 from sweep.families.skeletons import X, Y, Z, dimensions, parameter
 
@@ -295,7 +295,7 @@ def heddle_shaft(parameters: Parameters, line: Callable[[Array], tuple[Array, Ar
 def _shaft_lever(parameters: Parameters, designs: Array, motion: Columns) -> Turning:
     """Return the turning of the shaft lever: of its rates the family gives those of the shaft, (7)."""
     arm, heddle, slide = dimensions(parameters, designs, "O4E", "EG", "x_s")
-    lam, first, second = (np.asarray(motion[name], np.float64) for name in ("lam", "dy", "d2y"))
+    lam, first, second = floats(motion, "lam", "dy", "d2y")
     x, y = arm * np.cos(lam), arm * np.sin(lam)
     z = np.where(heddle > 0.0, x - slide, 0.0)
     height = np.where(heddle > 0.0, np.sqrt((heddle - z) * (heddle + z)), 1.0)

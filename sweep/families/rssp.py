@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from kernels.families import rssp
 from kernels.types import EPS, Array
 from sweep.families import capabilities as can
-from sweep.families.base import Accuracy, Angles, Columns, Family, Output, Parameter, PoseFunction, Step
+from sweep.families.base import Accuracy, Angles, Columns, Family, Output, Parameter, PoseFunction, Step, floats
 from sweep.families.hardpoints import PLANAR_SLIDER_POINTS, SLIDER_CRANK_POINTS
 from sweep.families.outputs import coordinate_outputs, joint_outputs, ladders
 from sweep.families.poses import chosen, move_records, poses_of, step_of
@@ -123,7 +123,7 @@ _JOINT_NEEDS = ("s", "ds", "d2s", "discriminant")
 
 def joint_records(designs: Array, angles: Angles, motion: Columns, per_pose: Array, per_design: Array) -> None:
     """Fill the joint records that effects work from; ``motion`` holds the pose outputs they are made of."""
-    given = np.stack([np.asarray(motion[name], np.float64) for name in _JOINT_NEEDS])
+    given = np.stack(floats(motion, *_JOINT_NEEDS))
     rssp.joints(designs, angles.cos, angles.sin, given, per_pose, per_design)
 
 

@@ -11,7 +11,7 @@ from kernels import status as st
 from kernels.families import rssr
 from kernels.types import Array
 from sweep.families import capabilities as can
-from sweep.families.base import Accuracy, Angles, Columns, Family, Output, Parameter, PoseFunction, Step, Work
+from sweep.families.base import Accuracy, Angles, Columns, Family, Output, Parameter, PoseFunction, Step, Work, floats
 from sweep.families.hardpoints import CRANK_ROCKER_POINTS
 from sweep.families.outputs import coordinate_outputs, joint_outputs, ladders
 from sweep.families.poses import chosen, move_records, of_matrix, optional_outputs, poses_of, together
@@ -100,7 +100,7 @@ JOINT_NEEDS = ("cos_psi", "sin_psi", "dpsi", "d2psi", "discriminant")
 
 def joint_records(designs: Array, angles: Angles, motion: Columns, per_pose: Array, per_design: Array) -> None:
     """Fill the joint records that effects work from; ``motion`` holds the pose outputs they are made of."""
-    given = np.stack([np.asarray(motion[name], np.float64) for name in JOINT_NEEDS])
+    given = np.stack(floats(motion, *JOINT_NEEDS))
     rssr.joints(designs, angles.cos, angles.sin, given, per_pose, per_design)
 
 

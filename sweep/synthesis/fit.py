@@ -17,7 +17,7 @@ from kernels.linear.line_fit import Straightest, line_fit
 from sweep.errors import InputError
 from sweep.evaluation.summaries import design_outputs
 from sweep.families import family as find_family
-from sweep.families.base import Accuracy, Angles, Array, Family
+from sweep.families.base import Accuracy, Angles, Array, Family, floats
 from sweep.families.capabilities import GuidedPoint
 from sweep.families.chain import Chain, driven_guide
 from sweep.reductions.steps import applying_step
@@ -114,7 +114,7 @@ def _fitted(
     """Fitted parameters (4, n), the travel (n,) and the status of guides at their input angles (n, m)."""
     names = ("x_b", "y_b", "x_c", "y_c")
     pins = guide.poses(own, Angles.of(angles), frozenset(names))
-    parts = [np.asarray(pins[name], np.float64) for name in names]
+    parts = floats(pins, *names)
     missing = pins["status"] != codes.OK
     if missing.any():
         for part in parts:

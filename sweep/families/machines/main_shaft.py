@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from kernels import status as st
 from kernels.effects.speed_fluctuation import RESOLVED
 from kernels.types import Array, Status
-from sweep.families.base import Accuracy, Angles, Columns, Output, Parameter, Step, Work
+from sweep.families.base import Accuracy, Angles, Columns, Output, Parameter, Step, Work, floats
 from sweep.families.curve_features import Smooth, least_samples
 from sweep.families.machines.relations import Relation
 from sweep.families.poses import chosen
@@ -176,6 +176,6 @@ def _samples(
     angles = Angles.of(2.0 * np.pi * np.arange(size)[None] / size)
     names = [shaft.name, f"{shaft.name}_inertia", f"{shaft.name}_dinertia"]
     poses = machine.poses(designs, angles, frozenset(names))
-    torque, inertia, bend = (np.asarray(poses[name], np.float64) for name in names)
+    torque, inertia, bend = floats(poses, *names)
     status = np.asarray(poses["status"], np.uint8).max(axis=1, initial=0)
     return np.ascontiguousarray(inertia), 0.5 * bend * speed[:, None] ** 2 - torque, status

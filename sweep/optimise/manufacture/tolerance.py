@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sweep.evaluation.summaries import design_outputs
-from sweep.families.base import Accuracy, Array, Family
+from sweep.families.base import Accuracy, Array, Family, floats
 from sweep.families.names import MINUS, is_flag, judged_by, without_minus
 from sweep.optimise.extrema.gradients import scalar_gradient, step_gradients, stepped
 from sweep.optimise.local.model import Model
@@ -97,7 +97,7 @@ def _plain_ends(
 
     def values(designs: Array, names: Sequence[str]) -> Array:
         columns = design_outputs(asked.family, designs, names, asked.accuracy, asked.window)
-        return np.stack([np.asarray(columns[name], np.float64) for name in names], axis=1)
+        return np.stack(floats(columns, *names), axis=1)
 
     moves = design + 1j * stepped(asked, design, at).imag  # about the very design whose values are asked for
     slopes = step_gradients(asked.family, moves, outputs, asked.accuracy)

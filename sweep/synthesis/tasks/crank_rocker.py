@@ -75,8 +75,7 @@ class LocusPoint:
 
 def motion(designs: Array, angles: Angles, *wanted: str) -> list[Array]:
     """Pose outputs of crank-rockers, (n, m) each, nan where there is no mechanism."""
-    found = RSSR.poses(designs, angles, frozenset(wanted))
-    return [np.asarray(found[name], np.float64) for name in wanted]
+    return RSSR.values(designs, angles, *wanted)
 
 
 def acceleration(designs: Array) -> Array:
@@ -110,7 +109,7 @@ def bearing_reserve(designs: Array, bearings: Mapping[str, float]) -> Array:
     whole, least = extended(RSSR, [f"min_{name}"]), np.full(len(designs), np.nan)
     alive = np.isfinite(designs).all(axis=1)
     matrix = design_matrix(whole, {**named(designs[alive]), **bearings})[0]
-    least[alive] = np.asarray(whole.poses(matrix, turn(), frozenset({name}))[name], np.float64).min(axis=1)
+    least[alive] = whole.values(matrix, turn(), name)[0].min(axis=1)
     return least
 
 

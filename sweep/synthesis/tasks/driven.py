@@ -11,7 +11,7 @@ import numpy as np
 from sweep.errors import InputError
 from sweep.evaluation.summaries import design_outputs
 from sweep.families import slotted
-from sweep.families.base import Accuracy, Angles, Array
+from sweep.families.base import Accuracy, Angles, Array, floats
 from sweep.synthesis.tasks.crank_rocker import OnLocus, motion, named, pressure_limit, turn
 from sweep.synthesis.tasks.problem import Found, Unknown, ranges, turning
 from sweep.synthesis.tasks.second_stage import RSSP, chain_motion, second_pressure_limit
@@ -46,7 +46,7 @@ def slot(a2: Array, e2: Array, t: Array) -> Slot:
     for k, parameter in enumerate(slotted.PARAMETERS):
         matrix[:, k] = places.get(parameter.name, matrix[:, k])
     columns = slotted.poses(matrix, Angles.of(t), frozenset({"rho", "drho", "d2rho"}))
-    return Slot(*(np.asarray(columns[name], np.float64) for name in ("rho", "drho", "d2rho")))
+    return Slot(*floats(columns, "rho", "drho", "d2rho"))
 
 
 @dataclass(frozen=True)
@@ -161,7 +161,7 @@ class Task8(OnLocus):
         place = "phi_ext" if self.limit == "extended" else "phi_fold"
         theta = np.asarray(design_outputs(RSSP, shape, [place], EXACT)[place], np.float64)
         span = np.linspace(0.0, self.kappa * self.swing, 9)
-        slide = np.asarray(RSSP.poses(shape, Angles.of(theta[:, None] + span), frozenset("s"))["s"], np.float64)
+        (slide,) = RSSP.values(shape, Angles.of(theta[:, None] + span), "s")
         travel = slide[:, -1] - slide[:, 0]
         a2 = self.stroke / np.abs(travel)
         columns = named(designs, "1") | {
@@ -191,7 +191,6 @@ class Task8(OnLocus):
         turned = motion(designs, Angles.of(phi1[:, None] + window), "psi")[0] - psi1[:, None]
         rest = np.full((len(designs), 2), [self.alpha2, float(self.branch)])
         stage = np.column_stack([lengths, rest])
-        s = RSSP.poses(stage, Angles.of(theta[:, None] + self.kappa * turned), frozenset("s"))["s"]
-        away = np.abs(np.asarray(s, np.float64) - np.asarray(s, np.float64)[:, [WINDOW // 2]])
-        largest: Array = away.max(axis=1)
+        (s,) = RSSP.values(stage, Angles.of(theta[:, None] + self.kappa * turned), "s")
+        largest: Array = np.abs(s - s[:, [WINDOW // 2]]).max(axis=1)
         return largest

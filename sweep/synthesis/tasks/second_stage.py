@@ -61,8 +61,7 @@ def chain_motion(second: str, columns: Mapping[str, Array], *wanted: str) -> lis
     # A stage stands where it does by default, as far as the task says nothing of its place.
     defaults = {p.name: np.full_like(columns["a1"], p.default) for p in chain.parameters if p.default is not None}
     rows = np.column_stack([(defaults | dict(columns))[name] for name in chain.parameter_names])
-    found = chain.poses(rows, turn(), frozenset(wanted))
-    return [np.asarray(found[name], np.float64) for name in wanted]
+    return chain.values(rows, turn(), *wanted)
 
 
 def second_pressure_limit(angle: Array, largest: float) -> Array:
@@ -95,16 +94,13 @@ class FourBar:
         x, y, dx, dy = self.poses(shape, angles, branch, self.coordinates)
         return x + 1j * y, dx + 1j * dy
 
-    def poses(
-        self, shape: Mapping[str, Array], angles: Angles, branch: int, wanted: tuple[str, ...]
-    ) -> tuple[Array, ...]:
+    def poses(self, shape: Mapping[str, Array], angles: Angles, branch: int, wanted: tuple[str, ...]) -> list[Array]:
         """Return pose outputs of stages with a crank of 1, (n, m) each."""
         known = family(self.family)
         columns = {"a": 1.0, "branch": float(branch)} | {self.dimensions[name]: part for name, part in shape.items()}
         n = len(angles.phi)
         rows = np.column_stack([np.broadcast_to(columns.get(p.name, 0.0), n) for p in known.parameters])
-        found = known.poses(rows, angles, frozenset(wanted))
-        return tuple(np.asarray(found[name], np.float64) for name in wanted)
+        return known.values(rows, angles, *wanted)
 
     def over_the_turn(self, drive: Drive, columns: Mapping[str, Array]) -> tuple[Array, Array | None]:
         """Return acceleration along ``lam2`` and pressure angle, if any, over a turn of the drive, (n, m)."""
@@ -310,8 +306,7 @@ class Task7(Task):
         }
         stage = np.column_stack([columns[f"{name}2"] for name in RSSP.parameter_names])
         ends = Angles.of(np.column_stack([theta, theta + self.kappa * first.swing]))
-        at = RSSP.poses(stage, ends, frozenset(("s", "ds")))
-        s, ds = (np.asarray(at[name], np.float64) for name in ("s", "ds"))
+        s, ds = RSSP.values(stage, ends, "s", "ds")
         wanted = {"start": self.start_acceleration, "end": self.end_acceleration}
         equations = {"stroke": (s[:, 1] - s[:, 0] - self.stroke) / abs(self.stroke)}
         for k, ((end, value), second) in enumerate(zip(wanted.items(), self._second_derivatives, strict=True)):

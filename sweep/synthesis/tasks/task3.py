@@ -13,7 +13,7 @@ from kernels.synthesis.acceptance import PARAMETERS
 from sweep.errors import InputError
 from sweep.evaluation.summaries import design_outputs
 from sweep.evaluation.tables import design_matrix
-from sweep.families.base import Accuracy, Array
+from sweep.families.base import Accuracy, Array, floats
 from sweep.synthesis.tasks.crank_rocker import RSSR, acceleration, designs_on_locus, named, pressure_limit
 from sweep.synthesis.tasks.problem import Found, Task, Unknown, ranges, turning
 
@@ -146,7 +146,7 @@ def adjustments(design: Mapping[str, float]) -> pd.DataFrame:
     if limits["status"][0] != 0:
         raise InputError("design", dict(design), "a crank-rocker that turns fully and oscillates", "adjustments")
     rates = np.empty((1, len(PARAMETERS), 4))
-    arguments = [matrix, *(np.asarray(limits[name], np.float64) for name in names), rates]
+    arguments = [matrix, *floats(limits, *names), rates]
     kernels.limit_sensitivities(*arguments)
     psi_ext, phi_ext, psi_fold, phi_fold = rates[0].T
     swing, phi0 = psi_fold - psi_ext, phi_fold - phi_ext
