@@ -243,7 +243,7 @@ def nearest(word: str, known: Iterable[str]) -> str:
 
 
 def listed(names: Iterable[str]) -> str:
-    """Write names with commas between them, and how many there are besides the first of very many."""
+    """Join names by commas; of very many the first ones and the number of the others."""
     every = list(names)
     more = f" and {len(every) - MOST_NAMES} more" if len(every) > MOST_NAMES else ""
     return ", ".join(every[:MOST_NAMES]) + more

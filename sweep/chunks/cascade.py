@@ -294,7 +294,7 @@ def ordered_routes(study: Study) -> tuple[Route, ...]:
 
 
 def _before_fit(study: Study, route: Route) -> bool:
-    """Whether the route concerns only stages before the one that [fit] finishes, and no load that it hands back."""
+    """Whether a route needs only stages before the one that [fit] finishes, and no load from that one."""
     if study.fit is None:
         return False
     last = len(study.bare.stages)

@@ -92,9 +92,8 @@ def _output_rows(outputs: Iterable[Output]) -> Rows:
 def _design_rows(entry: Effect) -> Rows:
     """Return outputs per design, but for reductions of outputs per pose."""
     poses = {o.name for o in entry.outputs}
-    results = entry.design_result.outputs if entry.design_result else ()
-    reduced = [(found := REDUCED.fullmatch(o.name)) is not None and found["pose"] in poses for o in results]
-    return _output_rows(o for o, one in zip(results, reduced, strict=True) if not one)
+    reduced = {o for o in entry.design_outputs if (found := REDUCED.fullmatch(o.name)) and found["pose"] in poses}
+    return _output_rows(o for o in entry.design_outputs if o not in reduced)
 
 
 def _input_rows(inputs: Iterable[Parameter]) -> Rows:

@@ -86,7 +86,7 @@ def over(family: Family) -> str:
 
 
 def capability_words(family: Family) -> list[str]:
-    """Say what a family can be asked for besides its motion."""
+    """List in words what a family offers besides its motion."""
     return [*(word for kind, word in CAPABILITIES if family.find(kind) is not None), *["points"] * bool(family.points)]
 
 

@@ -60,7 +60,7 @@ def study_text(name: str, family: Family, schema: str, drawn: Mapping[str, float
 
 
 def smoke_text(family: Family) -> str:
-    """Return the tiny version beside it."""
+    """Return the text of the tiny version of the study."""
     few = {"count": 2}
     design: dict[str, Any] = dict.fromkeys(swept_names(family), few)
     if isinstance(family, Machine):

@@ -147,7 +147,7 @@ def cache() -> None:
 
 @cache.command()
 def clear() -> None:
-    """Remove the compiled kernels of every version; they are compiled anew when needed.
+    """Remove the compiled kernels of every version; they are compiled again when needed.
 
     Files cut short are noticed and made anew; this is the cure for any other damage, and makes room.
     """

@@ -69,7 +69,7 @@ class Verbs(click.Group):
         return list(VERBS)
 
     def get_command(self, ctx: click.Context, cmd_name: str) -> click.Command | None:
-        """Import a verb; None for a name that is none."""
+        """Import the command of a verb; None for an unknown name."""
         if cmd_name not in VERBS:
             return None
         module, name = VERBS[cmd_name][0].split(":")
@@ -79,7 +79,7 @@ class Verbs(click.Group):
     def resolve_command(
         self, ctx: click.Context, args: list[str]
     ) -> tuple[str | None, click.Command | None, list[str]]:
-        """Find the verb that is called; of a word that is none, say what it may be."""
+        """Find the verb that is called; for an unknown one the error names the nearest."""
         word = args[0]
         if word not in VERBS and not word.startswith("-"):
             from sweep.study.tables import TABLES

@@ -151,7 +151,7 @@ def parts(folder: Path) -> list[Part]:
 
 
 def listing(folder: Path) -> tuple[list[Part], list[Path]]:
-    """Return the chunks of a folder by their names, in design order, and what lies there besides; nothing is opened.
+    """Return the chunks of a folder by their names, in design order, and all other entries; no file is opened.
 
     A hidden file is nobody's data.
     """

@@ -156,7 +156,7 @@ def _effect_names(family: Family) -> frozenset[str]:
 
 
 def _carriers(family: Family, placed: Placed) -> list[Placed]:
-    """Effects of the later stages that hand back the load of this one."""
+    """Effects of the later stages that give the load on this one."""
     key = placed.entry.takes_load
     return [
         Placed(entry, k, stage.tail, False)
@@ -167,7 +167,7 @@ def _carriers(family: Family, placed: Placed) -> list[Placed]:
 
 
 def _handing(family: Family, placed: Placed) -> list[Placed]:
-    """Effects of all later stages that hand back the load of this one; none if a stage cannot."""
+    """Effects of all later stages that give the load on this one; empty if one of these stages has none."""
     found = _carriers(family, placed)
     return found if len(found) == len(family.stages) - 1 - placed.stage else []
 
@@ -260,7 +260,7 @@ def _check_even(machine: Machine, found: Mapping[str, Family]) -> None:
 
 
 def _asked(machine: Machine, wanted: Iterable[str]) -> set[str]:
-    """Dotted names that wanted names are about, those behind relations included."""
+    """Find the outputs that wanted names are reductions of, with those of members that relations are made of."""
     names = {about for name in wanted for about in reduced(name, machine.domain)}
     asked = [timing for timing in machine.timings if timing.name in names]
     places = [place for timing in asked for place in timing.places]
@@ -303,7 +303,7 @@ def with_effects(family: Family, effects: tuple[Placed, ...], curves: Mapping[st
 
 
 def _felt(family: Family, effects: tuple[Placed, ...], name: str) -> frozenset[str]:
-    """Names of the pose outputs of the effects that take an input, a later stage's through what that hands back."""
+    """Names of the pose outputs that depend on an input, of a later stage through the load that it puts on this one."""
 
     def takes(source: Placed) -> bool:
         own = at_stage(name, source.number) if source.number else name
@@ -318,7 +318,7 @@ def _design_ns(entry: Effect, accuracy: Accuracy) -> float:
 
 
 def inputs(family: Family, effects: Iterable[Placed]) -> tuple[Parameter, ...]:
-    """List the inputs of these effects and of those that hand back their load, with their stage's number.
+    """List the inputs of these effects and of the later stages' effects that give their load, with stage numbers.
 
     One that several share stands once, and is required if any of them requires it.
     """

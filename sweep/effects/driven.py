@@ -53,7 +53,7 @@ def _weighs(stage: Scene | Driven, given: dict[str, Array], inputs: Sequence[Par
 
 
 def driven_side(scene: Scene, slopes: bool) -> DrivenSide | None:
-    """Compute what the follower drives besides itself; None where that is nothing. Slopes are zero unless asked for."""
+    """Compute torque and inertia of what the follower drives, None for nothing; slopes are 0 unless asked for."""
     found = _stages(scene, slopes) if _behind_weighs(scene).any() else None
     tip = _tip(scene)
     if found is None or tip is None:

@@ -1,4 +1,4 @@
-"""Loads of a stage of a chain, and what it hands back to the stage that drives it, by what its family offers.
+"""Loads of a stage of a chain, and the torque and inertia that the stage driving it feels.
 
 A family with joint records has its loads in closed form, one with a tree of links by virtual power.  The tree alone
 would do: for crank-rockers, slider-cranks and guides at 360 angles both agree to 2e-15.  But it takes, with the poses
@@ -68,7 +68,7 @@ def route(family: Family) -> Route | None:
 
 
 def inputs_of_loads(family: Family) -> tuple[Parameter, ...]:
-    """List the inputs of the effect that hands back a family's load; none where there is no such effect."""
+    """List the inputs of the effect that gives the load on the stage before; empty without such an effect."""
     found = route(family)
     return () if found is None else found.inputs(family)
 
@@ -102,7 +102,7 @@ def computed(scene: Scene, key: str, wanted: frozenset[str]) -> Columns:
 
 
 def behind(scene: Scene, key: str) -> Columns | None:
-    """Compute what the next stage hands back, its status among it; None at the end of the chain."""
+    """Compute torque, inertia and status of the next stage, as this one feels them; None at the end of the chain."""
     if scene.driven is None:
         return None
     memo = f"behind {key}"
@@ -139,7 +139,7 @@ def _carried(scene: Scene, handed_back: Columns) -> dict[str, Array]:
 
 
 def _on_output(scene: Scene, found: Route, handed_back: Columns | None, key: str) -> Array:
-    """Load of the output link, with the next stage's driving torque that acts on it besides."""
+    """Load of the output link, less the driving torque that the next stage takes from it."""
     name = found.load(scene)
     load = np.zeros((len(scene.designs), 1)) if name is None else scene.load(name)
     if handed_back is None:

@@ -107,7 +107,7 @@ def _grids(scene: Scene, rubs: bool) -> tuple[int, ...]:
 
 
 def _apart(scene: Scene, run: Callable[[Scene], Columns]) -> Columns:
-    """Run designs whose tool pierces apart from the others: their grids are nobody else's."""
+    """Solve designs whose tool pierces by themselves, on grids of their own."""
     pierces = scene.pierces
     groups = [rows for rows in (np.flatnonzero(~pierces), np.flatnonzero(pierces)) if rows.size]
     parts = [run(scene.only(rows)) for rows in groups] or [run(scene)]

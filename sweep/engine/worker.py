@@ -1,4 +1,4 @@
-"""What runs in a worker, wherever that is: compute one chunk, write it, say so."""
+"""The task of a worker, in any process: compute one chunk, write it, return its numbers."""
 
 from __future__ import annotations
 

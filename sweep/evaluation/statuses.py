@@ -15,7 +15,7 @@ from sweep.families.names import error_of
 
 
 def meaning(code: int) -> str:
-    """Return what one status code says; a number that is none of ours says so."""
+    """Return the meaning of a status code in words, also of an unknown one."""
     return MEANING.get(int(code), f"status {int(code)}: unknown")
 
 
@@ -26,7 +26,7 @@ def meanings(codes: Iterable[int]) -> list[str]:
 
 
 def explained(columns: Columns, names: Iterable[str]) -> Columns:
-    """Columns with a status wherever one of these values is missing or has left float64, and no error of it.
+    """Return columns with a status wherever one of these values is missing or infinite; its error is nan there.
 
     The status of what no kernel has explained is INVALID_INPUT: the scale of its parameters is beyond float64.
     """

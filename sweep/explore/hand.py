@@ -110,7 +110,7 @@ class Hand:
         return design
 
     def answer(self, designs: Sequence[Mapping[str, object]], names: Sequence[str]) -> dict[str, Any]:
-        """Return all the page shows of a design and of those that are pinned beside it, as JSON takes it."""
+        """Return everything that the page shows of a design and of the pinned ones, as JSON."""
         return judged(self.data, [self._row(tuple(self.design(one).items())) for one in designs], names)
 
     def _computed(self, design: tuple[tuple[str, float], ...]) -> Row:

@@ -104,7 +104,7 @@ def machine(
     shafts: Mapping[str, Any] | None = None,
     tools: Mapping[str, Any] | None = None,
 ) -> Machine:
-    """Several mechanisms on one main shaft, accepted wherever a family's name is.
+    """Make a machine of several mechanisms on one main shaft; it is accepted wherever a family's name is.
 
     Parameters
     ----------

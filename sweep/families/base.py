@@ -236,7 +236,7 @@ class Family:
 
     @cached_property
     def _precise(self) -> Family:
-        """Made once, so that what is found of it and kept beside it serves every call."""
+        """The family with precise poses, made once: results that are cached with it serve every call."""
         assert self.precise_poses is not None
         return replace(self, poses=self.precise_poses)
 

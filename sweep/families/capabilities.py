@@ -1,4 +1,4 @@
-"""What else a family can be asked for besides its motion, as typed objects.
+"""Capabilities: what a family offers besides its motion, as typed objects.
 
 An effect, a proof, a drawing or a fit names the type of what it needs; a family that offers an object of that type is
 served.  Nothing asks for a family's name.
@@ -294,7 +294,7 @@ class Arm:
 
 @dataclass(frozen=True)
 class Dimensions:
-    """Which parameters are the sizes of the moving links; limits on what can be made are about them.
+    """Parameters that are dimensions of the moving links, on which limits of manufacture bear.
 
     Parameters
     ----------
@@ -310,7 +310,7 @@ class Dimensions:
 
     @property
     def names(self) -> tuple[str, ...]:
-        """All parameters that it is about."""
+        """All these parameters."""
         vectors = (*self.links, self.optional, *(side for arm in self.arms for side in (arm.point, arm.link)))
         return tuple(dict.fromkeys(name for vector in vectors for name in vector))
 

@@ -1,4 +1,4 @@
-"""Frames of stages and members: a crank axis is laid on an axis that turns, the rest of the mechanism follows."""
+"""Frames of stages and members: each crank axis lies on a turning axis, and the frame of the mechanism follows."""
 
 from __future__ import annotations
 
@@ -75,7 +75,7 @@ def product(a: Array, b: Array) -> Array:
 
 
 def place_parameters(what: str, at: Sequence[float]) -> tuple[Parameter, ...]:
-    """Return where something stands in the machine's frame, and how it is tilted there: what tolerances are about."""
+    """Return parameters for place and tilt of a part in the machine's frame, which may have tolerances."""
     return (
         *(
             Parameter(f"{axis}_at", "length", f"{axis} of {what} in the machine's frame", default=x)

@@ -152,7 +152,7 @@ class Member:
         return found
 
     def _given(self, designs: Array) -> Frame:
-        """Frame that ``place`` gives, of the stage that it is about."""
+        """Frame of the stage that ``place`` is given for."""
         at, tilt = (self.columns.stop + self._place[name] for name in ("x_at", "x_tilt"))
         return Frame(tilted(self.place.rotation[None], designs[:, tilt : tilt + 3]), designs[:, at : at + 3])
 
@@ -180,7 +180,7 @@ class Member:
         return name.removeprefix(prefix) if name.startswith(prefix) else ""
 
     def geared_parts(self, name: str) -> tuple[str, ...]:
-        """Name what a magnitude is made of anew where the crank does not turn as the main shaft does."""
+        """Name the components of a magnitude that is computed again: the crank does not turn as the main shaft does."""
         output = self.family.pose_output.get(name)
         return () if output is None or (self.driver is None and self.ratio == 1) else output.parts
 

@@ -1,4 +1,4 @@
-"""Places on a member that relations and tools are about: joints of all stages, fixed axes, tip, eye, blades."""
+"""Points and axes of a member that relations and tools refer to: joints of all stages, fixed axes, tip, eye, blades."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Where tasks run: here, in threads, in processes, on a cluster, or wherever somebody has registered an executor for.
+"""Executors: tasks run here, in threads, in processes, on a cluster, or by an executor that has been registered.
 
 A task is called with a number and a function that says whether to stop; it must be fit to be pickled, and may rely on
 neither its parent's process nor its signals.  How a worker learns that it is to stop, and what becomes of it when its

@@ -48,7 +48,7 @@ def best_words(value: float) -> str:
 
 
 def unsaid(label: str, done: int, total: int, unit: str) -> None:
-    """Tell nobody."""
+    """Report nothing."""
 
 
 class Progress:
@@ -185,7 +185,7 @@ class Progress:
 
 
 class Phases:
-    """One piece of work after the other, each told by itself, if ``quiet`` only what takes more than two seconds.
+    """Progress of pieces of work one after another; with ``quiet`` only of those that take more than two seconds.
 
     It is used as a context.
     """

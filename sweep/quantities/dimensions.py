@@ -37,6 +37,18 @@ ALL = (LEAST_LINK, LINK_RATIO, ARM_RATIO, PIVOT_DISTANCE)
 ROUNDINGS = 16.0 * 2.0**-53  # a few products, a sum and a root
 
 
+def near_unit_size(family: Family, designs: Array) -> tuple[Array, NDArray[np.int32]]:
+    """Return the same mechanisms near unit size, and the powers of two (n,) by which they are larger.
+
+    Nothing overflows then, and no bit changes.
+    """
+    lengths = [k for k, p in enumerate(family.parameters) if p.unit == "length"]
+    _, exponent = np.frexp(np.abs(designs[:, lengths]).max(axis=1, initial=0.0))
+    scaled = designs.copy()
+    scaled[:, lengths] = np.ldexp(designs[:, lengths], -exponent[:, None])
+    return scaled, exponent
+
+
 @dataclass(frozen=True)
 class Size:
     """A size of a family: the least or the largest of its pieces, which are squares of what they stand for if so said.
@@ -54,10 +66,7 @@ class Size:
 
         Lengths are brought near 1 by a power of two first: nothing overflows.
         """
-        lengths = [k for k, p in enumerate(family.parameters) if p.unit == "length"]
-        _, exponent = np.frexp(np.abs(designs[:, lengths]).max(axis=1))
-        scaled = designs.copy()
-        scaled[:, lengths] = np.ldexp(designs[:, lengths], -exponent[:, None])
+        scaled, exponent = near_unit_size(family, designs)
         with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
             each = np.stack([piece(scaled) for piece in self.pieces])
         found = each.min(axis=0) if self.least else each.max(axis=0)

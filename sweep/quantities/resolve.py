@@ -260,7 +260,7 @@ def _limit(family: Family, name: str) -> LimitPosition | None:
 
 
 def limit_order(family: Family, position: str) -> tuple[str, str]:
-    """How the extended and the folded position are told apart, in words."""
+    """Say in words how the extended and the folded position are distinguished."""
     sign = family.outward_sign(position)
     if sign:
         return f"largest (smallest if {sign} = -1)", f"smallest (largest if {sign} = -1)"
@@ -318,7 +318,7 @@ def _unknown(family: Family, name: str) -> InputError:
 
 
 def _known(family: Family, name: str) -> str:
-    """Words for an unknown name: what there is, and the nearest."""
+    """Say in words, for an unknown name, what is known and which name is nearest."""
     names = output_names(family)
     grammar = prefixes(family.domain)
     special = listed(n for n in names if not n.startswith(grammar))

@@ -21,7 +21,7 @@ START, LIMIT = 256, 16384  # samples of the first look, and those beyond which a
 
 
 def event_outputs(family: Family, designs: Array, names: Sequence[str], accuracy: Accuracy) -> Columns:
-    """First place and number of the events that the names are about.
+    """Compute the first crank angle and the number of the events that are asked for.
 
     Parameters
     ----------

@@ -9,6 +9,7 @@ from kernels.types import TWO_PI
 from sweep.families.base import Accuracy, Array, Columns, Family, Stage, Step
 from sweep.families.capabilities import Assembly
 from sweep.families.names import is_flag
+from sweep.quantities.dimensions import near_unit_size
 from sweep.quantities.kinds import Request
 from sweep.reductions import fused
 from sweep.reductions.extrema import true_extrema
@@ -124,7 +125,7 @@ def _stage_margin(family: Family, designs: Array, suffix: str, accuracy: Accurac
 
 def _from_poses(family: Family, designs: Array, suffix: str, looked: int) -> Columns:
     """Margin from the family's discriminant, refined to its least value but where ``looked`` poses tell enough."""
-    designs = _unit_lengths(family, designs)
+    designs, _ = near_unit_size(family, designs)  # no discriminant overflows
     loop = next(found for found in family.every(Assembly) if found.stage == suffix)
     discriminant, angle = loop.discriminant, loop.pressure_angle
     request = Request(discriminant, -1)
@@ -167,13 +168,3 @@ def _apart(family: Family, designs: Array, discriminant: str, looked: int) -> Ex
     rows = np.flatnonzero(values.min(axis=1) < 0.0)
     least.value[rows], least.phi[rows] = values[rows, lowest[rows]], lowest[rows] * (TWO_PI / looked)
     return least
-
-
-def _unit_lengths(family: Family, designs: Array) -> Array:
-    """Return the same mechanisms near unit size, by a power of two: no discriminant overflows, no bit changes."""
-    lengths = [k for k, p in enumerate(family.parameters) if p.unit == "length"]
-    scaled = designs.copy()
-    if lengths:
-        _, exponent = np.frexp(np.abs(designs[:, lengths]).max(axis=1))
-        scaled[:, lengths] = np.ldexp(designs[:, lengths], -exponent[:, None])
-    return scaled

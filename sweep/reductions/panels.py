@@ -106,7 +106,7 @@ def extrema(
 
 
 def _cut_alike(family: Family, requests: Sequence[Request]) -> list[list[Request]]:
-    """Return the requests in groups for which the turn is cut at the same places: a cut is nobody else's matter."""
+    """Group the requests for which the turn is cut at the same crank angles."""
     groups: dict[tuple[Bends, ...], list[Request]] = {}
     for request in requests:
         groups.setdefault(bends(family, request.pose), []).append(request)

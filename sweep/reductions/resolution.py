@@ -86,7 +86,7 @@ def nearest(family: Family, designs: Array, outputs: Collection[str], within: fl
 
 
 def broken(family: Family, designs: Array, near: Singularities, status: Status) -> None:
-    """Write the status of designs that have no pose where a singularity is as near as can be told.
+    """Write the status of designs that have no pose next to a singularity, as near as angles can be distinguished.
 
     The gap may be narrower than any samples.
     """

@@ -207,7 +207,7 @@ def _residual(value: float) -> str:
 
 
 def search_sentence(data: Dataset, found: Scan) -> str:
-    """Say how the optimum was searched, and that this proves nothing where there is no proof besides."""
+    """Say how the optimum was searched, and, without a proof, that this does not prove it."""
     if data.result is None or data.study.objective is None:
         return ""
     if data.optimum is None:

@@ -227,7 +227,7 @@ def write_survivors(parts: Sequence[Path], target: Path) -> None:
 
 
 def judged(data: Dataset, rows: Sequence[Row], names: Sequence[str]) -> dict[str, Any]:
-    """Return what a page shows of designs under their names; the first one is in hand, the others beside it."""
+    """Return what a page shows of designs under their names: the current one first, then those it is compared with."""
     seen = [as_result(data, row) for row in rows]
     roles = ["result", *(f"pin pin-{k}" for k in range(1, len(rows)))]
     shown = [Shown(name, role, status_words(row), row) for name, role, row in zip(names, roles, rows, strict=True)]

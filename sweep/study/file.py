@@ -62,7 +62,7 @@ class Faults:
         self._misspelt.add(key)
 
     def unknown(self, key: Key, known: Iterable[str], what: str = "key") -> None:
-        """Report a key that nobody reads, with the nearest right one."""
+        """Report an unknown key, with the nearest known one."""
         names = list(known)
         guess = closest(str(key[-1]), names)
         if guess is not None:

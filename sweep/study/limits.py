@@ -49,7 +49,7 @@ SETTINGS = {
 
 
 def limits_of_settings(file: StudyFile) -> list[Limit]:
-    """Return the limits of every relation that names the settings of a machine, and report a name that is none."""
+    """Return the limits of every relation that names the settings of a machine, and report unknown names."""
     found = []
     for relation, table in _settled(file.data.get("relations")).items():
         key: Key = ("relations", relation, "settings")

@@ -67,7 +67,7 @@ class Locus:
 
     @property
     def has_roots(self) -> bool:
-        """Whether a requirement has two solutions, told apart by ``root``."""
+        """Whether a requirement has two solutions, which ``root`` distinguishes."""
         return "root" in self.parameter_names
 
     def read(self, table: Table) -> Array:

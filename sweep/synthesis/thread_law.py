@@ -26,7 +26,7 @@ LEAST = 1e-3  # of the demand's range that a slack counts as, where it is the un
 
 @dataclass(frozen=True)
 class ThreadLaw:
-    """What a take-up takes up, P = sum of cos[k - 1] cos(k phi) + sin[k - 1] sin(k phi), and the stock beside it.
+    """Law of a take-up, P = sum of cos[k - 1] cos(k phi) + sin[k - 1] sin(k phi), and the stock of thread.
 
     ``largest`` is the largest magnitude of P''; ``spare`` the least distance of the surplus from its two bounds.
     """

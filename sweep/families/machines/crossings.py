@@ -34,7 +34,7 @@ Read: TypeAlias = Callable[["Machine", Any, Places, frozenset[str]], Columns]
 
 @dataclass
 class Found:
-    """Angles of several designs in one row: the design of each, and the angle."""
+    """Crank angles of several designs, one after another: the row of its design for each."""
 
     row: NDArray[np.intp]
     phi: Array

@@ -1,4 +1,4 @@
-"""When events of a machine happen, as its pose outputs need it: the path of a thread changes there."""
+"""Crank angles of the events of a machine at which the paths of its threads change."""
 
 from __future__ import annotations
 

@@ -154,7 +154,7 @@ def _read(taking: Taking, machine: Machine, designs: Any, places: Places, wanted
 
 
 class _Tip:
-    """The tip in the needle's frame, of several designs, at angles of theirs."""
+    """Coordinates of the tip in the needle's frame, at given crank angles of several designs."""
 
     def __init__(self, taking: Taking, poses: Poses) -> None:
         self.taking, self.poses = taking, poses

@@ -149,7 +149,7 @@ def with_size(name: str, parts: list[Any], wanted: frozenset[str]) -> dict[str, 
     return columns | ({name: np.sqrt(parts[0] ** 2 + parts[1] ** 2 + parts[2] ** 2)} if name in wanted else {})
 
 
-def once(names: Sequence[str]) -> None:
+def check_unique(names: Sequence[str]) -> None:
     """Refuse an output or parameter that two relations have: one would be read where the other is meant."""
     seen: set[str] = set()
     for name in names:
@@ -159,15 +159,15 @@ def once(names: Sequence[str]) -> None:
         seen.add(name)
 
 
-def two(given: tuple[str, ...], known: Sequence[str] | None, what: str, where: str) -> tuple[str, str]:
+def two_names(given: tuple[str, ...], known: Sequence[str] | None, what: str, where: str) -> tuple[str, str]:
     """Return two names out of what a user gives, of those that are known if any are."""
     if len(given) != 2:
         raise InputError(what, given, f"two {what}", where)
-    first, second = given if known is None else each(given, known, what, where)
+    first, second = given if known is None else known_names(given, known, what, where)
     return first, second
 
 
-def each(given: tuple[str, ...], known: Sequence[str], what: str, where: str) -> tuple[str, ...]:
+def known_names(given: tuple[str, ...], known: Sequence[str], what: str, where: str) -> tuple[str, ...]:
     """Return names out of what a user gives; refuse one that is not known."""
     for part in given:
         if part not in known:

@@ -18,7 +18,16 @@ from sweep.families.machines.happenings import check_happenings
 from sweep.families.machines.machine import Machine, assemble
 from sweep.families.machines.main_shaft import Driven, ShaftTorque
 from sweep.families.machines.pressing import read_pressing
-from sweep.families.machines.relations import Distance, EventValue, Relation, Speed, Timing, each, once, two
+from sweep.families.machines.relations import (
+    Distance,
+    EventValue,
+    Relation,
+    Speed,
+    Timing,
+    check_unique,
+    known_names,
+    two_names,
+)
 from sweep.families.machines.segments import Body, Gap
 from sweep.families.machines.shaking import Shaken, Shaking, shaken
 from sweep.families.machines.stitching import read_entering, read_sewing, read_taking, read_thread
@@ -152,7 +161,7 @@ def built(given: Specification, find: FindFamily) -> Machine:
     every = [output for relation in machine.relations for output in relation.outputs]
     every += [output for step in machine.steps for output in step.provides] + [t.output for t in machine.timings]
     places = [f"{word}_{event.name}" for event in machine.events for word in ("phi", "count")]
-    once([*machine.parameter_names, *(output.name for output in every), *places])
+    check_unique([*machine.parameter_names, *(output.name for output in every), *places])
     return machine
 
 
@@ -200,7 +209,7 @@ def _mount(table: dict[str, Any], family: Family, shafts: Mapping[str, Shaft], w
 
 
 def _eye(member: Member, given: Any, where: str) -> tuple[float, ...]:
-    """Read a point of the coupler; a spatial one turns about its own line nobody knows how, so it lies on that."""
+    """Read a point of the coupler; of a spatial one it lies on its line, as its rotation about that is undetermined."""
     x, y, z = vector(given, where)
     if coupler_joints(member) is None:
         raise InputError("eye", given, f"a member with a coupler; {member.family.name} has none", where)
@@ -290,14 +299,14 @@ def _relation(
         raise InputError(kind, given, "a list of names", where)
     if kind == "distance":
         points = [f"{m.name}.{point}" for m in members.values() for point in m.points]
-        return Distance(name, two(given, points, "points", where))
+        return Distance(name, two_names(given, points, "points", where))
     if kind == "speed":
         moving = [f"{m.name}.{point}" for m in members.values() for point in m.moving]
         if len(given) == 1:
-            return Speed(name, each(given, moving, "points whose velocity is known", where))
-        return Speed(name, two(given, moving, "points whose velocity is known", where))
+            return Speed(name, known_names(given, moving, "points whose velocity is known", where))
+        return Speed(name, two_names(given, moving, "points whose velocity is known", where))
     if kind == "timing":
-        return Timing(name, two(given, None, "crank angles", where))
+        return Timing(name, two_names(given, None, "crank angles", where))
     known = {f"{m.name}{number}": (m.name, number) for m in members.values() for number in _stages(m.family)}
     known |= {m.name: (m.name, _stages(m.family)[0]) for m in members.values()}
     for part in given:
@@ -336,7 +345,7 @@ def _shaken(members: Mapping[str, Member], listed: list[tuple[str, str]], where:
 
 def _gap(name: str, table: dict[str, Any], known: Mapping[str, Body], where: str) -> Gap:
     known_keys(table, ("gap", "radii"), where)
-    first, second = (known[one] for one in two(table["gap"], list(known), "bodies", where))
+    first, second = (known[one] for one in two_names(table["gap"], list(known), "bodies", where))
     if "radii" in table:
         a, b = (length("radii", radius, where) for radius in table["radii"])
         first, second = replace(first, radius=a), replace(second, radius=b)

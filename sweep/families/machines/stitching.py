@@ -13,7 +13,7 @@ from sweep.errors import InputError, choices, known_keys, number, sign
 from sweep.families.capabilities import ThreadPath
 from sweep.families.machines.main_shaft import ShaftTorque
 from sweep.families.machines.moments import RiseWindow, Taking
-from sweep.families.machines.relations import each, two
+from sweep.families.machines.relations import known_names, two_names
 from sweep.families.machines.sewing import Sewing
 from sweep.families.machines.thread_balance import ThreadBalance
 from sweep.families.machines.thread_way import Edge, TakeUp, Waypoint, spots
@@ -31,7 +31,7 @@ THREAD_KEYS = (
 def read_taking(name: str, table: dict[str, Any], tools: Mapping[str, Tool], where: str) -> Taking:
     """Read a relation ``take``: a needle, a blade, the sense, fields of work."""
     known_keys(table, ("take", "sense", "fields", "vary"), where)
-    needle, blade = (tools[one] for one in two(table["take"], list(tools), "tools", where))
+    needle, blade = (tools[one] for one in two_names(table["take"], list(tools), "tools", where))
     if not isinstance(needle, Needle) or not isinstance(blade, Blade):
         raise InputError("take", table["take"], "a needle, then a blade", where)
     vary = table.get("vary", False)
@@ -60,7 +60,7 @@ def read_entering(name: str, table: dict[str, Any], tools: Mapping[str, Tool], w
     known_keys(table, ("enter", "sense", "window"), where)
     if len(table["enter"]) != 3:
         raise InputError("enter", table["enter"], "three tools: what passes, a blade, the seam", where)
-    entering, blade, seam = (tools[one] for one in each(table["enter"], list(tools), "tools", where))
+    entering, blade, seam = (tools[one] for one in known_names(table["enter"], list(tools), "tools", where))
     if not isinstance(entering, Needle | Blade) or not isinstance(blade, Blade) or not isinstance(seam, Seam):
         raise InputError("enter", table["enter"], "a needle or blade, a blade, a seam", where)
     if not (blade.eye and blade.hold):
@@ -81,7 +81,7 @@ def read_sewing(name: str, table: dict[str, Any], known: Mapping[str, Any]) -> S
     """Read a relation ``sew``: the moments, speeds, the clearance that takes a loop, the torque of the main shaft."""
     where = f"machine.relations.{name}"
     known_keys(table, ("sew", "speeds", "clearance", "shaft"), where)
-    moments = list(each(table["sew"], list(known), "relations", where))
+    moments = list(known_names(table["sew"], list(known), "relations", where))
     taking = [known[one] for one in moments if isinstance(known[one], Taking) and known[one].window]
     entering = tuple(known[one] for one in moments if isinstance(known[one], Entering))
     if len(taking) != 1 or len(entering) + 1 != len(moments):

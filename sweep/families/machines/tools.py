@@ -10,7 +10,7 @@ from typing import Any, TypeAlias
 from sweep.errors import InputError, choices, known_keys, number, sign
 from sweep.families.base import Output
 from sweep.families.capabilities import OutputLink
-from sweep.families.machines.relations import Relation, two
+from sweep.families.machines.relations import Relation, two_names
 from sweep.families.machines.segments import Body, dot, minus
 from sweep.families.parts import Member, vector
 from sweep.families.sites import AXES, links_of
@@ -208,7 +208,7 @@ def read_height(
     spots = {tool.name: tool.working for tool in tools.values() if isinstance(tool, Needle | Blade)}
     spots |= {point: Spot(point) for m in members.values() for point in (f"{m.name}.{own}" for own in m.moving)}
     plates = {tool.name: tool for tool in tools.values() if isinstance(tool, Plate)}
-    of, plate = two(table["above"], [*spots, *(name for name in tools if name not in spots)], "tools and points", where)
+    of, plate = two_names(table["above"], list(dict.fromkeys((*spots, *tools))), "tools and points", where)
     if len(table) != 1 or of not in spots or plate not in plates:
         allowed = f"a needle, a blade or a moving point, then a plate: {', '.join(plates) or 'there is none'}"
         raise InputError("above", table["above"], allowed, where)

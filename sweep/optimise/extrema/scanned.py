@@ -186,7 +186,7 @@ def distances(edges: Array, phi: Array) -> Array:
 
 
 def overtopped(points: Points, at_edges: Points, stride: float) -> NDArray[np.bool_]:
-    """Tell which points have an edge within a stride that is as high: Newton's steps towards a kink end beside it."""
+    """Tell which points have an edge as high within a stride: Newton's steps towards a kink end beside it."""
     found = np.zeros(len(points), np.bool_)
     for k in range(len(at_edges)):
         edge = at_edges.take([k])

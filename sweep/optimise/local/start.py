@@ -1,4 +1,4 @@
-"""One start, wherever it runs: the search, and what ``summarise`` says of the design it ends at."""
+"""One start: the search from it, and its end design verified by ``summarise``."""
 
 from __future__ import annotations
 

@@ -187,7 +187,7 @@ def _batch(
 
 
 def ranked(results: list[Result]) -> list[Result]:
-    """Return results in the order of their rank; those in the best basin are told how many they are."""
+    """Return results in the order of their rank; those in the best basin carry its number of starts."""
     order = sorted(with_basins(results), key=lambda r: (*r.rank, r.start))
     agree = sum(r.basin == 1 for r in order)
     return [replace(r, agree=agree) if r.basin == 1 else r for r in order]

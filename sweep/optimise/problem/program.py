@@ -148,7 +148,7 @@ class _Layout:
         self.rest.append((weight * shift + bound, slack, equal, label))
 
     def require(self, r: Requirement) -> bool:
-        """Add the rows of one limit; the result is false where the design has none of the extrema that it is about."""
+        """Add the rows of one limit; return False where the design has no extremum of the limited output."""
         found = True
         self._keep_first(r, "minimum" if r.maximum is None else "maximum")
         if r.equal and r.minimum is not None:

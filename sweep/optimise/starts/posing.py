@@ -151,7 +151,7 @@ def compile_descents(study: Study) -> None:
 
 
 def problem_of_dataset(study: Study, folder: Path, found: Array) -> Problem:
-    """Return the problem of a study whose search is done, without searching for starts anew.
+    """Return the problem of a study whose search is done, without searching for starts again.
 
     Parameters
     ----------
