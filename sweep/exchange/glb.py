@@ -9,8 +9,9 @@ from __future__ import annotations
 import json
 import math
 import struct
+from itertools import pairwise
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,6 +20,9 @@ from sweep.evaluation.joints import Part
 from sweep.exchange.scene import Placed, extent, shown_name
 from sweep.families.base import Array
 from sweep.families.capabilities import Link
+
+if TYPE_CHECKING:
+    from scipy.spatial.transform import Rotation
 
 COLOURS = {
     "frame": (0.08, 0.09, 0.12), "joint": (0.92, 0.93, 0.95),
@@ -132,22 +136,15 @@ def _group(model: Model, one: Placed, times: int, size: float) -> int:
     """Node of a part with those of its links, joints and axes."""
     part, children, thick = one.part, [], 0.008 * size
     for k, link in enumerate(part.links):
-        pairs = list(zip(link.joints, link.joints[1:], strict=False))
+        pairs = list(pairwise(link.joints))
         pairs += [(link.joints[-1], link.joints[0])] if len(link.joints) > 2 else []
         colour = f"link {k % 5}"
-        bars = [
-            _bar(
-                model,
-                f"{link.name} {shown_name(a)}-{shown_name(b)}",
-                colour,
-                part.joints[a],
-                part.joints[b],
-                times,
-                thick,
-            )
-            for a, b in pairs
-            if np.abs(part.joints[b] - part.joints[a]).max() > 1e-9 * size  # the fork slot has an arm of no length
-        ]
+        bars = []
+        for a, b in pairs:
+            start, end = part.joints[a], part.joints[b]
+            if np.abs(end - start).max() > 1e-9 * size:  # the fork slot has an arm of no length
+                name = f"{link.name} {shown_name(a)}-{shown_name(b)}"
+                bars.append(_bar(model, name, colour, start, end, times, thick))
         bars += [_block(model, part, link, colour, times, thick)] if _slides(part, link) else []
         if bars:
             children.append(model.node(name=link.name, children=bars))
@@ -166,7 +163,7 @@ def _group(model: Model, one: Placed, times: int, size: float) -> int:
         children.append(
             model.node(
                 name=f"axis_{shown_name(joint)}", mesh=model.mesh("bar", "frame"), translation=at.tolist(),
-                rotation=_unit(_from_z(axis)).tolist(), scale=[0.4 * thick, 0.4 * thick, 2.0 * reach],
+                rotation=_from_z(axis).as_quat().tolist(), scale=[0.4 * thick, 0.4 * thick, 2.0 * reach],
             )
         )  # fmt: skip
     name = part.label if part.member or part.stage else "stage"
@@ -185,7 +182,7 @@ def _block(model: Model, part: Part, link: Link, colour: str, times: int, thick:
     path = part.joints[link.joints[0]] - reach * axis
     node = model.node(
         name=f"{link.name} block", mesh=model.mesh("bar", colour), translation=path[0].tolist(),
-        rotation=_unit(_from_z(axis)).tolist(), scale=[2.2 * thick, 2.2 * thick, 2.0 * reach],
+        rotation=_from_z(axis).as_quat().tolist(), scale=[2.2 * thick, 2.2 * thick, 2.0 * reach],
     )  # fmt: skip
     model.animate(node, times, "translation", path)
     return node
@@ -211,30 +208,24 @@ def _bar(model: Model, name: str, colour: str, start: Array, end: Array, times: 
 
 def _following(directions: Array) -> Array:
     """Quaternions (x, y, z, w) that turn z into each direction, each from the one before by the shortest way."""
-    found = np.empty((len(directions), 4))
-    found[0] = _unit(_from_z(directions[0]))
-    for k in range(1, len(directions)):
-        found[k] = _unit(_product(_shortest(directions[k - 1], directions[k]), found[k - 1]))
-    return found
+    turns = [_from_z(directions[0])]
+    for before, after in pairwise(directions):
+        turns.append(_shortest(before, after) * turns[-1])
+    return np.array([turn.as_quat() for turn in turns])
 
 
-def _from_z(direction: Array) -> Array:
+def _from_z(direction: Array) -> Rotation:
+    from scipy.spatial.transform import Rotation
+
     if direction[2] < -0.9:  # by a half turn about x first, away from where the shortest way is none
-        return _product(_shortest(np.array([0.0, 0.0, -1.0]), direction), np.array([1.0, 0.0, 0.0, 0.0]))
+        return _shortest(np.array([0.0, 0.0, -1.0]), direction) * Rotation.from_quat([1.0, 0.0, 0.0, 0.0])
     return _shortest(np.array([0.0, 0.0, 1.0]), direction)
 
 
-def _shortest(first: Array, second: Array) -> Array:
-    return _unit(np.append(np.cross(first, second), 1.0 + first @ second))
+def _shortest(first: Array, second: Array) -> Rotation:
+    from scipy.spatial.transform import Rotation
 
-
-def _product(p: Array, q: Array) -> Array:
-    vector = p[3] * q[:3] + q[3] * p[:3] + np.cross(p[:3], q[:3])
-    return np.append(vector, p[3] * q[3] - p[:3] @ q[:3])
-
-
-def _unit(values: Array) -> Array:
-    return values / np.linalg.norm(values)
+    return Rotation.from_quat(np.append(np.cross(first, second), 1.0 + first @ second))
 
 
 def _cylinder() -> tuple[Array, Array, NDArray[np.int64]]:
@@ -251,17 +242,13 @@ def _cylinder() -> tuple[Array, Array, NDArray[np.int64]]:
 
 def _ball() -> tuple[Array, Array, NDArray[np.int64]]:
     """Return a ball of radius 1."""
-    polar = np.linspace(0.0, math.pi, RINGS + 1)
+    polar = np.linspace(0.0, math.pi, RINGS + 1)[:, None]
     angle = np.linspace(0.0, 2.0 * math.pi, SIDES, endpoint=False)
-    points = np.array(
-        [[math.sin(p) * math.cos(a), math.sin(p) * math.sin(a), math.cos(p)] for p in polar for a in angle]
-    )
-    faces = []
-    for i in range(RINGS):
-        for j in range(SIDES):
-            a, b = i * SIDES + j, i * SIDES + (j + 1) % SIDES
-            if i:
-                faces.append([a, b + SIDES, b])
-            if i < RINGS - 1:
-                faces.append([a, a + SIDES, b + SIDES])
-    return points, points, np.array(faces)
+    parts = np.sin(polar) * np.cos(angle), np.sin(polar) * np.sin(angle), np.cos(polar)
+    points = np.stack(np.broadcast_arrays(*parts), axis=-1).reshape(-1, 3)
+    here = np.arange(len(points)).reshape(RINGS + 1, SIDES)
+    beside = np.roll(here, -1, axis=1)
+    # Two triangles between two rings; at either pole, where a ring is a point, one.
+    lower = np.stack([here[:-2], here[1:-1], beside[1:-1]], axis=-1)
+    upper = np.stack([here[1:-1], beside[2:], beside[1:-1]], axis=-1)
+    return points, points, np.concatenate([lower, upper]).reshape(-1, 3)
