@@ -23,7 +23,7 @@ from sweep.families.base import Array, Family, Interval
 from sweep.plot.drawing import COLOURS, mechanism_figure
 from sweep.quantities.units import speed_given
 from sweep.report.figures import LIMIT, OPTIMUM, QUIET, REFERENCE, WIDTH, crank_axis, house_style, new_figure
-from sweep.report.live import lowest
+from sweep.report.live import lowest, whole
 from sweep.report.quantities import quantity
 
 if TYPE_CHECKING:
@@ -118,7 +118,7 @@ def motion(
     >>> import sweep
     >>> axes = sweep.plot.motion("slider_crank", {"a": 20.0, "b": 70.0, "e": 5.0}, "s, d2s")
     >>> [panel.get_title(loc="left") for panel in axes]
-    ['displacement s [mm]', 'acceleration s″ [mm/rad²]']
+    ['displacement s from its lowest [mm]', 'acceleration s″ [mm/rad²]']
     """
     import pandas as pd
 
@@ -162,7 +162,8 @@ def _panels(
             angle, values = aligned_turn(turn, name, family.position)
             look = {"color": REFERENCE, "linestyle": "--"} if design == "reference" else {"color": colour}
             axes.plot(np.degrees(angle), values * shown.factor, label=design, zorder=3, **look)
-        axes.set_title(shown.title)
+        below = " from its lowest" if name == family.position and not free else ""
+        axes.set_title(f"{shown.heading}{below} [{shown.unit}]" if shown.unit else f"{shown.heading}{below}")
         if speed is not None and shown.order:
             scale = shown.speed_scale * speed**shown.order / shown.factor
             twin = axes.secondary_yaxis("right", functions=(lambda v, k=scale: v * k, lambda v, k=scale: v / k))
@@ -183,7 +184,7 @@ def aligned_turn(turn: pd.DataFrame, name: str, position: str) -> tuple[Array, A
         full = np.copysign(2.0 * np.pi, path[-1] - path[0]) if name == position else 0.0
         return np.append(phi, 2.0 * np.pi), np.append(values, values[0] + full)
     order = np.r_[start : phi.size, 0:start]
-    values = values[order] - (values[start] if name == position else 0.0)
+    values = whole(name, values[order]) - (values[start] if name == position else 0.0)
     return np.append(np.mod(phi[order] - phi[start], 2.0 * np.pi), 2.0 * np.pi), np.append(values, values[0])
 
 

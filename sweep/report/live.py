@@ -80,6 +80,17 @@ def in_window(path: Array, window: tuple[float, float]) -> NDArray[np.bool_]:
     return (fraction >= window[0]) & (fraction <= window[1])
 
 
+FOLLOWERS = ("psi", "alpha")  # positions that are angles
+
+
+def whole(name: str, path: Array) -> Array:
+    """Return a follower's angle without its jumps of a turn, and any other curve as it is."""
+    known = np.isfinite(path)
+    found = path.copy()
+    found[known] = np.unwrap(path[known]) if stem(name) in FOLLOWERS else path[known]
+    return found
+
+
 def lowest(position: str, path: Array) -> tuple[Array, bool, int]:
     """Find from where the curves of a follower begin: at its lowest position, unless it turns fully.
 
@@ -88,9 +99,8 @@ def lowest(position: str, path: Array) -> tuple[Array, bool, int]:
     path, bool, int
         without the jumps of an angle; whether the follower makes a turn itself; the pose, 0 of what makes one.
     """
-    angle = stem(position) == "psi"
-    path = np.unwrap(path) if angle else path
-    free = angle and bool(abs(path[-1] - path[0]) > 0.9 * 2.0 * np.pi)
+    path = whole(position, path)
+    free = stem(position) in FOLLOWERS and bool(abs(path[-1] - path[0]) > 0.9 * 2.0 * np.pi)
     return path, free, int(np.nanargmin(path)) if not free and np.isfinite(path).any() else 0
 
 
@@ -119,7 +129,7 @@ class Motion:
     ----------
     shown : the design
     phi : values of the input variable, (m,)
-    free : the follower turns fully, so that there is no lowest position to start from
+    from_lowest : the turn, and the follower's position, count from the lowest one, which a follower that turns has not
     curves : by name, (m,) each
     inside : poses in which a deviation counts, (m,)
     placed : stages and members with their joints, empty where the mechanism has none
@@ -127,7 +137,7 @@ class Motion:
 
     shown: Shown
     phi: Array
-    free: bool
+    from_lowest: bool
     curves: dict[str, Array]
     inside: NDArray[np.bool_]
     placed: tuple[Placed, ...]
@@ -141,7 +151,7 @@ def moving(data: Dataset, shown: Sequence[Shown]) -> dict[str, Any] | None:
     names = [x for x in dict.fromkeys(motion_curves(family)) if x == family.position or coordinate(x) is None]
     motions = [_motion(data, one, names) for one in shown]
     interval = isinstance(family.domain, Interval)
-    phase = "" if interval or any(motion.free for motion in motions) else " from the lowest position"
+    phase = " from the lowest position" if all(motion.from_lowest for motion in motions) else ""
     variable = quantity(family.domain.name, family.domain.unit)
     joints = [one.part for motion in motions for one in motion.placed]
     designs = [_design(data, motion, variable.factor) for motion in motions]
@@ -169,12 +179,13 @@ def _motion(data: Dataset, shown: Shown, names: list[str]) -> Motion:
     if closed:
         path, free, start = lowest(family.position, path)
     order = np.roll(np.arange(POSES), -start)
-    curves = {name: np.asarray(found[name][0], np.float64)[order] for name in names}
-    curves[family.position] = path[order] - (path[start] if closed and not free else 0.0)
+    curves = {name: whole(name, np.asarray(found[name][0], np.float64)[order]) for name in names}
+    from_lowest = closed and not free and bool(np.isfinite(path[start]))
+    curves[family.position] = path[order] - (path[start] if from_lowest else 0.0)
     window = data.study.window
     working = curves[cut] if cut in curves else np.asarray(found[cut][0], np.float64)[order]
     inside = np.zeros(POSES, np.bool_) if window is None else in_window(working, window)
-    return Motion(shown, phi[order], free, curves, inside, _placed(family, design, phi, order))
+    return Motion(shown, phi[order], from_lowest, curves, inside, _placed(family, design, phi, order))
 
 
 def _placed(family: Family, design: dict[str, float], phi: Array, order: NDArray[np.intp]) -> tuple[Placed, ...]:
@@ -203,9 +214,10 @@ def _panel(data: Dataset, name: str, motions: list[Motion]) -> dict[str, Any]:
         high = AROUND * max(abs(low), abs(high))
         low = -high
     fast = shown.order and speed is not None
+    relative = name == data.study.family.position and any(m.from_lowest for m in motions)
     return {
         "name": name,
-        "title": shown.heading,
+        "title": shown.heading + (" from its lowest" if relative else ""),
         "unit": shown.unit,
         "range": [low * shown.factor, high * shown.factor],
         "limits": [value * shown.factor for value in lines],
@@ -300,10 +312,10 @@ def _axes(data: Dataset, cells: Sequence[Cells]) -> list[Quantity]:
     second = [] if data.second is None else [data.second]
     stored = set(data.units) | set(study.want)
     limits = [limit.output for limit in study.limits if limit.output in study.want and not is_flag(limit.output)]
-    told = [name for name in dict.fromkeys([*objective, *second, *limits]) if name in stored and not is_flag(name)]
-    outputs = told[:OUTPUTS]
     dimensions = [limited(data, cell.name) for cell in cells][:DIMENSIONS]
-    return [*dimensions, *(data.shown(name) for name in outputs)]
+    there = {axis.name for axis in dimensions}  # of a [locus] an output is a dimension
+    told = [name for name in dict.fromkeys([*objective, *second, *limits]) if name in stored and not is_flag(name)]
+    return [*dimensions, *[data.shown(name) for name in told if name not in there][:OUTPUTS]]
 
 
 def _lines(parts: Sequence[Path], names: list[str], objective: str | None, of: int) -> tuple[Array, Array]:

@@ -33,10 +33,12 @@ SYMBOLS = {
 PRIMES = ("", "′", "″", "‴")
 POWERS = {1: "", 2: "²", 3: "³", 4: "⁴"}
 # Units that a designer reads instead of those that are stored, with the factor to them.
-READ_IN = {"t": ("g", 1e6), "t*mm^2": ("kg·mm²", 1e3), "life": ("h", 1.0 / 3600.0)}
+READ_IN = {"t": ("g", 1e6), "t*mm^2": ("kg·mm²", 1e3), "life": ("h", 1.0 / 3600.0), "speed": ("rpm", 30.0 / math.pi)}
 NO_ANGLE = 1e-10  # rad: what is smaller is the rounding of zero, or of the place of an extremum at zero
 NONE_OF = {"°": NO_ANGLE, "mm": 1e-12}  # of quantities shown in these units, as stored: what is smaller is rounding
 _POINT = re.compile("([xyz])_([a-z])")
+_OF_MACHINE = re.compile("([a-z]|tip|point)_([xyz])")
+_SIZE = re.compile("(speed|acceleration|jerk)_([a-z])")  # of a point's motion in space
 
 
 @dataclass(frozen=True)
@@ -112,18 +114,13 @@ def quantity(name: str, unit: str) -> Quantity:
     order, root, stage = _derivative(base)
     followed = root in ("s", "psi", "dev")  # the follower's own motion has a symbol and a word each
     symbolic = followed and (order > 0 or root != "dev")
-    point = _POINT.fullmatch(root)
-    root, at = (point[1], f" of {point[2].upper()}") if point else (root, "")
-    symbol = SYMBOLS.get(root, root.replace("_", " ")) + PRIMES[order] + at + stage.translate(SUBSCRIPTS)
-    symbol, root = symbol.replace("phi ", "φ "), root + at
-    words = POSITIONS.get(root, root.replace("_", " ")) if order == 0 else DERIVATIVES[order]
-    words += "" if not order or root in ("s", "psi") else " across the line" if root == "dev" else f" of {root}"
-    words += f" of stage {stage}" if stage else ""
+    symbol, words = _called(order, root, stage)
     symbol, words = symbol_form.format(symbol), words_form.format(words)
     if is_place(name) or (order == 0 and unit in ("rad", "angle")):
         return Quantity(name, symbol, words, "°", math.degrees(1.0), symbolic)
     if order == 0:
-        read, factor = READ_IN.get("life" if unit == "s" and "life" in name else unit, (_pretty_unit(unit), 1.0))
+        kind = {"s": "life", "rad/s": "speed"}.get(unit, "")  # where the name says what it is
+        read, factor = READ_IN.get(kind if kind and kind in name else unit, (_pretty_unit(unit), 1.0))
         return Quantity(name, symbol, words, read, factor, symbolic)
     length = unit.startswith("mm")
     return Quantity(
@@ -142,10 +139,28 @@ def quantity(name: str, unit: str) -> Quantity:
 SUBSCRIPTS = str.maketrans("0123456789", "₀₁₂₃₄₅₆₇₈₉")
 
 
+def _called(order: int, root: str, stage: str) -> tuple[str, str]:
+    """Symbol and words of a quantity or its derivative."""
+    at = ""
+    if size := _SIZE.fullmatch(root):
+        root, order = f"{size[1]} of {size[2].upper()}", 0
+    elif point := _POINT.fullmatch(root):
+        root, at = point[1], f" of {point[2].upper()}"
+    elif point := _OF_MACHINE.fullmatch(root):
+        root, at = point[2], f" of {point[1].upper() if len(point[1]) == 1 else point[1]}"
+    symbol = SYMBOLS.get(root, root.replace("_", " ")) + PRIMES[order] + at + stage.translate(SUBSCRIPTS)
+    symbol, root = symbol.replace("phi ", "φ "), root + at
+    words = POSITIONS.get(root, root.replace("_", " ")) if order == 0 else DERIVATIVES[order]
+    words += "" if not order or root in ("s", "psi") else " across the line" if root == "dev" else f" of {root}"
+    return symbol, words + (f" of stage {stage}" if stage else "")
+
+
 def _derivative(base: str) -> tuple[int, str, str]:
     """Order, quantity and stage number of ``d2psi1``."""
     _, root, stage = parts(base)
-    match = re.fullmatch(r"(d[23]?)?(s|psi|dev|chi|rho|P|S|y|[xyz]_[a-z])", root)
+    if size := _SIZE.fullmatch(root):
+        return ("speed", "acceleration", "jerk").index(size[1]) + 1, root, stage
+    match = re.fullmatch(r"(d[23]?)?(s|psi|dev|chi|rho|alpha|P|S|y|[xyz]_[a-z]|(?:[a-z]|tip|point)_[xyz])", root)
     if match:
         mark, root = match.groups()
         return (0 if mark is None else int(mark[1:] or 1)), root, stage

@@ -179,7 +179,7 @@ def threads_figure(turn: pd.DataFrame) -> Figure:
         pace.axhline(way * MEASURED_SPEED.high, color=LIMIT, linewidth=1.0, linestyle="--")
     for axes, words in ((needs, "P, from its mean [mm]"), (left, "surplus [mm]"), (pace, "speed [m/s]")):
         axes.set_ylabel(words)
-        axes.legend(fontsize="small", loc="upper right")
+    needs.legend(ncols=len(names) + 1, loc="lower right", bbox_to_anchor=(1.0, 1.0))  # above: the curves fill the field
     pace.set_xlabel("angle of the main shaft [°]")
     pace.set_xticks(range(0, 361, 60))
     return figure

@@ -187,7 +187,8 @@ def parameter_rows(data: Dataset, row: Row | None = None, digits: int = 6) -> li
     own = study.bare.parameter_names
     size = max((abs(value_of(row, p.name)) for p in study.bare.parameters if p.unit == "length"), default=0.0)
     for p in study.family.parameters:
-        if p.name not in own and study.space.fixed.get(p.name) == (0.0 if p.unless else p.default):
+        left_out = 0.0 if p.unless else p.default
+        if p.name not in own and p.name in study.space.fixed and study.space.fixed[p.name] == left_out:
             continue  # an input of an effect that the study left out
         shown = quantity(p.name, data.units.get(p.name, {"length": "mm", "angle": "rad"}.get(p.unit, "1")))
         value, other = value_of(row, p.name), value_of(data.reference, p.name)

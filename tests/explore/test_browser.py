@@ -10,6 +10,7 @@ import pytest
 import sweep
 from sweep.report.quantities import quantity
 from tests.support.browser import DRAWS, launcher, pixels
+from tests.support.explorer import explored
 
 pytestmark = pytest.mark.browser
 MOVE = """([name, value]) => {
@@ -156,6 +157,10 @@ def test_click_on_a_cell_takes_its_best_design_in_hand(opened, folder):
     rect.click()
     row = sweep.load(folder).query(f"design == {number}").iloc[0]
     until(lambda: page.evaluate("design.a") == row["a"] and page.evaluate("design.b") == row["b"])
+    until(lambda: not page.evaluate("asking"))
+    assert page.inner_text("#said") == f"design {number} in hand"  # also when its numbers are there
+    moved(page, "a", 9.5)
+    assert page.inner_text("#said") == ""
 
 
 def test_saves_a_study(opened):
@@ -233,6 +238,21 @@ def test_click_on_a_band_takes_its_best_design_in_hand(opened, folder):
     own = page.evaluate("design")
     rows = sweep.load(folder).query("status == 0")
     assert ((rows["a"] == own["a"]) & (rows["b"] == own["b"])).any()
+
+
+def test_a_drive_that_turns_fully_ends_its_turn_and_has_no_table_of_no_limits(browser):
+    with explored("geared_dwell") as address:
+        page = browser.new_page()
+        page.goto(address)
+        until(lambda: answers(page) >= 1)
+        ends = page.evaluate(
+            "[0, 0.998, 1].map((at) => { moving.panels[0].pose(at); return moving.panels[0].value.data; })"
+        )
+        assert [float(text.removesuffix("°").replace("−", "-")) for text in ends] == pytest.approx(
+            [0, 360, 360], abs=1.0
+        )
+        assert page.locator("#limits").is_hidden() and page.locator("#outputs").is_visible()
+        page.close()
 
 
 def test_dragged_joint_changes_the_dimensions(opened):

@@ -16,6 +16,7 @@ from sweep.report.dataset import gather
 from sweep.report.live import BEST, POSES, SPREAD, live, moving, parallel, runs
 from sweep.report.optima import Shown, groups, shown_designs
 from sweep.report.page import write_report
+from sweep.study import study_from_data
 from tests.support.report_dataset import study_data, write_dataset
 
 FOUR_BAR = {"a": 10.0, "b": 35.0, "c": 30.0, "e": 32.0, "xi": 20.0, "eta": 5.0}
@@ -45,8 +46,6 @@ def four_bars(tmp_path_factory):
         "objective": {"minimise": "max_abs_d2psi"},
         "reference": {"design": {name: f"{value} mm" for name, value in FOUR_BAR.items()} | {"a": "60 mm"}},
     }  # fmt: skip
-    from sweep.study import study_from_data
-
     out = tmp_path_factory.mktemp("bars") / "designs"
     return sweep.run(study_from_data(study, "study.toml"), out=out, jobs=1)
 
@@ -81,7 +80,10 @@ def test_design_moves_as_its_joints_and_curves_do(four_bars):
     angle = next(curve for curve in found["curves"] if curve["name"] == "pressure_angle")
     assert angle["limits"] == pytest.approx([50.0])
     # A reference that does not turn has gaps in its curves, and joints that are not everywhere.
-    assert np.isnan(numbers(reference["curves"]["psi"])).any()
+    known = [np.isfinite(numbers(reference["curves"][name])) for name in ("psi", "d2psi")]
+    assert known[0].any() and not known[0].all()
+    np.testing.assert_array_equal(*known)
+    assert found["curves"][0]["title"] == "follower angle ψ from its lowest"
 
 
 def test_lines_are_rows_of_the_dataset_the_best_among_them(four_bars):
@@ -97,6 +99,24 @@ def test_lines_are_rows_of_the_dataset_the_best_among_them(four_bars):
     feasible = rows[rows["status"] == 0]
     assert set(feasible["max_abs_d2psi"].nsmallest(BEST).index) <= set(found["rows"])
     assert found["designs"][0]["role"] == "result"
+
+
+def test_output_that_a_locus_sweeps_has_one_axis(tmp_path):
+    data = {
+        "study": {"name": "swings"},
+        "mechanism": {"family": "rssr"},
+        "scene": {"want": ["swing", "max_pressure_angle"]},
+        "locus": {
+            "swing": {"from": 12, "to": 16, "count": 3, "unit": "deg"},
+            "phi0": "182 deg",
+            "phi_ext": {"from": 208, "to": 214, "count": 3, "unit": "deg"},
+        },
+        "design": {"e": "16 mm", "f": "-63 mm", "g": "12 mm", "alpha": "90 deg"},
+        "objective": {"minimise": "max_abs_d2psi"},
+    }
+    data, _, cells = gather(sweep.run(study_from_data(data, "study.toml"), out=tmp_path / "designs", jobs=1))
+    found = parallel(data, cells, shown_designs(data, groups(data)))
+    assert [axis["name"] for axis in found["axes"]] == ["swing", "phi_ext", "max_abs_d2psi", "max_pressure_angle"]
 
 
 def test_study_without_curves_or_designs_has_nothing_to_move(gathered, tmp_path):

@@ -21,7 +21,7 @@ from sweep.plot.mechanisms import aligned_turn
 from sweep.report.answer import answer, searched
 from sweep.report.dataset import gather, marked
 from sweep.report.figures import house_style
-from sweep.report.live import in_window, lowest
+from sweep.report.live import in_window, lowest, whole
 from sweep.report.maps import design_map, map_figure, overlays
 from sweep.report.page import write_report
 from sweep.report.quantities import quantity
@@ -267,6 +267,18 @@ def test_follower_that_turns_is_not_cut_at_its_lowest_position() -> None:
     angle, psi = aligned_turn(rocking, "psi", "psi")
     assert psi[0] == psi.min() == 0.0
     np.testing.assert_allclose(np.ptp(psi), 2.0, atol=2e-3)
+
+
+def test_angle_is_shown_where_it_is_known_and_without_jumps() -> None:
+    """A follower whose crank does not turn fully, and one whose angle passes half a turn."""
+    phi = np.arange(72) * (2.0 * np.pi / 72)
+    path = 3.0 - np.cos(phi - 1.0)
+    jumping = np.where(phi > 5.0, np.nan, np.angle(np.exp(1j * path)))
+    for name in ("psi", "needle.psi", "alpha"):
+        found = whole(name, jumping)
+        np.testing.assert_array_equal(np.isnan(found), np.isnan(jumping))
+        np.testing.assert_allclose(found[phi <= 5.0], path[phi <= 5.0], atol=1e-12)
+    np.testing.assert_array_equal(whole("s", jumping), jumping)
 
 
 def test_window_is_counted_from_the_lowest_position() -> None:

@@ -27,6 +27,20 @@ RPM = 2.0 * math.pi / 60.0
         ("max_pressure_angle2", "rad", "max pressure angle₂", "largest pressure angle of stage 2", "°"),
         ("max_abs_dev", "length", "max |dev|", "largest deviation from the line", "mm"),
         ("max_abs_d2x_m2", "length", "max |x″ of M₂|", "largest acceleration of x of M of stage 2", "mm/rad²"),
+        (
+            "looper.max_acceleration_p",
+            "length",
+            "max acceleration of P looper",
+            "largest acceleration of P of the looper",
+            "mm/rad²",
+        ),
+        ("speed_p", "length", "speed of P", "speed of P", "mm/rad"),
+        ("max_abs_d2alpha", "1", "max |alpha″|", "largest acceleration of alpha", "rad/rad²"),
+        ("alpha", "rad", "alpha", "alpha", "°"),
+        ("looper.range_p_y", "length", "range of y of P looper", "range of y of P of the looper", "mm"),
+        ("looper.dtip_x", "length", "x′ of tip looper", "velocity of x of tip of the looper", "mm/rad"),
+        ("speed1", "rad/s", "speed₁", "speed of stage 1", "rpm"),
+        ("omega3", "rad/s", "omega₃", "omega of stage 3", "rad/s"),
         ("pull.dS", "length", "S′ pull", "velocity of S of the pull", "mm/rad"),
         ("dchi", "1", "χ′", "velocity of chi", "rad/rad"),
         ("range_x_m2", "length", "range of x of M₂", "range of x of M of stage 2", "mm"),
@@ -49,6 +63,8 @@ def test_values_at_speed_are_those_calculated_by_hand() -> None:
     # 1 rad/rad^3 at 60/min: (2 pi)^3 rad/s^3
     assert quantity("d3psi", "1").at_speed(1.0, 60.0 * RPM) == "248.1\u00a0rad/s³"
     assert quantity("ds", "mm").at_speed(2.0, 500.0) == "1\u00a0m/s"
+    assert quantity("looper.max_acceleration_p", "mm").at_speed(12.0, 7000.0 * RPM) == "6448\u00a0m/s²"
+    assert quantity("speed", "rad/s").show(7000.0 * RPM) == "7000\u00a0rpm"
     assert quantity("stroke", "mm").at_speed(24.5, 500.0) == ""
     assert quantity("d2s", "mm").at_speed(12.0, None) == ""
 

@@ -153,7 +153,7 @@ class Panel {
 
   pose(share) {
     const values = this.data.designs[this.index].values[this.curve.name];
-    const value = between(values, share, this.data.closed);
+    const value = between(values, share, this.data.closed, 0.5 * (this.high - this.low));
     const x = this.x(share), { unit, fast, range } = this.curve;
     // What is this small beside the curve is the rounding of zero.
     const shown = Math.abs(value) < 1e-9 * Math.max(...range.map(Math.abs)) ? 0 : value;
@@ -167,9 +167,11 @@ class Panel {
   }
 }
 
-// A curve's value at a share of the turn, between two poses.
-function between(values, share, closed) {
+// A curve's value at a share of the turn, between two poses. A position that turns fully goes on beyond the last one: it
+// would have to jump by more than `most` to close.
+function between(values, share, closed, most = Infinity) {
   const along = share * (closed ? values.length : values.length - 1), k = Math.min(Math.floor(along), values.length - 1);
   const next = closed ? (k + 1) % values.length : Math.min(k + 1, values.length - 1);
-  return (1 - along + k) * values[k] + (along - k) * values[next];
+  const goes = next === 0 && Math.abs(values[0] - values[k]) > most, end = goes ? 2 * values[k] - values[k - 1] : values[next];
+  return (1 - along + k) * values[k] + (along - k) * end;
 }

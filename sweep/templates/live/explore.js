@@ -6,6 +6,7 @@ const by = (id) => document.getElementById(id);
 const made = (tag, parent, entries = {}) => Object.assign(parent.appendChild(document.createElement(tag)), entries);
 
 let design = { ...page.first }, pins = page.pins.map((pin) => ({ ...pin })), moving = null, found = null;
+let note = ""; // what is said of the design in hand until it changes
 const past = [], free = Object.fromEntries(page.ranges.filter((r) => r.swept).map((r) => [r.name, true])), rows = {};
 
 function say(text, wrong = false) {
@@ -33,7 +34,7 @@ async function renew() {
       show(found);
       document.body.dataset.milliseconds = performance.now() - begun;
       document.body.dataset.answers = Number(document.body.dataset.answers ?? 0) + 1;
-      say(found.status[0], true);
+      say(found.status[0] || note, found.status[0] !== "");
     } catch (error) { say(error.message, true); }
   } while (again);
   asking = false;
@@ -77,6 +78,8 @@ function show(answer) {
     return [value, "", words ?? (slack ? `${slack} left` : "kept"), `state ${row.states[k]}`];
   })]);
   const outputs = answer.outputs.map((row) => [[row.symbol, row.text], ...row.values.map((value, k) => [value, "", row.fast[k], "fast"])]);
+  const frame = by("limits").parentElement;
+  frame.hidden = frame.previousElementSibling.hidden = !limits.length;
   table(by("limits"), ["limit", "asked", ...heads], limits, 2);
   table(by("outputs"), ["output", ...heads], outputs, 1);
   answer.outputs.forEach((row, k) => { by("outputs").tBodies[0].rows[k].cells[1].dataset.output = row.name; });
@@ -111,16 +114,17 @@ function table(host, heads, lines, plain) {
 }
 
 function keep() {
+  note = "";
   past.push({ ...design });
   by("undo").disabled = false;
 }
 
 function take(other, text) {
   keep();
+  note = text;
   design = { ...design, ...other };
   steady = false;
   for (const range of page.ranges) put(range);
-  say(text ?? "");
   return renew();
 }
 
@@ -185,6 +189,7 @@ function addDimension(range) {
 function undo() {
   if (!past.length) return;
   design = past.pop();
+  note = "";
   by("undo").disabled = !past.length;
   for (const range of page.ranges) put(range);
   renew();
@@ -226,10 +231,10 @@ async function improve() {
       text = lines.pop();
       for (const line of lines.filter(Boolean).map(JSON.parse)) {
         if (line.error) throw new Error(line.error);
-        if (line.design) await take(line.design, "");
         const held = line.active?.length ? `; held back by ${line.active.join(", ")}` : "";
         const end = `${line.ended} after ${line.looks} looks${line.feasible ? "" : ", some limits are missed"}${held}`;
-        say(line.design ? end : `searching: ${line.looks} looks, ${line.seconds.toFixed(1)} s`);
+        if (line.design) await take(line.design, end);
+        else say(`searching: ${line.looks} looks, ${line.seconds.toFixed(1)} s`);
       }
     }
   } catch (error) { say(error.name === "AbortError" ? "stopped" : error.message, error.name !== "AbortError"); }

@@ -245,3 +245,6 @@ def test_figure_has_demand_surplus_and_speed_of_every_thread():
     figure = threads_figure(sweep.thread.diagram(machine(), DESIGN))
     assert [axes.get_ylabel() for axes in figure.axes] == ["P, from its mean [mm]", "surplus [mm]", "speed [m/s]"]
     assert [len(axes.lines) for axes in figure.axes] == [2, 2, 3]
+    figure.canvas.draw()
+    legends = [(axes, axes.get_legend()) for axes in figure.axes if axes.get_legend()]
+    assert legends and all(words.get_window_extent().y0 >= axes.get_window_extent().y1 for axes, words in legends)
