@@ -25,6 +25,7 @@ if TYPE_CHECKING:
 
 MISSED = ("missed", "unknown")
 NEAREST = 4  # limits with room to spare that are named in the answer; the table has them all
+BEHIND = 1e-6  # relative, of an optimum than which something better is known
 NO_PROOF = "This is no proof of a global optimum"
 
 
@@ -132,7 +133,7 @@ def not_achieved(data: Dataset, found: Scan) -> list[str]:
             faults.append(f"as it is made: {share_words(made, asked, str(data.optimum.get('ended')))}")
         if objective is not None and found.best_row:
             best, value = found.best_row[objective.name], value_of(data.optimum, objective.name)
-            if not compared(objective.name, value) <= compared(objective.name, best) + 1e-6 * abs(best):
+            if not compared(objective.name, value) <= compared(objective.name, best) + BEHIND * abs(best):
                 faults.append(f"the optimiser ended behind the best design of the sweep, {objective.show(best)}")
     return [f"Not achieved: {'; '.join(faults)}."] if faults else []
 
@@ -267,9 +268,28 @@ def _is_proven(data: Dataset) -> bool:
 
 
 def _unconfirmed(data: Dataset) -> tuple[str, ...]:
-    """Say that the search followed other extrema than the true ones, where it did."""
+    """Say that the search followed other extrema than the true ones, or ended behind the front, where it did."""
     best = data.optimum
     if best is None or best.get("ended") != DIFFERS:
-        return ()
+        return _behind_the_front(data)
     apart = f"{100.0 * float(best['gap']):.2g} %"
-    return (f"the search took values that are up to {apart} beside the true ones, which are shown: better may be near",)
+    text = f"the search took values that are up to {apart} beside the true ones, which are shown: better may be near"
+    return (text, *_behind_the_front(data))
+
+
+def _behind_the_front(data: Dataset) -> tuple[str, ...]:
+    """Say that a drawing of the front keeps all limits and is better than the optimum, where one is."""
+    study, shown, front, best = data.study, data.objective, data.front, data.optimum
+    robust = study.tolerance is not None and study.tolerance.robust is not None
+    if study.pareto is None or shown is None or front is None or best is None or robust:
+        return ()
+    good = (front["status"] == codes.OK) & (front["kkt_residual"] <= KKT)
+    for limit in study.limits:  # the bounds of the front take the place of its side
+        own = limit.minimum if study.pareto.at_least else limit.maximum
+        if limit.output == study.pareto.output and own is not None:
+            good &= front["bound"] >= own if study.pareto.at_least else front["bound"] <= own
+    least = float(compared(shown.name, front[shown.name][good].to_numpy()).min(initial=math.inf))
+    missed = int(best.get("status", 0)) == codes.LIMIT_EXCEEDED
+    value = math.inf if missed else compared(shown.name, value_of(best, shown.name))
+    better = math.isfinite(least) and least < value - BEHIND * abs(least)
+    return (f"the front has a better design within all limits, {shown.show(least)}: run more starts",) if better else ()

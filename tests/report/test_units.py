@@ -9,6 +9,8 @@ import pandas as pd
 import pytest
 
 from kernels import status as codes
+from sweep.optimise.multistart.survey import Survey
+from sweep.report.answer import survey_warnings
 from sweep.report.dataset import Dataset, gather, without_rows
 from sweep.report.front import Front
 from sweep.report.maps import trade_off
@@ -49,6 +51,19 @@ def test_what_gives_way_is_said_in_the_unit_of_its_table() -> None:
     (row,) = Front.of(front_of("at_most", codes.LIMIT_EXCEEDED)).rows()
     angle = "largest pressure angle of stage 1 by 0.579°"
     assert row.held == f"{angle}; stroke by 0.2\u00a0mm; largest acceleration has no value"
+
+
+@pytest.mark.parametrize(("found", "bound", "status", "words"), [
+    (7.9, 40.0, codes.OK, "the front has a better design within all limits, 7.9 mm/rad²: run more starts"),
+    (8.0, 40.0, codes.OK, ""),
+    (7.9, 50.0, codes.OK, ""),  # the study allows 45 degrees
+    (7.9, 40.0, codes.LIMIT_EXCEEDED, ""),
+])  # fmt: skip
+def test_a_front_that_is_better_than_the_optimum_is_told(found, bound, status, words) -> None:
+    data = front_of("at_most", status)
+    data.front["max_abs_d2s"], data.front["bound"] = found, np.radians(bound)
+    said = " ".join(survey_warnings(data, Survey(4, 4, 1, 4, 0.0, 0.02, "enough"))).replace("\u00a0", " ")
+    assert said == words
 
 
 @pytest.mark.parametrize("larger", [False, True])
