@@ -23,6 +23,7 @@ from kernels.jit import inline, kernel
 from kernels.types import Array, Status
 
 EXCHANGES = 60
+ROUNDING = 2.0**-49  # of a residual, relative to its terms
 
 
 @inline
@@ -154,7 +155,10 @@ def _exchange(
     m = dx.size
     if not _first_reference(target, dx, dy, inside, x, points):
         return False
-    weights = np.empty(4)
+    weights, size = np.empty(4), abs(x[0]) + abs(x[1]) + abs(x[2])
+    for j in range(m):
+        size = max(size, abs(target[j]))
+    rounding = ROUNDING * size  # of residuals: where the point runs straight to that, all four are as good as others
     for _ in range(EXCHANGES):
         # Weights of the reference: sum_i weight_i row_i = 0 with weight_3 = 1.
         for k in range(3):
@@ -163,12 +167,12 @@ def _exchange(
             y[k] = -_row(dx, dy, points[3], k)
         if not _solve3(a, y):
             return False
-        level, size = 0.0, 0.0
+        level, total = 0.0, 0.0
         for i in range(4):
             weights[i] = y[i] if i < 3 else 1.0
             level += weights[i] * target[points[i]]
-            size += abs(weights[i])
-        level /= size
+            total += abs(weights[i])
+        level /= total
         # The solution whose residuals on the reference are level * sign(weight).
         for i in range(3):
             for k in range(3):
@@ -183,7 +187,7 @@ def _exchange(
                 r = abs(target[j] + x[0] * dy[j] + x[1] * dx[j] - x[2])
                 if r > worst_size:
                     worst, worst_size = j, r
-        if worst < 0 or worst_size <= abs(level) * (1.0 + 1e-9) + 1e-15:
+        if worst < 0 or worst_size <= abs(level) * (1.0 + 1e-9) + rounding:
             return True
         # Stiefel's rule: the new row in terms of the reference decides who leaves, so the level can only rise.
         sign = math.copysign(1.0, target[worst] + x[0] * dy[worst] + x[1] * dx[worst] - x[2])

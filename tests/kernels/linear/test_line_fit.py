@@ -56,6 +56,20 @@ def test_deviation_equals_linear_programme_for_given_direction():
     assert np.all(got["deviation"] >= best - tolerance)
 
 
+@pytest.mark.parametrize("turn", [5.0, 15.0, 30.0])
+def test_points_that_run_straight_to_rounding_are_found(turn):
+    """The residuals of the best point are all rounding then; the exchange took that for points left to be exchanged."""
+    pins, pins2 = random_fourbars(400, turn=turn, seed=5)
+    got = fit(pins, pins2, 0.3, free=True)
+    found = np.flatnonzero(got["status"] == st.OK)
+    assert len(found) > 390
+    for i in found:
+        across, _ = deviation(pins[i], pins2[i], *(got[k][i] for k in ("xi", "eta", "lam", "h")))
+        rounding = 1e-14 * (1.0 + abs(got["xi"][i]) + abs(got["eta"][i]) + abs(got["h"][i]))
+        # a best point of three unknowns is as far off at four places
+        assert np.count_nonzero(abs(across) >= got["deviation"][i] * (1.0 - 2e-9) - rounding) >= 4
+
+
 def test_returned_point_has_the_returned_deviation_and_travel():
     pins, pins2 = random_fourbars(40)
     got = fit(pins, pins2, 0.3, free=True)
