@@ -16,6 +16,8 @@ from sweep.errors import InputError, MissingInput, listed
 from sweep.evaluation.angles import AngleUnit
 from sweep.evaluation.poses import evaluate
 from sweep.evaluation.summaries import summarise
+from sweep.families import family as find_family
+from sweep.families.base import Interval
 
 FORMATS = (".parquet", ".csv")
 FAMILY = click.argument("family", shell_complete=complete_families)
@@ -59,21 +61,28 @@ def evaluate_table(
 
     TABLE has a column for each parameter of FAMILY, in one length unit, ANGLES IN RAD unless --angles or a header such
     as `alpha [deg]` says otherwise, and a column phi (then each row is one pose) unless --poses is given (then each row
-    is a design).  FAMILY is a family or a chain such as rssr+guide.  A value that is nan has a status that says why.
+    is a design); of a family over an interval a column of its variable, such as rho.  FAMILY is a family or a chain
+    such as rssr+guide.  A value that is nan has a status that says why.
     """
     out = checked_format(out)
+    mechanism, chosen = find_family(family_names(family)), kept(keep)
+    variable = mechanism.domain.name
+    turns = not isinstance(mechanism.domain, Interval)
+    if poses is not None and not turns:
+        raise InputError("--poses", poses, f"a column {variable}: the ends are those of each design", "command line")
     whole = 2.0 * np.pi if angles != "deg" else 360.0
     phi = None if poses is None else np.arange(poses) * (whole / poses)
     designs = read_table(table)
     names = [str(name).split("[")[0].strip() for name in designs.columns]
-    has_phi = "phi" in names
-    if poses is None and not has_phi:
-        needed = "a column phi [rad], or --poses N for N crank angles over the turn"
-        raise MissingInput("phi", f"{needed}; found {listed(names)}", str(table))
-    if poses is not None and has_phi:
-        raise InputError("--poses", poses, f"either --poses or a column phi in {table}, not both", "command line")
-    parts, chosen = family_names(family), kept(keep)
-    write_table(evaluate(parts, designs, wanted(want), phi, keep=chosen, status_text=status_text, angles=angles), out)
+    if poses is None and variable not in names:
+        needed = f"a column {variable}{' [rad], or --poses N for N crank angles over the turn' if turns else ''}"
+        raise MissingInput(variable, f"{needed}; found {listed(names)}", str(table))
+    if poses is not None and variable in names:
+        raise InputError(
+            "--poses", poses, f"either --poses or a column {variable} in {table}, not both", "command line"
+        )
+    wants = wanted(want)
+    write_table(evaluate(mechanism, designs, wants, phi, keep=chosen, status_text=status_text, angles=angles), out)
 
 
 @click.command("summarise")

@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 from kernels.types import TWO_PI
 from sweep.effects import elsewhere, extended, inputs_beside, offered
 from sweep.effects.wanted import expanded
-from sweep.errors import InputError, nearest
+from sweep.errors import InputError, MissingInput, nearest
 from sweep.evaluation.angles import AngleUnit, grid_in_radians, in_radians, plain_names
 from sweep.evaluation.loads import Loads, curves_of
 from sweep.evaluation.statuses import explained, meanings
@@ -173,7 +173,7 @@ def _check_column(mechanism: Family, extras: Container[str]) -> None:
     variable = mechanism.domain.name
     if variable not in extras:
         allowed = f"a column {variable}, or the argument phi="
-        raise InputError(variable, None, allowed, f"table of {mechanism.name}")
+        raise MissingInput(variable, allowed, f"table of {mechanism.name}")
 
 
 def _grid(mechanism: Family, table: Table, phi: ArrayLike) -> NDArray[np.float64]:

@@ -213,7 +213,7 @@ def read_points(file: Path, reader: Hardpoints | None = None, *, part: str = "",
     reads = readers.get(file.suffix.lower())
     groups, exported = _of_csv(file, scale) if reads is None else reads(file)
     if not part and len(groups) > 1:
-        raise InputError("part", None, f"one of {', '.join(groups)}: name it with --part", str(file))
+        raise MissingInput("part", f"one of {', '.join(groups)}: name it with --part", str(file))
     if part and part not in groups:
         raise InputError("part", part, f"one of {', '.join(groups)}", str(file))
     found = groups[part] if part else next(iter(groups.values()))

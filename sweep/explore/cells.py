@@ -16,6 +16,7 @@ from sweep.errors import InputError
 from sweep.explore.hand import Hand
 from sweep.families.base import Array
 from sweep.quantities.limits import compared
+from sweep.report.tables import limited
 
 MOST_BINS, NOWHERE = 64, 255
 Places: TypeAlias = NDArray[np.uint8]
@@ -55,7 +56,7 @@ def cells(
     merit = objective.output if objective is not None else "design"
     names = dict.fromkeys([*chain.from_iterable(pairs), *ranges])
     columns = {name: _column(hand.folder, merit, name) for name in names}
-    shown = {name: hand.data.shown(name) for name in columns}
+    shown = {name: limited(hand.data, name) for name in columns}
     design = _column(hand.folder, merit, "design").values
     kept = np.ones(design.size, np.bool_)
     for name, ends in dict(ranges).items():

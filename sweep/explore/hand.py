@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property, lru_cache
 from pathlib import Path
@@ -20,6 +20,7 @@ from sweep.report.page import judged
 from sweep.report.quantities import quantity
 from sweep.study import Study
 from sweep.study.load import study_from_data
+from sweep.study.loads import speeds
 from sweep.study.toml import design_entries, toml
 
 Design = Mapping[str, float]
@@ -28,6 +29,7 @@ Design = Mapping[str, float]
 REACH = 0.5  # of a dimension that no study sweeps, to either side; of an angle in rad
 KEPT = 256  # designs whose outputs are remembered: pins and what is undone
 COUNT, SAMPLE = 25, 65_536  # of a saved study: values of each of two axes, designs over more of them
+STEADY = "at least one ticked dimension that changes steadily"
 TABLES = ("fit", "locus", "task", "pareto", "reference", "report")  # that a saved study of plain dimensions has not
 STARTS = 12
 MOST_LETTERS = 64  # of a study's name
@@ -70,9 +72,15 @@ class Hand:
         return self.study.family
 
     @cached_property
+    def own(self) -> list[str]:
+        """Parameters of the mechanism without effects, but for the speeds that the scene gives."""
+        given = speeds(self.family, self.study.speed)
+        return [name for name in self.study.bare.parameter_names if name not in given]
+
+    @cached_property
     def ranges(self) -> list[Range]:
         """Dimensions of the mechanism, and inputs of effects that the study gives."""
-        given = {*self.study.bare.parameter_names, *self.study.written} - {*self.study.curves}
+        given = {*self.own, *self.study.written} - {*self.study.curves}
         return [self._range(p) for p in self.family.parameters if p.name in given]
 
     def _range(self, p: Parameter) -> Range:
@@ -126,7 +134,7 @@ class Hand:
             "first": dict(self.first),
             "pins": [{"name": name, "design": dict(design)} for name, design in self.pins.items()][:PINS],
             "most": PINS,
-            "columns": [*outputs, *stored],
+            "columns": [*dict.fromkeys([*outputs, *stored])],  # of a [locus] an output is a dimension
             "swept": stored,
             "objective": None if self.study.objective is None else self.study.objective.output,
         }
@@ -136,8 +144,8 @@ class Hand:
 
         Raises
         ------
-        StudyError
-            where what the study asks does not go with plain dimensions.
+        InputError, StudyError
+            where a search has nothing to vary, or what the study asks does not go with plain dimensions.
         """
         design = self.design(given)
         entries: dict[str, Any] = dict(design_entries(self.family, design))
@@ -146,7 +154,9 @@ class Hand:
             low, high = swept[p.name]
             entries[p.name] = {"from": low, "to": high, "unit": PARAMETER_UNITS[p.unit]}
             entries[p.name] |= {"count": COUNT} if len(axes) <= 2 else {}
-        old, own = self.study.data, self.study.bare.parameter_names
+        old, own = self.study.data, self.own
+        if not axes and "optimise" in old:
+            raise InputError("dimensions", "none", STEADY, "explore")
         data: dict[str, Any] = {name: table for name, table in old.items() if name not in TABLES}
         for table in ("bodies", "loads", "design"):
             kept = {name: entry for name, entry in old.get(table, {}).items() if name != "sample"}
@@ -156,7 +166,7 @@ class Hand:
             data["design"]["sample"] = {"kind": "sobol", "n": SAMPLE}
         data["limits"] = {name: limit for name, limit in old.get("limits", {}).items() if name not in own}
         data["study"] = {**old["study"], "name": f"{self.study.name}-in-hand"[:MOST_LETTERS]}
-        data["reference"] = {"design": design_entries(self.study.bare, design)}
+        data["reference"] = {"design": self._reference_entries(design, swept)}
         data |= {"optimise": {"starts": STARTS}} if "optimise" in old else {}
         study_from_data(data, "study.toml")
         return toml(data)
@@ -166,7 +176,13 @@ class Hand:
 
     def reference(self, given: Mapping[str, object]) -> str:
         """Return the table [reference.design] of a study."""
-        return toml({"reference": {"design": design_entries(self.study.bare, self.design(given))}})
+        return toml({"reference": {"design": self._reference_entries(self.design(given), ())}})
+
+    def _reference_entries(self, design: Design, swept: Collection[str]) -> dict[str, str | float]:
+        """Return a reference design: the mechanism, and inputs of effects that are not those of the study."""
+        fixed = self.study.space.fixed
+        own = {*self.own, *swept, *(r.name for r in self.ranges if design[r.name] != fixed.get(r.name))}
+        return design_entries(self.family, {name: value for name, value in design.items() if name in own})
 
 
 def of_study(study: Study) -> Hand:

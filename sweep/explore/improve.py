@@ -7,8 +7,8 @@ from typing import Any
 
 import numpy as np
 
-from sweep.errors import InputError
-from sweep.explore.hand import Hand
+from sweep.errors import InputError, MissingInput
+from sweep.explore.hand import STEADY, Hand
 from sweep.optimise.local.start import search
 from sweep.optimise.problem.statement import Problem
 
@@ -25,7 +25,7 @@ def problem_in_hand(hand: Hand, design: Mapping[str, float], free: Mapping[str, 
     """
     study = hand.study
     if study.objective is None:
-        raise InputError("objective", None, "a study that says what to minimise: [objective]", "explore")
+        raise MissingInput("objective", "a study that says what to minimise: [objective]", "explore")
     bounds = {}
     for p in study.family.parameters:
         if p.name not in free or p.choices is not None:
@@ -36,7 +36,7 @@ def problem_in_hand(hand: Hand, design: Mapping[str, float], free: Mapping[str, 
         high = min([high, *(x.maximum for x in own if x.maximum is not None)])
         bounds[p.name] = (min(low, design[p.name]), max(high, design[p.name]))
     if not bounds:
-        raise InputError("dimensions", "none", "at least one ticked dimension that changes steadily", "explore")
+        raise InputError("dimensions", "none", STEADY, "explore")
     ends = np.array(list(bounds.values()))
     fixed = {name: value for name, value in design.items() if name not in bounds}
     return Problem(

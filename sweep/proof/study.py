@@ -16,7 +16,7 @@ from kernels import status as st
 from kernels.cache_folder import source_hash
 from sweep.dataset import files
 from sweep.dataset.files import metadata
-from sweep.errors import InputError
+from sweep.errors import MissingInput
 from sweep.proof.certificate import Proof, concluded, read_proof, write
 from sweep.proof.question import Question, described, question_of
 from sweep.proof.rounds import SHARES, UNITS, Cores, Tell, explored
@@ -85,7 +85,7 @@ def known_proof(study: Study, folder: str | Path) -> Proof | None:
 def _asked(study: Study, folder: Path) -> tuple[ProveSettings, Question, float, str]:
     """Return the settings, question, target in the unit of the proof's rows, and what the certificate depends on."""
     if study.optimise is None or study.optimise.prove is None:
-        raise InputError("optimise.prove", None, '{ gap = "1 %", boxes = 1000000 }', str(study.path))
+        raise MissingInput("optimise.prove", '{ gap = "1 %", boxes = 1000000 }', str(study.path))
     asked, question = study.optimise.prove, question_of(study)
     best = _best(files.beside(folder) / files.OPTIMUM, question)
     target = question.in_kernel(best / (1.0 + asked.gap)) if np.isfinite(best) else NEVER

@@ -10,7 +10,7 @@ import numpy as np
 from kernels import status as st
 from kernels.curves import samples as scan
 from kernels.types import TWO_PI, Status
-from sweep.errors import InputError
+from sweep.errors import MissingInput
 from sweep.families.base import Accuracy, Array, Columns, Family
 from sweep.quantities.kinds import LimitPosition, Margin, Quantity, Reduced, Request, WindowAngle, requests
 from sweep.quantities.resolve import STAY, resolve
@@ -103,7 +103,7 @@ def limits_and_reductions(
 def _window(position: str, found: Found, accuracy: Accuracy, part: tuple[float, float] | None) -> Window:
     """Return the window of a follower whose ends are found."""
     if part is None:
-        raise InputError("window", None, f"two fractions of the stroke, as {STAY.name} is wanted", "design outputs")
+        raise MissingInput("window", f"two fractions of the stroke, as {STAY.name} is wanted", "design outputs")
     most, least = found[Request(position, 1)], found[Request(position, -1)]
     err = np.maximum(most.err, least.err) if accuracy.target is not None else np.zeros(most.value.size)
     return Window.of_stroke(position, least.value, most.value, np.where(np.isfinite(most.value), err, np.nan), part)

@@ -7,7 +7,7 @@ from typing import Annotated, Any
 
 from pydantic import Field
 
-from sweep.errors import InputError, choices, closest
+from sweep.errors import InputError, MissingInput, choices, closest
 from sweep.families import NAMES
 from sweep.families import family as find_family
 from sweep.families.base import Family
@@ -278,7 +278,10 @@ def _machine(
             name = name if name in own else next((kind for kind in RELATION_KINDS if kind in own), "")
         key = place if place[:1] in (("relations",), ("shafts",), ("tools",)) else ("machine", *place)
         key = (*key, name) if name else key
-        faults.value(key, _written(data, key, error.value), error.allowed)
+        if isinstance(error, MissingInput):
+            faults.missing(key, error.allowed)
+        else:
+            faults.value(key, _written(data, key, error.value), error.allowed)
         return None
 
 

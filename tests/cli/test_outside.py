@@ -6,7 +6,11 @@ import subprocess
 import sys
 from pathlib import Path
 
+import pandas as pd
 import pytest
+
+import sweep
+from sweep.families import family
 
 HEAVY = ("numpy", "numba", "pandas", "scipy", "pyarrow", "matplotlib", "pydantic", "jinja2", "joblib")
 
@@ -61,3 +65,18 @@ def test_table_goes_through_a_pipe(tmp_path: Path) -> None:
     rows = [line.split(",") for line in done.stdout.splitlines()]
     assert rows[0] == ["psi", "status"]
     assert [float(row[0]) for row in rows[1:]] == pytest.approx([0.5, 3.0], abs=1e-15)
+
+
+def test_eval_over_an_interval_takes_its_variable_beside_a_parameter_phi(tmp_path: Path) -> None:
+    design = pd.DataFrame([family("backrest").example])
+    assert "phi" in design
+    design.to_csv(tmp_path / "design.csv", index=False)
+    posed = design.assign(rho=0.3)
+    posed.to_csv(tmp_path / "posed.csv", index=False)
+    done = shell("eval", "backrest", "posed.csv", "--want", "theta", cwd=tmp_path)
+    true = sweep.evaluate("backrest", posed, ["theta"])["theta"].item()
+    assert float(done.stdout.splitlines()[1].split(",")[0]) == true
+    for arguments, words in (((), "rho is missing; needed: a column rho; found"), (("--poses", "5"), "a column rho")):
+        done = shell("eval", "backrest", "design.csv", "--want", "theta", *arguments, cwd=tmp_path)
+        assert done.returncode == 2 and words in done.stderr
+    assert "did you mean 'rssr'" in shell("eval", "rsr", "design.csv", "--want", "psi", cwd=tmp_path).stderr

@@ -14,10 +14,12 @@ import sweep
 from sweep.cli.explore import in_hand
 from sweep.errors import InputError
 from sweep.evaluation.joints import parts
+from sweep.explore.cells import cells
 from sweep.explore.drag import dragged
 from sweep.explore.hand import of_study
 from sweep.explore.server import Server
 from sweep.study import study_from_data
+from tests.support.report_dataset import write_dataset
 
 STUDIES = Path(__file__).parents[2] / "studies"
 
@@ -30,15 +32,36 @@ def test_family_is_explored_as_its_example(source):
     assert all(one.low < one.high for one in hand.ranges if not one.choices)
 
 
-@pytest.mark.parametrize("name", ["needle208", "needle208-loads", "head208", "looper-sphere"])
+@pytest.mark.parametrize(
+    "name", ["needle208", "needle208-loads", "head208", "looper-sphere", "overlock208", "joint-loads", "heddle-shafts"]
+)
 def test_studies_are_taken_as_they_are(name):
     hand = in_hand(str(STUDIES / name))
     found = hand.answer([hand.first], ["in hand"])
     assert [row["name"] for row in found["limits"]] == [limit.output for limit in hand.study.limits]
     text = hand.saved(hand.first, {one.name: (one.low, one.high) for one in hand.ranges if one.swept})
     saved = study_from_data(tomllib.loads(text), "study.toml")
-    own = hand.study.bare.parameter_names
+    own = [one.name for one in hand.ranges]  # inputs of effects that are swept, or were moved, among them
     np.testing.assert_array_equal([saved.reference[n] for n in own], [hand.first[n] for n in own])
+    moved = hand.first | {own[-1]: hand.first[own[-1]] + 0.1}
+    kept = hand.study.data | tomllib.loads(hand.reference(moved))
+    assert study_from_data(kept, "study.toml").reference[own[-1]] == moved[own[-1]]
+
+
+def test_columns_stand_once_and_a_search_that_varies_nothing_is_not_saved(tmp_path):
+    hand = in_hand(str(STUDIES / "crank-rocker-atlas"))
+    hand.folder = tmp_path
+    columns = hand.page()["columns"]
+    assert len(columns) == len(set(columns)) and "swing" in columns
+    with pytest.raises(InputError, match="at least one ticked dimension"):
+        other = in_hand(str(STUDIES / "needle208"))
+        other.saved(other.first, {})
+
+
+def test_dimensions_of_stages_keep_their_names_beside_cells(tmp_path):
+    hand = in_hand(str(write_dataset(tmp_path / "designs", optimum={})))
+    axes = cells(hand, [["a1", "stroke"]], {}, 4)["axes"]
+    assert (axes["a1"]["title"], axes["stroke"]["title"]) == ("a1 [mm]", "stroke [mm]")
 
 
 def test_result_of_a_run_is_in_hand_and_its_reference_pinned(folder):

@@ -7,6 +7,7 @@ import math
 import pytest
 
 import sweep
+from sweep.errors import StudyError
 from sweep.study.load import load_study
 
 TEXT = """
@@ -53,6 +54,12 @@ want = ["left.swing"]
 def loaded(tmp_path, text):
     (tmp_path / "study.toml").write_text(text)
     return load_study(tmp_path)
+
+
+def test_a_shaft_that_is_missing_is_said_to_be(tmp_path):
+    words = r"machine\.right\.shaft is missing; needed: the shaft that drives it: main, upper"
+    with pytest.raises(StudyError, match=words):
+        loaded(tmp_path, TEXT.replace('shaft = "upper"\nsense = -1\nturn = "90 deg"\n', ""))
 
 
 def test_shafts_of_a_file_are_read_with_their_units(tmp_path):

@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from sweep.errors import InputError, choices, known_keys, nearest, number
+from sweep.errors import InputError, MissingInput, choices, known_keys, nearest, number
 from sweep.families.base import Event, Family, Output, Turn
 from sweep.families.capabilities import OutputLink
 from sweep.families.frames import crank_axis
@@ -199,7 +199,7 @@ def _mount(table: dict[str, Any], family: Family, shafts: Mapping[str, Shaft], w
             if key in table:
                 raise InputError(key, table[key], "nothing here: it belongs to a member that names its shaft", where)
         if shafts and table.get("driver", "shaft") == "shaft":
-            raise InputError("shaft", None, f"the shaft that drives it: {', '.join(shafts)}", where)
+            raise MissingInput("shaft", f"the shaft that drives it: {', '.join(shafts)}", where)
         return None
     first, *_, last = (*family.stages, family.stages[-1])
     has_axis = crank_axis(first.family, np.ones((1, len(first.family.parameters)))) is not None

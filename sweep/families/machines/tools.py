@@ -7,7 +7,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from typing import Any, TypeAlias
 
-from sweep.errors import InputError, choices, known_keys, number, sign
+from sweep.errors import InputError, MissingInput, choices, known_keys, number, sign
 from sweep.families.base import Output
 from sweep.families.capabilities import OutputLink
 from sweep.families.machines.relations import Relation, two_names
@@ -231,7 +231,7 @@ def read_tools(given: Mapping[str, Mapping[str, Any]], members: dict[str, Member
         known_keys(table, keys, where, f"for a {kind}, ")
         for key in NEEDED[kind]:
             if key not in table:
-                raise InputError(key, None, f"what a {kind} needs: {', '.join(NEEDED[kind])}", where)
+                raise MissingInput(key, f"what a {kind} needs: {', '.join(NEEDED[kind])}", where)
         if kind == "seam":
             found[name] = Seam(name, vector(table["at"], f"{where}.at"))
         elif kind == "plate":

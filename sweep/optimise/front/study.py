@@ -14,7 +14,7 @@ import numpy as np
 from kernels import status as st
 from sweep.dataset import chunk_files, files
 from sweep.dataset.files import metadata
-from sweep.errors import InputError, SearchCutShort
+from sweep.errors import MissingInput, SearchCutShort
 from sweep.evaluation.summaries import output
 from sweep.families.base import Array
 from sweep.families.names import by_magnitude
@@ -72,7 +72,7 @@ def front_study(
         if ``pareto.time_budget`` stopped it, likewise.
     """
     if study.pareto is None:
-        raise InputError("pareto", None, "a [pareto] section", str(study.path))
+        raise MissingInput("pareto", "a [pareto] section", str(study.path))
     place = Path(folder)
     settings, path = study.pareto, files.beside(place) / files.PARETO
     front = saved(path, key) or Front.of(settings)

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from sweep.errors import InputError, choices
+from sweep.errors import InputError, MissingInput, choices
 from sweep.families.base import Accuracy, Array, Family, March
 
 if TYPE_CHECKING:
@@ -84,7 +84,7 @@ class Problem:
                 raise InputError(limit.output, (limit.minimum, limit.maximum), allowed, PLACE)
         for name in self.given:
             if name not in self.variables and name not in self.fixed:
-                raise InputError(name, None, "a variable or a fixed value", PLACE)
+                raise MissingInput(name, "a variable or a fixed value", PLACE)
         if self.window is not None and not 0.0 <= self.window[0] < self.window[1] <= 1.0:
             raise InputError("window", self.window, "two fractions of the stroke, in order, between 0 and 1", PLACE)
 
@@ -150,7 +150,7 @@ class Problem:
         for column, parameter in enumerate(self.family.parameters):
             value = signs.get(parameter.name, self.fixed.get(parameter.name, parameter.default))
             if value is None and column not in self.columns:
-                raise InputError(parameter.name, None, "a variable or a fixed value", PLACE)
+                raise MissingInput(parameter.name, "a variable or a fixed value", PLACE)
             base[column] = np.nan if value is None else value
         return self._filled(base, values)
 

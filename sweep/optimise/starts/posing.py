@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from sweep.errors import InputError
+from sweep.errors import InputError, MissingInput
 from sweep.families.base import Array, Parameter
 from sweep.optimise.multistart.multistart import listed
 from sweep.optimise.multistart.survey import Group
@@ -47,7 +47,7 @@ def problem_of(study: Study, designs: Array, on_locus: bool | None = None) -> Pr
         if the study has no objective, or nothing that can change.
     """
     if study.objective is None:
-        raise InputError("objective", None, "[objective] minimise = an output", str(study.path))
+        raise MissingInput("objective", "[objective] minimise = an output", str(study.path))
     coordinates = (
         LocusCoordinates(study.locus) if study.locus and (_wanted(study) if on_locus is None else on_locus) else None
     )
@@ -136,7 +136,7 @@ def problem_and_starts(
     otherwise they come from the dataset and from samples.  ``stop`` ends it early.
     """
     if study.optimise is None:
-        raise InputError("optimise", None, "an [optimise] section", str(study.path))
+        raise MissingInput("optimise", "an [optimise] section", str(study.path))
     designs, merit, problem = _known(study, folder)
     if study.optimise.by_populations:
         return problem, from_populations(study, problem, designs, merit, stop, jobs)
@@ -174,7 +174,7 @@ def _known(study: Study, folder: Path) -> tuple[Array, Array, Problem]:
     Where no design is feasible they are random ones without an objective.
     """
     if study.objective is None:
-        raise InputError("objective", None, "[objective] minimise = an output", str(study.path))
+        raise MissingInput("objective", "[objective] minimise = an output", str(study.path))
     designs, merit = best_rows(study.family, study.objective.output, folder)
     if not len(designs) and study.optimise is not None:
         designs = drawn(study, study.optimise.starts, study.optimise.seed)
