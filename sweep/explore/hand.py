@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Collection, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property, lru_cache
 from pathlib import Path
 from typing import Any
@@ -58,7 +58,9 @@ class Hand:
     """A study with a first design, ready to answer for any other design of the same mechanism."""
 
     def __init__(self, data: Dataset, folder: Path | None, first: Design, pins: Mapping[str, Design]) -> None:
-        self.data, self.folder, self.first, self.pins = data, folder, first, pins
+        # A study whose report has no curves is looked at with them.
+        study = replace(data.study, output=replace(data.study.output, curves="optimum"))
+        self.data, self.folder, self.first, self.pins = replace(data, study=study), folder, first, pins
         self._row = lru_cache(KEPT)(self._computed)
 
     @property

@@ -118,7 +118,7 @@ def motion(
     >>> import sweep
     >>> axes = sweep.plot.motion("slider_crank", {"a": 20.0, "b": 70.0, "e": 5.0}, "s, d2s")
     >>> [panel.get_title(loc="left") for panel in axes]
-    ['displacement s from its lowest [mm]', 'acceleration s″ [mm/rad²]']
+    ['displacement s, from its lowest [mm]', 'acceleration s″ [mm/rad²]']
     """
     import pandas as pd
 
@@ -162,7 +162,7 @@ def _panels(
             angle, values = aligned_turn(turn, name, family.position)
             look = {"color": REFERENCE, "linestyle": "--"} if design == "reference" else {"color": colour}
             axes.plot(np.degrees(angle), values * shown.factor, label=design, zorder=3, **look)
-        below = " from its lowest" if name == family.position and not free else ""
+        below = ", from its lowest" if name == family.position and not free else ""
         axes.set_title(f"{shown.heading}{below} [{shown.unit}]" if shown.unit else f"{shown.heading}{below}")
         if speed is not None and shown.order:
             scale = shown.speed_scale * speed**shown.order / shown.factor

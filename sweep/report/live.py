@@ -180,7 +180,7 @@ def _motion(data: Dataset, shown: Shown, names: list[str]) -> Motion:
         path, free, start = lowest(family.position, path)
     order = np.roll(np.arange(POSES), -start)
     curves = {name: whole(name, np.asarray(found[name][0], np.float64)[order]) for name in names}
-    from_lowest = closed and not free and bool(np.isfinite(path[start]))
+    from_lowest = closed and not free
     curves[family.position] = path[order] - (path[start] if from_lowest else 0.0)
     window = data.study.window
     working = curves[cut] if cut in curves else np.asarray(found[cut][0], np.float64)[order]
@@ -217,7 +217,7 @@ def _panel(data: Dataset, name: str, motions: list[Motion]) -> dict[str, Any]:
     relative = name == data.study.family.position and any(m.from_lowest for m in motions)
     return {
         "name": name,
-        "title": shown.heading + (" from its lowest" if relative else ""),
+        "title": shown.heading + (", from its lowest" if relative else ""),
         "unit": shown.unit,
         "range": [low * shown.factor, high * shown.factor],
         "limits": [value * shown.factor for value in lines],

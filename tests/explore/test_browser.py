@@ -115,6 +115,8 @@ def test_pins_stand_beside_and_undo_goes_back(opened):
     page.click("#pin")
     moved(page, "a", 11.9)
     assert page.locator("#outputs th").all_inner_texts() == ["output", "in hand", "reference", "A"]
+    align = "all => all.map((e) => getComputedStyle(e).textAlign)"
+    assert page.locator("#outputs th").evaluate_all(align) == ["left", "right", "right", "right"]
     assert page.locator("#outputs tr:has(td[data-output=max_abs_d2psi]) td").nth(3).inner_text().split("\n")[0] == first
     page.keyboard.press("Control+z")
     until(lambda: shown(page, "max_abs_d2psi") == first)
@@ -251,6 +253,7 @@ def test_a_drive_that_turns_fully_ends_its_turn_and_has_no_table_of_no_limits(br
         assert [float(text.removesuffix("°").replace("−", "-")) for text in ends] == pytest.approx(
             [0, 360, 360], abs=1.0
         )
+        assert page.evaluate("[withUnit(short(NaN), 'mm'), withUnit(short(45), '°')]") == ["–", "45°"]
         assert page.locator("#limits").is_hidden() and page.locator("#outputs").is_visible()
         page.close()
 

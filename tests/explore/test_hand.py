@@ -51,6 +51,7 @@ def test_studies_are_taken_as_they_are(name):
 def test_columns_stand_once_and_a_search_that_varies_nothing_is_not_saved(tmp_path):
     hand = in_hand(str(STUDIES / "crank-rocker-atlas"))
     hand.folder = tmp_path
+    assert hand.answer([hand.first], ["in hand"])["motion"]["curves"]  # although its report has none
     columns = hand.page()["columns"]
     assert len(columns) == len(set(columns)) and "swing" in columns
     with pytest.raises(InputError, match="at least one ticked dimension"):

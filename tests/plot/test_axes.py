@@ -158,7 +158,7 @@ def test_verb_draws_motions_of_several_designs_with_real_letters(folder, tmp_pat
     done = CliRunner().invoke(main, ["draw", "motion", str(folder), "--design", "0,2,reference", "--out", str(out)])
     assert done.exit_code == 0, done.output
     text = out.read_text()
-    for words in ("design 0", "design 2", "reference", "displacement s from its lowest [mm]"):
+    for words in ("design 0", "design 2", "reference", "displacement s, from its lowest [mm]"):
         assert f">{words}</text>" in text
     assert len(text) < 100_000
 

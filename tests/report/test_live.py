@@ -83,7 +83,7 @@ def test_design_moves_as_its_joints_and_curves_do(four_bars):
     known = [np.isfinite(numbers(reference["curves"][name])) for name in ("psi", "d2psi")]
     assert known[0].any() and not known[0].all()
     np.testing.assert_array_equal(*known)
-    assert found["curves"][0]["title"] == "follower angle ψ from its lowest"
+    assert found["curves"][0]["title"] == "follower angle ψ, from its lowest"
 
 
 def test_lines_are_rows_of_the_dataset_the_best_among_them(four_bars):

@@ -39,6 +39,7 @@ function short(value, digits = 4) {
 }
 
 function withUnit(text, unit) {
+  if (!unit || text === "–") return text;
   return unit === "°" ? text + unit : `${text} ${unit}`;
 }
 
@@ -162,7 +163,7 @@ class Panel {
     this.dot.style.display = Number.isFinite(value) ? "" : "none";
     write(this.dot, "cx", x);
     write(this.dot, "cy", Number.isFinite(value) ? this.y(value) : 0);
-    const also = fast ? ` = ${withUnit(short(shown * fast.factor), fast.unit)}` : "";
+    const also = fast && Number.isFinite(shown) ? ` = ${withUnit(short(shown * fast.factor), fast.unit)}` : "";
     tell(this.value, withUnit(short(shown), unit) + also);
   }
 }

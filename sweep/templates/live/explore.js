@@ -92,7 +92,7 @@ function table(host, heads, lines, plain) {
   if (host.dataset.shape !== shape) {
     host.replaceChildren();
     const top = made("tr", made("thead", host)), body = made("tbody", host);
-    words.forEach((text, k) => made("th", top, { textContent: text, className: k > plain ? `pin-${k - plain}` : "" }));
+    words.forEach((text, k) => made("th", top, { textContent: text, className: k < plain ? "" : k > plain ? `n pin-${k - plain}` : "n" }));
     for (const line of lines) {
       const row = made("tr", body);
       line.forEach((_, k) => {
@@ -356,7 +356,12 @@ class Cells {
     this.rails.forEach((name, k) => {
       const { symbol, ends } = this.bands.axes[name], x = this.railAt(k), range = this.ranges[name], top = k % 2 ? 22 : 10;
       svg("line", { class: "axis", x1: x, x2: x, y1: RAILS.top, y2: RAILS.high - RAILS.bottom }, host);
-      svg("text", { x, y: top, "text-anchor": "middle" }, host).textContent = symbol.length > 12 ? `${symbol.slice(0, 11)}…` : symbol;
+      const [edge, anchor] = k === 0 ? [0, "start"] : k === this.rails.length - 1 ? [RAILS.wide, "end"] : [x, "middle"];
+      const label = svg("text", { x: edge, y: top, "text-anchor": anchor }, host);
+      // Names of members begin alike, outputs end alike.
+      const brief = page.swept.includes(name) ? `…${symbol.slice(-11)}` : `${symbol.slice(0, 11)}…`;
+      label.textContent = symbol.length > 12 ? brief : symbol;
+      svg("title", {}, label).textContent = symbol;
       svg("text", { x, y: RAILS.high - 6, "text-anchor": "middle" }, host).textContent = short(ends[0], 3);
       if (range) {
         const [low, high] = range.map((value) => this.height((value - ends[0]) / (ends[1] - ends[0])));
