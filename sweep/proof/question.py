@@ -14,6 +14,7 @@ from sweep.families.base import Array
 from sweep.families.capabilities import ProvableLocus
 from sweep.families.chain import Chain
 from sweep.optimise.multistart.multistart import listed
+from sweep.quantities.limits import meets
 
 if TYPE_CHECKING:
     from sweep.study import Limit, Study
@@ -126,7 +127,7 @@ def question_of(study: Study) -> Question:
     swing = entries[provable.coordinates[0]]
     if swing[0] * swing[1] <= 0.0:
         raise InputError("locus.swing", swing, "angles of one sign", place)
-    cos2, links, left_out = _limits(study, provable)
+    cos2, links, left_out = _limits(study, provable, entries)
     return Question(
         provable, study.objective.output, names,
         np.array([entries[n][0] for n in names]), np.array([entries[n][1] for n in names]),
@@ -167,11 +168,21 @@ def _entries(study: Study, coordinates: tuple[str, ...], place: str) -> dict[str
             low = high = fixed
         else:  # an angle of the rocker, wherever it is
             low, high = -np.pi, np.pi
-        found[name] = (float(low), float(high))
+        found[name] = _narrowed(study, name, float(low), float(high))
     return found
 
 
-def _limits(study: Study, provable: ProvableLocus) -> tuple[float, Array, tuple[str, ...]]:
+def _narrowed(study: Study, name: str, low: float, high: float) -> tuple[float, float]:
+    """Return the ends of a coordinate within the limits on it; as they are where nothing is left between."""
+    own = [x for x in study.limits if x.output == name and name not in study.prescribed]
+    least = max([low, *(x.minimum for x in own if x.minimum is not None)])
+    most = min([high, *(x.maximum for x in own if x.maximum is not None)])
+    return (least, most) if least <= most else (low, high)
+
+
+def _limits(
+    study: Study, provable: ProvableLocus, entries: Mapping[str, tuple[float, float]]
+) -> tuple[float, Array, tuple[str, ...]]:
     """Least cos^2 of the pressure angle, least and most of every link, and the limits that are not used."""
     cos2, left_out = 0.0, []
     links = np.array([-np.inf, np.inf] * len(provable.links))
@@ -180,7 +191,7 @@ def _limits(study: Study, provable: ProvableLocus) -> tuple[float, Array, tuple[
             links[2 * number : 2 * number + 2] = study.space.bounds[name]
         elif name in study.space.fixed:
             links[2 * number : 2 * number + 2] = study.space.fixed[name]
-    known = set(provable.coordinates) | {"rotatable"}
+    known = {"rotatable", *study.prescribed}
     for limit in study.limits:
         name = limit.output
         if name == "max_pressure_angle" and limit.maximum is not None:
@@ -189,7 +200,7 @@ def _limits(study: Study, provable: ProvableLocus) -> tuple[float, Array, tuple[
             cos2 = max(cos2, limit.minimum * WEAKER)
         elif name in provable.links:
             _put(links, provable.links.index(name), limit)
-        elif name not in known:
+        elif name not in known and not (name in entries and meets(limit, np.array(entries[name])).all()):
             left_out.append(name)
     return cos2, links, tuple(left_out)
 

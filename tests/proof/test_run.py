@@ -17,6 +17,7 @@ from sweep.jobs.executors import Here
 from sweep.jobs.signals import Stop
 from sweep.nights.carry import carry, searched
 from sweep.proof import known_proof, prove_study, read_proof
+from sweep.proof.question import question_of
 from sweep.proof.rounds import Cores
 from sweep.report.page import write_report
 from sweep.study import load_study
@@ -220,3 +221,12 @@ def test_figure_of_the_space_accounts_for_all_of_it_and_shows_the_optimum_in_its
     figure = proof_space.draw(space, 75.0)
     labels = [text.get_text() for text in figure.legends[0].get_texts()]
     assert labels[-1] == "the optimum" and any(label.startswith("pressure angle above its limit: ") for label in labels)
+
+
+def test_limits_on_coordinates_narrow_the_space_and_others_are_named(tmp_path: Path) -> None:
+    wide = '{ from = 10, to = 90, unit = "deg" }'
+    limits = 'alpha = { max = 40, unit = "deg" }\ng = { max = 5, unit = "mm" }\ne = { max = 50, unit = "mm" }'
+    question = question_of(load_study(written(tmp_path / "limits", alpha=wide, limits=limits)))
+    assert question.names == ("phi0", "phi_ext", "alpha")
+    np.testing.assert_allclose(np.degrees([question.low[2], question.high[2]]), [10.0, 40.0])
+    assert question.left_out == ("e",)  # no design of the space keeps it: e is 100 mm; g is 0 in all
