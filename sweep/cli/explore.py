@@ -10,6 +10,7 @@ import click
 from sweep.cli.families import family_names
 from sweep.cli.first_study import study_text
 from sweep.dataset.files import PLAN, beside, located
+from sweep.errors import InputError
 from sweep.explore.hand import Hand, of_results, of_study
 from sweep.explore.server import Server
 from sweep.families import family
@@ -47,5 +48,9 @@ def in_hand(source: str) -> Hand:
         return of_results(path)
     if path.exists():
         return of_study(load_study(path))
-    mechanism = family(family_names(source))
+    try:
+        mechanism = family(family_names(source))
+    except InputError as error:
+        allowed = f"a study, a folder of results, or a family, {error.allowed}"
+        raise InputError("SOURCE", source, allowed, "explore") from None
     return of_study(study_from_data(tomllib.loads(study_text("first-look", mechanism, "")), "study.toml"))

@@ -9,6 +9,7 @@ from functools import cached_property, lru_cache
 from pathlib import Path
 from typing import Any
 
+from kernels import status as codes
 from sweep.chunks.plan import PARAMETER_UNITS
 from sweep.errors import InputError, nearest
 from sweep.evaluation.tables import design_matrix
@@ -128,8 +129,9 @@ class Hand:
 
     def page(self) -> dict[str, Any]:
         """Return what the page knows from the beginning."""
-        stored = [] if self.folder is None else [axis.name for axis in self.study.space.axes if axis.varies]
-        outputs = [] if self.folder is None else [name for name in self.study.want if not is_flag(name)]
+        feasible = 0 if self.folder is None else self.data.counts.get(codes.OK, 0)
+        stored = [axis.name for axis in self.study.space.axes if axis.varies] if feasible else []
+        outputs = [name for name in self.study.want if not is_flag(name)] if feasible else []
         return {
             "title": self.study.title or self.study.name,
             "ranges": [vars(one) for one in self.ranges],
@@ -138,6 +140,7 @@ class Hand:
             "most": PINS,
             "columns": [*dict.fromkeys([*outputs, *stored])],  # of a [locus] an output is a dimension
             "swept": stored,
+            "empty": self.folder is not None and not feasible,
             "objective": None if self.study.objective is None else self.study.objective.output,
         }
 

@@ -17,9 +17,9 @@ from sweep.evaluation.joints import parts
 from sweep.explore.cells import cells
 from sweep.explore.drag import dragged
 from sweep.explore.hand import of_study
-from sweep.explore.server import Server
+from sweep.explore.server import Server, page_text
 from sweep.study import study_from_data
-from tests.support.report_dataset import write_dataset
+from tests.support.report_dataset import study_data, write_dataset
 
 STUDIES = Path(__file__).parents[2] / "studies"
 
@@ -50,13 +50,28 @@ def test_studies_are_taken_as_they_are(name):
 
 def test_columns_stand_once_and_a_search_that_varies_nothing_is_not_saved(tmp_path):
     hand = in_hand(str(STUDIES / "crank-rocker-atlas"))
-    hand.folder = tmp_path
+    hand.folder = tmp_path  # as if it had been run
+    hand.data.plan["counts"] = {"OK": 1}
     assert hand.answer([hand.first], ["in hand"])["motion"]["curves"]  # although its report has none
     columns = hand.page()["columns"]
     assert len(columns) == len(set(columns)) and "swing" in columns
     with pytest.raises(InputError, match="at least one ticked dimension"):
         other = in_hand(str(STUDIES / "needle208"))
         other.saved(other.first, {})
+
+
+def test_a_run_without_feasible_designs_says_so_and_draws_no_empty_field(tmp_path):
+    data = study_data(limits={"stroke": {"min": 500, "unit": "mm"}})
+    hand = in_hand(str(sweep.run(study_from_data(data, "study.toml"), out=tmp_path / "designs", jobs=1)))
+    assert hand.page()["columns"] == []
+    assert "No design of the run keeps all limits." in page_text(hand)
+
+
+def test_what_is_neither_a_place_nor_a_family_is_told():
+    with pytest.raises(
+        InputError, match="SOURCE = 'nothing'; allowed: a study, a folder of results, or a family, one of"
+    ):
+        in_hand("nothing")
 
 
 def test_dimensions_of_stages_keep_their_names_beside_cells(tmp_path):
