@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-from typing import NamedTuple
 
 import numpy as np
 
@@ -11,12 +10,14 @@ from kernels import status as st
 from kernels.curves import samples as scan
 from kernels.types import EPS, TWO_PI, Status
 from sweep.families.base import Array, Family
-from sweep.families.curve_features import singular
+from sweep.families.curve_features import singular, switches
 from sweep.numerics.singularities import Singularities
 from sweep.quantities.kinds import Request
+from sweep.reductions.hidden_tops import Turn, closer_looks, dips, doubtful, tops_of, unknown
 from sweep.reductions.refine import (
     SHRINK,
     VARIES,
+    Candidates,
     Peaks,
     Sampler,
     attained,
@@ -56,23 +57,11 @@ PER_SINGULARITY = 12.0  # samples per distance of the nearest complex singularit
 NARROWEST = 2.0 * PER_SINGULARITY / LIMIT  # such a distance [rad] below which panels resolve a peak with fewer poses
 BREAKING = 512  # samples from which on what is still rough may be a jump
 DISAGREEMENT = 0.05  # between the peak guessed from the samples and the refined one
+FINER = 0.25  # of the error allowed: the rest is for what precise poses may find
 RIVALS = 1e-3  # peaks lower than the best by no more of its size may turn out the highest
 NEVER = 2**40  # more samples than are ever needed
 CLOSE = 0.1  # distance of a singularity [rad] from which on it is measured what rounding does
 TIE = 1e-10  # to which peaks are told apart where their places are wanted
-
-
-class Candidates(NamedTuple):
-    """Samples next to a possible extremum, each (k,): request, row of the block, column, sign that makes it large."""
-
-    request: Index
-    row: Index
-    column: Index
-    sign: Array
-
-    def only(self, which: Index | Mask) -> Candidates:
-        """Return some of them."""
-        return Candidates(self.request[which], self.row[which], self.column[which], self.sign[which])
 
 
 @dataclass
@@ -147,13 +136,14 @@ class Search:
         needed = np.maximum(needed, self._samples_by_singularity(columns, samples, rows.size))
         resolved = looked & ((needed <= samples) | (samples == LIMIT))
         candidates = candidates.only(resolved[candidates.request, candidates.row])
-        peaks = self._refine(rows, columns, samples, candidates, scales)
+        turn = Turn(rows, columns, samples)
+        candidates, peaks = self._refine(turn, candidates, scales, resolved)
         for number, request in enumerate(self.requests):
             mine = candidates.request == number
             row, found = candidates.row[mine], peaks.only(mine)
             if self.window is not None and request.windowed:
                 row, found = self._within_window(rows, columns, request, row, found, resolved[number])
-            moved = self._keep_best(rows, request, row, found) > DISAGREEMENT * scales[request]
+            moved = self._keep_best(rows, request, row, found) > DISAGREEMENT * scales[number]
             again = moved & resolved[number] & ~alone[number]
             needed[number, again] = np.maximum(needed[number, again], 2 * samples)
         # Everything is looked at with LIMIT samples before it is given up.
@@ -163,17 +153,17 @@ class Search:
 
     def _candidates(
         self, rows: Index, columns: dict[str, Array], samples: int
-    ) -> tuple[Candidates, dict[Request, Array], Index, Mask]:
+    ) -> tuple[Candidates, Array, Index, Mask]:
         """Candidates of all requests, sizes of their curves, samples needed, and which need no more: noise, jumps."""
-        needed, pieces, scales = np.full((len(self.requests), rows.size), START), [], {}
-        alone = np.zeros(needed.shape, np.bool_)
+        needed, pieces = np.full((len(self.requests), rows.size), START), []
+        scales, alone = np.empty(needed.shape), np.zeros(needed.shape, np.bool_)
         for number, request in enumerate(self.requests):
             values = columns[request.pose]
             allowed = None
             if self.window is not None and request.windowed:
                 allowed = self.window.holds(rows, columns[self.window.position])
                 needed[number, self.window.grazed(rows, columns[self.window.position])] = 2 * samples
-            scale, rough = np.empty(rows.size), np.empty(rows.size)
+            scale, rough = scales[number], np.empty(rows.size)
             row, column = (np.empty(rows.size * (samples // 2 + 1), np.int64) for _ in range(2))
             count = scan.peaks(values, request.mode, SHARE, allowed, scale, rough, row, column)
             row, column = row[:count], column[:count]
@@ -188,7 +178,6 @@ class Search:
                 self.torn[number, rows[torn]], alone[number, torn], rough[torn] = True, True, 0.0
             sign = np.sign(values[row, column]) if request.mode == 0 else np.full(count, float(request.mode))
             pieces.append(Candidates(np.full(count, number), row, column, sign))
-            scales[request] = scale
             needed[number, rough > ROUGH] = 2 * samples
         joined = [np.concatenate(parts) for parts in zip(*pieces, strict=True)]
         return Candidates(*joined), scales, needed, alone
@@ -204,45 +193,53 @@ class Search:
         samples_needed: Index = np.exp2(np.ceil(np.log2(np.maximum(wanted, 1.0)))).astype(np.int64)
         return samples_needed
 
-    def _refine(
-        self, rows: Index, columns: dict[str, Array], samples: int, candidates: Candidates, scales: dict[Request, Array]
-    ) -> Peaks:
-        number, row, column, sign = candidates
-        near = (column[:, None] + np.arange(-3, 4)) % samples
-        around, size = np.empty((row.size, 7)), np.empty(row.size)
-        for k, request in enumerate(self.requests):
-            mine = number == k
-            around[mine] = sign[mine, None] * columns[request.pose][row[mine, None], near[mine]]
-            size[mine] = scales[request][row[mine]]
-        spacing = TWO_PI / samples
-        # A quarter of what is allowed: the rest is for what precise poses may find.
-        tolerance: Array = 0.25 * self.target * size
-        centre = np.multiply(column, spacing, dtype=np.float64)
-        first = first_peaks(centre, np.full(row.size, spacing), around)
-        sample = self._sampler(self.family, rows, candidates, sign * around[:, 3])
-        place = np.where(self.places(number), self.target, np.inf)
-        peaks = sharpen(sample, first, tolerance, place)
-        share = self._rounding(rows, columns, candidates, self.guards)
+    def _refine(self, turn: Turn, candidates: Candidates, size: Array, resolved: Mask) -> tuple[Candidates, Peaks]:
+        """Peaks of the candidates, and those that closer looks find beside them and beside switches."""
+        spacing = np.full(candidates.row.size, TWO_PI / turn.samples)
+        around = candidates.sign[:, None] * turn.around(self.requests, candidates, np.arange(-3, 4))
+        first = first_peaks(np.multiply(candidates.column, spacing, dtype=np.float64), spacing, around)
+        peaks = self._sharpened(turn, candidates, first, size)
+        # Which of several is the highest decides on the place, at every target.
+        enough = np.where(self.places(candidates.request), min(TIE, self.target), FINER * self.target)
+        hidden = doubtful(candidates, peaks, around, enough * size[candidates[:2]])
+        least = [request.pose for request in self.requests if request.mode == -1 and not self.anywhere]
+        angles = switches(self.family, self.designs[turn.rows], least)
+        beside = dips(self.requests, turn.columns, resolved) if angles.shape[1] else Candidates.none()
+        looks, phi = closer_looks(candidates.only(hidden), beside, angles, turn.samples)
+        if len(phi):
+            sample = self._sampler(self.family, turn, looks)
+            more, first = tops_of(sample, looks, phi, turn.samples, peaks.guess[hidden])
+            new = unknown((candidates, peaks), (more, first))
+            more, first = more.only(new), first.only(new)
+            peaks = peaks.joined(self._sharpened(turn, more, first, size))
+            candidates = candidates.joined(more)
+        share = self._rounding(turn, candidates, self.guards)
         if self.near is not None:
-            share += singular_share(self.near.only(rows[row]), peaks.phi, self._orders(candidates))
+            near = self.near.only(turn.rows[candidates.row])
+            share += singular_share(near, peaks.phi, self._orders(candidates))
         peaks = peaks._replace(err_height=peaks.err_height + share * np.abs(peaks.height))
         if self.family.precise_poses is None:
             # A quartic may say less than nothing of what touches zero; a value at a pose is one that there is.
-            return attained(sample, peaks, np.arange(row.size))
-        self._confirm(rows, columns, candidates, peaks, size, share)
-        return peaks
+            sample = self._sampler(self.family, turn, candidates)
+            return candidates, attained(sample, peaks, np.arange(len(peaks.phi)))
+        self._confirm(turn, candidates, peaks, size[candidates[:2]], share)
+        return candidates, peaks
 
-    def _confirm(
-        self, rows: Index, columns: dict[str, Array], candidates: Candidates, peaks: Peaks, size: Array, share: Array
-    ) -> None:
+    def _sharpened(self, turn: Turn, candidates: Candidates, first: Peaks, size: Array) -> Peaks:
+        """Refine peaks; ``size`` (r, n) are the sizes of the curves."""
+        place = np.where(self.places(candidates.request), self.target, np.inf)
+        tolerance = FINER * self.target * size[candidates[:2]]
+        return sharpen(self._sampler(self.family, turn, candidates), first, tolerance, place)
+
+    def _confirm(self, turn: Turn, candidates: Candidates, peaks: Peaks, size: Array, share: Array) -> None:
         """Replace the peaks that may be the highest by what the family's precise poses say of them.
 
         ``share`` of a height is what rounding may have changed.
         """
         number, row, _, sign = candidates
         windowed = np.array([request.windowed for request in self.requests])[number]  # which of them count, shows later
-        group, doubt = number * rows.size + row, peaks.err_height + RIVALS * size
-        lowest = np.full(len(self.requests) * rows.size, -np.inf)
+        group, doubt = number * turn.rows.size + row, peaks.err_height + RIVALS * size
+        lowest = np.full(len(self.requests) * turn.rows.size, -np.inf)
         np.maximum.at(lowest, group, peaks.height - doubt)
         rivals = np.flatnonzero((peaks.height + doubt >= lowest[group]) | windowed)
         group, tolerance = group[rivals], self.target * size[rivals]
@@ -251,7 +248,7 @@ class Search:
         tied = (np.bincount(group, minlength=lowest.size)[group] > 1) & located
         tolerance = np.where(tied, np.minimum(tolerance, TIE * size[rivals]), tolerance)
         mine, peak = candidates.only(rivals), peaks.only(rivals)
-        sample = self._sampler(self.family.precise(), rows, mine, sign[rivals] * peak.height)
+        sample = self._sampler(self.family.precise(), turn, mine, sign[rivals] * peak.height)
         locate = np.full(rivals.size, np.inf)
         # Without a derivative to polish it by, a place is no better than the rounding of the heights: precise ones.
         bare = np.array([request.pose not in self.family.derivative_of for request in self.requests])[mine.request]
@@ -260,16 +257,18 @@ class Search:
         peak.err_phi[bare] = np.maximum(peak.step, SHRINK**3 * peak.spacing)[bare]
         peak = confirmed(sample, peak, tolerance, locate, share[rivals] * np.abs(peak.height))
         # The first stage of a chain is given its exact input, those behind it a rounded one.
-        rounding = self._rounding(rows, columns, mine, self.guards[1:]) * np.abs(peak.height)
+        rounding = self._rounding(turn, mine, self.guards[1:]) * np.abs(peak.height)
         for column, found in zip(peaks, peak._replace(err_height=peak.err_height + rounding), strict=True):
             column[rivals] = found
 
-    def _sampler(self, family: Family, rows: Index, candidates: Candidates, middle: Array) -> Sampler:
-        """Measure candidates by the poses of ``family``, angles continuous with the values ``middle``."""
+    def _sampler(self, family: Family, turn: Turn, candidates: Candidates, middle: Array | None = None) -> Sampler:
+        """Measure candidates by the poses of ``family``, angles continuous with values, at first of samples."""
         number, row, _, sign = candidates
+        if middle is None:
+            middle = turn.around(self.requests, candidates, np.zeros(1, np.intp))[:, 0]
 
         def sample(active: Index, phi: Array) -> Array:
-            designs = rows[row[active]]
+            designs = turn.rows[row[active]]
             poses, status = pose_columns(family, self.designs[designs], phi, self.names)
             if not self.anywhere:
                 bad = status != st.OK
@@ -286,9 +285,9 @@ class Search:
 
         return sample
 
-    def _rounding(self, rows: Index, columns: dict[str, Array], candidates: Candidates, guards: list[str]) -> Array:
+    def _rounding(self, turn: Turn, candidates: Candidates, guards: list[str]) -> Array:
         """Share of a value that rounding may have changed alike at neighbouring poses."""
-        given = self.designs[rows], columns, candidates.row, candidates.column
+        given = self.designs[turn.rows], turn.columns, candidates.row, candidates.column
         return rounding_share(self.family, *given, guards, self._orders(candidates))
 
     def _orders(self, candidates: Candidates) -> Index:

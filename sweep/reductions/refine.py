@@ -33,6 +33,29 @@ SHORTEST, SHORTEST_KINKED = 1e-6, 1e-12  # of the spacing of the samples: steps 
 VARIES = 8.0  # times the rounding at one pose: what that of its neighbours may be
 
 
+class Candidates(NamedTuple):
+    """Samples next to a possible extremum, each (k,): request, row of the block, column, sign that makes it large."""
+
+    request: Index
+    row: Index
+    column: Index
+    sign: Array
+
+    def only(self, which: Index | Mask) -> Candidates:
+        """Return some of them."""
+        return Candidates(self.request[which], self.row[which], self.column[which], self.sign[which])
+
+    @classmethod
+    def none(cls) -> Candidates:
+        """Return none."""
+        nothing = np.zeros(0, np.int64)
+        return cls(nothing, nothing, nothing, np.zeros(0))
+
+    def joined(self, others: Candidates) -> Candidates:
+        """Join these and others."""
+        return Candidates(*(np.concatenate(pair) for pair in zip(self, others, strict=True)))
+
+
 class Peaks(NamedTuple):
     """Refined peaks of k candidates, each (k,).
 

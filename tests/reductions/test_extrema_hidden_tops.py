@@ -71,6 +71,45 @@ GAP = {
     "y0": 1.8000311038474457, "chi0": 0.36780405989114023, "h_sigma": -1.0,
 }  # fmt: skip
 
+# Two tops stand closer together than two samples, 0.016 and 0.0025 rad; the samples show one.
+TWINS = {
+    "k": 1.608479486, "a": -0.1978622555, "n": 3.0, "mesh": -1.0, "m_carrier": 1.099555691e-05,
+    "m_planet": 6.655382509e-06, "m_link": 1.710511042e-05, "m_tool": 2.130094572e-05, "tool_force_y": -8.878258294,
+    "tool_x": 1.05091262, "planet_radius": 1.424655241, "speed": 631.2580826,
+}  # fmt: skip
+CLOSE_TWINS = {
+    "a": 1.653489512, "e": -1.645912541, "f": 0.3989102893, "g": 0.3833156727, "alpha": 0.5214709831,
+    "Lw": -3.621771364, "gravity_x": 0.06868948802, "gravity_y": -0.03128765202, "gravity_z": 0.03518066538,
+    "m_tool": 0.01877467659, "tool_force_x": 0.03614139272, "tool_force_y": -9.055211669,
+    "tool_force_z": 0.0202736093, "speed": 1286.019782, "speed_change": -0.05934607833,
+}  # fmt: skip
+# The force falls to 2.3 N and rises again within 0.001 rad before a dwell begins, in which it is 4.0 N.
+BESIDE_A_DWELL = {
+    "lift": 0.2847655157, "rise": 1.516154323, "dwell": 1.634076167, "fall": 1.5121245, "start": -0.06194717157,
+    "r0": 3.142854256, "c": 2095.267188, "e": 2096.35893, "branch": -1.0, "m_cam": 1.960478176e-05,
+    "m_lever": 8.61223306e-06, "m_tool": 2.229599773e-05, "tool_force_y": -3.968032453, "tool_x": 2.482597182,
+    "speed": 297.2732688,
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("accuracy", [1e-4, 1e-8])
+@pytest.mark.parametrize(
+    ("family", "row", "output", "kind", "place"),
+    [
+        ("epicyclic_dwell", TWINS, "tool_load", "max", 5.258609919860764),
+        ("swivel", CLOSE_TWINS, "tool_load", "max", 3.258325968448641),
+        ("cam_lever", BESIDE_A_DWELL, "force_d", "min", 4.598405267519598),
+    ],
+)
+def test_no_pose_beside_what_samples_show_exceeds_the_extremum_by_more_than_its_error(
+    family, row, output, kind, place, accuracy
+):
+    got = sweep.summarise(family, row, [f"{kind}_{output}"], accuracy=accuracy).iloc[0]
+    value, sign = got[f"{kind}_{output}"], -1.0 if kind == "min" else 1.0
+    poses = sweep.evaluate(family, row, [output], phi=place + np.linspace(-1e-4, 1e-4, 9))[output].to_numpy()
+    assert got["status"] == st.OK
+    assert (sign * poses).max() <= sign * value + got[f"err_{kind}_{output}"] + ROUNDING * np.abs(poses).max()
+
 
 @pytest.mark.parametrize("accuracy", [1e-3, 1e-6, 1e-9])
 @pytest.mark.parametrize(
