@@ -141,6 +141,15 @@ def _first_reference(
 
 
 @inline
+def _rounding(target: Array, x: Array) -> float:
+    """Rounding of residuals; where the point runs straight to that, all references are as good as others."""
+    size: float = abs(x[0]) + abs(x[1]) + abs(x[2])
+    for j in range(target.size):
+        size = max(size, abs(target[j]))
+    return ROUNDING * size
+
+
+@inline
 def _exchange(
     target: Array,
     dx: Array,
@@ -155,10 +164,7 @@ def _exchange(
     m = dx.size
     if not _first_reference(target, dx, dy, inside, x, points):
         return False
-    weights, size = np.empty(4), abs(x[0]) + abs(x[1]) + abs(x[2])
-    for j in range(m):
-        size = max(size, abs(target[j]))
-    rounding = ROUNDING * size  # of residuals: where the point runs straight to that, all four are as good as others
+    weights, rounding = np.empty(4), _rounding(target, x)
     for _ in range(EXCHANGES):
         # Weights of the reference: sum_i weight_i row_i = 0 with weight_3 = 1.
         for k in range(3):

@@ -28,7 +28,6 @@ from sweep.families.machines.relations import (
     known_names,
     two_names,
 )
-from sweep.families.machines.segments import Body, Gap
 from sweep.families.machines.shaking import Shaken, Shaking, shaken
 from sweep.families.machines.stitching import read_entering, read_sewing, read_taking, read_thread
 from sweep.families.machines.tools import (
@@ -38,7 +37,7 @@ from sweep.families.machines.tools import (
     SEAM_KEYS,
     Tool,
     bodies,
-    length,
+    read_gap,
     read_height,
     read_tools,
 )
@@ -283,7 +282,7 @@ def _relation(
 ) -> Relation | Timing:
     where = f"machine.relations.{name}"
     if "gap" in table:
-        return _gap(name, table, bodies(members, tools), where)
+        return read_gap(name, table, bodies(members, tools), where)
     if "take" in table:
         return read_taking(name, table, tools, where)
     if "enter" in table:
@@ -341,15 +340,6 @@ def _shaken(members: Mapping[str, Member], listed: list[tuple[str, str]], where:
             allowed = "a chain whose stages have places. For shaking forces, give one stage and its place"
             raise InputError("shaking", f"{member}{stage}", allowed, where)
         yield shaken(member, stage, stages[int(stage) - 1].family if stage else m.family, listed)
-
-
-def _gap(name: str, table: dict[str, Any], known: Mapping[str, Body], where: str) -> Gap:
-    known_keys(table, ("gap", "radii"), where)
-    first, second = (known[one] for one in two_names(table["gap"], list(known), "bodies", where))
-    if "radii" in table:
-        a, b = (length("radii", radius, where) for radius in table["radii"])
-        first, second = replace(first, radius=a), replace(second, radius=b)
-    return Gap(name, (first, second))
 
 
 def _stages(family: Family) -> list[str]:

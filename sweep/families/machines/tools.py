@@ -11,7 +11,7 @@ from sweep.errors import InputError, MissingInput, choices, known_keys, number, 
 from sweep.families.base import Output
 from sweep.families.capabilities import OutputLink
 from sweep.families.machines.relations import Relation, two_names
-from sweep.families.machines.segments import Body, dot, minus
+from sweep.families.machines.segments import Body, Gap, dot, minus
 from sweep.families.parts import Member, vector
 from sweep.families.sites import AXES, links_of
 
@@ -311,3 +311,13 @@ def bodies(members: Mapping[str, Member], tools: Mapping[str, Tool]) -> dict[str
         for link, (first, second) in links_of(m).items():
             found[f"{m.name}.{link}"] = Body(f"{m.name}.{link}", (f"{m.name}.{first}", f"{m.name}.{second}"))
     return found
+
+
+def read_gap(name: str, table: dict[str, Any], known: Mapping[str, Body], where: str) -> Gap:
+    """Read the gap between two of the known bodies, with radii of its own if they are given."""
+    known_keys(table, ("gap", "radii"), where)
+    first, second = (known[one] for one in two_names(table["gap"], list(known), "bodies", where))
+    if "radii" in table:
+        a, b = (length("radii", radius, where) for radius in table["radii"])
+        first, second = replace(first, radius=a), replace(second, radius=b)
+    return Gap(name, (first, second))
