@@ -121,6 +121,14 @@ def part(function: F) -> F:
     return _helper(function)
 
 
+def folded(function: F) -> F:
+    """Fold a function with one caller into it before it is compiled, so that it costs no machine code of its own.
+
+    A caller is optimised with everything that it calls, whose optimisation by itself would be wasted.
+    """
+    return _helper(function, inline="always")
+
+
 def inline_fused(helper: F) -> F:
     """Compile the same helper again, for :func:`kernel_fused` loops: products and sums may be contracted in it too.
 

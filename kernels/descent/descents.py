@@ -12,7 +12,7 @@ from kernels.descent.program import Program, begin, box, learn, no_program, prep
 from kernels.descent.room import rooms
 from kernels.descent.rows import UNKNOWNS, Task, columns_of, slopes_of, values_of, worth_of
 from kernels.descent.unknowns import solved, unknowns_of
-from kernels.jit import inline, kernel, part
+from kernels.jit import folded, inline, kernel, part
 from kernels.types import Array
 
 LOCKED = 1e6  # above what any design is worth that turns
@@ -56,7 +56,7 @@ def _with_room(task: Task, kind: int, d: Design, moved: Array) -> None:
         rooms(task, kind, d.place, d.x, d.room, moved)
 
 
-@part
+@folded
 def _begun(task: Task, kind: int, d: Design) -> float:
     """Solve the unknowns of a design whose place is set; what it is worth, infinite where it does not turn."""
     none = np.empty((0, len(d.room)))
@@ -106,7 +106,7 @@ def _look(task: Task, kind: int, d: Design, slopes: Array) -> bool:
     return True
 
 
-@part
+@folded
 def _try(task: Task, kind: int, d: Design, step: Array, out: Design, spare: Design) -> float:
     """Go a step with its own unknowns or with the best ones of the proportions there, whichever are worth more."""
     n, none = len(d.place), np.empty((0, len(d.room)))
@@ -169,7 +169,7 @@ def _largest(values: Array, count: int) -> float:
     return t
 
 
-@part
+@folded
 def _tried(
     task: Task, kind: int, here: Design, worth: float, slopes: Array, q: Program, weights: Array, best: Design
 ) -> tuple[float, float]:
