@@ -142,7 +142,7 @@ def _first_reference(
 
 @inline
 def _rounding(target: Array, x: Array) -> float:
-    """Rounding of residuals; where the point runs straight to that, all references are as good as others."""
+    """Return the rounding of residuals: where the point runs straight to that, one reference is as good as another."""
     size: float = abs(x[0]) + abs(x[1]) + abs(x[2])
     for j in range(target.size):
         size = max(size, abs(target[j]))
