@@ -197,7 +197,7 @@ SYNONYMS = {
     "max_velocity": ("max_abs_dpsi", "max_abs_ds"),
     "max_acceleration": ("max_abs_d2psi", "max_abs_d2s"),
     "max_jerk": ("max_abs_d3psi", "max_abs_d3s"),
-    "transmission_angle": ("least_transmission_angle", "pressure_angle"),
+    "transmission_angle": ("least_transmission_angle", "pressure_angle", "max_pressure_angle"),
     "min_transmission_angle": ("least_transmission_angle",),
     "quick_return_ratio": ("stroke_ratio",),
     "stroke": ("swing",),
