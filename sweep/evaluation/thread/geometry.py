@@ -11,7 +11,7 @@ from kernels.families import eyelet as eyelet_kernels
 from kernels.families import free_cam as free_cam_kernels
 from kernels.families import guided_cam as guided_cam_kernels
 from kernels.status import OK, SINGULAR
-from sweep.evaluation.thread.rows import Sheet, columns_of, frame, side_by_side
+from sweep.evaluation.thread.rows import Sheet, columns_of, computed, frame, side_by_side
 from sweep.families.base import Array, Parameter
 
 if TYPE_CHECKING:
@@ -129,12 +129,8 @@ def feed(table: Table) -> pd.DataFrame:
     given = columns_of(_FEED, table)
     guides = side_by_side(given, GUIDES)
     place, first, second = (side_by_side(given, names)[:, None] for names in (POINT, FIRST, SECOND))
-    n = len(place)
-    status, out = np.zeros((n, 1), np.uint8), [np.empty((n, 1)) for _ in range(4)]
-    thread_over_point(guides, place, first, second, status, *out)
-    names = ("L", "dL_dphi", "d2L_dphi2", "wrap")
     units = {"length": "L dL_dphi d2L_dphi2", "rad": "wrap"}
-    return frame(table, dict(zip(names, out, strict=True)) | {"status": status}, units)
+    return computed(table, units, thread_over_point, guides, place, first, second)
 
 
 def eyelet(table: Table) -> pd.DataFrame:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import warnings
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -61,3 +61,15 @@ def warn_outside(values: Array, measured: Range, constants: tuple[Parameter, ...
         )
         known = f"{measured.low:g} to {measured.high:g} {measured.unit}"
         warnings.warn(f"{text} outside {known}, where the constants were measured", MeasuredRangeWarning, stacklevel=3)
+
+
+def computed(table: Table, units: Mapping[str, str], kernel: Callable[..., object], *arguments: Array) -> pd.DataFrame:
+    """Call ``kernel(*arguments, status, *outputs)``, each output (n, 1), and return the result as :func:`frame` does.
+
+    ``units`` names the outputs in the kernel's order.
+    """
+    n = len(arguments[0])
+    status, names = np.zeros((n, 1), np.uint8), " ".join(units.values()).split()
+    columns = {name: np.empty((n, 1)) for name in names}
+    kernel(*arguments, status, *columns.values())
+    return frame(table, columns | {"status": status}, units)

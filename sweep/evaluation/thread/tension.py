@@ -17,7 +17,7 @@ from kernels.effects.thread import capstan as capstan_kernel
 from kernels.status import SINGULAR
 from sweep.errors import InputError
 from sweep.evaluation.tables import numbers
-from sweep.evaluation.thread.rows import Sheet, columns_of, frame, side_by_side, warn_outside
+from sweep.evaluation.thread.rows import Sheet, columns_of, computed, frame, side_by_side, warn_outside
 from sweep.families.base import Parameter
 from sweep.families.machines.thread_balance import (
     ALPHA,
@@ -87,13 +87,9 @@ def contour(table: Table) -> pd.DataFrame:
     """
     given = columns_of(_CONTOUR, table)
     warn_outside(given["R"], MEASURED_RADIUS, FITTED, table)
-    n = len(given["R"])
-    status, out = np.zeros((n, 1), np.uint8), [np.empty((n, 1)) for _ in range(5)]
     data = side_by_side(given, CONTOUR_COLUMNS)
-    thread_contour(given["T1"][:, None], given["theta_deg"][:, None], data, status, *out)
-    names = ("T2", "capstan", "bending", "adhesion", "r_thread")
     units = {"gf": "T2 capstan bending adhesion", "mm": "r_thread"}
-    return frame(table, dict(zip(names, out, strict=True)) | {"status": status}, units)
+    return computed(table, units, thread_contour, given["T1"][:, None], given["theta_deg"][:, None], data)
 
 
 def path(T1: ArrayLike, contours: Table, theta_deg: ArrayLike | None = None) -> pd.DataFrame:
@@ -215,10 +211,8 @@ def speed(table: Table) -> pd.DataFrame:
     """
     given = columns_of(_SPEED, table)
     warn_outside(np.abs(given["v"]), MEASURED_SPEED, SPEED_CONSTANTS, table)
-    n = len(given["v"])
-    status, ratio = np.zeros((n, 1), np.uint8), np.empty((n, 1))
-    thread_speed(given["v"][:, None], side_by_side(given, SPEED_COLUMNS), status, ratio)
-    return frame(table, {"ratio_to_ref": ratio, "status": status}, {"1": "ratio_to_ref"})
+    data = side_by_side(given, SPEED_COLUMNS)
+    return computed(table, {"1": "ratio_to_ref"}, thread_speed, given["v"][:, None], data)
 
 
 def capstan(table: Table) -> pd.DataFrame:
@@ -241,7 +235,5 @@ def capstan(table: Table) -> pd.DataFrame:
     0  6.107  5.4129       0
     """
     given = columns_of(_CAPSTAN, table)
-    n = len(given["T1"])
-    status, out = np.zeros((n, 1), np.uint8), [np.empty((n, 1)) for _ in range(2)]
-    capstan_kernel(given["T1"][:, None], given["wrap"][:, None], given["mu"], status, *out)
-    return frame(table, {"T2": out[0], "force": out[1], "status": status}, {"force": "T2 force"})
+    arguments = given["T1"][:, None], given["wrap"][:, None], given["mu"]
+    return computed(table, {"force": "T2 force"}, capstan_kernel, *arguments)

@@ -217,12 +217,8 @@ def _placed(
         results=(*front.results[:at], None, *front.results[at:]),
         found=(*front.found[:at], -1, *front.found[at:]),
     )
-    front = _with(
-        front,
-        Step(at, at - 1, first=True),
-        number,
-        _search(problem, settings, bound, designs[np.sort(first)], asked, jobs),
-    )
+    result = _search(problem, settings, bound, designs[np.sort(first)], asked, jobs)
+    front = _with(front, Step(at, at - 1, first=True), number, result)
     for step in (Step(at + 1, at, first=False), *(Step(k, k + 1, first=False) for k in range(at, -1, -1))):
         near, held = front.results[step.neighbour], front.results[step.target]
         if near is None or held is None or not near.feasible or asked():
@@ -238,13 +234,13 @@ def _placed(
 def places(problem: Problem, settings: ParetoSettings, front: Front) -> tuple[Array, Array]:
     """Return the second output and the objective of each result; the bound and nan where there is none."""
     reached, values = np.array(front.bounds, np.float64), np.full(len(front.bounds), np.nan)
-    good = [k for k, r in enumerate(front.results) if r is not None and r.feasible]
+    good = {k: r for k, r in enumerate(front.results) if r is not None and r.feasible}
     if good:
-        designs = np.array([r.design for k in good if (r := front.results[k]) is not None])
+        rows, designs = list(good), np.array([r.design for r in good.values()])
         outputs = design_outputs(problem.family, designs, [settings.output], problem.accuracy, problem.window)
         size = compared(settings.output, np.asarray(outputs[settings.output], np.float64))
-        reached[good] = np.where(np.isfinite(size), size, reached[good])
-        values[good] = [r.objective for k in good if (r := front.results[k]) is not None]
+        reached[rows] = np.where(np.isfinite(size), size, reached[rows])
+        values[rows] = [r.objective for r in good.values()]
     return reached, values
 
 
