@@ -18,6 +18,7 @@ from kernels.types import Status
 from sweep.families.base import Angles, Array, Columns, Family
 from sweep.families.capabilities import JointRecords
 from sweep.families.chain import drive, driving_names
+from sweep.families.curve_features import samples_of_waves
 from sweep.families.link_tree import LinkTree
 from sweep.families.names import at_stage
 from sweep.numerics.curves import Curve
@@ -224,9 +225,9 @@ class Scene:
 
     @property
     def least_samples(self) -> Array:
-        """So many even samples of a turn show what the loads do, (n,); inf where a tool pierces, and one jumps."""
-        least = max((curve.samples for curve in self.every_curve), default=0.0)
-        return np.where(self.pierces, np.inf, least)
+        """So many even samples of a turn show what loads and waves do, (n,); inf where a tool pierces: a load jumps."""
+        of_loads = max((curve.samples for curve in self.every_curve), default=0.0)
+        return np.where(self.pierces, np.inf, np.maximum(samples_of_waves(self.family, self.designs), of_loads))
 
     def only(self, rows: Rows) -> Scene:
         """Keep some of the designs; the scene itself where these are all."""

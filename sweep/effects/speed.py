@@ -103,13 +103,19 @@ def samples(grid: Scene) -> tuple[Array, Array]:
 def _grids(scene: Scene, rubs: bool) -> tuple[int, ...]:
     if rubs:
         return RUBBING
-    return GRIDS + FINER if scene.pierces.any() or scene.every_curve else GRIDS
+    return GRIDS + FINER if scene.every_curve or _late(scene).any() else GRIDS
+
+
+def _late(scene: Scene) -> NDArray[np.bool_]:
+    """Which designs need finer grids than most, as their tool pierces or their planet turns fast."""
+    late: NDArray[np.bool_] = scene.least_samples > GRIDS[-1]
+    return late
 
 
 def _apart(scene: Scene, run: Callable[[Scene], Columns]) -> Columns:
-    """Solve designs whose tool pierces by themselves, on grids of their own."""
-    pierces = scene.pierces
-    groups = [rows for rows in (np.flatnonzero(~pierces), np.flatnonzero(pierces)) if rows.size]
+    """Solve designs that need finer grids by themselves."""
+    late = _late(scene)
+    groups = [rows for rows in (np.flatnonzero(~late), np.flatnonzero(late)) if rows.size]
     parts = [run(scene.only(rows)) for rows in groups] or [run(scene)]
     if len(parts) == 1:
         return parts[0]

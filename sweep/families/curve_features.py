@@ -23,6 +23,8 @@ from sweep.numerics.curves import PER_GAP
 NARROWEST = 1e-9  # angles [rad] that are nearer to each other are one
 
 T = TypeVar("T")
+PER_WAVE = 32.0  # samples: sixteen multiples of the order of a wave
+
 Feature = TypeVar("Feature", "Waves", "Switches", "Singular")
 SingularCurve: TypeAlias = Callable[[Array, Angles], Array]
 
@@ -158,12 +160,23 @@ def crossed(family: Family, designs: Array, outputs: Collection[str]) -> NDArray
     return found
 
 
+def samples_of_waves(family: Family, designs: Array) -> Array:
+    """Return so many even samples of a turn that the waves of a mechanism are resolved, (n,); 0 where it has none.
+
+    Curves of a planet that turns m times have orders about multiples of m and none between.  Too few samples fold the
+    higher ones onto lower orders and show nothing at their own highest, so they seem to resolve the curve.
+    """
+    count = waves(family, designs, ())
+    return np.where(count > 1.0, PER_WAVE * count, 0.0)
+
+
 def least_samples(family: Family, designs: Array, outputs: Collection[str]) -> Array:
     """Return even samples of a turn, (n,), of which some lie on each wave and between known angles; inf if it jumps."""
     angles = np.sort(switches(family, designs, outputs), axis=1)
     gaps = np.diff(np.concatenate([angles, angles[:, :1] + TWO_PI], axis=1), axis=1)
     narrowest = np.where(gaps > NARROWEST, gaps, TWO_PI).min(axis=1, initial=TWO_PI)
     least = PER_GAP * np.maximum(TWO_PI / narrowest, waves(family, designs, outputs))
+    least = np.maximum(least, samples_of_waves(family, designs))
     return np.where(crossed(family, designs, outputs), np.inf, least)
 
 

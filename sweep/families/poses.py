@@ -247,7 +247,9 @@ def differenced(poses: PoseFunction, designs: Array, angles: Angles, wanted: fro
     steps = [np.abs(x.imag) / np.maximum(np.abs(x.real), 1e-3) for x in (designs, angles.cos, angles.sin)]
     # An interval's variable may move where no cosine does; near 0 an angle is small against a turn, not against itself.
     steps.append(np.abs(angles.phi.imag) / np.maximum(np.abs(angles.phi.real), 1.0))
-    t = DIFFERENCE / max(max(float(x.max(initial=0.0)) for x in steps), 1e-300)
+    # Each design moves along its own direction: a step that suits a small dimension drowns those of others in rounding.
+    largest = [np.broadcast_to(x.max(axis=1, initial=0.0), len(designs)) for x in steps]
+    t = DIFFERENCE / np.maximum(np.max(largest, axis=0), 1e-300)[:, None]
 
     # All three at once: a search asks for a few poses at a time, of which a call costs more than they do.
     shape = len(designs), angles.cos.shape[1]

@@ -27,6 +27,7 @@ SMALLEST = 1e-100  # a limit nearer to zero is a limit at zero
 Moving: TypeAlias = tuple[Mapping[str, float], float]
 NOT_MOVING: Moving = ({}, 0.0)
 DIFFERENCE = 1e-6  # relative, for the derivative of an inner value by its output
+ALIKE = 1e-10  # of their size: tops as high as each other, of which summaries give the place of the first
 
 
 @dataclass(frozen=True)
@@ -205,12 +206,12 @@ class _Layout:
             return [({k: m.sign}, 0.0) for k in (ends if many else ends[:1])]
         if m.kind in ("phi_max", "phi_min"):
             ends = maxima if m.kind == "phi_max" else minima
-            return [({len(self.points) + k: 1.0}, self._turns(k)) for k in ends[:1]]
+            return [({len(self.points) + k: 1.0}, self._turns(k)) for k in self._first(ends)]
         if m.kind in ("max_abs", "phi_max_abs"):
             value = self.points.value
             ends = sorted([*maxima, *minima], key=lambda k: -self.points.sense[k] * value[k])
             if m.kind == "phi_max_abs":
-                return [({len(self.points) + k: 1.0}, self._turns(k)) for k in ends[:1]]
+                return [({len(self.points) + k: 1.0}, self._turns(k)) for k in self._first(ends)]
             return [({k: float(self.points.sense[k])}, 0.0) for k in (ends if above else ends[:1])]
         if not maxima or not minima:
             return []
@@ -218,7 +219,8 @@ class _Layout:
             pairs = [(i, j) for i in maxima[:4] for j in minima[:4]]
             return [({i: 1.0, j: -1.0}, 0.0) for i, j in (pairs if above else pairs[:1])]
         outward = self._outward(m.series[0].output)
-        ext, fold = (maxima[0], minima[0]) if outward > 0.0 else (minima[0], maxima[0])
+        highest, lowest = self._first(maxima)[0], self._first(minima)[0]
+        ext, fold = (highest, lowest) if outward > 0.0 else (lowest, highest)
         k, other = len(self.points), {"ext": ext, "fold": fold}
         if m.kind in ("ext", "fold"):
             return [({other[m.kind]: 1.0}, 0.0)]
@@ -227,6 +229,12 @@ class _Layout:
             return [({k + end: 1.0}, self._turns(end))]
         apart = self.points.phi[fold] - self.points.phi[ext]
         return [({k + fold: 1.0, k + ext: -1.0}, -2.0 * math.pi * math.floor(apart / (2.0 * math.pi)))]
+
+    def _first(self, ends: list[int]) -> list[int]:
+        """Return, as a list, that of the best ends which comes first in the turn: of tops alike it is the place."""
+        size = np.abs(self.points.value)
+        alike = [k for k in ends if abs(size[k] - size[ends[0]]) <= ALIKE * size[ends[0]]]
+        return sorted(alike, key=lambda k: float(self.points.phi[k]) % (2.0 * math.pi))[:1]
 
     def _numbers(self, m: Measure, above: bool) -> list[tuple[Term, float]]:
         """Return sums of plain numbers, and of the ends of curves with them."""

@@ -1,0 +1,52 @@
+"""Slopes of sensitivities against differences of what summaries say: tied tops, dimensions of very different sizes."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+import sweep
+from sweep.effects import extended
+from sweep.evaluation.summaries import design_outputs
+from sweep.families import family
+from sweep.families.base import Accuracy
+from sweep.optimise.manufacture.tolerance import sensitivities
+
+FINE = Accuracy(target=1e-10)
+STEP = 1e-4
+
+
+def design(full, values):
+    """A design row of the family, with defaults for what is not given."""
+    return np.array([values.get(p.name, p.default or 0.0) for p in full.parameters])
+
+
+def slope_of_summaries(full, row, output, parameter):
+    """Fourth-order difference of a design output."""
+    rows = np.tile(row, (4, 1))
+    rows[:, full.parameter_names.index(parameter)] += np.array([-2.0, -1.0, 1.0, 2.0]) * STEP
+    return (
+        np.asarray(design_outputs(full, rows, [output], FINE)[output]) @ np.array([1.0, -8.0, 8.0, -1.0]) / 12.0 / STEP
+    )
+
+
+def test_of_tops_alike_the_place_of_the_first_counts_as_in_summaries():
+    """A member of ratio -2 has every top twice a turn."""
+    full = family(sweep.machine({"p": {"family": "geared_dwell", "ratio": -2, "offset": 0.7}}))
+    row = design(full, {f"p.{name}": value for name, value in family("geared_dwell").example.items()})
+    output = "p.phi_max_abs_y_b"
+    found = sensitivities(full, row, [output])
+    expected = slope_of_summaries(full, row, output, "p.k")
+    assert found["value"][0] == pytest.approx(design_outputs(full, row[None], [output], FINE)[output][0], abs=1e-8)
+    assert found["growing"][found["parameter"].index("p.k")] == pytest.approx(expected, rel=1e-6)
+
+
+@pytest.mark.parametrize("output", ["max_force_c_y", "max_x_p"])
+def test_a_small_dimension_does_not_drown_the_slopes_of_others_in_rounding(output):
+    """The step of a difference suits each dimension by itself: 1e-8 is what fourth-order differences are good to."""
+    full = extended(family("rssr"), (output.removeprefix("max_"),))
+    given = {"x_point": 3.0, "y_point": 2.0, "z_point": 1.0, "m_coupler": 1e-4, "m_rocker": 1e-4, "speed": 200.0}
+    row = design(full, dict(family("rssr").example) | given)
+    found = sensitivities(full, row, [output])
+    slope = found["growing"][found["parameter"].index("alpha")]
+    assert slope == pytest.approx(slope_of_summaries(full, row, output, "alpha"), rel=1e-8)
