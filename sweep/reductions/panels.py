@@ -28,8 +28,7 @@ from sweep.reductions.sampling import DESIGN_STATUS, Extremum, Index, Mask, bloc
 
 PANELS = 64  # of a turn at first, besides those that begin where a follower reverses
 TAIL = 4  # last coefficients that tell how wrong a polynomial may be; of a tent in the middle three nearly vanish ...
-CAREFUL = 4.0  # ... times this: the tip of a tent, wherever on the panel, is up to 2.91 times their sum above the rest,
-# that of a tent whose sides bend by half 3.44 times, and 3.61 times of one that was met
+CAREFUL = 3.0  # ... times this: the tip of a tent, wherever on the panel, is up to 2.91 times their sum above the rest
 LATELY = 0.25  # of what the polynomial before was wrong by: halving takes a kink's share to a half
 # Next to a reversal friction takes its direction from a speed that is all rounding: nearer poses are noise.
 NARROWEST = 1e-11  # width of a panel [rad] that can only hold a jump
