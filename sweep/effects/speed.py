@@ -256,7 +256,7 @@ def _lost(grid: Scene, speed: Array, change: Array, status: Status) -> Array:
 
 def advise(scene: Scene) -> Advice | None:
     """Estimate the unevenness for small fluctuations: [max - min of W - (J - mean J) w^2/2]/(mean J w^2)."""
-    inertia, excess = samples(scene.on_grid(GRIDS[0]))
+    inertia, excess = samples(scene.on_grid(FINER[-1] if _late(scene).any() else GRIDS[0]))
     turning = np.isfinite(excess).all(axis=1)
     if not turning.any():
         return None

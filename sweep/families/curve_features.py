@@ -21,10 +21,9 @@ from sweep.families.parts import Member
 from sweep.numerics.curves import PER_GAP
 
 NARROWEST = 1e-9  # angles [rad] that are nearer to each other are one
+SAMPLES_PER_WAVE = 32.0  # of a mechanism: they tell its order and the fifteen next multiples of that
 
 T = TypeVar("T")
-PER_WAVE = 32.0  # samples: sixteen multiples of the order of a wave
-
 Feature = TypeVar("Feature", "Waves", "Switches", "Singular")
 SingularCurve: TypeAlias = Callable[[Array, Angles], Array]
 
@@ -167,7 +166,7 @@ def samples_of_waves(family: Family, designs: Array) -> Array:
     higher ones onto lower orders and show nothing at their own highest, so they seem to resolve the curve.
     """
     count = waves(family, designs, ())
-    return np.where(count > 1.0, PER_WAVE * count, 0.0)
+    return np.where(count > 1.0, SAMPLES_PER_WAVE * count, 0.0)
 
 
 def least_samples(family: Family, designs: Array, outputs: Collection[str]) -> Array:

@@ -19,14 +19,16 @@ from sweep.quantities.kinds import Request
 from sweep.reductions.refine import Candidates, Peaks, Sampler
 from sweep.reductions.sampling import Index, Mask
 
-NARROW = 0.02  # error of the first guess against the fall to the next samples, from which on a top is looked at closely
+# Error of the first guess against the fall to the next samples, from which on a top is looked at closely: 0.04 and 0.1
+# where two tops showed as one; few tops of smooth curves have more.
+NARROW = 0.02
 RUNGS = np.exp2(np.arange(-12.0, 1.0))
 CROWDED = np.concatenate([-RUNGS[::-1], RUNGS])  # places about a switch, in samples
 CLOSER = np.linspace(-2.25, 2.25, CROWDED.size)  # places about a top
 
 
-class Turn(NamedTuple):
-    """Samples of one turn: numbers of the designs (n,), pose outputs (n, m) by name, and how many samples there are."""
+class Sampled(NamedTuple):
+    """Samples of a turn: numbers of the designs (n,), pose outputs (n, m) by name, and how many samples there are."""
 
     rows: Index
     columns: dict[str, Array]
@@ -106,17 +108,17 @@ def tops_of(sample: Sampler, looks: Candidates, phi: Array, samples: int, guess:
     return found, Peaks(at, height, gap, np.full(look.size, np.inf), shown, gap, 0.5 * gap)
 
 
-def unknown(known: tuple[Candidates, Peaks], found: tuple[Candidates, Peaks]) -> Index:
-    """Return which peaks that were found stand nowhere beside one that is known of the same curve.
+def apart(known: tuple[Candidates, Peaks], found: tuple[Candidates, Peaks]) -> Index:
+    """Return which of the peaks found are none of those known of the same curve: these are farther away than the gap.
 
-    The same top twice, once known better, would be two that rounding chooses from.
+    One top listed twice, with different errors, would make a tie of which rounding chooses the place.
     """
     requests = 1 + max(which.request.max(initial=0) for which, _ in (known, found))
     low, high = (2.0 * TWO_PI * _curve(which, requests) + np.mod(peaks.phi, TWO_PI) for which, peaks in (known, found))
     low = np.concatenate([[-np.inf], np.sort(low), [np.inf]])
     above = np.searchsorted(low, high)
-    apart: Index = np.flatnonzero(np.minimum(high - low[above - 1], low[above] - high) > found[1].spacing)
-    return apart
+    new: Index = np.flatnonzero(np.minimum(high - low[above - 1], low[above] - high) > found[1].spacing)
+    return new
 
 
 def _curve(candidates: Candidates, requests: int) -> Index:

@@ -13,7 +13,7 @@ from sweep.families.base import Array, Family
 from sweep.families.curve_features import singular, switches
 from sweep.numerics.singularities import Singularities
 from sweep.quantities.kinds import Request
-from sweep.reductions.hidden_tops import Turn, closer_looks, dips, doubtful, tops_of, unknown
+from sweep.reductions.hidden_tops import Sampled, apart, closer_looks, dips, doubtful, tops_of
 from sweep.reductions.refine import (
     SHRINK,
     VARIES,
@@ -57,7 +57,7 @@ PER_SINGULARITY = 12.0  # samples per distance of the nearest complex singularit
 NARROWEST = 2.0 * PER_SINGULARITY / LIMIT  # such a distance [rad] below which panels resolve a peak with fewer poses
 BREAKING = 512  # samples from which on what is still rough may be a jump
 DISAGREEMENT = 0.05  # between the peak guessed from the samples and the refined one
-FINER = 0.25  # of the error allowed: the rest is for what precise poses may find
+SEARCHED = 0.25  # of the error allowed that the search may leave: the rest is for what precise poses may find
 RIVALS = 1e-3  # peaks lower than the best by no more of its size may turn out the highest
 NEVER = 2**40  # more samples than are ever needed
 CLOSE = 0.1  # distance of a singularity [rad] from which on it is measured what rounding does
@@ -136,7 +136,7 @@ class Search:
         needed = np.maximum(needed, self._samples_by_singularity(columns, samples, rows.size))
         resolved = looked & ((needed <= samples) | (samples == LIMIT))
         candidates = candidates.only(resolved[candidates.request, candidates.row])
-        turn = Turn(rows, columns, samples)
+        turn = Sampled(rows, columns, samples)
         candidates, peaks = self._refine(turn, candidates, scales, resolved)
         for number, request in enumerate(self.requests):
             mine = candidates.request == number
@@ -193,14 +193,14 @@ class Search:
         samples_needed: Index = np.exp2(np.ceil(np.log2(np.maximum(wanted, 1.0)))).astype(np.int64)
         return samples_needed
 
-    def _refine(self, turn: Turn, candidates: Candidates, size: Array, resolved: Mask) -> tuple[Candidates, Peaks]:
+    def _refine(self, turn: Sampled, candidates: Candidates, size: Array, resolved: Mask) -> tuple[Candidates, Peaks]:
         """Peaks of the candidates, and those that closer looks find beside them and beside switches."""
         spacing = np.full(candidates.row.size, TWO_PI / turn.samples)
         around = candidates.sign[:, None] * turn.around(self.requests, candidates, np.arange(-3, 4))
         first = first_peaks(np.multiply(candidates.column, spacing, dtype=np.float64), spacing, around)
         peaks = self._sharpened(turn, candidates, first, size)
         # Which of several is the highest decides on the place, at every target.
-        enough = np.where(self.places(candidates.request), min(TIE, self.target), FINER * self.target)
+        enough = np.where(self.places(candidates.request), min(TIE, self.target), SEARCHED * self.target)
         hidden = doubtful(candidates, peaks, around, enough * size[candidates[:2]])
         least = [request.pose for request in self.requests if request.mode == -1 and not self.anywhere]
         angles = switches(self.family, self.designs[turn.rows], least)
@@ -209,7 +209,7 @@ class Search:
         if len(phi):
             sample = self._sampler(self.family, turn, looks)
             more, first = tops_of(sample, looks, phi, turn.samples, peaks.guess[hidden])
-            new = unknown((candidates, peaks), (more, first))
+            new = apart((candidates, peaks), (more, first))
             more, first = more.only(new), first.only(new)
             peaks = peaks.joined(self._sharpened(turn, more, first, size))
             candidates = candidates.joined(more)
@@ -225,13 +225,13 @@ class Search:
         self._confirm(turn, candidates, peaks, size[candidates[:2]], share)
         return candidates, peaks
 
-    def _sharpened(self, turn: Turn, candidates: Candidates, first: Peaks, size: Array) -> Peaks:
+    def _sharpened(self, turn: Sampled, candidates: Candidates, first: Peaks, size: Array) -> Peaks:
         """Refine peaks; ``size`` (r, n) are the sizes of the curves."""
         place = np.where(self.places(candidates.request), self.target, np.inf)
-        tolerance = FINER * self.target * size[candidates[:2]]
+        tolerance = SEARCHED * self.target * size[candidates[:2]]
         return sharpen(self._sampler(self.family, turn, candidates), first, tolerance, place)
 
-    def _confirm(self, turn: Turn, candidates: Candidates, peaks: Peaks, size: Array, share: Array) -> None:
+    def _confirm(self, turn: Sampled, candidates: Candidates, peaks: Peaks, size: Array, share: Array) -> None:
         """Replace the peaks that may be the highest by what the family's precise poses say of them.
 
         ``share`` of a height is what rounding may have changed.
@@ -261,8 +261,11 @@ class Search:
         for column, found in zip(peaks, peak._replace(err_height=peak.err_height + rounding), strict=True):
             column[rivals] = found
 
-    def _sampler(self, family: Family, turn: Turn, candidates: Candidates, middle: Array | None = None) -> Sampler:
-        """Measure candidates by the poses of ``family``, angles continuous with values, at first of samples."""
+    def _sampler(self, family: Family, turn: Sampled, candidates: Candidates, middle: Array | None = None) -> Sampler:
+        """Measure candidates by the poses of ``family``.
+
+        An angle is continued from ``middle`` (k,), its sample next to the candidate if that is left out.
+        """
         number, row, _, sign = candidates
         if middle is None:
             middle = turn.around(self.requests, candidates, np.zeros(1, np.intp))[:, 0]
@@ -285,7 +288,7 @@ class Search:
 
         return sample
 
-    def _rounding(self, turn: Turn, candidates: Candidates, guards: list[str]) -> Array:
+    def _rounding(self, turn: Sampled, candidates: Candidates, guards: list[str]) -> Array:
         """Share of a value that rounding may have changed alike at neighbouring poses."""
         given = self.designs[turn.rows], turn.columns, candidates.row, candidates.column
         return rounding_share(self.family, *given, guards, self._orders(candidates))

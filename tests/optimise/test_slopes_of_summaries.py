@@ -41,11 +41,11 @@ def test_of_tops_alike_the_place_of_the_first_counts_as_in_summaries():
     assert found["growing"][found["parameter"].index("p.k")] == pytest.approx(expected, rel=1e-6)
 
 
-@pytest.mark.parametrize("output", ["max_force_c_y", "max_x_p"])
-def test_a_small_dimension_does_not_drown_the_slopes_of_others_in_rounding(output):
+def test_a_small_dimension_does_not_drown_the_slopes_of_others_in_rounding():
     """The step of a difference suits each dimension by itself: 1e-8 is what fourth-order differences are good to."""
+    output = "max_force_c_y"
     full = extended(family("rssr"), (output.removeprefix("max_"),))
-    given = {"x_point": 3.0, "y_point": 2.0, "z_point": 1.0, "m_coupler": 1e-4, "m_rocker": 1e-4, "speed": 200.0}
+    given = {"m_coupler": 1e-4, "m_rocker": 1e-4, "speed": 200.0}
     row = design(full, dict(family("rssr").example) | given)
     found = sensitivities(full, row, [output])
     slope = found["growing"][found["parameter"].index("alpha")]
