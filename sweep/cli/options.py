@@ -24,7 +24,9 @@ BACKEND = click.option(
     help="threading, loky (processes), dask (processes of a local cluster) or dask=tcp://HOST:8786 (docs/cluster.md).",
 )
 SMOKE = click.option("--smoke", is_flag=True, help="The tiny version: smoke.toml beside the study.")
-DESIGN = click.option("--design", help="optimum, reference, best, or the number of a row; default: optimum, else best.")
+DESIGN = click.option(
+    "--design", help="optimum, reference, best, or a number of the column design; default: optimum, else best."
+)
 ANGLES = click.option(
     "--angles",
     type=click.Choice(["rad", "deg"]),

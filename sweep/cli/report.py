@@ -89,7 +89,7 @@ class Options(TypedDict):
 @click.option("--out", required=True, type=A_FILE, help="A .svg, .png or .pdf file; of cyclogram also a .csv table.")
 @click.option(
     "--design",
-    help="Of a dataset: optimum, reference, best, or the number of a row; of motion several, as a,b.",
+    help="Of a dataset: optimum, reference, best, or a number of the column design; of motion several, as a,b.",
 )
 @click.option("--row", type=click.IntRange(min=0), default=0, show_default=True, help="Of TABLE.")
 @click.option("--want", help="Of motion: outputs, separated by commas.")

@@ -99,6 +99,30 @@ def best(folder: str | Path, output: str, count: int = 10) -> pd.DataFrame:
     return _whole(source, kept["design"].to_numpy(np.int64))
 
 
+def of_number(folder: str | Path, number: int) -> pd.DataFrame:
+    """Return the row of a design, by its number in the column ``design``.
+
+    Parameters
+    ----------
+    folder : what ``sweep run`` wrote
+    number : of the design, as :func:`sweep.load`, the report and the pictures show it
+
+    Raises
+    ------
+    InputError, StoreError
+        as :func:`scan`; also for a number that no row has.
+    """
+    import pyarrow.compute as pc
+
+    source = scan(folder)
+    row: pd.DataFrame = source.to_table(filter=pc.field("design") == number).to_pandas()
+    if row.empty:
+        there = pc.min_max(source.to_table(columns=["design"]).column("design")).as_py()
+        allowed = f"a number of the column design; the designs kept are some of {there['min']} to {there['max']}"
+        raise InputError("design", number, allowed, str(folder))
+    return row
+
+
 def pareto(folder: str | Path, first: str, second: str) -> pd.DataFrame:
     """Designs within all limits that no other one beats in both outputs, ordered by the first; smaller is better.
 

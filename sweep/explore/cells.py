@@ -11,7 +11,7 @@ from typing import Any, NamedTuple, TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
-from sweep.dataset.reading import scan
+from sweep.dataset.reading import of_number, scan
 from sweep.errors import InputError
 from sweep.explore.hand import Hand
 from sweep.families.base import Array
@@ -124,11 +124,7 @@ def _read(folder: Path, name: str) -> Array:
 
 def design_of(hand: Hand, number: int) -> dict[str, float]:
     """Return a design of the dataset by its number in the column ``design``."""
-    import pyarrow.compute as pc
-
     if hand.folder is None:
         raise InputError("design", number, "a design of a run", "explore")
-    rows = scan(hand.folder).to_table(filter=pc.field("design") == number).to_pylist()
-    if not rows:
-        raise InputError("design", number, "a number of the column design", "explore")
-    return {name: float(rows[0].get(name, hand.first[name])) for name in hand.first}
+    row = of_number(hand.folder, number).iloc[0]
+    return {name: float(row.get(name, hand.first[name])) for name in hand.first}

@@ -12,6 +12,7 @@ from kernels import status as codes
 from sweep.chunks.plan import PARAMETER_UNITS
 from sweep.dataset import chunk_files, files, store
 from sweep.dataset.files import check_tables
+from sweep.dataset.reading import of_number
 from sweep.errors import InputError
 from sweep.evaluation.cyclogram import cyclogram, table_in_degrees
 from sweep.evaluation.statuses import meaning
@@ -263,8 +264,8 @@ def chosen(folder: str | Path, design: str | int | None = None) -> Chosen:
     Parameters
     ----------
     folder : what `sweep run` left behind
-    design : "optimum", "reference", "best" (of the sweep) or the number of a row as :func:`sweep.load` counts them; if
-        left out the optimum, or where nothing was optimised the best
+    design : "optimum", "reference", "best" (of the sweep) or a number of the column ``design``; if left out the
+        optimum, or where nothing was optimised the best
 
     Raises
     ------
@@ -275,24 +276,20 @@ def chosen(folder: str | Path, design: str | int | None = None) -> Chosen:
     if isinstance(design, int) or (isinstance(design, str) and design.lstrip("-").isdigit()):
         return _row(path, int(design))
     if design is not None and design not in ROLES:
-        raise InputError("design", design, f"{', '.join(ROLES)}, or the number of a row", str(folder))
+        raise InputError("design", design, f"{', '.join(ROLES)}, or a number of the column design", str(folder))
     data = read_dataset(path)
     if design == "best" or (design == "reference" and data.optima is None) or (design is None and data.optimum is None):
         data, _, _ = gather(path)  # goes through all rows
     row = {"optimum": data.optimum, "reference": data.reference, "best": data.best, None: data.result}[design]
     if row is None:
-        raise InputError(
-            "design", design or "result", f"one this dataset has, of {', '.join(ROLES)}, or a row", str(folder)
-        )
+        allowed = f"one this dataset has, of {', '.join(ROLES)}, or a number of the column design"
+        raise InputError("design", design or "result", allowed, str(folder))
     return _chosen(data, row)
 
 
 def _row(folder: Path, number: int) -> Chosen:
     data = read_dataset(folder)
-    rows = store.load(folder)
-    if not 0 <= number < len(rows):
-        raise InputError("design", number, f"a row from 0 to {len(rows) - 1}", str(folder))
-    return _chosen(data, records(_with_defaults(data.study, rows.iloc[[number]]))[0])
+    return _chosen(data, records(_with_defaults(data.study, of_number(folder, number)))[0])
 
 
 def _chosen(data: Dataset, row: Row) -> Chosen:

@@ -276,7 +276,7 @@ CONSTANT = 1e-12
 def parallel(data: Dataset, cells: Sequence[Cells], shown: Sequence[Shown]) -> dict[str, Any] | None:
     """Lines, their axes and the named designs among them; None where there are no two designs to compare.
 
-    A line's number is that of its row in :func:`sweep.load`, by which ``sweep export`` finds the design.
+    A line's number is that of the column ``design``, by which ``sweep export`` finds the design.
     """
     axes = _axes(data, cells)
     if len(axes) < 2:
@@ -284,8 +284,8 @@ def parallel(data: Dataset, cells: Sequence[Cells], shown: Sequence[Shown]) -> d
     objective = data.objective
     of = data.counts.get(codes.OK, 0)
     names, best = [axis.name for axis in axes], None if objective is None else objective.name
-    rows, values = _lines(data.parts, names, best, of)
-    if len(rows) < 2:
+    numbers, values = _lines(data.parts, names, best, of)
+    if len(numbers) < 2:
         return None
     told = np.ptp(values, axis=0) > CONSTANT * np.abs(values).max(axis=0)
     axes, values = [axis for axis, varies in zip(axes, told, strict=True) if varies], values[:, told]
@@ -296,7 +296,7 @@ def parallel(data: Dataset, cells: Sequence[Cells], shown: Sequence[Shown]) -> d
     return {
         "axes": [{"name": axis.name, "symbol": axis.symbol, "unit": axis.unit} for axis in axes],
         "objective": next((k for k, axis in enumerate(axes) if objective and axis.name == objective.name), -1),
-        "rows": rows.tolist(),
+        "numbers": numbers.tolist(),
         "values": packed(values * [axis.factor for axis in axes]),
         "designs": [
             {"name": one.name, "role": one.role, "values": packed(mark)} for one, mark in zip(named, marks, strict=True)
@@ -318,29 +318,27 @@ def _axes(data: Dataset, cells: Sequence[Cells]) -> list[Quantity]:
     return [*dimensions, *[data.shown(name) for name in told if name not in there][:OUTPUTS]]
 
 
-def _lines(parts: Sequence[Path], names: list[str], objective: str | None, of: int) -> tuple[Array, Array]:
-    """Row numbers and values of the best, and of others evenly spaced, among ``of`` feasible designs in row order."""
+def _lines(parts: Sequence[Path], names: list[str], objective: str | None, of: int) -> tuple[NDArray[np.int64], Array]:
+    """Numbers and values of the best, and of others evenly spaced, among ``of`` feasible designs in their order."""
     step = max(1, -(-of // SPREAD))
     seen = 0
-    rows, values = np.empty(0), np.empty((0, len(names)))
-    best_rows, best_values = rows, values
+    numbers, values = np.empty(0, np.int64), np.empty((0, len(names)))
+    best_numbers, best_values = numbers, values
     for found, table in _feasible(parts, names):
         taken = slice(-seen % step, None, step)
-        rows, values = np.concatenate([rows, found[taken]]), np.vstack([values, table[taken]])
+        numbers, values = np.concatenate([numbers, found[taken]]), np.vstack([values, table[taken]])
         seen += found.size
         if objective is not None:
-            best_rows, best_values = np.concatenate([best_rows, found]), np.vstack([best_values, table])
+            best_numbers, best_values = np.concatenate([best_numbers, found]), np.vstack([best_values, table])
             order = np.argsort(compared(objective, best_values[:, names.index(objective)]), kind="stable")[:BEST]
-            best_rows, best_values = best_rows[order], best_values[order]
-    rows, first = np.unique(np.concatenate([rows, best_rows]), return_index=True)
-    return rows.astype(np.int64), np.vstack([values, best_values])[first]
+            best_numbers, best_values = best_numbers[order], best_values[order]
+    numbers, first = np.unique(np.concatenate([numbers, best_numbers]), return_index=True)
+    return numbers, np.vstack([values, best_values])[first]
 
 
-def _feasible(parts: Sequence[Path], names: list[str]) -> Iterator[tuple[Array, Array]]:
-    """Yield batches of feasible designs with finite values: row numbers over all parts, and values (n, names)."""
-    start = 0
-    for batch in batches(parts, [*names, "status"]):
+def _feasible(parts: Sequence[Path], names: list[str]) -> Iterator[tuple[NDArray[np.int64], Array]]:
+    """Yield batches of feasible designs with finite values: their numbers, and values (n, names)."""
+    for batch in batches(parts, ["design", *names, "status"]):
         table = np.column_stack([np.asarray(batch[name], np.float64) for name in names])
         good = np.flatnonzero((np.asarray(batch["status"]) == 0) & np.isfinite(table).all(axis=1))
-        yield (start + good).astype(np.float64), table[good]
-        start += batch.num_rows
+        yield np.asarray(batch["design"])[good], table[good]

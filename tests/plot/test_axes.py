@@ -190,7 +190,7 @@ def test_verb_draws_a_row_of_a_table(tmp_path):
 
 
 @pytest.mark.parametrize("kind", ["csv", "glb", "dxf", "mjcf", "law"])
-def test_export_verb_takes_the_optimum_or_a_row_of_a_folder(kind, tmp_path):
+def test_export_verb_takes_the_optimum_or_a_design_of_a_folder(kind, tmp_path):
     design = {f"{k}1": v * (20.0 if k in "abcefg" else 1.0) for k, v in RSSR.items()}
     design |= {f"{k}2": v * (1.0 if k in ("lam", "branch") else 20.0) for k, v in family("guide").example.items()}
     place = write_dataset(tmp_path / "designs", optimum=design)
@@ -199,13 +199,19 @@ def test_export_verb_takes_the_optimum_or_a_row_of_a_folder(kind, tmp_path):
     file = Path(done.output.split(": ")[1].strip())
     assert file.parent == files.beside(place) / "export" and file.stat().st_size > 200
     out = tmp_path / "row.csv"
-    done = CliRunner().invoke(main, ["export", str(place), "--format", "csv", "--design", "3", "--out", str(out)])
+    rows = sweep.load(place).set_index("design")
+    number = rows.index[-1]
+    assert number > len(rows)  # what keeps no limit is not there, so a row's place is not its design's number
+    done = CliRunner().invoke(main, ["export", str(place), "--format", "csv", f"--design={number}", "--out", str(out)])
     assert done.exit_code == 0, done.output
-    row = sweep.load(place).iloc[3]
+    row = rows.loc[number]
     points = pd.read_csv(out).set_index(["stage", "name"])
     assert points.loc[(1, "B"), "x"] == pytest.approx(row["a1"], abs=1e-12)  # the crank at phi = 0
     wrong = CliRunner().invoke(main, ["export", str(place), "--format", "csv", "--design", "worst"])
     assert wrong.exit_code == 2 and "optimum, reference, best" in wrong.output
+    for missing in (-1, 10**6, next(k for k in rows.index + 1 if k not in rows.index)):
+        wrong = CliRunner().invoke(main, ["export", str(place), "--format", "csv", f"--design={missing}"])
+        assert wrong.exit_code == 2 and f"some of {rows.index[0]} to {rows.index[-1]}" in wrong.output
 
 
 def test_motion_of_what_does_not_turn_is_refused_and_its_mechanism_is_drawn():

@@ -86,7 +86,7 @@ def test_design_moves_as_its_joints_and_curves_do(four_bars):
     assert found["curves"][0]["title"] == "follower angle ψ, from its lowest"
 
 
-def test_lines_are_rows_of_the_dataset_the_best_among_them(four_bars):
+def test_lines_are_designs_of_the_dataset_the_best_among_them(four_bars):
     data, _, cells = gather(four_bars)
     rows = sweep.load(four_bars)
     found = parallel(data, cells, shown_designs(data, groups(data)))
@@ -94,10 +94,10 @@ def test_lines_are_rows_of_the_dataset_the_best_among_them(four_bars):
     assert names == ["a", "b", "max_abs_d2psi", "max_pressure_angle"]
     assert found["objective"] == 2 and found["of"] == (rows["status"] == 0).sum()
     values = numbers(found["values"]).reshape(-1, len(names)) / [1.0, 1.0, 1.0, np.degrees(1.0)]
-    np.testing.assert_allclose(values, rows.iloc[found["rows"]][names], rtol=1e-6)
-    assert len(found["rows"]) <= BEST + SPREAD < found["of"]
+    np.testing.assert_allclose(values, rows.set_index("design").loc[found["numbers"], names], rtol=1e-6)
+    assert len(found["numbers"]) <= BEST + SPREAD < found["of"]
     feasible = rows[rows["status"] == 0]
-    assert set(feasible["max_abs_d2psi"].nsmallest(BEST).index) <= set(found["rows"])
+    assert set(feasible.nsmallest(BEST, "max_abs_d2psi")["design"]) <= set(found["numbers"])
     assert found["designs"][0]["role"] == "result"
 
 
@@ -159,5 +159,5 @@ def test_data_in_the_page_are_what_was_made(folder):
     data = json.loads(re.search(r'id="motion-data">(.*?)</script>', page)[1])
     assert [design["role"] for design in data["designs"]] == ["result", "reference"]
     lines = json.loads(re.search(r'id="lines-data">(.*?)</script>', page)[1])
-    assert lines["of"] > len(lines["rows"]) > 100
+    assert lines["of"] > len(lines["numbers"]) > 100
     assert study_data()["study"]["title"] not in page  # escaped in the markup

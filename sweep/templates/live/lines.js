@@ -24,7 +24,7 @@ class Lines {
     this.said = host.querySelector("output");
     this.table = host.querySelector("tbody");
     const group = svg("g", { class: "all" }, this.frame);
-    this.drawn = data.rows.map((_, row) => svg("path", { d: this.path(this.rowOf(row)) }, group));
+    this.drawn = data.numbers.map((_, row) => svg("path", { d: this.path(this.rowOf(row)) }, group));
     this.paint();
     data.designs.forEach((design, k) => svg("path", { d: this.path(marks[k]), class: `mark ${design.role}` }, this.frame));
     this.brushes = data.axes.map((axis, k) => this.addAxis(axis, k));
@@ -66,7 +66,7 @@ class Lines {
   // Colour by the rank of the objective: the better a design, the nearer to the colour of the optimum.
   paint() {
     const of = this.data.objective;
-    this.order = this.data.rows.map((_, row) => row);
+    this.order = this.data.numbers.map((_, row) => row);
     if (of < 0) return;
     this.order.sort((a, b) => Math.abs(this.rowOf(a)[of]) - Math.abs(this.rowOf(b)[of]));
     this.order.forEach((row, rank) => {
@@ -127,14 +127,14 @@ class Lines {
     });
     const inside = new Set(kept);
     this.drawn.forEach((line, row) => line.classList.toggle("out", !inside.has(row)));
-    const drawn = this.data.rows.length, all = this.data.of > drawn ? `, taken from ${this.data.of}` : "";
+    const drawn = this.data.numbers.length, all = this.data.of > drawn ? `, taken from ${this.data.of}` : "";
     this.said.textContent = `Within all ranges: ${kept.length} of ${drawn} designs${all}.`;
     this.table.replaceChildren(...kept.slice(0, LISTED).map((row) => this.listed(row)));
   }
 
   listed(row) {
     const line = document.createElement("tr");
-    for (const text of [this.data.rows[row], ...[...this.rowOf(row)].map((value) => short(value))]) {
+    for (const text of [this.data.numbers[row], ...[...this.rowOf(row)].map((value) => short(value))]) {
       line.appendChild(document.createElement("td")).textContent = text;
     }
     return line;
