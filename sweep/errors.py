@@ -66,6 +66,11 @@ def shown(value: object) -> str:
     return text if len(text) <= LONGEST else f"{text[: LONGEST - 4]} ..."
 
 
+def how_many(count: int, thing: str, ending: str = "s") -> str:
+    """Return a number of things in words, ``1 chunk`` or ``3 chunks``; ``ending`` is that of the plural."""
+    return f"{count} {thing}{'' if count == 1 else ending}"
+
+
 class StudyError(LinksweepError, ValueError):
     """A study file has faults; all of them are reported at once, each with its place.
 
@@ -78,7 +83,7 @@ class StudyError(LinksweepError, ValueError):
     def __init__(self, path: str, faults: Sequence[str]) -> None:
         self.path, self.faults = path, list(faults)
         count = len(self.faults)
-        lines = [f"{path}: {count} {'fault' if count == 1 else 'faults'}", *(f"  {f}" for f in faults[:MOST_FAULTS])]
+        lines = [f"{path}: {how_many(count, 'fault')}", *(f"  {f}" for f in faults[:MOST_FAULTS])]
         more = [f"  and {count - MOST_FAULTS} more; mend these first"] if count > MOST_FAULTS else []
         super().__init__("\n".join([*lines, *more]))
 

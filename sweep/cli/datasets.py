@@ -13,6 +13,7 @@ from sweep.dataset.files import DESIGNS
 from sweep.dataset.verification import verify as verify_dataset
 from sweep.engine.parts import merge as merge_parts
 from sweep.engine.parts import split as split_study
+from sweep.errors import how_many
 from sweep.study import load_study
 
 
@@ -88,10 +89,10 @@ def merge(study: Path, out: Path | None, smoke: bool) -> None:
     for path in found.damaged:
         click.echo(f"{path}: damaged, left out; the run of this part computes it anew")
     if found.missing:
-        missing = f"{len(found.missing)} are missing (the first is {found.missing[0]})"
+        missing = f"{how_many(len(found.missing), 'chunk')} missing (the first is {found.missing[0]})"
     else:
         missing = "all are there; sweep run notes the totals and searches the optimum"
-    click.echo(f"{found.folder}: {found.taken} chunks taken over, {missing}")
+    click.echo(f"{found.folder}: {how_many(found.taken, 'chunk')} taken over, {missing}")
     click.get_current_context().exit(INCOMPLETE if found.missing else 0)
 
 

@@ -15,6 +15,7 @@ from sweep.cli.options import SMOKE, STUDY
 from sweep.effects.advice import findings, left_out, tree
 from sweep.effects.loads import POINT
 from sweep.engine.estimate import LEAST_KEPT, Estimate, check_budget, duration, estimate, other_accuracies, searches
+from sweep.errors import how_many
 from sweep.evaluation.summaries import output
 from sweep.families.base import Family
 from sweep.families.machines.machine import Machine
@@ -73,17 +74,21 @@ def plan_lines(study: Study, cost: Estimate, others: Sequence[tuple[str, float]]
     kind = "every combination" if study.space.kind == "product" else "Sobol sample"
     large = without_minus(study.objective.output) if study.objective is not None else None
     costs = [
-        ("chunks", f"{cost.chunks} of {min(cost.chunk_size, cost.designs)} designs"),
+        ("chunks", f"{cost.chunks} of {how_many(min(cost.chunk_size, cost.designs), 'design')}"),
         ("rows kept", f"{_kept(cost)} ({study.output.keep}, {study.output.dtype})"),
         ("memory", size(cost.memory_bytes)),
         ("disk", f"{size(cost.disk_bytes)}, allowed {size(study.budget.disk_bytes)}"),
-        ("time", f"{duration(cost.seconds)} with {cost.jobs} workers, allowed {duration(study.budget.seconds)}"),
+        (
+            "time",
+            f"{duration(cost.seconds)} with {how_many(cost.jobs, 'worker')}, allowed {duration(study.budget.seconds)}",
+        ),
         *((words, f"{duration(seconds)}, {_times(seconds / cost.seconds)}") for words, seconds in others),
     ]
     lines = [f"{study.name}: {study.title}" if study.title else study.name, *_mechanism(study.family)]
     if study.speed is not None:
         lines += [f"speed {study.speed * 30.0 / math.pi:g} rpm ({study.speed:.6g} rad/s)"]
-    lines += ["", f"{study.space.count} designs, {kind} of" if study.space.axes else "1 design, nothing is swept"]
+    of = f"{kind} of" if study.space.axes else "nothing is swept"
+    lines += ["", f"{how_many(study.space.count, 'design')}, {of}"]
     lines += aligned([(axis.name, _axis(axis)) for axis in study.space.axes])
     lines += [*_computed(study), *_before_and_between(study), *_effects(study, sent), *_left_out(study)]
     if study.objective is not None:
@@ -101,9 +106,11 @@ def _optimiser(study: Study) -> list[str]:
     settings = study.optimise
     share = 100.0 * wanted(settings)
     unlikely = f"better optima are unlikely (under {share:g} %) and " if share < 100.0 else ""
-    most = f"at most {settings.starts} starts of {settings.looks} looks"
+    most = f"at most {how_many(settings.starts, 'start')} of {how_many(settings.looks, 'look')}"
     if settings.by_populations:
-        most = f"at most {settings.populations} populations, with starts of {settings.looks} looks"
+        most = (
+            f"at most {how_many(settings.populations, 'population')}, with starts of {how_many(settings.looks, 'look')}"
+        )
     return [f"optimiser: {most}, fewer once {unlikely}the best was found {MET} times{_brake(settings.time_budget)}"]
 
 
@@ -125,7 +132,7 @@ def _mechanism(family: Family) -> list[str]:
     if not isinstance(family, Machine):
         return [f"mechanism {family.name} ({family.title})"]
     rows = [(m.name, m.family.name, m.family.title) for m in family.members]
-    return [f"machine of {len(rows)} {'member' if len(rows) == 1 else 'members'}", *aligned(rows)]
+    return [f"machine of {how_many(len(rows), 'member')}", *aligned(rows)]
 
 
 def _left_out(study: Study) -> list[str]:
@@ -187,9 +194,10 @@ def _front(study: Study) -> list[str]:
     shown = quantity(name, output(study.family, name).unit)
     ends = f"{number(min(bounds) * shown.factor)} to {shown.show(max(bounds))}"
     side = "at least" if study.pareto.at_least else "at most"
+    count = how_many(searches(study.pareto), "search", "es")
     return [
-        f"front: the same with {name} {side} {ends}, {len(bounds)} bounds; "
-        f"up to {searches(study.pareto)} searches besides those of the optimiser{_brake(study.pareto.time_budget)}"
+        f"front: the same with {name} {side} {ends}, {how_many(len(bounds), 'bound')}; "
+        f"up to {count} besides those of the optimiser{_brake(study.pareto.time_budget)}"
     ]
 
 
@@ -203,7 +211,7 @@ def _proof(study: Study) -> list[str]:
     unused = f"; no use is made of the limits on {', '.join(question.left_out)}" if question.left_out else ""
     return [
         f"proof: that no design is better than the optimum by more than {100.0 * asked.gap:g} %, over "
-        f"{', '.join(question.names)}; at most {asked.boxes} boxes, "
+        f"{', '.join(question.names)}; at most {how_many(asked.boxes, 'box', 'es')}, "
         f"{duration(asked.boxes * SECONDS_PER_BOX)} of processor time{_brake(asked.seconds)}{unused}"
     ]
 
@@ -222,11 +230,10 @@ def _effects(study: Study, sent: Pilot) -> list[str]:
     looked_at, tried = spread_rows(sent.kept, ADVISED), sent.tried
     if not len(looked_at):
         looked_at, tried = feasible_designs(study, ADVISED)
-    number = "1 design" if len(looked_at) == 1 else f"{len(looked_at)} designs"
-    which = f"by {number} within all limits, of {tried} tried"
+    which = f"by {how_many(len(looked_at), 'design')} within all limits, of {tried} tried"
     if not len(looked_at):
         looked_at = spread_designs(study, ADVISED)
-        which = f"by {len(looked_at)} designs spread over the space: none of {tried} tried keeps all limits"
+        which = f"by {how_many(len(looked_at), 'design')} spread over the space: none of {tried} tried keeps all limits"
     rods = [p.name for p in study.family.parameters if p.unless and study.space.fixed.get(p.name) == 1.0]
     if rods:
         lines += ["", "bodies without centre and inertia are slender rods between their joints", f"  {', '.join(rods)}"]
@@ -257,7 +264,7 @@ def _points(study: Study) -> list[str]:
 def _axis(axis: Axis) -> str:
     unit = "" if axis.unit == "1" else f" {axis.unit}"
     low, high = axis.low / axis.factor, axis.high / axis.factor
-    count = "" if axis.values is None else f", {axis.count} values"
+    count = "" if axis.values is None else f", {how_many(axis.count, 'value')}"
     return f"{low:g} to {high:g}{unit}{count}{', log' if axis.scale == 'log' else ''}"
 
 

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from sweep.dataset import chunk_files, files
 from sweep.dataset.files import check_tables
-from sweep.errors import InputError, StoreError
+from sweep.errors import InputError, StoreError, how_many
 from sweep.families.names import is_error
 
 if TYPE_CHECKING:
@@ -103,25 +103,25 @@ class Comparison:
 
     def lines(self) -> list[str]:
         """Return the findings in words."""
-        found = [*self.notes, f"{self.rows} rows in both"]
+        found = [*self.notes, f"{how_many(self.rows, 'row')} in both"]
         old, new = ", ".join(self.columns_only_old), ", ".join(self.columns_only_new)
         told = {
-            f"{self.only_old} rows only in the old dataset": self.only_old,
-            f"{self.only_new} rows only in the new dataset": self.only_new,
+            f"{how_many(self.only_old, 'row')} only in the old dataset": self.only_old,
+            f"{how_many(self.only_new, 'row')} only in the new dataset": self.only_new,
             f"columns only in the old dataset: {old}": old,
             f"columns only in the new dataset: {new}": new,
-            f"{self.status_changed} rows with another status": self.status_changed,
+            f"{how_many(self.status_changed, 'row')} with another status": self.status_changed,
             f"the first of these rows: designs {', '.join(map(str, self.designs))}": self.designs,
         }
         found += [words for words, there in told.items() if there]
         for column in self.moved.values():
             if column.changed:
                 found.append(
-                    f"{column.name}: {column.changed} values changed, at most by {column.absolute:.3g}, "
+                    f"{column.name}: {how_many(column.changed, 'value')} changed, at most by {column.absolute:.3g}, "
                     f"relative {column.relative:.3g} (worst: {column.where}{_first(column)})"
                 )
             if column.missing:
-                found.append(f"{column.name}: {column.missing} values appeared or went missing")
+                found.append(f"{column.name}: {how_many(column.missing, 'value')} appeared or went missing")
         if not (self.values_changed or self.rows_changed):
             found.append("no value changed")
         if self.seconds is not None:

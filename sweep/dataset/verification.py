@@ -17,7 +17,7 @@ from sweep.chunks.chunk import compute_chunk
 from sweep.chunks.parameters import parameter_matrix
 from sweep.dataset import chunk_files, files, store
 from sweep.dataset.files import TABLES, altered
-from sweep.errors import InputError, LinksweepError, StoreError
+from sweep.errors import InputError, LinksweepError, StoreError, how_many
 from sweep.families.base import Columns
 from sweep.families.names import is_error
 from sweep.study import Study
@@ -78,8 +78,8 @@ class Verification:
 
     def lines(self) -> list[str]:
         """Return the findings in words, one per line; the last line is the verdict."""
-        words = [f"{self.chunks} whole chunks, {self.rows} rows, {self.size} bytes read"]
-        words += [f"{self.recomputed} designs computed again"] if self.recomputed else []
+        words = [f"{how_many(self.chunks, 'whole chunk')}, {how_many(self.rows, 'row')}, {self.size} bytes read"]
+        words += [f"{how_many(self.recomputed, 'design')} computed again"] if self.recomputed else []
         damaged = sum(finding.damage for finding in self.findings)
         verdict = (
             f"{damaged} damaged, {len(self.findings) - damaged} missing" if self.findings else "complete and undamaged"
@@ -280,7 +280,9 @@ def row_faults(rows: pd.DataFrame, own: Mapping[str, Any], about: Mapping[str, A
         return [*faults, f"design numbers not growing inside {own['start']}:{own['stop']}"]
     faults += _count_faults(status, own)
     if study is not None and study.output.keep == "all" and len(rows) != own["stop"] - own["start"]:
-        faults.append(f"{len(rows)} rows, although every one of {own['stop'] - own['start']} designs is kept")
+        faults.append(
+            f"{how_many(len(rows), 'row')}, although every one of {own['stop'] - own['start']} designs is kept"
+        )
     outputs = [column["name"] for column in about.get("columns", []) if column["role"] == "output"]
     missing = rows.loc[status == 0, [name for name in outputs if not is_error(name)]].isna().any()
     faults += [f"{name}: missing values in rows whose status is ok" for name in missing.index[missing]]
@@ -293,7 +295,7 @@ def _count_faults(status: np.ndarray[Any, Any], own: Mapping[str, Any]) -> list[
     faults = []
     noted, number = own["counts"], own["stop"] - own["start"]
     if sum(noted.values()) != number:
-        faults.append(f"{sum(noted.values())} designs counted, {number} in the chunk")
+        faults.append(f"{how_many(sum(noted.values()), 'design')} counted, {number} in the chunk")
     codes, found = np.unique(status, return_counts=True)
     rows = {
         chunk_files.STATUS_NAMES.get(int(code), str(code)): int(count) for code, count in zip(codes, found, strict=True)

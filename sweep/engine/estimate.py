@@ -10,7 +10,7 @@ import numpy as np
 
 from sweep.chunks.cascade import CALL_SECONDS, levels
 from sweep.chunks.plan import Pilot, choose_chunk_size, describe_columns, pilot, pilot_at, row_bytes
-from sweep.errors import BudgetError
+from sweep.errors import BudgetError, how_many
 from sweep.evaluation.summaries import FEWEST_SAMPLES, FINEST_TARGET, MOST_SAMPLES
 from sweep.families.names import is_error, is_flag
 from sweep.reductions.steps import certified_names, is_windowed
@@ -223,7 +223,7 @@ def check_budget(study: Study, cost: Estimate) -> None:
         over.append(f"disk about {cost.disk_bytes / 1e9:.3g} GB; allowed: {allowed / 1e9:.3g} GB (budget.disk)")
     if over:
         way_out = "take fewer values, raise the budget in the study file, or force it"
-        size = f"{cost.designs} designs on {cost.jobs} workers"
+        size = f"{how_many(cost.designs, 'design')} on {how_many(cost.jobs, 'worker')}"
         raise BudgetError(f"{study.path}: over the budget with {size}: {'; '.join(over)}; {way_out}")
 
 

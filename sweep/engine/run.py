@@ -31,7 +31,7 @@ from sweep.engine.estimate import check_budget, estimate
 from sweep.engine.opening import is_part, known_folder, open_plan, part_range, plan_note
 from sweep.engine.searches import refuse_unprovable, search, stages_of
 from sweep.engine.worker import ChunkTask, Done
-from sweep.errors import StoreError, TimeUsedUp, WorkerDied
+from sweep.errors import StoreError, TimeUsedUp, WorkerDied, how_many
 from sweep.jobs.executors import Executor, at_work, executor, for_tasks
 from sweep.jobs.progress import Phases, Progress, stages
 from sweep.jobs.signals import Stop, stop_on_signal
@@ -167,7 +167,7 @@ def run(
             computed = _sweep(model, folder, jobs, place, force, chunk_size, progress)
             if not is_part(folder):
                 search(model, folder, jobs, backend, progress)
-            end.append(f"{computed} chunks computed")
+            end.append(f"{how_many(computed, 'chunk')} computed")
     return folder
 
 
@@ -281,7 +281,7 @@ def _compute(
         raise failure
     stop.raise_if_signalled(folder, "finished chunks are")
     if results < len(missing):
-        left = f"{len(missing) - results} of {plan.chunks} chunks to go"
+        left = f"{len(missing) - results} of {how_many(plan.chunks, 'chunk')} to go"
         way_out = "finished chunks are kept, run again to continue, or force it to have no limit"
         raise TimeUsedUp(f"{folder}: the {study.budget.seconds:g} s of budget.time are used up, {left}; {way_out}")
     return results

@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Any
 
 from sweep.dataset import chunk_files, files, store
-from sweep.errors import InputError, LinksweepError, StoreError, TimeUsedUp, WorkerDied
+from sweep.errors import InputError, LinksweepError, StoreError, TimeUsedUp, WorkerDied, how_many
 from sweep.nights import archive
 from sweep.nights.archive import Journal, NightRecord, State, StudyRecord
 from sweep.nights.carry import REPORT, Carried, carry
@@ -219,12 +219,16 @@ def _words(name: str, record: StudyRecord) -> str:
     """Return one study in words."""
     if record.state == "waiting":
         return f"{name}: not begun, the time was over"
-    linked = f", {record.linked} chunks linked from {record.linked_from}" if record.linked else ""
+    linked = f", {how_many(record.linked, 'chunk')} linked from {record.linked_from}" if record.linked else ""
     if record.state == "cut":
         return f"{name}: cut off, the time was over{linked}; the next night begins with it"
     if record.state == "failed":
         return f"{name}: failed with {record.code}: {record.message}"
-    took = "nothing to compute" if record.seconds is None else f"{record.computed} chunks in {record.seconds:.3g} s"
+    took = (
+        "nothing to compute"
+        if record.seconds is None
+        else f"{how_many(record.computed, 'chunk')} in {record.seconds:.3g} s"
+    )
     lines = [f"{name}: {took}{linked}", *record.changes, *([record.message] if record.message else [])]
     if record.compared_with is None:
         lines.append("the first good night with it, nothing to compare with")

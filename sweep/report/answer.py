@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 
 from kernels import status as codes
 from sweep.dataset import files
+from sweep.errors import how_many
 from sweep.optimise.local.descent import KKT
 from sweep.optimise.local.start import DIFFERS
 from sweep.proof import read_proof
@@ -216,10 +217,10 @@ def search_sentence(data: Dataset, found: Scan) -> str:
     starts, agree = data.starts, value_of(data.optimum, "agree")
     kind = "" if found.feasible else "random "
     head = "The" if proof_sentence(data) else f"{NO_PROOF}: the"
-    text = f"{head} optimiser started from {starts} {kind}design{'s' if starts != 1 else ''}"
+    text = f"{head} optimiser started from {how_many(starts, f'{kind}design')}"
     populations = 0 if data.survey is None else data.survey.populations
     some = "most of them " if starts > 2 * populations else ""  # at most two of a population, the others of the sweep
-    text += f", {some}ends of {populations} populations" if populations else " of the sweep"
+    text += f", {some}ends of {how_many(populations, 'population')}" if populations else " of the sweep"
     if math.isfinite(agree) and not populations:  # of those the survey tells more
         text += f", {number(agree)} of which ended at this value"
     if data.survey is not None:
@@ -259,7 +260,7 @@ def search_words(data: Dataset, found: Survey) -> str:
     """Say what the starts met; beside a proof of the whole space an estimate of what is unseen says nothing."""
     if found.basins == 0 or not _is_proven(data):
         return found.words
-    return f"{found.basins} basin{'s' if found.basins > 1 else ''} met"
+    return f"{how_many(found.basins, 'basin')} met"
 
 
 def _is_proven(data: Dataset) -> bool:

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from kernels import status as codes
+from sweep.errors import how_many
 from sweep.optimise.front.pareto import SHOWN, gaps
 from sweep.optimise.local.descent import KKT
 from sweep.optimise.local.kkt import NO_VALUE
@@ -103,8 +104,7 @@ class Front:
         text += f" {begun - given} of the bounds were placed where the front bends." if begun > given else ""
         text += f" Time was up before {wanted - begun} more bounds." if begun < wanted else ""
         text += self._gap()
-        rows = f"{late} row{'s' if late > 1 else ''}"
-        return text + (f" In {rows} time was up before the search had ended." if late else "")
+        return text + (f" In {how_many(late, 'row')} time was up before the search had ended." if late else "")
 
     def _gap(self) -> str:
         """Say where the front is least known, if that is worth a word."""
@@ -159,5 +159,5 @@ def _held(active: str, second: str) -> str:
     edges = [word for word in words if word.endswith(EDGES)]
     limits = ["this bound" if word.split()[0] == second else word for word in words if word not in edges]
     if edges:
-        limits.append(f"{len(edges)} dimension{'s' if len(edges) > 1 else ''} on the edge of the space")
+        limits.append(f"{how_many(len(edges), 'dimension')} on the edge of the space")
     return "; ".join(limits)

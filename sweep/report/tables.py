@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from kernels import status as codes
+from sweep.errors import how_many
 from sweep.evaluation.statuses import meaning
 from sweep.families.names import error_of, is_flag, is_place, without_minus
 from sweep.quantities.limits import compared, meets
@@ -300,7 +301,7 @@ def run_rows(runs: tuple[dict[str, Any], ...]) -> list[tuple[str, str]]:
     ]
     rows.append(("versions", ", ".join(f"{name} {release}" for name, release in last.get("versions", {}).items())))
     seconds = sum(run.get("seconds", 0.0) for run in runs)
-    rows.append(("time taken", f"{number(seconds, 3)} s in {len(starts)} run{'s' if len(starts) > 1 else ''}"))
+    rows.append(("time taken", f"{number(seconds, 3)} s in {how_many(len(starts), 'run')}"))
     return rows
 
 

@@ -14,13 +14,13 @@ import numpy as np
 from kernels import status as codes
 from sweep.chunks.plan import spread_designs
 from sweep.dataset import files
+from sweep.errors import how_many
 from sweep.evaluation.statuses import meaning
 from sweep.evaluation.summaries import design_outputs
 from sweep.families.base import Angles, Interval
 from sweep.families.capabilities import Assembly
 from sweep.optimise import read_survey
 from sweep.optimise.local.descent import KKT
-from sweep.optimise.multistart.survey import started
 from sweep.quantities.limits import compared
 from sweep.report.answer import proof_sentence, search_words, share_words, survey_warnings
 from sweep.report.dataset import Dataset, read_dataset
@@ -58,15 +58,16 @@ def ending(folder: Path) -> Ending:
     """
     data = read_dataset(folder)
     feasible = data.counts.get(codes.OK, 0)
-    lines = [f"{data.study.name}: {data.designs} designs, {feasible} within all limits{_best_of_sweep(data, feasible)}"]
+    swept = f"{data.study.name}: {how_many(data.designs, 'design')}"
+    lines = [f"{swept}, {feasible} within all limits{_best_of_sweep(data, feasible)}"]
     best = data.optimum
     if best is not None:
         missed = int(best.get("status", 0)) == codes.LIMIT_EXCEEDED
         lines += _nearest(data) if missed else _optimum(data)
         found = read_survey(files.beside(folder) / files.OPTIMUM)
         if found is not None:
-            lines.append(f"search: {started(found.starts)}, {search_words(data, found)}")
-            kinds = [f"{words}: {started(n)}, {b} basin{'' if b == 1 else 's'}" for words, n, b in found.kinds]
+            lines.append(f"search: {how_many(found.starts, 'start')}, {search_words(data, found)}")
+            kinds = [f"{words}: {how_many(n, 'start')}, {how_many(b, 'basin')}" for words, n, b in found.kinds]
             lines += [f"signs: {'; '.join(kinds)}"] if kinds else []
             lines += [f"warning: {text}" for text in survey_warnings(data, found)]
         lines += [sentence] if (sentence := proof_sentence(data)) else []
@@ -182,7 +183,10 @@ def _nearest_of_space(study: Study, data: Dataset) -> list[str]:
     columns |= {name: designs[:, k] for k, name in enumerate(names)}
     worst = np.max([_shortfall(limit, columns[limit.output])[1] for limit in study.limits], axis=0)
     row = {name: values[int(np.argmin(worst))] for name, values in columns.items()}
-    return ["no design keeps all limits", *_give_way(data, row, f"the nearest of {len(designs)} designs of the space")]
+    return [
+        "no design keeps all limits",
+        *_give_way(data, row, f"the nearest of {how_many(len(designs), 'design')} of the space"),
+    ]
 
 
 def _give_way(data: Dataset, row: Mapping[str, Any], who: str) -> list[str]:

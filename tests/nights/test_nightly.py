@@ -103,7 +103,7 @@ def test_a_changed_constant_in_a_kernel_is_found_with_rows_study_and_outputs(tmp
     second = command(sources, *line)
     assert second.returncode == 0
     assert "no change (exit code 0" in second.stdout
-    assert second.stdout.count("nothing to compute, 1 chunks linked") == 1
+    assert second.stdout.count("nothing to compute, 1 chunk linked") == 1
     assert not told.exists()
     chunks = [next((place / "tiny" / "designs").glob("part-*")) for place in archive.nights(into)]
     assert chunks[0].stat().st_ino == chunks[1].stat().st_ino

@@ -213,7 +213,7 @@ def test_damaged_chunk_is_set_aside_and_computed_anew(
     run(study, out)
     assert chunk_bytes(out) == whole
     assert (beside(out) / BAD / victim.name).read_bytes() == bad
-    assert read_runs(out)[-1]["text"] == "1 chunks computed"
+    assert read_runs(out)[-1]["text"] == "1 chunk computed"
 
 
 def test_lost_or_damaged_plan_is_made_again(study: Study, whole: dict[str, bytes], tmp_path: Path) -> None:

@@ -98,7 +98,7 @@ def test_the_printed_commands_compute_the_parts(study: Path, tmp_path: Path) -> 
     assert len(lines) == 2
     assert shell.invoke(main, shlex.split(lines[0])[1:]).exit_code == 0
     merged = shell.invoke(main, ["merge", str(study), "--out", str(out)])
-    assert (merged.exit_code, "3 are missing (the first is 2)" in merged.output) == (11, True)
+    assert (merged.exit_code, "3 chunks missing (the first is 2)" in merged.output) == (11, True)
     assert shell.invoke(main, shlex.split(lines[1])[1:]).exit_code == 0
     merged = shell.invoke(main, ["merge", str(study), "--out", str(out)])
     assert (merged.exit_code, "3 chunks taken over, all are there" in merged.output) == (0, True)

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
+from sweep.errors import how_many
 from sweep.families.base import Array
 from sweep.optimise.local.kkt import AGREE, Result
 from sweep.optimise.problem.statement import Problem
@@ -92,10 +93,10 @@ class Survey:
     def words(self) -> str:
         """``14 basins met, the best 5 times, estimated unseen 1 %``."""
         if self.basins == 0:
-            return f"none of {started(self.starts)} became feasible"
-        basins = f"{self.basins} basin{'s' if self.basins > 1 else ''} met"
+            return f"none of {how_many(self.starts, 'start')} became feasible"
+        basins = f"{how_many(self.basins, 'basin')} met"
         times = {1: "once", 2: "twice"}.get(self.best, f"{self.best} times")
-        by = f" by {self.populations} populations" if self.populations else ""
+        by = f" by {how_many(self.populations, 'population')}" if self.populations else ""
         return f"{basins}{by}, the best {times}, estimated unseen {_percent(self.unseen)}"
 
     @property
@@ -109,13 +110,13 @@ class Survey:
         found = []
         if self.ended in CUT:
             why = "time ran out" if self.ended == "time" else "interrupted"
-            of = f"{self.starts} starts" if self.populations else f"{self.starts} of {started(self.asked)}"
+            asked = how_many(self.asked, "start")
+            of = how_many(self.starts, "start") if self.populations else f"{self.starts} of {asked}"
             after = "; not all that follows them, neighbouring values and robust designs, was" if self.late else ""
             found.append(f"{why}: {of}{after}")
         elif not self.populations and self.starts < self.asked and not self.enough:
-            found.append(
-                f"only {started(self.starts)} of the {self.asked} asked: no more were found in the design space"
-            )
+            some = how_many(self.starts, "start")
+            found.append(f"only {some} of the {self.asked} asked: no more were found in the design space")
         return tuple(found)
 
     @property
@@ -240,11 +241,6 @@ def _kinds(problem: Problem, starts: Array, results: Sequence[Result]) -> tuple[
         count[words] += 1
         basins.setdefault(words, set()).update({r.basin} - {0})
     return tuple((words, count[words], len(basins[words])) for words in sorted(count)) if differ else ()
-
-
-def started(count: int) -> str:
-    """Return a number of starts in words."""
-    return f"{count} start{'' if count == 1 else 's'}"
 
 
 def _percent(share: float) -> str:
