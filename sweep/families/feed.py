@@ -7,13 +7,16 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from functools import partial
+from itertools import combinations
 
 import numpy as np
+from numpy.typing import NDArray
 
 from kernels.families import feed
 from kernels.families.feed import triad
 from kernels.families.feed.motion import EVENTS as _EVENTS
 from kernels.families.feed.motion import OUTPUTS as _POSES
+from kernels.status import NOT_ASSEMBLED, NOT_CONVERGED
 from kernels.types import EPS, Array
 from sweep.families.base import Accuracy, Angles, Columns, Family, Output, Parameter, Step, Work, floats
 from sweep.families.capabilities import Arm, Dimensions, Link, Made, Skeleton
@@ -247,9 +250,6 @@ TRIAD_OUTPUTS = (
 )
 
 
-triad_poses = partial(_poses, feed.triad_poses, triad.OUTPUTS, ("phi",))
-
-
 def rocker_pin(designs: Array, angles: Angles, found: Columns) -> Array:
     """Return H, on the arm of the horizontal chain's rocker."""
     (psi,) = _of_chain(TRIAD_PARAMETERS, designs, angles, "psi")
@@ -261,9 +261,8 @@ def eccentric(number: int) -> Made:
     """Centre of an eccentric."""
 
     def at(designs: Array, angles: Angles, found: Columns) -> Array:
-        x, y, radius, ahead = dimensions(
-            TRIAD_PARAMETERS, designs, *(f"{name}{number}" for name in ("xE", "yE", "rE", "dE"))
-        )
+        names = (f"{name}{number}" for name in ("xE", "yE", "rE", "dE"))
+        x, y, radius, ahead = dimensions(TRIAD_PARAMETERS, designs, *names)
         turn = angles.phi + ahead
         return np.stack([x + radius * np.cos(turn), y + radius * np.sin(turn), 0.0 * turn], axis=-1)
 
@@ -280,6 +279,34 @@ def rack_joint(number: int) -> Made:
         return np.stack([x + along * cos - across * sin, y + along * sin + across * cos, 0.0 * chi], axis=-1)
 
     return Made(("x_t", "y_t", "chi"), at)
+
+
+_SURELY = 1e-6  # of the others' sum a link is longer: more than rounding moves a rocker pin
+
+
+def _apart(designs: Array) -> NDArray[np.bool_]:
+    """Designs that no guess assembles: two links, the rack and the distance of their leads cannot close at phi = 0."""
+    start = Angles.of(np.zeros((1, 1)))
+    leads = [at(designs, start, {})[:, 0] for at in (rocker_pin, eccentric(2).at, eccentric(3).at)]
+    x, y, q = ([dimensions(TRIAD_PARAMETERS, designs, name.format(k))[0] for k in (1, 2, 3)]
+               for name in ("f{}x", "f{}y", "q{}"))  # fmt: skip
+    apart = np.zeros(len(designs), np.bool_)
+    for i, j in combinations(range(3), 2):
+        distance = np.linalg.norm(leads[i] - leads[j], axis=1, keepdims=True)
+        sides = np.sort(np.hstack([distance, np.hypot(x[i] - x[j], y[i] - y[j]), q[i], q[j]]), axis=1)
+        apart |= sides[:, 3] > (1.0 + _SURELY) * sides[:, :3].sum(axis=1)
+    return apart
+
+
+def triad_poses(designs: Array, angles: Angles, wanted: frozenset[str]) -> Columns:
+    """Compute the wanted pose outputs and status; designs of which two leads are too far apart are NOT_ASSEMBLED."""
+    columns = _poses(feed.triad_poses, triad.OUTPUTS, ("phi",), designs, angles, wanted)
+    lost = columns["status"] == NOT_CONVERGED
+    rows = np.flatnonzero(lost.any(axis=1))
+    if rows.size:
+        lost[rows] &= _apart(designs[rows].real)[:, None]
+        columns["status"][lost] = NOT_ASSEMBLED
+    return columns
 
 
 TRIAD_EXAMPLE = {

@@ -94,16 +94,37 @@ def triad(p: dict[str, Any], phi: Any, start: tuple[float, float, float]) -> lis
     return list(place)
 
 
+def _at_start(p: dict[str, float]) -> tuple[dict[str, float], list[complex], list[complex]]:
+    """All dimensions, leads at phi = 0 and joints of the rack seen from the tooth."""
+    full = {name: p.get(name, 0.0) for name in ("h_f", "h_g", "h_alpha", "dh")} | p
+    leads = [complex(full["h_e"] + full["rh"] * mp.expj(rocker({k: mp.mpf(v) for k, v in full.items()}, mp.mpf(0))
+                     + full["dh"]))]  # fmt: skip
+    leads += [complex(full[f"xE{k}"], full[f"yE{k}"]) + full[f"rE{k}"] * cmath.exp(1j * full[f"dE{k}"]) for k in (2, 3)]
+    return full, leads, [complex(full[f"f{k}x"], full[f"f{k}y"]) for k in (1, 2, 3)]
+
+
+def triad_closes(p: dict[str, float], samples: int = 4096) -> bool:
+    """Whether there is an assembly at phi = 0, whatever the guess.
+
+    Two differences of the closures are linear in the tooth, so that the first closure times the square of their
+    determinant is a trigonometric polynomial of the rack's angle, of degree 3: it has to change its sign.
+    """
+    full, leads, arms = _at_start(p)
+    turn = np.exp(2j * np.pi * np.arange(samples) / samples)
+    first, *others = (turn * arm - lead for arm, lead in zip(arms, leads, strict=True))
+    u, v = (other - first for other in others)
+    r, s = (0.5 * (full[f"q{k}"] ** 2 - full["q1"] ** 2 - np.abs(d) ** 2) for k, d in ((2, u), (3, v)))
+    determinant = (np.conj(u) * v).imag
+    left = np.abs(r * v - s * u) ** 2 - (full["q1"] * determinant) ** 2
+    return bool(left.min() < 0.0 < left.max())
+
+
 def triad_from_guess(p: dict[str, float], steps: int) -> list[float] | None:
     """Tooth and rack angle at phi = 0 on the assembly that the guess chooses, None where the leads lock before.
 
     Links as long as the guess needs them take on their own lengths: their squares change evenly, in so many steps.
     """
-    full = {name: p.get(name, 0.0) for name in ("h_f", "h_g", "h_alpha", "dh")} | p
-    leads = [complex(full["h_e"] + full["rh"] * mp.expj(rocker({k: mp.mpf(v) for k, v in full.items()}, mp.mpf(0))
-                     + full["dh"]))]  # fmt: skip
-    leads += [complex(full[f"xE{k}"], full[f"yE{k}"]) + full[f"rE{k}"] * cmath.exp(1j * full[f"dE{k}"]) for k in (2, 3)]
-    arms = [complex(full[f"f{k}x"], full[f"f{k}y"]) for k in (1, 2, 3)]
+    full, leads, arms = _at_start(p)
 
     def links(place: Any) -> Any:
         turned = [cmath.exp(1j * place[2]) * arm for arm in arms]

@@ -51,3 +51,15 @@ def test_triad_starts_on_the_assembly_whose_links_grow_from_those_of_the_guess()
             compared += 1
             np.testing.assert_allclose([got["x_t"], got["y_t"], got["chi"]], followed, rtol=1e-9, atol=1e-9)
     assert 20 <= compared < 40  # some have no assembly near the guess
+
+
+def test_triad_of_which_two_leads_cannot_reach_each_other_is_not_assembled():
+    """It was NOT_CONVERGED, as a design of which only another guess would find an assembly."""
+    random = np.random.default_rng(5)
+    varied = {key: value * np.exp(random.uniform(-0.6, 0.6, 400)) for key, value in TRIAD.items() if key[0] in "xyrfq"}
+    rows = {name: np.full(400, value) for name, value in TRIAD.items()} | varied
+    status = sweep.evaluate("feed_triad", rows, ["x_t"], phi=[0.0])["status"].to_numpy()
+    closes = np.array([naive.triad_closes({k: float(v[i]) for k, v in rows.items()}) for i in range(400)])
+    assert set(status[~closes]) == {st.NOT_ASSEMBLED, st.NOT_CONVERGED}
+    assert set(status[closes]) == {st.OK, st.NOT_CONVERGED}
+    assert np.mean(status[~closes] == st.NOT_ASSEMBLED) > 0.75
