@@ -15,7 +15,7 @@ from kernels.families.slotted import links as fill_links
 from kernels.families.swivel import links as fill_swivel_links
 from kernels.linkage.bodies import DRIVEN, FRAME, SLIDE, TURN
 from kernels.types import Array
-from sweep.families.base import Angles, Columns, Family, Output, Parameter
+from sweep.families.base import Angles, Columns, Family, Output, Parameter, floats
 from sweep.families.capabilities import Assembly, Dimensions, Link, Made, OutputLink, Skeleton
 from sweep.families.curve_features import Singular
 from sweep.families.link_tree import LinkBody, LinkJoint, LinkTree, filled_by
@@ -76,6 +76,17 @@ def unit(designs: Array) -> Array:
     return np.ones(len(designs))
 
 
+def axis_squared(designs: Array, angles: Angles, found: Columns) -> Array:
+    """Squared distance of the ball from the driven axis, in cranks, (n, m): a fork without offset turns at once there.
+
+    Its pressure angle is 0 everywhere, so that the discriminant does not show it.
+    """
+    a, e = dimensions(PARAMETERS, designs, "a", "e")
+    x, y = floats(found, "x_b", "y_b")
+    squared: Array = np.square((x - e) / a) + np.square(y / a)
+    return squared
+
+
 _RATES = ("cos_psi", "sin_psi", "dpsi", "d2psi", "rho", "drho", "d2rho")
 LINKS = LinkTree(
     bodies=(
@@ -112,6 +123,7 @@ FAMILY = Family(
     uses_phi=False,
     points={"b": ("x_b", "y_b", "z_b"), "c": ("x_c", "y_c", "z_c")},
     capabilities=(
+        Singular(axis_squared, ("x_b", "y_b")),
         Dimensions(links("a"), optional=("k",)),
         Assembly("discriminant", "pressure_angle", unit),
         OutputLink(standing(PARAMETERS, "e").at),

@@ -189,6 +189,7 @@ def test_a_feed_rack_close_to_locking_has_its_narrow_peak(gap):
     [
         ("swivel", {"a": 1.0, "e": 1.003, "f": 2e-3, "g": 0.0, "alpha": 0.0, "Lw": 2.0}, "d2y_p"),
         ("inverted_slider_crank", {"a": 1.0, "e": 1.003, "h": 0.0}, "d2psi"),
+        ("slotted", {"a": 1.0, "e": 1.00003}, "d2psi"),
         ("epicyclic_dwell", {"k": 1.9, "a": -0.103, "n": 1.0}, "d2psi"),
     ],
 )
@@ -200,6 +201,13 @@ def test_a_pin_that_passes_close_to_what_it_turns_has_its_narrow_peak(name, desi
     assert_largest(found, output, values)
     exact = np.sqrt(np.trapezoid(values**2, near) / TURN)
     assert abs(found[f"rms_{output}"] - exact) <= found[f"err_rms_{output}"] + 1e-5 * exact
+
+
+@pytest.mark.parametrize(("a", "e"), [(2.0, 1.5), (3.7, 1.1)])
+def test_a_ball_that_passes_through_the_driven_axis_has_no_largest_velocity(a, e):
+    """Both axes square to each other, the crank circle is seen as a segment: psi jumps by pi where it meets the axis."""
+    found = summary("slotted", {"a": a, "e": e, "alpha": 0.5 * np.pi}, ["max_abs_dpsi"])
+    assert found["status"] == st.NOT_CONVERGED
 
 
 def test_the_least_pressure_angle_of_a_cam_is_zero_within_its_error():
