@@ -223,7 +223,9 @@ def first_of_equals(row: Index, peaks: Peaks, chosen: Index) -> Index:
     best[row[chosen]] = chosen
     best = best[row]
     known = 2.0 * np.minimum(peaks.err_height, peaks.err_height[best])
-    late = np.where(peaks.height >= peaks.height[best] - known, -np.mod(peaks.phi, TWO_PI), -np.inf)
+    # A place just before the end of the turn, by no more than its error, is its beginning.
+    place = np.mod(peaks.phi + peaks.err_phi, TWO_PI)
+    late = np.where(peaks.height >= peaks.height[best] - known, -place, -np.inf)
     first = np.full(row.max(initial=0) + 1, -1)
     scan.best_candidate(row, late, np.full(first.size, -np.inf), first)
     found: Index = first[row[chosen]]

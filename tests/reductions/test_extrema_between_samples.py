@@ -312,3 +312,13 @@ def test_of_tops_as_high_as_each_other_the_place_is_that_of_the_first(sense, dri
         found = sweep.summarise("heddle", drive, [f"phi_{kind}_y", f"{kind}_y"], accuracy=target).iloc[0]
         assert abs(found[f"phi_{kind}_y"] - tops[0]) <= found[f"err_phi_{kind}_y"] + 2.0 * TURN / FINE.size
         assert abs(found[f"{kind}_y"] - sense * values.max()) <= found[f"err_{kind}_y"] + 1e-5
+
+
+@pytest.mark.parametrize(("k", "n", "output"), [(0.3, 2.0, "min_dpsi"), (0.3, 4.0, "max_d3psi"), (1.0, 4.0, "min_dpsi")])
+def test_a_top_at_the_beginning_of_the_turn_is_the_first(k, n, output):
+    """Rounding put it a hair before the end of the turn, behind its equals."""
+    for target in (1e-2, 1e-4, 1e-6, 1e-8, 1e-10):
+        drive = {"k": k, "a": 0.0, "n": n}
+        found = sweep.summarise("epicyclic_dwell", drive, [f"phi_{output}"], accuracy=target).iloc[0]
+        place = found[f"phi_{output}"]
+        assert min(place, TURN - place) <= 2.0 * found[f"err_phi_{output}"]
