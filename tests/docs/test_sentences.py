@@ -2,14 +2,17 @@
 
 from __future__ import annotations
 
+import re
 from pathlib import Path
 from types import SimpleNamespace
 
 import pytest
 from click.testing import CliRunner
 
+import sweep
 from sweep.cli import main
 from sweep.cli.plan import _optimiser
+from sweep.families import NAMES, family
 from sweep.report.answer import search_warnings
 from sweep.study.study import OptimiseSettings
 
@@ -26,6 +29,21 @@ def test_margin_says_what_it_is_and_when_the_linkage_jams(name):
 def test_page_on_study_files_says_how_maximised_outputs_are_stored():
     page = (DOCS / "study-files.md").read_text(encoding="utf-8")
     assert "Maximised outputs are stored negated, as `minus_<output>`" in page
+
+
+def has_box(name):
+    try:
+        sweep.summarise(name, family(name).example, ["box_x"], samples=16)
+    except sweep.InputError:
+        return False
+    return True
+
+
+def test_page_on_ready_limits_names_the_families_that_have_a_box():
+    """It gave cams none and the feed one; it is the other way round."""
+    page = (DOCS / "ready-limits.md").read_text(encoding="utf-8")
+    sentence = page.split("* **Box.**")[1].split(".")[0]
+    assert set(re.findall(r"`(\w+)`", sentence)) == set(filter(has_box, NAMES))
 
 
 def test_plan_says_when_a_search_ends():

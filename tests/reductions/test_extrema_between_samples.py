@@ -314,7 +314,9 @@ def test_of_tops_as_high_as_each_other_the_place_is_that_of_the_first(sense, dri
         assert abs(found[f"{kind}_y"] - sense * values.max()) <= found[f"err_{kind}_y"] + 1e-5
 
 
-@pytest.mark.parametrize(("k", "n", "output"), [(0.3, 2.0, "min_dpsi"), (0.3, 4.0, "max_d3psi"), (1.0, 4.0, "min_dpsi")])
+@pytest.mark.parametrize(
+    ("k", "n", "output"), [(0.3, 2.0, "min_dpsi"), (0.3, 4.0, "max_d3psi"), (1.0, 4.0, "min_dpsi")]
+)
 def test_a_top_at_the_beginning_of_the_turn_is_the_first(k, n, output):
     """Rounding put it a hair before the end of the turn, behind its equals."""
     for target in (1e-2, 1e-4, 1e-6, 1e-8, 1e-10):
