@@ -205,7 +205,7 @@ def test_a_pin_that_passes_close_to_what_it_turns_has_its_narrow_peak(name, desi
 
 @pytest.mark.parametrize(("a", "e"), [(2.0, 1.5), (3.7, 1.1)])
 def test_a_ball_that_passes_through_the_driven_axis_has_no_largest_velocity(a, e):
-    """Both axes square to each other, the crank circle is seen as a segment: psi jumps by pi where it meets the axis."""
+    """Of square axes the crank circle is seen as a segment: psi jumps by pi where that meets the driven axis."""
     found = summary("slotted", {"a": a, "e": e, "alpha": 0.5 * np.pi}, ["max_abs_dpsi"])
     assert found["status"] == st.NOT_CONVERGED
 
