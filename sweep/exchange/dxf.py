@@ -16,7 +16,12 @@ if TYPE_CHECKING:
     from sweep.evaluation.joints import Part
 
 LAYERS = {"LINKS": 5, "JOINTS": 7, "PIVOTS": 1, "AXES": 8, "PATHS": 3, "TEXT": 7}
-VIEWS = {"front": (0, 1), "side": (2, 1), "top": (0, 2)}
+# To the right and upwards: the side is seen from the left, the top from above, where z points down.
+VIEWS = {
+    "front": np.eye(3)[:2],
+    "side": np.eye(3)[[2, 1]],
+    "top": np.array([[1.0, 0.0, 0.0], [0.0, 0.0, -1.0]]),
+}
 UNITS = {"mm": 4, "m": 6}
 
 
@@ -64,11 +69,10 @@ def write_dxf(placed: list[Placed], path: Path, unit: str) -> None:
         size = extent(same)
         points = np.vstack([path for part in same for path in part.joints.values()])
         spatial = float(np.ptp(points[:, 2])) > 1e-9 * size
-        for view, columns in VIEWS.items():
+        for view, seen in VIEWS.items():
             if view != "front" and not spatial:
                 continue
-            seen = list(columns)
-            flat = points[:, seen]
+            flat = points @ seen.T
             shift = np.array([0.0 if first else right + 0.25 * size - float(flat[:, 0].min()), 0.0])
             first, right = False, float(flat[:, 0].max() + shift[0])
             for part in same:
@@ -101,9 +105,9 @@ def add_tables(path: Path, tables: Sequence[tuple[str, Sequence[str], Sequence[S
     document.saveas(path)
 
 
-def _draw(space: Any, part: Part, seen: list[int], shift: Array, size: float) -> None:
-    front = tuple(seen) == VIEWS["front"]
-    at = {name: path[:, seen] + shift for name, path in part.joints.items()}
+def _draw(space: Any, part: Part, seen: Array, shift: Array, size: float) -> None:
+    front = seen is VIEWS["front"]
+    at = {name: path @ seen.T + shift for name, path in part.joints.items()}
     for link in part.links:
         corners = [at[name][0] for name in link.joints]
         if len(corners) > 1:
@@ -120,7 +124,7 @@ def _draw(space: Any, part: Part, seen: list[int], shift: Array, size: float) ->
         if name not in part.kinds and float(np.ptp(path, axis=0).max()) > 0.0:
             space.add_lwpolyline([tuple(p) for p in path[:-1]], close=True, dxfattribs={"layer": "PATHS"})
     for name, axis in part.axes.items():
-        middle, along = at[name][0], 0.12 * size * axis[seen]
+        middle, along = at[name][0], 0.12 * size * seen @ axis
         if front:
             middle, along = np.append(middle, part.joints[name][0, 2]), 0.12 * size * axis
         if float(np.linalg.norm(along)) > 1e-6 * size:

@@ -52,6 +52,7 @@ def draw(axes: Axes, parts: Sequence[Part], view: str, unit: str, positions: int
     if view in VIEWS:
         axes.set_xlabel(f"{view[0]} [{unit}]")
         axes.set_ylabel(f"{view[1]} [{unit}]")
+        axes.yaxis.set_inverted(view == "xz")  # seen from above z points down, else it is a mirror image
     else:
         axes.set_axis_off()
 

@@ -15,11 +15,12 @@ from sweep.errors import InputError
 from sweep.exchange.dxf import add_tables
 from sweep.exchange.export import export
 from sweep.exchange.scene import exists, frames_of, is_spatial, over, pose, shown_name
+from sweep.optimise.manufacture.tolerance import touched
 from sweep.plot.drawing import draw
 from sweep.report.dataset import Dataset, as_result, chosen, cyclogram_of, read_dataset, row_of
 from sweep.report.figures import house_style, new_figure
 from sweep.report.quantities import number, quantity, rpm
-from sweep.report.tables import limit_states, parameter_rows
+from sweep.report.tables import limit_states, parameter_rows, value_of
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -31,7 +32,7 @@ VIEWS_HIGH, TABLES_HIGH = 5.7, 6.0  # inches, of the views and of each row of ta
 LINES = 24  # of a table before it goes on in the next one
 WIDTHS = ((1.5, 1.1, 1.0), (1.0, 1.0))  # of the tables in the first row and in those below it, as shares
 POSES = 180  # of the paths of joints
-WORDS = {"xy": "front", "zy": "side", "xz": "top"}
+WORDS = {"xy": "front", "zy": "side, from the left", "xz": "top"}
 LETTERS, PAD, LEAST = 23.0, 1.0, 12.0  # of an inch, of a cell's rim, of the last column
 DIGITS = 6  # of coordinates: a micrometre in half a metre
 ENDINGS = (".pdf", ".svg", ".dxf")
@@ -81,14 +82,17 @@ def write_sheet(folder: str | Path, design: str | int | None, path: str | Path, 
 def tables_of(data: Dataset, parts: Sequence[Part]) -> list[Table]:
     """Return dimensions with tolerances, hardpoints of one position, limits, cyclogram, and inputs of effects."""
     study, tolerance = data.study, data.study.tolerance
-    spread = {} if tolerance is None else {"length": tolerance.lengths, "angle": tolerance.angles}
+    names = study.family.parameter_names
+    design = np.array([value_of(data.result, name) for name in names])
+    wide = np.zeros(len(names)) if tolerance is None else touched(study.family, design, tolerance)
+    spread = dict(zip(names, wide.tolist(), strict=True))
     units = {p.name: p.unit for p in study.family.parameters}
     own = study.bare.parameter_names
     lines: list[tuple[str, ...]] = []
     others: list[tuple[str, ...]] = []
     for row in parameter_rows(data):
         shown = quantity(row.name, {"length": "mm", "angle": "rad"}.get(units[row.name], "1"))
-        give = spread.get(units[row.name], 0.0)
+        give = spread[row.name]
         member = row.name.rpartition(".")[0]
         text = row.text.removeprefix(f"{member}: ")
         line = (row.name, row.value, f"± {shown.show(give, 3)}" if give else "", text)

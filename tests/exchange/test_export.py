@@ -123,6 +123,17 @@ def test_drawing_of_a_spatial_stage_has_three_views_and_of_a_planar_one_the_fron
         assert len(links) == 3 * views
 
 
+def test_views_are_seen_from_in_front_from_the_left_and_from_above_and_are_no_mirror_images(tmp_path):
+    document = ezdxf.readfile(sweep.export("rssr", scaled("rssr"), tmp_path / "views.dxf", phi=0.7))
+    cranks = [np.array(x.get_points("xy")) for x in document.modelspace().query('LWPOLYLINE[layer=="LINKS"]')][::3]
+    at = sweep.joints("rssr", scaled("rssr"), 0.7).set_index("joint")[["x", "y", "z"]].astype(float)
+    x, y, z = at.loc["b"] - at.loc["a"]
+    for crank, sides in zip(cranks, ([x, y], [z, y], [x, -z]), strict=True):
+        np.testing.assert_allclose(crank[1] - crank[0], sides, atol=1e-9)
+    (axes,) = sweep.plot.mechanism("rssr", scaled("rssr"), view="xz")
+    assert axes.yaxis_inverted() and not axes.xaxis_inverted()
+
+
 def solved(model, data, phi, crank="crank"):
     """Joint positions that close MuJoCo's own loop at a crank angle, by Newton with MuJoCo's own Jacobians."""
     data.qpos[model.joint(crank).qposadr[0]] = phi

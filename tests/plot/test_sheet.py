@@ -25,7 +25,7 @@ STUDY = {
     "limits": {"swing": {"min": 30.0, "unit": "deg"}},
     "objective": {"minimise": "max_abs_d2psi"},
     "optimise": {"starts": 2},
-    "tolerance": {"lengths": "0.02 mm", "angles": "0.05 deg"},
+    "tolerance": {"lengths": "0.02 mm", "angles": "0.05 deg", "own": {"c": "0.005 mm", "g": "0 mm"}},
 }
 
 
@@ -42,6 +42,7 @@ def test_tables_hold_dimensions_tolerances_joints_and_limits(folder):
     by_name = {line[0]: line[1:] for line in dimensions.lines}
     assert by_name["b"][:2] == ("40 mm", "± 0.02 mm") and by_name["alpha"][:2] == ("60°", "± 0.05°")
     assert by_name["branch"][1] == ""
+    assert by_name["c"][1] == "± 0.005 mm" and by_name["g"][1] == ""  # of their own
     true = sweep.joints("rssr", found.design, 0.3).set_index("joint")[["x", "y", "z"]]
     for name, *at in joints.lines:
         np.testing.assert_allclose([float(x.replace("−", "-")) for x in at], true.loc[name.lower()], atol=5e-5)
