@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from kernels.types import TWO_PI
 from kernels.types import Array as Array
+from sweep.families.parameter import PER_RADIAN as PER_RADIAN
 from sweep.families.parameter import Output as Output
 from sweep.families.parameter import Parameter as Parameter
 from sweep.families.parameter import Unit as Unit
@@ -34,8 +35,7 @@ class Turn:
 class Interval:
     """An interval of an input variable; its ends are candidates for extrema.
 
-    ``ends(designs)`` gives the first and the last value of the variable for each row of the (n, P) design matrix, both
-    (n,).  ``poses`` of the family gets the values of the variable as ``angles.phi``; cosine and sine mean nothing.
+    ``ends(designs)``, of (n, P), gives both (n,).  ``poses`` gets it as ``angles.phi``; cosine and sine mean nothing.
     """
 
     kind: ClassVar[str] = "interval"

@@ -18,7 +18,7 @@ from kernels.families.feed.motion import EVENTS as _EVENTS
 from kernels.families.feed.motion import OUTPUTS as _POSES
 from kernels.status import NOT_ASSEMBLED, NOT_CONVERGED
 from kernels.types import EPS, Array
-from sweep.families.base import Accuracy, Angles, Columns, Family, Output, Parameter, Step, Work, floats
+from sweep.families.base import PER_RADIAN, Accuracy, Angles, Columns, Family, Output, Parameter, Step, Work, floats
 from sweep.families.capabilities import Arm, Dimensions, Link, Made, Skeleton
 from sweep.families.curve_features import Singular
 from sweep.families.feed_trees import three_leads, two_leads
@@ -101,8 +101,8 @@ FEEDING_OUTPUTS = (
     Output("phi_entry", "rad", "event: crank angle at which the tooth rises through the plate, in [0, 2 pi)", "(11)"),
     Output("phi_leave", "rad", "event: crank angle at which it sinks through the plate, in [0, 2 pi)", "(11)"),
     Output("feed_angle", "rad", "crank angle from entry to leaving: time in the fabric times the speed", "(11)"),
-    Output("entry_speed", "length", "dy_t at entry, per radian: times the speed it is that of the impact", "(12)"),
-    Output("leave_speed", "length", "dy_t at leaving, per radian", "(12)"),
+    Output("entry_speed", PER_RADIAN, "dy_t at entry, per radian: times the speed it is that of the impact", "(12)"),
+    Output("leave_speed", PER_RADIAN, "dy_t at leaving, per radian", "(12)"),
     Output("stitch_length", "length", "way of the tooth along the feed from entry to leaving, signed", "(13)"),
     Output("rise", "length", "greatest height of the tooth above the plate from entry to leaving", "(14)"),
     Output("flatness", "1", "area under the path over rise times stitch length: 1 for a rectangle", "(14)"),

@@ -85,6 +85,7 @@ WORDS = {
     "acceleration": "mm/s^2",
     "time": "s",
 }
+PER_RADIAN = "length/rad"  # of a speed by the crank angle whose name does not say so, as that of ds does
 _WORD = re.compile(r"[a-z_]{2,}")
 _PRODUCT = re.compile(r"(1|rad|s|N|[a-z_]{2,})(\^[2-9])?([*/](rad|s|N|[a-z_]{2,})(\^[2-9])?)*")
 

@@ -112,10 +112,12 @@ def quantity(name: str, unit: str) -> Quantity:
     reduction, base = next(split(name, Turn()), (None, name))
     symbol_form, words_form = (reduction.symbol, reduction.words) if reduction else ("{}", "{}")
     order, root, stage = _derivative(base)
+    bare = unit.removesuffix("/rad")
     followed = root in ("s", "psi", "dev")  # the follower's own motion has a symbol and a word each
     symbolic = followed and (order > 0 or root != "dev")
     symbol, words = _called(order, root, stage)
     symbol, words = symbol_form.format(symbol), words_form.format(words)
+    unit, order = bare, max(order, int(unit != bare))  # a speed whose unit says that it is one
     if is_place(name) or (order == 0 and unit in ("rad", "angle")):
         return Quantity(name, symbol, words, "°", math.degrees(1.0), symbolic)
     if order == 0:

@@ -11,11 +11,14 @@ import pandas as pd
 import pytest
 from scipy import stats
 
+import sweep
 from kernels import status as st
 from sweep.dataset.files import MADE, beside
+from sweep.effects import extended
 from sweep.engine.run import run
 from sweep.errors import StudyError
 from sweep.evaluation.summaries import design_outputs
+from sweep.evaluation.tables import design_matrix
 from sweep.families import family
 from sweep.families.base import Accuracy
 from sweep.optimise import Problem
@@ -85,6 +88,27 @@ def test_shared_extrema_have_the_slopes_of_both_sides_whether_least_or_largest()
         row = table[(table.parameter == "e") & (table.output == output)].iloc[0]
         assert row.growing == pytest.approx(growing, rel=1e-12), output
         assert row.shrinking == pytest.approx(-growing, rel=1e-12), output
+
+
+def test_a_curve_that_is_the_same_all_over_the_turn_has_the_slopes_of_every_angle() -> None:
+    """A tool on the axis of its rocker weighs what it weighs; beside it, m (psi'' e_t - psi'^2 e_r) omega^2 more."""
+    mass, weight, omega = 0.2, 3.0, 10.0
+    given = dict(zip(RSSR.parameter_names, DESIGN.tolist(), strict=True))
+    given |= {"m_tool": mass, "gravity_x": -weight, "speed": omega, "tool_x": 0.0, "tool_y": 0.0, "tool_z": 0.0}
+    phi = np.linspace(0.0, 2.0 * math.pi, 100_001)
+    psi, first, second = (
+        sweep.evaluate("rssr", given, ["psi", "dpsi", "d2psi"], phi=phi)[["psi", "dpsi", "d2psi"]].to_numpy().T
+    )
+    pull = mass * omega**2 * (-second * np.sin(psi) - first**2 * np.cos(psi))  # along x, against the weight
+    low, high = pull.min(), pull.max()
+    known = {"min_tip_load": (low, high), "max_tip_load": (high, low), "minus_min_tip_load": (-low, -high)}
+    known |= {"max_abs_tip_load": (high, low), "range_tip_load": (high - low, low - high)}
+    whole = extended(RSSR, list(known))
+    table = pd.DataFrame(sensitivities(whole, design_matrix(whole, given)[0][0], tuple(known)))
+    for output, ends in known.items():
+        row = table[(table.parameter == "tool_x") & (table.output == output)].iloc[0]
+        # extremes of the dense grid miss a peak by the square of their distance
+        assert (row.growing, row.shrinking) == pytest.approx(ends, rel=1e-7), output
 
 
 def test_planar_mechanism_has_its_alpha_and_offsets_in_second_order_only() -> None:

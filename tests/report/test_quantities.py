@@ -3,16 +3,22 @@
 from __future__ import annotations
 
 import math
+import re
+from pathlib import Path
 from types import SimpleNamespace
 
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as some
 
+from sweep.families.names import is_place
+from sweep.quantities.units import internal_unit
 from sweep.report.dataset import Dataset
 from sweep.report.quantities import change, number, percent_change, quantity
+from sweep.study.load import load_study
 
 RPM = 2.0 * math.pi / 60.0
+STUDIES = Path(__file__).parents[2] / "studies"
 
 
 @pytest.mark.parametrize(
@@ -38,6 +44,8 @@ RPM = 2.0 * math.pi / 60.0
         ("max_abs_d2alpha", "1", "max |alpha″|", "largest acceleration of alpha", "rad/rad²"),
         ("alpha", "rad", "alpha", "alpha", "°"),
         ("looper.range_p_y", "length", "range of y of P looper", "range of y of P of the looper", "mm"),
+        ("max_speed", "length/rad", "max speed", "largest speed", "mm/rad"),
+        ("err_rms_pace", "mm/rad", "error of rms pace", "error of the root mean square of pace", "mm/rad"),
         ("looper.dtip_x", "length", "x′ of tip looper", "velocity of x of tip of the looper", "mm/rad"),
         ("speed1", "rad/s", "speed₁", "speed of stage 1", "rpm"),
         ("omega3", "rad/s", "omega₃", "omega of stage 3", "rad/s"),
@@ -63,6 +71,7 @@ def test_values_at_speed_are_those_calculated_by_hand() -> None:
     # 1 rad/rad^3 at 60/min: (2 pi)^3 rad/s^3
     assert quantity("d3psi", "1").at_speed(1.0, 60.0 * RPM) == "248.1\u00a0rad/s³"
     assert quantity("ds", "mm").at_speed(2.0, 500.0) == "1\u00a0m/s"
+    assert quantity("max_pace", "length/rad").at_speed(2.0, 500.0) == "1\u00a0m/s"
     assert quantity("looper.max_acceleration_p", "mm").at_speed(12.0, 7000.0 * RPM) == "6448\u00a0m/s²"
     assert quantity("speed", "rad/s").show(7000.0 * RPM) == "7000\u00a0rpm"
     assert quantity("stroke", "mm").at_speed(24.5, 500.0) == ""
@@ -151,3 +160,14 @@ def test_rounding_of_an_angle_or_a_length_is_none():
     assert (
         quantity("a_room", "mm").show(-7e-15) == "0\u00a0mm" and quantity("err_a_room", "mm").show(7e-15) != "0\u00a0mm"
     )
+
+
+@pytest.mark.parametrize("study", ["overlock208", "looper-sphere", "feed208"])
+def test_speeds_by_the_crank_angle_are_shown_so_whatever_they_are_called(study: str) -> None:
+    family = load_study(STUDIES / study).family
+    outputs = [*family.pose_outputs, *(o for step in family.steps for o in step.provides)]
+    words = re.compile("derivative of the [dh]|derivative of [ab]_|per radian|velocity analogue")
+    rates = [o for o in outputs if words.search(o.text) and not is_place(o.name)]
+    shown = [quantity(o.name, internal_unit(o.unit)) for o in rates if o.unit != "1"]
+    assert shown and [one.name for one in shown if one.unit != "mm/rad" and one.order < 2] == []
+    assert {one.speed_unit for one in shown} <= {"m/s", "m/s²", "m/s³"}

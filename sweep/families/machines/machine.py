@@ -12,7 +12,7 @@ import numpy as np
 from kernels.chains.links import chain_rule
 from kernels.status import OK
 from kernels.types import Array
-from sweep.families.base import Angles, Columns, Event, Family, Output, Parameter, of_family
+from sweep.families.base import PER_RADIAN, Angles, Columns, Event, Family, Output, Parameter, of_family
 from sweep.families.capabilities import Assembly
 from sweep.families.chain import magnitude
 from sweep.families.curve_features import of_members, on_part
@@ -154,11 +154,12 @@ def _outputs(placed: list[Member]) -> list[Output]:
         replace(o, name=f"{m.name}.{o.name}", own=f"{m.name}.{o.base}") for m in placed for o in m.family.pose_outputs
     ]
     for m in placed:
-        for rate, points, what in (("", m.points, ""), ("d", m.moving, "velocity analogue, ")):
+        for rate, unit, points, what in (
+            ("", "length", m.points, ""),
+            ("d", PER_RADIAN, m.moving, "velocity analogue, "),
+        ):
             outputs += [
-                Output(
-                    f"{m.name}.{rate}{p}_{axis}", "length", f"{m.name}: {what}{axis} of {p}, machine's frame", "ours"
-                )
+                Output(f"{m.name}.{rate}{p}_{axis}", unit, f"{m.name}: {what}{axis} of {p}, machine's frame", "ours")
                 for p in points
                 for axis in AXES
             ]

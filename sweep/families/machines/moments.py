@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 
 from kernels.types import Array
-from sweep.families.base import Output, Parameter
+from sweep.families.base import PER_RADIAN, Output, Parameter
 from sweep.families.machines.relations import Relation
 from sweep.families.machines.segments import Gap, cross, dot, minus
 from sweep.families.machines.tools import Blade, Needle, rate_of
@@ -112,13 +112,13 @@ class Taking(Relation):
         found = [Output(f"{self.name}_{what}", "length", text, "(12)") for what, text in texts.items()]
         found += [
             Output(
-                f"{self.name}_d{what}", "length", f"derivative of {self.name}_{what} by phi of the main shaft", "(12)"
+                f"{self.name}_d{what}", PER_RADIAN, f"derivative of {self.name}_{what} by phi of the main shaft", "(12)"
             )
             for what in texts
         ]
         speed = "speed of the tip relative to the needle, per radian of the main shaft"
         gap = Output(self.gap.name, "length", "gap between needle and blade, less their radii", "(9)", kinks=True)
-        return (*found, Output(f"{self.name}_speed", "length", speed, "(12)"), gap)
+        return (*found, Output(f"{self.name}_speed", PER_RADIAN, speed, "(12)"), gap)
 
     @property
     def parameters(self) -> tuple[Parameter, ...]:

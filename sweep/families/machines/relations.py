@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from sweep.errors import InputError, choices
-from sweep.families.base import Output, Parameter
+from sweep.families.base import PER_RADIAN, Output, Parameter
 from sweep.families.sites import AXES
 
 
@@ -124,7 +124,7 @@ class Speed(Relation):
     def outputs(self) -> tuple[Output, ...]:
         """The speed, per radian of the main shaft."""
         text = f"speed of {self.points[-1]}" + (f" relative to {self.points[0]}" if len(self.points) == 2 else "")
-        return (Output(self.name, "length", f"{text}, per radian of the main shaft", "ours"),)
+        return (Output(self.name, PER_RADIAN, f"{text}, per radian of the main shaft", "ours"),)
 
     def needs(self, wanted: frozenset[str]) -> frozenset[str]:
         """Return velocities of the points."""

@@ -26,7 +26,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from kernels.types import TWO_PI
-from sweep.families.base import Output, Parameter
+from sweep.families.base import PER_RADIAN, Output, Parameter
 from sweep.families.machines.relations import Relation
 from sweep.families.machines.thread_way import (
     PHI,
@@ -121,7 +121,7 @@ class ThreadBalance(Relation):
         ]
         if self.moves:
             found += [
-                ("rate", "length", f"derivative of the demand of thread {who} between events"),
+                ("rate", PER_RADIAN, f"derivative of the demand of thread {who} between events"),
                 ("velocity", "length/s", f"of thread {who}: {speed}"),
             ]
         if self.allowed is not None:

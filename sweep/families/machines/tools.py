@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 from typing import Any, TypeAlias
 
 from sweep.errors import InputError, MissingInput, choices, known_keys, number, sign
-from sweep.families.base import Output
+from sweep.families.base import PER_RADIAN, Output
 from sweep.families.capabilities import OutputLink
 from sweep.families.machines.relations import Relation, two_names
 from sweep.families.machines.segments import Body, Gap, dot, minus
@@ -184,7 +184,7 @@ class Height(Relation):
         return (
             Output(self.name, "length", text, "ours"),
             Output(f"{self.name}_fabric", "length", f"{text}, less the fabric's thickness", "ours"),
-            Output(f"d{self.name}", "length", f"derivative of the {text} by phi of the main shaft", "ours"),
+            Output(f"d{self.name}", PER_RADIAN, f"derivative of the {text} by phi of the main shaft", "ours"),
         )
 
     def needs(self, wanted: frozenset[str]) -> frozenset[str]:

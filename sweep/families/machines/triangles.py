@@ -15,7 +15,7 @@ import numpy as np
 
 from kernels import status as st
 from kernels.types import TWO_PI
-from sweep.families.base import Columns, Output, Step
+from sweep.families.base import PER_RADIAN, Columns, Output, Step
 from sweep.families.machines.crossings import (
     TANGENT,
     Places,
@@ -75,7 +75,9 @@ class Entering(Relation):
         of = "of the tip above the plane of the triangle"
         return (
             Output(f"{self.name}_above", "length", f"height {of}", "(13)"),
-            Output(f"{self.name}_dabove", "length", f"derivative of the height {of} by phi of the main shaft", "(13)"),
+            Output(
+                f"{self.name}_dabove", PER_RADIAN, f"derivative of the height {of} by phi of the main shaft", "(13)"
+            ),
             *(Output(f"{self.name}_to_{side}", "length", TEXTS[f"from_{side}"], "(13)") for side in SIDES),
         )
 
@@ -111,7 +113,9 @@ def entering_step(entering: Entering, machine: Machine) -> Step:
     name = entering.name
     place = Output(f"phi_{name}", "rad", "crank angle at which the tip passes the plane of the triangle", "(13)")
     count = Output(f"count_{name}", "1", "passages of the plane in the stated sense and window", "(13)", jumps=True)
-    provides = (place, count, *(Output(f"{name}_{key}", "length", text, "(13)") for key, text in TEXTS.items()))
+    units = {"pace": PER_RADIAN}
+    read = (Output(f"{name}_{key}", units.get(key, "length"), text, "(13)") for key, text in TEXTS.items())
+    provides = (place, count, *read)
     return step_of(name, provides, machine, partial(_found, entering), partial(_read, entering))
 
 

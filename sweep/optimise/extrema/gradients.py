@@ -8,15 +8,19 @@ from typing import Any
 
 import numpy as np
 
+from kernels.types import TWO_PI
 from sweep.families.base import Accuracy, Angles, Array, Family, Step
 from sweep.optimise.extrema.points import STEP, Curves, Points
-from sweep.optimise.extrema.scanned import CROSSING, EDGE, PASSING, followed
+from sweep.optimise.extrema.scanned import CROSSING, EDGE, PASSING, STATIC, followed
 from sweep.optimise.problem.statement import Problem
+from sweep.quantities.measures import Measure
 from sweep.reductions.steps import applying_step
 
 # Mixed derivative of the slope: complex step in the variable, fourth-order difference in the crank angle.
 OFFSET = 1e-3
 ALONG = 1e-5  # of the bounds of a variable, for differences between designs at their edges
+LEVEL = 1e-9  # of the bounds of a variable: a curve that varies less than by such a step is the same all over the turn
+LOOKS, ZOOM = 256, 16  # angles of a turn at which slopes of a level curve are looked at; finer ones between two of them
 STENCIL = ((-2.0, 1.0 / 12.0), (-1.0, -8.0 / 12.0), (1.0, 8.0 / 12.0), (2.0, -1.0 / 12.0))
 
 # Twelve times the weights of the derivative at the first of five points, in their middle, and at the last.
@@ -93,6 +97,54 @@ def _at_edges(curves: Curves, designs: Any, points: Points, values: Array, moves
         own = points.series[which] == number
         x = curves.curve(series, columns)[:, own] if own.any() else np.zeros((2 * n, 0))
         values[which[own]] = ((x[:n] - x[n:]) / (2.0 * ALONG)).T
+
+
+def level_gradients(curves: Curves, designs: Any, points: Points, measure: Measure, slopes: Array) -> Array:
+    """Return gradients (k, n) of a reduction of a curve that is the same all over the turn; none of another one.
+
+    Every angle has its extreme then, so that the slopes of all angles count: where a variable grows the largest of them
+    is that of a maximum, that of a range is the largest minus the least.
+
+    Parameters
+    ----------
+    curves, designs, points : as of :func:`gradients`
+    measure : the reduction, or the negative of one
+    slopes : (K, n) its gradients at the points, whose size tells a level curve from rounding
+    """
+    of = measure.parts[0] if measure.kind == "minus" else measure
+    if of.kind not in ("max", "min", "max_abs", "range") or len(of.series) != 1 or of.series[0].window:
+        return slopes[:0]
+    number = curves.series.index(of.series[0])
+    values = points.value[points.series == number]
+    noise = max(LEVEL * np.abs(slopes).max(initial=0.0), 1e-13 * np.abs(values).max())
+    if np.ptp(values) > noise:
+        return slopes[:0]
+    low, high = _along_the_turn(curves, designs, number)
+    zero = of.kind == "max_abs" and abs(values[0]) <= noise
+    sign = np.sign(values[0]) if of.kind == "max_abs" and not zero else of.sign
+    rows = [high - low, low - high] if of.kind == "range" else [high, low, *([-high, -low] if zero else [])]
+    return (-sign if measure is not of else sign) * np.array(rows)
+
+
+def _along_the_turn(curves: Curves, designs: Any, number: int) -> tuple[Array, Array]:
+    """Return the least and the largest derivative of a curve over the turn by each scaled variable, (n,)."""
+    every, step = np.arange(len(designs)), TWO_PI / LOOKS
+
+    def at(phi: Array) -> Array:
+        there = Points.of((number, angle, 1.0, STATIC, 0.0, 0.0) for angle in phi.ravel())
+        return np.asarray(curves.values(designs, there).imag / STEP, np.float64)
+
+    def extreme(sign: float) -> Array:
+        phi = first[(sign * coarse).argmax(axis=1)]
+        for width in (step, step / ZOOM, step / ZOOM**2):
+            near = phi[:, None] + width * np.linspace(-1.0, 1.0, 2 * ZOOM + 1)
+            fine = at(near).reshape(len(every), *near.shape)[every, every]
+            phi = near[every, (sign * fine).argmax(axis=1)]
+        return np.asarray(sign * (sign * fine).max(axis=1))
+
+    first = step * np.arange(LOOKS, dtype=np.float64)
+    coarse = at(first)
+    return extreme(-1.0), extreme(1.0)
 
 
 def reading_gradient(curves: Curves, designs: Any, output: str, phi: float, moves: Array) -> Array:

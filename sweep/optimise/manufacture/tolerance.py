@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from sweep.evaluation.summaries import design_outputs
 from sweep.families.base import Accuracy, Array, Family, floats
 from sweep.families.names import MINUS, is_flag, judged_by, without_minus
-from sweep.optimise.extrema.gradients import scalar_gradient, step_gradients, stepped
+from sweep.optimise.extrema.gradients import level_gradients, scalar_gradient, step_gradients, stepped
 from sweep.optimise.local.model import Model
 from sweep.optimise.problem.program import Program
 from sweep.optimise.problem.statement import Problem
@@ -123,9 +123,12 @@ def _ends(problem: Problem, design: Array) -> tuple[float, Array, Array]:
     nothing = np.full(len(problem.variables), math.nan)
     if not own.any() or not math.isfinite(value):
         return math.nan, nothing, nothing
+    points = state.form.points
     inner = -(state.form.constant + state.form.matrix @ state.atoms)[own] * model.scale
-    jacobian = -model.jacobian(state.fractions, state.form, state.form.points)[own] * model.scale
-    shared = jacobian[inner >= inner.max() - TIE * abs(inner.max())] * _outward(program.objective, float(inner.max()))
+    jacobian = -model.jacobian(state.fractions, state.form, points)[own] * model.scale
+    shared = jacobian[inner >= inner.max() - TIE * abs(inner.max())]
+    level = level_gradients(model.curves, stepped(problem, design, state.fractions), points, program.objective, shared)
+    shared = np.concatenate([shared, level]) * _outward(program.objective, float(inner.max()))
     return value, shared.min(axis=0), shared.max(axis=0)
 
 
