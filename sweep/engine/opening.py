@@ -109,12 +109,16 @@ def old_name() -> str:
     return f"{files.OLD}/{time.strftime('%Y%m%d-%H%M%S')}"
 
 
+def words_of(study: Study) -> dict[str, Any]:
+    """Return what a plan says of its study, down to what decides no value: reports are written from it."""
+    return {"about": {"name": study.name, "title": study.title, "question": study.question}, "data": study.data}
+
+
 def plan_note(study: Study, folder: Path, plan: Plan) -> dict[str, Any]:
     """Return the content of ``_plan.json``, with what an earlier run noted of the optimum."""
     noted = files.read_plan(folder) or {}
     return plan.as_dict() | {
-        "about": {"name": study.name, "title": study.title, "question": study.question},
-        "data": study.data,
+        **words_of(study),
         "optimise": study.optimise is not None,
         "optimised": noted.get("optimised"),
         "pareto": study.pareto is not None,

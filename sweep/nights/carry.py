@@ -11,6 +11,7 @@ from sweep.chunks.plan import make_plan
 from sweep.dataset import files
 from sweep.dataset.files import link_or_copy
 from sweep.dataset.verification import verify
+from sweep.engine.opening import words_of
 from sweep.engine.searches import optimum_key
 from sweep.errors import LinksweepError
 from sweep.optimise import read_survey
@@ -23,7 +24,7 @@ REPORT, FIGURES, SURVIVORS = "report.html", "figures", "survivors.parquet"
 
 @dataclass(frozen=True)
 class Carried:
-    """The night from which chunks were linked, and how many; ``whole`` if there is nothing left to compute."""
+    """The night from which chunks were linked, and how many; ``whole`` if nothing is left to compute or to say."""
 
     night: str
     chunks: int
@@ -71,7 +72,8 @@ def carry(study: Study, earlier: Sequence[Path], target: Path) -> Carried | None
             # Lines are added to this one, so it is no link.
             if (files.beside(source) / files.RUNS).is_file():
                 shutil.copyfile(files.beside(source) / files.RUNS, target / files.RUNS)
-            whole = not found.findings and bool(noted.get("complete")) and searched(study, target)
+            same = all(noted.get(key) == words for key, words in words_of(study).items())  # a title is in the report
+            whole = not found.findings and bool(noted.get("complete")) and same and searched(study, target)
             if whole:
                 _link_report(files.beside(source), target)
         return Carried(night.name, len(sound), whole)

@@ -131,7 +131,8 @@ class _Night:
         at_work, after = StudyRecord("cut", code, message=message), StudyRecord("waiting", code, message=message)
         self.written({**records, **{name: after if k else at_work for k, name in enumerate(left)}}, code)
         kept = ", ".join(records) or "no study"
-        words = f"interrupted at {left[0]}: {kept} kept, with all finished chunks; the next night goes on"
+        where = left[0] if left else "its end"
+        words = f"interrupted at {where}: {kept} kept, with all finished chunks; the next night goes on"
         self.journal.note("interrupted", words, exit_code=code)
         write_page(self.settings.into)
 
@@ -147,8 +148,9 @@ class _Night:
             carried = carry(one.study, self.earlier, target)
             ended = Ended(0, 0.0, "") if carried and carried.whole else self.run(one, target)
             source, linked = (carried.night, carried.chunks) if carried else (None, 0)
-            whole = store.is_complete(target / files.DESIGNS)
-            if not whole:
+            # A proof that died leaves designs and optimum behind, which are whole.
+            died = ended.code not in (0, TimeUsedUp.exit_code)
+            if died or not store.is_complete(target / files.DESIGNS):
                 state: State = "cut" if ended.code in CUT else "failed"
                 code = ended.code if ended.code in (*TOLD, *CUT) else WorkerDied.exit_code
                 return StudyRecord(state, code, source, linked, seconds=ended.seconds, message=ended.message)
@@ -171,7 +173,10 @@ class _Night:
         """Return the report, figures and comparison of a complete dataset."""
         message, cut = "", ended.message if ended.code == TimeUsedUp.exit_code else ""
         if not (target / REPORT).is_file():
-            message = call(["report", str(target)], target / RUN_LOG, max(self.left, 0.0)).message
+            told = call(["report", str(target)], target / RUN_LOG, max(self.left, 0.0))
+            message = told.message
+            if told.code == StoreError.exit_code:
+                raise StoreError(message.removeprefix("sweep: "))
         reported = (target / REPORT).is_file()
         designs = target / files.DESIGNS
         chunks = len(chunk_files.parts(designs))

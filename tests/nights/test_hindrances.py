@@ -166,6 +166,23 @@ def test_an_interrupted_night_says_what_it_kept(
     assert last.name in (into / "index.html").read_text()
 
 
+def test_a_night_interrupted_behind_its_last_study_says_so(
+    after_one: tuple[Path, Path], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    study, into = after_one
+    note = archive.Journal.note
+
+    def interrupted(journal: archive.Journal, event: str, words: str, **about: Any) -> None:
+        if event == "study":
+            raise KeyboardInterrupt
+        note(journal, event, words, **about)
+
+    monkeypatch.setattr(archive.Journal, "note", interrupted)
+    with pytest.raises(KeyboardInterrupt):
+        night(into, [study])
+    assert "interrupted at its end: tiny kept" in (archive.nights(into)[-1] / "log.txt").read_text()
+
+
 def test_a_study_with_a_program_for_figures_has_them_drawn(tmp_path: Path) -> None:
     study = written(tmp_path / "one")
     (study / "figure.py").write_text("import sys, pathlib\npathlib.Path(sys.argv[1], 'drawn').write_text('')\n")
