@@ -193,7 +193,7 @@ def _unserved(family: Family, name: str, accuracy: Accuracy) -> InputError:
 
 def _composed(family: Family, asked: Negative | Extent | TimingOf, accuracy: Accuracy, windowed: bool) -> Route:
     """Make the route to an output made of others; it costs what those do."""
-    name, order = asked.output.name, (Work.SEARCH, 0)
+    name, least = asked.output.name, (Work.SEARCH, 0)
     of: Sequence[str]
     compose: Compose
     match asked:
@@ -203,15 +203,17 @@ def _composed(family: Family, asked: Negative | Extent | TimingOf, accuracy: Acc
         case Extent(box=box):
             of, title, compose = box.asked, f"box {name}", partial(route.extent, box)
         case TimingOf(timing=timing):
-            of = timing.places
             # each of its places is a search by itself, and a value there a search of all of its passage
-            order = max((Work.LONG, 0), *(route.order for route in routes(family, of, accuracy)))
+            of, least = timing.places, (Work.LONG, 0)
             if isinstance(timing, EventValue):
                 assert isinstance(family, Machine)
                 title, compose = f"value {name}", partial(route.value_at, family, timing)
             else:
                 title, compose = f"timing {name}", partial(route.difference, timing)
-    cost = sum(route.ns_per_design for route in routes(family, of, accuracy, windowed))
+    parts = routes(family, of, accuracy, windowed)
+    cost = sum(route.ns_per_design for route in parts)
+    # Not before what it is made of: the margin of what does not turn would be left out.
+    order = max([least, *(route.order for route in parts)])
     whole = isinstance(asked, Extent)  # an extent is about the whole motion; the window is for deviations only
     return Route(title, (name,), cost, partial(_run_composed, family, of, compose, whole), order=order)
 

@@ -191,8 +191,18 @@ def singular(family: Family, outputs: Collection[str]) -> list[Singular]:
 
 def singular_curves(family: Family, outputs: Collection[str]) -> Sequence[SingularCurve]:
     """Functions of designs (n, P) and angles whose complex zeros are the singularities of some pose outputs."""
-    loops = [Singular(_only, (loop.discriminant,)) for loop in family.every(Assembly)]
-    return [partial(_measured, family, known) for known in (*loops, *singular(family, outputs))]
+    found = [partial(_measured, family, known) for known in singular(family, outputs)]
+    discriminants = [loop.discriminant for loop in family.every(Assembly)]
+    if set(outputs) <= set(discriminants):
+        # They are smooth where they vanish, and go on where the links do not reach.
+        return [partial(_where_reached, curve) for curve in found]
+    return [*(partial(_measured, family, Singular(_only, (name,))) for name in discriminants), *found]
+
+
+def _where_reached(curve: SingularCurve, designs: Array, angles: Angles) -> Array:
+    """Values of a curve, 1 for designs whose links do not reach at one of the angles."""
+    values = curve(designs, angles)
+    return np.where(np.isnan(values).any(axis=1, keepdims=True), 1.0, values)
 
 
 def _only(designs: Array, angles: Angles, found: Columns) -> Array:

@@ -176,7 +176,7 @@ def events(designs: Array, wanted: frozenset[str], accuracy: Accuracy) -> Column
             "leave_speed": height + angle * size, "stitch_length": height + angle * size, "rise": height,
             "flatness": height / columns["rise"] + (height + angle * size) / np.abs(columns["stitch_length"])
             + columns.pop("area_error"),
-            "crossings": 0.0 * angle,
+            "crossings": np.zeros(len(designs)),
         }  # fmt: skip
     return chosen(columns | {f"err_{name}": error for name, error in errors.items()}, wanted, status)
 

@@ -6,6 +6,7 @@ swivel linkage the rod slides through a block that swivels, with a working point
 
 from __future__ import annotations
 
+from functools import partial
 from itertools import chain
 
 import numpy as np
@@ -76,12 +77,12 @@ def unit(designs: Array) -> Array:
     return np.ones(len(designs))
 
 
-def axis_squared(designs: Array, angles: Angles, found: Columns) -> Array:
-    """Squared distance of the ball from the driven axis, in cranks, (n, m): a fork without offset turns at once there.
+def axis_squared(parameters: tuple[Parameter, ...], designs: Array, angles: Angles, found: Columns) -> Array:
+    """Squared distance of the pin from the driven axis, in cranks, (n, m): a slot without offset turns at once there.
 
     Its pressure angle is 0 everywhere, so that the discriminant does not show it.
     """
-    a, e = dimensions(PARAMETERS, designs, "a", "e")
+    a, e = dimensions(parameters, designs, "a", "e")
     x, y = floats(found, "x_b", "y_b")
     squared: Array = np.square((x - e) / a) + np.square(y / a)
     return squared
@@ -123,7 +124,7 @@ FAMILY = Family(
     uses_phi=False,
     points={"b": ("x_b", "y_b", "z_b"), "c": ("x_c", "y_c", "z_c")},
     capabilities=(
-        Singular(axis_squared, ("x_b", "y_b")),
+        Singular(partial(axis_squared, PARAMETERS), ("x_b", "y_b")),
         Dimensions(links("a"), optional=("k",)),
         Assembly("discriminant", "pressure_angle", unit),
         OutputLink(standing(PARAMETERS, "e").at),
@@ -184,7 +185,7 @@ PLANAR = Family(
     uses_phi=False,
     points={"b": ("x_b", "y_b", None)},
     capabilities=(
-        Singular.where_small("s"),
+        Singular(partial(axis_squared, PLANAR_PARAMETERS), ("x_b", "y_b")),
         Dimensions(links("a")),
         Assembly("discriminant", "pressure_angle", unit),
         OutputLink(standing(PLANAR_PARAMETERS, "e").at),

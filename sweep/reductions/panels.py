@@ -131,13 +131,15 @@ def _block(
         panels = _fitted(row, low, high, values, request.mode)
         top, size = _climbed(family, designs[rows], panels, request, target, locate or request.place)
         rounding = _rounding(guards, poses, good, row, top, family.precise_poses is not None)
+        lost = np.zeros(top.row.size, np.bool_)  # no digit is left next to a singularity
         if singular(family, (request.pose,)):
             near = nearest(family, designs[rows[top.row]], (request.pose,), MATTERS)
             order = np.full(top.row.size, order_of(family, request.pose))
-            rounding += singular_share(near, top.phi, order) * np.abs(top.value)
+            share = singular_share(near, top.phi, order)
+            rounding, lost = rounding + share * np.abs(top.value), share >= 1.0
         # the size of a level curve is rounding, and no target for its error
         allowed = np.maximum(target * size[top.row], STEADY * EPS * np.abs(top.value))
-        late = (top.err > allowed) & (top.err > rounding)
+        late = lost | ((top.err > allowed) & (top.err > rounding))
         status[top.row[late]] = np.where(status[top.row[late]] == st.OK, st.NOT_CONVERGED, status[top.row[late]])
         at = rows[top.row]
         answer.value[at] = -top.value if request.mode == -1 else top.value

@@ -294,8 +294,8 @@ class Search:
         return rounding_share(self.family, *given, guards, self._orders(candidates))
 
     def _orders(self, candidates: Candidates) -> Index:
-        """Return of which derivative each candidate is."""
-        orders = np.array([order_of(self.family, request.pose) for request in self.requests])
+        """Return of which derivative each candidate is; a discriminant rounds as a position does."""
+        orders = np.array([0 if self.anywhere else order_of(self.family, request.pose) for request in self.requests])
         found: Index = orders[candidates.request]
         return found
 

@@ -52,7 +52,9 @@ def test_negative_margin_is_the_discriminant_over_its_scale(mechanism, make):
     assert (found["margin"][no] <= sampled[no] + 1e-12).all()
 
 
-@pytest.mark.parametrize(("name", "beside"), [("rssr", "max_psi"), ("four_bar", "max_x_m"), ("guide", "max_abs_dev")])
+@pytest.mark.parametrize(
+    ("name", "beside"), [("rssr", "max_psi"), ("four_bar", "max_x_m"), ("guide", "max_abs_dev"), ("guide", "box_x")]
+)
 def test_margin_on_samples_is_that_of_the_margin_alone_whatever_is_asked_beside_it(name, beside):
     """Whether the crank turns is looked for before poses are sampled; that took the margin from what does not turn."""
     design = {"a": [25.0, 25.0], "b": [30.0, 60.0], "c": [30.0, 50.0], "e": [60.0, 40.0]}
@@ -62,6 +64,14 @@ def test_margin_on_samples_is_that_of_the_margin_alone_whatever_is_asked_beside_
     assert alone.margin[0] < 0.0 < alone.margin[1]
     np.testing.assert_array_equal(both.margin, alone.margin)
     assert both.status.tolist() == [st.NOT_ROTATABLE, st.OK] and np.isnan(both[beside][0])
+
+
+@pytest.mark.parametrize(("name", "offset"), [("inverted_slider_crank", "h"), ("slotted", "s")])
+def test_error_of_the_margin_of_a_slot_that_does_not_reach_is_rounding(name, offset):
+    """There the motion is singular, the discriminant is not: the error of its least value was larger than that."""
+    found = sweep.summarise(name, {"a": 1.0, "e": 1.25, offset: 0.5}, ["margin"], accuracy=1e-8).iloc[0]
+    assert found.status == st.NOT_ROTATABLE
+    assert abs(found.margin + 3.0) <= found.err_margin <= 1e-10
 
 
 @pytest.mark.parametrize(

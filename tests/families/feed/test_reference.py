@@ -157,6 +157,8 @@ def test_feed_without_entry_says_so():
     for plate in (-10.0, 10.0):
         got = sweep.summarise("feed", RACK | {"y_plate": plate}, ["phi_entry", "rise"], samples=64).iloc[0]
         assert got.status == st.NO_EVENT and math.isnan(got.phi_entry)
+    none = sweep.summarise("feed", RACK | {"y_plate": 10.0}, ["crossings"], accuracy=1e-8).iloc[0]
+    assert (none.crossings, none.err_crossings) == (0.0, 0.0)
     long = sweep.summarise("feed", RACK | {"h_a": 3.0}, ["phi_entry"], samples=64).iloc[0]
     assert long.status == st.NOT_ASSEMBLED
 
