@@ -120,7 +120,7 @@ def of_number(folder: str | Path, number: int) -> pd.DataFrame:
         there = pc.min_max(source.to_table(columns=["design"]).column("design")).as_py()
         allowed = f"a number of the column design; the designs kept are some of {there['min']} to {there['max']}"
         raise InputError("design", number, allowed, str(folder))
-    return row
+    return _with_units(row, source)
 
 
 def pareto(folder: str | Path, first: str, second: str) -> pd.DataFrame:

@@ -79,6 +79,7 @@ TABLES = {
     sweep.load: sweep.load,
     sweep.cyclogram: lambda folder: sweep.cyclogram("rssr", RSSR),
     reading.best: lambda folder: reading.best(folder, "stroke"),
+    reading.of_number: lambda folder: reading.of_number(folder, 0),
     reading.pareto: lambda folder: reading.pareto(folder, "stroke", "max_abs_dev"),
     sweep.synthesise: lambda folder: sweep.synthesise("rssr", LOCUS),
     mechanisms.central_slots: lambda folder: sweep.synthesise(
@@ -134,7 +135,11 @@ def test_every_public_table_is_looked_at():
 
 @pytest.mark.parametrize("function", TABLES, ids=lambda f: f"{f.__module__}.{f.__name__}")
 def test_every_public_table_names_the_unit_of_every_number(function, tmp_path):
-    place = write_dataset(tmp_path / "designs") if function in (sweep.load, reading.best, reading.pareto) else None
+    place = (
+        write_dataset(tmp_path / "designs")
+        if function in (sweep.load, reading.best, reading.of_number, reading.pareto)
+        else None
+    )
     found = TABLES[function](place)
     assert len(found)
     assert set(found.attrs["units"]) - COUNTED == set(found.columns) - COUNTED - PLACES
