@@ -6,7 +6,8 @@ import errno
 import json
 import os
 import shutil
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -17,7 +18,7 @@ from sweep.errors import LinksweepWarning, LockedError
 from sweep.nights import archive
 from sweep.nights.archive import HISTORY, NIGHT, read_history, read_night
 from sweep.nights.page import write_page
-from sweep.nights.studies import chosen
+from sweep.nights.studies import Ended, chosen
 from tests.nights.conftest import called
 from tests.nights.test_nightly import night, written
 from tests.support.selection import mostly_long
@@ -164,6 +165,38 @@ def test_an_interrupted_night_says_what_it_kept(
     }  # fmt: skip
     assert "interrupted at two: tiny kept" in (last / "log.txt").read_text()
     assert last.name in (into / "index.html").read_text()
+
+
+def test_a_new_title_is_in_the_report_of_the_next_night_though_nothing_is_computed(tmp_path: Path) -> None:
+    study = written(tmp_path / "one")
+    night(tmp_path / "nights", [study])
+    file = study / "study.toml"
+    file.write_text(file.read_text().replace('name = "tiny"', 'name = "tiny"\ntitle = "A later title"'))
+    second, _ = night(tmp_path / "nights", [study])
+    record = second.studies["tiny"]
+    assert (record.computed, record.changed) == (0, 0)
+    assert "A later title" in (tmp_path / "nights" / second.name / "tiny" / "report.html").read_text()
+
+
+def test_a_run_that_dies_behind_its_optimum_has_failed(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    def dies(words: Sequence[str], log: Path, seconds: float) -> Ended:
+        return replace(called(words, log, seconds), code=137, message="Killed")
+
+    monkeypatch.setattr("sweep.nights.night.call", dies)
+    record, _ = night(tmp_path / "nights", [written(tmp_path / "one")])
+    assert (record.exit_code, record.good, record.studies["tiny"].message) == (70, False, "Killed")
+
+
+def test_a_disk_that_has_no_room_for_a_report_is_told_by_the_exit_code(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    full = Ended(74, 0.0, "sweep: report.html: No space left on device")
+    monkeypatch.setattr(
+        "sweep.nights.night.call", lambda words, *rest: full if "report" in words else called(words, *rest)
+    )
+    record, _ = night(tmp_path / "nights", [written(tmp_path / "one")])
+    own = record.studies["tiny"]
+    assert (record.exit_code, own.state, own.message) == (74, "failed", "report.html: No space left on device")
 
 
 def test_a_night_interrupted_behind_its_last_study_says_so(

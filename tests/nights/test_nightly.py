@@ -24,10 +24,9 @@ from sweep.nights import Settings, archive, nightly
 from sweep.nights.archive import NightRecord, StudyRecord, write_night
 from sweep.nights.carry import carry
 from sweep.nights.changes import changes
-from sweep.nights.studies import Ended, chosen, in_order
+from sweep.nights.studies import chosen, in_order
 from sweep.study import ParetoSettings, load_study
 from tests.faults.ground import SLOW_DISK
-from tests.nights.conftest import called
 from tests.optimise.test_study import STUDY as OPTIMUM
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -254,39 +253,6 @@ def test_an_edited_study_is_said_with_its_edit(tmp_path: Path) -> None:
     found = changes(load_study(path), old, sweep.run(path, tmp_path / "new" / "designs", jobs=1))
     assert found.code == 11
     assert "the study itself was edited: design.e 90 mm -> 91 mm" in found.lines
-
-
-@pytest.mark.usefixtures("in_this_process")
-def test_a_new_title_is_in_the_report_of_the_next_night_though_nothing_is_computed(tmp_path: Path) -> None:
-    study = written(tmp_path / "one")
-    night(tmp_path / "nights", [study])
-    file = study / "study.toml"
-    file.write_text(file.read_text().replace('name = "tiny"', 'name = "tiny"\ntitle = "A later title"'))
-    second, _ = night(tmp_path / "nights", [study])
-    record = second.studies["tiny"]
-    assert (record.computed, record.changed) == (0, 0)
-    assert "A later title" in (tmp_path / "nights" / second.name / "tiny" / "report.html").read_text()
-
-
-def test_a_run_that_dies_behind_its_optimum_has_failed(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    def dies(words: Sequence[str], log: Path, seconds: float) -> Ended:
-        return replace(called(words, log, seconds), code=137, message="Killed")
-
-    monkeypatch.setattr("sweep.nights.night.call", dies)
-    record, _ = night(tmp_path / "nights", [written(tmp_path / "one")])
-    assert (record.exit_code, record.good, record.studies["tiny"].message) == (70, False, "Killed")
-
-
-def test_a_disk_that_has_no_room_for_a_report_is_told_by_the_exit_code(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    full = Ended(74, 0.0, "sweep: report.html: No space left on device")
-    monkeypatch.setattr(
-        "sweep.nights.night.call", lambda words, *rest: full if "report" in words else called(words, *rest)
-    )
-    record, _ = night(tmp_path / "nights", [written(tmp_path / "one")])
-    own = record.studies["tiny"]
-    assert (record.exit_code, own.state, own.message) == (74, "failed", "report.html: No space left on device")
 
 
 def test_retention_keeps_the_last_good_night_however_old(tmp_path: Path) -> None:
