@@ -238,7 +238,7 @@ def _of_members(
     for name, one in asked.items():
         member = machine.split(name)
         free = isinstance(one, LargestLength)  # of how the member is driven
-        if member is not None and (free or (is_alone(member[0]) and not _is_of_point(member[0], one))):
+        if member is not None and (free or (member[0].alone and not _is_of_point(member[0], one))):
             own[member[0].name].append(member[1])
         elif isinstance(one, Margin) and member is None:
             margin.append(name)
@@ -254,11 +254,6 @@ def _of_members(
         cost = sum(group_ns(m.family, "margin", (), accuracy) for m in machine.members)
         found.append(Route("margins", tuple(margin), cost, partial(_margins, machine), order=(Work.QUICK, 0)))
     return found, left
-
-
-def is_alone(member: Member) -> bool:
-    """Tell whether the member turns with the main shaft, so that its extrema over a turn are those of its family."""
-    return member.driver is None and member.ratio == 1
 
 
 def _is_of_point(member: Member, asked: Quantity) -> bool:

@@ -124,6 +124,11 @@ class Member:
     mount: Mount | None = None
     carried: tuple[tuple[str, tuple[float, float, float]], ...] = ()
 
+    @property
+    def alone(self) -> bool:
+        """Whether it turns with the main shaft, so that its extrema over a turn are those of its family."""
+        return self.driver is None and self.ratio == 1
+
     def designs(self, designs: Array) -> Array:
         """Design matrix of this member's family."""
         return np.ascontiguousarray(designs[:, self.columns])
@@ -182,7 +187,7 @@ class Member:
     def geared_parts(self, name: str) -> tuple[str, ...]:
         """Name the components of a magnitude that is computed again: the crank does not turn as the main shaft does."""
         output = self.family.pose_output.get(name)
-        return () if output is None or (self.driver is None and self.ratio == 1) else output.parts
+        return () if output is None or self.alone else output.parts
 
     @cached_property
     def added(self) -> tuple[Parameter, ...]:

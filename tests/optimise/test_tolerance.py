@@ -111,6 +111,18 @@ def test_a_curve_that_is_the_same_all_over_the_turn_has_the_slopes_of_every_angl
         assert (row.growing, row.shrinking) == pytest.approx(ends, rel=1e-7), output
 
 
+@pytest.mark.parametrize("offset", [0.0, 2.0, 4.0, 5.5])
+def test_of_tops_alike_a_member_has_the_place_that_summaries_give_whatever_its_offset(offset: float) -> None:
+    """A central slider-crank is as fast on its way out as back; each comes once per turn of its crank."""
+    machine, output = sweep.machine({"x": {"family": "slider_crank", "offset": offset}}, {}), "x.phi_max_abs_ds"
+    drive = {"x.a": 10.0, "x.b": np.array([25.0, 25.01, 24.99]), "x.e": 0.0}
+    place, longer, shorter = sweep.summarise(machine, drive, [output], accuracy=1e-12)[output]
+    row = pd.DataFrame(sensitivities(family(machine), design_matrix(family(machine), drive)[0][0], (output,)))
+    row = row[row.parameter == "x.b"].iloc[0]
+    assert row.value == pytest.approx(place, rel=1e-12)
+    assert row.growing == pytest.approx((longer - shorter) / 0.02, rel=1e-5)  # the square of the step
+
+
 def test_planar_mechanism_has_its_alpha_and_offsets_in_second_order_only() -> None:
     planar = np.array([25.0, 100.0, 60.0, 100.0, 0.0, 0.0, 0.0, 1.0])
     table = pd.DataFrame(sensitivities(RSSR, planar, ("max_abs_d2psi", "swing")))

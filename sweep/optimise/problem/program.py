@@ -11,6 +11,7 @@ import numpy as np
 
 from sweep.errors import InputError
 from sweep.families.base import Array
+from sweep.families.machines.machine import Machine
 from sweep.optimise.extrema.points import Curves, Points
 from sweep.optimise.extrema.scanned import first_passage
 from sweep.optimise.problem.rows import Form, Label, Term, box, numbers
@@ -234,7 +235,16 @@ class _Layout:
         """Return, as a list, that of the best ends which comes first in the turn: of tops alike it is the place."""
         size = np.abs(self.points.value)
         alike = [k for k in ends if abs(size[k] - size[ends[0]]) <= ALIKE * size[ends[0]]]
-        return sorted(alike, key=lambda k: float(self.points.phi[k]) % (2.0 * math.pi))[:1]
+        begin = self._begin(self.curves.series[self.points.series[ends[0]]].output) if ends else 0.0
+        return sorted(alike, key=lambda k: float(self.points.phi[k] - begin) % (2.0 * math.pi))[:1]
+
+    def _begin(self, output: str) -> float:
+        """Return where the turn of an output's crank begins: a member that turns with the shaft has one of its own."""
+        family = self.curves.family
+        found = family.split(output) if isinstance(family, Machine) else None
+        if found is None or not found[0].alone or found[1] not in found[0].family.pose_output:
+            return 0.0
+        return -float(found[0].phase(self.design[None, :])[0])
 
     def _numbers(self, m: Measure, above: bool) -> list[tuple[Term, float]]:
         """Return sums of plain numbers, and of the ends of curves with them."""
