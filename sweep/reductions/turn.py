@@ -130,7 +130,7 @@ def sampled_extrema(
     n = len(designs)
     found = {request: Extremum.unknown(n) for request in requests}
     status = np.zeros(n, np.uint8)
-    names = list(dict.fromkeys([*(r.pose for r in requests), *([family.position] if window is not None else [])]))
+    names = list(dict.fromkeys([*(r.pose for r in requests), *([window.position] if window is not None else [])]))
     quick = sampled_maxima(family, designs, tuple(requests), samples)
     unsure = np.ones(n, np.bool_)
     for request, most in quick.items():
@@ -158,7 +158,7 @@ def _best_samples(
     """Write the best sample of some designs and its crank angle; returns the designs that have none in the window."""
     allowed = None
     if window is not None and request.windowed:
-        allowed = window.holds(rows, columns[family.position])
+        allowed = window.holds(rows, columns[window.position])
     best, column = np.empty(rows.size), np.empty(rows.size, np.int64)
     scan.best_sample(columns[request.pose], request.mode, allowed, best, column)
     found.value[rows] = -best if request.mode == -1 else best

@@ -136,6 +136,16 @@ def test_window_of_a_member_is_a_part_of_its_own_stroke(three_guides, output):
     assert found[f"driven.{output}"] == pytest.approx(counted[output], abs=2e-3)
 
 
+@pytest.mark.parametrize("output", ["max_dev", "min_dev", "max_abs_dev", "range_dev"])
+def test_samples_count_in_the_stroke_of_the_member_too(three_guides, output):
+    machine, table = three_guides
+    wanted = [f"{m}.{output}" for m in ("plain", "geared", "driven")]
+    exact = sweep.summarise(machine, table, wanted, accuracy=1e-10, window=PART).iloc[0]
+    found = sweep.summarise(machine, table, wanted, samples=4096, window=PART).iloc[0]
+    assert found.status == 0
+    assert found[wanted].tolist() == pytest.approx(exact[wanted].tolist(), abs=0.05)  # a sample beside the edge
+
+
 @pytest.mark.parametrize("member", ["plain", "geared", "driven"])
 def test_optimiser_follows_the_window_of_the_member(three_guides, member):
     machine, table = three_guides
