@@ -12,7 +12,7 @@ from sweep.cli.options import A_FILE, DESIGN, FOLDER, IS_FILE
 from sweep.cli.tables import checked_format, write_table
 from sweep.dataset.files import beside, located
 from sweep.evaluation.angles import grid_in_radians
-from sweep.exchange.export import FORMATS
+from sweep.exchange.export import FORMATS, MOST_POSES
 from sweep.exchange.export import export as write
 from sweep.exchange.points import TOLERANCE, drawn
 from sweep.families import family as find_family
@@ -63,7 +63,7 @@ def points(family: str, file: Path, part: str, unit: str, tolerance: float | Non
 @click.option("--format", "kind", required=True, type=click.Choice([*dict.fromkeys([*FORMATS, *OF_DATASETS])]))
 @click.option("--out", type=A_FILE, help="Default: export/DESIGN.ending beside FOLDER.")
 @click.option("--phi", type=float, default=0.0, show_default=True, help="Crank angle of the drawn position [rad].")
-@click.option("--poses", type=click.IntRange(min=3), default=120, show_default=True, help="Steps of a turn.")
+@click.option("--poses", type=click.IntRange(3, MOST_POSES), default=120, show_default=True, help="Steps of a turn.")
 def export(folder: Path, design: str | None, kind: str, out: Path | None, phi: float, poses: int) -> None:
     """Write one design of a dataset to a file that other programs read.
 

@@ -92,7 +92,7 @@ _AREAS: dict[str, Callable[..., float]] = {
     "round": lambda d: 0.25 * math.pi * d * d,
     "square": lambda a: a * a,
     "rectangular": lambda a, b: a * b,
-    "tube": lambda d, wall: math.pi * wall * (d - wall),
+    "tube": lambda d, wall: math.pi * wall * (d - wall) if 2.0 * wall <= d else math.nan,
 }
 # Square of the radius of gyration about a line across the bar, of sections for which all these lines are alike.
 _GYRATIONS: dict[str, Callable[..., float]] = {
@@ -146,7 +146,7 @@ def rod(body: str, material: str, section: str, inertia: str = "slender") -> dic
     except (AssertionError, TypeError, ValueError):
         raise InputError("section", section, f"a section, as {SECTIONS}", body) from None
     if not area > 0.0:
-        raise InputError("section", section, "positive sizes, a wall of less than the diameter", body)
+        raise InputError("section", section, "positive sizes, a wall of at most half the diameter", body)
     if inertia not in INERTIAS or (inertia == "exact" and math.isnan(square)):
         allowed = f"{' or '.join(INERTIAS)}; how a rectangular section lies is not known, so it is slender"
         raise InputError("inertia", inertia, allowed, body)

@@ -22,7 +22,7 @@ from sweep.evaluation.tables import design_matrix
 from sweep.exchange.dxf import write_dxf
 from sweep.exchange.glb import write_glb
 from sweep.exchange.mjcf import write_mjcf
-from sweep.exchange.scene import pose, shown_name, turn
+from sweep.exchange.scene import finite, pose, shown_name, turn
 from sweep.families import Mechanism
 from sweep.families import family as find_family
 from sweep.families.base import Family, Interval, Turn, equal_steps
@@ -104,6 +104,7 @@ def write_law(
 FORMATS = {"csv": (".csv",), "glb": (".glb",), "dxf": (".dxf",), "mjcf": (".xml",), "law": (".csv", ".parquet")}
 UNITS = {"mm": 1e-3, "m": 1.0}
 SECONDS = 2.0  # of an animation where no speed is given
+MOST_POSES = 100_000  # a table of a few MB for each column
 
 
 def export(
@@ -132,7 +133,7 @@ def export(
         .csv is hardpoints, .xml is mjcf
     phi : angle of the driving shaft in the drawn position, where a turn begins [rad]; over an interval the value of its
         variable
-    poses : steps of a turn
+    poses : steps of a turn, 3 to 100000
     unit : what a length of the design is, "mm" or "m"
     speed : of the driving shaft [rad/s], or a text such as "7000 rpm": gives the law a column of time and the animation
         its duration
@@ -163,14 +164,14 @@ def export(
     kind = _format(target, format)
     if unit not in UNITS:
         raise InputError("unit", unit, "mm or m", "export")
-    if poses < 3:
-        raise InputError("poses", poses, "at least 3", "export")
+    if not 3 <= poses <= MOST_POSES:
+        raise InputError("poses", poses, f"at least 3, at most {MOST_POSES}", "export")
     speed = speed_given(speed)
     if speed is not None and not (math.isfinite(speed) and speed > 0.0):
         raise InputError("speed", speed, "a positive number of rad/s", "export")
     family = find_family(mechanism)
     design = in_radians(family, design, angles)
-    phi = float(np.asarray(grid_in_radians(family.domain.name, family.domain.unit, phi, angles)))
+    phi = finite(float(np.asarray(grid_in_radians(family.domain.name, family.domain.unit, phi, angles))))
     write = _writer(kind, mechanism, design, phi, poses, unit, speed)
     with replacing(target) as partial:
         write(partial)

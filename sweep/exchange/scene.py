@@ -91,6 +91,19 @@ def _taken(part: Part, rows: list[int], phi: Array) -> Part:
     return replace(part, phi=phi, joints=joints, crank=crank, position=position, status=status)
 
 
+def finite(phi: float) -> float:
+    """Return the angle of a drawn position.
+
+    Raises
+    ------
+    InputError
+        where it is no finite number.
+    """
+    if not math.isfinite(phi):
+        raise InputError("phi", phi, "a finite angle [rad]", "export")
+    return phi
+
+
 def pose(mechanism: Mechanism, design: Table, phi: float) -> list[Part]:
     """All parts in one position.
 

@@ -14,7 +14,7 @@ from sweep.dataset.files import unwritable
 from sweep.errors import InputError
 from sweep.exchange.dxf import add_tables
 from sweep.exchange.export import export
-from sweep.exchange.scene import exists, frames_of, is_spatial, over, pose, shown_name
+from sweep.exchange.scene import exists, finite, frames_of, is_spatial, over, pose, shown_name
 from sweep.optimise.manufacture.tolerance import touched
 from sweep.plot.drawing import draw
 from sweep.report.dataset import Dataset, as_result, chosen, cyclogram_of, read_dataset, row_of
@@ -66,7 +66,7 @@ def write_sheet(folder: str | Path, design: str | int | None, path: str | Path, 
     if target.suffix.lower() not in ENDINGS:
         raise InputError("path", target.name, f"a file ending in {', '.join(ENDINGS)}", "export")
     data, found = read_dataset(Path(folder)), chosen(folder, design)
-    parts = over(found.family, found.design, phi, POSES)
+    parts = over(found.family, found.design, finite(phi), POSES)
     if not exists(parts):
         raise InputError("mechanism", found.family.name, "one whose joints are known, docs/frames.md", "export")
     tables = tables_of(as_result(data, row_of(data.study, found.design)), pose(found.family, found.design, phi))

@@ -12,6 +12,7 @@ from sweep.study.file import Faults, Section, Share, Size, StudyFile, Width, hol
 from sweep.study.study import Tolerance
 
 UNITS = {"length": "mm", "angle": "rad"}
+MOST_SAMPLES = 1 << 22  # more than memory holds of a machine of a hundred dimensions
 
 
 class ToleranceSection(Section):
@@ -35,8 +36,9 @@ def read_tolerance(section: ToleranceSection, file: StudyFile, family: Family) -
         needed = 'a length as "0.02 mm"; or angles, as "0.05 deg"'
         file.faults.missing(("tolerance", "lengths"), needed, instead="angles")
     samples = Tolerance.samples if section.samples is None else section.samples
-    if samples < 2 or samples & (samples - 1):
-        file.faults.value(("tolerance", "samples"), samples, "a power of two: a Sobol sample keeps its balance only so")
+    if not 2 <= samples <= MOST_SAMPLES or samples & (samples - 1):
+        allowed = f"a power of two, 2 to {MOST_SAMPLES}: a Sobol sample keeps its balance only so"
+        file.faults.value(("tolerance", "samples"), samples, allowed)
     own = tuple(_own(section.own, file, family).items())
     return Tolerance(section.lengths or 0.0, section.angles or 0.0, section.robust, own, samples)
 

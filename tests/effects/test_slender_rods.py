@@ -66,6 +66,13 @@ def test_exact_inertia_needs_a_section_that_is_alike_all_round():
             sweep.rod("crank", "steel", section, inertia)
 
 
+def test_a_wall_of_more_than_half_the_diameter_is_refused():
+    solid = sweep.rod("crank", "steel", "6 mm round")["line_mass_crank"]
+    assert sweep.rod("crank", "steel", "6 x 3 mm tube")["line_mass_crank"] == pytest.approx(solid, rel=1e-15)
+    with pytest.raises(sweep.InputError, match="at most half the diameter"):
+        sweep.rod("crank", "steel", "6 x 4 mm tube")
+
+
 def test_an_explicit_zero_is_a_mass_in_its_pivot():
     zeros = {f"com_{body}_x": 0.0 for body in LENGTHS}
     assert loads("rssr", LINKS, **MASSES, **zeros).drive_torque.abs().max() > 0.0

@@ -126,6 +126,7 @@ FAULTS = {
     "axis without count": (A_AXIS, A_AXIS.replace("count = 5, ", ""), ["design.c.count is missing"]),
     "axis with misspelt count": (A_AXIS, A_AXIS.replace("count", "coutn"), ["design.c.coutn", "did you mean 'count'?"]),
     "axis without to": (A_AXIS, A_AXIS.replace("to = 40, ", ""), ["design.c.to is missing"]),
+    "many samples": ("[output]", '[tolerance]\nangles = "1 deg"\nsamples = 8388608\n[output]', ["2 to 4194304"]),
     "count of zero": (A_AXIS, A_AXIS.replace("= 5", "= 0"), ["design.c.count = 0", "1 to 1000000"]),
     "count with a fraction": (A_AXIS, A_AXIS.replace("= 5", "= 5.0"), ["design.c.count = 5.0", "whole number"]),
     "count over a million": (A_AXIS, A_AXIS.replace("= 5", "= 1000001"), ["design.c.count = 1000001"]),
