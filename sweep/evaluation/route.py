@@ -22,7 +22,7 @@ from sweep.quantities.kinds import Group, Reduced
 from sweep.quantities.resolve import find
 from sweep.reductions.events import event_outputs
 from sweep.reductions.means import mean_squares
-from sweep.reductions.rounding import sharpen_maxima
+from sweep.reductions.rounding import shaken, sharpen_maxima
 from sweep.reductions.sampling import pose_columns
 from sweep.reductions.steps import group_ns, group_order, step_ns, steps_of
 from sweep.reductions.turn import limits_and_reductions, margin_group
@@ -191,7 +191,7 @@ def difference(timing: Timing, designs: Array, found: Columns, accuracy: Accurac
 
 
 def value_at(machine: Machine, reading: EventValue, designs: Array, found: Columns, accuracy: Accuracy) -> Columns:
-    """Give a pose output at a crank angle of each design; its error is that of the angle, by the slope there."""
+    """Give a pose output at a crank angle of each design; its error is that of the angle, by the slope, and rounding."""
     place = reading.places[0]
     phi = np.asarray(found[place], np.float64)
     known = np.isfinite(phi)
@@ -202,5 +202,6 @@ def value_at(machine: Machine, reading: EventValue, designs: Array, found: Colum
     columns: Columns = {reading.name: np.where(status == st.OK, values[:, 0], np.nan), "status": status}
     if accuracy.target is not None:
         slope = np.abs(values[:, 2] - values[:, 1]) / (2.0 * SLOPE)
-        columns[error_of(reading.name)] = slope * np.asarray(found[error_of(place)], np.float64)
+        rounded = shaken(machine, designs, near[:, 0], reading.of.name) + 4.0 * ROUNDING * np.abs(values[:, 0])
+        columns[error_of(reading.name)] = slope * np.asarray(found[error_of(place)], np.float64) + rounded
     return columns

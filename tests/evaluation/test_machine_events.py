@@ -114,6 +114,14 @@ def test_value_at_an_event_is_that_of_the_pose_there() -> None:
     assert np.isnan(sweep.summarise(never, TABLE, ["x"])["x"][0])
 
 
+def test_error_of_a_value_knows_the_rounding_of_poses_where_the_slope_tells_nothing() -> None:
+    """At the least clearance the slope is zero: the error of the value was 0."""
+    machine = sweep.machine(MEMBERS, RELATIONS | {"least": {"value": ["clearance", "phi_min_clearance"]}})
+    found = sweep.summarise(machine, TABLE, ["least", "min_clearance"], accuracy=1e-10).iloc[0]
+    assert abs(found["least"] - found["min_clearance"]) <= found["err_least"]
+    assert 2.0**-53 * found["least"] <= found["err_least"] <= 1e-11 * found["least"]
+
+
 def test_guided_point_moves_at_the_rate_of_its_places() -> None:
     machine = sweep.machine(MEMBERS, {"pace": {"speed": ["needle.point"]}})
     phi, h = np.linspace(0.1, 6.0, 7), 1e-5
