@@ -46,6 +46,14 @@ def test_page_on_ready_limits_names_the_families_that_have_a_box():
     assert set(re.findall(r"`(\w+)`", sentence)) == set(filter(has_box, NAMES))
 
 
+def test_page_on_extrema_names_the_families_whose_branch_decides_which_end_is_extended():
+    """It said so of all, but a slotted link, a cam's lever and Kim and Dison's rocker are extended where farthest."""
+    page = (DOCS / "extrema.md").read_text(encoding="utf-8")
+    modes = page.split("* **Extended**")[1].split("**Folded**")[0].split("assembly mode -1")[1]
+    named = set(re.findall(r"`(\w+)`", modes)) - {"branch", "branch1"}
+    assert named == {name for name in NAMES if family(name).outward}
+
+
 def test_plan_says_when_a_search_ends():
     (line,) = _optimiser(SimpleNamespace(optimise=OptimiseSettings()))
     assert "fewer once better optima are unlikely (under 2 %) and the best was found 3 times" in line
