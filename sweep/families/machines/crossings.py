@@ -33,15 +33,15 @@ Read: TypeAlias = Callable[["Machine", Any, Places, frozenset[str]], Columns]
 
 
 @dataclass
-class Found:
+class CrankAngles:
     """Crank angles of several designs, one after another: the row of its design for each."""
 
     row: NDArray[np.intp]
     phi: Array
 
-    def take(self, which: NDArray[Any]) -> Found:
+    def take(self, which: NDArray[Any]) -> CrankAngles:
         """Return some of them."""
-        return Found(self.row[which], self.phi[which])
+        return CrankAngles(self.row[which], self.phi[which])
 
 
 def step_of(name: str, provides: Sequence[Output], machine: Machine, find: Find, read: Read) -> Step:
@@ -152,14 +152,14 @@ class Poses:
         kept = [self.sampled[name, count] for name in names]
         return np.maximum.reduce([status for status, _ in kept]), [values for _, values in kept]
 
-    def turning(self, rate: str, slope: Array) -> Found:
+    def turning(self, rate: str, slope: Array) -> CrankAngles:
         """Return where samples (n, m) of an output, a derivative, change their sign, closed to its roots."""
         after = np.roll(slope, -1, axis=1)
         row, column = np.nonzero((slope > 0.0) & (after <= 0.0) | (slope < 0.0) & (after >= 0.0))
         step = TWO_PI / slope.shape[1]
-        return Found(row, self._root(row, column * step, (column + 1) * step, rate, slope))
+        return CrankAngles(row, self._root(row, column * step, (column + 1) * step, rate, slope))
 
-    def roots(self, extremes: Found, at_extremes: Array, name: str, rate: str, values: Array) -> Found:
+    def roots(self, extremes: CrankAngles, at_extremes: Array, name: str, rate: str, values: Array) -> CrankAngles:
         """Return the zeros of an output, of each design in order: between neighbours of opposite sign.
 
         Neighbours are samples (n, m) and extremes: two zeros between samples have an extreme between them.  Each is
@@ -171,7 +171,7 @@ class Poses:
         phi = np.concatenate([np.tile(grid, n), extremes.phi])
         height = np.concatenate([values.ravel(), at_extremes])
         order = np.lexsort((phi, row))
-        nodes, height = Found(row, phi).take(order), height[order]
+        nodes, height = CrankAngles(row, phi).take(order), height[order]
         left, right, after = _neighbours(nodes)
         k = np.flatnonzero((height < 0.0) & (height[after] >= 0.0) | (height > 0.0) & (height[after] <= 0.0))
         row = nodes.row[k]
@@ -180,7 +180,7 @@ class Poses:
         with np.errstate(divide="ignore", invalid="ignore"):
             polished = found - x / slope
         found = np.mod(np.where((polished > left[k]) & (polished < right[k]), polished, found), TWO_PI)
-        return Found(row, found).take(np.lexsort((found, row)))
+        return CrankAngles(row, found).take(np.lexsort((found, row)))
 
     def first(self, name: str, level: float, sense: float, count: int = SAMPLES) -> tuple[NDArray[np.uint8], Array]:
         """Return status and where an output first passes a level in a sense, each (n,); nan where it does not.
@@ -192,7 +192,7 @@ class Poses:
         passes = (off < 0.0) & (np.roll(off, -1, axis=1) >= 0.0)
         row = np.flatnonzero(passes.any(axis=1))
         start = passes[row].argmax(axis=1) * (TWO_PI / count)
-        found = whole(len(off), row, self._root(row, start, start + TWO_PI / count, name, values, level))
+        found = scattered(len(off), row, self._root(row, start, start + TWO_PI / count, name, values, level))
         status = np.where((status == st.OK) & np.isnan(found), st.NO_EVENT, status).astype(np.uint8)
         touching = np.zeros(len(off), np.bool_)
         scan.grazes(values, np.full(len(off), level), touching)
@@ -254,7 +254,7 @@ class Poses:
         return place
 
 
-def _neighbours(ordered: Found) -> tuple[Array, Array, NDArray[np.intp]]:
+def _neighbours(ordered: CrankAngles) -> tuple[Array, Array, NDArray[np.intp]]:
     """Return of each angle, sorted by design, itself, the next one of its design around the turn, and where that is."""
     row, phi = ordered.row, ordered.phi
     first = np.searchsorted(row, row)
@@ -270,13 +270,13 @@ def largest(row: NDArray[np.intp], values: Array, n: int) -> Array:
     return np.where(np.isfinite(most), most, np.nan)
 
 
-def where_largest(found: Found, values: Array, n: int) -> Array:
+def where_largest(found: CrankAngles, values: Array, n: int) -> Array:
     """Return the angle of each design at which the value is largest; nan where there is none."""
     order = np.argsort(values, kind="stable")
-    return whole(n, found.row[order], found.phi[order])
+    return scattered(n, found.row[order], found.phi[order])
 
 
-def whole(n: int, row: NDArray[np.intp], values: Array) -> Array:
+def scattered(n: int, row: NDArray[np.intp], values: Array) -> Array:
     """Lay values of some designs out over all; nan in the others."""
     column = np.full(n, np.nan)
     column[row] = values

@@ -13,17 +13,17 @@ from kernels.types import TWO_PI, Array
 from sweep.families.base import Columns, Output, Step
 from sweep.families.machines.crossings import (
     TANGENT,
-    Found,
+    CrankAngles,
     Places,
     Poses,
     largest,
     moved,
     outputs_at,
+    scattered,
     steepness,
     step_of,
     verdict,
     where_largest,
-    whole,
 )
 from sweep.families.machines.moments import Taking
 from sweep.families.machines.thread_way import turned as turned_back
@@ -91,8 +91,8 @@ def _found(taking: Taking, poses: Poses, samples: int, wanted: frozenset[str]) -
     found = verdict(status, at.touches(extremes, across), count, ways)
     taken = np.flatnonzero(beside & right & (found[roots.row] == st.OK))
     row, phi = roots.row[taken], roots.phi[taken]
-    passage = whole(n, row, phi)
-    after = whole(n, row, roots.phi[_following(roots, taken)])
+    passage = scattered(n, row, phi)
+    after = scattered(n, row, roots.phi[_following(roots, taken)])
     size = np.abs(poses.designs).max(axis=1)
     low = _last(stops, depths, size, passage)
     top = _last(stops, -depths, size, low)
@@ -103,7 +103,7 @@ def _found(taking: Taking, poses: Poses, samples: int, wanted: frozenset[str]) -
     places["beyond"] = where_largest(extremes.take(between), sense * across[between], n)
     if f"{name}_free" in wanted:
         rows = np.flatnonzero(status == st.OK)
-        places["near"] = whole(n, rows, poses.least(rows, places["top"][rows], low[rows], f"{name}_gap"))
+        places["near"] = scattered(n, rows, poses.least(rows, places["top"][rows], low[rows], f"{name}_gap"))
     return places | {"count": np.where(status == st.OK, count, np.nan), "status": found}
 
 
@@ -159,11 +159,11 @@ class _Tip:
     def __init__(self, taking: Taking, poses: Poses) -> None:
         self.taking, self.poses = taking, poses
 
-    def __call__(self, where: Found, *what: str) -> list[Array]:
+    def __call__(self, where: CrankAngles, *what: str) -> list[Array]:
         """Return outputs by their own names."""
         return self.poses.at(where.row, where.phi, *(f"{self.taking.name}_{one}" for one in what))
 
-    def touches(self, extremes: Found, across: Array) -> NDArray[np.bool_]:
+    def touches(self, extremes: CrankAngles, across: Array) -> NDArray[np.bool_]:
         """Tell of each design whether an extreme beside the needle is 0 within rounding of its coordinates."""
         side, height = self(extremes, "side", "height")
         designs = self.poses.designs
@@ -172,7 +172,7 @@ class _Tip:
         return np.bincount(extremes.row, near, len(designs)) > 0
 
 
-def _last(stops: Found, depth: Array, size: Array, phi: Array) -> Array:
+def _last(stops: CrankAngles, depth: Array, size: Array, phi: Array) -> Array:
     """Return where the needle is lowest; of several such places, alike to rounding, the last one before ``phi``.
 
     A guide whose own dead point is passed on the way down and up is lowest twice, and one that turns twice.  Depths are
@@ -186,7 +186,7 @@ def _last(stops: Found, depth: Array, size: Array, phi: Array) -> Array:
     return found
 
 
-def _following(roots: Found, taken: NDArray[np.intp]) -> NDArray[np.intp]:
+def _following(roots: CrankAngles, taken: NDArray[np.intp]) -> NDArray[np.intp]:
     """Return of each passage the next one of its design, around the turn."""
     after = taken + 1
     same = np.append(roots.row, -1)[after] == roots.row[taken]

@@ -36,11 +36,11 @@ from sweep.families.machines.thread_way import (
     TakeUp,
     Waypoint,
     beside,
-    followed,
-    laid,
+    length_and_bends,
+    masked,
     nearest_way,
-    only,
     outside,
+    placed_points,
     spots,
     turned,
 )
@@ -186,8 +186,8 @@ class ThreadBalance(Relation):
         for up, places in groupby(self.path, _is_take_up):
             run = list(places)
             if not up:
-                pieces = laid(run, found, moving)
-                length, change, bends = followed(pieces, moving, bent)
+                pieces = placed_points(run, found, moving)
+                length, change, bends = length_and_bends(pieces, moving, bent)
                 needed, rate = needed + length, rate + change
                 wraps += zip(run[1:-1], bends, pieces[1:-1], strict=True) if bent else ()
                 continue
@@ -205,9 +205,9 @@ class ThreadBalance(Relation):
         if moving:
             columns |= {"rate": rate, "velocity": rate * found[f"{self.name}_speed"]}
         if bent:
-            angles = [(p, only(piece.on, angle + p.wrap)) for p, angle, piece in wraps]
+            angles = [(p, masked(piece.on, angle + p.wrap)) for p, angle, piece in wraps]
             columns["wrap"] = sum((angle for _, angle in angles), 0.0 * needed)
-            sliding = [only(outside(p.fixed, found), angle) for p, angle in angles]
+            sliding = [masked(outside(p.fixed, found), angle) for p, angle in angles]
             pull = self.tension - self.stiffness * columns["surplus"]
             columns["tension"] = self._tension(pull * self._hurried(columns, found), sliding)
         return {f"{self.name}_{key}": values for key, values in columns.items()}
@@ -269,7 +269,7 @@ def _is_take_up(place: Waypoint) -> bool:
 
 def _past_ends(run: Run, found: Mapping[str, Any]) -> list[Any]:
     """Return how far along each blade of a run, from either end, the way over its line is shortest."""
-    pieces, past = laid(run, found, False), []
+    pieces, past = placed_points(run, found, False), []
     for k, place in enumerate(run):
         if isinstance(place.on, Edge):
             ends = (spot.position(found) for spot in spots(place))

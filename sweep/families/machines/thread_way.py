@@ -84,7 +84,7 @@ def outside(ends: tuple[str, ...], found: Mapping[str, Any], inside: bool = Fals
     return (turned(np.real(found[PHI]) - start) < turned(end - start)) == inside
 
 
-def only(where: Any, values: Any) -> Any:
+def masked(where: Any, values: Any) -> Any:
     """Return values where the thread runs so, else 0."""
     return values if where is None else np.where(where, values, 0.0)
 
@@ -93,7 +93,7 @@ def _chosen(where: Any, a: Point, b: Point) -> Point:
     return [np.where(where, x, y) for x, y in zip(a, b, strict=True)]
 
 
-def laid(run: Sequence[Waypoint], found: Mapping[str, Any], moving: bool) -> list[Piece]:
+def placed_points(run: Sequence[Waypoint], found: Mapping[str, Any], moving: bool) -> list[Piece]:
     """Place the points of a run, those on blades last: each lies between two that do not depend on it."""
     pieces: list[Piece] = []
     for place in run:
@@ -123,7 +123,7 @@ def beside(pieces: Sequence[Piece], k: int, step: int) -> Piece:
     return Piece(_chosen(piece.on, piece.at, other.at), _chosen(piece.on, piece.rate, other.rate), None)
 
 
-def followed(pieces: Sequence[Piece], moving: bool, bent: bool) -> tuple[Any, Any, list[Any]]:
+def length_and_bends(pieces: Sequence[Piece], moving: bool, bent: bool) -> tuple[Any, Any, list[Any]]:
     """Return the length of a run, its derivative, and the bends at all places but its ends."""
     length: Any = 0.0
     change: Any = 0.0
@@ -133,9 +133,9 @@ def followed(pieces: Sequence[Piece], moving: bool, bent: bool) -> tuple[Any, An
             continue
         before = beside(pieces, k, -1)
         size, along = _piece(before.at, piece.at)
-        length = length + only(piece.on, size)
+        length = length + masked(piece.on, size)
         if moving:
-            change = change + only(piece.on, dot(along, minus(piece.rate, before.rate)))
+            change = change + masked(piece.on, dot(along, minus(piece.rate, before.rate)))
         if bent and k + 1 < len(pieces):
             bends.append(bend(along, _piece(piece.at, beside(pieces, k, 1).at)[1]))
     return length, change, bends

@@ -22,10 +22,10 @@ from sweep.families.machines.crossings import (
     Poses,
     moved,
     outputs_at,
+    scattered,
     steepness,
     step_of,
     verdict,
-    whole,
 )
 from sweep.families.machines.relations import Relation
 from sweep.families.machines.segments import cross, dot, minus
@@ -141,7 +141,7 @@ def _found(entering: Entering, poses: Poses, samples: int, wanted: frozenset[str
     near = _within(entering, extremes.phi) & (np.abs(heights) <= TANGENT * size)
     found = verdict(status, np.bincount(extremes.row, near, n) > 0, count, ways)
     taken = np.flatnonzero(inside & right & (found[roots.row] == st.OK))
-    place = whole(n, roots.row[taken], roots.phi[taken])
+    place = scattered(n, roots.row[taken], roots.phi[taken])
     places = {"at": place, "count": np.where(status == st.OK, count, np.nan), "status": found}
     return places | {"fastest": np.abs(slope).max(axis=1)}
 
