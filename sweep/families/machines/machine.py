@@ -24,7 +24,7 @@ from sweep.families.machines.passages import taking_step
 from sweep.families.machines.pressing import Pressing
 from sweep.families.machines.relations import EventValue, Relation, Timing
 from sweep.families.machines.sewing import Sewing, sewing_step
-from sweep.families.machines.shaking import Shaking, frame_key, orders_of
+from sweep.families.machines.shaking import Shaking, orders_of
 from sweep.families.machines.triangles import Entering, entering_step
 from sweep.families.parts import Member
 from sweep.families.sites import AXES
@@ -190,16 +190,18 @@ def _poses(machine: Machine, designs: Array, angles: Angles, wanted: frozenset[s
         columns = _member(needs, designs, angles, found)
         np.copyto(status, columns.pop("status"), where=status == OK)
         found |= {f"{needs.member.name}.{name}": values for name, values in columns.items()}
-    if any(isinstance(r, Shaking) for r in asked.relations):
-        found |= _frames(machine, designs)
     found["phi"] = angles.phi
     if asked.events:
         events, code = event_angles(machine, designs)
         np.copyto(status, code[:, None], where=status == OK)
         found |= events
     found |= {name: designs[:, [column]] for name, column in asked.inputs.items()}
+    frames = _frames(machine, designs) if any(isinstance(r, Shaking) for r in asked.relations) else {}
     for relation in asked.relations:
-        found |= relation.compute(found, wanted)
+        if isinstance(relation, Shaking):
+            found |= relation.on_frame(found, frames, wanted)
+        else:
+            found |= relation.compute(found, wanted)
     return {name: _whole(found[name], shape) for name in wanted} | {"status": status}
 
 
@@ -256,11 +258,11 @@ def _of_member(m: Member, own: frozenset[str]) -> _OfMember:
 
 
 def _frames(machine: Machine, designs: Array) -> dict[str, Frame]:
-    """Return the frames of all stages, under the keys that shaking reads them by."""
+    """Return the frames of all stages, of "looper2" or "looper"."""
     found: dict[str, Frame] = {}
     for m in machine.members:
         placed = zip(m.family.stages, m.frames(designs), strict=True)
-        found |= {frame_key(f"{m.name}{stage.tail}"): frame for stage, frame in placed if frame is not None}
+        found |= {f"{m.name}{stage.tail}": frame for stage, frame in placed if frame is not None}
     return found
 
 

@@ -15,7 +15,7 @@ from sweep.errors import InputError
 from sweep.families.base import Accuracy, Angles, Columns, Family, Output, Step, Work
 from sweep.families.capabilities import GuidedPoint, JointRecords, ToolPoint, skeleton_of
 from sweep.families.curve_features import Smooth, least_samples
-from sweep.families.frames import CRANKS
+from sweep.families.frames import CRANKS, Frame
 from sweep.families.link_tree import LinkTree
 from sweep.families.machines.relations import Relation, with_size
 from sweep.families.machines.segments import cross
@@ -52,11 +52,6 @@ class Shaken:
         return f"{self.member}.{output}{self.stage}"
 
     @property
-    def frame(self) -> str:
-        """Key of its frame in the machine's, among the pose outputs of all members."""
-        return frame_key(f"{self.member}{self.stage}")
-
-    @property
     def axis(self) -> list[str]:
         """Names of the components of its crank axis in the machine's frame."""
         return [f"{self.member}.{self.crank}{self.stage}_axis_{axis}" for axis in AXES]
@@ -64,11 +59,6 @@ class Shaken:
     def vector(self, found: Mapping[str, Any], output: str) -> list[Any]:
         """Return a vector in the frame of the stage."""
         return [found[self.named(f"{output}_{axis}")] for axis in AXES]
-
-
-def frame_key(stage: str) -> str:
-    """Return the key of the frame of a stage, "looper2" or "looper", among pose outputs: none of these has a blank."""
-    return f"frame of {stage}"
 
 
 def shaken(member: str, stage: str, family: Family, listed: Sequence[tuple[str, str]]) -> Shaken:
@@ -145,12 +135,12 @@ class Shaking(Relation):
                 names |= {one.named("drive_torque"), *one.axis}
         return frozenset(names)
 
-    def compute(self, found: Mapping[str, Any], wanted: frozenset[str]) -> dict[str, Any]:
-        """Return the force and moment on the frame, (n, m)."""
+    def on_frame(self, found: Mapping[str, Any], frames: Mapping[str, Frame], wanted: frozenset[str]) -> dict[str, Any]:
+        """Return the force and moment on the frame, (n, m); ``frames`` are those of all stages, of "looper2"."""
         force: list[Any] = [0.0, 0.0, 0.0]
         moment: list[Any] = [0.0, 0.0, 0.0]
         for one in self.stages:
-            frame = found[one.frame]
+            frame = frames[f"{one.member}{one.stage}"]
             own = frame.turned(one.vector(found, "shaking_force"))
             force = [total + part for total, part in zip(force, own, strict=True)]
             if self._turning(wanted):
