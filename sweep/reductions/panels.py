@@ -74,7 +74,7 @@ class Top(NamedTuple):
 def has_kinks(family: Family, request: Request, jumps: bool = False) -> bool:
     """Whether an extremum is to be searched for on panels; ``jumps``: all curves of these designs may jump."""
     output = family.pose_output[request.pose]
-    return (output.kinks or jumps) and not output.wraps and not request.windowed
+    return (output.kinks or output.jumps or jumps) and not output.wraps and not request.windowed
 
 
 def extrema(
@@ -139,6 +139,9 @@ def _block(
             rounding, lost = rounding + share * np.abs(top.value), share >= 1.0
         # the size of a level curve is rounding, and no target for its error
         allowed = np.maximum(target * size[top.row], STEADY * EPS * np.abs(top.value))
+        if family.pose_output[request.pose].jumps:  # constant in pieces: a polynomial only adds rounding
+            attained, _ = pose_columns(family, designs[rows[top.row]], top.phi[:, None], [request.pose])
+            top = top._replace(value=_measured(attained[request.pose][:, 0], request.mode))
         late = lost | ((top.err > allowed) & (top.err > rounding))
         status[top.row[late]] = np.where(status[top.row[late]] == st.OK, st.NOT_CONVERGED, status[top.row[late]])
         at = rows[top.row]
