@@ -15,7 +15,7 @@ from sweep.evaluation.summaries import FEWEST_SAMPLES, FINEST_TARGET, MOST_SAMPL
 from sweep.families.names import is_error, is_flag
 from sweep.reductions.steps import certified_names, is_windowed
 from sweep.study.load import study_from_data, with_accuracy
-from sweep.study.study import Study
+from sweep.study.study import OptimiseSettings, Study
 
 # With no survivor in the pilot, this share is assumed.
 LEAST_KEPT = 1e-3
@@ -25,11 +25,12 @@ WRITE_SECONDS_PER_ROW = 120e-9
 WRITE_SECONDS_PER_CHUNK = 5e-3
 # Measured: what zstd leaves of a result and of its error estimate; a sampled parameter keeps seven of its eight bytes,
 # the parameters of a lattice, design number and status together take less than half a byte a row.
-PACKED_RESULT, PACKED_ERROR = 0.78, 0.4
+PACKED_RESULT, PACKED_ERROR = 0.78, 0.55  # 0.3 to 0.8 of an error
 SAMPLED_VALUE_BYTES = 7.0
 OTHER_BYTES_PER_ROW = 0.5
-# Of a column in a chunk besides its values: 457 to 496 in the footer, with name and definition, and 94 to 137 in pages.
-BYTES_PER_COLUMN = 600.0
+# Of a column in a chunk besides its values: 350 to 450 in the footer, with name and definition, and 94 to 137 in pages;
+# of a chunk besides its columns: 2000 to 5500, what determined its values, once as it is and once in base64.
+BYTES_PER_COLUMN, BYTES_PER_CHUNK = 520.0, 2800.0
 
 # Python, numpy, pandas, pyarrow and the compiled kernels.
 BASE_MEMORY_BYTES = 350e6
@@ -40,8 +41,10 @@ THREAD_EFFICIENCY = 0.97
 
 
 # Looks of a local search in the median, those that tell the price of one, and those that a population of needle drives
-# takes as long as: 27 and 29 s of 9 ms each were measured, without and with room for tolerances.
+# takes as long as: 27 and 29 s of 9 ms each were measured, without and with room for tolerances.  A search that
+# converges within the time allowed here tells itself how many it takes.
 TYPICAL_LOOKS, TRIED_LOOKS, POPULATION_LOOKS = 300, 40, 3000
+TRIED_SECONDS = 0.5
 NEAR_LOOKS = 75  # of a search of a front, which begins at its neighbour's answer: 56 and 73 were measured
 REPORT_SECONDS = 5.0
 
@@ -107,7 +110,7 @@ def estimate(
         kept=kept,
         memory_bytes=BASE_MEMORY_BYTES + jobs * COPIES_OF_A_CHUNK * min(chunk_size, designs) * row_bytes(study),
         disk_bytes=designs * kept * (OTHER_BYTES_PER_ROW + sampled + results)
-        + chunks * len(columns) * BYTES_PER_COLUMN,
+        + chunks * (len(columns) * BYTES_PER_COLUMN + BYTES_PER_CHUNK),
         seconds=work / (1.0 if jobs == 1 else jobs * THREAD_EFFICIENCY),
         optimise_seconds=None if study.optimise is None else study.optimise.time_budget,
     )
@@ -124,7 +127,6 @@ def searches(study: Study, jobs: int, known: Pilot) -> tuple[tuple[str, float, f
     # scipy's minimisers take as long as numpy to import, which a study without a search need not wait for
     from sweep.optimise.front import pareto
     from sweep.optimise.local.start import search
-    from sweep.optimise.manufacture import robust
     from sweep.optimise.multistart.survey import MET, TOGETHER
     from sweep.optimise.starts.dataset import SAMPLES, drawn, sample_seconds
     from sweep.optimise.starts.global_starts import MADE, SWEPT
@@ -136,9 +138,11 @@ def searches(study: Study, jobs: int, known: Pilot) -> tuple[tuple[str, float, f
     problem = problem_of(study, designs)
     search(0, problem, designs[0], lambda: False, TRIED_LOOKS)  # compiles
     begin = time.process_time()
-    spent = search(0, problem, designs[0], lambda: False, TRIED_LOOKS).looks
-    look = (time.process_time() - begin) / max(spent, 1) / jobs
-    typical, most = min(settings.looks, TYPICAL_LOOKS) * look, settings.looks * look
+    late = lambda: time.process_time() - begin > TRIED_SECONDS  # noqa: E731
+    tried = search(0, problem, designs[0], late, TYPICAL_LOOKS)
+    look = (time.process_time() - begin) / max(tried.looks, 1) / jobs
+    settled = tried.looks if tried.ended == "converged" else None
+    typical, most = min(settings.looks, settled or TYPICAL_LOOKS) * look, settings.looks * look
     share = None if study.tolerance is None else study.tolerance.robust
     population = POPULATION_LOOKS * look if settings.by_populations else 0.0
     if settings.by_populations:
@@ -151,16 +155,31 @@ def searches(study: Study, jobs: int, known: Pilot) -> tuple[tuple[str, float, f
         all_of_them = -(-SAMPLES * settings.starts // TOGETHER) * sample
         found = [("search", some + settings.starts * typical, all_of_them + settings.starts * most)]
     if study.tolerance is not None and share is not None:
-        # A robust search uses up its allowed looks: 9 to 14 s of each start and 33 to 41 s of each end were measured,
-        # samples included, where 1600 and 4000 looks take 14 and 36 s.
-        first = robust.TRIED * robust.ROUNDS * min(robust.HEAT, settings.looks) * look
-        whole = first + robust.ENDED * most + MADE * population
-        found.append(("tolerances", whole, 2.0 * whole))
+        some, every = (n * look + MADE * population for n in _robust_looks(settings, settled))
+        found.append(("tolerances", some, 2.0 * every))
     if study.pareto is not None:
         count = pareto.searches(study.pareto)
         allowed = min(study.pareto.looks, settings.looks) * look
         found.append(("front", count * min(NEAR_LOOKS * look, allowed), count * allowed))
     return (*found, ("tables and report", REPORT_SECONDS, 4.0 * REPORT_SECONDS))
+
+
+def _robust_looks(settings: OptimiseSettings, settled: int | None) -> tuple[int, int]:
+    """Return looks of the searches with room for tolerances: typical, and where none of them converges.
+
+    Those of needle drives use up what is allowed: 9 to 14 s of each start and 33 to 41 s of each end were measured,
+    samples included, where 1600 and 4000 looks take 14 and 36 s.  Where a search has ``settled`` after so many looks,
+    each round of search takes as many at most.  Without populations no more are begun than there are starts.
+    """
+    from sweep.optimise.manufacture import robust
+
+    begun = robust.TRIED if settings.by_populations else min(robust.TRIED, settings.starts)
+    rounds, heat = begun * robust.ROUNDS, min(robust.HEAT, settings.looks)
+    ended, corrected = min(robust.ENDED, begun), robust.CORRECTIONS * robust.ROUNDS
+    most = rounds * heat + ended * settings.looks
+    if settled is None:
+        return most, most
+    return rounds * min(heat, settled) + ended * min(settings.looks, corrected * settled), most
 
 
 def other_accuracies(

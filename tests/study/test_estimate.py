@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import itertools
+import tomllib
 from dataclasses import replace
 from pathlib import Path
 from types import SimpleNamespace
@@ -12,9 +13,11 @@ import pytest
 from sweep.chunks.cascade import ordered_routes
 from sweep.costs import nanoseconds
 from sweep.engine.estimate import check_budget, estimate, other_accuracies, searches
+from sweep.engine.run import run
 from sweep.errors import BudgetError
 from sweep.evaluation.tables import design_matrix
-from sweep.study import Budget, Study, load_study
+from sweep.study import Budget, Study, load_study, study_from_data
+from tests.optimise.test_robust import ROBUST
 
 PROOF = "with the proof that no peak is missed"
 TEXT = """
@@ -73,8 +76,6 @@ def test_dropping_infeasible_designs_saves_disk(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("count", [400, 2])  # of a small study most lies in the footer, per column
 def test_disk_estimate_is_close_to_that_of_a_run(tmp_path: Path, count: int) -> None:
-    from sweep.engine.run import run
-
     question = study(tmp_path, count)
     expected = estimate(question, 2)
     folder = run(question, tmp_path / "designs")
@@ -172,7 +173,7 @@ def test_ends_of_a_window_have_the_price_of_events(tmp_path: Path, wanted: str, 
 @pytest.mark.parametrize("jobs", [1, 2])
 def test_price_of_what_follows_counts_every_search(monkeypatch, jobs):
     """A look takes 10 ms: 27 s of a population and 36 s of a robust end were measured at 9."""
-    monkeypatch.setattr("sweep.optimise.local.start.search", lambda *_: SimpleNamespace(looks=10))
+    monkeypatch.setattr("sweep.optimise.local.start.search", lambda *_: SimpleNamespace(looks=10, ended="looks"))
     ticks = itertools.count(step=0.1)
     monkeypatch.setattr("sweep.engine.estimate.time.process_time", lambda: next(ticks))
     study = load_study(Path(__file__).parents[2] / "studies" / "needle208")
@@ -183,3 +184,27 @@ def test_price_of_what_follows_counts_every_search(monkeypatch, jobs):
     assert found["search"] == pytest.approx((3 * (30.0 + 6.0) / jobs, (40 * (30.0 + 80.0) + 80.0) / jobs))
     whole = (4 * 16.0 + 3 * 40.0 + 3 * 30.0) / jobs
     assert found["tolerances"] == pytest.approx((whole, 2.0 * whole))
+
+
+def test_price_of_searches_that_converge_is_that_of_the_looks_they_take(monkeypatch):
+    """The tolerances of a crank-rocker of seven dimensions were said to take 66 s, and took 1.6."""
+    monkeypatch.setattr("sweep.optimise.local.start.search", lambda *_: SimpleNamespace(looks=25, ended="converged"))
+    ticks = itertools.count(step=0.025)
+    monkeypatch.setattr("sweep.engine.estimate.time.process_time", lambda: next(ticks))
+    monkeypatch.setattr("sweep.optimise.starts.dataset.sample_seconds", lambda *_: 0.0)
+    study = study_from_data(tomllib.loads(ROBUST), "study.toml")
+    design = design_matrix(study.family, study.reference)[0]
+    found = {name: (typical, most) for name, typical, most in searches(study, 1, SimpleNamespace(kept=design))}
+    looks = study.optimise.looks
+    assert found["search"] == pytest.approx((3 * 0.025, 3 * looks * 1e-3))
+    # Four rounds from each of three starts, and forty from each end at most, of 25 looks of 1 ms.
+    assert found["tolerances"] == pytest.approx(((3 * 4 + 3 * 40) * 0.025, 2 * (3 * 4 * 400 + 3 * looks) * 1e-3))
+
+
+def test_disk_of_a_small_study_is_that_of_a_run(tmp_path: Path) -> None:
+    """It was said to be 1.33 times too small: three runs of neighbours told the share kept, no metadata were priced."""
+    question = study(tmp_path, 2)
+    expected = estimate(question, 1)
+    folder = run(question, tmp_path / "designs", jobs=1)
+    size = sum(part.stat().st_size for part in folder.glob("part-*"))
+    assert expected.disk_bytes / 1.1 < size < expected.disk_bytes * 1.1
