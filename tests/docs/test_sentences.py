@@ -54,6 +54,15 @@ def test_page_on_extrema_names_the_families_whose_branch_decides_which_end_is_ex
     assert named == {name for name in NAMES if family(name).outward}
 
 
+def test_files_that_pages_name_are_there():
+    """Two pages named files that had been renamed."""
+    root = DOCS.parent
+    pages = [page for page in DOCS.rglob("*.md") if not page.name.startswith("how-to-add")]  # files to be made
+    for page in [*pages, root / "README.md", *root.glob("studies/*/README.md")]:
+        for path in re.findall(r"`((?:kernels|sweep|tests|studies)/[\w/.-]+\.\w+)", page.read_text(encoding="utf-8")):
+            assert (root / path).exists(), f"{page.name}: {path}"
+
+
 def test_plan_says_when_a_search_ends():
     (line,) = _optimiser(SimpleNamespace(optimise=OptimiseSettings()))
     assert "fewer once better optima are unlikely (under 2 %) and the best was found 3 times" in line
