@@ -57,7 +57,8 @@ def design_matrix(
     family : whose parameters are expected
     table : DataFrame or mapping of equally long columns (scalars are repeated); missing columns take the default
     extra : further columns that may stand in the table (``phi``); returned separately if present
-    unused : names that mean something elsewhere (inputs of effects that are not called for) and are no misspelling
+    unused : names that mean something elsewhere (inputs of effects that are not called for) and are no misspelling;
+        their columns are as long as the others
 
     Raises
     ------
@@ -72,7 +73,8 @@ def design_matrix(
             if guess:
                 raise InputError("column", name, f"the columns {', '.join(known)}{guess}", "table")
     columns = {name: numbers(table[key], name, f"column {name}, row") for name, key in keys.items() if name in known}
-    rows = _row_count(columns)
+    beside = {name: np.asarray(table[key]) for name, key in keys.items() if name in unused and name not in columns}
+    rows = _row_count(columns | beside)
     matrix = np.empty((rows, len(family.parameters)))
     for k, parameter in enumerate(family.parameters):
         matrix[:, k] = _checked_column(family, parameter, columns, keys)

@@ -82,6 +82,15 @@ def test_kept_column_of_another_length_is_refused() -> None:
     refused("id = '3 rows'", sweep.summarise, "rssr", ROCKER | {"a": [1.0, 2.0], "id": [1, 2, 3]}, "margin", keep="id")
 
 
+def test_every_row_counts_that_only_an_input_of_another_effect_has() -> None:
+    masses = np.array([1e-6, 2e-6, 3e-6])
+    assert len(sweep.summarise("rssr", {**ROCKER, "m_crank": masses}, "swing")) == 3
+    assert len(sweep.evaluate("rssr", {**ROCKER, "m_crank": masses}, "psi", phi=[0.1, 0.2])) == 6
+    members = {**{f"x.{name}": x for name, x in ROCKER.items()}, "x.m_crank": masses}
+    assert len(sweep.summarise(sweep.machine({"x": "rssr"}), members, "x.swing")) == 3
+    refused("3 rows", sweep.summarise, "rssr", {**ROCKER, "a": [1.0, 0.9], "m_crank": masses}, "swing")
+
+
 def test_status_in_words() -> None:
     found = sweep.summarise("rssr", FRAME, "swing", status_text=True)
     assert list(found["status_text"]) == [MEANING[code] for code in found["status"]]
