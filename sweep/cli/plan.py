@@ -226,7 +226,8 @@ def _effects(study: Study, sent: Pilot) -> list[str]:
     if bare is not study.family:
         lines += ["", "effects, with their share of the cost at equal numbers of poses"]
         lines += aligned(tree(bare, study.want, POSES))
-    lines += ["", "effects not computed, because nothing asks for them", f"  {', '.join(out)}"]
+    if out:
+        lines += ["", "effects not computed, because nothing asks for them", f"  {', '.join(out)}"]
     looked_at, tried = spread_rows(sent.kept, ADVISED), sent.tried
     if not len(looked_at):
         looked_at, tried = feasible_designs(study, ADVISED)

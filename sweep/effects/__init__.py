@@ -233,7 +233,7 @@ def extended(family: Family, wanted: Iterable[str], curves: Mapping[str, Curve] 
     input that they add to; what no wanted effect takes is left out.
     """
     if isinstance(family, Machine):
-        asked = _asked(family, wanted)
+        asked = asked_of_machine(family, wanted)
         found = {
             m.name: extended(
                 m.family,
@@ -248,18 +248,23 @@ def extended(family: Family, wanted: Iterable[str], curves: Mapping[str, Curve] 
     return with_effects(family, called_for(family, wanted), curves)
 
 
+def asks_speed(names: Iterable[str]) -> bool:
+    """Tell whether one of these inputs is the speed of a crank, of a chain that of its first stage."""
+    return any(stem(name) == "speed" for name in names)
+
+
 def _check_even(machine: Machine, found: Mapping[str, Family]) -> None:
     """Refuse effects that need a speed of a member that another drives: its crank does not turn evenly."""
     for m in machine.members:
         added = found[m.name].parameter_names[len(m.family.parameter_names) :]
-        if m.driver is not None and "speed" in added:
+        if m.driver is not None and asks_speed(added):
             allowed = (
                 f"geometry alone, as {'.'.join(m.driver)} drives it unevenly: make one chain of both for its forces"
             )
             raise InputError("outputs", f"of loads of {m.name}", allowed, f"machine.{m.name}")
 
 
-def _asked(machine: Machine, wanted: Iterable[str]) -> set[str]:
+def asked_of_machine(machine: Machine, wanted: Iterable[str]) -> set[str]:
     """Find the outputs that wanted names are reductions of, with those of members that relations are made of."""
     names = {about for name in wanted for about in reduced(name, machine.domain)}
     asked = [timing for timing in machine.timings if timing.name in names]

@@ -8,12 +8,37 @@ from typing import NamedTuple
 import numpy as np
 
 from sweep.costs import nanoseconds
-from sweep.effects import applicable, called_for, effect, inputs
+from sweep.effects import applicable, asked_of_machine, asks_speed, called_for, effect, inputs
 from sweep.effects.base import Advice, Effect, Placed
 from sweep.effects.scene import first_scene
 from sweep.families.base import Angles, Array, Family
+from sweep.families.machines.machine import Machine
 
 SAMPLES = 64
+
+
+class _Part(NamedTuple):
+    """What effects are asked of: a family or a chain by itself, or a member of a machine, with what stands before."""
+
+    before: str
+    family: Family
+    wanted: frozenset[str]
+    even: bool = True
+
+    @property
+    def offered(self) -> list[Placed]:
+        """Effects that can be asked of it: none that asks for a speed if another member drives it."""
+        of = self.family
+        return [p for p in applicable(of) if self.even or not asks_speed(one.name for one in inputs(of, [p]))]
+
+
+def _parts(family: Family, wanted: Iterable[str]) -> list[_Part]:
+    if not isinstance(family, Machine):
+        return [_Part("", family, frozenset(wanted))]
+    asked = asked_of_machine(family, wanted)
+    return [
+        _Part(f"{m.name}.", m.family, frozenset(map(m.own, asked)) - {""}, m.driver is None) for m in family.members
+    ]
 
 
 class Finding(NamedTuple):
@@ -58,17 +83,16 @@ def tree(family: Family, wanted: Iterable[str], poses: float) -> list[tuple[str,
     What an effect needs stands below it and is part of its cost.  ``poses`` is the number of poses of one
     design, for the cost of what is computed per design.
     """
-    names = frozenset(wanted)
-    own = called_for(family, names)
-    motion = nanoseconds("work", "joint records")
-    costs = {placed.name: cost(placed, names, poses) for placed in own}
-    total = poses * motion + sum(costs.values())
+    parts = _parts(family, wanted)
+    each = [(part, placed) for part in parts for placed in called_for(part.family, part.wanted)]
+    motion = len(parts) * nanoseconds("work", "joint records")
+    costs = [cost(placed, part.wanted, poses) for part, placed in each]
+    total = poses * motion + sum(costs)
     rows = [("motion", "K0", f"{motion:.3g} ns per pose", f"{100.0 * poses * motion / total:.0f} %")]
-    for placed in own:
-        whole = costs[placed.name] > poses * placed.entry.ns_per_pose
-        per_pose = f"{placed.entry.ns_per_pose:.0f} ns per pose"
-        unit = f"{costs[placed.name] / 1e3:.3g} us per design" if whole else per_pose
-        rows.append((placed.name, placed.entry.key, unit, f"{100.0 * costs[placed.name] / total:.0f} %"))
+    for (part, placed), ns in zip(each, costs, strict=True):
+        whole = ns > poses * placed.entry.ns_per_pose
+        unit = f"{ns / 1e3:.3g} us per design" if whole else f"{placed.entry.ns_per_pose:.0f} ns per pose"
+        rows.append((f"{part.before}{placed.name}", placed.entry.key, unit, f"{100.0 * ns / total:.0f} %"))
         for depth, need in _needs(placed.entry, 1):
             rows.append(("  " * depth + need.name, need.key, "part of it", ""))
     return rows
@@ -88,10 +112,19 @@ def _needs(entry: Effect, depth: int) -> list[tuple[int, Effect]]:
 
 def left_out(family: Family, wanted: Iterable[str]) -> tuple[str, ...]:
     """Names of the effects that could be asked for and are not needed here."""
-    used = {
-        f"{entry.name}{placed.number}" for placed in called_for(family, wanted) for entry in closure([placed.entry])
-    }
-    return tuple(placed.name for placed in applicable(family) if placed.name not in used)
+    return tuple(
+        f"{part.before}{placed.name}"
+        for part in _parts(family, wanted)
+        for used in (_computed(part),)
+        for placed in part.offered
+        if placed.name not in used
+    )
+
+
+def _computed(part: _Part) -> set[str]:
+    """Return names of the effects that what is wanted of it calls for, with those that these need."""
+    called = called_for(part.family, part.wanted)
+    return {f"{entry.name}{placed.number}" for placed in called for entry in closure([placed.entry])}
 
 
 def findings(bare: Family, full: Family, designs: Array, wanted: Iterable[str]) -> list[Finding]:
@@ -99,20 +132,28 @@ def findings(bare: Family, full: Family, designs: Array, wanted: Iterable[str]) 
 
     Parameters
     ----------
-    bare : the family without effects, or the chain
+    bare : the family without effects, or the chain, or the machine
     full : the family the design matrix belongs to;  designs : (n, P)
     wanted : names of outputs
     """
-    columns = {name: np.ascontiguousarray(designs[:, k]) for k, name in enumerate(full.parameter_names)}
+    whole = {name: np.ascontiguousarray(designs[:, k]) for k, name in enumerate(full.parameter_names)}
+    found = []
+    for part in _parts(bare, wanted):
+        columns = {name.removeprefix(part.before): x for name, x in whole.items() if name.startswith(part.before)}
+        found += [one._replace(name=f"{part.before}{one.name}") for one in _findings(part, columns)]
+    return found
+
+
+def _findings(part: _Part, columns: dict[str, Array]) -> list[Finding]:
+    bare, computed = part.family, _computed(part)
     own = np.column_stack([columns[name] for name in bare.parameter_names])
     angles = Angles.of(2.0 * np.pi * np.arange(SAMPLES)[None] / SAMPLES)
-    computed = {f"{e.name}{placed.number}" for placed in called_for(bare, wanted) for e in closure([placed.entry])}
-    needs = {placed.name: inputs(bare, [placed]) for placed in applicable(bare)}
+    needs = {placed.name: inputs(bare, [placed]) for placed in part.offered}
     defaults = {p.name: p.left_out(columns) for some in needs.values() for p in some}
     # A rule may look at more than its effect's own inputs, so it gets all that is known of the scene.
-    given = {name: np.full(len(designs), x) for name, x in defaults.items() if x is not None} | columns
+    given = {name: np.full(len(own), x) for name, x in defaults.items() if x is not None} | columns
     found = []
-    for placed in applicable(bare):
+    for placed in part.offered:
         if any(p.default is None and p.name not in columns for p in needs[placed.name]):
             continue
         advice = placed.entry.advice(first_scene(bare, own, angles, given).stage(placed.stage))

@@ -5,14 +5,16 @@ from __future__ import annotations
 import re
 from pathlib import Path
 
+import numpy as np
 import pytest
 from click.testing import CliRunner
 
+import sweep
 from studies.accuracy.ordinary import designs
 from sweep.cli import main
 from sweep.cli.effects import every_input, page
 from sweep.effects import NAMES, applicable, effect, extended, offered
-from sweep.effects.advice import closure, findings
+from sweep.effects.advice import closure, findings, left_out, tree
 from sweep.effects.base import Placed
 from sweep.families import NAMES as FAMILIES
 from sweep.families import family
@@ -81,6 +83,27 @@ def test_a_large_axial_force_is_said_where_nobody_asks_for_it():
     words = [finding.words for finding in findings(bare, full, designs(full, 4), ["psi"])]
     (found,) = [line for line in words if line.startswith("Axial force is large; ask for `pressure`")]
     assert float(found.split(": ")[1].split(",")[0]) > 0.05 and found.endswith("not below 0.05 of the coupler force")
+
+
+def test_effects_of_members_are_told_by_their_names_with_their_shares_of_the_cost():
+    """What a relation is made of counts; a member that another drives has no forces that could be asked for."""
+    driven = {"family": "rssr", "driver": "y.psi"}
+    members = {"x": {"family": "slider_crank", "ratio": 2}, "y": "rssr", "z": driven}
+    bare = family(sweep.machine(members, {"t": {"torque": ["x", "y"]}}))
+    full = extended(bare, ["max_t"])
+    rows = tree(bare, ["max_t"], 64.0)
+    names = [name for name, *_ in rows if not name.startswith(" ")]
+    assert names == ["motion", "x.slider_kinetostatics", "y.kinetostatics"]
+    assert sum(int(share.split()[0]) for *_, share in rows if share) == pytest.approx(100, abs=2)
+    out = left_out(bare, ["max_t"])
+    assert {"x.pressure", "y.friction", "z.pressure"} <= set(out)
+    assert not {"x.slider_kinetostatics", "y.coupler", "z.kinetostatics", "z.friction"} & set(out)
+    matrix = np.array([[p.default or 0.0 for p in full.parameters]] * 4)
+    for m in full.members:
+        matrix[:, m.columns] = designs(m.family, 4)
+    judged = {one.name: one.wanted for one in findings(bare, full, matrix, ["max_t"])}
+    assert judged["y.kinetostatics"] and not judged["z.pressure"]
+    assert "z.kinetostatics" not in judged
 
 
 def test_the_finger_says_that_the_coupler_cannot_spin_freely():
