@@ -10,6 +10,7 @@ from functools import lru_cache
 from sweep.families.base import Turn
 from sweep.families.names import is_error, is_place, parts, without_error, without_minus
 from sweep.families.reduction import split
+from sweep.quantities.units import factor as unit_factor
 from sweep.quantities.units import internal_unit
 
 POSITIONS = {
@@ -34,6 +35,7 @@ PRIMES = ("", "′", "″", "‴")
 POWERS = {1: "", 2: "²", 3: "³", 4: "⁴"}
 # Units that a designer reads instead of those that are stored, with the factor to them.
 READ_IN = {"t": ("g", 1e6), "t*mm^2": ("kg·mm²", 1e3), "life": ("h", 1.0 / 3600.0), "speed": ("rpm", 30.0 / math.pi)}
+LENGTHS = ("mm", "um", "cm", "m", "in")
 NO_ANGLE = 1e-10  # rad: what is smaller is the rounding of zero, or of the place of an extremum at zero
 NONE_OF = {"°": NO_ANGLE, "mm": 1e-12}  # of quantities shown in these units, as stored: what is smaller is rounding
 _POINT = re.compile("([xyz])_([a-z])")
@@ -118,23 +120,24 @@ def quantity(name: str, unit: str) -> Quantity:
     symbol, words = _called(order, root, stage)
     symbol, words = symbol_form.format(symbol), words_form.format(words)
     unit, order = bare, max(order, int(unit != bare))  # a speed whose unit says that it is one
+    length = unit in LENGTHS
+    order = order if length or unit in ("1", "rad") else 0  # a force that is called ds is none
     if is_place(name) or (order == 0 and unit in ("rad", "angle")):
         return Quantity(name, symbol, words, "°", math.degrees(1.0), symbolic)
     if order == 0:
         kind = {"s": "life", "rad/s": "speed"}.get(unit, "")  # where the name says what it is
         read, factor = READ_IN.get(kind if kind and kind in name else unit, (_pretty_unit(unit), 1.0))
         return Quantity(name, symbol, words, read, factor, symbolic)
-    length = unit.startswith("mm")
     return Quantity(
         name,
         symbol,
         words,
-        f"{'mm' if length else 'rad'}/rad{POWERS[order]}",
+        f"{unit if length else 'rad'}/rad{POWERS[order]}",
         1.0,
         symbolic,
         order,
         f"{'m' if length else 'rad'}/s{POWERS[order]}",
-        1e-3 if length else 1.0,
+        1e-3 * unit_factor(unit, "mm") if length else 1.0,
     )
 
 

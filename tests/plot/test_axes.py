@@ -36,6 +36,16 @@ def folder(tmp_path_factory):
     return place
 
 
+def test_lengths_of_a_design_in_metres_give_velocities_in_metres():
+    panels = sweep.plot.motion("slider_crank", {"a": 0.02, "b": 0.07, "e": 0.0}, "s, ds, d2s", unit="m", speed=100.0)
+    titles = [axes.get_title(loc="left") for axes in panels]
+    assert [title.partition("[")[2] for title in titles] == ["m]", "m/rad]", "m/rad²]"]
+    (pace,) = panels[1].child_axes
+    panels[1].figure.canvas.draw()
+    assert pace.get_ylabel() == "m/s"
+    assert pace.get_ylim()[1] == pytest.approx(100.0 * panels[1].get_ylim()[1])
+
+
 def test_motion_has_a_panel_for_each_curve_and_draws_it():
     axes = sweep.plot.motion("rssr", RSSR, "dpsi, d2psi")
     assert len(axes) == 2

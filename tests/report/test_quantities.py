@@ -71,6 +71,8 @@ def test_values_at_speed_are_those_calculated_by_hand() -> None:
     # 1 rad/rad^3 at 60/min: (2 pi)^3 rad/s^3
     assert quantity("d3psi", "1").at_speed(1.0, 60.0 * RPM) == "248.1\u00a0rad/s³"
     assert quantity("ds", "mm").at_speed(2.0, 500.0) == "1\u00a0m/s"
+    assert quantity("ds", "m").at_speed(0.002, 500.0) == "1\u00a0m/s" and quantity("d2s", "cm").unit == "cm/rad²"
+    assert quantity("ds", "N*mm").show(2.0) == "2\u00a0N·mm"  # a relation that is called so
     assert quantity("max_pace", "length/rad").at_speed(2.0, 500.0) == "1\u00a0m/s"
     assert quantity("looper.max_acceleration_p", "mm").at_speed(12.0, 7000.0 * RPM) == "6448\u00a0m/s²"
     assert quantity("speed", "rad/s").show(7000.0 * RPM) == "7000\u00a0rpm"
