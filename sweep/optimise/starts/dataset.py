@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import math
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass, field, fields
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -101,29 +102,62 @@ def kinds(study: Study, problem: Problem, known: Array) -> list[dict[str, float]
     return [{names[c]: float(design[c]) for c in others} for design in chosen]
 
 
+@dataclass(frozen=True)
+class Catalogued(Problem):
+    """A problem whose listed parameters vary too, from one of their values to the next: samples choose them."""
+
+    values: Mapping[str, Array] = field(default_factory=dict)
+
+    @classmethod
+    def of(cls, problem: Problem, values: Mapping[str, Array]) -> Catalogued:
+        """Add the listed parameters, with their values in order, to the variables of a problem."""
+        own = {part.name: getattr(problem, part.name) for part in fields(problem)}
+        own["variables"] = (*problem.variables, *values)
+        own["lower"] = np.append(problem.lower, [listed[0] for listed in values.values()])
+        own["upper"] = np.append(problem.upper, [listed[-1] for listed in values.values()])
+        return cls(**own, values=values)
+
+    def placed(self, base: Array, fractions: Array) -> Array:
+        """Return designs as of :class:`Problem`, their listed parameters at the nearest of their values."""
+        designs = super().placed(base, fractions)
+        for name, listed in self.values.items():
+            column = self.family.parameter_names.index(name)
+            away = np.abs(designs[..., column, None] - listed)
+            designs[..., column] = listed[away.argmin(axis=-1)]
+        return designs
+
+
 def swept_and_sampled(
-    study: Study, problem: Problem, designs: Array, merit: Array, stop: Callable[[], bool]
+    study: Study,
+    problem: Problem,
+    designs: Array,
+    merit: Array,
+    catalogue: Mapping[str, Array],
+    stop: Callable[[], bool],
 ) -> Iterator[Group]:
     """Yield groups of starts: what does the study's [task], the diverse best of the sweep, and the best of samples.
 
     On the locus half of the starts come from samples in any case: they cost next to nothing there, and reach the
     bounds, where a sweep may have no design at all.  Where no row of the dataset is feasible, the first half are the
-    best of random designs.
+    best of random designs.  So it is beside a catalogue, as no start leaves its listed values: a sweep has few of their
+    combinations, a sample looks for good ones.
 
     Parameters
     ----------
     study, problem : what is searched
     designs, merit : (k, P) of the sweep, and what they are worth (k,), empty where none is feasible
+    catalogue : values of the listed parameters
     stop : true ends it
     """
     assert study.optimise is not None
     count, seed = study.optimise.starts, study.optimise.seed
-    sampled = not len(merit) or (problem.coordinates is not None and study.fit is None)
+    sampled = not len(merit) or (study.fit is None and (problem.coordinates is not None or len(catalogue) > 0))
     worth = merit if len(merit) else ranking(problem, designs)
     own = diverse(problem, designs, worth, count - count // 2 if sampled else count, ALIKE)
     begun = np.concatenate([of_task(study, count, seed), own])[:count]
     yield from in_groups(begun)
-    offered = _offered(study, problem, designs, worth, begun, stop)
+    choosing = Catalogued.of(problem, catalogue) if catalogue else problem
+    offered = _offered(study, choosing, designs, worth, begun, stop)
     while len(begun) < count and not stop() and (more := next(offered, None)) is not None:
         taken = apart(problem, begun, more.designs, count)
         if len(taken) > len(begun):

@@ -140,7 +140,7 @@ def problem_and_starts(
     designs, merit, problem = _known(study, folder)
     if study.optimise.by_populations:
         return problem, from_populations(study, problem, designs, merit, stop, jobs)
-    return problem, swept_and_sampled(study, problem, designs, merit, stop)
+    return problem, swept_and_sampled(study, problem, designs, merit, listed(study), stop)
 
 
 def compile_descents(study: Study) -> None:
