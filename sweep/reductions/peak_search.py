@@ -159,13 +159,14 @@ class Search:
         scales, alone = np.empty(needed.shape), np.zeros(needed.shape, np.bool_)
         for number, request in enumerate(self.requests):
             values = columns[request.pose]
-            allowed = None
+            allowed, share = None, SHARE
             if self.window is not None and request.windowed:
-                allowed = self.window.holds(rows, columns[self.window.position])
+                # A top may stand between two samples that are both outside, beside a higher one that does not count.
+                allowed, share = self.window.nears(rows, columns[self.window.position]), 0.0
                 needed[number, self.window.grazed(rows, columns[self.window.position])] = 2 * samples
             scale, rough = scales[number], np.empty(rows.size)
             row, column = (np.empty(rows.size * (samples // 2 + 1), np.int64) for _ in range(2))
-            count = scan.peaks(values, request.mode, SHARE, allowed, scale, rough, row, column)
+            count = scan.peaks(values, request.mode, share, allowed, scale, rough, row, column)
             row, column = row[:count], column[:count]
             if request.mode != 0:
                 measure_constants(values, scale, rough)

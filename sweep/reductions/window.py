@@ -40,6 +40,13 @@ class Window(NamedTuple):
         """Whether the positions (k, m) of the designs ``rows`` (k,) lie in the window."""
         return (positions >= self.low[rows, None]) & (positions <= self.high[rows, None])
 
+    def nears(self, rows: Index, positions: Array) -> Mask:
+        """Whether the motion is in the window at samples (k, m) of a turn, or on the way to a neighbour of theirs."""
+        after = np.roll(positions, -1, axis=1)
+        low, high = np.minimum(positions, after), np.maximum(positions, after)
+        passed = (high >= self.low[rows, None]) & (low <= self.high[rows, None])
+        return passed | np.roll(passed, 1, axis=1)
+
     def grazed(self, rows: Index, positions: Array) -> Mask:
         """Whether the motion may enter or leave the window between two samples and come back at once."""
         doubtful = np.zeros(rows.size, np.bool_)

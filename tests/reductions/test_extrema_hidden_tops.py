@@ -191,3 +191,25 @@ def test_a_gap_between_samples_in_which_no_pose_is_found_has_its_status(wanted):
     poses = sweep.evaluate("feed_triad", GAP, ["x_t"], phi=np.linspace(5.083, 5.09, 50))
     assert (poses["status"] != st.OK).any(), "the control: the gap is there"
     assert sweep.summarise("feed_triad", GAP, [wanted], accuracy=1e-6)["status"].iloc[0] != st.OK
+
+
+@pytest.mark.parametrize(
+    "drive",
+    [
+        {"a": 0.567073, "b": 2.7048, "c": 3.064, "e": 2.13737, "xi": -1.12881, "eta": 0.998897, "lam": -1.90155},
+        {"a": 0.906426, "b": 2.9956, "c": 2.20911, "e": 3.60229, "xi": -1.9823, "eta": 1.02632, "lam": -1.52806},
+        {"a": 0.226634, "b": 3.05308, "c": 2.97830, "e": 2.63819, "xi": -2.40248, "eta": -0.267198, "lam": 1.82065},
+        {"a": 0.427985, "b": 2.19127, "c": 1.7514, "e": 2.3542, "xi": -2.77207, "eta": 0.863569, "lam": -0.839122,
+         "branch": -1.0},
+    ],
+)  # fmt: skip
+def test_a_top_between_two_samples_that_are_both_outside_a_narrow_window_counts(drive):
+    """The follower passes the window within less than a step of the first samples; ends of the window alone counted."""
+    part, drive = (0.2, 0.25), drive | {"h": 0.0}
+    found = sweep.summarise("guide", drive, ["max_dev"], accuracy=1e-9, window=part).iloc[0]
+    phi = np.linspace(0.0, TURN, 40_000, endpoint=False)
+    poses = sweep.evaluate("guide", drive, ["s", "dev"], phi=phi)
+    s, dev = poses["s"].to_numpy(), poses["dev"].to_numpy()
+    low, high = s.min() + np.array(part) * np.ptp(s)
+    assert found.status == st.OK
+    assert dev[(s >= low) & (s <= high)].max() <= found.max_dev + found.err_max_dev
