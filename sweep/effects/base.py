@@ -97,12 +97,14 @@ class Bend:
     """Functions of the crank angle at whose zeros some pose outputs of an effect have kinks, jumps or narrow peaks.
 
     ``curves(scene)`` gives their values, (n, m, q); ``outputs`` are the effect's own names.  Of ``squares``, which are
-    never negative, the places count where they nearly vanish.
+    never negative, the places count where they nearly vanish.  With ``zero`` the outputs vanish there, too, and are
+    nowhere negative.
     """
 
     outputs: tuple[str, ...]
     curves: Callable[[Scene], Array]
     squares: bool = False
+    zero: bool = False
 
 
 def tool_place(family: Family) -> int | None:

@@ -6,16 +6,17 @@ from dataclasses import replace
 from functools import lru_cache
 
 import numpy as np
+from numpy.typing import NDArray
 
 from kernels import status as st
 from kernels.types import Array
-from sweep.effects.base import Effect, Largest
+from sweep.effects.base import Bend, Effect, Largest
 from sweep.effects.contact import MODULUS, line_stress
 from sweep.effects.load_effects import loads_of
 from sweep.effects.load_passing import compute_loads
 from sweep.effects.scene import Scene, take_over
 from sweep.families import family
-from sweep.families.base import Columns, Output, Parameter
+from sweep.families.base import Columns, Output, Parameter, floats
 
 EQUATION = "docs/cam.md (12)-(14)"
 FORMULAS = (
@@ -33,16 +34,29 @@ OUTPUTS = (
 )
 
 
-def pitch_curvature(scene: Scene) -> Array:
-    """Curvature of the path of the roller's centre in the cam's frame, (12), (n, m)."""
+def _pitch(scene: Scene) -> tuple[NDArray[np.complex128], NDArray[np.complex128]]:
+    """First and second derivative of the roller's centre as the cam sees it, in directions of the frame, (n, m)."""
     body, centre, at = scene.links.bodies[:, :, 1], scene.links.bodies[:, :, 0, :3], scene.links.lines[:, :, 0, :3]
     omega, arm = body[:, :, 9:12], at - body[:, :, :3]
     v = body[:, :, 3:6] + np.cross(omega, arm)
     a = body[:, :, 6:9] + np.cross(body[:, :, 12:15], arm) + np.cross(omega, np.cross(omega, arm))
     place, first, second = (x[:, :, 0] + 1j * x[:, :, 1] for x in (at - centre, v, a))
-    first, second = first - 1j * place, second - 2j * first - place
+    return first - 1j * place, second - 2j * first - place
+
+
+def pitch_curvature(scene: Scene) -> Array:
+    """Curvature of the path of the roller's centre in the cam's frame, (12), (n, m)."""
+    first, second = _pitch(scene)
     found: Array = -(np.conj(first) * second).imag / np.abs(first) ** 3
     return found
+
+
+def normal_force(scene: Scene) -> Array:
+    """Force on the roller across the pitch curve, with its sign and in units of the speed of its centre, (n, m, 1)."""
+    loads = compute_loads(scene, frozenset({"force_r_x", "force_r_y"}))
+    along, (x, y) = _pitch(scene)[0], floats(loads, "force_r_x", "force_r_y")
+    found: Array = along.real * y - along.imag * x
+    return found[:, :, None]
 
 
 def compute(scene: Scene, wanted: frozenset[str]) -> Columns:
@@ -83,6 +97,7 @@ def roller_of(name: str) -> Effect:
         only_for={p.name: ("stress_r",) for p in (*bare.inputs, LENGTH, MODULUS)},
         outputs=OUTPUTS,
         compute=compute,
+        bends=(Bend(("stress_r",), normal_force, zero=True),),
         called_for="a cam that can be made, wear of the roller",
         negligible="a pitch curve whose least radius is far above the roller's",
         advise=Largest("undercut", "undercut", 0.3),

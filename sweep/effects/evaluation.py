@@ -180,7 +180,7 @@ def bends(added: Added, effects: tuple[Placed, ...]) -> list[Bends]:
     for placed in effects:
         for bend in placed.entry.bends:
             of = frozenset(name for name, own in placed.own.items() if own in bend.outputs)
-            found += [Bends(of, partial(bend_curves, precise, placed, bend), bend.squares)] if of else []
+            found += [Bends(of, partial(bend_curves, precise, placed, bend), bend.squares, bend.zero)] if of else []
     return found
 
 

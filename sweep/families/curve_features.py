@@ -101,12 +101,14 @@ class Bends:
     ``curves(designs, angles)`` gives their values, (n, m, q).  A bearing's load changes its formula where the load
     along the shaft passes a share of that across it, friction turns where a joint stops, and what a bearing permits
     has a narrow peak where nothing acts along the shaft.  Of ``squares``, which are never negative, the places count
-    where they nearly vanish: the direction of a velocity turns at once there.
+    where they nearly vanish: the direction of a velocity turns at once there.  With ``zero`` the outputs vanish where
+    the functions do, and are nowhere negative: the pressure of a contact goes like a root of its force.
     """
 
     of: frozenset[str]
     curves: Callable[[Array, Angles], Array]
     squares: bool = False
+    zero: bool = False
 
 
 @dataclass(frozen=True)
@@ -287,7 +289,7 @@ def _geared(member: Member, count: DesignMap, designs: Array) -> Array:
 
 def _of_shaft(member: Member, known: Bends) -> Bends:
     names = frozenset(f"{member.name}.{name}" for name in known.of)
-    return Bends(names, partial(_turned, member, known.curves), known.squares)
+    return Bends(names, partial(_turned, member, known.curves), known.squares, known.zero)
 
 
 def _turned(member: Member, curves: Callable[..., Array], designs: Array, angles: Angles, *found: Columns) -> Array:

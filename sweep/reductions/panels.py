@@ -22,7 +22,7 @@ from sweep.families.base import Array, Family
 from sweep.families.curve_features import Bends, bends, singular
 from sweep.numerics.chebyshev import DENSE, NODES, at_nodes, basis, product, rising, summits
 from sweep.quantities.kinds import Request
-from sweep.reductions.resolution import MATTERS, ends, nearest
+from sweep.reductions.resolution import MATTERS, ends, nearest, zeros
 from sweep.reductions.rounding import order_of, singular_share
 from sweep.reductions.sampling import DESIGN_STATUS, Extremum, Index, Mask, blocks, discriminants, pose_columns
 
@@ -32,6 +32,7 @@ CAREFUL = 3.0  # ... times this: the tip of a tent, wherever on the panel, is up
 LATELY = 0.25  # of what the polynomial before was wrong by: halving takes a kink's share to a half
 # Next to a reversal friction takes its direction from a speed that is all rounding: nearer poses are noise.
 NARROWEST = 1e-11  # width of a panel [rad] that can only hold a jump
+VANISHED = 1e-6  # of the size: a root of what is zero to rounding
 EDGE = 2.0**17  # times EPS of the size: what a curve that rises by six sizes a radian may do in a quarter of that
 CROWD = 48  # panels of one curve beyond which rounding alone is halved
 ALLOWED = 1.0 / 32.0  # of the target: what two successive polynomials may differ by
@@ -139,6 +140,8 @@ def _block(
             rounding, lost = rounding + share * np.abs(top.value), share >= 1.0
         # the size of a level curve is rounding, and no target for its error
         allowed = np.maximum(target * size[top.row], STEADY * EPS * np.abs(top.value))
+        if request.mode == -1:
+            _vanish(family, designs[rows], request.pose, top, size)
         if family.pose_output[request.pose].jumps:  # constant in pieces: a polynomial only adds rounding
             attained, _ = pose_columns(family, designs[rows[top.row]], top.phi[:, None], [request.pose])
             top = top._replace(value=_measured(attained[request.pose][:, 0], request.mode))
@@ -148,6 +151,17 @@ def _block(
         answer.value[at] = -top.value if request.mode == -1 else top.value
         answer.phi[at], answer.err[at], answer.err_phi[at] = np.mod(top.phi, TWO_PI), top.err + rounding, top.err_phi
     return status
+
+
+def _vanish(family: Family, designs: Array, pose: str, top: Top, size: Array) -> None:
+    """Make the least value 0, in place, of curves that pass zero at a known place, like a root of the distance."""
+    row, phi = zeros(family, designs, pose)
+    values, _ = pose_columns(family, designs[row], phi[:, None], [pose])
+    passes = values[pose][:, 0] <= VANISHED * size[row]  # at a jump the function has another sign, but no zero
+    first = np.full(len(designs), np.inf)
+    np.minimum.at(first, row[passes], np.mod(phi[passes], TWO_PI))
+    at = np.flatnonzero(first[top.row] < np.inf)
+    top.phi[at], top.value[at], top.err[at], top.err_phi[at] = first[top.row[at]], 0.0, 0.0, NARROWEST
 
 
 def _cut(family: Family, designs: Array, output: str) -> tuple[Index, Array, Array]:

@@ -144,6 +144,13 @@ def events(family: Family, designs: Array, looks: int, outputs: Collection[str])
     return rows, phi
 
 
+def zeros(family: Family, designs: Array, output: str) -> tuple[Index, Array]:
+    """Return designs (k,) and angles (k,) where a pose output that is nowhere negative is known to vanish, or jumps."""
+    looked = _looked(len(designs), BENDING, np.zeros(0, np.intp), np.zeros((0, 0)))
+    found = [_bent(bent, designs, looked) for bent in bends(family, output) if bent.zero]
+    return found[0] if found else (np.zeros(0, np.intp), np.zeros(0))
+
+
 def _bent(bent: Bends, designs: Array, looked: Array) -> tuple[Index, Array]:
     """Return designs and angles where functions pass zero at which curves bend, as seen at ``looked``."""
 

@@ -187,11 +187,16 @@ def test_mean_pressure_where_the_force_turns_is_as_good_as_its_error() -> None:
 
 
 @pytest.mark.parametrize("force", [50.0, 100.0])
-def test_least_stress_of_a_roller_that_is_pulled_off_is_as_exact_as_asked_or_not_converged(force):
-    """It goes to 0 like a root where the force passes zero: errors of 2e-3 of the largest were called converged."""
+def test_least_stress_of_a_roller_that_is_pulled_off_is_zero(force):
+    """It goes to 0 like a root where the force passes zero: poses beside that place only say that it is small."""
     row = {"lift": 1.064, "rise": 1.631, "dwell": 1.596, "fall": 1.567, "law": 2.0, "r0": 3.112, "e": 0.39,
            "roller": 0.14, "contact_length_r": 0.183, "m_follower": 1.01, "m_tool": 0.357, "tool_force_x": -272.0,
            "tool_force_y": -187.0, "load_force": force, "speed": 10.7}  # fmt: skip
     found = sweep.summarise("cam", row, ["min_stress_r", "max_stress_r"], accuracy=1e-8).iloc[0]
-    assert found["min_stress_r"] <= found["err_min_stress_r"]  # it is 0
-    assert found["status"] == st.NOT_CONVERGED or found["err_min_stress_r"] <= 1e-8 * found["max_stress_r"]
+    assert (found["status"], found["min_stress_r"]) == (st.OK, 0.0)
+    assert found["err_min_stress_r"] <= 1e-14 * found["max_stress_r"]
+    place = sweep.summarise("cam", row, ["phi_min_stress_r"], accuracy=1e-8)["phi_min_stress_r"][0]
+    signs = np.sign(sweep.evaluate("cam", row, ["force_r_x"], phi=PHI)["force_r_x"])
+    assert 0.0 < place - PHI[np.flatnonzero(np.diff(signs))[0]] < PHI[1]  # the first of the turn
+    dense = sweep.evaluate("cam", row, ["stress_r"], phi=PHI)["stress_r"]
+    assert found["max_stress_r"] >= dense.max() and dense.min() < 0.2 * dense.max()
