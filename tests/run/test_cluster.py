@@ -196,7 +196,9 @@ def test_interruption_of_a_local_cluster_ends_with_130_and_one_line(
     _, errors = process.communicate(timeout=30)
     assert process.returncode == 130, errors
     dashboard, *rest = errors.splitlines()
-    assert "dashboard" in dashboard and len(rest) == 1 and "finished chunks are kept" in rest[0], errors
+    # On a busy machine Dask says how late its workers ended.
+    ours = [line for line in rest if " - distributed." not in line]
+    assert "dashboard" in dashboard and len(ours) == 1 and "finished chunks are kept" in ours[0], errors
     assert parts(out) and chunk_bytes(out).items() <= whole.items()
     assert chunk_bytes(sweep.run(study, out)) == whole
 
