@@ -16,14 +16,14 @@ import pytest
 from kernels import status as st
 from sweep.families import family
 from sweep.families.base import Array
-from sweep.optimise import Problem, on_locus
+from sweep.optimise import Problem, minimise, on_locus
 from sweep.optimise.local import descent
 from sweep.optimise.local.kkt import Result
 from sweep.optimise.local.start import search
 from sweep.optimise.problem.on_locus import in_parameters
 from sweep.optimise.starts.dataset import drawn
 from sweep.optimise.starts.posing import problem_of
-from sweep.study import Limit
+from sweep.study import Limit, OptimiseSettings
 from tests.optimise.test_locus import PROBLEMS
 from tests.support.needle208_record import record
 
@@ -131,3 +131,20 @@ def test_links_without_limits_may_change_by_the_longest_of_them() -> None:
     assert again is not None
     ends = {n: (x, y) for n, x, y in zip(again.variables, again.lower, again.upper, strict=True)}
     assert ends["a"] == pytest.approx((0.03, 2.3)) and ends["b"] == pytest.approx((0.2, 4.0))
+
+
+def test_a_search_that_leaves_its_limits_where_no_slope_leads_back_ends_within_them():
+    """The follower meets its ends twice a turn there, so that phi0 is half a turn, whatever the dimensions are."""
+    ends = {
+        "a1": (8, 14), "b1": (30, 60), "c1": (15, 30), "e1": (25, 45), "a2": (15, 30), "b2": (40, 70), "e2": (0, 25),
+        "offset2": (0.0, 2.0 * math.pi),
+    }  # fmt: skip
+    fixed = {"f1": -3.3, "g1": 0.0, "alpha1": 0.5 * math.pi, "f2": 0.0, "alpha2": 0.0}
+    lower, upper = np.array(list(ends.values()), np.float64).T
+    limits = (Limit("phi0", 3.1416, None), Limit("stroke", 13.541, None))
+    problem = Problem(family(["rssr", "rssp"]), tuple(ends), lower, upper, fixed, "rms_d2s", limits)
+    start = problem.rows(
+        np.array([12.5655, 47.1209, 18.9302, 44.8986, 20.9742, 58.3931, 3.80146, 2.442905]), branch1=1.0, branch2=-1.0
+    )
+    (found,) = minimise(problem, start, OptimiseSettings(starts=1, looks=600))
+    assert found.feasible

@@ -26,6 +26,7 @@ NEWTON = 240  # rounds of Newton steps: along a narrow curved valley hundreds ar
 SOON = 30  # of these on a locus, before the parameters are tried: near its singular places they creep
 KKT = 1e-6  # residual of a converged result
 CORNER = 1e-14  # residual of a result that no Newton round betters: SLSQP gets into corners of limits to rounding
+RETURNS = 2  # to where a search left the limits
 DEARER = 10.0  # violations become so many times where a search comes to rest outside of its limits
 DWINDLING = 1e-9  # gain of a round from which a fulfilled condition of optimality ends the search
 REMEMBERED = 48  # extrema of refused designs that stay among the rows: the next long step would meet them again
@@ -36,6 +37,8 @@ Propose: TypeAlias = Callable[[Model, State, Form, float, float, float | None], 
 
 class Descent:
     """Search from one start; ``best`` always holds the best checked design so far, ``gap`` is that of the last round.
+
+    ``within`` is the best design within the limits that was met, None before the first.
 
     Parameters
     ----------
@@ -51,10 +54,42 @@ class Descent:
         fractions = np.clip(problem.scaled(start[None, :])[0], 0.0, 1.0)
         self.model = Model(problem, program, problem.placed(start, fractions), stop, allowed)
         self.gap = math.nan
+        self.within: State | None = None
         self.best = self.model.state(fractions)
 
+    @property
+    def best(self) -> State:
+        """The design that the search is at."""
+        return self._best
+
+    @best.setter
+    def best(self, new: State) -> None:
+        self._best = new
+        if new.feasible and (self.within is None or new.objective < self.within.objective):
+            self.within = new
+
     def run(self) -> State:
-        """Search for a feasible design first, then for the best; polish it and verify it on a finer grid."""
+        """Search for a feasible design first, then for the best; polish it and verify it on a finer grid.
+
+        A limit may have no slope beyond its bound, as ``phi0`` where a follower meets its ends twice a turn: from there
+        no step leads back, so the search goes on where it left the limits, at a price that keeps it within them.
+        """
+        self._descend()
+        for _ in range(RETURNS):
+            if self.best.feasible or self.within is None:
+                break
+            self.best = self.within
+            self.model.price *= DEARER**CYCLES
+            self._descend()
+        self.return_within()
+        return self.best
+
+    def return_within(self) -> None:
+        """Take the best design within the limits where the search has ended outside of them."""
+        if not self.best.feasible and self.within is not None:
+            self.best = self.within
+
+    def _descend(self) -> None:
         for _ in range(3):
             if not self.best.feasible:
                 self._restore()
@@ -63,7 +98,6 @@ class Descent:
                 self.best = newton.polish(self.model, newton.repair(self.model, self.best))
             if self._verified():
                 break
-        return self.best
 
     def _settle(self) -> None:
         """Minimise until the conditions of optimality hold; where a locus makes that slow, use the parameters."""

@@ -45,6 +45,7 @@ def search(number: int, problem: Problem, start: Array, asked: Callable[[], bool
         ended = "time"
     except KeyboardInterrupt:
         ended = "interrupted"
+    descent.return_within()
     looks = descent.model.looks
     descent.model.stop, descent.model.allowed = (lambda: False), math.inf
     return confirmed(problem, program, replace(_result(number, problem, program, descent, ended), looks=looks))
