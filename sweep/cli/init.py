@@ -13,7 +13,7 @@ from sweep.cli.families import complete_families, family_names
 from sweep.cli.first_study import smoke_text, study_text
 from sweep.cli.options import A_FOLDER, IS_FILE, IS_THERE
 from sweep.dataset.files import unwritable
-from sweep.errors import InputError
+from sweep.errors import InputError, MissingInput
 from sweep.exchange.points import drawn
 from sweep.families import family as find_family
 from sweep.families.machines.machine import Machine
@@ -62,9 +62,12 @@ def init(
     feed, thread supply.  What [cyclogram] and [limits] ask of a member are its limits, and each takes the members
     before it from the accepted optimum of the study before.
     """
-    if sum((family is not None, bool(members), cyclogram is not None)) != 1:
-        allowed = "either --family, or --member once for each member, or --from-cyclogram"
-        raise InputError("--family", family, allowed, "command line")
+    given = sum((family is not None, bool(members), cyclogram is not None))
+    if given == 0:
+        needed = "a family; or --member once for each member, or --from-cyclogram"
+        raise MissingInput("--family", needed, "command line")
+    if given > 1:
+        raise InputError("--family, --member, --from-cyclogram", f"{given} of them", "one", "command line")
     if NAME.fullmatch(name) is None:
         raise InputError("NAME", name, "a plain word of a-z, 0-9 and '-'", "command line")
     if points is not None and family is None:
