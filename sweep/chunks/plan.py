@@ -37,10 +37,8 @@ CHUNKS_AT_LEAST = 16
 SECONDS_AT_LEAST = 0.1
 CHUNK_STEP = 512
 
-PILOT_MOST, PILOT_LEAST, PILOT_PARTS = 1024, 16, 4
-PILOT_RUNS = (
-    128  # of designs side by side, which are alike: of 4 and of 32 runs the share that is kept was 0.2 and 0.6 off
-)
+# Designs side by side are alike: of 4 and of 32 runs of them the share that is kept was 0.2 and 0.6 off.
+PILOT_MOST, PILOT_LEAST, PILOT_RUNS, PILOT_PARTS = 1024, 16, 128, 4
 PILOT_SHARE = 8  # a pilot takes no more than this part of a sweep: of a small one it would cost as much again
 
 PARAMETER_UNITS = {word: internal_unit(word) for word in get_args(Unit)}

@@ -112,13 +112,11 @@ def _needs(entry: Effect, depth: int) -> list[tuple[int, Effect]]:
 
 def left_out(family: Family, wanted: Iterable[str]) -> tuple[str, ...]:
     """Names of the effects that could be asked for and are not needed here."""
-    return tuple(
-        f"{part.before}{placed.name}"
-        for part in _parts(family, wanted)
-        for used in (_computed(part),)
-        for placed in part.offered
-        if placed.name not in used
-    )
+    found: list[str] = []
+    for part in _parts(family, wanted):
+        used = _computed(part)
+        found += [f"{part.before}{placed.name}" for placed in part.offered if placed.name not in used]
+    return tuple(found)
 
 
 def _computed(part: _Part) -> set[str]:

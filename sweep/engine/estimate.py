@@ -138,8 +138,7 @@ def searches(study: Study, jobs: int, known: Pilot) -> tuple[tuple[str, float, f
     problem = problem_of(study, designs)
     search(0, problem, designs[0], lambda: False, TRIED_LOOKS)  # compiles
     begin = time.process_time()
-    late = lambda: time.process_time() - begin > TRIED_SECONDS  # noqa: E731
-    tried = search(0, problem, designs[0], late, TYPICAL_LOOKS)
+    tried = search(0, problem, designs[0], lambda: time.process_time() - begin > TRIED_SECONDS, TYPICAL_LOOKS)
     look = (time.process_time() - begin) / max(tried.looks, 1) / jobs
     settled = tried.looks if tried.ended == "converged" else None
     typical, most = min(settings.looks, settled or TYPICAL_LOOKS) * look, settings.looks * look

@@ -191,7 +191,7 @@ def difference(timing: Timing, designs: Array, found: Columns, accuracy: Accurac
 
 
 def value_at(machine: Machine, reading: EventValue, designs: Array, found: Columns, accuracy: Accuracy) -> Columns:
-    """Give a pose output at a crank angle of each design; its error is that of the angle, by the slope, and blur."""
+    """Give a pose output at a crank angle of each design; its error is the angle's times the slope, and rounding."""
     place = reading.places[0]
     phi = np.asarray(found[place], np.float64)
     known = np.isfinite(phi)
