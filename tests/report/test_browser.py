@@ -149,7 +149,7 @@ def test_drawing_in_a_curve_moves_the_cursor(address, browser):
         assert float(page.locator(".drive input").input_value()) == pytest.approx(0.5, abs=2e-3)
 
 
-def test_brushing_keeps_the_designs_of_a_range_and_lists_their_rows(folder, address, browser):
+def test_brushing_keeps_the_designs_of_a_range_and_lists_their_numbers(folder, address, browser):
     rows = sweep.load(folder)
     with opened(browser, address) as page:
         hit = page.locator('.hit[data-axis="a1"]')
@@ -166,7 +166,7 @@ def test_brushing_keeps_the_designs_of_a_range_and_lists_their_rows(folder, addr
         assert 0 < kept < len(rows)
         assert kept == pytest.approx(within.sum(), abs=1)  # the middle is met within a pixel
         listed = [int(text) for text in page.locator(".listed tbody tr td:first-child").all_inner_texts()]
-        assert listed == rows[within].nsmallest(5, "max_abs_d2s").index.tolist()
+        assert listed == rows[within].nsmallest(5, "max_abs_d2s")["design"].tolist()
         page.mouse.click(x, middle)
         assert page.locator("#lines path.out").count() == 0
 
