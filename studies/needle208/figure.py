@@ -1,6 +1,6 @@
 """What it costs to build the needle drive: record on paper, best drawing, drive to be built and reference side by side.
 
-``python studies/needle208/figure.py FOLDER`` reads the optimum in FOLDER and writes FOLDER/price.csv and
+``python studies/needle208/figure.py FOLDER`` reads study and optimum in FOLDER and writes FOLDER/price.csv and
 FOLDER/figures/price.svg.
 """
 
@@ -20,8 +20,9 @@ from sweep.jobs.progress import Phases, Say, unsaid
 from sweep.optimise.manufacture.robust import kept
 from sweep.optimise.manufacture.tolerance import deviating
 from sweep.optimise.starts.posing import problem_of
+from sweep.report.dataset import read_dataset
 from sweep.report.figures import LIMIT, OPTIMUM, QUIET, REFERENCE, WIDTH, new_figure
-from sweep.study import Study, load_study
+from sweep.study import Study
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -104,7 +105,7 @@ def chart(table: pd.DataFrame, most: float) -> Figure:
 def main() -> None:
     """Read the optimum of a run, write table and chart."""
     folder = folder_asked(__doc__)
-    study = load_study(FOLDER)
+    study = read_dataset(folder / "designs").study
     with Phases(show=True, quiet=False) as phases:
         table = price(study, mechanisms(study, folder), phases.say)
     table.to_csv(folder / "price.csv", index=False)
