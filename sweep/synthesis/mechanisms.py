@@ -31,6 +31,7 @@ if TYPE_CHECKING:
 
 _LIMITS = ("phi_ext", "phi_fold", "psi_ext", "psi_fold", "swing", "phi0", "margin", "max_pressure_angle")
 _EXACT = Accuracy(target=1e-12)
+LIMITS_APART = 1e-7  # half of what a limit position may be off [rad]; both are known to 1e-9
 
 
 CENTRAL_SLOT = Sheet(
@@ -214,9 +215,10 @@ def five_links_with_limits(table: Table, h: float) -> pd.DataFrame:
     Returns
     -------
     pandas.DataFrame
-        the columns of ``five_link`` and ``status``: OK, NOT_ADMISSIBLE where no five-link has these limits,
-        NOT_ROTATABLE or UNDECIDABLE where its crank does not turn fully; otherwise why the crank-rocker has no limits.
-        Links that were not found are nan.
+        the columns of ``five_link`` and ``status``: OK, NOT_ADMISSIBLE where no five-link has these limits, or has them
+        on two assembly modes, NOT_ROTATABLE or UNDECIDABLE where its crank does not turn fully; otherwise why the
+        crank-rocker has no limits.
+        Links that were not found are nan.  Indexed like the table.
 
     Raises
     ------
@@ -237,9 +239,14 @@ def five_links_with_limits(table: Table, h: float) -> pd.DataFrame:
         [a, b, designs[:, 2:7], np.full(n, float(h)), np.zeros(n), designs[:, 7], np.ones(n)]
     )  # fmt: skip
     there = np.flatnonzero(status == st.OK)
-    turning = design_outputs(family("five_link"), matrix[there], ["margin"], Accuracy(target=1e-9))
+    turning = design_outputs(family("five_link"), matrix[there], ["psi_ext", "psi_fold"], Accuracy(target=1e-9))
     status[there] = turning["status"]
-    frame = pd.DataFrame(matrix, columns=list(family("five_link").parameter_names))
+    # a stroke may end elsewhere than at both places found, if they lie on two assembly modes
+    places: Array = np.column_stack([turning["psi_ext"], turning["psi_fold"]])
+    apart = places - np.column_stack([ext, fold])[there]
+    defect = there[(np.abs(np.sin(0.5 * apart)) > LIMITS_APART).any(axis=1)]
+    status[defect], matrix[defect, :2] = st.NOT_ADMISSIBLE, np.nan
+    frame = pd.DataFrame(matrix, index_of(table, n), list(family("five_link").parameter_names))
     frame["status"] = status
     frame.attrs["units"] = parameter_units(family("five_link").parameters)
     return frame

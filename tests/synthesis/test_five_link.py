@@ -11,14 +11,15 @@ from tests.support.rssr_designs import random_designs
 
 
 def test_five_links_with_limits_keep_the_limit_positions_of_the_crank_rocker():
-    designs = random_designs(12, 21, rotatable=True)
+    # of 300 there are two whose places with h = -1.5 lie on two assembly modes; they had status 0 and another swing
+    designs = random_designs(300, 21, rotatable=True)
     table = dict(zip(("a", "b", "c", "e", "f", "g", "alpha", "branch"), designs.T, strict=True))
     wanted = ["psi_ext", "psi_fold", "phi_ext", "phi0", "swing"]
     theirs = sweep.summarise("rssr", table, wanted, accuracy=1e-10)
     for h in (0.5, -1.5):
         found = five_links_with_limits(table, h)
         good = (found.status == st.OK) & (theirs.status == st.OK)
-        assert good.sum() >= 4
+        assert good.sum() >= 270 and (found.status == st.NOT_ADMISSIBLE).any()
         ours = sweep.summarise("five_link", found[good].drop(columns="status"), wanted, accuracy=1e-10)
         assert (ours.status == st.OK).all()
         for name in wanted:
