@@ -3,17 +3,22 @@
 from __future__ import annotations
 
 import re
+from collections import Counter
 from collections.abc import Iterable, Sequence
 from itertools import groupby, takewhile
-from typing import TypeAlias
+from typing import NamedTuple, TypeAlias
 
 import click
 
 from sweep.cli.families import aligned, echo_columns
 from sweep.effects import NAMES, effect
 from sweep.effects.base import Effect
+from sweep.effects.link_loads import rods_of
+from sweep.effects.load_passing import LOADS
+from sweep.effects.loads import FRICTION_SUFFIX
 from sweep.errors import InputError, choices
 from sweep.families.base import Output, Parameter
+from sweep.families.link_tree import LinkTree
 from sweep.pages import rendered
 from sweep.quantities.units import internal_unit
 
@@ -21,6 +26,7 @@ Rows: TypeAlias = list[tuple[str, str, str]]  # names, unit, definition
 COMPONENT = re.compile(r"_[xyz]{1,2}$")  # of a vector or a tensor
 OF_COMPONENT = re.compile(r"^(?:magnitude|[xyz]): |: entry of the tensor, - integral [xyz] [xyz] dm")
 ALONG = re.compile(r" along [xyz](?= of the fixed axes)")
+OF_PLACE = rf"(?:[123]?(?:{FRICTION_SUFFIX})?|_[xyz]{{1,2}})"  # what a name has behind that of a link or joint
 REDUCED = re.compile(r"(?:(?:phi_)?(?:max_abs|max|min)|range|rms)_(?P<pose>.+)")
 
 
@@ -153,25 +159,96 @@ def heading(group: Sequence[Effect]) -> str:
     return "_".join([words[0] for words in alike][::-1]) or ", ".join(entry.name for entry in group)
 
 
-def parts(group: Sequence[Effect]) -> list[tuple[str, list[str], Rows]]:
-    """Return the tables of a group: the kind, of whom (empty: of all its effects), and the rows.
+class Place(NamedTuple):
+    """A link, ``B``, or a joint, ``J``, of a tree of links: its kind, name and words, and those of any such place."""
 
-    Inputs that an effect has from one that it needs are not said again.
+    sign: str
+    kind: str
+    name: str
+    text: str
+    general: tuple[tuple[str, str], ...]
+
+
+def places(tree: LinkTree) -> list[Place]:
+    """Return the links and the joints of a tree."""
+    rods, found = rods_of(tree), list[Place]()
+    for k, b in enumerate(tree.bodies):
+        kind = "slender" if b.slender else "rod" if k in rods else "compact"
+        named = (rf"_{b.name}\b", "_B"), (rf"\bof (?:the )?{b.name}\b", "of link B")
+        found.append(Place("B", kind, b.name, b.axes, ((re.escape(f"({b.axes})"), "along its axes"), *named)))
+    for j in tree.joints:
+        acting = re.escape(f"of the {j.acts}"), "of its first link on the second"
+        general = (f"(?<!of the ){re.escape(j.text)}", "joint J"), acting
+        found.append(Place("J", j.kind, j.name, f"{j.text}: {j.acts}", general))
+    return found
+
+
+def _generalised(tree: LinkTree, row: tuple[str, str, str]) -> tuple[str, str, tuple[str, str, str]] | None:
+    """Return sign and kind of the place that a row is about, and the row about any; None where it is about none."""
+    for place in places(tree):
+        name = re.sub(rf"_{place.name}(?={OF_PLACE}(?:,|$))", f"_{place.sign}", row[0], count=1)
+        text = row[2]
+        for words, general in place.general:
+            text = re.sub(words, general, text)
+        if name != row[0] and text != row[2]:
+            return place.sign, place.kind, (name, row[1], text)
+    return None
+
+
+def of_any_place(trees: Sequence[LinkTree], tables: Sequence[Rows]) -> tuple[Rows, list[Rows]]:
+    """Return the rows that all links or joints of some kinds have, for any of them, and the other rows of each tree."""
+    every = Counter((place.sign, place.kind) for tree in trees for place in places(tree))
+    found = [[_generalised(tree, row) for row in table] for tree, table in zip(trees, tables, strict=True)]
+    kinds: dict[tuple[str, tuple[str, str, str]], Counter[str]] = {}
+    for sign, kind, row in (one for ones in found for one in ones if one is not None):
+        kinds.setdefault((sign, row), Counter())[kind] += 1
+    whole = {
+        key: of
+        for key, of in kinds.items()
+        if of.total() > 1 and all(every[key[0], kind] == n for kind, n in of.items())
+    }
+    rows = []
+    for (sign, (name, unit, text)), of in whole.items():
+        all_kinds = len(of) == sum(one == sign for one, _ in every)
+        rows.append((name, unit, text if all_kinds else f"{text}; {', '.join(of)}"))
+    left = [
+        [row for row, one in zip(table, ones, strict=True) if one is None or (one[0], one[2]) not in whole]
+        for table, ones in zip(tables, found, strict=True)
+    ]
+    return rows, left
+
+
+def parts(group: Sequence[Effect]) -> list[tuple[str, list[str], Rows]]:
+    """Return the tables of a group: their columns, of which effects (empty: of all), and the rows.
+
+    Inputs that an effect has from one that it needs are not said again.  What several effects have is one table, what
+    all links or joints of trees of links have is one row.
     """
     known = [{p for name in entry.needs for p in every_input(effect(name))} for entry in group]
     kinds = {
-        "output": [_output_rows(entry.outputs) for entry in group],
-        "output per design": [_design_rows(entry) for entry in group],
-        "input": [
+        "output | unit | definition": [_output_rows(entry.outputs) for entry in group],
+        "output per design | unit | definition": [_design_rows(entry) for entry in group],
+        "input | unit | definition": [
             _input_rows(p for p in every_input(entry) if p not in old) for entry, old in zip(group, known, strict=True)
         ],
     }
+    trees = [entry.tree for entry in group if entry.tree is not None]
+    together = len(trees) == len(group) > 1
     out: list[tuple[str, list[str], Rows]] = []
-    for kind, tables in kinds.items():
+    if together and group[0].key == LOADS:
+        alike: dict[tuple[tuple[str, str, str], ...], list[str]] = {}
+        for entry, tree in zip(group, trees, strict=True):
+            alike.setdefault(tuple((p.name, p.kind, p.text) for p in places(tree)), []).append(entry.name)
+        out += [("link B or joint J | kind | axes; what it is", names, list(table)) for table, names in alike.items()]
+    for columns, tables in kinds.items():
         common = [row for row in tables[0] if all(row in table for table in tables)]
-        out.append((kind, [], common))
-        for entry, table in zip(group, tables, strict=True):
-            out.append((kind, [entry.name], [row for row in table if row not in common]))
+        own = [[row for row in table if row not in common] for table in tables]
+        general, own = of_any_place(trees, own) if together else ([], own)
+        of_several: dict[tuple[str, ...], Rows] = {}
+        for row in dict.fromkeys(row for table in own for row in table):
+            names = tuple(entry.name for entry, table in zip(group, own, strict=True) if row in table)
+            of_several.setdefault(names, []).append(row)
+        out += [(columns, [], common + general), *((columns, list(names), rows) for names, rows in of_several.items())]
     return [part for part in out if part[2]]
 
 
