@@ -9,9 +9,8 @@ import pandas as pd
 
 from sweep.cli.families import complete_families
 from sweep.cli.options import A_FILE, DESIGN, FOLDER, IS_FILE
-from sweep.cli.tables import checked_format, write_table
+from sweep.cli.tables import checked_format, refuse_degrees, write_table
 from sweep.dataset.files import beside, located
-from sweep.evaluation.angles import grid_in_radians
 from sweep.exchange.export import FORMATS, MOST_POSES
 from sweep.exchange.export import export as write
 from sweep.exchange.points import TOLERANCE, drawn
@@ -80,8 +79,7 @@ def export(folder: Path, design: str | None, kind: str, out: Path | None, phi: f
         click.echo(f"xlsx: {write_workbook(folder, out or _place(folder, 'results.xlsx'))}")
         return
     found = chosen(folder, design)
-    domain = found.family.domain
-    grid_in_radians(domain.name, domain.unit, phi, None)  # an angle is in rad, whatever the design is
+    refuse_degrees(found.family.domain, phi)
     if kind in OF_DATASETS:
         target = out or _place(folder, f"{design or 'result'}.{kind}")
         click.echo(f"{kind}: {write_sheet(folder, design, target, phi)}")

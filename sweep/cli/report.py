@@ -13,10 +13,10 @@ import pandas as pd
 import sweep.plot as plot
 from sweep.cli.families import family_names
 from sweep.cli.options import A_FILE, A_FOLDER, ANGLES, FOLDER, IS_FILE, IS_FOLDER
-from sweep.cli.tables import read_table
+from sweep.cli.tables import read_table, refuse_degrees
 from sweep.dataset.files import beside, located
 from sweep.errors import InputError
-from sweep.evaluation.angles import AngleUnit, grid_in_radians
+from sweep.evaluation.angles import AngleUnit
 from sweep.evaluation.cyclogram import cyclogram, table_in_degrees
 from sweep.jobs.progress import Phases
 from sweep.nights.studies import FIGURE
@@ -152,7 +152,7 @@ def _of_one(what: str, source: str, table: Path | None, options: Options) -> Any
         "mechanism": {"phi": options["phi"], "view": options["view"], "positions": options["positions"]},
     }
     if table is None:
-        grid_in_radians(mechanism.domain.name, mechanism.domain.unit, options["phi"], None)  # a folder is in rad
+        refuse_degrees(mechanism.domain, options["phi"])
     if what == "cyclogram":
         known[what] = {"made": _made(source, table, options)}
     unit: AngleUnit | None = "rad" if table is None else options["angles"]

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from pathlib import Path
 
 import click
@@ -13,11 +14,11 @@ from sweep.cli.families import complete_families, complete_outputs, family_names
 from sweep.cli.options import A_FILE, ANGLES, IS_FILE
 from sweep.dataset.files import replacing
 from sweep.errors import InputError, MissingInput, listed
-from sweep.evaluation.angles import AngleUnit
+from sweep.evaluation.angles import AngleUnit, is_plausible
 from sweep.evaluation.poses import evaluate
 from sweep.evaluation.summaries import summarise
 from sweep.families import family as find_family
-from sweep.families.base import Interval
+from sweep.families.base import Domain, Interval
 
 FORMATS = (".parquet", ".csv")
 FAMILY = click.argument("family", shell_complete=complete_families)
@@ -64,7 +65,7 @@ def evaluate_table(
     is a design); of a family over an interval a column of its variable, such as rho.  FAMILY is a family or a chain
     such as rssr+guide.  A value that is nan has a status that says why.
     """
-    out = checked_format(out)
+    out = checked_format(out, table)
     mechanism, chosen = find_family(family_names(family)), kept(keep)
     variable = mechanism.domain.name
     turns = not isinstance(mechanism.domain, Interval)
@@ -120,7 +121,7 @@ def summarise_table(
     as `alpha [deg]` says otherwise.  FAMILY is a family or a chain such as rssr+guide.  A value that is nan has a
     status that says why.
     """
-    out = checked_format(out)
+    out = checked_format(out, table)
     designs = read_table(table)
     found = summarise(
         family_names(family),
@@ -137,6 +138,12 @@ def summarise_table(
     write_table(found, out)
 
 
+def refuse_degrees(domain: Domain, phi: float) -> None:
+    """Refuse a crank angle of a folder's design that reads as degrees: a folder is in rad."""
+    if domain.unit == "rad" and not is_plausible(abs(phi), True):
+        raise InputError("--phi", phi, f"an angle in rad; {phi:g} deg is {math.radians(phi):.6g}", "command line")
+
+
 def wanted(texts: tuple[str, ...]) -> list[str]:
     """Names out of ``--want x,y --want z``, without repetition."""
     names = [name.strip() for text in texts for name in text.split(",")]
@@ -149,10 +156,12 @@ def kept(texts: tuple[str, ...]) -> bool | list[str]:
     return True if names == ["all"] else names
 
 
-def checked_format(out: Path | None) -> Path | None:
-    """Refuse an output file that could not be written before anything is computed."""
+def checked_format(out: Path | None, table: Path | None = None) -> Path | None:
+    """Refuse an output file that could not be written, or is the table itself, before anything is computed."""
     if out is None:
         return None
+    if table is not None and out.resolve() == table.resolve():
+        raise InputError("--out", str(out), "a file of its own: this one is TABLE", "command line")
     if out.suffix.lower() not in FORMATS:
         raise InputError("--out", str(out), f"a file name ending in {' or '.join(FORMATS)}", "command line")
     if not out.resolve().parent.is_dir():

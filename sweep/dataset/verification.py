@@ -127,7 +127,7 @@ def verify(folder: str | Path, designs: int = DEFAULT_DESIGNS) -> Verification:
     place = files.located(folder)
     plan = files.read_plan(place)
     chunks, strangers = chunk_files.listing(place)
-    if plan is None and not chunks and not strangers:
+    if plan is None and not chunks:
         raise InputError("folder", str(folder), "a dataset that sweep run wrote", "verify")
     found = Verification(place)
     for path in strangers:

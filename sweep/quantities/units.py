@@ -102,8 +102,9 @@ def factor(unit: str, internal: str) -> float:
     ours, own = _parsed(internal)
     try:
         theirs, powers = _parsed(unit)
-    except UnitFault as fault:
-        raise UnitFault(f"{example(internal)}{fault}") from None
+    except UnitFault:
+        offered = re.split(", | or ", example(internal).partition(", in ")[2])  # a foot is no misspelt ton
+        raise UnitFault(f"{example(internal)}{nearest(unit, offered)}") from None
     # Angles in a denominator count only if the wanted unit has angles alone.
     free = own["rad"] <= 0 and powers["rad"] <= 0
     if any(own[base] != powers[base] for base in _BASE if not (free and base == "rad")):
@@ -149,7 +150,7 @@ def _parsed(text: str) -> tuple[float, Counter[str]]:
         match = _TERM.fullmatch(part)
         symbol = part if match is None else _ALIASES.get(match[1], match[1])
         if match is None or symbol not in (*SYMBOLS, "1"):
-            raise UnitFault(nearest(symbol, (*SYMBOLS, *_ALIASES)))
+            raise UnitFault(text)
         own, of = _DERIVED.get(symbol, (1.0, symbol))
         known = Counter() if of == "1" else Counter([of]) if of in _BASE else _parsed(of)[1]
         exponent = int(match[2] or 1)

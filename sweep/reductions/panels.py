@@ -22,6 +22,7 @@ from sweep.families.base import Array, Family
 from sweep.families.curve_features import Bends, bends, singular
 from sweep.numerics.chebyshev import DENSE, NODES, at_nodes, basis, product, rising, summits
 from sweep.quantities.kinds import Request
+from sweep.reductions.refine import hill
 from sweep.reductions.resolution import MATTERS, ends, nearest, zeros
 from sweep.reductions.rounding import order_of, singular_share
 from sweep.reductions.sampling import DESIGN_STATUS, Extremum, Index, Mask, blocks, discriminants, pose_columns
@@ -194,12 +195,11 @@ def _climbed(
         tolerance = np.maximum(ALLOWED * target * size, 4.0 * EPS * np.abs(best))[halves.row]
         narrow = halves.high - halves.low < NARROWEST
         top = _tops(halves, request.mode, AGAIN * miss)
-        settled = miss <= tolerance
+        settled, at_end = miss <= tolerance, (top.phi <= halves.low) | (top.phi >= halves.high)
         if locate:
-            settled &= (top.err_phi <= target) | (miss <= 4.0 * EPS * np.abs(top.value))
+            settled &= (top.err_phi <= target) | at_end | (miss <= 4.0 * EPS * np.abs(top.value))
         off = _off(family, designs, halves, top, request, np.flatnonzero(settled & ~narrow))
         settled &= off <= tolerance
-        at_end = (top.phi <= halves.low) | (top.phi >= halves.high)
         top.err[:] += AGAIN * off + np.where(at_end, EDGE * EPS * size[halves.row], 0.0)
         ends = halves.only(narrow)
         held = _held(ends, np.repeat(panels.peak, 2)[narrow], size)
@@ -226,14 +226,13 @@ def _halved(family: Family, designs: Array, panels: Panels, request: Request) ->
     # The highest pose seen may stand alone, as one in the very place of a jump: it is kept by the half it lies in.
     peak, at = np.repeat(panels.peak, 2), np.repeat(panels.at, 2)
     kept = (peak > halves.peak) & (low <= at) & (at <= high)
-    miss = np.repeat(miss, 2)
-    return halves._replace(peak=np.where(kept, peak, halves.peak), at=np.where(kept, at, halves.at), missed=miss), miss
+    best, at, miss = np.where(kept, peak, halves.peak), np.where(kept, at, halves.at), np.repeat(miss, 2)
+    return halves._replace(peak=best, at=at, missed=miss), miss
 
 
 def _off(family: Family, designs: Array, panels: Panels, top: Top, request: Request, which: Index) -> Array:
     """How far poses at some tops are from these: a kink next to an end is seen by no other pose."""
-    off = np.zeros(top.row.size)
-    place = _inside(top.phi, panels.low, panels.high)
+    off, place = np.zeros(top.row.size), _inside(top.phi, panels.low, panels.high)
     for some in blocks(which, 1):
         poses, _ = pose_columns(family, designs[top.row[some]], place[some, None], [request.pose])
         off[some] = np.abs(_measured(poses[request.pose][:, 0], request.mode) - top.value[some])
@@ -243,12 +242,14 @@ def _off(family: Family, designs: Array, panels: Panels, top: Top, request: Requ
 def _tops(panels: Panels, mode: int, err: Array) -> Top:
     """Highest points of the polynomials, whose heights are wrong by ``err`` at most."""
     x, value = summits(panels.series, mode)
-    bow = np.abs(chebyshev.chebval(x, chebyshev.chebder(panels.series, 2, axis=1).T, tensor=False))
+    derived = (chebyshev.chebder(panels.series, order, axis=1).T for order in (1, 2))
+    slope, bow = (np.abs(chebyshev.chebval(x, of, tensor=False)) for of in derived)
     half = 0.5 * (panels.high - panels.low)
     # At an end the slope is what holds the place, inside it is the bend; poses stand a little inside of a jump there.
     inside = np.abs(x) < 1.0
-    blur = np.divide(SLOPE * err, bow, out=np.full(x.size, 2.0), where=bow > 0.0)
-    err_phi = np.where(inside, half * np.minimum(blur, 2.0), 0.5 * NARROWEST) + 8.0 * EPS * np.pi
+    held = np.where(inside, bow / SLOPE, slope)
+    blur = np.divide(err, held, out=np.full(x.size, 2.0), where=held > 0.0)
+    err_phi = half * np.minimum(blur, 2.0) + np.where(inside, 0.0, 0.5 * NARROWEST) + 8.0 * EPS * np.pi
     return Top(panels.row, 0.5 * (panels.low + panels.high) + half * x, value, err + 4.0 * EPS * np.abs(value), err_phi)
 
 
@@ -275,19 +276,18 @@ def _beside(family: Family, designs: Array, panels: Panels, request: Request) ->
 
 def _given_up(panels: Panels, mode: int) -> Top:
     """Highest poses of panels that are no longer halved, and how much higher their polynomials may be."""
-    err = _upper(panels, mode) - panels.peak
-    return Top(panels.row, panels.at, panels.peak, err, panels.high - panels.low)
+    return Top(panels.row, panels.at, panels.peak, _upper(panels, mode) - panels.peak, panels.high - panels.low)
 
 
 def _highest(tops: list[Top], n: int) -> Top:
-    """Highest top of each row; what another one may be higher by is part of its error."""
+    """Highest top of each row; what another one may be higher by is part of its error, and so is how far that is."""
     every = Top(*(np.concatenate(parts) for parts in zip(*tops, strict=True)))
     order = np.lexsort((every.phi, -every.value, every.row))
     row, first = np.unique(every.row[order], return_index=True)
-    highest = _only(every, order[first])
-    ceiling = np.full(n, -np.inf)
+    highest, ceiling = _only(every, order[first]), np.full(n, -np.inf)
     np.maximum.at(ceiling, every.row, every.value + every.err)
-    return highest._replace(err=np.maximum(highest.err, ceiling[row] - highest.value))
+    phi, err_phi = hill(every.row, every.phi, every.err_phi, every.value, every.err, order[first])
+    return highest._replace(err=np.maximum(highest.err, ceiling[row] - highest.value), phi=phi, err_phi=err_phi)
 
 
 def _only(top: Top, which: Index | Mask) -> Top:

@@ -30,6 +30,7 @@ RIPPLE = 0.25  # of the fourth difference: eight times the noise of one sample o
 BENT, CLOSELY_BENT = 0.4, 0.15  # change of second differences against the largest, of first samples and of later ones
 LEARNT = 0.8  # of the error before: what a narrower window about a kink leaves of it at most
 SHORTEST, SHORTEST_KINKED = 1e-6, 1e-12  # of the spacing of the samples: steps of the last windows
+NEIGHBOURS = TWO_PI / 64.0  # rad between tops of neighbouring pieces at most
 VARIES = 8.0  # times the rounding at one pose: what that of its neighbours may be
 
 
@@ -219,17 +220,48 @@ def first_of_equals(row: Index, peaks: Peaks, chosen: Index) -> Index:
     ----------
     row : (k,) of the peaks;  chosen : numbers of the highest peaks, one of a row
     """
-    best = np.full(row.max(initial=0) + 1, chosen[0] if chosen.size else 0)
-    best[row[chosen]] = chosen
-    best = best[row]
-    known = 2.0 * np.minimum(peaks.err_height, peaks.err_height[best])
+    return _first(row, peaks.phi, peaks.err_phi, peaks.height, peaks.err_height, chosen)
+
+
+def _first(row: Index, phi: Array, err_phi: Array, height: Array, err: Array, chosen: Index) -> Index:
+    best = _of_row(row, chosen)
+    known = 2.0 * np.minimum(err, err[best])
     # A place just before the end of the turn, by no more than its error, is its beginning.
-    place = np.mod(peaks.phi + peaks.err_phi, TWO_PI)
-    late = np.where(peaks.height >= peaks.height[best] - known, -place, -np.inf)
+    place = np.mod(phi + err_phi, TWO_PI)
+    late = np.where(height >= height[best] - known, -place, -np.inf)
     first = np.full(row.max(initial=0) + 1, -1)
     scan.best_candidate(row, late, np.full(first.size, -np.inf), first)
     found: Index = first[row[chosen]]
     return found
+
+
+def _of_row(row: Index, chosen: Index) -> Index:
+    """Return for every peak the one that is chosen in its row."""
+    found = np.full(row.max(initial=0) + 1, chosen[0] if chosen.size else 0)
+    found[row[chosen]] = chosen
+    return found[row]
+
+
+def hill(row: Index, phi: Array, err_phi: Array, height: Array, err: Array, chosen: Index) -> tuple[Array, Array]:
+    """Return the places of the highest tops ``chosen`` of some rows, and their errors.
+
+    A top at the end of a piece of the curve may belong a little beyond it, and one of a dwell anywhere on it: the
+    place errs as far as tops go that may be as high, without a gap of more than `NEIGHBOURS`.  Of several such hills
+    the first of the turn counts, as in `first_of_equals`.
+    """
+    first = _first(row, phi, err_phi, height, err, chosen)
+    rival = np.flatnonzero(height + 2.0 * err >= height[_of_row(row, chosen)])
+    rival = rival[np.lexsort((phi[rival], row[rival]))]
+    apart = (np.diff(row[rival]) != 0) | (np.diff(phi[rival]) > NEIGHBOURS)
+    number = np.zeros(row.size, np.int64)
+    number[rival[1:]] = np.cumsum(apart)
+    low, high, top = np.full(row.size, np.inf), np.full(row.size, -np.inf), np.full(row.size, -1)
+    np.minimum.at(low, number[rival], (phi - err_phi)[rival])
+    np.maximum.at(high, number[rival], (phi + err_phi)[rival])
+    scan.best_candidate(number[rival], height[rival], np.full(row.size, -np.inf), top)
+    mine = number[first]
+    place = phi[rival[top[mine]]]
+    return place, np.maximum(place - low[mine], high[mine] - place)
 
 
 def polish_places(slope: Sampler, phi: Array, err_phi: Array) -> tuple[Array, Array]:

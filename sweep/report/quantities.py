@@ -38,6 +38,7 @@ READ_IN = {"t": ("g", 1e6), "t*mm^2": ("kg·mm²", 1e3), "life": ("h", 1.0 / 360
 LENGTHS = ("mm", "um", "cm", "m", "in")
 NO_ANGLE = 1e-10  # rad: what is smaller is the rounding of zero, or of the place of an extremum at zero
 NONE_OF = {"°": NO_ANGLE, "mm": 1e-12}  # of quantities shown in these units, as stored: what is smaller is rounding
+_PER_RADIAN = re.compile(r"(.*)/rad(?:\^([23]))?")
 _POINT = re.compile("([xyz])_([a-z])")
 _OF_MACHINE = re.compile("([a-z]|tip|point)_([xyz])")
 _SIZE = re.compile("(speed|acceleration|jerk)_([a-z])")  # of a point's motion in space
@@ -114,12 +115,13 @@ def quantity(name: str, unit: str) -> Quantity:
     reduction, base = next(split(name, Turn()), (None, name))
     symbol_form, words_form = (reduction.symbol, reduction.words) if reduction else ("{}", "{}")
     order, root, stage = _derivative(base)
-    bare = unit.removesuffix("/rad")
+    per = _PER_RADIAN.fullmatch(unit)
     followed = root in ("s", "psi", "dev")  # the follower's own motion has a symbol and a word each
     symbolic = followed and (order > 0 or root != "dev")
     symbol, words = _called(order, root, stage)
     symbol, words = symbol_form.format(symbol), words_form.format(words)
-    unit, order = bare, max(order, int(unit != bare))  # a speed whose unit says that it is one
+    if per:  # a derivative whose unit says that it is one
+        unit, order = per[1], max(order, int(per[2] or 1))
     length = unit in LENGTHS
     order = order if length or unit in ("1", "rad") else 0  # a force that is called ds is none
     if is_place(name) or (order == 0 and unit in ("rad", "angle")):

@@ -68,7 +68,11 @@ def check_tolerance(tolerance: Tolerance | None, family: Family, limits: tuple[L
         return
     for key, unit, size in (("lengths", "length", tolerance.lengths), ("angles", "angle", tolerance.angles)):
         if size > 0.0 and not any(p.unit == unit and p.choices is None for p in family.parameters):
-            faults.value(("tolerance", key), size, f"nothing: {family.name} has no {key} that could deviate")
+            faults.value(
+                ("tolerance", key),
+                f"{size:.6g} {UNITS[unit]}",
+                f"nothing: {family.name} has no {key} that could deviate",
+            )
     roomy = [x.output for x in limits if x.minimum != x.maximum]
     equal = [x.output for x in limits if x.is_equation and x.output not in roomy]
     if tolerance.robust is not None and equal:

@@ -126,6 +126,7 @@ def test_summarise_passes_accuracy_and_window(tmp_path: Path) -> None:
         (("geared_dwell", "{table}", "--want", "d2psy"), "want = 'd2psy'"),
         (("geared_dwell", "{table}", "--want", "psi", "--out", "{tmp}/x.xlsx"), "ending in .parquet or .csv"),
         (("geared_dwell", "{table}", "--want", "psi", "--out", "{tmp}/none/x.csv"), "a file in a folder that exists"),
+        (("geared_dwell", "{table}", "--want", "psi", "--out", "{tmp}/../{name}/good.csv"), "this one is TABLE"),
         (("geared_dwell", "{tmp}/bad.csv", "--want", "psi"), "column k, row 1: k = 'x'; allowed: a number"),
         (("geared_dwell", "{tmp}/nan.csv", "--want", "psi"), "column k, row 1: k = nan; allowed: a finite number"),
         (("geared_dwell", "{tmp}/nophi.csv", "--want", "psi"), "phi is missing; needed: a column phi [rad], or --p"),
@@ -144,7 +145,7 @@ def test_bad_input_is_one_message_and_exit_code_2(tmp_path: Path, arguments: tup
     for name in ("empty.csv", "fake.parquet", "table.txt"):
         (tmp_path / name).write_text("" if name == "empty.csv" else "no table")
     before = sorted(tmp_path.rglob("*"))
-    result = call("eval", *(a.format(table=tmp_path / "good.csv", tmp=tmp_path) for a in arguments))
+    result = call("eval", *(a.format(table=tmp_path / "good.csv", tmp=tmp_path, name=tmp_path.name) for a in arguments))
     assert result.exit_code == 2
     assert result.stdout == ""
     assert result.stderr.startswith("sweep: ")

@@ -197,6 +197,10 @@ def test_the_command_line_says_the_verdict_and_ends_with_its_code(dataset: Path,
     result = CliRunner().invoke(main, ["verify", str(dataset.parent)])
     assert result.exit_code == DAMAGED
     assert "1 damaged, 0 missing" in result.output
-    (tmp_path / "empty").mkdir()
-    assert CliRunner().invoke(main, ["verify", str(tmp_path / "empty")]).exit_code == 2
+    # The folder of a study, and the one that holds results, are no datasets.
+    (tmp_path / "press").mkdir()
+    for folder in (tmp_path / "press", dataset.parent.parent):
+        (folder / "study.toml").write_text("")
+        result = CliRunner().invoke(main, ["verify", str(folder)])
+        assert result.exit_code == 2 and "a dataset that sweep run wrote" in result.output
     assert json.loads((dataset.parent / "_plan.json").read_text())["complete"]

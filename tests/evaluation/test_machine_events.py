@@ -114,6 +114,16 @@ def test_value_at_an_event_is_that_of_the_pose_there() -> None:
     assert np.isnan(sweep.summarise(never, TABLE, ["x"])["x"][0])
 
 
+def test_value_of_a_derivative_has_its_unit() -> None:
+    values = {name: {"value": [of, "looper.phi_max_psi"]} for name, of in VALUES.items()}
+    machine = sweep.machine(MEMBERS, RELATIONS | values)
+    units = sweep.summarise(machine, TABLE, [*VALUES]).attrs["units"]
+    assert [units[name] for name in VALUES] == ["length", "length/rad", "length/rad^2", "length/rad", "1"]
+
+
+VALUES = {"here": "needle.s", "quick": "needle.ds", "hit": "needle.d2s", "swift": "pace", "turning": "looper.d2psi"}
+
+
 def test_error_of_a_value_knows_the_rounding_of_poses_where_the_slope_tells_nothing() -> None:
     """At the least clearance the slope is zero: the error of the value was 0."""
     machine = sweep.machine(MEMBERS, RELATIONS | {"least": {"value": ["clearance", "phi_min_clearance"]}})

@@ -219,6 +219,8 @@ def test_export_verb_takes_the_optimum_or_a_design_of_a_folder(kind, tmp_path):
     assert points.loc[(1, "B"), "x"] == pytest.approx(row["a1"], abs=1e-12)  # the crank at phi = 0
     wrong = CliRunner().invoke(main, ["export", str(place), "--format", "csv", "--design", "worst"])
     assert wrong.exit_code == 2 and "optimum, reference, best" in wrong.output
+    wrong = CliRunner().invoke(main, ["export", str(place), "--format", "csv", "--phi", "90"])
+    assert wrong.exit_code == 2 and "an angle in rad; 90 deg is 1.5708" in wrong.output
     for missing in (-1, 10**6, next(k for k in rows.index + 1 if k not in rows.index)):
         wrong = CliRunner().invoke(main, ["export", str(place), "--format", "csv", f"--design={missing}"])
         assert wrong.exit_code == 2 and f"some of {rows.index[0]} to {rows.index[-1]}" in wrong.output

@@ -107,12 +107,17 @@ def made(curve) -> Family:
 
 
 def searched(curve, mode, target=1e-9) -> tuple[Array, Array, Array, Array]:
+    value, err, away, _, status = placed(curve, mode, target)
+    return value, err, away, status
+
+
+def placed(curve, mode, target) -> tuple[Array, Array, Array, Array, Array]:
     shifts = np.random.default_rng(2).uniform(0.0, 6.0, (40, 1))
     request = Request("y", mode)
     answers, status = panels.extrema(made(curve), shifts, [request], target, True)
     answer = answers[request]
     away = np.mod(answer.phi - shifts[:, 0] + 1.0, 2.0 * np.pi) - 1.0
-    return answer.value, answer.err, away, status
+    return answer.value, answer.err, away, answer.err_phi, status
 
 
 @pytest.mark.parametrize("jump", [1.0, 1e-2, 1e-5, 1e-9])
@@ -141,6 +146,29 @@ def test_the_tip_of_a_kink_is_found_to_the_target(mode):
     assert (np.abs(value - sign) <= err).all()
     assert (err <= 1e-9).all()
     assert (np.abs(away - 2.0) <= 1e-8).all()
+
+
+@pytest.mark.parametrize("target", [1e-4, 1e-6, 1e-8, 1e-10])
+@pytest.mark.parametrize(
+    "curve",
+    [
+        lambda x: 3.0 * np.cos(x - 2.0) + np.where(x < 5.0, 0.0, 0.2 * (x - 5.0)),  # a smooth top
+        lambda x: np.where(x < 2.0, 1.5 * (x - 2.0), 1.8 * (2.0 - x)),  # a tip
+        lambda x: np.where(x < 2.0, 1.5 * (x - 2.0), 0.5 * np.expm1(2.0 - x)),
+    ],
+)
+def test_the_place_of_a_top_errs_by_no_more_than_it_says(curve, target):
+    """Tops next to the end of a panel among them: 40 of one curve, shifted along the turn."""
+    _, _, away, err_phi, _ = placed(curve, 1, target)
+    assert (np.abs(away - 2.0) <= err_phi).all()
+
+
+def test_the_place_of_a_dwell_errs_by_as_much_as_the_dwell_is_long():
+    """Level from 2 to 3.5 rad, but for rounding."""
+    _, _, away, err_phi, _ = placed(lambda x: 1.0 - np.maximum(np.abs(x - 2.75) - 0.75, 0.0) ** 2, 1, 1e-8)
+    # Rounding takes the dwell on by sqrt(4 eps) to either side; a panel is 0.1 rad, a turn may begin within the dwell.
+    assert (np.abs(away + 1e-3 >= 2.0)).all() and (away <= 3.5 + 1e-3).all()
+    assert (np.maximum(away - 2.0, 3.5 - away) <= err_phi + 0.1).mean() >= 0.7
 
 
 def test_a_curve_that_is_all_noise_is_not_converged_and_its_error_says_so():

@@ -46,6 +46,7 @@ STUDIES = Path(__file__).parents[2] / "studies"
         ("looper.range_p_y", "length", "range of y of P looper", "range of y of P of the looper", "mm"),
         ("max_speed", "length/rad", "max speed", "largest speed", "mm/rad"),
         ("err_rms_pace", "mm/rad", "error of rms pace", "error of the root mean square of pace", "mm/rad"),
+        ("hit", "length/rad^2", "hit", "hit", "mm/rad²"),
         ("looper.dtip_x", "length", "x′ of tip looper", "velocity of x of tip of the looper", "mm/rad"),
         ("speed1", "rad/s", "speed₁", "speed of stage 1", "rpm"),
         ("omega3", "rad/s", "omega₃", "omega of stage 3", "rad/s"),
@@ -74,6 +75,7 @@ def test_values_at_speed_are_those_calculated_by_hand() -> None:
     assert quantity("ds", "m").at_speed(0.002, 500.0) == "1\u00a0m/s" and quantity("d2s", "cm").unit == "cm/rad²"
     assert quantity("ds", "N*mm").show(2.0) == "2\u00a0N·mm"  # a relation that is called so
     assert quantity("max_pace", "length/rad").at_speed(2.0, 500.0) == "1\u00a0m/s"
+    assert quantity("hit", "length/rad^2").at_speed(12.0, 7000.0 * RPM) == "6448\u00a0m/s²"
     assert quantity("looper.max_acceleration_p", "mm").at_speed(12.0, 7000.0 * RPM) == "6448\u00a0m/s²"
     assert quantity("speed", "rad/s").show(7000.0 * RPM) == "7000\u00a0rpm"
     assert quantity("stroke", "mm").at_speed(24.5, 500.0) == ""

@@ -11,7 +11,7 @@ import pytest
 from sweep.cli.tables import write_table
 from sweep.errors import StoreError, closest
 from sweep.families import NAMES
-from sweep.quantities.units import SYMBOLS
+from sweep.quantities.units import SYMBOLS, UnitFault, factor
 
 OUTPUTS = [
     "psi", "eps_y", "dpsi", "d2psi", "swing", "margin", "max_abs_d2psi", "max_crank_acceleration", "max_pressure_angle",
@@ -44,6 +44,23 @@ PARAMETERS = ["a", "b", "c", "e", "f", "g", "alpha", "branch"]
 )
 def test_hint_is_what_is_meant_or_nothing(word: str, known: list[str], meant: str | None) -> None:
     assert closest(word, known) == meant
+
+
+@pytest.mark.parametrize(
+    ("unit", "internal", "hint"),
+    [
+        ("ft", "mm", "m or inch"),
+        ("mmm", "mm", "did you mean 'mm'?"),
+        ("KG", "t", "did you mean 'kg'?"),
+        ("Nmm", "N*mm", "did you mean 'N*mm'?"),
+        ("mm/s2", "mm/s^2", "did you mean 'mm/s^2'?"),
+        ("rmp", "rad/s", "did you mean 'rpm'?"),
+    ],
+)
+def test_hint_about_a_unit_is_one_that_may_stand_there(unit: str, internal: str, hint: str) -> None:
+    with pytest.raises(UnitFault) as fault:
+        factor(unit, internal)
+    assert str(fault.value).endswith(hint)
 
 
 def test_a_disk_that_can_only_be_read_is_an_error_of_its_own(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

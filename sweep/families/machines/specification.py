@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from sweep.errors import InputError, MissingInput, choices, known_keys, nearest, number
-from sweep.families.base import Event, Family, Output, Turn
+from sweep.families.base import PER_RADIAN, Event, Family, Turn
 from sweep.families.capabilities import OutputLink
 from sweep.families.frames import crank_axis
 from sweep.families.link_tree import LinkTree
@@ -143,9 +143,9 @@ def built(given: Specification, find: FindFamily) -> Machine:
         if "sew" not in table
     }
     known |= {name: read_sewing(name, table, known) for name, table in plain.items() if "sew" in table}
-    outputs = _outputs(members, tuple(known.values()))
+    before = assemble("", tuple(members.values()), tuple(r for r in known.values() if not isinstance(r, Timing)))
     events = {
-        name: _event(name, dict(table), outputs) if "event" in dict(table) else _reading(name, dict(table), outputs)
+        name: (_event if "event" in dict(table) else _reading)(name, dict(table), before)
         for name, table in given.relations
         if name not in plain
     }
@@ -244,32 +244,29 @@ def _derivatives(family: Family, output: str) -> int:
     return number
 
 
-def _outputs(members: Mapping[str, Member], others: tuple[Any, ...]) -> Mapping[str, Output]:
-    """Pose outputs of the machine: of its members, their points, and relations of several."""
-    relations = tuple(r for r in others if not isinstance(r, Timing))
-    return assemble("", tuple(members.values()), relations).pose_output
-
-
-def _reading(name: str, table: dict[str, Any], outputs: Mapping[str, Output]) -> EventValue:
-    """Value of a pose output at a crank angle."""
+def _reading(name: str, table: dict[str, Any], before: Machine) -> EventValue:
+    """Value of a pose output, of a member or a relation before, at a crank angle."""
     where, given = f"machine.relations.{name}", table["value"]
     if len(table) != 1:
         raise InputError(name, dict(table), "value alone", where)
     if not isinstance(given, tuple) or len(given) != 2 or not all(isinstance(part, str) for part in given):
         raise InputError("value", given, "a pose output and a crank angle", where)
     of, place = given
-    if of not in outputs:
-        raise InputError("value", of, f"a pose output of the machine{nearest(of, outputs)}", where)
-    return EventValue(name, outputs[of], (place,))
+    if of not in before.pose_output:
+        raise InputError("value", of, f"a pose output of the machine{nearest(of, before.pose_output)}", where)
+    output, order = before.pose_output[of], len(before.orders(of))
+    if order and output.unit == "length":  # the name no longer says that it is a derivative
+        output = replace(output, unit=PER_RADIAN if order == 1 else f"{PER_RADIAN}^{order}")
+    return EventValue(name, output, (place,))
 
 
-def _event(name: str, table: dict[str, Any], outputs: Mapping[str, Output]) -> Event:
+def _event(name: str, table: dict[str, Any], before: Machine) -> Event:
     """Event where a pose output of the machine, a relation's or a member's, passes a level."""
     where = f"machine.relations.{name}"
     known_keys(table, ("event", "level", "rising"), where)
     of, rising = table["event"], table.get("rising", True)
-    if of not in outputs:
-        raise InputError("event", of, f"a pose output of the machine{nearest(str(of), outputs)}", where)
+    if of not in before.pose_output:
+        raise InputError("event", of, f"a pose output of the machine{nearest(str(of), before.pose_output)}", where)
     level = number("level", table.get("level", 0.0), where, f"a number, in the unit of {of}")
     if not isinstance(rising, bool):
         raise InputError("rising", rising, "true or false", where)
