@@ -11,7 +11,7 @@ import math
 from kernels import status as st
 from kernels.families.heddle import driven, four_bar
 from kernels.jit import inline, kernel
-from kernels.types import EPS, Array, Status
+from kernels.types import EPS, TWO_PI, Array, Status
 
 _MOST_STEPS = 200
 
@@ -64,6 +64,18 @@ def heddle_extremes(requirements: Array, extremes: Array, status: Status) -> Non
             out[5] = 2.0 * lever * math.sin(mu) if way == 1 else stroke
 
 
+@inline
+def lever_angle(frame: float, arm: float, lever: float, rod: float, side: float, xi: float) -> tuple[float, float]:
+    """Angle of the cam lever, continuous in xi where C passes behind O2, too; below 0 where the rod does not reach."""
+    reach = distance_to_c(frame, arm, xi)
+    near = (rod - (lever - reach)) * (rod + (lever - reach))
+    far = ((lever + reach) - rod) * ((lever + reach) + rod)
+    towards = math.atan2(arm * math.sin(xi), frame - arm * math.cos(xi))
+    if arm > frame:
+        towards = math.pi - xi - math.atan2(frame * math.sin(xi), arm - frame * math.cos(xi))
+    return towards + side * 2.0 * math.atan2(math.sqrt(max(near, 0.0)), math.sqrt(max(far, 0.0))), min(near, far)
+
+
 @kernel
 def heddle_lever_angles(positions: Array, angles: Array, status: Status) -> None:
     """Compute angles of the cam lever O2B in both extreme positions for a given rod BC; (10) of docs/heddle.md.
@@ -76,24 +88,17 @@ def heddle_lever_angles(positions: Array, angles: Array, status: Status) -> None
     """
     for i in range(positions.shape[0]):
         frame, arm, lever, rod = positions[i, 0], positions[i, 1], positions[i, 4], positions[i, 5]
-        side = positions[i, 6]
-        status[i] = st.OK
-        if not (lever > 0.0 and rod > 0.0 and side * side == 1.0 and positions[i, 2] == positions[i, 2]):
-            status[i] = st.INVALID_INPUT
-        for k in range(2):
-            xi = positions[i, 2 + k]
-            reach = distance_to_c(frame, arm, xi)
-            near = (rod - (lever - reach)) * (rod + (lever - reach))
-            far = ((lever + reach) - rod) * ((lever + reach) + rod)
-            if status[i] == st.OK and not (near >= 0.0 and far >= 0.0):
-                status[i] = st.NOT_ASSEMBLED
-            if status[i] == st.OK:
-                towards = math.atan2(arm * math.sin(xi), frame - arm * math.cos(xi))
-                angles[i, k] = towards + side * 2.0 * math.atan2(math.sqrt(near), math.sqrt(far))
+        xi1, xi2, side = positions[i, 2], positions[i, 3], positions[i, 6]
+        angles[i, :] = math.nan
+        status[i] = st.INVALID_INPUT
+        if not (lever > 0.0 and rod > 0.0 and side * side == 1.0 and xi1 == xi1):
+            continue
+        one, reached = lever_angle(frame, arm, lever, rod, side, xi1)
+        two, reached2 = lever_angle(frame, arm, lever, rod, side, xi2)
+        status[i] = st.OK if reached >= 0.0 and reached2 >= 0.0 else st.NOT_ASSEMBLED
         if status[i] == st.OK:
-            angles[i, 2] = angles[i, 0] - angles[i, 1]
-        else:
-            angles[i, :] = math.nan
+            turns = TWO_PI * math.floor(0.5 + 0.5 * (one + two) / TWO_PI)
+            angles[i, 0], angles[i, 1], angles[i, 2] = one - turns, two - turns, one - two
 
 
 @inline
@@ -150,6 +155,10 @@ def heddle_rods(positions: Array, rods: Array, count: Status, status: Status) ->
                 x, y = along * nx - turn * across * ny, along * ny + turn * across * nx
                 rod = _kept_rod(x, y, one, two, side)
                 if rod == rod:
+                    start, _ = lever_angle(frame, arm, lever, rod, side, xi1)
+                    end, _ = lever_angle(frame, arm, lever, rod, side, xi2)
+                    if abs(start - end) > math.pi:  # the lever goes the other way round
+                        continue
                     place = count[i]
                     while place > 0 and rods[i, place - 1] > rod:
                         rods[i, place] = rods[i, place - 1]
