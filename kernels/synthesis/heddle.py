@@ -191,7 +191,7 @@ def heddle_shaft_arms(shafts: Array, arms: Array, status: Status) -> None:
     Notes
     -----
     DF lets both arms stand square to O3O4 at mid-stroke.  The stroke grows with the arm until the link reaches a dead
-    point; the arm is bracketed from zero upwards and bisected to the last bit.
+    point; the arm is bisected to the last bit.
     """
     for i in range(shafts.shape[0]):
         stroke, end, lever, frame, half = shafts[i, 0], shafts[i, 1], shafts[i, 2], shafts[i, 3], shafts[i, 4]
@@ -199,29 +199,24 @@ def heddle_shaft_arms(shafts: Array, arms: Array, status: Status) -> None:
         if not (stroke > 0.0 and end > 0.0 and lever > 0.0 and frame > 0.0 and 0.0 < half < 0.5 * math.pi):
             status[i] = st.INVALID_INPUT
             continue
-        # Upwards from the first-order arm in small steps, so that no dead point is passed unseen.
+        # Upwards from the first-order arm; what passes a dead point is too long, as what has the stroke is.
         low, high = 0.0, lever * (0.5 * stroke / end) / math.sin(half)
-        found = False
         for _ in range(_MOST_STEPS):
             up, down, code = _travel(high, lever, frame, end, half)
-            if code != st.OK:
-                break
-            if up - down >= stroke:
-                found = True
+            if code != st.OK or up - down >= stroke:
                 break
             low, high = high, 1.03125 * high
-        status[i] = st.OK if found else st.NOT_ADMISSIBLE
-        if not found:
-            continue
         for _ in range(_MOST_STEPS):
             middle = 0.5 * (low + high)
             if middle in (low, high):
                 break
             up, down, code = _travel(middle, lever, frame, end, half)
-            if up - down >= stroke:
+            if code != st.OK or up - down >= stroke:
                 high = middle
             else:
                 low = middle
         up, down, code = _travel(high, lever, frame, end, half)
-        arms[i, 0], arms[i, 1] = high, math.hypot(frame, high - lever)
-        arms[i, 2], arms[i, 3] = up, down
+        status[i] = st.OK if code == st.OK and up - down >= stroke else st.NOT_ADMISSIBLE
+        if status[i] == st.OK:
+            arms[i, 0], arms[i, 1] = high, math.hypot(frame, high - lever)
+            arms[i, 2], arms[i, 3] = up, down

@@ -199,3 +199,19 @@ def test_heddle_lever_follows_a_bell_crank_that_passes_behind_its_pivot():
             # the arc cosine loses half of the digits where rod and lever are nearly in line
             assert row.lever_swing == pytest.approx(followed({k: x[i] for k, x in asked.items()}, rod), abs=1e-6)
             assert rods is not None or abs(row.lever_swing) == pytest.approx(asked["swing"][i], abs=1e-6)
+
+
+@pytest.mark.parametrize(
+    ("stroke", "O4E", "O4F", "O3O4", "mu_3"),
+    [(195.8558374601882, 100.8, 190.7, 206.5, 1.4224), (90.86, 205.64, 119.53, 189.96, 0.04625), (127.55, 216.8, 30.36, 131.5, 0.02829)],
+)  # fmt: skip
+def test_heddle_arm_is_found_where_the_first_guess_is_next_to_a_dead_point_or_beyond(stroke, O4E, O4F, O3O4, mu_3):
+    """Places of E by two circles; of 1167 random shafts with an arm 29 were NOT_ADMISSIBLE."""
+    found = heddle.arms({"stroke": stroke, "O4E": O4E, "O4F": O4F, "O3O4": O3O4, "mu_3": mu_3}).iloc[0]
+    assert found.status == st.OK
+    places = []
+    for turn in (mu_3, -mu_3):
+        way = 1j * found.O3D * np.exp(1j * turn) - O3O4  # from O4 to D
+        aside = math.acos((O4F**2 + abs(way) ** 2 - found.DF**2) / (2.0 * O4F * abs(way)))
+        places.append(O4E * math.sin(np.angle(way) - aside - 0.5 * math.pi))  # F to the right of O4-D, as at mid-stroke
+    assert abs(places[0] - places[1]) == pytest.approx(stroke, rel=1e-7)
