@@ -219,13 +219,14 @@ def _next_event(path: Array, foot: Foot, state: State, j: int, s: float) -> tupl
             if which >= 0:
                 return first, which
         elif _measure(path, foot, state, j, after, 2) < 0.0:
-            # A launch begins with no gap: halve towards it until there is one.  A hop that shows none ends here.
+            # A launch begins with no gap: halve towards it until there is one.  A hop that shows none ends here, a
+            # rebound where it is highest.
             clear = before
             for n in range(1, 30):
                 if _measure(path, foot, state, j, clear, 2) > 0.0:
                     return _root(path, foot, state, j, clear, after, 2), 2
                 clear = before + (after - before) * 0.5**n
-            return after, 2
+            return before if state.clear > state.since else after, 2
         before = after
     return 2.0, -1
 
