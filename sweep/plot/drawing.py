@@ -6,6 +6,8 @@ from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
+from matplotlib.text import Annotation
+from matplotlib.transforms import Bbox
 
 from sweep.exchange.scene import VIEWS, extent, first_pose, frames_of, is_spatial, projection, shown_name
 from sweep.families.base import Array
@@ -37,6 +39,7 @@ def mechanism_figure(parts: Sequence[Part], unit: str, view: str | None = None, 
         handles, labels = axes.get_legend_handles_labels()
         once = dict(zip(labels, handles, strict=True))  # members of a machine have links of the same name
         axes.legend(once.values(), once.keys(), fontsize="small")
+    spread(figure)
     return figure
 
 
@@ -59,7 +62,8 @@ def draw(axes: Axes, parts: Sequence[Part], view: str, unit: str, positions: int
 
 COLOURS = (OPTIMUM, "#2f8f5b", "#c8551b", "#7a4fa3", "#14808f", "#8c6d1f")
 FRAME = "#14181f"
-CLOSE = 0.04  # of the mechanism's size: joints so near to each other share a line of names
+CLOSE = 0.01  # of the mechanism's size: joints so near to each other share a line of names
+NAME = "_name of a joint"  # legends leave out what begins so
 TURN = np.linspace(-0.75 * np.pi, 0.75 * np.pi, 25)
 
 
@@ -82,9 +86,30 @@ def draw_frame(axes: Axes, parts: Sequence[Part], seen: Array, *, pose: int = 0)
             _joint(axes, path, seen, pose, fixed=name in part.kinds)
             names.append((seen @ path[pose], f"{shown_name(name)}{part.stage}"))
     for at, words in _joined(names, CLOSE * size):
-        axes.annotate(words, (float(at[0]), float(at[1])), (6, 5), textcoords="offset points", zorder=8)
+        axes.annotate(words, (float(at[0]), float(at[1])), (6, 5), textcoords="offset points", zorder=8, label=NAME)
     axes.set_aspect("equal", adjustable="datalim")
     axes.grid(False)
+
+
+def spread(figure: Figure) -> None:
+    """Move names of joints to where they cover neither each other nor another joint, once all places are known."""
+    figure.draw_without_rendering()
+    point = figure.dpi / 72.0
+    for axes in figure.axes:
+        names = [text for text in axes.texts if isinstance(text, Annotation) and text.get_label() == NAME]
+        joints = {name: axes.transData.transform(name.xy) for name in names}
+        taken = [Bbox([at - 5.0 * point, at + 5.0 * point]) for at in joints.values()]
+        taken += [text.get_window_extent() for text in axes.texts if text not in names and text.get_text()]
+        for name, at in joints.items():
+            box = name.get_window_extent()
+            size = np.array([box.width, box.height])
+            wide, high = size / point
+            rises = [y + k * high for k in (0, 1, -1, 2, -2) for y in (5.0, -5.0 - high)]
+            corners = {(x, y): at + point * np.array([x, y]) for y in rises for x in (6.0, -6.0 - wide)}
+            boxes = {way: Bbox([corner, corner + size + [3.0 * point, 0.0]]) for way, corner in corners.items()}
+            best = min(boxes, key=lambda way: boxes[way].count_overlaps(taken))
+            name.set_position(best)
+            taken.append(boxes[best])
 
 
 def _joined(names: Sequence[tuple[Array, str]], near: float) -> list[tuple[Array, str]]:

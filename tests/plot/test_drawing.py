@@ -60,3 +60,21 @@ def test_members_of_a_machine_share_a_frame_and_a_legend() -> None:
     assert axes.get_title(loc="left") == "one, other"
     labels = [text.get_text() for text in axes.get_legend().get_texts()]
     assert len(labels) == len(set(labels)) == 3
+
+
+@pytest.mark.parametrize("view", ["space", "xy", "zy", "xz"])
+def test_names_of_joints_cover_neither_each_other_nor_joints(view: str) -> None:
+    """Square to the plane of a needle drive all joints stand in one line, some of them close together."""
+    drive = {f"{name}1": value for name, value in family("rssr").example.items()}
+    drive |= {f"{name}2": value for name, value in family("guide").example.items()}
+    with house_style():
+        figure = mechanism_figure(over(["rssr", "guide"], drive, 0.0, 12), "mm", view)
+        figure.draw_without_rendering()
+    axes = figure.axes[0]
+    words = [text for text in axes.texts if len(text.get_text()) > 1]
+    assert len(words) > 4
+    boxes = [text.get_window_extent() for text in words]
+    joints = [axes.transData.transform(text.xy) for text in words]
+    for k, box in enumerate(boxes):
+        assert box.count_overlaps(boxes[:k]) == 0, words[k]
+        assert not any(box.contains(*at) for at in joints), words[k]
