@@ -17,6 +17,7 @@ from sweep.nights.carry import REPORT, Carried, carry
 from sweep.nights.changes import Changes, changes, figures, slower
 from sweep.nights.page import write_page
 from sweep.nights.studies import FIGURE, RUN_LOG, Chosen, Ended, call, chosen, draw, in_order, notify
+from sweep.report.terminal import INFEASIBLE
 from sweep.study import Study
 
 # A run ended so: its own code says why.  Any other end is that of a process that died.
@@ -148,8 +149,8 @@ class _Night:
             carried = carry(one.study, self.earlier, target)
             ended = Ended(0, 0.0, "") if carried and carried.whole else self.run(one, target)
             source, linked = (carried.night, carried.chunks) if carried else (None, 0)
-            # A proof that died leaves designs and optimum behind, which are whole.
-            died = ended.code not in (0, TimeUsedUp.exit_code)
+            # A proof that died leaves designs and optimum behind, which are whole; none feasible is an answer, too.
+            died = ended.code not in (0, INFEASIBLE, TimeUsedUp.exit_code)
             if died or not store.is_complete(target / files.DESIGNS):
                 state: State = "cut" if ended.code in CUT else "failed"
                 code = ended.code if ended.code in (*TOLD, *CUT) else WorkerDied.exit_code

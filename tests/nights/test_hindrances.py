@@ -229,3 +229,14 @@ def test_the_page_speaks_of_a_first_night_of_labels_and_per_cent(first: tuple[Pa
     assert "no change" not in page and "first night" in page
     assert "100\u00a0%" in page
     assert "max_abs_dP" not in page and "mm" in page
+
+
+def test_a_study_of_which_no_design_keeps_the_limits_is_complete(tmp_path: Path) -> None:
+    """Its run ends with 4, and all files are there; the night said that its process had died."""
+    path = written(tmp_path / "studies" / "tiny")
+    with (path / "study.toml").open("a", encoding="utf-8") as file:
+        file.write('[limits]\nrange_P = "<= 1 um"\n')
+    record, _ = night(tmp_path / "nights", [tmp_path / "studies"])
+    assert (record.exit_code, record.studies["tiny"].state, record.studies["tiny"].report) == (0, "complete", True)
+    again, _ = night(tmp_path / "nights", [tmp_path / "studies"])
+    assert again.exit_code == 0 and again.studies["tiny"].linked == record.studies["tiny"].computed
