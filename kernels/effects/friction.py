@@ -34,7 +34,7 @@ from kernels.linkage.joints import Joints, read
 from kernels.types import Array, Status
 
 TOLERANCE = 1e-14
-PASSES = 200
+PASSES = 5000  # a pose that all but jams settles slowly
 STALLED = 5
 LEAP = 10  # every so many passes the rest of the geometric series is gone at once (Aitken)
 STRAIGHT = 0.9  # squared cosine of the angle between two steps, below which they are no geometric series

@@ -141,10 +141,9 @@ def poses(designs: Numbers, cos_phi: Numbers, sin_phi: Numbers, status: Status, 
     designs : (n, 9) columns as `PARAMETERS` of sweep/families/slotted.py; k = 0 is the fork slot, k > 0 the bar
     cos_phi, sin_phi : (n, m), or (1, m) shared by all designs
     status : (n, m) out; OK, NOT_ASSEMBLED, DEAD_POINT, SINGULAR or INVALID_INPUT
-    psi ... cos_psi : (n, m) out [rad; 1], or None: what is None is neither computed nor compiled
-    slide : record of (n, m) arrays [length] or None
-    discriminant, pressure_angle : (n, m) out [1; rad], or None
-    joints : (6, n, m) out, ball x y z and the point of the slot or bar that guides it x y z, or None
+    out : psi and rho with their derivatives, discriminant, pressure angle, each (n, m) [rad; length; 1; rad]; joints
+        (6, n, m), ball x y z and the point of the slot or bar that guides it x y z; what is None is neither computed
+        nor compiled
 
     Notes
     -----

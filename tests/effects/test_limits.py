@@ -32,6 +32,15 @@ def test_friction_is_found_right_up_to_where_it_jams():
         np.testing.assert_allclose(found[f"ball_couple_{joint}"], expected, rtol=1e-11)
 
 
+def test_friction_that_settles_slowly_is_no_jam():
+    """Just below the coefficient that jams each pass takes a small share of what is left: 200 were too few."""
+    steep = FRICTION | {"mu_a": 3.5696, "mu_b": 1.7842, "mu_d": 1.708, "mu_c": 5.188471177944861}
+    (row,) = sweep.evaluate("rssr", RSSR_LOADS | steep | {"phi": 6.0023}, [*JOINTS, "friction_passes"]).itertuples()
+    assert row.status == st.OK and row.friction_passes > 200
+    assert row.ball_couple_c == pytest.approx(steep["mu_c"] * steep["radius_c"] * row.force_c_friction, rel=1e-11)
+    assert row.ball_couple_b == pytest.approx(steep["mu_b"] * steep["radius_b"] * row.force_b_friction, rel=1e-11)
+
+
 def test_a_jam_that_grows_beyond_float64_is_a_jam():
     """Couples that grow a hundredfold in each pass overflow: infinity less infinity is not standing still."""
     rough = SLIDER | SLIDE | {"mu_c": 100.0, "mu_d": 50.0}
