@@ -1,6 +1,6 @@
 """Enclosures of analytic functions of the crank angle: polynomials with proven remainders.
 
-docs/extrema.md, section 5, explains the method.
+docs/internals/extrema.md explains the method.
 
 A jet encloses a function f(phi + z) on the complex disc |z| <= reach.  In x = z/reach it is a polynomial of degree
 ORDER plus two remainders of which only the size is known.  ``noise`` is any power series; it stands for rounding errors

@@ -6,7 +6,7 @@ closures into those of the chain, ``dense``, ``search`` and ``means`` generate t
 Parts of the search: ``curves``; their samples (``halves``) of a block of designs (``abreast``) or of one (``look``);
 the ``listing`` of local maxima among them and their refinement (``peaks``).  Which families have a form is theirs to
 say.
-docs/chain.md, docs/extrema.md.
+docs/chain.md, docs/internals/extrema.md.
 """
 
 from kernels.chains.chain import Chained as Chained

@@ -1,7 +1,8 @@
 """The list of local maxima under refinement: all those of a block of designs, side by side.
 
 As in :mod:`kernels.families.rssr.sampling`: Newton steps on the next derivative, and what a refined maximum must keep
-to be trusted (docs/extrema.md).  A minimum, or a negative peak of a magnitude, is a maximum of the curve times a sign.
+to be trusted (docs/internals/extrema.md).  A minimum, or a negative peak of a magnitude, is a maximum of the curve
+times a sign.
 """
 
 from __future__ import annotations

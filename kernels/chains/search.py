@@ -1,4 +1,4 @@
-"""True extrema of a chain over the turn, refined between samples: the generated kernel (docs/extrema.md).
+"""True extrema of a chain over the turn, refined between samples: the generated kernel (docs/internals/extrema.md).
 
 Per design: samples that resolve the curve (`kernels.chains.listing`); every local maximum of at least 60 % of the best
 is refined, vectorised over the maxima of a block of designs (`kernels.chains.peaks`).  What is not trusted, or what

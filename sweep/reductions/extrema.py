@@ -1,4 +1,4 @@
-"""True extrema over one turn of any pose output of any family; docs/extrema.md.
+"""True extrema over one turn of any pose output of any family; docs/internals/extrema.md.
 
 Sampled, refined between the samples, and sampled again more densely where the samples do not resolve the curve.  A
 chain of families that can be fused has one kernel for that, and a smooth curve of dear poses is the Fourier series of

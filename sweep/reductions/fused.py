@@ -1,4 +1,4 @@
-"""Extrema over the turn of chains whose stages are fused into one kernel (:mod:`kernels.chains`); docs/extrema.md.
+"""Extrema over the turn of chains whose stages are fused into one kernel, :mod:`kernels.chains`.
 
 A family that can only end a chain is one by itself: a guide whose crank is the main shaft.
 """

@@ -4,7 +4,7 @@ Friction changes its direction where a joint stops turning.  There loads jump or
 places a curve may rise and fall within a hundredth of a radian.  So the turn is cut where the followers reverse, which
 are roots of known functions, and into even panels between.  On each panel a polynomial goes through the poses; a panel
 whose polynomial, and what it may be wrong by, stays below the highest pose is left.  The others are halved until the
-poses of both halves agree with the polynomial before (docs/extrema.md, section 3b).
+poses of both halves agree with the polynomial before (docs/internals/extrema.md).
 """
 
 from __future__ import annotations

@@ -41,7 +41,7 @@ def rounding_share(
     family: Family, designs: Array, columns: dict[str, Array], row: Index, column: Index, guards: list[str],
     order: Index,
 ) -> Array:  # fmt: skip
-    """Share of values that rounding may have changed (docs/extrema.md, section 3).
+    """Share of values that rounding may have changed (docs/internals/extrema.md).
 
     Parameters
     ----------

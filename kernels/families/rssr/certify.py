@@ -1,6 +1,6 @@
 """Certified maxima: proof that the search missed no peak, of a crank-rocker, and of a point guided by a chain.
 
-docs/rssr.md, section 6.1, and docs/extrema.md, section 5.
+docs/rssr.md, section 6.1, and docs/internals/extrema.md.
 """
 
 from __future__ import annotations
