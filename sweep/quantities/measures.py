@@ -202,7 +202,10 @@ def _measure(family: Family, name: str, asked: Quantity, window: tuple[float, fl
             return Measure(name, LIMIT_KINDS[kind], (curve(family, asked.of),), ratio)
         case Reduced(reduction=reduction, extreme=True):
             inside = window if family.pose_output[asked.of].windowed else None
-            return Measure(name, cast(Kind, reduction.kind), (curve(family, asked.of, inside),))
+            # Of a vector's length, which has no slope at zero, both signs bound the largest, as those of a magnitude.
+            of_vector = {f"{asked.of}_{axis}" for axis in "xyz"} <= family.pose_output.keys()
+            kind = "max_abs" if of_vector and reduction.kind == "max" else reduction.kind
+            return Measure(name, cast(Kind, kind), (curve(family, asked.of, inside),))
         case Extent(box=box):
             numbers = tuple(f"{name}, still {k}" for k in range(len(box.still)))
             curves = tuple(curve(family, of) for of in box.curves)

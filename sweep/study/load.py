@@ -166,7 +166,7 @@ def _study(
     check_search(sections.optimise, file, bare)
     check_objective(objective, family, faults)
     check_steady(file, family, objective, limits)
-    front = read_pareto(sections.pareto, file, family, objective, sections.optimise)
+    front = read_pareto(sections.pareto, file, family, objective, sections.optimise, limits)
     other = _elsewhere(file, bare, family, fitted, sections.scene.speed, locus, prescribed, inputs)
     space = read_space(file, family, other)
     if space is not None and fit is None and (locus is None or sections.optimise.variables != "parameters"):

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Any, cast
 
 from sweep.errors import InputError
@@ -117,6 +118,7 @@ def read_pareto(
     family: Family,
     objective: ObjectiveSection,
     search: OptimiseSection,
+    limits: Sequence[Limit],
 ) -> ParetoSettings | None:
     """Read the settings of the front, or None if something is faulty (all faults are reported).
 
@@ -125,6 +127,7 @@ def read_pareto(
     section : [pareto]
     family : with the effects that the second output calls for
     objective, search : [objective] and [optimise]
+    limits : those of the study, of which the one on the other side of the second output holds all along the front
     """
     raw, faults = file.data.get("pareto"), file.faults
     if "pareto" in file and "optimise" not in file:
@@ -150,12 +153,17 @@ def read_pareto(
     bounds = _bounds(output, raw[given[0]], key, faults)
     if bounds is None or not _searchable(family, output, bounds, given[0], faults):
         return None
+    low = given[0] == "at_least"
+    ends = [limit.maximum if low else limit.minimum for limit in limits if limit.output == output.name]
+    if any(bound > end if low else bound < end for end in ends if end is not None for bound in bounds):
+        side = "maximum" if low else "minimum"
+        faults.value(key, raw[given[0]], f"bounds that leave room to the {side} of {output.name} in [limits]")
+        return None
     if section.points is not None and not 2 <= len(set(bounds)) < section.points:
         some = f"more than the {len(set(bounds))} bounds given, of which there must be two or more"
         faults.value(("pareto", "points"), section.points, some)
         return None
-    low, seconds = given[0] == "at_least", section.time_budget
-    return ParetoSettings(output.name, bounds, low, section.starts, seconds, section.points, search.looks)
+    return ParetoSettings(output.name, bounds, low, section.starts, section.time_budget, section.points, search.looks)
 
 
 def _bounds(output: Output, raw: object, key: Key, faults: Faults) -> tuple[float, ...] | None:

@@ -291,3 +291,23 @@ def test_terminal_warns_of_a_search_that_followed_other_values(
     assert (best["ended"] == DIFFERS) is missed and math.isfinite(best["max_abs_d3s"])
     warned = [line for line in ending(folder).lines if "beside the true ones" in line]
     assert len(warned) == missed
+
+
+def test_a_limit_that_is_kept_and_holds_nothing_back_may_differ():
+    """The speed of a tip is 0 where it turns back, with a kink that no search follows: its range is some 1e-5 off."""
+    machine = sweep.machine({"p": {"family": "rssr", "tip": [2.0, 0.5, 0.0]}}, {"pace": {"speed": ["p.tip"]}})
+    given = {f"p.{name}": float(x) for name, x in family("rssr").example.items() if name != "p.b"}
+
+    def ended(objective: str, most: float) -> Result:
+        limits = (Limit("range_pace", None, most),)
+        problem = Problem(
+            family(machine), ("p.b",), np.array([3.9]), np.array([4.4]), given | {"p.b": 4.2}, objective, limits
+        )
+        return minimise(problem, problem.rows(np.array([[4.2]])), ONCE)[0]
+
+    free, held = ended("p.max_abs_d2psi", 1.26), ended("minus_p.max_abs_d2psi", 1.26)
+    assert free.ended == "converged" and free.active == ("p.b at its lower bound",)
+    # Of a speed that is 0 somewhere the range is the largest one, and that has no kink.
+    fastest = sweep.summarise(machine, given | {"p.b": 3.9}, "max_pace")["max_pace"][0]
+    assert free.values["range_pace"] == pytest.approx(fastest, abs=1e-8)
+    assert held.ended == DIFFERS and held.active == ("range_pace at its maximum",)

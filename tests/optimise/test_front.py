@@ -217,6 +217,8 @@ def test_points_are_placed_and_the_report_says_so(whole: tuple[Study, Path], tmp
         ('[pareto]\noutput = "swing"\nat_most = "40 deg"\ntime_budget = "0 s"\n', "positive"),
         (TABLE + "points = 3\n", "more than the 3 bounds given"),
         ('[pareto]\noutput = "swing"\nat_most = "40 deg"\npoints = 4\n', "there must be two or more"),
+        ('[pareto]\noutput = "swing"\nat_most = { values = [39, 45], unit = "deg" }\n', "minimum of swing in .limits"),
+        (TABLE.replace("most", "least").replace("50", "51"), "maximum of max_pressure_angle in .limits"),
         ('[pareto]\noutput = "swing"\nat_most = { from = 1, to = 9, count = 65, unit = "deg" }\n', "at most 64"),
     ],
 )

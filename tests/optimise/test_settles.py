@@ -13,6 +13,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+import sweep
 from kernels import status as st
 from sweep.families import family
 from sweep.families.base import Array
@@ -148,3 +149,14 @@ def test_a_search_that_leaves_its_limits_where_no_slope_leads_back_ends_within_t
     )
     (found,) = minimise(problem, start, OptimiseSettings(starts=1, looks=600))
     assert found.feasible
+
+
+def test_a_length_that_comes_down_to_zero_has_converged() -> None:
+    """Two equal cranks in step: nothing is below 0, where the distance of their pins has no slope."""
+    one = {"family": "slider_crank"}
+    machine = sweep.machine({"p": one, "q": one | {"offset": 0.2}}, {"apart": {"distance": ["p.b", "q.b"]}})
+    fixed = {f"{n}.{k}": float(x) for n in "pq" for k, x in family("slider_crank").example.items()}
+    problem = Problem(family(machine), ("q.offset",), np.array([-1.0]), np.array([1.0]), fixed, "max_apart")
+    for found in minimise(problem, problem.rows(np.array([[0.4], [-0.7]])), OptimiseSettings()):
+        assert found.ended == "converged" and found.active == () and found.looks < 100
+        assert abs(found.objective) < 1e-9 and abs(found.design[problem.columns[0]]) < 1e-8

@@ -18,6 +18,7 @@ from sweep.optimise.local.model import LooksUsedUp, State, Stopped
 from sweep.optimise.problem.program import SMALLEST, Program
 from sweep.optimise.problem.rows import Form
 from sweep.optimise.problem.statement import Problem
+from sweep.quantities.limits import meets
 from sweep.quantities.measures import Measure
 
 FIRST = 2  # looks that give a start its scale and its first design
@@ -142,6 +143,10 @@ def confirmed(problem: Problem, program: Program, found: Result) -> Result:
     if program.objective.name in other and _vanishes(problem, found, other[program.objective.name]):
         other.pop(program.objective.name)
     far = [name for name in other if not apart[name] <= true[name][1] + DIGITS * _size(asked[name], true[name][0])]
+    # A limit that is kept and holds nothing back does not enter the conditions of optimality.
+    acting = {program.objective.name, *(text.split()[0] for text in found.active)}
+    missed = {x.output for x in problem.limits if x.output in far and not meets(x, np.array([other[x.output]])).all()}
+    far = [name for name in far if name in acting | missed]
     kept = replace(
         found,
         objective=other.get(program.objective.name, found.objective),
