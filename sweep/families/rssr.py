@@ -9,7 +9,7 @@ import numpy as np
 
 from kernels import status as st
 from kernels.families import rssr
-from kernels.types import Array
+from kernels.types import TWO_PI, Array
 from sweep.families import capabilities as can
 from sweep.families.base import Accuracy, Angles, Columns, Family, Output, Parameter, PoseFunction, Step, Work, floats
 from sweep.families.hardpoints import CRANK_ROCKER_POINTS
@@ -183,6 +183,9 @@ def true_maxima(designs: Array, wanted: frozenset[str], accuracy: Accuracy) -> C
     status, phi, error, phi_error = np.empty(n, np.uint8), *(np.empty((3, n)) for _ in range(3))
     most = [np.empty(n) if wanted & {f"max_abs_{x}", f"phi_max_abs_{x}"} else None for x in names]
     rssr.true_maxima(designs, sampling_tables(), accuracy.target, status, phi, error, phi_error, *most)
+    # Square axes and g = 0: the way back is the way forth, and of two tops the first of the turn counts.
+    even = (designs[:, 5] == 0.0) & (np.abs(np.cos(designs[:, 6])) < 1e-15)
+    phi[:, even] = np.minimum(phi, TWO_PI - phi)[:, even]
     columns: Columns = {"status": status}
     for order, name in enumerate(names):
         pairs = ((f"max_abs_{name}", most[order], error), (f"phi_max_abs_{name}", phi[order], phi_error))

@@ -144,3 +144,15 @@ def test_negative_control_printed_sign_of_the_rocker_ball_fails_the_oracle():
     frame = sweep.evaluate("kim_dison", table(rows), ["alpha"])
     printed = np.array([math.pi - float(row["out"]["alpha"]) for row in rows])
     assert (np.abs(np.exp(1j * frame.alpha) - np.exp(1j * printed)) > 1e-3).all()
+
+
+@pytest.mark.parametrize("target", [1e-4, 1e-8, 1e-11])
+def test_of_two_tops_as_high_as_each_other_the_first_of_the_turn_counts(target: float) -> None:
+    """The way back is the way forth, so every top has a twin at 2 pi - phi: rounding chose among them."""
+    draw = np.random.default_rng(1).uniform
+    links = {"r": draw(0.5, 1.0, 200), "l": draw(5.5, 6.5, 200), "h": draw(3.0, 3.4, 200)}
+    links |= {"a": 2.9, "b": 4.0, "branch": -1}
+    names = [f"phi_max_abs_{name}" for name in ("dalpha", "d2alpha", "d3alpha")]
+    found = sweep.summarise("kim_dison", links, names, accuracy=target)
+    assert (found["status"] == 0).all()
+    assert (found[names] <= np.pi + 1e-7).all(axis=None)
