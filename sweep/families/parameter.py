@@ -64,8 +64,11 @@ class Parameter:
     @property
     def choice(self) -> str:
         """The values it may have, in words; signs are shown where they are the choice."""
-        signed = any(x < 0.0 for x in self.choices or ())
-        return " or ".join(f"{x:+g}" if signed else f"{x:g}" for x in self.choices or ())
+        choices = self.choices or ()
+        if len(choices) > 4 and choices == tuple(np.arange(choices[0], choices[-1] + 1.0)):
+            return f"a whole number, {choices[0]:g} to {choices[-1]:g}"
+        signed = any(x < 0.0 for x in choices)
+        return " or ".join(f"{x:+g}" if signed else f"{x:g}" for x in choices)
 
 
 WORDS = {

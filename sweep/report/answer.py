@@ -113,7 +113,7 @@ def _edge_sentence(data: Dataset) -> list[str]:
         return []
     edges = [f"{row.name} ({row.edge}, {row.value})" for row in parameter_rows(data) if row.edge]
     return (
-        [f"On the edge of the space that was searched: {'; '.join(edges)}. A wider one may hold better."]
+        [f"On the edge of the space that was searched: {'; '.join(edges)}. A wider space may hold a better design."]
         if edges
         else []
     )

@@ -50,6 +50,12 @@ def test_an_entry_that_keeps_the_rules_is_accepted_and_answers() -> None:
     assert sweep.summarise(KEPT, {"a": 2.0}, ["stroke"], accuracy=1e-10)["stroke"][0] == pytest.approx(4.0, abs=1e-9)
 
 
+def test_choices_in_words_are_short() -> None:
+    assert SIGN.choice == "-1 or +1"
+    assert Parameter("n", "count", "teeth", choices=tuple(map(float, range(1, 65)))).choice == "a whole number, 1 to 64"
+    assert Parameter("n", "count", "teeth", choices=(1.0, 2.0, 3.0, 5.0, 8.0)).choice == "1 or 2 or 3 or 5 or 8"
+
+
 def outputs(**changed: Output) -> dict[str, Any]:
     return {"pose_outputs": tuple(changed.get(o.name, o) for o in OUTPUTS)}
 
