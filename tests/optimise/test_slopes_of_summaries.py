@@ -50,3 +50,23 @@ def test_a_small_dimension_does_not_drown_the_slopes_of_others_in_rounding():
     found = sensitivities(full, row, [output])
     slope = found["growing"][found["parameter"].index("alpha")]
     assert slope == pytest.approx(slope_of_summaries(full, row, output, "alpha"), rel=1e-8)
+
+
+@pytest.mark.parametrize("parameter", ["p.x_tilt", "p.y_tilt", "q.x_tilt", "q.y_tilt", "q.z_at"])
+def test_a_box_of_planar_members_has_the_slopes_of_all_joints_in_its_outer_planes(parameter):
+    """Where a plane tilts, the joint that rises most at its angle of the turn is foremost, on either side another."""
+    above = {
+        "family": "slider_crank",
+        "place": {"at": [0.0, 0.0, 2.0], "axis": [0.0, 0.0, 1.0], "zero": [1.0, 0.0, 0.0]},
+    }
+    full = family(sweep.machine({"p": {"family": "four_bar"}, "q": above}))
+    given = {"p": family("four_bar").example, "q": family("slider_crank").example}
+    row = design(full, {f"{member}.{name}": x for member, own in given.items() for name, x in own.items()})
+    found = sensitivities(full, row, ["box_z"])
+    moved = np.tile(row, (5, 1))
+    moved[:, full.parameter_names.index(parameter)] += np.array([-2.0, -1.0, 0.0, 1.0, 2.0]) * STEP
+    box = np.asarray(design_outputs(full, moved, ["box_z"], FINE)["box_z"])
+    place = found["parameter"].index(parameter)
+    # One-sided differences of second order: the square of the step remains.
+    assert found["growing"][place] == pytest.approx(box[2:] @ [-1.5, 2.0, -0.5] / STEP, rel=1e-6)
+    assert found["shrinking"][place] == pytest.approx(box[:3] @ [0.5, -2.0, 1.5] / STEP, rel=1e-6)

@@ -20,6 +20,7 @@ from sweep.reductions.steps import applying_step
 OFFSET = 1e-3
 ALONG = 1e-5  # of the bounds of a variable, for differences between designs at their edges
 LEVEL = 1e-9  # of the bounds of a variable: a curve that varies less than by such a step is the same all over the turn
+ALIKE = 1e-6  # of a box: ends that are as far out as each other
 LOOKS, ZOOM = 256, 16  # angles of a turn at which slopes of a level curve are looked at; finer ones between two of them
 STENCIL = ((-2.0, 1.0 / 12.0), (-1.0, -8.0 / 12.0), (1.0, 8.0 / 12.0), (2.0, -1.0 / 12.0))
 
@@ -103,7 +104,7 @@ def level_gradients(curves: Curves, designs: Any, points: Points, measure: Measu
     """Return gradients (k, n) of a reduction of a curve that is the same all over the turn; none of another one.
 
     Every angle has its extreme then, so that the slopes of all angles count: where a variable grows the largest of them
-    is that of a maximum, that of a range is the largest minus the least.
+    is that of a maximum, that of a range is the largest minus the least.  Of a box those of all its ends are returned.
 
     Parameters
     ----------
@@ -112,11 +113,13 @@ def level_gradients(curves: Curves, designs: Any, points: Points, measure: Measu
     slopes : (K, n) its gradients at the points, whose size tells a level curve from rounding
     """
     of = measure.parts[0] if measure.kind == "minus" else measure
+    if of.kind == "box":
+        return (-1.0 if measure is not of else 1.0) * _of_box(curves, designs, points, of)
     if of.kind not in ("max", "min", "max_abs", "range") or len(of.series) != 1 or of.series[0].window:
         return slopes[:0]
     number = curves.series.index(of.series[0])
     values = points.value[points.series == number]
-    noise = max(LEVEL * np.abs(slopes).max(initial=0.0), 1e-13 * np.abs(values).max())
+    noise = _noise(values, slopes)
     if np.ptp(values) > noise:
         return slopes[:0]
     low, high = _along_the_turn(curves, designs, number)
@@ -124,6 +127,30 @@ def level_gradients(curves: Curves, designs: Any, points: Points, measure: Measu
     sign = np.sign(values[0]) if of.kind == "max_abs" and not zero else of.sign
     rows = [high - low, low - high] if of.kind == "range" else [high, low, *([-high, -low] if zero else [])]
     return (-sign if measure is not of else sign) * np.array(rows)
+
+
+def _noise(values: Array, slopes: Array) -> float:
+    """Return by how much a curve with that many slopes varies at most that is the same all over the turn."""
+    return float(max(LEVEL * np.abs(slopes).max(initial=0.0), 1e-13 * np.abs(values).max()))
+
+
+def _of_box(curves: Curves, designs: Any, points: Points, box: Measure) -> Array:
+    """Return the gradients (2, n) of a box where each variable grows and where it shrinks, of all ends alike."""
+    ends: list[tuple[float, Array, Array]] = []  # what may be foremost or rearmost: value, least and largest slope
+    for number in (curves.series.index(s) for s in box.series):
+        own = points.take(points.series == number)
+        slopes = curves.values(designs, own).imag.T / STEP
+        if len(own) and np.ptp(own.value) <= _noise(own.value, slopes):
+            ends.append((float(own.value[0]), *_along_the_turn(curves, designs, number)))
+        else:
+            ends += [(float(x), slope, slope) for x, slope in zip(own.value, slopes, strict=True)]
+    for piece in box.pieces:
+        still = np.asarray(piece(designs), np.complex128)
+        ends.append((float(still[0].real), still.imag / STEP, still.imag / STEP))
+    values, low, high = (np.array(column) for column in zip(*ends, strict=True))
+    top, bottom = (np.abs(values - x) <= ALIKE * np.ptp(values) for x in (values.max(), values.min()))
+    grows = high[top].max(axis=0) - low[bottom].min(axis=0)
+    return np.array([grows, low[top].min(axis=0) - high[bottom].max(axis=0)])
 
 
 def _along_the_turn(curves: Curves, designs: Any, number: int) -> tuple[Array, Array]:
