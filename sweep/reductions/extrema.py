@@ -22,6 +22,7 @@ from sweep.reductions.resolution import series_of
 from sweep.reductions.sampling import Extremum, Mask, blocks
 from sweep.reductions.window import Window
 
+OVER = 1e-6  # of a limit position from the cut of its angle [rad]
 HARD = 512  # samples of the first look at what the fused search has left open
 
 
@@ -156,7 +157,11 @@ def _searched(
     for request, torn in zip(requests, search.torn, strict=True):
         rows = np.flatnonzero(torn)
         if rows.size:
-            cut, search.status[rows] = panels.extrema(family, designs[rows], [request], target, locate)
+            cut, now = panels.extrema(family, designs[rows], [request], target, locate)
+            if family.pose_output[request.pose].wraps:  # panels do not continue an angle that swings over its cut
+                over = np.abs(cut[request].value) + 2.0 * cut[request].err > np.pi - OVER
+                now = np.where((now == st.OK) & over, st.NOT_CONVERGED, now)
+            search.status[rows] = np.where(search.status[rows] == st.OK, now, search.status[rows])
             for column, values in zip(search.found[request], cut[request], strict=True):
                 column[rows] = values
     return search.found, search.status

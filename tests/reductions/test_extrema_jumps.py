@@ -109,3 +109,21 @@ def test_the_largest_count_is_that_of_a_phase_shorter_than_the_first_samples_and
     assert (found["status"] == 0).all()
     assert found["max_minima"].tolist() == ends["max"].tolist() == [2.0, 2.0, 2.0]
     assert found["min_minima"].tolist() == ends["min"].tolist()
+
+
+def test_an_angle_that_all_but_jumps_over_its_cut_is_not_called_a_turn():
+    """Forks whose ball passes close to the driven axis: of 1869 that swing 124 had a swing of 2 pi."""
+    rng, n = np.random.default_rng(5), 400
+    a, alpha, at = rng.uniform(5.0, 40.0, n), rng.uniform(-3.0, 3.0, n), rng.uniform(0.0, 2.0 * np.pi, n)
+    f = -a * np.cos(alpha) * np.sin(at) / np.sin(alpha)
+    e = a * np.cos(at) + a * 10.0 ** rng.uniform(-7.0, -1.0, n) * rng.choice([-1, 1], n)
+    got = sweep.summarise("slotted", {"a": a, "e": e, "f": f, "alpha": alpha}, ["swing"])
+    close = np.concatenate([-np.geomspace(1e-10, 1e-2, 1000), np.geomspace(1e-10, 1e-2, 1000)])
+    swinging = 0
+    for i in np.flatnonzero(got.status == st.OK):
+        phi = np.sort(np.concatenate([np.linspace(0.0, 2.0 * np.pi, 20_001), at[i] + close]))
+        up = f[i] * np.sin(alpha[i]) + a[i] * np.cos(alpha[i]) * np.sin(phi)
+        psi = np.unwrap(np.arctan2(up, a[i] * np.cos(phi) - e[i]))  # 1e-6 from a limit position no sample is
+        assert abs(got.swing[i]) == pytest.approx(np.ptp(psi), abs=1e-4)
+        swinging += 1
+    assert swinging > 80
