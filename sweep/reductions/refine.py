@@ -226,8 +226,9 @@ def first_of_equals(row: Index, peaks: Peaks, chosen: Index) -> Index:
 def _first(row: Index, phi: Array, err_phi: Array, height: Array, err: Array, chosen: Index) -> Index:
     best = _of_row(row, chosen)
     known = 2.0 * np.minimum(err, err[best])
-    # A place just before the end of the turn, by no more than its error, is its beginning.
-    place = np.mod(phi + err_phi, TWO_PI)
+    # A place just before the end of the turn, by no more than its error, is its beginning, behind one that is there.
+    place = np.mod(phi, TWO_PI)
+    place = np.where(place + err_phi < TWO_PI, place, err_phi)
     late = np.where(height >= height[best] - known, -place, -np.inf)
     first = np.full(row.max(initial=0) + 1, -1)
     scan.best_candidate(row, late, np.full(first.size, -np.inf), first)
