@@ -111,12 +111,14 @@ def searched(curve, mode, target=1e-9) -> tuple[Array, Array, Array, Array]:
     return value, err, away, status
 
 
+SHIFTS = np.random.default_rng(2).uniform(0.0, 6.0, (40, 1))
+
+
 def placed(curve, mode, target) -> tuple[Array, Array, Array, Array, Array]:
-    shifts = np.random.default_rng(2).uniform(0.0, 6.0, (40, 1))
     request = Request("y", mode)
-    answers, status = panels.extrema(made(curve), shifts, [request], target, True)
+    answers, status = panels.extrema(made(curve), SHIFTS, [request], target, True)
     answer = answers[request]
-    away = np.mod(answer.phi - shifts[:, 0] + 1.0, 2.0 * np.pi) - 1.0
+    away = np.mod(answer.phi - SHIFTS[:, 0] + 1.0, 2.0 * np.pi) - 1.0
     return answer.value, answer.err, away, answer.err_phi, status
 
 
@@ -164,11 +166,14 @@ def test_the_place_of_a_top_errs_by_no_more_than_it_says(curve, target):
 
 
 def test_the_place_of_a_dwell_errs_by_as_much_as_the_dwell_is_long():
-    """Level from 2 to 3.5 rad, but for rounding."""
+    """Level from 2 to 3.5 rad, but for rounding; of one across the angle 0 the part on one side of it counts."""
     _, _, away, err_phi, _ = placed(lambda x: 1.0 - np.maximum(np.abs(x - 2.75) - 0.75, 0.0) ** 2, 1, 1e-8)
-    # Rounding takes the dwell on by sqrt(4 eps) to either side; a panel is 0.1 rad, a turn may begin within the dwell.
-    assert (np.abs(away + 1e-3 >= 2.0)).all() and (away <= 3.5 + 1e-3).all()
-    assert (np.maximum(away - 2.0, 3.5 - away) <= err_phi + 0.1).mean() >= 0.7
+    # Rounding takes the dwell on by sqrt(4 eps) to either side; a panel is 0.1 rad.
+    assert (away >= 2.0 - 1e-3).all() and (away <= 3.5 + 1e-3).all()
+    begin, end = (np.mod(SHIFTS[:, 0] + x, 2.0 * np.pi) for x in (2.0, 3.5))
+    whole = begin < end
+    assert whole.sum() > 20
+    assert (np.maximum(away - 2.0, 3.5 - away) <= err_phi + 0.1)[whole].all()
 
 
 def test_a_curve_that_is_all_noise_is_not_converged_and_its_error_says_so():
