@@ -20,6 +20,7 @@ from sweep.effects.scene import Scene, take_over
 from sweep.effects.turn import at_poses, on_finer_grids, per_turn, reduction_outputs
 from sweep.families import family
 from sweep.families.base import Accuracy, Array, Columns, Output, Parameter, floats
+from sweep.families.curve_features import Switches
 from sweep.numerics.steady_speed import FINER, GRIDS, LEFT, PER_LEFT, steady
 
 EQUATION = "D4 (1)-(4)"
@@ -103,7 +104,7 @@ def samples(grid: Scene) -> tuple[Array, Array]:
 def _grids(scene: Scene, rubs: bool) -> tuple[int, ...]:
     if rubs:
         return RUBBING
-    return GRIDS + FINER if scene.every_curve or _late(scene).any() else GRIDS
+    return GRIDS + FINER if scene.every_curve or scene.family.every(Switches) or _late(scene).any() else GRIDS
 
 
 def _late(scene: Scene) -> NDArray[np.bool_]:
