@@ -104,7 +104,8 @@ def samples(grid: Scene) -> tuple[Array, Array]:
 def _grids(scene: Scene, rubs: bool) -> tuple[int, ...]:
     if rubs:
         return RUBBING
-    return GRIDS + FINER if scene.every_curve or scene.family.every(Switches) or _late(scene).any() else GRIDS
+    bent = bool(scene.every_curve) or bool(scene.family.every(Switches)) or _late(scene).any()
+    return GRIDS + FINER if bent else GRIDS
 
 
 def _late(scene: Scene) -> NDArray[np.bool_]:
