@@ -1,4 +1,4 @@
-"""Study files: a question about a mechanism as data (docs/study-files.md)."""
+"""Study files: a question about a mechanism, written as TOML (docs/study-files.md)."""
 
 from __future__ import annotations
 
@@ -39,7 +39,7 @@ __all__ = [
 
 
 def __getattr__(name: str) -> Any:
-    # Reading a file takes pydantic, which a worker that gets a finished study does not need.
+    # Reading a file imports pydantic, which a worker that receives a finished study does not need.
     if name in ("load_study", "study_from_data", "with_accuracy"):
         from sweep.study import load
 

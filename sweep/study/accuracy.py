@@ -1,4 +1,4 @@
-"""[accuracy]: a relative error of the extrema, or a grid of crank angles; and what is to be proven."""
+"""[accuracy]: a relative error of the extrema, or a grid of crank angles, and the maxima to be proven."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from sweep.study.file import Faults, Section, holds
 
 
 def _proofs(value: object) -> object:
-    # Not by the type: of a union of types pydantic reports each one's complaint.
+    # A union type would make pydantic report one error for each member of the union.
     if isinstance(value, bool) or (isinstance(value, list) and all(isinstance(name, str) for name in value)):
         return value
     raise ValueError("neither a truth value nor names")
@@ -30,7 +30,7 @@ class AccuracySection(Section):
 
 
 def read_accuracy(section: AccuracySection, faults: Faults) -> Accuracy:
-    """Read how exact the extrema are to be."""
+    """Read [accuracy] as target error, number of samples and maxima to be proven."""
     if section.target is not None and section.samples is not None:
         faults.value(("accuracy", "samples"), section.samples, "either target or samples, not both")
     if section.samples is not None:
@@ -52,7 +52,7 @@ def check_proofs(accuracy: Accuracy, family: Family, want: tuple[str, ...], *, w
 
 
 def accuracy_table(accuracy: Accuracy) -> dict[str, Any]:
-    """Write [accuracy] as a study file has it."""
+    """Return [accuracy] as the table of a study file."""
     table = {
         "target": accuracy.target,
         "samples": accuracy.samples,

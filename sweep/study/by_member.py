@@ -1,4 +1,4 @@
-"""A study of a machine as studies of its members, one after the other, each with those before it fixed.
+"""A study of a machine split into studies of its members, each with the members before it fixed.
 
 The order is that of the source, I.7: the needle, the looper that takes its loop, the other blades, what moves the
 fabric, the thread supply.
@@ -25,7 +25,7 @@ BY_NAME = ("machine", "tools", *RELATIONS, "cyclogram")
 
 
 def studies_of_members(study: Study, name: str) -> dict[str, dict[str, Any]]:
-    """Return the tables of a study for every member by the study's name, in the order in which they are searched.
+    """Return the tables of one study per member, in the order of design, keyed by the study's name.
 
     Raises
     ------
@@ -50,7 +50,7 @@ def studies_of_members(study: Study, name: str) -> dict[str, dict[str, Any]]:
 
 
 def order_of_design(spec: Specification, machine: Machine) -> list[str]:
-    """Return the members in the order of design: each decides what those behind it have to do."""
+    """Return the members in the order of design; each sets the requirements of those behind it."""
     tools = {name: dict(table) for name, table in spec.tools}
     carriers = {name: str(table["on"]).partition(".")[0] for name, table in tools.items() if "on" in table}
     taking = {tool for _, table in spec.relations for tool in dict(table).get("take", ())}
@@ -65,12 +65,12 @@ def order_of_design(spec: Specification, machine: Machine) -> list[str]:
 
 
 def _within(spec: Specification, kept: list[str]) -> tuple[Family, set[str]]:
-    """Return the machine of some members with all relations that they allow, and the names of all that is in it."""
+    """Return the machine of the ``kept`` members, with every relation it can hold, and the names of all its parts."""
     members = tuple((name, table) for name, table in spec.members if name in kept)
     tools = tuple((n, t) for n, t in spec.tools if str(dict(t).get("on", kept[0])).partition(".")[0] in kept)
     part = replace(spec, members=members, tools=tools, relations=())
     machine = find_family(part)
-    # an event may be about a relation, a thread about events: again until nothing more fits
+    # An event may refer to a relation and a thread to events: repeat until no further relation fits.
     left = list(spec.relations)
     while True:
         now = [one for one in left if (more := _fits(part, one)) is not None and (part := more)]
@@ -94,7 +94,7 @@ def _fits(part: Specification, relation: tuple[str, Any]) -> Specification | Non
 def _tables(
     study: Study, known: set[str], part: Family, before: Family | None, name: str, last: str | None
 ) -> dict[str, Any]:
-    """Return the study of the last member that ``known`` has: its dimensions, and the limits that come with it."""
+    """Return the study of the last member in ``known``: its dimensions, and the limits that involve it."""
     data, member = study.data, name.rpartition("-")[2]
 
     def new(output_name: str) -> bool:
@@ -103,7 +103,7 @@ def _tables(
     found: dict[str, Any] = {"study": {"name": name, "title": f"{study.title}: {member}"}}
     for table in BY_NAME:
         entries = {key: entry for key, entry in data.get(table, {}).items() if key in known}
-        if table == "relations":  # settings of a real machine were asked of the member that came last then
+        if table == "relations":  # already limits of an earlier member
             old = {r.name for r in getattr(before, "relations", ())}
             entries = {k: {x: y for x, y in e.items() if x != "settings" or k not in old} for k, e in entries.items()}
         if table == "cyclogram":
@@ -117,7 +117,7 @@ def _tables(
         position = f"{member}.{part.member(member).family.position}"
         goal = f"{member}.max_abs_{part.derivative_of[part.derivative_of[position]].partition('.')[2]}"
     varied = any(isinstance(x, dict) and "value" not in x for key, x in own.items() if key != "sample")
-    if not varied:  # its dimensions stand: what they give is computed
+    if not varied:  # All its dimensions are fixed: compute the goal as a wanted output.
         own.pop("sample", None)
     wanted = [x for x in data.get("scene", {}).get("want", ()) if new(x)]
     found["scene"] = data.get("scene", {}) | {"want": wanted if varied else [*wanted, goal]}
@@ -135,14 +135,14 @@ def _tables(
 
 
 def _by_member(entries: dict[str, Any], member: str) -> dict[str, Any]:
-    """Put dotted names of a member into a table of its own."""
+    """Move the dotted names of a member into a table of its own."""
     own = {key.removeprefix(f"{member}."): x for key, x in entries.items() if key.startswith(f"{member}.")}
     others = {key: x for key, x in entries.items() if not key.startswith(f"{member}.")}
     return others | ({member: own} if own else {})
 
 
 def _has(family: Family, name: str) -> bool:
-    """Tell whether a machine has a design output: of a member it has, or of what its members are to each other."""
+    """Tell whether a machine has the named design output, of one of its members or of a relation between them."""
     if "." in name and isinstance(family, Machine) and family.split(name) is None:
         return False
     try:

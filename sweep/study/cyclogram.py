@@ -1,4 +1,4 @@
-"""[cyclogram]: when events happen and members stroke, as limits of crank angles, durations and sizes."""
+"""[cyclogram]: times of events and strokes, read as limits of crank angles, durations and sizes."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ ENDS = {"ext": "phi_ext", "fold": "phi_fold", "duration": "phi0"}
 
 
 class StrokeSection(Section):
-    """Table ``cyclogram.<member>``: of its stroke from the folded to the extended position."""
+    """Table ``cyclogram.<member>``: the stroke of a member from its folded to its extended position."""
 
     ext: TwoTexts | None = holds('when the stroke ends, extended, from and to, as ["170 deg", "190 deg"]')
     fold: TwoTexts | None = holds('when it ends, folded, as ["350 deg", "359 deg"]')
@@ -25,7 +25,7 @@ class StrokeSection(Section):
 
 
 def limits_of_cyclogram(file: StudyFile, family: Family) -> list[Limit]:
-    """Return what the windows of events and strokes ask of the machine, in internal units."""
+    """Return the limits that the windows of events and strokes stand for, in internal units."""
     found, members = [], {name.partition(".")[0] for name in family.parameter_names if "." in name}
     for name, entry in (file.free_table("cyclogram") or {}).items():
         key: Key = ("cyclogram", name)
@@ -40,7 +40,7 @@ def limits_of_cyclogram(file: StudyFile, family: Family) -> list[Limit]:
 
 
 def _size(family: Family, member: str) -> str:
-    """Name the size of a member's stroke: a swing of what turns, else a stroke."""
+    """Name the output that measures a member's stroke: its swing if it has one, otherwise its stroke."""
     try:
         return design_output(family, f"{member}.swing").name
     except InputError:
@@ -48,7 +48,7 @@ def _size(family: Family, member: str) -> str:
 
 
 def _window(faults: Faults, family: Family, name: str, given: Any, key: Key) -> list[Limit]:
-    """Read from and to; a window over the zero of the main shaft is refused, since limits are plain bounds."""
+    """Read a window as a limit; one across angle 0 of the main shaft is refused, since a limit is a plain interval."""
     try:
         output = design_output(family, name)
     except InputError as error:

@@ -1,6 +1,6 @@
 """[design] and [reference]: the designs of the study, and one design to compare them with.
 
-``from = "needle208"`` takes dimensions out of the accepted optimum of another study, so that they stand once.
+``from = "needle208"`` takes dimensions from the accepted optimum of another study, so that they are written only once.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ from sweep.study.space import Axis, DesignSpace
 MOST_DESIGNS = 10**12
 FROM, HASH = "from", "hash"
 ACCEPTED = "expected.json"
-_DIGITS = 12  # of the hash
+_DIGITS = 12  # hexadecimal digits of the hash
 
 
 class SampleTable(Section):
@@ -45,11 +45,12 @@ class ReferenceSection(Section):
 
 @dataclass(frozen=True)
 class Elsewhere:
-    """What [design] need not give, because another table says it.
+    """Parameters and entries that other tables than [design] give.
 
-    ``fitted`` parameters are set by [fit]: they must not be given, except lam, which then says where "up" is.
-    ``given`` ones have their value from [scene].  ``made`` ones follow from [locus], whose ``prescribed`` outputs take
-    their place in the space.  ``entries`` are those of [bodies] and [loads], ``tables`` where they stand, or belong.
+    ``fitted`` parameters are set by [fit] and must not be given, except lam, which then defines "up".  ``given``
+    parameters have their value from [scene].  ``made`` parameters follow from [locus], whose ``prescribed`` outputs
+    take their place in the space.  ``entries`` are those of [bodies] and [loads], ``tables`` names the table of each
+    parameter.
     """
 
     fitted: tuple[str, ...] = ()
@@ -65,7 +66,7 @@ def read_space(file: StudyFile, family: Family, other: Elsewhere) -> DesignSpace
     raw, faults = file.free_table("design"), file.faults
     if raw is None:
         return None
-    # What no wanted effect takes describes the machine all the same, and is left alone.
+    # Inputs that no wanted effect takes still describe the machine; they are no parameters of the space.
     raw = raw | {name: entry for name, entry in other.entries.items() if name in family.parameter_names}
     before = len(faults.lines)
     sample = read_section(SampleTable, raw["sample"], ("design", "sample"), faults) if "sample" in raw else None
@@ -97,9 +98,9 @@ def read_space(file: StudyFile, family: Family, other: Elsewhere) -> DesignSpace
 
 
 def check_varied(file: StudyFile, family: Family, space: DesignSpace, entries: Mapping[str, Any]) -> None:
-    """Report a space in which [optimise] finds nothing to vary: signs and listed values do not change steadily.
+    """Report a space without a continuous parameter, in which [optimise] has nothing to vary.
 
-    ``entries`` are those of [bodies] and [loads].
+    Signs and listed values are discrete.  ``entries`` are those of [bodies] and [loads].
     """
     if "optimise" not in file:
         return
@@ -114,9 +115,9 @@ def check_varied(file: StudyFile, family: Family, space: DesignSpace, entries: M
 def read_reference(
     section: ReferenceSection, bare: Family, family: Family, faults: Faults, other: Elsewhere, space: DesignSpace | None
 ) -> dict[str, float] | None:
-    """Read the parameters of one design, in the order of the family.
+    """Read the parameters of the reference design, in the order of the family.
 
-    The inputs of effects describe the scene: the design has those of the ``space`` unless it says otherwise.
+    Inputs of effects that it leaves out have the values fixed in ``space``.
     """
     raw = section.design
     if raw is None:
@@ -125,7 +126,7 @@ def read_reference(
     own = (*bare.parameter_names, *other.prescribed)
     fixed = {} if space is None else space.fixed
     given = {**other.given, **{name: value for name, value in fixed.items() if name not in own}}
-    # Of a space with faults nobody knows which inputs it fixes.
+    # If the space has faults, the inputs that it fixes are unknown.
     scene = tuple(name for name in family.parameter_names if name not in own) if space is None else tuple(given)
     _check_names(family, raw, key, faults, scene)
     defaults = {p.name: p.left_out(raw) for p in family.parameters}
@@ -144,7 +145,7 @@ def read_reference(
 
 
 def _check_needless(raw: Mapping[str, Any], other: Elsewhere, faults: Faults) -> None:
-    """Report parameters that another table sets."""
+    """Report parameters in [design] that another table sets."""
     for name in other.given:
         if name in raw:
             faults.value(("design", name), raw[name], "nothing here: [scene] gives it")
@@ -164,11 +165,11 @@ def _check_names(
     elsewhere: tuple[str, ...],
     tables: Mapping[str, str] | None = None,
 ) -> None:
-    """Report names that are no parameters, and parameters that neither stand here nor come from ``elsewhere``."""
+    """Report names that are no parameters, and parameters missing both here and in ``elsewhere``."""
     extra = ("sample",) if key == ("design",) else ()
     for name in raw:
         if name not in family.parameter_names and name not in extra:
-            # The nearest of those still missing is the better guess.
+            # The closest match is sought among the missing parameters first.
             unknown_to = [p for p in family.parameter_names if p not in raw] or list(family.parameter_names)
             known = [*unknown_to, *(e for e in extra if e not in raw)]
             faults.unknown((*key, name), known, f"parameter of {family.name}")
@@ -180,7 +181,7 @@ def _check_names(
 
 
 def fingerprint(design: Mapping[str, float]) -> str:
-    """Return the hash of a design: of its names and values, whatever their order.
+    """Return the hash of a design's names and values, independent of their order.
 
     >>> fingerprint({"a": 1.0, "b": 2.0}) == fingerprint({"b": 2.0, "a": 1.0})
     True
@@ -190,10 +191,10 @@ def fingerprint(design: Mapping[str, float]) -> str:
 
 
 def take(file: StudyFile, family: Family, elsewhere: Collection[str]) -> None:
-    """Put what [design] and [reference.design] take from other studies in its place, and report what cannot be had.
+    """Replace ``from`` in [design] and [reference.design] by the dimensions of the named study, and report its faults.
 
-    What stands in the file wins; what ``elsewhere`` gives, such as [fit], is left out.  The content that a dataset
-    keeps has the dimensions themselves, and in ``study.taken`` where they come from.
+    Dimensions in the file have precedence; those that ``elsewhere``, such as [fit], sets are left out.  The content
+    kept with a dataset holds the dimensions themselves, and their origin in ``study.taken``.
     """
     notes: list[str] = []
     for key in (("design",), ("reference", "design")):
@@ -210,7 +211,7 @@ def take(file: StudyFile, family: Family, elsewhere: Collection[str]) -> None:
             own = fingerprint(design)
             if pinned is not None and pinned != own:
                 file.faults.value((*key, f"{member}{HASH}"), pinned, f'"{own}", the hash of what {source} accepts now')
-            # a fitted lam may stand in [design]: it says where "up" is
+            # A fitted lam may be given in [design], where it defines "up".
             left_out = {x for x in elsewhere if not x.startswith("lam")} if key == ("design",) else set()
             _fill(file, table, (*key, name), member, design, family, left_out)
             notes.append(f"{'.'.join((*key, member.rstrip('.'))).rstrip('.')}: {source} {own}")
@@ -220,13 +221,13 @@ def take(file: StudyFile, family: Family, elsewhere: Collection[str]) -> None:
 
 
 def taken_reference(file: StudyFile, section: ReferenceSection) -> ReferenceSection:
-    """Return the section with what was taken into its table."""
+    """Return the section with the design that `take` has filled in."""
     table = _table(file.data, ("reference", "design"))
     return section if section.design is None else section.model_copy(update={"design": table})
 
 
 def _table(data: Mapping[str, Any], key: tuple[str, ...]) -> dict[str, Any] | None:
-    """Return a table of the file as one of its own, which may be written on; None where there is none."""
+    """Replace a table of the file by a copy that may be changed, and return the copy; None if it does not exist."""
     found: Any = data
     for part in key:
         if not isinstance(found, dict) or not isinstance(found.get(part), dict):
@@ -237,7 +238,7 @@ def _table(data: Mapping[str, Any], key: tuple[str, ...]) -> dict[str, Any] | No
 
 
 def _accepted(file: StudyFile, key: Key, source: object) -> dict[str, float] | None:
-    """Return the design of the accepted optimum of a study; None with its fault."""
+    """Return the accepted optimum of another study, or None with its fault reported."""
     if not isinstance(source, str) or not source or Path(source).name != source:
         file.faults.value(key, source, "the name of a study whose folder stands beside this one")
         return None

@@ -1,4 +1,4 @@
-"""A study file while it is read: its tables as pydantic models, and its faults with file, line, key, value and rule."""
+"""Reading of a study file: tables as pydantic models, and faults with file, line, key, value and rule."""
 
 from __future__ import annotations
 
@@ -29,10 +29,11 @@ _LONGEST_VALUE = 60
 
 
 class Faults:
-    """The list of faults, and the files in which keys are looked up, the last one first.
+    """Faults found so far, and the files in which their keys are looked up, the last file first.
 
     A key that is missing because it is misspelt is one fault, so unknown keys are reported before missing ones.
-    ``places`` are the lines of keys by file (:func:`sweep.study.toml.key_lines`); a missing key has that of its table.
+    ``places`` are the lines of keys by file (:func:`sweep.study.toml.key_lines`); a missing key has the line of its
+    table.
     """
 
     def __init__(
@@ -43,26 +44,26 @@ class Faults:
         self._misspelt: set[Key] = set()
 
     def value(self, key: Key, value: object, allowed: str) -> None:
-        """Report a value that may not stand there."""
+        """Report a value that is not allowed."""
         written = str(value).lower() if isinstance(value, bool) else shown(value)
         written = written if len(written) <= _LONGEST_VALUE else written[: _LONGEST_VALUE - 3] + "..."
         self._add(key, f"{spelled(key)} = {written}; allowed: {allowed}")
 
     def missing(self, key: Key, needed: str, instead: str = "") -> None:
-        """Report a key that must be there, or another one instead."""
+        """Report a missing key, unless it or the key ``instead`` was reported as misspelt."""
         if not self.misspelt(key) and not self.misspelt((*key[:-1], instead)):
             self._add(key, f"{spelled(key)} is missing; needed: {needed}")
 
     def misspelt(self, key: Key) -> bool:
-        """Tell whether a missing key, or its table, stands there with a spelling mistake, which was reported."""
+        """Tell whether a missing key, or its table, was reported as misspelt."""
         return any(key[:k] in self._misspelt for k in range(1, len(key) + 1))
 
     def excuse(self, key: Key) -> None:
-        """Let a key be missing: that it is follows from a fault that was reported."""
+        """Suppress the report of a missing key whose absence follows from a reported fault."""
         self._misspelt.add(key)
 
     def unknown(self, key: Key, known: Iterable[str], what: str = "key") -> None:
-        """Report an unknown key, with the nearest known one."""
+        """Report an unknown key, with the closest known one."""
         names = list(known)
         guess = closest(str(key[-1]), names)
         if guess is not None:
@@ -70,11 +71,11 @@ class Faults:
         self.unknown_name(key, what, choices(str(key[-1]), names))
 
     def unknown_name(self, key: Key, what: str, allowed: str) -> None:
-        """Report a key that should be the name of something."""
+        """Report a key that should name a known item."""
         self._add(key, f"{spelled(key)}: unknown {what}; allowed: {allowed}")
 
     def number(self, text: str, internal: str, key: Key) -> float | None:
-        """Read a text such as "7000 rpm" in the internal unit; None with a fault for what is no such quantity."""
+        """Convert a text such as "7000 rpm" to the internal unit; None, with a fault, if it is no such quantity."""
         try:
             return units.read(text, internal)
         except units.UnitFault as fault:
@@ -82,7 +83,7 @@ class Faults:
             return None
 
     def factor(self, unit: str, internal: str, key: Key) -> float | None:
-        """Find the multiplier from a written unit to the internal one; None with a fault for a unit of another kind."""
+        """Return the factor from a written unit to the internal one; None, with a fault, for a unit of another kind."""
         try:
             return units.factor(unit, internal)
         except units.UnitFault as fault:
@@ -109,7 +110,7 @@ class Faults:
 
 @dataclass(frozen=True)
 class StudyFile:
-    """The content of a study file, where it lies, and its faults so far."""
+    """Content of a study file, its path, and its faults so far."""
 
     data: Mapping[str, Any]
     path: Path
@@ -120,14 +121,14 @@ class StudyFile:
         return table in self.data
 
     def free_table(self, name: str) -> dict[str, Any] | None:
-        """Return a table whose keys are names of the mechanism, as it stands in the file; None where there is none."""
+        """Return a table whose keys are names of the mechanism, as written in the file; None if it is missing."""
         table = self.data.get(name)
         if table is not None and not isinstance(table, dict):
             self.faults.value((name,), table, f"a table [{name}]")
         return table if isinstance(table, dict) else None
 
     def texts(self, table: str, key: str) -> list[tuple[int, str]]:
-        """Return the texts of a list as it stands in the file, with their places, whatever else is wrong with it."""
+        """Return the texts of a list as written in the file, with their indices, even if other items are faulty."""
         raw = self.data[table].get(key) if isinstance(self.data.get(table), dict) else None
         return [(k, name) for k, name in enumerate(raw) if isinstance(name, str)] if isinstance(raw, list) else []
 
@@ -144,7 +145,7 @@ class StudyFile:
 
 
 def spelled(key: Key) -> str:
-    """Write a key path as people do: scene.want[2]."""
+    """Write a key path as messages show it: scene.want[2]."""
     text = "".join(f"[{part}]" if isinstance(part, int) else f".{part}" for part in key)
     return text.removeprefix(".")
 
@@ -159,7 +160,7 @@ def _holds(table: Any, key: Key) -> bool:
 
 
 def quantity(internal: str, allowed: Callable[[float], bool] = lambda x: True, kind: str = "") -> BeforeValidator:
-    """Return what reads a text such as "7000 rpm" in the internal unit; ``kind`` says in words what is allowed."""
+    """Return a validator that reads a text such as "7000 rpm" in the internal unit; ``kind`` states the range."""
 
     def read(value: object) -> float:
         if not isinstance(value, str):
@@ -197,7 +198,7 @@ TwoTexts = Annotated[list[str], Field(min_length=2, max_length=2)]
 TwoLengths = Annotated[list[Length], Field(min_length=2, max_length=2)]
 ThreeLengths = Annotated[list[Length], Field(min_length=3, max_length=3)]
 
-# Of a plain union of types pydantic reports the complaints of each one.
+# A discriminator keeps pydantic from reporting one error for each member of a union.
 ONE, WORD, LIST, TABLE = "<one>", "<word>", "<list>", "<table>"
 KIND = Discriminator(
     lambda value: LIST if isinstance(value, list) else TABLE if isinstance(value, dict | Section) else ONE
@@ -212,12 +213,12 @@ TextOrNumber = Annotated[
 
 
 def holds(words: str, default: Any = None, **more: Any) -> Any:
-    """Declare a key that may be left out, and say what it may hold; ``more`` is as of pydantic's ``Field``."""
+    """Declare an optional key and describe its values; ``more`` is passed to pydantic's ``Field``."""
     return Field(default, description=words, **more)
 
 
 def _as_written(schema: dict[str, Any], model: type[Section]) -> None:
-    """Give the JSON schema of a table the keys that it must have, and leave out titles, docstrings, empty defaults."""
+    """Add the required keys to the JSON schema of a table; remove titles, docstrings and empty defaults."""
     schema.pop("title", None)
     schema.pop("description", None)
     schema |= {"required": list(model.required)} if model.required else {}
@@ -228,9 +229,9 @@ def _as_written(schema: dict[str, Any], model: type[Section]) -> None:
 
 
 class Section(BaseModel):
-    """A table of the file; what each key may hold is its ``description``, which messages quote.
+    """Base of the models of tables; the ``description`` of a key states its values and is quoted in messages.
 
-    ``required`` keys are optional to pydantic, so that the others are read all the same.
+    ``required`` keys are optional to pydantic, so that a missing key does not hide the faults of other keys.
     """
 
     model_config = ConfigDict(
@@ -243,12 +244,12 @@ S = TypeVar("S", bound=Section)
 
 
 def read_table(model: type[S], name: str, file: StudyFile) -> S:
-    """Read a table of the file by its model; all defaults where the file has no such table."""
+    """Read a table of the file by its model; return the defaults if the table does not exist."""
     return read_section(model, file.data[name], (name,), file.faults) if name in file else model()
 
 
 def read_section(model: type[S], raw: object, key: Key, faults: Faults) -> S:
-    """Read a table by its model; faulty keys are reported and left at their defaults."""
+    """Read a table by its model; report faulty keys and leave them at their defaults."""
     if not isinstance(raw, dict):
         faults.value(key, raw, f"a table with the keys {', '.join(_keys(model))}")
         return model()
@@ -258,7 +259,7 @@ def read_section(model: type[S], raw: object, key: Key, faults: Faults) -> S:
 
 
 def _missing_keys(model: type[Section], raw: Mapping[str, Any], key: Key, faults: Faults) -> None:
-    """Report the required keys that a table and the tables within it have not."""
+    """Report the required keys missing in a table and in the tables within it."""
     for name in model.required:
         if name not in raw:
             faults.missing((*key, name), _reached(model, (name,))[1])
@@ -286,14 +287,14 @@ def _validated(model: type[S], raw: Mapping[str, Any], key: Key, faults: Faults)
 
 
 def _keys(model: type[Section]) -> dict[str, Any]:
-    """Return the fields of a model by the keys that a file has for them."""
+    """Return the fields of a model by their names in the file."""
     return {field.alias or name: field for name, field in model.model_fields.items()}
 
 
 def _reached(model: type[Section], place: Key) -> tuple[type[Section], str]:
-    """Find the model of the table at a place, and the description of the innermost key that a model knows.
+    """Find the model of the table at a place, and the description of the innermost key known to a model.
 
-    What stands under names of the user's, or is no table, has the model without keys.
+    A place under names chosen by the user, or outside any table, has the model without keys.
     """
     words = ""
     for part in place:
@@ -305,7 +306,7 @@ def _reached(model: type[Section], place: Key) -> tuple[type[Section], str]:
 
 
 def _table_in(annotation: Any) -> type[Section]:
-    """Find the model that an annotation names; the one without keys if it names none."""
+    """Find the model named in an annotation, or the model without keys if there is none."""
     stack = [annotation]
     while stack:
         candidate = stack.pop()

@@ -1,4 +1,4 @@
-"""[limits]: bounds of design outputs and parameters, each in its unit; settings that instructions of machines give."""
+"""[limits]: bounds of design outputs and parameters, each in its unit, and settings from the manuals of machines."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ from sweep.study.parameter import Entry
 
 
 class Setting(NamedTuple):
-    """What instructions of a machine ask for, least and most [mm]; None is not asked."""
+    """Bounds in a machine's manual, (least, most) [mm] each; None if the manual does not state them."""
 
     source: str
     rise: tuple[float, float] | None = None
@@ -30,7 +30,7 @@ class Setting(NamedTuple):
     back_height: tuple[float, float] | None = None
 
 
-# `reach` is what manuals measure as the looper's gauge, at its far end.  A single value has a band of 0.1 mm, ours.
+# `reach` is the looper's gauge at its far end, as manuals measure it.  A single value is given a band of 0.1 mm.
 SETTINGS = {
     "juki-mo-104d": Setting("Juki MO-104D, overlock", clearance=(0.01, 0.1), back_height=(-0.2, 0.2)),
     "janome-213d": Setting("Janome MyLock 213D, overlock", clearance=(0.0, 0.05)),
@@ -49,7 +49,7 @@ SETTINGS = {
 
 
 def limits_of_settings(file: StudyFile) -> list[Limit]:
-    """Return the limits of every relation that names the settings of a machine, and report unknown names."""
+    """Return the limits of every relation that names a machine's settings, and report unknown names."""
     found = []
     for relation, table in _settled(file.data.get("relations")).items():
         key: Key = ("relations", relation, "settings")
@@ -85,7 +85,7 @@ class LimitEntry(Section):
 
 
 def read_output_name(family: Family, name: str, key: Key, faults: Faults) -> Output | None:
-    """Find the design output named by the value at ``key`` or by the key itself; or report it with the nearest."""
+    """Find the design output named by the value at ``key`` or by the key itself, or report the name as unknown."""
     try:
         return design_output(family, name)
     except InputError as error:
@@ -97,9 +97,9 @@ def read_output_name(family: Family, name: str, key: Key, faults: Faults) -> Out
 
 
 def read_limits(file: StudyFile, family: Family, prescribed: Mapping[str, Entry]) -> tuple[Limit, ...]:
-    """Read the limits in internal units: of prescribed outputs, a machine's settings and cyclogram, then the table's.
+    """Read the limits in internal units: of prescribed outputs, of settings, of the cyclogram, then those of [limits].
 
-    What the table bounds itself, settings do not.
+    A bound in [limits] replaces the setting of the same output.
     """
     raw, faults = file.free_table("limits") or {}, file.faults
     found = list(prescribed_limits(prescribed))
@@ -130,14 +130,14 @@ def read_limits(file: StudyFile, family: Family, prescribed: Mapping[str, Entry]
 
 
 def _around(held: Limit | None, band: Limit) -> bool:
-    """Tell whether a limit leaves room on both sides of what the locus holds."""
+    """Tell whether a band leaves room on both sides of the interval that the locus holds."""
     ends = (band.minimum, *((held.minimum, held.maximum) if held else ()), band.maximum)
     known = [x for x in ends if x is not None]
     return len(known) == 4 and known == sorted(known) and known[0] < known[1] and known[2] < known[3]
 
 
 def _parameter(family: Family, name: str) -> Output | None:
-    """Take a parameter as something to be bounded: [fit] may set or scale it."""
+    """Return a parameter as an output that can be bounded ([fit] may set or scale it), or None."""
     found = next((p for p in family.parameters if p.name == name and p.choices is None), None)
     return None if found is None else Output(name, found.unit, found.text)
 
@@ -161,7 +161,7 @@ def _read_bounds(output: Output, raw: Mapping[str, Any], key: Key, faults: Fault
 
 
 def _read_text(output: Output, text: str, key: Key, faults: Faults) -> list[Limit]:
-    """Read a value and how far it may be missed, as "40 +- 0.2 deg", or a bound on one side, as "<= 45 deg"."""
+    """Read a value with its band, as "40 +- 0.2 deg", or a bound on one side, as "<= 45 deg"."""
     internal = units.internal_unit(output.unit)
     middle, band, rest = text.partition("+-")
     form, sign = f"a value and its band, as {_band(internal)}", ""

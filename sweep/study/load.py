@@ -1,4 +1,4 @@
-"""``load_study``: from TOML to a checked :class:`Study`, or every fault of the file at once."""
+"""``load_study``: read TOML into a checked :class:`Study`, or report every fault of the file at once."""
 
 from __future__ import annotations
 
@@ -65,7 +65,7 @@ def load_study(path: str | Path, smoke: bool = False) -> Study:
 
 
 def study_from_data(data: Mapping[str, Any], path: str | Path) -> Study:
-    """Return the study of ``Study.data`` (as a dataset's _plan.json keeps it); ``path`` is what messages name.
+    """Return the study described by ``Study.data``, as _plan.json of a dataset keeps it; messages name ``path``.
 
     Raises
     ------
@@ -76,7 +76,7 @@ def study_from_data(data: Mapping[str, Any], path: str | Path) -> Study:
 
 
 def study_of(plan: Mapping[str, Any], path: Path) -> Study:
-    """Return the study that a dataset answers, from its plan in ``path``; its title stands there under ``about``.
+    """Return the study that a dataset answers, from its plan in ``path``, which keeps the title under ``about``.
 
     Raises
     ------
@@ -88,7 +88,7 @@ def study_of(plan: Mapping[str, Any], path: Path) -> Study:
 
 
 def with_accuracy(study: Study, target: float | None = None, certify: bool | Sequence[str] | None = None) -> Study:
-    """Return the same study with another relative error of its extrema, or with or without the proof of its maxima.
+    """Return the same study with another target error of its extrema, or with its proof of maxima switched on or off.
 
     Raises
     ------
@@ -104,10 +104,10 @@ def with_accuracy(study: Study, target: float | None = None, certify: bool | Seq
 
 
 def merged(base: Mapping[str, Any], over: Mapping[str, Any], key: tuple[str, ...] = ()) -> dict[str, Any]:
-    """Lay one file's tables over another's, key by key.
+    """Merge the tables of one file into those of another, key by key.
 
-    [accuracy], [objective] and whatever stands as value or values of a parameter replace what they cover: half of one
-    and half of the other would be neither.
+    [accuracy], [objective] and the value or values of a parameter are replaced as a whole, since a mixture of two
+    entries would be meaningless.
     """
     result = copy.deepcopy(dict(base))
     for name, new in over.items():
@@ -138,10 +138,10 @@ def _build(
     found = read_mechanism(sections.mechanism, file, read_threads(file))
     task = None
     if "task" in file:
-        from sweep.study.task import read_study_task  # with all that does tasks, which few studies ask for
+        from sweep.study.task import read_study_task  # imports every task, which few studies need
 
         task = read_study_task(file, found and found[0])
-    if found is None:  # nothing else can be checked
+    if found is None:  # the remaining checks need the mechanism
         raise StudyError(str(path), faults.lines)
     return _study(file, sections, window, accuracy, task, *found)
 
@@ -179,7 +179,7 @@ def _study(
     want = _computed(family, [*expanded(bare, sections.scene.want), *asked], limits, goal, front)
     check_proofs(accuracy, family, want, window=window is not None, faults=faults)
     file.raise_faults()
-    assert space is not None  # without it there are faults
+    assert space is not None  # a faulty space was raised above
     return Study(
         name=sections.study.name or "",
         title=sections.study.title,
@@ -211,7 +211,7 @@ def _elsewhere(
     file: StudyFile, bare: Family, family: Family, fitted: tuple[str, ...], speed: float | None, locus: OnLocus | None,
     prescribed: dict[str, Entry], inputs: Inputs,
 ) -> Elsewhere:  # fmt: skip
-    """Collect what other tables than [design] say of the parameters."""
+    """Collect the parameters that other tables than [design] give."""
     tables = tables_of_inputs(file, bare, family, inputs)
     made = () if locus is None else locus.made
     return Elsewhere(fitted, speeds(family, speed), made, prescribed, inputs.raw, tables)
@@ -220,14 +220,14 @@ def _elsewhere(
 def _computed(
     family: Family, names: list[str], limits: tuple[Limit, ...], goal: str | None, front: ParetoSettings | None
 ) -> tuple[str, ...]:
-    """Collect all design outputs that are computed: named, limited, to be made small, or set against that."""
+    """Return the names of all computed design outputs: wanted, limited, objective and second output of the front."""
     wanted = [*names, *(limit.output for limit in limits), goal, None if front is None else front.output]
     own = family.parameter_names
     return tuple(name for name in dict.fromkeys(wanted) if name and name not in own)
 
 
 def _completed(file: StudyFile, sections: Sections, accuracy: Accuracy, inputs: Inputs) -> dict[str, Any]:
-    """Fill in the content of the file with its defaults, and with the files that [loads] names."""
+    """Return the content of the file with its defaults and with the files that [loads] names."""
     defaults = {"accuracy": accuracy_table(accuracy), "output": sections.output.model_dump()}
     if inputs.inlined:
         defaults["loads"] = copy.deepcopy(inputs.inlined)

@@ -1,6 +1,6 @@
-"""[scene], [bodies] and [loads]: speed, wanted outputs and window, what effects ask for, and loads over the turn.
+"""[scene], [bodies] and [loads]: speed, wanted outputs, window, inputs of effects, and loads over the turn.
 
-A load over the turn is a file of two columns, the same two columns in the study, or a series.
+A load over the turn is a file of two columns, the same two columns in the study, or a Fourier series.
 """
 
 from __future__ import annotations
@@ -39,7 +39,7 @@ Numbers = Annotated[list[Number], Field(max_length=MOST_POINTS)]
 
 
 class CurveSection(Section):
-    """Table ``loads.<name>`` of a load that changes over the turn."""
+    """Table ``loads.<name>`` of a load that varies over the turn."""
 
     file: str | None = holds('the name of a CSV or Parquet file beside the study, as "load.csv"')
     columns: TwoTexts | None = holds('two names of columns, as ["angle", "force"]; the first two if left out')
@@ -57,7 +57,7 @@ TABLE, SERIES = ("phi", "values"), ("mean", "cos", "sin")
 
 @dataclass
 class Inputs:
-    """Inputs of effects as they stand in [bodies] and [loads], by name, with the table of each; and the curves.
+    """Entries of [bodies] and [loads] by name, the table of each, and the curves of loads over the turn.
 
     ``inlined`` is [loads] with the contents of the files that it names.
     """
@@ -69,7 +69,7 @@ class Inputs:
 
 
 def read_inputs(file: StudyFile, bare: Family) -> Inputs:
-    """Read both tables; names that are no inputs of effects, or stand in the wrong table, are reported."""
+    """Read [bodies] and [loads]; report names that are no inputs of effects or stand in the wrong table."""
     found = Inputs()
     given = {table: entries for table in ("bodies", "loads") if (entries := file.free_table(table)) is not None}
     homes = {name: home(bare, name) for name in (input_names(bare) if given else ())}
@@ -91,7 +91,7 @@ def read_inputs(file: StudyFile, bare: Family) -> Inputs:
 
 
 def _with_rods(entries: Mapping[str, Any], faults: Faults) -> dict[str, Any]:
-    """Fill [bodies] with the columns of :func:`sweep.evaluation.loads.rod` for bodies of a material and a section."""
+    """Replace bodies of a material and a section by their columns of :func:`sweep.evaluation.loads.rod`."""
     found: dict[str, Any] = {}
     for name, entry in entries.items():
         if not isinstance(entry, dict) or {"material", "section"}.isdisjoint(entry):
@@ -111,14 +111,14 @@ def _with_rods(entries: Mapping[str, Any], faults: Faults) -> dict[str, Any]:
 
 
 def tables_of_inputs(file: StudyFile, bare: Family, family: Family, inputs: Inputs) -> dict[str, str]:
-    """Name the tables in which inputs of effects stand, or should stand; a name that is left out is [design]'s."""
+    """Return the table of every input of the effects; a missing input has the table it belongs to."""
     design = file.free_table("design") or {}
     added = [name for name in family.parameter_names if name not in bare.parameter_names and name not in design]
     return {name: inputs.tables.get(name, home(bare, name)) for name in added}
 
 
 def check_unused(file: StudyFile, bare: Family, family: Family, inputs: Inputs) -> None:
-    """Report faults of inputs that no wanted effect takes: they describe the machine, and count once one does."""
+    """Report faults of inputs that no wanted effect takes yet."""
     design = file.free_table("design") or {}
     for name, entry in inputs.raw.items():
         if name not in family.parameter_names:
@@ -127,16 +127,16 @@ def check_unused(file: StudyFile, bare: Family, family: Family, inputs: Inputs) 
 
 
 def home(family: Family, name: str) -> str:
-    """Name the table that an input of an effect belongs to.
+    """Return the table that an input of an effect belongs to.
 
-    The crank's speed is given in [scene] or swept in [design].
+    The speed of the crank is given in [scene] or swept in [design].
     """
     plain = plain_name(family, name)
     return "loads" if plain in STUDY_LOADS else "design" if plain in OF_SCENE else "bodies"
 
 
 def plain_name(family: Family, name: str) -> str:
-    """Strip the name of an effect's input of member and stage."""
+    """Remove member and stage from the name of an effect's input."""
     if isinstance(family, Machine):
         member, own = family.split(name) or (None, name)
         return plain_name(member.family, own) if member is not None else name
@@ -152,7 +152,7 @@ def _misplaced(bare: Family, key: Key, entry: object, homes: dict[str, str], fau
         faults.value(key, entry, f"nothing here: it stands in {place}")
     else:
         names = sorted(name for name, place in homes.items() if place == table)
-        guess = closest(name, names)  # all of a chain's are hundreds
+        guess = closest(name, names)  # the inputs of a chain are hundreds
         names = names if guess is None else [guess]
         faults.unknown(key, names, f"input of the effects of {bare.name}")
 
@@ -168,20 +168,20 @@ def _read_load(file: StudyFile, bare: Family, found: Inputs, name: str, entry: d
 
 
 def is_curve(entry: object) -> bool:
-    """Tell whether an entry of [loads] changes over the turn: it has a key that no constant and no axis has."""
+    """Tell whether an entry of [loads] varies over the turn: it has a key that no constant and no axis has."""
     return isinstance(entry, dict) and not {"file", "phi", *SERIES}.isdisjoint(entry)
 
 
 def read_curve(
     raw: dict[str, Any], internal: str, folder: Path, key: Key, faults: Faults
 ) -> tuple[Curve, dict[str, Any]] | None:
-    """Read the curve in internal units, and the same entry with the content of its file; or report its faults.
+    """Read the curve in internal units and its entry with the content of its file, or report its faults.
 
     Parameters
     ----------
     raw : the entry
     internal : internal unit of the load
-    folder : where a file is looked for
+    folder : where the file is looked for
     """
     before = len(faults.lines)
     section = read_section(CurveSection, raw, key, faults)
@@ -224,7 +224,7 @@ def _factor(section: CurveSection, name: str, internal: str, key: Key, faults: F
 def _file(
     section: CurveSection, folder: Path, key: Key, faults: Faults
 ) -> tuple[Sequence[float], Sequence[float]] | None:
-    """Read the two columns of a file beside the study."""
+    """Read the two columns of a file in the folder of the study."""
     import pandas as pd
 
     name = section.file or ""
@@ -271,7 +271,7 @@ class SceneSection(Section):
 
 
 def read_window(window: WindowTable | None, faults: Faults) -> tuple[float, float] | None:
-    """Read the part of the stroke in which deviations count, from 0 to 1; None where the file has none."""
+    """Read the part of the stroke in which deviations count, as fractions 0 to 1; None if the file has none."""
     if window is None or window.low is None or window.high is None:
         return None
     low, high = window.low, window.high
@@ -281,7 +281,7 @@ def read_window(window: WindowTable | None, faults: Faults) -> tuple[float, floa
 
 
 def with_effects(file: StudyFile, bare: Family, others: Iterable[str], curves: Mapping[str, Curve]) -> Family:
-    """Add the effects of all that is wanted to the mechanism; wrong names in [scene] are reported.
+    """Extend the mechanism by the effects of all wanted outputs; wrong names in [scene] are reported.
 
     Parameters
     ----------
@@ -299,9 +299,9 @@ def with_effects(file: StudyFile, bare: Family, others: Iterable[str], curves: M
 
 
 def speeds(family: Family, speed: float | None) -> dict[str, float]:
-    """Find what scene.speed gives where an effect asks for the speed of a crank.
+    """Return the speed of every crank whose speed an effect takes, from scene.speed [rad/s].
 
-    A member turns ratio times as fast, backwards where that is negative.
+    The crank of a member turns ratio times as fast, backwards if the ratio is negative.
     """
     asking = [p for p in family.parameter_names if parts(p).stem == "speed"]
     if speed is None:

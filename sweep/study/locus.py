@@ -1,4 +1,4 @@
-"""[locus] and [fit]: limit positions from which the links of a stage follow, and the line of a guided point."""
+"""[locus] and [fit]: limit positions that determine the links of a stage, and the fitted line of a guided point."""
 
 from __future__ import annotations
 
@@ -18,13 +18,13 @@ from sweep.study.space import Axis
 from sweep.synthesis.fit import LineFit
 from sweep.synthesis.locus import LOCI, OnLocus
 
-# Two words for phi0/(2 pi - phi0): that of the time there over the time back, and the output's.
+# Two names of phi0/(2 pi - phi0): as the ratio of the times of both strokes, and as the design output.
 RATIOS = ("time_ratio", "stroke_ratio")
 WHOLE_TURN = 2.0 * np.pi * (1.0 - 1e-12)
 
 
 def read_locus(file: StudyFile, bare: Family) -> tuple[OnLocus | None, dict[str, Entry]]:
-    """Find the stage that [locus] is about, and its prescribed outputs as fixed values or axes."""
+    """Find the stage that [locus] describes, and its prescribed outputs as fixed values or axes."""
     raw = file.free_table("locus")
     locus = None if raw is None else _stage(bare, file.faults)
     if raw is None or locus is None:
@@ -43,14 +43,14 @@ def _stage(family: Family, faults: Faults) -> OnLocus | None:
 
 
 def _prescribed(locus: OnLocus, raw: Mapping[str, Any], faults: Faults, sampled: bool) -> dict[str, Entry]:
-    """Read the prescribed outputs as fixed values or axes; faulty ones are reported and left out."""
+    """Read the prescribed outputs as fixed values or axes; report and omit faulty ones."""
     known = [p.name for p in locus.prescribed]
     ratios, phi0 = [f"{name}{locus.number}" for name in RATIOS], f"phi0{locus.number}"
     ratio = next((name for name in ratios if name in raw), ratios[0])
     known.insert(known.index(phi0) + 1, ratio)
     for name in raw:
         if name not in known:
-            told = {phi0, ratio} if {phi0, ratio} & set(raw) else set()  # one of both says it
+            told = {phi0, ratio} if {phi0, ratio} & set(raw) else set()  # either of both gives phi0
             faults.unknown(("locus", name), [k for k in known if k not in raw and k not in told] or known)
     found: dict[str, Entry] = {}
     for p in locus.prescribed:
@@ -74,7 +74,7 @@ def _prescribed(locus: OnLocus, raw: Mapping[str, Any], faults: Faults, sampled:
 
 
 def _angle_of_ratio(phi0: str, raw: Mapping[str, Any], ratio: str, faults: Faults, sampled: bool) -> Entry | None:
-    """Read phi0 from the ratio of the times of both strokes, phi0/(2 pi - phi0), the crank turning evenly."""
+    """Read phi0 from the ratio of stroke times, phi0/(2 pi - phi0), for a crank of constant speed."""
     key = ("locus", ratio)
     if phi0 in raw:
         faults.value(key, raw[ratio], f"{phi0} or {ratio}, not both: they say the same")
@@ -93,9 +93,9 @@ def _angle(ratio: Any) -> Any:
 
 
 def prescribed_limits(entries: Mapping[str, Entry]) -> tuple[Limit, ...]:
-    """Give what is prescribed as limits: values as equations, axes as bounds.
+    """Return the prescribed outputs as limits: values as equations, axes as bounds.
 
-    What is swept over a whole turn has none.
+    An output swept over a whole turn has no limit.
     """
     found = []
     for name, entry in entries.items():
@@ -121,7 +121,7 @@ class FitSection(Section):
 
 
 def read_fit(section: FitSection, file: StudyFile, family: Family) -> LineFit | None:
-    """Read the fit of the mechanism's guided point; None where the file asks for none."""
+    """Read the line fit of the mechanism's guided point, or None if the file has no [fit]."""
     if "fit" not in file:
         return None
     fit = LineFit(section.stroke, section.direction == "free")
@@ -136,7 +136,7 @@ def read_fit(section: FitSection, file: StudyFile, family: Family) -> LineFit | 
 
 
 def _check_stroke(stroke: float, family: Family, limits: dict[str, object], faults: Faults) -> None:
-    """Report an optimum without a bound on its stroke: [fit] scales the designs of the sweep, not of the search."""
+    """Report an optimisation without bounds on the stroke: [fit] scales only designs of the sweep."""
     names = ("stroke", f"stroke{len(family.stages)}") if isinstance(family, Chain) else ("stroke",)
     if not any(name in limits for name in names):
         words = f'{{ min = {stroke * 0.999:g}, max = {stroke * 1.001:g}, unit = "mm" }}'

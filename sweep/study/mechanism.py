@@ -1,4 +1,4 @@
-"""[mechanism], or [machine], [relations] and [tools]: what a study is about, and what members are to each other."""
+"""[mechanism], or [machine], [relations] and [tools]: the mechanism of a study, and the relations of its members."""
 
 from __future__ import annotations
 
@@ -61,7 +61,7 @@ class ToolSection(Section):
 
 Names = Annotated[list[str], Field(min_length=1)]
 
-# Tables in which a member's own entries may stand in a table of the member's name.
+# Tables in which the entries of a member may stand in a table of the member's name.
 BY_MEMBER = (("design",), ("bodies",), ("loads",), ("limits",), ("reference", "design"))
 
 
@@ -149,7 +149,7 @@ class RelationSection(Section):
 
 
 def flattened(data: Mapping[str, Any], members: object) -> dict[str, Any]:
-    """Put the members' entries under dotted names: ``[design.needle] a1`` becomes ``design."needle.a1"``."""
+    """Move members' entries to dotted names: ``[design.needle] a1`` becomes ``design."needle.a1"``."""
     result = dict(data)
     if not isinstance(members, dict):
         return result
@@ -178,12 +178,12 @@ def _flatten(data: dict[str, Any], key: tuple[str, ...], members: Mapping[str, A
 def read_mechanism(
     section: MechanismSection, file: StudyFile, threads: Mapping[str, dict[str, Any]] | None
 ) -> tuple[tuple[str, ...] | Specification, Family] | None:
-    """Read the mechanism as the study names it, and its family without effects; None with its faults.
+    """Read the mechanism as the study names it, and its family without effects, or return None with its faults.
 
     Parameters
     ----------
     section : [mechanism]
-    threads : of a machine, as relations; None with the faults of one, which take the names of its outputs along
+    threads : threads of a machine as relations; None if one is faulty, as the names of its outputs are unknown then
     """
     data, faults = file.data, file.faults
     if "machine" not in file:
@@ -215,9 +215,10 @@ def _families(section: MechanismSection, data: Mapping[str, Any], faults: Faults
 
 
 def _family(names: tuple[str, ...], data: Mapping[str, Any], faults: Faults) -> Family | None:
-    """Return the mechanism, or None with a fault for each unknown name, or for a chain that cannot be.
+    """Return the family or chain, or None with a fault for each unknown name or for an impossible chain.
 
-    A misspelt family is a fault, but the rest is checked against the nearest one, so that no second round is needed.
+    A misspelt family is a fault; the other tables are checked against the closest match, so that one run finds all
+    faults.
     """
     single = "family" in data.get("mechanism", {}) if names else False
     unknown = [k for k, name in enumerate(names) if name not in NAMES]
@@ -237,7 +238,7 @@ def _family(names: tuple[str, ...], data: Mapping[str, Any], faults: Faults) -> 
 def _machine(
     data: Mapping[str, Any], faults: Faults, threads: Mapping[str, dict[str, Any]] | None
 ) -> tuple[Specification, Family] | None:
-    """Read the machine of a file with its threads, or None with its faults."""
+    """Return the machine with its threads, or None with its faults."""
     before = len(faults.lines)
     members = _read_each(MemberSection, data, "machine", faults)
     relations = _read_each(RelationSection, data, "relations", faults)
@@ -286,7 +287,7 @@ def _machine(
 
 
 def _written(data: Any, key: Key, value: object) -> object:
-    """Return what stands in the file, with its unit; of several names the faulty one alone."""
+    """Return the value in the file, with its unit; of a list of names only the faulty one."""
     for part in () if isinstance(value, str) else key:
         if not isinstance(data, Mapping) or part not in data:
             return value
@@ -295,17 +296,17 @@ def _written(data: Any, key: Key, value: object) -> object:
 
 
 def _key_of_thread(error: InputError) -> str:
-    """Report a fault of the path as one of its key in the file."""
+    """Return the key of [thread] to which an error in a thread belongs; faults of the places belong to path."""
     return "path" if error.name == "thread" or error.place.endswith(".thread") else error.name
 
 
 def _hangs_on_events(table: Mapping[str, Any]) -> bool:
-    """Tell whether a relation is one at an event, or a thread whose path changes at some."""
+    """Tell whether a relation depends on an event, or is a thread whose path changes at events."""
     return bool({"event", "value", "feeding"} & set(table)) or any(isinstance(x, dict) for x in table.get("thread", ()))
 
 
 def _level(given: str | float, internal: str, name: str, faults: Faults) -> float:
-    """Return the level of an event in the internal unit of its output; a bare number only where there is no unit."""
+    """Return the level of an event in the internal unit of its output; a bare number needs an output without unit."""
     key: Key = ("relations", name, "level")
     if isinstance(given, str):
         return faults.number(given, internal, key) or 0.0
@@ -315,7 +316,7 @@ def _level(given: str | float, internal: str, name: str, faults: Faults) -> floa
 
 
 def _read_each(model: type[Section], data: Mapping[str, Any], table: str, faults: Faults) -> dict[str, dict[str, Any]]:
-    """Read what stands under each name of a table, in internal units."""
+    """Read the entry under each name of a table, in internal units."""
     raw = data.get(table, {})
     if not isinstance(raw, dict):
         faults.value((table,), raw, f"tables [{table}.NAME]")

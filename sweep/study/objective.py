@@ -1,4 +1,4 @@
-"""[objective] and [pareto]: what is made small or large, and the second output that it is set against."""
+"""[objective] and [pareto]: the output to be minimised or maximised, and the second output of the front."""
 
 from __future__ import annotations
 
@@ -27,18 +27,18 @@ class ObjectiveSection(Section):
 
     @property
     def goal(self) -> str | None:
-        """The output that is made small: of one to be made large its negative."""
+        """Output to be minimised; for ``maximise`` the negative of its output."""
         return self.minimise or (self.maximise and negative(self.maximise))
 
     @property
     def named(self) -> tuple[tuple[str, str], ...]:
-        """The keys that are given, and the outputs that they name."""
+        """Given keys and the outputs that they name."""
         both = (("minimise", self.minimise), ("maximise", self.maximise))
         return tuple((key, name) for key, name in both if name is not None)
 
 
 def check_goal(section: ObjectiveSection, file: StudyFile) -> None:
-    """Report an objective that names no output, or two; and a search for nothing."""
+    """Report an objective that names no output, or two, and [optimise] without an objective."""
     written = file.data.get("objective")
     if isinstance(written, dict) and not {"minimise", "maximise"} & set(written):
         needed = "the name of a design output; or maximise, the name of one to be made large"
@@ -58,9 +58,9 @@ def check_objective(section: ObjectiveSection, family: Family, faults: Faults) -
 
 
 def check_steady(file: StudyFile, family: Family, objective: ObjectiveSection, limits: tuple[Limit, ...]) -> None:
-    """Report an objective and limits that are constant in pieces: no slope leads a search to them.
+    """Report objectives and limits that are piecewise constant, whose gradients are zero.
 
-    What is only wanted may jump; it has no sensitivities.
+    A wanted output may jump, since it needs no sensitivities.
     """
     if "optimise" not in file:
         return
@@ -82,7 +82,7 @@ def check_steady(file: StudyFile, family: Family, objective: ObjectiveSection, l
 
 
 def _followed(family: Family, limit: Limit) -> str:
-    """Say what bounds the optimiser can follow, where it cannot follow these."""
+    """Describe the bounds that the optimiser can follow, if it cannot follow those of a limit."""
     try:
         return measure(family, limit.output).refused(limit.minimum, limit.maximum)
     except InputError:  # reported where the name stands
@@ -125,9 +125,9 @@ def read_pareto(
     Parameters
     ----------
     section : [pareto]
-    family : with the effects that the second output calls for
+    family : mechanism with the effects that the second output needs
     objective, search : [objective] and [optimise]
-    limits : those of the study, of which the one on the other side of the second output holds all along the front
+    limits : limits of the study; one on the other side of the second output holds along the whole front
     """
     raw, faults = file.data.get("pareto"), file.faults
     if "pareto" in file and "optimise" not in file:
@@ -167,7 +167,7 @@ def read_pareto(
 
 
 def _bounds(output: Output, raw: object, key: Key, faults: Faults) -> tuple[float, ...] | None:
-    # Bounds are written as the values of a parameter are, in any unit that an output can have.
+    # Bounds are written like the values of a parameter, in any unit of the output's kind.
     word = cast(Unit, "angle" if output.unit == "rad" else output.unit)
     entry = read_entry(Parameter(output.name, word, output.text), raw, key, faults, sampled=False)
     if entry is None:
@@ -180,7 +180,7 @@ def _bounds(output: Output, raw: object, key: Key, faults: Faults) -> tuple[floa
 
 
 def _searchable(family: Family, output: Output, bounds: tuple[float, ...], side: str, faults: Faults) -> bool:
-    """Tell whether the optimiser can hold such bounds."""
+    """Tell whether the optimiser can keep these bounds on the second output."""
     try:
         found = measure(family, output.name)
     except InputError as error:

@@ -1,4 +1,4 @@
-"""[optimise]: how the optimiser searches."""
+"""[optimise]: settings of the optimiser."""
 
 from __future__ import annotations
 
@@ -43,7 +43,7 @@ def read_optimise(section: OptimiseSection) -> OptimiseSettings:
 
 
 def check_search(section: OptimiseSection, file: StudyFile, bare: Family) -> None:
-    """Report a search over a locus that is not given, or over proportions of a mechanism in which nothing is linear."""
+    """Report a search over a missing locus, or over proportions of a mechanism without linear variables."""
     if section.variables == "locus" and file.free_table("locus") is None:
         file.faults.value(("optimise", "variables"), "locus", '"parameters", or a table [locus]')
     if section.globally == "proportions" and driven_guide(bare) is None:

@@ -1,4 +1,4 @@
-"""One parameter as a study file writes it: a value, a list of values or a range, in its unit and within its range."""
+"""Entry of one parameter in a study file: a value, a list of values or a range, checked for unit and range."""
 
 from __future__ import annotations
 
@@ -42,12 +42,12 @@ class FixedEntry(Section):
 
 
 def missing_parameter(p: Parameter) -> str:
-    """Say what is needed where a parameter is missing: its meaning and the right ways to write it."""
+    """Describe a missing parameter: its meaning and the valid ways to write it."""
     return f"{p.text}: {forms(p)}, or an axis {{ from = ..., to = ..., count = ...{_unit_form(p)} }}"
 
 
 def read_entry(p: Parameter, raw: object, key: Key, faults: Faults, sampled: bool) -> Entry | None:
-    """Read a parameter as written: a value [mm, rad], an axis, or None if it is faulty."""
+    """Read the entry of a parameter as a value [mm, rad] or an axis, or None if it is faulty."""
     before = len(faults.lines)
     entry: Entry | None
     if not isinstance(raw, dict):
@@ -71,7 +71,7 @@ def _read_plain(p: Parameter, raw: object, key: Key, faults: Faults) -> float | 
         return None
     bare = raw if isinstance(raw, (int, float)) and not isinstance(raw, bool) else None
     if bare is None or internal != "1":
-        # A whole number may have more digits than a float has room for.
+        # An integer in the file may exceed the range of a float.
         shown = bare if bare is not None and abs(bare) <= units.LARGEST else None
         faults.value(key, raw, forms(p, shown))
         return None
@@ -148,12 +148,12 @@ def _checked(p: Parameter, written: float, value: float, key: Key, faults: Fault
 
 
 def _usual(internal: str) -> str:
-    """Name the unit a designer writes where the internal one is given."""
+    """Return the unit that designers write for an internal unit."""
     return {"rad": "deg", "t": "kg", "t*mm^2": "kg*mm^2", "rad/s": "rpm", "N*mm*s": "N*m/rpm"}.get(internal, internal)
 
 
 def forms(p: Parameter, number: object = None) -> str:
-    """Show the right ways to write a fixed value of this parameter."""
+    """Show the valid ways to write a fixed value of this parameter."""
     if p.choices is not None:
         return f"{p.choice}, or {{ values = {[int(c) for c in p.choices]} }}"
     internal = units.internal_unit(p.unit)

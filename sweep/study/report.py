@@ -1,4 +1,4 @@
-"""[study], [report], [output] and [budget]: what a study asks, what is shown and stored, what it may cost."""
+"""[study], [report], [output] and [budget]: question, figures, stored results, and limits on cost."""
 
 from __future__ import annotations
 
@@ -52,7 +52,7 @@ class ReportSection(Section):
 
 
 def check_report(report: ReportSection, file: StudyFile, family: Family, prescribed: Iterable[str]) -> None:
-    """Report figures with a folder in their names, and curves over other parameters than those of the study.
+    """Report figures with a folder in their names, and curves over parameters that the study does not have.
 
     ``prescribed`` are the outputs that [locus] prescribes.
     """

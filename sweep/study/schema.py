@@ -1,7 +1,7 @@
-"""The JSON schema of study files, made from the models that read them and from the register of families.
+"""The JSON schema of study files, built from the models that read them and from the register of families.
 
-Editors complete and check by it (docs/study-files.md, In an editor).  It knows the shape of every table and the
-parameters of every family; what one table asks of another, `sweep check` says.
+Editors use it to complete and check files (docs/study-files.md, In an editor).  It covers the shape of every table and
+the parameters of every family; `sweep check` covers conditions between tables.
 """
 
 from __future__ import annotations
@@ -23,12 +23,12 @@ from sweep.study.tables import REQUIRED_TABLES, TABLES
 
 Schema: TypeAlias = dict[str, Any]
 
-DRAFT = "http://json-schema.org/draft-07/schema#"  # the newest that editors for TOML know
+DRAFT = "http://json-schema.org/draft-07/schema#"  # newest draft that editors for TOML support
 ENTRY = {"$ref": "#/definitions/entry"}
 
 
 def study_schema() -> Schema:
-    """Return the schema as a plain dict, the same at every call."""
+    """Return the schema as a plain dict, identical at every call."""
     definitions: Schema = {"entry": _entry()}
     tables: Schema = {name: _model(t.model, definitions) for name, t in TABLES.items() if t.model is not None}
     tables |= {name: _each(_model(t.each, definitions)) for name, t in TABLES.items() if t.each is not None}
@@ -37,7 +37,7 @@ def study_schema() -> Schema:
         "properties": {"sample": _model(SampleTable, definitions)}
     }
     tables["bodies"] = _each({"anyOf": [ENTRY, _each(ENTRY)]})
-    # a load is a parameter, or changes over the turn; in a machine it stands under its member
+    # a load is a parameter or varies over the turn; in a machine it may stand in the table of its member
     load = {"anyOf": [ENTRY, tables["loads"]["additionalProperties"]]}
     tables["loads"] = _each({"anyOf": [*load["anyOf"], _each(load)]})
     limit = {"anyOf": [{"const": True}, {"type": "string"}, _model(LimitEntry, definitions)]}
@@ -68,13 +68,13 @@ def _each(schema: Schema) -> Schema:
 
 
 def _entry() -> Schema:
-    """Return a parameter: a number, a text with its unit, or one of the three tables."""
+    """Return the schema of a parameter: a number, a text with its unit, or one of the three tables."""
     tables = [_model(model, {}) for model in (FixedEntry, ListEntry, RangeEntry)]
     return {"anyOf": [{"type": "number"}, {"type": "string"}, *tables]}
 
 
 def _of_family(entry: Family) -> Schema:
-    """Return what [design] may hold where the mechanism is this family alone."""
+    """Return the schema of [design] for a mechanism of this family alone."""
     own = {p.name: {"description": _described(p), "allOf": [ENTRY]} for p in entry.parameters}
     known = [*own, *sorted(input_names(entry) - own.keys()), "sample", FROM, HASH]
     design = {"properties": own, "propertyNames": {"enum": known}}
@@ -93,7 +93,7 @@ def _described(p: Parameter) -> str:
 
 
 def _model(model: type[Section], definitions: Schema) -> Schema:
-    """Return the schema of one table as a file writes it."""
+    """Return the schema of one table by the names that a file uses."""
     template = "#/definitions/{model}"
     found: Schema = model.model_json_schema(by_alias=True, ref_template=template, schema_generator=_WithoutNull)
     definitions |= found.pop("$defs", {})
@@ -101,7 +101,7 @@ def _model(model: type[Section], definitions: Schema) -> Schema:
 
 
 class _WithoutNull(GenerateJsonSchema):
-    """TOML has no null: what is None in a model is left out of a file."""
+    """Schema generator without null: TOML has none, and a value None in a model is omitted from a file."""
 
     def nullable_schema(self, schema: Any) -> JsonSchemaValue:
         return self.generate_inner(schema["schema"])

@@ -1,8 +1,8 @@
-"""Scrambled Sobol points by index: any slice of the sequence, the same bits however it is cut.
+"""Scrambled Sobol points by index: any slice of the sequence, with the same bits however it is divided.
 
-scipy.stats.qmc gives the same sequence, but reaches point i only by stepping through all before it, and with more than
-30 bits its ``fast_forward`` fails (1.17); a chunk of a study must be computable alone.  The tests compare the plain
-sequence with scipy's bit for bit.
+scipy.stats.qmc gives the same sequence, but reaches point i only by stepping through all points before it, and with
+more than 30 bits its ``fast_forward`` fails (1.17); a chunk of a study must be computable alone.  The tests compare the
+plain sequence with scipy's bit for bit.
 """
 
 from __future__ import annotations
@@ -66,14 +66,14 @@ DIMENSIONS = len(_JOE_KUO)
 
 
 class Sobol:
-    """The sequence of one seed; ``points(start, stop)`` has the shape (dimensions, stop - start) and lies in (0, 1).
+    """Sobol sequence of one seed; ``points(start, stop)`` has the shape (dimensions, stop - start), values in (0, 1).
 
     ``seed`` chooses a random lower-triangular mixing of the digits and a random digital shift (Matousek's scrambling):
     every aligned block of 2^k points keeps its stratification.  None leaves the plain sequence, which starts at 0.
     """
 
     def __init__(self, dimensions: int, seed: int | None) -> None:
-        # Raw output of PCG64 is fixed by numpy's promise on bit streams, that of Generator methods is not.
+        # numpy guarantees the raw bit stream of PCG64, but not that of Generator methods.
         source = None if seed is None else np.random.PCG64(seed)
         self._shift = np.zeros(dimensions, np.int64)
         self._centre = 0.0 if seed is None else 0.5
@@ -87,13 +87,13 @@ class Sobol:
             tables.append(_xor_tables(directions))
         self._tables = np.array(tables, np.int64).reshape(dimensions, INDEX_BITS // TABLE_BITS, RUN)
         low = np.arange(2 * RUN)
-        # The digit above the lowest ones changes the highest of their Gray code.
+        # The bit above the lowest TABLE_BITS flips the highest bit of their Gray code.
         gray = (low ^ (low >> 1)) & (RUN - 1)
         first_runs = np.ascontiguousarray(self._tables[:, 0, gray].reshape(dimensions, 2, RUN))
         self._digits = Digits(first_runs, self._tables, self._shift, self._centre)
 
     def points(self, start: int, stop: int, which: Sequence[int] | None = None) -> Array:
-        """Return points start to stop - 1, one row per dimension; with ``which`` of those dimensions only."""
+        """Return points start to stop - 1, one row per dimension, restricted to the dimensions ``which`` if given."""
         chosen = range(len(self._shift)) if which is None else which
         out = np.empty((stop - start, len(chosen)))
         self.fill(start, stop, chosen, [(0.0, 1.0)] * len(chosen), range(len(chosen)), out)
@@ -103,16 +103,16 @@ class Sobol:
         self, start: int, stop: int, which: Sequence[int], ends: Sequence[tuple[float, float]], columns: Sequence[int],
         out: Array,
     ) -> None:  # fmt: skip
-        """Write points start to stop - 1 in some dimensions, stretched to between two ends each.
+        """Write points start to stop - 1 of some dimensions, scaled to the two ends of each.
 
-        ``out`` is (stop - start, P); ``columns`` says where in it each dimension of ``which`` goes.
+        ``out`` is (stop - start, P); ``columns`` names the column of each dimension of ``which``.
         """
         low, high = np.array(ends, np.float64).reshape(len(which), 2).T.copy()
         chosen, places = np.array(which, np.int64), np.array(columns, np.int64)
         sobol_points(start, stop, self._digits, chosen, low, high, places, out)
 
     def at(self, index: NDArray[np.int64], which: Sequence[int] | None = None) -> Array:
-        """Return the points of these numbers, in any order, with the same bits as `points`."""
+        """Return the points of the given indices, in any order, with the same bits as `points`."""
         gray = index ^ (index >> 1)
         first, high = gray & (RUN - 1), gray >> TABLE_BITS
         chosen = range(len(self._shift)) if which is None else which
@@ -122,7 +122,7 @@ class Sobol:
         return self._scaled(out)
 
     def _upper(self, k: int, high: NDArray[np.int64]) -> NDArray[np.int64]:
-        """Return what the shift of dimension k and all digits of a Gray code but the lowest make of it."""
+        """Return the exclusive or of the shift of dimension k and the direction numbers of the ``high`` digits."""
         x = np.full(high.size, self._shift[k])
         for part, table in enumerate(self._tables[k, 1:]):
             x ^= table[(high >> (part * TABLE_BITS)) & (RUN - 1)]
@@ -151,7 +151,7 @@ def direction_numbers(dimension: int) -> list[int]:
 
 
 def _mix(direction: int, raw: list[int]) -> int:
-    """Return each digit plus (mod 2) a random choice of the digits above it."""
+    """Return the scrambled direction number: each digit plus (mod 2) a random selection of the digits above it."""
     mixed = 0
     for digit in range(BITS):
         place = BITS - 1 - digit
@@ -161,7 +161,7 @@ def _mix(direction: int, raw: list[int]) -> int:
 
 
 def _xor_tables(directions: list[int]) -> NDArray[np.int64]:
-    """Return for every group of index digits the exclusive or of the direction numbers of each combination."""
+    """Return the exclusive or of the direction numbers for every combination of index digits, one table per group."""
     tables = np.zeros((INDEX_BITS // TABLE_BITS, RUN), np.int64)
     for j, direction in enumerate(directions):
         part, bit = divmod(j, TABLE_BITS)

@@ -1,4 +1,4 @@
-"""The designs of a study: parameter values by design number, never the whole lattice in memory."""
+"""The designs of a study: parameter values by design number, without the whole lattice in memory."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ Scale = Literal["linear", "log"]
 class Axis:
     """One swept parameter.
 
-    ``values`` are the lattice values or the listed ones; None where a sample draws from ``low`` to ``high``.  All three
+    ``values`` are the lattice values or the listed ones; None if a sample draws from ``low`` to ``high``.  All three
     are internal [mm, rad]; ``unit`` and ``factor`` are those of the study file, internal = written * factor.
     """
 
@@ -43,13 +43,13 @@ class Axis:
         factor: float = 1.0,
         scale: Scale = "linear",
     ) -> Axis:
-        """Return ``count`` values from ends[0] to ends[1], both included and in the written unit; one is ends[0]."""
+        """Return an axis of ``count`` values from ends[0] to ends[1], both included; a single one is ends[0]."""
         values = _between(ends, np.arange(count, dtype=np.float64), max(count - 1, 1), scale) * factor
         return cls(name, ends[0] * factor, ends[1] * factor, _read_only(values), unit, factor, scale)
 
     @classmethod
     def listed(cls, name: str, values: Sequence[float], unit: str = "1", factor: float = 1.0) -> Axis:
-        """Take the values as listed, in their order."""
+        """Return an axis of listed values, in their order."""
         array = np.asarray(values, dtype=np.float64) * factor
         return cls(name, float(array.min()), float(array.max()), _read_only(array), unit, factor)
 
@@ -57,26 +57,26 @@ class Axis:
     def sampled(
         cls, name: str, ends: tuple[float, float], unit: str = "1", factor: float = 1.0, scale: Scale = "linear"
     ) -> Axis:
-        """Allow any value between the ends, to be drawn by a sample."""
+        """Return an axis from which a sample draws any value between the ends."""
         return cls(name, ends[0] * factor, ends[1] * factor, None, unit, factor, scale)
 
     @property
     def count(self) -> int:
-        """Number of values; 0 for a sampled axis, which has no list of them."""
+        """Number of values; 0 for a sampled axis."""
         return 0 if self.values is None else len(self.values)
 
     @property
     def varies(self) -> bool:
-        """Whether designs differ in it: a lattice of one value has two ends all the same."""
+        """Whether designs differ in this parameter; a lattice of one value has two different ends but one value."""
         return self.high > self.low and self.count != 1
 
     @property
     def is_plain(self) -> bool:
-        """Whether a sample draws from it in proportion to the share of the way between its ends."""
+        """Whether sampled values are linear in the sample's coordinate."""
         return self.values is None and self.scale == "linear"
 
     def at(self, fraction: Array) -> Array:
-        """Find the values for numbers in (0, 1): those in whose equal share they fall, or points between the ends."""
+        """Return the values for fractions in (0, 1): listed ones by equal shares, otherwise points between the ends."""
         if self.values is not None:
             return self.values[(fraction * len(self.values)).astype(np.int64)]
         return _between((self.low, self.high), fraction, 1, self.scale)
@@ -111,20 +111,14 @@ class DesignSpace:
     def columns(self, start: int, stop: int, names: Sequence[str] | None = None) -> dict[str, Array]:
         """Return parameter values of the designs start to stop - 1, one array per parameter in the family's order.
 
-        ``names`` are those wanted, of `names`; None for all.  A design has the same bits in whatever slice it is asked
-        for.  Measured on one core, per design and swept parameter: lattice 9 to 16 ns, sample 1 ns, sample on a log
-        scale 150 ns.
-
-        Raises
-        ------
-        IndexError
-            if the slice is not within 0 and ``count``.
+        ``names`` are the wanted parameters, None for all.  A design has the same bits in every slice.
+        Measured on one core, per design and swept parameter: lattice 9 to 16 ns, sample 1 ns, sample on a log
         """
         wanted = self.names if names is None else names
         return dict(zip(wanted, self.matrix(start, stop, wanted).T.copy(), strict=True))
 
     def matrix(self, start: int, stop: int, names: Sequence[str]) -> Array:
-        """Return the named parameters as `columns` does, side by side: (stop - start, P)."""
+        """Return the named parameters of designs start to stop - 1 as a matrix, (stop - start, P)."""
         if not 0 <= start <= stop <= self.count:
             raise IndexError(f"designs {start} to {stop}; the space has {self.count}")
         matrix, wanted = np.empty((stop - start, len(names))), tuple(names)
@@ -138,7 +132,7 @@ class DesignSpace:
         for column, name in enumerate(wanted):
             if column not in columns:
                 matrix[:, column] = self.fixed[name]
-        # Between the ends of a linear axis a point is where it belongs at once, elsewhere it is a share of the way.
+        # Points on a linear axis are scaled in place; for other axes the sequence gives fractions first.
         ends = [(axis.low, axis.high) if axis.is_plain else (0.0, 1.0) for axis in axes]
         self._sequence.fill(start, stop, swept, ends, columns, matrix)
         for axis, column in zip(axes, columns, strict=True):
@@ -147,20 +141,20 @@ class DesignSpace:
         return matrix
 
     def columns_at(self, index: NDArray[np.int64], names: Sequence[str] | None = None) -> dict[str, Array]:
-        """Return parameter values of designs by their numbers, in any order, as `columns` does."""
+        """Return parameter values of designs by their numbers, in any order, one array per parameter."""
         swept = self._swept(names)
         if self.kind == "product":
             return self._collected(names, index.size, swept, self._lattice(index, swept))
         return self._collected(names, index.size, swept, self._sequence.at(index, swept))
 
     def _swept(self, names: Sequence[str] | None) -> list[int]:
-        """Return the places of the axes that are wanted."""
+        """Return the indices of the wanted axes."""
         return [k for k, axis in enumerate(self.axes) if names is None or axis.name in names]
 
     def _collected(
         self, names: Sequence[str] | None, n: int, swept: Sequence[int], places: Iterable[Array]
     ) -> dict[str, Array]:
-        """Return the wanted columns; ``places`` are where the designs stand on the swept axes."""
+        """Return the wanted columns; ``places`` are the coordinates of the designs on the swept axes."""
         found = {self.axes[k].name: self._on_axis(k, u) for k, u in zip(swept, places, strict=True)}
         wanted = self.names if names is None else names
         return {name: found[name] if name in found else np.full(n, self.fixed[name]) for name in wanted}
@@ -184,14 +178,14 @@ class DesignSpace:
 
 
 def _between(ends: tuple[float, float], k: Array, steps: int, scale: Scale) -> Array:
-    """Return points k/steps of the way; the ends weighed by k and steps - k, so 0 to 90 in 9 steps gives exact tens."""
+    """Return points k/steps between the ends, weighted by k and steps - k: 0 to 90 in 9 steps gives exact tens."""
     low, high = ends
     if scale == "log":
-        # The C library's power, one value at a time: vectorised ones may round by position in the array.
+        # The C library's power, one value at a time: vectorised versions may round by position in the array.
         values = np.array([low ** (1.0 - t) * high**t for t in (k / steps).tolist()])
     else:
         values = (low * (steps - k) + high * k) / steps if steps != 1 else low * (1.0 - k) + high * k
-        if steps == 1:  # then both ends are exact
+        if steps == 1:  # this form gives both ends exactly
             return np.clip(values, low, high, out=values)
     inside: Array = np.clip(values, low, high)
     return np.where(k == 0, low, np.where(k == steps, high, inside))

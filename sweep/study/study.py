@@ -1,4 +1,4 @@
-"""A checked study: what the engine, the optimiser and the report work from; in mm, rad and s."""
+"""A checked study, the input of engine, optimiser and report; in mm, rad and s."""
 
 from __future__ import annotations
 
@@ -27,23 +27,23 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class Objective:
-    """The design output to be made small: the negative of one that is to be made large."""
+    """Design output to be minimised; for maximisation the negative of the named output."""
 
     output: str
 
     @property
     def aim(self) -> str:
-        """What is done with the output that the study names."""
+        """Direction of the objective as a word, for the output that the study names."""
         return "maximised" if without_minus(self.output) else "minimised"
 
 
 @dataclass(frozen=True)
 class ProveSettings:
-    """The gap between optimum and proven bound that is wanted, and the boxes of designs that may be judged for it.
+    """Wanted gap between optimum and proven bound, and the largest number of boxes of designs to evaluate for it.
 
-    A box is not halved once all its sides are below the share ``smallest`` of their ranges; what it holds stays open,
-    as an exception that the answer names.  ``seconds`` is an emergency brake: no round of boxes begins after it, and
-    the answer says so.
+    A box is not halved once all its sides are below the share ``smallest`` of their ranges; it stays open, and the
+    answer lists it as an exception.  ``seconds`` is an emergency brake: no round of boxes begins after it, and the
+    answer says so.
     """
 
     gap: float
@@ -54,15 +54,15 @@ class ProveSettings:
 
 @dataclass(frozen=True)
 class OptimiseSettings:
-    """The most starts of the local search, seed of their choice, what ends it earlier, and what is varied.
+    """Settings of the local search: largest number of starts, seed, stopping rules and variables.
 
-    ``variables`` is "locus" for what [locus] prescribes, "parameters" for the links, None for what suits the study.
-    ``unseen`` is the estimated share of unseen basins below which no more starts are made once the best basin was met
-    often enough; None asks for 2 % of starts, and of populations for the best basin alone.
-    ``looks`` are the designs each start may look at; with ``globally`` = "proportions" starts are ends of populations
-    of descents over what is not linear, at most ``populations`` that know nothing of each other.  ``time_budget`` [s]
-    is an emergency brake: what it stops says so, and no result that was not stopped depends on it.  ``prove`` asks for
-    a proof that nothing in the space is better.
+    ``variables`` is "locus" for the outputs that [locus] prescribes, "parameters" for the links, None for the default
+    of the study.  ``unseen`` is the estimated share of unseen basins below which no more starts are made once the best
+    basin was met often enough; None asks for 2 % of starts, and of populations for the best basin alone.  ``looks`` is
+    the number of designs that each start may evaluate; with ``globally`` = "proportions" starts are ends of populations
+    of descents over the nonlinear variables, from at most ``populations`` independent populations.  ``time_budget`` [s]
+    is an emergency brake: a stopped result says so, and no other result depends on it.  ``prove`` asks for a proof that
+    no design of the space is better.
     """
 
     starts: int = 20
@@ -77,18 +77,18 @@ class OptimiseSettings:
 
     @property
     def by_populations(self) -> bool:
-        """Whether starts are ends of populations of descents."""
+        """Whether the starts are ends of populations of descents."""
         return self.globally == "proportions"
 
 
 @dataclass(frozen=True)
 class ParetoSettings:
-    """Bounds on a second output for each of which the least objective is searched.
+    """Bounds on a second output, for each of which the objective is minimised.
 
     ``bounds`` are upper ones, or with ``at_least`` lower ones; ``starts`` designs of the sweep within each bound are
     searched besides the optimum and the result of the next looser bound; ``time_budget`` [s] for the whole front is an
-    emergency brake.  With ``points`` further bounds are placed where the front bends, until there are so many.
-    ``looks`` are the designs each start may look at, as many as those of the optimum.
+    emergency brake.  With ``points`` further bounds are placed where the front bends, until the front has that many.
+    ``looks`` is the number of designs that each start may evaluate, as for the optimum.
     """
 
     output: str
@@ -102,22 +102,23 @@ class ParetoSettings:
 
 @dataclass(frozen=True)
 class Tolerance:
-    """Manufacturing tolerances: +- of every length [mm] and of every angle [rad]; zero is exact.
+    """Manufacturing tolerances, +- of every length [mm] and of every angle [rad]; zero is exact.
 
-    ``robust`` is the share of mechanisms within them that have to keep the limits; None asks it of the drawing alone.
-    ``own`` are those of single parameters, by name; ``samples`` is how many mechanisms say the share.
+    ``robust`` is the share of manufactured mechanisms that must keep the limits; None tests the nominal design alone.
+    ``own`` are tolerances of single parameters, by name; ``samples`` is the number of mechanisms that estimate the
+    share.
     """
 
     lengths: float = 0.0
     angles: float = 0.0
     robust: float | None = None
     own: tuple[tuple[str, float], ...] = ()
-    samples: int = 1 << 16  # the share of 95 % is good to 0.05 %; of 8192 it was 0.2 % off
+    samples: int = 1 << 16  # a share of 95 % is accurate to 0.05 %; with 8192 it was 0.2 % off
 
 
 @dataclass(frozen=True)
 class OutputSettings:
-    """Which designs become rows, how results are stored, for which designs curves over a turn are written."""
+    """Designs that become rows, float type of the results, and designs whose curves over the turn are written."""
 
     keep: Literal["feasible", "all"] = "feasible"
     dtype: Literal["float32", "float64"] = "float64"
@@ -126,7 +127,7 @@ class OutputSettings:
 
 @dataclass(frozen=True)
 class Budget:
-    """What a run may cost before it must be forced."""
+    """Costs above which a run must be forced."""
 
     disk_bytes: float
     seconds: float
@@ -136,10 +137,10 @@ class Budget:
 class Study:
     """A question about one mechanism, made by :func:`sweep.study.load_study`.
 
-    ``want`` holds every design output that is computed: the wanted ones, those of the limits, the objective and what is
-    set against it.  ``curves`` are the loads over the turn, by the input they add to.  ``data`` is the file's content
-    with defaults filled in and tables of other files inserted, ready for JSON; ``study_from_data`` makes the study
-    again.
+    ``want`` holds every computed design output: the wanted ones, those of the limits, the objective and the second
+    output of the front.  ``curves`` are the loads over the turn, by the input to which each adds.  ``data`` is the
+    file's content with defaults filled in and tables of other files inserted, ready for JSON; ``study_from_data``
+    rebuilds the study.
     """
 
     name: str
@@ -168,17 +169,17 @@ class Study:
 
     @property
     def written(self) -> dict[str, Any]:
-        """The entries of parameters and of inputs of effects as they stand in the file, by name."""
+        """Entries of parameters and of inputs of effects as written in the file, by name."""
         return {name: x for table in ("loads", "bodies", "design") for name, x in self.data.get(table, {}).items()}
 
     @property
     def parameter_limits(self) -> tuple[Limit, ...]:
-        """The limits that bound a parameter."""
+        """Limits that bound a parameter."""
         return tuple(limit for limit in self.limits if limit.output in self.family.parameter_names)
 
     @property
     def output_limits(self) -> tuple[Limit, ...]:
-        """The limits that bound a design output."""
+        """Limits that bound a design output."""
         return tuple(limit for limit in self.limits if limit.output not in self.family.parameter_names)
 
     @property
@@ -188,29 +189,29 @@ class Study:
 
     @property
     def tested_limits(self) -> tuple[Limit, ...]:
-        """The limits that a design of the sweep may miss: those of prescribed outputs are met by construction."""
+        """Limits that a design of the sweep may violate; those of prescribed outputs hold by construction."""
         return tuple(limit for limit in self.output_limits if limit.output not in self.prescribed)
 
     @property
     def bands(self) -> tuple[Limit, ...]:
-        """The limits around what [locus] prescribes: a design holds its value exactly, what is made of it scatters."""
+        """Tolerance bands around prescribed outputs: designs hold the value, manufactured mechanisms scatter."""
         own = [limit for limit in self.output_limits if limit.output in self.prescribed]
         return tuple(x for k, x in enumerate(own) if x.output in [other.output for other in own[:k]])
 
     @property
     def made(self) -> tuple[str, ...]:
-        """Parameters that [locus] or [fit] sets."""
+        """Parameters that [locus] or [fit] determines."""
         links = () if self.locus is None else self.locus.made
         return links if self.fit is None else (*links, *self.fit.parameters(self.family))
 
     @property
     def rescaled(self) -> tuple[str, ...]:
-        """Parameters whose values in the study are proportions only: [fit] scales them."""
+        """Parameters of which the study gives proportions only, since [fit] scales them."""
         return () if self.fit is None else self.fit.rescaled(self.family)
 
     @cached_property
     def family(self) -> Family:
-        """The mechanism: a family, a chain or a machine, with the effects that what is wanted calls for."""
+        """The mechanism: a family, a chain or a machine, with the effects that the wanted outputs need."""
         return extended(self.bare, self.want, self.curves)
 
     @cached_property
@@ -220,7 +221,7 @@ class Study:
 
     @cached_property
     def fingerprint(self) -> str:
-        """Hash of all that determines values: not of name, title, question, budget or report.
+        """Hash of everything that determines values, without name, title, question, budget and report.
 
         The same values written in other units or in another order give the same fingerprint.
         """
@@ -253,12 +254,12 @@ class Study:
 
 
 def _counted(settings: OptimiseSettings | ParetoSettings) -> dict[str, Any]:
-    """Return settings without the emergency brake, which decides no value."""
+    """Return the settings without the emergency brake, which determines no value."""
     return {key: value for key, value in asdict(settings).items() if key != "time_budget"}
 
 
 def _without_none(content: dict[str, Any], name: str) -> dict[str, Any]:
-    """Return a key that came later: without a value it leaves the fingerprints of older datasets as they are."""
+    """Remove a later key that has no value, so that fingerprints of older datasets stay the same."""
     return {key: value for key, value in content.items() if key != name or value is not None}
 
 

@@ -1,4 +1,4 @@
-"""The tables of a study file: what each is about, and the models of those whose keys are fixed."""
+"""The tables of a study file: the subject of each, and the models of tables with fixed keys."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ REQUIRED_TABLES = ("study", "design")
 
 @dataclass(frozen=True)
 class Table:
-    """What a table is about, its model, and the model of what stands under each name in it."""
+    """Subject of a table, its model, and the model of the entries under its names."""
 
     about: str
     model: type[Section] | None = None
@@ -35,7 +35,7 @@ DESIGNS = "The designs of the study, and one design to compare them with."
 INPUTS = "What the effects of a scene ask for besides the mechanism, and loads over the turn."
 COSTS = "What is stored, and what a run may cost."
 
-# In the order in which messages and the schema list them.
+# Messages and the schema list the tables in this order.
 TABLES: Mapping[str, Table] = {
     "study": Table("Name, title and question.", StudySection),
     "mechanism": Table("What the study is about.", MechanismSection),
@@ -71,7 +71,7 @@ TABLES: Mapping[str, Table] = {
 
 @dataclass(frozen=True)
 class Sections:
-    """The tables of a file as their models read them; of a table that it does not have all defaults."""
+    """Tables of a file as read by their models; a missing table has all its defaults."""
 
     study: StudySection
     mechanism: MechanismSection
@@ -89,7 +89,7 @@ class Sections:
 
 
 def read_sections(file: StudyFile) -> Sections:
-    """Read the shape of every table; unknown and missing tables, unknown keys and wrong values are reported."""
+    """Read every table by its model; report unknown and missing tables, unknown keys and wrong values."""
     for name in file.data:
         if name not in TABLES:
             file.faults.unknown((name,), [table for table in TABLES if table not in file], "table")

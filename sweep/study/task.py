@@ -1,4 +1,4 @@
-"""[task]: one of the tasks of the engineering method as a file says it, every quantity in its unit."""
+"""[task]: a task of the engineering method in a study file, every quantity with its unit."""
 
 from __future__ import annotations
 
@@ -26,14 +26,14 @@ from sweep.synthesis.tasks.task3 import Setting
 KINDS: Mapping[str, Any] = {"engineering": tasks.EngineeringMethod} | {
     f"task{number}": getattr(tasks, f"Task{number}") for number in range(1, 9)
 }
-# What the mechanisms that do a task are; the second stage of task 5 is no family.
+# Mechanisms that solve each task; the second stage of task 5 is no family.
 CHAINS: Mapping[str, tuple[str, ...]] = {
     "engineering": ("rssr",), "task1": ("rssr",), "task2": ("rssr",), "task3": ("rssr",), "task4": ("rssr",),
     "task6": ("rssr", "guide"), "task7": ("rssr", "rssp"), "task8": ("rssr", "rssp"),
 }  # fmt: skip
 RECORDS: Mapping[str, Any] = {"task1": Position, "task2": Position, "task3": Setting, "task5": SlotPosition}
 
-# What the numbers of the tasks are, by name; all others are lengths. A range is called as what it is a range of.
+# Kinds of the numbers of tasks, by name; all others are lengths.  A range has the name of its quantity.
 ANGLES = ("swing", "phi0", "alpha", "alpha2", "max_pressure_angle", "dwell", "dphi", "dpsi", "start_direction",
           "end_direction")  # fmt: skip
 RATIOS = ("ratio", "coupler", "offset", "f2_ratio", "size")
@@ -42,7 +42,7 @@ BEARINGS = ("min_theta1_reserve", "min_theta1_reserve_rolling")
 
 
 def _range(internal: str) -> BeforeValidator:
-    """Return what reads a range with its unit as its ends in the internal unit."""
+    """Return a validator that converts a range with its unit to its ends in the internal unit."""
 
     def read(value: object) -> tuple[float, float]:
         table = value if isinstance(value, dict) else {}
@@ -59,7 +59,7 @@ def _range(internal: str) -> BeforeValidator:
 
 
 def _is_number(raw: object) -> TypeGuard[float]:
-    """Tell whether it is a number that a float holds with room to spare; nan is none."""
+    """Tell whether a value is a finite number of at most 1e100; nan is none."""
     return isinstance(raw, int | float) and not isinstance(raw, bool) and -1e100 <= raw <= 1e100
 
 
@@ -67,7 +67,7 @@ Bounds = dict[str, Annotated[tuple[float, float], _range("mm")]]
 
 
 def load_task(path: str | Path) -> SynthesisTask:
-    """Read the problem of a file's [task] table.
+    """Read the problem in the [task] table of a file.
 
     Parameters
     ----------
@@ -84,7 +84,7 @@ def load_task(path: str | Path) -> SynthesisTask:
     file = file / "study.toml" if file.is_dir() else file
     data = read_toml(file)
     faults = Faults({file.name: data}, {file.name: key_lines(toml_text(file))})
-    if not {"mechanism", "machine"} & set(data):  # a study checks its other tables itself
+    if not {"mechanism", "machine"} & set(data):  # the other tables of a study are checked by the study
         for name in data:
             if name not in ("task", "study"):
                 faults.unknown((name,), ("task", "study"))
@@ -95,7 +95,7 @@ def load_task(path: str | Path) -> SynthesisTask:
 
 
 def read_task(raw: object, faults: Faults) -> SynthesisTask | None:
-    """Read the problem of a table [task], or None with its faults."""
+    """Read the problem of a table [task], or return None with its faults."""
     before = len(faults.lines)
     if not isinstance(raw, dict):
         needed = "a table [task] with kind and what is given"
@@ -125,9 +125,9 @@ def read_task(raw: object, faults: Faults) -> SynthesisTask | None:
 
 
 def read_study_task(file: StudyFile, mechanism: object) -> SynthesisTask | None:
-    """Read the task of a study, which asks for the search that begins at the task's mechanisms.
+    """Read the task of a study, whose mechanisms are the starts of the study's search.
 
-    It is a fault if these are not those of the study, unless its ``mechanism`` is unknown, None.
+    A task of other mechanisms than the study's is a fault, unless the study's ``mechanism`` is unknown, None.
     """
     task = read_task(file.data["task"], file.faults)
     if "optimise" not in file:
@@ -147,14 +147,14 @@ def read_study_task(file: StudyFile, mechanism: object) -> SynthesisTask | None:
 
 
 def task_model(kind: str) -> type[Section]:
-    """Return the model of [task] for a kind of task: a key for each field of the task's class."""
+    """Return the model of [task] for one kind of task, with a key for each field of the task's class."""
     own = [f for f in fields(KINDS[kind]) if f.init]
     needed = [f.name for f in own if f.default is MISSING and f.default_factory is MISSING]
     return _table(kind, {"kind": (Any, "")} | {f.name: _key(kind, f.name) for f in own}, needed)
 
 
 def _table(name: str, keys: Mapping[str, tuple[Any, str]], required: Iterable[str] = ()) -> type[Section]:
-    """Return the model of a table of these keys, each with its type and what it may hold."""
+    """Return the model of a table with the given keys, each with its type and the description of its values."""
     own: dict[str, Any] = {key: (kind | None, Field(None, description=words)) for key, (kind, words) in keys.items()}
     model = create_model(name, __base__=Section, **own)
     model.required = tuple(required)
@@ -162,7 +162,7 @@ def _table(name: str, keys: Mapping[str, tuple[Any, str]], required: Iterable[st
 
 
 def _key(kind: str, name: str) -> tuple[Any, str]:
-    """Return the type of a key of a task, and what it may hold."""
+    """Return the type of a key of a task and the description of its values."""
     unit = _unit(name)
     if name in WORDS:
         return Any, "a word, see docs/tasks.md"

@@ -43,7 +43,7 @@ class AllowedTable(Section):
 
 
 class ThreadPlaceTable(Section):
-    """A place of ``thread.<name>.path`` that counts between two events only, or has a bend of its own."""
+    """Place of ``thread.<name>.path`` that counts only between two events, or has an additional bend."""
 
     required = ("on",)
     on: Place | None = holds('a name or three lengths, as "low" or ["10 mm", "0 mm", "40 mm"]')
@@ -77,7 +77,7 @@ class ThreadSection(Section):
 
 
 def read_threads(file: StudyFile) -> dict[str, dict[str, Any]] | None:
-    """Read the threads as relations of the machine, in internal units; None if one is faulty."""
+    """Read the threads as relations of the machine, in internal units, or None if one is faulty."""
     faults, raw = file.faults, file.data.get("thread", {})
     before = len(faults.lines)
     found: dict[str, dict[str, Any]] = {}

@@ -1,4 +1,4 @@
-"""[tolerance]: how far the lengths and angles of a mechanism that is made may be off."""
+"""[tolerance]: manufacturing tolerances of the lengths and angles of a mechanism."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from sweep.study.file import Faults, Section, Share, Size, StudyFile, Width, hol
 from sweep.study.study import Tolerance
 
 UNITS = {"length": "mm", "angle": "rad"}
-MOST_SAMPLES = 1 << 22  # more than memory holds of a machine of a hundred dimensions
+MOST_SAMPLES = 1 << 22  # a machine of a hundred dimensions exceeds the memory beyond this
 
 
 class ToleranceSection(Section):
@@ -26,7 +26,7 @@ class ToleranceSection(Section):
 
 
 def read_tolerance(section: ToleranceSection, file: StudyFile, family: Family) -> Tolerance | None:
-    """Read the tolerances of the mechanisms of a family that are made; None where the file gives none."""
+    """Read the manufacturing tolerances of a family's mechanisms, or None if the file gives none."""
     if "tolerance" not in file:
         return None
     if "optimise" not in file:
@@ -44,7 +44,7 @@ def read_tolerance(section: ToleranceSection, file: StudyFile, family: Family) -
 
 
 def _own(given: Mapping[str, str], file: StudyFile, family: Family) -> dict[str, float]:
-    """Return tolerances of single parameters; of several patterns that name one the last holds."""
+    """Return the tolerances of single parameters; of several matching patterns the last holds."""
     found: dict[str, float] = {}
     for pattern, text in given.items():
         named = [p for p in family.parameters if fnmatchcase(p.name, pattern) and p.unit in UNITS and p.choices is None]
@@ -63,7 +63,7 @@ def _own(given: Mapping[str, str], file: StudyFile, family: Family) -> dict[str,
 
 
 def check_tolerance(tolerance: Tolerance | None, family: Family, limits: tuple[Limit, ...], faults: Faults) -> None:
-    """Report tolerances that change nothing, and a robust search for what no made mechanism can keep."""
+    """Report tolerances without effect, and a robust search with equations as limits."""
     if tolerance is None:
         return
     for key, unit, size in (("lengths", "length", tolerance.lengths), ("angles", "angle", tolerance.angles)):

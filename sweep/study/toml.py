@@ -1,4 +1,4 @@
-"""The text of a study file as tables with the line of each key, and studies as text that reads back the same."""
+"""TOML of study files: parsing into tables, line numbers of keys, and writing text that reads back the same."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from sweep.errors import StudyError
 from sweep.families.base import Family, Parameter
 from sweep.quantities.units import factor, internal_unit
 
-DEEPEST = 16  # tables within tables; a study needs four
+DEEPEST = 16  # levels of nested tables; a study needs four
 _DIGITS = re.compile(r"\d[\d_]{4000,}")
 _PLACE = re.compile(r"\(at line (\d+), column \d+[^)]*\)")
 _KEY = re.compile(r"""\s*([\w."'-]+)\s*=""")
@@ -24,12 +24,12 @@ _TOKEN = re.compile(
     rf"#[^\n]*|(?P<text>{_LONG}|{_SHORT})|(?P<mark>[\[\]{{}}=,.\n])|(?P<bare>[^\s#\[\]{{}}=,.\"']+)", re.DOTALL
 )
 _OPENED = re.compile(f"#[^\n]*|{_LONG}|(?P<three>[\"']{{3}})|{_SHORT}|(?P<one>[\"'])", re.DOTALL)
-# What tomllib says of a text that has no end.
+# Messages of tomllib for an unterminated text.
 _QUOTED = 'a text between quotes, as name = "press", over several lines between three of them'
 _NO_END = ("Illegal character '\\n'", "Found invalid character '\\n'", "Unterminated string", "Expected \"'")
-# What tomllib says of words without quotes, and of a unit behind a bare number.
+# Messages of tomllib for words without quotes, and for a unit behind a bare number.
 _BARE_WORDS = ("Invalid value", "Expected newline or end of document after a statement")
-# What tomllib says where a key or a table comes a second time.
+# Messages of tomllib for a key or a table that occurs twice.
 _TWICE = ("Cannot overwrite", "Cannot declare", "Duplicate inline")
 
 
@@ -59,7 +59,7 @@ def read_toml(file: Path) -> dict[str, Any]:
 
 
 def toml_text(file: Path) -> str:
-    """Return the text of a file.
+    """Return the text of a UTF-8 file.
 
     Raises
     ------
@@ -82,7 +82,7 @@ def _fault(file: Path, text: str) -> StudyError:
 
 
 def _said(text: str, message: str) -> str:
-    """Repeat what tomllib says; for a key that stands twice, add the line of the first one."""
+    """Return tomllib's message in clearer words; for a duplicate key with the line of the first one."""
     line, column = text.count("\n") + 1, len(text) - text.rfind("\n")
     message = message.replace("at end of document", f"at line {line}, column {column}, the end of the file")
     place = _PLACE.search(message)
@@ -120,13 +120,13 @@ def _name(line: str) -> str | None:
 
 
 def _heading(lines: list[str]) -> str:
-    """Return the table that the last line stands in."""
+    """Return the heading of the table that holds the last line."""
     found = [match[1].strip() for match in map(_TABLE.fullmatch, lines) if match is not None]
     return found[-1] if found else ""
 
 
 def _too_deep(data: dict[str, Any]) -> str | None:
-    """Return the first key under which tables and lists are nested too deeply."""
+    """Return the first key under which tables and lists are nested too deeply, or None."""
     for key, value in data.items():
         level = [value]
         for _ in range(DEEPEST):
@@ -158,16 +158,16 @@ def key_lines(text: str) -> dict[str, int]:
 
 
 class _Walk:
-    """One pass over the tokens; it leans on the parser for what is wrong and looks for keys alone."""
+    """One pass over the tokens of valid TOML that records the line of every key."""
 
     def __init__(self, text: str) -> None:
         self.tokens, line = [("", "", 0)], 1
         for match in _TOKEN.finditer(text):
             self.tokens += [(match.lastgroup, match[0], line)] if match.lastgroup else []
             line += match[0].count("\n")
-        self.tokens = self.tokens[:0:-1]  # the next one is the last
+        self.tokens = self.tokens[:0:-1]  # reversed: the next token is popped from the end
         self.found: dict[str, int] = {}
-        lengths, heading = Counter[str](), ""  # of lists of tables [[x]]
+        lengths, heading = Counter[str](), ""  # of arrays of tables [[x]]
         while self._next() is not None:
             if self._next() != "[":
                 self._entry(heading)
@@ -187,7 +187,7 @@ class _Walk:
         return self.tokens.pop()
 
     def _next(self) -> str | None:
-        """Return the next token that is no end of a line."""
+        """Skip line ends and return the next token, or None at the end."""
         while self.tokens and self.tokens[-1][1] == "\n":
             self._take()
         return self.tokens[-1][1] if self.tokens else None
@@ -204,7 +204,7 @@ class _Walk:
             self._take()
 
     def _entry(self, path: str) -> None:
-        """Note the keys of ``a.b = value``."""
+        """Record the keys of ``a.b = value``."""
         line = self.tokens[-1][2]
         for name in self._names():
             path = _join(path, name)
@@ -235,12 +235,12 @@ def _join(path: str, name: str) -> str:
 
 
 BARE = re.compile(r"[A-Za-z0-9_-]+")
-SHORT = 4  # entries of a table that stand in one line
-EXACT = 17  # digits that tell every float64
+SHORT = 4  # entries of a table that are written in one line
+EXACT = 17  # digits that determine every float64
 
 
 def toml(data: Mapping[str, Any]) -> str:
-    """Return the TOML of a study's tables."""
+    """Return the tables of a study as TOML."""
     return "\n".join(_table((name,), entries) for name, entries in data.items())
 
 
@@ -267,12 +267,12 @@ def _value(entry: object) -> str:
 
 
 def design_entries(family: Family, design: Mapping[str, float]) -> dict[str, str | float]:
-    """Return a design as a study file writes it: texts with units, signs and ratios as numbers."""
+    """Return a design as entries of a study file: texts with units; signs and ratios as numbers."""
     return {p.name: written(p, design[p.name]) for p in family.parameters if p.name in design}
 
 
 def written(p: Parameter, value: float) -> str | float:
-    """Return a value in mm, degrees ... with the fewest digits that read back as the same number, six at least."""
+    """Return a value in mm, degrees ... with the fewest digits, at least six, that read back as the same number."""
     internal = internal_unit(p.unit)
     if internal == "1":
         return int(value) if p.choices is not None else value
