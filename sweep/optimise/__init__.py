@@ -1,4 +1,4 @@
-"""The optimiser: smallest objective under limits, by quadratic programs on its epigraph form, exact gradients."""
+"""The optimiser: minimises an objective under limits by quadratic programs in epigraph form, with exact gradients."""
 
 from __future__ import annotations
 
@@ -31,5 +31,5 @@ __all__ = [
     "read_survey",
 ]
 
-# Worker processes have one thread for BLAS each; with more here the sums, and so a search's last bits, would differ.
+# Worker processes use one BLAS thread; more threads here would change the sums, and so the last bits of a search.
 threadpool_limits(limits=1, user_api="blas")

@@ -1,4 +1,4 @@
-"""A study's optimum: from its dataset to ``_optimum.parquet``, ``_curves.parquet`` and the tables beside them."""
+"""Optimum of a study: computed from its dataset, written to ``_optimum.parquet`` and the tables beside it."""
 
 from __future__ import annotations
 
@@ -73,7 +73,7 @@ TEXTS = {
 
 
 def certificates(results: list[Result]) -> dict[str, list[Any]]:
-    """Return what is known of each result, column by column."""
+    """Return violation, optimality residual, active limits and ending of each result, as table columns."""
     return {
         "violation": [r.violation for r in results],
         "kkt_residual": [r.kkt_residual for r in results],
@@ -89,7 +89,7 @@ def certificates(results: list[Result]) -> dict[str, list[Any]]:
 
 
 def outputs(study: Study, designs: Array) -> dict[str, Any]:
-    """Return every wanted output of designs (k, P) with its error estimate."""
+    """Return every wanted output of designs (k, P), with its error estimate."""
     columns = design_outputs(study.family, designs, study.want, study.accuracy, study.window)
     return {name: values for name, values in columns.items() if name != "status"}
 
@@ -101,9 +101,9 @@ def write(
     own_texts: Mapping[str, tuple[str, str]] = MappingProxyType({}),
     about: Mapping[str, str] = MappingProxyType({}),
 ) -> None:
-    """Write a table whose fields' metadata say unit and definition; ``own_texts`` are those of this table alone.
+    """Write a table whose field metadata give unit and definition; ``own_texts`` add definitions for this table.
 
-    The file's metadata name the study and say what is in ``about``.
+    The metadata of the file name the study and hold ``about``.
     """
     import pyarrow as pa
     import pyarrow.parquet as pq
@@ -149,23 +149,23 @@ def optimise_study(
     say: Say = unsaid,
     key: str = "",
 ) -> Path:
-    """Search from diverse best designs of the dataset and write the result beside it.
+    """Search from diverse good designs of the dataset and write the result beside it.
 
     Parameters
     ----------
-    study : with an objective and [optimise]
-    folder : its dataset; where it has no feasible row, the starts come from a sample of the same bounds
-    stop : asked often; true ends the search as Ctrl-C does
-    jobs : processes the starts are spread over; the result does not depend on it
-    say : called with the number of starts that are done and the most there will be, then with what else is worked on
-    key : what the result depends on, in a word: a search with this key that was stopped goes on behind the parts that
-        were over, and ends with the same bytes; without it nothing is kept
+    study : study with an objective and [optimise]
+    folder : folder of its dataset; if that has no feasible row, the starts come from a sample within the same bounds
+    stop : called often; true ends the search like Ctrl-C
+    jobs : number of processes over which the starts are spread; the result does not depend on it
+    say : called with the number of finished starts and its maximum, then with the name of each further step
+    key : hash of everything that the result depends on; a stopped search with this key continues after its finished
+        parts and ends with the same bytes; without a key nothing is kept
 
     Returns
     -------
-    Path of ``_optimum.parquet``, whose metadata hold what the starts tell of the search (:func:`read_survey`);
-    ``_curves.parquet``, ``_sensitivity.parquet`` and, where the study has tolerances, ``_tolerance.parquet`` and
-    ``_made.parquet`` stand beside it.  Each is written as a whole or not at all.
+    Path of ``_optimum.parquet``, whose metadata hold the survey of the starts (:func:`read_survey`);
+    ``_curves.parquet``, ``_sensitivity.parquet`` and, for a study with tolerances, ``_tolerance.parquet`` and
+    ``_made.parquet`` are written beside it.  Each file is written as a whole or not at all.
 
     Raises
     ------
@@ -174,7 +174,7 @@ def optimise_study(
     StoreError
         if the folder cannot be written
     KeyboardInterrupt
-        if the search was stopped, after the best so far was written.
+        if the search was stopped, after the best result so far was written.
     """
     place = Path(folder)
     side = files.beside(place)
@@ -183,7 +183,7 @@ def optimise_study(
     problem, results, found = _drawing(study, place, deadline, jobs, say, kept)
     nominal, settings, share = results[0], study.optimise, math.nan
     if study.tolerance is not None and study.tolerance.robust is not None and settings and found.ended not in CUT:
-        unlimited = replace(settings, time_budget=None)  # one deadline for all that follows
+        unlimited = replace(settings, time_budget=None)  # one deadline for all following steps
         part = kept.parts.get("insensitive")
         known = None if part is None else np.array(part).reshape(-1, len(problem.family.parameters))
         whole, more = insensitive(study, unlimited, problem, deadline, jobs, say, known)
@@ -224,7 +224,7 @@ def optimise_study(
 def _drawing(
     study: Study, place: Path, deadline: Deadline, jobs: int, say: Say, kept: Kept
 ) -> tuple[Problem, list[Result], Survey]:
-    """Return the problem, the results of its search, best first, and what they tell; those that are kept at once."""
+    """Return the problem, the results of the nominal search, best first, and its survey, or those kept by `Kept`."""
     part = kept.parts.get("drawing")
     if part is not None:
         problem = problem_of_dataset(study, place, np.empty((0, len(study.family.parameters))))
@@ -251,9 +251,9 @@ def _drawing(
 
 
 def _table(study: Study, problem: Problem, results: list[Result], nominal: Result, share: float) -> dict[str, Any]:
-    """Return one row per start, best first, then the reference; a robust design stands before the ``nominal`` best.
+    """Return one row per start, best first, then the reference; a robust design precedes the ``nominal`` best.
 
-    ``share`` is what is known of the first row: the mechanisms within all limits, nan if nobody has counted them.
+    ``share`` is the yield of the first row, nan if it has not been computed.
     """
     designs = np.array([r.design for r in results])
     roles = ["nominal" if r is nominal else "start" for r in results[1:]]
@@ -280,7 +280,7 @@ def _table(study: Study, problem: Problem, results: list[Result], nominal: Resul
 def _reference(study: Study, problem: Problem) -> tuple[Array, float]:
     """Return the study's reference design, (1, P), and its violation.
 
-    It may lie outside the bounds or off the locus.
+    The reference may lie outside the bounds or off the locus.
     """
     design, _ = design_matrix(study.family, study.reference or {})
     if problem.coordinates is not None:
@@ -290,7 +290,7 @@ def _reference(study: Study, problem: Problem) -> tuple[Array, float]:
 
 
 def _curves(study: Study, table: dict[str, Any]) -> dict[str, Any]:
-    """Return pose curves of optimum and reference over one turn; no rows where the study wants none."""
+    """Return pose curves of optimum and reference over one turn; no rows if the study wants none."""
     shown = [k for k, role in enumerate(table["role"]) if role in ("optimum", "reference")]
     designs = np.array([[table[name][k] for name in study.family.parameter_names] for k in shown])
     columns = curves(study, designs.reshape(len(shown), len(study.family.parameters)))
@@ -299,10 +299,10 @@ def _curves(study: Study, table: dict[str, Any]) -> dict[str, Any]:
 
 
 def curves(study: Study, designs: Array) -> Columns:
-    """Return curves of designs (k, P) over one turn, one design below the other; none where the study wants none."""
+    """Return curves of designs (k, P) over one turn, stacked by design; none if the study wants none."""
     family = study.family
     wanted = [*motion_curves(family), *joint_curves(family)]
-    if study.output.curves == "none" or isinstance(family.domain, Interval):  # there is no turn over an interval
+    if study.output.curves == "none" or isinstance(family.domain, Interval):  # an interval has no turn
         designs = designs[:0]
     phi: Array = np.arange(POSES, dtype=np.float64) * (2.0 * np.pi / POSES)
     columns = family.poses(designs, Angles.of(phi[None, :]), frozenset(wanted))
@@ -310,7 +310,7 @@ def curves(study: Study, designs: Array) -> Columns:
 
 
 def _by_role(study: Study, table: dict[str, Any], rows_of: Callable[[Study, Array], dict[str, list[Any]]]) -> Any:
-    """Return rows about the optimum and about the reference, one below the other."""
+    """Return the rows of a table about the optimum, followed by those about the reference."""
     rows: dict[str, list[Any]] = {"role": []}
     for k, role in enumerate(table["role"]):
         if role in ("optimum", "reference"):
@@ -322,7 +322,7 @@ def _by_role(study: Study, table: dict[str, Any], rows_of: Callable[[Study, Arra
 
 
 def _write_made(path: Path, study: Study, design: Array | None) -> None:
-    """Write what is made of the optimum (P,), which takes long where there are many limits; None leaves no table."""
+    """Write the sample of manufactured mechanisms of the optimum (P,), slow for many limits; None removes the table."""
     made = None if design is None else manufactured(study, design)
     if made is None:
         path.unlink(missing_ok=True)
@@ -332,7 +332,7 @@ def _write_made(path: Path, study: Study, design: Array | None) -> None:
 
 
 def sensitivity(study: Study, design: Array) -> dict[str, list[Any]]:
-    """Return how fast what the study wants changes with the dimensions of a design (P,)."""
+    """Return the derivatives of the wanted outputs by the dimensions of a design (P,)."""
     return sensitivities(study.family, design, study.want, study.window)
 
 

@@ -1,1 +1,1 @@
-"""Extrema of a design's curves, followed as it moves, and their gradients."""
+"""Extrema of a design's curves, tracked while the design changes, and their gradients."""

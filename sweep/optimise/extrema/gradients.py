@@ -1,4 +1,4 @@
-"""Exact gradients: one call of the family's poses with the complex step in every variable at every point at once."""
+"""Exact gradients: one call of the family's poses, with a complex step in every variable at all points together."""
 
 from __future__ import annotations
 
@@ -16,15 +16,16 @@ from sweep.optimise.problem.statement import Problem
 from sweep.quantities.measures import Measure
 from sweep.reductions.steps import applying_step
 
-# Mixed derivative of the slope: complex step in the variable, fourth-order difference in the crank angle.
+# Mixed derivative of the slope: complex step in the variable, fourth-order difference in the crank angle (OFFSET
+# [rad]).
 OFFSET = 1e-3
-ALONG = 1e-5  # of the bounds of a variable, for differences between designs at their edges
-LEVEL = 1e-9  # of the bounds of a variable: a curve that varies less than by such a step is the same all over the turn
-ALIKE = 1e-6  # of a box: ends that are as far out as each other
-LOOKS, ZOOM = 256, 16  # angles of a turn at which slopes of a level curve are looked at; finer ones between two of them
+ALONG = 1e-5  # share of a variable's bounds: step of the differences between designs at curve edges
+LEVEL = 1e-9  # share of a variable's bounds: a curve of less variation than this step causes is constant over the turn
+ALIKE = 1e-6  # share of a box: ends within this distance of the outermost count as equal
+LOOKS, ZOOM = 256, 16  # angles of a turn at which slopes of a constant curve are sampled; refinement
 STENCIL = ((-2.0, 1.0 / 12.0), (-1.0, -8.0 / 12.0), (1.0, 8.0 / 12.0), (2.0, -1.0 / 12.0))
 
-# Twelve times the weights of the derivative at the first of five points, in their middle, and at the last.
+# Twelve times the weights of the derivative at the first, the middle and the last of five equidistant points.
 FIVE_POINTS = {
     2.0: (-25.0, 48.0, -36.0, 16.0, -3.0),
     0.0: (1.0, -8.0, 0.0, 8.0, -1.0),
@@ -33,28 +34,28 @@ FIVE_POINTS = {
 
 
 def stepped(problem: Problem, base: Array, fractions: Array) -> Any:
-    """Return n complex designs (n, P), each with the imaginary step STEP in one scaled variable and what follows."""
+    """Return n complex designs (n, P), each with the imaginary step STEP in one scaled variable and its dependants."""
     return problem.placed(base, fractions + 1j * STEP * np.eye(len(fractions)))
 
 
 def gradients(curves: Curves, designs: Any, points: Points, places: bool) -> tuple[Array, Array]:
     """Return derivatives of the curves at the points, and of the points' crank angles, by the scaled variables.
 
-    The motion of a stationary point does not enter (envelope theorem); a crossing of the window's edge moves with
-    the position curve and its two ends, and takes the curve along its slope.  The angle of a stationary point moves by
-    -(dx'/dp)/x'', that of the passage of a level by -(dx/dp)/x'.
+    The motion of a stationary point does not contribute (envelope theorem); a crossing of the window's edge moves with
+    the position curve and its two ends, and changes the curve's value by its slope.  The angle of a stationary point
+    moves by -(dx'/dp)/x'', the angle at which a curve passes a level by -(dx/dp)/x'.
 
     Parameters
     ----------
-    curves : of the problem
+    curves : curves of the problem
     designs : (n, P) complex: the design with the imaginary step STEP in one scaled variable each, see :func:`stepped`
-    points : as left by :meth:`Curves.follow` on this design (values, slopes and curvatures are used)
-    places : whether the second result is wanted; without it the array is zero
+    points : points tracked to this design by :meth:`Curves.follow` (values, slopes and curvatures are used)
+    places : whether the second result is needed; without it that array is zero
 
     Returns
     -------
     (K, n) and (K, n), per unit of the variables scaled to their bounds.  Measured against mpmath: 2e-15 relative for
-    values and angles of passages, 5e-10 for angles of extrema (the difference that gives the curvature).
+    values and angles of passages, 5e-10 for angles of extrema (limited by the difference that gives the curvature).
     """
     values = curves.values(designs, points).imag.T / STEP
     moves = np.zeros_like(values)
@@ -66,7 +67,7 @@ def gradients(curves: Curves, designs: Any, points: Points, places: bool) -> tup
             moves = -mixed / points.curvature[:, None]
     passing = points.how == PASSING
     if passing.any():
-        # The root's implicit derivative; the curve itself stays at its level.
+        # Implicit derivative of the root; the curve's value stays at the level.
         moves[passing] = -values[passing] / points.slope[passing, None]
         values[passing] = 0.0
     if (points.how == EDGE).any():
@@ -84,9 +85,9 @@ def gradients(curves: Curves, designs: Any, points: Points, places: bool) -> tup
 
 
 def _at_edges(curves: Curves, designs: Any, points: Points, values: Array, moves: Array) -> None:
-    """Fill in the derivatives at the edges of curves, which move: differences between designs, each at its own edge.
+    """Fill in the derivatives at curve edges, as differences between designs, each evaluated at its own edge.
 
-    What tolerances add to the curves there counts as constant.
+    Margins for tolerances count as constant there.
     """
     base, direction = designs[0].real, designs.imag / STEP
     both = np.concatenate([base + ALONG * direction, base - ALONG * direction])
@@ -101,16 +102,16 @@ def _at_edges(curves: Curves, designs: Any, points: Points, values: Array, moves
 
 
 def level_gradients(curves: Curves, designs: Any, points: Points, measure: Measure, slopes: Array) -> Array:
-    """Return gradients (k, n) of a reduction of a curve that is the same all over the turn; none of another one.
+    """Return gradients (k, n) of a reduction of a curve that is constant over the turn; none for any other curve.
 
-    Every angle has its extreme then, so that the slopes of all angles count: where a variable grows the largest of them
-    is that of a maximum, that of a range is the largest minus the least.  Of a box those of all its ends are returned.
+    Every angle is an extremum of such a curve, so the slopes at all angles count: if a variable grows, a maximum has
+    the largest slope, a range the largest minus the smallest.  For a box the gradients of all its ends are returned.
 
     Parameters
     ----------
     curves, designs, points : as of :func:`gradients`
-    measure : the reduction, or the negative of one
-    slopes : (K, n) its gradients at the points, whose size tells a level curve from rounding
+    measure : the reduction, or its negative
+    slopes : (K, n) gradients at the points, which give the scale of rounding noise
     """
     of = measure.parts[0] if measure.kind == "minus" else measure
     if of.kind == "box":
@@ -130,13 +131,13 @@ def level_gradients(curves: Curves, designs: Any, points: Points, measure: Measu
 
 
 def _noise(values: Array, slopes: Array) -> float:
-    """Return by how much a curve with that many slopes varies at most that is the same all over the turn."""
+    """Return the largest variation of a curve over the turn that counts as rounding, from its values and slopes."""
     return float(max(LEVEL * np.abs(slopes).max(initial=0.0), 1e-13 * np.abs(values).max()))
 
 
 def _of_box(curves: Curves, designs: Any, points: Points, box: Measure) -> Array:
-    """Return the gradients (2, n) of a box where each variable grows and where it shrinks, of all ends alike."""
-    ends: list[tuple[float, Array, Array]] = []  # what may be foremost or rearmost: value, least and largest slope
+    """Return the gradients (2, n) of a box for growing and for shrinking variables, from all of its equal ends."""
+    ends: list[tuple[float, Array, Array]] = []  # candidates for the outermost ends: value, least and largest slope
     for number in (curves.series.index(s) for s in box.series):
         own = points.take(points.series == number)
         slopes = curves.values(designs, own).imag.T / STEP
@@ -154,7 +155,7 @@ def _of_box(curves: Curves, designs: Any, points: Points, box: Measure) -> Array
 
 
 def _along_the_turn(curves: Curves, designs: Any, number: int) -> tuple[Array, Array]:
-    """Return the least and the largest derivative of a curve over the turn by each scaled variable, (n,)."""
+    """Return the least and the largest derivative of a curve over the turn by each scaled variable, (n,) each."""
     every, step = np.arange(len(designs)), TWO_PI / LOOKS
 
     def at(phi: Array) -> Array:
@@ -181,7 +182,7 @@ def reading_gradient(curves: Curves, designs: Any, output: str, phi: float, move
     ----------
     curves, designs : as of :func:`gradients`
     output : the pose output
-    phi : where it is read [rad];  moves : (n,) derivatives of that angle by the scaled variables
+    phi : crank angle at which the output is read [rad];  moves : (n,) derivatives of phi by the scaled variables
     """
     wanted = frozenset((output,))
     standing = curves.poses(designs, np.array([phi]), wanted)[output][:, 0].imag / STEP
@@ -190,7 +191,7 @@ def reading_gradient(curves: Curves, designs: Any, output: str, phi: float, move
 
 
 def step_gradients(family: Family, designs: Any, outputs: Sequence[str], accuracy: Accuracy) -> dict[str, Array]:
-    """Return gradients (n,) of those outputs that steps of the family give of designs as of :func:`stepped`."""
+    """Return gradients (n,) of the outputs that analytic steps of the family give, for designs of :func:`stepped`."""
     steps: dict[str, tuple[Step, list[str]]] = {}
     for name in outputs:
         found = applying_step(family, name, accuracy)
@@ -205,15 +206,15 @@ def step_gradients(family: Family, designs: Any, outputs: Sequence[str], accurac
 
 
 def scalar_gradient(function: Any, fractions: Array) -> Array:
-    """Return the gradient of a number without inner structure, from five values per variable.
+    """Return the gradient of a function without known structure, from five values per variable.
 
-    Exact steps of a family are good to 1e-15, so a fourth-order difference over 1e-3 of the bounds is good to 1e-11.
-    Near a bound the five points lie on the inner side.
+    Exact steps of a family are accurate to 1e-15, so a fourth-order difference over 1e-3 of the bounds is accurate to
+    1e-11.  Near a bound the five points lie on the inner side.
 
     Parameters
     ----------
     function : takes (k, n) scaled variables, returns (k,), or (k, m) for m functions at once
-    fractions : (n,) where
+    fractions : (n,) scaled variables at which the gradient is taken
 
     Returns
     -------

@@ -1,7 +1,7 @@
-"""Where along the turn the extrema are: found on a grid, refined, and followed while the design changes.
+"""Extrema over the turn: found on a grid, refined, and tracked while the design changes.
 
-Slopes with respect to the crank angle come from the complex step through the family's own poses, so any pose output can
-be followed, with or without an output that is its derivative.
+Slopes by the crank angle come from the complex step through the family's own poses, so any pose output can be tracked,
+with or without an output that is its derivative.
 """
 
 from __future__ import annotations
@@ -41,22 +41,21 @@ from sweep.reductions.sampling import on_closed_turn
 
 Index: TypeAlias = NDArray[np.intp]
 
-STEP = 1e-30  # imaginary step: the error is of order STEP^2, there is no difference to cancel
-NEIGHBOUR = 3e-5  # distance of the slopes whose difference is the curvature; it only steers Newton [rad]
-SETTLED = 3e-6  # a Newton step this short leaves an error of its square [rad]
-STRIDE = 0.1  # longest single move of a followed point [rad]
+STEP = 1e-30  # imaginary step: the error is of order STEP^2, without cancellation
+NEIGHBOUR = 3e-5  # distance of the slopes whose difference gives the curvature, used only in Newton's steps [rad]
+SETTLED = 3e-6  # a Newton step of this length leaves an error of its square [rad]
+STRIDE = 0.1  # longest single move of a tracked point [rad]
 
 
 @dataclass(frozen=True)
 class Points:
     """K points of a design's curves; every array is (K,).
 
-    ``series`` numbers the curve, ``phi`` is the crank angle, ``sense`` +1 for a maximum and -1 for a minimum; ``how``
-    says what holds the point: stationary, the crossing of the window's edge at the fraction ``level`` of the stroke, a
-    fixed angle, an edge of the curve (``level`` says which one, and on which side), or the place where the curve
-    passes ``level``, upwards for ``sense`` +1.  ``value`` is the curve there,
-    ``slope`` and ``curvature`` are its derivatives with respect to phi;
-    ``pace`` is the slope of the position.
+    ``series`` is the number of the curve, ``phi`` the crank angle, ``sense`` +1 for a maximum and -1 for a minimum.
+    ``how`` is the condition that defines the point: stationary, the crossing of the window's edge at the fraction
+    ``level`` of the stroke, a fixed angle, an edge of the curve (``level`` gives its number and side), or the angle at
+    which the curve passes ``level``, upwards for ``sense`` +1.  ``value`` is the curve there, ``slope`` and
+    ``curvature`` are its derivatives by phi; ``pace`` is the slope of the position.
     """
 
     series: Index
@@ -77,12 +76,12 @@ class Points:
         return Points(*(getattr(self, name)[which] for name in self.__dataclass_fields__))
 
     def shifted(self, offset: float) -> Points:
-        """Return the same curves at crank angles ``offset`` further on."""
+        """Return the same points at crank angles increased by ``offset``."""
         return replace(self, phi=self.phi + offset)
 
     @classmethod
     def of(cls, rows: Iterable[Row]) -> Points:
-        """Return points of (series, phi, sense, how, level, value)."""
+        """Return points from rows (series, phi, sense, how, level, value)."""
         table = np.array(list(rows), dtype=np.float64).reshape(-1, 6)
         nothing = np.zeros(len(table))
         number, phi, sense, how, level, value = table.T
@@ -90,15 +89,15 @@ class Points:
 
     @classmethod
     def joined(cls, first: Points, second: Points) -> Points:
-        """Return both sets, the second after the first."""
+        """Return both sets of points, the second after the first."""
         pairs = ((getattr(first, name), getattr(second, name)) for name in first.__dataclass_fields__)
         return cls(*(np.concatenate(pair) for pair in pairs))
 
 
 class Curves:
-    """The curves a problem needs, of one design or of many at the same crank angles.
+    """The curves that a problem needs, for one design or for many at the same crank angles.
 
-    ``places`` says that the angles of extrema are asked for as well: they need the curvature there.
+    With ``places`` the angles of extrema are needed as well, which requires the curvature there.
     """
 
     def __init__(self, problem: Problem, series: tuple[Series, ...], places: bool = False) -> None:
@@ -106,7 +105,7 @@ class Curves:
         self.family = on_closed_turn(differentiable(problem.family))
         followers = [curve(self.family, self.family.follower(s.output)) for s in series if s.window is not None]
         self.series = series = (*series, *(s for s in dict.fromkeys(followers) if s not in series))
-        # Of each series that of the position which says where its window is; -1 for none.
+        # For each series the number of the position that defines its window; -1 without a window.
         known = {s: n for n, s in enumerate(series) if s in followers}
         known |= {s: known[p] for s, p in zip((s for s in series if s.window is not None), followers, strict=True)}
         self.position: Index = np.array([known.get(s, -1) for s in series], np.intp)
@@ -123,15 +122,15 @@ class Curves:
         angles = np.asarray(phi)[None, :]
         if np.iscomplexobj(angles) or np.iscomplexobj(designs):
             angles, designs = angles.astype(np.complex128), np.asarray(designs).astype(np.complex128)
-        # A trial design may leave the domain of its kernel; the search answers the resulting nan by a shorter step.
+        # A trial design may leave the domain of its kernel; the search reacts to the resulting nan with a shorter step.
         with np.errstate(all="ignore"):
             return self.family.poses(np.ascontiguousarray(designs), Angles.of(angles), wanted or self.wanted)
 
     def scan(self, design: Array, samples: int) -> tuple[Points, bool]:
-        """Return all extrema of all curves that can matter, refined, and whether every pose exists.
+        """Return all relevant extrema of all curves, refined, and whether every pose exists.
 
-        Only maxima in the upper half of a curve's range and minima in the lower half are kept.  A curve that is not
-        defined over the whole turn has none.
+        Only maxima in the upper half of a curve's range and minima in the lower half are kept.  A curve that is
+        undefined at some angle has none.
         """
         samples = max(samples, poses_needed(self.problem.family, design, self.wanted))
         phi: Array = np.arange(samples, dtype=np.float64) * (2.0 * math.pi / samples)
@@ -160,7 +159,7 @@ class Curves:
     def _with_edges(
         self, design: Array, columns: dict[str, Any], found: Points, points: Points, stride: float
     ) -> Points:
-        """Return points and those at edges of curves; ``found`` is where the points began, samples ``stride`` apart."""
+        """Add the points at curve edges; ``found`` are the initial points, on samples ``stride`` apart."""
         names = bending(self.problem.family, design, self.plain)
         if not names:
             return points
@@ -173,7 +172,7 @@ class Curves:
             rows += tops(n, sides, which, values, self.curve(self.series[n], columns)[0])
         at_edges = Points.of(rows)
         at_edges = replace(at_edges, value=self.values(design[None, :], at_edges)[0])
-        # A top beside an edge stands for the edge; from elsewhere none may end lower than it began.
+        # An extremum beside an edge is the edge itself; elsewhere a point that ends lower than it began is put back.
         own = np.isin(points.series, bent)
         fell = own & (points.sense * (found.value - points.value) > 0.0)
         phi = np.where(fell, found.phi, points.phi)
@@ -183,7 +182,7 @@ class Curves:
         return Points.joined(Points.joined(points.take(~fell & ~beside), held), at_edges)
 
     def curve(self, series: Series, columns: dict[str, Any]) -> Any:
-        """Return values of a series (n, m) out of pose outputs on a set of angles."""
+        """Return the values (n, m) of a series from pose outputs."""
         x = columns[series.output]
         if series.pressure:
             with np.errstate(invalid="ignore"):
@@ -191,12 +190,12 @@ class Curves:
         return x
 
     def _margin(self, n: int, designs: Any, phi: Any) -> Any:
-        """Return what tolerances add to the maxima of series n and take from its minima, (n, m)."""
+        """Return the tolerance margin added to the maxima of series n and subtracted from its minima, (n, m)."""
         room = self.problem.curve_margins.get(self.series[n].output)
         return np.zeros((len(designs), len(phi))) if room is None else room.at(designs, phi)
 
     def stroke(self, points: Points, n: int) -> tuple[int, int]:
-        """Return the points with the smallest and the largest position of the follower whose stroke cuts series n."""
+        """Return the points of smallest and largest position of the follower that defines the window of series n."""
         own = np.flatnonzero((points.series == self.position[n]) & np.isin(points.how, (STATIONARY, EDGE)))
         low, high = own[points.sense[own] < 0], own[points.sense[own] > 0]
         if not len(low) or not len(high):
@@ -206,9 +205,9 @@ class Curves:
     def follow(self, design: Array, points: Points, stride: float = STRIDE) -> Points:
         """Move the points to their places on this design, and update their values.
 
-        A stationary point climbs (or descends) to its extremum by Newton's method on the slope, at most ``stride`` at a
-        time.  Whatever angle it ends at, the curve's value there bounds the maximum from below.  Slopes, curvatures and
-        paces are brought up to date where an edge or the angles of extrema need them.
+        A stationary point climbs (or descends) to its extremum by Newton's method on the slope, at most ``stride`` per
+        step.  The curve's value at any angle bounds the maximum from below.  Slopes, curvatures and paces are updated
+        if an edge or the angles of extrema need them.
         """
         if not len(points):
             return points
@@ -228,7 +227,7 @@ class Curves:
             climb = held & ~peak
             move[climb] = np.copysign(stride, points.sense * slope)[climb]
             self._approach_edges(points, phi, place, pace, move)
-            # A point whose step changes sign has passed the extremum: halve its longest step from now on.
+            # A step that changes sign has passed the extremum: halve the longest step of that point.
             reach[uphill * move < 0.0] *= 0.5
             uphill = move
             move = np.minimum(np.maximum(move, -reach), reach)
@@ -238,15 +237,15 @@ class Curves:
                 break
         if self.places or (points.how == CROSSING).any():
             slope, curvature, pace, _, value = self._local(design, phi, points, own)
-            # The angle of a passage is itself an atom, so its error is of first order: one more Newton step.
-            with np.errstate(divide="ignore", invalid="ignore"):  # points that do not pass may be level
+            # The angle of a passage is itself an atom, so its error is of first order: take one more Newton step.
+            with np.errstate(divide="ignore", invalid="ignore"):  # other points may have slope zero
                 phi[passing] += np.clip((points.level - value) / slope, -SETTLED, SETTLED)[passing]
         moved = replace(points, phi=phi, slope=slope, curvature=curvature, pace=pace)
         return replace(moved, value=self.values(design[None, :], moved)[0])
 
     def values(self, designs: Any, points: Points) -> Any:
-        """Return curves (n, K) of designs (n, P) at the points' crank angles."""
-        if not self.wanted:  # an output of a step alone follows no curve
+        """Return the curves' values (n, K) for designs (n, P) at the points' crank angles."""
+        if not self.wanted:  # an output computed by a step alone needs no curve
             return np.empty((len(designs), len(points)), dtype=np.result_type(designs))
         columns = self.poses(designs, self._angles(points))
         out = np.empty((len(designs), len(points)), dtype=columns[next(iter(self.wanted))].dtype)
@@ -258,30 +257,31 @@ class Curves:
             if s.output in self.problem.curve_margins:
                 out[:, own] += points.sense[own] * self._margin(n, designs, points.phi[own])
             if s.wrapped:
-                # The angle of the same turn as before: a step of the optimiser never moves it by half a turn.
+                # Choose the turn nearest to the previous value: a step of the optimiser never moves an angle by half a
+                # turn.
                 turns = np.round((points.value[own] - out[:, own].real) / (2.0 * math.pi))
                 out[:, own] += 2.0 * math.pi * np.nan_to_num(turns)
         return out
 
     def positions(self, designs: Any, points: Points) -> Any:
-        """Return the position of the follower whose stroke cuts each point's series, (n, K), at the crank angles."""
+        """Return the position of the follower that defines each point's window, (n, K), at the points' crank angles."""
         return self.values(designs, replace(points, series=self.position[points.series], value=np.zeros(len(points))))
 
     def _angles(self, points: Points) -> Array:
-        """Return the points' angles, then a few that tell the scale of a discriminant where the points cannot."""
+        """Return the points' angles, followed by 16 angles that give the scale of a discriminant."""
         if any(s.pressure for s in self.series):
             return np.concatenate([points.phi, np.arange(16) * (math.pi / 8.0)])
         return points.phi
 
     def _by_series(self, points: Points) -> list[tuple[Series, Index]]:
-        """Return the series that have points, and which points these are."""
+        """Return the series that have points, with the indices of these points."""
         found = ((s, np.flatnonzero(points.series == n)) for n, s in enumerate(self.series))
         return [(s, own) for s, own in found if len(own)]
 
     def _local(
         self, design: Array, phi: Array, points: Points, owners: list[tuple[Series, Index]]
     ) -> tuple[Array, Array, Array, Array, Array]:
-        """Return slope and curvature of each point's output, slope and value of its position, (K,) each."""
+        """Return slope and curvature of each output, slope and value of its position, and its value, (K,) each."""
         three = np.concatenate([phi - NEIGHBOUR, phi, phi + NEIGHBOUR])
         columns = self.poses(design[None, :], three + 1j * STEP)
         k = len(phi)
@@ -336,7 +336,7 @@ def _is_plain(series: Series) -> bool:
 
 
 def _without_repetition(points: Points) -> Points:
-    """Keep one of several grid maxima that refinement has brought to the same crank angle."""
+    """Keep one of several grid maxima that refinement has moved to the same crank angle."""
     key = np.stack([points.series, points.sense, points.how, np.round(np.mod(points.phi, 2.0 * math.pi), 5)])
     _, first = np.unique(key, axis=1, return_index=True)
     return points.take(np.sort(first))

@@ -1,4 +1,4 @@
-"""Where a scan of a curve finds extrema, passages through a level, and edges at which it bends or jumps."""
+"""Scan of a curve for extrema, passages of a level, and edges at which it bends or jumps."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from sweep.reductions.resolution import FEWEST, denser, events
 if TYPE_CHECKING:
     from sweep.optimise.extrema.points import Points
 
-STATIONARY, CROSSING, STATIC, EDGE = 0, 1, 2, 4  # how a point is held; 3 is PASSING of sweep.optimise.extrema.scanned
+STATIONARY, CROSSING, STATIC, EDGE = 0, 1, 2, 4  # kinds of points (``how``); 3 is PASSING below
 
 Row: TypeAlias = tuple[int, float, float, int, float, float]
 
@@ -32,7 +32,7 @@ def extrema(
     if wrapped:
         x = np.unwrap(x)
         if abs(x[0] - x[-1] + math.remainder(x[-1] - x[0], 2.0 * math.pi)) > 1.0:
-            return []  # turns fully: no limit positions
+            return []  # turns fully: has no limit positions
     counts = np.ones(len(x), dtype=np.bool_) if inside is None else inside
     if not counts.any():
         return []
@@ -42,22 +42,22 @@ def extrema(
     before, after, middle = np.roll(x, 1), np.roll(x, -1), 0.5 * (top + bottom)
     peak = counts & (sense * x > sense * before) & (sense * x >= sense * after)
     if inside is None:
-        # In a window all extrema count: a refused step cannot add the extrema of its design.
+        # All extrema inside a window count: a refused step cannot add the extrema of its design.
         peak &= sense * (x - middle) >= 0.0
     return [(n, float(phi[j]), sense, STATIONARY, math.nan, float(x[j])) for j in np.flatnonzero(peak)]
 
 
 def tops(n: int, phi: Array, which: Array, values: Array, curve: Array) -> list[Row]:
-    """Return rows of points at the higher side of every edge for maxima, at the lower one for minima.
+    """Return points at the higher side of every edge as maxima and at the lower side as minima.
 
-    Their level says what the edge is, negative for a point before it.
+    Their level is the number of the edge, negative for a point before it.
 
     Parameters
     ----------
     n : number of the series
     phi, values : (2, k) both sides of the edges, and the curve there
-    which : (k,) what each edge is
-    curve : (m,) the curve over the turn: as elsewhere, only what is in its upper half can be a maximum that matters
+    which : (k,) number of each edge
+    curve : (m,) the curve over the turn; only points in its upper half can be relevant maxima
     """
     if not np.isfinite(values).all():
         return []
@@ -72,16 +72,16 @@ def tops(n: int, phi: Array, which: Array, values: Array, curve: Array) -> list[
     return rows
 
 
-NEARING, PASSING = 0, 3  # how a point is held: an extremum that only comes near the level; the passage itself
+NEARING, PASSING = 0, 3  # kinds of points (``how``): an extremum that approaches the level, and a passage of the level
 
 
 def passages(
     n: int, phi: Array, x: Array, level: float, sense: float
 ) -> list[tuple[int, float, float, int, float, float]]:
-    """List where samples over the turn pass the level in that sense, and where they only come near it.
+    """Find where samples over the turn pass the level in the given sense, and where they only approach it.
 
-    Rows are those of :meth:`sweep.optimise.extrema.points.Points.of`.  The extrema that come near the level without
-    reaching it say how far another passage is.
+    Rows are those of :meth:`sweep.optimise.extrema.points.Points.of`.  The extrema that approach the level without
+    reaching it show how far a further passage is.
     """
     if not np.isfinite(x).all():
         return []
@@ -94,19 +94,19 @@ def passages(
 
 
 def first_passage(phi: Array, how: NDArray[np.intp], own: Sequence[int]) -> tuple[int | None, list[int]]:
-    """Return the point of a curve where it first passes its level in [0, 2 pi).
+    """Return the point at which a curve first passes its level in [0, 2 pi).
 
-    Points before it that only come near the level are returned, too.
+    Points before it that only approach the level are returned, too.
 
     Parameters
     ----------
-    phi, how : (K,) angles of the points, and how each is held
+    phi, how : (K,) angles and kinds of the points
     own : numbers of the curve's points
 
     Notes
     -----
-    If a point that only comes near the level reaches it, an earlier passage arises and the event jumps to it.  No
-    gradient foretells that, so the search has to keep these points on their side of the level.
+    If a point that only approaches the level reaches it, an earlier passage arises and the event jumps to it.  No
+    gradient predicts that, so the search has to keep these points on their side of the level.
     """
     order = sorted(own, key=lambda k: math.remainder(phi[k] - math.pi, math.tau))
     before = list(itertools.takewhile(lambda k: how[k] != PASSING, order))
@@ -114,13 +114,13 @@ def first_passage(phi: Array, how: NDArray[np.intp], own: Sequence[int]) -> tupl
     return first, before
 
 
-LOOKS = 512  # poses among which levels that are passed, and followers that reverse, are looked for
-BESIDE = 1e-11  # distance from an edge at which its sides are looked at [rad]
-REACH = 0.1  # by which an edge moves with a step of the search at most [rad]: further ones are others
+LOOKS = 512  # samples of a turn in which passages of levels and reversals of followers are sought
+BESIDE = 1e-11  # distance from an edge at which its sides are evaluated [rad]
+REACH = 0.1  # largest motion of an edge in one step of the search [rad]; an edge farther away is another one
 
 
 def poses_needed(family: Family, design: Array, outputs: Collection[str]) -> int:
-    """Return how many poses of a turn show all that curves of a design hold; 0 where any number will do."""
+    """Return the number of poses per turn that resolves the curves of a design; 0 if any number will do."""
     if isinstance(family.domain, Interval) or not any(family.every(kind) for kind in (Waves, Singular, Switches)):
         return 0
     return int(FEWEST * denser(family, design[None, :], outputs)[0])
@@ -140,10 +140,10 @@ def bending(family: Family, design: Array, outputs: tuple[str, ...]) -> list[int
 
 
 def edges(family: Family, design: Array, outputs: Collection[str]) -> tuple[Array, Array]:
-    """Return crank angles just before and just behind every edge of some curves, (2, k) [rad], and what each is, (k,).
+    """Return crank angles just before and just behind every edge of some curves, (2, k) [rad], and its number, (k,).
 
-    The latter is 1 + j for the end j of those known beforehand, 1/2 where a level is passed, a follower reverses, or
-    something passes zero at which the curves bend.
+    The number is 1 + j for the end j of those known beforehand, 1/2 for a passed level, a reversal of a follower, or a
+    zero at which the curves bend.
     """
     known = switches(family, design[None, :], outputs)[0]
     found = events(family.precise(), design[None, :], LOOKS, outputs)[1]
@@ -153,15 +153,16 @@ def edges(family: Family, design: Array, outputs: Collection[str]) -> tuple[Arra
 
 
 def followed(family: Family, designs: Array, phi: Array, level: Array, outputs: Collection[str]) -> Array:
-    """Return where points at edges belong on other designs, (n, k).
+    """Return the crank angles of edge points on other designs, (n, k).
 
-    An end known beforehand is found by its number, another one as the nearest: where that is far away the point stays.
+    An end known beforehand is found by its number, any other edge as the nearest one; without a near one the point
+    stays.
 
     Parameters
     ----------
     family, designs : (n, P)
-    phi : (k,) crank angles of the points, beside an edge of a design near by
-    level : (k,) what the edge is, negative for a point before it
+    phi : (k,) crank angles of the points, beside an edge of a neighbouring design
+    level : (k,) number of the edge, negative for a point before it
     outputs : as of :func:`edges`
     """
     side, number = np.sign(level), np.abs(level)
@@ -181,12 +182,12 @@ def followed(family: Family, designs: Array, phi: Array, level: Array, outputs: 
 
 
 def distances(edges: Array, phi: Array) -> Array:
-    """Return the distance of every crank angle (k,) from the nearest of some edges [rad]."""
+    """Return the distance of every crank angle (k,) from the nearest edge [rad]."""
     return np.asarray(np.abs(_way(phi, edges[:, None])).min(axis=0, initial=math.pi), np.float64)
 
 
 def overtopped(points: Points, at_edges: Points, stride: float) -> NDArray[np.bool_]:
-    """Tell which points have an edge as high within a stride: Newton's steps towards a kink end beside it."""
+    """Tell which points have an edge at least as high within a stride; Newton's steps towards a kink end beside it."""
     found = np.zeros(len(points), np.bool_)
     for k in range(len(at_edges)):
         edge = at_edges.take([k])
@@ -197,7 +198,7 @@ def overtopped(points: Points, at_edges: Points, stride: float) -> NDArray[np.bo
 
 
 def _way(start: Array, end: Array) -> Array:
-    """Return the shorter way from one crank angle to another [rad]."""
+    """Return the shorter way between two crank angles, in [-pi, pi) [rad]."""
     return np.asarray(np.remainder(end - start + math.pi, TWO_PI) - math.pi, np.float64)
 
 
@@ -207,14 +208,14 @@ def _bends(family: Family, name: str) -> bool:
 
 
 def discriminant_scale(discriminant: Any, pressure_angle: Any) -> Any:
-    """Divide the discriminant by cos^2 of the pressure angle, (n, 1): one number for all crank angles.
+    """Return the ratio of a discriminant to cos^2 of the pressure angle, (n, 1): one number for all crank angles.
 
-    Taken at the pose whose pressure angle is nearest to half a radian: well away from the dead points, where the ratio
-    is 0/0, and from a pressure angle of zero, where the angle (not its cosine) has a kink and no derivative.
+    It is taken at the pose whose pressure angle is nearest to half a radian: well away from the dead points, where the
+    ratio is 0/0, and from a pressure angle of zero, where the angle (not its cosine) has a kink.
     """
     angle = pressure_angle.real
     distance = np.where(np.isfinite(angle), np.abs(angle - 0.5), np.inf)
     best = np.arange(len(angle)), np.argmin(distance, axis=1)
     cos = np.cos(pressure_angle[best])
-    with np.errstate(invalid="ignore"):  # where nothing assembles the scale is nan, and so is all that needs it
+    with np.errstate(invalid="ignore"):  # if no pose assembles, the scale is nan, and so is everything that needs it
         return (discriminant[best] / (cos * cos))[:, None]

@@ -1,1 +1,1 @@
-"""The least objective for each bound on a second output."""
+"""Fronts: the objective minimised for each bound on a second output."""

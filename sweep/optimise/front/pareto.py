@@ -1,4 +1,4 @@
-"""Fronts: the least objective for each of several bounds on a second output (epsilon constraint)."""
+"""Fronts: the objective minimised for each of several bounds on a second output (epsilon constraint)."""
 
 from __future__ import annotations
 
@@ -25,19 +25,19 @@ if TYPE_CHECKING:
     from sweep.study import ParetoSettings
 
 
-NARROWEST = 1.0 / 256.0  # of the whole range of bounds: a narrower gap is a jump, which no point fills
-LEAST = 1e-4  # of the square around the front: a smaller triangle is no gap
-SHOWN = 0.02  # a larger gap is reported
+NARROWEST = 1.0 / 256.0  # share of the range of bounds: a narrower gap is a jump of the front, which no point fills
+LEAST = 1e-4  # share of the square around the front: a smaller triangle is no gap
+SHOWN = 0.02  # share of that square above which a gap is reported
 
 
 @dataclass(frozen=True)
 class Front:
     """Bounds on a second output, the loosest first, with the best result known for each.
 
-    ``results`` holds None where no search has begun; ``found`` says in which step a result was found; ``taken`` counts
-    the steps that are finished.  The first ``given`` bounds are those asked for, further ones are placed until there
-    are ``points``, or until the front is ``filled``: no gap is left that a point could fill.  A front is all that a
-    search interrupted between two steps needs to go on.
+    ``results`` holds None for a bound not yet searched; ``found`` is the step that found each result; ``taken`` counts
+    the finished steps.  The first ``given`` bounds are those of the study; further ones are placed until there are
+    ``points``, or until the front is ``filled``, without a gap that a point could fill.  A front is the whole state of
+    a search, which can be interrupted between two steps.
     """
 
     bounds: tuple[float, ...]
@@ -50,14 +50,14 @@ class Front:
 
     @classmethod
     def of(cls, settings: ParetoSettings) -> Front:
-        """Return a front of which nothing is known yet."""
+        """Return a front without results."""
         bounds = tuple(sorted(set(settings.bounds), reverse=not settings.at_least))
         none, never = (None,) * len(bounds), (-1,) * len(bounds)
         return cls(bounds, none, never, given=len(bounds), points=settings.points or len(bounds))
 
     @property
     def steps(self) -> int:
-        """The number of steps: those of the given bounds, and one for each further point."""
+        """Number of steps: those of the given bounds, and one for each further point."""
         return len(steps(self.given)) + max(self.points - self.given, 0)
 
     @property
@@ -66,13 +66,13 @@ class Front:
         return self.taken == self.steps or self.filled
 
     def known(self) -> list[tuple[float, Result]]:
-        """Return the bounds that were begun, with their results."""
+        """Return the searched bounds with their results."""
         return [(b, r) for b, r in zip(self.bounds, self.results, strict=True) if r is not None]
 
 
 @dataclass(frozen=True)
 class Step:
-    """Search bound number ``target`` from the result of its neighbour, at first from all other starts as well."""
+    """Search of bound ``target`` from the result of its neighbour, in the first pass from all starts as well."""
 
     target: int
     neighbour: int
@@ -82,7 +82,7 @@ class Step:
 def steps(count: int) -> tuple[Step, ...]:
     """List the steps of a front: from the loosest bound to the tightest, back, and to the tightest again.
 
-    Each search starts from its neighbour's result, so a good design reaches every bound that it keeps.
+    Each search starts from its neighbour's result, so a good design reaches every bound that it satisfies.
     """
     there = [Step(k, k - 1, first=True) for k in range(count)]
     back = [Step(k, k + 1, first=False) for k in range(count - 2, -1, -1)]
@@ -91,16 +91,17 @@ def steps(count: int) -> tuple[Step, ...]:
 
 
 def searches(settings: ParetoSettings) -> int:
-    """Return local searches a front takes at most, from the settings alone."""
+    """Return the largest number of local searches of a front, from the settings alone."""
     count = len(Front.of(settings).bounds)
     placed = max((settings.points or count) - count, 0)
-    # One more start is the optimum itself, one more from the second bound on the result before.  A placed bound begins
+    # Each bound adds the optimum as a start, from the second bound on also the previous result.  A placed bound starts
+    # from both neighbours as well, and its result is tried for them.
     # with both neighbours besides, and is lent to them.
     return count * (settings.starts + 1) + max(0, 3 * (count - 1)) + placed * (settings.starts + 5)
 
 
 def bounded(problem: Problem, settings: ParetoSettings, bound: float) -> Problem:
-    """Return the problem with the bound in place of its own limit on that side of the second output."""
+    """Return the problem with the bound replacing its own limit on that side of the second output."""
     name = settings.output
     others = tuple(limit for limit in problem.limits if limit.output != name)
     own = [limit for limit in problem.limits if limit.output == name]
@@ -118,25 +119,25 @@ def pareto(
     stop: Callable[[], bool] | None = None,
     jobs: int = 1,
 ) -> list[Result]:
-    """Return the least objective for each bound on the second output, the loosest bound first.
+    """Return the minimised objective for each bound on the second output, the loosest bound first.
 
-    With ``settings.points`` further bounds are placed, one after the other in the middle of the largest gap.
-    Every bound is searched from its starts and from the result of the next looser one.  Then the results go back from
-    the tighter to the looser bounds, for which they are good designs too, and forth again, so a bound never has a worse
-    design than a tighter one.  A bound that makes no difference repeats the design.
+    With ``settings.points`` further bounds are placed, one after the other in the middle of the largest gap.  Every
+    bound is searched from its starts and from the result of the next looser one.  Then the results are passed from the
+    tighter to the looser bounds, which they satisfy too, and forth again, so a bound never has a worse design than a
+    tighter one.  A bound that is not active repeats the design.
 
     Parameters
     ----------
-    problem : objective and limits; a limit on the second output gives way to the bound on its side, the other stays
+    problem : objective and limits; the bound replaces a limit on its side of the second output, the other side stays
     settings : second output and bounds; ``time_budget`` is an emergency deadline for the whole front
     starts : (k, P) designs for all bounds, or one such array for each bound, the loosest first
-    stop : as for :func:`sweep.optimise.minimise`; the bounds reached by then are returned
+    stop : as for :func:`sweep.optimise.minimise`; the bounds reached until then are returned
     jobs : processes
 
     Returns
     -------
-    One result per bound that was begun; an infeasible one says so in its ``status``.  Same starts, same results, unless
-    it was stopped.
+    One result per searched bound; an infeasible one says so in its ``status``.  The same starts give the same
+    results, unless the search was stopped.
 
     Raises
     ------
@@ -159,8 +160,8 @@ def advance(
 ) -> Iterator[Front]:
     """Yield the front after each further step; parameters as for :func:`pareto`.
 
-    The steps of a front taken up half way are those of one that was never left, to the bit.  A step that ``stop`` cut
-    short leaves the best it found but counts as not taken, and nothing follows it.
+    A resumed front takes the same steps as an uninterrupted one, to the bit.  A step cut short by ``stop`` keeps its
+    best result but does not count as taken, and the search ends.
     """
     if settings.output == problem.objective:
         raise InputError("second output", settings.output, "another output than the objective", PLACE)
@@ -197,10 +198,10 @@ def _placed(
     asked: Callable[[], bool],
     jobs: int,
 ) -> tuple[Front, bool]:
-    """Return the front with one more bound, in the middle of its largest gap, and whether it was cut short.
+    """Return the front with one more bound, in the middle of its largest gap, and whether the search was cut short.
 
-    It is searched from the results of both neighbours and from the starts of the next tighter bound that was given.
-    Its tighter neighbour is searched from what it finds, and so are looser bounds as far as that is better there.
+    The bound is searched from the results of both neighbours and from the starts of the next tighter given bound.  Its
+    result is then a start for the tighter neighbour, and for looser bounds as long as it is better there.
     """
     found = gaps(np.array(front.bounds), *places(problem, settings, front))
     if not found:
@@ -232,7 +233,7 @@ def _placed(
 
 
 def places(problem: Problem, settings: ParetoSettings, front: Front) -> tuple[Array, Array]:
-    """Return the second output and the objective of each result; the bound and nan where there is none."""
+    """Return second output and objective of each result; the bound and nan for a bound without a feasible one."""
     reached, values = np.array(front.bounds, np.float64), np.full(len(front.bounds), np.nan)
     good = {k: r for k, r in enumerate(front.results) if r is not None and r.feasible}
     if good:
@@ -246,11 +247,11 @@ def places(problem: Problem, settings: ParetoSettings, front: Front) -> tuple[Ar
 
 @dataclass(frozen=True)
 class Gap:
-    """Two neighbouring points of a front: the number of the looser one, and how large the gap is.
+    """Two neighbouring points of a front: number of the looser one, and size of the gap.
 
-    Within bounds that tighten the objective only grows, so between two points the front lies in the rectangle they
-    span, and a convex one in its lower triangle.  ``area`` is that of the triangle, with both axes scaled to 1.
-    ``middle`` halves it.
+    The objective can only grow as the bound tightens, so between two points the front lies in the rectangle they span,
+    and a convex front in its lower triangle.  ``area`` is that of the triangle, with both axes scaled to 1.  ``middle``
+    is the bound in the middle of the gap.
     """
 
     number: int
@@ -261,16 +262,14 @@ class Gap:
 def gaps(bounds: Array, reached: Array, values: Array) -> list[Gap]:
     """Return the gaps of a front that a point could fill, the largest first.
 
-    Of equal gaps the looser comes first.
-
-    Between the bound of a point and what it reaches the front is flat, so a gap goes from what the looser point reaches
-    to the bound of the tighter one.
+    Of equal gaps the looser comes first.  Between the bound of a point and its second output the front is flat, so a
+    gap extends from the second output of the looser point to the bound of the tighter one.
 
     Parameters
     ----------
-    bounds : on the second output, the loosest first
-    reached : what the points reach of the second output; their bounds where nothing was found
-    values : the objective to be small, nan where no design keeps the bound: the front ends before it, at any height
+    bounds : bounds on the second output, the loosest first
+    reached : second output of the points; the bound if nothing was found
+    values : minimised objective, nan if no design keeps the bound: the front ends before it, at unknown height
     """
     known = np.isfinite(values)
     if bounds.size < 2 or not known.any():
@@ -292,7 +291,7 @@ def gaps(bounds: Array, reached: Array, values: Array) -> list[Gap]:
 
 
 def _begin(front: Front, step: Step, number: int, starts: Array) -> Array | None:
-    """Return designs to start from; None where the neighbour has nothing new to offer."""
+    """Return the starting designs of a step, or None if the neighbour offers nothing new."""
     near = front.results[step.neighbour] if 0 <= step.neighbour < len(front.bounds) else None
     if step.first:
         designs = starts if near is None else np.concatenate([near.design[None, :], starts])
@@ -304,7 +303,7 @@ def _begin(front: Front, step: Step, number: int, starts: Array) -> Array | None
     seen = step.neighbour < step.target and front.found[step.neighbour] < front.given
     worse = held.feasible and not near.feasible
     offers = not (seen or worse or np.array_equal(near.design, held.design))
-    # A search that has not converged goes on from where it ended.
+    # A search that has not converged is continued from its end.
     unfinished = held.status == st.NOT_CONVERGED
     begin = [near.design] * offers + [held.design] * unfinished
     return np.array(begin) if begin else None
@@ -318,7 +317,7 @@ def _search(
     asked: Callable[[], bool],
     jobs: int,
 ) -> Result:
-    # All starts of a bound are searched: the rule that ends a search early does not apply here.
+    # All starts of a bound are searched: the stopping rule of the survey is switched off.
     search = OptimiseSettings(len(begin), unseen=0.0, looks=settings.looks)
     results = minimise(bounded(problem, settings, bound), begin, search, asked, jobs)
     cut = any(r.ended in CUT for r in results) or len(results) < len(begin)
@@ -326,7 +325,7 @@ def _search(
 
 
 def _with(front: Front, step: Step, number: int, result: Result) -> Front:
-    """Return the front with this result where it is the better one."""
+    """Return the front with this result if it is better than the known one."""
     held = front.results[step.target]
     if held is not None and not result.rank < held.rank:
         return front

@@ -1,4 +1,4 @@
-"""A study's front: from its dataset and its optimum to ``_pareto.parquet``, step by step and resumable."""
+"""Front of a study: computed from its dataset and its optimum, written to ``_pareto.parquet`` in resumable steps."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ if TYPE_CHECKING:
     from sweep.optimise.problem.statement import Problem
     from sweep.study import ParetoSettings, Study
 
-KEPT = 2048  # best rows of the dataset within each bound among which starts are chosen
+KEPT = 2048  # best rows of the dataset within each bound from which starts are chosen
 KEY, STATE = b"key", b"state"
 
 
@@ -42,19 +42,18 @@ def front_study(
     jobs: int = 1,
     say: Say = unsaid,
 ) -> Path:
-    """Search the least objective for each bound of [pareto] and write the front beside the optimum, step by step.
+    """Minimise the objective for each bound of [pareto] and write the front beside the optimum after every step.
 
-    A front in the folder that carries the same key is taken up where it stopped and ends with the bytes of one that was
-    never stopped.
+    A front in the folder with the same key is resumed, and ends with the bytes of an uninterrupted one.
 
     Parameters
     ----------
-    study : with [pareto]
-    folder : its dataset, with ``_optimum.parquet``
-    key : what the result depends on, in a word
-    stop : asked often; true ends the search as Ctrl-C does
-    jobs : processes the starts are spread over; the result does not depend on it
-    say : called with how many steps of the front are done, and how many there are
+    study : study with [pareto]
+    folder : folder of its dataset, with ``_optimum.parquet``
+    key : hash of everything that the result depends on
+    stop : called often; true ends the search like Ctrl-C
+    jobs : number of processes over which the starts are spread; the result does not depend on it
+    say : called with the numbers of finished steps and of all steps of the front
 
     Returns
     -------
@@ -99,7 +98,7 @@ def front_study(
 
 
 def saved(path: Path, key: str) -> Front | None:
-    """Return the front a file holds, as its search left it; None where there is no file, or one with another key."""
+    """Return the front that a file holds, or None if there is no file or its key differs."""
     about = metadata(path)
     if about.get(KEY) != key.encode():
         return None
@@ -109,14 +108,14 @@ def saved(path: Path, key: str) -> Front | None:
             tuple(state["bounds"]), tuple(r and result_of(r) for r in state["results"]), tuple(state["found"]),
             state["taken"], state["given"], state["points"], state["filled"],
         )  # fmt: skip
-    except (ValueError, KeyError, TypeError):  # damaged: the search begins anew
+    except (ValueError, KeyError, TypeError):  # damaged: start again
         return None
 
 
 def _write(
     path: Path, study: Study, settings: ParetoSettings, best: Front, key: str, kept: Front, ended: str = ""
 ) -> None:
-    """Write ``best`` as the rows; ``kept``, the front after its last finished step, is what a search goes on from."""
+    """Write ``best`` as rows; the search resumes from ``kept``, the front after its last finished step."""
     bounds, results = (list(column) for column in zip(*best.known(), strict=True))
     designs = np.array([r.design for r in results])
     columns: dict[str, Any] = {"bound": bounds}
@@ -137,7 +136,7 @@ def _unit(study: Study, name: str) -> str:
 
 
 def _searched(study: Study, folder: Path) -> tuple[Array, Array]:
-    """Return the designs that the search for the optimum ended at (k, P), and of them the optimum (1, P)."""
+    """Return the designs at which the search for the optimum ended, (k, P), and the optimum (1, P)."""
     names = list(study.family.parameter_names)
     rows = _columns(files.beside(folder) / files.OPTIMUM, [*names, "role"])
     designs = np.column_stack([rows[name] for name in names]).astype(np.float64)
@@ -147,7 +146,7 @@ def _searched(study: Study, folder: Path) -> tuple[Array, Array]:
 def _starts(study: Study, settings: ParetoSettings, problem: Problem, folder: Path, own: Array) -> list[Array]:
     """Return the starts for each bound, the loosest bound first.
 
-    They are the optimum ``own`` and diverse best designs of the dataset within the bound.
+    These are the optimum ``own`` and diverse good designs of the dataset within the bound.
     """
     chosen = []
     for designs, merit in within(study, settings, Front.of(settings).bounds, folder):
@@ -159,7 +158,7 @@ def _starts(study: Study, settings: ParetoSettings, problem: Problem, folder: Pa
 def within(
     study: Study, settings: ParetoSettings, bounds: tuple[float, ...], folder: Path
 ) -> list[tuple[Array, Array]]:
-    """Return the best feasible designs (k, P) of a dataset within each bound, k up to 2048, and their objective."""
+    """Return the best feasible designs (k, P) of a dataset within each bound, k up to 2048, with their objectives."""
     assert study.objective is not None
     names = study.family.parameter_names
     kept = [(np.empty((0, len(names))), np.empty(0)) for _ in bounds]

@@ -1,1 +1,1 @@
-"""The search from one start: SLSQP, Newton rounds, polish, and what is known of its end."""
+"""Local search from one start: SLSQP, Newton rounds, polishing, and the optimality check of its end."""

@@ -1,4 +1,4 @@
-"""One start: rounds of SLSQP, then of Newton steps, each checked against the true extrema; then polish."""
+"""One start: rounds of SLSQP, then of Newton steps, each checked against the true extrema; then polishing."""
 
 from __future__ import annotations
 
@@ -21,31 +21,31 @@ from sweep.optimise.problem.rows import Form
 from sweep.optimise.problem.statement import Problem
 
 ROUNDS, CYCLES = 60, 3
-PATIENCE, AGAIN = 8, 2  # rounds of learnt curvature that may halve a violation, at first and after Newton rounds
-NEWTON = 240  # rounds of Newton steps: along a narrow curved valley hundreds are needed, and each gains
-SOON = 30  # of these on a locus, before the parameters are tried: near its singular places they creep
+PATIENCE, AGAIN = 8, 2  # quasi-Newton rounds allowed to halve a violation, at first and after Newton rounds
+NEWTON = 240  # Newton rounds: along a narrow curved valley hundreds are needed, and each gains
+SOON = 30  # Newton rounds on a locus before the parameters are tried: near its singular places they creep
 KKT = 1e-6  # residual of a converged result
-CORNER = 1e-14  # residual of a result that no Newton round betters: SLSQP gets into corners of limits to rounding
-RETURNS = 2  # to where a search left the limits
-DEARER = 10.0  # violations become so many times where a search comes to rest outside of its limits
-DWINDLING = 1e-9  # gain of a round from which a fulfilled condition of optimality ends the search
-REMEMBERED = 48  # extrema of refused designs that stay among the rows: the next long step would meet them again
-NEAR_ANGLE = 0.1  # a followed point reaches this far by itself [rad]
-NEAR = 1e-3  # scaled violation from which the objective is looked at
+CORNER = 1e-14  # residual that no Newton round improves: SLSQP reaches corners of limits to rounding
+RETURNS = 2  # returns to the last design within the limits
+DEARER = 10.0  # factor on the price of violations if a search comes to rest outside of its limits
+DWINDLING = 1e-9  # gain of a round below which a satisfied optimality condition ends the search
+REMEMBERED = 48  # extrema of refused designs kept among the rows, since the next long step would meet them again
+NEAR_ANGLE = 0.1  # largest distance that a tracked point moves by itself [rad]
+NEAR = 1e-3  # scaled violation below which the objective is minimised
 Propose: TypeAlias = Callable[[Model, State, Form, float, float, float | None], tuple[Array, float]]
 
 
 class Descent:
-    """Search from one start; ``best`` always holds the best checked design so far, ``gap`` is that of the last round.
+    """Search from one start; ``best`` is always the best checked design so far, ``gap`` is that of the last round.
 
-    ``within`` is the best design within the limits that was met, None before the first.
+    ``within`` is the best design met within the limits, None before the first.
 
     Parameters
     ----------
     problem, program : what to minimise
     start : (P,) design; its signs are kept
     stop : asked at every evaluation; true ends the search by :class:`sweep.optimise.local.model.Stopped`
-    allowed : evaluations after which it ends as well
+    allowed : number of evaluations after which the search ends as well
     """
 
     def __init__(
@@ -59,7 +59,7 @@ class Descent:
 
     @property
     def best(self) -> State:
-        """The design that the search is at."""
+        """Current design of the search."""
         return self._best
 
     @best.setter
@@ -69,10 +69,10 @@ class Descent:
             self.within = new
 
     def run(self) -> State:
-        """Search for a feasible design first, then for the best; polish it and verify it on a finer grid.
+        """Search for a feasible design first, then for the best one; polish it and verify it on a finer grid.
 
-        A limit may have no slope beyond its bound, as ``phi0`` where a follower meets its ends twice a turn: from there
-        no step leads back, so the search goes on where it left the limits, at a price that keeps it within them.
+        A limit may have no slope beyond its bound, as ``phi0`` if a follower meets its ends twice a turn.  No step
+        leads back from there, so the search resumes where it left the limits, with a higher price of violations.
         """
         self._descend()
         for _ in range(RETURNS):
@@ -85,7 +85,7 @@ class Descent:
         return self.best
 
     def return_within(self) -> None:
-        """Take the best design within the limits where the search has ended outside of them."""
+        """Replace a final design outside the limits by the best one met within them."""
         if not self.best.feasible and self.within is not None:
             self.best = self.within
 
@@ -100,9 +100,9 @@ class Descent:
                 break
 
     def _settle(self) -> None:
-        """Minimise until the conditions of optimality hold; where a locus makes that slow, use the parameters."""
+        """Minimise until the optimality conditions hold; if a locus makes that slow, continue in the parameters."""
         if self._optimal(KKT):
-            return  # it began where an earlier search had ended
+            return  # the start was the end of an earlier search
         other = in_parameters(self.model.problem, self.best.design)
         for _ in range(CYCLES):
             self._rounds(slsqp.propose, relaxed=False, enough=1e-4, rounds=8)
@@ -120,7 +120,7 @@ class Descent:
         return self.best.violation <= ACTIVE and self.model.certificate(self.best).residual <= residual
 
     def _detour(self, other: Problem) -> None:
-        """Search from the present design in other coordinates, and come back with what is found there."""
+        """Search from the present design in other coordinates, and return to the original ones with the result."""
         model = self.model
         there = Descent(other, Program(other), self.best.design, model.stop, model.allowed - model.looks)
         try:
@@ -134,9 +134,10 @@ class Descent:
                     self.best = new
 
     def _restore(self) -> None:
-        """Find the smallest relaxation of the limits: zero where a feasible design is near.
+        """Find the smallest relaxation of the limits: zero if a feasible design is near.
 
-        In a narrow curved valley learnt curvature, which every round begins anew, creeps; there Newton rounds go on.
+        In a narrow curved valley quasi-Newton curvature, rebuilt every round, converges slowly; then Newton rounds
+        follow.
         """
         patience = PATIENCE
         for _ in range(ROUNDS):
@@ -156,13 +157,13 @@ class Descent:
     def _rounds(
         self, propose: Propose, relaxed: bool, enough: float, rounds: int = ROUNDS, patience: int | None = None
     ) -> bool:
-        """Take the designs that ``propose`` finds, if their true extrema are better, until a round gains too little.
+        """Accept the designs that ``propose`` finds if their true extrema are better, until a round gains too little.
 
-        A refused design shortens the next step, and its extrema that the rows did not know are added to them.
+        A refused design shortens the next step, and its extrema missing among the rows are added to them.
 
         Returns
         -------
-        Whether the search was slow: ``patience`` rounds in a row have not halved the violation.
+        Whether the search was slow: ``patience`` rounds in a row did not halve the violation.
         """
         radius, extra, refused = 0.25, Points.of([]), False
         missed: list[float] = []
@@ -193,7 +194,7 @@ class Descent:
                 if gain <= enough * max(abs(true), 1.0) or (relaxed and new.feasible):
                     break
                 if residual <= (KKT if gain <= DWINDLING else 1e-2 * KKT):
-                    break  # the polish covers the rest of the distance in one step
+                    break  # the polish covers the remaining distance in one step
             elif step < 1e-10 or gain > -1e-13 or radius < 1e-7:
                 break
             else:
@@ -203,17 +204,17 @@ class Descent:
         return False
 
     def _unknown(self, found: Points, known: Points) -> Points:
-        """Return the extrema of a refused design that are not near a known point, to be held at their crank angles."""
+        """Return the extrema of a refused design that are not near a known point, at fixed crank angles."""
         apart = np.abs(np.remainder(found.phi[:, None] - known.phi + np.pi, 2.0 * np.pi) - np.pi)
         same = (found.series[:, None] == known.series) & (found.sense[:, None] == known.sense)
         new = ~((apart < NEAR_ANGLE) & same).any(axis=1)
-        # Windows and passages move with the design: a fixed angle may leave them, and outside the limit does not apply.
+        # Windows and passages move with the design: a fixed angle may leave them, where the limit does not apply.
         held = [s.window is None and s.passes is None for s in self.model.curves.series]
         new &= np.array(held, dtype=np.bool_)[found.series]
         return replace(found, how=np.full(len(found), STATIC)).take(new)
 
     def _verified(self) -> bool:
-        """Return whether four times as many poses show the same extrema; if not, the search goes on with them."""
+        """Tell whether four times as many poses give the same extrema; if not, they become the search's extrema."""
         model = self.model
         fine = model.state(self.best.fractions, 4 * model.samples)
         if math.isfinite(self.best.objective):

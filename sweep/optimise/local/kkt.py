@@ -1,4 +1,4 @@
-"""What is known about a result: multipliers, optimality residual, active limits in words, agreement of the starts."""
+"""Optimality of a result: multipliers, residual, active limits in words, agreement of the starts."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ ACTIVE = 1e-6  # a row within this of its bound (scaled) may carry a multiplier
 EDGE = 1e-10  # a variable within this of its bound, as a fraction of the bounds, may carry a multiplier
 AGREE = 1e-4  # starts whose objective is within this of the best agree
 
-NO_VALUE = "has no value"  # of an output that a design does not have, as it does not turn
+NO_VALUE = "has no value"  # of an output that a design lacks since it does not turn
 CAVEAT = (
     "The conditions hold at a local optimum; starts that agree make a better one less likely, they do not exclude it: "
     "this is no proof of a global optimum."
@@ -30,8 +30,8 @@ WORDS = {"minimum": "at its minimum", "maximum": "at its maximum", "equal": "hel
 class Multipliers:
     """Least-squares multipliers: ``gradient of t = sum weights * gradient of rows + bounds``.
 
-    ``residual`` is the largest component of the remainder, in variables scaled to their bounds and the objective scaled
-    by its value at the start; ``bounds`` holds the multipliers of the lower (+) and upper (-) bounds.
+    ``residual`` is the largest component of the remainder, for variables scaled to their bounds and the objective
+    scaled by its value at the start; ``bounds`` holds the multipliers of the lower (+) and upper (-) bounds.
     """
 
     weights: Array
@@ -41,7 +41,7 @@ class Multipliers:
 
 
 def multipliers(form: Form, rows: Array, jacobian: Array, fractions: Array, within: float = ACTIVE) -> Multipliers:
-    """Return multipliers of the active rows and bounds by non-negative least squares (equations are free in sign).
+    """Return multipliers of the active rows and bounds by non-negative least squares (any sign for equations).
 
     Parameters
     ----------
@@ -63,7 +63,7 @@ def multipliers(form: Form, rows: Array, jacobian: Array, fractions: Array, with
     edges[upper, len(lower) + np.arange(len(upper))] = -1.0
     matrix = np.concatenate([full, -equations, edges], axis=1)
     target = np.concatenate([np.zeros(n), [1.0]])
-    # Columns of very different size would hide the small ones from the active-set choice.
+    # Small columns beside very large ones would be missed by the choice of the active set.
     size = np.sqrt((matrix * matrix).sum(axis=0))
     size[size == 0.0] = 1.0
     solution = non_negative(matrix / size, target) / size
@@ -82,19 +82,18 @@ def multipliers(form: Form, rows: Array, jacobian: Array, fractions: Array, with
 
 @dataclass(frozen=True)
 class Result:
-    """A start's outcome.
+    """Outcome of a search from one start.
 
-    ``design`` (P,) in the family's units.  ``gap`` is the difference between the maximum the search worked with and the
-    true one found afterwards on a finer grid, relative to the objective.  ``violation`` is the largest scaled
-    violation; ``relaxation`` says by how much every violated limit would have to give way, in the unit of its output.
-    ``multipliers`` are relative changes of the objective (of cos^2 of a pressure angle) per relative change of each
-    active limit (of sin^2 of a pressure angle, of a margin itself; per width between the bounds of a variable), not
-    negative but for equations.  Where infeasible, they are changes of the smallest relaxation per relative change of
-    each limit, and ``kkt_residual`` is that of the smallest relaxation.  ``status`` is OK, LIMIT_EXCEEDED (infeasible)
-    or NOT_CONVERGED, and ``ended`` says how the search ended: "converged", "stalled", "differs" (from what
-    ``summarise`` finds, see :mod:`sweep.optimise.local.start`), "infeasible", "looks", "time" or "interrupted".
-    ``basin`` numbers the values that starts ended at, 1 for the best, 0 where infeasible; ``looks`` counts the
-    evaluations.
+    ``design`` (P,) is in the family's units.  ``gap`` is the difference between the maximum that the search used and
+    the true one found afterwards on a finer grid, relative to the objective.  ``violation`` is the largest scaled
+    violation; ``relaxation`` is the amount by which each violated limit would have to be relaxed, in the unit of its
+    output.  ``multipliers`` are relative changes of the objective (of cos^2 of a pressure angle) per relative change of
+    each active limit (of sin^2 of a pressure angle, of a margin itself; per width between the bounds of a variable),
+    negative only for equations.  If infeasible, they are changes of the smallest relaxation per relative change of each
+    limit, and ``kkt_residual`` is that of the smallest relaxation.  ``status`` is OK, LIMIT_EXCEEDED (infeasible) or
+    NOT_CONVERGED, and ``ended`` is the ending of the search: "converged", "stalled", "differs" (from the values of
+    ``summarise``, see :mod:`sweep.optimise.local.start`), "infeasible", "looks", "time" or "interrupted".  ``basin``
+    numbers the values at which starts ended, 1 for the best, 0 if infeasible; ``looks`` counts the evaluations.
     """
 
     start: int
@@ -121,7 +120,7 @@ class Result:
 
     @property
     def rank(self) -> tuple[bool, float]:
-        """What results are ordered by: feasible ones by their objective, then the others by their violation."""
+        """Sort key of results: feasible ones by their objective, then infeasible ones by their violation."""
         value = self.objective if self.feasible else self.violation
         return not self.feasible, math.inf if math.isnan(value) else value
 
@@ -134,7 +133,7 @@ class Result:
 
 
 def in_words(labels: tuple[Label, ...], found: Multipliers, variables: tuple[str, ...]) -> dict[str, float]:
-    """Return active limits and bounds with their multipliers, by name; several points of one limit are one."""
+    """Return active limits and bounds with their multipliers, by name; multipliers of one limit's points are added."""
     words: dict[str, float] = {}
     for label, weight in zip(labels, found.weights, strict=True):
         if label.side != "objective" and abs(weight) > 1e-9:

@@ -1,4 +1,4 @@
-"""Least squares of the search, and the step that makes a quadratic model small under linear rows."""
+"""Least-squares problems of the search, and the step that minimises a quadratic model under linear constraints."""
 
 from __future__ import annotations
 
@@ -7,30 +7,30 @@ import numpy as np
 from sweep.families.base import Array
 from sweep.optimise.problem.rows import Form
 
-EXCHANGES = 10  # per column after which non-negative least squares are given up
+EXCHANGES = 10  # exchanges per column after which non-negative least squares stops
 
 
 def least_squares(a: Array, b: Array, tolerance: float) -> Array:
-    """Shortest x with the least ``|a x - b|``; singular values below ``tolerance`` of the largest are zero."""
+    """Return the shortest least-squares solution of a x = b; ``tolerance`` is the relative cut of singular values."""
     if not a.size:
         return np.zeros(a.shape[1])
     return np.asarray(np.linalg.lstsq(a, b, rcond=tolerance)[0], np.float64)
 
 
 def non_negative(a: Array, b: Array) -> Array:
-    """Smallest ``|a x - b|`` with x >= 0; zero where no active set is found."""
+    """Return the x >= 0 that minimises ``|a x - b|``; zero if no active set is found."""
     from scipy.optimize import nnls
 
     if not a.size:
         return np.zeros(a.shape[1])
     try:
         return np.asarray(nnls(a, b, maxiter=EXCHANGES * a.shape[1])[0], np.float64)
-    except RuntimeError:  # nearly dependent columns exchange each other without end
+    except RuntimeError:  # nearly dependent columns may be exchanged without end
         return np.zeros(a.shape[1])
 
 
 def split(rows: Array, tolerance: float) -> tuple[Array, Array]:
-    """Orthonormal directions (k, n) that rows (m, n) span, and those (n - k, n) that all of them leave alone."""
+    """Return orthonormal bases of the row space (k, n) and of the null space (n - k, n) of rows (m, n)."""
     if not len(rows):
         return np.empty((0, rows.shape[1])), np.eye(rows.shape[1])
     _, sizes, axes = np.linalg.svd(rows)
@@ -38,26 +38,26 @@ def split(rows: Array, tolerance: float) -> tuple[Array, Array]:
     return axes[:rank], axes[rank:]
 
 
-FLAT = 1e-6  # smallest curvature of the quadratic model: the objective is about 1, the variables run from 0 to 1
-BEND = 1e-4  # curvature lent to t and to the violation, which have none; it changes multipliers by 1e-4 of the step
+FLAT = 1e-6  # smallest curvature of the quadratic model; the objective is about 1, the variables run from 0 to 1
+BEND = 1e-4  # curvature given to t and to the violation, which have none; it changes multipliers by 1e-4 of the step
 
 
 def quadratic_step(
     curvature: Array, full: Array, rows: Array, form: Form, box: tuple[Array, Array, float], price: float
 ) -> tuple[Array, Array]:
-    """Return the step (d, t) that makes t + d'Hd/2 + price v small; every limit's linear row may be missed by v.
+    """Return the step (d, t) that minimises t + d'Hd/2 + price v, where v relaxes the linear row of every limit.
 
-    A least-distance problem, solved by non-negative least squares (Lawson and Hanson 1974, chapter 23): in the axes of
-    the curvature, which is positive, the objective is the distance from a point.
+    It is a least-distance problem, solved by non-negative least squares (Lawson and Hanson 1974, chapter 23): in the
+    eigenvectors of the curvature, which is positive, the objective is the distance from a point.
 
     Parameters
     ----------
-    curvature : (n, n) H, symmetric; what is less than FLAT is taken for FLAT
+    curvature : (n, n) H, symmetric; eigenvalues below FLAT are raised to FLAT
     full : (R, n + 1) gradients of the rows by the variables and by t
-    rows : (R,) their values, to become at least zero, or zero where ``form`` says so
-    form : labels of the rows: those of limits may be missed
+    rows : (R,) their values, to become at least zero, or zero for equations of ``form``
+    form : labels of the rows; only limits may be relaxed
     box : lower and upper ends of d, and lower end of the step in t
-    price : of a unit of v
+    price : price of a unit of v
 
     Returns
     -------
@@ -80,7 +80,7 @@ def quadratic_step(
     known = np.isfinite(bounds)
     original, bounds = sides[known], bounds[known]
     sides = original @ back
-    # sides @ (y - centre) + bounds >= 0, |y| smallest
+    # minimise |y| subject to sides @ (y - centre) + bounds >= 0
     size = np.sqrt((sides * sides).sum(axis=1))
     size[size == 0.0] = 1.0
     sides, needs = sides / size[:, None], (sides @ centre - bounds) / size
@@ -96,7 +96,7 @@ def quadratic_step(
     every[known] = held / size / -left[-1]
     weights = every[: len(rows)].copy()
     weights[form.equal] -= every[len(rows) : len(rows) + len(twice)]
-    # A straightness of 0.01 mm on links of 100 mm has slopes of 1e4: the rows that hold must hold to the last digit.
+    # A straightness of 0.01 mm on links of 100 mm has slopes of 1e4: active rows must hold to the last digit.
     original, offsets = original[held > 0.0], bounds[held > 0.0]
     for _ in range(2):
         step -= least_squares(original, original @ step + offsets, 1e-13)

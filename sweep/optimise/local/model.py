@@ -1,4 +1,4 @@
-"""A start's mechanism as the searches see it: true extrema of a design, rows of its program, their gradients."""
+"""Model of the mechanism for the searches: true extrema of a design, rows of its program, and their gradients."""
 
 from __future__ import annotations
 
@@ -22,19 +22,19 @@ from sweep.optimise.problem.statement import PLACE, Problem
 from sweep.reductions.steps import applying_step
 
 FEASIBLE = 1e-9  # largest scaled violation of a feasible design
-PRICE = 10.0  # of a unit of scaled violation when two designs are compared, until multipliers are known
-SAMPLES = 256  # poses per turn on which extrema are looked for
-INWARDS = 0.1  # of the way to the middle of the bounds, where equations are looked at beside a start
-DEPENDENT = 1e-7  # least singular value of equations' gradients, each of length one, and least length that counts
-NOT_TURNING = 1e6  # added to the violation of a design some of whose limits do not exist
+PRICE = 10.0  # price of a unit of scaled violation when two designs are compared, until multipliers are known
+SAMPLES = 256  # poses per turn on which extrema are sought
+INWARDS = 0.1  # share of the way to the middle of the bounds at which equations are checked besides the start
+DEPENDENT = 1e-7  # smallest singular value of normalised gradients of equations, and smallest length of one
+NOT_TURNING = 1e6  # added to the violation of a design for which some limits do not exist
 
 
 class Stopped(Exception):
-    """The caller wants to stop."""
+    """The caller stops the search."""
 
 
 class LooksUsedUp(Stopped):
-    """The start has had all the evaluations it is allowed."""
+    """The start has used all its allowed evaluations."""
 
 
 @dataclass(frozen=True)
@@ -49,7 +49,7 @@ class State:
     violation: float
 
     def merit(self, price: float) -> float:
-        """Return the merit: objective plus priced violation; infinite where the objective does not exist."""
+        """Return objective plus price times violation; infinite if the objective does not exist."""
         return self.objective + price * self.violation
 
     @property
@@ -64,19 +64,19 @@ class State:
 
     @property
     def short(self) -> float:
-        """The violation that the elastic program minimises; designs that do not turn rank behind all that do."""
+        """Violation that the elastic program minimises; designs that do not turn rank behind all that do."""
         return self.known if self.form.complete else self.known + NOT_TURNING
 
 
 class Model:
-    """One start: its signs and fixed parameters, the scale of its objective, and who may stop the search.
+    """One start: its signs and fixed parameters, the scale of its objective, and its stopping rules.
 
     Parameters
     ----------
     problem, program : what to minimise
     start : (P,) design; its signs are kept
     stop : asked at every evaluation; true ends the search by :class:`Stopped`
-    allowed : evaluations after which it ends by :class:`LooksUsedUp`; ``looks`` counts them
+    allowed : number of evaluations after which the search ends by :class:`LooksUsedUp`; ``looks`` counts them
     """
 
     def __init__(
@@ -92,7 +92,7 @@ class Model:
             self.scale = size if 1e-12 < size < math.inf else 1.0
 
     def check(self) -> None:
-        """Count one more look at a design; raise :class:`Stopped` if the search is to end."""
+        """Count one more evaluation of a design; raise :class:`Stopped` if the search is to end."""
         if self.looks >= self.allowed:
             raise LooksUsedUp
         if self.stop():
@@ -100,16 +100,16 @@ class Model:
         self.looks += 1
 
     def design(self, fractions: Array) -> Array:
-        """Return the design (P,) with its variables at the fractions of their bounds."""
+        """Return the design (P,) with its variables at the given fractions of their bounds."""
         return self.problem.placed(self.base, fractions)
 
     def state(self, fractions: Array, samples: int | None = None) -> State:
-        """Return the true extrema of a design, looked for on ``samples`` poses and refined."""
+        """Return the state of a design with its true extrema, sought on ``samples`` poses and refined."""
         self.check()
         return self.uncounted(fractions, samples)
 
     def uncounted(self, fractions: Array, samples: int | None = None) -> State:
-        """Return the result of :meth:`state` for a design evaluated before: not counted, never stopped."""
+        """Return the same as :meth:`state` without counting the evaluation and without stopping."""
         design = self.design(fractions)
         points, turns = self.curves.scan(design, samples or self.samples)
         form = self.program.lay_out(self.curves, design, points, turns, self.scale)
@@ -117,31 +117,31 @@ class Model:
         return State(fractions, design, form, atoms, form.objective(atoms), form.violation(atoms))
 
     def with_points(self, at: State, extra: Points) -> Form:
-        """Return the form of a design with further points at fixed crank angles."""
+        """Return the form of a design with additional points at fixed crank angles."""
         if not len(extra):
             return at.form
         points = Points.joined(at.form.points, self.curves.follow(at.design, extra))
         return self.program.lay_out(self.curves, at.design, points, at.form.complete, self.scale)
 
     def atoms(self, design: Array, form: Form, points: Points) -> Array:
-        """Return the quantities that make up the form's rows: curves at the points, their angles, plain numbers."""
+        """Return the atoms of the form's rows: curves at the points, crank angles of the points, plain numbers."""
         found = self._scalars(form.scalars, design[None, :])
         return np.concatenate([points.value, points.phi, [found[name][0] for name in form.scalars]])
 
     def moved(self, fractions: Array, form: Form, points: Points) -> tuple[Points, Array]:
-        """Return the points followed to another design, and the atoms there."""
+        """Return the points tracked to another design, and the atoms there."""
         self.check()
         design = self.design(fractions)
         there = self.curves.follow(design, points)
         return there, self.atoms(design, form, there)
 
     def jacobian(self, fractions: Array, form: Form, points: Points) -> Array:
-        """Return gradients (R, n) of the form's rows by the scaled variables, at followed points."""
+        """Return gradients (R, n) of the form's rows by the scaled variables, at tracked points."""
         designs = stepped(self.problem, self.base, fractions)
         values, moves = gradients(self.curves, designs, points, self.program.places)
         scalars = self._scalar_gradients(form.scalars, fractions, designs, points, moves)
         jacobian = np.concatenate([values, moves, *(scalars[name][None, :] for name in form.scalars)])
-        # A quantity without a derivative, as the angle of a vanishing extremum, gives nan only in the rows that use it.
+        # A quantity without derivative, as the angle of a vanishing extremum, gives nan only in the rows that use it.
         lost = ~np.isfinite(jacobian).all(axis=1)
         jacobian[lost] = 0.0
         rows = np.asarray(form.matrix @ jacobian)
@@ -154,14 +154,14 @@ class Model:
         return multipliers(state.form, state.form.rows(state.atoms, state.objective), jacobian, state.fractions)
 
     def learn(self, state: State) -> float:
-        """Price violations at twice what the multipliers of the limits say they are worth (exact penalty).
+        """Set the price of violations to twice the sum of the limits' multipliers (exact penalty).
 
-        A higher price than needed forbids steps along curved limits that a later step would bring back.
+        A higher price than needed forbids steps along curved limits that a later step would correct.
 
         Returns
         -------
-        The residual of the optimality conditions; nan where the rows that hold are not at their bounds, so that their
-        multipliers mean nothing.
+        The residual of the optimality conditions; nan if active rows are not at their bounds, which makes multipliers
+        meaningless.
         """
         if state.violation > ACTIVE:
             return math.nan
@@ -196,7 +196,7 @@ class Model:
         return found
 
     def _scalars(self, names: Sequence[str], designs: Any) -> dict[str, Any]:
-        """Return plain numbers of designs, each (k,); one step of the family is called once for all that it gives."""
+        """Return plain numbers of designs, each (k,); every step of the family is called once for all its outputs."""
         problem, found, steps = self.problem, {}, defaultdict(list)
         for name in names:
             if name in problem.family.parameter_names:
@@ -215,13 +215,13 @@ class Model:
 def refuse_dependent(problem: Problem, program: Program, starts: Array) -> None:
     """Refuse equations of which one follows from the others, or from what the coordinates hold by construction.
 
-    No multipliers belong to them, so every start would stall.  At a single design gradients may be parallel by
-    accident: they have to be at two of each start.
+    Their multipliers are not unique, so every start would stall.  Gradients at a single design may be parallel by
+    accident: they have to be dependent at two designs of each start.
 
     Raises
     ------
     InputError
-        naming these equations.
+        naming the dependent equations.
     """
     if not any(r.equal for r in program.requirements):
         return

@@ -1,7 +1,7 @@
-"""The next design near a solution: sequential quadratic programming with the exact Hessian of the Lagrangian.
+"""Step near a solution: sequential quadratic programming with the exact Hessian of the Lagrangian.
 
-Curvature that is learnt from the steps comes late: in a narrow curved valley (a straightness of 0.05 mm on links of
-50 mm) that takes hundreds.  Here the curvature comes from differences of exact gradients, so a few steps do.
+Quasi-Newton curvature converges slowly: in a narrow curved valley (a straightness of 0.05 mm on links of 50 mm) it
+takes hundreds of steps.  Here the curvature comes from differences of exact gradients, so a few steps suffice.
 """
 
 from __future__ import annotations
@@ -15,24 +15,24 @@ from sweep.optimise.local.least_squares import FLAT, least_squares, quadratic_st
 from sweep.optimise.local.model import FEASIBLE, Model, State
 from sweep.optimise.problem.rows import Form
 
-CORRECTIONS = 8  # of a step along curved limits, each two or three milliseconds
-SHORTENED, KEPT = 4, 0.1  # times a step is halved, and the share of the promised gain that it must keep
-LOST = 1.0  # scaled violation that no correction mends, above all of links that do not reach: the step must be shorter
-DIFFERENCE = 1e-5  # of the scaled variables; gradients are good to 1e-12, so the Hessian is to 1e-5
-CENTRAL = 1e-6  # the same to both sides of a design
-SLIPPED = 1e-5  # by so much the merit may grow in between while a design is polished
-RANK = 1e-9  # of rows that hold: what is left of one below this, relative to the largest, is rounding
+CORRECTIONS = 8  # second-order corrections of a step along curved limits, each two or three milliseconds
+SHORTENED, KEPT = 4, 0.1  # halvings of a step, and the share of the promised gain that it must reach
+LOST = 1.0  # scaled violation beyond any correction, as of links that do not reach: the step must be shorter
+DIFFERENCE = 1e-5  # step of the scaled variables; gradients are accurate to 1e-12, so the Hessian is to 1e-5
+CENTRAL = 1e-6  # step of central differences
+SLIPPED = 1e-5  # growth of the merit that is allowed between polishing steps
+RANK = 1e-9  # relative singular value of active rows below which they are dependent
 
 
 def propose(model: Model, at: State, form: Form, t: float, radius: float, floor: float | None) -> tuple[Array, float]:
-    """Minimise the quadratic model of the Lagrangian under linear rows, with a second-order correction.
+    """Minimise the quadratic model of the Lagrangian under linear constraints, with a second-order correction.
 
     Parameters and results are those of :func:`sweep.optimise.local.slsqp.propose`.
     """
     points = form.points
     jacobian = np.nan_to_num(model.jacobian(at.fractions, form, points))
     rows = form.rows(model.atoms(at.design, form, points), t)
-    # Of a design that misses its limits a little, the rows that will hold are not all at their bounds.
+    # If a design violates its limits a little, the rows that will be active are not all at their bounds.
     found = multipliers(form, rows, jacobian, at.fractions, max(ACTIVE, 10.0 * min(at.violation, 1e-3)))
     curvature = hessian(model, at, form, found, np.arange(len(at.fractions)))
     curvature = _upward(curvature, _holding(jacobian, form, found))
@@ -46,7 +46,7 @@ def propose(model: Model, at: State, form: Form, t: float, radius: float, floor:
             best, value = step, merit
         if merit <= now - KEPT * promised:
             break
-        # The limits are curved more than the corrections can follow: shorten the step, keep the Hessian.
+        # The limits curve more than the corrections can follow: shorten the step, keep the Hessian.
         reach = 0.5 * min(reach, float(np.abs(step[:-1]).max()))
     return np.clip(at.fractions + best[:-1], 0.0, 1.0), t + float(best[-1])
 
@@ -55,7 +55,7 @@ def _corrected(
     model: Model, at: State, form: Form, t: float, parts: tuple[Array, Array, Array],
     bounds: tuple[Array, Array, float | None],
 ) -> tuple[Array, float, float]:  # fmt: skip
-    """Return the step brought back to the curved rows, the merit it reaches, and the gain promised."""
+    """Return the step corrected towards the curved rows, the merit it reaches, and the promised gain."""
     curvature, full, rows = parts
     low, high, floor = bounds
     box = (low, high, -np.inf if floor is None else floor - t)
@@ -73,7 +73,7 @@ def _corrected(
         best, value = step, merit
         if missed <= FEASIBLE or missed > LOST:
             break
-        # The rows are curved: shift their linear targets by what the step missed (second-order correction).
+        # The rows are curved: shift their linear targets by the step's residual (second-order correction).
         step, _ = quadratic_step(curvature, full, true - full @ step, form, box, model.price)
     return best, value, promised
 
@@ -85,8 +85,8 @@ def _missed(form: Form, rows: Array) -> float:
 def hessian(model: Model, at: State, form: Form, found: Multipliers, free: Index, both_sides: bool = False) -> Array:
     """Return the second derivatives of the Lagrangian by the free variables, from differences of exact gradients.
 
-    With ``both_sides`` they are good to 1e-8 instead of 1e-5, for twice as many looks: the curvature along a valley may
-    be 1e-9 of that across it.
+    With ``both_sides`` they are accurate to 1e-8 instead of 1e-5, for twice as many evaluations: the curvature along a
+    valley may be 1e-9 of that across it.
     """
 
     def slope(j: int, step: float) -> Array:
@@ -106,9 +106,9 @@ def hessian(model: Model, at: State, form: Form, found: Multipliers, free: Index
 
 
 def _holding(jacobian: Array, form: Form, found: Multipliers) -> Array:
-    """Return gradients (rows) whose null space holds the steps that keep the active set.
+    """Return gradients (rows) whose null space contains the steps that keep the active set.
 
-    Such a step changes no active limit and no bound, and it changes all active rows of the objective alike.
+    Such a step changes no active limit and no bound, and it changes all active rows of the objective equally.
     """
     active = found.weights != 0.0
     slack, weights = form.slack[active], found.weights[active]
@@ -120,8 +120,8 @@ def _holding(jacobian: Array, form: Form, found: Multipliers) -> Array:
 def _upward(curvature: Array, held: Array) -> Array:
     """Return the Hessian with its negative eigenvalues made positive.
 
-    The null space of the active rows and its complement are treated separately.  In the null space the curvature sets
-    the length of a step; in the complement the rows do.  If both were treated together, the strong curvature of the
+    The null space of the active rows and its complement are treated separately.  In the null space the curvature
+    determines the length of a step, in the complement the rows do.  Treated together, the strong curvature of the
     complement would stiffen a flat valley, and every step along it would be a hundred times too short.
     """
     out = np.zeros_like(curvature)
@@ -134,7 +134,7 @@ def _upward(curvature: Array, held: Array) -> Array:
 
 
 def repair(model: Model, state: State) -> State:
-    """Bring a nearly feasible design within its limits by small steps that mend violated rows and keep close ones."""
+    """Move a nearly feasible design within its limits by small steps that correct violated rows and keep close ones."""
     for _ in range(5):
         if state.feasible or not state.violation < 1e-2:
             break
@@ -143,7 +143,8 @@ def repair(model: Model, state: State) -> State:
         close = limits & ((c <= ACTIVE) | state.form.equal)
         wanted = np.where(state.form.equal, -c, np.maximum(-c, 0.0))[close]
         jacobian = np.nan_to_num(model.jacobian(state.fractions, state.form, state.form.points))[close]
-        # A variable that left its bound by a hair would lose its multiplier: those at bounds move only if they must.
+        # A variable that leaves its bound slightly would lose its multiplier: variables at bounds move only if
+        # necessary.
         inside = (state.fractions > EDGE) & (state.fractions < 1.0 - EDGE)
         new = state
         for free in (inside, np.ones_like(inside)):
@@ -158,7 +159,7 @@ def repair(model: Model, state: State) -> State:
 
 
 def polish(model: Model, state: State) -> State:
-    """Take Newton steps on the optimality conditions of the active rows, as long as they improve them."""
+    """Take Newton steps on the optimality conditions of the active rows, as long as they reduce the residual."""
     residual, begun, size = model.certificate(state).residual, state, max(1.0, abs(state.objective))
     best = state
     for _ in range(6):
@@ -168,7 +169,7 @@ def polish(model: Model, state: State) -> State:
         if fractions is None:
             break
         new = model.state(fractions)
-        # A step misses a curved limit by the order of its square; the next step corrects that.
+        # A step misses a curved limit by the square of its length; the next step corrects that.
         if not new.merit(model.price) <= begun.merit(model.price) + SLIPPED * size:
             break
         new_residual = model.certificate(new).residual

@@ -1,4 +1,4 @@
-"""The next design from far away: scipy's SLSQP on the epigraph program, whose rows follow their extrema."""
+"""Step far from a solution: scipy's SLSQP on the epigraph program, whose rows track their extrema."""
 
 from __future__ import annotations
 
@@ -10,8 +10,8 @@ from sweep.families.base import Array
 from sweep.optimise.local.model import Model, State
 from sweep.optimise.problem.rows import Form
 
-ITERATIONS, PER_VARIABLE = 30, 3  # at most; in few variables Newton does the rest faster
-SETTLED = 1e-13  # change of t at which the rows are as good as they get
+ITERATIONS, PER_VARIABLE = 30, 3  # largest number of iterations; with few variables Newton steps finish faster
+SETTLED = 1e-13  # change of t at which SLSQP ends
 
 
 def propose(model: Model, at: State, form: Form, t: float, radius: float, floor: float | None) -> tuple[Array, float]:
@@ -20,9 +20,9 @@ def propose(model: Model, at: State, form: Form, t: float, radius: float, floor:
     Parameters
     ----------
     model, at : the start and its present design
-    form : rows; their points are followed as the design moves
-    t : value to begin with
-    radius : of the box the search may not leave
+    form : rows; their points are tracked as the design moves
+    t : initial value
+    radius : half width of the box around the present design, in scaled variables
     floor : lower bound of t, if any
 
     Returns
@@ -55,7 +55,7 @@ def propose(model: Model, at: State, form: Form, t: float, radius: float, floor:
 
 
 class _Trail:
-    """Rows and gradients along one run; the points are followed from the last design that took a gradient."""
+    """Rows and gradients along one run; points are tracked from the last design whose gradient was computed."""
 
     def __init__(self, model: Model, form: Form) -> None:
         self.model, self.form = model, form
@@ -69,12 +69,12 @@ class _Trail:
             self.seen, self.slopes = x.copy(), None
 
     def rows(self, z: Array) -> Array:
-        """Rows (R,) at the scaled variables and t."""
+        """Return the rows (R,) at the scaled variables and t."""
         self._move(z[:-1])
         return self.form.rows(self.atoms, float(z[-1]))
 
     def jacobian(self, z: Array) -> Array:
-        """Gradients (R, n + 1) by the scaled variables and by t."""
+        """Return the gradients (R, n + 1) of the rows by the scaled variables and by t."""
         self._move(z[:-1])
         if self.slopes is None:
             self.slopes = self.model.jacobian(z[:-1], self.form, self.points)

@@ -1,4 +1,4 @@
-"""One start: the search from it, and its end design verified by ``summarise``."""
+"""One start: the search from it, and the verification of its final design by ``summarise``."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ from sweep.optimise.problem.statement import Problem
 from sweep.quantities.limits import meets
 from sweep.quantities.measures import Measure
 
-FIRST = 2  # looks that give a start its scale and its first design
+FIRST = 2  # evaluations that give a start its scale and its first design
 
 
 def search(number: int, problem: Problem, start: Array, asked: Callable[[], bool], allowed: float = math.inf) -> Result:
@@ -29,11 +29,11 @@ def search(number: int, problem: Problem, start: Array, asked: Callable[[], bool
 
     Parameters
     ----------
-    number : of the start, for the result
+    number : number of the start, for the result
     problem : what to minimise
     start : (P,) design
-    asked : true ends the search with the best checked design so far; the first one is reached in any case
-    allowed : looks at designs after which it ends in the same way, wherever and however fast it runs
+    asked : true ends the search with the best checked design so far, after the first design in any case
+    allowed : number of evaluations after which the search ends likewise, on any machine
     """
     program = Program(problem)
     descent = Descent(problem, program, start, _after_first(asked), max(allowed, FIRST))
@@ -68,7 +68,7 @@ def _result(number: int, problem: Problem, program: Program, descent: Descent, e
     elif exists:
         found = descent.model.certificate(state)
         residual = found.residual
-        size = abs(state.objective) or 1.0  # of the objective here, in units of the start's
+        size = abs(state.objective) or 1.0  # size of the objective here, in units of the start's
         words = {text: weight / size for text, weight in in_words(state.form.labels, found, problem.variables).items()}
     values = {
         r.measure.name: program.value(r.measure, state.form, descent.model.curves, state.design, state.atoms)
@@ -88,14 +88,14 @@ def _result(number: int, problem: Problem, program: Program, descent: Descent, e
 
 
 def _of_relaxation(descent: Descent, state: State) -> tuple[Form, Multipliers]:
-    """Return the elastic program at a design that misses its limits, and its multipliers."""
+    """Return the elastic program at an infeasible design, and its multipliers."""
     form = state.form.relaxed({"rotatable"})
     jacobian = descent.model.jacobian(state.fractions, form, form.points)
     return form, multipliers(form, form.rows(state.atoms, state.violation), jacobian, state.fractions)
 
 
 def _relaxation(program: Program, values: dict[str, float], state: State) -> dict[str, float]:
-    """Return by how much each violated limit has to give way, in the unit of its output."""
+    """Return the amount by which each violated limit has to be relaxed, in the unit of its output."""
     if state.feasible:
         return {}
     out: dict[str, float] = {}
@@ -109,24 +109,24 @@ def _relaxation(program: Program, values: dict[str, float], state: State) -> dic
     return out
 
 
-TARGET = 1e-9  # relative error of the outputs that are compared, unless the problem asks for another
-DIGITS = 1e-8  # of a value: what the search's own extrema may be off by beside that
-NOTHING = 1e-12  # of what an objective amounts to between the bounds: rounding leaves less where it vanishes
-ACROSS = (0.001, 0.01, 0.1, 0.5, 1.0)  # ways to either corner of the bounds at which it is looked at
-DIFFERS = "differs"  # how a start ended whose extrema are not those of summarise
+TARGET = 1e-9  # relative error of the verified outputs, unless the problem sets another
+DIGITS = 1e-8  # relative error of the search's own extrema, in addition
+NOTHING = 1e-12  # share of the objective's size between the bounds below which it is rounding
+ACROSS = (0.001, 0.01, 0.1, 0.5, 1.0)  # shares of the way to either corner of the bounds where the objective is sampled
+DIFFERS = "differs"  # ending of a start whose extrema differ from those of summarise
 
 
 def confirmed(problem: Problem, program: Program, found: Result) -> Result:
-    """Return a feasible result with the values of ``summarise``, where those of the search are not within their errors.
+    """Return a feasible result with the values of ``summarise`` for outputs that differ from the search's values.
 
-    Where they differ by more than rounding the result has not converged, since the conditions of optimality hold for
-    other extrema; it is infeasible where it misses a limit by the values of ``summarise``.
+    If they differ by more than rounding, the result has not converged, since the optimality conditions hold for other
+    extrema; it is infeasible if it violates a limit by the values of ``summarise``.
 
     Parameters
     ----------
-    problem, program : what was searched.  Limits that give up room to tolerances are not about the drawing: these are
-        left to samples of what is made
-    found : what the search says of its design
+    problem, program : problem and program of the search.  Limits with margins for tolerances are left out: samples of
+        manufactured mechanisms verify them
+    found : result of the search
     """
     if not found.feasible or not math.isfinite(found.objective):
         return found
@@ -143,7 +143,7 @@ def confirmed(problem: Problem, program: Program, found: Result) -> Result:
     if program.objective.name in other and _vanishes(problem, found, other[program.objective.name]):
         other.pop(program.objective.name)
     far = [name for name in other if not apart[name] <= true[name][1] + DIGITS * _size(asked[name], true[name][0])]
-    # A limit that is kept and holds nothing back does not enter the conditions of optimality.
+    # A limit that is kept and inactive does not enter the optimality conditions.
     acting = {program.objective.name, *(text.split()[0] for text in found.active)}
     missed = {x.output for x in problem.limits if x.output in far and not meets(x, np.array([other[x.output]])).all()}
     far = [name for name in far if name in acting | missed]
@@ -156,7 +156,7 @@ def confirmed(problem: Problem, program: Program, found: Result) -> Result:
 
 
 def _vanishes(problem: Problem, found: Result, true: float) -> bool:
-    """Tell whether the objective is nothing but rounding, which has no digits that could agree, nor certain extrema."""
+    """Tell whether the objective is zero but for rounding: then it has no certain digits and no certain extrema."""
     place, shares = problem.scaled(found.design[None, :])[0], np.array(ACROSS)[:, None]
     designs = problem.placed(found.design, np.concatenate([place + shares * (end - place) for end in (0.0, 1.0)]))
     designs = designs[np.isfinite(designs).all(axis=1)]
@@ -167,7 +167,7 @@ def _vanishes(problem: Problem, found: Result, true: float) -> bool:
 
 
 def _differing(problem: Problem, kept: Result, far: dict[str, tuple[float, float]]) -> Result:
-    """Return the result marked as not converged, or infeasible, since its outputs differ from those of the search."""
+    """Return the result as not converged, or as infeasible, since its outputs differ from those of the search."""
     short, missed = {}, []
     for limit in problem.limits:
         value = far[limit.output][0] if limit.output in far else math.nan
@@ -187,12 +187,12 @@ def _differing(problem: Problem, kept: Result, far: dict[str, tuple[float, float
 
 
 def _has_margin(problem: Problem, m: Measure) -> bool:
-    """Return whether tolerances enter the value that the search has of an output, or its limit."""
+    """Tell whether a margin for tolerances enters the search's value of an output, or its limit."""
     return m.name in problem.allowances or any(s.output in problem.curve_margins for s in m.series)
 
 
 def _summarised(problem: Problem, found: Result, names: tuple[str, ...]) -> dict[str, tuple[float, float]]:
-    """Return the value of each output of the design and its error; what has no error is as good as float64."""
+    """Return value and error of each output of the design; the error is 0 for outputs of float64 accuracy."""
     accuracy = Accuracy(target=problem.accuracy.target or TARGET)
     columns = design_outputs(problem.family, found.design[None, :], names, accuracy, problem.window)
     out = {}

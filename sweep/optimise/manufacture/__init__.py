@@ -1,1 +1,1 @@
-"""What is made: tolerances, margins that limits give up to them, and designs that keep their limits."""
+"""Manufacture of a design: tolerances, margins of limits for them, and designs whose mechanisms keep the limits."""

@@ -1,4 +1,4 @@
-"""Margins of curves along the turn: what tolerances do to a pose output, and how that changes with the design."""
+"""Margins of curves along the turn: standard deviations of pose outputs, as functions of the design."""
 
 from __future__ import annotations
 
@@ -15,15 +15,15 @@ from sweep.optimise.local.least_squares import least_squares
 from sweep.optimise.problem.program import Program
 from sweep.optimise.problem.statement import Problem
 
-POSES, HARMONICS = 64, 16  # poses per turn at which the margin is known, and harmonics of the sum through it
-MOVED = 1e-4  # of the variables' bounds: a deviation from exact derivatives, so its difference is good to 1e-4
+POSES, HARMONICS = 64, 16  # poses per turn at which the margin is computed, and harmonics of the sum through it
+MOVED = 1e-4  # share of a variable's bounds: step of the difference of exact derivatives, accurate to 1e-4
 
 
 @dataclass(frozen=True)
 class CurveMargin:
-    """Trigonometric sum whose (M,) coefficients are ``constant + slopes (values of the columns - place)``.
+    """Trigonometric sum with (M,) coefficients ``constant + slopes @ (values of the columns - place)``.
 
-    ``columns`` (V,) of the design matrix, ``place`` (V,) their values where the sum is exact, ``slopes`` (M, V).
+    ``columns`` (V,) of the design matrix, ``place`` (V,) their values at which the sum is exact, ``slopes`` (M, V).
     """
 
     columns: tuple[int, ...]
@@ -32,11 +32,11 @@ class CurveMargin:
     slopes: Array
 
     def times(self, level: float) -> CurveMargin:
-        """Return so many of these margins."""
+        """Return the margin multiplied by ``level``."""
         return replace(self, constant=level * self.constant, slopes=level * self.slopes)
 
     def at(self, designs: Any, phi: Array) -> Any:
-        """Return the margin (n, m) of designs (n, P), which may carry the imaginary step, at crank angles (m,)."""
+        """Return the margin (n, m) of designs (n, P), which may have imaginary parts, at crank angles (m,)."""
         moved = designs[:, list(self.columns)] - self.place
         return trigonometric_sum(self.constant + moved @ self.slopes.T, phi)
 
@@ -48,7 +48,7 @@ class CurveMargin:
 
 @dataclass(frozen=True)
 class Allowance:
-    """What a limit gives up to tolerances beyond a fixed amount: ``slopes`` (V,) times what the ``names`` have moved.
+    """Margin of a limit beyond a fixed amount: ``slopes`` (V,) times the changes of the parameters ``names``.
 
     ``place`` (V,) are the values of these parameters at which the fixed amount is exact.
     """
@@ -58,18 +58,18 @@ class Allowance:
     slopes: Array
 
     def times(self, level: float) -> Allowance:
-        """Return so many of these margins."""
+        """Return the allowance multiplied by ``level``."""
         return replace(self, slopes=level * self.slopes)
 
 
 def allowances(problem: Problem, design: Array, spread: Callable[[Array], dict[str, float]]) -> dict[str, Allowance]:
-    """Return how the margins of some outputs change with the variables, to first order.
+    """Return the first-order changes of the margins of some outputs with the variables.
 
     Parameters
     ----------
-    problem : its variables are the ones that may change
+    problem : its variables are those that may change
     design : (P,)
-    spread : gives the margin of every output for a design
+    spread : returns the margin of every output of a design
     """
     around, moved = _around(problem, design)
     found = [spread(row) for row in around[1:]]
@@ -84,7 +84,7 @@ def allowances(problem: Problem, design: Array, spread: Callable[[Array], dict[s
 
 
 def _around(problem: Problem, design: Array) -> tuple[Array, Array]:
-    """Return a design with those a step to either side of it in every variable, and by how much columns differ."""
+    """Return a design with its neighbours one step up and down in every variable, and the differences of columns."""
     n = len(problem.variables)
     steps = np.concatenate([np.zeros((1, n)), MOVED * np.eye(n), -MOVED * np.eye(n)])
     designs = problem.placed(design, problem.scaled(design[None, :])[0] + steps)
@@ -96,12 +96,12 @@ def trigonometric_sum(coefficients: Any, phi: Array, derivative: bool = False) -
 
     Parameters
     ----------
-    coefficients : (n, 2 K + 1), which may carry the imaginary step
+    coefficients : (n, 2 K + 1), which may have imaginary parts
     phi : (m,) angles in rad
-    derivative : whether the derivative is wanted
+    derivative : whether the derivative is returned
     """
     k = np.arange(1, coefficients.shape[1] // 2 + 1)
-    powers = np.exp(1j * phi)[None, :].repeat(len(k), axis=0).cumprod(axis=0)  # quicker than their cosines
+    powers = np.exp(1j * phi)[None, :].repeat(len(k), axis=0).cumprod(axis=0)  # faster than computing cosines and sines
     along, aside = coefficients[:, 1::2], coefficients[:, 2::2]
     if derivative:
         return (k * aside) @ powers.real - (k * along) @ powers.imag
@@ -109,9 +109,9 @@ def trigonometric_sum(coefficients: Any, phi: Array, derivative: bool = False) -
 
 
 def curves_with_margin(problem: Problem) -> dict[str, str]:
-    """Return pose outputs whose limits can have a margin along the turn, by the names of these limits.
+    """Return the pose outputs whose limits can have a margin along the turn, by the names of these limits.
 
-    These limits are on largest and smallest values, and no other kind of limit is made of the same curve.
+    The limits bound largest and smallest values, and no other kind of limit uses the same curve.
     """
     program = Program(problem)
     measures = [program.objective, *(r.measure for r in program.requirements)]
@@ -133,17 +133,17 @@ def curves_with_margin(problem: Problem) -> dict[str, str]:
 
 
 def curve_margins(problem: Problem, design: Array, sigma: Array, levels: Mapping[str, float]) -> dict[str, CurveMargin]:
-    """Return standard deviations of pose outputs along the turn, and how they change with the variables.
+    """Return standard deviations of pose outputs along the turn, and their changes with the variables.
 
     Parameters
     ----------
-    problem : its variables are the ones that may change
+    problem : its variables are those that may change
     design : (P,)
     sigma : (P,) standard deviations of the dimensions
-    levels : how many standard deviations of each pose output; what is not finite is left out
+    levels : number of standard deviations of each pose output; an output with a value that is not finite is left out
     """
     n = len(problem.variables)
-    # Parameters that follow from coordinates move together: the slopes by the parameters that reproduce those seen.
+    # Parameters that follow from coordinates move together: take the shortest slopes that reproduce their changes.
     designs, moved = _around(problem, design)
     turn: Array = np.arange(POSES, dtype=np.float64) * (2.0 * math.pi / POSES)
     found = curve_derivatives(problem.family, designs, sigma, tuple(levels), turn)
@@ -163,7 +163,7 @@ def curve_margins(problem: Problem, design: Array, sigma: Array, levels: Mapping
 
 
 def _shortest(moved: Array, change: Array) -> Array:
-    """Return slopes (V,) by the columns that explain the changes (n,) seen with the moves (n, V)."""
+    """Return the shortest slopes (V,) that explain the changes (n,) by the moves (n, V) of the columns."""
     size = np.abs(moved).max(axis=0)
     size[size == 0.0] = 1.0
     return np.asarray(least_squares(moved / size, change, 1e-10) / size, np.float64)
@@ -172,23 +172,23 @@ def _shortest(moved: Array, change: Array) -> Array:
 def curve_derivatives(
     family: Family, designs: Array, sigma: Array, outputs: Sequence[str], phi: Array
 ) -> dict[str, Array]:
-    """Return how much outputs change when one dimension is off by its standard deviation, by the complex step.
+    """Return the changes of outputs for a deviation of one dimension by its standard deviation, by the complex step.
 
     Parameters
     ----------
-    family : of the designs
+    family : family of the designs
     designs : (n, P)
-    sigma : (P,) standard deviations; what is exact has none and no row
+    sigma : (P,) standard deviations; an exact dimension has 0 and no row
     outputs : names of pose outputs
     phi : (m,) crank angles
 
     Returns
     -------
-    For each output (n, q, m), one row per dimension that is not exact.  The root of the sum of their squares is the
-    standard deviation of the curve there, to first order and for independent dimensions; nan for designs with a nan.
+    For each output (n, q, m), one row per inexact dimension.  The root of the sum of their squares is the standard
+    deviation of the curve there, to first order and for independent dimensions; nan for designs with a nan.
     """
     own = np.flatnonzero(sigma)
-    # Complex kernels raise where they divide by zero: designs that do not exist are left out.
+    # Complex kernels raise on a division by zero: designs with nan are left out.
     known = np.flatnonzero(np.isfinite(designs).all(axis=1))
     stepped = np.repeat(designs[known].astype(np.complex128), len(own), axis=0)
     stepped[np.arange(len(stepped)), np.tile(own, len(known))] += 1j * STEP * np.tile(sigma[own], len(known))

@@ -1,4 +1,4 @@
-"""Limits tightened by the margins that tolerances need, the price of a margin, and mechanisms out of limits."""
+"""Limits tightened by margins for tolerances, the price of a margin, and the allocation of risk among limits."""
 
 from __future__ import annotations
 
@@ -27,24 +27,24 @@ from sweep.quantities.limits import meets
 if TYPE_CHECKING:
     from sweep.study import Limit, Tolerance
 
-STEPS = (0.2, 0.1, 0.05)  # of the search for shares, in standard deviations; finer ones follow the noise of the sample
-TURNS = 100  # rounds of each step at most
-CLOSE = 3.0  # rooms from its bound at which the slopes of a limit's room are still asked for
-MOVED = 1e-3  # standard deviations by which bounds move to see what their rows do
+STEPS = (0.2, 0.1, 0.05)  # steps of the compass search [standard deviations]; finer ones follow the sample's noise
+TURNS = 100  # largest number of rounds of each step
+CLOSE = 3.0  # distance from a limit, in margins, within which the slopes of its margin are computed
+MOVED = 1e-3  # shift of bounds by which the change of their rows is found [standard deviations]
 TURN: Array = np.arange(POSES, dtype=np.float64) * (2.0 * math.pi / POSES)
 
 Levels = Mapping[str, float]
-"""Numbers of standard deviations that limits give up, by the keys of :func:`keyed`."""
+"""Numbers of standard deviations in the margins of limits, by the keys of :func:`keyed`."""
 
 
 def bounded(problem: Problem) -> list[Limit]:
-    """Return the inequality limits on outputs: these give up a margin; limits on parameters are about the drawing."""
+    """Return the inequality limits on outputs, which get a margin; limits on parameters apply to the nominal design."""
     own = [x for x in problem.limits if x.output not in problem.family.parameter_names]
     return [x for x in own if x.minimum is None or x.minimum != x.maximum]
 
 
 def keyed(problem: Problem) -> dict[str, str]:
-    """Return the limited outputs that give up a margin, each with the key of its number of standard deviations.
+    """Return the limited outputs that get a margin, each with the key of its number of standard deviations.
 
     Limits on one curve share its margin, so their key is the pose output.  The key of any other limit is its own name.
     """
@@ -54,14 +54,14 @@ def keyed(problem: Problem) -> dict[str, str]:
 
 
 class Scatter:
-    """What tolerances do to the limited outputs of a design, in standard deviations, and how that changes with it.
+    """Standard deviations of the limited outputs of a design, and their changes with the design.
 
-    What is known of the last design is kept: a search asks for its margins again with other numbers of deviations.
+    The values of the last design are cached, since a search needs margins with other numbers of standard deviations.
 
     Parameters
     ----------
-    problem : with the limits as they are asked for
-    tolerance : of what is made
+    problem : problem with the limits as given
+    tolerance : manufacturing tolerances
     """
 
     def __init__(self, problem: Problem, tolerance: Tolerance) -> None:
@@ -72,7 +72,7 @@ class Scatter:
         self._changes: dict[str, Allowance] = {}
 
     def look(self, design: Array) -> None:
-        """Find the deviations ``curves`` of curves, and those of ``single`` outputs with their values."""
+        """Compute the deviations ``curves`` of curves, and those of ``single`` outputs with their values."""
         if np.array_equal(design, self._design):
             return
         sigma = touched(self.problem.family, design, self.tolerance) / SIGMAS
@@ -83,7 +83,7 @@ class Scatter:
         self._design, self._sigma, self._changes = design.copy(), sigma, {}
 
     def changes(self, names: Sequence[str]) -> dict[str, Allowance]:
-        """Return how the deviations of single outputs change with the variables of the design last looked at."""
+        """Return the changes of single outputs' deviations with the variables, at the design of the last `look`."""
         new = [name for name in names if name not in self._changes]
         if new:
 
@@ -95,14 +95,14 @@ class Scatter:
 
 
 def with_margins(scatter: Scatter, design: Array, levels: Levels, radius: float | None) -> Problem:
-    """Return the problem with its limits tightened by the margins of a design, bounded to a box about that design.
+    """Return the problem with its limits tightened by the margins at a design, bounded to a box around that design.
 
     Parameters
     ----------
-    scatter : of what is made, with the problem as it is asked for
+    scatter : deviations of the problem's outputs
     design : (P,)
-    levels : standard deviations that each limit gives up
-    radius : of the box about the design in scaled variables; None for the bounds of the problem
+    levels : number of standard deviations in the margin of each limit
+    radius : half width of the box in scaled variables; None for the bounds of the problem
     """
     problem, keys = scatter.problem, scatter.keys
     scatter.look(design)
@@ -121,10 +121,10 @@ def with_margins(scatter: Scatter, design: Array, levels: Levels, radius: float 
 
 @dataclass(frozen=True)
 class Price:
-    """What the margin of a limit costs, and its unit.
+    """Price of a limit's margin, and its unit.
 
     ``price`` is the relative change of the objective per standard deviation of margin; ``spread`` is that standard
-    deviation, of a curve where it is at its limit.
+    deviation, for a curve at the angles where it is at its limit.
     """
 
     price: float
@@ -134,8 +134,8 @@ class Price:
 def prices(scatter: Scatter, design: Array, levels: Levels) -> dict[str, Price]:
     """Return the price of the margin of every limit at an optimum of :func:`with_margins`, by its key.
 
-    The multipliers of the rows that hold tell it: a bound that moves by a standard deviation moves its rows, and the
-    objective by their multipliers times that.
+    It follows from the multipliers of the active rows: a bound shifted by a standard deviation shifts its rows, and the
+    objective changes by their multipliers times that.
     """
     whole = with_margins(scatter, design, levels, None)
     keys, units, spreads = scatter.keys, scatter.curves, scatter.single
@@ -164,15 +164,15 @@ def prices(scatter: Scatter, design: Array, levels: Levels) -> dict[str, Price]:
 
 
 def excesses(problem: Problem, found: Mapping[str, Array], known: Mapping[str, Price]) -> dict[str, Array]:
-    """Return by how many standard deviations outputs exceed their limits, by the keys of these.
+    """Return the excess of outputs over their limits in standard deviations, by the keys of the limits.
 
-    It is infinite for what has no such output, and wherever a mechanism does not turn: no room helps there.
+    It is infinite for a mechanism without the output, and for one that does not turn: no margin helps there.
 
     Parameters
     ----------
-    problem : with the limits as they are asked for
-    found : limited outputs of n mechanisms, as they are compared
-    known : the standard deviation of every limit
+    problem : problem with the limits as given
+    found : limited outputs of n mechanisms, as compared with limits
+    known : standard deviation of every limit
     """
     keys, out = keyed(problem), dict[str, Array]()
     lost = np.zeros(len(found[problem.objective]), np.bool_)
@@ -191,13 +191,13 @@ def excesses(problem: Problem, found: Mapping[str, Array], known: Mapping[str, P
 
 
 def _close(limit: Limit, room: float, value: float) -> bool:
-    """Return whether a limit is so near that how its room changes may matter."""
+    """Tell whether a limit is so close that the change of its margin may matter."""
     low = limit.minimum is not None and value - CLOSE * room < limit.minimum
     return low or (limit.maximum is not None and value + CLOSE * room > limit.maximum)
 
 
 def _spreads(problem: Problem, design: Array, sigma: Array, names: Sequence[str]) -> dict[str, tuple[float, float]]:
-    """Return standard deviations of outputs, from exact derivatives by every toleranced dimension, and their values."""
+    """Return standard deviations of outputs, from exact derivatives by all toleranced dimensions, with their values."""
     if not names:
         return {}
     rows = sensitivities(problem.family, design, names, problem.window)
@@ -212,38 +212,38 @@ def _spreads(problem: Problem, design: Array, sigma: Array, names: Sequence[str]
 
 
 def _drawn_in(limit: Limit, room: float) -> Limit:
-    """Return a limit tightened by its margin; a band narrower than the margins is missed until a design needs less."""
+    """Return a limit tightened by its margin; a band narrower than both margins becomes infeasible."""
     low = None if limit.minimum is None else limit.minimum + room
     high = None if limit.maximum is None else limit.maximum - room
     return replace(limit, minimum=low, maximum=high)
 
 
 def risk_allocation(excess: Array, prices: Array, share: float, reach: float = math.inf) -> tuple[Array, float]:
-    """Return the change of each limit's margin with which a share of a sample keeps all limits, at the least price.
+    """Return the shifts of all limits' margins with which a share of a sample keeps the limits, at the least price.
 
-    A larger margin moves the whole sample away from a limit.  The share holds where the largest excess less its limit's
-    shift is negative; the sum of prices times shifts is made small under this condition.
+    A larger margin moves the whole sample away from a limit.  The share holds if the largest excess minus its limit's
+    shift is negative; the sum of prices times shifts is minimised under this condition.
 
     Parameters
     ----------
-    excess : (n, L) by how much each mechanism exceeds each limit, in the limit's unit of room; negative where it keeps
-        it, infinite where nothing helps
-    prices : (L,) what a unit of room costs, not negative
-    share : of the sample that has to keep all limits, between 0 and 1
-    reach : distance at most of a limit's shift from that of the dearest one
+    excess : (n, L) excess of each mechanism over each limit, in units of the limit's margin; negative if it keeps the
+        limit, infinite if no margin helps
+    prices : (L,) price of a unit of margin, not negative
+    share : share of the sample that has to keep all limits, between 0 and 1
+    reach : largest difference of a limit's shift from that of the most expensive limit
 
     Returns
     -------
-    shifts (L,), and what they save against one shift for all limits.  Both shifts are infinite where too many
-    mechanisms are lost.
+    shifts (L,), and the saving against an equal shift of all limits.  Both are infinite if too many mechanisms are
+    lost.
 
     Notes
     -----
-    For normally distributed excesses the share is log-concave in the shifts (Prekopa 1971), so there is one least
-    price, and a compass search finds it.  Its last step leaves some 0.1 % of the saving.
+    For normally distributed excesses the share is log-concave in the shifts (Prekopa 1971), so the minimum of the
+    price is unique, and a compass search finds it.  Its last step leaves some 0.1 % of the saving.
     """
     number = min(max(math.ceil(share * len(excess)), 1), len(excess))
-    around = [number - 1, min(number, len(excess) - 1)]  # the last mechanism that keeps all limits and the next one
+    around = [number - 1, min(number, len(excess) - 1)]  # the last mechanism that keeps all limits, and the next
     weights = prices if prices.any() else np.ones(len(prices))
     total, dearest = float(weights.sum()), int(np.argmax(weights))
 

@@ -1,4 +1,4 @@
-"""Limits with margins so large that the wanted share of toleranced mechanisms keeps them."""
+"""Robust design: margins of limits such that the wanted share of toleranced mechanisms keeps all limits."""
 
 from __future__ import annotations
 
@@ -39,27 +39,27 @@ from sweep.quantities.limits import compared, meets
 if TYPE_CHECKING:
     from sweep.study import OptimiseSettings, Tolerance
 
-SAME = 1e-8  # relative, of values of two optima that are equally good
-BOTH = 4.0  # ways in which a design misses a limit that know little of each other, to begin with
-TRIED = 4  # basins of the search that are begun with
-ENDED = 3  # designs that go on after the first rounds
-HEAT = 400  # looks of each of the first rounds
-ROUNDS, CORRECTIONS = 4, 10  # of search with the room of the design before; of the number of standard deviations
-ONCE = 2  # looks that say how good a design is
-STAYED = 1e-3  # scaled step of a design with which its room agrees: that is of first order, and errs by the square
-RADIUS = 0.15  # of the first rounds, in scaled variables
-NEARLY = 1e-4  # scaled violation of a design whose objective counts
-ALIKE = 0.02  # greatest distance in scaled variables of designs that are taken for one
-REACH = 0.6  # distance of two limits' numbers of standard deviations in the first correction
-FADING = 0.7  # of that distance, from one correction to the next
-LEAP, AMPLE = 1.0, 4.0  # of a correction at most; standard deviations that hardly anything exceeds
-SAVED = 2e-6  # of the objective that another share-out should save, below which it is as good as it gets
-ENOUGH = 0.0005  # by so much the sampled share may exceed the wanted one; 0.003 cost 0.02 % of acceleration
+SAME = 1e-8  # relative difference of two optima that count as equally good
+BOTH = 4.0  # assumed number of nearly independent ways to violate the limits, for the first margins
+TRIED = 4  # number of basins from which the search starts
+ENDED = 3  # number of designs that continue after the first rounds
+HEAT = 400  # evaluations of each of the first rounds
+ROUNDS, CORRECTIONS = 4, 10  # of search with the previous design's margins; of the numbers of standard deviations
+ONCE = 2  # evaluations that give the objective of a design
+STAYED = 1e-3  # scaled step below which margins, of first order, agree with the design: the error is its square
+RADIUS = 0.15  # radius of the first rounds, in scaled variables
+NEARLY = 1e-4  # scaled violation below which the objective of a design counts
+ALIKE = 0.02  # largest distance, in scaled variables, of designs that count as the same
+REACH = 0.6  # largest difference of two limits' numbers of standard deviations in the first correction
+FADING = 0.7  # factor on that difference from one correction to the next
+LEAP, AMPLE = 1.0, 4.0  # largest change of one correction; number of standard deviations that hardly anything exceeds
+SAVED = 2e-6  # relative saving of another allocation below which the allocation is optimal
+ENOUGH = 0.0005  # allowed excess of the sampled share over the wanted one; 0.003 cost 0.02 % of acceleration
 
 
 @dataclass(frozen=True)
 class Robust:
-    """A robust result, the sampled share of mechanisms that keep all limits, and whether time cut it short."""
+    """A robust result, the sampled share of mechanisms that keep all limits, and whether time ran out."""
 
     result: Result
     share: float
@@ -67,18 +67,18 @@ class Robust:
 
 
 def kept(problem: Problem, designs: Array) -> tuple[dict[str, Array], NDArray[np.bool_]]:
-    """Return limited outputs of designs (n, P), and which designs keep all limits on outputs."""
+    """Return limited outputs of designs (n, P), and which designs keep all limits on outputs, (n,)."""
     found, good = within_limits(problem, bounded(problem), designs, problem.objective)
     return {name: compared(name, np.asarray(x, np.float64)) for name, x in found.items()}, good
 
 
 def _begun(results: Sequence[Result], more: Array | None) -> tuple[list[Array], list[int]]:
-    """Name the designs to begin with, and the numbers of their starts: found with room, else of the best basins."""
+    """Return the starting designs and their start numbers: those found with margins, otherwise the best basins."""
     heads: list[Result] = []
     for result in results:
         if result.feasible and result.ended not in CUT and result.basin not in [h.basin for h in heads]:
             heads.append(result)
-    # Designs that were looked for with room in their limits are far better starts than the best drawings.
+    # Designs found with margins in their limits are far better starts than the best nominal designs.
     heads = heads[: TRIED if more is None or not len(more) else 0]
     number = 1 + max((r.start for r in results), default=-1)
     begin = [h.design for h in heads] + list(np.empty((0, 0)) if more is None else more)
@@ -99,28 +99,27 @@ def robust(
 ) -> Robust | None:
     """Return the best design of which the wanted share of toleranced mechanisms keeps all limits.
 
-    Every limit gives up a margin of its own number of standard deviations.  The margin of a curve follows the turn and,
-    to first order, the design, so the search trades acceleration for insensitivity.  The margin of any other output is
-    one number; near its limit it too follows the design to first order.  Each round of search takes the margins of the
-    design before it; the rounds end where the design stays.  Then the numbers are corrected until the share of a sample
-    holds and no cheaper risk allocation is found.
+    Every limit has a margin of its own number of standard deviations.  The margin of a curve varies over the turn and,
+    to first order, with the design, so the search trades acceleration for insensitivity.  The margin of any other
+    output is one number; near its limit it too varies with the design to first order.  Each round of search uses the
+    margins of the previous design; the rounds end when the design stays.  Then the numbers of standard deviations are
+    corrected until the share holds in a sample and no cheaper risk allocation is found.
 
     Parameters
     ----------
-    problem : with the limits as they are asked for
-    results : of the search, best first; the best of up to four basins are begun with where there is no ``more``
-    tolerance : with ``robust``, the share
+    problem : problem with the limits as given
+    results : results of the search, best first; without ``more`` the best of up to four basins are the starts
+    tolerance : tolerances with ``robust``, the wanted share
     settings, stop, jobs : as for ``minimise``
-    more : (k, P) designs that a search for insensitive ones has found, to begin with instead
-    say : called with how many searches are done, how many there are at most, and the best value so far in words
-    kept : what a run that was stopped has found, and where this one notes what it finds
+    more : (k, P) designs of a search for insensitive ones, which replace the starts
+    say : called with the number of finished searches, its maximum, and the best value so far in words
+    kept : parts of a stopped run, to which this run adds its own
 
     Returns
     -------
-    The best one that reaches the share, else the one with the largest share; None where there is nothing to begin with.
-    ``agree`` of the result is the number of searches that met it: whose first rounds ended at a design that was found
-    to have its objective, within 1e-4.
-    ``violation`` and ``relaxation`` of the result are about the limits as they are asked for.
+    The best design that reaches the share, otherwise the one with the largest share; None without a start.
+    ``agree`` of the result is the number of searches whose first rounds ended at a design with its objective, within
+    1e-4.  ``violation`` and ``relaxation`` of the result refer to the limits as given.
     """
     begin, starts = _begun(results, more)
     if not begin:
@@ -130,7 +129,7 @@ def robust(
     total = len(begin) + min(ENDED, len(begin))
 
     def over(name: str, task: Task[Robust], count: int, before: int) -> list[Robust]:
-        """Return what a task gives for the numbers below a count that were begun; what is kept is not done again."""
+        """Return the results of a task for the begun numbers below ``count``; kept results are not repeated."""
         parts = {number: kept.parts.get(f"{name} {number}") for number in range(count)}
         done = {k: Robust(result_of(part["result"]), part["share"]) for k, part in parts.items() if part is not None}
 
@@ -148,10 +147,10 @@ def robust(
 
     near = _Approach(problem, np.array(begin), tuple(starts), tolerance, level, min(HEAT, settings.looks))
     found = [x.result for x in over("approach", near, len(begin), 0)]
-    # The objective of designs that miss their limits still says little.
+    # The objective of designs that violate their limits says little.
     order = sorted(found, key=lambda r: (r.violation > NEARLY, r.objective if r.violation <= NEARLY else r.violation))
     ends = _different(problem, order)[:ENDED]
-    if not ends:  # stopped before any of them was begun
+    if not ends:  # stopped before the first search
         return None
     total = len(begin) + len(ends)
     last = _Calibrate(problem, tuple(ends), tolerance, level, settings.seed, settings.looks)
@@ -172,13 +171,13 @@ def _never() -> bool:
 
 
 def _alike(problem: Problem, one: Result, other: Result) -> bool:
-    """Whether two designs are near each other."""
+    """Tell whether two designs differ by at most ALIKE in every scaled variable."""
     places = problem.scaled(np.array([one.design, other.design]))
     return float(np.abs(places[0] - places[1]).max()) <= ALIKE
 
 
 def _different(problem: Problem, results: Sequence[Result]) -> list[Result]:
-    """Return results whose designs are not near those of better ones."""
+    """Return the results whose designs are not near those of better ones."""
     apart: list[Result] = []
     for result in results:
         if not any(_alike(problem, result, other) for other in apart):
@@ -188,7 +187,7 @@ def _different(problem: Problem, results: Sequence[Result]) -> list[Result]:
 
 @dataclass(frozen=True)
 class _Approach:
-    """First rounds from some designs: a task for processes."""
+    """Task for processes: the first rounds from one starting design."""
 
     problem: Problem
     designs: Array
@@ -198,7 +197,7 @@ class _Approach:
     looks: int
 
     def __call__(self, number: int, should_stop: Callable[[], bool]) -> Robust:
-        """Return where the first rounds from a design end."""
+        """Return the result of the first rounds from a design."""
         levels = dict.fromkeys(keyed(self.problem).values(), self.level)
         start, design = self.numbers[number], self.designs[number]
         scatter = Scatter(self.problem, self.tolerance)
@@ -208,7 +207,7 @@ class _Approach:
 
 @dataclass(frozen=True)
 class _Calibrate:
-    """The rest of the way, and how many standard deviations each limit gives up: a task for processes."""
+    """Task for processes: further rounds with corrected numbers of standard deviations per limit."""
 
     problem: Problem
     results: tuple[Result, ...]
@@ -227,21 +226,22 @@ class _Calibrate:
         for corrected in range(CORRECTIONS):
             if should_stop():
                 return replace(best, cut=True)
-            if corrected or head.ended != "converged":  # else these margins have led to this head already
-                # One whose rounds do not settle must not hold up the others: all corrections share the looks of one.
+            if corrected or head.ended != "converged":  # otherwise these margins have led to this head already
+                # Rounds that do not settle must not delay the other searches: all corrections share the evaluations of
+                # one search.
                 looks = max(HEAT, (self.looks - spent) // ROUNDS)
                 result, radius, step = _approached(
                     scatter, head.start, design, levels, should_stop, ROUNDS, looks, radius
                 )
                 design, spent = result.design, spent + result.looks
                 values, share = self._made(design)
-            value = best.result.objective  # negative where an output is to be large
+            value = best.result.objective  # negative if an output is maximised
             gained = (value - result.objective) / (abs(value) or 1.0) if best.share >= wanted else math.inf
             better = share >= wanted and gained > 0.0
             if result.violation <= NEARLY and (better or (best.share < wanted and share > best.share)):
                 best = Robust(result, share, result.ended in CUT)
             if spent >= self.looks or (corrected and share >= wanted and not better and result.ended == "looks"):
-                break  # prices from a search that has not settled mislead the correction
+                break  # prices of an unsettled search would mislead the correction
             levels, saved = self._corrected(scatter, design, levels, values, reach)
             if wanted <= share <= wanted + enough and step < STAYED and min(saved, gained) < SAVED:
                 break
@@ -263,13 +263,13 @@ class _Calibrate:
         shifts, saved = risk_allocation(excess, np.array([known[key].price for key in keys]), wanted, reach)
         out = {}
         for key, shift in zip(keys, shifts.tolist(), strict=True):
-            # A limit without a price is not active: the design has a larger margin there than it was asked for.
+            # A limit without a price is not active: the design has a larger margin there than required.
             now = levels[key] if known[key].price > 0.0 else max(levels[key], -float(found[key][0]))
             out[key] = min(max(now + min(shift, LEAP), 0.0), AMPLE)
         return out, saved
 
     def _made(self, design: Array) -> tuple[dict[str, Array], float]:
-        """Return limited outputs of a design and of mechanisms about it, and the share of these that keeps limits."""
+        """Return limited outputs of a design and of mechanisms around it, and the share that keeps all limits."""
         about = deviating(self.problem.family, design, self.tolerance, self.seed, self.tolerance.samples)
         values, good = kept(self.problem, np.concatenate([design[None, :], about]))
         return values, float(good[1:].mean())
@@ -285,7 +285,7 @@ def _approached(
     looks: int,
     radius: float,
 ) -> tuple[Result, float, float]:
-    """Repeat the search, each time with the margins of the design before, until the design stays.
+    """Repeat the search, each time with the margins of the previous design, until the design stays.
 
     Returns
     -------
@@ -300,20 +300,21 @@ def _approached(
         step, room_of, design = float(np.abs(move).max()), design, result.design
         if result.ended in CUT or step < STAYED:
             break
-        # The margin is exact at the design where it was taken.  A reversed step tells of oscillation in a flat valley.
+        # The margin is exact at the design where it was computed.  A reversed step indicates oscillation in a flat
+        # valley.
         if (move * before).sum() < 0.0:
             radius *= 0.5
         elif step > 0.9 * radius:
             radius = min(2.0 * radius, RADIUS)
         before = move
-    # Bounds of the last round may hold the design where those of the problem do not.
+    # Bounds of the last round may be active where those of the problem are not.
     whole = search(number, with_margins(scatter, room_of, levels, None), design, asked, ONCE)
     kept_ended = result.ended if whole.ended == "looks" else whole.ended
     return replace(whole, looks=total, ended=kept_ended), radius, step
 
 
 def _share(problem: Problem, design: Array, tolerance: Tolerance, seed: int) -> float:
-    """Return the share of mechanisms that keep all limits; those that miss the cheap ones are not asked for others."""
+    """Return the share of mechanisms that keep all limits; cheap limits are tested first, and failures not further."""
     limits, good = bounded(problem), deviating(problem.family, design, tolerance, seed, tolerance.samples)
     for route in routes(problem.family, [x.output for x in limits], problem.accuracy):
         found = design_outputs(problem.family, good, route.outputs, problem.accuracy, problem.window)
@@ -327,7 +328,7 @@ def yields(problem: Problem, designs: Array, tolerance: Tolerance, seed: int) ->
 
 
 def better_made(problem: Problem, results: list[Result], tolerance: Tolerance, seed: int) -> list[Result]:
-    """Return results, first the one with the largest yield among those whose value is that of the best."""
+    """Return the results, first the one with the largest yield among those with the best value."""
     best = results[0]
     equal = [r for r in results if r.feasible and abs(r.objective - best.objective) <= SAME * abs(best.objective)]
     twins = _different(problem, equal)[:TRIED]

@@ -1,4 +1,4 @@
-"""What manufacture does to a design: exact derivatives by its dimensions, and samples of what is made."""
+"""Effects of manufacture on a design: exact derivatives by its dimensions, and samples of toleranced mechanisms."""
 
 from __future__ import annotations
 
@@ -24,9 +24,9 @@ from sweep.quantities.resolve import output as described
 if TYPE_CHECKING:
     from sweep.study import Study, Tolerance
 
-TIE = 1e-6  # extrema this near to the largest one (relative) share it
-DIMENSIONS = ("length", "angle", "ratio")  # a geared drive's dimensions are in planet radii
-REACH = 0.1  # step outputs are differentiated over a thousandth of this part of the dimension
+TIE = 1e-6  # relative difference below which extrema count as equal to the largest one
+DIMENSIONS = ("length", "angle", "ratio")  # with a tolerance; ratios are dimensions of a geared drive in planet radii
+REACH = 0.1  # range of a dimension for the derivatives of step outputs, relative to the longest dimension
 
 
 def sensitivities(
@@ -36,21 +36,21 @@ def sensitivities(
 
     They are dx/dp = dx/dy dy/dp, where y is the inner value.
 
-    A maximum that several extrema share has two derivatives: the largest of their gradients where the dimension grows,
-    the smallest where it shrinks; a shared minimum the other way round.  A corner optimum has them of opposite signs.
+    A maximum shared by several extrema has two derivatives: the largest of their gradients for growth of the dimension,
+    the smallest for shrinkage; a shared minimum the other way round.  At a corner optimum their signs differ.
 
     Parameters
     ----------
-    family : of the design
+    family : family of the design
     design : (P,)
-    outputs : names of design outputs; swing and stroke count by magnitude, whether it turns (``rotatable``) is left out
+    outputs : names of design outputs; swing and stroke count by magnitude, flags (``rotatable``) are left out
     window : part of the stroke in which deviations from a line count
 
     Returns
     -------
     Rows ``parameter``, ``output``, ``value``, ``growing`` and ``shrinking`` (per internal unit of the parameter: mm,
-    rad or 1), nan where the output does not exist.  Derivatives are exact to rounding (docs/internals/optimiser.md,
-    Gradients).  An output that is constant in pieces, such as a count, has no rows, and a design with a nan has none.
+    rad or 1), nan if the output does not exist.  Derivatives are exact to rounding (docs/internals/optimiser.md,
+    Gradients).  A piecewise constant output, such as a count, has no rows, and a design with a nan has none.
     """
     there = ~_absent(family, design)
     varied = [k for k, p in enumerate(family.parameters) if p.unit in DIMENSIONS and there[k]]
@@ -68,7 +68,7 @@ def sensitivities(
     def problem(output: str) -> Problem:
         return Problem(family, names, place - 0.5 * span, place + 0.5 * span, fixed, output, (), window, accuracy)
 
-    asked = asked if np.isfinite(design).all() else []  # [locus] may have no links for it
+    asked = asked if np.isfinite(design).all() else []  # [locus] may have no links for the design
     found = _plain_ends(problem, design, [name for name in asked if _is_plain(family, name, window)])
     for output in asked:
         value, low, high = found[output] if output in found else _ends(problem(output), design)
@@ -81,7 +81,7 @@ def sensitivities(
 
 
 def _is_plain(family: Family, output: str, window: tuple[float, float] | None) -> bool:
-    """Tell whether an output is a number without extrema that could be followed, and no parameter."""
+    """Tell whether an output is a plain number, without extrema to be tracked, and no parameter."""
     found = measure(family, output, window)
     return found.kind == "scalar" and not found.parts and output not in family.parameter_names
 
@@ -99,7 +99,7 @@ def _plain_ends(
         columns = design_outputs(asked.family, designs, names, asked.accuracy, asked.window)
         return np.stack(floats(columns, *names), axis=1)
 
-    moves = design + 1j * stepped(asked, design, at).imag  # about the very design whose values are asked for
+    moves = design + 1j * stepped(asked, design, at).imag  # exactly at the design whose values are computed
     slopes = step_gradients(asked.family, moves, outputs, asked.accuracy)
     rest = [name for name in outputs if name not in slopes]
     if rest:
@@ -110,9 +110,9 @@ def _plain_ends(
 
 
 def _ends(problem: Problem, design: Array) -> tuple[float, Array, Array]:
-    """Return the objective and its gradients by scaled variables, where each of these shrinks and where it grows."""
+    """Return the objective and its gradients by the scaled variables, for shrinking and for growing variables."""
     program = Program(problem)
-    if program.objective.is_least:  # what its extrema bound from above is its negative
+    if program.objective.is_least:  # its extrema bound its negative from above
         opposite = without_minus(problem.objective) or f"{MINUS}{problem.objective}"
         value, low, high = _ends(replace(problem, objective=opposite), design)
         return -value, -low, -high
@@ -147,15 +147,15 @@ def _outward(measure: Measure, inner: float) -> float:
     return 1.0
 
 
-SAMPLES = 2048  # a power of two: a Sobol sample keeps its balance only so
+SAMPLES = 2048  # a power of two: only then is a Sobol sample balanced
 SIGMAS = 3.0  # a tolerance of +-t is three standard deviations
 BAND = (2.5, 97.5)  # percent
 
 
 def touched(family: Family, design: Array, tolerance: Tolerance) -> Array:
-    """Return the tolerance (P,) of every parameter: its own, else that of lengths, of angles, zero for all others.
+    """Return the tolerance (P,) of every parameter: its own, otherwise that of lengths or angles, zero for all others.
 
-    What may not be negative and is 0 in the design (P,), as the arm of a fork slot, is a part that is not there.
+    A parameter that cannot be negative and is 0 in the design (P,), as the arm of a fork slot, is a missing part.
     """
     widths, own = {"length": tolerance.lengths, "angle": tolerance.angles}, dict(tolerance.own)
     wide = [own.get(p.name, widths.get(p.unit, 0.0)) for p in family.parameters]
@@ -163,20 +163,20 @@ def touched(family: Family, design: Array, tolerance: Tolerance) -> Array:
 
 
 def _absent(family: Family, design: Array) -> NDArray[np.bool_]:
-    """Tell which parameters (P,) of a design are choices, or parts that are not there."""
+    """Tell which parameters (P,) of a design are choices or missing parts."""
     given = zip(family.parameters, design, strict=True)
     return np.array([p.choices is not None or (p.not_negative and x == 0.0) for p, x in given])
 
 
 def deviating(family: Family, design: Array, tolerance: Tolerance, seed: int, samples: int = SAMPLES) -> Array:
-    """Return designs (samples, P) about one, every length and angle normally distributed, independent of each other.
+    """Return designs (samples, P) around a design, with independent normally distributed lengths and angles.
 
     Parameters
     ----------
-    family : of the design
+    family : family of the design
     design : (P,)
     tolerance : +- of lengths (mm) and angles (rad), three standard deviations
-    seed : of the scrambled Sobol sequence
+    seed : seed of the scrambled Sobol sequence
     samples : a power of two
     """
     from scipy.special import ndtri
@@ -201,15 +201,15 @@ def tolerance_rows(
     accuracy: Accuracy,
     window: tuple[float, float] | None = None,
 ) -> dict[str, list[Any]]:
-    """Return the distribution of design outputs under manufacturing tolerances by 2048 designs about the given one.
+    """Return the distribution of design outputs under manufacturing tolerances, from 2048 designs around the given one.
 
-    They are fewer where the tolerance asks for fewer.
+    A tolerance with fewer samples gives fewer designs.
 
     Parameters
     ----------
-    family, design : (P,) what is made
+    family, design : (P,) nominal design
     outputs : names of design outputs
-    limits : those that ``within`` counts; equations are left out, since no toleranced mechanism keeps them
+    limits : limits counted in ``within``, without equations, which no toleranced mechanism keeps
     tolerance, seed : see :func:`deviating`
     accuracy, window : as for ``summarise``
 
@@ -217,7 +217,7 @@ def tolerance_rows(
     -------
     Rows ``output``, ``nominal``, ``mean``, ``low``, ``high`` (2.5 and 97.5 % of the designs that have the output),
     ``missing`` (share without it), ``within`` (share that keeps its limits; nan without a limit); a last row
-    "all limits" has only ``within``.  The share of 2048 designs is good to about 1 %.
+    "all limits" has only ``within``.  The share of 2048 designs is accurate to about 1 %.
     """
     limits = [limit for limit in limits if limit.minimum is None or limit.minimum != limit.maximum]
     designs = np.concatenate(
@@ -242,16 +242,16 @@ def tolerance_rows(
     return {name: list(column) for name, column in zip(names, zip(*rows, strict=True), strict=True)}
 
 
-SINGLE = 512  # mechanisms of those made, for what each dimension costs
-COSTS = 8  # dimensions that are tried exact
-TELLING = 0.004  # a share of mechanisms below which a dimension costs nothing that 512 of them could tell
+SINGLE = 512  # mechanisms of the sample used for the cost of each dimension
+COSTS = 8  # number of dimensions made exact, one at a time
+TELLING = 0.004  # share of mechanisms below which 512 of them show no cost of a dimension
 
 
 class Cost(NamedTuple):
-    """What one dimension's tolerance costs, found by making the same mechanisms with it exact.
+    """Cost of one dimension's tolerance, from the same mechanisms with this dimension exact.
 
-    ``spread`` is its share in the variance of the output whose limit is missed most, ``gain`` the share of mechanisms
-    that keep the limits more without it.  A design that stands at its limit gains nothing from any single dimension.
+    ``spread`` is its share in the variance of the output whose limit is violated most, ``gain`` the additional share of
+    mechanisms that keep the limits.  A design at its limit gains nothing from any single dimension.
     """
 
     name: str
@@ -261,7 +261,7 @@ class Cost(NamedTuple):
 
 
 class Manufactured(NamedTuple):
-    """What is made of a design: the ``output`` whose limit is missed most, its ``values`` (n,), which keep all limits.
+    """Sample of mechanisms of a design: the ``output`` violated most, its ``values`` (n,), and which keep all limits.
 
     ``costs`` are those of its dimensions, the dearest first.
     """
@@ -273,13 +273,13 @@ class Manufactured(NamedTuple):
 
 
 def limits_of_made(study: Study) -> list[Limit]:
-    """Return the limits that leave room, each on the number that decides it: a yes or no has no scatter to be shown."""
+    """Return the inequality limits; a flag is replaced by the number that decides it, since a flag has no scatter."""
     limits = [limit for limit in study.output_limits if not limit.is_equation]
     return [Limit(judged_by(x.output), 0.0, None) if is_flag(x.output) else x for x in limits]
 
 
 def manufactured(study: Study, design: Array) -> Manufactured | None:
-    """Make a design (P,) many times; None without tolerances, a design, or a limit that leaves room."""
+    """Sample mechanisms of a design (P,); None without tolerances, a finite design, or an inequality limit."""
     limits = limits_of_made(study)
     if study.tolerance is None or study.optimise is None or not limits or not np.isfinite(design).all():
         return None
@@ -294,7 +294,7 @@ def manufactured(study: Study, design: Array) -> Manufactured | None:
 def within_limits(
     of: Study | Problem, limits: Sequence[Limit], designs: Array, *more: str
 ) -> tuple[dict[str, NDArray[np.generic]], NDArray[np.bool_]]:
-    """Return outputs of designs (n, P) that are limited, ``more`` of them, and which designs keep all limits, (n,)."""
+    """Return limited outputs and outputs ``more`` of designs (n, P), and which designs keep all limits, (n,)."""
     names = list(dict.fromkeys([*(limit.output for limit in limits), *more]))
     columns = design_outputs(of.family, designs, names, of.accuracy, of.window)
     met = [np.ones(len(designs), np.bool_), *(meets(limit, columns[limit.output]) for limit in limits)]
@@ -305,11 +305,11 @@ def _costs(
     study: Study, limits: list[Limit], worst: Limit, design: Array, designs: Array,
     columns: dict[str, NDArray[np.generic]], before: float,
 ) -> list[Cost]:  # fmt: skip
-    """Dimensions by what their tolerances cost, the dearest first: the same mechanisms with one dimension exact.
+    """Return the dimensions by the cost of their tolerances, the most expensive first.
 
-    Of the mechanisms ``designs`` the ``columns`` are known, and the share ``before`` that keeps all limits.  Made exact
-    are the dimensions whose share in the variance of an output, times the share that misses its limit, is largest.  A
-    limit from which all these mechanisms keep a standard deviation of theirs is kept with one dimension exact, too.
+    For the mechanisms ``designs`` the output ``columns`` are known, and the share ``before`` that keeps all limits.
+    The dimensions with the largest share in the variance of an output, times the share that violates its limit, are
+    made exact one at a time.  A limit that all these mechanisms keep by a standard deviation is kept then, too.
     """
     assert study.tolerance is not None
     limits = [x for x in limits if x is worst or _near(x, columns[x.output])]
@@ -321,7 +321,7 @@ def _costs(
         values = compared(limit.output, np.asarray(columns[limit.output], np.float64))
         known = np.isfinite(values)
         if not known.any():
-            continue  # no mechanism has this output, and no dimension alone gives it one
+            continue  # no mechanism has this output, and no single dimension changes that
         off, away = designs[known][:, own] - design[own], values[known] - values[known].mean()
         along = (away @ off) ** 2 / (off**2).sum(axis=0)
         matters += along / max(along.sum(), 1e-300) * (1.0 - float(meets(limit, columns[limit.output]).mean()))
@@ -336,7 +336,7 @@ def _costs(
 
 
 def _near(limit: Limit, column: NDArray[np.generic]) -> bool:
-    """Return whether a value misses the limit, or comes as near to it as the values scatter."""
+    """Tell whether a value violates the limit, or is within one standard deviation of it."""
     room = math.sqrt(_variance({limit.output: column}, limit))
     low, high = (None if x is None else x + d for x, d in ((limit.minimum, room), (limit.maximum, -room)))
     return not meets(replace(limit, minimum=low, maximum=high), column).all()

@@ -1,1 +1,1 @@
-"""Searches from many starts, here or in processes, and how far they can be relied upon."""
+"""Searches from many starts, in this process or in several, and the reliability of their result."""

@@ -1,6 +1,6 @@
-"""``minimise`` and ``optimum``: searches from several starts, best first, with budgets of starts and looks.
+"""``minimise`` and ``optimum``: searches from several starts, best first, with limited starts and evaluations.
 
-Parameters that a study gives as a list of values are kept by each start; then the neighbouring ones are tried.
+Each start keeps parameters that a study gives as a list of values; then the neighbouring values are tried.
 """
 
 from __future__ import annotations
@@ -31,15 +31,15 @@ from sweep.optimise.starts.samples import samples
 if TYPE_CHECKING:
     from sweep.study import OptimiseSettings, Study
 
-LOOKED_AT = 3  # starts at which equations are looked at
-SERIAL_LOOKS = 800  # of a search before processes are worth their start, about a second
-ROUNDS = 12  # steps from catalogue value to catalogue value, each of at most two searches per parameter
-GAIN = 1e-9  # relative, of a step that counts
+LOOKED_AT = 3  # number of starts at which equations are checked for dependency
+SERIAL_LOOKS = 800  # evaluations, about a second, after which a search is worth several processes
+ROUNDS = 12  # steps between catalogue values, each of at most two searches per parameter
+GAIN = 1e-9  # smallest relative gain of such a step
 Tell = Callable[[int, int, float], None]
 
 
 class Search(NamedTuple):
-    """What a search has found: results, best first, what they tell of it, and the problem with its final bounds."""
+    """Results of a search, best first, their survey, and the problem with its final bounds."""
 
     results: list[Result]
     survey: Survey
@@ -53,12 +53,12 @@ def minimise(
     stop: Callable[[], bool] | None = None,
     jobs: int = 1,
 ) -> list[Result]:
-    """Return the smallest objective under the limits; one result per start that was begun, best first.
+    """Minimise the objective under the limits; return one result per begun start, best first.
 
     Parameters
     ----------
     problem : what to minimise
-    starts : (k, P) designs; their signs are kept, their variables are the starting points
+    starts : (k, P) designs, which set the signs and the initial values of the variables
     settings, stop, jobs : as for :func:`explore`
 
     Raises
@@ -82,29 +82,29 @@ def explore(
     jobs: int = 1,
     tell: Tell | None = None,
 ) -> Search:
-    """Search from one group of starts after the other until enough is known of the basins.
+    """Search from one group of starts after the other until the survey of the basins suffices.
 
     Parameters
     ----------
     problem : what to minimise
-    groups : of starts, each of which is asked for when those before it have been searched from
-    settings : ``looks`` are allowed to each start; groups end when ``unseen`` and the best basin are as asked (see
-        :class:`sweep.optimise.multistart.survey.Survey`); ``time_budget`` [s] or None is an emergency deadline
-    stop : asked often; when it answers true, or at Ctrl-C, the search ends and each start in progress keeps its best
+    groups : groups of starts, each requested after the search from the previous one
+    settings : ``looks`` evaluations are allowed per start; the search ends when ``unseen`` and the best basin meet the
+        rule (:class:`sweep.optimise.multistart.survey.Survey`); ``time_budget`` [s] or None is an emergency deadline
+    stop : called often; if it returns true, or at Ctrl-C, the search ends and each start in progress keeps its best
         design so far
-    jobs : processes the starts are spread over, once the search turns out to be long; results do not depend on it
-    tell : called at first and after each start, with the number of starts (or populations) that are done, the most
-        there will be, and the best value so far
+    jobs : number of processes over which the starts of a long search are spread; results do not depend on it
+    tell : called at first and after each start, with the number of finished starts (or populations), its maximum, and
+        the best value so far
 
     Returns
     -------
-    Feasible results by objective, then infeasible ones by violation; none without a start.  The same
-    groups give the same results to the bit on any machine, busy or not, unless it was stopped.
+    Feasible results by objective, then infeasible ones by violation; none without a start.  The same groups give the
+    same results to the bit on any machine, busy or not, unless the search was stopped.
 
     Raises
     ------
     InputError
-        if a name of the problem is unknown, or two equations say the same
+        if a name of the problem is unknown, or two equations are dependent
     WorkerDied
         if a worker process was killed.
     """
@@ -128,7 +128,7 @@ def explore(
             first = len(results)
             begun.append(group)
             problem = group.problem or problem
-            if not first:  # unknown names and equations that say the same are refused here, not in a worker
+            if not first:  # unknown names and dependent equations are refused here, not in a worker
                 refuse_dependent(problem, Program(problem), group.designs[:LOOKED_AT])
             numbers = list(range(first, first + len(group.designs)))
             task = SearchTask(problem, group.designs, settings.looks, first)
@@ -152,14 +152,14 @@ def explore(
 
 
 def _done(begun: Sequence[Group], results: Sequence[Result]) -> int:
-    """Return how many of the starts that count are over."""
+    """Return the number of finished starts, of those that count."""
     counts = counted(begun)
     return sum(counts[r.start] for r in results)
 
 
 @contextmanager
 def _signals() -> Iterator[Stop]:
-    """Let Ctrl-C set a flag, so that every process ends with its best design; a caller's own handler is left alone."""
+    """Let Ctrl-C set a flag, so that every process ends with its best design; leave a caller's own handler alone."""
     if signal.getsignal(signal.SIGINT) is not signal.default_int_handler:
         yield Stop()
         return
@@ -171,11 +171,11 @@ def _batch(
     task: SearchTask, numbers: list[int], before: Sequence[Result], asked: Callable[[], bool], jobs: int,
     told: Callable[[Result], None],
 ) -> list[Result]:  # fmt: skip
-    """Search from some starts, in this process as long as few looks were needed, then in several."""
+    """Search from some starts, in this process until many evaluations were needed, then in several processes."""
     results: list[Result] = []
     while len(results) < len(numbers):
         spent = sum(r.looks for r in (*before, *results))
-        # The very first start always has a result, whoever wants to stop.
+        # The very first start always has a result, even if the search is to stop.
         if (results or before) and (asked() or (jobs > 1 and spent >= SERIAL_LOOKS)):
             break
         results.append(task(numbers[len(results)], asked))
@@ -187,7 +187,7 @@ def _batch(
 
 
 def ranked(results: list[Result]) -> list[Result]:
-    """Return results in the order of their rank; those in the best basin carry its number of starts."""
+    """Return results ordered by rank; those in the best basin carry its number of starts."""
     order = sorted(with_basins(results), key=lambda r: (*r.rank, r.start))
     agree = sum(r.basin == 1 for r in order)
     return [replace(r, agree=agree) if r.basin == 1 else r for r in order]
@@ -202,21 +202,21 @@ def optimum(
 ) -> list[Result]:
     """Return the best designs of a problem.
 
-    Equations are eliminated where they can be; local searches begin from the best of several samples.
+    Equations are eliminated if possible; local searches start from the best of several samples.
 
-    Where no start becomes feasible the equations may give way as well: a second search, in the parameters themselves,
-    begins from the least infeasible design and a sample; of both searches the smallest relaxation comes first.
+    If no start becomes feasible, the equations may be relaxed as well: a second search, in the parameters themselves,
+    starts from the least infeasible design and a sample; of both searches the smallest relaxation comes first.
 
     Parameters
     ----------
-    problem : in the parameters themselves
+    problem : problem in the parameters themselves
     signs : combinations of the parameters that are not varied, as ``[{"branch": 1.0}, {"branch": -1.0}]``
-    settings : the most starts of each search, seed of the samples, what ends a search earlier
+    settings : largest number of starts of each search, seed of the samples, stopping rules
     stop, jobs : as for ``minimise``
 
     Returns
     -------
-    Results as of ``minimise``, best first.  Same arguments, same results, unless it was stopped.
+    Results as of ``minimise``, best first.  The same arguments give the same results, unless the search was stopped.
 
     Raises
     ------
@@ -226,7 +226,7 @@ def optimum(
     along = on_locus(problem)
     results = _sampled(along, signs, settings, stop, jobs)
     if along is not problem and not any(result.feasible for result in results):
-        # The equations give way, or the bounds of the links do: the smaller relaxation is the answer.
+        # Relaxing the equations competes with relaxing the bounds of the links: the smaller relaxation is the answer.
         others = _sampled(problem, signs, settings, stop, jobs, [result.design for result in results[:1]])
         first = 1 + max((result.start for result in results), default=-1)
         results = ranked([*results, *(replace(result, start=first + result.start) for result in others)])
@@ -243,16 +243,16 @@ def _sampled(
     jobs: int,
     near: Sequence[Array] = (),
 ) -> list[Result]:
-    """Search from some designs, then from samples."""
+    """Search from the designs ``near``, then from samples."""
     own = samples(problem, signs, settings.starts, settings.seed, stop or (lambda: False))
     return explore(problem, chain(in_groups(np.array(near)), own), settings, stop, jobs).results
 
 
 def listed(study: Study) -> dict[str, Array]:
-    """Return the parameters that keep the values listed by the study, with these values, sorted.
+    """Return the listed values, sorted, of the parameters that a search keeps at values listed by the study.
 
-    Signs are listed by nature and are not among them.  What [locus] or [fit] sets or scales has no list: there the
-    values are proportions, and prescribed ones are ranges.
+    Signs are listed by nature and are not included, nor are parameters that [locus] or [fit] sets or scales: listed
+    values of those are proportions, and prescribed ones are ranges.
     """
     raw = study.written
     names = study.family.parameter_names
@@ -276,17 +276,17 @@ def with_neighbours(
     stop: Callable[[], bool] | None,
     jobs: int,
 ) -> list[Result]:
-    """Return results, the best first, with those of neighbours of the best among listed values.
+    """Return results, the best first, with those of neighbours of the best one among listed values.
 
     A neighbour has one listed value exchanged for the next larger or smaller one.
 
-    The exchange goes on from the new best as long as it gains, so that the answer cannot be bettered by the next larger
-    or smaller value of any one parameter.  Same results for any number of jobs.
+    The exchange continues from the new best while it gains, so that no change of a single parameter to the next larger
+    or smaller value improves the answer.  The results do not depend on the number of jobs.
 
     Parameters
     ----------
     problem, settings, stop, jobs : as for ``minimise``; the listed parameters are no variables
-    results : of the search so far, best first
+    results : results of the search so far, best first
     catalogue : the listed parameters and their values
     """
     names = problem.family.parameter_names

@@ -1,4 +1,4 @@
-"""Starts spread over processes: most of a search runs in Python, where threads would wait for each other."""
+"""Starts spread over processes, since most of a search runs in Python, where threads would block each other."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ T = TypeVar("T")
 
 
 class _Asked(Stop):
-    """A flag that is set as soon as a reader of it finds that a function answers true."""
+    """A stop flag that is set when a reader finds that ``asked`` returns true."""
 
     def __init__(self, asked: Callable[[], bool]) -> None:
         self._asked = asked
@@ -33,13 +33,13 @@ class _Asked(Stop):
 
 @dataclass(frozen=True)
 class _Checked(Generic[T]):
-    """A task for workers; one whose sources are not those of the process that asks does nothing."""
+    """A task for workers, refused by a worker with sources other than those of the calling process."""
 
     task: Task[T]
     code: str
 
     def __call__(self, number: int, should_stop: Callable[[], bool]) -> tuple[int, T] | None:
-        """Return the number with what the task gives for it, None if it is not to be begun any more."""
+        """Return the number with the result of the task, or None if the search is to stop."""
         own = optimiser_hash()
         if own != self.code:
             allowed = f"{self.code}, the sources and libraries of the process that searches"
@@ -49,7 +49,7 @@ class _Checked(Generic[T]):
 
 @dataclass(frozen=True)
 class SearchTask:
-    """Search from one of the starts, the first of which has the number ``first``."""
+    """Search from one of the starts, which are numbered from ``first``."""
 
     problem: Problem
     starts: Array
@@ -57,7 +57,7 @@ class SearchTask:
     first: int = 0
 
     def __call__(self, number: int, should_stop: Callable[[], bool]) -> Result:
-        """Return the result from that start."""
+        """Return the result of the start with this number."""
         return search(number, self.problem, self.starts[number - self.first], should_stop, self.allowed)
 
 
@@ -68,18 +68,18 @@ def spread_over(
     jobs: int,
     tell: Callable[[int, T], None] = lambda _, __: None,
 ) -> list[T]:
-    """Return what a task gives for each number that was begun before ``asked`` became true, in their order.
+    """Return the results of a task for the numbers begun before ``asked`` became true, in their order.
 
-    A single number, or what a single worker does, runs here; the rest in processes, or on the cluster of the run.  Each
-    result is what this process finds, to the bit.
+    A single number, or the work of a single worker, runs in this process; otherwise processes or the cluster of the run
+    are used.  Each result is the same as in this process, to the bit.
 
     Parameters
     ----------
-    task : fit to be pickled
-    numbers : what it is called with
-    asked : looked at in this process; workers learn of it, and what does not answer soon is given up
-    jobs : how many workers
-    tell : called with each number and what was found
+    task : task that can be pickled
+    numbers : arguments of its calls
+    asked : called in this process; workers are told to stop, and one that does not answer soon is abandoned
+    jobs : number of workers
+    tell : called with each number and its result
 
     Raises
     ------

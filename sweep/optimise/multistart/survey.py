@@ -1,4 +1,4 @@
-"""When a search ends and how far it can be relied upon: basins its starts ended in, estimated share of unseen ones."""
+"""Stopping rule and reliability of a search: basins in which its starts ended, estimated share of unseen ones."""
 
 from __future__ import annotations
 
@@ -18,24 +18,24 @@ from sweep.optimise.problem.statement import Problem
 if TYPE_CHECKING:
     from sweep.study import OptimiseSettings
 
-TOGETHER = 6  # starts between two looks at whether more are needed
+TOGETHER = 6  # starts searched between two checks of the stopping rule
 MET = 3  # distinct starts that have to end in the best basin
-UNSEEN = 0.02  # share of basins that starts may leave unseen, unless a study asks for another; of populations all
-DISTINCT = 0.05  # of the average distance of two random designs: nearer starts are not distinct
-CUT = ("time", "interrupted")  # how a start ends that was not searched to its end
+UNSEEN = 0.02  # default of the estimated share of unseen basins below which a search ends; populations need no estimate
+DISTINCT = 0.05  # share of the average distance of two random designs below which starts are not distinct
+CUT = ("time", "interrupted")  # endings of a start whose search was cut short
 
 
 class Group(NamedTuple):
-    """Starts that are searched from together.
+    """Starts that are searched as one group.
 
     Parameters
     ----------
     designs : (k, P), the best first
-    source : the sample or population that they come from, -1 for all others.  Starts of different sources are distinct
-        wherever they stand, since these know nothing of each other; those of one source where they stand apart.
-    counted : the first so many tell which basins there are; the others are searched from and do not count.  A
-        population has chosen its ends itself, so its best one counts alone.  None counts all.
-    problem : with bounds that hold the designs, where they are not those of the search
+    source : number of the sample or population of the starts, -1 for all others.  Starts of different sources are
+        independent and always distinct; those of one source are distinct if they are far apart.
+    counted : number of leading starts that count in the survey of basins; the others are searched without counting.  Of
+        a population, which has selected its ends itself, only the best counts.  None counts all.
+    problem : problem with bounds that contain the designs, if it differs from that of the search
     """
 
     designs: Array
@@ -45,32 +45,32 @@ class Group(NamedTuple):
 
 
 def in_groups(starts: Array) -> Iterator[Group]:
-    """Yield starts (k, P) in groups of at most six, which are the same for any number of jobs."""
+    """Yield starts (k, P) in groups of at most six, independent of the number of jobs."""
     for first in range(0, len(starts), TOGETHER):
         yield Group(starts[first : first + TOGETHER])
 
 
 def counted(groups: Sequence[Group]) -> list[bool]:
-    """Return for each start of some groups whether it counts."""
+    """Tell for each start of some groups whether it counts."""
     return [group.counted is None or k < group.counted for group in groups for k in range(len(group.designs))]
 
 
 @dataclass(frozen=True)
 class Survey:
-    """What the starts of a search tell of it.
+    """Survey of the starts of a search.
 
     Parameters
     ----------
-    starts : starts that were searched to their end
-    asked : the most starts, or populations, that the study allows
-    basins : different values the feasible ones ended at; values within 1e-4 count as one basin
-    best : distinct starts that ended in the best basin
-    unseen : estimated share of basins, by their volume, that no start has met; 1 where no start became feasible
-    wanted : what ``unseen`` should fall below
-    ended : "enough" where the rule was fulfilled, "starts" where none was left, "time" or "interrupted"
-    kinds : starts and basins for each combination of signs, as ``(("branch = 1", 7, 3), ...)``
-    late : whether all starts were searched, and time ran out over what follows them
-    populations : those that were counted, each with its best end; 0 where starts were counted
+    starts : number of starts whose search was not cut short
+    asked : largest number of starts, or populations, that the study allows
+    basins : number of different values of feasible ends; values within 1e-4 count as one basin
+    best : number of distinct starts that ended in the best basin
+    unseen : estimated share of unseen basins, by their volume; 1 if no start became feasible
+    wanted : share that ``unseen`` should fall below
+    ended : "enough" if the stopping rule holds, "starts" if none was left, "time" or "interrupted"
+    kinds : numbers of starts and basins for each combination of signs, as ``(("branch = 1", 7, 3), ...)``
+    late : whether time ran out after all starts, during the steps that follow them
+    populations : number of counted populations, each with its best end; 0 if starts were counted
     """
 
     starts: int
@@ -86,12 +86,12 @@ class Survey:
 
     @property
     def enough(self) -> bool:
-        """Whether the best basin was met often enough and few basins are likely to be unseen."""
+        """Whether the best basin was met often enough and the estimated share of unseen basins is small enough."""
         return self.best >= MET and self.unseen <= self.wanted
 
     @property
     def words(self) -> str:
-        """``14 basins met, the best 5 times, estimated unseen 1 %``."""
+        """Summary as ``14 basins met, the best 5 times, estimated unseen 1 %``."""
         if self.basins == 0:
             return f"none of {how_many(self.starts, 'start')} became feasible"
         basins = f"{how_many(self.basins, 'basin')} met"
@@ -101,12 +101,12 @@ class Survey:
 
     @property
     def warnings(self) -> tuple[str, ...]:
-        """The warnings that a reader has to know before trusting the result."""
+        """Warnings that a reader needs before trusting the result."""
         return (*self.shortcomings, *self.doubts)
 
     @property
     def shortcomings(self) -> tuple[str, ...]:
-        """The parts of the search that were asked for and not done."""
+        """Parts of the search that were requested and not done."""
         found = []
         if self.ended in CUT:
             why = "time ran out" if self.ended == "time" else "interrupted"
@@ -121,7 +121,7 @@ class Survey:
 
     @property
     def doubts(self) -> tuple[str, ...]:
-        """Why there may be something better than what the search found."""
+        """Reasons why a better result than that of the search may exist."""
         found = []
         if self.ended == "starts" and self.basins and not self.enough:
             of = "populations" if self.populations else "distinct valleys"
@@ -138,22 +138,22 @@ class Survey:
 def survey(
     problem: Problem, groups: Sequence[Group], results: Sequence[Result], settings: OptimiseSettings, ended: str
 ) -> Survey:
-    """Return what the results of a search tell of it.
+    """Return the survey of the results of a search.
 
     Parameters
     ----------
-    problem : whose variables tell how far two starts are apart
-    groups : the starts, which are numbered one group after the other
-    results : of those that were begun, in any order
-    settings : the number of starts asked, and the share of unseen basins that is allowed
-    ended : how the search ended
+    problem : its variables define the distance of two starts
+    groups : groups of starts, numbered one group after the other
+    results : results of the begun starts, in any order
+    settings : wanted number of starts, and allowed share of unseen basins
+    ended : ending of the search
 
     Notes
     -----
     The unseen share is the larger of two estimates for n starts that met w basins, s of them once: s / n (Good and
-    Turing) and w (w + 1) / (n (n - 1)) (Boender and Rinnooy Kan 1987, for unknown volumes).  Both suppose that starts
-    are drawn at random; these are the best of samples, so the estimate is about further starts of the same kind.
-    Populations are drawn at random: they differ by their seeds alone.
+    Turing) and w (w + 1) / (n (n - 1)) (Boender and Rinnooy Kan 1987, for unknown volumes).  Both assume random starts;
+    these are the best of samples, so the estimate refers to further starts of the same kind.  Populations are random:
+    they differ by their seeds alone.
     """
     whole = [r for r in results if r.ended not in CUT]
     none = np.empty((0, len(problem.family.parameters)))
@@ -171,19 +171,19 @@ def survey(
 
 
 def most_counted(settings: OptimiseSettings) -> int:
-    """Return how many starts, or populations, are counted at most."""
+    """Return the largest number of starts, or populations, that are counted."""
     return settings.populations if settings.by_populations else settings.starts
 
 
 def wanted(settings: OptimiseSettings) -> float:
-    """Share of unseen basins below which a search ends: of populations the best basin alone decides unless asked."""
+    """Return the share of unseen basins below which a search ends; 1 by default for populations."""
     if settings.unseen is not None:
         return settings.unseen
     return 1.0 if settings.by_populations else UNSEEN
 
 
 def basins(values: Sequence[float]) -> list[int]:
-    """Return the number of the basin of each value, 1 for the least; 0 for what is no number."""
+    """Return the number of each value's basin, 1 for the smallest; 0 for values that are not finite."""
     numbers, number, first = [0] * len(values), 0, 0.0
     for k in sorted((k for k, x in enumerate(values) if math.isfinite(x)), key=lambda k: values[k]):
         if not number or not values[k] - first <= AGREE * max(abs(first), 1e-300):
@@ -193,26 +193,26 @@ def basins(values: Sequence[float]) -> list[int]:
 
 
 def later(found: Survey) -> Survey:
-    """Return the survey of a search whose time ran out when its starts had been searched."""
+    """Return the survey of a search whose time ran out after all starts had been searched."""
     return replace(found, ended="time", late=True)
 
 
 def with_basins(results: Sequence[Result]) -> list[Result]:
-    """Return results with their basin, in its order: 1 for the best; infeasible ones have 0 and come last."""
+    """Return results with their basin, ordered by rank: 1 for the best; infeasible ones have 0 and come last."""
     numbers = basins([r.objective if r.feasible else math.inf for r in results])
     found = [replace(r, basin=number) for r, number in zip(results, numbers, strict=True)]
     return sorted(found, key=lambda r: (*r.rank, r.start))
 
 
 def _unseen(met: Counter[int]) -> float:
-    """Return the larger of both estimates of the share of unseen basins; 1 where they say nothing."""
+    """Return the larger of both estimates of the share of unseen basins; 1 for fewer than two starts."""
     n, w = met.total(), len(met)
     once = sum(1 for count in met.values() if count == 1)
     return min(1.0, max(once / n, w * (w + 1) / (n * (n - 1)))) if n > 1 else 1.0
 
 
 def _distinct(problem: Problem, starts: Array, numbers: list[int], source: Sequence[int]) -> int:
-    """Return how many of some starts stand in distinct valleys, or come from distinct sources."""
+    """Return the number of starts that are far apart or come from different sources."""
     place = problem.scaled(starts)
     others = [c for c in range(starts.shape[1]) if c not in problem.columns]
     least = DISTINCT * math.sqrt(place.shape[1] / 6.0)
@@ -230,7 +230,7 @@ def _distinct(problem: Problem, starts: Array, numbers: list[int], source: Seque
 
 
 def _kinds(problem: Problem, starts: Array, results: Sequence[Result]) -> tuple[tuple[str, int, int], ...]:
-    """Return starts and basins for each combination of the parameters that are chosen, not varied."""
+    """Return numbers of starts and basins for each combination of the parameters that are not varied."""
     others = [c for c in range(starts.shape[1]) if c not in problem.columns]
     differ = [c for c in others if len(np.unique(starts[:, c])) > 1]
     names = problem.family.parameter_names

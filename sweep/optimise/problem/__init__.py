@@ -1,1 +1,1 @@
-"""What is to be optimised, and the rows of its epigraph program."""
+"""The optimisation problem, and the rows of its epigraph program."""

@@ -1,6 +1,6 @@
-"""Equations for limit positions eliminated: the same problem in coordinates in which they hold by construction.
+"""Elimination of equations for limit positions: the problem in coordinates in which they hold by construction.
 
-The way back to the parameters serves near singular places of these coordinates.
+The return to the parameters serves near singular places of these coordinates.
 """
 
 from __future__ import annotations
@@ -20,10 +20,10 @@ from sweep.optimise.problem.statement import Problem
 from sweep.study import Limit
 from sweep.synthesis.locus import OnLocus
 
-# The place on the locus is a periodic angle: a search that begins within one turn may leave it on either side.
+# The place on the locus is a periodic angle: a search that starts within one turn may leave it on either side.
 PLACE_BOUNDS = (-math.pi, 3.0 * math.pi)
 WHOLE_TURN = 2.0 * math.pi * (1.0 - 1e-9)
-SHORTEST = 0.1  # of its present length is a link without a lower limit
+SHORTEST = 0.1  # lower bound of a link without a lower limit, relative to its present length
 
 
 EXACT = Accuracy(target=1e-12)
@@ -31,27 +31,27 @@ EXACT = Accuracy(target=1e-12)
 
 @dataclass(frozen=True)
 class LocusCoordinates:
-    """Limit positions instead of links: swing or stroke (by magnitude), phi0 and the place on the locus are variables.
+    """Coordinates in place of links: swing or stroke (by magnitude), phi0 and the place on the locus are variables.
 
-    The links of the stage follow (docs/synthesis.md), so a prescribed swing, stroke or phi0 holds exactly wherever the
-    search goes.  The branch belongs to the start as ever; it tells the sign of the swing.
+    The links of the stage follow (docs/synthesis.md), so a prescribed swing, stroke or phi0 holds exactly during the
+    search.  The branch is fixed by the start and gives the sign of the swing.
     """
 
     stage: OnLocus
 
     @cached_property
     def given(self) -> tuple[str, ...]:
-        """The prescribed design outputs, with the number of the stage."""
+        """Prescribed design outputs, with the number of the stage."""
         return tuple(p.name for p in self.stage.prescribed)
 
     @cached_property
     def made(self) -> tuple[str, ...]:
-        """The links that follow."""
+        """Links that follow from the coordinates."""
         return tuple(name for name in self.stage.made if name != self._branch)
 
     @property
     def periodic(self) -> tuple[str, ...]:
-        """The place on the locus."""
+        """Name of the place on the locus."""
         return (f"phi_ext{self.stage.number}",)
 
     @cached_property
@@ -63,14 +63,14 @@ class LocusCoordinates:
         return f"branch{self.stage.number}"
 
     def make(self, columns: Mapping[str, Any]) -> Mapping[str, Any]:
-        """Return the links that do what is prescribed; nan where the locus has no mechanism there."""
+        """Return the links that give the prescribed outputs; nan if the locus has no mechanism there."""
         matrix = np.column_stack([columns[name] for name in self._asked])
         matrix[:, 0] *= -columns[self._branch].real
         links = self.stage.links_of(self.stage.way.solve(matrix))
         return {name: links[name] for name in self.made}
 
     def read(self, family: Family, designs: Array) -> Mapping[str, Array]:
-        """Limit positions of designs; nan where there are none."""
+        """Return the limit positions of designs; nan if they do not exist."""
         number, direction = self.stage.number, f"direction{self.stage.number}"
         asked = [name for name in self.given if name != direction]
         columns = design_outputs(family, designs, asked, EXACT)
@@ -85,15 +85,15 @@ class LocusCoordinates:
 def on_locus(problem: Problem) -> Problem:
     """Return the problem on the locus of its first stage.
 
-    It is the problem itself where that has no equations to eliminate.
+    A problem without equations to eliminate is returned unchanged.
 
     Equations for swing (rssr) or stroke (rssp) and phi0 of the first stage become fixed coordinates, the place on the
-    locus a variable; the links that follow keep their bounds as limits.  Where the rocker's length is fixed and e and g
+    locus a variable; the links that follow keep their bounds as limits.  If the rocker's length is fixed and e and g
     are not, the direction of (e, g) is the variable and both follow.
 
     Parameters
     ----------
-    problem : in the parameters themselves
+    problem : problem in the parameters themselves
     """
     family = problem.family
     first, number = family.stages[0].family, family.stages[0].tail
@@ -128,19 +128,19 @@ def on_locus(problem: Problem) -> Problem:
 def in_parameters(problem: Problem, design: Array) -> Problem | None:
     """Return a problem on the locus in the parameters themselves.
 
-    What the locus holds becomes limits, equations where it is fixed, and the links that follow become variables.
-    None where the problem is already in the parameters, where the place on the locus is not free, and where limits
+    The coordinates become limits, equations if they are fixed, and the links that follow become variables.  None if the
+    problem is already in the parameters, if the place on the locus is not free, or if limits leave a link no interval.
     leave a link no room.
 
     Parameters
     ----------
-    problem : as of :func:`on_locus`, or of a study with [locus]
-    design : (P,) where the search stands; links without limits may grow and shrink by the longest of its links
+    problem : problem of :func:`on_locus`, or of a study with [locus]
+    design : (P,) present design; links without limits may grow and shrink by the length of its longest link
     """
     coordinates = problem.coordinates
     if not isinstance(coordinates, LocusCoordinates):
         return None
-    held, places = coordinates.given[:2], coordinates.given[2:]  # swing or stroke and phi0; where on the locus
+    held, places = coordinates.given[:2], coordinates.given[2:]  # swing or stroke and phi0; place on the locus
     bounds = {n: (float(x), float(y)) for n, x, y in zip(problem.variables, problem.lower, problem.upper, strict=True)}
     if any(n not in bounds or (n in coordinates.periodic and np.ptp(bounds[n]) < WHOLE_TURN) for n in places):
         return None
@@ -166,7 +166,7 @@ def in_parameters(problem: Problem, design: Array) -> Problem | None:
 
 
 def _around(problem: Problem, design: Array, links: tuple[str, ...], name: str) -> tuple[float, float]:
-    """Return the bounds of a link that follows: its limits; where it has none, some way about the present design."""
+    """Return the bounds of a link that follows: its limits, otherwise an interval around its present length."""
     names = problem.family.parameter_names
     reach = float(np.abs([design[names.index(link)] for link in links]).max())
     here, parameter = float(design[names.index(name)]), problem.family.parameters[names.index(name)]
@@ -181,7 +181,7 @@ def _directions(
 ) -> tuple[float, float] | None:
     """Return the least and greatest direction of the offsets (e, g).
 
-    There is one where the rocker's length c alone is fixed, otherwise None.
+    The direction is a variable if only the rocker's length c is fixed; otherwise None.
     """
     if not sized:
         return None

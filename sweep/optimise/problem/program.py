@@ -22,21 +22,21 @@ from sweep.quantities.resolve import output
 if TYPE_CHECKING:
     from sweep.optimise.manufacture.curve_margins import Allowance
 
-SMALLEST = 1e-100  # a limit nearer to zero is a limit at zero
+SMALLEST = 1e-100  # a smaller limit counts as a limit at zero
 
 
 Moving: TypeAlias = tuple[Mapping[str, float], float]
 NOT_MOVING: Moving = ({}, 0.0)
-DIFFERENCE = 1e-6  # relative, for the derivative of an inner value by its output
-ALIKE = 1e-10  # of their size: tops as high as each other, of which summaries give the place of the first
+DIFFERENCE = 1e-6  # relative step for the derivative of an inner value by its output
+ALIKE = 1e-10  # relative difference of extrema of equal height, of which summaries report the place of the first
 
 
 @dataclass(frozen=True)
 class Requirement:
-    """One limit in the optimiser's inner values (`Measure`); it is an equation where ``minimum == maximum``.
+    """One limit in the optimiser's inner values (`Measure`); it is an equation if ``minimum == maximum``.
 
-    ``raised`` and ``lowered`` say how its lower and upper bound change with parameters, by their names: derivatives,
-    and the sum of these times the values at which the bounds are as given.
+    ``raised`` and ``lowered`` are the changes of its lower and upper bound with parameters: derivatives by name, and
+    the sum of these times the values at which the bounds hold as given.
     """
 
     measure: Measure
@@ -52,12 +52,12 @@ class Requirement:
 
 
 def measured_in(size: float) -> float:
-    """Give the divisor of violations of a limit of that size; it is 1 where the quotient would overflow."""
+    """Return the divisor of violations of a limit of the given size; 1 if the quotient would overflow."""
     return size if size > SMALLEST else 1.0
 
 
 class Program:
-    """The objective and the limits of a problem, ready to be laid out as rows for any design."""
+    """Objective and limits of a problem, ready to be laid out as rows for any design."""
 
     def __init__(self, problem: Problem) -> None:
         self.problem = problem
@@ -65,7 +65,7 @@ class Program:
         if self.objective.inner == "rotatable":
             raise InputError("objective", problem.objective, "a quantity that changes steadily", PLACE)
         for name in (problem.objective, *(limit.output for limit in problem.limits)):
-            measure(problem.family, name, problem.window)  # unknown names end here
+            measure(problem.family, name, problem.window)  # raises for unknown names
             if name not in problem.family.parameter_names and output(problem.family, name).jumps:
                 raise InputError(name, "constant in pieces", "a quantity that changes steadily", PLACE)
         self.turning = Measure("rotatable", "min", margins(problem.family), "rotatable")
@@ -76,7 +76,7 @@ class Program:
             if found.inner == "rotatable":
                 if limit.maximum is not None or limit.minimum not in (1, 1.0, True):
                     raise InputError(limit.output, (limit.minimum, limit.maximum), "at least 1 (it turns)", PLACE)
-                continue  # required of every design without being asked
+                continue  # required of every design anyway
             if allowed := found.refused(limit.minimum, limit.maximum):
                 raise InputError(limit.output, (limit.minimum, limit.maximum), allowed, PLACE)
             sides = [None if side is None else found.to_inner(float(side)) for side in (limit.minimum, limit.maximum)]
@@ -93,7 +93,7 @@ class Program:
         self.readings = {m.name: m for m in readings if m.kind == "scalar" and m.parts}
 
     def lay_out(self, curves: Curves, design: Array, points: Points, turns: bool, scale: float) -> Form:
-        """Lay out the rows for a design; ``points`` are its extrema, ``scale`` divides the objective."""
+        """Return the rows for a design; ``points`` are its extrema, ``scale`` divides the objective."""
         layout = _Layout(curves, points, design, self.scalars)
         complete = turns
         for requirement in self.requirements:
@@ -104,19 +104,19 @@ class Program:
         return layout.form(complete and layout.has_objective, reaches)
 
     def place(self, name: str, curves: Curves, design: Array, points: Points) -> int:
-        """Return the number of the point where one of the ``readings`` is taken; -1 where the design has none."""
+        """Return the number of the point at which one of the ``readings`` is taken; -1 if the design has none."""
         found = _Layout(curves, points, design, self.scalars).upper(self.readings[name].parts[0])
         return next(iter(found[0][0])) - len(points) if found else -1
 
     def value(self, found: Measure, form: Form, curves: Curves, design: Array, atoms: Array) -> float:
-        """Give the value of a measure in its own unit; nan where it does not exist."""
+        """Return the value of a measure in its own unit; nan if it does not exist."""
         layout = _Layout(curves, form.points, design, self.scalars)
         inner = [sum(w * atoms[k] for k, w in term.items()) + shift for term, shift in layout.upper(found)]
         return found.from_inner(float(max(inner))) if inner else math.nan
 
 
 def _moving(found: Measure, bound: float | None, given: Allowance | None, sense: float) -> Moving:
-    """Return how a bound changes in inner values when its allowance grows; ``sense`` is +1 for a lower bound."""
+    """Return the change of a bound, in inner values, with its allowance; ``sense`` is +1 for a lower bound."""
     if bound is None or given is None:
         return NOT_MOVING
     step = DIFFERENCE * max(abs(bound), DIFFERENCE)
@@ -127,7 +127,7 @@ def _moving(found: Measure, bound: float | None, given: Allowance | None, sense:
 
 
 def _label(r: Requirement, side: str, bound: float, size: float) -> Label:
-    """Make the label of a limit's row; violations of pressure angles and margins are not divided by the bound."""
+    """Return the label of a limit's row; violations of pressure angles and margins are not divided by the bound."""
     own = r.measure.inner == "pressure" or any(s.pressure for s in r.measure.series)
     return Label(r.measure.name, side, 1.0 if own else abs(bound) / size)
 
@@ -150,7 +150,7 @@ class _Layout:
         self.rest.append((weight * shift + bound, slack, equal, label))
 
     def require(self, r: Requirement) -> bool:
-        """Add the rows of one limit; return False where the design has no extremum of the limited output."""
+        """Add the rows of one limit; return False if the design has no extremum of the limited output."""
         found = True
         self._keep_first(r, "minimum" if r.maximum is None else "maximum")
         if r.equal and r.minimum is not None:
@@ -182,11 +182,11 @@ class _Layout:
         ]
 
     def upper(self, m: Measure) -> list[tuple[Term, float]]:
-        """List sums of atoms: the inner value is below a bound if and only if all of them are."""
+        """Return sums of atoms such that the inner value is below a bound if and only if all sums are."""
         return self._bounded(m, above=m.sign > 0.0)
 
     def lower(self, m: Measure) -> list[tuple[Term, float]]:
-        """List sums of atoms: the inner value is above a bound if and only if all of them are."""
+        """Return sums of atoms such that the inner value is above a bound if and only if all sums are."""
         return self._bounded(m, above=m.sign < 0.0)
 
     def _bounded(self, m: Measure, above: bool) -> list[tuple[Term, float]]:
@@ -232,14 +232,14 @@ class _Layout:
         return [({k + fold: 1.0, k + ext: -1.0}, -2.0 * math.pi * math.floor(apart / (2.0 * math.pi)))]
 
     def _first(self, ends: list[int]) -> list[int]:
-        """Return, as a list, that of the best ends which comes first in the turn: of tops alike it is the place."""
+        """Return, as a list of one, the first of the equally high ends in the turn, which defines the place."""
         size = np.abs(self.points.value)
         alike = [k for k in ends if abs(size[k] - size[ends[0]]) <= ALIKE * size[ends[0]]]
         begin = self._begin(self.curves.series[self.points.series[ends[0]]].output) if ends else 0.0
         return sorted(alike, key=lambda k: float(self.points.phi[k] - begin) % (2.0 * math.pi))[:1]
 
     def _begin(self, output: str) -> float:
-        """Return where the turn of an output's crank begins: a member that turns with the shaft has one of its own."""
+        """Return the crank angle at which the turn of an output begins; a member on the shaft has its own phase."""
         family = self.curves.family
         found = family.split(output) if isinstance(family, Machine) else None
         if found is None or not found[0].alone or found[1] not in found[0].family.pose_output:
@@ -247,7 +247,7 @@ class _Layout:
         return -float(found[0].phase(self.design[None, :])[0])
 
     def _numbers(self, m: Measure, above: bool) -> list[tuple[Term, float]]:
-        """Return sums of plain numbers, and of the ends of curves with them."""
+        """Return sums of plain numbers, combined for a box with the ends of curves."""
         first = 2 * len(self.points)
         if m.kind == "box":
             tops, bottoms = ([(float(self.points.value[k]), k) for k in side] for side in self._ends(m.series))
@@ -255,7 +255,7 @@ class _Layout:
         return numbers(m, self.design, self.curves.family.parameter_names, self.scalars, first, above)
 
     def _difference(self, m: Measure, above: bool) -> list[tuple[Term, float]]:
-        """Give the second angle minus the first, with whole turns so that it is in (-pi, pi] at the present points."""
+        """Return the second angle minus the first, with whole turns that put it in (-pi, pi] at the present points."""
         ends = [self._bounded(part, above)[:1] for part in m.parts]
         if not all(ends):
             return []
@@ -271,7 +271,7 @@ class _Layout:
         return first_passage(self.points.phi, self.points.how, own)
 
     def _keep_first(self, r: Requirement, side: str) -> None:
-        """Add rows that keep earlier passages from arising where an event is limited: a limit would jump to them."""
+        """Add rows that prevent earlier passages where an event is limited, since the event would jump to them."""
         for series in r.measure.series:
             if series.passes is None:
                 continue
@@ -281,7 +281,7 @@ class _Layout:
                 self.add({k: -sense}, 0.0, 1.0 / size, sense * level / size, 0.0, False, Label(r.measure.name, side))
 
     def _outward(self, position: str) -> float:
-        """Return +1 where the extended position of that follower is the largest, -1 where it is the smallest."""
+        """Return +1 if the extended position of the follower is the largest, -1 if it is the smallest."""
         family = self.curves.family
         sign = family.outward_sign(position)
         return float(self.design[family.parameter_names.index(sign)]) if sign else 1.0
@@ -290,7 +290,7 @@ class _Layout:
         return -2.0 * math.pi * math.floor(float(self.points.phi[k]) / (2.0 * math.pi))
 
     def _ends(self, series: Sequence[Series]) -> tuple[list[int], list[int]]:
-        """List the points that are maxima, highest first, and those that are minima, lowest first, of some series."""
+        """Return the maxima of some series, highest first, and their minima, lowest first, as numbers of points."""
         numbers = [self.curves.series.index(s) for s in series]
         own = np.isin(self.points.series, numbers)
         value, sense = self.points.value, self.points.sense
@@ -299,7 +299,7 @@ class _Layout:
         return maxima, minima
 
     def _size(self, r: Requirement, bound: float) -> float:
-        """Give the divisor of a limit's violations: its bound, unless that is tiny against the curve; 1 for margins.
+        """Return the divisor of a limit's violations: its bound, unless that is tiny against the curve; 1 for margins.
 
         For a plain number, which has no curve, it is the larger of both bounds.
         """

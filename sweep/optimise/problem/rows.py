@@ -16,14 +16,14 @@ from sweep.optimise.extrema.points import Points
 from sweep.quantities.measures import Measure
 
 AT_HAND = 0.6  # scaled distance from its bound beyond which a row is left out at first
-FAR = 1e3  # stands for a row that cannot be computed at a trial design: far outside, but a number
+FAR = 1e3  # value of a row that cannot be computed at a trial design: far outside, but finite
 
 
 @dataclass(frozen=True)
 class Label:
-    """What a row stands for: an output and its side, "objective", "minimum", "maximum" or "equal".
+    """Meaning of a row: an output and its side, "objective", "minimum", "maximum" or "equal".
 
-    ``per`` turns the row's multiplier into one per relative change of the bound: the bound over the row's scale.
+    ``per`` converts the row's multiplier to one per relative change of the bound: the bound over the row's scale.
     """
 
     name: str
@@ -36,7 +36,7 @@ class Form:
     """Rows of the program and the points whose curves they use.
 
     ``complete`` says that the design turns and every limit exists for it, ``reaches`` that every stage assembles
-    somewhere, so that its margin says how far it is from turning.
+    somewhere, so that its margin measures the distance from turning.
     """
 
     points: Points
@@ -64,7 +64,7 @@ class Form:
         return float(-(self.constant + self.matrix @ atoms)[own].min())
 
     def violation(self, atoms: Array) -> float:
-        """Return the largest scaled violation of the limits; infinite where one does not exist."""
+        """Return the largest scaled violation of the limits; infinite if a limit does not exist for the design."""
         if not self.complete:
             return math.inf
         return self.known_violation(atoms)
@@ -72,7 +72,7 @@ class Form:
     def known_violation(self, atoms: Array) -> float:
         """Return the largest scaled violation of the limits that exist for this design.
 
-        It is infinite where some stage of the design assembles nowhere.
+        It is infinite if some stage of the design assembles nowhere.
         """
         if not self.reaches:
             return math.inf
@@ -92,7 +92,7 @@ class Form:
         )  # fmt: skip
 
     def relaxed(self, hard: set[str]) -> Form:
-        """Return the elastic program: smallest t by which all limits but the ``hard`` ones have to give way."""
+        """Return the elastic program: t is the smallest relaxation of all limits but the ``hard`` ones."""
         keep = np.array([label.side != "objective" for label in self.labels], dtype=np.bool_)
         soft = np.array([label.name not in hard for label in self.labels], dtype=np.float64)[keep]
         both = self.equal[keep]
@@ -109,21 +109,21 @@ class Form:
 
 
 Term = dict[int, float]
-ENDS = 4  # foremost and rearmost joints that are followed: a step rarely brings a further one to the end
+ENDS = 4  # foremost and rearmost joints that are tracked: a step rarely makes another one the end
 
 
 def numbers(
     m: Measure, design: Array, parameters: tuple[str, ...], scalars: tuple[str, ...], first: int, above: bool
 ) -> list[tuple[Term, float]]:
-    """Return a plain number, every piece of a size, or every length with both signs.
+    """Return sums of atoms for a plain number, for every piece of a size, or for every length with both signs.
 
-    Where only one of them has to stay on its side of a bound, it is the one that makes the output.
+    If a single sum on its side of the bound suffices, it is the one that determines the output.
 
     Parameters
     ----------
     m : the measure;  design : (P,);  parameters : names of its columns
     scalars : names of all plain numbers; ``first`` is the place of the first among the atoms
-    above : whether the sums have to stay below a bound for the inner value to do so
+    above : whether all sums must be below a bound for the inner value to be below it
     """
     if m.kind == "scalar":
         return [({first + scalars.index(m.name): m.sign}, 0.0)]
@@ -148,10 +148,10 @@ def box(
     first: int,
     above: bool,
 ) -> list[tuple[Term, float]]:
-    """Return the foremost ends of the joints less the rearmost ones, joints that stand still among them.
+    """Return the foremost ends of the joints minus the rearmost ones, including joints that stand still.
 
-    ``maxima`` and ``minima`` are the values of the joints' coordinates at their extrema, and their places among the
-    atoms; none where the design has none of them.
+    ``maxima`` and ``minima`` are the extreme values of the joints' coordinates, with their places among the atoms; the
+    result is empty if the design has none.
     """
     if not maxima or not minima:
         return []

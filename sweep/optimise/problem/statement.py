@@ -1,4 +1,4 @@
-"""What is to be optimised: a family, the dimensions that may change, the objective and the limits."""
+"""The optimisation problem: a family, the dimensions that may change, the objective and the limits."""
 
 from __future__ import annotations
 
@@ -29,16 +29,16 @@ class Problem:
     family : single family or chain
     variables : names of the parameters that may change; signs (branches) are fixed by each start, never varied
     lower, upper : (n,) bounds of the variables, in the family's internal units
-    fixed : values of the other parameters; what is missing takes the family's default
+    fixed : values of the other parameters; a missing one has the family's default
     objective : design output to be minimised, or a parameter
     limits : ``Limit(output, minimum, maximum)``, also of parameters that follow from others; equal minimum and maximum
-        make an equation.  That every stage assembles over the whole turn is demanded without being asked.
+        make an equation.  Every stage must assemble over the whole turn, without a limit for it.
     window : part of the stroke in which deviations from a line count, as fractions from the smallest position
     accuracy : relative error to which the extrema over the turn are verified (``target``), or the number of poses per
-        turn they are looked for on (``samples``)
-    coordinates : variables that are no parameters, and what follows from them; None varies parameters alone
-    curve_margins : what tolerances add to pose outputs along the turn, where limits are to hold for what is made
-    allowances : how what other limits give up to tolerances changes with the design, by their outputs
+        turn on which they are sought (``samples``)
+    coordinates : variables that are no parameters, and the parameters that follow; None varies parameters alone
+    curve_margins : margins added to pose outputs along the turn, if limits are to hold for manufactured mechanisms
+    allowances : changes of the margins of other limits with the design, by their outputs
 
     Raises
     ------
@@ -112,7 +112,7 @@ class Problem:
     def scaled(self, designs: Array) -> Array:
         """Return the variables of designs (k, P) as fractions of their bounds, (k, n).
 
-        A coordinate that a design does not have is nan.
+        A coordinate that does not exist for a design is nan.
         """
         read = {} if self.coordinates is None else self.coordinates.read(self.family, designs)
         names = self.family.parameter_names
@@ -120,7 +120,7 @@ class Problem:
         return (np.column_stack(values) - self.lower) / self.span
 
     def placed(self, base: Array, fractions: Array) -> Array:
-        """Return designs like ``base`` (P,) with their variables at fractions of their bounds.
+        """Return designs like ``base`` (P,) with their variables at the given fractions of their bounds.
 
         Parameters
         ----------
@@ -129,7 +129,7 @@ class Problem:
 
         Returns
         -------
-        (P,) or (k, P); what follows from the coordinates is nan where there is no such design.
+        (P,) or (k, P); parameters that follow from coordinates are nan if no such design exists.
         """
         values = np.atleast_2d(self.lower + fractions * self.span)
         designs = self._filled(np.asarray(base, np.float64), values)
@@ -138,7 +138,7 @@ class Problem:
     def rows(self, values: Array, **signs: float) -> Array:
         """Return the designs (k, P) of variable values (k, n).
 
-        The rest comes from ``signs``, ``fixed`` and the defaults.
+        The other parameters come from ``signs``, ``fixed`` and the defaults.
 
         Raises
         ------
@@ -169,7 +169,7 @@ class Problem:
 
     @cached_property
     def _direct(self) -> tuple[list[int], list[int]]:
-        """Which variables are parameters, and their columns of the design matrix."""
+        """Indices of the variables that are parameters, and their columns of the design matrix."""
         names = self.family.parameter_names
         own = [k for k, name in enumerate(self.variables) if name in names]
         return own, [names.index(self.variables[k]) for k in own]

@@ -1,1 +1,1 @@
-"""Where searches begin: samples, datasets, populations of descents."""
+"""Starts of searches: from samples, datasets, and populations of descents."""

@@ -1,4 +1,4 @@
-"""Starts of a study: the best of its sweep, filled up from samples where they are too few or too similar."""
+"""Starts of a study: the best designs of its sweep, supplemented by samples if they are too few or too similar."""
 
 from __future__ import annotations
 
@@ -25,13 +25,13 @@ from sweep.synthesis.tasks import solve
 if TYPE_CHECKING:
     from sweep.study import Study
 
-KEPT = 100_000  # best rows of a dataset that are looked at
-SCREENED = 256  # designs of a study's space per start where a dataset gives none
-TASK_SAMPLES = 4  # of a [task]: its mechanisms are starts only
+KEPT = 100_000  # best rows of a dataset that are candidates
+SCREENED = 256  # designs of a study's space drawn per start if its dataset has no feasible row
+TASK_SAMPLES = 4  # samples for a [task], whose mechanisms serve as starts only
 
 
 def best_rows(family: Family, objective: str, folder: Path) -> tuple[Array, Array]:
-    """Return the best feasible designs of a dataset (k, P), k up to 10^5, and their objective as it is compared.
+    """Return the best feasible designs of a dataset (k, P), k up to 10^5, and their compared objective.
 
     Only the parameters, the objective and the status are read, batch by batch.
     """
@@ -49,9 +49,9 @@ def best_rows(family: Family, objective: str, folder: Path) -> tuple[Array, Arra
 
 
 def of_task(study: Study, count: int, seed: int) -> Array:
-    """Return designs of the study that do its [task], the best first, (k, P).
+    """Return the study's designs that solve its [task], the best first, (k, P).
 
-    There are at most ``count``, and none without a task.  A parameter that the study gives as a number keeps it.
+    There are at most ``count``, and none without a task.  A parameter that the study fixes keeps its value.
     """
     names = study.family.parameter_names
     if study.task is None:
@@ -65,9 +65,9 @@ def of_task(study: Study, count: int, seed: int) -> Array:
 
 
 def drawn(study: Study, count: int, seed: int) -> Array:
-    """Return random designs of a study's space, finished by its [locus] and [fit].
+    """Return random designs of a study's space, completed by its [locus] and [fit].
 
-    They serve datasets without feasible rows.
+    They replace the rows of a dataset without feasible ones.
     """
     length = min(64, study.space.count)
     blocks = max(1, SCREENED * count // length)
@@ -80,18 +80,18 @@ def drawn(study: Study, count: int, seed: int) -> Array:
     return np.asarray(fitted[status == st.OK], np.float64)
 
 
-LOOKED_AT = 4  # times 256 designs of a space, that tell which signs it has
-SOME, ENOUGH = (64, 256, 8192), 0.05  # designs that tell the price of a sample, until they take so long [s]
-SAMPLES = 2  # times as many as would do if no start were near another
-MOST_KINDS = 64  # combinations of signs among which a sample is shared out
+LOOKED_AT = 4  # blocks of 256 designs of a space that show its combinations of signs
+SOME, ENOUGH = (64, 256, 8192), 0.05  # designs timed for the price of a sample, until they take ENOUGH [s]
+SAMPLES = 2  # factor on the samples, since starts near another one are dropped
+MOST_KINDS = 64  # combinations of signs among which a sample is divided
 
 
 def kinds(study: Study, problem: Problem, known: Array) -> list[dict[str, float]]:
-    """Return the combinations of signs and listed values that the designs of a study have.
+    """Return the combinations of signs and listed values in the designs of a study.
 
     Parameters
     ----------
-    study, problem : the columns that the problem does not vary are looked at
+    study, problem : combinations are those of the parameters that the problem does not vary
     known : (k, P) designs whose combinations come first
     """
     names = problem.family.parameter_names
@@ -104,13 +104,13 @@ def kinds(study: Study, problem: Problem, known: Array) -> list[dict[str, float]
 
 @dataclass(frozen=True)
 class Catalogued(Problem):
-    """A problem whose listed parameters vary too, from one of their values to the next: samples choose them."""
+    """A problem whose listed parameters vary too, among their values, for the choice by samples."""
 
     values: Mapping[str, Array] = field(default_factory=dict)
 
     @classmethod
     def of(cls, problem: Problem, values: Mapping[str, Array]) -> Catalogued:
-        """Add the listed parameters, with their values in order, to the variables of a problem."""
+        """Return the problem with the listed parameters, and their values in order, as further variables."""
         own = {part.name: getattr(problem, part.name) for part in fields(problem)}
         own["variables"] = (*problem.variables, *values)
         own["lower"] = np.append(problem.lower, [listed[0] for listed in values.values()])
@@ -118,7 +118,7 @@ class Catalogued(Problem):
         return cls(**own, values=values)
 
     def placed(self, base: Array, fractions: Array) -> Array:
-        """Return designs as of :class:`Problem`, their listed parameters at the nearest of their values."""
+        """Return designs as in :class:`Problem`, each listed parameter at the nearest of its values."""
         designs = super().placed(base, fractions)
         for name, listed in self.values.items():
             column = self.family.parameter_names.index(name)
@@ -135,19 +135,19 @@ def swept_and_sampled(
     catalogue: Mapping[str, Array],
     stop: Callable[[], bool],
 ) -> Iterator[Group]:
-    """Yield groups of starts: what does the study's [task], the diverse best of the sweep, and the best of samples.
+    """Yield groups of starts: mechanisms of the study's [task], diverse best designs of the sweep, best of samples.
 
     On the locus half of the starts come from samples in any case: they cost next to nothing there, and reach the
-    bounds, where a sweep may have no design at all.  Where no row of the dataset is feasible, the first half are the
-    best of random designs.  So it is beside a catalogue, as no start leaves its listed values: a sweep has few of their
-    combinations, a sample looks for good ones.
+    bounds, where a sweep may have no design at all.  If no row of the dataset is feasible, the first half are the best
+    of random designs.  The same applies with a catalogue, since each start keeps its listed values: a sweep has few of
+    their combinations, a sample seeks good ones.
 
     Parameters
     ----------
-    study, problem : what is searched
-    designs, merit : (k, P) of the sweep, and what they are worth (k,), empty where none is feasible
+    study, problem : study and problem of the search
+    designs, merit : (k, P) of the sweep, and their compared objective (k,), empty if none is feasible
     catalogue : values of the listed parameters
-    stop : true ends it
+    stop : true ends the iteration
     """
     assert study.optimise is not None
     count, seed = study.optimise.starts, study.optimise.seed
@@ -168,10 +168,10 @@ def swept_and_sampled(
 def _offered(
     study: Study, problem: Problem, designs: Array, worth: Array, begun: Array, stop: Callable[[], bool]
 ) -> Iterator[Group]:
-    """Yield what more there is to begin with.
+    """Yield further groups of starts.
 
-    A sample of the problem's own variables finds more than the space of the study, unless [fit] has to finish every
-    design; then designs of the space are drawn.  In the end the sweep's designs are taken as near as they stand.
+    A sample of the problem's own variables finds more than the space of the study, unless [fit] has to complete every
+    design; then designs of the space are drawn.  Finally the sweep's designs follow, at any distance of at least ALIKE.
     """
     assert study.optimise is not None
     count, seed = study.optimise.starts, study.optimise.seed
@@ -184,9 +184,9 @@ def _offered(
 
 
 def sample_seconds(problem: Problem, base: Array, count: int) -> float:
-    """Return what a sample for so many starts takes, measured on some of its designs; few where they are dear.
+    """Return the time of a sample for ``count`` starts [s], measured on some of its designs.
 
-    Its signs are those of the design ``base`` (P,).
+    The designs have the signs of ``base`` (P,); fewer are measured if they are slow.
     """
     rng, number, seconds = np.random.default_rng(0), 0, 0.0
     for number in SOME:
@@ -200,7 +200,7 @@ def sample_seconds(problem: Problem, base: Array, count: int) -> float:
 
 
 def apart(problem: Problem, starts: Array, more: Array, count: int) -> Array:
-    """Return the starts and, up to a number, those of others that are not near one of them."""
+    """Return the starts and those designs ``more`` that are not near one of them, up to ``count`` in all."""
     both = np.concatenate([starts, more])
     place = problem.scaled(both)
     others = [c for c in range(both.shape[1]) if c not in problem.columns]

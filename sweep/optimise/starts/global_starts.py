@@ -1,4 +1,4 @@
-"""Starts of a study from populations of descents: for its drawing, and for what is made of it."""
+"""Starts of a study from populations of descents, for the nominal search and for the robust one."""
 
 from __future__ import annotations
 
@@ -21,31 +21,31 @@ from sweep.optimise.starts.samples import ALIKE, diverse
 if TYPE_CHECKING:
     from sweep.study import OptimiseSettings, Study, Tolerance
 
-SWEPT = 6  # of so many starts one comes from the sweep beside populations
-MADE, BEGUN = 3, 4  # populations with room for tolerances, and ends of them that the robust search begins with
-OTHER_SEED = 1000  # further on, for samples of their own
-ANOTHER = 1e-3  # share of a value by which that of another basin differs
+SWEPT = 6  # one of this many starts comes from the sweep, beside populations
+MADE, BEGUN = 3, 4  # populations with margins for tolerances, and number of their ends that start the robust search
+OTHER_SEED = 1000  # offset of the seed for the samples of these populations
+ANOTHER = 1e-3  # relative difference of values in different basins
 
 
 def from_populations(
     study: Study, problem: Problem, designs: Array, merit: Array, stop: Callable[[], bool], jobs: int
 ) -> Iterator[Group]:
-    """Yield groups of starts: the best end of each population, and another one.
+    """Yield groups of starts: the best end of each population, and one with another value.
 
-    A population counts by the local optimum of its best end: at fixed poses one basin looks like several.  A few
-    designs of the sweep follow where one is better than these ends, or where populations do not settle.
+    A population counts by the local optimum of its best end, since at fixed poses one basin looks like several.  A few
+    designs of the sweep follow if one is better than these ends, or if populations do not settle.
 
     Parameters
     ----------
-    study, problem : what is searched
-    designs, merit : (k, P) of the sweep, and what they are worth (k,), empty where none is feasible
-    stop : true ends it
-    jobs : threads of the descents; the starts do not depend on it
+    study, problem : study and problem of the search
+    designs, merit : (k, P) of the sweep, and their compared objective (k,), empty if none is feasible
+    stop : true ends the iteration
+    jobs : threads of the descents; the starts do not depend on their number
 
     Raises
     ------
     InputError
-        if the problem has no linear part, or nothing that turns was found.
+        if the problem has no linear part, or no turning mechanism was found.
     """
     assert study.optimise is not None
     settings, linear = study.optimise, _linear(study, problem)
@@ -72,7 +72,7 @@ def from_populations(
 
 
 def _apart(worth: Array, values: Sequence[float], most: int) -> list[int]:
-    """Return the numbers of at most so many ends, best first, whose values are not near those given or each other."""
+    """Return the numbers of at most ``most`` ends, best first, whose values differ from each other and ``values``."""
     found, known = list[int](), list(values)
     for k in np.argsort(worth, kind="stable").tolist():
         if len(found) < most and all(abs(worth[k] - value) > ANOTHER * abs(value) for value in known):
@@ -90,12 +90,12 @@ def insensitive(
     say: Say = unsaid,
     found: Array | None = None,
 ) -> tuple[Problem, Array]:
-    """Look for designs that are good when they are made: ends of populations whose descents leave room for tolerances.
+    """Find designs that are good when manufactured: ends of populations whose descents include margins for tolerances.
 
     Returns
     -------
-    The problem with bounds that hold the designs, and these (k, P), the best first; none without a global search.
-    Designs that were ``found`` before are not looked for again.
+    The problem with bounds that contain the designs, and the designs (k, P), the best first; none without a global
+    search.  With designs ``found`` before, no search takes place.
     """
     if found is not None and len(found):
         return holding(study, problem, found), found
@@ -114,7 +114,7 @@ def insensitive(
 
 
 def descend_once(study: Study, problem: Problem) -> None:
-    """Run a tiny population of descents, so that their kernels are compiled or loaded."""
+    """Run a small population of descents to compile or load their kernels."""
     signs = kinds(study, problem, np.empty((0, len(problem.family.parameters))))
     for _ in populations(_linear(study, problem), signs, 1, 0, size=TINY):
         pass
@@ -128,5 +128,5 @@ def _linear(study: Study, problem: Problem, tolerance: Tolerance | None = None) 
 
 
 def holding(study: Study, problem: Problem, found: Array) -> Problem:
-    """Return the problem with bounds that hold designs (k, P), of the variables that [fit] makes."""
+    """Return the problem with bounds of the variables that [fit] sets, widened to contain designs (k, P)."""
     return widened(problem, found, [n for n in problem.variables if n in study.made])

@@ -1,11 +1,11 @@
-"""What is linear, eliminated: coupler point, line and scale of a guide behind a crank-rocker, for given proportions.
+"""Linear variables of a guide behind a crank-rocker, eliminated: coupler point, line and scale, for given proportions.
 
 With B the crank pin of the guide and d the direction of its coupler, both complex, and one length as unit,
 
     s + i dev = z1 B + z2 d - i h,      z1 = scale e^{-i lam},  z2 = scale (xi + i eta) e^{-i lam}
 
-so displacement, deviation and all their derivatives are linear in five numbers.  The least largest acceleration, with a
-straightness and a stroke prescribed, is a small linear program, which descents solve after every step
+so displacement, deviation and all their derivatives are linear in five numbers.  The smallest maximum acceleration,
+with a straightness and a stroke prescribed, is a small linear program, which descents solve after every step
 (:mod:`kernels.descent`).
 """
 
@@ -29,9 +29,9 @@ from sweep.optimise.problem.statement import Problem
 if TYPE_CHECKING:
     from sweep.study import Tolerance
 
-POSES = 64  # per turn on which the linear program sees the motion
-SMALLEST = 1e-9  # scale of a guide that has any
-BOTH = 4.0  # a deviation misses its limit on either side, and in two places that know little of each other
+POSES = 64  # poses per turn in the linear program
+SMALLEST = 1e-9  # smallest scale of a guide
+BOTH = 4.0  # a deviation can violate its limit on either side, and in two nearly independent places
 TURN: Array = np.arange(POSES, dtype=np.float64) * (2.0 * np.pi / POSES)
 NEEDED = (
     "a chain of rssr and guide without a window, whose guide's crank, point and line vary ([fit]), with a lower limit "
@@ -41,11 +41,11 @@ NEEDED = (
 
 @dataclass(frozen=True)
 class Elimination:
-    """The linear part of a problem.
+    """Linear part of a problem.
 
-    ``wanted`` is the output along the line that is to be small (that across it where ``straight``), ``bound`` the
-    largest deviation or None, ``stroke`` the least one, ``driver`` the output of the crank-rocker.  ``sigma``, (P,),
-    are standard deviations of what is made, and the limits on deviation and stroke shall hold ``level`` of them away.
+    ``wanted`` is the output along the line to be minimised (that across the line if ``straight``), ``bound`` the
+    largest deviation or None, ``stroke`` the least stroke, ``driver`` the output of the crank-rocker.  ``sigma``, (P,),
+    are standard deviations of the dimensions; the limits on deviation and stroke get a margin of ``level`` of them.
     """
 
     problem: Problem
@@ -61,28 +61,28 @@ class Elimination:
 
     @cached_property
     def free(self) -> tuple[str, ...]:
-        """Variables that remain: all but the point, the line and one length of the guide, which is its unit."""
+        """Variables that remain: all except point, line and one length of the guide, which is its unit."""
         out = {f"{name}{self.last}" for name in (*self.guide.fitted, self.guide.links[0])}
         return tuple(name for name in self.problem.variables if name not in out)
 
     @cached_property
     def links(self) -> tuple[str, ...]:
-        """Lengths of the guide that grow with its scale."""
+        """Lengths of the guide that are proportional to its scale."""
         return tuple(f"{name}{self.last}" for name in self.guide.links)
 
     @cached_property
     def position(self) -> str:
-        """The output along the line."""
+        """Name of the output along the line."""
         return next(iter(self.guide.across))
 
     def column(self, name: str) -> int:
-        """Column of a parameter of the guide."""
+        """Return the column of a parameter of the guide."""
         return self.problem.family.parameter_names.index(f"{name}{self.last}")
 
     def finished(self, designs: Array, x: Array) -> Array:
-        """Return designs (n, P) with the point, line and scale that belong to the unknowns (n, 5)."""
+        """Return designs (n, P) with the point, line and scale given by the unknowns (n, 5)."""
         scale: Array = np.sqrt(x[:, 0] ** 2 + x[:, 1] ** 2)
-        scale[scale < SMALLEST] = np.nan  # a guide without size is no solution, and its poses are undefined
+        scale[scale < SMALLEST] = np.nan  # a guide of size zero is no solution, and its poses are undefined
         along, aside, line, offset = (
             self.column(n) for n in (*self.guide.arms, self.guide.direction, self.guide.offset)
         )
@@ -90,7 +90,7 @@ class Elimination:
         out = designs.copy()
         for name in self.guide.links:
             out[:, self.column(name)] *= scale
-        # numpy's arctan2 depends on the processor, that of the C library does not
+        # numpy's arctan2 depends on the processor, the C library's does not
         lam = np.array([math.atan2(-y, x) for x, y in x[:, :2].tolist()])
         out[:, along] = (x[:, 2] * x[:, 0] + x[:, 3] * x[:, 1]) * grown
         out[:, aside] = (x[:, 3] * x[:, 0] - x[:, 2] * x[:, 1]) * grown
@@ -98,7 +98,7 @@ class Elimination:
         return out
 
     def turned(self, lam: Array) -> Array:
-        """Return the direction as an angle within its bounds, if one of its turns is."""
+        """Return the direction with the whole turns that put it within its bounds, if possible."""
         name = f"{self.guide.direction}{self.last}"
         if name not in self.problem.variables:
             return lam
@@ -108,9 +108,9 @@ class Elimination:
 
 
 def elimination(problem: Problem, tolerance: Tolerance | None = None) -> Elimination | None:
-    """Return the linear part of a problem, or None where it has none.
+    """Return the linear part of a problem, or None if it has none.
 
-    With a ``tolerance`` that has a share, the limits on deviation and stroke are to hold for what is made.
+    With a ``tolerance`` that asks for a share, the limits on deviation and stroke get margins.
     """
     stages = driven_guide(problem.family)
     if stages is None or problem.window is not None or problem.coordinates is not None:
@@ -140,7 +140,7 @@ def elimination(problem: Problem, tolerance: Tolerance | None = None) -> Elimina
 
 
 def turned_into(problem: Problem, designs: Array) -> Array:
-    """Return the designs whose angles lie within their bounds, by whole turns."""
+    """Return the designs with whole turns added to angles that put them within their bounds."""
     out = designs.copy()
     for k, name in enumerate(problem.variables):
         column = problem.family.parameter_names.index(name)
@@ -151,7 +151,7 @@ def turned_into(problem: Problem, designs: Array) -> Array:
 
 
 def widened(problem: Problem, designs: Array, names: Sequence[str]) -> Problem:
-    """Return the problem with bounds so wide that the designs lie half their size within them."""
+    """Return the problem with bounds that contain the designs with a distance of half their size."""
     lower, upper = problem.lower.astype(np.float64), problem.upper.astype(np.float64)
     for k, name in enumerate(problem.variables):
         if name in names and len(designs):

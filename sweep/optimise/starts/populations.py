@@ -1,7 +1,7 @@
-"""Starts from generations of descents: stages of good mechanisms are recombined, and descents begin from them.
+"""Starts from generations of descents, which begin from recombined stages of good mechanisms.
 
 A guide that suits one crank-rocker suits others, so the stages of two good mechanisms are a far better start than a
-random mechanism.  Populations are independent: that several end at the same design is evidence for it.
+random mechanism.  Populations are independent: if several end at the same design, that is evidence for it.
 """
 
 from __future__ import annotations
@@ -21,22 +21,22 @@ from sweep.optimise.starts.linear import Elimination, turned_into
 from sweep.optimise.starts.pose_rows import Descents, Index, PoseRows
 from sweep.optimise.starts.samples import spread
 
-PARENTS = 40  # best ends, no two of them alike, from which a generation is made: as many of all signs
-TRIES, STRANGERS = 64, 256  # of every child, the best of which descends; of one half of which is at random
-DRIVERS = 4  # among the tries of a child
-MUTATIONS = (0.0, 0.03, 0.1)  # standard deviations, one of which a child is varied by
-NICHE = 0.15  # of the average distance of two random guides: nearer ones are alike
-CLASSES = 5  # of swings, each of which has parents
-SMALLEST = 1e-3  # swing that is none [rad]
-USELESS = 1.3  # times the best value: worse ends are no parents
+PARENTS = 40  # best ends, all distinct, from which a generation is made; divided among the signs
+TRIES, STRANGERS = 64, 256  # tries of every child, the best of which descends; tries with one random stage
+DRIVERS = 4  # drivers among the tries of a child
+MUTATIONS = (0.0, 0.03, 0.1)  # standard deviations of the variation of a child, chosen at random
+NICHE = 0.15  # share of the average distance of two random guides below which guides are alike
+CLASSES = 5  # classes of swings, each with its own parents
+SMALLEST = 1e-3  # swing below which a swing counts as zero [rad]
+USELESS = 1.3  # multiple of the best value above which ends are no parents
 
 
 class Size(NamedTuple):
-    """How large a population is.
+    """Size of a population.
 
-    ``sampled`` proportions for each combination of signs, two to eight in a hundred of which turn; ``first`` descents
-    of the first generation, ``later`` of each of the other ``generations``; ``heat`` steps of all descents, ``steps``
-    of the better half of them.
+    ``sampled`` proportions for each combination of signs, two to eight per cent of which turn; ``first`` descents in
+    the first generation, ``later`` in each of the other ``generations``; ``heat`` steps for all descents, ``steps`` for
+    the better half of them.
     """
 
     sampled: int = 1 << 14
@@ -48,11 +48,11 @@ class Size(NamedTuple):
 
 
 FULL = Size()
-TINY = Size(1 << 10, 4, 0, 0, 1, 2)  # a few of its samples turn: enough to compile what descends
+TINY = Size(1 << 10, 4, 0, 0, 1, 2)  # enough samples of it turn to compile the descents
 
 
 class Population(NamedTuple):
-    """Ends of a population, no two alike and the best first: designs (k, P), what they are worth (k,), and looks."""
+    """Ends of a population, all distinct and the best first: designs (k, P), their values (k,), and evaluations."""
 
     designs: Array
     worth: Array
@@ -75,7 +75,7 @@ def breed(
     jobs: int = 1,
     size: Size = FULL,
 ) -> Population:
-    """Return the ends of generations of descents from one seed, each descended from in ``jobs`` threads."""
+    """Return the ends of generations of descents from one seed, run in ``jobs`` threads."""
     rows, rng = PoseRows(linear, signs), np.random.default_rng(seed)
     ends, looks = list[_End](), 0
     for generation in range(1 + size.generations):
@@ -103,17 +103,17 @@ def populations(
     jobs: int = 1,
     size: Size = FULL,
 ) -> Iterator[Population]:
-    """Breed independent populations, one after the other, as long as the caller asks for more.
+    """Yield independent populations, one after the other, as long as the caller requests them.
 
     Parameters
     ----------
     linear : the linear part of the problem
     signs : combinations of the parameters that are not varied
-    most : populations at most; each takes some 14 000 looks
-    seed : of samples and children
-    stop : true ends the populations where they are
-    jobs : threads; the ends do not depend on it
-    size : of each
+    most : largest number of populations; each takes some 14 000 evaluations
+    seed : seed of samples and children
+    stop : true ends the descents at their present designs
+    jobs : number of threads; the ends do not depend on it
+    size : size of each population
     """
     for number in range(most):
         if stop():
@@ -122,9 +122,9 @@ def populations(
 
 
 def _sampled(rows: PoseRows, rng: np.random.Generator, size: Size, jobs: int) -> tuple[Array, Index, Array]:
-    """Places of a Sobol sample of each kind that turn, the best of every class of swings that are not alike.
+    """Return places and kinds of turning designs of a Sobol sample, diverse good ones of each class of swings.
 
-    The third result are swings of the better quarter.
+    The third result are the swings of the better quarter.
     """
     from scipy.stats import qmc
 
@@ -153,10 +153,10 @@ def _tried(rows: PoseRows, places: Array, kinds: Index, jobs: int) -> Array:
 def _children(
     rows: PoseRows, parents: Sequence[_End], rng: np.random.Generator, count: int, jobs: int
 ) -> tuple[Array, Index]:
-    """Places and kinds of children, so many of each kind: the best of many tries for each.
+    """Return places and kinds of children, ``count`` of each kind, each the best of many tries.
 
-    Most of them are stage 1 of one parent and the guide of another, slightly varied, a sixth is stage 1 of a parent
-    with a guide at random, a sixth the guide of a parent with a stage 1 at random.
+    Most of them combine stage 1 of one parent with the guide of another, slightly varied; a sixth combine stage 1 of a
+    parent with a random guide, a sixth the guide of a parent with a random stage 1.
     """
     few, places, kinds = count // 6, list[Array](), list[int]()
     for kind in sorted({p.kind for p in parents}):
@@ -175,8 +175,8 @@ def _children(
 def _mixed(rows: PoseRows, own: Sequence[_End], parents: Sequence[_End], rng: np.random.Generator, count: int) -> Array:
     """Combine stage 1 of one parent with the guide of another, slightly varied, in many tries of each child.
 
-    Offsets whose bounds lie on both sides of zero alike change their side in every second try: a crank-rocker and
-    its mirror image move alike.
+    Offsets with bounds symmetric to zero change their sign in every second try, since a crank-rocker and its mirror
+    image have the same motion.
     """
     guide = rng.integers(0, len(own), count)
     # With all drivers at once the best try would nearly always lie in the same basin.
@@ -185,7 +185,7 @@ def _mixed(rows: PoseRows, own: Sequence[_End], parents: Sequence[_End], rng: np
     places[:, :, rows.driving] = np.array([p.place for p in parents])[driver][:, :, rows.driving]
     other = (rng.random((count, TRIES)) < 0.5)[:, :, None] & rows.mirrored
     places = np.where(other, 1.0 - places, places)
-    # A child equal to its parent would only end where the parent is.
+    # A child equal to its parent would only end at the parent's end.
     numbers = np.array([next(k for k, p in enumerate(parents) if p is end) for end in own])
     same = driver == numbers[guide][:, None]
     spread_by = np.where(same, MUTATIONS[-1], np.array(MUTATIONS)[rng.integers(0, len(MUTATIONS), count)][:, None])
@@ -202,9 +202,9 @@ def _best(rows: PoseRows, tries: Array, kind: int, jobs: int) -> Array:
 def _descended(
     rows: PoseRows, places: Array, kinds: Index, swings: Array, size: Size, stop: Callable[[], bool], jobs: int
 ) -> tuple[list[_End], int]:
-    """Return the ends of descents from some places, and their looks; the worse half is given up after a heat.
+    """Return the ends of descents from some places, and their evaluations; the worse half stops after the first heat.
 
-    Each class, among ``swings``, of each kind has its own worse half.
+    The halves are formed in each class, among ``swings``, of each kind.
     """
     many = Descents(rows, rows.without_middle(places, kinds), kinds, jobs)
     many.advance(size.heat, stop)

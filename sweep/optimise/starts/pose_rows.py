@@ -1,6 +1,6 @@
-"""A problem with a linear part as compiled descents see it: rows at fixed poses, of places and linear unknowns.
+"""A problem with a linear part for compiled descents: rows at fixed poses, as functions of places and linear unknowns.
 
-The search in all variables follows the true extrema of one design.  Here 64 poses stand for the turn, and limits that
+The search in all variables tracks the true extrema of one design.  Here 64 poses stand for the turn, and limits that
 these curves do not give are left to that search (:mod:`kernels.descent`).
 """
 
@@ -39,18 +39,18 @@ from sweep.quantities.measures import ROTATABLE_MARGIN, Measure, measure
 T = TypeVar("T")
 Index = NDArray[np.intp]
 
-SHORT = 0.15  # shortest length of a guide that the search begins with, against the longest its crank may have
+SHORT = 0.15  # shortest initial length of a guide, relative to the longest that its crank may have
 MIDDLE = Accuracy(target=1e-3)
-BLOCK = 256  # places that a thread looks at in one go
-UNIT = 4.0 / math.pi**2  # of the objective, in strokes: no motion there and back has less acceleration
-PRICE = 6.0  # of a limit missed by its own size, in such units
-DEVIATION = 1.0 / 30.0  # the same for the deviation, as a share: a straightness twice as coarse gains little
-NARROW = 0.1  # the same for the range of the position with room for tolerances, which its band may not hold
-FREE = 1e3  # strokes that a deviation without a limit may be
+BLOCK = 256  # places that a thread evaluates together
+UNIT = 4.0 / math.pi**2  # unit of the objective, in strokes: no reciprocating motion has less acceleration
+PRICE = 6.0  # price of a limit violated by its own size, in such units
+DEVIATION = 1.0 / 30.0  # price of the deviation as a share of PRICE: a straightness twice as coarse gains little
+NARROW = 0.1  # factor on the size of the position's limits with margins, which its band may not hold
+FREE = 1e3  # bound on a deviation without a limit, in strokes
 
 
 class _Curve(NamedTuple):
-    """``sign * output <= bound`` in units of ``size``: at every pose, where the output ends, or for its whole range."""
+    """Row ``sign * output <= bound`` in units of ``size``: at every pose, at an end of the output, or for its range."""
 
     output: str
     sign: float
@@ -60,7 +60,7 @@ class _Curve(NamedTuple):
 
 
 class PoseRows:
-    """The rows of a problem at fixed poses, as functions of places between 0 and 1 and of five linear unknowns.
+    """Rows of a problem at fixed poses, as functions of places between 0 and 1 and of five linear unknowns.
 
     Parameters
     ----------
@@ -76,7 +76,7 @@ class PoseRows:
         self.bases[:, names.index(linear.links[0])] = 1.0
         self.columns = [names.index(name) for name in linear.free]
         self._bounds()
-        # Places of stage 1, those of them that may change their side, and that of the angle between the stages.
+        # Masks of the variables of stage 1 and of those with symmetric bounds; index of the angle between stages.
         self.driving = np.array([c < len(self.driver.parameters) for c in self.columns])
         self.mirrored = self.driving & (self.low == -self.high)
         offset = f"offset{linear.last}"
@@ -85,10 +85,10 @@ class PoseRows:
         self.task = self._task(self.limits)
 
     def _bounds(self) -> None:
-        """Set ``low`` and ``high`` (n,), the ends of places, and ``wide``, the width of those on a logarithmic scale.
+        """Set ``low`` and ``high`` (n,), the ends of places, and ``wide``, the logarithmic width of lengths.
 
-        Lengths of the guide are told against its crank, which is the unit.  They and lengths of stage 1 that cannot
-        vanish are on a logarithmic scale.
+        Lengths of the guide are relative to its crank, which is the unit.  They and positive lengths of stage 1 are on
+        a logarithmic scale.
         """
         problem, links = self.linear.problem, self.linear.links
         at = [problem.variables.index(name) for name in self.linear.free]
@@ -107,10 +107,10 @@ class PoseRows:
                 self.wide[k] = math.log(self.high[k] / self.low[k])
 
     def placed(self, places: Array, kinds: Index) -> Array:
-        """Return designs (k, P) at places (k, n), of kinds (k,), with the point, line and scale still to be found."""
+        """Return designs (k, P) at places (k, n), of kinds (k,), without the point, line and scale of the guide."""
         values: Array = self.low + places * (self.high - self.low)
         log = self.wide != 0.0
-        # numpy's exponential depends on the processor, that of the C library does not
+        # numpy's exponential depends on the processor, the C library's does not
         grown = [math.exp(x) for x in (places[:, log] * self.wide[log]).ravel().tolist()]
         values[:, log] = self.low[log] * np.reshape(grown, (len(places), int(log.sum())))
         designs = self.bases[kinds]
@@ -118,7 +118,7 @@ class PoseRows:
         return designs
 
     def driven(self, places: Array, kinds: Index) -> tuple[Array, Array]:
-        """Return middle and range (k,) of the guide's input angles without offset; 0 where stage 1 does not turn."""
+        """Return middle and range (k,) of the guide's input angles without offset; 0 if stage 1 does not turn."""
         upstream = np.ascontiguousarray(self.placed(places, kinds)[:, : len(self.driver.parameters)])
         found = design_outputs(self.driver, upstream, ("psi_ext", "swing"), MIDDLE)
         swing = np.asarray(found["swing"], np.float64)
@@ -126,7 +126,7 @@ class PoseRows:
         return np.nan_to_num(middle), np.nan_to_num(np.abs(swing))
 
     def _codes(self) -> dict[str, int]:
-        """Curves that the kernels know, by their names."""
+        """Return the kernels' codes of curves by their names."""
         linear = self.linear
         margins = [loop.discriminant for loop in self.family.every(Assembly)]
         codes = dict(zip(margins, (FIRST_MARGIN, FIRST_MARGIN + 1), strict=True))
@@ -156,7 +156,7 @@ class PoseRows:
         linear, problem, codes = self.linear, self.linear.problem, self._codes()
         known = [codes[curve.output] for curve in curves]
         if linear.sigma is not None:
-            # What is made leaves room on either side.
+            # Margins for tolerances widen the deviation on either side.
             for k in range(2, len(curves)):
                 if known[k] == ACROSS and curves[k].at == EVERY:
                     known[k] = HIGH if curves[k].sign > 0.0 else LOW
@@ -198,7 +198,7 @@ class PoseRows:
         return out
 
     def wrapped(self, places: Array) -> Array:
-        """Places (k, n) brought back between 0 and 1: an angle that has a whole turn by turns, the others to an end."""
+        """Return places (k, n) between 0 and 1: an angle with a whole turn is wrapped, other variables are clipped."""
         out = np.clip(places, 0.0, 1.0)
         if self.turning >= 0 and self.high[self.turning] - self.low[self.turning] >= 2.0 * math.pi - 1e-9:
             out[:, self.turning] = places[:, self.turning] % 1.0
@@ -213,7 +213,7 @@ class PoseRows:
         return self.linear.finished(self.placed(places, kinds), x)
 
     def begun(self, places: Array, kinds: Index, jobs: int = 1) -> tuple[Array, Array]:
-        """Return the best linear unknowns (k, 5) of some places, and what the designs are worth (k,)."""
+        """Return the best linear unknowns (k, 5) of some places, and the values of the designs (k,)."""
         x, worth = np.empty((len(places), UNKNOWNS)), np.empty(len(places))
 
         def some(part: slice) -> None:
@@ -224,14 +224,14 @@ class PoseRows:
 
 
 class Descents:
-    """Descents from many places; ``worth`` (k,) is what each has reached, ``looks`` counts designs with gradients.
+    """Descents from many places; ``worth`` (k,) are their present values, ``looks`` counts evaluations with gradients.
 
     Parameters
     ----------
-    rows : the problem
-    places : (k, n) where they begin, between 0 and 1
-    kinds : (k,) the signs of each
-    jobs : threads; no descent knows of the others
+    rows : rows of the problem
+    places : (k, n) starts of the descents, between 0 and 1
+    kinds : (k,) number of each start's combination of signs
+    jobs : number of threads; the descents are independent
     """
 
     def __init__(self, rows: PoseRows, places: Array, kinds: Index, jobs: int = 1) -> None:
@@ -246,22 +246,22 @@ class Descents:
 
     @property
     def worth(self) -> Array:
-        """What each descent has reached."""
+        """Present value of each descent."""
         return self.states[:, 0]
 
     @property
     def looks(self) -> int:
-        """Designs looked at with gradients, those of descents that were given up too."""
+        """Number of evaluations with gradients, including those of abandoned descents."""
         return int(self.spent + self.states[:, 3].sum())
 
     def keep(self, numbers: NDArray[np.intp]) -> None:
-        """Continue only some of the descents."""
+        """Continue only the descents with these numbers."""
         self.spent += float(self.states[:, 3].sum() - self.states[numbers, 3].sum())
         for name in ("places", "kinds", "x", "states", "curvature"):
             setattr(self, name, getattr(self, name)[numbers])
 
     def advance(self, steps: int, stop: Callable[[], bool] = lambda: False) -> None:
-        """So many steps of all descents that have not come to rest."""
+        """Take ``steps`` steps of all descents that have not converged."""
 
         def one(k: int) -> None:
             if not stop():
@@ -272,14 +272,14 @@ class Descents:
 
 
 def in_threads(task: Callable[[T], None], parts: Iterable[T], jobs: int) -> None:
-    """Call compiled work for each of its parts: it does not hold Python's lock."""
+    """Call compiled work, which releases Python's lock, for each part in threads."""
     with ThreadPoolExecutor(jobs) as threads:
         for _ in threads.map(task, parts):
             pass
 
 
 def _rows_of(found: Measure, bound: float, upper: bool, deviation: str) -> list[_Curve]:
-    """Rows for one side of a limit, in inner values; none where poses do not tell."""
+    """Return the rows for one side of a limit, in inner values; none if poses do not give them."""
     if found.kind not in ("max", "min", "max_abs", "range"):
         return []
     side = 1.0 if upper else -1.0

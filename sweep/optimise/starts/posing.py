@@ -1,4 +1,4 @@
-"""What a study asks of the optimiser: its problem, and the designs that the search starts from."""
+"""The optimisation problem of a study, and the designs from which its search starts."""
 
 from __future__ import annotations
 
@@ -21,25 +21,25 @@ if TYPE_CHECKING:
     from sweep.study import Study
 
 WHOLE_TURN = 2.0 * np.pi - 1e-9
-SHORTEST = 0.02  # of its upper limit is a length without a lower one
-TAILS = (2.0, 98.0)  # percent; beyond are needles that hardly moved and were scaled up to the stroke
+SHORTEST = 0.02  # lower bound of a length without a lower limit, relative to its upper limit
+TAILS = (2.0, 98.0)  # percent; designs beyond had hardly any motion and were scaled up to the stroke
 
 
 def problem_of(study: Study, designs: Array, on_locus: bool | None = None) -> Problem:
     """Return the optimisation problem of a study.
 
-    Swept steady parameters vary between the ends of their axes, those that [locus] or [fit] sets or scales as far as
-    ``designs`` (k, P) reach and half their size beyond; limits on parameters narrow both.  An angle swept over a whole
-    turn may go on for half a turn.  Parameters given as lists of values are not varied: each start keeps its own.
+    Swept continuous parameters vary between the ends of their axes, those that [locus] or [fit] sets or scales over the
+    range of ``designs`` (k, P) widened by half its size; limits on parameters narrow both.  An angle swept over a whole
+    turn may continue for half a turn.  Parameters given as lists of values are not varied: each start keeps its own.
 
-    On the locus, what it prescribes is varied instead of the links: fixed values hold by construction, axes are bounds,
-    limits on links stay limits.  Otherwise what is prescribed becomes limits: equations where it is fixed.
+    On the locus, the prescribed outputs are varied instead of the links: fixed values hold by construction, axes are
+    bounds, limits on links stay limits.  Otherwise prescribed outputs become limits: equations if they are fixed.
 
     Parameters
     ----------
     study : with an objective
     designs : (k, P) from its space
-    on_locus : None leaves it to ``optimise.variables``, and without that to whether [locus] fixes swing, stroke or phi0
+    on_locus : None follows ``optimise.variables``, by default the locus if [locus] fixes swing, stroke or phi0
 
     Raises
     ------
@@ -74,14 +74,14 @@ def problem_of(study: Study, designs: Array, on_locus: bool | None = None) -> Pr
 
 
 def _wanted(study: Study) -> bool:
-    """Return whether the search goes along the locus: as the study says, or where that spares it an equation."""
+    """Tell whether the search uses the locus: as the study says, by default if that eliminates an equation."""
     if study.optimise is not None and study.optimise.variables is not None:
         return study.optimise.variables == "locus"
     return any(limit.output in study.prescribed and limit.minimum == limit.maximum for limit in study.limits)
 
 
 def _bounds(study: Study, name: str, designs: Array) -> tuple[float, float] | None:
-    """Return the bounds of a parameter or of a prescribed output; None where it is given, or a sign."""
+    """Return the bounds of a parameter or of a prescribed output; None if it is fixed, or a sign."""
     names = study.family.parameter_names
     parameter = next(p for p in (*study.family.parameters, *_prescribed(study)) if p.name == name)
     if parameter.choices is not None:
@@ -96,7 +96,7 @@ def _bounds(study: Study, name: str, designs: Array) -> tuple[float, float] | No
     elif name in study.space.bounds:
         low, high = study.space.bounds[name]
         if name not in names and not name.startswith("phi"):
-            low, high = sorted((abs(low), abs(high)))  # the branch tells the sign of swing and stroke
+            low, high = sorted((abs(low), abs(high)))  # the branch gives the sign of swing and stroke
         elif parameter.unit == "angle" and high - low >= WHOLE_TURN:
             low, high = low - np.pi, high + np.pi
     else:
@@ -106,7 +106,7 @@ def _bounds(study: Study, name: str, designs: Array) -> tuple[float, float] | No
         if limit.output == name:
             low = low if limit.minimum is None else max(low, limit.minimum)
             high = high if limit.maximum is None else min(high, limit.maximum)
-    if name in (*study.made, *study.rescaled):  # of what is made perhaps no design comes near the limits
+    if name in (*study.made, *study.rescaled):  # perhaps no design of [locus] or [fit] comes near the limits
         if high <= least:
             low = max(high - width, SHORTEST * high) if parameter.positive else high - width
         elif low >= most:
@@ -115,7 +115,7 @@ def _bounds(study: Study, name: str, designs: Array) -> tuple[float, float] | No
 
 
 def _limited(study: Study, name: str) -> tuple[float, float] | None:
-    """Return the limits of a guide's length, which are its bounds where proportions are searched globally."""
+    """Return the limits of a guide's length, which are its bounds in a global search over proportions."""
     limits = [x for x in study.parameter_limits if x.output == name and x.maximum is not None]
     if not _by_populations(study) or not limits:
         return None
@@ -130,10 +130,10 @@ def _prescribed(study: Study) -> tuple[Parameter, ...]:
 def problem_and_starts(
     study: Study, folder: Path, stop: Callable[[], bool] = lambda: False, jobs: int = 1
 ) -> tuple[Problem, Iterator[Group]]:
-    """Return the problem of a study and its starts, group by group, each of which is made when it is asked for.
+    """Return the problem of a study and an iterator of its groups of starts, each made when requested.
 
     With ``optimise.global = "proportions"`` they are ends of populations, whose descents run in ``jobs`` threads;
-    otherwise they come from the dataset and from samples.  ``stop`` ends it early.
+    otherwise they come from the dataset and from samples.  ``stop`` ends the iteration early.
     """
     if study.optimise is None:
         raise MissingInput("optimise", "an [optimise] section", str(study.path))
@@ -144,20 +144,20 @@ def problem_and_starts(
 
 
 def compile_descents(study: Study) -> None:
-    """Compile or load what the search over proportions of a study runs, on a few designs of its space."""
+    """Compile or load the kernels of a study's search over proportions, with a few designs of its space."""
     designs = drawn(study, 1, 0)
-    if len(designs):  # otherwise the search will say what is wrong
+    if len(designs):  # otherwise the search reports the fault
         descend_once(study, problem_of(study, designs))
 
 
 def problem_of_dataset(study: Study, folder: Path, found: Array) -> Problem:
-    """Return the problem of a study whose search is done, without searching for starts again.
+    """Return the problem of a study whose search is finished, without searching for starts again.
 
     Parameters
     ----------
-    study : with an objective
-    folder : its dataset
-    found : designs (k, P) that the search found, which the bounds hold where they follow from such designs
+    study : study with an objective
+    folder : folder of its dataset
+    found : designs (k, P) of the search, which the bounds must contain if they depend on such designs
 
     Raises
     ------
@@ -171,7 +171,7 @@ def problem_of_dataset(study: Study, folder: Path, found: Array) -> Problem:
 def _known(study: Study, folder: Path) -> tuple[Array, Array, Problem]:
     """Return the best designs of a dataset, their objectives, and the problem.
 
-    Where no design is feasible they are random ones without an objective.
+    Without a feasible row the designs are random ones without an objective.
     """
     if study.objective is None:
         raise MissingInput("objective", "[objective] minimise = an output", str(study.path))

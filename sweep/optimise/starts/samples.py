@@ -1,6 +1,6 @@
 """Starts without a dataset: the best of large samples, improved by ever smaller samples around them.
 
-Every six starts come from a sample of their own: a region that one sample misses the next one may hit.
+Every six starts come from a sample of their own, since one sample may hit a region that another one misses.
 """
 
 from __future__ import annotations
@@ -20,36 +20,36 @@ from sweep.optimise.problem.statement import Problem
 from sweep.quantities.limits import compared
 from sweep.quantities.measures import ROTATABLE_MARGIN, margins
 
-SAMPLED = 1 << 15  # designs per start: on a locus they cost a third of a microsecond each
-BLOCK, LEAST = 1 << 15, 1 << 12  # designs ranked together; the least number, where there are many signs
-BEYOND = 0.35  # of the width of the bounds, to either side: two coordinates in five are brought back onto a bound
-KEPT = 512  # best of the sample per start, and as many of those that miss their limits
-PARENTS, CHILDREN, ROUNDS = 16, 24, 12  # improved per start; samples around each and round
+SAMPLED = 1 << 15  # designs per start; on a locus they cost a third of a microsecond each
+BLOCK, LEAST = 1 << 15, 1 << 12  # designs ranked together; smallest such number, with many signs
+BEYOND = 0.35  # share of the bounds' width added on either side: two coordinates in five are clipped to a bound
+KEPT = 512  # best designs of the sample per start, and as many of the infeasible ones
+PARENTS, CHILDREN, ROUNDS = 16, 24, 12  # designs improved per start; samples around each design per round; rounds
 RANKED = SAMPLED + PARENTS * CHILDREN * ROUNDS  # designs per start in all
 FARTHEST = 1e100
-RADIUS = 0.06  # of the first of these samples, in variables scaled to their bounds
-ACCURACY = Accuracy(samples=64)  # misses a peak by less than what the local search gains ...
-TURNING = Accuracy(samples=16)  # the same for margins, which rank what does not turn; those of what turns are exact
-VERIFIED, HIDDEN = Accuracy(target=1e-3), 2.0  # ... but near a pole, told by a true extremum so many times larger
-NEARLY = 0.03  # a search mends so small a violation in passing: the objective tells more
-PRICE = 3.0  # of such a violation, in objectives
-ABSENT = 100.0  # violation of a limit on what a design does not have, as the swing of a rocker that turns
-ALIKE = 0.02  # of the average distance of two random designs: nearer designs of a sweep are one start
-OUTSIDE, STUCK = 1e100, 1e200  # above every objective: misses its limits, does not turn
+RADIUS = 0.06  # radius of the first of these samples, in variables scaled to their bounds
+ACCURACY = Accuracy(samples=64)  # misses a peak by less than the local search gains ...
+TURNING = Accuracy(samples=16)  # the same for margins, which rank designs that do not turn; other margins are exact
+VERIFIED, HIDDEN = Accuracy(target=1e-3), 2.0  # ... except near a pole, where a true extremum is larger by this factor
+NEARLY = 0.03  # violation that a search corrects in passing, so that the objective ranks the design
+PRICE = 3.0  # price of such a violation, in objectives
+ABSENT = 100.0  # violation of a limit on an output that a design does not have, as the swing of a rocker that turns
+ALIKE = 0.02  # share of the average distance of two random designs: nearer designs of a sweep give one start
+OUTSIDE, STUCK = 1e100, 1e200  # above every objective: violates its limits, does not turn
 
 
 def samples(
     problem: Problem, signs: Sequence[dict[str, float]], count: int, seed: int, stop: Callable[[], bool] = lambda: False
 ) -> Iterator[Group]:
-    """Yield at most ``count`` good designs, those of one sample after the other; same arguments, same designs.
+    """Yield at most ``count`` good designs, sample by sample; the same arguments give the same designs.
 
     Parameters
     ----------
     problem : what is to be minimised
-    signs : combinations of the parameters that are not varied (branches); each sample is shared out among them
-    count : how many at most, as many of each sample, up to six
-    seed : of the samples
-    stop : true ends a sample that has been begun with the best so far; there is no further one
+    signs : combinations of the parameters that are not varied (branches), among which each sample is divided
+    count : largest number of designs, equally many of each sample, up to six
+    seed : seed of the samples
+    stop : true ends the present sample with the best designs so far, and the iteration
     """
     number = -(-count // TOGETHER)
     size = -(-count // number)
@@ -65,17 +65,17 @@ def sample(
     problem: Problem, signs: Sequence[dict[str, float]], count: int, seed: int, number: int,
     stop: Callable[[], bool] = lambda: False,
 ) -> Array:  # fmt: skip
-    """Return diverse good designs of one Sobol sample and of what is found around the best of it, the best first.
+    """Return diverse good designs of one Sobol sample and of samples around its best ones, the best first.
 
-    Each sample is scrambled anew, so that it has points of its own.  Half of them are drawn from beyond the bounds and
-    brought back onto them.
+    Each sample has its own scrambling, and so its own points.  Half of them are drawn from a range wider than the
+    bounds and clipped to them.
 
     Parameters
     ----------
     problem, signs, seed : see :func:`samples`
-    count : how many designs at most
-    number : of the sample
-    stop : asked several times a second; true ends with the best so far
+    count : largest number of designs
+    number : number of the sample
+    stop : called several times a second; true ends the search with the best designs so far
     """
     from scipy.stats import qmc
 
@@ -104,7 +104,7 @@ def sample(
     chosen, near = _parents(place, kind, merit, PARENTS * count)
     place, merit = _improved(problem, bases, place[chosen], kind[chosen], merit[chosen], rng, stop)
     ranked = np.argsort(merit, kind="stable")
-    if near >= count:  # what was brought within the limits has to be as good as what was there
+    if near >= count:  # designs moved within the limits have to be as good as those that were there
         ranked = ranked[merit[ranked] <= merit[:near].max()]
     place, kind = place[ranked], kind[chosen][ranked]
     designs = [problem.placed(bases[kind[k]], place[k]) for k in spread(place, kind, count)]
@@ -112,7 +112,7 @@ def sample(
 
 
 def _brought_in(problem: Problem, fractions: Array) -> Array:
-    """Return points of a block of a sample within the bounds, half of them drawn beyond and brought back onto a bound.
+    """Return points of a block of a sample within the bounds, half of them drawn from a wider range and clipped.
 
     Optima lie on bounds, often on several at once, and the feasible designs near them may fill less than a millionth of
     the space between the bounds.
@@ -129,7 +129,7 @@ def _brought_in(problem: Problem, fractions: Array) -> Array:
 def _parents(place: Array, kind: NDArray[np.intp], merit: Array, count: int) -> tuple[NDArray[np.intp], int]:
     """Return the row numbers of diverse designs to be improved, feasible ones first, and how many are feasible.
 
-    The feasible ones are up to half; the others miss the limits and keep a distance from them.
+    Feasible ones are up to half; the others violate the limits and keep a distance from them.
 
     A limit may leave several separate regions.  A sample can miss the smallest, which is then reached from infeasible
     designs beside it.
@@ -146,7 +146,7 @@ def _parents(place: Array, kind: NDArray[np.intp], merit: Array, count: int) -> 
 
 
 def _one_turn(problem: Problem) -> tuple[Array, Array]:
-    """Return the bounds in which samples are drawn.
+    """Return the bounds in which samples are drawn, as fractions.
 
     A variable with the period of a turn is drawn from the middle turn of its bounds only.
     """
@@ -161,7 +161,7 @@ def _one_turn(problem: Problem) -> tuple[Array, Array]:
 
 
 def _verified(problem: Problem, bases: list[Array], place: Array, kind: NDArray[np.intp], merit: Array) -> Array:
-    """Return the ranks of designs, by true extrema where the poses hid most of a peak."""
+    """Return the ranks of designs, from true extrema if the poses hid most of a peak."""
     out = merit.copy()
     for own, base in enumerate(bases):
         rows = np.flatnonzero((kind == own) & (merit < OUTSIDE))
@@ -175,7 +175,7 @@ def _improved(
     problem: Problem, bases: list[Array], place: Array, kind: NDArray[np.intp], merit: Array, rng: np.random.Generator,
     stop: Callable[[], bool],
 ) -> tuple[Array, Array]:  # fmt: skip
-    """Repeatedly replace each design by the best of a sample around it; without a better one the radius is halved."""
+    """Replace each design repeatedly by the best of a sample around it; without a better one the radius is halved."""
     place, merit = place.copy(), merit.copy()
     radius = np.full(len(place), RADIUS)
     for _ in range(ROUNDS):
@@ -200,17 +200,17 @@ def _improved(
 def ranking(problem: Problem, designs: Array, accuracy: Accuracy = ACCURACY) -> Array:
     """Return the rank of each design; smaller is better.
 
-    It is the objective where all limits are nearly kept, far above that the largest violation, and above that what does
-    not turn.
+    It is the objective if all limits are nearly kept, otherwise a larger number that grows with the violation, and
+    above all for designs that do not turn.
 
-    Cheap limits first: parameters, then margins and pressure angles, then the others; only designs that nearly keep
-    them go on.  Infinite where there is no design or no objective.
+    Cheap limits come first: parameters, then margins and pressure angles, then the others; only designs that nearly
+    keep them are evaluated further.  Infinite if there is no design or no objective.
 
     Parameters
     ----------
-    problem : whose objective and limits count
+    problem : problem of the objective and the limits
     designs : (n, P)
-    accuracy : of their extrema over the turn
+    accuracy : accuracy of the extrema over the turn
     """
     limits = [limit for limit in problem.limits if not is_flag(limit.output)]
     names = problem.family.parameter_names
@@ -233,7 +233,7 @@ def ranking(problem: Problem, designs: Array, accuracy: Accuracy = ACCURACY) -> 
         merit[alive[bad]] = OUTSIDE * (left + violation[alive[bad]])
         if left == 2.0 and turning:
             stuck = ~(columns["margin"] >= ROTATABLE_MARGIN)
-            # How far a crank is from turning is a rank only; numbers beyond this are all alike, and would overflow.
+            # The distance of a crank from turning is a rank only; larger numbers count as equal, and would overflow.
             margin = np.maximum(np.nan_to_num(columns["margin"][stuck]), -FARTHEST)
             merit[alive[stuck]] = STUCK * (1.0 - margin)
             bad |= stuck
@@ -245,7 +245,7 @@ def ranking(problem: Problem, designs: Array, accuracy: Accuracy = ACCURACY) -> 
 
 
 def _values(problem: Problem, designs: Array, wanted: list[str], accuracy: Accuracy) -> dict[str, Array]:
-    """Return outputs and parameters (n,) of designs."""
+    """Return outputs and parameters of designs, (n,) each."""
     names = problem.family.parameter_names
     columns: dict[str, Any] = {name: designs[:, names.index(name)] for name in wanted if name in names}
     outputs = [name for name in wanted if name not in names]
@@ -257,7 +257,7 @@ def _values(problem: Problem, designs: Array, wanted: list[str], accuracy: Accur
 def _missed(limit: Any, value: Array) -> Array:
     """Return the violation of a limit relative to its bound, (n,).
 
-    An output that a design does not have misses its limit by far.
+    A missing output has a large violation.
     """
     value = compared(limit.output, value)
     out = np.zeros(len(value))
@@ -271,16 +271,16 @@ def _missed(limit: Any, value: Array) -> Array:
 def diverse(problem: Problem, designs: Array, merit: Array, count: int, least: float = 0.0) -> Array:
     """Return the best designs that keep a distance from each other, best first.
 
-    The best one is taken, its neighbourhood left out, and so on; the distance (in variables scaled to their bounds) is
+    The best one is taken, its neighbourhood excluded, and so on; the distance (in variables scaled to their bounds) is
     halved until there are enough.  Designs of different signs are never neighbours.  Ties go to the earlier row.
 
     Parameters
     ----------
-    problem : whose variables count
+    problem : its variables define the distance
     designs : (k, P)
     merit : (k,) the smaller the better; rows that are not finite are never taken
-    count : how many at most
-    least : distance that is kept in any case, as a share of the average one of two random designs
+    count : largest number of designs
+    least : distance kept in any case, as a share of the average distance of two random designs
     """
     order = np.argsort(merit, kind="stable")
     ranked = designs[order[np.isfinite(merit[order])]]
@@ -292,12 +292,12 @@ def diverse(problem: Problem, designs: Array, merit: Array, count: int, least: f
 def spread(place: Array, kind: NDArray[np.intp], count: int, least: float = 0.0, first: int = 0) -> list[int]:
     """Return the numbers of the best rows that keep a distance from each other.
 
-    At most ``count`` rows of ``place`` (k, n) are taken, which are ranked, the best first.
+    At most ``count`` rows of ``place`` (k, n), which is ranked with the best first, are taken.
 
     ``kind`` (k,): rows of different kinds are never neighbours.  The distance is never less than ``least``, a share of
-    the average one of two random designs.  The ``first`` rows are taken in any case.
+    the average distance of two random designs.  The ``first`` rows are taken in any case.
     """
-    distance = 0.5 * np.sqrt(place.shape[1] / 6.0)  # half of what two random designs keep on average
+    distance = 0.5 * np.sqrt(place.shape[1] / 6.0)  # half of the average distance of two random designs
     taken: list[int] = []
     for _ in range(12):
         taken, free = list(range(first)), np.ones(len(place), dtype=np.bool_)
