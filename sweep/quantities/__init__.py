@@ -1,1 +1,1 @@
-"""What can be asked of a mechanism, as data: reductions of pose outputs, and how names of quantities are composed."""
+"""Design outputs as data: reductions of pose outputs, limits, and the grammar of their names."""

@@ -1,4 +1,4 @@
-"""The box of a mechanism: how far its joints, moving and fixed, reach along x, y and z over one turn."""
+"""Bounding box of a mechanism: extent of its joints, moving and fixed, along x, y and z over one turn."""
 
 from __future__ import annotations
 
@@ -39,15 +39,15 @@ class Box:
 
     @property
     def asked(self) -> tuple[str, ...]:
-        """The design outputs that it is made of."""
+        """Names of the design outputs, largest and smallest coordinates, that the extent is computed from."""
         return tuple(name for pair in self.reductions for name in pair)
 
 
 @of_family
 def boxes(family: Family) -> dict[str, Box]:
-    """Boxes of a family by name: its own, of a chain every stage's, of a machine the whole and every member's.
+    """Boxes of a family by name: of every stage of a chain; of a machine as a whole and of each member.
 
-    That of a chain is given stage by stage, in each stage's own frame; of a machine's chain the last stage counts.
+    The box of a stage is given in the stage's own frame; of a machine's chain only the last stage counts.
     """
     if isinstance(family.domain, March):
         return {}
@@ -60,7 +60,7 @@ def boxes(family: Family) -> dict[str, Box]:
 
 
 def _own(of: Stage, axis: int) -> Box | None:
-    """Box of a stage, in its own frame."""
+    """Box of a stage along one axis, in the stage's own frame."""
     family, stage = of.family, of.tail
     at = {name: points[axis] for name, points in _moving(family).items()}
     curves = tuple(dict.fromkeys(f"{name}{stage}" for name in at.values() if name is not None))
@@ -78,7 +78,7 @@ def _own(of: Stage, axis: int) -> Box | None:
 
 
 def _of_member(m: Member, found: Box) -> Box:
-    """Return a member's own box under the machine's names."""
+    """Rename a member's box and its columns for the machine."""
     output = Output(f"{m.name}.{found.output.name}", "length", f"{m.name}: {found.output.text}")
     pairs = tuple((f"{m.name}.{most}", f"{m.name}.{least}") for most, least in found.reductions)
     still = tuple(partial(_of_columns, piece, m.columns) for piece in found.still)
@@ -86,7 +86,7 @@ def _of_member(m: Member, found: Box) -> Box:
 
 
 def _whole(machine: Machine, axis: int) -> Box | None:
-    """Box of all members in the machine's frame; of a chain its last stage, which is what stands there."""
+    """Box of all members along one axis in the machine's frame; a chain is represented by its last stage."""
     curves, pairs, still = [], [], list[Piece]()
     for m in machine.members:
         last = m.family.stages[-1]
@@ -106,14 +106,14 @@ def _whole(machine: Machine, axis: int) -> Box | None:
 
 
 def _moving(family: Family) -> Mapping[str, Coordinates]:
-    """List the moving joints of all links; none where one of them is no pose output, so that its place is not known."""
+    """Coordinate names of all moving joints; empty where the place of any joint is not a pose output."""
     at, skeleton = family.points, skeleton_of(family)
     joints = [joint for link in skeleton.links for joint in link.joints if joint not in skeleton.fixed]
     return {joint: at[joint] for joint in joints} if set(joints) <= at.keys() else {}
 
 
 def _standing(family: Family) -> Iterator[Fixed]:
-    """Yield bearings and points of the frame; a line along which something slides is no joint."""
+    """Yield the fixed bearings and points of the frame; slide axes are left out."""
     yield from (fixed for fixed in skeleton_of(family).fixed.values() if fixed.kind != "slide")
 
 
@@ -130,6 +130,6 @@ def _of_columns(piece: Piece, columns: slice, designs: Any) -> Any:
 
 
 def _placed(m: Member, fixed: Fixed, axis: int, columns: slice, designs: Any) -> Any:
-    """Return a coordinate in the machine's frame of a point that stands still in the member's."""
+    """Coordinate of a fixed point of a member in the machine's frame, (n,) [length]."""
     at = np.asarray(fixed.at(designs[:, columns]))
     return m.frame(designs).placed([at[:, [k]] for k in range(3)])[axis][:, 0]

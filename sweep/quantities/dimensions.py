@@ -1,7 +1,7 @@
-"""Sizes that a designer always asks about: least link, ratio of links, arm of a coupler point, distance of pivots.
+"""Sizes computed from the dimensions alone: shortest link, link ratio, arm ratio, distance of pivots.
 
-They follow from the dimensions alone, without a pose.  Each is the least or the largest of smooth *pieces*, so that
-limits on it have exact gradients: every piece stays on its side of a bound.
+No pose is needed.  Each size is the minimum or maximum of smooth *pieces*, so that limits on it have exact gradients:
+every piece stays on its side of a bound.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ from sweep.families.capabilities import Dimensions, skeleton_of
 from sweep.families.machines.machine import Machine
 
 Piece: TypeAlias = Callable[[Any], Any]
-"""Designs (n, P), real or complex, to one number each."""
+"""Function of designs (n, P), real or complex, that returns one number per design, (n,)."""
 
 LEAST_LINK = Output("least_link", "length", "length of the shortest moving link")
 LINK_RATIO = Output("link_ratio", "1", "length of the shortest moving link over that of the longest")
@@ -38,9 +38,9 @@ ROUNDINGS = 16.0 * 2.0**-53  # a few products, a sum and a root
 
 
 def near_unit_size(family: Family, designs: Array) -> tuple[Array, NDArray[np.int32]]:
-    """Return the same mechanisms near unit size, and the powers of two (n,) by which they are larger.
+    """Scale all lengths of the designs near 1 by powers of two; return the designs and the exponents (n,).
 
-    Nothing overflows then, and no bit changes.
+    The scaling prevents overflow and is exact.
     """
     lengths = [k for k, p in enumerate(family.parameters) if p.unit == "length"]
     _, exponent = np.frexp(np.abs(designs[:, lengths]).max(axis=1, initial=0.0))
@@ -51,7 +51,7 @@ def near_unit_size(family: Family, designs: Array) -> tuple[Array, NDArray[np.in
 
 @dataclass(frozen=True)
 class Size:
-    """A size of a family: the least or the largest of its pieces, which are squares of what they stand for if so said.
+    """A size of a family: the minimum (``least``) or maximum of its pieces, which are squares if ``squared``.
 
     Squares are smooth where a length vanishes.
     """
@@ -64,7 +64,7 @@ class Size:
     def values(self, family: Family, designs: Array) -> Array:
         """Size of every design, (n,).
 
-        Lengths are brought near 1 by a power of two first: nothing overflows.
+        Lengths are scaled near 1 by a power of two first, so that nothing overflows.
         """
         scaled, exponent = near_unit_size(family, designs)
         with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
@@ -76,7 +76,7 @@ class Size:
 
 @dataclass(frozen=True)
 class _Part:
-    """A family that stands alone in a chain or a machine: where its parameters are, what its names are called there."""
+    """A stage's or member's family with its parameter columns and the prefix and suffix of its names."""
 
     family: Family
     columns: NDArray[np.intp]
@@ -84,7 +84,7 @@ class _Part:
     stage: str = ""
 
     def of(self, piece: Piece) -> Piece:
-        """Return a piece of the part as one of the whole."""
+        """Piece of the part as a function of the whole design."""
         return partial(_of_columns, piece, self.columns)
 
 
@@ -94,7 +94,7 @@ def _of_columns(piece: Piece, columns: NDArray[np.intp], designs: Any) -> Any:
 
 @of_family
 def sizes(family: Family) -> dict[str, Size]:
-    """All sizes of a family by name: of the whole, of every member, and of every stage."""
+    """All sizes of a family by name: of the whole, of every member and of every stage."""
     groups: dict[tuple[str, str], list[_Part]] = {}
     for part in _parts(family):
         for key in dict.fromkeys((("", ""), (part.member, ""), (part.member, part.stage))):
@@ -126,7 +126,7 @@ def dimension_step(family: Family) -> Step | None:
 
 
 def lengths(family: Family) -> tuple[str, ...]:
-    """Parameters that are lengths of the mechanism itself, not places, nor of bodies and bearings of effects."""
+    """Names of the parameters that are lengths of the mechanism; placements and inputs of effects are left out."""
     others = set(input_names(family)) | {p.name for p in family.parameters if p.places}
     if isinstance(family, Machine):
         others |= {p.name for relation in family.relations for p in relation.parameters}
@@ -134,7 +134,7 @@ def lengths(family: Family) -> tuple[str, ...]:
 
 
 def size_step(family: Family) -> Step | None:
-    """Route to ``size``; None where a family has ratios of lengths only."""
+    """Route to ``size``; None where no parameter is a length."""
     if not any(p.unit == "length" and not p.places for p in family.parameters):
         return None
 
@@ -154,12 +154,12 @@ def _parts(family: Family) -> Iterator[_Part]:
                 yield _Part(part.family, part.columns + first, f"{m.name}.", part.stage)
         return
     for stage in family.stages:
-        if any(p.unit == "length" for p in stage.family.parameters):  # ratios of lengths only have no size
+        if any(p.unit == "length" for p in stage.family.parameters):  # a family without lengths has no size
             yield _Part(stage.family, np.arange(stage.columns.start, stage.columns.stop), stage=stage.tail)
 
 
 def _size(of: Output, member: str, stage: str, parts: list[_Part]) -> Size | None:
-    """Size of some parts together; several stages or members give the least or the largest of all."""
+    """Size over several parts together; None where they have no pieces."""
     pieces = tuple(part.of(piece) for part in parts for piece in _PIECES[of.name](part.family))
     if not pieces:
         return None
@@ -170,7 +170,7 @@ def _size(of: Output, member: str, stage: str, parts: list[_Part]) -> Size | Non
 
 
 def _links(family: Family) -> list[Piece]:
-    """Lengths of the moving links; one that is not there (length 0) counts as the longest of the others."""
+    """Lengths of the moving links; an optional link of length 0 counts as the longest regular link."""
     found: list[Piece] = []
     for dimensions in family.every(Dimensions):
         always = [partial(_length, _columns(family, names)) for names in dimensions.links]
@@ -184,7 +184,7 @@ def _ratios(family: Family) -> list[Piece]:
 
 
 def _arms(family: Family) -> list[Piece]:
-    """Squares of the distances of a carried point from both joints of its link, over that of the joints."""
+    """Squared distances of a carried point from both joints of its link, over the squared distance of the joints."""
     return [
         partial(_arm, _columns(family, arm.point), _columns(family, arm.link), share)
         for dimensions in family.every(Dimensions)
@@ -194,7 +194,7 @@ def _arms(family: Family) -> list[Piece]:
 
 
 def _pivots(family: Family) -> list[Piece]:
-    """Squares of the distances between the centres of all bearings of links that turn about a fixed axis."""
+    """Squared distances between the centres of all pairs of fixed axes."""
     return [
         partial(_apart, one.at, other.at)
         for one, other in combinations([f for f in skeleton_of(family).fixed.values() if f.kind == "axis"], 2)

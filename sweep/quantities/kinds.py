@@ -1,4 +1,4 @@
-"""The kinds of design outputs: what a name can stand for."""
+"""Kinds of design outputs: the types that a resolved name can have."""
 
 from __future__ import annotations
 
@@ -13,30 +13,30 @@ from sweep.quantities.dimensions import Size
 
 BOTH_EXTREMA: tuple[Mode, ...] = (1, -1)
 PLACES = ("phi_ext", "phi_fold", "phi0", "stroke_ratio")
-"""Of the kinds of limit positions, those that need crank angles."""
+"""Kinds of limit positions that are computed from crank angles."""
 
 
 class Request(NamedTuple):
-    """An extremum that is wanted: of which pose output, and which (0 largest magnitude, +1 largest, -1 least).
+    """Requested extremum of a pose output; ``mode`` 0 largest magnitude, +1 largest, -1 smallest value.
 
-    Each is searched for as if it were the only one, so that no bit of it depends on what is wanted beside it.
+    Each extremum is searched for independently, so that its value does not depend on other requests.
     """
 
     pose: str
     mode: Mode
     windowed: bool = False  # only poses whose position lies in the search's window count
-    place: bool = False  # its crank angle is wanted, to the target [rad]
+    place: bool = False  # the crank angle of the extremum is wanted, to the target [rad]
 
 
 @dataclass(frozen=True)
 class _Meaning:
-    """What every quantity has.
+    """Fields common to all quantities.
 
     Parameters
     ----------
     output : name, unit, definition
-    of : the pose output that it is taken of; "" for none
-    stage : the number of the stage, of margins and limit positions in a chain; in a machine behind the member's name
+    of : pose output that the quantity is computed from; "" for none
+    stage : number of the stage, for margins and limit positions in a chain; in a machine behind the member's name
     """
 
     output: Output
@@ -47,14 +47,14 @@ class _Meaning:
 
 @dataclass(frozen=True)
 class Margin(_Meaning):
-    """Rotatability, margin, or an extreme pressure or transmission angle, as ``kind`` says."""
+    """Rotatability, margin, or an extreme pressure or transmission angle, selected by ``kind``."""
 
     kind: str
 
 
 @dataclass(frozen=True)
 class LimitPosition(_Meaning):
-    """A number made of the two limit positions of a follower: swing, stroke, phi0, psi_ext ..., as ``kind`` says."""
+    """Quantity of the two limit positions of a follower: swing, stroke, phi0, psi_ext ..., selected by ``kind``."""
 
     kind: str
 
@@ -72,27 +72,27 @@ class Reduced(_Meaning):
 
     @property
     def extreme(self) -> bool:
-        """Whether it is made of extrema; a mean is not."""
+        """Whether the reduction is computed from extrema; a mean is not."""
         return bool(self.reduction.modes)
 
 
 @dataclass(frozen=True)
 class EventPlace(_Meaning):
-    """The value of the domain's variable at which an event first happens."""
+    """Value of the domain's variable at the first occurrence of an event."""
 
     event: Event
 
 
 @dataclass(frozen=True)
 class EventCount(_Meaning):
-    """How often an event happens."""
+    """Number of occurrences of an event."""
 
     event: Event
 
 
 @dataclass(frozen=True)
 class Extent(_Meaning):
-    """How far the joints reach along an axis."""
+    """Extent of the joints along an axis."""
 
     box: Box
 
@@ -113,14 +113,14 @@ class LargestLength(_Meaning):
 
 @dataclass(frozen=True)
 class TimingOf(_Meaning):
-    """What a machine's timing gives: the difference of two crank angles, or the value of a pose output at one."""
+    """Result of a machine's timing: difference of two crank angles, or value of a pose output at one."""
 
     timing: Timing | EventValue
 
 
 @dataclass(frozen=True)
 class OwnOutput(_Meaning):
-    """What nothing but an own step of the family gives; ``of_part``: of a stage's or a member's family."""
+    """Output that only a family's own step computes; ``of_part``: a step of a stage's or a member's family."""
 
     of_part: bool = False
 
@@ -138,11 +138,11 @@ Quantity: TypeAlias = (
 )  # fmt: skip
 
 Group: TypeAlias = Literal["margin", "limits", "reductions", "means", "events"]
-"""What general routes work out together."""
+"""Groups of quantities that one general route computes together."""
 
 
 def group_of(family: Family, asked: Quantity) -> Group | None:
-    """Name the general route that works a quantity out from poses; None where there is none."""
+    """Name the general route that computes a quantity from poses; None where there is none."""
     match asked:
         case Margin():
             return "margin"
@@ -157,7 +157,7 @@ def group_of(family: Family, asked: Quantity) -> Group | None:
 
 
 def requests(family: Family, asked: Quantity, windowed: bool) -> tuple[Request, ...]:
-    """List the extrema that a quantity is made of; a window concerns deviations across a line only."""
+    """List the extrema that a quantity is computed from; only windowed pose outputs are limited to the window."""
     match asked:
         case LimitPosition(kind=kind):
             modes, place = BOTH_EXTREMA, kind in PLACES

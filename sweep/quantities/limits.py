@@ -1,4 +1,4 @@
-"""Limits of design outputs and parameters, and how they compare."""
+"""Limits of design outputs and parameters, and their comparison with values."""
 
 from __future__ import annotations
 
@@ -16,9 +16,9 @@ Number = TypeVar("Number", float, Array)
 
 @dataclass(frozen=True)
 class Limit:
-    """Bounds of a design output or of a parameter; equal ones ask for a value, ``rotatable = true`` is a minimum of 1.
+    """Bounds of a design output or of a parameter; equal bounds prescribe a value.
 
-    A parameter needs bounds of its own where [fit] sets or scales it.
+    ``rotatable = true`` is a minimum of 1.  A parameter needs bounds of its own where [fit] sets or scales it.
     """
 
     output: str
@@ -27,17 +27,17 @@ class Limit:
 
     @property
     def is_equation(self) -> bool:
-        """Whether it asks for a value, which nothing that scatters keeps."""
+        """Whether the bounds are equal and prescribe a value, which no toleranced design can keep."""
         return self.minimum is not None and self.minimum == self.maximum
 
 
 def compared(name: str, values: Number) -> Number:
-    """Give what limits and objectives compare: the magnitude of a swing or stroke, the value of any other output."""
+    """Value that limits and objectives compare: the magnitude of a swing or stroke, any other output as it is."""
     return abs(values) if by_magnitude(name) else values
 
 
 def meets(limit: Limit, values: NDArray[np.generic]) -> NDArray[np.bool_]:
-    """Tell whether each value keeps the limit; nan does not, and a swing or stroke is compared by magnitude."""
+    """Test which values keep the limit, (n,); nan fails, and a swing or stroke is compared by magnitude."""
     x = compared(limit.output, np.asarray(values, dtype=np.float64))
     good = np.isfinite(x)
     if limit.minimum is not None:

@@ -1,8 +1,8 @@
-"""What each design output is along the turn: which extrema of which pose outputs make it, and how.
+"""Decomposition of design outputs into extrema of pose outputs, as the optimiser follows them.
 
 The optimiser works with *inner* values that are smooth and sums of pose outputs at single crank angles.  Most outputs
-are their own inner value; the pressure angle becomes -cos^2 of itself, the stroke ratio the angle phi0, and both rise
-with what they replace, so minima, maxima and limits carry over.
+are their own inner value; the pressure angle becomes -cos^2 of itself, the stroke ratio the angle phi0.  Both inner
+values increase with the output, so minima, maxima and limits carry over.
 """
 
 from __future__ import annotations
@@ -32,7 +32,7 @@ from sweep.quantities.kinds import (
 )  # fmt: skip
 from sweep.quantities.resolve import find, resolve
 
-# A crank that turns must keep this much of Delta/b^2 at its worst pose: cos^2 of 89.94 degrees.
+# Least Delta/b^2 at the worst pose of a crank that turns: cos^2 of 89.94 degrees.
 ROTATABLE_MARGIN = 1e-6
 
 Kind: TypeAlias = Literal[
@@ -41,7 +41,7 @@ Kind: TypeAlias = Literal[
 ]  # fmt: skip
 Inner: TypeAlias = Literal["same", "pressure", "ratio", "rotatable", "square", "transmission"]
 
-# What the optimiser follows of the two limit positions: which end, or the difference of both.
+# Measure of each quantity of the limit positions: one end, or the difference of both.
 LIMIT_KINDS: dict[str, Kind] = {
     "swing": "range", "stroke": "range", "phi0": "phi0", "stroke_ratio": "phi0", "phi_ext": "phi_ext",
     "phi_fold": "phi_fold", "ext": "ext", "fold": "fold",
@@ -50,12 +50,12 @@ LIMIT_KINDS: dict[str, Kind] = {
 
 @dataclass(frozen=True)
 class Series:
-    """A curve over the turn whose extrema are followed.
+    """Curve over the turn whose extrema, or passages of a level, the optimiser follows.
 
-    ``output`` is the pose output; with ``pressure`` it is a discriminant and the curve is Delta/b^2 = cos^2 of that
-    pressure angle (the ratio of both does not depend on the crank angle, and the discriminant goes on below zero).
-    ``window`` limits it to a part of the stroke.  ``wrapped`` curves are angles that jump by a full turn.  With
-    ``passes``, a level and +1 upwards or -1 downwards, not its extrema are followed but where it passes that level.
+    ``output`` is the pose output.  With ``pressure`` it is a discriminant, and the curve is Delta/b^2 = cos^2 of that
+    pressure angle (their ratio does not depend on the crank angle, and the discriminant continues below zero).
+    ``window`` limits the curve to a part of the stroke.  ``wrapped`` curves are angles that jump by a full turn.
+    ``passes`` is a level and a direction, +1 upwards or -1 downwards: the passages of the level are followed then.
     """
 
     output: str
@@ -67,12 +67,13 @@ class Series:
 
 @dataclass(frozen=True)
 class Measure:
-    """A design output as ``sign`` * (reduction ``kind`` of its series), read back through ``inner``.
+    """Design output as ``sign`` * (reduction ``kind`` of its series), converted by ``inner``.
 
-    ``parts`` are the two angles of a "difference", the second minus the first; of "minus" what it is the negative of;
-    of a "scalar" that is the pose output ``of`` where an event happens, that event.
-    ``numbers`` are plain numbers instead of series: the output itself ("scalar"), parameters of which it is the largest
-    magnitude ("lengths"), or the pieces of which it is the "least" or the "most".  ``pieces`` computes the latter.
+    ``parts`` are the two angles of a "difference" (second minus first), the measure that "minus" negates, or the event
+    at which a "scalar" takes the value of the pose output ``of``.
+    ``numbers`` are plain numbers instead of series: the output itself ("scalar"), the parameters of which the largest
+    magnitude is taken ("lengths"), or the pieces of which the minimum ("least") or maximum ("most") is taken;
+    ``pieces`` computes the latter.
     """
 
     name: str
@@ -87,25 +88,25 @@ class Measure:
 
     @property
     def is_angle(self) -> bool:
-        """Whether it is made of crank angles at which something happens."""
+        """Whether the output is computed from crank angles of extrema or events."""
         if self.kind == "minus":
             return self.parts[0].is_angle
         return self.kind.startswith("phi") or self.kind == "difference"
 
     @property
     def is_least(self) -> bool:
-        """Whether it is the least of several values, each of which bounds it from above."""
+        """Whether the output is a minimum of several values, each of which bounds it from above."""
         if self.kind == "minus":
             return not self.parts[0].is_least
         return (self.kind in ("min", "least")) == (self.sign > 0.0)
 
     @property
     def follows_angles(self) -> bool:
-        """Whether its slopes need those of crank angles."""
+        """Whether the gradient needs gradients of crank angles."""
         return self.is_angle or any(part.follows_angles for part in self.parts)
 
     def refused(self, minimum: float | None, maximum: float | None) -> str:
-        """Say what bounds an inner value can stand for, where it cannot for these; "" where it can."""
+        """Say which bounds the inner value can represent, if it cannot represent the given ones; else ""."""
         if self.kind == "minus":
             return self.parts[0].refused(*(x if x is None else -x for x in (maximum, minimum)))
         low, high = (0.0 if x is None else x for x in (minimum, maximum))
@@ -115,7 +116,7 @@ class Measure:
         return "angles between 0 and 90 deg" if self.inner in ("pressure", "transmission") and not right else ""
 
     def to_inner(self, value: float) -> float:
-        """Inner value that stands for a value of the output."""
+        """Convert a value of the output to its inner value."""
         if self.kind == "minus":
             return -self.parts[0].to_inner(-value)
         if self.inner == "pressure":
@@ -131,7 +132,7 @@ class Measure:
         return value
 
     def from_inner(self, value: float) -> float:
-        """Value of the output for an inner value; nan where there is none (a mechanism that does not turn)."""
+        """Convert an inner value to the output; nan where there is none (a mechanism that does not turn)."""
         if self.kind == "minus":
             return -self.parts[0].from_inner(-value)
         if self.inner == "pressure":
@@ -149,12 +150,12 @@ class Measure:
 
 
 def curve(family: Family, output: str, window: tuple[float, float] | None = None) -> Series:
-    """Series of a plain pose output."""
+    """Series of a pose output, limited to the window if one is given."""
     return Series(output, window=window, wrapped=family.pose_output[output].wraps)
 
 
 def margins(family: Family, stage: str = "") -> tuple[Series, ...]:
-    """Return Delta/b^2 of the stage of that number; without a number of every stage. Empty where nothing can lock.
+    """Series Delta/b^2 of one stage, or of every stage if ``stage`` is ""; empty where nothing can lock.
 
     In a machine "needle.2" is a stage, "needle." every stage of the member.
     """
@@ -165,13 +166,13 @@ def margins(family: Family, stage: str = "") -> tuple[Series, ...]:
 
 
 def measure(family: Family, name: str, window: tuple[float, float] | None = None) -> Measure:
-    """Give the form in which the optimiser follows a design output.
+    """Measure of a design output.
 
     Parameters
     ----------
-    family : whose output it is
-    name : any design output.  Means, parameters, and what only a step of the family computes, are taken as numbers
-        without inner structure
+    family : family of the output
+    name : any design output.  Means, parameters and outputs of a family's own step become numbers without inner
+        structure
     window : see :class:`sweep.optimise.problem.statement.Problem`
 
     Raises
@@ -182,7 +183,7 @@ def measure(family: Family, name: str, window: tuple[float, float] | None = None
     if name in family.parameter_names and find(family, name) is None:
         return Measure(name, "scalar", (), numbers=(name,))
     if stem(name) == "rotatable" and not without_minus(name) and not margins(family, parts(name).stage):
-        return _of_margin(name, "rotatable", ())  # what never locks turns always
+        return _of_margin(name, "rotatable", ())  # a mechanism without dead points always turns
     return _measure(family, name, resolve(family, name), window)
 
 
@@ -202,7 +203,7 @@ def _measure(family: Family, name: str, asked: Quantity, window: tuple[float, fl
             return Measure(name, LIMIT_KINDS[kind], (curve(family, asked.of),), ratio)
         case Reduced(reduction=reduction, extreme=True):
             inside = window if family.pose_output[asked.of].windowed else None
-            # Of a vector's length, which has no slope at zero, both signs bound the largest, as those of a magnitude.
+            # A vector's length has no slope at zero: its largest value is bounded by both signs, like a magnitude.
             of_vector = {f"{asked.of}_{axis}" for axis in "xyz"} <= family.pose_output.keys()
             kind = "max_abs" if of_vector and reduction.kind == "max" else reduction.kind
             return Measure(name, cast(Kind, kind), (curve(family, asked.of, inside),))
@@ -219,15 +220,15 @@ def _measure(family: Family, name: str, asked: Quantity, window: tuple[float, fl
         case OwnOutput(of_part=True):
             raise InputError("output", name, "an output that changes steadily", f"design outputs of {family.name}")
         case _:
-            # Means, counts, stays, own outputs; the passage of an angle that jumps, and one on the way out of an
-            # interval, are found anew for every design.
+            # Means, counts, dwells, own outputs; passages of wrapped angles, and passages over an interval, are
+            # searched anew for every design.
             return Measure(name, "scalar", (), numbers=(name,))
 
 
 def _of_timing(family: Family, timing: Timing | EventValue, window: tuple[float, float] | None) -> Measure:
     ends = tuple(measure(family, place, window) for place in timing.places)
     if isinstance(timing, EventValue):
-        # The angle of a passage has an exact slope; that of an extremum no better one than differences have.
+        # The angle of a passage has an exact gradient; that of an extremum only finite differences.
         at = ends if ends[0].kind == "phi_event" else ()
         series = ends[0].series if at else ()
         return Measure(timing.name, "scalar", series, numbers=(timing.name,), parts=at, of=timing.of.name)

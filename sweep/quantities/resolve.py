@@ -1,4 +1,4 @@
-"""What the name of a design output means, decided here and nowhere else: ``resolve`` gives a typed quantity."""
+"""Meaning of the names of design outputs, decided here only: ``resolve`` returns a typed quantity."""
 
 from __future__ import annotations
 
@@ -45,7 +45,7 @@ STAY = Output("window_angle", "rad", "crank angle over which the position lies i
 
 
 def resolve(family: Family, name: str) -> Quantity:
-    """Tell what the name of a design output means for a family, a chain or a machine.
+    """Resolve the name of a design output of a family, a chain or a machine to a typed quantity.
 
     Raises
     ------
@@ -63,17 +63,17 @@ def resolve(family: Family, name: str) -> Quantity:
 
 @of_family
 def _resolved(family: Family) -> dict[str, Quantity]:
-    """Remember what names of a family mean: it is asked the same for every chunk of a sweep."""
+    """Cache of resolved names of a family: a sweep resolves the same names for every chunk."""
     return {}
 
 
 def output(family: Family, name: str) -> Output:
-    """Name, unit and definition of a design output; an unknown one is refused as by `resolve`."""
+    """Name, unit and definition of a design output; raises as `resolve` for an unknown name."""
     return resolve(family, name).output
 
 
 def find(family: Family, name: str) -> Quantity | None:
-    """Tell what a name means as `resolve` does; None where it means nothing."""
+    """Resolve a name as `resolve` does; None for an unknown name."""
     of = without_minus(name)
     if of:
         inner = find(family, of)
@@ -88,11 +88,11 @@ def find(family: Family, name: str) -> Quantity | None:
     own = _own(family, name)
     if own is None or found is None:
         return found or own
-    return replace(found, output=own.output)  # the family knows best what it gives
+    return replace(found, output=own.output)  # the family's own definition takes precedence
 
 
 def _own(family: Family, name: str) -> OwnOutput | None:
-    """Find the output that a step of the family provides, or one of a chain's first stage, which turns alone."""
+    """Find the output among the family's own steps, or those of a chain's first stage, which turns alone."""
     for step in family.steps:
         for o in step.provides:
             if o.name == name:
@@ -135,13 +135,13 @@ def _of_machine(machine: Machine, name: str) -> Quantity | None:
     timing = next((t for t in machine.timings if t.name == name), None)
     if timing is not None:
         return _timing(machine, timing)
-    # A machine has no limit positions of its own: those are its members'.
+    # A machine has no limit positions of its own, only its members have.
     found = _margin(machine, name) or _event(machine, name) or _reduction(machine, name)
     return found or _from_dimensions(machine, name)
 
 
 def _timing(machine: Machine, timing: Timing | EventValue) -> TimingOf:
-    """Find what a timing gives; refuse one of anything but crank angles at which something happens."""
+    """Resolve a timing; raise unless its places are crank angles of extrema or events."""
     begins = f"{machine.domain.name}_"
     others = [t.name for t in machine.timings]
     for place in timing.places:
@@ -155,13 +155,13 @@ def _timing(machine: Machine, timing: Timing | EventValue) -> TimingOf:
 
 
 def check_timings(machine: Family) -> None:
-    """Refuse timings of what are no crank angles, whether they are asked for or not."""
+    """Raise if any timing of the machine refers to something else than crank angles."""
     for timing in machine.timings if isinstance(machine, Machine) else ():
         resolve(extended(machine, [timing.name]), timing.name)
 
 
 def _of_member(machine: Machine, name: str, member: Member, own: str) -> Quantity | None:
-    """Find what a dotted name means, in the machine's terms."""
+    """Resolve a dotted name in the machine's terms."""
     point, found = _of_point(machine, member, own), find(member.family, own)
     if found is None:
         return point
@@ -181,7 +181,7 @@ def _of_member(machine: Machine, name: str, member: Member, own: str) -> Quantit
 
 
 def _of_point(machine: Machine, member: Member, own: str) -> Reduced | None:
-    """Find a reduction of a pose output of the machine, such as a coordinate in its frame, under a member's name."""
+    """Resolve a reduction of a machine's pose output, such as a coordinate in its frame, under a member's name."""
     for reduction, rest in split(own, machine.domain):
         pose = machine.pose_output.get(f"{member.name}.{rest}")
         if pose is not None:
@@ -191,7 +191,7 @@ def _of_point(machine: Machine, member: Member, own: str) -> Reduced | None:
 
 
 def event_names(family: Family, event: Event) -> tuple[str, str]:
-    """Name the design outputs of an event: where it happens first, and how often."""
+    """Names of an event's two design outputs: place of the first occurrence, and count."""
     return f"{family.domain.name}_{event.name}", f"count_{event.name}"
 
 
@@ -209,7 +209,7 @@ def _event(family: Family, name: str) -> EventPlace | EventCount | None:
 
 
 def limit_names(family: Family, position: str, stage: str) -> dict[str, str]:
-    """Return names made of the two limit positions of a follower, and what each is."""
+    """Names of the quantities of a follower's two limit positions, each with its kind."""
     pose = family.pose_output.get(position)
     if pose is None:
         return {}
@@ -234,7 +234,7 @@ def _margin(family: Family, name: str) -> Margin | None:
 
 
 def _limit(family: Family, name: str) -> LimitPosition | None:
-    # The times of both strokes stand to each other as the angles do: two words for one ratio.
+    # At constant speed the times of both strokes have the ratio of the angles: two names for one ratio.
     plain = name.replace("time_ratio", "stroke_ratio")
     for position, stage in family.positions.items():
         kind = limit_names(family, position, stage).get(plain)
@@ -260,7 +260,7 @@ def _limit(family: Family, name: str) -> LimitPosition | None:
 
 
 def limit_order(family: Family, position: str) -> tuple[str, str]:
-    """Say in words how the extended and the folded position are distinguished."""
+    """Words for the extended and the folded position: which one has the largest and which the smallest value."""
     sign = family.outward_sign(position)
     if sign:
         return f"largest (smallest if {sign} = -1)", f"smallest (largest if {sign} = -1)"
@@ -281,7 +281,7 @@ def _reduction(family: Family, name: str) -> Reduced | None:
 
 
 def output_names(family: Family) -> tuple[str, ...]:
-    """Design outputs worth listing: the family's own, margins, limit positions, reductions of every pose output."""
+    """List design outputs: the family's own, margins, limit positions, reductions of every pose output."""
     if isinstance(family, Machine):
         dotted = [f"{m.name}.{name}" for m in family.members for name in output_names(m.family)]
         own = [o.name for relation in family.relations for o in relation.outputs]
@@ -307,7 +307,7 @@ def output_names(family: Family) -> tuple[str, ...]:
 
 
 def _unknown(family: Family, name: str) -> InputError:
-    """Make the error for a name that means nothing; a member's family speaks for its own names."""
+    """Error for an unknown name; a dotted name is checked by the member's family."""
     of = without_minus(name)
     if of:
         return _unknown(family, of)
@@ -318,7 +318,7 @@ def _unknown(family: Family, name: str) -> InputError:
 
 
 def _known(family: Family, name: str) -> str:
-    """Say in words, for an unknown name, what is known and which name is nearest."""
+    """List the known names for a message about an unknown one, and suggest the nearest."""
     names = output_names(family)
     grammar = prefixes(family.domain)
     special = listed(n for n in names if not n.startswith(grammar))

@@ -1,7 +1,7 @@
-"""Written units: numbers, texts such as "20 g" and quantities of pint to mm, t, s, rad and what follows, or bytes.
+"""Conversion of written units: numbers, texts such as "20 g" and quantities of pint to mm, t, s, rad or bytes.
 
 Forces in N, couples in N mm, pressures in MPa are consistent with lengths in mm, times in s and masses in tonnes: no
-factor stands in any equation of motion.
+equation of motion contains a conversion factor.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ import numpy as np
 from sweep.errors import InputError, nearest
 from sweep.families.parameter import spelt_out
 
-# Base units, then what each other one is of them, with its power; an angle is a dimension, so 45 is not 45 rad.
+# Base units, then derived units as a factor and base units; an angle is a dimension, so 45 is not 45 rad.
 _BASE = ("mm", "rad", "s", "t", "B")
 _DERIVED = {
     "um": (1e-3, "mm"),
@@ -43,11 +43,11 @@ _DERIVED = {
     "%": (1e-2, "1"),
 }
 SYMBOLS = (*_BASE, *_DERIVED)
-# Other ways to write a symbol: "90°", "2 inch", both code points of the micro sign.
+# Alternative spellings of a symbol: "90°", "2 inch", both code points of the micro sign.
 _ALIASES = {"°": "deg", "inch": "in", "\u00b5m": "um", "\u03bcm": "um"}
 
-LARGEST = 1e100  # number that may stand in a study: with a unit it must not overflow
-# What may stand for an internal unit, as messages say it.
+LARGEST = 1e100  # magnitude allowed in a study, so that conversion to internal units does not overflow
+# Allowed inputs by internal unit, as messages write them.
 _EXAMPLES = {
     "mm": "a length, in mm, um, cm, m or inch",
     "rad": "an angle, in deg, rad, mrad or rev",
@@ -73,11 +73,11 @@ _TERM = re.compile(r"([A-Za-z%°\u00b5\u03bc]+|1)(?:\^(-?[1-9]))?")
 
 
 class UnitFault(ValueError):
-    """A unit that is unknown or of the wrong kind; the text says what is allowed."""
+    """Unknown unit, or a unit of the wrong kind; the text says which units are allowed."""
 
 
 def example(internal: str) -> str:
-    """Return what may stand where the internal unit is ``internal``, in words."""
+    """Words for the inputs that are allowed for an internal unit."""
     return _EXAMPLES.get(internal, f"in units such as {internal}")
 
 
@@ -90,9 +90,9 @@ def internal_unit(word: str) -> str:
 
 @lru_cache
 def factor(unit: str, internal: str) -> float:
-    """Multiplier from a written unit to the internal one.
+    """Factor from a written unit to the internal one.
 
-    Angles count as a dimension, so 45 deg is no ratio; but an analogue such as d2s may be given per rad or rad^2.
+    Angles count as a dimension, so 45 deg is not a pure number; an analogue such as d2s may be given per rad or rad^2.
 
     Raises
     ------
@@ -105,7 +105,7 @@ def factor(unit: str, internal: str) -> float:
     except UnitFault:
         offered = re.split(", | or ", example(internal).partition(", in ")[2])  # a foot is no misspelt ton
         raise UnitFault(f"{example(internal)}{nearest(unit, offered)}") from None
-    # Angles in a denominator count only if the wanted unit has angles alone.
+    # Angles are ignored where neither unit has them in its numerator, as for d2s per rad^2.
     free = own["rad"] <= 0 and powers["rad"] <= 0
     if any(own[base] != powers[base] for base in _BASE if not (free and base == "rad")):
         raise UnitFault(example(internal))
@@ -143,7 +143,7 @@ def read(text: str, internal: str) -> float:
 
 
 def _parsed(text: str) -> tuple[float, Counter[str]]:
-    """Return a product of known symbols with small whole exponents: its size in base units, and their powers."""
+    """Parse a product of known symbols with integer exponents into a size in base units and their powers."""
     parts = re.split(r"\s*([*/])\s*", text.strip())
     size, powers = 1.0, Counter[str]()
     for operator, part in zip(["*", *parts[1::2]], parts[::2], strict=True):
@@ -161,7 +161,7 @@ def _parsed(text: str) -> tuple[float, Counter[str]]:
 
 
 def plain(values: Any, internal: str, name: str, place: str = "units") -> Any:
-    """Return values without their units, in the internal one; what says no unit stays as it is.
+    """Convert values with units to the internal unit; values without units are returned unchanged.
 
     Parameters
     ----------
@@ -188,7 +188,7 @@ def plain(values: Any, internal: str, name: str, place: str = "units") -> Any:
 
 
 def _says(value: object) -> bool:
-    """Tell whether one value says its unit; a text that is a bare number does not, nor one that begins with none."""
+    """Whether a value carries a unit; a text that is a bare number, or does not begin with a number, does not."""
     if isinstance(value, str):
         text = value.strip()
         if not text[:1].isdigit() and text[:1] not in ("+", "-", "."):
@@ -202,7 +202,7 @@ def _says(value: object) -> bool:
 
 
 def one_value(value: Any, internal: str, name: str, place: str) -> Any:
-    """Return one value that says its unit in the internal one; arguments and errors as of `plain`."""
+    """Convert one value with a unit to the internal unit; arguments and errors as in `plain`."""
     if isinstance(value, str):
         try:
             number, unit = split(value, internal)
@@ -211,12 +211,12 @@ def one_value(value: Any, internal: str, name: str, place: str) -> Any:
             raise InputError(name, value, str(fault), place) from None
     try:
         return value.to("dimensionless" if internal == "1" else internal).magnitude
-    except (ValueError, TypeError, AttributeError) as error:  # what pint raises for another dimension is a TypeError
+    except (ValueError, TypeError, AttributeError) as error:  # pint raises a TypeError for another dimension
         raise InputError(name, str(value), example(internal), place) from error
 
 
 def heading_factor(name: str, unit: str, internal: str) -> float:
-    """Return what a column whose heading says its unit is multiplied by, as `m_crank [g]`.
+    """Factor that converts a column whose heading gives its unit, such as `m_crank [g]`.
 
     Raises
     ------
@@ -230,6 +230,6 @@ def heading_factor(name: str, unit: str, internal: str) -> float:
 
 
 def speed_given(speed: Any) -> float | None:
-    """Return a speed of the driving shaft in rad/s, from a number or from what says its unit."""
+    """Speed of the driving shaft in rad/s, from a number or a value with a unit; None stays None."""
     found = plain(speed, "rad/s", "speed")
     return None if found is None else float(np.float64(found))
