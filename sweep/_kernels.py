@@ -1,6 +1,6 @@
-"""Checks that the package ``kernels`` is ours: another distribution on the package index has the same name.
+"""Checks that the package ``kernels`` is linksweep's: another distribution on PyPI has the same name.
 
-Whichever is installed last overwrites the other's files, and an import would answer from the wrong ones.
+The distribution installed last overwrites the other's files, and an import would use the wrong ones.
 """
 
 from __future__ import annotations
@@ -8,18 +8,18 @@ from __future__ import annotations
 from importlib.util import find_spec
 from pathlib import Path
 
-# A file that another package may bring too, and what ours says in it; and one that is ours alone.
+# A file that the other package may have too, with words that only ours contains; and a file that only ours has.
 FILE, WORDS = "__init__.py", "Mechanics only: jitted, floats in, arrays out"
 OWN_FILE = "jit.py"
 
 
 def check_kernels() -> None:
-    """See that ``import kernels`` gives the kernels of this distribution.
+    """Check that ``import kernels`` finds the kernels of this distribution.
 
     Raises
     ------
     ImportError
-        if it gives another package, or none; it says what to do.
+        if it finds another package, or none; the message says what to do.
     """
     remedy = (
         "Remove both and install linksweep again (pip uninstall kernels linksweep, then pip install linksweep), "

@@ -1,4 +1,4 @@
-"""What linksweep raises on purpose: every message names the quantity, its value, what is allowed and the place."""
+"""Exceptions of linksweep: every message names the quantity, its value, the allowed range and the place."""
 
 from __future__ import annotations
 
@@ -9,13 +9,13 @@ from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-LONGEST = 200  # letters of a value in a message
+LONGEST = 200  # characters of a value in a message
 MOST_FAULTS = 30  # of a study file in its message
 MOST_NAMES = 40  # in one list of a message
 
 
 class LinksweepError(Exception):
-    """Base of all errors raised on purpose; ``exit_code`` is what the command line ends with."""
+    """Base of all errors raised on purpose; ``exit_code`` is the exit code of the command line."""
 
     exit_code = 2
 
@@ -27,8 +27,8 @@ class InputError(LinksweepError, ValueError):
     ----------
     name : the quantity, as the user wrote it
     value : what was found
-    allowed : what may stand there
-    place : where it stands (column and row, file and key)
+    allowed : the allowed values, in words
+    place : where the value stands (column and row, file and key)
     """
 
     def __init__(self, name: str, value: object, allowed: str, place: str) -> None:
@@ -40,13 +40,13 @@ class InputError(LinksweepError, ValueError):
 
 
 class MissingInput(InputError):
-    """A column, a point or another thing that is needed was not given.
+    """A required column, point or other input was not given.
 
     Parameters
     ----------
     name : what is missing
     needed : what it should be
-    place : where it was looked for
+    place : where it was expected
     """
 
     def __init__(self, name: str, needed: str, place: str) -> None:
@@ -58,7 +58,7 @@ class MissingInput(InputError):
 
 
 def shown(value: object) -> str:
-    """Return a value as it stands in a message: its repr, cut short where it is long."""
+    """Return the repr of a value for a message, shortened if it is long."""
     try:
         text = repr(value)
     except ValueError:  # an int of thousands of digits, an object that cannot show itself
@@ -67,7 +67,7 @@ def shown(value: object) -> str:
 
 
 def how_many(count: int, thing: str, ending: str = "s") -> str:
-    """Return a number of things in words, ``1 chunk`` or ``3 chunks``; ``ending`` is that of the plural."""
+    """Write a count with its noun, ``1 chunk`` or ``3 chunks``; ``ending`` is that of the plural."""
     return f"{count} {thing}{'' if count == 1 else ending}"
 
 
@@ -116,12 +116,12 @@ class WorkerDied(LinksweepError):
 
 
 class ProgramFault(LinksweepError):
-    """An error in the program itself, not in what it was given, ended a chunk; finished chunks are kept.
+    """An error in the program itself, not in its input, ended a chunk; finished chunks are kept.
 
     Parameters
     ----------
-    message : where it happened, what it was, and what to do
-    trace : of the worker, for whoever mends the program; the command line prints it before the message
+    message : place and kind of the error, and what to do
+    trace : traceback of the worker; the command line prints it before the message
     """
 
     exit_code = 70
@@ -141,7 +141,7 @@ class TimeUsedUp(LinksweepError):
 
 
 class SearchCutShort(TimeUsedUp):
-    """The emergency brake has stopped the optimiser or the front; the folder holds what was found until then.
+    """The time limit has stopped the optimiser or the front; the folder holds the results found until then.
 
     Parameters
     ----------
@@ -170,7 +170,7 @@ class Interrupted(LinksweepError):
 
 
 class LinksweepWarning(UserWarning):
-    """What linksweep says without stopping; the command line prints it as one line."""
+    """Base of all warnings of linksweep; the command line prints them as one line."""
 
 
 class IncompleteWarning(LinksweepWarning):
@@ -178,14 +178,14 @@ class IncompleteWarning(LinksweepWarning):
 
 
 class MeasuredRangeWarning(LinksweepWarning):
-    """Reported constants are used outside the range in which they were measured; the numbers extrapolate."""
+    """Published constants are used outside the range in which they were measured; the numbers extrapolate."""
 
 
 _SPACE = re.compile("[ -]")
 
-ALIKE = 0.65  # likeness by difflib, from 0 to 1, of a slip
+ALIKE = 0.65  # similarity by difflib, from 0 to 1, that a misspelling has
 
-# What people call things, and our names for them; the first one that is known where the word stands is meant.
+# Common words and our names for them; the first name that is known at that place is meant.
 SYNONYMS = {
     "crank": ("a", "a1"),
     "coupler": ("b", "b1"),
@@ -225,19 +225,19 @@ SYNONYMS = {
 def closest(word: str, known: Iterable[str]) -> str | None:
     """Return the known word nearest to ``word``, or None if none is near."""
     choices = list(known)
-    # Case first: among e1, f1, g1 the letters of E1 say nothing.
+    # Case first: E1 is as similar to f1 and g1 as to e1.
     matches = [k for k in choices if k.casefold() == word.casefold()]
     matches = matches or [name for name in SYNONYMS.get(_SPACE.sub("_", word.casefold()), ()) if name in choices]
     if not matches:
         alike = difflib.get_close_matches(word, choices, n=8, cutoff=0.5)
         near = difflib.get_close_matches(word, alike, n=8, cutoff=ALIKE)
-        # Slips are rare in the first letter: psy is psi, and not eps_y.
+        # The first letter is rarely wrong: psy is psi, and not eps_y.
         matches = sorted((n for n in alike if n in near or _begins(word, n)), key=lambda name: name[:1] != word[:1])
     return matches[0] if matches else None
 
 
 def _begins(word: str, name: str) -> bool:
-    """Return whether one is the beginning of the other, and not only a letter or two of it."""
+    """Whether one word begins with the other, both longer than three letters."""
     return min(len(word), len(name)) > 3 and (name.startswith(word) or word.startswith(name))
 
 
@@ -248,34 +248,34 @@ def nearest(word: str, known: Iterable[str]) -> str:
 
 
 def listed(names: Iterable[str]) -> str:
-    """Join names by commas; of very many the first ones and the number of the others."""
+    """Join names by commas; a long list is cut and ends with the number of omitted names."""
     every = list(names)
     more = f" and {len(every) - MOST_NAMES} more" if len(every) > MOST_NAMES else ""
     return ", ".join(every[:MOST_NAMES]) + more
 
 
 def choices(word: str, known: Iterable[str]) -> str:
-    """Write the names that may stand where ``word`` does, and the nearest of them."""
+    """List the known names, and suggest the one nearest to ``word``."""
     names = list(known)
     return f"{listed(names)}{nearest(word, names)}"
 
 
 def known_keys(table: Mapping[str, Any], keys: Sequence[str], place: str, words: str = "") -> None:
-    """Refuse a key of a table that means nothing there; ``words`` stand before those that do."""
+    """Raise for a key of a table that is not among ``keys``; ``words`` precede the known keys in the message."""
     for key in table:
         if key not in keys:
             raise InputError(key, table[key], f"{words}{choices(key, keys)}", place)
 
 
 def number(name: str, value: Any, place: str, allowed: str = "a finite number") -> float:
-    """Return a number that a user gives; refuse what is none."""
+    """Return a user's number as float; raise unless it is a finite number."""
     if isinstance(value, bool) or not isinstance(value, int | float) or not math.isfinite(value):
         raise InputError(name, value, allowed, place)
     return float(value)
 
 
 def sign(name: str, value: Any, place: str, words: str) -> int:
-    """Return a sign that a user gives; ``words`` say what both mean."""
+    """Return a user's sign; ``words`` say in the message what 1 and -1 mean."""
     if value not in (1, -1) or isinstance(value, bool):
         raise InputError(name, value, f"1 or -1: {words}", place)
     return int(value)

@@ -1,4 +1,4 @@
-"""Pages and files that are made from the templates of the package."""
+"""Rendering of the package's templates into pages and files."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ TEMPLATES = Path(__file__).resolve().parent / "templates"
 
 @cache
 def environment() -> Environment:
-    """Return where templates are found; what is put into HTML is escaped, and a name that is missing is an error."""
+    """Environment of the templates; values are escaped in HTML, and an undefined name is an error."""
     from jinja2 import Environment, FileSystemLoader, StrictUndefined, select_autoescape
     from markupsafe import Markup
 
@@ -31,7 +31,7 @@ def environment() -> Environment:
 
 
 def rendered(template: str, **names: Any) -> Markup:
-    """Fill a template, in which ``files`` sets others as they are; all names that it knows have to be given."""
+    """Render a template; all names that it uses must be given, and ``files`` inserts template files verbatim."""
     from markupsafe import Markup
 
     return Markup(environment().get_template(template).render(**names))

@@ -1,7 +1,7 @@
-"""The sources of this package as they were when this process imported the first one that makes a value.
+"""Hashes of this package's sources, read when this process first imports a module that computes values.
 
-A dataset names the code that made it.  Sources may be edited while a process that has imported them goes on, a notebook
-perhaps; what it computes then is still what was read here.
+A dataset names the code that computed it.  Sources may be edited while a process that has imported them is running, a
+notebook perhaps; its results still come from the sources that were read here.
 """
 
 from __future__ import annotations
