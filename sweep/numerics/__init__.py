@@ -1,1 +1,1 @@
-"""Numerical methods that know no mechanism: adaptive quadrature, distances of singularities."""
+"""Numerical methods without mechanics: adaptive quadrature, roots, interpolation, distances of singularities."""

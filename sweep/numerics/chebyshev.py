@@ -1,4 +1,4 @@
-"""Polynomials through a few values on a panel, as sums of Chebyshev polynomials; many panels at once."""
+"""Chebyshev interpolation on a panel, vectorised over many panels."""
 
 from __future__ import annotations
 
@@ -9,14 +9,14 @@ from numpy.polynomial import chebyshev
 
 from kernels.types import Array
 
-DENSE = 33  # places at which the highest point of a polynomial is looked for, its ends included
-PASSES = 8  # of Newton's method between two of them, or by halves: then a top is found to 1e-4 of a panel at least
-NODES = 8  # of a panel, its ends among them: a jump just inside would be seen by no other
+DENSE = 33  # points at which a polynomial's maximum is bracketed, both ends included
+PASSES = 8  # steps of Newton's method or bisection per bracket: a maximum is found to 1e-4 of a panel at least
+NODES = 8  # nodes of a panel, both ends included: a jump just inside an end would be seen by no other node
 
 
 @lru_cache
 def basis() -> tuple[Array, Array]:
-    """Nodes on [-1, 1], its ends among them, and the matrix that makes coefficients of values there."""
+    """Nodes on [-1, 1], both ends included, and the matrix from values at the nodes to coefficients."""
     order = np.arange(NODES, dtype=np.float64)
     nodes: Array = -np.cos(np.pi * order / (NODES - 1))
     weights = np.where((order == 0) | (order == NODES - 1), 0.5, 1.0)
@@ -25,17 +25,17 @@ def basis() -> tuple[Array, Array]:
 
 
 def at_nodes(series: Array) -> Array:
-    """Values at the nodes, (k, NODES), of polynomials with these coefficients, (k, NODES)."""
+    """Values (k, NODES) at the nodes of polynomials with coefficients (k, NODES)."""
     return product(series, rising(basis()[0]))
 
 
 def rising(x: Array) -> Array:
-    """Return the Chebyshev polynomials at x (m,), lowest order first, (NODES, m)."""
+    """Evaluate the Chebyshev polynomials at x (m,), lowest order first, (NODES, m)."""
     return np.asarray(chebyshev.chebvander(x, NODES - 1).T, np.float64)
 
 
 def product(rows: Array, matrix: Array) -> Array:
-    """Matrix product, summed in one order: that of a library depends on how many rows there are."""
+    """Matrix product with a fixed order of summation, so that a row's bits do not depend on the other rows."""
     total: Array = rows[:, 0, None] * matrix[0]
     for k in range(1, matrix.shape[0]):
         total += rows[:, k, None] * matrix[k]
@@ -43,18 +43,18 @@ def product(rows: Array, matrix: Array) -> Array:
 
 
 def summits(series: Array, mode: int) -> tuple[Array, Array]:
-    """Highest points of polynomials on [-1, 1]: places and measured values; each (k,).
+    """Maxima of polynomials on [-1, 1] in the sense of ``mode``: places and heights, each (k,).
 
     Parameters
     ----------
     series : (k, NODES) coefficients
-    mode : 0 for the largest magnitude, +1 for the largest value, -1 for the largest negative
+    mode : 0 for the largest magnitude, +1 for the largest value, -1 for the smallest (its height is the negative value)
 
     Notes
     -----
-    Between two of 33 places a top shows by the change of sign of the slope, however little it rises above both: next
-    to an end, or as one of two tops, it may be the highest and stand beside no high place.  The places crowd towards
-    the ends, as tops may: next to a dwell the end is level too.
+    Between two of the 33 points a maximum is bracketed by the sign change of the slope, even where it hardly exceeds
+    both: next to an end, or as one of two maxima, it may be the largest although no point nearby is.  The points are
+    denser towards the ends, as maxima may be: next to a dwell the slope vanishes at the end too.
     """
     dense: Array = -np.cos(np.pi * np.arange(DENSE) / (DENSE - 1))
     values = product(series, rising(dense))
@@ -78,7 +78,7 @@ def summits(series: Array, mode: int) -> tuple[Array, Array]:
         after = at - np.divide(uphill, bow, out=np.full(at.shape, np.inf), where=bow < 0.0)
         at = np.where((low <= after) & (after <= high), after, 0.5 * (low + high))
     top = sign * chebyshev.chebval(at, terms, tensor=False)
-    order = np.argsort(top, kind="stable")  # of several tops of a row the highest is written last
+    order = np.argsort(top, kind="stable")  # of several maxima of a row the largest is written last
     order = order[top[order] >= value[row[order]]]
     x[row[order]], value[row[order]] = at[order], top[order]
     return x, value

@@ -1,4 +1,4 @@
-"""Periodic functions of one angle that a user gives: a table, or a Fourier series."""
+"""Periodic functions of one angle given by the user: a table, or a Fourier series."""
 
 from __future__ import annotations
 
@@ -13,8 +13,8 @@ from kernels.types import TWO_PI, Array
 if TYPE_CHECKING:
     from scipy.interpolate import PchipInterpolator
 
-PER_GAP = 4.0  # samples between two points of a table, or on a wave
-AROUND = 3  # points of the next and the last turn: the slope at a point depends on its two neighbours alone
+PER_GAP = 4.0  # samples between two points of a table, or per period of a harmonic
+AROUND = 3  # points repeated from the next and the last turn: a slope depends on the two neighbours alone
 
 
 @dataclass(frozen=True)
@@ -34,17 +34,17 @@ class TableCurve:
     values: tuple[float, ...]
 
     def __call__(self, phi: Array) -> Array:
-        """Values at any angles, of the same shape."""
+        """Values at angles of any shape."""
         start = self.phi[0]
         return self._cubics(start + np.mod(phi - start, TWO_PI))
 
     @property
     def samples(self) -> float:
-        """So many even samples of a turn that some lie between any two of its points."""
+        """Number of even samples of a turn that places several between any two points of the table."""
         return PER_GAP * TWO_PI / float(np.diff([*self.phi, self.phi[0] + TWO_PI]).min())
 
     def slope(self, phi: Array) -> Array:
-        """Return the derivative at any angles."""
+        """Return the derivative at angles of any shape."""
         start = self.phi[0]
         return self._cubics(start + np.mod(phi - start, TWO_PI), 1)
 
@@ -69,11 +69,11 @@ class SeriesCurve:
 
     @property
     def samples(self) -> float:
-        """So many even samples of a turn that some lie on each of its waves."""
+        """Number of even samples of a turn that places several on each period of its highest harmonic."""
         return PER_GAP * max(len(self.cos), len(self.sin))
 
     def __call__(self, phi: Array) -> Array:
-        """Values at any angles, of the same shape."""
+        """Values at angles of any shape."""
         total = np.full_like(phi, self.mean)
         for factors, function in ((self.cos, np.cos), (self.sin, np.sin)):
             for order, factor in enumerate(factors, start=1):
@@ -83,11 +83,11 @@ class SeriesCurve:
 
 Curve: TypeAlias = TableCurve | SeriesCurve
 
-SEAM = 1e-9  # between both ends of a turn: of angles [rad], and of values against the largest
+SEAM = 1e-9  # tolerance at the seam of the turn: of angles [rad], and of values relative to the largest
 
 
 def table_curve(phi: Array, values: Array) -> TableCurve:
-    """Curve of a table, its points in any order of the turn.
+    """Build the curve of a table; its first point may lie anywhere in the turn.
 
     Parameters
     ----------
@@ -97,8 +97,8 @@ def table_curve(phi: Array, values: Array) -> TableCurve:
     Raises
     ------
     ValueError
-        says what is wrong: fewer than two points, values that are not finite, angles that do not rise or cover more
-        than a turn, two values at the seam.
+        for fewer than two points, values that are not finite, angles that do not rise or cover more than a turn, or
+        two different values at the seam.
     """
     if phi.ndim != 1 or phi.shape != values.shape:
         raise ValueError("as many angles as values")

@@ -1,4 +1,4 @@
-"""Where continuous functions of the crank angle change their signs: found between samples, dips below zero included."""
+"""Roots of continuous functions of the crank angle, bracketed by samples; pairs of roots in a dip included."""
 
 from __future__ import annotations
 
@@ -14,10 +14,10 @@ GOLDEN = 0.5 * (np.sqrt(5.0) - 1.0)
 SECTIONS = 12
 PARABOLAS = 4
 NARROWER = 1.0 / 16.0
-WIDER = 8.0  # times the place before: between them a pole beside the nearer end leaves 2.1^-k of the k-th coefficient
-SHORTEST = 1e-11  # distance of a zero [rad] below which no pose sees what turns there
+WIDER = 8.0  # ratio of successive distances: a pole beside the nearer end leaves 2.1^-k in the k-th coefficient
+SHORTEST = 1e-11  # distance of a zero [rad] below which its effect falls between two crank angles
 BISECTIONS = 120  # at most; a smooth function takes some eight steps, a jump one for each bit of the angle
-GRID, GRIDS = 65, 11  # places of each grid about a minimum; of a whole turn as many grids find it to rounding
+GRID, GRIDS = 65, 11  # points of each grid about a minimum; grids that narrow a whole turn down to rounding
 LAST = 2.0**-48  # width of the last brackets [rad]: four times the rounding of an angle
 
 Functions: TypeAlias = Callable[[Index, Array], Array]
@@ -25,7 +25,7 @@ Functions: TypeAlias = Callable[[Index, Array], Array]
 
 
 def sign_changes(functions: Functions, angles: Array) -> tuple[Index, Array]:
-    """Return designs (k,) and crank angles (k,) in [0, 2 pi) at which one of the functions changes its sign.
+    """Find designs (k,) and crank angles (k,) in [0, 2 pi) at which one of the functions changes its sign.
 
     Parameters
     ----------
@@ -34,7 +34,7 @@ def sign_changes(functions: Functions, angles: Array) -> tuple[Index, Array]:
 
     Notes
     -----
-    Zeros by bisection.  Two zeros between samples show as a dip: golden sections look for its bottom.
+    Roots are found by bracketing.  Two roots between samples appear as a dip: its bottom is found by golden sections.
     """
     n = len(angles)
     before = np.concatenate([angles[:, -1:] - TWO_PI, angles[:, :-1]], axis=1)
@@ -47,7 +47,7 @@ def sign_changes(functions: Functions, angles: Array) -> tuple[Index, Array]:
 
     dip = (np.abs(values) <= np.abs(left)) & (np.abs(values) <= np.abs(right))
     dip &= ((values < 0.0) == (left < 0.0)) & ((values < 0.0) == (right < 0.0))
-    dip &= (left != 0.0) | (right != 0.0)  # a dwell goes nowhere
+    dip &= (left != 0.0) | (right != 0.0)  # a dwell at zero does not change its sign
     row, column, which = np.nonzero(dip)
     near = _reaches(values, left, right, row, column, which)
     row, column, which = row[near], column[near], which[near]
@@ -64,15 +64,15 @@ def sign_changes(functions: Functions, angles: Array) -> tuple[Index, Array]:
 
 
 def zeros(function: Callable[[Index, Array], Array], low: Array, high: Array) -> Array:
-    """Return places where functions change their signs between two places each, to the rounding of the angle.
+    """Find roots between two places each, to the rounding of the angle.
 
-    Chandrupatla (1997): inverse parabolas where they are safe, else bisection, so a jump is found too; in a third to a
-    fifth of the time of ``scipy.optimize.elementwise.find_root``.
+    Chandrupatla (1997): inverse parabolas where they are safe, else bisection, so a jump through zero is found too; it
+    takes a third to a fifth of the time of ``scipy.optimize.elementwise.find_root``.
 
     Parameters
     ----------
     function : values (j,) of the functions with numbers (j,) at one place each (j,)
-    low, high : (k,) places on either side of a zero; where rounding hides the change of sign one of them is the zero
+    low, high : (k,) brackets of the roots; where rounding hides the change of sign, one end is returned
     """
     every = np.arange(low.size)
     at_low, at_high = function(every, low), function(every, high)
@@ -92,7 +92,7 @@ def zeros(function: Callable[[Index, Array], Array], low: Array, high: Array) ->
         found[left] = np.where(np.abs(at1) < np.abs(at2), x1, x2)
         least = LAST / np.maximum(np.abs(x2 - x1), LAST)
         share = np.clip(_inverse(x1, x2, x3, at1, at2, at3), least, 1.0 - least)
-        # after a zero too: a function that stays zero from there on may jump where it begins to
+        # also after an exact zero: a function that stays zero from there on may jump where that range begins
         more = least < 0.5
         left = left[more]
         share, x1, x2, at1, at2 = (y[more] for y in (share, x1, x2, at1, at2))
@@ -100,14 +100,14 @@ def zeros(function: Callable[[Index, Array], Array], low: Array, high: Array) ->
 
 
 def bottoms(function: Callable[[Array], Array], low: Array, high: Array) -> Array:
-    """Return where functions with one minimum between two places each are least, to the rounding of the angle.
+    """Find the minima of functions with one minimum in each bracket, to the rounding of the angle.
 
-    Ever finer grids find it, of a wedge as of a smooth function: many places at once take hardly longer than one.
+    Successively finer grids work for a wedge as for a smooth function: many points at once take hardly longer than one.
 
     Parameters
     ----------
-    function : values (k, m) of all functions at m places of each (k, m)
-    low, high : (k,) places on either side of the minimum
+    function : values (k, m) of k functions at m points each (k, m)
+    low, high : (k,) brackets of the minima
     """
     every, share = np.arange(low.size), np.linspace(0.0, 1.0, GRID)
     for _ in range(GRIDS):
@@ -120,9 +120,9 @@ def bottoms(function: Callable[[Array], Array], low: Array, high: Array) -> Arra
 
 
 def _inverse(x1: Array, x2: Array, x3: Array, at1: Array, at2: Array, at3: Array) -> Array:
-    """Share of the way from x1 to x2 at which the inverse parabola through three points is zero.
+    """Relative step from x1 to x2 to the root of the inverse parabola through three points.
 
-    It is a half where the parabola is not safe.
+    The step is one half where the parabola is not safe.
     """
     with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
         place, height = (x1 - x2) / (x3 - x2), (at1 - at2) / (at3 - at2)
@@ -134,20 +134,20 @@ def _inverse(x1: Array, x2: Array, x3: Array, at1: Array, at2: Array, at3: Array
 
 
 def near_zeros(functions: Functions, angles: Array, reach: float) -> tuple[Index, Array]:
-    """Return designs (k,) and crank angles (k,) where functions that are never negative nearly vanish.
+    """Find designs (k,) and crank angles (k,) where non-negative functions nearly vanish.
 
     Parameters
     ----------
-    functions : squares of smooth ones, periodic in 2 pi
+    functions : squares of smooth functions, periodic in 2 pi
     angles : (n, m) rising samples of one turn
     reach : the largest distance of a complex zero from the real angles that counts [rad]
 
     Notes
     -----
-    A dip D + D''/2 x^2 has such a zero at the distance sqrt(2 D/D''): the angles of its bottom, of both places as
-    far beside it, and of places ever eight times farther up to ``reach`` are returned.  What turns there goes on
-    turning like the inverse of the distance: a panel that begins close by and ends far away would hide that.  The
-    bottom is found by golden sections.
+    A dip D + D''/2 x^2 has a complex zero at the distance sqrt(2 D/D'').  The angles returned are the bottom, both
+    angles at that distance from it, and angles at eight times the previous distance up to ``reach``.  Quantities that
+    turn quickly there decay like the inverse of the distance: a panel that begins close by and ends far away would
+    not resolve that.  The bottom is found by golden sections.
     """
     before = np.concatenate([angles[:, -1:] - TWO_PI, angles[:, :-1]], axis=1)
     after = np.concatenate([angles[:, 1:], angles[:, :1] + TWO_PI], axis=1)
@@ -155,7 +155,7 @@ def near_zeros(functions: Functions, angles: Array, reach: float) -> tuple[Index
     left, right = np.roll(values, 1, axis=1), np.roll(values, -1, axis=1)
     row, column, which = np.nonzero((values <= left) & (values < right))
     sides = values[row, column, which], left[row, column, which], right[row, column, which]
-    # A parabola goes below its lowest sample by an eighth of the bend at most: what stays far above has no such zero.
+    # A parabola falls below its lowest sample by an eighth of the bend at most: dips that stay above have no near zero.
     near = sides[0] <= sides[1] + sides[2] - 2.0 * sides[0]
     row, which, low, high = row[near], which[near], before[row, column][near], after[row, column][near]
     bottom, lowest = _bottom(functions, row, which, np.ones(row.size), low, high, whole=True)
@@ -179,7 +179,7 @@ def _one(functions: Functions, row: Index, which: Index, phi: Array) -> Array:
 
 
 def _reaches(values: Array, left: Array, right: Array, row: Index, column: Index, which: Index) -> Mask:
-    """Whether a dip may go through zero: a parabola goes below its lowest sample by an eighth of the bend at most."""
+    """Whether a dip may cross zero: a parabola falls below its lowest sample by an eighth of the bend at most."""
     a, b, c = (np.abs(y[row, column, which]) for y in (left, values, right))
     return np.asarray(b <= a + c - 2.0 * b)
 
@@ -187,9 +187,9 @@ def _reaches(values: Array, left: Array, right: Array, row: Index, column: Index
 def _bottom(
     functions: Functions, row: Index, which: Index, sign: Array, low: Array, high: Array, whole: bool
 ) -> tuple[Array, Array]:
-    """Return places and values of the bottoms of dips: golden sections, then parabolas ever closer.
+    """Find places and values of the bottoms of dips by golden sections, then parabolas on shrinking steps.
 
-    Unless ``whole``, a dip is followed until it is known whether it goes below zero.
+    Unless ``whole``, the search of a dip ends once it is known whether the dip crosses zero.
     """
     place, lowest = 0.5 * (low + high), np.full(low.size, np.inf)
     left = np.arange(low.size)
@@ -201,7 +201,7 @@ def _bottom(
         better = value < lowest[left]
         place[left[better]], lowest[left[better]] = x[better], value[better]
 
-    # Both ends, both places between them, and the values at all four.
+    # Both ends, both inner points, and the values at all four.
     four = np.stack([low, high - GOLDEN * (high - low), low + GOLDEN * (high - low), high])
     values = np.stack([at(x) for x in four])
     for _ in range(SECTIONS):
@@ -233,7 +233,7 @@ def _bottom(
 
 
 def with_events(edges: Array, rows: Index, phi: Array) -> Array:
-    """Put further ends (k,) into those of panels (n, p + 1); rows with fewer of them repeat their last end."""
+    """Insert further edges (k,) into the panels' edges (n, p + 1); shorter rows repeat their last edge."""
     n = len(edges)
     count = np.bincount(rows, minlength=n)
     added = np.repeat(edges[:, -1:], int(count.max(initial=0)), axis=1)

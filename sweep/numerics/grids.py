@@ -1,4 +1,4 @@
-"""Designs solved on even samples of a turn, each on the first of ever finer grids that resolves it."""
+"""Solve designs on even samples of a turn, each on the coarsest grid that resolves it."""
 
 from __future__ import annotations
 
@@ -18,8 +18,8 @@ Solver: TypeAlias = Callable[[NDArray[np.intp], int], tuple[dict[str, Array], St
 def on_first_grid(least: Array, grids: Sequence[int], solve: Solver) -> tuple[dict[str, Array], Status]:
     """Solve every design on the first of the ``grids`` that resolves it.
 
-    ``least`` (n,) are samples that a design takes at least; a grid of fewer is left out, but for the last one.  What
-    ``solve`` calls NOT_CONVERGED is tried again on the next grid.
+    ``least`` (n,) is the least number of samples of each design; coarser grids are skipped, except the last one.
+    Designs for which ``solve`` returns NOT_CONVERGED are solved again on the next grid.
     """
     n, found = len(least), dict[str, Array]()
     status: Status = np.full(n, NOT_CONVERGED, np.uint8)

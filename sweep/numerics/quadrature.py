@@ -1,7 +1,7 @@
-"""Integrals over one turn of many curves at the same time: Gauss-Kronrod rules on panels that are halved where needed.
+"""Integrals over one turn of many curves at once: Gauss-Kronrod rules on panels that are halved adaptively.
 
-Smooth curves converge with every halving by orders of magnitude, kinks by four, jumps by two: none of them has to be
-known in advance, as long as the first panels see them.
+With every halving the error of smooth curves falls by orders of magnitude, of kinks by four, of jumps by two; none of
+them has to be known in advance, as long as the first panels see them.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ Integrand: TypeAlias = Callable[[Index, Index, Array], Array]
 first panels in which these lie."""
 
 # Kronrod's extension of the Gauss rule of seven points (Piessens et al., QUADPACK, 1983): nodes and both weights on
-# [-1, 1]; tests/numerics/test_quadrature.py checks to which degree they are exact.
+# [-1, 1]; tests/numerics/test_quadrature.py checks their degree of exactness.
 _NODES = (0.991455371120812639206854697526329, 0.949107912342758524526189684047851, 0.864864423359769072789712788640926,
           0.741531185599394439863864773280788, 0.586087235467691130294144838258730, 0.405845151377397166906606412076961,
           0.207784955007898467600689403773245)  # fmt: skip
@@ -35,27 +35,27 @@ _GAUSS = (0.0, 0.129484966168869693270611432679082, 0.0, 0.279705391489276667901
 NODES = np.array([*(-x for x in _NODES), 0.0, *_NODES[::-1]])
 KRONROD = np.array([*_KRONROD, 0.209482141084727828012999174891714, *_KRONROD[::-1]])
 GAUSS = np.array([*_GAUSS, 0.417959183673469387755102040816327, *_GAUSS[::-1]])
-# Beyond the last nodes a jump or a kink is not seen: values just inside both ends are compared with what the polynomial
-# through all nodes has there.  They do not enter the integral.
+# Beyond the last nodes a jump or a kink is not seen: values just inside both ends are compared with the interpolating
+# polynomial through all nodes.  They do not enter the integral.
 _END = 1.0 - 2.0**-30
 PROBED = np.array([-_END, *NODES, _END])
 _THERE = np.array([np.prod([(_END - x) / (node - x) for x in NODES if x != node]) for node in NODES])
-# The difference of both rules vanishes where a kink stands in some places of a panel, its last Legendre coefficients do
-# not vanish together; so many times these count as a difference: no kink of 16 000 is missed then.
+# For some places of a kink in a panel the difference of both rules vanishes, but the last two Legendre coefficients do
+# not both vanish; weighted by this factor they count as a difference: no kink of 16 000 tested is missed then.
 _LAST = [(n + 0.5) * KRONROD * np.polynomial.legendre.Legendre.basis(n)(NODES) for n in (13, 14)]
 _COUNTS = 0.03
 
-PASSES = 60  # halvings of a first panel, after which a jump between two doubles is all that can be left
-MOST = 4096  # panels of one curve
-SHARED = 0.1  # of the error of a panel is left in each of its halves, where it is noise
-NOISE = 4  # such generations, after which it is taken for noise
-SMALL = 1e-4  # of the integral: what noise can be
+PASSES = 60  # halvings of a first panel, after which only a jump between two doubles can be left
+MOST = 4096  # panels of one curve at most
+SHARED = 0.1  # a panel is suspected of noise if each half keeps more than this share of its error
+NOISE = 4  # generations of suspected panels after which the error is taken for noise
+SMALL = 1e-4  # largest error, as a share of the integral, that is taken for noise
 
 
 class Integrals(NamedTuple):
-    """Integrals of n curves, each (n, q), with estimates of their errors, and (n,) whether these are as small as asked.
+    """Integrals of n curves and their error estimates, each (n, q), and (n,) whether the target is met.
 
-    ``seen`` tells for which curves every value was a number; the others have nan.
+    ``seen`` marks the curves whose values were all finite; the integrals of the others are nan.
     """
 
     value: Array
@@ -65,7 +65,7 @@ class Integrals(NamedTuple):
 
 
 class _Panels(NamedTuple):
-    """Panels of all curves, each (k,); integrals and errors (k, q), generations of noise (k, 1)."""
+    """Panels of all curves, each (k,); integrals and errors (k, q), generations of suspected noise (k, 1)."""
 
     row: Index
     origin: Index
@@ -81,19 +81,19 @@ class _Panels(NamedTuple):
 
 
 def integrate(function: Integrand, edges: Array, target: float) -> Integrals:
-    """Integrals of n curves over x, each to a relative error.
+    """Integrate n curves over x, each to a relative error.
 
     Parameters
     ----------
-    function : the curves; nan gives up the curve
-    edges : (n, p + 1) rising ends of the first panels
-    target : error of each integral against the sum of magnitudes of its panels
+    function : the curves; a nan value ends the integration of its curve
+    edges : (n, p + 1) rising edges of the first panels
+    target : error of each integral relative to the largest magnitude of its estimates
 
     Notes
     -----
-    Errors are QUADPACK's (200 |K - G|/spread)^1.5 spread of the difference of both rules on each panel, or what its
-    last Legendre coefficients make of it, and what a jump or a kink beyond its last nodes may hide, summed.  What does
-    not shrink as panels are halved is rounding of the curve, and stays in the error.
+    The error of a panel is QUADPACK's (200 |K - G|/spread)^1.5 spread, where the difference of both rules is bounded
+    below by the last Legendre coefficients, plus an estimate for a jump or a kink beyond the last nodes.  An error
+    that does not shrink as panels are halved is rounding of the curve, and stays in the sum.
     """
     n, p = edges.shape[0], edges.shape[1] - 1
     row, origin = np.repeat(np.arange(n), p), np.tile(np.arange(p), n)
@@ -141,14 +141,14 @@ def _halved(function: Integrand, panels: _Panels) -> _Panels:
     low, high = np.concatenate([panels.low, middle]), np.concatenate([middle, panels.high])
     halves = _evaluated(function, row, origin, low, high)
     k = panels.row.size
-    # Beside a kink or a jump one half is smooth; of noise both halves have their share.
+    # Beside a kink or a jump one half is smooth; noise is in both halves.
     both = np.minimum(halves.err[:k].max(axis=1), halves.err[k:].max(axis=1)) > SHARED * panels.err.max(axis=1)
     idle = np.where(both[:, None], panels.idle + 1.0, np.maximum(panels.idle - 1.0, 0.0))
     return halves._replace(idle=np.concatenate([idle, idle]))
 
 
 def _weighted(weights: Array, values: Array) -> Array:
-    """Return the sums (k, q) over the nodes of values (k, j, q), in one order: that of a library depends on k."""
+    """Weighted sums (k, q) over the nodes of values (k, j, q), in an order that does not depend on k."""
     total: Array = weights[0] * values[:, 0]
     for j in range(1, weights.size):
         total += weights[j] * values[:, j]

@@ -1,7 +1,7 @@
-"""Where a motion is nearly singular: complex zeros of its discriminants, and crank angles that crowd about them.
+"""Near singularities of a motion: complex zeros of its discriminants, and crank angles clustered about them.
 
-Near a change point everything of interest happens within a few distances of such a zero from its place, so crank angles
-whose spacing is a share of that distance resolve a curve however close to the change point it is.
+Near a change point the motion varies on the scale of the zero's distance from the real angles, so crank angles whose
+spacing is a share of that distance resolve a curve however close to the change point it is.
 """
 
 from __future__ import annotations
@@ -17,26 +17,26 @@ from sweep.numerics.quadrature import Index
 Curve: TypeAlias = Callable[[Index, Array], Array]
 """``f(rows, phi)``: values of a discriminant of the designs ``rows`` (k,) at crank angles (k, m), or (1, m) for all."""
 
-SAMPLES = 64  # of a discriminant, which is smooth whatever the motion does
-NEAREST = 3  # dips of each discriminant that count
+SAMPLES = 64  # samples of a discriminant, which is smooth even where the motion is nearly singular
+NEAREST = 3  # nearest dips of each discriminant that are used
 PASSES = 10
 CLOSER = 0.25
-SHORTEST = 1e-8  # steps and distances [rad] below which rounding of the crank angle is all that is seen
-FAR = 10.0  # distance of a zero that does not matter: the poses are then spread evenly
+SHORTEST = 1e-8  # steps and distances [rad] below which the crank angle's rounding dominates
+FAR = 10.0  # distance [rad] given to zeros that do not matter: the poses are then spread evenly
 
 
 class Singularities(NamedTuple):
-    """Places of the nearest zeros of n designs, each (n, k) [rad]: real part, and distance from the real angles."""
+    """Nearest complex zeros of n designs, each (n, k) [rad]: real part, and distance from the real angles."""
 
     phi: Array
     rho: Array
 
     def only(self, which: Index) -> Singularities:
-        """Those of some designs."""
+        """Select designs by index."""
         return Singularities(self.phi[which], self.rho[which])
 
     def distance(self, phi: Array) -> Array:
-        """How far the nearest zero is from crank angles (n,), or (n, m)."""
+        """Distance of the nearest zero from crank angles (n,) or (n, m)."""
         one = phi[:, None] if phi.ndim == 1 else phi
         away = np.abs(one[:, :, None] - self.phi[:, None, :])
         away = np.abs(away - TWO_PI * np.round(away / TWO_PI))
@@ -45,11 +45,11 @@ class Singularities(NamedTuple):
 
 
 def singularities(discriminants: Sequence[Curve], n: int, within: float = FAR) -> Singularities:
-    """Nearest complex zeros of the discriminants of n designs, from their dips over the turn.
+    """Find the nearest complex zeros of the discriminants of n designs from their dips over the turn.
 
-    A dip D + D''/2 x^2 vanishes at x = +- i rho with rho^2 = D/(D''/2).  The parabola through three samples is taken
-    again ever closer to the dip, unless the first one puts the zero farther away than ``within`` [rad]: such zeros
-    are as good as the samples.  Where a discriminant is nan there is no pose, so a zero is there.
+    A dip D + D''/2 x^2 vanishes at x = +- i rho with rho^2 = D/(D''/2).  The parabola through three samples is repeated
+    with smaller steps about the dip, unless the first one puts the zero farther away than ``within`` [rad]: for such
+    zeros the samples are accurate enough.  Where a discriminant is nan there is no pose, and a zero is placed there.
     """
     if not discriminants:
         return Singularities(np.ones((n, 1)), np.full((n, 1), FAR))
@@ -60,7 +60,7 @@ def singularities(discriminants: Sequence[Curve], n: int, within: float = FAR) -
 def _dips(curve: Curve, n: int, number: int, within: float) -> Singularities:
     spacing = TWO_PI / SAMPLES
     turn = np.arange(SAMPLES, dtype=np.float64) * spacing
-    # One row of angles for all designs: its cosines and sines are taken once.
+    # One row of angles for all designs: their cosines and sines are computed once.
     values = np.broadcast_to(curve(np.arange(n), turn[None]), (n, SAMPLES))
     before, after = np.roll(values, 1, axis=1), np.roll(values, -1, axis=1)
     half_bend = 0.5 * (before + after) - values
@@ -82,19 +82,19 @@ def _dips(curve: Curve, n: int, number: int, within: float) -> Singularities:
 
 
 def _elsewhere(n: int, number: int) -> tuple[Array, Array]:
-    """Return places for dips that are not there, no two of the same angle, far away."""
+    """Placeholders for missing dips: far away, each at another angle."""
     return np.tile(np.arange(1.0, 1.0 + NEAREST) + 0.1 * number, (n, 1)), np.full((n, NEAREST), FAR)
 
 
 def _closer(curve: Curve, row: Index, phi: Array) -> tuple[Array, Array]:
-    """Return places and distances of the zeros of designs ``row`` near dips at ``phi``, (k,)."""
+    """Refine places and distances (k,) of the zeros of designs ``row`` near dips at ``phi`` (k,)."""
     spacing = TWO_PI / SAMPLES
     every, rho, step = np.arange(phi.size), np.full(phi.size, FAR), np.full(phi.size, spacing)
     for _ in range(PASSES if phi.size else 0):
         angles = phi[:, None] + step[:, None] * np.arange(-1.0, 2.0)
         values = curve(row, angles)
         lost = np.isnan(values)
-        left, here, right = np.where(lost.any(axis=1, keepdims=True), 0.0, values).T  # does not bend, is not followed
+        left, here, right = np.where(lost.any(axis=1, keepdims=True), 0.0, values).T  # without a bend it is not refined
         none = lost.any(axis=1)
         phi, rho = np.where(none, angles[every, lost.argmax(axis=1)], phi), np.where(none, SHORTEST, rho)
         bend, slope = 0.5 * (left + right) - here, 0.5 * (right - left)
@@ -111,12 +111,12 @@ def _closer(curve: Curve, row: Index, phi: Array) -> tuple[Array, Array]:
 def crowded(near: Singularities, share: float) -> Array:
     """Crank angles (n, m) of a turn in rising order, spaced by at most a share of the nearest zero's distance.
 
-    About each zero they stand at phi + rho sinh(t) for equidistant t, which spaces them by hypot(rho, x) dt.  A design
-    that needs fewer than others repeats some: its angles do not depend on what else is asked.
+    About each zero the angles are phi + rho sinh(t) for equidistant t, a spacing of hypot(rho, x) dt.  A design that
+    needs fewer angles than others repeats some, so that its angles do not depend on the other designs.
     """
     n, k = near.phi.shape
     reach = np.arcsinh(np.pi / near.rho).max(axis=1, initial=1.0)
-    own = np.ceil(reach / share).astype(np.int64)  # angles on either side of its zeros that each design needs
+    own = np.ceil(reach / share).astype(np.int64)  # angles that each design needs on either side of its zeros
     half = int(own.max(initial=1))
     number = np.clip(np.arange(-half, half + 1), -own[:, None], own[:, None]) / own[:, None]
     t = np.arcsinh(np.pi / near.rho)[:, :, None] * number[:, None, :]
@@ -125,7 +125,7 @@ def crowded(near: Singularities, share: float) -> Array:
 
 
 def turn_edges(near: Singularities, share: float) -> Array:
-    """Cut a turn from 0 to 2 pi into panels, (n, p + 1) ends, no longer than a share of the distance of a zero."""
+    """Panel edges (n, p + 1) from 0 to 2 pi; no panel is longer than a share of the nearest zero's distance."""
     inner = crowded(near, share)
     ends = np.zeros((len(inner), 1))
     return np.concatenate([ends, inner, ends + TWO_PI], axis=1)

@@ -7,21 +7,21 @@ import numpy as np
 from kernels.effects.speed_fluctuation import Uneven, speed_fluctuation
 from kernels.types import Array, Status
 
-# Odd grids: the next one is tried for designs that the one before does not resolve.
+# Odd grids: the next one is tried for designs that the previous one does not resolve.
 GRIDS = (65, 129, 257)
-# Loads that jump or have kinks: no grid resolves all of them, the error says what the last one misses.
+# For loads with jumps or kinks: no grid resolves all of them, the error estimates what the last one misses.
 FINER = (513, 2049)
-LEFT = 1e-3  # share of J omega^2 that the last of these may miss of the torque
+LEFT = 1e-3  # share of J omega^2 that the last of these grids may miss of the torque
 PER_LEFT = 5.0  # a jump h leaves h/(pi K) in harmonic K and shifts the energy by h pi/N at most, N = 2 K + 1
 ERROR = 1e-9
-SLOWEST = 0.9  # ratio of the last two eighths of the harmonics of a curve with jumps is 0.87, with kinks 0.75
+SLOWEST = 0.9  # largest ratio of the last two eighths of the harmonics: 0.87 with jumps, 0.75 with kinks
 
 
 def beyond(values: Array, order: int = 0) -> Array:
-    """Estimate the sum of the harmonics beyond those of samples (n, N) on an even grid of the turn, (n,).
+    """Estimate the sum of the unresolved harmonics of samples (n, N) on an even grid of the turn, (n,).
 
-    The last two eighths of the known ones go on as a geometric series, which falls short of those of a kink by 2.7, and
-    as much is folded back into the known ones.  ``order`` is that of a derivative, whose harmonics these are.
+    The last two eighths of the resolved harmonics are extrapolated as a geometric series, which underestimates those of
+    a kink by 2.7; as much again is aliased.  ``order`` is that of a derivative whose harmonics are summed.
     """
     size = np.abs(np.fft.rfft(values, axis=1)) * (2.0 / values.shape[1])
     size *= np.arange(size.shape[1]) ** order
@@ -33,10 +33,10 @@ def beyond(values: Array, order: int = 0) -> Array:
 
 
 def forwards(speed: Array, phi: Array, *curves: Array) -> tuple[Array, list[Array]]:
-    """Crank angles and curves of designs as a crank sees them that turns forwards.
+    """Crank angles and curves of designs in the direction of rotation, as a crank sees them that turns forwards.
 
     A turn backwards in phi is one forwards in -phi.  Where ``speed`` (n,) is negative, angles (n, m) or (1, m) change
-    their sign, and (n, N) curves, samples on an even grid of the turn, are mirrored on it.
+    their sign, and (n, N) curves, samples on an even grid of the turn, are mirrored.
     """
     back = (speed < 0.0)[:, None]
     if not back.any():
@@ -48,11 +48,11 @@ def forwards(speed: Array, phi: Array, *curves: Array) -> tuple[Array, list[Arra
 def steady(
     inertia: Array, excess: Array, speed: Array, slope: Array | None, phi: Array, coarsest: float
 ) -> tuple[dict[str, Array], Status]:
-    """Kernel's numbers, (n,), and curves at phi, (n, m), without a suffix, and the status.
+    """Compute the steady speed: design outputs (n,), curves at ``phi`` (n, m), and the status.
 
-    Numbers are of the magnitude of the speed; errors of the energy, and of the torque without jumps, are shares of J
-    speed^2.  A crank that turns backwards is one that turns forwards in -phi, where the torque that is left over acts
-    the other way.
+    Design outputs are computed for the magnitude of the speed; errors of the energy, and of the torque without jumps,
+    are shares of J speed^2.  A crank that turns backwards is one that turns forwards in -phi, where the excess torque
+    acts with the opposite sign.
     """
     n, sense = len(inertia), np.copysign(1.0, speed)[:, None]
     phi, (stored, left) = forwards(speed, phi, inertia, sense * excess)
