@@ -1,1 +1,1 @@
-"""What long work needs whatever it computes: signals that set a flag, and progress with remaining time."""
+"""Infrastructure of long computations: executors, signals that set a flag, progress with remaining time."""

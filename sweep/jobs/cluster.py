@@ -1,7 +1,7 @@
-"""Tasks on a Dask cluster: processes of this machine, or whatever stands behind an address.
+"""Tasks on a Dask cluster: processes of this machine, or the cluster at a scheduler's address.
 
-A worker learns from the scheduler that it is to stop: a flag says so when it may hand back what it has, and the loss of
-its task says so when the program that asked for it is gone.  A task whose worker dies is given to another one.
+A worker learns from the scheduler that it has to stop: a flag while its results are still wanted, the loss of its task
+once the program that submitted it is gone.  A task whose worker dies is given to another worker.
 """
 
 from __future__ import annotations
@@ -23,17 +23,17 @@ if TYPE_CHECKING:
 
 T = TypeVar("T")
 
-GRACE = 2.0  # for workers to hand back what they have once they are to stop [s]
-ASK_SECONDS = 0.25  # between two questions of a task to the scheduler
+GRACE = 2.0  # for workers to return their results after a stop [s]
+ASK_SECONDS = 0.25  # between two queries of a task to the scheduler
 COUNT_SECONDS = 2.0  # between two counts of the cluster's threads
 CONNECT_SECONDS = 20
 CLOSE_SECONDS = 10
 FIRST_WORKER_SECONDS = 60.0
-POLL = 0.05  # between two looks at the flag [s]
+POLL = 0.05  # between two checks of the flag [s]
 
 
 class Dask:
-    """A Dask cluster; used as a context it keeps its workers from one call to the next.
+    """A Dask cluster; used as a context manager it keeps its workers from one call to the next.
 
     Parameters
     ----------
@@ -57,7 +57,7 @@ class Dask:
                     one.close(timeout=CLOSE_SECONDS)
 
     def outcomes(self, task: Task[T], numbers: Iterator[int], jobs: int, stop: Stop) -> Iterator[T]:
-        """See `Executor`; with an address, as many tasks are on their way as the cluster has threads."""
+        """Yield results as `Executor.outcomes` does; a cluster at an address gets a task per thread, and one more."""
         client = self._connected(jobs)
         from distributed import Event, KilledWorker
 
@@ -72,7 +72,7 @@ class Dask:
         except CancelledError as error:
             raise WorkerDied(f"the Dask scheduler at {client.scheduler.address} is gone") from error
         finally:
-            pool.shutdown(wait=False)  # takes back what is still on its way
+            pool.shutdown(wait=False)  # cancels pending tasks
 
     def _connected(self, jobs: int) -> Any:
         if self._client is not None:
@@ -99,7 +99,7 @@ class Dask:
         return self._client
 
     def _jobs(self, jobs: int) -> Callable[[], int]:
-        """How many threads the cluster has at the moment; workers may come and go."""
+        """Return a function that gives the present number of workers; those of a cluster may come and go."""
 
         def now() -> int:
             if time.monotonic() - self._counted > COUNT_SECONDS:
@@ -121,7 +121,7 @@ def _at_worker(task: Task[T], number: int, name: str) -> T:
         nonlocal asked, told
         if not told and time.monotonic() - asked > ASK_SECONDS:
             own = worker.state.tasks.get(key)
-            lost = own is None or own.state == "cancelled"  # nobody waits for it any more
+            lost = own is None or own.state == "cancelled"  # nobody waits for the result any more
             told = lost or flag.is_set()
             asked = time.monotonic()
         return told
@@ -135,13 +135,13 @@ def _flow(
     jobs: Callable[[], int],
     stop: Stop,
 ) -> Iterator[T]:
-    """Yield outcomes as they come; one number more than there are workers is on its way, so that none of them waits.
+    """Yield outcomes as they become ready; one task more than there are workers is queued, so that no worker waits.
 
     Parameters
     ----------
-    submit : begin the task of a number
+    submit : submits the task of a number
     numbers, stop : as for `Executor`
-    jobs : how many workers there are now
+    jobs : returns the present number of workers
     """
     waiting: set[Future[T]] = set()
     late = math.inf

@@ -1,8 +1,8 @@
-"""Executors: tasks run here, in threads, in processes, on a cluster, or by an executor that has been registered.
+"""Executors: run tasks in this thread, in threads, in processes, on a cluster, or by a registered executor.
 
-A task is called with a number and a function that says whether to stop; it must be fit to be pickled, and may rely on
-neither its parent's process nor its signals.  How a worker learns that it is to stop, and what becomes of it when its
-parent dies, is the affair of its executor.
+A task is called with a number and a function that says whether to stop; it must be picklable, and may rely on neither
+its parent's process nor its signals.  Each executor decides how its workers learn that they have to stop, and what
+happens to them when their parent dies.
 """
 
 from __future__ import annotations
@@ -25,16 +25,16 @@ from sweep.jobs.signals import Stop, depend_on_parent, unheard
 T = TypeVar("T")
 T_co = TypeVar("T_co", covariant=True)
 
-GRACE = 1.0  # for processes to hand back what they have once they are to stop [s]
-POLL = 0.05  # between two looks at the flag [s]
+GRACE = 1.0  # for processes to return their results after a stop [s]
+POLL = 0.05  # between two checks of the flag [s]
 MOST_JOBS = 1024
 
 
 class Task(Protocol[T_co]):
-    """What a worker does with one number; ``should_stop`` is to be asked often."""
+    """Work of a worker on one number; it should call ``should_stop`` often."""
 
     def __call__(self, number: int, should_stop: Callable[[], bool]) -> T_co:
-        """Do it."""
+        """Run the task for one number."""
         ...
 
 
@@ -42,14 +42,14 @@ class Executor(Protocol):
     """Runs a task for many numbers."""
 
     def outcomes(self, task: Task[T], numbers: Iterator[int], jobs: int, stop: Stop) -> Iterator[T]:
-        """Yield what the task gives, in the order in which it is ready.
+        """Yield the results of the task in the order in which they become ready.
 
         Parameters
         ----------
         task : called once for every number
         numbers : the next one is taken when a worker is about to be free
-        jobs : how many workers
-        stop : once it is true, no number is taken any more, and tasks may be dropped
+        jobs : number of workers
+        stop : once it is true, no further number is taken, and tasks may be dropped
 
         Raises
         ------
@@ -60,18 +60,18 @@ class Executor(Protocol):
 
 
 class Here:
-    """Runs tasks one after the other in the thread that asks."""
+    """Runs tasks one after the other in the calling thread."""
 
     def outcomes(self, task: Task[T], numbers: Iterator[int], jobs: int, stop: Stop) -> Iterator[T]:
-        """See `Executor`."""
+        """Yield results as `Executor.outcomes` does."""
         return (task(number, stop.event.is_set) for number in _until(stop, numbers))
 
 
 class Threads:
-    """Threads of this process; the kernels release the interpreter's lock."""
+    """Threads of this process; the kernels release the GIL."""
 
     def outcomes(self, task: Task[T], numbers: Iterator[int], jobs: int, stop: Stop) -> Iterator[T]:
-        """See `Executor`."""
+        """Yield results as `Executor.outcomes` does."""
         from joblib import delayed
 
         with _watched(stop):
@@ -80,14 +80,14 @@ class Threads:
 
 
 class Processes:
-    """Processes of this machine.
+    """Worker processes of this machine.
 
-    Joblib tells them nothing once they are at work.  So they learn by a file that they are to stop; who does not listen
-    (a compiler) is killed soon after; and they end with their parent, whose folder they would otherwise write into.
+    Joblib cannot signal busy workers, so a file tells them to stop; a worker that does not react (a compiler) is killed
+    soon after; and they exit with their parent, in whose folder they would otherwise go on writing.
     """
 
     def outcomes(self, task: Task[T], numbers: Iterator[int], jobs: int, stop: Stop) -> Iterator[T]:
-        """See `Executor`."""
+        """Yield results as `Executor.outcomes` does."""
         from joblib import delayed
 
         _begin_tracker()
@@ -112,12 +112,12 @@ class Processes:
                         return
                     if not isinstance(error, BrokenProcessPool):
                         raise
-                    reason = str(error).partition("\n")[0]  # the rest is about the exit codes of all of them
+                    reason = str(error).partition("\n")[0]  # the rest lists the exit codes of all workers
                     raise WorkerDied(f"a worker process died ({reason.rstrip('.')})") from error
 
 
 def _pool(jobs: int, **settings: Any) -> Callable[..., Iterator[Any]]:
-    """Prepare a call of joblib, which takes the next numbers when a worker has become free."""
+    """Prepare a call of joblib that takes the next number when a worker becomes free."""
     from joblib import Parallel
 
     return Parallel(
@@ -137,7 +137,7 @@ def _until(stop: Stop, numbers: Iterator[int]) -> Iterator[int]:
 
 @contextmanager
 def _watched(stop: Stop, give_up: Callable[[], None] | None = None) -> Iterator[None]:
-    """Look at the flag while this thread waits for results, and give up a second after it is set."""
+    """Watch the flag while this thread waits for results, and call ``give_up`` a second after it is set."""
     over = threading.Event()
 
     def watch() -> None:
@@ -157,14 +157,14 @@ def _watched(stop: Stop, give_up: Callable[[], None] | None = None) -> Iterator[
 
 
 def _begin_tracker() -> None:
-    """Begin the process that clears away what joblib's workers leave; begun later it would unblock signals.
+    """Start joblib's resource tracker, which cleans up after its workers; started later it would unblock signals.
 
-    Of a program that had to leave at once it would say, after the last line, how many semaphores it found.
+    Its warning about leaked semaphores is silenced, which it would print after a program has left at once.
     """
     from joblib.externals.loky.backend import resource_tracker
 
     before = sys.warnoptions[:]
-    sys.warnoptions.append("ignore:resource_tracker:UserWarning")  # its command line takes the options of this process
+    sys.warnoptions.append("ignore:resource_tracker:UserWarning")  # the tracker inherits these options
     try:
         resource_tracker.ensure_running()
     finally:
@@ -183,25 +183,25 @@ def _until_flag(task: Task[T], number: int, flag: Path) -> T:
 
 EXECUTORS: dict[str, Callable[..., Executor]] = {"threading": Threads, "loky": Processes, "dask": Dask}
 
-# Those that can be told where: "dask=tcp://10.0.0.1:8786".
+# Executors that accept an address: "dask=tcp://10.0.0.1:8786".
 ADDRESSED = ("dask",)
 
-# Where searches put the starts that are worth a process; set for the time of a run.
+# Executor on which searches run their expensive starts; set for the time of a run.
 _searches: ContextVar[Executor | None] = ContextVar("linksweep_searches", default=None)
 
 
 def executor(name: str, jobs: int) -> Executor:
-    """Executor of that name in `EXECUTORS`, checked together with the number of its workers.
+    """Make the executor of a name in `EXECUTORS`; name and number of workers are checked.
 
     Parameters
     ----------
     name : such as "loky"; "dask=tcp://10.0.0.1:8786" is the cluster at that address
-    jobs : workers; a single one on this machine is this thread
+    jobs : number of workers; with 1 on this machine tasks run in this thread
 
     Raises
     ------
     InputError
-        if there is none, or ``jobs`` is no whole number from 1 to 1024.
+        for an unknown name, or if ``jobs`` is no whole number from 1 to 1024.
     """
     kind, equals, address = str(name).partition("=")
     if kind not in EXECUTORS:
@@ -216,13 +216,13 @@ def executor(name: str, jobs: int) -> Executor:
 
 
 def for_tasks(place: Executor, count: int) -> Executor:
-    """Choose where so many tasks run: a single one is not worth a pool of this machine."""
+    """Choose where ``count`` tasks run: a single task is not worth a pool on this machine."""
     return Here() if count < 2 and isinstance(place, (Threads, Processes)) else place
 
 
 @contextmanager
 def at_work(place: Executor) -> Iterator[Executor]:
-    """Let the searches within this context use this executor too, unless it shares the interpreter with them.
+    """Let searches within this context use this executor too, unless it runs in their own process.
 
     An executor that is a context manager keeps its workers until the context ends.
     """
@@ -238,5 +238,5 @@ def at_work(place: Executor) -> Iterator[Executor]:
 
 
 def place_of_searches() -> Executor:
-    """Choose where starts of the optimiser run that are worth a process: on the cluster of the run, if it has one."""
+    """Executor for expensive starts of the optimiser: that of the running run, otherwise processes."""
     return _searches.get() or Processes()

@@ -1,4 +1,4 @@
-"""How far long work is: a bar with the remaining time on a terminal, a plain line now and then in a log."""
+"""Progress of long work: a bar with the remaining time on a terminal, a plain line now and then in a log."""
 
 from __future__ import annotations
 
@@ -18,14 +18,14 @@ FIRST_SECONDS = 2.0  # of silence at the beginning
 LINE_SECONDS = 10.0
 TICK_SECONDS = 0.5
 TICKER = "linksweep: progress"
-# Share, and number, of what is to be done from which the remaining time is known to a factor of two.
+# Share and number of finished items from which the remaining time is known to a factor of two.
 ENOUGH, ALIKE = 0.1, 2
 SCALED = 10_000  # numbers from which a bar counts in thousands and millions
-BAR = "{desc}: {n_fmt} of {total_fmt}{unit} [{elapsed}]"  # where it is not
-AT_MOST = "at most"  # in what is counted: its total is a maximum, of which no share and no remaining time is known
+BAR = "{desc}: {n_fmt} of {total_fmt}{unit} [{elapsed}]"  # without the remaining time
+AT_MOST = "at most"  # marks a unit whose total is a maximum, so that neither share nor remaining time is known
 
 Say: TypeAlias = Callable[[str, int, int, str], None]
-"""``say(label, done, total, unit)``: what is worked on, and how much of it is done; ``total`` as is known by now."""
+"""``say(label, done, total, unit)``: name of the work, amount done, and total amount as known by now."""
 
 
 _stages: ContextVar[tuple[str, ...]] = ContextVar("linksweep_stages", default=())
@@ -33,7 +33,7 @@ _stages: ContextVar[tuple[str, ...]] = ContextVar("linksweep_stages", default=()
 
 @contextmanager
 def stages(*labels: str) -> Iterator[None]:
-    """Let progress of these labels within this context say which of all stages it is, or of those of a wider one."""
+    """Show progress of these labels as stage 1/n, 2/n ... within this context; known labels keep an outer numbering."""
     known = _stages.get()
     token = _stages.set(known if set(labels) <= set(known) else labels)
     try:
@@ -43,28 +43,28 @@ def stages(*labels: str) -> Iterator[None]:
 
 
 def best_words(value: float) -> str:
-    """Say the best value so far, behind a unit or alone; nothing where there is none."""
+    """Words for the best value so far, to follow a unit; empty where there is none."""
     return f", the best {value:.5g}" if math.isfinite(value) else ""
 
 
 def unsaid(label: str, done: int, total: int, unit: str) -> None:
-    """Report nothing."""
+    """Report no progress."""
 
 
 class Progress:
-    """Counts designs, or starts; used as a context.
+    """Progress of designs, or starts; used as a context manager.
 
-    A thread looks twice a second whether something has to be said, so that long steps are not silent.  Nobody to tell
-    (a closed pipe, a lost terminal) silences it, not the sweep.
+    A thread checks twice a second whether a line is due, so that long steps are not silent.  A closed pipe or a lost
+    terminal silences the progress and does not stop the sweep.
 
     Parameters
     ----------
-    label : what is swept
-    total : designs in all; 0 where nothing can be counted
+    label : name of the work
+    total : number of designs; 0 where nothing can be counted
     done : designs finished by earlier runs
-    show : False for a silent one (the library's way unless asked)
+    show : False for a silent one (default of the library)
     unit : what is counted
-    quiet : nothing is said of work that takes less than two seconds; otherwise its end always is
+    quiet : work that takes less than two seconds prints nothing; otherwise its end is always printed
     """
 
     def __init__(
@@ -124,7 +124,7 @@ class Progress:
         return not self.at_most and done >= ALIKE and ENOUGH * total <= done < total
 
     def advance(self, designs: int) -> None:
-        """Count so many more designs as finished."""
+        """Add finished designs to the count."""
         with self._listener():
             self.done, self.moved = self.done + designs, time.monotonic()
             if self.bar is not None:
@@ -134,7 +134,7 @@ class Progress:
                 self._line_if_due()
 
     def expect(self, total: int, unit: str | None = None) -> None:
-        """Note how much there is in all, as is known by now, and what is counted."""
+        """Update the total, as known by now, and the unit that is counted."""
         with self._listener():
             self.total, self.unit = total, self.unit if unit is None else unit
             if self.bar is not None:
@@ -166,7 +166,7 @@ class Progress:
                 self.show, self.bar = False, None
 
     def _left(self, now: float) -> float:
-        """Return the time [s] that the rest takes if it is as quick as what is done; not positive where it is late."""
+        """Remaining time [s] at the average speed so far; not positive where the work is late."""
         share = (self.total - self.done) / (self.done - self.first)
         return (self.moved - self.begin) * share - (now - self.moved)
 
@@ -185,9 +185,9 @@ class Progress:
 
 
 class Phases:
-    """Progress of pieces of work one after another; with ``quiet`` only of those that take more than two seconds.
+    """Progress of successive pieces of work; with ``quiet`` only of those that take more than two seconds.
 
-    It is used as a context.
+    It is used as a context manager.
     """
 
     def __init__(self, show: bool, stream: TextIO | None = None, quiet: bool = True) -> None:
@@ -201,7 +201,7 @@ class Phases:
         self.end()
 
     def say(self, label: str, done: int = 0, total: int = 0, unit: str = "steps") -> None:
-        """Note how much is done of this piece of work; another one than before begins its own count."""
+        """Report the amount done of a piece of work; a new label starts its own count."""
         if self.now is None or self.now.label != label:
             self.end()
             self.now = Progress(label, total, done, self.show, self.stream, unit, self.quiet).__enter__()
@@ -212,7 +212,7 @@ class Phases:
             self.now.advance(done - self.now.done)
 
     def end(self) -> None:
-        """Note that the present piece is finished."""
+        """Finish the present piece of work."""
         if self.now is not None:
             self.now.__exit__()
             self.now = None

@@ -1,6 +1,6 @@
 """Stopping on request: the first signal sets a flag, the second ends the process.
 
-A deadline is one clock for all parts of a search, which looks at it where it may stop.
+A deadline is shared by all parts of a search, which check it where they can stop.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ WATCH, WATCH_SECONDS = "linksweep: is the parent there", 0.5
 
 
 class Stop:
-    """A flag that tasks look at, and the signal that set it (None if something else did)."""
+    """A flag that tasks check, and the signal that set it (None if something else did)."""
 
     def __init__(self) -> None:
         self._raises = False
@@ -35,20 +35,20 @@ class Stop:
         return self.event.is_set()
 
     def set(self) -> None:
-        """Set the flag and tell whom it concerns."""
+        """Set the flag and call the listeners."""
         self.event.set()
         for hear in self._listeners:
-            with suppress(OSError):  # who cannot be told any more is not there any more
+            with suppress(OSError):  # a listener that cannot be reached has ended
                 hear()
 
     def tell(self, hear: Callable[[], object]) -> None:
-        """Call this when the flag is set, by a signal handler perhaps; at once if it is set already."""
+        """Call ``hear`` when the flag is set, perhaps by a signal handler; at once if it is set already."""
         self._listeners.append(hear)
         if self:
             hear()
 
     def handle(self, number: int, frame: FrameType | None) -> None:
-        """Set the flag; whoever asks a second time gets the system's own way, which stops at once."""
+        """Set the flag; a second signal gets the system's default action, which ends the process at once."""
         self.signal_number = number
         self.set()
         signal.signal(number, signal.SIG_DFL)
@@ -58,19 +58,17 @@ class Stop:
             raise KeyboardInterrupt
 
     def raise_if_signalled(self, what: object, kept: str) -> None:
-        """Raise :class:`Interrupted` if a signal has set the flag; the words say what it stopped, and what is kept."""
+        """Raise :class:`Interrupted` if a signal has set the flag; ``what`` was stopped, ``kept`` is kept."""
         if self.signal_number is not None:
             text = f"{what}: stopped by signal {self.signal_number}; {kept} kept, run again to continue"
             raise Interrupted(self.signal_number, text)
 
     @contextmanager
     def raising(self) -> Iterator[None]:
-        """Let a signal raise KeyboardInterrupt as well within this context.
+        """Let a signal also raise KeyboardInterrupt within this context, for work of one process that checks no flag.
 
-        This is for work of one process that looks at no flag.
-
-        It ends the context without a word; the flag says why.  A compiler may swallow the interruption and fail over it
-        later: once the flag is set, any error is a consequence.
+        The interruption ends the context silently; the flag says why.  A compiler may swallow the interruption and fail
+        later because of it: once the flag is set, any error is a consequence.
         """
         self._raises, hook = True, sys.unraisablehook
         try:
@@ -87,7 +85,7 @@ class Stop:
 def stop_on_signal() -> Iterator[Stop]:
     """Let SIGINT and SIGTERM set the flag within this context (a handler that raises can hang a pool of workers).
 
-    Outside the main thread Python allows no handlers; then the flag is set by errors only.
+    Outside the main thread Python allows no handlers; then only errors set the flag.
     """
     stop = Stop()
     if threading.current_thread() is not threading.main_thread():
@@ -103,16 +101,15 @@ def stop_on_signal() -> Iterator[Stop]:
 
 @contextmanager
 def unheard() -> Iterator[None]:
-    """Keep signals from processes begun within.
+    """Shield processes that are started within this context from signals.
 
-    Ctrl-C reaches the whole group, also those that are still starting up.
-
-    This process hears what came in between as soon as the context ends.
+    Ctrl-C reaches the whole process group, also processes that are still starting up.  This process receives pending
+    signals as soon as the context ends.
     """
     if threading.current_thread() is not threading.main_thread() or not hasattr(signal, "pthread_sigmask"):
-        yield  # Python lets no other thread decide on signals
+        yield  # Python handles signals in the main thread only
         return
-    # What is ignored stays so in a new process; what is blocked waits, here, until it is neither.
+    # A new process inherits ignored signals; blocked signals wait in this process until they are unblocked.
     mask = signal.pthread_sigmask(signal.SIG_BLOCK, SIGNALS)
     before = {number: signal.signal(number, signal.SIG_IGN) for number in SIGNALS}
     try:
@@ -124,20 +121,20 @@ def unheard() -> Iterator[None]:
 
 
 class Terminated(KeyboardInterrupt):
-    """SIGTERM, where nothing better is to be done than to leave; ``number`` is that of the signal."""
+    """SIGTERM, where the program can only leave; ``number`` is that of the signal."""
 
     number = signal.SIGTERM
 
 
-# How long a process that has promised to leave may take to do so by itself [s], and what it says if it does not.
+# Time that a process has for leaving by itself after a signal [s], and the message if it does not.
 _promised: list[tuple[float, str]] = []
 
 
 @contextmanager
 def leaving_within(seconds: float, words: str) -> Iterator[None]:
-    """Give the process so many seconds to leave after a signal within this context; then it ends, whatever it does.
+    """Give the process ``seconds`` to leave after a signal within this context; then it is ended.
 
-    For a program of its own, not for a library: compiling and other people's code look at no flag.  Outside of
+    For a program, not for a library: compilers and other people's code check no flag.  Outside of
     :func:`stop_on_signal` a signal raises KeyboardInterrupt, or :class:`Terminated`.
     """
     heard: list[int] = []
@@ -172,7 +169,7 @@ def _interruption(number: int) -> KeyboardInterrupt:
 
 
 def _say_nothing(what: object) -> None:
-    """Say nothing, in place of the words about an interruption in the middle of somebody's callback."""
+    """Replace the hook that reports an interruption within a callback; report nothing."""
 
 
 def _countdown(number: int) -> None:
@@ -190,9 +187,7 @@ def _leave(number: int, words: str) -> None:
 
 
 def depend_on_parent(parent: int) -> None:
-    """Leave signals to the parent of this worker process, and die with it.
-
-    A terminal sends them to the whole group.
+    """Ignore signals in this worker process, since a terminal sends them to the whole group, and exit with its parent.
 
     Without its parent a worker holds no lock on the folder and would wait for work for minutes.
     """
@@ -210,7 +205,7 @@ def _end_with(parent: int) -> None:
 
 
 class Deadline:
-    """Asked often; true once the budget [s] is used up or the caller wants to stop.  ``pulled`` remembers it."""
+    """Callable that returns True once the budget [s] is used up or ``stop`` returns True; ``pulled`` remembers it."""
 
     def __init__(self, budget: float | None, stop: Callable[[], bool] | None) -> None:
         self.end = math.inf if budget is None else time.monotonic() + budget
