@@ -1,1 +1,1 @@
-"""What one chunk of a sweep holds: the cut of the design space, and designs on their way through outputs and limits."""
+"""Chunks of a sweep: their cut from the design space, and the cascade of routes and limits that computes them."""

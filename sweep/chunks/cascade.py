@@ -1,8 +1,8 @@
-"""Designs through the outputs of a study, quick routes first; only those within every limit so far go on.
+"""Cascade: designs pass through the routes of a study, quick ones first, and leave at the first limit they miss.
 
 Few designs survive the first limits, and a call of a costly route takes a millisecond or more even for a few designs.
-So survivors wait before each route until there are enough of them, or until no more come.  Measured times decide only
-how many are enough: a design's row does not depend on them.
+So survivors wait before each route until a batch is full, or until no more come.  Measured times decide only the size
+of batches: a design's row does not depend on them.
 """
 
 from __future__ import annotations
@@ -29,8 +29,8 @@ from sweep.synthesis.fit import driving_outputs, fit_line
 if TYPE_CHECKING:
     from sweep.study import Study
 
-# A route gets at most so many designs at once, so that their tables stay in the caches, and of a dear one at most what
-# it does in this time: a stop is noticed in between.
+# Largest batch of a route, so that its tables stay in the caches; a costly route gets at most what it computes in
+# BATCH_SECONDS, so that a stop is noticed in between.
 BLOCK = 16384
 BATCH_SECONDS = 0.1
 FEWEST = 64
@@ -39,15 +39,15 @@ CALL_SECONDS = 1e-3
 
 
 class Dropped(Exception):
-    """Raised where work is given up half way because the run was asked to stop."""
+    """Raised to abandon unfinished work because the run was asked to stop."""
 
 
 @dataclass(frozen=True)
 class Level:
-    """One level of the cascade with its cost: a route; where it is None, the fit and the limits on parameters.
+    """One level of the cascade: a route and its cost; where ``route`` is None, the fit and the limits on parameters.
 
-    ``columns`` says how many of the first columns of the design matrix it needs; None for all.  ``further`` are outputs
-    that the route gives beside its own at no cost, for a level behind it.
+    ``columns`` is the number of leading columns of the design matrix that the level needs; None for all.  ``further``
+    are outputs for a later level that the route computes at no extra cost.
     """
 
     route: Route | None
@@ -57,18 +57,18 @@ class Level:
 
     @property
     def outputs(self) -> tuple[str, ...]:
-        """Names of the outputs that the level is there for."""
+        """Names of the outputs that the level computes, without ``further``."""
         return () if self.route is None else self.route.outputs
 
     @property
     def batch(self) -> int:
-        """How many designs are worked on at once."""
+        """Number of designs per call of the route."""
         return int(min(max(1e9 * BATCH_SECONDS / max(self.ns_per_design, 1.0), FEWEST), BLOCK))
 
 
 @dataclass(frozen=True)
 class Batch:
-    """Some designs: their index (k,), parameters (k, P), outputs found so far, each (k,), and status (k,)."""
+    """A batch of designs: index (k,), parameters (k, P), outputs found so far, each (k,), and status (k,)."""
 
     index: NDArray[np.int64]
     designs: Array
@@ -76,12 +76,12 @@ class Batch:
     status: NDArray[np.uint8]
 
     def only(self, which: NDArray[np.int64] | slice) -> Batch:
-        """Take some of the designs, by their places."""
+        """Select designs of the batch by index or slice."""
         outputs = {name: values[which] for name, values in self.outputs.items()}
         return Batch(self.index[which], self.designs[which], outputs, self.status[which])
 
     def ordered(self) -> Batch:
-        """Sort the designs by their index; the same batch where they are in order."""
+        """Sort the designs by their index; an ordered batch is returned as it is."""
         if bool(np.all(self.index[1:] >= self.index[:-1])):
             return self
         order = np.argsort(self.index, kind="stable")
@@ -90,7 +90,7 @@ class Batch:
 
     @classmethod
     def joined(cls, batches: Sequence[Batch]) -> Batch:
-        """Join batches that have the same outputs."""
+        """Concatenate batches with the same outputs."""
         if len(batches) == 1:
             return batches[0]
         return cls(
@@ -103,15 +103,15 @@ class Batch:
 
 @dataclass
 class Cascade:
-    """The designs of a study on their way through its levels.
+    """The levels of a study with the designs that wait at each of them.
 
-    A design's row does not depend on the designs that wait beside it, so it does not depend on how they are fed.
+    A design's row does not depend on the other designs of its batch, so it does not depend on how designs are fed.
 
     Parameters
     ----------
-    study : whose family, wanted outputs, limits and accuracy apply
-    keep : whether designs that leave half way are among the results; they are counted either way
-    should_stop : asked before every batch; if it answers true, `Dropped` is raised
+    study : gives family, wanted outputs, limits and accuracy
+    keep : whether designs that miss a limit are among the results; they are counted either way
+    should_stop : called before every batch; if it returns true, `Dropped` is raised
     """
 
     study: Study
@@ -132,28 +132,28 @@ class Cascade:
         self.missed = Counter()
 
     def feed(self, index: NDArray[np.int64], designs: Array, status: NDArray[np.uint8]) -> None:
-        """Send designs in, with all parameters (k, P) or as many as the first level needs.
+        """Feed designs with all parameters (k, P), or with the leading columns that the first level needs.
 
-        Those that are not OK (k,) leave at once.
+        Designs whose status (k,) is not OK leave at once.
         """
         self._sort(Batch(index, designs, {}, status), status == codes.OK, 0)
         self._work(0, whole=False)
 
     def end(self, names: Sequence[str]) -> Batch:
-        """Finish every design that still waits, and hand out the results.
+        """Finish every waiting design, and return the results.
 
         Returns
         -------
         Batch
             in the order of the index; the named outputs, nan where not computed; status 0 for designs that meet every
-            limit, LIMIT_EXCEEDED for those that miss one, otherwise the status of the kernel that could not answer.
+            limit, LIMIT_EXCEEDED for those that miss one, otherwise the status of the kernel that returned no value.
         """
         for number in range(len(self.levels)):
             self._work(number, whole=True)
         left, width = self._left, len(self.study.family.parameters)
         index = np.concatenate([np.empty(0, np.int64), *(batch.index for batch in left)])
         order = np.argsort(index, kind="stable")
-        # Column by column, each released once it is collected: a chunk is in memory once, not three times.
+        # Column by column, each released once it is joined: a chunk is in memory once, not three times.
         outputs: dict[str, Array] = {}
         for name in names:
             taken = [batch.outputs.pop(name, None) for batch in left]
@@ -166,7 +166,7 @@ class Cascade:
         return Batch(index[order], designs, outputs, status)
 
     def _work(self, number: int, whole: bool) -> None:
-        """Work on what waits at a level and at those behind it: on full batches only, or on everything."""
+        """Compute the batches that wait at a level and at later levels; incomplete batches only if ``whole``."""
         if number == len(self.levels):
             return
         level, waiting = self.levels[number], self._waiting[number]
@@ -188,12 +188,12 @@ class Cascade:
             self._work(number + 1, whole=False)
 
     def _completed(self, batch: Batch) -> Batch:
-        """Give the designs of a batch all their parameters."""
+        """Add the missing parameter columns to the designs of a batch."""
         designs = completed(self.study, batch.index, batch.designs)
         return batch if designs is batch.designs else replace(batch, designs=designs)
 
     def _computed(self, level: Level, batch: Batch) -> tuple[Batch, NDArray[np.bool_]]:
-        """Add the outputs of a level to a batch, and say which of its designs go on."""
+        """Add the outputs of a level to a batch; return the batch and a mask of the designs that go on."""
         study = self.study
         found = self._found(level, batch)
         status = np.where(batch.status == codes.OK, found["status"], batch.status)
@@ -204,12 +204,12 @@ class Cascade:
         return Batch(batch.index, batch.designs, batch.outputs | more, status), self._go_on[status]
 
     def _found(self, level: Level, batch: Batch) -> Mapping[str, NDArray[Any]]:
-        """Return outputs of a level with their error estimates, and ``status``."""
+        """Compute the outputs of a level with their error estimates, and ``status``."""
         study, outputs = self.study, (*level.outputs, *level.further)
         return design_outputs(study.family, batch.designs, outputs, study.accuracy, study.window)
 
     def _fitted(self, batch: Batch) -> tuple[Batch, NDArray[np.bool_]]:
-        """Fit the parameters of a batch, and say which of its designs keep the limits on parameters."""
+        """Fit the parameters of a batch; return the batch and a mask of the designs within the parameter limits."""
         study, designs, status = self.study, batch.designs, batch.status.copy()
         goes_on = np.ones(status.size, np.bool_)
         if study.fit is not None:
@@ -229,13 +229,13 @@ class Cascade:
         self.missed[limit.output] += int(np.count_nonzero(exceeds))
 
     def _sort(self, batch: Batch, goes_on: NDArray[np.bool_], number: int) -> None:
-        """Let the designs that go on wait at the next level, if there is one; the others leave."""
+        """Queue the designs that go on at the next level, if any; count the others, and keep their rows if wanted."""
         staying = np.flatnonzero(goes_on) if number < len(self.levels) else np.empty(0, np.int64)
         if staying.size:
             self._waiting[number].append(batch if staying.size == goes_on.size else batch.only(staying))
         if staying.size == goes_on.size:
             return
-        # Most designs leave: counting all and subtracting those that stay is cheaper than selecting those that leave.
+        # Most designs leave: counting all and subtracting the staying ones is cheaper than selecting the leaving ones.
         self.counts += np.bincount(batch.status, minlength=self.counts.size)
         self.counts -= np.bincount(batch.status[staying], minlength=self.counts.size)
         leaves = np.ones(goes_on.size, np.bool_) if self.keep else batch.status == codes.OK
@@ -246,11 +246,11 @@ class Cascade:
 
 @dataclass
 class Recalled(Cascade):
-    """A cascade for designs whose outputs are all known from an earlier run with other limits.
+    """Cascade for designs whose outputs are known from an earlier run with other limits.
 
     Parameters
     ----------
-    known : column ``design``, ascending, and every output and error estimate of those designs, in float64
+    known : column ``design``, ascending, and every output and error estimate of these designs, in float64
     """
 
     known: Columns = field(default_factory=dict)
@@ -262,7 +262,7 @@ class Recalled(Cascade):
 
 
 def levels(study: Study) -> tuple[Level, ...]:
-    """Levels of a study: its routes in the order of `Work`; those that need fitted parameters come after [fit]."""
+    """Levels of a study: its routes in the order of `Work`, the fit before routes that need fitted parameters."""
     found = [_level(study, route) for route in ordered_routes(study)]
     if study.fit is not None or study.parameter_limits:
         before = sum(_before_fit(study, level.route) for level in found if level.route is not None)
@@ -271,17 +271,17 @@ def levels(study: Study) -> tuple[Level, ...]:
 
 
 def _level(study: Study, route: Route) -> Level:
-    """Return the level of a route; what gives one of the outputs that the fit needs gives the other too."""
+    """Make the level of a route; a route with one of the outputs that the fit needs also computes the other."""
     needed = driving_outputs(study.family) if study.fit is not None else ()
     further = tuple(name for name in needed if name not in route.outputs) if set(needed) & set(route.outputs) else ()
     return Level(route, route.ns_per_design, route.columns, further)
 
 
 def ordered_routes(study: Study) -> tuple[Route, ...]:
-    """Return the routes of a study in the order of `Work`; those that need the fitted parameters come last.
+    """Order the routes of a study by `Work`; routes that need fitted parameters come last.
 
-    Where only feasible designs count, effects and what is long are for those that keep all limits, unless limits are
-    on them.
+    Where only feasible designs are kept, effects and other long routes follow all limits, unless they have limits
+    themselves.
     """
     found = routes(study.family, study.want, study.accuracy, study.window is not None)
     limited = {limit.output for limit in study.tested_limits}
@@ -294,12 +294,12 @@ def ordered_routes(study: Study) -> tuple[Route, ...]:
 
 
 def _before_fit(study: Study, route: Route) -> bool:
-    """Whether a route needs only stages before the one that [fit] finishes, and no load from that one."""
+    """Whether a route needs only stages before the one that [fit] completes, and no load of that stage."""
     if study.fit is None:
         return False
     last = len(study.bare.stages)
     numbers = [parts(name).stage for name in route.outputs]
     if not all(number and int(number) < last for number in numbers):
         return False
-    # The loads of a stage include those of all stages behind it.
+    # The loads of a stage include those of all later stages.
     return not any(placed.entry.takes_load for placed in called_for(study.bare, route.outputs))

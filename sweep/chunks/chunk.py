@@ -1,4 +1,4 @@
-"""One chunk of a sweep: consecutive designs of the space, their parameters, and the rows computed from them."""
+"""One chunk of a sweep: consecutive designs of the space, their parameters and their computed rows."""
 
 from __future__ import annotations
 
@@ -25,9 +25,9 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class ChunkResult:
-    """Rows of a chunk, and the number of its designs by status and by missed limit; designs without a row count too.
+    """Rows of a chunk, and the numbers of all its designs by status and by missed limit, with or without a row.
 
-    A design counts with the first limit that it misses, in the order in which limits are tested.
+    A design is counted under the first limit that it misses, in the order in which limits are tested.
     """
 
     columns: Columns
@@ -36,9 +36,9 @@ class ChunkResult:
 
 
 def output_columns(study: Study) -> dict[str, str]:
-    """Names and types of the result columns: what the study wants, each number with its error estimate, if any.
+    """Names and types of the result columns: the wanted outputs, each followed by its error column, if any.
 
-    An estimate is stored in float32 always, a proven bound is not; whether a crank turns is no number and has none.
+    An error estimate is stored in float32, a proven bound in float64; the flag ``rotatable`` has no error column.
     """
     columns: dict[str, str] = {}
     for name in study.want:
@@ -49,27 +49,27 @@ def output_columns(study: Study) -> dict[str, str]:
 
 
 def warm(study: Study) -> None:
-    """Compile or load every kernel the study's sweep needs, on a few designs spread over its space."""
+    """Compile or load the kernels of the sweep by computing a few designs spread over the space."""
     for number in range(len(asked_outputs(study))):
         warm_step(study, number)
 
 
 def warm_step(study: Study, number: int) -> None:
-    """Compile or load the kernels of one of the steps through which a design goes."""
+    """Compile or load the kernels of one step of the sweep."""
     design_outputs(study.family, few_designs(study), asked_outputs(study)[number], study.accuracy, study.window)
 
 
 def asked_outputs(study: Study) -> list[Sequence[str]]:
-    """Return the outputs asked of a design, step by step, in the order in which they are computed."""
+    """List the outputs of each step of the sweep, in the order of computation."""
     return [level.route.outputs for level in levels(study) if level.route is not None]
 
 
 def few_designs(study: Study) -> Array:
-    """Return a few designs (n, P) spread over the space of a study."""
+    """Choose a few designs (n, P) spread over the space of a study."""
     count = study.space.count
     starts = sorted({k * (count - 1) // 7 for k in range(8)})
     matrix, _ = runs_matrix(study, [(start, start + 1) for start in starts])
-    # Any numbers will do, also for a design that [locus] cannot make: it compiles the same.
+    # Any numbers will do for compiling, also for a design that [locus] cannot make.
     designs = np.nan_to_num(matrix, nan=1.0)
     if study.fit is not None:
         designs, _ = fit_line(study.family, designs, study.fit, study.window)
@@ -85,28 +85,28 @@ def compute_chunk(
 ) -> ChunkResult:
     """Compute the rows of the designs start, ..., stop - 1: index, parameters, wanted outputs, status.
 
-    Designs are made and worked on in blocks, so memory holds a few blocks and the rows that are kept.
+    Designs are generated and computed in blocks, so memory holds a few blocks and the rows that are kept.
 
     Parameters
     ----------
-    study : the question
+    study : the study
     start, stop : range of design indices in the study's space
-    should_stop : asked before every batch of designs
-    known : rows of the same chunk of a study that differs in its limits only; outputs of designs that were within all
-        of those are taken from them, not computed again
+    should_stop : called before every batch of designs
+    known : rows of the same chunk of a study that differs in its limits only; outputs of designs that met all of
+        these limits are taken from the rows, not computed again
 
     Returns
     -------
     ChunkResult
         columns ``design`` int64, parameters float64 [mm, rad], outputs in the study's dtype, ``status`` uint8; with
-        ``keep = "feasible"`` only the rows with status 0, all designs are counted either way.
+        ``keep = "feasible"`` only the rows with status 0; all designs are counted either way.
 
     Raises
     ------
     InputError
         if the range is not inside the space, or a design of the space has a bad value.
     Dropped
-        if ``should_stop`` answered true.
+        if ``should_stop`` returned true.
     """
     if not 0 <= start <= stop <= study.space.count:
         raise InputError("designs", f"{start}:{stop}", f"a range inside 0:{study.space.count}", f"study {study.name}")
@@ -133,7 +133,7 @@ def compute_chunk(
 
 
 def _result(study: Study, cascades: Sequence[Cascade]) -> ChunkResult:
-    """Collect rows and counts from cascades that have been fed all designs of a chunk."""
+    """Join rows and counts of cascades that have been fed all designs of a chunk."""
     types = output_columns(study)
     found = Batch.joined([cascade.end(tuple(types)) for cascade in cascades]).ordered()
     columns: Columns = {"design": found.index}

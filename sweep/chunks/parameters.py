@@ -1,7 +1,8 @@
-"""Parameters of the designs of a chunk: first those that the first outputs need, then all others, of survivors only.
+"""Parameters of the designs of a chunk: first the columns of the first outputs, later the others, for survivors only.
 
-Of a chain only one design in some thirty survives the limits on its first stage, and making parameters takes as long as
-these limits; so what the first stage does not need is made later, by the numbers of the surviving designs.
+Of a chain only one design in about thirty survives the limits on its first stage, and generating parameters takes as
+long as these limits; so parameters that the first stage does not need are generated later, by the indices of the
+surviving designs.
 """
 
 from __future__ import annotations
@@ -23,7 +24,7 @@ if TYPE_CHECKING:
 
 
 def parameter_matrix(study: Study, start: int, stop: int) -> tuple[Array, NDArray[np.uint8]]:
-    """Check the designs start, ..., stop - 1 of the study's space: their matrix (n, P) and status (n,).
+    """Generate and check the designs start, ..., stop - 1 of the space: matrix (n, P) and status (n,).
 
     The status is OK unless [locus] found no mechanism for a design; its links are nan then.
     """
@@ -31,9 +32,9 @@ def parameter_matrix(study: Study, start: int, stop: int) -> tuple[Array, NDArra
 
 
 def runs_matrix(study: Study, runs: Iterable[tuple[int, int]]) -> tuple[Array, NDArray[np.uint8]]:
-    """Check several runs of designs as `parameter_matrix` does, each from its start to its stop; one below the other.
+    """Generate and check several ranges of designs as `parameter_matrix` does, one below the other.
 
-    To check all at once takes no longer than to check one run.
+    Checking all ranges at once takes no longer than checking one.
     """
     found = [study.space.columns(start, stop) for start, stop in runs]
     columns = {name: np.concatenate([run[name] for run in found]) for name in found[0]}
@@ -41,7 +42,7 @@ def runs_matrix(study: Study, runs: Iterable[tuple[int, int]]) -> tuple[Array, N
         matrix, _ = design_matrix(study.family, columns)
         return matrix, np.zeros(len(matrix), np.uint8)
     made, status = study.locus.links(columns)
-    # A design without a mechanism gets a status; it is not refused.
+    # A design without a mechanism gets a status; it raises no error.
     given = {name: values for name, values in columns.items() if name in study.family.parameter_names}
     matrix, _ = design_matrix(study.family, given | {name: np.ones(status.size) for name in made})
     for name, values in made.items():
@@ -50,7 +51,7 @@ def runs_matrix(study: Study, runs: Iterable[tuple[int, int]]) -> tuple[Array, N
 
 
 def parameter_ns(study: Study) -> float:
-    """Return the estimated cost of the parameters of a design [ns]."""
+    """Estimate the time for the parameters of a design [ns]."""
     own = nanoseconds("work", "parameter") * len(study.family.parameters)
     own += nanoseconds("work", "locus") if study.locus is not None else 0.0
     if study.space.kind == "product":
@@ -61,12 +62,12 @@ def parameter_ns(study: Study) -> float:
 
 @dataclass(frozen=True)
 class Parameters:
-    """Makes the parameters of a study's designs; their bits do not depend on when they are made.
+    """Generator of the parameters of a study's designs; their bits do not depend on when they are generated.
 
     Parameters
     ----------
-    study : the question
-    leading : how many columns of the design matrix `first` makes
+    study : the study
+    leading : number of columns of the design matrix that `first` generates
     """
 
     study: Study
@@ -74,17 +75,17 @@ class Parameters:
 
     @classmethod
     def of(cls, study: Study, needed: int | None) -> Parameters:
-        """Make the first ``needed`` columns at first (None: all).
+        """Choose how many columns are generated at first: ``needed``, or all if it is None.
 
-        All of them are made where rows are kept anyway, where [locus] makes some from others, and where a value may be
-        refused, with the place where it stands.
+        All are generated at first where rows are kept anyway, where [locus] computes some from others, and where a
+        value may be invalid, so that the error names its place.
         """
         whole = len(study.family.parameters)
         early = needed is not None and study.output.keep != "all" and study.locus is None and _is_valid(study)
         return cls(study, needed if needed is not None and early else whole)
 
     def first(self, start: int, stop: int) -> tuple[Array, NDArray[np.uint8]]:
-        """Return the leading columns of the designs start to stop - 1, (n, leading), and their status (n,)."""
+        """Return the leading columns of the designs start, ..., stop - 1, (n, leading), and their status (n,)."""
         names = self.study.family.parameter_names
         if self.leading == len(names):
             return parameter_matrix(self.study, start, stop)
@@ -92,7 +93,7 @@ class Parameters:
 
 
 def completed(study: Study, index: NDArray[np.int64], designs: Array) -> Array:
-    """Return all columns (k, P) of designs by their numbers (k,), from the first few of them."""
+    """Complete the leading columns of designs to all columns (k, P), by their indices (k,)."""
     names = study.family.parameter_names[designs.shape[1] :]
     if not names:
         return designs
@@ -108,7 +109,7 @@ def _beside(columns: Iterable[Array], n: int) -> Array:
 
 
 def _is_valid(study: Study) -> bool:
-    """Return whether no design of the space can have a bad value: values stand between the ends of their axes."""
+    """Whether no design of the space can have an invalid value: values lie between the ends of their axes."""
     space, family = study.space, study.family
     if space.names != family.parameter_names:
         return False

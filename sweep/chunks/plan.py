@@ -1,4 +1,4 @@
-"""How a sweep is cut into chunks, what its columns are, and the identity that every chunk carries."""
+"""The plan of a sweep: its cut into chunks, its columns, and the identity in every chunk's name."""
 
 from __future__ import annotations
 
@@ -29,26 +29,26 @@ if TYPE_CHECKING:
 
 FORMAT = 2
 
-# A chunk should take a few seconds on one core by the routes' own cost figures, so every machine cuts alike; it should
-# hold at most this much before it is encoded; and there should be enough of them to keep the workers even to the end.
+# A chunk should take a few seconds on one core by the routes' own costs, so that every machine cuts alike; it should
+# have at most CHUNK_BYTES before it is encoded; and there should be enough chunks to keep all workers busy to the end.
 CHUNK_SECONDS = 2.0
 CHUNK_BYTES = 32 * 2**20
 CHUNKS_AT_LEAST = 16
 SECONDS_AT_LEAST = 0.1
 CHUNK_STEP = 512
 
-# Designs side by side are alike: of 4 and of 32 runs of them the share that is kept was 0.2 and 0.6 off.
+# Neighbouring designs are alike: with 4 and with 32 runs of them the share kept was off by 0.2 and 0.6.
 PILOT_MOST, PILOT_LEAST, PILOT_RUNS, PILOT_PARTS = 1024, 16, 128, 4
-PILOT_SHARE = 8  # a pilot takes no more than this part of a sweep: of a small one it would cost as much again
+PILOT_SHARE = 8  # a pilot has at most 1/8 of the designs: for a small sweep it would otherwise double the time
 
 PARAMETER_UNITS = {word: internal_unit(word) for word in get_args(Unit)}
 
-# The folders of the package whose sources decide values in a chunk.
+# Folders of the package whose sources determine values in a chunk.
 VALUES = frozenset(
     ["numerics", "families", "quantities", "effects", "reductions", "evaluation", "synthesis", "study", "chunks"]
 )
 
-# Sections of the study file that decide no value in a chunk.
+# Sections of the study file that determine no value in a chunk.
 NOT_IN_CHUNKS = ("study", "optimise", "pareto", "tolerance", "reference", "budget", "report")
 
 
@@ -64,10 +64,10 @@ class Column:
 
 
 class Pilot(NamedTuple):
-    """Estimates from a few designs: time of one design on one core [s], and the share of designs within every limit.
+    """Estimates from a pilot: time per design on one core [s], and share of designs within every limit.
 
-    ``reached`` are the outputs of every level of the cascade, and the share of designs that reach it; ``kept`` those of
-    the ``tried`` designs that are within every limit, (n, P).
+    ``reached`` lists the outputs of every level of the cascade and the share of designs that reach it; ``kept`` are the
+    designs (n, P) among the ``tried`` that are within every limit.
     """
 
     seconds_per_design: float
@@ -79,7 +79,7 @@ class Pilot(NamedTuple):
 
 @dataclass(frozen=True)
 class Plan:
-    """The cut of a sweep into chunks and everything that decides their content: equal plans give equal bytes."""
+    """The cut of a sweep into chunks and all that determines their content: equal plans give equal bytes."""
 
     name: str
     study: str
@@ -97,7 +97,7 @@ class Plan:
 
     @property
     def format(self) -> int:
-        """Number of the layout of a chunk, which its metadata name."""
+        """Version of the chunk layout, which a chunk's metadata name."""
         return FORMAT
 
     @property
@@ -108,22 +108,22 @@ class Plan:
         return hashlib.sha256(text.encode()).hexdigest()[:12]
 
     def bounds(self, index: int) -> tuple[int, int]:
-        """Return the first design of a chunk and the one after its last."""
+        """Return the first design of a chunk, and the one after its last."""
         start = index * self.chunk_size
         return start, min(start + self.chunk_size, self.designs)
 
     def as_dict(self) -> dict[str, Any]:
-        """Return what ``_plan.json`` says of the chunks."""
+        """Return the plan as it is written to ``_plan.json``."""
         return {"format": FORMAT, "identity": self.identity, "chunks": self.chunks} | asdict(self)
 
 
 def make_plan(study: Study, chunk_size: int | None = None) -> Plan:
-    """Return the plan of a study; a pilot of about a thousand designs tells how many get through the cascade.
+    """Make the plan of a study; its chunk size is estimated from a pilot of about a thousand designs.
 
     Parameters
     ----------
-    study : the question
-    chunk_size : designs per chunk if it is known already (a run that is resumed)
+    study : the study
+    chunk_size : designs per chunk if it is known already (a resumed run)
     """
     return Plan(
         name=study.name,
@@ -138,22 +138,22 @@ def make_plan(study: Study, chunk_size: int | None = None) -> Plan:
 
 
 def _repetitive(study: Study) -> tuple[str, ...]:
-    """List the parameters whose values recur from design to design; the store writes them with a dictionary."""
+    """List the parameters whose values repeat among the designs; they are written dictionary-encoded."""
     names = study.space.fixed if study.space.kind == "sobol" else study.space.names
     own = study.family.parameter_names
     return tuple(name for name in names if name in own and name not in (*study.made, *study.rescaled))
 
 
 def designs_fingerprint(study: Study) -> str:
-    """Hash the study without what concerns only the optimum, so that a change there leaves the designs valid."""
+    """Hash the study without the parts that concern only the optimum: changing these leaves the designs valid."""
     output = replace(study.output, curves="none")
     return replace(study, optimise=None, pareto=None, tolerance=None, reference=None, output=output).fingerprint
 
 
 def choose_chunk_size(study: Study, known: Pilot | None = None) -> int:
-    """Return designs per chunk: a multiple of 512 from the routes' cost, the memory and the number of designs.
+    """Choose the designs per chunk: a multiple of 512 from the routes' cost, the memory and the number of designs.
 
-    Neither the number of workers nor the clock of the machine enters.  ``known`` is a pilot that was already sent.
+    Neither the number of workers nor the clock of the machine enters.  ``known`` is a pilot that has been run already.
     """
     seconds = max((pilot(study) if known is None else known).seconds_per_design, 1e-10)
     by_time = CHUNK_SECONDS / seconds
@@ -162,17 +162,17 @@ def choose_chunk_size(study: Study, known: Pilot | None = None) -> int:
     return CHUNK_STEP * max(1, math.floor(min(by_time, by_memory, by_count) / CHUNK_STEP))
 
 
-TRIED = (512, 4096)  # designs that are sent through the limits where some that keep them are asked for
-RUN = 8  # of them that stand side by side: what one call costs is shared
+TRIED = (512, 4096)  # designs that are tested in search of feasible ones
+RUN = 8  # consecutive designs among them, which share the cost of a call
 
 
 def pilot(study: Study, tell: Callable[[int, int], None] = lambda _, __: None) -> Pilot:
-    """Send about a thousand designs, an eighth of a smaller space, through the cascade, spread over the space.
+    """Run the cascade on about a thousand designs spread over the space, or on an eighth of a smaller space.
 
-    ``tell`` is called with how many parts of them are done, and how many there are.
+    ``tell`` is called with the number of finished parts and of all parts.
 
-    Effects behind the last limit are priced, not computed.  The time counts parameters, and each route as often as
-    designs reached it, by their own cost figures, so it is the same on every machine.
+    Effects without a limit at the end of the cascade are priced, not computed.  The time counts parameters, and each
+    route as often as designs reached it, by their own costs, so it is the same on every machine.
     """
     count = study.space.count
     number = min(PILOT_MOST, max(count // PILOT_SHARE, min(PILOT_LEAST, count)))
@@ -200,7 +200,7 @@ def pilot(study: Study, tell: Callable[[int, int], None] = lambda _, __: None) -
 
 
 def _telling(study: Study) -> int:
-    """Return how many levels a pilot works on: behind them are effects without a limit, which few designs miss."""
+    """Return the number of levels that a pilot computes; effects without a limit at the end are skipped."""
     limited = {limit.output for limit in study.tested_limits}
     count = len(levels(study))
     if study.bare is study.family:
@@ -213,10 +213,10 @@ def _telling(study: Study) -> int:
 
 
 def pilot_at(study: Study, known: Pilot) -> Pilot:
-    """Price a study by a pilot of the same study at another accuracy.
+    """Price a study by the pilot of the same study at another accuracy.
 
-    How far designs get depends on that only for those on the edge of a limit.  A level that a proof puts elsewhere is
-    reached by as many as before, and by no fewer than the levels behind it.
+    The accuracy affects only designs close to a limit.  A level that a proof moves is reached by as many designs as
+    before, and by no fewer than the levels after it.
     """
     share_of = {name: share for names, share in known.reached for name in names or ("",)}
     shares = [max(share_of[name] for name in level.outputs or ("",)) for level in levels(study)]
@@ -224,7 +224,7 @@ def pilot_at(study: Study, known: Pilot) -> Pilot:
 
 
 def _seconds(study: Study, shares: Sequence[float]) -> float:
-    """Price one design [s], given the share of designs that reach each level."""
+    """Estimate the time of one design [s], given the share of designs that reach each level."""
     seconds, calls = 1e-9 * parameter_ns(study), 1.0 / BLOCK
     for share, level in zip(shares, levels(study), strict=True):
         seconds += 1e-9 * share * level.ns_per_design
@@ -233,13 +233,13 @@ def _seconds(study: Study, shares: Sequence[float]) -> float:
 
 
 def _spread(number: int, count: int) -> list[int]:
-    """Choose about so many of the numbers below ``count``, spread over them; the same at every call."""
+    """Choose about ``number`` integers below ``count``, evenly spread; the same at every call."""
     golden = (math.sqrt(5.0) - 1.0) / 2.0
     return sorted({int((k * golden) % 1.0 * count) for k in range(number)})
 
 
 def spread_designs(study: Study, number: int) -> Array:
-    """Return about that many designs spread over the space, (n, P); fewer where [locus] finds no mechanism for some."""
+    """Choose about ``number`` designs (n, P) spread over the space; fewer where [locus] finds no mechanism."""
     starts = _spread(number, study.space.count)
     matrix, status = runs_matrix(study, [(start, start + 1) for start in starts])
     found: Array = matrix[status == OK]
@@ -247,10 +247,10 @@ def spread_designs(study: Study, number: int) -> Array:
 
 
 def feasible_designs(study: Study, number: int) -> tuple[Array, int]:
-    """Return about that many designs that keep all limits, spread over those found, and how many were tried.
+    """Find about ``number`` designs that keep all limits, spread over the feasible ones, and the number tried.
 
-    512 designs spread over the space go through the limits, then 4096 if none of them keeps all: fitted and on their
-    locus, as those of the sweep.
+    512 designs spread over the space go through the limits, then 4096 if none of these keeps all; they are fitted and
+    on their locus like the designs of the sweep.
     """
     count, tried = study.space.count, 0
     kept = np.empty((0, len(study.family.parameters)))
@@ -267,19 +267,19 @@ def feasible_designs(study: Study, number: int) -> tuple[Array, int]:
 
 
 def spread_rows(designs: Array, number: int) -> Array:
-    """Return so many of the designs, or all if they are fewer, spread evenly over them."""
+    """Select ``number`` of the designs, evenly spread, or all if they are fewer."""
     some = np.unique(np.linspace(0, len(designs) - 1, min(number, len(designs))).astype(int))
     chosen: Array = designs[some]
     return chosen
 
 
 def row_bytes(study: Study) -> int:
-    """Return bytes of one row before it is encoded."""
+    """Return the number of bytes of a row before it is encoded."""
     return sum(np.dtype(column.dtype).itemsize for column in describe_columns(study))
 
 
 def describe_columns(study: Study) -> tuple[Column, ...]:
-    """Return the columns of a chunk in order: design, parameters, outputs, status."""
+    """List the columns of a chunk in order: design, parameters, outputs, status."""
     columns = [Column("design", "int64", "1", "index of the design in the study's design space", "index")]
     columns += [
         Column(p.name, "float64", PARAMETER_UNITS[p.unit], p.text, "parameter") for p in study.family.parameters
@@ -290,7 +290,7 @@ def describe_columns(study: Study) -> tuple[Column, ...]:
 
 
 def error_words(study: Study, name: str) -> str:
-    """Return what the error column of an output holds."""
+    """Definition of an output's error column: proven bound or estimate."""
     return (
         "proven bound of the absolute error"
         if is_proven(study.family, name, study.accuracy)
@@ -307,7 +307,7 @@ def _output_column(study: Study, name: str, dtype: str) -> Column:
 
 @lru_cache
 def code_hash() -> str:
-    """Return the hash of the sources and libraries that determine the values in a chunk."""
+    """Hash the sources and libraries that determine the values in a chunk."""
     import scipy
 
     values = [path for path in DIGESTS if path.split("/")[0] in VALUES]
@@ -316,7 +316,7 @@ def code_hash() -> str:
 
 @lru_cache
 def optimiser_hash() -> str:
-    """Return the hash of the sources that determine the optimum, beyond those of the chunks."""
+    """Hash the sources that determine the optimum, beyond those of the chunks."""
     return _hash_sources([path for path in DIGESTS if path.startswith("optimise/")], code_hash())
 
 
