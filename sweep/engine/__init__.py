@@ -1,1 +1,1 @@
-"""``run``: chunks over the cores, then the optimum and its front; what a run will cost."""
+"""``run``: chunks over the cores, then the optimum and its front; estimates of a run's cost."""

@@ -1,4 +1,4 @@
-"""What a study will cost before it starts, and the refusal of one that costs too much."""
+"""Estimate of a study's time, disk and memory before it starts, and the check against its budget."""
 
 from __future__ import annotations
 
@@ -17,41 +17,41 @@ from sweep.reductions.steps import certified_names, is_windowed
 from sweep.study.load import study_from_data, with_accuracy
 from sweep.study.study import OptimiseSettings, Study
 
-# With no survivor in the pilot, this share is assumed.
+# Share of kept designs that is assumed where the pilot kept none.
 LEAST_KEPT = 1e-3
 COARSEST_TARGET = 0.1
-# Measured: writing a row takes 120 ns, a chunk by itself 5 ms.
+# Measured: writing takes 120 ns per row and 5 ms per chunk.
 WRITE_SECONDS_PER_ROW = 120e-9
 WRITE_SECONDS_PER_CHUNK = 5e-3
-# Measured: what zstd leaves of a result and of its error estimate; a sampled parameter keeps seven of its eight bytes,
-# the parameters of a lattice, design number and status together take less than half a byte a row.
-PACKED_RESULT, PACKED_ERROR = 0.78, 0.55  # 0.3 to 0.8 of an error
+# Measured share of bytes after zstd of a result and of its error estimate; a sampled parameter keeps seven of its
+# eight bytes; lattice parameters, design number and status together take less than half a byte per row.
+PACKED_RESULT, PACKED_ERROR = 0.78, 0.55  # 0.3 to 0.8 for errors
 SAMPLED_VALUE_BYTES = 7.0
 OTHER_BYTES_PER_ROW = 0.5
-# Of a column in a chunk besides its values: 350 to 450 in the footer, with name and definition, and 94 to 137 in pages;
-# of a chunk besides its columns: 2000 to 5500, what determined its values, once as it is and once in base64.
+# Bytes of a column in a chunk besides its values: 350 to 450 in the footer, with name and definition, and 94 to 137 in
+# pages; of a chunk besides its columns: 2000 to 5500 of metadata, once as text and once in base64.
 BYTES_PER_COLUMN, BYTES_PER_CHUNK = 520.0, 2800.0
 
-# Python, numpy, pandas, pyarrow and the compiled kernels.
+# Memory of Python, numpy, pandas, pyarrow and the compiled kernels.
 BASE_MEMORY_BYTES = 350e6
-# A chunk is alive as designs, as outputs and as the table being encoded.
+# A chunk is in memory as designs, as outputs and as the table being encoded.
 COPIES_OF_A_CHUNK = 3
 # Threads share memory bandwidth and the interpreter: two were measured at 1.95 times the speed of one.
 THREAD_EFFICIENCY = 0.97
 
 
-# Looks of a local search in the median, those that tell the price of one, and those that a population of needle drives
-# takes as long as: 27 and 29 s of 9 ms each were measured, without and with room for tolerances.  A search that
-# converges within the time allowed here tells itself how many it takes.
+# Evaluations of a local search in the median, evaluations to compile and time one, and evaluations equivalent to a
+# population of needle drives: 27 and 29 s at 9 ms each were measured, without and with room for tolerances.  If a
+# trial search converges within TRIED_SECONDS, its own number of evaluations is used.
 TYPICAL_LOOKS, TRIED_LOOKS, POPULATION_LOOKS = 300, 40, 3000
 TRIED_SECONDS = 0.5
-NEAR_LOOKS = 75  # of a search of a front, which begins at its neighbour's answer: 56 and 73 were measured
+NEAR_LOOKS = 75  # evaluations of a search of a front, which starts at its neighbour's optimum: 56 and 73 were measured
 REPORT_SECONDS = 5.0
 
 
 @dataclass(frozen=True)
 class Estimate:
-    """Cost of a run; ``kept`` is the share of designs expected to become rows."""
+    """Estimated cost of a run; ``kept`` is the share of designs expected to become rows."""
 
     designs: int
     chunks: int
@@ -70,22 +70,22 @@ def estimate(
     tell: Callable[[int, int], None] = lambda _, __: None,
     known: Pilot | None = None,
 ) -> Estimate:
-    """Estimate a run from the routes' cost figures and a pilot of about a thousand designs spread over the space.
+    """Estimate a run from the routes' costs and a pilot of about a thousand designs spread over the space.
 
     Parameters
     ----------
-    study : the question
-    jobs : workers it will run on
-    tell : called with how many parts of the pilot are done, and how many there are
-    known : the pilot, where it was already sent
+    study : the study
+    jobs : number of workers
+    tell : called with the number of finished parts of the pilot and of all parts
+    known : the pilot, if it has been run already
 
     Returns
     -------
     Estimate
         ``seconds`` of the sweep alone, without the first compilation of the kernels; ``optimise_seconds`` is the time
         the optimiser may take, None without optimiser or budget.  If the pilot keeps no design, one in a thousand is
-        assumed.  ``disk_bytes`` takes every result of a row as computed and free of repetition, which is too much where
-        rows of infeasible designs are kept or symmetries make values repeat.
+        assumed.  ``disk_bytes`` assumes that every result of a row is computed and does not repeat, which is too much
+        where rows of infeasible designs are kept or symmetries make values repeat.
     """
     found = pilot(study, tell) if known is None else known
     chunk_size = choose_chunk_size(study, found)
@@ -100,7 +100,7 @@ def estimate(
     sampled = len(study.space.axes) * SAMPLED_VALUE_BYTES if study.space.kind == "sobol" else 0.0
     chunks = -(-designs // chunk_size)
     work = designs * (found.seconds_per_design + kept * WRITE_SECONDS_PER_ROW)
-    # At the end of a chunk every level works on the designs that wait there, even on a few.
+    # At the end of a chunk every level computes the designs that still wait there, even a few.
     work += chunks * (WRITE_SECONDS_PER_CHUNK + CALL_SECONDS * len(levels(study)))
     return Estimate(
         designs=designs,
@@ -117,14 +117,14 @@ def estimate(
 
 
 def searches(study: Study, jobs: int, known: Pilot) -> tuple[tuple[str, float, float], ...]:
-    """Return the searches after the sweep, with their typical and longest time [s], from measured looks at a design.
+    """List the searches after the sweep with their typical and longest time [s], from timed evaluations of a design.
 
-    A design of the pilot, or a random one, is searched from for a few looks.  Compiling is left out.
+    A short trial search starts at a design of the pilot, or at a random one.  Compilation is not counted.
     """
     settings = study.optimise
     if settings is None or study.objective is None:
         return ()
-    # scipy's minimisers take as long as numpy to import, which a study without a search need not wait for
+    # scipy's minimisers take as long as numpy to import; a study without a search does not wait for them
     from sweep.optimise.front import pareto
     from sweep.optimise.local.start import search
     from sweep.optimise.multistart.survey import MET, TOGETHER
@@ -164,11 +164,12 @@ def searches(study: Study, jobs: int, known: Pilot) -> tuple[tuple[str, float, f
 
 
 def _robust_looks(settings: OptimiseSettings, settled: int | None) -> tuple[int, int]:
-    """Return looks of the searches with room for tolerances: typical, and where none of them converges.
+    """Estimate the evaluations of the searches with room for tolerances: typical, and if none converges.
 
-    Those of needle drives use up what is allowed: 9 to 14 s of each start and 33 to 41 s of each end were measured,
-    samples included, where 1600 and 4000 looks take 14 and 36 s.  Where a search has ``settled`` after so many looks,
-    each round of search takes as many at most.  Without populations no more are begun than there are starts.
+    Searches of needle drives use all evaluations they are allowed: 9 to 14 s per start and 33 to 41 s per end were
+    measured, samples included, where 1600 and 4000 evaluations take 14 and 36 s.  Where a trial search has ``settled``
+    after some number of evaluations, each round takes at most that many.  Without populations no more searches are
+    begun than there are starts.
     """
     from sweep.optimise.manufacture import robust
 
@@ -184,9 +185,9 @@ def _robust_looks(settings: OptimiseSettings, settled: int | None) -> tuple[int,
 def other_accuracies(
     study: Study, jobs: int, tell: Callable[[int, int], None] = lambda _, __: None, known: Pilot | None = None
 ) -> tuple[tuple[str, float], ...]:
-    """Return the estimated time [s] of the same sweep at other accuracies, each accuracy in words.
+    """Estimate the time [s] of the same sweep at other accuracies, each described in words.
 
-    ``tell`` is called with how many of them are done, and how many there are.  ``known`` is the pilot of the study.
+    ``tell`` is called with the number of finished estimates and of all estimates.  ``known`` is the pilot of the study.
     """
     sent = pilot(study) if known is None else known
     found, others = [], neighbours(study)
@@ -197,10 +198,10 @@ def other_accuracies(
 
 
 def neighbours(study: Study) -> tuple[tuple[str, Study], ...]:
-    """Return the same study with one digit less and one more, or half and twice the samples; in words, and the study.
+    """List the same study with one digit less and one more, or half and twice the samples, each with a description.
 
-    With a target also without the proof of its maxima, or with it where they have one.  An accuracy outside the range
-    of `sweep.summarise` is left out.
+    With a target also without the proof of its maxima, or with it where its maxima can be proven.  An accuracy outside
+    the range of `sweep.summarise` is left out.
     """
     target, samples = study.accuracy.target, study.accuracy.samples
     if target is not None:
@@ -226,12 +227,12 @@ def neighbours(study: Study) -> tuple[tuple[str, Study], ...]:
 
 
 def check_budget(study: Study, cost: Estimate) -> None:
-    """Refuse a study whose estimate is over its budget ([budget] in the file: 20 GB and 1 h unless it says otherwise).
+    """Raise if a study's estimate exceeds its budget ([budget] in the file; 20 GB and 1 h by default).
 
     Raises
     ------
     BudgetError
-        names what is over, by how much, and the way out.
+        with the estimate, the budget and the way out.
     """
     over = []
     if cost.seconds > study.budget.seconds:
@@ -246,7 +247,7 @@ def check_budget(study: Study, cost: Estimate) -> None:
 
 
 def duration(seconds: float) -> str:
-    """Return a time, in words."""
+    """Write a time in words."""
     for below, unit in ((1e-6, "ns"), (1e-3, "us"), (1.0, "ms")):
         if 0.0 < seconds < below:
             return f"{float(f'{seconds / below * 1e3:.3g}'):g} {unit}"

@@ -1,4 +1,4 @@
-"""The plan a run begins with: that of the folder if it is this study's, otherwise a new one; other data stay apart."""
+"""Opening of a dataset folder: its plan if it is this study's, otherwise a new one; other data are set aside."""
 
 from __future__ import annotations
 
@@ -13,16 +13,16 @@ from sweep.dataset import chunk_files, files, store
 from sweep.dataset.files import TABLES
 from sweep.study import Study
 
-MOST = 6  # differences that are reported
+MOST = 6  # differences that are reported at most
 
-# What concerns only these designs; the report about them as well.
+# Files that belong to these designs only, their report included.
 OWN_FILES = (files.PLAN, *files.OF_OPTIMUM, files.PARETO, "report.html")
 
 
 def open_plan(study: Study, folder: Path, force: bool, chunk_size: int | None = None) -> Plan:
-    """Return the plan in the folder if it is this study's, otherwise a new one; foreign data only go with ``force``.
+    """Return the plan in the folder if it is this study's, otherwise a new one; foreign data need ``force``.
 
-    ``chunk_size`` is that of a new plan, where an estimate has told it already.
+    ``chunk_size`` is that of a new plan, if an estimate has chosen it already.
     """
     noted = files.read_plan(folder)
     if noted is not None:
@@ -46,7 +46,7 @@ def open_plan(study: Study, folder: Path, force: bool, chunk_size: int | None = 
 
 
 def _differs_in_limits_only(study: Study, noted: dict[str, Any], plan: Plan) -> bool:
-    """Return whether the designs of a dataset can be sorted anew: every row and every bit of it has been kept."""
+    """Whether stored designs can be sorted by new limits: all rows were kept in float64, only limits changed."""
     apart = ("limits", *NOT_IN_CHUNKS)
     before, now = ({k: v for k, v in data.items() if k not in apart} for data in (noted.get("data") or {}, study.data))
     kept = study.output.keep == "all" and study.output.dtype == "float64"
@@ -56,7 +56,7 @@ def _differs_in_limits_only(study: Study, noted: dict[str, Any], plan: Plan) -> 
 
 
 def _with_other_limits(study: Study, folder: Path, plan: Plan) -> Plan:
-    """Set the chunks aside and note where: their designs are sorted by the new limits."""
+    """Set the chunks aside and note their folder in the plan: their designs are sorted by the new limits."""
     where = old_name()
     own = [files.beside(folder) / name for name in OWN_FILES]
     files.set_aside(
@@ -67,24 +67,24 @@ def _with_other_limits(study: Study, folder: Path, plan: Plan) -> Plan:
 
 
 def known_folder(folder: Path) -> Path | None:
-    """Return the folder of the chunks that those of this dataset are made from."""
+    """Folder of the chunks from which this dataset's chunks are recomputed; None if there is none."""
     where = (files.read_plan(folder) or {}).get("known")
     return files.beside(folder) / where if isinstance(where, str) else None
 
 
 def is_part(folder: Path) -> bool:
-    """Return whether the folder is for some of the chunks only, as ``sweep split`` makes it."""
+    """Whether the folder is for some of the chunks only, as ``sweep split`` makes it."""
     return "part" in (files.read_plan(folder) or {})
 
 
 def part_range(folder: Path, chunks: int) -> range:
-    """Return indices of the chunks that belong into the folder."""
+    """Range of the chunk indices that belong in the folder."""
     first, stop = (files.read_plan(folder) or {}).get("part", (0, chunks))
     return range(first, stop)
 
 
 def _conflict(study: Study, noted: dict[str, Any], plan: Plan) -> str:
-    """Name the differences between the data in the folder and those that this run would compute."""
+    """Describe how the data in the folder differ from those that this run would compute."""
     before, now = (
         {key: value for key, value in data.items() if key not in NOT_IN_CHUNKS}
         for data in (noted.get("data") or noted["chunk_data"], study.data)
@@ -105,17 +105,17 @@ def _set_foreign_aside(folder: Path, plan: Plan, others: tuple[str, ...]) -> Non
 
 
 def old_name() -> str:
-    """Return the name under which data are set aside now."""
+    """Name of the folder for data that are set aside now."""
     return f"{files.OLD}/{time.strftime('%Y%m%d-%H%M%S')}"
 
 
 def words_of(study: Study) -> dict[str, Any]:
-    """Return what a plan says of its study, down to what decides no value: reports are written from it."""
+    """Return what a plan notes of its study, reporting sections included, so that reports need no study file."""
     return {"about": {"name": study.name, "title": study.title, "question": study.question}, "data": study.data}
 
 
 def plan_note(study: Study, folder: Path, plan: Plan) -> dict[str, Any]:
-    """Return the content of ``_plan.json``, with what an earlier run noted of the optimum."""
+    """Return the content of ``_plan.json``, with an earlier run's notes about the optimum."""
     noted = files.read_plan(folder) or {}
     return plan.as_dict() | {
         **words_of(study),
@@ -132,7 +132,7 @@ def plan_note(study: Study, folder: Path, plan: Plan) -> dict[str, Any]:
 
 
 def differences(old: Mapping[str, Any], new: Mapping[str, Any]) -> list[str]:
-    """Return keys whose values differ, such as ``limits.swing.min 170 -> 50 deg``; at most six of them."""
+    """Describe keys whose values differ, such as ``limits.swing.min 170 -> 50 deg``; at most six of them."""
     found = list(_lines(old, new, ""))
     more = [f"and {len(found) - MOST} more"] if len(found) > MOST else []
     return found[:MOST] + more

@@ -1,4 +1,4 @@
-"""A study in parts for batch systems: ``split`` fixes the cut, every part is a run of its own, ``merge`` joins them."""
+"""A study in parts for batch systems: ``split`` fixes the cut, each part is its own run, ``merge`` joins them."""
 
 from __future__ import annotations
 
@@ -18,17 +18,17 @@ MOST_PARTS = 10_000
 
 
 def split(study: str | Path, out: str | Path, parts: int, *, smoke: bool = False) -> list[Path]:
-    """Cut a study once, and make a folder for each of several runs that may go on at the same time.
+    """Cut a study into chunks once, and make a folder for each of several runs that may go on at the same time.
 
-    Each part is a run of consecutive chunks of one and the same cut.  ``sweep run STUDY --out PART`` computes it and
-    nothing else, wherever it runs; :func:`merge` brings the chunks together.  Optimum and front are searched by the
-    run of the whole dataset afterwards.
+    Each part is a run of consecutive chunks of one and the same cut.  ``sweep run STUDY --out PART`` computes only that
+    part, on any machine; :func:`merge` brings the chunks together.  Optimum and front are searched afterwards by a run
+    of the whole dataset.
 
     Parameters
     ----------
     study : study file or its folder
     out : folder of the chunks of the whole dataset
-    parts : how many; no more than there are chunks are made
+    parts : number of parts; at most as many as there are chunks are made
     smoke : take the study's tiny version
 
     Returns
@@ -65,7 +65,7 @@ def split(study: str | Path, out: str | Path, parts: int, *, smoke: bool = False
 
 @dataclass(frozen=True)
 class Merged:
-    """What :func:`merge` did: chunks that came in, those still missing, damaged ones that were left where they are."""
+    """Result of :func:`merge`: chunks taken in, chunks still missing, damaged chunks left where they are."""
 
     folder: Path
     taken: int
@@ -74,7 +74,7 @@ class Merged:
 
 
 def merge(study: str | Path, out: str | Path, *, smoke: bool = False) -> Merged:
-    """Link the finished chunks of all parts into the dataset; it may be called as often as one likes.
+    """Link the finished chunks of all parts into the dataset; it may be called repeatedly.
 
     Parameters
     ----------

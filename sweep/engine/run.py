@@ -1,6 +1,6 @@
-"""``run``: a study's design space over the cores, chunk by chunk, into a dataset folder; resumable at any moment.
+"""``run``: computes a study's design space, chunk by chunk on all cores, into a dataset folder; resumable any time.
 
-The log of a dataset says of each run who, when, where, by which command, with which versions.
+The log of a dataset records process, time, machine, command and versions of each run.
 """
 
 from __future__ import annotations
@@ -42,14 +42,14 @@ LIBRARIES = ("linksweep", "numpy", "numba", "llvmlite", "scipy", "pandas", "pyar
 
 
 def command(study: Study, folder: Path, smoke: bool, accuracy: float | None, certify: bool | None) -> str:
-    """Return the command that makes the dataset again."""
+    """Return the command that reproduces the dataset."""
     words = ["sweep", "run", str(study.path), "--out", str(folder), *(["--smoke"] if smoke else [])]
     words += [] if accuracy is None else ["--accuracy", repr(accuracy)]
     return shlex.join([*words, *(["--certify"] if certify else [])])
 
 
 def circumstances(jobs: int, backend: str) -> dict[str, Any]:
-    """Return the circumstances of a run, which may differ between runs that give the same bytes."""
+    """Record the circumstances of a run, which do not affect its bytes."""
     return {
         "time": time.strftime("%Y-%m-%dT%H:%M:%SZ", time.gmtime()),
         "host": socket.gethostname(),
@@ -64,7 +64,7 @@ def circumstances(jobs: int, backend: str) -> dict[str, Any]:
 
 
 def _commit() -> str | None:
-    """Return the commit of the sources, None where they are not a git work tree or there is no git."""
+    """Commit of the sources; None where they are not a git work tree or git is missing."""
     line = ["git", "-C", str(Path(__file__).resolve().parent), "rev-parse", "HEAD"]
     try:
         done = subprocess.run(line, capture_output=True, text=True, check=False, timeout=10)
@@ -75,7 +75,7 @@ def _commit() -> str | None:
 
 @contextmanager
 def logged(folder: Path, said: str, jobs: int, backend: str) -> Iterator[list[str]]:
-    """Log the start of a run and its end: the error that ended it, or what the caller appends to the list."""
+    """Log the start and the end of a run: the error that ended it, or the words that the caller appends to the list."""
     head = {"run": uuid.uuid4().hex[:12]}
     begin = time.monotonic()
     files.append_run(folder, head | {"event": "start", "command": said} | circumstances(jobs, backend))
@@ -93,10 +93,10 @@ def _end(begin: float, outcome: str, text: str) -> dict[str, Any]:
     return {"event": "end", "outcome": outcome, "seconds": round(time.monotonic() - begin, 3), "text": text}
 
 
-# So many steps of a sweep are as soon compiled one after the other: to begin a process costs 3 s of processor time.
+# Up to this many steps of a sweep are compiled one after the other: a process costs 3 s of processor time to start.
 ALIKE = 4
 
-# How often chunks that were removed or damaged during the run are computed again.
+# Number of times that chunks removed or damaged during the run are computed again.
 ROUNDS = 3
 
 
@@ -112,23 +112,23 @@ def run(
     certify: bool | None = None,
     progress: bool = False,
 ) -> Path:
-    """Compute a study's designs into a folder, continuing where an earlier run stopped; then its optimum if it asks.
+    """Compute a study's designs into a folder, continuing an earlier run, then its optimum if the study asks for it.
 
     The bytes of the chunks do not depend on jobs, backend, or interruptions.
 
     Parameters
     ----------
     study : study file, its folder, or a loaded study
-    out : folder of the chunks; default ``results/<name>/designs`` (``results/smoke/<name>/designs``).  The rest lies
-        beside it: in the parent of a folder called ``designs``, in ``<out>.meta`` next to any other
-    jobs : workers
+    out : folder of the chunks; default ``results/<name>/designs`` (``results/smoke/<name>/designs``).  All other files
+        lie in the parent of a folder called ``designs``, in ``<out>.meta`` next to any other
+    jobs : number of workers
     backend : "threading" (the kernels release the lock), "loky" (processes), "dask" (a cluster of processes on this
         machine), "dask=tcp://HOST:8786" (the Dask cluster at that address, docs/cluster.md), or another of
         ``sweep.jobs.executors.EXECUTORS``
     smoke : take the study's tiny version
-    force : run whatever the budget says, and set data of another study or code in the folder aside into ``_old/``
+    force : ignore the budget, and set data of another study or code in the folder aside into ``_old/``
     accuracy : relative accuracy of the extrema in place of the study's own
-    certify : whether the wanted maxima are proven, in place of the study's own word
+    certify : whether the wanted maxima are proven, in place of the study's own setting
     progress : bar on a terminal, lines in a log
 
     Returns
@@ -143,8 +143,8 @@ def run(
     BudgetError
         if the estimate exceeds the study's budget (3)
     WorkerDied, StoreError, LockedError, TimeUsedUp, Interrupted
-        worker killed (70), disk full or forbidden (74), folder in use (75), the budget's time or that of the optimiser
-        over (124), signal (130, 143); finished chunks and what was found of the optimum stay.
+        worker killed (70), disk full or forbidden (74), folder in use (75), time of the budget or of the optimiser over
+        (124), signal (130, 143); finished chunks and the optimum found so far stay.
 
     Examples
     --------
@@ -153,7 +153,7 @@ def run(
     >>> len(sweep.load(folder))
     4
     """
-    place = executor(backend, jobs)  # refuses what there is not
+    place = executor(backend, jobs)  # raises for an unknown backend
     model = _model(study, smoke, accuracy, certify)
     refuse_unprovable(model)
     with stages(*stages_of(model)):
@@ -178,7 +178,7 @@ def _model(study: str | Path | Study, smoke: bool, accuracy: float | None, certi
 
 @dataclass(frozen=True)
 class KernelStep:
-    """Compiles or loads what a study needs, by number: the kernels of each step of its sweep, then of its descents."""
+    """Compiles or loads a study's kernels by number: those of each step of its sweep, then of its descents."""
 
     study: Study
 
@@ -188,12 +188,12 @@ class KernelStep:
 
     @property
     def count(self) -> int:
-        """How many numbers there are."""
+        """Number of steps."""
         settings = self.study.optimise
         return len(asked_outputs(self.study)) + (settings is not None and settings.globally == "proportions")
 
     def __call__(self, number: int, should_stop: Callable[[], bool] = lambda: False) -> int:
-        """Return the number once its kernels are ready."""
+        """Compile or load the kernels of a step, and return its number."""
         if number < len(asked_outputs(self.study)):
             warm_step(self.study, number)
         else:
@@ -202,10 +202,10 @@ class KernelStep:
 
 
 def _compile(study: Study, jobs: int, phases: Phases) -> None:
-    """Load or compile every kernel the study needs; once one had to be compiled, those behind it are in processes.
+    """Load or compile every kernel the study needs; after the first that had to be compiled, in processes.
 
-    The last, of the descents, take longest to compile and come first there.  A few steps of a sweep share most of what
-    they need, and are compiled here.
+    The kernels of descents come last, take longest to compile and are begun first by the processes.  A few remaining
+    steps of a sweep share most of their kernels, and are compiled in this process.
     """
     step = KernelStep(study)
     count = step.count
@@ -220,11 +220,11 @@ def _compile(study: Study, jobs: int, phases: Phases) -> None:
                 for done, _ in enumerate(ready, k + 2):
                     phases.say("compiling", done, count)
             stop.raise_if_signalled("compiling", "what is compiled is")
-            jobs = 1  # the rest is loaded
+            jobs = 1  # all later steps are loaded
 
 
 def _within_budget(study: Study, jobs: int, tell: Callable[[int, int], None]) -> int:
-    """Return designs per chunk of a study whose estimate is within its budget."""
+    """Check the study's estimate against its budget, and return the designs per chunk."""
     cost = estimate(study, jobs, tell)
     check_budget(study, cost)
     return cost.chunk_size
@@ -233,7 +233,7 @@ def _within_budget(study: Study, jobs: int, tell: Callable[[int, int], None]) ->
 def _sweep(
     study: Study, folder: Path, jobs: int, place: Executor, force: bool, chunk_size: int | None, progress: bool
 ) -> int:
-    """Compute the missing chunks and note the totals; returns the number of chunks computed."""
+    """Compute the missing chunks and write the totals to the plan; returns the number of chunks computed."""
     computed = 0
     with stop_on_signal() as stop, Phases(progress) as phases:
         reading = "reading what is there"
@@ -264,7 +264,7 @@ def _sweep(
 def _compute(
     task: ChunkTask, missing: list[int], jobs: int, place: Executor, stop: Stop, force: bool, progress: bool
 ) -> int:
-    """Compute these chunks; returns their number."""
+    """Compute the missing chunks; returns their number."""
     study, plan, folder = task.study, task.plan, task.folder
     failure: Exception | None = None
     allowed = math.inf if force else study.budget.seconds
@@ -290,10 +290,10 @@ def _compute(
 def _results(
     task: ChunkTask, missing: list[int], jobs: int, place: Executor, stop: Stop, allowed: float
 ) -> Iterator[Done]:
-    """Yield finished chunks in the order they become ready; no new one is begun when the allowed time [s] is over."""
+    """Yield finished chunks in the order they become ready; none is begun after the allowed time [s]."""
     with stop.raising():
         warm(task.study)  # one process compiles, the others load the machine code
-    deadline = time.monotonic() + allowed  # compiling does not count, so that every run gets on
+    deadline = time.monotonic() + allowed  # compiling does not count, so that every run makes progress
     todo = (index for index in missing if not stop and time.monotonic() < deadline)
     try:
         yield from for_tasks(place, len(missing)).outcomes(task, todo, jobs, stop)

@@ -1,4 +1,4 @@
-"""The stages of a run after its sweep: the optimum, the proof and the front that its study asks for."""
+"""Stages of a run after its sweep: the optimum, the proof and the front, as far as the study asks for them."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ from sweep.study import Study
 
 
 def search(study: Study, folder: Path, jobs: int, backend: str, progress: bool) -> None:
-    """Compute those of optimum, proof and front that the study asks for."""
+    """Compute optimum, proof and front, as far as the study asks for them."""
     if study.optimise is not None:
         _optimise(replace(study, pareto=None), folder, jobs, progress)
     proof_cut_short = prove(study, folder, jobs, backend, progress)
@@ -35,7 +35,7 @@ def search(study: Study, folder: Path, jobs: int, backend: str, progress: bool) 
 
 
 def stages_of(study: Study) -> tuple[str, ...]:
-    """Name the stages of a run in their order, as its progress does."""
+    """List the stages of a run in order, by the labels of its progress."""
     found, settings = ["compiling", "planning", study.name], study.optimise
     if settings is not None:
         robust = study.tolerance is not None and study.tolerance.robust is not None
@@ -46,13 +46,13 @@ def stages_of(study: Study) -> tuple[str, ...]:
 
 
 def optimum_key(study: Study, note: Mapping[str, Any]) -> str:
-    """Name what an optimum or a front depends on: chunks by their plan's note, study, the optimiser's sources."""
+    """Key of all that an optimum or a front depends on: identity of the chunks, study, optimiser's sources."""
     return f"{note['identity']}-{study.fingerprint[:12]}-{plans.optimiser_hash()}"
 
 
 @contextmanager
 def _stoppable(folder: Path, words: str) -> Iterator[Stop]:
-    """Let a signal set the flag within this context, and say what it has stopped."""
+    """Let a signal set the flag within this context; an interruption is raised with the words of what it stopped."""
     with stop_on_signal() as stop:
         try:
             yield stop
@@ -62,7 +62,7 @@ def _stoppable(folder: Path, words: str) -> Iterator[Stop]:
 
 
 def _optimise(study: Study, folder: Path, jobs: int, progress: bool) -> None:
-    """Run the optimiser unless its result for these very sources is there already, whole."""
+    """Run the optimiser unless an intact result for this key is there already."""
     note = files.read_plan(folder) or {}
     key = optimum_key(study, note)
     place = files.beside(folder)
@@ -79,7 +79,7 @@ def _optimise(study: Study, folder: Path, jobs: int, progress: bool) -> None:
 
 
 def _raise_if_cut_short(folder: Path) -> None:
-    """Raise where the optimum is written but the deadline has kept some starts from being searched."""
+    """Raise if the optimum is written but its time limit left some starts unsearched."""
     found = optimise.read_survey(files.beside(folder) / files.OPTIMUM)
     if found is not None and found.ended == "time":
         text = f"{folder}: {found.warnings[0]} searched; run again with a greater optimise.time_budget for all of them"
@@ -87,7 +87,7 @@ def _raise_if_cut_short(folder: Path) -> None:
 
 
 def _front(study: Study, folder: Path, jobs: int, progress: bool) -> None:
-    """Search the study's front, from where an earlier run of these very sources left it."""
+    """Search the study's front, continuing an earlier run with the same key."""
     if study.pareto is None:
         (files.beside(folder) / files.PARETO).unlink(missing_ok=True)
         return
@@ -99,7 +99,7 @@ def _front(study: Study, folder: Path, jobs: int, progress: bool) -> None:
     if damaged:
         (place / files.PARETO).unlink(missing_ok=True)
     if files.PARETO in known and (damaged or metadata(place / files.PARETO).get(b"key") != key.encode()):
-        del known[files.PARETO]  # it belongs to a finished front: the new one grows step by step
+        del known[files.PARETO]  # the hash of an earlier front: the new one grows step by step
         files.write_plan(folder, note | {TABLES: known})
     with _stoppable(folder, "searching the front; run again to continue") as stop, Phases(progress) as phases:
         optimise.front_study(study, folder, key, lambda: bool(stop), jobs, phases.say)
@@ -108,29 +108,29 @@ def _front(study: Study, folder: Path, jobs: int, progress: bool) -> None:
 
 
 def refuse_unprovable(study: Study) -> None:
-    """Refuse a study that asks for a proof of what cannot be proven, before it has computed anything.
+    """Raise before anything is computed if the study asks for a proof that is not possible.
 
     Raises
     ------
     InputError
-        with what is allowed.
+        with the allowed values.
     """
     if study.optimise is not None and study.optimise.prove is not None:
         question_of(study)
 
 
 def prove(study: Study, folder: Path, jobs: int, backend: str, progress: bool) -> bool:
-    """Prove what ``optimise.prove`` asks for, going on where an earlier run stopped; nothing where it asks for nothing.
+    """Compute the proof that ``optimise.prove`` asks for, continuing an earlier run; returns False without it.
 
     Returns
     -------
     bool
-        whether its emergency brake, ``optimise.prove.time``, has pulled.
+        whether its time limit, ``optimise.prove.time``, has ended it.
 
     Raises
     ------
     InputError
-        if the study asks for what cannot be proven
+        if the study asks for a proof that is not possible
     Interrupted
         by a signal; finished work is kept.
     """
@@ -149,7 +149,7 @@ def prove(study: Study, folder: Path, jobs: int, backend: str, progress: bool) -
 
 
 def _proven(study: Study, folder: Path, jobs: int, backend: str, progress: bool) -> Proof:
-    """Judge the boxes, on as many cores as there are workers."""
+    """Run the proof over the boxes, on as many cores as there are workers."""
     assert study.optimise is not None and study.optimise.prove is not None
     boxes = study.optimise.prove.boxes
     words = "proving; run again to continue"

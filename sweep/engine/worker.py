@@ -1,4 +1,4 @@
-"""The task of a worker, in any process: compute one chunk, write it, return its numbers."""
+"""Task of a worker in any process: compute one chunk, write it, return its counts."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from sweep.errors import InputError, LinksweepError, ProgramFault, StoreError, W
 from sweep.families.base import Columns
 from sweep.study import Study
 
-# What the loader says of a library for which there is no memory.
+# Message of the loader for a library that does not fit into memory.
 UNMAPPED = "failed to map segment"
 
 
@@ -34,10 +34,10 @@ class Done:
 class ChunkTask:
     """Compute and write a chunk of a study.
 
-    An error is handed back as a value: the other workers finish what they hold, and the parent raises it when all is
-    quiet.  A worker whose sources are not those of the plan computes nothing.
+    An error is returned as a value: the other workers finish their chunks, and the parent raises it at the end.  A
+    worker whose sources differ from those of the plan computes nothing.
 
-    In the folder ``known`` lie the same chunks under other limits.
+    The folder ``known`` holds the same chunks under other limits.
     """
 
     study: Study
@@ -50,7 +50,7 @@ class ChunkTask:
         return self.__dict__ | {"study": replace(self.study)}
 
     def __call__(self, number: int, should_stop: Callable[[], bool]) -> Done:
-        """Return the chunk of that index, unless ``should_stop`` answers true before it is ready."""
+        """Compute and write a chunk by its index, unless ``should_stop`` returns true before it is ready."""
         start, end = self.plan.bounds(number)
         try:
             self._check_sources()
@@ -80,7 +80,7 @@ class ChunkTask:
             return None
         try:
             rows = [part.rows() for part in parts(self.known) if part.index == number]
-        except StoreError:  # damaged since: it is computed
+        except StoreError:  # damaged in the meantime: the chunk is computed instead
             return None
         return {str(name): rows[0][name].to_numpy() for name in rows[0].columns} if len(rows) == 1 else None
 
