@@ -1,1 +1,1 @@
-"""The folder a sweep leaves behind: immutable Parquet chunks, their lock and their comparison."""
+"""Dataset folder of a sweep: immutable Parquet chunks, lock, reading, comparison and verification."""

@@ -1,12 +1,11 @@
-"""The chunks of a dataset: Parquet files whose names say what they hold, written once, read back with proof.
+"""Chunk files of a dataset: Parquet files named by content, written once, checked when they are read.
 
-A chunk is written beside the folder of designs, brought to the disk, renamed into it, and never touched again.
-Its name
+A chunk is written beside the folder of designs, flushed to disk, renamed into the folder, and never changed.  Its name
 
     part-<index>-<identity of study, code, cut and columns>-<hash of the file>.parquet
 
-says what it holds and whether it is whole, so the folder needs no manifest and survives a kill at any moment.
-Index and identity stand in the file's metadata too, so a file under another chunk's name is noticed.
+says what it holds and whether it is whole, so the folder needs no manifest and survives a kill at any moment.  The
+file's metadata repeat index and identity, so a file under another chunk's name is noticed.
 """
 
 from __future__ import annotations
@@ -32,11 +31,11 @@ if TYPE_CHECKING:
     from sweep.chunks.plan import Plan
 
 METADATA = b"linksweep"
-MOST_BYTES = 2**30  # of a chunk; they are planned to be a thirtieth of that
-ROWS_PER_BATCH = 262_144  # at most, of what is read at a time
+MOST_BYTES = 2**30  # largest size of a chunk; chunks are planned to have a thirtieth of it
+ROWS_PER_BATCH = 262_144  # rows that are read at a time, at most
 REMEDY = "run the study again to have it computed anew"
 
-# What the metadata of a chunk say at least, and as what.
+# Required metadata of a chunk, and their types.
 ABOUT_TYPES = {"chunk": int, "identity": str, "start": int, "stop": int, "counts": dict, "missed": dict}
 
 _PART = re.compile(r"part-(\d{6,})-([0-9a-f]{12})-([0-9a-f]{16})\.parquet")
@@ -46,7 +45,7 @@ STATUS_NAMES = {value: name for name, value in vars(codes).items() if name.isupp
 
 @dataclass(frozen=True)
 class Part:
-    """A chunk file by its name."""
+    """A chunk file, described by its name."""
 
     path: Path
     index: int
@@ -54,12 +53,12 @@ class Part:
     digest: str
 
     def read(self) -> tuple[pq.ParquetFile, dict[str, Any]]:
-        """Read the file, and open what it holds; with what its metadata say (see `about`).
+        """Read the whole file, check its hash, and return the opened Parquet file and its metadata (see `about`).
 
         Raises
         ------
         StoreError
-            if it is damaged, or is another chunk than its name says.
+            if the file is damaged, or holds another chunk than its name says.
         """
         import pyarrow as pa
 
@@ -76,12 +75,12 @@ class Part:
         return found
 
     def check_file(self) -> None:
-        """See that a file of a chunk's size is there, before anybody opens it: a pipe would never end.
+        """Check that the path is a file of plausible size before it is opened: reading a pipe would never end.
 
         Raises
         ------
         StoreError
-            if it is a folder, a pipe, a link that leads nowhere, or too large.
+            if it is a folder, a pipe or a broken link, or too large.
         """
         with store_errors(self.path):
             sound = self.path.is_file() and self.path.stat().st_size <= MOST_BYTES
@@ -90,12 +89,12 @@ class Part:
 
 
 def about(part: Part) -> dict[str, Any]:
-    """Return what a chunk's metadata say of it: study, code, identity, index, range of designs, counts.
+    """Read the metadata of a chunk: study, code, identity, index, range of designs, counts.
 
     Raises
     ------
     StoreError
-        if the metadata cannot be read, or are those of another chunk than the name says.
+        if the metadata cannot be read, or belong to another chunk than the name says.
     """
     part.check_file()
     return _opened(part, part.path)[1]
@@ -124,26 +123,26 @@ def _opened(part: Part, source: Path | pa.BufferReader) -> tuple[pq.ParquetFile,
 
 
 def content_hash(data: bytes) -> str:
-    """Return the hash that stands at the end of a chunk's name."""
+    """Hash at the end of a chunk's file name."""
     return hashlib.sha256(data).hexdigest()[:16]
 
 
 def part_of(path: Path) -> Part | None:
-    """Return the chunk file by its name; None if the name is no chunk's."""
+    """Parse the file name of a chunk; None for any other name."""
     match = _PART.fullmatch(path.name)
     return None if match is None else Part(path, int(match[1]), match[2], match[3])
 
 
 def parts(folder: Path) -> list[Part]:
-    """Return the chunk files by their names, in design order.
+    """List the chunk files of a folder in design order.
 
     Raises
     ------
     InputError
-        if the folder holds something else: other readers would take it for a part of the data.
+        if the folder holds other files, which Parquet readers would take for data.
     """
     found, strangers = listing(folder)
-    strangers = [path for path in strangers if not path.name.startswith("_")]  # pandas and pyarrow pass these over
+    strangers = [path for path in strangers if not path.name.startswith("_")]  # pandas and pyarrow ignore these
     if strangers:
         names = ", ".join(path.name for path in strangers[:3])
         raise InputError("file", names, "chunks named part-<index>-<identity>-<hash>.parquet", str(folder))
@@ -151,9 +150,9 @@ def parts(folder: Path) -> list[Part]:
 
 
 def listing(folder: Path) -> tuple[list[Part], list[Path]]:
-    """Return the chunks of a folder by their names, in design order, and all other entries; no file is opened.
+    """List the chunks of a folder in design order, and all other entries; no file is opened.
 
-    A hidden file is nobody's data.
+    Hidden files are ignored.
     """
     with store_errors(folder):
         entries = sorted(path for path in folder.iterdir() if path.name[0] != ".") if folder.is_dir() else []
@@ -163,20 +162,20 @@ def listing(folder: Path) -> tuple[list[Part], list[Path]]:
 
 
 def is_whole(part: Part) -> bool:
-    """Return whether the file is what its name says."""
+    """Whether the file is undamaged and holds the chunk that its name says."""
     try:
         part.read()
     except StoreError as error:
-        if isinstance(error.__cause__, OSError):  # the disk refuses: that says nothing of the chunk
+        if isinstance(error.__cause__, OSError):  # a read error of the disk says nothing about the chunk
             raise
         return False
     return True
 
 
 def batches(paths: Iterable[Path], columns: list[str] | None = None) -> Iterator[pa.RecordBatch]:
-    """Yield all rows of chunks, or some columns of them, in their order.
+    """Yield all rows of chunks, or some columns of them, in order.
 
-    Columns are read one after the other: in chunks as small as most are, threads would take longer than the reading.
+    Columns are read without threads, which would take longer than the reading for chunks of the usual size.
     """
     import pyarrow.parquet as pq
 
@@ -186,19 +185,19 @@ def batches(paths: Iterable[Path], columns: list[str] | None = None) -> Iterator
 
 
 def check_columns(chunks: Sequence[Part], schemas: Iterable[pa.Schema] = ()) -> None:
-    """Refuse chunks that can be read and have not the columns of the first one; ``schemas`` are theirs if known.
+    """Check that all chunks have the columns of the first one; ``schemas`` are those of the chunks, if known.
 
     Raises
     ------
     StoreError
-        for the first such chunk, with the columns that differ.
+        for the first chunk with other columns; the message names those that differ.
     """
     names: list[str] = []
     for part, schema in zip(chunks, schemas or map(_schema, chunks), strict=True):
         found = schema.names
         names = names or found
         if found != names:
-            part.read()  # a damaged name is no other column
+            part.read()  # a damaged file is reported as such
             apart = ", ".join(sorted({*names} ^ {*found})) or "their order"
             raise StoreError(
                 f"{part.path}: other columns than {chunks[0].path.name} ({apart}); move it away, then run again"
@@ -218,18 +217,18 @@ def _schema(part: Part) -> pa.Schema:
 
 
 def missing_chunks(folder: Path, chunks: list[Part]) -> list[int]:
-    """List the indices of the chunks that the folder's chunks, or its plan, announce and that are not there."""
+    """List the indices of missing chunks; their number is taken from the first chunk, or from the plan."""
     plan = read_plan(folder) or {}
     count = about(chunks[0]).get("chunks") if chunks else None
     return sorted(set(range(plan.get("chunks", 0) if count is None else count)) - {part.index for part in chunks})
 
 
 def encode(plan: Plan, index: int, result: ChunkResult) -> bytes:
-    """Return the Parquet file of a chunk; equal input gives equal bytes.
+    """Encode a chunk as a Parquet file; equal input gives equal bytes.
 
-    Parameters that repeat (lattice axes, fixed values) are dictionary-encoded, everything else byte-stream-split,
-    all under zstd.  The file's metadata say what determined the values, the fields' metadata unit and definition.
-    Every page carries a checksum, which readers verify if they are asked to.
+    Parameters that repeat (lattice axes, fixed values) are dictionary-encoded, all other columns byte-stream-split, all
+    compressed by zstd.  The file's metadata hold all that determined the values, the fields' metadata unit and
+    definition.  Every page has a checksum, which readers verify on request.
     """
     import pyarrow as pa
     import pyarrow.parquet as pq
@@ -261,7 +260,7 @@ def encode(plan: Plan, index: int, result: ChunkResult) -> bytes:
 
 
 def write_chunk(folder: Path, plan: Plan, index: int, result: ChunkResult) -> Path:
-    """Write one chunk so that at every moment its final name holds either nothing or the whole file."""
+    """Write one chunk atomically: its final name never holds an incomplete file."""
     data = encode(plan, index, result)
     path = folder / f"part-{index:06d}-{plan.identity}-{content_hash(data)}.parquet"
     write_atomically(path, data, beside(folder))
@@ -269,10 +268,10 @@ def write_chunk(folder: Path, plan: Plan, index: int, result: ChunkResult) -> Pa
 
 
 def named_counts(counts: Mapping[int, int]) -> dict[str, int]:
-    """Return designs by the name of their status."""
+    """Replace status codes by their names in a count by status."""
     return {STATUS_NAMES.get(code, str(code)): number for code, number in sorted(counts.items())}
 
 
 def units_of(schema: pa.Schema) -> dict[str, str]:
-    """Return the unit of every column of a chunk that has one, as its field metadata say."""
+    """Units of a chunk's columns, from the metadata of the fields that have one."""
     return {field.name: field.metadata[b"unit"].decode() for field in schema if b"unit" in (field.metadata or {})}

@@ -1,4 +1,4 @@
-"""``compare``: what moved between two datasets of one study, row by row: values, rows and missing values, time."""
+"""``compare``: differences between two datasets of one study: values, rows, missing values and time."""
 
 from __future__ import annotations
 
@@ -21,16 +21,16 @@ if TYPE_CHECKING:
 
 VALUES_CHANGED, ROWS_CHANGED, SLOWER = 10, 11, 12
 DEFAULT_SLOWER = 1.5
-# A run shorter than this tells nothing about speed [s].
+# Runs shorter than this are not compared in speed [s].
 LEAST_SECONDS = 5.0
 ROLES = ("optimum", "reference")
-# So many rows are named where more have moved.
+# Number of changed rows that are named.
 NAMED = 5
 
 
 @dataclass
 class Moved:
-    """What moved in one column: how many values and by how much at most, how many appeared or went missing."""
+    """Changes in one column: number of changed values, largest change, number of values that appeared or vanished."""
 
     name: str
     changed: int = 0
@@ -42,13 +42,13 @@ class Moved:
     places: list[str] = field(default_factory=list)
 
     def look(self, old: NDArray[Any], new: NDArray[Any], places: NDArray[Any], rtol: float) -> None:
-        """Take in some rows; ``places`` (n,) are their names."""
+        """Compare some rows of both datasets; ``places`` (n,) are the names of the rows."""
         a, b = np.asarray(old, np.float64), np.asarray(new, np.float64)
         self.missing += int((np.isnan(a) != np.isnan(b)).sum())
         size = np.maximum(np.abs(a), np.abs(b))
         with np.errstate(invalid="ignore"):
             absolute = np.where(a == b, 0.0, np.abs(a - b))
-            # nan against a number is no distance, it is counted above; an infinite one is far by any measure
+            # nan against a number is counted as missing above; an infinite difference always counts as a change
             far = (absolute > rtol * size) | np.isinf(absolute)
         self.changed += int(far.sum())
         self.places += [str(place) for place in places[far][: NAMED - len(self.places)]]
@@ -62,7 +62,7 @@ class Moved:
 
 @dataclass
 class Comparison:
-    """What :func:`compare` found; ``exit_code`` is what ``sweep compare`` ends with."""
+    """Result of :func:`compare`; ``exit_code`` is the exit code of ``sweep compare``."""
 
     rows: int = 0
     only_old: int = 0
@@ -78,7 +78,7 @@ class Comparison:
 
     @property
     def values_changed(self) -> bool:
-        """Whether a value moved by more than was allowed."""
+        """Whether a value changed by more than the allowed relative change."""
         return any(column.changed for column in self.moved.values())
 
     @property
@@ -89,7 +89,7 @@ class Comparison:
 
     @property
     def is_slower(self) -> bool:
-        """Whether the new run took so many times as long as the old."""
+        """Whether the new run took more than ``slower`` times as long as the old one."""
         if self.seconds is None or max(self.seconds) < LEAST_SECONDS:
             return False
         return self.seconds[1] > self.slower * self.seconds[0]
@@ -102,7 +102,7 @@ class Comparison:
         return VALUES_CHANGED if self.values_changed else SLOWER if self.is_slower else 0
 
     def lines(self) -> list[str]:
-        """Return the findings in words."""
+        """Describe the differences in words."""
         found = [*self.notes, f"{how_many(self.rows, 'row')} in both"]
         old, new = ", ".join(self.columns_only_old), ", ".join(self.columns_only_new)
         told = {
@@ -132,7 +132,7 @@ class Comparison:
 
 
 def _first(column: Moved) -> str:
-    """Return the first rows that moved, where the worst is not the only one."""
+    """Name the first changed rows, if there is more than one."""
     if column.changed < 2:
         return ""
     return f"; the first: {', '.join(column.places)}{', ...' if column.changed > len(column.places) else ''}"
@@ -143,15 +143,15 @@ def compare(old: str | Path, new: str | Path, rtol: float = 0.0, slower: float =
 
     Parameters
     ----------
-    old, new : folders that ``sweep run`` left behind
-    rtol : relative change of a value that counts as none; with 0 values have to be equal, as 0 and -0 are
-    slower : how many times as long the new run may take
+    old, new : dataset folders written by ``sweep run``
+    rtol : relative change of a value that is allowed; with 0 values have to be equal (0 and -0 are)
+    slower : allowed ratio of the new run's time to the old one's
 
     Returns
     -------
     Comparison
-        Parameters, outputs and status of every design, and of optimum and reference if both studies optimise.
-        Error estimates are no results and are left out.  Times are those of all runs into a folder together, and are
+        Differences of parameters, outputs and status of every design, and of optimum and reference if both studies
+        optimise.  Error estimates are not compared.  Times are those of all runs into a folder together; they are
         compared only if both ended complete and one took 5 s or more.
 
     Raises
@@ -203,7 +203,7 @@ def _columns(chunks: Sequence[chunk_files.Part]) -> list[str]:
 
 
 def _pieces(chunks: Iterable[chunk_files.Part], columns: list[str], stops: Iterable[float]) -> Iterator[pd.DataFrame]:
-    """Yield the rows of a dataset in design order, up to one stop after the other; a chunk at a time is in memory."""
+    """Yield the rows of a dataset in design order, split at the stops; one chunk at a time is in memory."""
     import pandas as pd
 
     rows, reached, following = pd.DataFrame({name: [] for name in columns}), 0, iter(chunks)
@@ -271,7 +271,7 @@ def _notes(old: Path, new: Path) -> tuple[str, ...]:
 
 
 def _seconds(old: Path, new: Path) -> tuple[float, float] | None:
-    """Return the time of all runs into each folder [s], if both came to their end."""
+    """Time of all runs into each folder [s]; None unless the last run into both was complete."""
     times = []
     for folder in (old, new):
         ends = [line for line in files.read_runs(folder) if line.get("event") == "end"]

@@ -1,7 +1,7 @@
-"""The files of a dataset beside its chunks: where they lie, written as a whole or not at all, and read back.
+"""Files of a dataset beside its chunks: their places, atomic writing, and checked reading.
 
-Every reader of Parquet files has its own idea of which files in a folder are data.  So the folder of designs holds
-``part-*.parquet`` and nothing else, and they all read the same rows; everything else lies in a folder beside it.
+Readers of Parquet files differ in which files of a folder they take for data.  So the folder of designs holds
+``part-*.parquet`` and nothing else, and all of them read the same rows; all other files lie in a folder beside it.
 """
 
 from __future__ import annotations
@@ -24,39 +24,39 @@ PLAN, RUNS, LOCK, BAD, OLD = "_plan.json", "_runs.jsonl", "_lock", "_bad", "_old
 OPTIMUM, CURVES = "_optimum.parquet", "_curves.parquet"
 SENSITIVITY, TOLERANCE, MADE = "_sensitivity.parquet", "_tolerance.parquet", "_made.parquet"
 PARETO, PROOF = "_pareto.parquet", "_proof.parquet"
-OF_OPTIMUM = (OPTIMUM, CURVES, SENSITIVITY, TOLERANCE, MADE)  # what one search writes, the optimum first
+OF_OPTIMUM = (OPTIMUM, CURVES, SENSITIVITY, TOLERANCE, MADE)  # files written by one search, the optimum first
 SIDE_FILES = (*OF_OPTIMUM, PARETO, PROOF)
-SEARCH = "_search.json"  # what a search that is not over has found
+SEARCH = "_search.json"  # intermediate results of an unfinished search
 TEMPORARY = "_tmp-"
 
 DESIGNS = "designs"
 SUFFIX = ".meta"
 
-# Where ``_plan.json`` keeps the hashes of the tables that a finished search has written.
+# Key in ``_plan.json`` of the hashes of the tables that a finished search has written.
 TABLES = "tables"
 
-# What a file system answers that makes no (more) links to a file.
+# Errors of a file system that cannot make a (further) link to a file.
 UNLINKABLE = (errno.EXDEV, errno.EPERM, errno.EMLINK, errno.ENOTSUP, errno.EOPNOTSUPP)
-# What a system answers where running again alone does not help.
+# Errors that do not go away by running again.
 CLOSED = (errno.ELOOP, errno.EACCES, errno.EPERM, errno.ENOTDIR, errno.EROFS, errno.ENAMETOOLONG)
 
-# The key under which a plan carries the hash of everything else that it says.
+# Key in ``_plan.json`` of the hash of all its other content.
 OWN_HASH = "hash"
-# What a plan says at least, and as what.
+# Required keys of a plan, and their types.
 PLAN_TYPES: Mapping[str, type] = {
     "identity": str, "chunks": int, "chunk_size": int, "name": str, "chunk_data": dict, "optimise": bool,
 }  # fmt: skip
 
 
 def located(folder: str | Path) -> Path:
-    """Folder of designs that a user means: the given one, or the ``designs`` in it where it holds no chunks."""
+    """Folder of designs: the given folder, or the ``designs`` folder inside if the given one has no chunks."""
     place = Path(folder)
     inner = place / DESIGNS
     return inner if inner.is_dir() and not any(place.glob("part-*.parquet")) else place
 
 
 def beside(folder: Path) -> Path:
-    """Return the folder of plan, log, lock, optimum and report of a folder of designs.
+    """Folder of plan, log, lock, optimum and report that belongs to a folder of designs.
 
     It is the parent of a folder called ``designs``, and ``<folder>.meta`` next to any other.
     """
@@ -66,13 +66,13 @@ def beside(folder: Path) -> Path:
 
 @contextlib.contextmanager
 def store_errors(place: Path) -> Iterator[None]:
-    """Turn what the operating system reports (disk full, no permission) into a :class:`StoreError`."""
+    """Convert errors of the operating system (disk full, no permission) to a :class:`StoreError`."""
     try:
         yield
     except OSError as error:
         where = error.filename or place
         remedy = "mend that and run again to continue" if error.errno in CLOSED else "run again to continue"
-        if error.errno == errno.EEXIST and Path(where).is_symlink():  # and what it leads to is no folder
+        if error.errno == errno.EEXIST and Path(where).is_symlink():  # and its target is no folder
             raise StoreError(f"{where}: a link that leads to no folder; remove it, or take another folder") from error
         text = f"{where}: {error.strerror or error}; finished chunks are kept, {remedy}"
         raise StoreError(text) from error
@@ -80,7 +80,7 @@ def store_errors(place: Path) -> Iterator[None]:
 
 @contextlib.contextmanager
 def unwritable(place: Path | str) -> Iterator[None]:
-    """Turn what the operating system reports of a file for other programs into a :class:`StoreError`."""
+    """Convert errors of the operating system while an exported file is written to a :class:`StoreError`."""
     try:
         yield
     except OSError as error:
@@ -89,19 +89,19 @@ def unwritable(place: Path | str) -> Iterator[None]:
 
 @contextlib.contextmanager
 def replacing(path: Path) -> Iterator[Path]:
-    """Yield a name beside a file: what is written there takes the file's name as a whole, or nothing is left."""
+    """Yield a temporary name beside a file; the file written there replaces the file as a whole, or is deleted."""
     partial = path.with_name(f"{TEMPORARY}{os.getpid()}-{path.name}")
     try:
         with unwritable(path):
             yield partial
             partial.replace(path)
     finally:
-        with contextlib.suppress(OSError):  # a disk that can only be read has refused already
+        with contextlib.suppress(OSError):  # a read-only disk has raised an error already
             partial.unlink(missing_ok=True)
 
 
 def write_atomically(path: Path, data: bytes, where: Path | None = None) -> None:
-    """Write under a temporary name, bring it to the disk, rename.
+    """Write a file under a temporary name, flush it to disk, and rename it.
 
     Parameters
     ----------
@@ -112,9 +112,9 @@ def write_atomically(path: Path, data: bytes, where: Path | None = None) -> None
     Raises
     ------
     StoreError
-        if the disk is full or refuses; nothing half-written is left.
+        if the disk is full or not writable; no partial file is left.
     """
-    # Containers of a cluster that share a folder may share process numbers too.
+    # Containers of a cluster that share a folder may have equal process ids.
     temporary = (
         path.parent if where is None else where
     ) / f"{TEMPORARY}{os.getpid()}-{os.urandom(4).hex()}-{path.name}"
@@ -147,14 +147,14 @@ def set_aside(folder: Path, paths: list[Path], where: str) -> None:
         target.mkdir(parents=True, exist_ok=True)
         for path in paths:
             to, count = target / path.name, 0
-            while to.is_dir() and not to.is_symlink():  # a folder in place of a chunk, set aside before
+            while to.is_dir() and not to.is_symlink():  # a folder of this name has been set aside before
                 count += 1
                 to = target / f"{path.name}.{count}"
             path.replace(to)
 
 
 def link_or_copy(source: Path, target: Path) -> None:
-    """Give a file that is never written into a second name; where the file system makes no links it is copied."""
+    """Hard-link an immutable file to a second name; it is copied where the file system makes no links."""
     try:
         os.link(source, target)
     except OSError as error:
@@ -164,15 +164,15 @@ def link_or_copy(source: Path, target: Path) -> None:
 
 
 def remove_temporary(folder: Path) -> None:
-    """Delete what killed runs left behind; only under the lock."""
+    """Delete temporary files of killed runs; to be called only under the lock."""
     with store_errors(folder):
         for path in beside(folder).glob(f"{TEMPORARY}*"):
-            if path.is_file():  # a folder is somebody else's
+            if path.is_file():  # folders are not made by linksweep
                 path.unlink(missing_ok=True)
 
 
 def read_plan(folder: Path) -> dict[str, Any] | None:
-    """Return the content of ``_plan.json``; None if there is none, or it is not as it was written."""
+    """Read ``_plan.json``; None if it does not exist or is altered."""
     path = beside(folder) / PLAN
     if not path.is_file():
         return None
@@ -189,12 +189,12 @@ def read_plan(folder: Path) -> dict[str, Any] | None:
 
 
 def trusted_plan(folder: Path) -> dict[str, Any] | None:
-    """Return the content of ``_plan.json``, None where there is none.
+    """Read ``_plan.json``; None if it does not exist.
 
     Raises
     ------
     StoreError
-        if it is not as it was written.
+        if it is altered.
     """
     plan = read_plan(folder)
     path = beside(folder) / PLAN
@@ -204,7 +204,7 @@ def trusted_plan(folder: Path) -> dict[str, Any] | None:
 
 
 def write_plan(folder: Path, data: Mapping[str, Any]) -> None:
-    """Replace ``_plan.json`` as a whole; it carries its own hash."""
+    """Replace ``_plan.json`` atomically, with its own hash."""
     data = dict(data) | {OWN_HASH: _own_hash(data)}
     write_atomically(beside(folder) / PLAN, (json.dumps(data, indent=1) + "\n").encode())
 
@@ -215,7 +215,7 @@ def _own_hash(data: Mapping[str, Any]) -> str:
 
 
 def read_table(path: Path) -> pd.DataFrame:
-    """Return a table beside the chunks, such as ``_optimum.parquet``.
+    """Read a table beside the chunks, such as ``_optimum.parquet``.
 
     Raises
     ------
@@ -234,19 +234,19 @@ def read_table(path: Path) -> pd.DataFrame:
 
 
 def read_runs(folder: Path) -> list[dict[str, Any]]:
-    """Return lines of ``_runs.jsonl``; a line torn by a kill is left out."""
+    """Read the lines of ``_runs.jsonl``; an incomplete line of a killed run is left out."""
     path = beside(folder) / RUNS
     if not path.is_file():
         return []
     lines = []
     for line in path.read_text(encoding="utf-8", errors="replace").splitlines():
-        with contextlib.suppress(ValueError, RecursionError):  # the torn line of a killed run says nothing
+        with contextlib.suppress(ValueError, RecursionError):  # the incomplete line of a killed run
             lines.append(json.loads(line))
     return [line for line in lines if isinstance(line, dict)]
 
 
 def append_run(folder: Path, event: Mapping[str, Any]) -> None:
-    """Add one line to ``_runs.jsonl``: who ran when, where, with which versions; nothing that determines a value."""
+    """Append one line to ``_runs.jsonl``: process, time, machine and versions; it determines no value."""
     path = beside(folder) / RUNS
     with store_errors(path):
         path.parent.mkdir(parents=True, exist_ok=True)
@@ -261,31 +261,31 @@ def append_run(folder: Path, event: Mapping[str, Any]) -> None:
 
 
 def digests(place: Path, names: Iterable[str]) -> dict[str, str]:
-    """Return SHA-256 of those of the tables that are there."""
+    """SHA-256 of the tables that exist, by name."""
     with store_errors(place):
         return {n: hashlib.sha256((place / n).read_bytes()).hexdigest() for n in names if (place / n).is_file()}
 
 
 def altered(place: Path, note: Mapping[str, Any], names: Iterable[str]) -> list[str]:
-    """Return the tables that are not as their search has written them, or not there; an older plan notes no hashes.
+    """List the tables that are missing or altered since their search; tables without a noted hash count as unaltered.
 
     Parameters
     ----------
     place : folder of the tables
     note : content of ``_plan.json``
-    names : of the tables
+    names : names of the tables
     """
     known, found = note.get(TABLES) or {}, digests(place, names)
     return [name for name in names if name not in found or known.get(name, found[name]) != found[name]]
 
 
 def check_tables(folder: Path, names: Iterable[str]) -> None:
-    """Refuse tables beside the chunks of a dataset that are there, and not as their search has written them.
+    """Raise if an existing table beside the chunks is altered since its search.
 
     Raises
     ------
     StoreError
-        for the first such table.
+        for the first altered table.
     """
     place = beside(folder)
     for name in altered(place, read_plan(folder) or {}, [name for name in names if (place / name).exists()]):
@@ -294,11 +294,11 @@ def check_tables(folder: Path, names: Iterable[str]) -> None:
 
 
 def metadata(path: Path) -> dict[bytes, bytes]:
-    """Return what a table says of itself; empty where there is none, or it is damaged."""
+    """Metadata of a table's schema; empty if the table does not exist or is damaged."""
     import pyarrow as pa
     import pyarrow.parquet as pq
 
     try:
         return dict(pq.read_schema(path).metadata or {}) if path.is_file() else {}
-    except (pa.ArrowException, OSError, ValueError):  # Arrow says OSError, too, of bytes that make no sense
+    except (pa.ArrowException, OSError, ValueError):  # Arrow raises OSError for damaged bytes, too
         return {}

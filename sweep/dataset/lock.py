@@ -1,4 +1,4 @@
-"""One run at a time in a dataset: a lock that dies with its process."""
+"""Lock of a dataset: one run at a time; the lock is released when its process ends."""
 
 from __future__ import annotations
 
@@ -16,30 +16,31 @@ from sweep.errors import LinksweepWarning, LockedError
 if TYPE_CHECKING:
     from filelock import BaseFileLock
 
-# Behind the name of a file that stands for a lock by being there.
+# Suffix of a file whose existence is the lock.
 SOFT = "-soft"
 
-# What a file system answers that has no locks.
+# Errors of a file system without locks.
 UNLOCKABLE = (errno.ENOSYS, errno.EOPNOTSUPP, errno.ENOTSUP, errno.ENOLCK)
 
 
 @contextlib.contextmanager
 def locked(folder: Path) -> Iterator[None]:
-    """Hold a dataset for this process; the lock dies with it.
+    """Lock a dataset for this process; the lock is released when the process ends.
 
-    Both the file ``_lock`` and the folder of the chunks are locked, so that nobody gets in by deleting the file.
+    Both the file ``_lock`` and the folder of the chunks are locked, so that deleting the file does not open the
+    dataset.
 
     Raises
     ------
     LockedError
-        if another run holds it
+        if another run holds the lock
     StoreError
         if the folder cannot be made or written to
 
     Warns
     -----
     LinksweepWarning
-        if the file system has no locks: then a file that is there or not takes the place of one.
+        if the file system has no locks: then the existence of a file is the lock.
     """
     with store_errors(folder):
         folder.mkdir(parents=True, exist_ok=True)
@@ -50,13 +51,13 @@ def locked(folder: Path) -> Iterator[None]:
 
 @contextlib.contextmanager
 def held(folder: Path, file: Path, taken: Callable[[], str]) -> Iterator[None]:
-    """Hold a folder that is there for this process, by the lock of a file and by that of the folder itself.
+    """Lock an existing folder for this process, by the lock of a file and by that of the folder itself.
 
     Parameters
     ----------
-    folder : nobody else gets in, also not by deleting the file
-    file : which is locked
-    taken : what is said where another process holds the folder
+    folder : locked folder; deleting the file does not open it
+    file : locked file
+    taken : returns the message if another process holds the folder
 
     Raises
     ------
@@ -88,7 +89,7 @@ def _acquired(folder: Path, path: Path, taken: Callable[[], str]) -> BaseFileLoc
         except OSError as error:
             if error.errno not in UNLOCKABLE or isinstance(error, Timeout):
                 raise
-            # Not the same file: the lock that could not be had has left one of that name.
+            # Another file: the failed lock has left one of the first name.
             path = path.with_name(path.name + SOFT)
             lock = SoftFileLock(path, timeout=0)
             lock.acquire()
@@ -101,7 +102,7 @@ def _acquired(folder: Path, path: Path, taken: Callable[[], str]) -> BaseFileLoc
 
 
 def _hold(folder: Path, taken: Callable[[], str]) -> int | None:
-    """Return a descriptor that holds a lock on the folder itself; None where the system locks no folders."""
+    """Lock the folder itself and return its descriptor; None where the system cannot lock folders."""
     try:
         import fcntl
     except ImportError:  # Windows

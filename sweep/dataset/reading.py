@@ -1,4 +1,4 @@
-"""Datasets of many rows in bounded memory: ``scan`` for pushdown, best designs, Pareto rows, histograms."""
+"""Datasets of many rows in bounded memory: ``scan`` for pushdown, best designs, Pareto front, histograms."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     import pandas as pd
     import pyarrow.dataset as ds
 
-# Rows that are in memory together.
+# Rows per batch in memory.
 BATCH_ROWS = 131_072
 MOST_BEST = 100_000
 MOST_BINS = 100_000
@@ -29,17 +29,17 @@ def scan(folder: str | Path) -> ds.Dataset:
     """Return a dataset as an Arrow dataset: columns and filters are applied while the files are read.
 
     ``sweep.scan(folder).to_table(columns=["design", "swing"], filter=(pc.field("status") == 0)).to_pandas()`` reads
-    two columns and the rows within all limits; ``.scanner(...).to_batches()`` gives them batch by batch.
+    two columns of the rows within all limits; ``.scanner(...).to_batches()`` reads them batch by batch.
 
     Parameters
     ----------
-    folder : what ``sweep run`` wrote
+    folder : folder written by ``sweep run``
 
     Returns
     -------
     pyarrow.dataset.Dataset
-        the chunks in design order.  Name and metadata of every chunk are checked, its bytes are not: ``sweep.verify``
-        does that, and ``sweep.load``.
+        the chunks in design order.  Name and metadata of every chunk are checked; its bytes are checked by
+        ``sweep.verify`` and ``sweep.load`` only.
 
     Raises
     ------
@@ -71,13 +71,13 @@ def scan(folder: str | Path) -> ds.Dataset:
 
 
 def best(folder: str | Path, output: str, count: int = 10) -> pd.DataFrame:
-    """Designs within all limits whose output is smallest, best first; signs of swing and stroke do not count.
+    """Find the designs within all limits with the smallest output, best first; swing and stroke by magnitude.
 
     Parameters
     ----------
-    folder : what ``sweep run`` wrote
-    output : column to be small
-    count : how many rows at most, up to 100000
+    folder : folder written by ``sweep run``
+    output : column to be minimised
+    count : number of rows at most, up to 100000
 
     Raises
     ------
@@ -100,12 +100,12 @@ def best(folder: str | Path, output: str, count: int = 10) -> pd.DataFrame:
 
 
 def of_number(folder: str | Path, number: int) -> pd.DataFrame:
-    """Return the row of a design, by its number in the column ``design``.
+    """Read the row of a design, by its number in the column ``design``.
 
     Parameters
     ----------
-    folder : what ``sweep run`` wrote
-    number : of the design, as :func:`sweep.load`, the report and the pictures show it
+    folder : folder written by ``sweep run``
+    number : number of the design, as in :func:`sweep.load`, the report and the pictures
 
     Raises
     ------
@@ -124,17 +124,17 @@ def of_number(folder: str | Path, number: int) -> pd.DataFrame:
 
 
 def pareto(folder: str | Path, first: str, second: str) -> pd.DataFrame:
-    """Designs within all limits that no other one beats in both outputs, ordered by the first; smaller is better.
+    """Find the Pareto-optimal designs within all limits, ordered by the first output; both are minimised.
 
     Parameters
     ----------
-    folder : what ``sweep run`` wrote
-    first, second : columns to be small; signs of swing and stroke do not count
+    folder : folder written by ``sweep run``
+    first, second : columns to be minimised; swing and stroke by magnitude
 
     Returns
     -------
     DataFrame
-        all columns of these rows; of rows equal in both outputs the first.  Memory is that of one batch and the front.
+        all columns of these rows; of rows equal in both outputs the first.  Memory holds one batch and the front.
 
     Raises
     ------
@@ -158,7 +158,7 @@ def pareto(folder: str | Path, first: str, second: str) -> pd.DataFrame:
 
 
 def _with_units(rows: pd.DataFrame, source: Any) -> pd.DataFrame:
-    """Return the rows with the units that stand in the schema."""
+    """Attach the units in the schema to the rows."""
     rows.attrs["units"] = chunk_files.units_of(source.schema)
     return rows
 
@@ -166,18 +166,18 @@ def _with_units(rows: pd.DataFrame, source: Any) -> pd.DataFrame:
 def histogram(
     folder: str | Path, output: str, bins: int = 100, ends: tuple[float, float] | None = None
 ) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
-    """Return how many designs within all limits have an output in each of equal bins, and the edges of the bins.
+    """Count the designs within all limits in equal bins of an output; return the counts and the bin edges.
 
     Parameters
     ----------
-    folder : what ``sweep run`` wrote
+    folder : folder written by ``sweep run``
     output : column
-    bins : how many, up to 100000
-    ends : lowest and highest edge; the rows are read twice without them, once for the smallest and the largest value
+    bins : number of bins, up to 100000
+    ends : lowest and highest edge; if missing, the rows are read twice, first for the smallest and largest value
 
     Returns
     -------
-    counts (bins,), edges (bins + 1,); values outside of ``ends`` and missing ones are not counted.
+    counts (bins,), edges (bins + 1,); missing values and values outside ``ends`` are not counted.
 
     Raises
     ------
@@ -213,7 +213,7 @@ def _ends(source: Any, output: str) -> tuple[float, float]:
 def _feasible(source: Any, names: Sequence[str]) -> Iterator[pd.DataFrame]:
     """Yield the rows with status 0, batch by batch.
 
-    One file comes after the other, so that memory is that of a few batches.
+    The files are read one after the other, so that only a few batches are in memory.
     """
     import pyarrow.compute as pc
 
@@ -227,9 +227,9 @@ def _feasible(source: Any, names: Sequence[str]) -> Iterator[pd.DataFrame]:
 
 
 def _whole(source: Any, designs: NDArray[np.int64]) -> pd.DataFrame:
-    """Columns, all of them, of some designs, in the order given.
+    """Read all columns of the given designs, in the given order.
 
-    Of files without any of them only the statistics are read.
+    Of files without any of these designs only the statistics are read.
     """
     import pyarrow.compute as pc
 

@@ -1,4 +1,4 @@
-"""A dataset as a whole: which of its chunks are finished, whether it is complete, and its rows."""
+"""A dataset as a whole: its finished chunks, its completeness and its rows."""
 
 from __future__ import annotations
 
@@ -22,9 +22,9 @@ if TYPE_CHECKING:
 def finished_chunks(
     folder: Path, plan: Plan, tell: Callable[[int, int], None] = lambda _, __: None
 ) -> dict[int, chunk_files.Part]:
-    """Return chunks of the plan that need not be computed again; damaged ones are moved to ``_bad/``.
+    """List the chunks of the plan that need not be computed again; damaged ones are moved to ``_bad/``.
 
-    ``tell`` is called with how many were read, and how many there are.
+    ``tell`` is called with the number of chunks read and of all chunks in the folder.
 
     Raises
     ------
@@ -52,7 +52,7 @@ def _twice(folder: Path, one: chunk_files.Part, other: chunk_files.Part) -> Stor
 
 
 def foreign(folder: Path, found: str, plan: Plan) -> InputError:
-    """Return the error for data of another study or code; they are never mixed."""
+    """Make the error for data of another study or code, which are never mixed."""
     allowed = (
         f"data of this study, as its file is now, and of this version of the program (identity {plan.identity}); "
         "take another folder with --out, or set what is there aside with --force"
@@ -61,7 +61,7 @@ def foreign(folder: Path, found: str, plan: Plan) -> InputError:
 
 
 def totals(folder: Path) -> tuple[dict[str, int], dict[str, int]]:
-    """Designs by the name of their status, and by the limit they miss, from the metadata of all chunks."""
+    """Count the designs by the name of their status, and by the limit they miss, from the metadata of all chunks."""
     counts: Counter[str] = Counter()
     missed: Counter[str] = Counter()
     for part in chunk_files.parts(folder):
@@ -72,16 +72,16 @@ def totals(folder: Path) -> tuple[dict[str, int], dict[str, int]]:
 
 
 def is_complete(folder: str | Path) -> bool:
-    """Whether every chunk of the dataset's plan is there and whole, and the optimum too if the study asks for one.
+    """Whether every chunk of the dataset's plan is whole, and the optimum is there if the study asks for one.
 
     Parameters
     ----------
-    folder : what ``sweep run`` wrote
+    folder : folder written by ``sweep run``
 
     Returns
     -------
     bool
-        False as well for a folder that is no dataset
+        False also for a folder without a dataset
 
     Examples
     --------
@@ -101,37 +101,37 @@ def is_complete(folder: str | Path) -> bool:
 
 
 def front_is_complete(path: Path) -> bool:
-    """Return whether the search of the front in this file has ended."""
+    """Whether the search of the front in this file has ended."""
     about = metadata(path)
     return about.get(b"complete") == b"true" or about.get(b"ended") == b"time"
 
 
 def front_cut_short(path: Path) -> str | None:
-    """Tell how much of a front its search time cut short, as ``5 of 28``; None for a whole one, or for none."""
+    """Return how much of a front was left out by its time limit, as ``5 of 28``; None if nothing was."""
     about = metadata(path)
     return None if about.get(b"complete") != b"false" else about.get(b"steps", b"").decode() or None
 
 
 def load(folder: str | Path, units: bool = False) -> pd.DataFrame:
-    """Return the finished part of a dataset, in design order.
+    """Read the finished part of a dataset, in design order.
 
     Parameters
     ----------
-    folder : what ``sweep run`` wrote
-    units : whether the columns carry their units, ``alpha1 [rad]``
+    folder : folder written by ``sweep run``
+    units : whether column names include their units, ``alpha1 [rad]``
 
     Returns
     -------
     DataFrame
-        ``design``, parameters [mm, rad], outputs, ``status``; ``attrs["units"]`` names the unit of each column.  Units
-        and definitions stand in the Parquet field metadata and in ``_plan.json``, too.
+        ``design``, parameters [mm, rad], outputs, ``status``; ``attrs["units"]`` gives the unit of each column.  Units
+        and definitions are in the Parquet field metadata and in ``_plan.json``, too.
 
     Raises
     ------
     InputError
         if the folder holds no chunks
     StoreError
-        if a chunk is damaged, lies under another chunk's name, or is there twice.
+        if a chunk is damaged, lies under another chunk's name, or exists twice.
 
     Warns
     -----

@@ -1,4 +1,4 @@
-"""``verify``: every byte against its hash, every row against the plan, some designs computed again."""
+"""``verify``: checks every byte against its hash, every row against the plan, and recomputes some designs."""
 
 from __future__ import annotations
 
@@ -26,9 +26,9 @@ from sweep.study.load import study_of
 if TYPE_CHECKING:
     import pandas as pd
 
-# What `sweep verify` ends with: chunks or the optimum are missing; something is damaged or wrong.
+# Exit codes of `sweep verify`: chunks or the optimum are missing; something is damaged or wrong.
 INCOMPLETE, DAMAGED = 11, 74
-# What plan and chunks both say.
+# Keys that plan and chunks have in common.
 SHARED = ("format", "study", "code", "designs", "chunks", "name")
 GOLDEN = (math.sqrt(5.0) - 1.0) / 2.0
 DEFAULT_DESIGNS = 32
@@ -39,9 +39,9 @@ UNSEEN = "a run takes it as finished; move it away, then the next run computes i
 
 @dataclass(frozen=True)
 class Finding:
-    """Something that is not as it should be, and what ``sweep run`` will do about it.
+    """A fault of a dataset, and what ``sweep run`` will do about it.
 
-    ``damage`` is False for what is only missing because a run has not ended.
+    ``damage`` is False for parts that are only missing because a run has not ended.
     """
 
     path: Path
@@ -55,7 +55,7 @@ class Finding:
 
 @dataclass
 class Verification:
-    """What :func:`verify` found; ``exit_code`` is what ``sweep verify`` ends with."""
+    """Result of :func:`verify`; ``exit_code`` is the exit code of ``sweep verify``."""
 
     folder: Path
     chunks: int = 0
@@ -66,7 +66,7 @@ class Verification:
     notes: list[str] = field(default_factory=list)
 
     def add(self, path: Path, words: str, remedy: str, damage: bool = True) -> None:
-        """Note something that is not as it should be."""
+        """Add a fault to the findings."""
         self.findings.append(Finding(path, words, remedy, damage))
 
     @property
@@ -77,7 +77,7 @@ class Verification:
         return INCOMPLETE if self.findings else 0
 
     def lines(self) -> list[str]:
-        """Return the findings in words, one per line; the last line is the verdict."""
+        """Describe the findings in words, one per line; the last line is the verdict."""
         words = [f"{how_many(self.chunks, 'whole chunk')}, {how_many(self.rows, 'row')}, {self.size} bytes read"]
         words += [f"{how_many(self.recomputed, 'design')} computed again"] if self.recomputed else []
         damaged = sum(finding.damage for finding in self.findings)
@@ -85,7 +85,7 @@ class Verification:
             f"{damaged} damaged, {len(self.findings) - damaged} missing" if self.findings else "complete and undamaged"
         )
         words += [*self.notes, *map(str, self.findings), f"{self.folder}: {verdict}"]
-        # The name of a file may be anything; bytes that are no letters are shown as such.
+        # File names may contain any bytes; undecodable ones are written as escapes.
         return [line.encode("utf-8", "backslashreplace").decode() for line in words]
 
 
@@ -94,13 +94,13 @@ def verify(folder: str | Path, designs: int = DEFAULT_DESIGNS) -> Verification:
 
     Every chunk is read and compared with the hash in its name.  Its rows are compared with the plan: columns, numbers
     and parameters of the designs, counts by status, no missing value without a status.  Some designs, spread over the
-    space, are computed again and compared to the bit, rows that were not kept included.
+    space, are recomputed and compared bit by bit, designs without a row included.
 
     Parameters
     ----------
-    folder : what ``sweep run`` wrote
-    designs : how many designs are computed again, 0 for none.  None are where the chunks were computed by other
-        sources or libraries; a note says so
+    folder : folder written by ``sweep run``
+    designs : number of designs that are recomputed, 0 for none.  If the chunks were computed by other sources or
+        libraries, none are, and a note says so
 
     Returns
     -------
@@ -113,7 +113,7 @@ def verify(folder: str | Path, designs: int = DEFAULT_DESIGNS) -> Verification:
     InputError
         if the folder is no dataset, or ``designs`` is negative
     StoreError
-        if the disk refuses to read.
+        if the disk cannot be read.
 
     Examples
     --------
@@ -134,12 +134,12 @@ def verify(folder: str | Path, designs: int = DEFAULT_DESIGNS) -> Verification:
         words = "no chunk, but every reader of the folder takes it for one"
         found.add(path, words, "the next run refuses it; move it away")
     about = plan or {}
-    for part in chunks if plan is None else ():  # then the first readable chunk tells of the study
+    for part in chunks if plan is None else ():  # then the first readable chunk describes the study
         with suppress(StoreError):
             about = about or chunk_files.about(part)
     study = None if plan is None else _study(found, plan)
     if plan is None:
-        # Chunks keep the study's tables, not the order of the axes in them.
+        # Chunks keep the study's tables, but not the order of the axes in them.
         found.notes.append("without the plan, parameters are not checked and no design is computed again")
         found.add(
             files.beside(place) / files.PLAN, "not there, or damaged", "the next run writes it and keeps the chunks"
@@ -153,7 +153,7 @@ def verify(folder: str | Path, designs: int = DEFAULT_DESIGNS) -> Verification:
 
 
 def _study(found: Verification, plan: dict[str, Any]) -> Study | None:
-    """Return the study the dataset answers; None, with a note, if this version does not understand it."""
+    """Study of the dataset; None, with a note, if this version cannot read it."""
     try:
         return study_of(plan, files.beside(found.folder) / files.PLAN)
     except LinksweepError as error:
@@ -164,7 +164,7 @@ def _study(found: Verification, plan: dict[str, Any]) -> Study | None:
 def _whole_chunks(
     found: Verification, chunks: list[chunk_files.Part], about: dict[str, Any], study: Study | None
 ) -> dict[int, chunk_files.Part]:
-    """Return the chunks that are what their names say; what is wrong with the others, or with their rows, is noted."""
+    """Return the undamaged chunks; faults of the others and of the rows are added to the findings."""
     whole: dict[int, chunk_files.Part] = {}
     for part in chunks:
         if part.identity != about.get("identity", part.identity):
@@ -193,7 +193,7 @@ def _whole_chunks(
 
 
 def _missing(found: Verification, plan: dict[str, Any], number: int, whole: dict[int, chunk_files.Part]) -> None:
-    """Report chunks and searches that the plan asks for and that are missing, and counts that are not the chunks'."""
+    """Report missing chunks and searches that the plan asks for, and counts that differ from the chunks'."""
     named = {finding.path.name[: len("part-000000-")] for finding in found.findings}
     lost = [k for k in range(number) if k not in whole and f"part-{k:06d}-" not in named]
     complete = bool(plan.get("complete"))
@@ -215,7 +215,7 @@ def _missing(found: Verification, plan: dict[str, Any], number: int, whole: dict
 
 
 def _side_files(found: Verification, plan: dict[str, Any]) -> None:
-    """Check the tables beside the chunks: the checksums of their pages, and the hashes that the plan notes."""
+    """Check the tables beside the chunks: page checksums, and the hashes in the plan."""
     place, told = files.beside(found.folder), {finding.path for finding in found.findings}
     for path in [place / name for name in files.SIDE_FILES]:
         if not path.is_file():
@@ -234,7 +234,7 @@ def _side_files(found: Verification, plan: dict[str, Any]) -> None:
 def _recompute(
     found: Verification, study: Study, about: dict[str, Any], whole: dict[int, chunk_files.Part], number: int
 ) -> None:
-    """Compute some designs again, each by itself: what a design gets does not depend on its company."""
+    """Recompute some designs, each by itself, since a design's row does not depend on other designs."""
     if about.get("code") != plans.code_hash():
         found.notes.append("computed by other sources or libraries than these: no design was computed again")
         return
@@ -251,14 +251,14 @@ def _recompute(
 
 
 def row_faults(rows: pd.DataFrame, own: Mapping[str, Any], about: Mapping[str, Any], study: Study | None) -> list[str]:
-    """Return what is wrong with the rows of one chunk, in words.
+    """Describe the faults in the rows of one chunk.
 
     Parameters
     ----------
-    rows : all of them, all columns
+    rows : all rows and columns of the chunk
     own : metadata of the chunk
     about : the plan, or the metadata of a chunk where there is no plan
-    study : whose design space gives the parameters; None if it is not known
+    study : gives the parameters of the design space; None if it is not known
     """
     faults = []
     if "chunk_size" in about:
@@ -300,14 +300,14 @@ def _count_faults(status: np.ndarray[Any, Any], own: Mapping[str, Any]) -> list[
     rows = {
         chunk_files.STATUS_NAMES.get(int(code), str(code)): int(count) for code, count in zip(codes, found, strict=True)
     }
-    # Rows that were not kept are counted; what is kept is kept of its status entirely.
+    # Rows that were not kept are counted too; of a status either all rows are kept or none.
     if any(noted.get(name, 0) != count for name, count in rows.items()) or (noted.get("OK", 0) and "OK" not in rows):
         faults.append(f"rows by status {rows}, counted {noted}")
     return faults
 
 
 def _parameter_faults(rows: pd.DataFrame, own: Mapping[str, Any], study: Study) -> list[str]:
-    """Parameters that are not those of the design space; what [fit] sets or scales is left to the recomputing."""
+    """Parameters that differ from the design space; those that [fit] sets or scales are not compared."""
     matrix, _ = parameter_matrix(study, own["start"], own["stop"])
     at = rows["design"].to_numpy() - own["start"]
     fitted = () if study.fit is None else (*study.fit.parameters(study.family), *study.rescaled)
@@ -323,7 +323,7 @@ def _parameter_faults(rows: pd.DataFrame, own: Mapping[str, Any], study: Study) 
 
 
 def spread(bounds: Mapping[int, tuple[int, int]], number: int) -> dict[int, list[int]]:
-    """Choose about ``number`` designs spread evenly over chunks of these bounds, by chunk; the same at every call."""
+    """Choose about ``number`` designs evenly spread over chunks of these bounds, by chunk; the same at every call."""
     indices = sorted(bounds)
     ends = np.cumsum([bounds[index][1] - bounds[index][0] for index in indices])
     places = np.unique((np.arange(1, number + 1) * GOLDEN % 1.0 * ends[-1]).astype(np.int64))
@@ -334,7 +334,7 @@ def spread(bounds: Mapping[int, tuple[int, int]], number: int) -> dict[int, list
 
 
 def unequal(row: pd.DataFrame, again: Columns) -> str:
-    """Return how a stored row (one or none) differs from the design computed again; empty if no bit does."""
+    """Describe how a stored row (one or none) differs from the recomputed design; empty if no bit differs."""
     if len(row) != len(again["design"]):
         return "has a row, computed again it has none" if len(row) else "has no row, computed again it has one"
     for name, values in again.items() if len(row) else ():
