@@ -1,1 +1,1 @@
-"""``evaluate`` and ``summarise``: given designs in a table, their motion and what a whole turn says about them."""
+"""``evaluate`` and ``summarise``: pose outputs and design outputs of given designs in a table."""

@@ -1,4 +1,4 @@
-"""Angles of a user's table: in rad, unless the table or the caller says degrees; what reads as degrees is refused."""
+"""Angles of a user's table: rad unless the table or the caller says degrees; values that look like degrees raise."""
 
 from __future__ import annotations
 
@@ -29,8 +29,8 @@ REMEDY = (
     'for degrees say angles="deg" (--angles deg) or "{name} [deg]" as the column\'s name, for rad "rad" in the same way'
 )
 
-# Most parameters are angles between two directions, so one turn is all of them; the slack is for rounding.
-# `reads_as_degrees` tells crank angles, the offset of a member, which is added to one, and the wrap of a thread.
+# Most angles lie between two directions and are at most one turn, with slack for rounding.  Crank angles, the offset of
+# a member, which is added to one, and the wrap of a thread may exceed it: `reads_as_degrees` checks these.
 MOST = TWO_PI * (1.0 + 1e-9)
 TURNING = ("offset", "phi", "wrap")
 _HEADER = re.compile(r"(\S+?)\s*\[\s*([^\]]*?)\s*\]\s*")
@@ -43,16 +43,16 @@ def in_radians(
     others: Mapping[str, Parameter] = MappingProxyType({}),
     domain: Domain | None = None,
 ) -> Table:
-    """Return the table with its angles in rad, what says its unit in mm, t, s ..., under the plain names of columns.
+    """Convert a table to angles in rad and other values in mm, t, s ..., under plain column names without units.
 
     Parameters
     ----------
-    family : whose parameters are looked for
-    table : as the user gave it; a header such as ``alpha [deg]`` or ``m_crank [g]`` says the unit of its column, a text
+    family : gives the known parameters
+    table : the user's table; a header such as ``alpha [deg]`` or ``m_crank [g]`` gives the unit of its column, a text
         such as "20 g" or a quantity of pint that of one value
-    angles : the unit of all angles without one in their header; None for rad that must be plausible
+    angles : unit of all angles without one in their header; None for rad that must be plausible
     others : further inputs by name, none of them an angle
-    domain : whose variable may be a column too
+    domain : the variable of this domain may be a column too
 
     Returns
     -------
@@ -62,8 +62,8 @@ def in_radians(
     Raises
     ------
     InputError
-        for an unknown unit, a column that stands there twice, a parameter above 2 pi or crank angles that read as
-        degrees while nothing says what they are.
+        for an unknown unit, a column given twice, and, without a unit, a parameter above 2 pi or crank angles that look
+        like degrees.
     """
     _check_unit(angles)
     known = dict.fromkeys(others, False) | {p.name: p.unit == "angle" for p in family.parameters}
@@ -71,7 +71,7 @@ def in_radians(
     if domain is not None:
         known[variable] = domain.unit == "rad"
     if not (isinstance(table, Mapping) or hasattr(table, "columns")):
-        return table  # no table: whoever reads it says so
+        return table  # not a table: the reader of the table raises
     renamed, changed = {}, {}
     columns: Any = table
     for key in columns:
@@ -105,7 +105,7 @@ def in_radians(
 
 
 def _internal(name: str, family: Parametrised, others: Mapping[str, Parameter], domain: Domain | None) -> str:
-    """Return the unit in which the kernels take a column."""
+    """Return the internal unit of a column."""
     if domain is not None and name == domain.name:
         return internal_unit(domain.unit)
     p = next((p for p in family.parameters if p.name == name), None) or others[name]
@@ -113,12 +113,12 @@ def _internal(name: str, family: Parametrised, others: Mapping[str, Parameter], 
 
 
 def plain_names(table: Iterable[Any]) -> tuple[str, ...]:
-    """Return the names of the columns without the units in their headers."""
+    """Return the column names without the units in their headers."""
     return tuple(found[1] if (found := _HEADER.fullmatch(str(key))) else str(key) for key in table)
 
 
 def grid_in_radians(name: str, unit: str, phi: ArrayLike, angles: AngleUnit | None) -> ArrayLike:
-    """Return the argument ``phi=`` in rad where the variable is an angle; as it is where it is not."""
+    """Convert the argument ``phi=`` to rad if the variable is an angle; otherwise it is returned as it is."""
     _check_unit(angles)
     said: ArrayLike = plain(phi, internal_unit(unit), name)
     if said is not phi:
@@ -138,7 +138,7 @@ def _check_unit(angles: object) -> None:
 
 
 def _plain_name(name: str, unit: str, table: Iterable[Any]) -> str:
-    """Return the name without its unit."""
+    """Return the name without its unit; raise if the table has a column of that name too."""
     if name in map(str, table):
         raise InputError("column", name, f"either {name} or {name} [{unit}], not both", f"column {name} [{unit}]")
     return name
@@ -148,7 +148,7 @@ def _check_plausible(name: str, values: Any, turns_on: bool) -> None:
     try:
         found = np.abs(numbers(values, name, "column"))
     except InputError:
-        return  # whoever reads it says so, with the right row
+        return  # the reader of the column raises, with the right row
     if found.size == 0 or np.maximum.reduce(found, axis=None) <= MOST:
         return  # the usual case, in one pass
     if is_plausible(float(np.max(found, initial=0.0, where=np.isfinite(found))), turns_on):
@@ -163,7 +163,7 @@ def _check_plausible(name: str, values: Any, turns_on: bool) -> None:
 
 
 def is_plausible(largest: float, turns_on: bool) -> bool:
-    """Tell whether the largest magnitude of an angle can be one in rad; ``turns_on`` for one that counts full turns."""
+    """Whether the largest magnitude of an angle may be in rad; ``turns_on`` marks angles that count full turns."""
     return not largest > MOST or (turns_on and not reads_as_degrees(largest))
 
 

@@ -1,7 +1,8 @@
-"""Balancing: orders of a shaking force, counterweights that leave the least of it (machine-and-stitch, 3).
+"""Balancing: harmonics of a shaking force, and optimal counterweights (machine-and-stitch, 3).
 
 A counterweight is a mass times the vector from a shaft's axis to it, U = (along, across) the mark of the shaft.  Forces
-are linear in U, so the best of any number of them are linear least squares; the inertia that they add is not.
+are linear in U, so optimal counterweights solve a linear least-squares problem; the inertia that they add is not
+linear.
 """
 
 from __future__ import annotations
@@ -16,7 +17,7 @@ from kernels.types import Array
 
 
 class Orders(NamedTuple):
-    """Mean, and amplitudes of cosine and sine, (n, ...), of the orders 1 to n of a turn."""
+    """Fourier coefficients over a turn: mean, and cosine and sine amplitudes (n, ...) of orders 1 to n."""
 
     mean: Array
     cos: Array
@@ -25,12 +26,12 @@ class Orders(NamedTuple):
 
 @dataclass(frozen=True)
 class CorrectionPlane:
-    """Where a counterweight sits.
+    """Plane of a counterweight.
 
     Parameters
     ----------
-    at : centre of its circle
-    mark, across : unit vectors, square to the axis: its mark at angle 0, and where that is a quarter of a turn later
+    at : centre of the counterweight's circle
+    mark, across : unit vectors square to the axis: the shaft's mark at angle 0, and a quarter of a turn later
     ratio, phase : the shaft turns by ratio phi + phase
     """
 
@@ -50,7 +51,7 @@ class CorrectionPlane:
 
 
 class Balanced(NamedTuple):
-    """Counterweights U, (k, 2), force and moment that are left, (m, 3)."""
+    """Counterweights U (k, 2), and the remaining force and moment, each (m, 3)."""
 
     weights: Array
     force: Array
@@ -58,14 +59,14 @@ class Balanced(NamedTuple):
 
 
 def orders(values: Array, most: int) -> Orders:
-    """Return orders of samples (m, ...) at equal steps of a turn from 0: exact up to what m samples alias."""
+    """Return the Fourier coefficients of samples (m, ...) at equal steps of a turn from 0; exact up to aliasing."""
     m = len(values)
     found = np.fft.rfft(values, axis=0) / m
     return Orders(found[0].real, 2.0 * found[1 : most + 1].real, -2.0 * found[1 : most + 1].imag)
 
 
 def rms(values: Array) -> float:
-    """Return the root of the mean square of the size of a vector, (m, 3), over the turn."""
+    """Return the root mean square of a vector's magnitude (m, 3) over the turn."""
     return float(np.sqrt((values**2).sum(axis=1).mean()))
 
 
@@ -77,15 +78,15 @@ def best_counterweights(
     places: Sequence[CorrectionPlane],
     length: float | None = None,
 ) -> Balanced:
-    """Return the counterweights that leave the least rms force, or of force and moment.
+    """Find the counterweights that minimise the rms force, or force and moment, by linear least squares.
 
     Parameters
     ----------
     phi : equal steps of a turn, (m,)
     force, moment : on the frame, about the origin, (m, 3)
     speed : of the main shaft, constant
-    places : where counterweights may sit
-    length : what a moment is divided by to count as a force; None leaves moments out
+    places : correction planes of the counterweights
+    length : divides a moment so that it counts as a force; None ignores moments
     """
     forces = [place.forces(phi, speed) for place in places]
     moments = [np.cross(np.array(place.at), f, axisb=1, axisc=1) for place, f in zip(places, forces, strict=True)]
@@ -102,8 +103,9 @@ def force_balance(lengths: tuple[float, float, float], masses: Array, centres: A
     """Return U of crank and rocker that remove the shaking force of a four-bar, Berkof and Lowen (8).
 
     ``lengths`` are those of crank, coupler and rocker; ``masses`` (3,) and ``centres`` (3,), complex along and across
-    each link from its first joint, of crank, coupler and rocker.  So does a crank-rocker in space whose coupler has its
-    centre on the line of its joints; where it has not, a rest remains that no counterweight on the shafts removes.
+    each link from its first joint, are those of the same links.  The result also holds for a crank-rocker in space
+    whose coupler has its centre on the line of its joints; otherwise a force remains that no counterweight on the
+    shafts removes.
     """
     a, b, c = lengths
     crank = -(masses[0] * centres[0] + masses[1] * a * (1.0 - centres[1] / b))

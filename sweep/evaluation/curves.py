@@ -1,4 +1,4 @@
-"""Which pose outputs of a mechanism are worth a curve over the turn, and which are coordinates for its drawing."""
+"""Selection of pose outputs: motion curves worth plotting over the turn, and joint coordinates for drawings."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ _OF_MACHINE = re.compile(r"([a-z][a-z_0-9]*)_([xyz])")
 
 
 class Coordinate(NamedTuple):
-    """A coordinate of a joint: the stage or member whose frame it is in, the joint and the axis."""
+    """Coordinate of a joint: stage or member of its frame, joint and axis."""
 
     part: str
     joint: str
@@ -27,7 +27,7 @@ class Coordinate(NamedTuple):
 
 
 def coordinate(name: str) -> Coordinate | None:
-    """Return what a column says of a joint: ``x_b2`` of stage 2, ``looper.tip_z`` in the machine's frame; else None."""
+    """Parse a coordinate's name: ``x_b2`` of stage 2, ``looper.tip_z`` in the machine's frame; else None."""
     member, stem, stage = parts(name)
     match = _OF_MACHINE.fullmatch(stem) if member else _OF_FAMILY.fullmatch(stem)
     if match is None:
@@ -38,7 +38,7 @@ def coordinate(name: str) -> Coordinate | None:
 
 
 def motion_curves(family: Family) -> tuple[str, ...]:
-    """Position and its derivatives, deviations, pressure angles; of a machine those of its members, and relations."""
+    """List position and derivatives, deviations, pressure angles; of a machine those of its members, and relations."""
     if isinstance(family, Machine):
         members = [f"{m.name}.{name}" for m in family.members for name in _ladder(m.family, 2)]
         relations = [r for r in family.relations if r.outputs and _has_loads(family, r)]
@@ -49,7 +49,7 @@ def motion_curves(family: Family) -> tuple[str, ...]:
 
 
 def _has_loads(machine: Machine, relation: Relation) -> bool:
-    """Tell whether the members have what a relation takes of their loads, which a scene may leave out."""
+    """Whether the members have the loads that a relation needs, which a scene may leave out."""
     if not isinstance(relation, Shaking | ShaftTorque):
         return True
     needed = relation.needs(frozenset({relation.outputs[0].name}))
@@ -57,14 +57,14 @@ def _has_loads(machine: Machine, relation: Relation) -> bool:
 
 
 def joint_curves(family: Family) -> tuple[str, ...]:
-    """Return coordinates of the joints, of every stage in its own frame, of a machine's points in one frame."""
+    """List the joint coordinates, of every stage in its own frame, of a machine's points in the machine's frame."""
     if isinstance(family, Machine):
         return tuple(f"{m.name}.{point}_{axis}" for m in family.members for point in m.points for axis in AXES)
     return tuple(f"{name}{s.tail}" for s in family.stages for at in s.family.points.values() for name in at if name)
 
 
 def _ladder(family: Family, orders: int) -> list[str]:
-    """Return the position and its derivatives to an order."""
+    """List the position and its derivatives up to an order."""
     names = [family.position]
     while len(names) <= orders and names[-1] in family.derivative_of:
         names.append(family.derivative_of[names[-1]])

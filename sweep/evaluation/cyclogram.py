@@ -1,4 +1,4 @@
-"""What all members of a machine do over one turn: strokes, dwells at their ends, and events; machine-and-stitch, 8."""
+"""Cyclogram of a machine over one turn: strokes, dwells at their ends, and events; machine-and-stitch, 8."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ if TYPE_CHECKING:
     from sweep.evaluation.tables import Table
 
 Row = tuple[str, str, str, float, float, float]
-AWAY = {PLATE: ("dwell", "low", 0.0), FLIGHT: ("flight", "flies", float("nan"))}  # what a foot does off the rack
+AWAY = {PLATE: ("dwell", "low", 0.0), FLIGHT: ("flight", "flies", float("nan"))}  # states of a foot off the rack
 FLIGHT_ENDS = ("loss", "land")  # of a presser foot's first flight
 COLUMNS = ("member", "kind", "name", "start", "end", "size")
 UNITS = {"start": "rad", "end": "rad", "size": "length, or rad of a follower that turns"}
@@ -40,22 +40,22 @@ UNITS = {"start": "rad", "end": "rad", "size": "length, or rad of a follower tha
 def cyclogram(
     mechanism: Mechanism, design: Table, *, dwell: float = 0.02, angles: AngleUnit | None = None
 ) -> pd.DataFrame:
-    """Return what happens over one turn of the main shaft, in its order.
+    """List the strokes, dwells and events of all members over one turn of the main shaft, ordered by angle.
 
     Parameters
     ----------
     mechanism, design : as of :func:`sweep.joints`
-    dwell : share of the largest stroke within which a member counts as standing at an end of it
-    angles : the unit of the angles of ``design``, "rad" or "deg", as of :func:`sweep.evaluate`
+    dwell : share of the largest stroke within which a member counts as standing still at its end
+    angles : unit of the angles of ``design``, "rad" or "deg", as of :func:`sweep.evaluate`
 
     Returns
     -------
     DataFrame
-        ``member`` ("" for what belongs to several), ``kind`` (stroke, dwell, flight, event), ``name``, ``start`` and
-        ``end`` (crank angles of the main shaft [rad]; an end below its start lies in the next turn), ``size`` (the way
-        of the follower with its sign; of a dwell its band; nan of a flight and an event).  A member that turns fully
-        has no strokes.  A presser foot has the strokes in which it follows the rack, its dwell on the plate, and its
-        flights; none of them where its turns differ.  ``attrs["units"]`` names the units
+        ``member`` ("" for events, and without a machine), ``kind`` (stroke, dwell, flight, event), ``name``, ``start``
+        and ``end`` (crank angles of the main shaft [rad]; an end below its start lies in the next turn), ``size``
+        (signed stroke of the follower; band of a dwell; nan for a flight and an event).  A member that turns fully has
+        no strokes.  A presser foot has strokes while it follows the rack, its dwell on the plate, and its flights;
+        none of them where its turns differ.  ``attrs["units"]`` names the units
 
     Examples
     --------
@@ -80,14 +80,14 @@ def cyclogram(
 
 
 def table_in_degrees(rows: pd.DataFrame) -> pd.DataFrame:
-    """Return the table for people and files: crank angles in degrees, and how long each takes."""
+    """Convert the table for output: crank angles in degrees, with the duration of each row."""
     start, end = (np.degrees(rows[name].to_numpy(np.float64)) for name in ("start", "end"))
     columns = {"member": rows["member"], "kind": rows["kind"], "name": rows["name"]}
     return rows[[]].assign(**columns, **{"from [deg]": start, "to [deg]": end, "lasts [deg]": (end - start) % 360.0})
 
 
 def _positions(family: Family) -> Iterator[tuple[str, str]]:
-    """Yield each member with the position of its follower, whose derivative is known."""
+    """Yield each member with the position of its follower, if its derivative is a pose output."""
     if isinstance(family, Machine):
         pairs = [(m.name, f"{m.name}.{m.family.position}") for m in family.members]
     else:
@@ -96,7 +96,7 @@ def _positions(family: Family) -> Iterator[tuple[str, str]]:
 
 
 def _strokes(poses: Poses, family: Family, member: str, name: str, dwell: float) -> Iterator[Row]:
-    """Yield the strokes between neighbouring extremes, and the dwells at both ends of the largest."""
+    """Yield the strokes between neighbouring extrema, and the dwells at the global minimum and maximum."""
     rate = family.derivative_of[name]
     status, (slope, values) = poses.samples([rate, name], SAMPLES)
     wraps = family.pose_output[name].wraps
@@ -107,7 +107,7 @@ def _strokes(poses: Poses, family: Family, member: str, name: str, dwell: float)
     if ends.size < 2:
         return
     exact = poses.at(np.zeros(ends.size, np.intp), ends, name)[0]
-    if wraps:  # the turn that the samples are in
+    if wraps:  # shifted by full turns to the unwrapped samples
         grid = np.arange(SAMPLES + 1) * TWO_PI / SAMPLES
         exact = exact + TWO_PI * np.round((np.interp(ends, grid, np.append(whole, whole[0])) - exact) / TWO_PI)
     for k, size in enumerate(np.roll(exact, -1) - exact):
@@ -124,7 +124,7 @@ def _strokes(poses: Poses, family: Family, member: str, name: str, dwell: float)
 
 
 def _left(off: Callable[[float], float], phi: float, way: float) -> float:
-    """Return where a band about an extreme is left, going one way from it."""
+    """Find where the band about an extremum is left, searching in one direction."""
     from scipy.optimize import brentq
 
     step = way * TWO_PI / SAMPLES
@@ -135,7 +135,7 @@ def _left(off: Callable[[float], float], phi: float, way: float) -> float:
 
 
 def _feet(family: Family, designs: Array) -> Iterator[tuple[str, Columns, Array, float]]:
-    """Yield each presser foot: its name, what its march tells, the path of its rack, its angle at that of 0."""
+    """Yield each presser foot: name, outputs of its march, path of its rack, its angle at crank angle 0."""
     for alone in family.every(PresserFoot):
         columns, path, _, _ = alone.march(designs, alone.nodes)
         yield "", columns, path[0], 0.0
@@ -150,9 +150,9 @@ def _pressings(family: Family) -> list[Pressing]:
 
 
 def _pieces(member: str, columns: Columns, path: Array, ahead: float) -> Iterator[Row]:
-    """Yield what a foot whose turns are alike does from one change to the next; on the rack from top to top.
+    """Yield strokes, dwell and flights of a foot whose turns are alike; on the rack strokes end at extrema.
 
-    On fabric it follows nothing that is known as exactly: its flights alone are told.
+    On fabric its path is not known as exactly: only its flights are listed.
     """
     changes = np.asarray(columns["changes"], np.float64)[0]
     if columns["status"][0] or not columns["settled"][0] or changes[0] > changes[1:].size // 2:
@@ -172,13 +172,13 @@ def _pieces(member: str, columns: Columns, path: Array, ahead: float) -> Iterato
 
 
 def _rack(path: Array, phi: Array) -> Array:
-    """Height of a rack's path (6, N) and its slope at crank angles (k,), (2, k)."""
+    """Height of a rack's path (6, N) and its slope at crank angles (k,); (2, k)."""
     cells = np.mod(phi, TWO_PI) * (path.shape[1] / TWO_PI)
     return np.array([rack_height(path, int(x), x % 1.0)[:2] for x in cells]).reshape(-1, 2).T
 
 
 def event_angles(family: Family) -> dict[str, str]:
-    """Return the output that is the crank angle of each event and moment, by its name in the cyclogram."""
+    """Map the name of each event and moment in the cyclogram to the output that is its crank angle."""
     names = {event.name: event_names(family, event)[0] for event in family.events}
     relations: tuple[Any, ...] = getattr(family, "relations", ())
     names |= {r.name: f"phi_{r.name}" for r in relations if isinstance(r, Taking | Entering)}
@@ -189,7 +189,7 @@ def event_angles(family: Family) -> dict[str, str]:
 
 
 def _events(family: Family, designs: Array) -> Iterator[Row]:
-    """Yield the moments and events of the machine that happen."""
+    """Yield the events and moments of the machine that occur."""
     accuracy = Accuracy(samples=SAMPLES) if isinstance(family.domain, March) else Accuracy(target=1e-9)
     for name, place in event_angles(family).items():
         found = design_outputs(family, designs, [place], accuracy)

@@ -1,4 +1,4 @@
-"""``joints``: where the joints of a mechanism are, stage by stage and member by member."""
+"""``joints``: coordinates of the joints of a mechanism, stage by stage and member by member."""
 
 from __future__ import annotations
 
@@ -38,15 +38,15 @@ class Part:
 
     Parameters
     ----------
-    member, stage : names; empty where there is one only
-    frame : in which coordinates are given: "machine", that of a chain's first stage, or the family's own
+    member, stage : names; empty where there is only one
+    frame : frame of the coordinates: "machine", that of a chain's first stage, or the family's own
     family, design : the stage's own family and its parameters, (P,)
     phi : angle of the driving shaft, (m,)
     crank, position : the stage's own crank angle and its output, the angle or displacement of its follower, (m,)
-    joints : by name (m, 3) each, fixed ones too
+    joints : paths by name, (m, 3) each, fixed joints too
     axes : unit vectors of axes and slides, by fixed joint
     kinds : "axis", "slide" or "point", by fixed joint
-    links : parts, by the joints that they connect
+    links : the links, with the joints that they connect
     status : (m,)
     """
 
@@ -66,19 +66,19 @@ class Part:
 
     @property
     def label(self) -> str:
-        """Member and stage in words; the family's name where there is one only."""
+        """Member and stage in words; the family's name where there is only one."""
         words = [self.member, f"stage {self.stage}" if self.stage else ""]
         return " ".join(word for word in words if word) or self.family.name
 
     @property
     def parameters(self) -> dict[str, float]:
-        """The stage's own design by parameter."""
+        """Parameters of the stage's own design, by name."""
         return dict(zip(self.family.parameter_names, self.design.tolist(), strict=True))
 
 
 @dataclass(frozen=True)
 class _Where:
-    """What a stage is called, and its frame in the frame that coordinates are given in."""
+    """Names of a stage, and its frame relative to the frame of the coordinates."""
 
     member: str = ""
     stage: str = ""
@@ -96,7 +96,7 @@ def joints(mechanism: Mechanism, design: Table, phi: ArrayLike, *, angles: Angle
     design : the parameters of one design, in one length unit and rad
     phi : angles of the driving shaft [rad], one or a plain list; over an interval values of its variable, of a march
         equal steps of one turn from 0
-    angles : the unit of the angles given, "rad" or "deg", as of :func:`sweep.evaluate`
+    angles : unit of the given angles, "rad" or "deg", as of :func:`sweep.evaluate`
 
     Returns
     -------
@@ -106,16 +106,16 @@ def joints(mechanism: Mechanism, design: Table, phi: ArrayLike, *, angles: Angle
         ========== ==================================================================================
         member     name of the machine's member; empty for a family or a chain
         stage      number of the stage in a chain; empty where there is one stage
-        frame      "machine" where x, y, z are in the machine's frame; else whose own frame they are in
+        frame      "machine" where x, y, z are in the machine's frame; else the stage or family of the frame
         joint      name of the joint as on the page of its family; ``tip`` is that of a member
         kind       "fixed" or "moving"
         phi        angle of the driving shaft [rad]
         x, y, z    coordinates [length unit of the design]; nan where the pose does not exist
-        status     why, see :mod:`kernels.status`
+        status     reason of a nan, see :mod:`kernels.status`
         ========== ==================================================================================
 
-        All stages of a chain stand in the frame of its first one; where a family names no axis that the next one
-        could turn on, each keeps its own.  ``attrs["units"]`` names the units.
+        All stages of a chain are given in the frame of the first one; where a family has no output axis for the next
+        stage, each stage keeps its own frame.  ``attrs["units"]`` names the units.
 
     Raises
     ------
@@ -152,7 +152,7 @@ def joints(mechanism: Mechanism, design: Table, phi: ArrayLike, *, angles: Angle
 
 
 def parts(mechanism: Mechanism, design: Table, phi: ArrayLike) -> list[Part]:
-    """Stages of a mechanism with their joints, in the order of members and stages; arguments as of `joints`."""
+    """List the stages of a mechanism with their joints, by member and stage; arguments as of `joints`."""
     family = find_family(mechanism).precise()
     matrix = one_design(family, design)
     angles = np.atleast_1d(numbers(phi, "phi", "phi, position"))
@@ -168,7 +168,7 @@ def parts(mechanism: Mechanism, design: Table, phi: ArrayLike) -> list[Part]:
 
 
 def _wheres(family: Family, matrix: Array) -> list[_Where]:
-    """Return where the stages of a mechanism stand: in the frame of the first, where a chain says how."""
+    """List names and frames of the stages of a mechanism: in the frame of the first stage, if a chain defines it."""
     stages = family.stages
     if not isinstance(family, Chain):
         return [_Where(frame=family.name)]
@@ -196,7 +196,7 @@ def _of_member(machine: Machine, member: Member, matrix: Array, angles: Angles) 
 
 
 def _of_stages(family: Family, matrix: Array, angles: Angles, phi: Array, wheres: Sequence[_Where]) -> Iterator[Part]:
-    """Yield every stage where it stands."""
+    """Yield every stage in its frame; each stage drives the next one."""
     stages = family.stages
     status = np.zeros(phi.size, np.uint8)
     for k, stage in enumerate(stages):
@@ -219,7 +219,7 @@ def _needed(family: Family) -> set[str]:
 def _part(
     family: Family, matrix: Array, angles: Angles, phi: Array, found: dict[str, Any], where: _Where, status: Any
 ) -> Part:
-    """Return the joints of one stage, turned and moved into the frame of ``where``."""
+    """Compute the joints of one stage, transformed into the frame of ``where``."""
     skeleton = skeleton_of(family)
     moving = {
         name: np.stack([found[x][0] if x else np.zeros(phi.size) for x in at], axis=-1)
@@ -227,7 +227,7 @@ def _part(
     }
     moving |= {name: made.at(matrix, angles, found)[0] for name, made in skeleton.made.items()}
     if linked := {joint for link in skeleton.links for joint in link.joints}:
-        # What no link carries is no joint of the fixed frame: the pitch curve stands in that of the cam.
+        # A point that no link carries is not a joint: the pitch curve is given in the frame of the cam.
         moving = {name: path for name, path in moving.items() if name in linked}
     fixed = {name: np.tile(point.at(matrix)[0], (phi.size, 1)) for name, point in skeleton.fixed.items()}
     axes = {name: point.axis(matrix)[0] for name, point in skeleton.fixed.items() if point.axis is not None}

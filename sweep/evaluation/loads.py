@@ -1,4 +1,4 @@
-"""Bodies and loads as a user states them: ``rod`` from material and section, curves over the turn."""
+"""Bodies and loads of a user: ``rod`` from material and section, load curves over the turn."""
 
 from __future__ import annotations
 
@@ -23,12 +23,12 @@ Loads: TypeAlias = "Mapping[str, Curve | tuple[Any, Any] | Mapping[str, Any]]"
 
 
 def curves_of(family: Family, loads: Loads | None) -> dict[str, Curve]:
-    """Return the curves of the argument ``loads=``, by the input that each adds to.
+    """Read the argument ``loads=``: curves by the input to which each is added.
 
     Raises
     ------
     InputError
-        for a name that is no load of this mechanism, or what is no curve.
+        for a name that is no load of this mechanism, or a value that is no curve.
     """
     found: dict[str, Curve] = {}
     known = curved_inputs(family) if loads else ()
@@ -74,8 +74,8 @@ def _column(values: object, name: str) -> Array:
     return column
 
 
-# kg/m^3.  EN 1991-1-1, table A.4: weights over 9.81 m/s^2, the middle of a range, of steel its lower end.  Titanium and
-# magnesium: CRC Handbook of Chemistry and Physics, physical constants of the elements.
+# kg/m^3.  EN 1991-1-1, table A.4: weights over 9.81 m/s^2, the middle of a range, for steel its lower end.  Titanium
+# and magnesium: CRC Handbook of Chemistry and Physics, physical constants of the elements.
 DENSITIES = {
     "steel": 7850.0,
     "cast iron": 7310.0,
@@ -94,7 +94,7 @@ _AREAS: dict[str, Callable[..., float]] = {
     "rectangular": lambda a, b: a * b,
     "tube": lambda d, wall: math.pi * wall * (d - wall) if 2.0 * wall <= d else math.nan,
 }
-# Square of the radius of gyration about a line across the bar, of sections for which all these lines are alike.
+# Squared radius of gyration about a diameter of the section, for sections where it is the same for all diameters.
 _GYRATIONS: dict[str, Callable[..., float]] = {
     "round": lambda d: d * d / 16.0,
     "square": lambda a: a * a / 12.0,
@@ -104,27 +104,27 @@ UNITS = ("t", "t/mm", "mm")  # of the columns
 
 
 def rod(body: str, material: str, section: str, inertia: str = "slender") -> dict[str, float]:
-    """Mass of a body as a bar between its joints: columns to put into a table beside the dimensions.
+    """Mass columns of a body as a bar between its joints, to be added to the columns of dimensions.
 
-    Centre and inertia follow from the length that the body has in each design.
+    Centre and inertia follow from the length of the body in each design.
 
     Parameters
     ----------
     body : its name, with the number of its stage, as ``crank``, ``rocker2``, ``needle.coupler1``
     material : one of :data:`DENSITIES`
     section : as "6 mm round", "5 mm square", "6 x 4 mm rectangular", "8 x 1 mm tube" (outer diameter, wall)
-    inertia : "slender", J = m l^2/12 across the bar and nothing along it, or "exact", m (l^2/12 + k^2) and 2 m k^2 with
-        the section's radius of gyration k; a rectangular section is slender: how it lies is not known
+    inertia : "slender", J = m l^2/12 across the bar and 0 along it, or "exact", m (l^2/12 + k^2) and 2 m k^2 with the
+        section's radius of gyration k; a rectangular section is slender: its orientation is not known
 
     Returns
     -------
     dict
-        0 for what its mass is besides [t], the mass per length [t/mm], and k [mm], 0 where it is slender
+        additional mass, 0 [t], mass per length [t/mm], and k [mm], 0 for "slender"
 
     Raises
     ------
     InputError
-        for an unknown material, a section that is not written like these, or another inertia
+        for an unknown material, a section in another notation, or another inertia
 
     Examples
     --------

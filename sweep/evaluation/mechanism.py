@@ -1,4 +1,4 @@
-"""``mechanism``: one design, checked and bound once, so that a number of it costs little more than its kernel."""
+"""``mechanism``: one design, checked and bound once, so that evaluating it costs little more than its kernel."""
 
 from __future__ import annotations
 
@@ -24,17 +24,17 @@ from sweep.families.names import stem
 from sweep.quantities.units import LARGEST, internal_unit, one_value, plain
 
 Number: TypeAlias = "float | str"
-"""A dimension [mm, rad, t, s and what follows from them], or a text with its unit, as "12 mm"."""
+"""A dimension in internal units (mm, rad, t, s and derived ones), or a text with its unit, as "12 mm"."""
 
 KEPT = 2**14  # crank angles of a grid whose cosines and sines are kept for the next call
 
 
 class BoundDesign:
-    """One design of a mechanism, as `mechanism` binds it; nothing of it changes.
+    """One design of a mechanism, as `mechanism` binds it; it is immutable.
 
     Parameters
     ----------
-    family : of the design
+    family : family of the design
     dimensions : its parameters, and inputs of effects, by name, in internal units
     """
 
@@ -49,11 +49,11 @@ class BoundDesign:
         return f"mechanism({self.family.name}{given})"
 
     def __call__(self, phi: ArrayLike) -> dict[str, Any]:
-        """Give every pose output at crank angles; see `poses`."""
+        """Compute every pose output at crank angles, as `poses` does."""
         return self.poses(phi, self.family.pose_names)
 
     def poses(self, phi: ArrayLike, want: str | Sequence[str]) -> dict[str, Any]:
-        """Give pose outputs at crank angles, bit for bit those of `sweep.evaluate`.
+        """Compute pose outputs at crank angles, bit for bit those of `sweep.evaluate`.
 
         Parameters
         ----------
@@ -63,12 +63,12 @@ class BoundDesign:
         Returns
         -------
         dict
-            an array like ``phi`` for each wanted name and ``status``; of one angle a number each.  ``pd.DataFrame``
-            takes it as it is
+            an array like ``phi`` for each wanted name and ``status``, or a number each for one angle; ``pd.DataFrame``
+            accepts it
         """
         asked = asked_of_poses(self._precise, want)
         angles, is_one = _angles(self.family.domain, phi)
-        with np.errstate(all="ignore"):  # what leaves float64 has a status in the end
+        with np.errstate(all="ignore"):  # values beyond float64 get a status below
             found = explained(
                 asked.family.poses(self._row(asked.family), angles, frozenset(asked.wanted)), asked.wanted
             )
@@ -84,12 +84,12 @@ class BoundDesign:
         accuracy: float | None = None,
         window: tuple[float, float] | None = None,
     ) -> dict[str, Any]:
-        """Give design outputs, bit for bit those of `sweep.summarise`, whose arguments these are.
+        """Compute design outputs, bit for bit those of `sweep.summarise`, with the arguments of `sweep.summarise`.
 
         Returns
         -------
         dict
-            a number for each wanted name, with ``accuracy`` its ``err_<name>``, and ``status``
+            a number for each wanted name, with ``accuracy`` also ``err_<name>``, and ``status``
         """
         asked = asked_of_designs(self.family, want)
         chosen = chosen_accuracy(self.family.domain, samples, accuracy)
@@ -105,7 +105,7 @@ class BoundDesign:
         return self.family.precise()
 
     def _row(self, family: Family) -> Array:
-        """Give the design matrix of one row of the family, which effects may have extended by inputs."""
+        """Build the design matrix (1, P) of a family that effects may have extended by inputs."""
         row = self._rows.get(family.parameter_names)
         if row is None:
             given = [self.dimensions.get(p.name, p.left_out(self.dimensions)) for p in family.parameters]
@@ -118,7 +118,7 @@ class BoundDesign:
 
 
 def mechanism(family: Mechanism, **dimensions: Number) -> BoundDesign:
-    """Bind one design of a mechanism, to ask it for numbers at once.
+    """Check and bind one design of a mechanism for repeated evaluation.
 
     Parameters
     ----------
@@ -158,7 +158,7 @@ def _place(family: Family) -> str:
 
 
 def _in_internal_units(family: Family, dimensions: Mapping[str, Number]) -> dict[str, float]:
-    """Read dimensions as `mechanism` takes them."""
+    """Check dimensions and convert them to internal units."""
     known = dict(inputs_beside(family, dimensions)) | {p.name: p for p in family.parameters}
     for name in dimensions:
         if name not in known:
@@ -168,7 +168,7 @@ def _in_internal_units(family: Family, dimensions: Mapping[str, Number]) -> dict
 
 
 def _is_number(given: object) -> TypeGuard[float]:
-    """Tell whether it is a finite number, of Python or numpy."""
+    """Whether a value is a finite number of Python or numpy."""
     if isinstance(given, bool) or not isinstance(given, int | float | np.integer | np.floating):
         return False
     number: Any = given
@@ -176,7 +176,7 @@ def _is_number(given: object) -> TypeGuard[float]:
 
 
 def _value(name: str, p: Parameter, given: object, place: str) -> float:
-    """Read one dimension, and check it as a table's column is checked."""
+    """Convert one dimension to its internal unit, with the checks of a table's column."""
     internal = internal_unit(p.unit)
     said: Any = (
         one_value(given, internal, name, place) if isinstance(given, str) else plain(given, internal, name, place)
@@ -201,7 +201,7 @@ def _value(name: str, p: Parameter, given: object, place: str) -> float:
 
 
 def _angles(domain: Domain, phi: ArrayLike) -> tuple[Angles, bool]:
-    """Check crank angles and tabulate them, a grid of the usual size only once; tell whether it is one angle."""
+    """Check and tabulate crank angles, cached for grids of the usual size; also return whether it is one angle."""
     if isinstance(phi, float) and isinstance(domain, Turn) and abs(phi) <= TWO_PI:
         return Angles.of(np.array([[phi]])), True
     grid = np.asarray(phi)

@@ -1,4 +1,4 @@
-"""``evaluate``: the motion of given designs, one row per pose."""
+"""``evaluate``: pose outputs of given designs, one row per pose."""
 
 from __future__ import annotations
 
@@ -46,14 +46,14 @@ def evaluate(
     table : DataFrame or mapping with a column per parameter [one length unit, rad]; missing ``branch`` means +1; units
         as of :func:`sweep.summarise`
     want : names of pose outputs (see ``sweep families``), in a list or in one text between commas; the name of an
-        effect stands for all of its own
+        effect stands for all its pose outputs
     phi : crank angles [rad], one or a plain list of them, for every design; without it the table must have a column
         ``phi``, and with it none.  A family over an interval takes values of its own variable here, or in a column of
-        that name; one whose poses depend on those before takes equal steps of one turn from 0, in order
-    keep : columns of the table that the result repeats in front: names, or True for all of them
+        that name; a family whose poses depend on earlier ones (a march) takes equal steps of one turn from 0, in order
+    keep : columns of the table to be repeated at the front of the result: names, or True for all
     status_text : add a column ``status_text``, the meaning of ``status`` in words
-    angles : the unit of angles in ``table`` and ``phi``, "rad" or "deg"; a header such as ``alpha [deg]`` says it of
-        one column.  Left out, it is rad, and what reads as degrees is refused: a parameter above 2 pi, crank angles
+    angles : unit of angles in ``table`` and ``phi``, "rad" or "deg"; a header such as ``alpha [deg]`` gives that of one
+        column.  By default it is rad, and values that look like degrees raise: a parameter above 2 pi, crank angles
         whose largest is a whole or half number between 4 pi and 720.  Results are in rad
     loads : loads over the turn, as for `summarise`
 
@@ -67,7 +67,7 @@ def evaluate(
     Raises
     ------
     InputError
-        for an unknown name or a bad value, with column and row; for angles that read as degrees.
+        for an unknown name or a bad value, with column and row; for angles that look like degrees.
 
     Examples
     --------
@@ -102,19 +102,19 @@ def evaluate(
         at, repeats = grid[None, :], grid.size
         head = {"design": np.repeat(np.arange(len(matrix)), repeats), variable: np.tile(grid, len(matrix))}
         index = None if index is None else index.repeat(repeats)
-    with np.errstate(all="ignore"):  # what leaves float64 has a status in the end
+    with np.errstate(all="ignore"):  # values beyond float64 get a status below
         columns = explained(mechanism.poses(matrix, Angles.of(at), frozenset(wanted)), wanted)
     made = head | {name: columns[name].ravel() for name in [*wanted, "status"]}
     if status_text:
         made["status_text"] = np.array(meanings(made["status"]), dtype=object)
-    own = pd.DataFrame(made, index=index, copy=False)  # nobody else has these arrays
+    own = pd.DataFrame(made, index=index, copy=False)  # the arrays are not shared
     result = _beside(kept_columns(given, keep, made, len(matrix)), own, len(matrix), repeats)
     result.attrs["units"] = dict(units)
     return result
 
 
 class Question(NamedTuple):
-    """What is asked of a mechanism: its family with the effects that this takes, the names in order, their units."""
+    """A request to a mechanism: its family with the effects that it needs, the names in order, their units."""
 
     family: Family
     wanted: tuple[str, ...]
@@ -123,12 +123,12 @@ class Question(NamedTuple):
 
 @of_family
 def questions(family: Family) -> dict[Hashable, Question]:
-    """Remember what was asked of a family, as long as no loads come with it: each question is looked at once."""
+    """Cache of the requests to a family without loads."""
     return {}
 
 
 def asked_of_poses(family: Family, want: str | Sequence[str], loads: Loads | None = None) -> Question:
-    """Make the question for pose outputs of a family with precise poses."""
+    """Make the request for pose outputs of a family with precise poses."""
     given = wanted_names(want, f"pose outputs of {family.name}")
     known, key = questions(family), ("poses", *given)
     if key in known and not loads:
@@ -144,7 +144,7 @@ def asked_of_poses(family: Family, want: str | Sequence[str], loads: Loads | Non
 
 
 def _beside(kept: Columns, result: pd.DataFrame, designs: int, repeats: int) -> pd.DataFrame:
-    """Return the result with input columns in front, each of whose rows belongs to ``repeats`` rows of the result."""
+    """Put input columns in front of the result; each input row is repeated ``repeats`` times."""
     import pandas as pd
 
     if not kept:
@@ -154,7 +154,7 @@ def _beside(kept: Columns, result: pd.DataFrame, designs: int, repeats: int) -> 
 
 
 def values_of_the_variable(phi: ArrayLike) -> NDArray[np.float64]:
-    """Return the argument phi= as a plain array."""
+    """Return the argument ``phi=`` as a 1-D array of finite values."""
     grid = numbers(phi, "phi", "phi, position")
     if grid.ndim > 1:
         raise InputError("phi", f"shape {grid.shape}", "one angle, or a plain list of angles for every design", "phi")
@@ -166,7 +166,7 @@ def values_of_the_variable(phi: ArrayLike) -> NDArray[np.float64]:
 
 
 def _check_column(mechanism: Family, extras: Container[str]) -> None:
-    """Refuse a table without a column of the variable, and any such column for a march."""
+    """Raise for a table without a column of the variable, and for any table of a march."""
     if isinstance(mechanism.domain, March):
         allowed = "the argument phi=, equal steps of one turn from 0: a pose depends on those before it"
         raise InputError("phi", "a column", allowed, f"table of {mechanism.name}")
@@ -177,7 +177,7 @@ def _check_column(mechanism: Family, extras: Container[str]) -> None:
 
 
 def _grid(mechanism: Family, table: Table, phi: ArrayLike) -> NDArray[np.float64]:
-    """Return the argument phi= for every design, checked against the table and the domain."""
+    """Return the argument ``phi=``, checked against the table and the domain."""
     variable = mechanism.domain.name
     if variable in map(str, table):
         allowed = f"either phi= for every design, or a column {variable}, not both"
@@ -188,7 +188,7 @@ def _grid(mechanism: Family, table: Table, phi: ArrayLike) -> NDArray[np.float64
 
 
 def check_march(domain: Domain, grid: NDArray[np.float64]) -> None:
-    """Refuse crank angles that are no march over one turn."""
+    """Raise if the domain is a march and the crank angles are not equal steps of one turn from 0."""
     if not isinstance(domain, March):
         return
     steps = np.arange(grid.size) * (TWO_PI / grid.size)
@@ -200,7 +200,7 @@ def check_march(domain: Domain, grid: NDArray[np.float64]) -> None:
 
 
 def pose_wants(mechanism: Family, want: str | Sequence[str]) -> list[str]:
-    """Return the wanted names without repetition; an unknown one is an error that names the nearest."""
+    """Return the wanted names without repetition; raise for an unknown one, with the nearest name."""
     wanted = wanted_names(want, f"pose outputs of {mechanism.name}")
     for name in wanted:
         if name not in mechanism.pose_names and name != "status":

@@ -1,4 +1,4 @@
-"""Routes: design outputs that are computed together, by a family's step, a general reduction, or from other outputs."""
+"""Routes: ways to compute design outputs together, by a family's step, a general reduction, or from other outputs."""
 
 from __future__ import annotations
 
@@ -28,23 +28,23 @@ from sweep.reductions.steps import group_ns, group_order, step_ns, steps_of
 from sweep.reductions.turn import limits_and_reductions, margin_group
 
 Part: TypeAlias = tuple[float, float] | None
-"""A window of the stroke as two fractions, or none."""
+"""A window of the stroke as two fractions, or None."""
 RunFunction: TypeAlias = Callable[[Array, Accuracy, Part], Columns]
 
 
 @dataclass(frozen=True)
 class Route:
-    """Some design outputs that are computed together.
+    """A way to compute some design outputs together.
 
     Parameters
     ----------
-    name : what computes them
-    outputs : their names
-    ns_per_design : estimate of the time that it takes
-    run : ``run(designs, accuracy, window)`` gives the outputs, perhaps their ``err_``, and ``status``, each (n,)
-    general : which general reduction it is; "" for a family's own step or an effect
-    order : kind of work, and its place among routes of that kind
-    columns : how many of the first columns of the design matrix ``run`` looks at; None for all
+    name : name of the step or reduction
+    outputs : names of the outputs
+    ns_per_design : estimated time [ns]
+    run : ``run(designs, accuracy, window)`` returns the outputs, perhaps their ``err_``, and ``status``, each (n,)
+    general : name of the general reduction; "" for a family's own step or an effect
+    order : kind of work, and the place among routes of that kind
+    columns : number of leading columns of the design matrix that ``run`` reads; None for all
     """
 
     name: str
@@ -57,7 +57,7 @@ class Route:
 
 
 def check_window(window: tuple[float, float] | None) -> None:
-    """Refuse a window that is no part of the stroke."""
+    """Raise if the window is no part of the stroke."""
     if window is None:
         return
     two = isinstance(window, Sequence) and len(window) == 2 and all(isinstance(x, Real) for x in window)
@@ -66,7 +66,7 @@ def check_window(window: tuple[float, float] | None) -> None:
 
 
 def own_route(step: Step, stage: Stage, outputs: tuple[str, ...], accuracy: Accuracy) -> Route:
-    """Make the route by a family's own step, or by one of a chain's first stage."""
+    """Make the route of a family's own step, or of a step of a chain's first stage."""
     place = [own.name for own in steps_of(stage.family)].index(step.name)
     run, cost = (
         partial(_run_step, step, stage, _own_outputs(step, stage, outputs)),
@@ -81,7 +81,7 @@ def own_route(step: Step, stage: Stage, outputs: tuple[str, ...], accuracy: Accu
 def general_route(
     family: Family, general: Group, effect: str, outputs: tuple[str, ...], accuracy: Accuracy, windowed: bool
 ) -> Route:
-    """Make the route by a general reduction over poses."""
+    """Make the route of a general reduction over poses."""
     run = partial(_run_general, family, general, outputs)
     cost = group_ns(family, general, outputs, accuracy, windowed)
     order = group_order(family, general, outputs)
@@ -103,7 +103,7 @@ def _run_general(
 
 
 class _Own(NamedTuple):
-    """An output of a step: its name outside, in the stage, and the pose output whose precise maximum may replace it."""
+    """Output of a step: outer name, name in the stage, and the pose output whose precise maximum may replace it."""
 
     name: str
     plain: str
@@ -116,9 +116,9 @@ def _own_outputs(step: Step, stage: Stage, outputs: Sequence[str]) -> tuple[_Own
 
 
 def _sharpened(family: Family, step: Step, name: str) -> str:
-    """Name the pose output of a located maximum, which the family's precise poses can make more accurate; "" if none.
+    """Name the pose output of a maximum whose place is known, to be recomputed by precise poses; "" if none.
 
-    The poses of an effect come from the same solution of the whole turn: they are wrong alike.
+    The poses of an effect come from the same solution of the whole turn and have the same error.
     """
     if family.precise_poses is None or step.work is Work.EFFECT:
         return ""
@@ -136,9 +136,9 @@ def _run_step(
     found = step.run(part, frozenset(own.plain for own in outputs), accuracy)
     if accuracy.target is not None:
         for _, plain, pose in outputs:
-            if error_of(plain) not in found:  # a step that serves a target promises it, or says its error itself
+            if error_of(plain) not in found:  # a step either meets the target, or gives its own error
                 found[error_of(plain)] = accuracy.target * np.abs(np.asarray(found[plain], np.float64))
-            # Rounding may have left a maximum less accurate than was asked.
+            # Rounding may have left a maximum less accurate than the target.
             if pose and not accuracy.certify:
                 sharpen_maxima(stage.family, step, part, pose, plain, found, accuracy.target)
     columns: Columns = {"status": found["status"]}
@@ -149,11 +149,11 @@ def _run_step(
     return columns
 
 
-SLOPE = 1e-5  # rad, for the slope that says what the error of an angle does to a value there
+SLOPE = 1e-5  # rad, step of the finite difference that propagates an angle's error to a value there
 
 
 def negative(name: str, of: str, designs: Array, found: Columns, accuracy: Accuracy) -> Columns:
-    """Give the negative of an output, which is small where the output is to be large."""
+    """Compute the negative of an output, which is minimised to maximise the output."""
     values = np.asarray(found[of], np.float64)
     columns: Columns = {name: -np.abs(values) if by_magnitude(of) else -values, "status": found["status"]}
     if accuracy.target is not None:
@@ -162,14 +162,14 @@ def negative(name: str, of: str, designs: Array, found: Columns, accuracy: Accur
 
 
 def extent(box: Box, designs: Array, found: Columns, accuracy: Accuracy) -> Columns:
-    """Give the extent of a mechanism from the largest and smallest coordinates of its joints."""
+    """Compute the extent of a mechanism from the largest and smallest coordinates of its joints."""
     still = [np.asarray(piece(designs), np.float64) for piece in box.still]
     ends = []
     errors: Array = np.zeros(len(designs))
     for which, take in ((0, np.maximum), (1, np.minimum)):
         names = [pair[which] for pair in box.reductions]
         values = floats(found, *names)
-        ends.append(take.reduce([*values, *still]))  # nan where a joint's extremum is: its status says why
+        ends.append(take.reduce([*values, *still]))  # nan where a joint's extremum is nan: its status says why
         if accuracy.target is not None:
             errors = errors + np.maximum.reduce([np.asarray(found[error_of(name)], np.float64) for name in names])
     name = box.output.name
@@ -180,7 +180,7 @@ def extent(box: Box, designs: Array, found: Columns, accuracy: Accuracy) -> Colu
 
 
 def difference(timing: Timing, designs: Array, found: Columns, accuracy: Accuracy) -> Columns:
-    """Give the difference of two crank angles, in (-pi, pi]."""
+    """Compute the difference of two crank angles, in (-pi, pi]."""
     first, second = floats(found, *timing.places)
     apart = second - first
     columns: Columns = {timing.name: apart - TWO_PI * np.ceil((apart - np.pi) / TWO_PI), "status": found["status"]}
@@ -191,7 +191,7 @@ def difference(timing: Timing, designs: Array, found: Columns, accuracy: Accurac
 
 
 def value_at(machine: Machine, reading: EventValue, designs: Array, found: Columns, accuracy: Accuracy) -> Columns:
-    """Give a pose output at a crank angle of each design; its error is the angle's times the slope, and rounding."""
+    """Compute a pose output at a crank angle of each design; the angle's error times the slope adds to its error."""
     place = reading.places[0]
     phi = np.asarray(found[place], np.float64)
     known = np.isfinite(phi)

@@ -1,6 +1,6 @@
-"""The routes to design outputs, chosen and run: own steps, effects, general reductions, members, outputs of others.
+"""Choice and execution of the routes to design outputs: own steps, effects, general reductions, members, composed ones.
 
-An output made of others, and one of a member of a machine, asks `design_outputs` for those in turn.
+A composed output, and an output of a machine's member, calls `design_outputs` for the outputs that it needs.
 """
 
 from __future__ import annotations
@@ -33,7 +33,7 @@ from sweep.reductions.sampling import Index, on_closed_turn
 from sweep.reductions.steps import applying_step, beyond_motion, group_ns
 from sweep.reductions.turn import margin_group
 
-# With these some outputs are missing or rough, the others are worth having.
+# Statuses with which some outputs are missing or rough, but others are still useful.
 PARTIAL = (
     st.OK, st.NOT_OSCILLATING, st.NOT_CONVERGED, st.NO_DWELL, st.JAMMED, st.NOT_LINEAR, st.SINGULAR, st.INVALID_INPUT,
     st.NO_EVENT, st.NEVER, st.TWICE, st.TANGENT, st.WRONG_SIDE, st.WRONG_WAY, st.NO_FRAME,
@@ -42,7 +42,7 @@ PARTIAL = (
 GOES_ON = np.isin(np.arange(256), PARTIAL)
 
 Compose: TypeAlias = Callable[[Array, Columns, Accuracy], Columns]
-"""What makes an output of others: from designs (n, P), and the columns of those others."""
+"""Function that composes an output from designs (n, P) and the columns of other outputs."""
 
 
 def design_outputs(
@@ -52,7 +52,7 @@ def design_outputs(
     accuracy: Accuracy,
     window: Part = None,
 ) -> Columns:
-    """Compute design outputs of a design matrix, cheapest first; what does not turn is left out of the dear ones.
+    """Compute design outputs of a design matrix, cheap routes first; non-rotatable designs skip the costly ones.
 
     Parameters
     ----------
@@ -65,8 +65,7 @@ def design_outputs(
     Returns
     -------
     Columns
-        each wanted name (n,), its ``err_`` where ``accuracy.target`` is set, and ``status``: of several causes the one
-        met first
+        each wanted name (n,), its ``err_`` if ``accuracy.target`` is set, and ``status``: of several causes the first
 
     Raises
     ------
@@ -80,20 +79,20 @@ def design_outputs(
     columns: Columns = {}
     turns = not isinstance(family.domain, Interval)
     ways = routes(family, wanted, accuracy)
-    # Refinement meets a dead point between samples, a plain grid does not.
+    # Refinement detects a dead point between samples, a plain grid does not.
     known = accuracy.samples is None or any(route.general == "margin" for route in ways) or not margin_suffixes(family)
-    with np.errstate(all="ignore"):  # what leaves float64 has a status in the end
+    with np.errstate(all="ignore"):  # values beyond float64 get a status below
         for route in ways:
             assert route.run is not None
-            if route.general and not known:  # quicker outputs of what does not turn, as its margin, are there by now
+            if route.general and not known:  # quicker outputs such as the margin are computed by now
                 status, known = np.where(status == st.OK, _turning(family, designs, accuracy), status), True
-            # A follower that turns fully has no limit positions, or no dwell, but extrema it has; one that jams moves.
-            alive = np.flatnonzero(GOES_ON[status]) if status.any() else None  # None is all of them
+            # A follower that turns fully lacks limit positions or a dwell, but has extrema; one that jams still moves.
+            alive = np.flatnonzero(GOES_ON[status]) if status.any() else None  # None means all
             of_these = designs if alive is None or alive.size == n else designs[alive]
             found = route.run(of_these, accuracy, window)
             for name in with_errors(route.outputs, accuracy):
                 columns[name] = _spread(found[name], alive, n)
-                if turns and is_place(name):  # np.mod makes 2 pi of a tiny negative angle
+                if turns and is_place(name):  # np.mod returns 2 pi for a tiny negative angle
                     columns[name] = np.where(columns[name] == TWO_PI, 0.0, columns[name])
             now = found["status"].astype(np.uint8)
             if alive is None:
@@ -101,13 +100,13 @@ def design_outputs(
             else:
                 status[alive] = np.where(status[alive] == st.OK, now, status[alive])
         if not turns:
-            status[status == st.NOT_ROTATABLE] = st.NOT_ASSEMBLED  # there is no crank that could turn
+            status[status == st.NOT_ROTATABLE] = st.NOT_ASSEMBLED  # an interval has no turning crank
         chosen = {name: columns[name] for name in with_errors(wanted, accuracy)}
         return explained(chosen | {"status": status}, dict.fromkeys(wanted))
 
 
 def _turning(family: Family, designs: Array, accuracy: Accuracy) -> Status:
-    """Return the status of the margin: of a machine's members by themselves, by their own steps."""
+    """Status of the margin; that of a machine comes from its members' own steps."""
     if isinstance(family, Machine):
         found = _margins(family, designs, accuracy, None)
     else:
@@ -116,7 +115,7 @@ def _turning(family: Family, designs: Array, accuracy: Accuracy) -> Status:
 
 
 def _spread(values: NDArray[np.generic], rows: Index | None, n: int) -> NDArray[np.generic]:
-    """Lay values of some rows, or of all, out as a whole column: False or nan in the others."""
+    """Expand values of some rows, or of all, to a whole column; False or nan in the other rows."""
     if rows is None or rows.size == n:
         return values
     whole: NDArray[np.generic] = np.zeros(n, np.bool_) if values.dtype == np.bool_ else np.full(n, np.nan)
@@ -125,19 +124,19 @@ def _spread(values: NDArray[np.generic], rows: Index | None, n: int) -> NDArray[
 
 
 def with_errors(wanted: Sequence[str], accuracy: Accuracy) -> list[str]:
-    """List the wanted names, and behind them those of their errors where a target is set."""
+    """List the wanted names, followed by those of their errors if a target is set."""
     return [*wanted, *map(error_of, wanted)] if accuracy.target is not None else list(wanted)
 
 
 def routes(family: Family, wanted: Sequence[str], accuracy: Accuracy, windowed: bool = False) -> tuple[Route, ...]:
-    """Choose what will be computed and how, in order; each route's outputs can be asked of `design_outputs` alone.
+    """Choose the routes to the wanted outputs, in order; each can be run by `design_outputs` alone.
 
-    With ``windowed`` the times are those in a window.
+    With ``windowed`` the estimated times are those with a window.
 
     Raises
     ------
     InputError
-        for an unknown name, or an accuracy that the family's domain or the output does not serve.
+        for an unknown name, or an accuracy that the family's domain or the output does not support.
     """
     known, key, prices = _known(family), (tuple(wanted), accuracy, windowed), costs.table()
     if key not in known or known[key][0] is not prices:
@@ -147,7 +146,7 @@ def routes(family: Family, wanted: Sequence[str], accuracy: Accuracy, windowed: 
 
 @of_family
 def _known(family: Family) -> dict[tuple[tuple[str, ...], Accuracy, bool], tuple[Any, tuple[Route, ...]]]:
-    """Remember routes with the prices they have: they are asked the same for every chunk of a sweep."""
+    """Cache of routes with the table of costs they were estimated by: every chunk of a sweep asks for the same."""
     return {}
 
 
@@ -160,7 +159,7 @@ def _routes(family: Family, wanted: Sequence[str], accuracy: Accuracy, windowed:
     if isinstance(family, Machine):
         found, asked = _of_members(family, asked, accuracy, windowed)
     own = {name: applying_step(family, name, accuracy) for name in asked}
-    # The margin of a whole chain asks all stages: a first one judged by itself would take its designs from the others.
+    # The margin of a whole chain needs all stages: the first stage alone would reject designs before the others.
     together = any(own[name] is None and isinstance(one, Margin) and not one.stage for name, one in asked.items())
     steps: dict[tuple[str, int], tuple[Step, Stage, list[str]]] = {}
     groups: dict[tuple[Group, str], list[str]] = {}
@@ -171,7 +170,7 @@ def _routes(family: Family, wanted: Sequence[str], accuracy: Accuracy, windowed:
         elif step is not None and not (together and group == "margin"):
             steps.setdefault((step[0].name, step[1].number), (*step, []))[2].append(name)
         elif group is not None:
-            # Each effect by itself: one that jams or leaves its range takes nothing from the others.
+            # Each effect by itself: one that jams or leaves its range does not affect the others.
             effect = beyond_motion(family, one.of).name
             groups.setdefault((group, effect), []).append(name)
         else:
@@ -192,7 +191,7 @@ def _unserved(family: Family, name: str, accuracy: Accuracy) -> InputError:
 
 
 def _composed(family: Family, asked: Negative | Extent | TimingOf, accuracy: Accuracy, windowed: bool) -> Route:
-    """Make the route to an output made of others; it costs what those do."""
+    """Make the route of a composed output; its time is that of the outputs it is composed of."""
     name, least = asked.output.name, (Work.SEARCH, 0)
     of: Sequence[str]
     compose: Compose
@@ -203,7 +202,7 @@ def _composed(family: Family, asked: Negative | Extent | TimingOf, accuracy: Acc
         case Extent(box=box):
             of, title, compose = box.asked, f"box {name}", partial(route.extent, box)
         case TimingOf(timing=timing):
-            # each of its places is a search by itself, and a value there a search of all of its passage
+            # each place of a timing is a search of its own
             of, least = timing.places, (Work.LONG, 0)
             if isinstance(timing, EventValue):
                 assert isinstance(family, Machine)
@@ -212,7 +211,7 @@ def _composed(family: Family, asked: Negative | Extent | TimingOf, accuracy: Acc
                 title, compose = f"timing {name}", partial(route.difference, timing)
     parts = routes(family, of, accuracy, windowed)
     cost = sum(route.ns_per_design for route in parts)
-    # Not before what it is made of: the margin of what does not turn would be left out.
+    # Not before the outputs it is composed of: the margin of non-rotatable designs would be left out.
     order = max([least, *(route.order for route in parts)])
     whole = isinstance(asked, Extent)  # an extent is about the whole motion; the window is for deviations only
     return Route(title, (name,), cost, partial(_run_composed, family, of, compose, whole), order=order)
@@ -227,17 +226,17 @@ def _run_composed(
 def _of_members(
     machine: Machine, asked: dict[str, Quantity], accuracy: Accuracy, windowed: bool
 ) -> tuple[list[Route], dict[str, Quantity]]:
-    """Make the routes of members by themselves and of the machine's margins, and keep what is left.
+    """Make the routes of single members and of the machine's margins; also return the remaining quantities.
 
-    A member that the main shaft drives turn by turn is asked by itself, by its own exact routes; only what depends on
-    several members, or on a gear between, is searched for on the poses of the whole machine.
+    A member that the main shaft drives turn by turn is computed alone, by its own exact routes; only quantities that
+    depend on several members, or on a gear between them, are searched for on the poses of the whole machine.
     """
     left: dict[str, Quantity] = {}
     own: dict[str, list[str]] = {m.name: [] for m in machine.members}
     margin: list[str] = []
     for name, one in asked.items():
         member = machine.split(name)
-        free = isinstance(one, LargestLength)  # of how the member is driven
+        free = isinstance(one, LargestLength)  # independent of the member's drive
         if member is not None and (free or (member[0].alone and not _is_of_point(member[0], one))):
             own[member[0].name].append(member[1])
         elif isinstance(one, Margin) and member is None:
@@ -257,12 +256,12 @@ def _of_members(
 
 
 def _is_of_point(member: Member, asked: Quantity) -> bool:
-    """Tell whether a quantity is about a point in the machine's frame, which the member alone does not know."""
+    """Whether a quantity belongs to a point in the machine's frame, which the member alone does not know."""
     return bool(asked.of) and member.own(asked.of) not in member.family.pose_output
 
 
 def _by_itself(m: Member, outputs: Sequence[str], designs: Array, accuracy: Accuracy, window: Part) -> Columns:
-    """Compute outputs of a member's family; once where no design varies the member."""
+    """Compute outputs of a member's family; only once where the member is the same in all designs."""
     own = m.designs(designs)
     once = len(own) > 1 and bool((own[1:] == own[0]).all())
     found = design_outputs(m.family, own[:1] if once else own, outputs, accuracy, window)
@@ -270,7 +269,7 @@ def _by_itself(m: Member, outputs: Sequence[str], designs: Array, accuracy: Accu
 
 
 def _of_member(m: Member, inner: Route, designs: Array, accuracy: Accuracy, window: Part) -> Columns:
-    """Run a member's own route under the machine's names."""
+    """Run a member's own route, and rename its outputs for the machine."""
     found, phase = _by_itself(m, inner.outputs, designs, accuracy, window), m.phase(designs)
     columns: Columns = {"status": found["status"]}
     for name in inner.outputs:
@@ -285,7 +284,7 @@ def _of_member(m: Member, inner: Route, designs: Array, accuracy: Accuracy, wind
 
 
 def _margins(machine: Machine, designs: Array, accuracy: Accuracy, window: Part) -> Columns:
-    """Find the margin of the weakest member; one that another drives has to assemble at the angles that it gets."""
+    """Compute the margin of the weakest member; a member driven by another is tested at the angles that it gets."""
     status = np.zeros(len(designs), np.uint8)
     columns: Columns = {}
     suffixes: list[str] = []
@@ -293,7 +292,7 @@ def _margins(machine: Machine, designs: Array, accuracy: Accuracy, window: Part)
         loops = tuple(loop.stage for loop in machine.every(Assembly) if m.own(loop.stage) or loop.stage == f"{m.name}.")
         if not loops:
             continue
-        if m.driver is None:  # whatever its gear, its crank turns fully
+        if m.driver is None:  # its crank turns fully with any gear ratio
             found = _by_itself(m, MARGINS, designs, accuracy, None)
             now, none = found["status"], np.zeros(len(designs))
             for name in MARGINS:

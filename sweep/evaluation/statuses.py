@@ -1,4 +1,4 @@
-"""What status codes say, in words: for tables that people read, and for the report; no value is missing without one."""
+"""Meanings of status codes, for tables and reports; every missing value gets a status."""
 
 from __future__ import annotations
 
@@ -15,20 +15,20 @@ from sweep.families.names import error_of
 
 
 def meaning(code: int) -> str:
-    """Return the meaning of a status code in words, also of an unknown one."""
+    """Meaning of a status code in words, also of an unknown one."""
     return MEANING.get(int(code), f"status {int(code)}: unknown")
 
 
 def meanings(codes: Iterable[int]) -> list[str]:
-    """Return what each of many status codes says, in their order."""
+    """Meanings of many status codes, in order."""
     known: dict[int, str] = {}
     return [known.setdefault(int(code), meaning(code)) for code in codes]
 
 
 def explained(columns: Columns, names: Iterable[str]) -> Columns:
-    """Return columns with a status wherever one of these values is missing or infinite; its error is nan there.
+    """Set a status wherever one of the named values is missing or infinite, and its error to nan there.
 
-    The status of what no kernel has explained is INVALID_INPUT: the scale of its parameters is beyond float64.
+    A missing value without a status of a kernel gets INVALID_INPUT: the scale of its parameters is beyond float64.
     """
     status = np.array(columns["status"], np.uint8)
     changed: Columns = {}
@@ -47,9 +47,9 @@ def explained(columns: Columns, names: Iterable[str]) -> Columns:
 
 
 def _all_finite(values: Sequence[NDArray[np.generic]]) -> bool:
-    """Tell whether equally shaped columns surely hold finite values alone.
+    """Whether equally shaped columns hold finite values only; False may be a false alarm.
 
-    A value that is missing stays so in a sum; a sum that overflows is no more than a reason to look closer.
+    A missing value makes the sum missing; an overflow of the sum only leads to a closer check.
     """
     if not values:
         return True

@@ -1,4 +1,4 @@
-"""``summarise``: what a whole turn says about given designs, one row per design; docs/extrema.md."""
+"""``summarise``: design outputs of given designs, one row per design; docs/extrema.md."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ if TYPE_CHECKING:
 
 __all__ = ["Route", "design_outputs", "output", "output_names", "routes", "summarise"]
 
-DEFAULT_SAMPLES = 720  # of a march, which no accuracy can be asked of
+DEFAULT_SAMPLES = 720  # for a march, whose accuracy cannot be chosen
 FINEST_TARGET = 1e-14
 MOST_SAMPLES = 2**20
 FEWEST_SAMPLES = 8
@@ -58,24 +58,24 @@ def summarise(
     ----------
     family : "rssr", "guide", ..., a list of them for a chain, or a table of members by name for a machine
     table : DataFrame or mapping with a column per parameter [one length unit, rad], and per input of the effects that
-        ``want`` calls for; missing ``branch`` means +1.  A text such as "20 g", a quantity of pint or a heading such as
-        ``m_crank [g]`` says its unit: it is brought to mm, t, s, N, and bare numbers beside it are taken in these
+        ``want`` needs; missing ``branch`` means +1.  Texts such as "20 g", quantities of pint and columns headed like
+        ``m_crank [g]`` are converted to mm, t, s, N; bare numbers beside them are taken in these units
     want : names of design outputs: ``rotatable``, ``margin``, ``stroke``, ``max_abs_d2s`` ... (see ``sweep families``),
         ``max_force_d``, ``rms_drive_torque``, ``unevenness`` ... (see ``sweep effects``); a list, or one text between
         commas; the name of an effect, as ``friction``, stands for its outputs
-    samples : extrema on a dense grid of so many crank angles
+    samples : number of crank angles of a dense grid, on which extrema are taken
     accuracy : true extrema, refined to this relative error; 1e-8 if neither is given.  A family whose poses depend on
-        those before (a march) has no true extrema: 720 samples if neither is given
-    certify : prove that no peak of the wanted maxima was missed, or of those named (docs/extrema.md, section 5); their
-        ``err_`` are then bounds instead of estimates
-    window : ``max_abs_dev`` and the other extrema of ``dev`` count only poses whose position lies between these
-        fractions of the stroke, measured from its smallest position; default the whole turn, as always of ``rms_dev``
-    keep : columns of the table that the result repeats in front: names, or True for all of them
+        earlier ones (a march) has no true extrema: 720 samples if neither is given
+    certify : prove that no peak of the wanted maxima, or of the named ones, was missed (docs/extrema.md, section 5);
+        their ``err_`` are then bounds instead of estimates
+    window : ``max_abs_dev`` and the other extrema of ``dev`` use only poses whose position lies between these
+        fractions of the stroke, measured from its smallest position; by default, and for ``rms_dev``, the whole turn
+    keep : columns of the table to be repeated at the front of the result: names, or True for all
     status_text : add a column ``status_text``, the meaning of ``status`` in words
-    angles : the unit of angles in ``table``, "rad" or "deg"; a header such as ``alpha [deg]`` says it of one column.
-        Left out, it is rad, and a parameter above 2 pi is refused.  Results are in rad
-    loads : loads over the turn, by the input that each adds to (``load_torque``, ``tool_force2``): a pair (crank angles
-        [rad], values), joined by periodic monotone cubics, or ``{"mean": m, "cos": [...], "sin": [...]}``
+    angles : unit of angles in ``table``, "rad" or "deg"; a header such as ``alpha [deg]`` gives that of one column.
+        By default it is rad, and a parameter above 2 pi raises.  Results are in rad
+    loads : loads over the turn, by the input to which each is added (``load_torque``, ``tool_force2``): a pair (crank
+        angles [rad], values), joined by periodic monotone cubics, or ``{"mean": m, "cos": [...], "sin": [...]}``
 
     Returns
     -------
@@ -89,7 +89,7 @@ def summarise(
     ------
     InputError
         for an unknown name or a bad value, with column and row; for ``certify`` with a maximum that cannot be proven;
-        for angles that read as degrees.
+        for angles that look like degrees.
 
     Examples
     --------
@@ -122,13 +122,13 @@ def summarise(
         made["status_text"] = np.array(meanings(columns["status"]), dtype=object)
     index = given.index if isinstance(given, pd.DataFrame) else None
     kept = kept_columns(given, keep, made, len(matrix))
-    found = pd.DataFrame(kept | made, index=index, copy=bool(kept))  # nobody else has the arrays made here
+    found = pd.DataFrame(kept | made, index=index, copy=bool(kept))  # the arrays made here are not shared
     found.attrs["units"] = {**units, **{error_of(name): unit for name, unit in units.items() if error_of(name) in made}}
     return found
 
 
 def asked_of_designs(family: Family, want: str | Sequence[str], loads: Loads | None = None) -> Question:
-    """Make the question for design outputs of a family."""
+    """Make the request for design outputs of a family."""
     given = wanted_names(want, f"design outputs of {family.name}")
     known, key = questions(family), ("designs", *given)
     if key in known and not loads:

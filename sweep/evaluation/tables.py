@@ -1,4 +1,4 @@
-"""From a user's table to a checked design matrix: every fault names column, row and the nearest right name."""
+"""Conversion of a user's table to a checked design matrix: every error names column, row and the nearest name."""
 
 from __future__ import annotations
 
@@ -19,12 +19,12 @@ if TYPE_CHECKING:
 
 
 FORMS = "a DataFrame of pandas, or a dict of columns; most other tables become one by .to_pandas()"
-MOST_MASS = 10.0  # t: who writes 20 means grams
-FEW = 64  # rows of a table that is looked at as a whole: to take its columns out one by one takes longer than poses
+MOST_MASS = 10.0  # t: a bare 20 is probably meant in grams
+FEW = 64  # rows of a table that is converted as a whole: extracting single columns takes longer than computing poses
 
 
 class Parametrised(Protocol):
-    """What has named columns: a family, or the requirement of a synthesis."""
+    """Anything with named columns: a family, or the requirement of a synthesis."""
 
     @property
     def name(self) -> str: ...  # noqa: D102
@@ -50,20 +50,20 @@ class Sheet:
 def design_matrix(
     family: Parametrised, table: Table, extra: Sequence[str] = (), unused: Container[str] = ()
 ) -> tuple[Array, dict[str, Array]]:
-    """Check a table and lay its parameters out as the (n, P) matrix the kernels take.
+    """Check a table and arrange its parameters as the (n, P) matrix of the kernels.
 
     Parameters
     ----------
-    family : whose parameters are expected
+    family : gives the expected parameters
     table : DataFrame or mapping of equally long columns (scalars are repeated); missing columns take the default
-    extra : further columns that may stand in the table (``phi``); returned separately if present
-    unused : names that mean something elsewhere (inputs of effects that are not called for) and are no misspelling;
-        their columns are as long as the others
+    extra : further columns that the table may have (``phi``); returned separately if present
+    unused : names with a meaning elsewhere (inputs of effects that are not wanted), which are no misspellings; their
+        columns must have the same length
 
     Raises
     ------
     InputError
-        for a missing or misspelt column, a value that is no number, a nan or infinity, a length that is not positive.
+        for a missing or misspelt column, a value that is not a finite number, or a wrong sign.
     """
     known = [*family.parameter_names, *extra]
     keys = _column_names(table)
@@ -87,7 +87,7 @@ def design_matrix(
 
 
 def one_design(family: Parametrised, table: Table, unused: Container[str] = ()) -> Array:
-    """Check a table of one design, which is what a picture or a course of one machine needs; (1, P)."""
+    """Check a table of one design, as pictures and cyclograms need it; (1, P)."""
     matrix, _ = design_matrix(family, table, unused=unused)
     if len(matrix) != 1:
         raise InputError("design", f"{len(matrix)} rows", "the parameters of one design", f"table of {family.name}")
@@ -95,10 +95,10 @@ def one_design(family: Parametrised, table: Table, unused: Container[str] = ()) 
 
 
 def plain_columns(table: Table) -> Table:
-    """Take the columns of a DataFrame out of it once, as arrays; what is no plain number stays as it is.
+    """Extract the columns of a DataFrame once, as arrays; columns that are not plain numbers stay as they are.
 
-    Every look at a column of a DataFrame takes as long as a pose.  A table with two columns of one name is handed on
-    whole: whoever reads it says so.
+    Every access to a column of a DataFrame takes as long as a pose.  A table with two columns of one name is returned
+    unchanged: the reader of the table raises.
     """
     import pandas as pd
 
@@ -120,7 +120,7 @@ def wanted_names(want: str | Sequence[str], place: str) -> list[str]:
     Raises
     ------
     InputError
-        if it is neither a name nor a list of names.
+        if ``want`` is neither a name nor a list of names.
     """
     names = (
         [name.strip() for name in want.split(",")]
@@ -136,19 +136,19 @@ def wanted_names(want: str | Sequence[str], place: str) -> list[str]:
 
 
 def kept_columns(table: Table, keep: bool | str | Sequence[str], made: Collection[str], rows: int) -> dict[str, Any]:
-    """Return columns of the input that a result shall repeat in front of its own, as they are.
+    """Select the input columns to be repeated at the front of a result, unchanged.
 
     Parameters
     ----------
     table : as for `design_matrix`
-    keep : True for all columns but those that have the name of a result; or the names of some;  False for none
+    keep : True for all columns except those with the name of a result; or some names; False for none
     made : names of the results
     rows : number of designs; single numbers are repeated
 
     Raises
     ------
     InputError
-        for a name that the table does not have or that the result needs itself, or a column of another length.
+        for a name that the table does not have or that is a result, or a column of another length.
     """
     if keep is False:
         return {}
@@ -164,7 +164,7 @@ def kept_columns(table: Table, keep: bool | str | Sequence[str], made: Collectio
         if isinstance(values, str) or not hasattr(values, "__len__"):
             columns[name] = [values] * rows
         elif len(values) == rows:
-            columns[name] = getattr(values, "array", values)  # of a Series what it holds, not its index
+            columns[name] = getattr(values, "array", values)  # the values of a Series, without its index
         else:
             raise InputError(name, f"{len(values)} rows", f"as many rows as there are designs, {rows}", "keep")
     return columns
@@ -176,7 +176,7 @@ def _check_kind(table: object) -> None:
 
 
 def _column_names(table: Table) -> dict[str, Any]:
-    """Return names of the columns, each once, and the keys under which the table has them."""
+    """Map column names to the table's keys; raise for repeated names."""
     _check_kind(table)
     names = [str(key) for key in table]
     for name in names if len(set(names)) < len(names) else ():
@@ -188,7 +188,7 @@ def _column_names(table: Table) -> dict[str, Any]:
 def _checked_column(
     family: Parametrised, p: Parameter, columns: Mapping[str, Array], keys: Iterable[str]
 ) -> Array | float:
-    """Return the column of a parameter, one number where it is that for all rows, or its default."""
+    """Return the checked column of a parameter, a number if it is the same for all rows, or its default."""
     if p.name not in columns:
         default = p.left_out(columns)
         if default is not None:
@@ -197,7 +197,7 @@ def _checked_column(
         present = ", ".join(keys) or "none"
         raise MissingInput(p.name, f"a column with the {p.text}; found {present}{guess}", f"table of {family.name}")
     values = columns[p.name]
-    # Least and largest tell in two passes whether anything is to be refused: nan makes both of them nan.
+    # Minimum and maximum show in two passes whether a value is invalid: nan makes both nan.
     if not values.ndim:
         least = largest = float(values)
     elif values.size:
@@ -233,12 +233,12 @@ def _row_count(columns: Mapping[str, Array]) -> int:
 
 
 def numbers(values: object, name: str, place: str) -> Array:
-    """Return values as float64.
+    """Convert values to float64.
 
     Raises
     ------
     InputError
-        for the first that is no number, with its place
+        for the first value that is not a number, with its place
     """
     found = _converted(values)
     if found is not None:
@@ -250,10 +250,10 @@ def numbers(values: object, name: str, place: str) -> Array:
 
 
 def _converted(values: object) -> Array | None:
-    """Return values as float64, None where one of them is no number."""
+    """Convert values to float64; None if one of them is not a number."""
     try:
         array = np.asarray(values)
-        # A date, a time span or a complex number is none, though numpy would take it for one.
+        # Dates, time spans and complex numbers are rejected, although numpy would convert them.
         if array.dtype.kind in "mMc" or (array.dtype.kind == "O" and not all(map(_is_number, array.flat))):
             return None
         return np.asarray(values, dtype=np.float64)
@@ -262,7 +262,7 @@ def _converted(values: object) -> Array | None:
 
 
 def _entries(values: object) -> list[Any]:
-    """Return the entries of the rows, of any type; a value that is no column gives one row."""
+    """List the entries of the rows, of any type; a scalar gives one row."""
     if isinstance(values, np.ndarray):
         return list(values.flat)
     if isinstance(values, (str, bytes)) or not isinstance(values, Iterable):
@@ -276,19 +276,19 @@ def _is_number(value: Any) -> bool:
     try:
         float(value)
     except (TypeError, ValueError, OverflowError):
-        return value is None or type(value).__name__ == "NAType"  # a gap: nan, which has a message of its own
+        return value is None or type(value).__name__ == "NAType"  # an empty cell: nan, which has its own message
     return True
 
 
 def index_of(table: Table, rows: int) -> pd.Index:
-    """Return the labels of a table's rows; numbers from 0 where it has none."""
+    """Row labels of a table; a range from 0 where it has none."""
     import pandas as pd
 
     return table.index if isinstance(table, pd.DataFrame) else pd.RangeIndex(rows)
 
 
 def refuse_rows(bad: Any, values: Array, name: str, allowed: str) -> None:
-    """Refuse the first value of a column that is ``bad``, with its row and what is allowed."""
+    """Raise for the first value of a column that is ``bad``, with its row and the allowed values."""
     if bad.any():
         row = int(np.argmax(bad))
         value = float(values.flat[row])
@@ -297,5 +297,5 @@ def refuse_rows(bad: Any, values: Array, name: str, allowed: str) -> None:
 
 
 def parameter_units(parameters: Iterable[Parameter]) -> dict[str, str]:
-    """Return units of parameters as result tables name them: "length" is that of the user, angles are in rad."""
+    """Units of parameters in result tables: "length" is the user's length unit, angles are in rad."""
     return {p.name: {"angle": "rad", "ratio": "1", "sign": "1"}.get(p.unit, p.unit) for p in parameters}

@@ -1,4 +1,4 @@
-"""The diagram P(phi) of every thread of a machine over one turn, and their sum; docs/thread.md, section 7."""
+"""Thread diagram P(phi) of every thread of a machine over one turn, and their sum; docs/thread.md, section 7."""
 
 from __future__ import annotations
 
@@ -22,20 +22,20 @@ if TYPE_CHECKING:
 
     from sweep.evaluation.tables import Table
 
-BESIDE = 1e-9  # rad, from an event to the angles just before and behind it
+BESIDE = 1e-9  # rad, from an event to the angles just before and after it
 COLUMNS = ("demand", "given", "surplus", "tension", "velocity")
 
 
 def diagram(
     mechanism: Mechanism, design: Table, *, samples: int = 720, angles: AngleUnit | None = None
 ) -> pd.DataFrame:
-    """Return what every thread demands over one turn, what it is given, and how it pulls.
+    """Compute demand, supply, surplus, tension and velocity of every thread over one turn.
 
     Parameters
     ----------
     mechanism, design : a machine with threads, and one design of it
-    samples : even angles of the turn, beside those just before and behind every event of a thread
-    angles : the unit of the angles of ``design``, "rad" or "deg", as of :func:`sweep.evaluate`
+    samples : number of even angles of the turn; angles just before and after every event of a thread are added
+    angles : unit of the angles of ``design``, "rad" or "deg", as of :func:`sweep.evaluate`
 
     Returns
     -------
@@ -52,7 +52,7 @@ def diagram(
     Warns
     -----
     MeasuredRangeWarning
-        where a thread is faster than the 7.4 m/s up to which the law of speed was measured (lengths in mm)
+        where a thread is faster than 7.4 m/s, the largest speed at which the law of speed was measured (lengths in mm)
 
     Examples
     --------

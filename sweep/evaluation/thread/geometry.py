@@ -1,4 +1,4 @@
-"""Wrap angle and length of the thread over eyelets and cams; the equation numbers are those of docs/takeup.md."""
+"""Wrap angle and length of the thread over eyelets and cams; equation numbers of docs/takeup.md."""
 
 from __future__ import annotations
 
@@ -82,7 +82,7 @@ def wrap(table: Table) -> pd.DataFrame:
     DataFrame
         L; wrap [rad], 0 for a straight thread; x, distance of the eyelet from the line of the guides; y, its place
         along the line from the middle of the guides; half_distance_c of the guides; status: SINGULAR where the eyelet
-        is at a guide, or where both guides are at one place, so that x and y have no meaning (L and wrap stay)
+        is at a guide, or where both guides coincide, so that x and y are undefined (L and wrap are not)
 
     Examples
     --------
@@ -204,7 +204,7 @@ def follower(table: Table) -> pd.DataFrame:
 
 
 def free_cam(table: Table) -> pd.DataFrame:
-    """Thread over the bare edge of a turning cam: where it lies without friction, and between which points it sticks.
+    """Thread over the bare edge of a turning cam: contact without friction, and the limit points of sticking.
 
     Equations (18) to (25).
 

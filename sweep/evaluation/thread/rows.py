@@ -1,4 +1,4 @@
-"""From a table to the arrays of a thread kernel and back."""
+"""Conversion between tables and the arrays of a thread kernel."""
 
 from __future__ import annotations
 
@@ -22,22 +22,22 @@ if TYPE_CHECKING:
 
 
 def columns_of(sheet: Parametrised, table: Table) -> dict[str, Array]:
-    """Return the checked columns by name, each (n,) and contiguous; a header such as ``wrap [deg]`` says its unit."""
+    """Return the checked columns by name, each (n,) and contiguous; a header such as ``wrap [deg]`` gives its unit."""
     matrix, _ = design_matrix(sheet, in_radians(sheet, table))
     return {name: np.ascontiguousarray(matrix[:, k]) for k, name in enumerate(sheet.parameter_names)}
 
 
 def side_by_side(columns: Mapping[str, Array], names: tuple[str, ...]) -> Array:
-    """Return some columns as a matrix (n, len(names))."""
+    """Stack columns into a matrix (n, len(names))."""
     return np.ascontiguousarray(np.column_stack([columns[name] for name in names]))
 
 
 def frame(
     table: Table, columns: Mapping[str, np.ndarray[tuple[int, ...], np.dtype[np.generic]]], units: Mapping[str, str]
 ) -> pd.DataFrame:
-    """Return a DataFrame of columns (n,) or (n, 1) with the index of the table it answers.
+    """Build a result DataFrame of columns (n,) or (n, 1), with the index of the input table.
 
-    A key of ``units`` is a unit, its value the columns that have it, separated by blanks.
+    Keys of ``units`` are units, values the names of the columns in that unit, separated by blanks.
     """
     import pandas as pd
 
@@ -48,9 +48,9 @@ def frame(
 
 
 def warn_outside(values: Array, measured: Range, constants: tuple[Parameter, ...], table: Table) -> None:
-    """Warn once of values for which the reported constants were not measured.
+    """Warn once if values lie outside the range in which the published constants were measured.
 
-    Nothing is said where the table has constants of its own: their range is the user's to know.
+    There is no warning for a table with its own constants, whose range only the user knows.
     """
     if any(p.name in list(table) for p in constants):
         return

@@ -1,4 +1,4 @@
-"""Tension over contours, with speed, and by Euler's law; the equation numbers are those of docs/thread.md."""
+"""Thread tension over contours, at speed, and by Euler's law; equation numbers of docs/thread.md."""
 
 from __future__ import annotations
 
@@ -56,7 +56,7 @@ _CAPSTAN = Sheet(
 
 
 def contour(table: Table) -> pd.DataFrame:
-    """Return the tension of a thread behind one contour, with the parts of it; equations (1) to (3).
+    """Return the tension of a thread after one contour, with its components; equations (1) to (3).
 
     Parameters
     ----------
@@ -66,7 +66,7 @@ def contour(table: Table) -> pd.DataFrame:
     Returns
     -------
     DataFrame
-        T2 [gf] and its parts capstan, bending, adhesion; r_thread [mm]; status: INVALID_INPUT where T2 is beyond
+        T2 [gf] and its components capstan, bending, adhesion; r_thread [mm]; status: INVALID_INPUT where T2 is beyond
         float64
 
     Warns
@@ -93,9 +93,9 @@ def contour(table: Table) -> pd.DataFrame:
 
 
 def path(T1: ArrayLike, contours: Table, theta_deg: ArrayLike | None = None) -> pd.DataFrame:
-    """Return the tension along a thread that passes several contours in sequence, at one pose or at many.
+    """Return the tension along a thread over several contours in sequence, at one pose or at many.
 
-    The tension behind one contour is the tension in front of the next.
+    The tension after one contour is the tension in front of the next.
 
     Parameters
     ----------
@@ -106,12 +106,12 @@ def path(T1: ArrayLike, contours: Table, theta_deg: ArrayLike | None = None) -> 
     Returns
     -------
     DataFrame
-        one row per pose: T1 in front of the first contour, T2 behind it, T3 behind the second, and so on [gf]; status
+        one row per pose: T1 in front of the first contour, T2 after it, T3 after the second, and so on [gf]; status
 
     Raises
     ------
     InputError
-        if T1 and theta_deg do not fit each other or the contours, or are negative or no numbers
+        if the shapes of T1, theta_deg and contours do not match, or a value is negative or not a number
 
     Warns
     -----
@@ -149,7 +149,7 @@ def path(T1: ArrayLike, contours: Table, theta_deg: ArrayLike | None = None) -> 
 
 
 def least_tension_radius(table: Table) -> pd.DataFrame:
-    """Radius of the contour behind which the tension is least, whatever the wrap angle and the tension; (4).
+    """Radius of the contour with the least tension after it, for any wrap angle and tension; (4).
 
     Parameters
     ----------
@@ -158,8 +158,8 @@ def least_tension_radius(table: Table) -> pd.DataFrame:
     Returns
     -------
     DataFrame
-        R_least [mm]: inf without adhesion, 0 where a sharp edge is best; r_thread [mm]; status: SINGULAR where neither
-        bending nor adhesion counts and every radius is as good
+        R_least [mm]: inf without adhesion, 0 where a sharp edge is optimal; r_thread [mm]; status: SINGULAR without
+        bending and adhesion, where every radius is optimal
 
     Examples
     --------
@@ -181,11 +181,11 @@ def least_tension_radius(table: Table) -> pd.DataFrame:
 
 
 def speed(table: Table) -> pd.DataFrame:
-    """Tension behind the disc tensioner over its value at the reference speed, for a speed of the thread; (7).
+    """Tension after the disc tensioner relative to its value at the reference speed, for a speed of the thread; (7).
 
     Parameters
     ----------
-    table : column v [m/s], its magnitude counts; constants v_ref [m/s], K, n, by default through the reported points
+    table : column v [m/s], used by magnitude; constants v_ref [m/s], K, n, by default through the reported points
 
     Returns
     -------
@@ -216,7 +216,7 @@ def speed(table: Table) -> pd.DataFrame:
 
 
 def capstan(table: Table) -> pd.DataFrame:
-    """Return the tension behind an eyelet by Euler's law, and the force of the thread on the eyelet; (5), (6).
+    """Return the tension after an eyelet by Euler's law, and the force of the thread on the eyelet; (5), (6).
 
     Parameters
     ----------
