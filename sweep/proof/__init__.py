@@ -1,7 +1,7 @@
 """Proofs that no design of a space is better: branch and bound over boxes of designs (docs/proof.md).
 
-``question`` reads what is asked from a study, ``rounds`` spreads the boxes over the cores, ``certificate`` writes and
-reads what was proven.
+``question`` reads the question from a study, ``rounds`` distributes the boxes over the cores, ``certificate`` writes
+and reads the proof.
 """
 
 from sweep.proof.certificate import Proof as Proof

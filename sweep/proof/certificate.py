@@ -1,4 +1,4 @@
-"""The certificate of a proof: every box with the rows that prove it, as Parquet, and what follows from all of them."""
+"""The certificate of a proof: every box with the rows that prove it, as Parquet, and the conclusion from all boxes."""
 
 from __future__ import annotations
 
@@ -19,14 +19,15 @@ from sweep.proof.rounds import OUTCOMES, Explored, Leaves
 
 @dataclass(frozen=True)
 class Proof:
-    """What is proven of a study's space.
+    """Proven statement about a study's space.
 
-    No design of the space outside the ``exceptions`` has less than ``bound``; ``best`` is the feasible design that the
-    study found, nan where it found none.  ``exceptions`` boxes were too small to be halved again; together they are the
-    share ``exceptional`` of the space, and lie between ``exception_low`` and ``exception_high``.  ``open`` boxes were
-    left when their number or the time was used up (``cut_short``: the time, or a signal); the bound holds for them too.
-    ``empty_share`` of the space was proven to hold no feasible design.  ``reasons`` counts the boxes by what proves
-    them.  ``floor`` is what no motion from rest to rest can be below; without a bound of its own ``bound`` is that.
+    No design of the space outside the ``exceptions`` has less than ``bound``; ``best`` is the study's feasible optimum,
+    nan without one.  ``exceptions`` is the number of boxes too small to be halved again; together they are the share
+    ``exceptional`` of the space, and lie between ``exception_low`` and ``exception_high``.  ``open`` is the number of
+    boxes left when the allowed boxes or the time were used up (``cut_short``: the time, or a signal); the bound holds
+    for them too.  ``empty_share`` of the space was proven to hold no feasible design.  ``reasons`` counts the boxes by
+    the reason of their proof.  ``floor`` is the lower bound for any motion from rest to rest; without a better bound
+    ``bound`` is equal.
     """
 
     objective: str
@@ -50,7 +51,7 @@ class Proof:
 
     @property
     def gap(self) -> float:
-        """By what part of the bound the best design is above it; infinite without either."""
+        """Relative excess of the best design over the bound; infinite without either."""
         return self.best / self.bound - 1.0 if self.bound > 0.0 and np.isfinite(self.best) else float("inf")
 
     @property
@@ -60,7 +61,7 @@ class Proof:
 
 
 def concluded(question: Question, found: Explored, best: float, wanted_gap: float) -> Proof:
-    """Return what follows from the leaves of a search."""
+    """Return the conclusion from the leaves of a search."""
     leaves = found.leaves
     outcome, bounds = leaves.outcome, np.where(leaves.outcome == EMPTY, np.inf, leaves.bound)
     volume = np.prod((leaves.high - leaves.low) / (question.high - question.low), axis=1)
@@ -91,7 +92,7 @@ def concluded(question: Question, found: Explored, best: float, wanted_gap: floa
 
 
 def reason(question: Question, outcome: int, kinds: Array) -> str:
-    """Return what proves a box, in words."""
+    """Return the reason that proves a box, in words."""
     if outcome == BOUND:
         return f"{question.objective} at least the target"
     if outcome == EMPTY:
@@ -111,7 +112,7 @@ def _reasons(question: Question, leaves: Leaves) -> tuple[tuple[str, int], ...]:
 
 
 def write(path: Path, question: Question, leaves: Leaves, proof: Proof, target: float, key: str) -> None:
-    """Write the certificate: one row per box, what was asked and what follows in the metadata."""
+    """Write the certificate: one row per box, question and conclusion in the metadata."""
     import pyarrow as pa
     import pyarrow.parquet as pq
 
@@ -135,11 +136,11 @@ def write(path: Path, question: Question, leaves: Leaves, proof: Proof, target: 
 
 
 def read_proof(path: Path) -> Proof | None:
-    """Return what a certificate says; None where there is no such file, or it is damaged."""
+    """Return the proof of a certificate, or None if there is no such file or it is damaged."""
     content = json.loads(metadata(path).get(b"proof", b"null"))
     if content is None:
         return None
-    content = {name: content[name] for name in Proof.__dataclass_fields__}  # earlier versions said more
+    content = {name: content[name] for name in Proof.__dataclass_fields__}  # earlier versions had more fields
     lists = ("exception_low", "exception_high", "free", "left_out")
     return Proof(
         **content

@@ -1,4 +1,4 @@
-"""What a study asks to be proven: the space of designs on the locus, the objective, and the limits a proof can use."""
+"""The question of a proof: space of designs on the locus, objective, and limits of a study that a proof can use."""
 
 from __future__ import annotations
 
@@ -20,17 +20,17 @@ if TYPE_CHECKING:
     from sweep.study import Limit, Study
 
 MOST_FREE = 4
-HUGE = 1e9  # no acceleration, but a target that stands for none
-WEAKER = 1.0 - 1e-14  # cos^2 of a limit, rounded to the side on which more designs are feasible
+HUGE = 1e9  # not an acceleration: a larger target stands for none
+WEAKER = 1.0 - 1e-14  # cos^2 of a limit, rounded so that more designs are feasible
 
 
 @dataclass(frozen=True)
 class Question:
-    """A space of designs on the locus and what is asked of them; lengths in mm, angles in rad.
+    """A space of designs on the locus with objective and limits; lengths in mm, angles in rad.
 
     ``names`` are the free coordinates, between ``low`` and ``high``; ``given`` are all coordinates, with any number for
-    the free ones.  ``links`` are the least and most of every link, infinite without a limit.  ``left_out`` are
-    limits of the study that the proof does not use; without them the bound is lower, and still one.
+    the free ones.  ``links`` are the lower and upper limit of every link, infinite without one.  ``left_out`` are
+    limits of the study that the proof does not use; the bound then holds for more designs, and is lower.
     """
 
     provable: ProvableLocus
@@ -46,12 +46,12 @@ class Question:
 
     @property
     def free(self) -> Array:
-        """Numbers of the free coordinates, as the kernels count them."""
+        """Indices of the free coordinates in the kernels."""
         return np.array([self.provable.coordinates.index(name) for name in self.names], np.float64)
 
     @property
     def floor(self) -> float:
-        """What no mechanism at all can be better than, in the unit of the rows: from rest to rest in so much time."""
+        """Lower bound of the objective for any motion from rest to rest in the given time, in the unit of the rows."""
         motion = self._motion()
         if motion is None:
             return 0.0
@@ -59,17 +59,17 @@ class Question:
         return max(least_acceleration(swing, phi0), least_acceleration(swing, 2.0 * np.pi - phi0))
 
     def tube(self, target: float) -> Array:
-        """Where a rocker can be that has an acceleration of at most ``target``; empty where nothing is known.
+        """Return bounds of a rocker's motion with an acceleration of at most ``target``; empty without such bounds.
 
-        Only poses are given at which the row of the proof tells the sides of the tube apart: across the tube, psi must
-        not meet the other assembly mode.  That one is 2 atan(T/W) away, T at least b cos(mu), W at most b + c.
+        At poses where the tube is too wide its sides are infinite: across the tube, psi must not meet the other
+        assembly mode.  That mode is 2 atan(T/W) away, with T at least b cos(mu), W at most b + c.
         """
         motion = self._motion()
         if motion is None or not self.floor < target < HUGE:
             return np.zeros((0, 9))
         least, longest = self.least_coupler, self._longest_rocker()
         found = tube(*motion, target)
-        # from half a turn on the tube holds the other mode wherever that is
+        # a tube of half a turn or more contains the other mode in any case
         wide = np.tan(0.5 * np.minimum(found[:, HIGH] - found[:, LOW], np.pi))
         blurred = ~(wide * (least + longest) < least * np.sqrt(self.cos2) * WEAKER)
         found[blurred, LOW], found[blurred, HIGH] = -np.inf, np.inf
@@ -77,7 +77,7 @@ class Question:
 
     @property
     def least_coupler(self) -> float:
-        """Least length of the coupler that the limits allow, the last of the links."""
+        """Lower limit of the coupler's length, the last of the links."""
         return max(float(self.links[-2]), 0.0)
 
     def _longest_rocker(self) -> float:
@@ -87,7 +87,7 @@ class Question:
         return float(self.given[self.provable.coordinates.index("c")])
 
     def _motion(self) -> tuple[float, float] | None:
-        """Swing and phi0 where the objective is an acceleration and both are given."""
+        """Return swing and phi0 if the objective is an acceleration and both are fixed, otherwise None."""
         order = self.provable.objectives[self.objective]
         return None if order != 2 or set(self.names) & {"swing", "phi0"} else (self.given[0], self.given[1])
 
@@ -96,19 +96,19 @@ class Question:
         return float(np.sin(value) ** 2) if self.provable.objectives[self.objective] == 0 else value
 
     def outside(self, bound: float) -> float:
-        """Value of the objective that a bound in the unit of the rows means."""
+        """Return the value of the objective for a bound in the unit of the proof's rows."""
         if self.provable.objectives[self.objective] == 0:
             return float(np.arcsin(np.sqrt(min(max(bound, 0.0), 1.0))))
         return bound
 
 
 def question_of(study: Study) -> Question:
-    """Return what the study asks to be proven.
+    """Return the question that a study asks.
 
     Raises
     ------
     InputError
-        if the mechanism, the objective or the number of free parameters is not one that a proof serves.
+        if proofs do not support the mechanism, the objective or the number of free parameters.
     """
     place = f"{study.path}: optimise.prove"
     provable = None if isinstance(study.family, Chain) or study.locus is None else _suited(study)
@@ -136,9 +136,10 @@ def question_of(study: Study) -> Question:
 
 
 def _suited(study: Study) -> ProvableLocus | None:
-    """Locus whose coordinates the study gives: with a rocker of one length that by the rocker.
+    """Return the locus whose coordinates the study gives; for a fixed rocker length the locus by the rocker.
 
-    There e and g follow, and their ranges become limits; elsewhere e and g are coordinates, and the rocker follows.
+    On that locus e and g follow, and their ranges become limits; otherwise e and g are coordinates, and the rocker
+    follows.
     """
     ways = study.family.every(ProvableLocus)
     given = {limit.output for limit in study.parameter_limits if limit.minimum == limit.maximum is not None}
@@ -152,7 +153,7 @@ def _known(study: Study) -> set[str]:
 
 
 def _entries(study: Study, coordinates: tuple[str, ...], place: str) -> dict[str, tuple[float, float]]:
-    """Return the ends between which every coordinate lies; twice the same where it is given."""
+    """Return the interval of every coordinate; its ends are equal if the coordinate is fixed."""
     found: dict[str, tuple[float, float]] = {}
     chosen = listed(study)
     for name in coordinates:
@@ -166,14 +167,14 @@ def _entries(study: Study, coordinates: tuple[str, ...], place: str) -> dict[str
             low = high = float(study.space.fixed[name])
         elif fixed is not None:
             low = high = fixed
-        else:  # an angle of the rocker, wherever it is
+        else:  # an angle of the rocker, unrestricted
             low, high = -np.pi, np.pi
         found[name] = _narrowed(study, name, float(low), float(high))
     return found
 
 
 def _narrowed(study: Study, name: str, low: float, high: float) -> tuple[float, float]:
-    """Return the ends of a coordinate within the limits on it; as they are where nothing is left between."""
+    """Return the interval of a coordinate reduced by the limits on it; unchanged if nothing would remain."""
     own = [x for x in study.limits if x.output == name and name not in study.prescribed]
     least = max([low, *(x.minimum for x in own if x.minimum is not None)])
     most = min([high, *(x.maximum for x in own if x.maximum is not None)])
@@ -183,7 +184,7 @@ def _narrowed(study: Study, name: str, low: float, high: float) -> tuple[float, 
 def _limits(
     study: Study, provable: ProvableLocus, entries: Mapping[str, tuple[float, float]]
 ) -> tuple[float, Array, tuple[str, ...]]:
-    """Least cos^2 of the pressure angle, least and most of every link, and the limits that are not used."""
+    """Return the least cos^2 of the pressure angle, the limits of every link, and the names of unused limits."""
     cos2, left_out = 0.0, []
     links = np.array([-np.inf, np.inf] * len(provable.links))
     for number, name in enumerate(provable.links):
@@ -213,7 +214,7 @@ def _put(links: Array, number: int, limit: Limit) -> None:
 
 
 def described(question: Question) -> Mapping[str, Any]:
-    """Return what the certificate has to hold so that another program can check it."""
+    """Return the data with which another program can check the certificate."""
     return {
         "objective": question.objective,
         "coordinates": list(question.provable.coordinates),

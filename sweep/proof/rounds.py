@@ -1,8 +1,8 @@
-"""Boxes of designs over the cores: rounds of work units whose results do not depend on how many cores there are.
+"""Distribution of boxes of designs over the cores, in rounds of work units, independent of the number of cores.
 
-A round shares the open boxes out among UNITS units, worst bounds dealt like cards, and gives each unit the same number
-of boxes to judge.  What a unit leaves open goes into the next round.  Finished units lie in a folder, so a run that was
-stopped goes on where it was.
+A round deals the open boxes, worst bounds first, to UNITS units in turn, and lets each unit evaluate the same number of
+boxes.  Boxes that remain open go into the next round.  Finished units are kept in a folder, from which a stopped run
+resumes.
 """
 
 from __future__ import annotations
@@ -28,36 +28,36 @@ if TYPE_CHECKING:
     from sweep.study import ProveSettings
 
 UNITS = 64
-SHARES = (0.1, 0.15, 0.25, 0.5)  # of all boxes, round by round: later ones know better where to look
-OUTCOMES = ("open", "too small", "bound", "empty")  # by their numbers in kernels.boxes.branching
+SHARES = (0.1, 0.15, 0.25, 0.5)  # shares of all boxes by round: later rounds have better bounds for choosing boxes
+OUTCOMES = ("open", "too small", "bound", "empty")  # indexed by the numbers of kernels.boxes.branching
 Tell: TypeAlias = Callable[[int, int], None]
 
 
 @dataclass(frozen=True)
 class Leaves:
-    """Boxes that were not halved: where they are, what was proven of them, and by which rows."""
+    """Boxes that were not halved: their bounds, outcome and proving rows."""
 
     low: Array  # (m, n)
     high: Array
     outcome: Numbers  # (m,) of OUTCOMES
     bound: Array  # (m,)
-    kinds: Numbers  # (m, COMBINED), -1 where fewer rows are combined
+    kinds: Numbers  # (m, COMBINED), -1 for unused entries
     theta: Array
     factors: Array
 
     @property
     def open(self) -> NDArray[np.bool_]:
-        """Which of them the next round goes on with."""
+        """Mask of the boxes that the next round halves."""
         found: NDArray[np.bool_] = self.outcome == OPEN
         return found
 
     def taken(self, which: Numbers) -> Leaves:
-        """Return some of them, by index or mask."""
+        """Select rows of the table by index or mask."""
         return Leaves(*(getattr(self, name)[which] for name in self.__dataclass_fields__))
 
 
 def empty(rows: int, free: int) -> Leaves:
-    """Return the room for so many leaves."""
+    """Return arrays for ``rows`` leaves over ``free`` coordinates."""
     return Leaves(
         np.zeros((rows, free)), np.zeros((rows, free)), np.zeros(rows, np.uint8), np.zeros(rows),
         np.full((rows, COMBINED), -1, np.int64), np.zeros((rows, COMBINED)), np.zeros((rows, COMBINED)),
@@ -65,12 +65,12 @@ def empty(rows: int, free: int) -> Leaves:
 
 
 def joined(parts: list[Leaves]) -> Leaves:
-    """All leaves in one."""
+    """Return the rows of all tables as one."""
     return Leaves(*(np.concatenate([getattr(p, n) for p in parts]) for n in Leaves.__dataclass_fields__))
 
 
 class Explored(NamedTuple):
-    """Leaves of a search, the number of boxes judged, whether time or a signal cut it short, and what it took.
+    """Leaves of a search, number of evaluated boxes, whether time or a signal cut it short, and processor time.
 
     ``seconds`` is processor time of the boxes, over all runs of a search that was stopped.
     """
@@ -83,7 +83,7 @@ class Explored(NamedTuple):
 
 @dataclass(frozen=True)
 class Cores:
-    """Where work units run: the executor, its workers, and the flag that stops them."""
+    """Executor of the work units, its number of workers, and the flag that stops them."""
 
     place: Executor
     jobs: int
@@ -92,7 +92,7 @@ class Cores:
 
 @dataclass(frozen=True)
 class Unit:
-    """Judge the boxes of one unit of a round and write what is left of them."""
+    """Evaluate the boxes of one unit of a round and write its leaves."""
 
     question: Question
     target: float  # in the unit of the proof's rows
@@ -103,11 +103,11 @@ class Unit:
     round: int
 
     def path(self, number: int) -> Path:
-        """Path at which the result of a unit stands."""
+        """Return the path of a unit's result."""
         return self.folder / f"round-{self.round}-unit-{number:02d}.npz"
 
     def __call__(self, number: int, should_stop: Callable[[], bool]) -> tuple[int, int]:
-        """Return the number of the unit and of the boxes it judged."""
+        """Return the number of the unit and of the boxes it evaluated."""
         mine = self.boxes.taken(np.arange(number, len(self.boxes.bound), UNITS))
         if should_stop() or not len(mine.bound):
             return number, 0
@@ -117,7 +117,7 @@ class Unit:
         question, starts = (*about, asked.tube(self.target)), (mine.low, mine.high, mine.bound)
         search = (starts, asked.high - asked.low, asked.free, asked.given, self.smallest)
         out = tuple(getattr(leaves, n) for n in Leaves.__dataclass_fields__)
-        provable.explore(question, (*search, 0), out)  # judges nothing, but compiles what is not compiled yet
+        provable.explore(question, (*search, 0), out)  # evaluates no box, but compiles the kernels
         begin = time.thread_time()
         filled, judged = provable.explore(question, (*search, self.most), out)
         _write(self.path(number), leaves.taken(np.arange(filled)), judged, time.thread_time() - begin)
@@ -141,21 +141,21 @@ def _read(path: Path) -> Explored:
 def explored(
     question: Question, target: float, asked: ProveSettings, folder: Path, cores: Cores, tell: Tell
 ) -> Explored:
-    """Halve boxes until all is proven or as many as asked were judged.
+    """Halve boxes until all is proven or the allowed number of boxes was evaluated.
 
     Parameters
     ----------
-    question : the space
+    question : the space, objective and limits
     target : in the unit of the proof's rows
-    asked : how many boxes to judge, and how small they may become
-    folder : where finished units are kept; the same question must find the same folder
-    cores : where units run, and what stops them
-    tell : called with the boxes judged so far and those expected in all: a round ends early where units prove all of
-        their boxes
+    asked : number of boxes to evaluate, and their smallest size
+    folder : folder of finished units; the same question must have the same folder
+    cores : executor of the units, and its stop flag
+    tell : called with the numbers of boxes evaluated so far and expected in all: a round ends early if units prove all
+        of their boxes
 
     Returns
     -------
-    All leaves, what they took, and whether time or a signal cut it short.
+    All leaves, the evaluated boxes and processor time, and whether time or a signal cut the search short.
     """
     done: list[Leaves] = []
     start = empty(1, len(question.names))
@@ -169,11 +169,11 @@ def explored(
             return Explored(joined([*done, todo]), judged, True, seconds)
         most = max(int(asked.boxes * share) // UNITS, 1)
         unit = Unit(question, target, _split(todo, question), most, asked.smallest, folder, number)
-        counts = [_read(path).judged for path in _finished(unit)]  # of a run that was stopped
+        counts = [_read(path).judged for path in _finished(unit)]  # of a stopped run
         for _, count in _run(unit, cores):
             counts.append(count)
             here = sum(counts)
-            # A unit that judged as many as it may has boxes left.
+            # A unit that used its whole share has boxes left.
             further = int(asked.boxes * sum(SHARES[number + 1 :])) if max(counts) == most else 0
             tell(judged + here, judged + here * UNITS // len(counts) + further)
         if cores.stop:

@@ -1,4 +1,4 @@
-"""The proof that a study asks for: question, rounds over the cores, certificate beside the dataset, and its words."""
+"""The proof of a study: question, rounds over the cores, certificate beside the dataset, and its statement in words."""
 
 from __future__ import annotations
 
@@ -24,29 +24,29 @@ from sweep.proof.rounds import SHARES, UNITS, Cores, Tell, explored
 if TYPE_CHECKING:
     from sweep.study import ProveSettings, Study
 
-NEVER = 1e300  # the target where no feasible design is known: then only emptiness can be proven
-PARTS = "_proof"  # folder of finished work units; it goes when the proof has ended
-EVENT = "proof"  # in ``_runs.jsonl``
+NEVER = 1e300  # target without a known feasible design: then only emptiness can be proven
+PARTS = "_proof"  # folder of finished work units; removed when the proof has ended
+EVENT = "proof"  # event in ``_runs.jsonl``
 
 
 def prove_study(study: Study, folder: str | Path, cores: Cores, tell: Tell = lambda _, __: None) -> Proof:
-    """Prove that no design of the study's space is better than its optimum by more than the gap it asks for.
+    """Prove that no design of the study's space is better than its optimum by more than the wanted gap.
 
     Parameters
     ----------
-    study : with ``optimise.prove``
-    folder : its dataset, with the optimum beside it
-    cores : where the boxes are judged; the certificate does not depend on it.  A stopped proof goes on in the next run
-    tell : called with the boxes judged so far and those expected in all
+    study : study with ``optimise.prove``
+    folder : folder of its dataset, with the optimum beside it
+    cores : executor of the boxes; the certificate does not depend on it.  A stopped proof continues in the next run
+    tell : called with the numbers of boxes evaluated so far and expected in all
 
     Returns
     -------
-    What is proven; the certificate is ``_proof.parquet`` beside the dataset, and ``_runs.jsonl`` says what it took.
+    The proof; the certificate is ``_proof.parquet`` beside the dataset, and ``_runs.jsonl`` records its cost.
 
     Raises
     ------
     InputError
-        if the study asks for what cannot be proven
+        if the study asks for a proof that is not supported
     KeyboardInterrupt
         if it was stopped; finished work units are kept.
     """
@@ -67,12 +67,12 @@ def prove_study(study: Study, folder: str | Path, cores: Cores, tell: Tell = lam
 
 
 def known_proof(study: Study, folder: str | Path) -> Proof | None:
-    """Return what the certificate beside a dataset says, if it answers what the study asks and no time cut it short.
+    """Return the proof of the certificate beside a dataset, if it answers the study's question and was not cut short.
 
     Raises
     ------
     InputError
-        if the study asks for what cannot be proven.
+        if the study asks for a proof that is not supported.
     """
     path = files.beside(Path(folder)) / files.PROOF
     found = read_proof(path)
@@ -83,7 +83,7 @@ def known_proof(study: Study, folder: str | Path) -> Proof | None:
 
 
 def _asked(study: Study, folder: Path) -> tuple[ProveSettings, Question, float, str]:
-    """Return the settings, question, target in the unit of the proof's rows, and what the certificate depends on."""
+    """Return the settings, the question, the target in the unit of the proof's rows, and the key of the certificate."""
     if study.optimise is None or study.optimise.prove is None:
         raise MissingInput("optimise.prove", '{ gap = "1 %", boxes = 1000000 }', str(study.path))
     asked, question = study.optimise.prove, question_of(study)
@@ -95,7 +95,7 @@ def _asked(study: Study, folder: Path) -> tuple[ProveSettings, Question, float, 
 
 
 def _best(path: Path, question: Question) -> float:
-    """Objective of the study's optimum; nan where no feasible design was found."""
+    """Return the objective of the study's optimum; nan if no feasible design was found."""
     import pyarrow.parquet as pq
 
     table = pq.read_table(path, columns=["role", "status", question.objective]).to_pylist()
@@ -104,13 +104,13 @@ def _best(path: Path, question: Question) -> float:
 
 
 def proof_words(proof: Proof, name: str, show: Callable[[float], str], seconds: float | None = None) -> str:
-    """One sentence or two for a report or a terminal, without the full stop at their end.
+    """Return the proof in one or two sentences for a report or a terminal, without the final full stop.
 
     Parameters
     ----------
-    proof : what is proven
+    proof : the proof
     name : the objective in words
-    show : a value of the objective with its unit
+    show : formats a value of the objective with its unit
     seconds : processor time of the boxes, if it is known
     """
     took = "" if seconds is None else f", {seconds:.2g} s of processor time" if seconds >= 0.1 else ", below 0.1 s"
@@ -140,7 +140,7 @@ def _bounded(proof: Proof, name: str, show: Callable[[float], str], took: str) -
 
 
 def _unfinished(proof: Proof, took: str) -> str:
-    """How far the boxes have come and what would help."""
+    """Return the number of open boxes and the remedy, as text."""
     if proof.settled:
         return f" ({proof.boxes} boxes{took})"
     head = f". After {proof.boxes} boxes{took}, {proof.open} are still open: "

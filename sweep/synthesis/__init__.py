@@ -1,1 +1,1 @@
-"""From a requirement to mechanisms: loci, acceptance tests, and the eight tasks of the engineering method."""
+"""Synthesis of mechanisms from requirements: loci, acceptance tests, and the eight tasks of the engineering method."""

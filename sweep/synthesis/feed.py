@@ -21,11 +21,11 @@ Norm = Literal["squares", "largest"]
 
 
 class LiftChain(NamedTuple):
-    """Dimensions of a lift chain and how well they do.
+    """Dimensions of a lift chain and their residual.
 
-    ``fx``, ``fy`` place the joint F on the rack, ``q`` is the coupler [length]; ``difference`` is, for each pose, by
-    how much the coupler is too long or too short, Delta q/(2 q) [length]; ``bar_branch`` the assembly mode, 0 if the
-    poses do not agree on one.
+    ``fx``, ``fy`` are the coordinates of the joint F on the rack, ``q`` is the coupler [length]; ``difference`` is the
+    excess length of the coupler in each pose, Delta q/(2 q) [length]; ``bar_branch`` the assembly mode, 0 if it differs
+    between poses.
     """
 
     fx: float
@@ -36,19 +36,19 @@ class LiftChain(NamedTuple):
 
 
 def rack_angles(table: Table, phi: Sequence[float] | Array, height: Sequence[float] | Array, side: int = 1) -> Array:
-    """Angles of the rack at which the tooth has wanted heights; (18) of docs/feed.md.
+    """Return the angles of the rack at which the tooth has the wanted heights; (18) of docs/feed.md.
 
     Parameters
     ----------
     table : one design of ``feed`` (its fx, fy are not used)
     phi : crank angles [rad]
-    height : wanted y_t at each of them [length]
-    side : +1 or -1, which of the two angles: +1 lets the tooth rise with the angle (dy_t/dchi > 0)
+    height : wanted y_t at these angles [length]
+    side : +1 or -1 for the choice of the angle: +1 lets the tooth rise with the angle (dy_t/dchi > 0)
 
     Returns
     -------
     array
-        rack angles [rad in (-pi, pi]]; nan where the rocker is not assembled or the tooth does not reach
+        rack angles [rad in (-pi, pi]]; nan if the rocker is not assembled or the tooth does not reach
 
     Raises
     ------
@@ -79,16 +79,16 @@ def lift_chain(
     weights: Sequence[float] | Array | None = None,
     norm: Norm = "squares",
 ) -> LiftChain:
-    """Joint F and coupler q that lead the rack best through wanted angles; (10), (19) of docs/feed.md.
+    """Return the joint F and coupler q that guide the rack best through wanted angles; (10), (19) of docs/feed.md.
 
-    The weighted difference |F - E|^2 - q^2 is linear in fx, fy and q^2 - fx^2 - fy^2, so no start is needed.
+    The weighted difference |F - E|^2 - q^2 is linear in fx, fy and q^2 - fx^2 - fy^2, so no initial guess is needed.
 
     Parameters
     ----------
     table : one design of ``feed``; its fx, fy are not used, q only as a scale
     phi, chi : crank angles and wanted angles of the rack, at least 3 [rad]
-    weights : of the poses; equal if not given
-    norm : "squares" makes the sum of the squared weighted differences least, "largest" the largest one (minimax)
+    weights : weights of the poses; equal if not given
+    norm : "squares" minimises the sum of the squared weighted differences, "largest" the largest one (minimax)
 
     Returns
     -------
@@ -97,8 +97,8 @@ def lift_chain(
     Raises
     ------
     InputError
-        for fewer than 3 poses, a bad number, a rocker that is not assembled, poses that leave the dimensions open, or
-        a result with no real coupler.
+        for fewer than 3 poses, a bad number, a rocker that is not assembled, poses that do not determine the
+        dimensions, or a result without a real coupler.
     """
     matrix, grid, angles = _given(table, phi, chi, "chi")
     share = np.ones_like(grid) if weights is None else numbers(weights, "weights", "weights, position")
@@ -151,7 +151,7 @@ def _least(system: Array, right: Array, weights: Array) -> Array:
 
 
 def _minimax(system: Array, right: Array, weights: Array) -> Array:
-    """Least largest weighted residual: a linear programme in the three unknowns and the bound."""
+    """Minimise the largest weighted residual: a linear programme in the three unknowns and the bound."""
     from scipy.optimize import linprog
 
     start = _least(system, right, weights)

@@ -1,8 +1,8 @@
-"""The inner fit of a guided four-bar: coupler point, line and scale that a study need not sweep.
+"""Fit of a guided four-bar: coupler point, line and scale, which a study then need not sweep.
 
-For the links of the last stage and the swing of what drives it, the coupler point (xi, eta) and the line (lam, h) with
-the smallest largest deviation over the working part follow from a linear problem (kernels/linear/line_fit.py); scaling
-the whole stage then gives the wanted stroke.  So a sweep over proportions is a sweep over finished needle mechanisms.
+For the links of the last stage and the swing of its drive, the coupler point (xi, eta) and the line (lam, h) with the
+smallest maximum deviation over the working part follow from a linear problem (kernels/linear/line_fit.py); scaling
+the whole stage then gives the wanted stroke.  So a sweep over proportions is a sweep over complete needle mechanisms.
 """
 
 from __future__ import annotations
@@ -22,32 +22,32 @@ from sweep.families.capabilities import GuidedPoint
 from sweep.families.chain import Chain, driven_guide
 from sweep.reductions.steps import applying_step
 
-# The deviation is a smooth function of the input: 48 Chebyshev points of a swing miss 1e-4 of its extremes as a rule,
-# 5e-3 at worst, 256 of a whole turn 4e-4 (48: up to 2e-2): far below what the optimiser moves afterwards.
+# The deviation is a smooth function of the input: 48 Chebyshev points of a swing usually miss 1e-4 of its extremes,
+# 5e-3 at worst, 256 of a whole turn 4e-4 (48: up to 2e-2): far less than the optimiser changes afterwards.
 SWING_SAMPLES, TURN_SAMPLES = 48, 256
 SWING_ACCURACY = Accuracy(target=1e-6)
 SWING = ("psi_ext", "swing")
-BLOCK = 8192  # positions worked on together: their fifteen or so arrays (64 kB each) stay in the caches
+BLOCK = 8192  # positions processed together: their fifteen or so arrays (64 kB each) stay in the caches
 
 
 @dataclass(frozen=True)
 class LineFit:
-    """What the fit aims at: ``stroke`` along the line [length] or None to keep the size of the links.
+    """Target of the fit: ``stroke`` along the line [length], or None to keep the size of the links.
 
-    With ``free_direction`` the line may turn up to 90 degrees away from the given lam, which says where "up" is.
+    With ``free_direction`` the line may turn up to 90 degrees away from the given lam, which defines "up".
     """
 
     stroke: float | None
     free_direction: bool
 
     def parameters(self, family: Family) -> tuple[str, ...]:
-        """Return names of the parameters the fit sets, xi2, eta2 ... in a chain; lam only if its direction is free."""
+        """Return the names of the parameters that the fit sets, with the stage's number; lam only if it is free."""
         guided, suffix = _guided(family)
         free = (name for name in guided.fitted if self.free_direction or name != guided.direction)
         return tuple(f"{name}{suffix}" for name in free)
 
     def rescaled(self, family: Family) -> tuple[str, ...]:
-        """Return names of the parameters whose given values are proportions only."""
+        """Return the names of the parameters whose given values are proportions only."""
         guided, suffix = _guided(family)
         return () if self.stroke is None else tuple(f"{name}{suffix}" for name in guided.scaled)
 
@@ -65,15 +65,15 @@ def fit_line(
     ----------
     family : "guide", or a chain that ends in it
     designs : (n, P) design matrix; the fitted columns are not read, except lam (see :class:`LineFit`)
-    fit : what to aim at
+    fit : target of the fit
     window : working part as fractions of the stroke from its smallest s; None is the whole stroke
-    driven : the `driving_outputs` of every design, each (n,), if they are known; all must be numbers
+    driven : the `driving_outputs` of every design, (n,) each, if they are known; all must be numbers
 
     Returns
     -------
     designs : (n, P), a copy with the fitted and scaled columns filled
-    status : (n,); OK, the status of the driving stages where they do not swing, NOT_ASSEMBLED, or NOT_CONVERGED where
-        the points do not determine a line
+    status : (n,); OK, the status of the driving stages if they do not swing, NOT_ASSEMBLED, or NOT_CONVERGED if the
+        points do not determine a line
 
     Raises
     ------
@@ -111,7 +111,7 @@ def fit_line(
 def _fitted(
     guide: Family, guided: GuidedPoint, own: Array, angles: Array, fit: LineFit, limits: Array
 ) -> tuple[Array, Array, NDArray[np.uint8]]:
-    """Fitted parameters (4, n), the travel (n,) and the status of guides at their input angles (n, m)."""
+    """Return the fitted parameters (4, n), the travel (n,) and the status of guides at their input angles (n, m)."""
     names = ("x_b", "y_b", "x_c", "y_c")
     pins = guide.poses(own, Angles.of(angles), frozenset(names))
     parts = floats(pins, *names)
@@ -128,10 +128,10 @@ def _fitted(
 
 
 def driving_outputs(family: Family) -> tuple[str, ...]:
-    """Return names of the chain's outputs that say how the guide is driven, if a sweep that has them may hand them on.
+    """Return the names of the outputs that describe the guide's drive, if a sweep that has them may pass them on.
 
-    They must be those that `fit_line` finds itself, to the last bit: so there are none unless one own step of the first
-    of two stages gives both, whatever the accuracy.
+    They must equal those that `fit_line` computes, to the last bit: so there are none unless a single step of the first
+    of two stages gives both at any accuracy.
     """
     both = driven_guide(family)
     if both is None:
@@ -139,13 +139,13 @@ def driving_outputs(family: Family) -> tuple[str, ...]:
     step = applying_step(both[0].family, SWING[0], SWING_ACCURACY)
     if step is None or not {o.name for o in step[0].provides} >= set(SWING):
         return ()
-    # A step that serves a grid too looks at no accuracy.
+    # A step that also serves a grid ignores the accuracy.
     exact = step[0].applies(Accuracy(samples=SWING_SAMPLES))
     return tuple(f"{name}{both[0].number}" for name in SWING) if exact else ()
 
 
 def _guided(family: Family) -> tuple[GuidedPoint, str]:
-    """Guided point, and what follows the names of its stage's parameters: the stage's number in a chain."""
+    """Return the guided point and the suffix of its stage's parameters, the stage's number in a chain."""
     last = family.stages[-1]
     guided = last.family.find(GuidedPoint)
     if guided is not None:
@@ -154,7 +154,7 @@ def _guided(family: Family) -> tuple[GuidedPoint, str]:
 
 
 def _driven(family: Family, designs: Array) -> tuple[Array, Array, NDArray[np.uint8]]:
-    """Where the angle that drives the guide starts, how far it goes, each (n,), and the status of its drive."""
+    """Return start and range of the angle that drives the guide, (n,) each, and the status of its drive."""
     n = len(designs)
     if not isinstance(family, Chain):
         return np.zeros(n), np.full(n, 2.0 * np.pi), np.zeros(n, np.uint8)
@@ -166,7 +166,7 @@ def _driven(family: Family, designs: Array) -> tuple[Array, Array, NDArray[np.ui
 
 
 def _input_angles(family: Family, designs: Array, driving: Array) -> Array:
-    """Input angles of the guide (n, m) from those of what drives it."""
+    """Return the input angles of the guide (n, m) from those of its drive."""
     if not isinstance(family, Chain):
         return driving
     last = family.stages[-1]

@@ -1,4 +1,4 @@
-"""Synthesis of a heddle drive: from the strokes of the shafts to levers and rods; docs/heddle.md."""
+"""Synthesis of a heddle drive: levers and rods for the strokes of the shafts; docs/heddle.md."""
 
 from __future__ import annotations
 
@@ -74,23 +74,23 @@ _ARMS = Sheet(
 
 
 def extremes(table: Table, mode: Mode = "exact") -> pd.DataFrame:
-    """Both extreme positions of a heddle drive for a wanted stroke, one row per row of the table.
+    """Return both extreme positions of a heddle drive for a wanted stroke, one row per row of the table.
 
-    Equations (1), (2) and, where the table has the columns O2B and BC, (10) of docs/heddle.md.
+    Equations (1), (2) and, if the table has the columns O2B and BC, (10) of docs/heddle.md.
 
     Parameters
     ----------
     table : DataFrame or mapping with ``stroke O4E O1O2 O1O3 O3C`` [one length unit] and ``kappa`` [rad]; with ``O2B``,
-        ``BC`` and ``side_B`` (+1 if missing) the angles of the cam lever follow as well
-    mode : "exact" takes the half swing mu from the chord of the lever's end; "printed" from the arc tangent that the
-        source prints, which makes the travel of E shorter than the stroke
+        ``BC`` and ``side_B`` (+1 if missing) the angles of the cam lever are added
+    mode : "exact" computes the half swing mu from the chord of the lever's end; "printed" from the arc tangent printed
+        in the source, which makes the travel of E shorter than the stroke
 
     Returns
     -------
     DataFrame
         ``mu xi_1 xi_2`` [rad; xi is the angle O2-O3-C, between 0 and pi], ``O2C_1 O2C_2 vertical_travel`` [length];
         with a rod ``lever_angle_1 lever_angle_2 lever_swing`` [rad from the line O1O3; signed].  ``status`` is
-        NOT_ASSEMBLED where the lever is too short for the stroke or the rod does not reach; its own columns are nan.
+        NOT_ASSEMBLED if the lever is too short for the stroke or the rod does not reach; its own columns are nan.
 
     Raises
     ------
@@ -113,7 +113,7 @@ def extremes(table: Table, mode: Mode = "exact") -> pd.DataFrame:
 
 
 def rods(table: Table, mode: Mode = "exact") -> pd.DataFrame:
-    """All rods BC that give the cam lever a wanted swing, one row per rod; (11) of docs/heddle.md.
+    """Return all rods BC that give the cam lever a wanted swing, one row per rod; (11) of docs/heddle.md.
 
     Parameters
     ----------
@@ -124,7 +124,7 @@ def rods(table: Table, mode: Mode = "exact") -> pd.DataFrame:
     -------
     DataFrame
         ``rod`` (1, 2, ... by length), ``BC``, the angles ``lever_angle_1 lever_angle_2 lever_swing`` and ``status``,
-        indexed like the table.  A row without any rod stays once, with nan and the status NOT_ADMISSIBLE.
+        indexed like the table.  A row without any rod appears once, with nan and the status NOT_ADMISSIBLE.
 
     Raises
     ------
@@ -152,7 +152,7 @@ def rods(table: Table, mode: Mode = "exact") -> pd.DataFrame:
 
 
 def shed(table: Table) -> pd.DataFrame:
-    """Strokes of the shafts for a clear shed: proportional to the distance from the fell; (14) of docs/heddle.md.
+    """Return the strokes of the shafts for a clear shed, proportional to their distance from the fell; (14).
 
     Parameters
     ----------
@@ -175,7 +175,7 @@ def shed(table: Table) -> pd.DataFrame:
 
 
 def arms(table: Table) -> pd.DataFrame:
-    """Arm O3D of every shaft, the other lengths being common to all shafts; (12), (13) of docs/heddle.md.
+    """Return the arm O3D of every shaft for other lengths common to all shafts; (12), (13) of docs/heddle.md.
 
     Parameters
     ----------
@@ -185,7 +185,7 @@ def arms(table: Table) -> pd.DataFrame:
     -------
     DataFrame
         ``O3D DF``, ``y_high`` and ``y_low`` of E against mid-stroke, ``asymmetry`` = y_high + y_low, and ``status``;
-        NOT_ADMISSIBLE where no arm gives the stroke.  Indexed like the table.
+        NOT_ADMISSIBLE if no arm gives the stroke.  Indexed like the table.
 
     Raises
     ------
@@ -202,7 +202,7 @@ def arms(table: Table) -> pd.DataFrame:
 
 
 def _frame(columns: Mapping[str, np.ndarray], index: pd.Index) -> pd.DataFrame:
-    """Columns with their units: angles by their names, all others but number and status are lengths."""
+    """Return columns with units: angles by their names, all others but number and status are lengths."""
     import pandas as pd
 
     found = pd.DataFrame(columns, index=index)
@@ -212,7 +212,7 @@ def _frame(columns: Mapping[str, np.ndarray], index: pd.Index) -> pd.DataFrame:
 
 
 def _positions(matrix: Array, mode: Mode) -> tuple[Array, np.ndarray]:
-    """Columns of the extreme positions by one of the two half angles, and their status."""
+    """Return the columns of the extreme positions for one of the two half angles, and their status."""
     if mode not in ("exact", "printed"):
         raise InputError("mode", mode, "exact or printed", "synthesis of a heddle drive")
     refuse_rows(matrix[:, 3] <= matrix[:, 2], matrix[:, 3], "O1O3", "a length above O1O2")
@@ -224,5 +224,5 @@ def _positions(matrix: Array, mode: Mode) -> tuple[Array, np.ndarray]:
 
 
 def _closure(matrix: Array, found: Array, lever: Array) -> Array:
-    """Rows for the kernels: O2O3, O3C, both angles xi, and what is given of the cam lever."""
+    """Return rows for the kernels: O2O3, O3C, both angles xi, and the given lengths of the cam lever."""
     return np.column_stack([matrix[:, 3] - matrix[:, 2], matrix[:, 4], found[:, 1], found[:, 2], lever])

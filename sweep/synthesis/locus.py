@@ -1,10 +1,10 @@
-"""The ways to state a requirement, and the link lengths that meet it: one `Locus` per way; docs/synthesis.md.
+"""The forms of a requirement, and the link lengths that meet it: one `Locus` per form; docs/synthesis.md.
 
-The admissible arcs are the crank angles phi1 for which a locus has a point that keeps the side condition.
+The admissible arcs are the crank angles phi1 for which a locus has a point that satisfies the side condition.
 
 A study with [locus] prescribes design outputs of stage 1, or of the only stage: swing (rssr) or stroke (rssp), phi0 and
 phi_ext, the place on the locus.  Links and branch that meet them exactly follow (`OnLocus`), so every design of the
-sweep keeps these limits and none is lost on looking for them.
+sweep satisfies these limits.
 """
 
 from __future__ import annotations
@@ -30,9 +30,9 @@ if TYPE_CHECKING:
 
 
 class Found(NamedTuple):
-    """Mechanisms of a requirement: the design matrix, per row its status and the acceptance test it failed, (n,) each.
+    """Mechanisms of a requirement: the design matrix, and per row its status and the failed acceptance test, (n,) each.
 
-    ``phi1`` (not brought into one turn) and ``start`` are the crank angle and the follower's position at the extended
+    ``phi1`` (not reduced to one turn) and ``start`` are the crank angle and the follower's position at the extended
     limit, ``phi0`` the crank angle from there to the folded one.
     """
 
@@ -46,11 +46,12 @@ class Found(NamedTuple):
 
 @dataclass(frozen=True)
 class Locus:
-    """One way to state what a follower has to do.
+    """One form of a requirement on the motion of a follower.
 
-    ``chosen_by`` is the column that tells this way from the others of its family; ``solve`` takes the (n, P) matrix
-    with the columns of ``parameters``; by phi1 it may be complex128, for gradients by the complex step.  ``arc_ends``
-    takes it too: where arcs of phi1 may begin and end, (n, k), nan where there are fewer; None if not known.
+    ``chosen_by`` is the column that distinguishes this form from the others of its family; ``solve`` takes the (n, P)
+    matrix with the columns of ``parameters``; with phi1 it may be complex128, for gradients by the complex step.
+    ``arc_ends`` takes it too and returns the possible ends of arcs of phi1, (n, k), nan for missing ones; None if
+    unknown.
     """
 
     family: str
@@ -100,10 +101,10 @@ class Locus:
 def _solved(
     kernel: Callable[..., None], parameters: int, gives: str, columns: Mapping[str, int], root: int | None = None
 ) -> Callable[[Array], Found]:
-    """Make the solution by a kernel of a family of so many parameters.
+    """Return the solver of a requirement by a kernel, for a family with ``parameters`` columns.
 
-    ``columns`` are the requirement's that stand in :class:`Found` as they are, ``root`` the one that tells solutions
-    apart; ``gives`` names what the kernel finds beside the designs.
+    ``columns`` are columns of the requirement copied to :class:`Found`, ``root`` is the column that selects the
+    solution; ``gives`` names the results of the kernel besides the designs.
     """
 
     def solve(matrix: Array) -> Found:
@@ -118,7 +119,7 @@ def _solved(
 
 
 def _ends(kernel: Callable[..., None], most: int) -> Callable[[Array], Array]:
-    """Make the places where arcs may begin and end, at most so many, by a kernel."""
+    """Return the function that computes the possible ends of arcs, at most ``most``, by a kernel."""
 
     def ends(matrix: Array) -> Array:
         found = np.empty((len(matrix), most))
@@ -161,19 +162,19 @@ LOCI = (
 
 
 def locus(family: str, names: tuple[str, ...]) -> Locus:
-    """Way of stating a requirement that the column names tell.
+    """Return the form of a requirement that its column names select.
 
     Raises
     ------
     InputError
-        if the family has no locus or no column tells the way.
+        if the family has no locus or the columns select no form.
     """
     of_family = [way for way in LOCI if way.family == family]
     if not of_family:
         known = tuple(dict.fromkeys(way.family for way in LOCI))
         raise InputError("family", family, f"{' or '.join(known)}{nearest(str(family), known)}", "synthesis")
     told = [way for way in of_family if way.chosen_by in names]
-    # A column that another way asks for as well tells nothing where that one is told.
+    # A column shared with another selected form selects nothing.
     told = [way for way in told if not any(way.chosen_by in other.parameter_names for other in told if other != way)]
     if not told or len({way.chosen_by for way in told} - {"e"}) > 1:
         ways = "; or ".join(", ".join(way.parameter_names) for way in of_family)
@@ -182,7 +183,7 @@ def locus(family: str, names: tuple[str, ...]) -> Locus:
 
 
 def locus_designs(family: str, columns: Table) -> tuple[Columns, Status]:
-    """Parameters of mechanisms that meet requirements: a derivation of design columns for studies and optimisers.
+    """Return parameters of mechanisms that meet requirements, as design columns for studies and optimisers.
 
     Parameters
     ----------
@@ -192,8 +193,8 @@ def locus_designs(family: str, columns: Table) -> tuple[Columns, Status]:
     Returns
     -------
     columns : one (n,) array per parameter of the family, ``branch`` among them
-    status : (n,) OK; NOT_ADMISSIBLE (lengths nan) where one of the acceptance tests (i)-(iii) fails.  Whether the crank
-        turns and by what margin is left to the family's own limits.
+    status : (n,) OK; NOT_ADMISSIBLE (lengths nan) if one of the acceptance tests (i)-(iii) fails.  Whether the crank
+        turns and its margin are left to the family's own limits.
 
     Raises
     ------
@@ -211,12 +212,12 @@ def locus_designs(family: str, columns: Table) -> tuple[Columns, Status]:
 
 
 def admissible_arcs(family: str, requirement: Mapping[str, float]) -> list[tuple[float, float]]:
-    """Arcs of phi1 on which test (i), the side condition, holds; equations (4) and (10) of docs/synthesis.md.
+    """Return the arcs of phi1 on which test (i), the side condition, holds; (4) and (10) of docs/synthesis.md.
 
     Parameters
     ----------
     family : "rssr" or "rssp"
-    requirement : the columns of the locus by phi1, without phi1; one number each [one length unit, rad]
+    requirement : the columns of the locus with phi1, except phi1 itself; one number each [one length unit, rad]
 
     Returns
     -------
@@ -255,15 +256,15 @@ def admissible_arcs(family: str, requirement: Mapping[str, float]) -> list[tuple
     return arcs
 
 
-# The synthesis calls the crank angle of the extended position phi1; as a design output it is phi_ext.
+# The crank angle of the extended position is phi1 in the synthesis and phi_ext as a design output.
 _PLACE = ("phi1", "phi_ext")
 
 
 @dataclass(frozen=True)
 class OnLocus:
-    """The stage whose links follow from its limit positions: its family, and its number as text ("" if it is alone).
+    """The stage whose links follow from its limit positions: its family, and its number as text ("" without a chain).
 
-    ``told_by`` is the column that tells the way of the synthesis: phi1, or direction for a rocker of given length.
+    ``told_by`` is the column that selects the form of the requirement: phi1, or direction for a given rocker length.
     """
 
     family: str
@@ -272,24 +273,24 @@ class OnLocus:
 
     @cached_property
     def way(self) -> Locus:
-        """The way of the synthesis that takes the place as a crank angle."""
+        """Form of the requirement that gives the place as a crank angle."""
         return locus(self.family, (self.told_by,))
 
     @cached_property
     def prescribed(self) -> tuple[Parameter, ...]:
-        """The design outputs that are prescribed, as columns of a design space."""
+        """Prescribed design outputs, as columns of a design space."""
         own = find_family(self.family).parameter_names
         asked = [p for p in self.way.parameters if p.name not in own]
         return tuple(Parameter(self.outside(p.name), p.unit, p.text) for p in asked)
 
     @cached_property
     def made(self) -> tuple[str, ...]:
-        """Parameters of the mechanism that follow: a, b, c and branch, of a slider-crank also e."""
+        """Parameters that follow: a, b, c and branch, of a slider-crank also e."""
         given = self.way.parameter_names
         return tuple(f"{name}{self.number}" for name in find_family(self.family).parameter_names if name not in given)
 
     def allowed(self, name: str, values: Array) -> str | None:
-        """Return what a prescribed output may be, if not all the values [mm, rad] are that; else None."""
+        """Return the allowed range of a prescribed output if values [mm, rad] lie outside of it; otherwise None."""
         stem = name.removesuffix(self.number) if self.number else name
         if stem == "swing":
             bad, words = ~((values != 0.0) & (np.abs(values) < TWO_PI)), "an angle below one turn, or its negative"
@@ -305,7 +306,7 @@ class OnLocus:
         return words if bad.any() else None
 
     def links(self, columns: Mapping[str, Array]) -> tuple[dict[str, Array], Status]:
-        """Parameters in ``made``, (n,) each, and the status of each design.
+        """Return the parameters in ``made``, (n,) each, and the status of each design.
 
         Parameters
         ----------
@@ -313,18 +314,18 @@ class OnLocus:
 
         Returns
         -------
-        columns : nan where the status is not OK
-        status : OK, or NOT_ADMISSIBLE where the place on the locus gives no mechanism that does what is prescribed
+        columns : nan if the status is not OK
+        status : OK, or NOT_ADMISSIBLE if the place on the locus gives no mechanism with the prescribed outputs
         """
         way = self.way
         found = way.solve(way.read({name: columns[self.outside(name)] for name in way.parameter_names}))
         return self.links_of(found), found.status
 
     def links_of(self, found: Found) -> dict[str, Array]:
-        """Parameters in ``made`` out of mechanisms of this stage alone."""
+        """Return the parameters in ``made`` from mechanisms of this stage alone."""
         own = find_family(self.family).parameter_names
         return {name: found.designs[:, own.index(name.removesuffix(self.number))] for name in self.made}
 
     def outside(self, name: str) -> str:
-        """Return what a column of the requirement is called in a study."""
+        """Return the name of a column of the requirement in a study."""
         return f"{_PLACE[1] if name == _PLACE[0] else name}{self.number}"

@@ -1,7 +1,7 @@
-"""``synthesise``: families of mechanisms from a table of requirements, each with the verdict of its tests.
+"""``synthesise``: mechanisms for a table of requirements, each with the result of its acceptance tests.
 
-Slotted links for a wanted crank angle between the limit positions follow from (8) of docs/slotted.md.  Five-links in
-place of crank-rockers have the same limit positions, with two revolutes at the crank pin.
+Slotted links for a wanted crank angle between the limit positions follow from (8) of docs/slotted.md.  Five-links can
+replace crank-rockers with the same limit positions, with two revolutes at the crank pin.
 """
 
 from __future__ import annotations
@@ -31,7 +31,7 @@ if TYPE_CHECKING:
 
 _LIMITS = ("phi_ext", "phi_fold", "psi_ext", "psi_fold", "swing", "phi0", "margin", "max_pressure_angle")
 _EXACT = Accuracy(target=1e-12)
-LIMITS_APART = 1e-7  # half of what a limit position may be off [rad]; both are known to 1e-9
+LIMITS_APART = 1e-7  # half of the allowed error of a limit position [rad]; both are accurate to 1e-9
 
 
 CENTRAL_SLOT = Sheet(
@@ -46,7 +46,7 @@ CENTRAL_SLOT = Sheet(
 
 
 def central_slots(table: Table) -> pd.DataFrame:
-    """Fork slots with s = 0 for a wanted crank angle between the limit positions, one row per row of the table.
+    """Return fork slots with s = 0 for a wanted crank angle between the limit positions, one row per row of the table.
 
     Parameters
     ----------
@@ -57,7 +57,7 @@ def central_slots(table: Table) -> pd.DataFrame:
     DataFrame
         the parameters of ``slotted``; ``phi_ext phi_fold psi_ext psi_fold swing phi0`` of the mechanism found, where
         extended is the larger psi, so that ``phi0`` is the wanted angle or 2 pi minus it; ``margin`` (1),
-        ``max_pressure_angle`` (0) and ``status``: OK, or NOT_ADMISSIBLE where both axes meet at the driven pivot or
+        ``max_pressure_angle`` (0) and ``status``: OK, or NOT_ADMISSIBLE if both axes meet at the driven pivot or
         alpha is a right angle.
 
     Raises
@@ -137,7 +137,7 @@ def synthesise(
         max_pressure_angle = np.radians(max_pressure_angle)
     if max_pressure_angle is not None and not 0.0 < max_pressure_angle <= 0.5 * np.pi:
         raise InputError("max_pressure_angle", max_pressure_angle, "an angle between 0 and pi/2", "synthesise")
-    if family == CENTRAL_SLOT.name:  # met by other mechanisms than those on a locus
+    if family == CENTRAL_SLOT.name:  # its mechanisms lie on no locus
         return central_slots(in_radians(CENTRAL_SLOT, table, angles))
     way = locus(family, plain_names(table))
     table = in_radians(way, table, angles)
@@ -160,7 +160,7 @@ def synthesise(
 
 
 def _units(way: Locus) -> dict[str, str]:
-    """Units of the columns that have one, by the letter of the output: an angle psi, a displacement s."""
+    """Return the units of the columns that have one, by the letter of the output: an angle psi, a displacement s."""
     mechanism, amplitude = find_family(way.family), way.parameter_names[0]
     letter, unit = mechanism.position, mechanism.pose_output[mechanism.position].unit
     angles = dict.fromkeys(("phi_ext", "phi_fold", "phi0", "max_pressure_angle"), "rad")
@@ -184,7 +184,7 @@ def _limits(way: Locus, found: Found, amplitude: Array) -> dict[str, object]:
 
 
 def _verdict(family: str, found: Found, limit: float | None) -> dict[str, object]:
-    """Return tests (iv) and (v) for what passed the first three."""
+    """Return tests (iv) and (v) of the mechanisms that passed the first three."""
     import pandas as pd
 
     status, failed = found.status.copy(), found.failed.copy()
@@ -202,10 +202,10 @@ def _verdict(family: str, found: Found, limit: float | None) -> dict[str, object
 
 
 def five_links_with_limits(table: Table, h: float) -> pd.DataFrame:
-    """Return five-links whose rocker stands still where that of a crank-rocker does; (10) of docs/five_link.md.
+    """Return five-links with the same limit positions of the rocker as crank-rockers; (10) of docs/five_link.md.
 
-    The limit positions, so swing, phi0 and stroke ratio, are those of the crank-rocker; crank and coupler change with
-    h, all other links stay.
+    Swing, phi0 and stroke ratio are those of the crank-rocker; crank and coupler change with h, all other links stay.
+
 
     Parameters
     ----------
@@ -215,10 +215,9 @@ def five_links_with_limits(table: Table, h: float) -> pd.DataFrame:
     Returns
     -------
     pandas.DataFrame
-        the columns of ``five_link`` and ``status``: OK, NOT_ADMISSIBLE where no five-link has these limits, or has them
-        on two assembly modes, NOT_ROTATABLE or UNDECIDABLE where its crank does not turn fully; otherwise why the
-        crank-rocker has no limits.
-        Links that were not found are nan.  Indexed like the table.
+        the columns of ``five_link`` and ``status``: OK, NOT_ADMISSIBLE if no five-link has these limits, or has them on
+        two assembly modes, NOT_ROTATABLE or UNDECIDABLE if its crank does not turn fully; otherwise the status of the
+        crank-rocker.  Links of a missing five-link are nan.  Indexed like the table.
 
     Raises
     ------
@@ -241,7 +240,7 @@ def five_links_with_limits(table: Table, h: float) -> pd.DataFrame:
     there = np.flatnonzero(status == st.OK)
     turning = design_outputs(family("five_link"), matrix[there], ["psi_ext", "psi_fold"], Accuracy(target=1e-9))
     status[there] = turning["status"]
-    # a stroke may end elsewhere than at both places found, if they lie on two assembly modes
+    # the stroke may end elsewhere than at the two places found, if they belong to different assembly modes
     places: Array = np.column_stack([turning["psi_ext"], turning["psi_fold"]])
     apart = places - np.column_stack([ext, fold])[there]
     defect = there[(np.abs(np.sin(0.5 * apart)) > LIMITS_APART).any(axis=1)]

@@ -1,9 +1,9 @@
 """Eyelet of a take-up for a wanted P(phi): least squares with the analytic Jacobian; docs/takeup.md, section 6.
 
-The length over the store, P_h, is linear: it is the weighted mean of what is left and leaves the problem.  What the
-wanted points do not determine is named: the parameters that share in a direction along which nothing changes.  One such
-direction there always is, for guides on the line x = e, y = 0: the squared distances of the eyelet from them hold seven
-parameters in six combinations, (28) of docs/takeup.md.  Fix e, a or alpha to be rid of it; at alpha = 0 fix f and e.
+The length over the store, P_h, is linear: it is the weighted mean of the remainder and is eliminated.  Parameters that
+the wanted points do not determine are named: those in a direction along which the residual stays constant.  For guides
+on the line x = e, y = 0 there is always one such direction: the squared distances of the eyelet from them contain seven
+parameters in six combinations, (28) of docs/takeup.md.  Fixing e, a or alpha removes it; at alpha = 0 fix f and e.
 """
 
 from __future__ import annotations
@@ -25,11 +25,11 @@ if TYPE_CHECKING:
 
     from sweep.evaluation.tables import Table
 
-# The columns of kernels.families.eyelet.length_sensitivities, which are those of the design matrix in this order.
+# The columns of kernels.families.eyelet.length_sensitivities, in the order of the design matrix.
 SOUGHT = ("a", "e", "f", "alpha", "Z1", "Z2", "phi_h")
 LENGTHS = ("a", "e", "f", "Z1", "Z2")
 STORE = 7
-# A direction whose singular value is below this share of the largest changes P by less than its rounding can show.
+# Relative singular value below which a direction changes P by less than its rounding error.
 LEAST_RANK = 1e-7
 SHARE = 0.1
 
@@ -39,14 +39,14 @@ class TakeUpFit:
     """An eyelet fitted to a wanted P(phi).
 
     ``designs`` has a row per start, the best first: the parameters of the family `eyelet`, ``rms`` and ``largest``
-    error of P [length], ``undetermined``: the parameters that the wanted points do not tell apart, comma-separated.
+    error of P [length], ``undetermined``: the parameters that the wanted points do not determine, comma-separated.
     """
 
     designs: pd.DataFrame
 
     @property
     def best(self) -> dict[str, float]:
-        """The parameters of the best eyelet."""
+        """Parameters of the best eyelet."""
         row = self.designs.iloc[0]
         return {name: float(row[name]) for name in family("eyelet").parameter_names}
 
@@ -54,14 +54,14 @@ class TakeUpFit:
 def fit_eyelet(
     phi: ArrayLike, P: ArrayLike, starts: Table, weights: ArrayLike | None = None, fixed: tuple[str, ...] = ()
 ) -> TakeUpFit:
-    """Find the eyelet on a crank that takes up the wanted thread, with the least squares of the errors of P.
+    """Find the eyelet on a crank that takes up the wanted thread, with the least sum of squared errors of P.
 
     Parameters
     ----------
-    phi, P : wanted points, crank angle [rad] and thread taken up [length]; a constant in P means nothing
-    starts : table of eyelets to start from, one per row
-    weights : of the squared errors, one per point, 1 by default
-    fixed : parameters that keep their value: of a, e, f, alpha, Z1, Z2, phi_h
+    phi, P : wanted points, crank angle [rad] and thread taken up [length]; a constant in P has no influence
+    starts : table of initial eyelets, one per row
+    weights : weights of the squared errors, one per point, 1 by default
+    fixed : parameters that keep their value, among a, e, f, alpha, Z1, Z2, phi_h
 
     Returns
     -------
@@ -70,12 +70,12 @@ def fit_eyelet(
     Raises
     ------
     InputError
-        for a bad table, points that do not fit each other, an unknown fixed parameter, or fewer points than unknowns.
+        for a bad table, points of different numbers, an unknown fixed parameter, or fewer points than unknowns.
 
     Notes
     -----
-    The length itself is fitted, not the weighted difference (27) of the source, which over-weights the points where
-    both parts of the thread are long.  A mirror image, or the guides exchanged, is as good an answer.
+    The length itself is fitted, not the weighted difference (27) of the source, which over-weights the points with
+    two long parts of the thread.  A mirror image, or an exchange of the guides, is an equally good answer.
     """
     import pandas as pd
 
@@ -113,7 +113,7 @@ class _Problem:
     sought: list[int]
 
     def solved(self, start: Array) -> dict[str, float | str]:
-        """Eyelet reached from one start."""
+        """Return the eyelet fitted from one start, as a row of the table."""
         from scipy.optimize import least_squares
 
         unit = float(np.abs(start[[SOUGHT.index(name) for name in LENGTHS]]).max())
@@ -154,7 +154,7 @@ class _Problem:
         return whole
 
     def errors(self, start: Array, x: Array) -> Array:
-        """Errors of P, weighted, with the best P_h."""
+        """Return the weighted errors of P, with the best P_h."""
         left = self.lengths(self.design(start, x)) - self.wanted
         return np.sqrt(self.weights) * (left - self.weights @ left)
 

@@ -20,8 +20,8 @@ if TYPE_CHECKING:
 
 CONTOUR = ("alpha", "beta", "B")
 SPEED = ("K", "n")
-# Singular values of the scaled Jacobian below this share of the largest: the measurements do not tell the constants
-# apart.  Tensions are measured to some per cent, never to a millionth.
+# Relative singular value of the scaled Jacobian below which the measurements do not determine the constants.  Tensions
+# are measured to some per cent, never to a millionth.
 LEAST_RANK = 1e-6
 
 _MEASURED = Sheet(
@@ -47,11 +47,11 @@ _SPEEDS = Sheet(
 
 @dataclass(frozen=True)
 class ConstantsFit:
-    """Constants that fit measurements best, and how well the measurements determine them.
+    """Constants fitted to measurements, with their confidence intervals.
 
     ``constants`` has a row per constant: value, standard_error, low and high of its confidence interval at
-    ``confidence``.  ``residual`` is the root mean square of the relative errors that are left.  ``undetermined`` names
-    the constants that the measurements do not tell apart: their intervals are infinite.
+    ``confidence``.  ``residual`` is the root mean square of the relative errors of the fit.  ``undetermined`` names
+    the constants that the measurements do not determine: their intervals are infinite.
     """
 
     constants: pd.DataFrame
@@ -61,7 +61,7 @@ class ConstantsFit:
 
     @property
     def values(self) -> dict[str, float]:
-        """The constants by name, as columns for `sweep.thread.contour` or `sweep.thread.speed`."""
+        """Constants by name, as columns for `sweep.thread.contour` or `sweep.thread.speed`."""
         return {str(name): float(x) for name, x in self.constants["value"].items()}
 
 
@@ -71,7 +71,7 @@ def fit_contour(table: Table, confidence: float = 0.95) -> ConstantsFit:
     Parameters
     ----------
     table : columns T1, T2 [gf], R [mm], theta_deg [degrees]; N and gamma of the thread as in `sweep.thread.contour`
-    confidence : of the intervals
+    confidence : confidence level of the intervals
 
     Returns
     -------
@@ -111,7 +111,7 @@ def fit_speed(table: Table, confidence: float = 0.95) -> ConstantsFit:
     Parameters
     ----------
     table : columns v [m/s], ratio_to_ref, v_ref [m/s] (1.23 by default)
-    confidence : of the intervals
+    confidence : confidence level of the intervals
 
     Returns
     -------
@@ -143,7 +143,7 @@ def _growth(x: Array) -> Array:
 
 
 def _growth_slope(x: Array) -> Array:
-    """Return the derivative of (e^x - 1)/x, by its series where the quotient would cancel."""
+    """Return the derivative of (e^x - 1)/x, as a series for small x, where the quotient suffers cancellation."""
     small = x < 0.05
     safe = np.where(small, 1.0, x)
     series = 0.5 + x * (1.0 / 3.0 + x * (1.0 / 8.0 + x * (1.0 / 30.0 + x * (1.0 / 144.0 + x / 840.0))))
@@ -167,7 +167,7 @@ def _fitted(
     scaled = slopes(values) * start
     _, size, right = np.linalg.svd(scaled, full_matrices=False)
     weak = size <= LEAST_RANK * size[0]
-    # A constant that has a share in a weak direction is not determined.
+    # A constant with a component in a weak direction is not determined.
     lost = (np.abs(right[weak]) > 1e-3).any(axis=0) if weak.any() else np.zeros(len(names), np.bool_)
     square = float(found.fun @ found.fun)
     variance = square / free if free > 0 else np.nan

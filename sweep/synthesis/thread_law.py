@@ -1,4 +1,4 @@
-"""A take-up for the thread that a stitch demands: the smoothest law within the slack, and the edge of a cam for it.
+"""Take-up for the thread demand of a stitch: the smoothest law within the slack, and the edge of a cam that gives it.
 
 The equation numbers are those of docs/takeup.md, section 9.
 """
@@ -18,17 +18,17 @@ if TYPE_CHECKING:
     import pandas as pd
     from numpy.typing import ArrayLike, NDArray
 
-DIRECTIONS = 720  # around the straight thread, in which the edge is looked for
-ROUNDS = 20  # of Newton's method from there
-TIGHT = 1e-9  # of the slack: below it a law counts as one within
-LEAST = 1e-3  # of the demand's range that a slack counts as, where it is the unit of length
+DIRECTIONS = 720  # directions around the straight thread in which the edge is sought
+ROUNDS = 20  # rounds of Newton's method for the edge
+TIGHT = 1e-9  # share of the slack below which an excess is rounding
+LEAST = 1e-3  # smallest slack relative to the range of the demand, for the unit of length
 
 
 @dataclass(frozen=True)
 class ThreadLaw:
     """Law of a take-up, P = sum of cos[k - 1] cos(k phi) + sin[k - 1] sin(k phi), and the stock of thread.
 
-    ``largest`` is the largest magnitude of P''; ``spare`` the least distance of the surplus from its two bounds.
+    ``largest`` is the largest magnitude of P''; ``spare`` the smallest distance of the surplus from its two bounds.
     """
 
     cos: Array
@@ -38,26 +38,26 @@ class ThreadLaw:
     spare: float
 
     def __call__(self, phi: ArrayLike, order: int = 0) -> Array:
-        """Return P or a derivative of it."""
+        """Return P or its derivative of the given order."""
         found: Array = _waves(np.asarray(phi, np.float64), len(self.cos), order) @ np.concatenate([self.cos, self.sin])
         return found
 
     @property
     def coefficients(self) -> dict[str, float]:
-        """The same for the family `guided_cam`."""
+        """Coefficients as parameters of the family `guided_cam`."""
         pairs = (("A", self.cos), ("B", self.sin))
         return {f"{letter}{k}": float(x) for letter, values in pairs for k, x in enumerate(values, start=1)}
 
 
 def smoothest_law(phi: ArrayLike, demand: ArrayLike, allowed: ArrayLike, harmonics: int = 6) -> ThreadLaw:
-    """Find the law with the least acceleration whose surplus stays between 0 and what is allowed; a linear program.
+    """Find the law with the least acceleration whose surplus stays between 0 and ``allowed``, by a linear program.
 
     Parameters
     ----------
-    phi : (n,) angles of the main shaft [rad]; where the demand jumps one just before and one just behind
-    demand : (n,) thread that the stitch demands there
-    allowed : most surplus, (n,) or one number
-    harmonics : of the law
+    phi : (n,) angles of the main shaft [rad]; two beside each jump of the demand, just before and just behind
+    demand : (n,) thread that the stitch demands at these angles
+    allowed : largest surplus, (n,) or one number
+    harmonics : number of harmonics of the law
 
     Returns
     -------
@@ -67,7 +67,7 @@ def smoothest_law(phi: ArrayLike, demand: ArrayLike, allowed: ArrayLike, harmoni
     Raises
     ------
     InputError
-        if no law of so many harmonics does: it says by how much the slack is too small.
+        if no law with this number of harmonics satisfies the bounds: it gives the lacking slack.
     """
     from scipy.optimize import linprog
 
@@ -80,12 +80,12 @@ def smoothest_law(phi: ArrayLike, demand: ArrayLike, allowed: ArrayLike, harmoni
             raise InputError(name, values.tolist()[:3], "finite numbers", "thread law")
     if harmonics < 1:
         raise InputError("harmonics", harmonics, "a whole number above 0", "thread law")
-    # The program's tolerances are those of numbers about 1.
+    # The tolerances of the linear program suit numbers of about 1.
     unit, least = max(float(np.abs(slack).max()), LEAST * float(np.ptp(need))) or 1.0, float(slack.min())
     need, slack = need / unit, np.broadcast_to(slack / unit, need.shape)
     waves, curving = _waves(at, harmonics, 0), _waves(at, harmonics, 2)
     one, none = np.ones((at.size, 1)), np.zeros((at.size, 1))
-    # unknowns: the coefficients, the stock, the largest |P''|, and by how much the slack is exceeded
+    # unknowns: the coefficients, the stock, the largest |P''|, and the excess over the slack
     rows = np.block(
         [
             [waves, -one, none, none],
@@ -110,29 +110,29 @@ def smoothest_law(phi: ArrayLike, demand: ArrayLike, allowed: ArrayLike, harmoni
 
 
 def cam_edge(law: ThreadLaw, guides: ArrayLike, P_h: float, count: int = 360) -> pd.DataFrame:
-    """Find the bare edge of a cam, turning with the main shaft, over which a thread between two guides follows a law.
+    """Find the edge of a cam on the main shaft over which a thread between two guides follows a law.
 
-    The edge is the envelope of the ovals on which the thread is as long as it has to be, (30): it touches each where
-    the thread lies then.
+    The edge is the envelope of the ovals on which the thread has the required length, (30): it touches each oval at the
+    place of the thread.
 
     Parameters
     ----------
-    law : what is to be taken up
+    law : law to be followed
     guides : (2, 3), on either side of the plane z = 0 of the cam, whose axis is z [length]
     P_h : length of the thread at P = 0
-    count : of points, at even angles of the cam
+    count : number of points, at even angles of the cam
 
     Returns
     -------
     DataFrame
         ``phi``, ``x``, ``y`` of the edge in the axes of the cam, its outward normal ``nx``, ``ny``, ``curvature``
-        (positive where it is convex), and ``clear``: by how much the thread would be longer over any other point of
-        the edge that is at least a hundredth of a turn away.  ``attrs["units"]`` names the units
+        (positive if convex), and ``clear``: smallest increase of the thread's length over any other point of the edge
+        that is at least a hundredth of a turn away.  ``attrs["units"]`` names the units
 
     Raises
     ------
     InputError
-        where the thread is too short, no edge gives the law, or the edge would cut into itself, with the angle.
+        if the thread is too short, no edge gives the law, or the edge would cut into itself, with the angle.
     """
     import pandas as pd
 
@@ -143,7 +143,7 @@ def cam_edge(law: ThreadLaw, guides: ArrayLike, P_h: float, count: int = 360) ->
     length, rate, bend = P_h + law(phi), law(phi, 1), law(phi, 2)
     q = _touched(ends, length, rate, phi)
     _, g, h = _way(ends, q)
-    swept = np.stack([-q[:, 1], q[:, 0]], axis=1)  # a point of the cam moves so
+    swept = np.stack([-q[:, 1], q[:, 0]], axis=1)  # velocity of a point of the cam
     across = np.einsum("nij,nj->ni", h, swept) + np.stack([g[:, 1], -g[:, 0]], axis=1)
     moves = np.linalg.solve(np.stack([g, across], axis=1), np.stack([rate, bend], axis=1)[..., None])[..., 0]
     size = np.hypot(g[:, 0], g[:, 1])
@@ -154,7 +154,7 @@ def cam_edge(law: ThreadLaw, guides: ArrayLike, P_h: float, count: int = 360) ->
     cos, sin = np.cos(phi), np.sin(phi)
     x, y = q[:, 0] * cos + q[:, 1] * sin, q[:, 1] * cos - q[:, 0] * sin
     nx, ny = normal[:, 0] * cos + normal[:, 1] * sin, normal[:, 1] * cos - normal[:, 0] * sin
-    # over each point of the edge at each angle; a hundredth of a turn aside it has to be longer
+    # over each point of the edge at each angle; a hundredth of a turn aside the thread must be longer
     placed = np.stack([np.outer(cos, x) - np.outer(sin, y), np.outer(sin, x) + np.outer(cos, y)], axis=2)
     longer = _way(ends, placed.reshape(-1, 2))[0].reshape(count, count) - length[:, None]
     apart = np.abs((np.arange(count) - np.arange(count)[:, None] + count // 2) % count - count // 2)
@@ -187,7 +187,7 @@ def _way(ends: Array, q: Array) -> tuple[Array, Array, Array]:
 
 
 def _touched(ends: Array, length: Array, rate: Array, phi: Array) -> Array:
-    """Return where the edge touches each oval, (n, 2): of all such places the farthest from the axis of the cam.
+    """Return the point at which the edge touches each oval, (n, 2); of several the farthest from the cam's axis.
 
     A first guess is looked for around where the straight thread passes the plane, then closed by Newton's method.
     """

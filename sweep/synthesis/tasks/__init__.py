@@ -1,4 +1,4 @@
-"""The eight tasks of Polukhin's engineering method as problems behind one interface; docs/tasks.md."""
+"""The eight tasks of Polukhin's engineering method as problems with a common interface; docs/tasks.md."""
 
 from sweep.synthesis.tasks.crank_rocker import EngineeringMethod as EngineeringMethod
 from sweep.synthesis.tasks.crank_rocker import Task4 as Task4

@@ -1,6 +1,6 @@
-"""Crank-rockers on their locus, the first stage of every task, and the engineering method, which asks for the best.
+"""Crank-rockers on their locus, the first stage of every task, and the engineering method, which optimises them.
 
-Task 4 is the same in the plane, the problem of Alt.
+Task 4 is its planar case, the problem of Alt.
 """
 
 from __future__ import annotations
@@ -29,20 +29,20 @@ _EXACT = Accuracy(target=1e-10)
 
 @lru_cache(maxsize=8)
 def turn(poses: int = POSES) -> Angles:
-    """Equidistant crank angles of one turn, (1, poses)."""
+    """Return equidistant crank angles of one turn, (1, poses)."""
     phi: Array = np.arange(poses, dtype=np.float64)[None, :] * (2.0 * np.pi / poses)
     return Angles.of(phi)
 
 
 def _rows(*columns: Array | float) -> Array:
-    """Return columns, or numbers that stand for whole columns, side by side."""
+    """Return columns, or numbers that represent whole columns, side by side."""
     return np.column_stack(np.broadcast_arrays(*columns)).astype(np.float64)
 
 
 def designs_on_locus(
     swing: Number, phi0: Number, phi1: Array, e: Number, f: Number, g: Number, alpha: Number
 ) -> tuple[Array, Array]:
-    """Design matrix (n, 8) and rocker angle psi1 (n,) of the extended position; nan where a test (i)-(iii) fails."""
+    """Return designs (n, 8) and rocker angles psi1 (n,) of the extended position; nan if a test (i)-(iii) fails."""
     requirements = _rows(swing, phi0, phi1, e, f, g, alpha)
     n = len(requirements)
     designs, psi1 = np.empty((n, 8)), np.empty(n)
@@ -52,7 +52,7 @@ def designs_on_locus(
 
 @dataclass(frozen=True)
 class LocusPoint:
-    """Points of the locus before f, a, b are chosen, (n,) each: ball X, Y about the rocker axis and rho1, rho2."""
+    """Points of the locus before the choice of f, a, b, (n,) each: ball X, Y about the rocker axis, rho1 and rho2."""
 
     x: Array
     y: Array
@@ -68,23 +68,23 @@ class LocusPoint:
         return cls(*points.T)
 
     def turned(self, angle: Number) -> tuple[Array, Array]:
-        """Return X, Y after the rocker has turned by the angle."""
+        """Return X, Y after the rocker has turned by an angle."""
         c, s = np.cos(angle), np.sin(angle)
         return self.x * c - self.y * s, self.x * s + self.y * c
 
 
 def motion(designs: Array, angles: Angles, *wanted: str) -> list[Array]:
-    """Pose outputs of crank-rockers, (n, m) each, nan where there is no mechanism."""
+    """Return pose outputs of crank-rockers, (n, m) each, nan if there is no mechanism."""
     return RSSR.values(designs, angles, *wanted)
 
 
 def acceleration(designs: Array) -> Array:
-    """Acceleration analogue of the rocker over a turn, (n, POSES)."""
+    """Return the acceleration analogue of the rocker over a turn, (n, POSES)."""
     return motion(designs, turn(), "d2psi")[0]
 
 
 def least_cos2(designs: Array) -> Array:
-    """Smallest cos^2 of the pressure angle over the turn, exact; nan where there is no mechanism."""
+    """Return the smallest cos^2 of the pressure angle over the turn, exact; nan if there is no mechanism."""
     whole = np.full(len(designs), np.nan)
     alive = np.isfinite(designs).all(axis=1)
     found = design_outputs(RSSR, designs[alive], ["margin"], _EXACT)
@@ -93,13 +93,13 @@ def least_cos2(designs: Array) -> Array:
 
 
 def pressure_limit(designs: Array, largest: float) -> Array:
-    """Slack of the limit on the pressure angle, cos^2 - cos^2[largest]; pi/2 asks for a full turn only."""
+    """Return the slack of the limit on the pressure angle, cos^2 - cos^2[largest]; pi/2 requires a full turn only."""
     slack: Array = least_cos2(designs) - np.cos(largest) ** 2
     return slack
 
 
 def bearing_reserve(designs: Array, bearings: Mapping[str, float]) -> Array:
-    """Least permissible less actual radial pressure angle over a turn, (n,), of the bearings that the rocker has.
+    """Return the least reserve of the rocker's bearings over a turn, (n,): permissible minus actual pressure angle.
 
     Step 3 of the engineering method.  ``bearings`` are the inputs of the effect ``sliding_bearings`` with its limits,
     or of ``rolling_bearings``, its torque among them; nan where there is no mechanism.
@@ -114,13 +114,13 @@ def bearing_reserve(designs: Array, bearings: Mapping[str, float]) -> Array:
 
 
 def named(designs: Array, suffix: str = "") -> dict[str, Array]:
-    """Design matrix as columns."""
+    """Return a design matrix as columns by name."""
     return {f"{name}{suffix}": column for name, column in zip(RSSR.parameter_names, designs.T, strict=True)}
 
 
 @dataclass(frozen=True)
 class OnLocus(Task):
-    """A task about a crank-rocker with a given limit motion: its members are those of `EngineeringMethod`."""
+    """A task about a crank-rocker with given limit positions; the fields are those of `EngineeringMethod`."""
 
     swing: float
     phi0: float
@@ -129,7 +129,7 @@ class OnLocus(Task):
     alpha: float
 
     def drive(self, phi1: Array, f: Number) -> tuple[Array, Array]:
-        """Return designs (n, 8) at places phi1 of the locus with offset f; psi1 (n,) of the extended position."""
+        """Return designs (n, 8) at places phi1 of the locus with offset f, and psi1 (n,) of the extended position."""
         return designs_on_locus(self.swing, self.phi0, phi1, self.e, f, self.g, self.alpha)
 
 
@@ -141,10 +141,10 @@ class EngineeringMethod(OnLocus):
     ----------
     swing, phi0 : rocker angle (signed) and crank angle from the extended to the folded position [rad]
     e, g, alpha : position of the rocker axis and of the rocker's plane on it [length, rad]
-    f_range : where f is looked for [length]; two equal numbers fix it.  With alpha = 0 only f - g matters.
+    f_range : range of f [length]; two equal numbers fix it.  With alpha = 0 only f - g matters.
     objective : "acceleration", max |d2psi|, or "pressure_angle", the largest over the turn
-    bearings : of the rocker, inputs of `bearing_reserve`: the radial pressure angle stays below what they permit
-    bounds : of what is found, by name: the lengths a, b, c, and the place x_ext, y_ext of the rocker ball at the
+    bearings : bearings of the rocker, inputs of `bearing_reserve`: they bound the radial pressure angle
+    bounds : bounds of results by name: the lengths a, b, c, and the place x_ext, y_ext of the rocker ball at the
         extended position, from the rocker axis: a box for the joint C1
     """
 
@@ -154,12 +154,12 @@ class EngineeringMethod(OnLocus):
 
     @property
     def unknowns(self) -> tuple[Unknown, ...]:
-        """phi1, and f where it is free."""
+        """phi1, and f if it is free."""
         low, high = self.f_range
         return (turning("phi1"),) if low == high else (turning("phi1"), Unknown("f", low, high))
 
     def found(self, x: Mapping[str, Array]) -> Found:
-        """See `Task`."""
+        """Compute equations, limits, curve and mechanisms of candidates from their unknowns, (n,) each."""
         designs, psi1 = self.drive(x["phi1"], x.get("f", self.f_range[0]))
         columns = named(designs)
         columns |= {"x_ext": columns["c"] * np.cos(psi1), "y_ext": columns["c"] * np.sin(psi1)}
@@ -172,9 +172,9 @@ class EngineeringMethod(OnLocus):
         return Found({}, limits, curve, columns)
 
     def offset_ranges(self, places: int = 180, offsets: int = 181) -> list[tuple[float, float]]:
-        """Return the ranges of f in which some place of the locus keeps all limits: step 3 of the method.
+        """Return the ranges of f in which some place of the locus satisfies all limits: step 3 of the method.
 
-        Seen on a grid of so many places and offsets: an end is good to a step of the grid.
+        They are found on a grid of places and offsets: an end is accurate to a step of the grid.
         """
         f: Array = np.linspace(*self.f_range, offsets, dtype=np.float64)
         phi1: Array = np.arange(places, dtype=np.float64) * (2.0 * np.pi / places)
@@ -187,8 +187,8 @@ class EngineeringMethod(OnLocus):
 class Task4(EngineeringMethod):
     """The engineering method in the plane: alpha = 0, f = g; the only unknown is phi1.
 
-    Give swing, phi0 and the frame e; the objective "pressure_angle" is the classical question for the best
-    transmission, "acceleration" that for the smoothest motion.
+    Given are swing, phi0 and the frame e; the objective "pressure_angle" gives the best transmission, "acceleration"
+    the smoothest motion.
     """
 
     g: float = field(default=0.0, init=False)

@@ -1,4 +1,4 @@
-"""Tasks 5 and 8: a crank-rocker on its locus and what it drives: a slotted link, or a slider that dwells."""
+"""Tasks 5 and 8: a crank-rocker on its locus that drives a slotted link, or a slider with a dwell."""
 
 from __future__ import annotations
 
@@ -17,11 +17,11 @@ from sweep.synthesis.tasks.problem import Found, Unknown, ranges, turning
 from sweep.synthesis.tasks.second_stage import RSSP, chain_motion, second_pressure_limit
 
 EXACT = Accuracy(target=1e-12)
-WINDOW = 33  # poses of the dwell; the deviation is largest at its ends, but this is not taken for granted
+WINDOW = 33  # poses of the dwell; the deviation is usually largest at its ends, which is not assumed
 
 
 class SlotPosition(NamedTuple):
-    """An intermediate value: crank angle from the extended position on [rad], and how far rho has changed [length]."""
+    """An intermediate value: crank angle from the extended position on [rad], and change of rho [length]."""
 
     dphi: float
     drho: float
@@ -36,7 +36,7 @@ class Slot(NamedTuple):
 
 
 def slot(a2: Array, e2: Array, t: Array) -> Slot:
-    """Planar slotted link: pin at radius a2 on the rocker, pivot at distance e2, t the angle between them.
+    """Return the motion of a planar slotted link: pin at radius a2, pivot at distance e2, t the angle between them.
 
     Equation (17) of docs/tasks.md, which is the fork slot of docs/slotted.md.  ``a2``, ``e2`` : (n,), their signs are
     equal and without effect; ``t`` : (n, m).
@@ -59,7 +59,7 @@ class Task5(OnLocus):
     rho0 : change of rho from the extended to the folded position [length], signed
     positions : intermediate values, each an equation
     kappa : +1, or -1 if the slotted link is driven through a reversing gear
-    ratio_range : where e2/a2 is looked for, not containing 1
+    ratio_range : range of e2/a2, not containing 1
     """
 
     f_range: tuple[float, float]
@@ -75,11 +75,11 @@ class Task5(OnLocus):
 
     @property
     def unknowns(self) -> tuple[Unknown, ...]:
-        """Places of both stages."""
+        """Places of both stages on their loci."""
         return (turning("phi1"), *ranges(self, "f"), turning("t1"), *ranges(self, "ratio"))
 
     def found(self, x: Mapping[str, Array]) -> Found:
-        """See `Task`."""
+        """Compute equations, limits, curve and mechanisms of candidates from their unknowns, (n,) each."""
         phi1, t1, ones = x["phi1"], x["t1"], np.ones(len(x["phi1"]))
         designs, psi1 = self.drive(phi1, x["f"])
         t2 = t1 + self.kappa * self.swing
@@ -111,7 +111,7 @@ class Task5(OnLocus):
 
 @dataclass(frozen=True)
 class Task8(OnLocus):
-    """The unknowns are phi1 and f of the crank-rocker, proportions of the slider-crank; its size is that of the stroke.
+    """The unknowns are phi1 and f of the crank-rocker, proportions of the slider-crank; the stroke gives its size.
 
     Both stages stand in a limit position at the same time, the first in its extended one: velocity, acceleration and
     jerk vanish there, and the slider moves by psi''^2 S'' dphi^4/8 to leading order.
@@ -119,12 +119,12 @@ class Task8(OnLocus):
     Parameters
     ----------
     swing, phi0, e, g, alpha, f_range : stage 1, as `EngineeringMethod`
-    stroke : of the slider, positive [length]
-    dwell : crank angle over which the slider has to stand still [rad], with the extended position in its middle
+    stroke : stroke of the slider, positive [length]
+    dwell : crank angle of the dwell [rad], with the extended position in its middle
     tolerance : largest deviation from the dwell position during it [length]
-    limit : in which of its limit positions stage 2 stands during the dwell
+    limit : limit position of stage 2 during the dwell
     kappa, branch : sense of the connection of the stages, assembly mode of the slider-crank
-    coupler_range, offset_range : where b2/a2 and e2/a2 are looked for
+    coupler_range, offset_range : ranges of b2/a2 and e2/a2
     f2_ratio, alpha2 : f2/a2 and the angle of a spatial slider-crank [1, rad]; 0 for a planar one
     max_pressure_angle : limit of both stages over the whole turn [rad]
     """
@@ -153,11 +153,11 @@ class Task8(OnLocus):
         return (turning("phi1"), *ranges(self, "f", "coupler", "offset"))
 
     def found(self, x: Mapping[str, Array]) -> Found:
-        """See `Task`."""
+        """Compute equations, limits, curve and mechanisms of candidates from their unknowns, (n,) each."""
         coupler, offset, ones = x["coupler"], x["offset"], np.ones(len(x["phi1"]))
         designs, psi1 = self.drive(x["phi1"], x["f"])
         shape = np.column_stack([ones, coupler, offset, self.f2_ratio * ones, self.alpha2 * ones, self.branch * ones])
-        # nan where the slider-crank does not turn fully and so has no limit positions
+        # nan if the slider-crank does not turn fully and so has no limit positions
         place = "phi_ext" if self.limit == "extended" else "phi_fold"
         theta = np.asarray(design_outputs(RSSP, shape, [place], EXACT)[place], np.float64)
         span = np.linspace(0.0, self.kappa * self.swing, 9)
@@ -180,13 +180,13 @@ class Task8(OnLocus):
             "dwell": np.log(self.tolerance / deviation),
             "pressure angle 1": pressure_limit(designs, self.max_pressure_angle),
             "pressure angle 2": second_pressure_limit(angle, self.max_pressure_angle),
-            # all steps of the slider go the way of the whole stroke
+            # all steps of the slider have the direction of the whole stroke
             "no return of the slider": (np.diff(slide, axis=1) * np.sign(travel)[:, None]).min(axis=1),
         }
         return Found({}, limits, d2s, columns | {"dwell_deviation": deviation})
 
     def _deviation(self, designs: Array, phi1: Array, psi1: Array, theta: Array, lengths: Array) -> Array:
-        """Largest distance from the dwell position during the dwell."""
+        """Return the largest distance from the dwell position during the dwell."""
         window = np.linspace(-0.5 * self.dwell, 0.5 * self.dwell, WINDOW)
         turned = motion(designs, Angles.of(phi1[:, None] + window), "psi")[0] - psi1[:, None]
         rest = np.full((len(designs), 2), [self.alpha2, float(self.branch)])

@@ -1,7 +1,7 @@
 """Tasks 1 and 2: crank-rockers through given positions, by the difference form of the closure, linear in the offset f.
 
-Task 1 has given swing and phi0 and passes one or two intermediate positions.  Task 2 passes two, with swing and phi0
-free within ranges.
+Task 1 has given swing and phi0 and one or two intermediate positions.  Task 2 has two, with swing and phi0 free within
+ranges.
 """
 
 from __future__ import annotations
@@ -53,11 +53,11 @@ def through_positions(
     positions: tuple[Position, ...],
     f: float = 0.0,
 ) -> Through:
-    """Crank-rockers on the locus whose f makes them pass the first position exactly, and how they miss the others.
+    """Return crank-rockers on the locus whose f puts them through the first position, with residuals of the others.
 
-    Equation (15) of docs/synthesis.md.  With sin(alpha) = 0 the closure does not contain f: the given f is taken and
-    the first position is a residual like the others.  Residuals are in squared mean distances of the rocker ball from
-    the crank axis.
+    Equation (15) of docs/synthesis.md.  With sin(alpha) = 0 the closure does not contain f: the given f is used and
+    the first position is a residual like the others.  Residuals are relative to the squared mean distance of the rocker
+    ball from the crank axis.
     """
     point = LocusPoint.of(swing, phi0, phi1, e, g, alpha)
     sa, ca = np.sin(alpha), np.cos(alpha)
@@ -86,7 +86,7 @@ def through_positions(
 
 
 def _branch_slack(designs: Array, psi: Array, phi: Array) -> Array:
-    """Cosine of the pressure angle at a position, positive if it lies on the design's own branch."""
+    """Return the cosine of the pressure angle at a position, positive if it lies on the design's own branch."""
     a, b, _, e, f, _, alpha, branch = designs.T
     x, y = e - a * np.cos(phi), f * np.sin(alpha) + a * np.cos(alpha) * np.sin(phi)
     slack: Array = -branch * (x * np.sin(psi) + y * np.cos(psi)) / b
@@ -105,14 +105,14 @@ class Task1(OnLocus):
     Parameters
     ----------
     swing, phi0, e, g, alpha : as `EngineeringMethod`
-    positions : one or two intermediate positions, from the extended one on; planar mechanisms (alpha = 0) have room
-        for one, and it fixes phi1
-    f : offset of the crank plane where alpha = 0, elsewhere it is found
+    positions : one or two intermediate positions, from the extended one on; planar mechanisms (alpha = 0) can take
+        one, and it determines phi1
+    f : offset of the crank plane if alpha = 0, otherwise it is found
 
     Raises
     ------
     InputError
-        for no position, or more than the mechanism has room for.
+        for no position, or more than the mechanism can take.
     """
 
     positions: tuple[Position, ...]
@@ -130,7 +130,7 @@ class Task1(OnLocus):
         return (turning("phi1"),)
 
     def found(self, x: Mapping[str, Array]) -> Found:
-        """See `Task`."""
+        """Compute equations, limits, curve and mechanisms of candidates from their unknowns, (n,) each."""
         given = (self.swing, self.phi0, x["phi1"], self.e, self.g, self.alpha)
         return _passing(self, through_positions(*given, self.positions, self.f))
 
@@ -139,20 +139,20 @@ class Task1(OnLocus):
 class Task2(Task):
     """The unknowns are swing, phi0, phi1 and f; closure at the two positions and at both limits are the equations.
 
-    The limits hold by the locus, the first position by f, the second one is left as an equation; the two degrees of
-    freedom that remain, four with g and alpha, go to the objective.  Only ratios of lengths matter: e sets the scale.
+    The limits hold by the locus, the first position by f, the second one remains as an equation; the two remaining
+    degrees of freedom, four with g and alpha, serve the objective.  Only ratios of lengths matter: e sets the scale.
 
     Parameters
     ----------
-    swing_range, phi0_range : where swing (one sign) and phi0 are looked for [rad]
+    swing_range, phi0_range : ranges of swing (one sign) and phi0 [rad]
     e, g, alpha : position of the rocker axis and of the rocker's plane on it [length, rad]; sin(alpha) not 0
     positions : two intermediate positions, from the extended one on
-    g_range, alpha_range : where g and alpha are looked for, if they are to be found as well
+    g_range, alpha_range : ranges of g and alpha, if they are unknown as well
 
     Raises
     ------
     InputError
-        for a planar mechanism, which has no f to give, or another number of positions.
+        for a planar mechanism, whose closure does not contain f, or another number of positions.
     """
 
     swing_range: tuple[float, float]
@@ -174,10 +174,10 @@ class Task2(Task):
 
     @property
     def unknowns(self) -> tuple[Unknown, ...]:
-        """Swing, phi0 and phi1, g and alpha where they are free."""
+        """Swing, phi0 and phi1, and g and alpha if they are free."""
         return (*ranges(self, "swing", "phi0"), turning("phi1"), *ranges(self, "g", "alpha"))
 
     def found(self, x: Mapping[str, Array]) -> Found:
-        """See `Task`."""
+        """Compute equations, limits, curve and mechanisms of candidates from their unknowns, (n,) each."""
         g, alpha = x.get("g", self.g), x.get("alpha", self.alpha)
         return _passing(self, through_positions(x["swing"], x["phi0"], x["phi1"], self.e, g, alpha, self.positions))

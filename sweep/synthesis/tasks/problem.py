@@ -1,4 +1,4 @@
-"""What a task is to the solver: unknowns in a box, equations, limits, a curve whose largest magnitude is minimised.
+"""Interface of a task for the solver: unknowns in a box, equations, limits, a curve whose maximum is minimised.
 
 What tasks are given is checked when a task is made: every number in its range, every choice among its words.
 """
@@ -66,7 +66,7 @@ RULES: dict[str, Rule] = {
 
 
 def check_given(task: DataclassInstance) -> None:
-    """Check every field of a task that is given and has a rule; None is "not given".
+    """Check every given field of a task that has a rule; None is "not given".
 
     Raises
     ------
@@ -84,7 +84,7 @@ def check_given(task: DataclassInstance) -> None:
 
 
 class Unknown(NamedTuple):
-    """A number to be found between two bounds; ``periodic`` if both bounds mean the same."""
+    """An unknown between two bounds; ``periodic`` if both bounds are equivalent."""
 
     name: str
     low: float
@@ -93,11 +93,11 @@ class Unknown(NamedTuple):
 
 
 class Candidates(NamedTuple):
-    """What n candidates are worth; all nan in a row where there is no mechanism.
+    """Values of n candidates; a row without a mechanism is nan.
 
-    ``equations`` (n, p) vanish at a solution, ``limits`` (n, q) are kept where they are not negative, both scaled so
-    that 1 is a large violation.  The objective of a candidate is the largest magnitude in its row of ``curve`` (n, m).
-    ``results`` holds the mechanisms: columns of (n,), named as the families name their parameters.
+    ``equations`` (n, p) vanish at a solution, ``limits`` (n, q) hold if they are not negative, both scaled so that 1 is
+    a large violation.  The objective of a candidate is the largest magnitude in its row of ``curve`` (n, m).
+    ``results`` holds the mechanisms: columns of (n,), named like the parameters of families.
     """
 
     equations: Array
@@ -107,27 +107,27 @@ class Candidates(NamedTuple):
 
 
 class SynthesisTask(Protocol):
-    """One of the tasks with its numbers: what `solve` takes."""
+    """One of the tasks with its numbers, the argument of `solve`."""
 
     @property
     def unknowns(self) -> tuple[Unknown, ...]:
-        """What is to be found."""
+        """Unknowns of the task."""
 
     @property
     def equations(self) -> tuple[str, ...]:
-        """Names of the equations, fewer than unknowns or as many."""
+        """Names of the equations, at most as many as unknowns."""
 
     @property
     def limits(self) -> tuple[str, ...]:
         """Names of the limits."""
 
     def evaluate(self, x: Array) -> Candidates:
-        """Equations, limits, objective curve and mechanisms of candidates x (n, number of unknowns)."""
+        """Return equations, limits, objective curve and mechanisms of candidates x (n, number of unknowns)."""
 
 
 @dataclass(frozen=True)
 class Solution:
-    """A mechanism that does a task, or the nearest one found where ``feasible`` is false.
+    """A mechanism that solves a task, or the nearest one found if ``feasible`` is false.
 
     ``equations`` and ``limits`` hold the remaining residuals and slacks by name; ``objective`` is the largest magnitude
     of the problem's curve, on its samples.
@@ -141,7 +141,7 @@ class Solution:
     limits: dict[str, float]
 
     def __str__(self) -> str:
-        """Answer in a few lines."""
+        """Return the solution as text in a few lines."""
         head = "feasible" if self.feasible else "infeasible"
         lines = [f"{head}, objective {self.objective:.6g}"]
         for title, entries in (
@@ -163,17 +163,17 @@ class Found(NamedTuple):
 
 @dataclass(frozen=True)
 class Task(ABC):
-    """A task of the engineering method: what all have in common.
+    """Base of the tasks of the engineering method.
 
     Parameters
     ----------
-    max_pressure_angle : limit over the whole turn [rad]; pi/2 asks for a full turn only
-    bounds : of what is found, by name
+    max_pressure_angle : limit over the whole turn [rad]; pi/2 requires a full turn only
+    bounds : bounds of results by name
 
     Raises
     ------
     InputError
-        for a number out of its range or a word that is none of those allowed.
+        for a number out of its range or a word that is not allowed.
     """
 
     max_pressure_angle: float = field(default=0.5 * np.pi, kw_only=True)
@@ -185,11 +185,11 @@ class Task(ABC):
     @property
     @abstractmethod
     def unknowns(self) -> tuple[Unknown, ...]:
-        """What is to be found."""
+        """Unknowns of the task."""
 
     @abstractmethod
     def found(self, x: Mapping[str, Array]) -> Found:
-        """Compute what candidates are worth from their unknowns by name, (n,) each."""
+        """Compute equations, limits, curve and mechanisms of candidates from their unknowns by name, (n,) each."""
 
     @cached_property
     def _named(self) -> Found:
@@ -206,13 +206,13 @@ class Task(ABC):
         return tuple(self._named.limits)
 
     def evaluate(self, x: Array) -> Candidates:
-        """See `SynthesisTask`."""
+        """Return equations, limits, objective curve and mechanisms of candidates x (n, number of unknowns)."""
         n, found = len(x), self._bounded(x)
         columns = {name: np.broadcast_to(np.asarray(values, np.float64), n) for name, values in found.results.items()}
         return Candidates(_stacked(n, found.equations), _stacked(n, found.limits), found.curve, columns)
 
     def _bounded(self, x: Array) -> Found:
-        """Return what candidates x (n, unknowns) are worth, with slacks of the bounds in units of their range."""
+        """Return the values of candidates x (n, unknowns), with slacks of the bounds in units of their range."""
         found = self.found(dict(zip((u.name for u in self.unknowns), x.T, strict=True)))
         limits = dict(found.limits)
         for name, (low, high) in self.bounds.items():
@@ -227,16 +227,16 @@ class Task(ABC):
 
 
 def _stacked(count: int, columns: Mapping[str, Array]) -> Array:
-    """Columns (n,) side by side as (n, k), also for k = 0."""
+    """Return columns (n,) side by side as (n, k), also for k = 0."""
     return np.column_stack(list(columns.values())) if columns else np.empty((count, 0))
 
 
 def turning(name: str) -> Unknown:
-    """Return an angle that is looked for all around."""
+    """Return an unknown angle with the range of a whole turn."""
     return Unknown(name, 0.0, TWO_PI, periodic=True)
 
 
 def ranges(task: object, *names: str) -> list[Unknown]:
-    """Return the unknowns among these names: those whose range, ``name_range``, a task gives."""
+    """Return the unknowns with these names for which a task gives a range, ``name_range``."""
     found = ((name, getattr(task, f"{name}_range")) for name in names)
     return [Unknown(name, *ends) for name, ends in found if ends is not None]

@@ -1,4 +1,4 @@
-"""Tasks 6 and 7: a given crank-rocker as first stage, and the chains that it drives.
+"""Tasks 6 and 7: a given crank-rocker as first stage, and the stages that it drives.
 
 In task 6 it drives a guiding four-bar, a rocker-slider or a rocker-slotted linkage: a working point between two places
 with given tangents.  In task 7 it drives a slider, with given stroke and given accelerations at its ends.
@@ -26,7 +26,7 @@ SIDEWAYS = {"along": (-4.0, 6.0), "across": (-4.0, 4.0)}
 
 
 class Drive(NamedTuple):
-    """A crank-rocker that turns and oscillates: its row of the design matrix and its limits."""
+    """A crank-rocker that turns and oscillates: its row of the design matrix and its limit positions."""
 
     row: Array
     psi_ext: float
@@ -36,7 +36,7 @@ class Drive(NamedTuple):
 
     @classmethod
     def of(cls, design: Mapping[str, float], place: str) -> Drive:
-        """Return the limits of a design of ``rssr``.
+        """Return the limit positions of a design of ``rssr``.
 
         Raises
         ------
@@ -51,21 +51,21 @@ class Drive(NamedTuple):
         return cls(matrix[0], *(float(found[name][0]) for name in names))
 
     def columns(self, count: int) -> dict[str, Array]:
-        """Its parameters as columns of stage 1."""
+        """Return the parameters of the crank-rocker as columns of stage 1."""
         return named(np.tile(self.row, (count, 1)), "1")
 
 
 def chain_motion(second: str, columns: Mapping[str, Array], *wanted: str) -> list[Array]:
-    """Pose outputs of crank-rockers and what they drive over one turn, nan where there is no mechanism."""
+    """Return pose outputs of crank-rockers with their second stage over one turn, nan if there is no mechanism."""
     chain = family(["rssr", second])
-    # A stage stands where it does by default, as far as the task says nothing of its place.
+    # A stage has its default place if the task does not define another.
     defaults = {p.name: np.full_like(columns["a1"], p.default) for p in chain.parameters if p.default is not None}
     rows = np.column_stack([(defaults | dict(columns))[name] for name in chain.parameter_names])
     return chain.values(rows, turn(), *wanted)
 
 
 def second_pressure_limit(angle: Array, largest: float) -> Array:
-    """Slack of the limit on the pressure angle of stage 2 over the poses of a turn, cos^2 - cos^2[largest]."""
+    """Return the slack of the limit on the pressure angle of stage 2 over a turn, cos^2 - cos^2[largest]."""
     slack: Array = (np.cos(angle) ** 2).min(axis=1) - np.cos(largest) ** 2
     return slack
 
@@ -74,7 +74,7 @@ Points: TypeAlias = NDArray[np.complex128]
 
 
 class FourBar:
-    """A coupler point of a four-bar: ``shape``, proportions in cranks; ``dimensions``, their names in the family."""
+    """A coupler point of a four-bar: ``shape`` are proportions relative to the crank, ``dimensions`` their names."""
 
     family = "guide"
     shape: ClassVar[Mapping[str, tuple[float, float]]] = {
@@ -116,7 +116,7 @@ class RockerSlider(FourBar):
     dimensions: ClassVar[Mapping[str, str]] = {"coupler": "b", "offset": "e", "along": "xi", "across": "eta"}
 
     def path(self, shape: Mapping[str, Array], angles: Angles, branch: int) -> tuple[Points, Points]:
-        """See `FourBar`."""
+        """Return the working point and its derivative by the crank angle, (n, m), for a crank of 1."""
         own = {name: shape[name] for name in ("coupler", "offset")}
         s, ds = self.poses(own, angles, branch, ("s", "ds"))
         share = ((shape["along"] + 1j * shape["across"]) / shape["coupler"])[:, None]
@@ -125,11 +125,11 @@ class RockerSlider(FourBar):
         return np.asarray(point, np.complex128), np.asarray(moving, np.complex128)
 
     def over_the_turn(self, drive: Drive, columns: Mapping[str, Array]) -> tuple[Array, Array | None]:
-        """See `FourBar`."""
+        """Return acceleration along ``lam2`` and pressure angle over a turn of the drive, (n, m)."""
         d2s, angle = chain_motion(self.family, columns, "d2s", "pressure_angle2")
         psi, dpsi, d2psi = motion(drive.row[None, :], turn(), "psi", "dpsi", "d2psi")
         kappa, offset, lam = (columns[name][:, None] for name in ("kappa2", "offset2", "lam2"))
-        with np.errstate(invalid="ignore"):  # of a linkage that does not reach all is nan
+        with np.errstate(invalid="ignore"):  # if a linkage does not reach, all its values are nan
             share = ((columns["xi2"] + 1j * columns["eta2"]) / columns["b2"])[:, None]
             pin = columns["a2"][:, None] * np.exp(1j * (kappa * psi + offset - lam)) * (1j * kappa * d2psi - dpsi**2)
             return np.real((1.0 - share) * pin + share * d2s * np.exp(-1j * lam)), angle
@@ -144,7 +144,7 @@ class RockerSlotted(FourBar):
     coordinates = ("x_p", "y_p", "dx_p", "dy_p")
 
     def over_the_turn(self, drive: Drive, columns: Mapping[str, Array]) -> tuple[Array, Array | None]:
-        """See `FourBar`."""
+        """Return acceleration along ``lam2`` over a turn of the drive, (n, m), and None for the pressure angle."""
         d2x, d2y = chain_motion(self.family, columns, "d2x_p", "d2y_p")
         lam = columns["lam2"][:, None]
         return d2x * np.cos(lam) + d2y * np.sin(lam), None
@@ -155,7 +155,7 @@ STAGES: Mapping[str, FourBar] = {one.family: one for one in (FourBar(), RockerSl
 
 @dataclass(frozen=True)
 class Task6(Task):
-    """The unknowns are shape and place of a second stage whose working point goes from J1 to J2 on given tangents.
+    """The unknowns are shape and place of a second stage whose working point moves from J1 to J2 with given tangents.
 
     Size, direction and place of the stage follow from J1 and J2 (they are similarity transformations), so the unknowns
     are its proportions and the crank angle at J1; the two tangents are the equations.
@@ -164,11 +164,11 @@ class Task6(Task):
     ----------
     drive : the crank-rocker, parameters of ``rssr``; J1 belongs to its extended, J2 to its folded position
     start, end : J1 and J2 (x, y) in the plane of the second stage [length]
-    start_direction, end_direction : of the path there, in the sense of going from J1 to J2 [rad]
+    start_direction, end_direction : directions of the path there, in the sense from J1 to J2 [rad]
     second : the second stage: "guide", a coupler point of a four-bar; "slider_crank", one of a rocker-slider; "swivel",
         a point of the rod of a rocker-slotted linkage
     kappa, branch : sense of the connection of the stages, assembly mode of the second stage
-    max_pressure_angle : limit of the second stage over the whole motion [rad]; below pi/2 keeps dead points away.  A
+    max_pressure_angle : limit of the second stage over the whole motion [rad]; below pi/2 keeps dead points away; a
         rod through a block has none
     """
 
@@ -192,11 +192,11 @@ class Task6(Task):
 
     @property
     def unknowns(self) -> tuple[Unknown, ...]:
-        """Proportions of the second stage in cranks, and the crank angle at J1."""
+        """Proportions of the second stage relative to its crank, and the crank angle at J1."""
         return (*(Unknown(name, *ends) for name, ends in STAGES[self.second].shape.items()), turning("theta1"))
 
     def found(self, x: Mapping[str, Array]) -> Found:
-        """See `Task`."""
+        """Compute equations, limits, curve and mechanisms of candidates from their unknowns, (n,) each."""
         first, stage, theta = self._first, STAGES[self.second], x["theta1"]
         shape = {name: x[name] for name in stage.shape}
         ones = np.ones(len(theta))
@@ -243,18 +243,18 @@ class Task7(Task):
     drive : the crank-rocker, parameters of ``rssr``
     stroke : slider position at the folded minus at the extended position of the drive [length], signed
     start_acceleration, end_acceleration : d2s/dphi2 at the extended and at the folded position [length]; of opposite
-        signs, as the slider turns round there: the first has the sign of the stroke
-    f2, alpha2 : of the slider-crank, 0 for a planar one [length, rad]
+        signs, as the slider reverses there: the first has the sign of the stroke
+    f2, alpha2 : dimensions of the slider-crank, 0 for a planar one [length, rad]
     kappa, branch : sense of the connection of the stages, assembly mode of the slider-crank
-    size_range : where a2, b2 and |e2| are looked for, in strokes
+    size_range : range of a2, b2 and |e2|, in strokes
     max_pressure_angle : limit of the slider-crank over the whole motion [rad]
-    objective : what the surplus of unknowns goes to: "acceleration", max |d2s| over the turn, or "pressure_angle", the
+    objective : objective for the surplus of unknowns: "acceleration", max |d2s| over the turn, or "pressure_angle", the
         largest of the slider-crank
 
     Raises
     ------
     InputError
-        for accelerations whose signs do not belong to the stroke, or a drive without limits.
+        for accelerations whose signs contradict the stroke, or a drive without limits.
     """
 
     drive: Mapping[str, float]
@@ -291,7 +291,7 @@ class Task7(Task):
         return Unknown("a2", low, high), Unknown("b2", low, high), Unknown("e2", -high, high), turning("theta1")
 
     def found(self, x: Mapping[str, Array]) -> Found:
-        """See `Task`."""
+        """Compute equations, limits, curve and mechanisms of candidates from their unknowns, (n,) each."""
         theta, first = x["theta1"], self._first
         ones = np.ones(len(theta))
         columns = first.columns(len(theta)) | {

@@ -1,4 +1,4 @@
-"""Solves a task: candidates from low-discrepancy sequences, equations by least squares, the objective on its epigraph.
+"""Solver of tasks: candidates from low-discrepancy sequences, equations by least squares, epigraph of the objective.
 
 The objective, a largest magnitude over many poses, has kinks; minimising t under -t <= curve <= t has none.  Gradients
 are central differences, all rows in one call of the problem, whose kernels are vectorised.
@@ -15,13 +15,13 @@ from sweep.families.base import Array
 from sweep.synthesis.tasks.problem import Solution, SynthesisTask
 
 BLOCK = 1024
-STEP = 3e-6  # of a central difference, in units of the box
-SHARE = 0.8  # poses with less than this part of the largest magnitude do not bound t
+STEP = 3e-6  # step of central differences, in units of the box
+SHARE = 0.8  # share of the largest magnitude below which poses do not bound t
 ROUNDS = 24
-WIDEST = 0.15  # first radius of a step, in units of the box
+WIDEST = 0.15  # initial radius of a step, in units of the box
 MET = 1e-9  # largest residual and violation of a feasible solution
-ENOUGH, ALIKE = 4, 1e-4  # samples that end at the best objective, to this share of it: no more are needed
-APART = 1e-2  # of the box: nearer solutions are one
+ENOUGH, ALIKE = 4, 1e-4  # number of samples that have to end at the best objective, to this relative difference
+APART = 1e-2  # share of the box: closer solutions count as the same
 
 
 class _Value(NamedTuple):
@@ -31,7 +31,7 @@ class _Value(NamedTuple):
 
 
 class _Scaled:
-    """A problem in the unit box; remembers its last point and gradient."""
+    """A problem scaled to the unit box."""
 
     def __init__(self, problem: SynthesisTask) -> None:
         self.problem = problem
@@ -40,17 +40,17 @@ class _Scaled:
         self.periodic = np.array([u.periodic for u in problem.unknowns])
 
     def real(self, z: Array) -> Array:
-        """Unknowns of points of the unit box."""
+        """Return the unknowns at points of the unit box."""
         x: Array = self.low + self.span * np.where(self.periodic, z % 1.0, z)
         return x
 
     def rows(self, z: Array) -> _Value:
-        """Values of points (n, k)."""
+        """Return equations, limits and curves at points (n, k)."""
         found = self.problem.evaluate(self.real(np.atleast_2d(z)))
         return _Value(found.equations, found.limits, found.curve)
 
     def with_gradient(self, z: Array) -> tuple[_Value, _Value]:
-        """Values at z and their derivatives, (k, ...) each; one-sided where a neighbour has no mechanism."""
+        """Return the values at z and their derivatives, (k, ...) each; one-sided if a neighbour has no mechanism."""
         k = z.size
         steps = STEP * np.eye(k)
         both = self.rows(np.vstack([z[None, :], z + steps, z - steps]))
@@ -68,15 +68,15 @@ class _Scaled:
 def solve(
     problem: SynthesisTask, *, candidates: int = 4096, starts: int = 6, samples: int = 12, seed: int = 0
 ) -> list[Solution]:
-    """Mechanisms that do a task, the best first.
+    """Return mechanisms that solve a task, the best first.
 
     Parameters
     ----------
     problem : one of the tasks
     candidates : points of each sample of the box
-    starts : of each sample refined, kept apart from each other
-    samples : at most, which know nothing of each other; no more follow when four have ended at the best objective
-    seed : of the samples; the same seed gives the same answer
+    starts : number of points of each sample that are refined, at a distance from each other
+    samples : largest number of independent samples; sampling ends when four have reached the best objective
+    seed : seed of the samples; the same seed gives the same answer
 
     Returns
     -------
@@ -86,7 +86,7 @@ def solve(
 
     Notes
     -----
-    Local solutions from many starts: no proof that the best one found is the best there is.
+    These are local solutions from many starts, without proof that the best one is the global optimum.
     """
     scaled = _Scaled(problem)
     solutions: list[Solution] = []
@@ -101,7 +101,7 @@ def solve(
 
 
 def _met(best: list[float]) -> bool:
-    """Tell whether enough samples ended at the best objective of all."""
+    """Tell whether enough samples ended at the best objective."""
     least = min(best, default=np.inf) * (1.0 + ALIKE)
     return sum(height <= least < np.inf for height in best) >= ENOUGH
 
@@ -127,7 +127,7 @@ def _starts(scaled: _Scaled, candidates: int, starts: int, seed: tuple[int, int]
     if not alive.any():
         return []
     points, miss, height = points[alive], miss[alive], height[alive]
-    # Candidates miss equations anyway: what counts is being near a solution, then a low objective.
+    # Candidates violate equations anyway: rank them by violation, then by objective.
     rank = np.log(np.maximum(miss, 1e-3)) + np.log(height / np.median(height) + 1e-12)
     chosen: list[Array] = []
     apart = 0.5 * starts ** (-1.0 / k) * 0.5
@@ -152,7 +152,7 @@ def _violation(value: _Value) -> Array:
 
 
 def _feasible(value: _Value) -> bool:
-    """Tell whether one point is a mechanism that meets equations and limits."""
+    """Tell whether one point is a mechanism that satisfies equations and limits."""
     return bool(np.isfinite(value.curve).all() and _violation(value)[0] <= MET)
 
 
@@ -166,7 +166,7 @@ def _refined(scaled: _Scaled, z: Array) -> Array:
     if not _feasible(value):
         return z
     best = float(np.abs(value.curve).max())
-    # Poses that have once been near the largest magnitude stay in the program, so a step cannot overlook them twice.
+    # Poses that were once near the largest magnitude stay in the program, so no step overlooks them twice.
     used, radius = np.zeros(value.curve.shape[1], np.bool_), WIDEST
     for _ in range(ROUNDS):
         used |= np.abs(value.curve[0]) >= SHARE * np.abs(value.curve[0]).max()
@@ -185,7 +185,7 @@ def _refined(scaled: _Scaled, z: Array) -> Array:
 
 
 def _restored(scaled: _Scaled, z: Array) -> Array:
-    """Bring equations and violated limits to zero: by least squares, then by Gauss-Newton steps of least length."""
+    """Reduce equations and violated limits to zero: by least squares, then by Gauss-Newton steps of least length."""
     from scipy.optimize import least_squares
 
     if _violation(scaled.rows(z))[0] <= 0.0:
@@ -218,7 +218,7 @@ def _restored(scaled: _Scaled, z: Array) -> Array:
 
 
 def _descended(scaled: _Scaled, z: Array, top: float, used: NDArray[np.bool_], radius: float) -> Array:
-    """Run SLSQP on the epigraph: t and the unknowns, t bounding the ``used`` poses, at most ``radius`` away."""
+    """Run SLSQP on the epigraph: t bounds the ``used`` poses, and the unknowns change by at most ``radius``."""
     from scipy.optimize import minimize
 
     if not top > 0.0:
@@ -234,7 +234,7 @@ def _descended(scaled: _Scaled, z: Array, top: float, used: NDArray[np.bool_], r
             below = np.concatenate([point[-1] - curve, point[-1] + curve, value.limits])
             rows = np.concatenate([-slope.curve[:, used] / top, slope.curve[:, used] / top, slope.limits], axis=1).T
             last = np.concatenate([np.ones(2 * curve.size), np.zeros(value.limits.size)])
-            # Outside all mechanisms: a value that makes the line search come back.
+            # Where no mechanism exists: a value that makes the line search step back.
             kept = np.where(np.isfinite(below), below, -1e3)
             equal = np.where(np.isfinite(value.equations), value.equations, 1e3)
             memory[key] = (kept, np.column_stack([rows, last]), equal,
@@ -257,7 +257,7 @@ def _descended(scaled: _Scaled, z: Array, top: float, used: NDArray[np.bool_], r
 
 
 def _distinct(scaled: _Scaled, solutions: list[Solution]) -> list[Solution]:
-    """Return the solutions that are not near one before them."""
+    """Return the solutions that differ from all better ones."""
     places = [(np.array([*s.unknowns.values()]) - scaled.low) / scaled.span for s in solutions]
     kept: list[int] = []
     for k in range(len(places)):

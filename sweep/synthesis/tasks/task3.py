@@ -1,4 +1,4 @@
-"""Task 3: an adjustable crank-rocker: settings that differ in one dimension; which dimension adjusts what."""
+"""Task 3: an adjustable crank-rocker with settings that differ in one dimension, and the effect of each dimension."""
 
 from __future__ import annotations
 
@@ -21,18 +21,18 @@ if TYPE_CHECKING:
     import pandas as pd
 
 _EXACT = Accuracy(target=1e-12)
-ALONE = 10.0  # so many times more strongly: the dimension adjusts that quantity alone
+ALONE = 10.0  # ratio of sensitivities above which a dimension adjusts one quantity alone
 
 
 class Setting(NamedTuple):
-    """What the mechanism does after one dimension has been changed [rad]; None leaves it free."""
+    """Required values of the mechanism after one dimension has been changed [rad]; None leaves a value free."""
 
     swing: float | None
     phi0: float | None = None
 
     @property
     def asked(self) -> dict[str, float]:
-        """The limits that are prescribed."""
+        """Prescribed values by name."""
         return {name: value for name, value in self._asdict().items() if value is not None}
 
 
@@ -42,17 +42,17 @@ class Task3(Task):
 
     Parameters
     ----------
-    swing, phi0 : of the first setting, signed and in the crank's sense [rad]
-    settings : what each further setting asks for, swing or phi0 or both
-    adjusted : the dimension that differs, and ``adjusted_range``, where its other values are looked for
-    e, g, alpha : as `EngineeringMethod`; the first setting, if e or g is the dimension adjusted
-    f_range : where f is looked for
-    g_range, alpha_range : where g and alpha are looked for, if they are to be found as well
+    swing, phi0 : values of the first setting, signed and in the crank's sense [rad]
+    settings : requirements of each further setting, swing or phi0 or both
+    adjusted : the dimension that differs, and ``adjusted_range``, the range of its other values
+    e, g, alpha : as `EngineeringMethod`; of the first setting, if e or g is the adjusted dimension
+    f_range : range of f
+    g_range, alpha_range : ranges of g and alpha, if they are unknown as well
 
     Raises
     ------
     InputError
-        for no setting, one that asks for nothing or for what the first has already, or more than can be met.
+        for no setting, one without requirements or with those of the first, or more requirements than unknowns.
     """
 
     swing: float
@@ -82,7 +82,7 @@ class Task3(Task):
 
     @property
     def unknowns(self) -> tuple[Unknown, ...]:
-        """phi1, f, what else is free, and the further values of the adjusted dimension."""
+        """phi1, f, further free parameters, and the further values of the adjusted dimension."""
         values = (Unknown(self._value(k), *self.adjusted_range) for k in range(2, len(self.settings) + 2))
         return (turning("phi1"), *ranges(self, "f", "g", "alpha"), *values)
 
@@ -90,7 +90,7 @@ class Task3(Task):
         return f"{self.adjusted} of setting {k}"
 
     def found(self, x: Mapping[str, Array]) -> Found:
-        """See `Task`."""
+        """Compute equations, limits, curve and mechanisms of candidates from their unknowns, (n,) each."""
         own = (x["phi1"], self.e, x["f"], x.get("g", self.g), x.get("alpha", self.alpha))
         first, _ = designs_on_locus(self.swing, self.phi0, *own)
         results, equations, designs = dict(named(first)), dict[str, Array](), [first]
@@ -108,7 +108,7 @@ class Task3(Task):
 
 
 def _missed(designs: Array, setting: Setting) -> dict[str, Array]:
-    """Return by how much designs miss what a setting asks for; nan where there is no mechanism."""
+    """Return the errors of designs against the requirements of a setting; nan if there is no mechanism."""
     alive = np.flatnonzero(np.isfinite(designs).all(axis=1))
     found = design_outputs(RSSR, designs[alive], list(setting.asked), _EXACT)
     missed = {}
@@ -120,7 +120,7 @@ def _missed(designs: Array, setting: Setting) -> dict[str, Array]:
 
 
 def adjustments(design: Mapping[str, float]) -> pd.DataFrame:
-    """Tell which dimension of a crank-rocker adjusts what: derivatives of swing and phi0, by implicit differentiation.
+    """Tell which limit values each dimension of a crank-rocker adjusts, from derivatives of swing and phi0.
 
     Parameters
     ----------
@@ -130,8 +130,8 @@ def adjustments(design: Mapping[str, float]) -> pd.DataFrame:
     -------
     DataFrame
         one row per dimension: ``dswing``, ``dphi0``, ``dpsi_ext``, ``dpsi_fold`` [rad per length unit, per rad for
-        alpha], and ``adjusts``: "swing", "phi0", "both" or "nothing"; one alone if it answers ten times more strongly
-        than the other.
+        alpha], and ``adjusts``: "swing", "phi0", "both" or "nothing"; a single one if it responds ten times more
+        strongly than the other.
 
     Raises
     ------
@@ -150,7 +150,7 @@ def adjustments(design: Mapping[str, float]) -> pd.DataFrame:
     kernels.limit_sensitivities(*arguments)
     psi_ext, phi_ext, psi_fold, phi_fold = rates[0].T
     swing, phi0 = psi_fold - psi_ext, phi_fold - phi_ext
-    units = np.where(np.array(PARAMETERS) == "alpha", 1.0, matrix[0, 2])  # lengths by the rocker
+    units = np.where(np.array(PARAMETERS) == "alpha", 1.0, matrix[0, 2])  # lengths relative to the rocker
     found = pd.DataFrame(
         {
             "dswing": swing,
