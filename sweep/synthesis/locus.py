@@ -310,7 +310,7 @@ class OnLocus:
 
         Parameters
         ----------
-        columns : (n,) arrays by name, among them the prescribed outputs and what the locus needs of the stage [mm, rad]
+        columns : (n,) arrays by name, with the prescribed outputs and parameters that the locus needs [mm, rad]
 
         Returns
         -------
