@@ -1,1 +1,1 @@
-"""The report about a dataset: one HTML file that needs no network, its figures, and the tables behind them."""
+"""The report of a dataset: one HTML file that needs no network, its figures, and the tables behind them."""

@@ -1,4 +1,4 @@
-"""The answer in words: what was reached, against what, which limits bind, what was not reached, what is proven."""
+"""The answer in words: result against the reference, active limits, what was not reached, what is proven."""
 
 from __future__ import annotations
 
@@ -25,13 +25,13 @@ if TYPE_CHECKING:
 
 
 MISSED = ("missed", "unknown")
-NEAREST = 4  # limits with room to spare that are named in the answer; the table has them all
-BEHIND = 1e-6  # relative, of an optimum than which something better is known
+NEAREST = 4  # inactive limits named in the answer; the table has them all
+BEHIND = 1e-6  # relative difference by which a known design must be better than the optimum
 NO_PROOF = "This is no proof of a global optimum"
 
 
 def answer(data: Dataset, found: Scan, further: Sequence[str] = ()) -> list[str]:
-    """Sentences that answer the study's question, the most important first; ``further`` ones before the limits."""
+    """Return the sentences that answer the study's question, most important first; ``further`` before the limits."""
     total = data.designs
     if data.result is None:
         stops = max(fates(data, found)[:-1], key=lambda fate: fate.count, default=None)
@@ -52,7 +52,7 @@ def answer(data: Dataset, found: Scan, further: Sequence[str] = ()) -> list[str]
     sentences += [f"{proven[0].upper()}{proven[1:]}."] if proven else []
     sentences += further
     sentences += [] if cut else search_warnings(data)
-    # What [locus] prescribes as an axis is a space that was searched; as a value it holds by construction.
+    # A prescribed output is met by construction if [locus] fixes it, and part of the searched space if it is an axis.
     states = [s for s in limit_states(data) if s.shown.name not in data.study.prescribed]
     tolerance = data.study.tolerance
     sentences += _limit_sentences(
@@ -94,7 +94,7 @@ def _with_speed(data: Dataset, shown: Quantity, value: float) -> str:
 
 
 def _limit_sentences(states: list[LimitState], robust: bool) -> list[str]:
-    """Say which limits are active and which are not; a robust design keeps the distance that its tolerances need."""
+    """Return sentences about active and inactive limits; a robust design keeps the margin that its tolerances need."""
     active = [f"{s.shown.words} ({s.bound})" for s in states if s.state == "active"]
     met = sorted((s for s in states if s.state == "met" and s.slack), key=lambda s: s.room)
     slack = [f"{s.shown.words} ({s.value}, {s.bound})" for s in met[:NEAREST]]
@@ -108,7 +108,7 @@ def _limit_sentences(states: list[LimitState], robust: bool) -> list[str]:
 
 
 def _edge_sentence(data: Dataset) -> list[str]:
-    """Parameters that lie on the edge of what was searched."""
+    """Return a sentence about parameters on the edge of the searched space."""
     if data.study.objective is None:
         return []
     edges = [f"{row.name} ({row.edge}, {row.value})" for row in parameter_rows(data) if row.edge]
@@ -120,7 +120,7 @@ def _edge_sentence(data: Dataset) -> list[str]:
 
 
 def not_achieved(data: Dataset, found: Scan) -> list[str]:
-    """Say what is not reached: limits that are missed, an optimiser that did not settle or lost a better design."""
+    """Return a sentence about missed limits, and about an optimiser that did not settle or lost a better design."""
     faults = [f"{s.shown.words}: {s.value} instead of {s.bound}" for s in limit_states(data) if s.state in MISSED]
     objective = data.objective
     if data.optimum is not None:
@@ -140,7 +140,7 @@ def not_achieved(data: Dataset, found: Scan) -> list[str]:
 
 
 def share_words(made: float, asked: float | None, ended: str, agree: int = 1) -> str:
-    """Return what share of what is made keeps all limits, how much was asked, and why it is less."""
+    """Describe the yield of manufactured mechanisms, the wanted yield, and why the wanted one was not reached."""
     if asked is None or made >= asked:
         text = f"{100.0 * made:.1f} % within all limits"
     else:
@@ -154,7 +154,7 @@ def share_words(made: float, asked: float | None, ended: str, agree: int = 1) ->
 
 
 def _against_reference(data: Dataset) -> list[str]:
-    """Say where the reference is better, and which limits it misses itself."""
+    """Return sentences about criteria in which the reference is better, and about limits that it misses."""
     if data.reference is None:
         return []
     criteria = [None if data.objective is None else data.objective.name, data.second]
@@ -187,7 +187,7 @@ def _sweep_sentences(data: Dataset, found: Scan) -> list[str]:
 
 
 def search_warnings(data: Dataset) -> list[str]:
-    """Return what a reader has to know before trusting the optimum; the optimiser's own words are in `searched`."""
+    """Return warnings about the optimum; the optimiser's own statements are in `searched`."""
     found, front = data.survey, data.front_steps
     words = [] if found is None else [*_unconfirmed(data), *found.shortcomings]
     if found is not None and found.doubts and not _is_proven(data):
@@ -199,7 +199,7 @@ def search_warnings(data: Dataset) -> list[str]:
 
 
 def searched(data: Dataset, found: Scan) -> list[str]:
-    """Say how the optimum was searched, in the optimiser's own words, and what they leave open."""
+    """Return sentences about the search for the optimum, in the optimiser's own words, and about its uncertainty."""
     doubts = () if data.survey is None or _is_proven(data) else data.survey.doubts
     return [text for text in (search_sentence(data, found), *(f"{x[0].upper()}{x[1:]}." for x in doubts)) if text]
 
@@ -209,7 +209,7 @@ def _residual(value: float) -> str:
 
 
 def search_sentence(data: Dataset, found: Scan) -> str:
-    """Say how the optimum was searched, and, without a proof, that this does not prove it."""
+    """Describe the search for the optimum and, without a proof, state that it is none."""
     if data.result is None or data.study.objective is None:
         return ""
     if data.optimum is None:
@@ -219,12 +219,12 @@ def search_sentence(data: Dataset, found: Scan) -> str:
     head = "The" if proof_sentence(data) else f"{NO_PROOF}: the"
     text = f"{head} optimiser started from {how_many(starts, f'{kind}design')}"
     populations = 0 if data.survey is None else data.survey.populations
-    some = "most of them " if starts > 2 * populations else ""  # at most two of a population, the others of the sweep
+    some = "most of them " if starts > 2 * populations else ""  # at most two per population, others from the sweep
     text += f", {some}ends of {how_many(populations, 'population')}" if populations else " of the sweep"
-    if math.isfinite(agree) and not populations:  # of those the survey tells more
+    if math.isfinite(agree) and not populations:  # for populations the survey is more detailed
         text += f", {number(agree)} of which ended at this value"
     if data.survey is not None:
-        # What comes from one valley is one meeting, so the survey may count fewer than ended at the value.
+        # Starts of one valley count once, so the survey may count fewer than ended at the value.
         text += f"; {'' if populations else 'counting distinct valleys, '}{search_words(data, data.survey)}"
     residual, violation = value_of(data.optimum, "kkt_residual"), value_of(data.optimum, "violation")
     wanted = "" if residual <= KKT else f" where {number(KKT)} is wanted"
@@ -237,12 +237,12 @@ def _is_number(row: Row, name: str) -> bool:
 
 
 def _count(n: float) -> str:
-    """Write 1 234 567 with thin no-break spaces."""
+    """Format a count as 1 234 567 with thin no-break spaces."""
     return f"{int(n):,}".replace(",", "\u202f")
 
 
 def proof_sentence(data: Dataset) -> str:
-    """One sentence; empty where the study asked for no proof."""
+    """Return the statement of the proof; empty if the study asked for none."""
     found = read_proof(files.beside(data.folder) / files.PROOF)
     if found is None:
         return ""
@@ -252,12 +252,12 @@ def proof_sentence(data: Dataset) -> str:
 
 
 def survey_warnings(data: Dataset, found: Survey) -> tuple[str, ...]:
-    """Return what a reader has to know of a search; a proof of the whole space leaves no doubt of something better."""
+    """Return warnings about a search; a proof of the whole space removes the doubts about better designs."""
     return (*_unconfirmed(data), *(found.shortcomings if _is_proven(data) else found.warnings))
 
 
 def search_words(data: Dataset, found: Survey) -> str:
-    """Say what the starts met; beside a proof of the whole space an estimate of what is unseen says nothing."""
+    """Describe the basins that the starts met; with a proof of the whole space without the estimate of unseen ones."""
     if found.basins == 0 or not _is_proven(data):
         return found.words
     return f"{how_many(found.basins, 'basin')} met"
@@ -269,7 +269,7 @@ def _is_proven(data: Dataset) -> bool:
 
 
 def _unconfirmed(data: Dataset) -> tuple[str, ...]:
-    """Say that the search followed other extrema than the true ones, or ended behind the front, where it did."""
+    """Return warnings if the search used extrema other than the true ones, or ended behind the front."""
     best = data.optimum
     if best is None or best.get("ended") != DIFFERS:
         return _behind_the_front(data)
@@ -279,13 +279,13 @@ def _unconfirmed(data: Dataset) -> tuple[str, ...]:
 
 
 def _behind_the_front(data: Dataset) -> tuple[str, ...]:
-    """Say that a drawing of the front keeps all limits and is better than the optimum, where one is."""
+    """Return a warning if a design of the front keeps all limits and is better than the optimum."""
     study, shown, front, best = data.study, data.objective, data.front, data.optimum
     robust = study.tolerance is not None and study.tolerance.robust is not None
     if study.pareto is None or shown is None or front is None or best is None or robust:
         return ()
     good = (front["status"] == codes.OK) & (front["kkt_residual"] <= KKT)
-    for limit in study.limits:  # the bounds of the front take the place of its side
+    for limit in study.limits:  # the front's bounds replace limits on its side
         own = limit.minimum if study.pareto.at_least else limit.maximum
         if limit.output == study.pareto.output and own is not None:
             good &= front["bound"] >= own if study.pareto.at_least else front["bound"] <= own

@@ -1,4 +1,4 @@
-"""A finished dataset folder as the report sees it, and designs out of it."""
+"""A complete dataset folder as read by the report, and single designs of it."""
 
 from __future__ import annotations
 
@@ -37,12 +37,12 @@ Row = Mapping[str, Any]
 
 @dataclass(frozen=True)
 class Dataset:
-    """Parts, optimum, front and curves of one folder, and the study they answer.
+    """Parts, optimum, front and curves of one folder, and their study.
 
     ``units`` and ``definitions`` come from the field metadata of the Parquet files; ``best`` is the best row of the
-    sweep once it has been read, None if no design is feasible; ``computed_reference`` the reference where no optimiser
-    has left it in the folder.  ``survey`` is what the starts tell of the search; ``front_steps`` says how far the front
-    came that time has cut short.
+    sweep after it has been read, None if no design is feasible; ``computed_reference`` is the reference if no optimiser
+    has stored it in the folder.  ``survey`` describes the starts of the search; ``front_steps`` is the progress of a
+    front that ran out of time.
     """
 
     folder: Path
@@ -61,27 +61,27 @@ class Dataset:
     computed_reference: Row | None = None
 
     def shown(self, name: str) -> Quantity:
-        """Return a column as it is shown."""
+        """Return a column's display form."""
         return quantity(name, self.units.get(name, ""))
 
     @property
     def objective(self) -> Quantity | None:
-        """The objective as it is shown; None where the study has none."""
+        """Display form of the objective; None without an objective."""
         return None if self.study.objective is None else self.shown(self.study.objective.output)
 
     def design(self, row: Row) -> dict[str, float]:
-        """Return the parameters of the mechanism out of a row."""
+        """Return the parameters of a row's mechanism."""
         return {name: float(row[name]) for name in self.study.family.parameter_names}
 
     @property
     def counts(self) -> dict[int, int]:
-        """Designs by status, those that were not kept included."""
+        """Number of designs by status, including those that were not kept."""
         codes = {name: code for code, name in chunk_files.STATUS_NAMES.items()}
         return {codes[name]: count for name, count in (self.plan.get("counts") or {}).items() if name in codes}
 
     @property
     def missed(self) -> dict[str, int]:
-        """Designs by the limit they miss first."""
+        """Number of designs by the first limit that they miss."""
         return {str(name): int(count) for name, count in (self.plan.get("missed") or {}).items()}
 
     @property
@@ -91,52 +91,52 @@ class Dataset:
 
     @cached_property
     def optimum(self) -> Row | None:
-        """The optimiser's result."""
+        """Row of the optimiser's result."""
         return self._role("optimum")
 
     @cached_property
     def reference(self) -> Row | None:
-        """The design the result is compared with."""
+        """Row of the design with which the result is compared."""
         stored = self._role("reference")
         return self.computed_reference if stored is None else stored
 
     @property
     def result(self) -> Row | None:
-        """The optimum, without an optimiser the best design of the sweep, without an objective its first one."""
+        """Optimum if there is one, otherwise the best design of the sweep, or without an objective its first one."""
         return self.optimum if self.optimum is not None else self.best
 
     @property
     def result_name(self) -> str:
-        """What the result is called; without an objective none is better than another."""
+        """Name of the result; without an objective no design is better than another."""
         if self.optimum is not None:
             return "optimum"
         return "first of the sweep" if self.study.objective is None else "best of the sweep"
 
     @property
     def starts(self) -> int:
-        """From how many designs the optimiser started."""
+        """Number of designs from which the optimiser started."""
         if self.optima is None:
             return 0
         return int(self.optima["role"].isin(["optimum", "start"]).sum())
 
     @property
     def active(self) -> list[str]:
-        """Outputs and parameters whose limits the optimiser calls active; the bounds of its search are no limits."""
+        """Outputs and parameters whose limits the optimiser reports as active, without bounds of its search."""
         words = "" if self.optimum is None else str(self.optimum.get("active") or "")
         limits = [word.strip() for word in words.split(";") if word.strip() and not word.strip().endswith(" bound")]
         return [word.split()[0].rstrip(":,") for word in limits]
 
     @property
     def reference_status(self) -> str:
-        """Why the reference has no values."""
+        """Reason why the reference has no values."""
         code = 0 if self.reference is None else int(self.reference.get("status", 0))
         return meaning(code)
 
     @cached_property
     def second(self) -> str | None:
-        """The criterion set against the objective: that of [pareto], else a deviation, else another maximum.
+        """Second criterion besides the objective: that of [pareto], otherwise a deviation, otherwise another maximum.
 
-        None where more of it is better.
+        None if larger values of it are better.
         """
         if self.study.pareto is not None:
             return None if self.study.pareto.at_least else self.study.pareto.output
@@ -149,7 +149,7 @@ class Dataset:
 
     @property
     def against(self) -> str | None:
-        """The criterion of the trade-off: that of [pareto], also where more of it is better."""
+        """Criterion of the trade-off: that of [pareto], also if larger values are better."""
         return self.study.pareto.output if self.study.pareto is not None else self.second
 
     def _role(self, role: str) -> Row | None:
@@ -159,7 +159,7 @@ class Dataset:
 
 
 def read_dataset(folder: Path) -> Dataset:
-    """Read what the report needs, except the rows of the parts.
+    """Read the data of the report, except the rows of the parts.
 
     Raises
     ------
@@ -173,7 +173,7 @@ def read_dataset(folder: Path) -> Dataset:
         raise InputError("folder", str(folder), allowed, "report")
     if not store.is_complete(folder):
         raise InputError("folder", str(folder), "a complete dataset; run the study again to resume it", "report")
-    if not plan.get("complete"):  # killed after the last chunk, before the totals were noted
+    if not plan.get("complete"):  # killed after the last chunk, before the totals were written
         counts, missed = store.totals(folder)
         plan |= {"counts": counts, "missed": missed}
     study = study_of(plan, files.beside(folder) / files.PLAN)
@@ -200,7 +200,7 @@ def read_dataset(folder: Path) -> Dataset:
 
 
 def without_rows(study: Study) -> Dataset:
-    """Return what the report needs of a study that has not been run."""
+    """Return the data of the report for a study that has not been run."""
     family = study.family
     outputs = [*family.pose_outputs, *(output(family, name) for name in study.want)]
     return Dataset(
@@ -219,19 +219,19 @@ def without_rows(study: Study) -> Dataset:
 
 
 def _with_defaults(study: Study, rows: pd.DataFrame) -> pd.DataFrame:
-    """Add the parameters that an earlier version did not have, at the values that stand for none of them."""
+    """Add parameters that an earlier version did not have, with the values that leave their feature out."""
     return rows.assign(**_absent(study, rows))
 
 
 def _absent(study: Study, known: Container[str]) -> dict[str, float]:
-    """Name the optional parameters that are not among the known ones, with their defaults."""
-    # A dataset without a choice that later versions have is one in which it was not taken.
+    """Return the optional parameters that are not among the known ones, with their defaults."""
+    # In a dataset of an earlier version an option of later versions was not used.
     defaults = {p.name: 0.0 if p.unless else p.default for p in study.family.parameters if p.name not in known}
     return {name: value for name, value in defaults.items() if value is not None}
 
 
 def field_metadata(files: Sequence[Path]) -> tuple[dict[str, str], dict[str, str]]:
-    """Units and definitions that stand in the schemas of Parquet files."""
+    """Return units and definitions from the schemas of Parquet files."""
     import pyarrow.parquet as pq
 
     units: dict[str, str] = {}
@@ -251,7 +251,7 @@ ROLES = ("optimum", "reference", "best")
 
 @dataclass(frozen=True)
 class Chosen:
-    """A design with the mechanism it is of; ``speed`` is that of the study's scene [rad/s]."""
+    """A design with its mechanism; ``speed`` is that of the study's scene [rad/s]."""
 
     family: Family
     design: dict[str, float]
@@ -263,14 +263,14 @@ def chosen(folder: str | Path, design: str | int | None = None) -> Chosen:
 
     Parameters
     ----------
-    folder : what `sweep run` left behind
-    design : "optimum", "reference", "best" (of the sweep) or a number of the column ``design``; if left out the
-        optimum, or where nothing was optimised the best
+    folder : folder that `sweep run` has written
+    design : "optimum", "reference", "best" (of the sweep) or a number of the column ``design``; by default the optimum,
+        or the best design if nothing was optimised
 
     Raises
     ------
     InputError
-        for a folder that is no complete dataset, or one that has no such design.
+        for a folder that is no complete dataset, or has no such design.
     """
     path = files.located(folder)
     if isinstance(design, int) or (isinstance(design, str) and design.lstrip("-").isdigit()):
@@ -279,7 +279,7 @@ def chosen(folder: str | Path, design: str | int | None = None) -> Chosen:
         raise InputError("design", design, f"{', '.join(ROLES)}, or a number of the column design", str(folder))
     data = read_dataset(path)
     if design == "best" or (design == "reference" and data.optima is None) or (design is None and data.optimum is None):
-        data, _, _ = gather(path)  # goes through all rows
+        data, _, _ = gather(path)  # reads all rows
     row = {"optimum": data.optimum, "reference": data.reference, "best": data.best, None: data.result}[design]
     if row is None:
         allowed = f"one this dataset has, of {', '.join(ROLES)}, or a number of the column design"
@@ -297,30 +297,30 @@ def _chosen(data: Dataset, row: Row) -> Chosen:
 
 
 def as_result(data: Dataset, row: Row) -> Dataset:
-    """Return a study with a design in the place of its result."""
+    """Return the dataset with a design in place of its result."""
     return replace(data, best=row, optima=None, computed_reference=None)
 
 
 def records(frame: pd.DataFrame) -> list[dict[str, Any]]:
-    """Return the rows of a table, each by the names of its columns."""
+    """Return the rows of a table as dicts by column name."""
     return [{str(name): value for name, value in row.items()} for row in frame.to_dict("records")]
 
 
 def cyclogram_of(data: Dataset) -> pd.DataFrame | None:
-    """Return the cyclogram of the result of a machine, angles in degrees; None of anything else."""
+    """Return the cyclogram of a machine's result, angles in degrees; None for any other mechanism."""
     if data.result is None or not isinstance(data.study.family, Machine):
         return None
     return table_in_degrees(cyclogram(data.study.family, data.design(data.result), angles="rad"))
 
 
 def marked(data: Dataset) -> dict[str, Any]:
-    """Return the designs that are marked in the pictures of the design space."""
+    """Return the designs that are marked in the figures of the design space."""
     found = {} if data.study.objective is None else {data.result_name: data.result}
     return found | {"reference": data.reference}
 
 
 def gather(folder: Path) -> tuple[Dataset, Scan, list[Cells]]:
-    """Read a dataset, go once through its rows, and compute what an optimiser would have left."""
+    """Read a dataset and all its rows once, and compute a reference that no optimiser has stored."""
     data = read_dataset(folder)
     feasible = data.counts.get(codes.OK, 0)
     cells = divided_axes(data.study, feasible)
@@ -339,7 +339,7 @@ def gather(folder: Path) -> tuple[Dataset, Scan, list[Cells]]:
 
 
 def row_of(study: Study, design: Mapping[str, float]) -> Row:
-    """Return a design with the outputs that a study wants, computed as its sweep computes them."""
+    """Return a design with the outputs that a study wants, computed like those of its sweep."""
     matrix, _ = design_matrix(study.family, design)
     found = design_outputs(study.family, matrix, study.want, study.accuracy, study.window)
     return dict(design) | {name: float(values[0]) for name, values in found.items()}

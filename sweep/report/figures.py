@@ -1,4 +1,4 @@
-"""Figures share one style file, one palette and one way of being saved."""
+"""Style, palette and saving of the report's figures."""
 
 from __future__ import annotations
 
@@ -18,12 +18,12 @@ if TYPE_CHECKING:
 
 OPTIMUM, REFERENCE, LIMIT, QUIET = "#1f5aa6", "#c8551b", "#b3261e", "#8a8f98"
 WIDTH = 9.6  # inches, the full text width of the page
-NARROW = 4.6  # bars and their names can still be read on a telephone
+NARROW = 4.6  # inches; narrow enough to read bars and their names on a telephone
 
 
 @dataclass(frozen=True)
 class Saved:
-    """A figure on disk, and the same bytes as a data URI for the page."""
+    """A saved figure, and the same bytes as a data URI for the page."""
 
     path: Path
     uri: str
@@ -31,7 +31,7 @@ class Saved:
 
 @contextmanager
 def house_style() -> Iterator[None]:
-    """Draw in the style of the house without changing the caller's settings."""
+    """Draw in the report's style without changing the caller's settings."""
     import matplotlib as mpl
     from matplotlib import style
 
@@ -41,7 +41,7 @@ def house_style() -> Iterator[None]:
 
 
 def new_figure(width: float, height: float, layout: Literal["constrained"] | None = "constrained") -> Figure:
-    """Return an empty figure that no window system ever sees; without a layout its margins are the caller's."""
+    """Return an empty figure without a window system; without a layout the caller sets the margins."""
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure
 
@@ -51,7 +51,7 @@ def new_figure(width: float, height: float, layout: Literal["constrained"] | Non
 
 
 def save(figure: Figure, path: Path) -> Saved:
-    """Write an SVG that depends on nothing but its data: no date, no random identifiers."""
+    """Write an SVG that depends on nothing but its data, without date and random identifiers."""
     path.parent.mkdir(parents=True, exist_ok=True)
     figure.savefig(path, format="svg", metadata={"Date": None, "Creator": None, "Format": None, "Type": None})
     path.write_text(smaller(path.read_text("utf-8")), "utf-8")
@@ -59,9 +59,9 @@ def save(figure: Figure, path: Path) -> Saved:
 
 
 def smaller(text: str) -> str:
-    """Write an SVG in less: hundredths of a point, no indents, no empty groups, and each style once.
+    """Shorten an SVG: hundredths of a point, no indents, no empty groups, and each style once.
 
-    Letters stay what they are: only numbers within tags are places.
+    Text is unchanged: only numbers within tags are rounded.
     """
     text = re.sub(r"<[^>]*>", lambda tag: re.sub(r"(\d\.\d\d)\d+", r"\1", tag[0]), re.sub(r"\n\s+", "\n", text))
     text = re.sub(r'<g id="[^"]*"/>\n| transform="rotate\(-0 [^"]*\)"', "", text)

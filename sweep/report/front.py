@@ -1,4 +1,4 @@
-"""The front: what each bound on the second output costs, as a table, in a sentence and as a curve."""
+"""The front: the cost of each bound on the second output, as a table, a sentence and a curve."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ EDGES = (" at its lower bound", " at its upper bound")
 
 @dataclass(frozen=True)
 class FrontRow:
-    """One bound: the least objective within it, against the optimum, and what else holds it back."""
+    """One bound: the minimised objective within it, its change against the optimum, and the active limits."""
 
     bound: str
     value: str
@@ -41,7 +41,7 @@ class FrontRow:
 
 @dataclass(frozen=True)
 class Front:
-    """The front of a dataset: what is set against what, and a point for each bound, the loosest first."""
+    """The front of a dataset: objective, second output, and a point for each bound, the loosest first."""
 
     data: Dataset
     objective: Quantity
@@ -51,7 +51,7 @@ class Front:
 
     @classmethod
     def of(cls, data: Dataset) -> Front | None:
-        """Return the front of a dataset; None where none was searched."""
+        """Return the front of a dataset, or None if none was searched."""
         settings, objective = data.study.pareto, data.objective
         if settings is None or objective is None or data.front is None:
             return None
@@ -59,11 +59,11 @@ class Front:
 
     @property
     def side(self) -> str:
-        """Which side of its bounds the second output keeps."""
+        """Side of its bounds on which the second output lies, in words."""
         return "at least" if self.settings.at_least else "at most"
 
     def rows(self) -> list[FrontRow]:
-        """Return every bound with the least objective within it."""
+        """Return a row for every bound with the minimised objective within it."""
         objective, second, optimum = self.objective, self.second, self.data.optimum
         best = math.nan if optimum is None else float(optimum[objective.name])
         rows = []
@@ -84,7 +84,7 @@ class Front:
         return rows
 
     def sentence(self) -> str:
-        """Return what the ends of the front say; nothing where there are none."""
+        """Return a sentence about the ends of the front; empty with fewer than two points."""
         objective, second = self.objective, self.second
         points = [point for point in self.points if not _missed(point)]
         if len(points) < 2:
@@ -96,7 +96,7 @@ class Front:
         return f"The {objective.words} against the {second.words}: {loose}, {tight}."
 
     def note(self) -> str:
-        """Say how much of the front was searched."""
+        """Describe how much of the front was searched."""
         given, begun = len(set(self.settings.bounds)), len(self.points)
         wanted = (self.settings.points or given) if self.data.front_steps else given
         late = sum(p["ended"] == "time" and not p["kkt_residual"] <= KKT for p in self.points)
@@ -107,7 +107,7 @@ class Front:
         return text + (f" In {how_many(late, 'row')} time was up before the search had ended." if late else "")
 
     def _gap(self) -> str:
-        """Say where the front is least known, if that is worth a word."""
+        """Name the largest gap of the front, if it is large enough to mention."""
         objective, second, points = self.objective.name, self.second, self.points
         reached = [float(p["bound"]) if _missed(p) else compared(second.name, float(p[second.name])) for p in points]
         values = [math.nan if _missed(p) else float(p[objective]) for p in points]
@@ -120,7 +120,7 @@ class Front:
         return f" It is least known between {ends}: pareto.points, now {count}, places further bounds there."
 
     def draw(self, axes: Axes) -> None:
-        """Draw the front as a curve through its designs, and the bounds within which none was found."""
+        """Draw the front as a curve through its designs, and the bounds without a design."""
         both, good = (self.objective, self.second), [p for p in self.points if not _missed(p)]
         if good:
             x, y = (np.array([compared(q.name, float(p[q.name])) * q.factor for p in good]) for q in both)
@@ -144,7 +144,7 @@ def _state(point: dict[str, Any]) -> str:
 
 
 def _given_way(data: Dataset, relaxation: str) -> str:
-    """Say by how much limits would have to give way, in the units of the table."""
+    """Describe the relaxation of each violated limit, in the units of the table."""
     words = []
     for part in filter(None, relaxation.split("; ")):
         name, _, size = part.partition(" ")
@@ -154,7 +154,7 @@ def _given_way(data: Dataset, relaxation: str) -> str:
 
 
 def _held(active: str, second: str) -> str:
-    """Return limits by name, and how many dimensions lie on the edge of what was searched."""
+    """Return active limits by name, and the number of dimensions on the edge of the searched space."""
     words = [word.strip() for word in active.split(";") if word.strip()]
     edges = [word for word in words if word.endswith(EDGES)]
     limits = ["this bound" if word.split()[0] == second else word for word in words if word not in edges]

@@ -1,6 +1,6 @@
-"""What the page needs to move: designs in motion and feasible designs as numbers, and the scripts that read them.
+"""Data of the interactive page: designs in motion and feasible designs as numbers, and the scripts that show them.
 
-The scripts in ``templates/live`` read them.  Lists of numbers are base64 of little-endian float32.
+The scripts are in ``templates/live``.  Lists of numbers are base64 of little-endian float32.
 """
 
 from __future__ import annotations
@@ -39,7 +39,7 @@ SPATIAL, PLANE = ("live/three.min.js", "live/view.js"), ("live/charts.js", "live
 
 
 def live(data: Dataset, cells: Sequence[Cells], different: Sequence[Group]) -> dict[str, Any]:
-    """Variables of the template: the data of both moving sections as JSON, empty where there is nothing to show."""
+    """Return the template's variables for both interactive sections as JSON, empty if there is nothing to show."""
     shown = shown_designs(data, different)
     motion = moving(data, shown)
     lines = parallel(data, cells, shown)
@@ -60,21 +60,21 @@ def _head(axis: dict[str, str]) -> str:
 
 
 def scripts_of(motion: Mapping[str, Any] | None) -> list[str]:
-    """Return the scripts that a page needs, the heavy one only where something stands in space."""
+    """Return the scripts that a page needs, the large one only for a spatial mechanism."""
     spatial = motion is not None and motion["size"] > 0.0
     return [*(SPATIAL if spatial else ()), *PLANE]
 
 
 def embedded(values: dict[str, Any]) -> str:
-    """Return JSON as it may stand within a script element: no character of it can end the element."""
+    """Return JSON for a script element, in which no character can end the element."""
     return json.dumps(values, ensure_ascii=False, allow_nan=False, separators=(",", ":")).replace("<", "\\u003c")
 
 
-FAR_LIMIT = 2.5  # limits farther out than so many times the curves are not drawn: the curves would be flat
+FAR_LIMIT = 2.5  # limits farther out than this multiple of the curves are not drawn, since the curves would look flat
 
 
 def in_window(path: Array, window: tuple[float, float]) -> NDArray[np.bool_]:
-    """Return poses whose position lies between two fractions of the stroke, counted from its smallest value."""
+    """Return a mask of poses whose position lies between two fractions of the stroke, from its smallest value."""
     low, high = np.nanmin(path), np.nanmax(path)
     fraction = (path - low) / (high - low) if high > low else np.zeros_like(path)
     return (fraction >= window[0]) & (fraction <= window[1])
@@ -84,7 +84,7 @@ FOLLOWERS = ("psi", "alpha")  # positions that are angles
 
 
 def whole(name: str, path: Array) -> Array:
-    """Return a follower's angle without its jumps of a turn, and any other curve as it is."""
+    """Return a follower's angle without jumps of a turn; any other curve unchanged."""
     known = np.isfinite(path)
     found = path.copy()
     found[known] = np.unwrap(path[known]) if stem(name) in FOLLOWERS else path[known]
@@ -92,12 +92,12 @@ def whole(name: str, path: Array) -> Array:
 
 
 def lowest(position: str, path: Array) -> tuple[Array, bool, int]:
-    """Find from where the curves of a follower begin: at its lowest position, unless it turns fully.
+    """Find the pose from which the curves of a follower are shown: its lowest position, unless it turns fully.
 
     Returns
     -------
     path, bool, int
-        without the jumps of an angle; whether the follower makes a turn itself; the pose, 0 of what makes one.
+        path without the jumps of an angle; whether the follower turns fully; number of the pose, 0 if it turns fully.
     """
     path = whole(position, path)
     free = stem(position) in FOLLOWERS and bool(abs(path[-1] - path[0]) > 0.9 * 2.0 * np.pi)
@@ -105,7 +105,7 @@ def lowest(position: str, path: Array) -> tuple[Array, bool, int]:
 
 
 def limit_values(name: str, limits: tuple[Limit, ...]) -> list[float]:
-    """Ordinates, in stored units, that the limits set to a curve itself; both signs where its size is limited."""
+    """Return the limits of a curve itself as ordinates in stored units, both signs for a limit on magnitude."""
     found = []
     above, below = (reduced("max_abs", name), reduced("max", name)), (reduced("min", name),)
     for limit in limits:
@@ -118,7 +118,7 @@ def limit_values(name: str, limits: tuple[Limit, ...]) -> list[float]:
 
 
 POSES = 240
-AROUND = 1.25  # a panel reaches so far beyond the deviation that counts
+AROUND = 1.25  # range of a panel relative to the largest deviation that counts
 
 
 @dataclass(frozen=True)
@@ -129,10 +129,10 @@ class Motion:
     ----------
     shown : the design
     phi : values of the input variable, (m,)
-    from_lowest : the turn, and the follower's position, count from the lowest one, which a follower that turns has not
+    from_lowest : whether turn and position are counted from the lowest position, which a full turn does not have
     curves : by name, (m,) each
-    inside : poses in which a deviation counts, (m,)
-    placed : stages and members with their joints, empty where the mechanism has none
+    inside : mask of poses in which a deviation counts, (m,)
+    placed : stages and members with their joints, empty for a mechanism without joints
     """
 
     shown: Shown
@@ -144,7 +144,7 @@ class Motion:
 
 
 def moving(data: Dataset, shown: Sequence[Shown]) -> dict[str, Any] | None:
-    """Return what the page moves; None where the study wants no curves or has no design to show."""
+    """Return the data of the moving designs; None if the study wants no curves or has no design to show."""
     if not shown or data.study.output.curves == "none":
         return None
     family = data.study.family
@@ -167,7 +167,7 @@ def moving(data: Dataset, shown: Sequence[Shown]) -> dict[str, Any] | None:
 
 
 def _motion(data: Dataset, shown: Shown, names: list[str]) -> Motion:
-    """Return a design from its lowest position on, as the static figure has it."""
+    """Return the motion of a design from its lowest position on, as in the static figure."""
     family = data.study.family
     design = data.design(shown.row)
     matrix = np.array([list(design.values())])
@@ -189,7 +189,7 @@ def _motion(data: Dataset, shown: Shown, names: list[str]) -> Motion:
 
 
 def _placed(family: Family, design: dict[str, float], phi: Array, order: NDArray[np.intp]) -> tuple[Placed, ...]:
-    """Stages and members with their joints in the order of the poses; a march is made in its own order."""
+    """Return stages and members with their joints in the order of the poses; a march is computed in its own order."""
     try:
         found = parts(family, design, phi)
     except InputError:  # a mechanism without joints has curves only
@@ -200,7 +200,7 @@ def _placed(family: Family, design: dict[str, float], phi: Array, order: NDArray
 
 
 def _panel(data: Dataset, name: str, motions: list[Motion]) -> dict[str, Any]:
-    """One curve: words, unit, limits, the range that its panel shows."""
+    """Return the panel of one curve: title, unit, limits and range."""
     shown = data.shown(name)
     speed = data.study.speed
     windowed = data.study.window is not None and data.study.family.pose_output[name].windowed
@@ -242,7 +242,7 @@ def _design(data: Dataset, motion: Motion, factor: float) -> dict[str, Any]:
 
 
 def _part(one: Placed) -> dict[str, Any]:
-    """Joints over the poses, fixed ones once; axes, kinds and links by the names that the page shows."""
+    """Return joints over the poses, fixed ones once, with axes, kinds and links by the names that the page shows."""
     part: Part = one.part
     name = {joint: f"{shown_name(joint)}{part.stage}" for joint in part.joints}
     return {
@@ -258,23 +258,23 @@ def _part(one: Placed) -> dict[str, Any]:
 
 
 def runs(inside: NDArray[np.bool_]) -> list[list[int]]:
-    """Return runs of poses that are inside, as first and last pose."""
+    """Return intervals of poses that are inside, as first and last pose."""
     edges = np.flatnonzero(np.diff(np.concatenate([[False], inside, [False]]).astype(np.int8)))
     return [[int(first), int(after) - 1] for first, after in edges.reshape(-1, 2)]
 
 
 def packed(values: ArrayLike) -> str:
-    """Return numbers as base64 of little-endian float32: a third of the room of decimal digits."""
+    """Return numbers as base64 of little-endian float32, a third of the size of decimal digits."""
     return base64.b64encode(np.ascontiguousarray(values, "<f4").tobytes()).decode("ascii")
 
 
-BEST, SPREAD = 250, 550  # lines of the best designs, and of those taken evenly from all others
+BEST, SPREAD = 250, 550  # number of lines for the best designs, and for designs spaced evenly among the others
 DIMENSIONS, OUTPUTS = 9, 4
 CONSTANT = 1e-12
 
 
 def parallel(data: Dataset, cells: Sequence[Cells], shown: Sequence[Shown]) -> dict[str, Any] | None:
-    """Lines, their axes and the named designs among them; None where there are no two designs to compare.
+    """Return lines, their axes and the named designs among them; None without two designs to compare.
 
     A line's number is that of the column ``design``, by which ``sweep export`` finds the design.
     """
@@ -306,20 +306,20 @@ def parallel(data: Dataset, cells: Sequence[Cells], shown: Sequence[Shown]) -> d
 
 
 def _axes(data: Dataset, cells: Sequence[Cells]) -> list[Quantity]:
-    """Swept dimensions, then the objective and what is limited; without an objective what the study wants."""
+    """Return the axes: swept dimensions, objective and limited outputs; without an objective the wanted outputs."""
     study = data.study
     objective = study.want if study.objective is None else [study.objective.output]
     second = [] if data.second is None else [data.second]
     stored = set(data.units) | set(study.want)
     limits = [limit.output for limit in study.limits if limit.output in study.want and not is_flag(limit.output)]
     dimensions = [limited(data, cell.name) for cell in cells][:DIMENSIONS]
-    there = {axis.name for axis in dimensions}  # of a [locus] an output is a dimension
+    there = {axis.name for axis in dimensions}  # a prescribed output of [locus] is a dimension
     told = [name for name in dict.fromkeys([*objective, *second, *limits]) if name in stored and not is_flag(name)]
     return [*dimensions, *[data.shown(name) for name in told if name not in there][:OUTPUTS]]
 
 
 def _lines(parts: Sequence[Path], names: list[str], objective: str | None, of: int) -> tuple[NDArray[np.int64], Array]:
-    """Numbers and values of the best, and of others evenly spaced, among ``of`` feasible designs in their order."""
+    """Return numbers and values of the best designs, and of evenly spaced others, among ``of`` feasible designs."""
     step = max(1, -(-of // SPREAD))
     seen = 0
     numbers, values = np.empty(0, np.int64), np.empty((0, len(names)))
@@ -337,7 +337,7 @@ def _lines(parts: Sequence[Path], names: list[str], objective: str | None, of: i
 
 
 def _feasible(parts: Sequence[Path], names: list[str]) -> Iterator[tuple[NDArray[np.int64], Array]]:
-    """Yield batches of feasible designs with finite values: their numbers, and values (n, names)."""
+    """Yield batches of feasible designs with finite values: numbers, and values (n, names)."""
     for batch in batches(parts, ["design", *names, "status"]):
         table = np.column_stack([np.asarray(batch[name], np.float64) for name in names])
         good = np.flatnonzero((np.asarray(batch["status"]) == 0) & np.isfinite(table).all(axis=1))

@@ -1,4 +1,4 @@
-"""The optimum as it is made: its yield, what tolerances cost, the spread of outputs, slopes of the objective."""
+"""Manufactured mechanisms of the optimum: yield, cost of tolerances, spread of outputs, slopes of the objective."""
 
 from __future__ import annotations
 
@@ -36,15 +36,16 @@ if TYPE_CHECKING:
 
 NOWHERE = (math.nan, math.nan)
 BINS = 41
-FAR = 2.0  # spreads of what is made from which on a bound is not drawn: it would make one bar of them
+FAR = 2.0  # spreads of the sample beyond which a bound is not drawn, as the histogram would be one bar
 STEPS = {"length": (0.1, "0.1\u00a0mm"), "angle": (math.radians(0.1), "0.1°")}
 
 
 @dataclass(frozen=True)
 class Histogram:
-    """An output over what is made: edges and shares of its bins in the unit shown, and the bounds of its limit.
+    """Histogram of an output over manufactured mechanisms: edges and shares of its bins, and the bounds of its limit.
 
-    A bound that is far from all that is made is None here, as one that is not asked for; ``within`` counts it.
+    Edges and bounds are in the unit shown.  A bound far from all mechanisms is None, like a missing one; ``within``
+    counts it.
     """
 
     shown: Quantity
@@ -56,14 +57,14 @@ class Histogram:
 
     @property
     def missing(self) -> NDArray[np.bool_]:
-        """Whether what falls into a bin misses the limit."""
+        """Mask of the bins that miss the limit."""
         middle = 0.5 * (self.edges[:-1] + self.edges[1:])
         low, high = (-math.inf if self.low is None else self.low), (math.inf if self.high is None else self.high)
         return (middle < low) | (middle > high)
 
 
 class Made(NamedTuple):
-    """Yield of the result, the limit that most of what is made misses, and what its dimensions cost."""
+    """Yield of the result, histogram of the limit missed most, and cost of the dimensions' tolerances."""
 
     share: float
     histogram: Histogram
@@ -71,7 +72,7 @@ class Made(NamedTuple):
 
 
 def many(data: Dataset, row: Mapping[str, Any] | None, samples: int = 0) -> tuple[Array, Array] | None:
-    """Return a design (P,) and what is made of it within the tolerances, as many as those say unless ``samples`` does.
+    """Return a design (P,) and its toleranced mechanisms (n, P), n from the tolerances unless ``samples`` is given.
 
     None without tolerances, an optimisation, or a design.
     """
@@ -84,7 +85,7 @@ def many(data: Dataset, row: Mapping[str, Any] | None, samples: int = 0) -> tupl
 
 
 def made(data: Dataset) -> Made | None:
-    """Return the yield of the optimum; None without tolerances, an optimum, or a limit that leaves room."""
+    """Return the yield of the optimum; None without tolerances, an optimum, or an inequality limit."""
     found = _manufactured(data)
     if found is None:
         return None
@@ -94,7 +95,7 @@ def made(data: Dataset) -> Made | None:
 
 
 def _manufactured(data: Dataset) -> Manufactured | None:
-    """Read what the search has noted; one of an earlier version has not, so that the optimum is made now."""
+    """Read the sample that the search has stored; for a dataset of an earlier version compute it."""
     path = files.beside(data.folder) / files.MADE
     if path.is_file():
         rows, costs = files.read_table(path), json.loads(files.metadata(path)[b"costs"])
@@ -109,7 +110,7 @@ def _design(data: Dataset, row: Mapping[str, Any]) -> Array:
 
 
 def made_sentence(found: Made | None, tolerance: str) -> str:
-    """Yield and what costs most, for the answer."""
+    """Return a sentence about the yield and the most expensive tolerance, for the answer."""
     if found is None:
         return ""
     text = f"Of what is made within {tolerance}, {number(100.0 * found.share, 3)}\u00a0% keeps all limits"
@@ -124,14 +125,14 @@ def made_sentence(found: Made | None, tolerance: str) -> str:
 
 
 def histogram(data: Dataset, output: str) -> Histogram | None:
-    """One output of the optimum over what is made; None without tolerances or an optimum."""
+    """Return the histogram of one output over manufactured mechanisms; None without tolerances or an optimum."""
     study, found = data.study, many(data, data.optimum)
     if found is None:
         return None
-    resolve.output(study.family, output)  # refuses a name that is none
+    resolve.output(study.family, output)  # raises for an unknown name
     values = design_outputs(study.family, found[1], [output], study.accuracy, study.window)[output]
     limits = [x for x in study.output_limits if x.output == output]
-    # Of two limits the last one: the band around what [locus] prescribes.
+    # Of two limits the last one is the tolerance band around a prescribed output.
     return _histogram(data, limits[-1] if limits else Limit(output, None, None), values)
 
 
@@ -148,7 +149,7 @@ def _histogram(data: Dataset, limit: Limit, column: NDArray[np.generic]) -> Hist
     room = 0.03 * (high - low) or 1e-9 * max(abs(high), 1.0)
     low, high = low - room, high + room
     width = (high - low) / BINS
-    at = next((x for x in bounds if x is not None), low)  # no bin stands astride of the bound
+    at = next((x for x in bounds if x is not None), low)  # no bin contains a bound in its interior
     first = at - width * np.ceil((at - low) / width)
     edges = first + width * np.arange(BINS + 2)
     edges[np.argmin(np.abs(edges - at))] = at
@@ -169,7 +170,7 @@ class Spread(NamedTuple):
 
     @property
     def changes(self) -> tuple[float, float, float] | None:
-        """Low end, mean and high end against the nominal value in percent; None where that is zero or unknown."""
+        """Low end, mean and high end relative to the nominal value in percent; None if that is zero or unknown."""
         if not abs(self.nominal) > 0.0:
             return None
         low, mean, high = (100.0 * (x / self.nominal - 1.0) for x in (self.low, self.mean, self.high))
@@ -177,7 +178,7 @@ class Spread(NamedTuple):
 
 
 def spreads(data: Dataset) -> list[Spread]:
-    """Distributions of the outputs of the optimum; empty where the study names no tolerances."""
+    """Return the distributions of the optimum's outputs; empty without tolerances."""
     return [
         Spread(data.shown(str(row["output"])),
                *(float(row[key]) for key in ("nominal", "low", "mean", "high", "within")))
@@ -187,7 +188,7 @@ def spreads(data: Dataset) -> list[Spread]:
 
 
 def event_bands(data: Dataset) -> dict[str, tuple[float, float]]:
-    """Main-shaft angles [deg] between which 95 % of what is made has an event of the cyclogram, by the event's name."""
+    """Return the interval of main-shaft angles [deg] with 95 % of the mechanisms' events of the cyclogram, by event."""
     rows = {str(row["output"]): row for row in _optimum_rows(data, files.TOLERANCE)}
     return {
         name: (math.degrees(rows[output]["low"]), math.degrees(rows[output]["high"]))
@@ -197,7 +198,7 @@ def event_bands(data: Dataset) -> dict[str, tuple[float, float]]:
 
 
 def with_bands(rows: pd.DataFrame, bands: Mapping[str, tuple[float, float]]) -> pd.DataFrame:
-    """Return the cyclogram in degrees with the angles between which what is made has an event; as it is without any."""
+    """Return the cyclogram in degrees with the intervals of manufactured mechanisms' events; unchanged without any."""
     known = [bands.get(name, NOWHERE) if kind == "event" else NOWHERE
              for kind, name in zip(rows["kind"], rows["name"], strict=True)]  # fmt: skip
     ends = {"made from [deg]": [low for low, _ in known], "made to [deg]": [high for _, high in known]}
@@ -205,14 +206,14 @@ def with_bands(rows: pd.DataFrame, bands: Mapping[str, tuple[float, float]]) -> 
 
 
 def share_made(data: Dataset) -> float:
-    """Share of what is made that keeps all limits, of as many mechanisms as it is known from; nan where it is not."""
+    """Return the share of mechanisms that keep all limits, from the largest sample known; nan without one."""
     few = [float(row["within"]) for row in _optimum_rows(data, files.TOLERANCE) if row["output"] == "all limits"]
     known = float((data.optimum or {}).get("yield", math.nan))
     return known if math.isfinite(known) else next(iter(few), math.nan)
 
 
 def tolerance_words(data: Dataset) -> str:
-    """Tolerances as they are meant."""
+    """Describe the tolerances in words."""
     tolerance = data.study.tolerance
     if tolerance is None:
         return ""
@@ -223,7 +224,7 @@ def tolerance_words(data: Dataset) -> str:
 
 
 class Slope(NamedTuple):
-    """Change of the objective in percent where a dimension grows, and where it shrinks, by ``step`` (in words)."""
+    """Change of the objective in percent for growth and for shrinkage of a dimension by ``step`` (in words)."""
 
     name: str
     text: str
@@ -233,12 +234,12 @@ class Slope(NamedTuple):
 
     @property
     def largest(self) -> float:
-        """The larger of both changes, by magnitude."""
+        """Larger of both changes, by magnitude."""
         return max(abs(self.growing), abs(self.shrinking))
 
 
 def slopes(data: Dataset) -> list[Slope]:
-    """Dimensions by how much they change the objective, the most telling first."""
+    """Return the dimensions with their changes of the objective, the largest first."""
     objective = data.objective
     if objective is None:
         return []
@@ -250,14 +251,14 @@ def slopes(data: Dataset) -> list[Slope]:
             continue
         step, words = STEPS.get(known[name].unit if name in known else "", (0.1, "0.1"))
         share = 100.0 * step / value
-        share = -share if without_minus(objective.name) else share  # shown as what is made large
+        share = -share if without_minus(objective.name) else share  # sign of the displayed output for a maximised one
         text = known[name].text if name in known else ""
         ranked.append(Slope(name, text, words, share * row["growing"], -share * row["shrinking"]))
     return sorted(ranked, key=lambda slope: -slope.largest)
 
 
 def _optimum_rows(data: Dataset, file: str) -> list[dict[str, Any]]:
-    """Rows of the optimum in a table beside the dataset; none where there is no such table."""
+    """Return the optimum's rows of a table beside the dataset; empty without that table."""
     path = files.beside(data.folder) / file
     if not path.exists():
         return []

@@ -1,4 +1,4 @@
-"""The design space: what the best design of each cell attains, where designs are feasible, and the trade-off."""
+"""Figures of the design space: best objective per cell, share of feasible designs, and the trade-off."""
 
 from __future__ import annotations
 
@@ -50,14 +50,14 @@ def map_figure(
     marks: dict[str, tuple[float, float]],
     overlays: Sequence[Overlay],
 ) -> Figure:
-    """Best objective per cell, and the share of the cell's designs that is feasible; ``marks`` in stored units.
+    """Draw the best objective per cell and the share of feasible designs in the cell; ``marks`` are in stored units.
 
-    Marks outside the space that was searched are left out.
+    Marks outside the searched space are left out.
     """
     from matplotlib.colors import LogNorm
     from matplotlib.ticker import NullLocator
 
-    figure = new_figure(WIDTH, 4.6, None)  # a layout found by drawing twice takes a tenth of the report's time
+    figure = new_figure(WIDTH, 4.6, None)  # a constrained layout draws twice, a tenth of the report's time
     figure.subplots_adjust(left=0.08, right=0.98, bottom=0.2, top=0.98, wspace=0.08)
     panels = figure.subplots(1, 2 if objective is not None else 1, squeeze=False, sharex=True, sharey=True)[0]
     (x_cells, x_shown), (y_cells, y_shown) = x, y
@@ -99,7 +99,7 @@ def map_figure(
 def line_figure(
     line: Grid, x: tuple[Cells, Quantity], designs: float, objective: Quantity | None, marks: dict[str, float]
 ) -> Figure:
-    """Draw what :func:`map_figure` does, over the only axis that a study sweeps."""
+    """Draw the same as :func:`map_figure` over the only axis that a study sweeps."""
     cells, shown = x
     figure = new_figure(WIDTH, 3.6)
     panels = figure.subplots(1, 2 if objective is not None else 1, squeeze=False)[0]
@@ -129,9 +129,9 @@ def trade_off_figure(
     limit: float | None,
     front: Callable[[Axes], None] | None = None,
 ) -> Figure:
-    """Feasible designs, objective against a second criterion, with those that no other beats in both.
+    """Draw feasible designs by objective and second criterion, with the non-dominated ones.
 
-    ``front`` draws what the optimiser made of it.
+    ``front`` draws the front of the optimiser.
     """
     figure = new_figure(WIDTH, 4.4, None)
     figure.subplots_adjust(left=0.08, right=0.98, bottom=0.2, top=0.97)
@@ -182,9 +182,9 @@ def _place(axes: Axes, marks: dict[str, tuple[float, float]], x_factor: float, y
 
 
 def _norm(values: Array) -> object:
-    """Choose a logarithmic scale where the values span more than a decade.
+    """Return a logarithmic scale if the values span more than a decade, otherwise a linear one.
 
-    So a few bad cells do not hide the good ones.
+    A logarithmic scale keeps a few bad cells from hiding differences between good ones.
     """
     from matplotlib.colors import LogNorm, Normalize
 
@@ -198,7 +198,7 @@ def _norm(values: Array) -> object:
 
 
 def _round_between(low: float, high: float) -> list[float]:
-    """Return 1, 2, 5, 10, ... between two bounds, at most eight of them."""
+    """Return the values 1, 2, 5, 10, ... between two bounds, at most eight."""
     decades = range(math.floor(math.log10(low)), math.ceil(math.log10(high)) + 1)
     ticks = [step * 10.0**k for k in decades for step in (1.0, 2.0, 5.0) if low <= step * 10.0**k <= high]
     return ticks[:: max(1, -(-len(ticks) // 8))]
@@ -211,7 +211,7 @@ def _share_norm(values: Array) -> object:
 
 
 def design_map(data: Dataset, found: Scan, cells: list[Cells], pair: tuple[str, str] | None = None) -> Figure | None:
-    """Show what the best design of each cell attains over one or two axes, by default the most telling pair."""
+    """Draw the best objective of each cell over one or two axes, by default the pair with the largest variation."""
     by_name = {c.name: c for c in cells}
     marks = {role: row for role, row in marked(data).items() if row is not None}
     shown = data.objective
@@ -234,7 +234,7 @@ def design_map(data: Dataset, found: Scan, cells: list[Cells], pair: tuple[str, 
 
 
 def trade_off(data: Dataset, found: Scan) -> Figure | None:
-    """Draw the objective against a second criterion, with the front where one was searched."""
+    """Draw the objective against a second criterion, with the front if one was searched."""
     study, shown = data.study, data.objective
     against = data.against
     if shown is None or against is None or not (len(found.scatter) or data.front is not None):
@@ -249,13 +249,13 @@ def trade_off(data: Dataset, found: Scan) -> Figure | None:
 
 
 def axis_quantity(data: Dataset, name: str) -> Quantity:
-    """Return a swept parameter under its own name, in the unit a designer reads."""
+    """Return the display form of a swept parameter under its own name."""
     shown = data.shown(name)
     return replace(shown, symbol=name, words=data.definitions.get(name, name))
 
 
 def overlays(study: Study, x: str, y: str) -> list[Overlay]:
-    """Known lines, ``[report] curves`` of the study, that lie in the plane of the map; points in the axes' units."""
+    """Return the known lines of ``[report] curves`` that lie in the plane of the map, in stored units."""
     factors = {axis.name: axis.factor for axis in study.space.axes}
     found = []
     for curve in study.data.get("report", {}).get("curves", []):

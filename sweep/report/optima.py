@@ -1,7 +1,7 @@
-"""Structurally different optima of a search, their cards, and the designs that can be looked at on the page.
+"""Structurally different optima of a search, their cards, and the designs that the page can show.
 
-Starts that ended alike, or in each other's mirror image, are one.  A designer chooses: the best on paper may be the one
-that nobody wants to build.
+Starts that ended in the same design or its mirror image form one group.  The designer chooses, since the best design by
+numbers may be one that nobody wants to build.
 """
 
 from __future__ import annotations
@@ -31,20 +31,20 @@ if TYPE_CHECKING:
     from sweep.families.base import Array
 
 
-ALIKE = 0.1  # of the mechanism's size, or of half a turn: what lies nearer is the same design in other numbers
-SAME = 1e-6  # relative difference of objectives that are one
+ALIKE = 0.1  # share of the mechanism's size, or of half a turn, below which designs count as the same
+SAME = 1e-6  # relative difference below which objectives are equal
 
 
 @dataclass(frozen=True)
 class Group:
-    """Starts that ended in the same design or its mirror image: the row that stands for them, and how many they are."""
+    """Starts that ended in the same design or its mirror image: representative row, and number of starts."""
 
     row: dict[str, Any]
     starts: int
     mirrored: int = 0
 
     def title(self, k: int) -> str:
-        """Return what the group is called as the ``k``-th of the list."""
+        """Return the title of the group as the ``k``-th of the list."""
         if self.row["role"] == "nominal":
             return "best on paper"
         return "optimum" if self.row["role"] == "optimum" else f"another optimum, {k}"
@@ -75,7 +75,7 @@ def groups(data: Dataset) -> list[Group]:
 
 
 def _places(data: Dataset, rows: list[dict[str, Any]]) -> tuple[Array, Array, Array]:
-    """Lengths and ratios over the largest of them, angles over half a turn, signs; (k, number of each)."""
+    """Return lengths and ratios over the largest of them, angles, and signs, (k, number of each)."""
     own = [p for p in data.study.bare.parameters if p.name in data.study.family.parameter_names]
     of = {unit: [p.name for p in own if p.unit == unit and p.choices is None] for unit in ("length", "ratio", "angle")}
     signs = [p.name for p in own if p.choices is not None]
@@ -96,18 +96,18 @@ def _apart(places: tuple[Array, Array, Array], j: int, k: int) -> float:
 
 
 def _mirrored(places: tuple[Array, Array, Array], values: list[float], j: int, k: int) -> bool:
-    """Whether two designs have the same lengths but for signs, and the same objective: one mirrors the other."""
+    """Tell whether two designs have the same lengths except for signs, and the same objective, as mirror images do."""
     sized = np.abs(places[0])
     same = abs(values[j] - values[k]) <= SAME * max(abs(values[j]), 1e-300)
     return same and float(np.abs(sized[j] - sized[k]).max(initial=0.0)) <= 1e-3 * ALIKE
 
 
-OFFERED = 5  # other optima, and as many designs of the front
+OFFERED = 5  # largest number of further optima, and of designs of the front
 
 
 @dataclass(frozen=True)
 class Shown:
-    """A design under a name; ``role`` is "result", "alternative", "front" or "reference", ``note`` its objective."""
+    """A design with a name; ``role`` is "result", "alternative", "front" or "reference", ``note`` its objective."""
 
     name: str
     role: str
@@ -116,7 +116,7 @@ class Shown:
 
 
 def shown_designs(data: Dataset, different: Sequence[Group]) -> list[Shown]:
-    """Return designs in the order in which they are offered; empty where no design was found.
+    """Return the designs in the order in which the page lists them; empty if no design was found.
 
     ``different`` are the optima of :func:`groups`, the study's answer first.
     """
@@ -132,7 +132,7 @@ def shown_designs(data: Dataset, different: Sequence[Group]) -> list[Shown]:
 
 
 def _of_front(data: Dataset) -> list[Shown]:
-    """Return designs of the front, spread evenly from the loosest bound to the tightest."""
+    """Return designs of the front, spaced evenly from the loosest bound to the tightest."""
     pareto = data.study.pareto
     if data.front is None or pareto is None:
         return []
@@ -149,8 +149,8 @@ def _objective(data: Dataset, row: Row) -> str:
     return f"{shown.symbol} = {shown.show(float(row[shown.name]), 4)}" if shown and shown.name in row else ""
 
 
-CARDS = 6  # are shown
-SAMPLES = 2048  # made mechanisms of each: a share good to 1 %
+CARDS = 6  # largest number of cards
+SAMPLES = 2048  # mechanisms sampled per optimum: a share accurate to 1 %
 EXTRAS = ("least_link", "arm_ratio")
 
 
@@ -158,8 +158,8 @@ EXTRAS = ("least_link", "arm_ratio")
 class Optimum:
     """One of the different optima, as a card shows it.
 
-    ``made`` is the share of what is made that keeps all limits, in words; empty without tolerances.  ``sizes`` are the
-    dimensions as name and value, ``extras`` outputs about them.
+    ``made`` is the yield of its manufactured mechanisms, in words; empty without tolerances.  ``sizes`` are the
+    dimensions as name and value, ``extras`` outputs of the dimensions.
     """
 
     title: str
@@ -174,9 +174,9 @@ class Optimum:
 
 
 def optima(data: Dataset, found: list[Group]) -> list[Optimum]:
-    """Cards of the first few, with pictures to one scale; none where there is only one."""
+    """Return the cards of the first optima, with pictures to one scale; empty if there is only one."""
     shown, own = data.objective, data.study.bare.parameter_names
-    tilts = {name for name in own if name.endswith("_tilt")}  # only what is made is tilted
+    tilts = {name for name in own if name.endswith("_tilt")}  # tilts of nominal designs are zero
     if len(found) < 2 or shown is None:
         return []
     found = found[:CARDS]
@@ -205,7 +205,7 @@ def optima(data: Dataset, found: list[Group]) -> list[Optimum]:
 
 
 def optima_sentence(data: Dataset, found: list[Group]) -> str:
-    """How many different optima there are, for the answer."""
+    """Return a sentence about the number of different optima, for the answer."""
     shown = data.objective
     if len(found) < 2 or shown is None:
         return ""
@@ -223,7 +223,7 @@ def optima_sentence(data: Dataset, found: list[Group]) -> str:
 
 
 def _made(data: Dataset, row: dict[str, Any]) -> str:
-    """Share of what is made within the tolerances that keeps all limits."""
+    """Describe the share of toleranced mechanisms that keep all limits."""
     study, known = data.study, float(row.get("yield", math.nan))
     limits = [limit for limit in study.output_limits if not limit.is_equation]
     if not limits:
@@ -238,7 +238,7 @@ def _made(data: Dataset, row: dict[str, Any]) -> str:
 
 
 def _extras(data: Dataset, row: dict[str, Any]) -> list[tuple[str, str]]:
-    """Return the outputs of the dimensions alone that tell whether one would build it."""
+    """Return outputs of the dimensions alone that matter for building the mechanism."""
     family = data.study.bare
     design = np.array([[float(row[name]) for name in family.parameter_names]])
     found = []

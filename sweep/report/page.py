@@ -1,4 +1,4 @@
-"""The pages: figures, tables and sentences of a dataset set with a template, and several results side by side."""
+"""The report's pages: figures, tables and sentences of a dataset in a template, and several results side by side."""
 
 from __future__ import annotations
 
@@ -44,8 +44,8 @@ if TYPE_CHECKING:
 
 
 COMPARISON = "comparison.html"
-STEPS = 4  # of a report: rows, figures, optima and yield, page
-MOST_VALUES = 9  # dimensions that stand in the sketch with their values; of more only the names
+STEPS = 4  # steps of a report: rows, figures, optima and yield, page
+MOST_VALUES = 9  # dimensions shown in the sketch with their values; with more only the names
 
 
 def write_report(folder: str | Path, out: str | Path | None = None, say: Say = unsaid) -> Path:
@@ -53,9 +53,9 @@ def write_report(folder: str | Path, out: str | Path | None = None, say: Say = u
 
     Parameters
     ----------
-    folder : dataset that ``sweep.run`` left behind, complete
-    out : where to write; default beside the chunks, ``results/<name>`` for ``results/<name>/designs``
-    say : called with how many of the report's steps are done
+    folder : complete dataset that ``sweep.run`` has written
+    out : output folder; by default beside the chunks, ``results/<name>`` for ``results/<name>/designs``
+    say : called with the number of finished steps of the report
 
     Returns
     -------
@@ -75,7 +75,7 @@ def write_report(folder: str | Path, out: str | Path | None = None, say: Say = u
 
 
 def _write(folder: Path, out: Path, say: Say) -> Path:
-    """Write everything the report consists of into ``out``."""
+    """Write all files of the report into ``out``."""
     say("report", 0, STEPS, "steps")
     data, found, cells = gather(folder)
     several = groups(data)
@@ -130,7 +130,7 @@ def _write(folder: Path, out: Path, say: Say) -> Path:
 
 
 def _as_made(data: Dataset) -> dict[str, Any]:
-    """Gather what the report says of the optimum as it is made."""
+    """Return the template's variables about manufactured mechanisms of the optimum."""
     told, within = made(data), tolerance_words(data)
     return {
         "made": told, "made_words": made_sentence(told, within), "tolerance": within, "spreads": spreads(data),
@@ -140,7 +140,7 @@ def _as_made(data: Dataset) -> dict[str, Any]:
 
 
 def _threads(data: Dataset, out: Path) -> dict[str, str]:
-    """Write the diagram of the threads of a machine, and draw it; nothing where there are none."""
+    """Write and draw the diagram of a machine's threads; empty without threads."""
     turn = diagram_of_dataset(data)
     if turn is None:
         return {}
@@ -150,7 +150,7 @@ def _threads(data: Dataset, out: Path) -> dict[str, str]:
 
 
 def draw(data: Dataset, found: Scan, cells: list[Cells], folder: Path) -> dict[str, str]:
-    """Return the figures of the design space that the data allow as data URIs, saved; keys are the template's names."""
+    """Save the available figures of the design space and return them as data URIs, by names of the template."""
     if not (len(cells) and found.feasible) and data.front is None:
         return {}
     with house_style():
@@ -163,7 +163,7 @@ def draw(data: Dataset, found: Scan, cells: list[Cells], folder: Path) -> dict[s
 
 
 def answer_sketch(data: Dataset) -> Markup | None:
-    """Draw the result with its dimensions in place; None where the study wants no curves, or there are no joints."""
+    """Draw the result with its dimensions; None if the study wants no curves, or there are no joints."""
     row = data.result
     placed = [] if row is None or data.study.output.curves == "none" else drawn_parts(data.study.family, row)
     if row is None or not placed:
@@ -177,9 +177,9 @@ def answer_sketch(data: Dataset) -> Markup | None:
 
 
 def _cyclogram(data: Dataset, events: Mapping[str, tuple[float, float]], out: Path) -> list[tuple[Any, ...]]:
-    """Write and return the cyclogram of the result of a machine; nothing of anything else.
+    """Write and return the cyclogram of a machine's result; empty for any other mechanism.
 
-    The file says besides where the ``events`` of what is made lie.
+    The file also has the intervals of the ``events`` of manufactured mechanisms.
     """
     found = cyclogram_of(data)
     if found is None:
@@ -189,7 +189,7 @@ def _cyclogram(data: Dataset, events: Mapping[str, tuple[float, float]], out: Pa
 
 
 def own_figures(study: Study, folder: Path) -> list[dict[str, Any]]:
-    """Pictures that ``[report] figures`` names; ``uri`` is None of what has not been drawn."""
+    """Return the figures that ``[report] figures`` names; ``uri`` is None for one that has not been drawn."""
     found = []
     for entry in study.data.get("report", {}).get("figures", []):
         path = folder / entry["file"]
@@ -198,17 +198,17 @@ def own_figures(study: Study, folder: Path) -> list[dict[str, Any]]:
 
 
 def copy_tables(folder: Path, out: Path) -> None:
-    """Copy the optimum with the tables about it, and the front, where the study has them."""
+    """Copy the optimum with its tables, and the front, if the study has them."""
     for name in (*OF_OPTIMUM, PARETO):
         source, target = beside(folder) / name, out / name.removeprefix("_")
         if source.exists():
             shutil.copyfile(source, target)
         else:
-            target.unlink(missing_ok=True)  # of an earlier report on another version of the study
+            target.unlink(missing_ok=True)  # written by an earlier report on another version of the study
 
 
 def write_survivors(parts: Sequence[Path], target: Path) -> None:
-    """Write the designs within all limits, in the order of the sweep, with the parts' units and definitions."""
+    """Write the designs within all limits, in the order of the sweep, with the units and definitions of the parts."""
     import pyarrow as pa
     import pyarrow.compute as pc
     import pyarrow.parquet as pq
@@ -220,14 +220,14 @@ def write_survivors(parts: Sequence[Path], target: Path) -> None:
         kept: list[pa.RecordBatch] = []
         for batch in batches(parts):
             kept.append(batch.filter(pc.equal(batch["status"], 0)))
-            if sum(map(len, kept)) >= ROWS_PER_BATCH:  # a group of rows for each small chunk would take as long again
+            if sum(map(len, kept)) >= ROWS_PER_BATCH:  # a row group for each small chunk would take twice as long
                 writer.write_table(pa.Table.from_batches(kept, schema))
                 kept = []
         writer.write_table(pa.Table.from_batches(kept, schema))
 
 
 def judged(data: Dataset, rows: Sequence[Row], names: Sequence[str]) -> dict[str, Any]:
-    """Return what a page shows of designs under their names: the current one first, then those it is compared with."""
+    """Return the page's data of designs by name: the current one first, then those compared with it."""
     seen = [as_result(data, row) for row in rows]
     roles = ["result", *(f"pin pin-{k}" for k in range(1, len(rows)))]
     shown = [Shown(name, role, status_words(row), row) for name, role, row in zip(names, roles, rows, strict=True)]
@@ -251,13 +251,13 @@ def judged(data: Dataset, rows: Sequence[Row], names: Sequence[str]) -> dict[str
 
 
 def status_words(row: Row) -> str:
-    """Say why a design has no values; empty where it has."""
+    """Return the reason why a design has no values; empty if it has them."""
     code = int(row.get("status", codes.OK))
     return "" if code == codes.OK else meaning(code)
 
 
 def write_comparison(folders: Sequence[Path], out: Path) -> Path:
-    """Write a page with the results of several datasets side by side, all judged by the study of the first.
+    """Write a page with the results of several datasets side by side, all evaluated by the study of the first.
 
     Raises
     ------
@@ -296,7 +296,7 @@ def write_comparison(folders: Sequence[Path], out: Path) -> Path:
 
 
 def _names(studies: Sequence[str], folders: Sequence[Path]) -> list[str]:
-    """Call results by their studies; by their folders where these are the same."""
+    """Name results by their studies, or by their folders if study names coincide."""
     if len({*studies}) == len(studies):
         return list(studies)
     return [str(folder.parent.name if folder.name == "designs" else folder.name) for folder in folders]

@@ -1,4 +1,4 @@
-"""What a column is called and in which unit a designer reads it: deg, mm, mm/rad^2, m/s^2 at the scene's speed."""
+"""Display names and units of columns, as designers read them: deg, mm, mm/rad^2, m/s^2 at the scene's speed."""
 
 from __future__ import annotations
 
@@ -33,11 +33,11 @@ SYMBOLS = {
 }
 PRIMES = ("", "′", "″", "‴")
 POWERS = {1: "", 2: "²", 3: "³", 4: "⁴"}
-# Units that a designer reads instead of those that are stored, with the factor to them.
+# Units shown instead of the stored ones, with the factor from the stored one.
 READ_IN = {"t": ("g", 1e6), "t*mm^2": ("kg·mm²", 1e3), "life": ("h", 1.0 / 3600.0), "speed": ("rpm", 30.0 / math.pi)}
 LENGTHS = ("mm", "um", "cm", "m", "in")
-NO_ANGLE = 1e-10  # rad: what is smaller is the rounding of zero, or of the place of an extremum at zero
-NONE_OF = {"°": NO_ANGLE, "mm": 1e-12}  # of quantities shown in these units, as stored: what is smaller is rounding
+NO_ANGLE = 1e-10  # rad: smaller values are rounding of zero, or of the angle of an extremum at zero
+NONE_OF = {"°": NO_ANGLE, "mm": 1e-12}  # stored values below these, by shown unit, are rounding
 _PER_RADIAN = re.compile(r"(.*)/rad(?:\^([23]))?")
 _POINT = re.compile("([xyz])_([a-z])")
 _OF_MACHINE = re.compile("([a-z]|tip|point)_([xyz])")
@@ -46,10 +46,10 @@ _SIZE = re.compile("(speed|acceleration|jerk)_([a-z])")  # of a point's motion i
 
 @dataclass(frozen=True)
 class Quantity:
-    """A column of a dataset as it is shown.
+    """Display form of a dataset's column.
 
-    ``symbolic`` says that the symbol is one and not the name again.  ``factor`` turns the stored value (mm, rad) into
-    ``unit``; ``order`` is that of the derivative with respect to the crank angle, ``speed_scale`` the factor to
+    ``symbolic`` says that the symbol differs from the name.  ``factor`` converts the stored value (mm, rad) to
+    ``unit``; ``order`` is that of the derivative by the crank angle, ``speed_scale`` the factor to
     ``speed_unit`` for 1 rad/s, so that a value at the speed omega is ``stored * speed_scale * omega**order``.
     """
 
@@ -70,7 +70,7 @@ class Quantity:
 
     @property
     def heading(self) -> str:
-        """Words, and the symbol where there is a real one; the words have the member of a machine already."""
+        """Words, with the symbol if there is one; the words already contain the member of a machine."""
         member = parts(self.name).member
         return f"{self.words} {self.symbol.removesuffix(f' {member}')}" if self.symbolic else self.words
 
@@ -80,30 +80,30 @@ class Quantity:
         return f"{self.heading} [{self.unit}]" if self.unit else self.heading
 
     def show(self, stored: float, digits: int = 5) -> str:
-        """Value with its unit; what only rounding keeps from 0 is 0, but an error is as small as it is."""
+        """Return the value with its unit; rounding of zero is shown as 0, except for errors."""
         if abs(stored) < NONE_OF.get(self.unit, 0.0) and not is_error(self.name):
             stored = 0.0
         return with_unit(number(stored * self.factor, digits), self.unit)
 
     def at_speed(self, stored: float, speed: float | None, digits: int = 4) -> str:
-        """Value at the size of the scene's speed with its unit, or nothing where a speed says nothing."""
+        """Return the value at the scene's speed with its unit; empty for a quantity that is no derivative."""
         if speed is None or self.order == 0:
             return ""
         return with_unit(number(stored * self.speed_scale * abs(speed) ** self.order, digits), self.speed_unit)
 
 
 def with_unit(text: str, unit: str) -> str:
-    """Write ``45°`` but ``24.5 mm``; nothing is added to a missing value."""
+    """Return ``45°`` but ``24.5 mm``; a missing value has no unit."""
     if not unit or text == "–":
         return text
     return text + unit if unit == "°" else f"{text}\u00a0{unit}"
 
 
-@lru_cache(maxsize=4096)  # the page of a slider asks for the same forty names at every step
+@lru_cache(maxsize=4096)  # the page of a slider needs the same forty names at every step
 def quantity(name: str, unit: str) -> Quantity:
-    """How the column ``name``, stored in ``unit`` ("mm" or "length", "rad", "1" ...), is shown."""
+    """Return the display form of the column ``name``, stored in ``unit`` ("mm" or "length", "rad", "1" ...)."""
     unit = internal_unit(unit)
-    if of := without_minus(name):  # what is to be made large is shown as itself
+    if of := without_minus(name):  # a maximised output is shown itself
         shown = quantity(of, unit)
         return replace(shown, name=name, factor=-shown.factor, speed_scale=-shown.speed_scale)
     if is_error(name):
@@ -116,18 +116,18 @@ def quantity(name: str, unit: str) -> Quantity:
     symbol_form, words_form = (reduction.symbol, reduction.words) if reduction else ("{}", "{}")
     order, root, stage = _derivative(base)
     per = _PER_RADIAN.fullmatch(unit)
-    followed = root in ("s", "psi", "dev")  # the follower's own motion has a symbol and a word each
+    followed = root in ("s", "psi", "dev")  # only the follower's own motion has a symbol and a word
     symbolic = followed and (order > 0 or root != "dev")
     symbol, words = _called(order, root, stage)
     symbol, words = symbol_form.format(symbol), words_form.format(words)
-    if per:  # a derivative whose unit says that it is one
+    if per:  # a derivative by its unit
         unit, order = per[1], max(order, int(per[2] or 1))
     length = unit in LENGTHS
-    order = order if length or unit in ("1", "rad") else 0  # a force that is called ds is none
+    order = order if length or unit in ("1", "rad") else 0  # a force called ds is no derivative
     if is_place(name) or (order == 0 and unit in ("rad", "angle")):
         return Quantity(name, symbol, words, "°", math.degrees(1.0), symbolic)
     if order == 0:
-        kind = {"s": "life", "rad/s": "speed"}.get(unit, "")  # where the name says what it is
+        kind = {"s": "life", "rad/s": "speed"}.get(unit, "")  # if the name contains the kind
         read, factor = READ_IN.get(kind if kind and kind in name else unit, (_pretty_unit(unit), 1.0))
         return Quantity(name, symbol, words, read, factor, symbolic)
     return Quantity(
@@ -147,7 +147,7 @@ SUBSCRIPTS = str.maketrans("0123456789", "₀₁₂₃₄₅₆₇₈₉")
 
 
 def _called(order: int, root: str, stage: str) -> tuple[str, str]:
-    """Symbol and words of a quantity or its derivative."""
+    """Return symbol and words of a quantity or its derivative."""
     at = ""
     if size := _SIZE.fullmatch(root):
         root, order = f"{size[1]} of {size[2].upper()}", 0
@@ -163,7 +163,7 @@ def _called(order: int, root: str, stage: str) -> tuple[str, str]:
 
 
 def _derivative(base: str) -> tuple[int, str, str]:
-    """Order, quantity and stage number of ``d2psi1``."""
+    """Return order, quantity and stage number of a name such as ``d2psi1``."""
     _, root, stage = parts(base)
     if size := _SIZE.fullmatch(root):
         return ("speed", "acceleration", "jerk").index(size[1]) + 1, root, stage
@@ -171,7 +171,7 @@ def _derivative(base: str) -> tuple[int, str, str]:
     if match:
         mark, root = match.groups()
         return (0 if mark is None else int(mark[1:] or 1)), root, stage
-    return (0, f"{root}{stage}", "") if root.endswith("_") else (0, root, stage)  # a number of its own: sews_at_7000
+    return (0, f"{root}{stage}", "") if root.endswith("_") else (0, root, stage)  # a number in a name: sews_at_7000
 
 
 def _pretty_unit(unit: str) -> str:
@@ -181,7 +181,7 @@ def _pretty_unit(unit: str) -> str:
 
 
 def number(value: float, digits: int = 5) -> str:
-    """Return a number as it is set in a table: significant digits, no trailing zeros, powers of ten written out."""
+    """Format a number for a table: significant digits, no trailing zeros, powers of ten written out."""
     if not math.isfinite(value):
         return "–" if math.isnan(value) else "∞" if value > 0.0 else "−∞"
     if value == 0.0:
@@ -205,7 +205,7 @@ SIGNED = re.compile(r"(max|min)_(?!abs_)")
 
 
 def change(shown: Quantity, new: float, old: float) -> str:
-    """Return a value against another: sizes in percent, angles and what changes its sign by their difference."""
+    """Compare a value with another: sizes in percent, angles and values of changing sign by their difference."""
     signed = bool(SIGNED.match(shown.name)) and min(new, old) < 0.0
     if shown.unit != "°" and not signed:
         return percent_change(new, old)
@@ -218,7 +218,7 @@ def change(shown: Quantity, new: float, old: float) -> str:
 
 
 def percent_change(new: float, old: float) -> str:
-    """Return ``14.2 % less`` or ``3.1 % more`` than the old magnitude."""
+    """Return ``14.2 % less`` or ``3.1 % more`` for a magnitude compared with the old one."""
     if not (math.isfinite(new) and math.isfinite(old)) or old == 0.0:
         return ""
     change = 100.0 * (abs(new) / abs(old) - 1.0)
@@ -228,5 +228,5 @@ def percent_change(new: float, old: float) -> str:
 
 
 def rpm(speed: float | None) -> str:
-    """Return a speed in turns per minute."""
+    """Return a speed in revolutions per minute, as text."""
     return "" if speed is None else f"{number(speed * 30.0 / math.pi, 5)} rpm"

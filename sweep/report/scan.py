@@ -1,4 +1,4 @@
-"""Read a dataset once, part by part, and collect what the maps, the trade-off and the counts of the report need.
+"""One pass over a dataset, part by part, that collects the data of maps, trade-off and counts of the report.
 
 Memory is bounded by a batch of rows, whatever the size of the dataset.  Values are in stored units: mm, rad.
 """
@@ -26,9 +26,9 @@ DESIGNS_PER_CELL = 3.0
 
 @dataclass(frozen=True)
 class Cells:
-    """The division of one axis of the design space into cells: one per value, or per run of values if there are many.
+    """Division of one axis of the design space into cells, one per value or per run of neighbouring values.
 
-    ``edges`` are the boundaries in stored units; ``weights`` the share of the axis that falls into each cell.
+    ``edges`` are the boundaries in stored units; ``weights`` the share of the axis in each cell.
     """
 
     name: str
@@ -37,7 +37,7 @@ class Cells:
 
     @classmethod
     def of_values(cls, name: str, values: Array, most: int) -> Cells:
-        """Divide a lattice axis; where it has more than ``most`` values, neighbouring values share a cell."""
+        """Divide a lattice axis; with more than ``most`` values, neighbouring values share a cell."""
         ordered = np.unique(values)
         if ordered.size == 1:
             reach = 0.5 * abs(ordered[0]) or 0.5
@@ -66,7 +66,7 @@ class Cells:
         return low + (value - low) % (2.0 * np.pi)
 
     def index(self, values: Array) -> np.ndarray[tuple[int], np.dtype[np.intp]]:
-        """Give the number of the cell in which each value lies; values beyond the ends count to the outer cells."""
+        """Return the number of the cell of each value; values beyond the ends belong to the outer cells."""
         return np.clip(np.searchsorted(self.edges, values, side="right") - 1, 0, self.edges.size - 2)
 
 
@@ -82,8 +82,8 @@ class Grid:
 class Scan:
     """Result of one pass over the rows.
 
-    ``grids`` and ``lines`` are cells over two axes and over one.  ``scatter`` holds a few points (objective, second
-    output) for the picture, ``front`` those of all points that no other beats.  ``errors`` has the largest error
+    ``grids`` and ``lines`` are cells over two axes and over one.  ``scatter`` holds a subset of the points (objective,
+    second output) for the figure, ``front`` the non-dominated ones of all points.  ``errors`` has the largest error
     estimate of each output, absolute and relative.  ``best_row`` is the feasible design with the smallest objective.
     """
 
@@ -99,17 +99,17 @@ class Scan:
 
 
 def divided_axes(study: Study, feasible: int) -> list[Cells]:
-    """Swept axes, divided into cells: finely if a single map shows them all, else coarsely.
+    """Return the swept axes divided into cells: finely if a single map shows them all, otherwise coarsely.
 
-    Axes of a sample are divided so that a cell holds some of the ``feasible`` designs on average.  Left out are signs,
-    which make no map, and what [locus] or [fit] makes.
+    Axes of a sample are divided so that a cell holds DESIGNS_PER_CELL of the ``feasible`` designs on average.  Signs,
+    which have no map, and parameters that [locus] or [fit] sets are left out.
     """
     signs = {p.name for p in study.family.parameters if p.choices is not None}
     left_out = signs.union(study.made, study.rescaled)
     swept = [axis for axis in study.space.axes if axis.varies and axis.name not in left_out]
     most = CELLS_OF_PAIR if len(swept) <= 2 else CELLS_OF_MANY
     if study.space.kind == "sobol":
-        # A power of two: a Sobol sequence puts equally many points into such cells.
+        # A power of two: a Sobol sequence puts equally many points into each cell.
         sampled = 2 ** min(5, max(2, math.floor(0.5 * math.log2(max(feasible, 1) / DESIGNS_PER_CELL))))
         return [
             Cells.of_range(axis.name, axis.low, axis.high, sampled)
@@ -134,9 +134,9 @@ def scan(
     ----------
     parts : Parquet files of the dataset
     cells : divided axes; every pair of them gets a grid
-    objective, second : output columns, smaller is better; None where the study has none
-    larger : more of the second is better
-    total : about how many rows there are, of which the picture of points shows every so many
+    objective, second : output columns, smaller is better; None if the study has none
+    larger : whether larger values of the second are better
+    total : approximate number of rows, which sets the stride of the points in the figure
     """
     sense = -1.0 if larger else 1.0
     found = Scan()
@@ -202,7 +202,7 @@ def _note_errors(found: Scan, name: str, errors: Array, values: Array) -> None:
 
 
 def non_dominated(points: Array) -> Array:
-    """Keep the points that no other point beats in both coordinates, sorted by the first; smaller is better."""
+    """Return the non-dominated points, sorted by the first coordinate; smaller is better."""
     if not len(points):
         return points
     ordered = points[np.lexsort((points[:, 1], points[:, 0]))]
@@ -211,17 +211,17 @@ def non_dominated(points: Array) -> Array:
 
 
 def most_telling(found: Scan) -> tuple[str, str] | None:
-    """Choose the pair of axes whose map tells most.
+    """Return the pair of axes whose map varies most.
 
-    That is the pair over whose cells the best objective varies most; of equal pairs, the one over whose cells the share
-    of feasible designs does.
+    That is the pair with the largest variation of the best objective over its cells; for equal pairs, the one with the
+    largest variation of the share of feasible designs.
     """
     scores: dict[tuple[str, str], tuple[float, float]] = {}
     for pair, grid in found.grids.items():
         reached = np.isfinite(grid.best)
         if not reached.any():
             continue
-        # A cell without a feasible design counts as the worst cell that has one.
+        # A cell without a feasible design counts as the worst cell with one.
         filled = np.where(reached, grid.best, grid.best[reached].max())
         share = grid.count / max(float(grid.count.max()), 1.0)
         scores[pair] = float(filled.std()), float(share.std())

@@ -1,4 +1,4 @@
-"""Will it sew at every speed, and what its threads demand over the turn, as the report shows it."""
+"""Sewing at every speed, and the thread demand over the turn, as the report shows them."""
 
 from __future__ import annotations
 
@@ -27,16 +27,16 @@ if TYPE_CHECKING:
 
     Mask = NDArray[np.bool_]
 
-CURVE = 33  # speeds of the curve
-ON_LIMIT = 1e-9  # mm: an optimum ends on its limits, and is beyond them by the rounding of its search
+CURVE = 33  # number of speeds of the curve
+ON_LIMIT = 1e-9  # mm: an optimum ends on its limits, and exceeds them by the rounding of its search
 
 
 @dataclass(frozen=True)
 class Row:
-    """One speed: the window of the rise, which end of it binds the optimum, and how many machines keep what.
+    """One speed: the window of the rise, the end of it that binds the optimum, and shares of mechanisms.
 
-    ``shares`` are of what is made: of the moments, then of the least and of the most rise; ``interval`` is that of 95 %
-    of the share ``every`` that keeps all moments.
+    ``shares`` are those of manufactured mechanisms that keep each moment, then the least and the most rise;
+    ``interval`` is the 95 % confidence interval of the share ``every`` that keeps all moments.
     """
 
     speed: str
@@ -49,10 +49,10 @@ class Row:
 
 @dataclass(frozen=True)
 class Sewn:
-    """What is made by speed: rows of the stated speeds, and curves of shares between them; the answer in words.
+    """Shares of manufactured mechanisms by speed: rows of the stated speeds, curves between them; the answer in words.
 
-    ``shares`` (S,) keep all moments, between ``low`` and ``high`` with 95 % sureness; ``ends`` are the shares that keep
-    the least and the most rise permitted.
+    ``shares`` (S,) keep all moments, with 95 % confidence between ``low`` and ``high``; ``ends`` are the shares that
+    keep the least and the most permitted rise.
     """
 
     sentence: str
@@ -67,7 +67,7 @@ class Sewn:
 
 
 def sewn(data: Dataset) -> Sewn | None:
-    """Make the optimum many times and sew at every speed; None without tolerances or a relation that sews."""
+    """Sample mechanisms of the optimum and test sewing at every speed; None without tolerances or a sewing relation."""
     study = data.study
     sewing = next((one for one in getattr(study.family, "relations", ()) if isinstance(one, Sewing)), None)
     drawn = many(data, data.optimum) if sewing else None
@@ -103,11 +103,11 @@ def sewn(data: Dataset) -> Sewn | None:
 
 
 def sewing_sentence(rooms: Mapping[str, Array], rpm: Array) -> str:
-    """Say whether a design sews, at which speeds it does not, and which moment has least to spare.
+    """Describe whether a design sews, at which speeds it does not, and which moment has the smallest margin.
 
     Parameters
     ----------
-    rooms : by moment, what it has to spare at each speed, (S,) [mm]; nan where it does not happen
+    rooms : margin of each moment at each speed, (S,) [mm]; nan if the moment does not happen
     rpm : the speeds, (S,) [1/min]
     """
     never = [name for name, room in rooms.items() if np.isnan(room).any()]
@@ -125,14 +125,14 @@ def sewing_sentence(rooms: Mapping[str, Array], rpm: Array) -> str:
 
 
 def window_sentence(low: tuple[str, float], high: tuple[str, float]) -> str:
-    """Say which fields of work set the least and the most rise, or that they leave none."""
+    """Name the fields of work that set the least and the most rise, or state that no rise suits all."""
     (slow, least), (fast, most) = low, high
     ends = f"at least {number(least, 3)}\u00a0mm for {slow}, at most {number(most, 3)}\u00a0mm for {fast}"
     return f"No rise suits all fields: {ends}." if least > most else f"All fields permit a rise of {ends}."
 
 
 def _binds(sewing: Sewing, rooms: Mapping[str, float], k: int) -> str:
-    """Say which end of the window is nearer to the rise of the optimum at the k-th speed, whose it is, and how near."""
+    """Name the end of the window closer to the rise of the optimum at the k-th speed, its field, and the distance."""
     end = min(rooms, key=lambda name: rooms[name])
     slow, fast = sewing.fields()
     whose = slow if k == 0 else fast if k == len(sewing.speeds) - 1 else f"{slow}, {fast}"
@@ -141,7 +141,7 @@ def _binds(sewing: Sewing, rooms: Mapping[str, float], k: int) -> str:
 
 
 def _interval(kept: Mask) -> tuple[float, float]:
-    """Return between which shares the true one lies with 95 % sureness, of machines (n,) that keep a limit or not."""
+    """Return the 95 % confidence interval of a share, from a sample of machines (n,) that keep a limit or not."""
     from scipy.stats import binomtest
 
     known = binomtest(int(kept.sum()), len(kept)).proportion_ci(method="wilson")
@@ -153,12 +153,12 @@ def _percent(share: float) -> str:
 
 
 def diagram_of_dataset(data: Dataset) -> pd.DataFrame | None:
-    """Return the threads of the optimum over the turn; None where the study has none."""
+    """Return the thread diagram of the optimum over the turn; None if the study has no threads."""
     row, family = data.result, data.study.family
     if row is None or not any(isinstance(r, ThreadBalance) for r in getattr(family, "relations", ())):
         return None
     with warnings.catch_warnings():
-        warnings.simplefilter("ignore", MeasuredRangeWarning)  # the picture shows how far the law of speed was measured
+        warnings.simplefilter("ignore", MeasuredRangeWarning)  # the figure shows the measured range of the law of speed
         return diagram(family, data.design(row), angles="rad")
 
 
@@ -179,7 +179,7 @@ def threads_figure(turn: pd.DataFrame) -> Figure:
         pace.axhline(way * MEASURED_SPEED.high, color=LIMIT, linewidth=1.0, linestyle="--")
     for axes, words in ((needs, "P, from its mean [mm]"), (left, "surplus [mm]"), (pace, "speed [m/s]")):
         axes.set_ylabel(words)
-    needs.legend(ncols=len(names) + 1, loc="lower right", bbox_to_anchor=(1.0, 1.0))  # above: the curves fill the field
+    needs.legend(ncols=len(names) + 1, loc="lower right", bbox_to_anchor=(1.0, 1.0))  # above: curves fill the axes
     pace.set_xlabel("angle of the main shaft [°]")
     pace.set_xticks(range(0, 361, 60))
     return figure

@@ -1,6 +1,6 @@
-"""The mechanism in the page: a sketch with its dimensions in place, and bodies that are bars between their joints.
+"""Sketch of the mechanism with its dimensions, and data of bodies that are bars between their joints.
 
-One position is drawn in full, others faint, with paths and joints.
+One position is drawn in full, others faintly, with paths and joints.
 """
 
 from __future__ import annotations
@@ -35,17 +35,17 @@ from sweep.report.tables import value_of
 if TYPE_CHECKING:
     from markupsafe import Markup
 
-POSES, FAINT = 180, 7  # of paths; of the mechanism in other positions
-WIDE, ROOM = 540.0, 36.0  # of the picture and of its border, in pixels
-LETTER, LINE = 8.2, 12.0  # what a letter takes of a line at most, and its height
+POSES, FAINT = 180, 7  # poses of the paths; number of faint positions
+WIDE, ROOM = 540.0, 36.0  # width of the picture and of its border, in pixels
+LETTER, LINE = 8.2, 12.0  # largest width of a letter, and height of a line
 AROUND = [(9, -8), (9, 14), (-9, -8), (-9, 14), (0, -16), (0, 24), (22, 3), (-22, 3), (30, -22), (-30, -22), (30, 30)]
-FEW = 2  # members whose joints are named; of more only the members are
-NEAR = 1e-7  # of the mechanism's size: a distance that is a dimension
-TELLING = 1e-3  # by which dimensions are changed to tell those of one value apart
+FEW = 2  # members up to which joints are named; with more only the members are
+NEAR = 1e-7  # share of the mechanism's size below which a distance equals a dimension
+TELLING = 1e-3  # relative change of dimensions that distinguishes equal ones
 
 
 def drawn_parts(family: Family, design: Mapping[str, float]) -> list[Placed]:
-    """Joints and links of a design over one turn, its frames side by side; empty for what has no joints or no pose."""
+    """Return joints and links of a design over one turn, frames side by side; empty without joints or poses."""
     try:
         found = over(family, {name: float(design[name]) for name in family.parameter_names}, 0.0, POSES)
     except InputError:  # a mechanism without joints has curves only
@@ -54,9 +54,9 @@ def drawn_parts(family: Family, design: Mapping[str, float]) -> list[Placed]:
 
 
 def dimensioned(family: Family, design: Mapping[str, float], placed: Sequence[Placed]) -> dict[str, Array]:
-    """Return the ends, (2, 3), of the lengths that are seen in a position as the distance of two points.
+    """Return the ends, (2, 3), of the lengths that appear in a position as the distance of two points.
 
-    A length is the distance that follows it: all lengths are changed a little, each by a part of its own.
+    A length is identified by a distance that follows it, when all lengths are changed slightly by different shares.
     """
     pose = first_pose([one.part for one in placed])
     own = [p.name for p in family.parameters if p.unit == "length" and abs(float(design[p.name])) > 0.0]
@@ -68,7 +68,7 @@ def dimensioned(family: Family, design: Mapping[str, float], placed: Sequence[Pl
     found: dict[str, Array] = {}
     for one, two in zip(placed, other, strict=True):
         points, moved = _points(one.part, pose), _points(two.part, pose)
-        # The links first: a length of the frame may be that of a link in some position.
+        # The links first: a length of the frame may equal that of a link in some position.
         linked = [pair for link in one.part.links for pair in combinations(link.joints, 2)]
         for p, q in [*linked, *combinations(points, 2)]:
             if p not in moved or q not in moved:
@@ -82,7 +82,7 @@ def dimensioned(family: Family, design: Mapping[str, float], placed: Sequence[Pl
 
 
 def _points(part: Part, pose: int) -> dict[str, Array]:
-    """Joints in a pose, feet of the common perpendicular of two axes, and of a plate's third point on its base."""
+    """Return joints in a pose, feet of the common perpendicular of two axes, and the foot of a plate's third point."""
     points = {name: path[pose] for name, path in part.joints.items()}
     for p, q in combinations(part.axes, 2):
         u, v, across = part.axes[p], part.axes[q], points[q] - points[p]
@@ -98,9 +98,9 @@ def sketch(
     placed: Sequence[Placed], title: str, dimensions: Mapping[str, Array] | None = None, *, names: bool = True,
     span: float = 0.0,
 ) -> Markup:  # fmt: skip
-    """Draw a mechanism as SVG in the colours of the page, seen from a corner where it is spatial, else from the front.
+    """Draw a mechanism as SVG in the colours of the page, from a corner if it is spatial, otherwise from the front.
 
-    ``dimensions`` are lengths by what is written at them, (2, 3) each; ``span`` is what the picture is wide at least.
+    ``dimensions`` are the ends of lengths by label, (2, 3) each; ``span`` is the least width of the picture in length.
     """
     parts = [
         replace(one.part, joints={name: path + one.shift for name, path in one.part.joints.items()}) for one in placed
@@ -139,7 +139,7 @@ def sketch(
         lines.append(("measure", _line(at(ends))))
         _write(taken, 0.5 * (first[0] + second[0]), 0.5 * (first[1] + second[1]), words, "dimension")
     members = {part.member: part for part in reversed(parts)}
-    if names and len(members) > FEW:  # letters of so many joints would lie on each other
+    if names and len(members) > FEW:  # letters of this many joints would overlap
         for member, part in members.items():
             ((x, y),) = at(next(iter(part.joints.values()))[[pose]]).tolist()
             _write(taken, x, y, member, "name")
@@ -159,7 +159,7 @@ def _line(points: Array) -> str:
 
 
 def _write(taken: list[tuple[float, float, str, str]], x: float, y: float, words: str, kind: str) -> None:
-    """Write words near a place where they cover no others; what finds none, or stands there already, is left out."""
+    """Place words near a point without covering others; omit words without a free place, and repeated ones."""
     half = 0.5 * LETTER * len(words)
     if any(math.hypot(x - a, y - b) < 3 * LINE and words == other for a, b, other, _ in taken):
         return
@@ -173,7 +173,7 @@ def _write(taken: list[tuple[float, float, str, str]], x: float, y: float, words
 
 
 class Bar(NamedTuple):
-    """A bar with what it has, in words: its centre from its first joint, its inertia across and along it."""
+    """A bar with its mass data, in words: centre from its first joint, inertia across and along it."""
 
     name: str
     kind: str
@@ -184,7 +184,7 @@ class Bar(NamedTuple):
 
 
 def bars(data: Dataset) -> list[Bar]:
-    """Return the bars that have a mass, in the order of the mechanism."""
+    """Return the bars with a mass, in the order of the mechanism."""
     family, row = data.study.family, data.result
     rods = [name for name in family.parameter_names if f".{name}".rpartition(".")[2].startswith("rod_")]
     rods = [name for name in rods if row is not None and value_of(row, name) == 1.0]

@@ -22,15 +22,15 @@ if TYPE_CHECKING:
     from sweep.study import Limit, Study
 
 
-ACTIVE = 1e-5  # a limit is called active if the optimum is this near to it, relative to its size
+ACTIVE = 1e-5  # distance of the optimum from a limit, relative to its size, below which the limit is active
 
 
 @dataclass(frozen=True)
 class LimitState:
-    """One limit and where the result stands; ``state`` is "active", "met", "missed" or "unknown".
+    """One limit and the result's value; ``state`` is "active", "met", "missed" or "unknown".
 
-    ``value`` and ``reference`` are what the limit compares: a swing or stroke by its magnitude.
-    ``room`` is the distance to the limit relative to its size, negative where it is missed.
+    ``value`` and ``reference`` are the compared values: magnitudes of swing and stroke.
+    ``room`` is the distance to the limit relative to its size, negative if it is missed.
     """
 
     shown: Quantity
@@ -43,7 +43,7 @@ class LimitState:
 
 
 def limited(data: Dataset, name: str) -> Quantity:
-    """Return an output under a limit; a parameter keeps its own name."""
+    """Return the display form of a limited output; a parameter keeps its own name."""
     shown = data.shown(name)
     return replace(shown, symbol=name, words=name) if name in data.study.family.parameter_names else shown
 
@@ -51,7 +51,7 @@ def limited(data: Dataset, name: str) -> Quantity:
 def limit_state(
     limit: Limit, row: Row | None, reference: Row | None, shown: Quantity, active_names: frozenset[str]
 ) -> LimitState:
-    """Whether a design keeps a limit, and with how much room."""
+    """Return whether a design keeps a limit, and its distance from it."""
     value, other = value_of(row, limit.output), value_of(reference, limit.output)
     if is_flag(limit.output):
         words = {1.0: "yes", 0.0: "no"}
@@ -67,7 +67,7 @@ def limit_state(
     tolerance = ACTIVE * max(abs(bound), 1e-12)
     known = value_of(row, error_of(limit.output))
     if bound == 0.0 and known > tolerance:
-        tolerance = known  # no share of 0 says how near is near enough: the error of the value does
+        tolerance = known  # relative to a limit of 0 there is no size: use the error of the value
     if math.isnan(room):
         state = "unknown"
     elif room < -tolerance:
@@ -89,7 +89,7 @@ def limit_state(
 
 
 def bound_words(limit: Limit, shown: Quantity) -> str:
-    """Return ``at most 45°``, ``24.4 to 24.6 mm``."""
+    """Return a limit as ``at most 45°`` or ``24.4 to 24.6 mm``."""
     if is_flag(limit.output):
         return "must turn fully"
     if limit.minimum is not None and limit.maximum is not None:
@@ -102,27 +102,27 @@ def bound_words(limit: Limit, shown: Quantity) -> str:
 
 
 def limit_states(data: Dataset) -> list[LimitState]:
-    """Every limit of the study at the result of the study."""
+    """Return the state of every limit at the result of the study."""
     row = data.result
     active = frozenset(data.active)
     return [limit_state(x, row, data.reference, limited(data, x.output), active) for x in data.study.limits]
 
 
 def value_of(row: Row | None, name: str) -> float:
-    """Return a number of a row; nan where there is no row, or no number."""
+    """Return a number of a row; nan if there is no row or no number."""
     value = None if row is None else row.get(name)
     return math.nan if value is None else float(value)
 
 
 FEW = 3
-# What is this small beside the ends of its axis is the rounding of zero.
+# Relative to the ends of its axis, below which a value is rounding of zero.
 ROUNDING = 1e-12
-NOTHING = 1e-9  # of the longest length: what is shorter is none
+NOTHING = 1e-9  # share of the longest length below which a length is zero
 
 
 @dataclass(frozen=True)
 class OutputRow:
-    """One output of the result against the reference."""
+    """One output of the result, compared with the reference."""
 
     name: str
     symbol: str
@@ -136,7 +136,7 @@ class OutputRow:
 
 @dataclass(frozen=True)
 class ParameterRow:
-    """One parameter; ``space`` says what was searched, ``edge`` whether the result lies on the edge of it."""
+    """One parameter; ``space`` is its searched range, ``edge`` the end of it at which the result lies, if any."""
 
     name: str
     text: str
@@ -148,7 +148,7 @@ class ParameterRow:
 
 @dataclass(frozen=True)
 class Fate:
-    """How many designs ended with one status."""
+    """Number of designs with one status."""
 
     code: int
     text: str
@@ -157,7 +157,7 @@ class Fate:
 
 
 def output_rows(data: Dataset) -> list[OutputRow]:
-    """Wanted outputs in designer's units, the objective first."""
+    """Return the wanted outputs in designers' units, the objective first."""
     study = data.study
     objective = [data.objective.name] if data.objective is not None else []
     rows = []
@@ -181,7 +181,7 @@ def output_rows(data: Dataset) -> list[OutputRow]:
 
 
 def parameter_rows(data: Dataset, row: Row | None = None, digits: int = 6) -> list[ParameterRow]:
-    """All parameters of the mechanism with what was searched, of the result or another design."""
+    """Return all parameters of the result or another design, with their searched ranges."""
     study, rows = data.study, []
     row = data.result if row is None else row
     links = () if study.locus is None else study.locus.made
@@ -190,7 +190,7 @@ def parameter_rows(data: Dataset, row: Row | None = None, digits: int = 6) -> li
     for p in study.family.parameters:
         left_out = 0.0 if p.unless else p.default
         if p.name not in own and p.name in study.space.fixed and study.space.fixed[p.name] == left_out:
-            continue  # an input of an effect that the study left out
+            continue  # an input of an effect that the study does not use
         shown = quantity(p.name, data.units.get(p.name, {"length": "mm", "angle": "rad"}.get(p.unit, "1")))
         value, other = value_of(row, p.name), value_of(data.reference, p.name)
         space, edge = "fixed", ""
@@ -218,14 +218,14 @@ def parameter_rows(data: Dataset, row: Row | None = None, digits: int = 6) -> li
 
 
 def _few_values(study: Study, name: str) -> list[float] | None:
-    """Two or three listed values of an axis: to a sweep they are a choice, not a range."""
+    """Return the two or three listed values of an axis, which a sweep treats as a choice, or None."""
     axis = next((axis for axis in study.space.axes if axis.name == name), None)
     listed = "values" in study.written.get(name, {})
     return None if axis is None or axis.values is None or not listed or axis.count > FEW else axis.values.tolist()
 
 
 def fates(data: Dataset, found: Scan) -> list[Fate]:
-    """Return designs per status in the order in which the sweep finds out, the feasible ones last."""
+    """Return the number of designs per status in the order of the sweep's checks, feasible ones last."""
     counts = data.counts or found.counts
     total = max(sum(counts.values()), 1)
     order = [codes.INVALID_INPUT, codes.NOT_ADMISSIBLE, codes.NOT_ASSEMBLED, codes.NOT_ROTATABLE, codes.UNDECIDABLE]
@@ -243,7 +243,7 @@ def fates(data: Dataset, found: Scan) -> list[Fate]:
 
 
 def _by_limit(data: Dataset) -> list[tuple[str, int]]:
-    """Return the limits that designs miss, in words, those of the study file's order."""
+    """Return the missed limits in words, with their counts, in the order of the study file."""
     shown = [(limited(data, limit.output), limit) for limit in data.study.limits]
     return [
         (f"{quantity.words}: not {bound_words(limit, quantity)}", data.missed[limit.output])
@@ -253,12 +253,12 @@ def _by_limit(data: Dataset) -> list[tuple[str, int]]:
 
 
 def error_rows(data: Dataset, found: Scan) -> list[tuple[str, str, str, str]]:
-    """Symbol of every output, error estimate at the result, the largest one in the sweep, and that one relative."""
+    """Return symbol of every output, error at the result, largest error in the sweep, and largest relative error."""
     rows = []
     for name in data.study.want:
         error = f"err_{name}"
         if is_place(name) or is_flag(name):
-            continue  # an error relative to an angle's zero, or of a yes, says nothing
+            continue  # a relative error of an angle or of a flag is meaningless
         if error not in found.errors and math.isnan(value_of(data.result, error)):
             continue
         shown = quantity(error, data.units.get(error, data.units.get(name, "")))
@@ -275,7 +275,7 @@ def error_rows(data: Dataset, found: Scan) -> list[tuple[str, str, str, str]]:
 
 
 def provenance(data: Dataset) -> list[tuple[str, str]]:
-    """Return what made the dataset: enough to make it again."""
+    """Return the data needed to reproduce the dataset."""
     rows = [("study", data.study.name), ("fingerprint of the study", data.study.fingerprint)]
     rows += [(key, str(data.plan[key])) for key in ("code", "identity", "designs", "chunks") if key in data.plan]
     accuracy = data.study.accuracy
@@ -289,7 +289,7 @@ def provenance(data: Dataset) -> list[tuple[str, str]]:
 
 
 def run_rows(runs: tuple[dict[str, Any], ...]) -> list[tuple[str, str]]:
-    """Say when, on what and with which versions the last run was made, and how long all of them took."""
+    """Return time, machine and versions of the last run, and the total time of all runs."""
     starts = [run for run in runs if run.get("event") == "start"]
     if not starts:
         return []

@@ -1,4 +1,4 @@
-"""What ``sweep run`` ends with in the terminal: the answer in a few lines, and what to do next."""
+"""Final output of ``sweep run`` in the terminal: the answer in a few lines, and the next command."""
 
 from __future__ import annotations
 
@@ -32,12 +32,12 @@ if TYPE_CHECKING:
 
 OK, INFEASIBLE = 0, 4
 TURN = np.arange(360, dtype=np.float64) * (2.0 * math.pi / 360)
-LOOKED_AT = 1024  # designs of a space among which the nearest miss is sought where no optimiser has looked for it
+LOOKED_AT = 1024  # designs of a space among which the nearest miss is sought without an optimiser
 
 
 @dataclass(frozen=True)
 class Ending:
-    """Lines to print, the exit code (0, or 4 where no design keeps all limits), and the command that comes next."""
+    """Lines to print, exit code (0, or 4 if no design keeps all limits), and next command."""
 
     lines: tuple[str, ...]
     exit_code: int
@@ -45,7 +45,7 @@ class Ending:
 
 
 def ending(folder: Path) -> Ending:
-    """Answer of a complete dataset in a few lines.
+    """Return the answer of a complete dataset in a few lines.
 
     Parameters
     ----------
@@ -76,7 +76,7 @@ def ending(folder: Path) -> Ending:
         lines += _nearest_of_space(data.study, data) if missed else []
     if data.front_steps is not None:
         lines.append(f"warning: time ran out: {data.front_steps} steps of the front")
-    # No-break spaces keep values with their units on a page; a shell's tools look for plain ones.
+    # No-break spaces keep values with their units on a page; tools of a shell expect plain ones.
     lines = [line.replace("\u00a0", " ") for line in lines]
     return Ending(tuple(lines), INFEASIBLE if missed else OK, f"next: sweep report {shlex.quote(str(folder))}")
 
@@ -94,7 +94,7 @@ def _best_of_sweep(data: Dataset, feasible: int) -> str:
 
 
 def _column(path: Path, name: str) -> Any:
-    """Finite values of a column where the status is OK."""
+    """Return the finite values of a column in rows with status OK."""
     import pyarrow.parquet as pq
 
     table = pq.read_table(path, columns=[name, "status"])
@@ -122,24 +122,24 @@ def _optimum(data: Dataset) -> list[str]:
 
 
 def held_back(held: list[str], ended: str) -> str:
-    """Return what keeps an optimum from being better: limits and bounds, or how its search ended."""
+    """Name what limits the objective of an optimum: limits and bounds, or the ending of its search."""
     if ended == "looks":
         held = [*held, "the number of looks, which ended its search"]
     return "; ".join(held) or "nothing: an optimum in the open"
 
 
 def _nearest(data: Dataset) -> list[str]:
-    """Which limits the nearest design found misses, by how much."""
+    """Name the limits that the nearest design misses, with their relaxations."""
     assert data.optimum is not None
     residual = float(data.optimum.get("kkt_residual", math.nan))
-    # Only where the conditions of the smallest relaxation hold is what is missed the least that has to give way.
+    # Only if the optimality conditions of the smallest relaxation hold is the missing amount the smallest one.
     open_end = [] if residual <= KKT else ["the search did not settle there: less may have to give way than it says"]
     apart = _cannot_meet(data)
     return ["no design keeps all limits", *_give_way(data, data.optimum, "the nearest design found"), *apart, *open_end]
 
 
 def _cannot_meet(data: Dataset) -> list[str]:
-    """Which links meet at no crank angle, of the design whose links come nearest; nothing where all of them do."""
+    """Name the links that meet at no crank angle, for the design that comes nearest; empty if all links meet."""
     import pyarrow.parquet as pq
 
     family, loops = data.study.family, data.study.family.every(Assembly)
@@ -151,7 +151,7 @@ def _cannot_meet(data: Dataset) -> list[str]:
         poses = family.poses(
             designs, Angles.of(np.asarray(TURN[None, :], np.float64)), frozenset(loop.discriminant for loop in loops)
         )
-        # Of a stage behind one that does not meet nothing is known.
+        # A stage behind one that does not assemble has unknown margins.
         reach = [np.max(poses[x.discriminant] / np.reshape(x.scale(designs), (-1, 1)), axis=1) for x in loops]
     nearest = int(np.argmax(np.nanmin(np.nan_to_num(reach, nan=math.inf), axis=0)))
     lines = []
@@ -167,7 +167,7 @@ def _cannot_meet(data: Dataset) -> list[str]:
 
 
 def _nearest_of_space(study: Study, data: Dataset) -> list[str]:
-    """Nearest miss among some designs of the space; where there are no limits, what most designs fail by."""
+    """Describe the nearest miss among designs of the space, or without limits the most frequent failure."""
     if not study.limits:
         status, count = max(((s, n) for s, n in data.counts.items() if s != codes.OK), key=lambda item: item[1])
         return [f"no design has all that is wanted; {count} of {data.designs}: {meaning(status)}"]
@@ -210,7 +210,7 @@ def _give_way(data: Dataset, row: Mapping[str, Any], who: str) -> list[str]:
 
 
 def _shortfall(limit: Limit, values: Any) -> tuple[Any, Any]:
-    """By how much values miss a limit, in their unit and relative to the bound; what does not exist misses by far."""
+    """Return the violation of a limit, in its unit and relative to its bound; large for missing values."""
     x = compared(limit.output, np.asarray(values, np.float64))
     low = -math.inf if limit.minimum is None else limit.minimum
     high = math.inf if limit.maximum is None else limit.maximum

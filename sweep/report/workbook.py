@@ -1,4 +1,4 @@
-"""A dataset as an Excel workbook: its best designs, its optimum, one turn of it, and what each column means."""
+"""A dataset as an Excel workbook: its best designs, its optimum, one turn of it, and the definitions of columns."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from sweep.report.quantities import quantity
 if TYPE_CHECKING:
     import pandas as pd
 
-MOST_ROWS = 10_000  # of designs: a sheet holds 1 048 576, but nobody scrolls through them, and 100 000 take minutes
+MOST_ROWS = 10_000  # designs: a sheet holds 1 048 576, but 100 000 take minutes to write
 
 
 def write_workbook(folder: str | Path, path: str | Path) -> Path:
@@ -23,20 +23,20 @@ def write_workbook(folder: str | Path, path: str | Path) -> Path:
 
     Parameters
     ----------
-    folder : what ``sweep run`` wrote
-    path : a file ending in .xlsx
+    folder : folder that ``sweep run`` has written
+    path : path of a file ending in .xlsx
 
     Returns
     -------
     Path
-        the file, with the sheets ``designs`` (within all limits, the best first where the study has an objective, at
-        most 10 000), ``optimum`` and ``curves`` (one turn, where the study optimises) and ``definitions``.  Headings
-        carry units; angles are in degrees, lengths in mm.
+        the file, with the sheets ``designs`` (within all limits, the best first if the study has an objective, at
+        most 10 000), ``optimum`` and ``curves`` (one turn, if the study optimises) and ``definitions``.  Headings
+        contain units; angles are in degrees, lengths in mm.
 
     Raises
     ------
     InputError
-        for another ending, a folder that is no complete dataset, or where openpyxl is not installed
+        for another ending, a folder that is no complete dataset, or if openpyxl is not installed
         (``pip install 'linksweep[excel]'``).
     StoreError
         if the file cannot be written.
@@ -73,19 +73,19 @@ def _designs(data: Dataset) -> pd.DataFrame:
 
 
 def _headed(data: Dataset, frame: pd.DataFrame) -> pd.DataFrame:
-    """Convert a table to the units that are shown, and put these into its headings."""
+    """Convert a table to displayed units, and add the units to its headings."""
     shown = {
         name: quantity(name, data.units[name])
         for name in map(str, frame.select_dtypes("number"))
         if data.units.get(name)
     }
-    # The heading is the name that the dataset has: what is made large stays the negative that it is there.
+    # The heading is the dataset's name: a maximised output stays the negative that it is there.
     scaled = {name: frame[name] * abs(of.factor) for name, of in shown.items() if abs(of.factor) != 1.0}
     return frame.assign(**scaled).rename(columns={n: f"{n} [{of.unit}]" for n, of in shown.items() if of.unit})
 
 
 def _definitions(data: Dataset, sheets: dict[str, pd.DataFrame]) -> pd.DataFrame:
-    """Tell what each column of the sheets is, and in which unit."""
+    """Return definition and unit of every column of the sheets."""
     import pandas as pd
 
     names = list(dict.fromkeys(str(name) for frame in sheets.values() for name in frame))
