@@ -45,6 +45,7 @@ MOTOR = Parameter(
     not_negative=True,
 )  # fmt: skip
 
+FINEST = GRIDS + FINER
 RUBBING = (129, *FINER[1:])  # friction has kinks where the follower turns back: few designs end on the first grid
 LEFT_OF_CURVE = 1e-4  # and of a curve: more than this is a jump, beside which a series overshoots
 ROUNDED = 1024.0 * EPS  # of speed^2 that rounding makes of no acceleration; seen 324
@@ -101,44 +102,51 @@ def samples(grid: Scene) -> tuple[Array, Array]:
     return inertia + grid.inputs["flywheel"][:, None], 0.5 * slope * speed * speed - drive
 
 
-def _grids(scene: Scene, rubs: bool) -> tuple[int, ...]:
-    if rubs:
-        return RUBBING
-    bent = bool(scene.every_curve) or bool(scene.family.every(Switches)) or _late(scene).any()
-    return GRIDS + FINER if bent else GRIDS
-
-
 def _late(scene: Scene) -> NDArray[np.bool_]:
     """Which designs need finer grids than most, as their tool pierces or their planet turns fast."""
     late: NDArray[np.bool_] = scene.least_samples > GRIDS[-1]
     return late
 
 
-def _apart(scene: Scene, run: Callable[[Scene], Columns]) -> Columns:
-    """Solve designs that need finer grids by themselves."""
-    late = _late(scene)
-    groups = [rows for rows in (np.flatnonzero(~late), np.flatnonzero(late)) if rows.size]
-    parts = [run(scene.only(rows)) for rows in groups] or [run(scene)]
-    if len(parts) == 1:
-        return parts[0]
-    order = np.argsort(np.concatenate(groups))
-    return {name: np.concatenate([part[name] for part in parts])[order] for name in parts[0]}
+def _bent(scene: Scene) -> NDArray[np.bool_]:
+    """Which designs take finer grids from the beginning: besides late ones all whose loads or motion have kinks."""
+    kinks = bool(scene.every_curve) or bool(scene.family.every(Switches))
+    return _late(scene) | kinks
 
 
-def _solved(scene: Scene, phi: Array, rubs: bool) -> tuple[dict[str, Array], Status, tuple[int, ...]]:
-    """Numbers and curves at phi by their names, the status, and the grids that were tried."""
-    grids = _grids(scene, rubs)
+def _refined(scene: Scene, rubs: bool, run: Callable[[Scene, tuple[int, ...]], Columns]) -> Columns:
+    """Run on coarse grids, and for designs that these do not suit, and outputs they do not resolve, on finer ones."""
+    if rubs:
+        return run(scene, RUBBING)
+    bent = _bent(scene)
+    found = run(scene, FINEST if bent.all() else GRIDS)
+    unresolved = (found["status"] == st.NOT_CONVERGED).reshape(len(bent), -1).any(axis=1)
+    again = np.flatnonzero(bent | unresolved)
+    if bent.all() or not again.size:
+        return found
+    finer = run(scene.only(again), FINEST)
+    # An output that the coarse grids resolve keeps its bits, whatever is asked beside it.
+    lost = {name: np.isnan(x[again]) for name, x in found.items() if not name.startswith("err_")}
+    lost["status"] = np.ones(found["status"][again].shape, np.bool_)
+    for name, x in found.items():
+        of = bent[again].reshape(-1, *[1] * (x.ndim - 1)) | lost[name.removeprefix("err_")]
+        x[again] = np.where(of, finer[name], x[again])
+    return found
+
+
+def _solved(scene: Scene, phi: Array, rubs: bool, grids: tuple[int, ...]) -> tuple[dict[str, Array], Status]:
+    """Numbers and curves at phi by their names, and the status."""
     found, status = on_finer_grids(scene, phi, grids, partial(_solve, rubs, grids[-1]))
-    return {f"{name}{SUFFIX[rubs]}": x for name, x in found.items()}, status, grids
+    return {f"{name}{SUFFIX[rubs]}": x for name, x in found.items()}, status
 
 
 def compute(scene: Scene, wanted: frozenset[str], rubs: bool = False) -> Columns:
     """Speed and acceleration of the crank at the wanted angles."""
-    return _apart(scene, partial(_compute, wanted=wanted, rubs=rubs))
+    return _refined(scene, rubs, partial(_compute, wanted=wanted, rubs=rubs))
 
 
-def _compute(scene: Scene, wanted: frozenset[str], rubs: bool) -> Columns:
-    found, status, _ = _solved(scene, scene.angles.phi, rubs)
+def _compute(scene: Scene, grids: tuple[int, ...], wanted: frozenset[str], rubs: bool) -> Columns:
+    found, status = _solved(scene, scene.angles.phi, rubs, grids)
     change = f"crank_acceleration{SUFFIX[rubs]}"
     if change in wanted:
         speed, even = (found[f"{name}{SUFFIX[rubs]}"] for name in ("crank_speed", "even_torque"))
@@ -163,12 +171,12 @@ def _balanced(scene: Scene, speed: Array, change: Array, even: Array, rubs: bool
 
 def turn(scene: Scene, wanted: frozenset[str], accuracy: Accuracy, rubs: bool = False) -> Columns:
     """Unevenness, extreme speeds and the reductions of speed and acceleration."""
-    return _apart(scene, partial(_turn, wanted=wanted, rubs=rubs))
+    return _refined(scene, rubs, partial(_turn, wanted=wanted, rubs=rubs))
 
 
-def _turn(scene: Scene, wanted: frozenset[str], rubs: bool) -> Columns:
-    finest, suffix = _grids(scene, rubs)[-1], SUFFIX[rubs]
-    found, status, grids = _solved(scene, scene.on_grid(finest).angles.phi, rubs)
+def _turn(scene: Scene, grids: tuple[int, ...], wanted: frozenset[str], rubs: bool) -> Columns:
+    suffix = SUFFIX[rubs]
+    found, status = _solved(scene, scene.on_grid(grids[-1]).angles.phi, rubs, grids)
     columns: Columns = {f"{name}{suffix}": found[f"{name}{suffix}"] for name in ("unevenness", "fastest", "slowest")}
     one, fastest = np.ones(len(scene.designs)), found[f"fastest{suffix}"]
     known = found[f"energy_error{suffix}"]
