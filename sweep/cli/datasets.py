@@ -97,7 +97,7 @@ def merge(study: Path, out: Path | None, smoke: bool) -> None:
 
 
 def _folder(study: Path, out: Path | None, smoke: bool) -> Path:
-    """Folder that `sweep run` would take."""
+    """Return the folder that `sweep run` uses."""
     if out is not None:
         return out
     return Path("results", *(["smoke"] if smoke else []), load_study(study, smoke=smoke).name, DESIGNS)

@@ -26,12 +26,12 @@ Rows: TypeAlias = list[tuple[str, str, str]]  # names, unit, definition
 COMPONENT = re.compile(r"_[xyz]{1,2}$")  # of a vector or a tensor
 OF_COMPONENT = re.compile(r"^(?:magnitude|[xyz]): |: entry of the tensor, - integral [xyz] [xyz] dm")
 ALONG = re.compile(r" along [xyz](?= of the fixed axes)")
-OF_PLACE = rf"(?:[123]?(?:{FRICTION_SUFFIX})?|_[xyz]{{1,2}})"  # what a name has behind that of a link or joint
+OF_PLACE = rf"(?:[123]?(?:{FRICTION_SUFFIX})?|_[xyz]{{1,2}})"  # suffix of a name behind that of a link or joint
 REDUCED = re.compile(r"(?:(?:phi_)?(?:max_abs|max|min)|range|rms)_(?P<pose>.+)")
 
 
 def complete_effects(context: click.Context, parameter: click.Parameter, incomplete: str) -> list[str]:
-    """Complete an effect."""
+    """Complete the name of an effect."""
     return [name for name in NAMES if name.startswith(incomplete)]
 
 
@@ -64,7 +64,7 @@ def cost_words(entry: Effect) -> str:
 
 
 def chain_words(entry: Effect) -> str:
-    """Return which stages of a chain the effect can be asked of."""
+    """Return the stages of a chain for which the effect is available, in words."""
     stages = "the first stage" if entry.even_crank else "any stage"
     return f"{stages}; the load of the stages behind it enters" if entry.takes_load else stages
 
@@ -96,7 +96,7 @@ def _output_rows(outputs: Iterable[Output]) -> Rows:
 
 
 def _design_rows(entry: Effect) -> Rows:
-    """Return outputs per design, but for reductions of outputs per pose."""
+    """Return the outputs per design, except reductions of outputs per pose."""
     poses = {o.name for o in entry.outputs}
     reduced = {o for o in entry.design_outputs if (found := REDUCED.fullmatch(o.name)) and found["pose"] in poses}
     return _output_rows(o for o in entry.design_outputs if o not in reduced)
@@ -107,11 +107,11 @@ def _input_rows(inputs: Iterable[Parameter]) -> Rows:
 
 
 def joined(rows: Iterable[tuple[str, str, str, str]]) -> Rows:
-    """Make one row of the components of a vector or a tensor, which stand one below the other.
+    """Merge the components of a vector or a tensor, which are consecutive rows, into one row.
 
     Parameters
     ----------
-    rows : name, unit, definition and what is said behind it
+    rows : name, unit, definition and note of each component
     """
 
     def vector(row: tuple[str, str, str, str]) -> tuple[str, str, str]:
@@ -134,18 +134,18 @@ def joined(rows: Iterable[tuple[str, str, str, str]]) -> Rows:
 
 
 def input_notes(p: Parameter) -> str:
-    """Return what an input may be, and what it is where it is left out."""
+    """Describe the range of an input, and its default."""
     notes = [p.sign] if p.sign else []
     return ", ".join([*notes, f"{p.default:g} if left out" if p.default is not None else "required"])
 
 
 def every_input(entry: Effect) -> tuple[Parameter, ...]:
-    """Return inputs of an effect for whatever family, those of a tool behind its own."""
+    """Return the inputs of an effect for any family, those of a tool after its own."""
     return tuple(dict.fromkeys((*entry.inputs, *(p for tool in entry.tool_inputs for p in tool))))
 
 
 def grouped(entries: Iterable[Effect]) -> list[list[Effect]]:
-    """Gather the effects that are one and the same for several families: same equations, same reason to ask for it."""
+    """Group the effects that are the same for several families, with equal equations and equal criteria."""
     groups: dict[tuple[object, ...], list[Effect]] = {}
     for entry in entries:
         groups.setdefault((entry.formulas, entry.called_for, entry.negligible), []).append(entry)
@@ -153,14 +153,14 @@ def grouped(entries: Iterable[Effect]) -> list[list[Effect]]:
 
 
 def heading(group: Sequence[Effect]) -> str:
-    """Return the words that the names of a group end with, or all its names."""
+    """Return the common last words of the names of a group, or all its names."""
     names = [entry.name.split("_")[::-1] for entry in group]
     alike = takewhile(lambda words: len(set(words)) == 1, zip(*names, strict=False))
     return "_".join([words[0] for words in alike][::-1]) or ", ".join(entry.name for entry in group)
 
 
 class Place(NamedTuple):
-    """A link, ``B``, or a joint, ``J``, of a tree of links: its kind, name and words, and those of any such place."""
+    """A link, ``B``, or a joint, ``J``, of a link tree: its kind, name and words, and patterns for any such place."""
 
     sign: str
     kind: str
@@ -170,7 +170,7 @@ class Place(NamedTuple):
 
 
 def places(tree: LinkTree) -> list[Place]:
-    """Return the links and the joints of a tree."""
+    """Return the links and the joints of a link tree."""
     rods, found = rods_of(tree), list[Place]()
     for k, b in enumerate(tree.bodies):
         kind = "slender" if b.slender else "rod" if k in rods else "compact"
@@ -184,7 +184,7 @@ def places(tree: LinkTree) -> list[Place]:
 
 
 def _generalised(tree: LinkTree, row: tuple[str, str, str]) -> tuple[str, str, tuple[str, str, str]] | None:
-    """Return sign and kind of the place that a row is about, and the row about any; None where it is about none."""
+    """Return sign and kind of a row's link or joint, and the row for any of them; None for a row about none."""
     for place in places(tree):
         name = re.sub(rf"_{place.name}(?={OF_PLACE}(?:,|$))", f"_{place.sign}", row[0], count=1)
         text = row[2]
@@ -196,7 +196,7 @@ def _generalised(tree: LinkTree, row: tuple[str, str, str]) -> tuple[str, str, t
 
 
 def of_any_place(trees: Sequence[LinkTree], tables: Sequence[Rows]) -> tuple[Rows, list[Rows]]:
-    """Return the rows that all links or joints of some kinds have, for any of them, and the other rows of each tree."""
+    """Return the rows that all links or joints of some kinds share, in general form, and each tree's other rows."""
     every = Counter((place.sign, place.kind) for tree in trees for place in places(tree))
     found = [[_generalised(tree, row) for row in table] for tree, table in zip(trees, tables, strict=True)]
     kinds: dict[tuple[str, tuple[str, str, str]], Counter[str]] = {}
@@ -219,10 +219,10 @@ def of_any_place(trees: Sequence[LinkTree], tables: Sequence[Rows]) -> tuple[Row
 
 
 def parts(group: Sequence[Effect]) -> list[tuple[str, list[str], Rows]]:
-    """Return the tables of a group: their columns, of which effects (empty: of all), and the rows.
+    """Return the tables of a group: columns, names of the effects (empty for all), and rows.
 
-    Inputs that an effect has from one that it needs are not said again.  What several effects have is one table, what
-    all links or joints of trees of links have is one row.
+    Inputs that an effect takes from one that it needs are not repeated.  Rows of several effects form one table, rows
+    of all links or joints of link trees are merged into one.
     """
     known = [{p for name in entry.needs for p in every_input(effect(name))} for entry in group]
     kinds = {
@@ -253,7 +253,7 @@ def parts(group: Sequence[Effect]) -> list[tuple[str, list[str], Rows]]:
 
 
 def page() -> str:
-    """Return docs/effects.md, made from the register."""
+    """Return docs/effects.md, generated from the register."""
     entries = [effect(name) for name in NAMES]
     return str(
         rendered(

@@ -31,7 +31,7 @@ def explore(source: str, port: int, opened: bool) -> None:
     """
     hand = in_hand(source)
     server = Server(hand, port)
-    hand.answer([hand.first], [""])  # compiles what the page will ask for
+    hand.answer([hand.first], [""])  # compiles the kernels for the page's first request
     click.echo(f"explore: {server.address}\nCtrl-C ends it")
     if opened:
         click.launch(server.address)
@@ -42,7 +42,7 @@ def explore(source: str, port: int, opened: bool) -> None:
 
 
 def in_hand(source: str) -> Hand:
-    """Return what a study file, a folder of results or a family's name stand for."""
+    """Return the design of a study file, a folder of results or a family's name."""
     path = Path(source)
     if path.is_dir() and (beside(located(path)) / PLAN).exists():
         return of_results(path)

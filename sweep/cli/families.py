@@ -1,4 +1,4 @@
-"""The verb ``families``, and what shells complete: families, chains of them, outputs."""
+"""The verb ``families``, and shell completion of families, chains and outputs."""
 
 from __future__ import annotations
 
@@ -39,27 +39,27 @@ CAPABILITIES = (
 
 
 def family_names(text: str) -> str | list[str]:
-    """Family of ``rssr``, or the families of a chain: ``rssr+guide`` or ``rssr,guide``."""
+    """Return the family of ``rssr``, or the families of a chain: ``rssr+guide`` or ``rssr,guide``."""
     names = chain_names(text)
     return list(names) if len(names) > 1 else names[0]
 
 
 def complete_families(context: click.Context, parameter: click.Parameter, incomplete: str) -> list[str]:
-    """Complete a family, behind a + the next stage of a chain."""
+    """Complete a family, and after a + the next stage of a chain."""
     before, plus, last = incomplete.rpartition("+")
     return [f"{before}{plus}{name}" for name in NAMES if name.startswith(last)]
 
 
 def complete_outputs(context: click.Context, parameter: click.Parameter, incomplete: str) -> list[str]:
-    """Complete an output of the FAMILY given before, behind a comma the next one."""
-    # Where an option still lacks its value, click leaves the arguments before it unread.
+    """Complete an output of the FAMILY given before, and after a comma the next one."""
+    # If an option still lacks its value, click leaves the arguments before it unread.
     given = context.params.get("family") or next(iter(context.args), None)
     if given is None:
         return []
     try:
         entry = family(family_names(given))
     except LinksweepError:
-        return []  # a misspelt family is said when the command runs
+        return []  # a misspelt family is reported when the command runs
     names = list(entry.pose_names) if context.command.name == "eval" else main_outputs(entry)
     before, comma, last = incomplete.rpartition(",")
     return [f"{before}{comma}{name}" for name in names if name.startswith(last)]
@@ -80,18 +80,18 @@ def families(name: str | None) -> None:
 
 
 def over(family: Family) -> str:
-    """Say in a word or two over what a family is evaluated."""
+    """Name the domain over which a family is evaluated."""
     domain = family.domain
     return domain.kind if domain.kind != "interval" else f"interval of {domain.name}"
 
 
 def capability_words(family: Family) -> list[str]:
-    """List in words what a family offers besides its motion."""
+    """List in words the capabilities of a family besides its motion."""
     return [*(word for kind, word in CAPABILITIES if family.find(kind) is not None), *["points"] * bool(family.points)]
 
 
 def describe(family: Family) -> list[str]:
-    """Parameters, pose outputs and design outputs of a family with their units, one per line."""
+    """Return parameters, pose outputs and design outputs of a family with their units, one per line."""
     words = ", ".join(capability_words(family))
     points = ", ".join(family.points)
     outputs = [output(family, name) for name in main_outputs(family)]
@@ -108,14 +108,14 @@ def describe(family: Family) -> list[str]:
 
 
 def described(p: Parameter, default: str = "", left_out: str = "") -> str:
-    """Say what a parameter is and may be; a value that it has if left out stands between two words."""
+    """Describe a parameter and its range; a default is put between the texts ``default`` and ``left_out``."""
     notes = [p.sign, p.choice if p.choices else "", "" if p.default is None else f"{default}{p.default:g}{left_out}"]
     told = ", ".join(filter(None, notes))
     return f"{p.text} ({told})" if told else p.text
 
 
 def main_outputs(family: Family) -> list[str]:
-    """Design outputs of a family; of the reductions of its pose outputs only those a designer asks for first."""
+    """Return the design outputs of a family, with only the main reductions of its pose outputs."""
     if isinstance(family, Machine):
         members = [f"{m.name}.{name}" for m in family.members for name in main_outputs(m.family)]
         between = [f"min_{o.name}" for r in family.relations for o in r.outputs[:1]] + [t.name for t in family.timings]
@@ -129,7 +129,7 @@ def main_outputs(family: Family) -> list[str]:
 
 
 def aligned(rows: Iterable[Sequence[str]]) -> list[str]:
-    """Rows of words as indented lines with aligned columns."""
+    """Return rows of words as indented lines with aligned columns."""
     table = [tuple(row) for row in rows]
     if not table:
         return []

@@ -1,4 +1,4 @@
-"""The text of a first study of a mechanism or a machine: its own example, swept in two, every table explained."""
+"""Text of a first study of a mechanism or a machine: its example, with two parameters swept, every table explained."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from sweep.families.names import is_flag, parts, stem
 from sweep.pages import rendered
 from sweep.study.toml import design_entries, toml
 
-# Units of the examples by unit word.  Those with forces or masses are in SI, the others in any length unit.
+# Units of the examples by unit word: those with forces or masses are in SI, the others in any length unit.
 SI = {
     "length": "m", "1/length": "1/m", "mass": "kg", "line_mass": "kg/m", "inertia": "kg*m^2", "force": "N",
     "torque": "N*m", "pressure": "N/m^2", "stiffness": "N/m", "damping": "N*s/m", "acceleration": "m/s^2",
@@ -23,20 +23,20 @@ SI = {
 LENGTHS = {"length": "mm", "1/length": "1/mm"}
 POWER = {"length": 1, "1/length": -1}
 OTHERS = {"speed": "rad/s", "angular_acceleration": "rad/s^2", "time": "s", "angle": "deg"}
-SPREAD, COUNT = 0.05, 5  # of the swept parameters: part of the example's value to either side, values
+SPREAD, COUNT = 0.05, 5  # swept range on either side, relative to the example's value, and number of values
 SWEPT = 2
 APART = 10  # mm between the frames of two members, along z
-OF_EACH = 2  # outputs of a member that are asked for
-LEAST_SIZE = 20.0  # mm, of the longest dimension of what stands in a machine
+OF_EACH = 2  # wanted outputs per member
+LEAST_SIZE = 20.0  # mm, least length of a member's longest dimension
 FIRST = ("swing", "stroke", "margin", "max_pressure_angle", "dwell_angle", "dwell_deviation")
 FEWEST_WANTED, MOST_WANTED = 3, 5
 WIDTH = 56  # column of the explanations
 
 
 def study_text(name: str, family: Family, schema: str, drawn: Mapping[str, float] | None = None) -> str:
-    """Return a study.toml that passes `sweep check`; ``schema`` is where its JSON schema lies, seen from the file.
+    """Return a study.toml that passes `sweep check`; ``schema`` is the path of its JSON schema, relative to the file.
 
-    With the design of a drawing [mm, rad] it is about that design, and the design is its reference.
+    With a design read from a drawing [mm, rad] the study is about that design, which is also its reference.
     """
     if isinstance(family, Machine):
         return _machine_text(name, family, schema)
@@ -60,7 +60,7 @@ def study_text(name: str, family: Family, schema: str, drawn: Mapping[str, float
 
 
 def smoke_text(family: Family) -> str:
-    """Return the text of the tiny version of the study."""
+    """Return the text of the study's tiny version."""
     few = {"count": 2}
     design: dict[str, Any] = dict.fromkeys(swept_names(family), few)
     if isinstance(family, Machine):
@@ -70,7 +70,7 @@ def smoke_text(family: Family) -> str:
 
 
 def _machine_text(name: str, machine: Machine, schema: str) -> str:
-    """Return the study of several mechanisms on one shaft, a dimension of two of them swept."""
+    """Return the study of several mechanisms on one shaft, with one dimension of two of them swept."""
     wanted = {m.name: wanted_outputs(m.family)[-OF_EACH:] for m in machine.members}
     members = {
         m.name: {
@@ -100,13 +100,13 @@ def _machine_text(name: str, machine: Machine, schema: str) -> str:
 
 
 def _swept_of(machine: Machine, member: str) -> list[str]:
-    """Return what is swept of a member: a dimension each of the first two."""
+    """Return the swept parameters of a member: one dimension for each of the first two members."""
     families = {m.name: m.family for m in machine.members[:2]}
     return swept_names(families[member])[:1] if member in families else []
 
 
 def _relations(machine: Machine) -> list[tuple[str, str]]:
-    """Entries and the output of each: a distance where two neighbours have points, and their timing."""
+    """Return relations and their outputs: a distance between neighbours with points, and the timing of neighbours."""
     found = []
     for one, other in pairwise(machine.members):
         points = [f"{m.name}.{m.points[-1]}" for m in (one, other) if m.points]
@@ -118,7 +118,7 @@ def _relations(machine: Machine) -> list[tuple[str, str]]:
 
 
 def _place(family: Family) -> str:
-    """Crank angle at which the family's output is largest; of what turns on and on, its acceleration."""
+    """Return the crank angle of the family's largest output, or of its largest acceleration if the follower turns."""
     turns = any(name.startswith("dwell_") for name in wanted_outputs(family))
     return f"phi_max_abs_d2{family.position}" if turns else f"phi_max_{family.position}"
 
@@ -134,11 +134,11 @@ def mechanism_line(family: Family) -> str:
 
 
 def wanted_outputs(family: Family) -> list[str]:
-    """List what a designer asks first: size of the motion, pressure angle, greatest acceleration; else any output."""
-    # Of a chain first what it does as a whole, then the stages.
+    """Return the main outputs: size of the motion, pressure angle, largest acceleration; otherwise any outputs."""
+    # For a chain the outputs of the whole come first, then those of the stages.
     offered = sorted((name for name in main_outputs(family) if not is_flag(name)), key=lambda name: parts(name).stage)
     dwells = [name for name in offered if parts(name).stem.startswith("dwell_")]
-    if dwells:  # what turns on and on has no limit positions
+    if dwells:  # a follower with full turns has no limit positions
         offered = dwells + [name for name in offered if parts(name).stem not in (*FIRST, "stroke_ratio")]
     bends = [name for name in offered if name.startswith("max_abs_d2")][:1]
     first = [name for name in offered if parts(name).stem in FIRST][: MOST_WANTED - len(bends)]
@@ -147,7 +147,7 @@ def wanted_outputs(family: Family) -> list[str]:
 
 
 def swept_names(family: Family) -> list[str]:
-    """Return the first two dimensions: lengths that are not zero, or any numbers where there are none."""
+    """Return the first two swept dimensions: lengths that are not zero, or numbers if there are none."""
     example = family.example
     usable = [p for p in family.parameters if p.choices is None and example.get(p.name)]
     lengths = [p.name for p in usable if p.unit == "length"]
@@ -157,7 +157,7 @@ def swept_names(family: Family) -> list[str]:
 def design_lines(family: Family, swept: list[str], drawn: Mapping[str, float] | None = None) -> Iterator[str]:
     """Yield every parameter with its meaning: ``swept`` ones as ranges, those with a default as comments.
 
-    Values are those of the example, or of a design that was ``drawn`` [mm, rad].
+    Values are those of the example, or of a design ``drawn`` [mm, rad].
     """
     example = family.example if drawn is None else drawn
     given = {p.unit for p in family.parameters}
@@ -166,7 +166,7 @@ def design_lines(family: Family, swept: list[str], drawn: Mapping[str, float] | 
     scale = 1.0 if si or drawn is not None else _scale(family, example)
     for p in family.parameters:
         value = example.get(p.name, p.default)
-        assert value is not None  # an example has every parameter that must be given
+        assert value is not None  # an example has every required parameter
         unit = units.get(p.unit, "")
         shown = math.degrees(value) if unit == "deg" else value * scale ** POWER.get(p.unit, 0)
         if p.name in swept:
@@ -180,7 +180,7 @@ def design_lines(family: Family, swept: list[str], drawn: Mapping[str, float] | 
 
 
 def _scale(family: Family, example: Mapping[str, float]) -> float:
-    """Return the power of ten by which the example, which is in any unit, becomes as large as a machine's."""
+    """Return the power of ten that scales the example, which has any unit, to the size of a machine."""
     longest = max((abs(example.get(p.name, 0.0)) for p in family.parameters if p.unit == "length"), default=0.0)
     return 10.0 ** max(0, math.ceil(math.log10(LEAST_SIZE / longest))) if longest else 1.0
 

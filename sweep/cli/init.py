@@ -1,4 +1,4 @@
-"""The verbs of the first minutes: init, schema."""
+"""The verbs init and schema."""
 
 from __future__ import annotations
 
@@ -95,7 +95,7 @@ def init(
 
 
 def _write(folder: Path, files: dict[str, str]) -> None:
-    """Make a folder, which must not be there yet, with files."""
+    """Create a folder, which must not exist, with files."""
     if folder.exists():
         raise InputError("NAME", folder.name, f"a folder that is not there yet; {folder} is", "command line")
     with unwritable(folder):
@@ -105,7 +105,7 @@ def _write(folder: Path, files: dict[str, str]) -> None:
 
 
 def _machine(members: tuple[str, ...]) -> Machine | None:
-    """Return the machine of NAME=FAMILY texts; None where there are none."""
+    """Return the machine of NAME=FAMILY texts, or None without any."""
     found: dict[str, str | list[str]] = {}
     for text in members:
         name, _, family = text.partition("=")
@@ -128,7 +128,7 @@ def schema() -> None:
 
 
 def schema_text() -> str:
-    """Return the schema as it stands in a file."""
+    """Return the JSON schema as the text of a file."""
     return json.dumps(study_schema(), indent=1, ensure_ascii=False) + "\n"
 
 

@@ -1,4 +1,4 @@
-"""The verbs about compiled kernels: warm makes them before they are needed, cache clear removes them."""
+"""The verbs about compiled kernels: warm compiles them in advance, cache clear removes them."""
 
 from __future__ import annotations
 
@@ -33,10 +33,10 @@ WHOLE_STROKE = (0.0, 1.0)
 
 
 class Part(NamedTuple):
-    """What one process compiles at a time.
+    """Unit of work that one process compiles.
 
-    Of a study it is the step of a number, without one all that is left of it; of a family some outputs, without any
-    its poses.
+    For a study it is the step of a number, or without one everything after the steps; for a family some outputs, or
+    without any its poses.
     """
 
     of: str
@@ -46,12 +46,12 @@ class Part(NamedTuple):
 
 @dataclass(frozen=True)
 class Compile:
-    """Compiles a part by its number, as a worker does it."""
+    """Compile a part by its number, in a worker."""
 
     parts: tuple[Part, ...]
 
     def __call__(self, number: int, should_stop: Callable[[], bool]) -> str:
-        """Compile or load the kernels of the part, on a few designs; returns what it belongs to."""
+        """Compile or load the kernels of the part, on a few designs; return the name of its study or family."""
         part = self.parts[number]
         if not Path(part.of).exists():
             _compile_family(find_family(part.of), part.outputs)
@@ -69,7 +69,7 @@ def _study(file: str) -> Study:
 
 
 def _compile_family(family: Family, outputs: Sequence[str]) -> None:
-    """Compile a family's design outputs, or its poses where none are named."""
+    """Compile a family's design outputs, or its poses if none are named."""
     designs = np.array([[family.example.get(p.name, p.default) for p in family.parameters]], np.float64)
     if outputs:
         design_outputs(family, designs, outputs, _accuracy(family), WHOLE_STROKE)
@@ -84,14 +84,14 @@ def _accuracy(family: Family) -> Accuracy:
 
 
 def rounds(what: Sequence[str]) -> tuple[list[Part], list[Part]]:
-    """Return the parts of studies and families: those that processes share first, then what is left of each study.
+    """Return the parts of studies and families: those that processes share first, then the rest of each study.
 
-    What is left is found by running the tiny version: the optimiser, the front, the proof.
+    The rest are the optimiser, the front and the proof, compiled by running the tiny version.
 
     Raises
     ------
     InputError
-        for what is neither a study nor a family.
+        for a name that is neither a study nor a family.
     """
     first: list[Part] = []
     then: list[Part] = []
@@ -110,12 +110,12 @@ def rounds(what: Sequence[str]) -> tuple[list[Part], list[Part]]:
 
 
 def compile_parts(parts: Sequence[Part], jobs: int, stop: Stop, advance: Callable[[int], None]) -> None:
-    """Compile parts in as many processes; ``advance`` is called with 1 as each is ready.
+    """Compile parts in ``jobs`` processes; ``advance`` is called with 1 after each part.
 
     Raises
     ------
     Interrupted
-        if a signal came; what is compiled is kept.
+        if a signal came; compiled kernels are kept.
     """
     place = for_tasks(executor("loky", jobs), len(parts))
     for _ in place.outcomes(Compile(tuple(parts)), iter(range(len(parts))), jobs, stop):

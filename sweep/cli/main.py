@@ -1,7 +1,6 @@
-"""The group of verbs, and how errors reach the shell.
+"""The group of verbs, and the conversion of errors to messages and exit codes.
 
-A verb's module is imported when the verb is called, so that ``sweep --help`` and the completion of verbs answer at
-once.
+A verb's module is imported when the verb is called, so that ``sweep --help`` and the completion of verbs are fast.
 """
 
 from __future__ import annotations
@@ -22,14 +21,14 @@ from click.shell_completion import CompletionItem
 from sweep.errors import LinksweepError, LinksweepWarning, ProgramFault, StoreError, WorkerDied, nearest
 from sweep.jobs.signals import leaving_within
 
-SIGNALLED = 128  # and the number of the signal: what a shell expects of an interrupted command
+SIGNALLED = 128  # plus the number of the signal: the exit code that a shell expects of an interrupted command
 
-# A signal is obeyed within two seconds, also by who compiles or has processes to gather.
+# A signal ends the program within two seconds, even while it compiles or gathers processes.
 SECONDS_TO_LEAVE = 1.6
 WORDS = "sweep: interrupted at work that cannot be stopped half way; what was finished is kept, run again to continue"
 
 
-# Where each verb is, and what the list of verbs says of it.
+# Module and command of each verb, and its words in the list of verbs.
 VERBS = {
     "cache": ("kernels:cache", "Manage the compiled kernels that are kept on disk."),
     "check": ("plan:check", "Validate a study and print what running it would compute and cost."),
@@ -62,14 +61,14 @@ VERBS = {
 
 
 class Verbs(click.Group):
-    """A group in which an error raised on purpose is one message and an exit code; any other shows its traceback."""
+    """Command group that shows an error of this package as a message and exit code, any other with its traceback."""
 
     def list_commands(self, ctx: click.Context) -> list[str]:
-        """Names of the verbs."""
+        """Return the names of the verbs."""
         return list(VERBS)
 
     def get_command(self, ctx: click.Context, cmd_name: str) -> click.Command | None:
-        """Import the command of a verb; None for an unknown name."""
+        """Import the command of a verb, or return None for an unknown name."""
         if cmd_name not in VERBS:
             return None
         module, name = VERBS[cmd_name][0].split(":")
@@ -79,7 +78,7 @@ class Verbs(click.Group):
     def resolve_command(
         self, ctx: click.Context, args: list[str]
     ) -> tuple[str | None, click.Command | None, list[str]]:
-        """Find the verb that is called; for an unknown one the error names the nearest."""
+        """Find the called verb; for an unknown one the error names the closest."""
         word = args[0]
         if word not in VERBS and not word.startswith("-"):
             from sweep.study.tables import TABLES
@@ -94,7 +93,7 @@ class Verbs(click.Group):
             formatter.write_dl([(name, words) for name, (_, words) in VERBS.items()])
 
     def shell_complete(self, ctx: click.Context, incomplete: str) -> list[CompletionItem]:
-        """Verbs that begin so, without importing them, and options."""
+        """Return matching verbs without importing them, and options."""
         found = [CompletionItem(name, help=words) for name, (_, words) in VERBS.items() if name.startswith(incomplete)]
         return found + click.Command.shell_complete(self, ctx, incomplete)
 
@@ -113,7 +112,7 @@ class Verbs(click.Group):
             click.echo("sweep: interrupted", err=True)
             ctx.exit(SIGNALLED + getattr(error, "number", signal.SIGINT))
         except OSError as error:
-            if error.errno == errno.EPIPE:  # whoever reads has had enough, which click knows
+            if error.errno == errno.EPIPE:  # the reader has closed the pipe, which click handles
                 raise
             gone = isinstance(error, FileNotFoundError) and not _is_here()
             words = "the folder it was started in is not there any more; go to another one" if gone else error
@@ -125,7 +124,7 @@ class Verbs(click.Group):
 
 
 def _last_words(text: str) -> None:
-    """Say why it ends, and let nothing else be written: a full disk refuses that at the very end, too."""
+    """Print a final message and discard later output, which a full disk would refuse at exit as well."""
     with suppress(OSError):
         click.echo(text, err=True)
     sys.stdout = Path(os.devnull).open("w", encoding="utf-8")  # noqa: SIM115
@@ -139,7 +138,7 @@ def _said(
     file: TextIO | None = None,
     line: str | None = None,
 ) -> None:
-    """Print a warning of our own in one line; others are for whoever programs."""
+    """Print a warning of this package in one line, any other in Python's format."""
     if issubclass(category, LinksweepWarning):
         click.echo(f"sweep: {message}", err=True)
     else:

@@ -1,4 +1,4 @@
-"""The verb that computes all studies every night: nightly."""
+"""The verb ``nightly``: computes all studies every night."""
 
 from __future__ import annotations
 

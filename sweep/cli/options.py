@@ -6,7 +6,7 @@ from pathlib import Path
 
 import click
 
-# What is there already, and what may be made.
+# Paths that must exist, and paths that may be created.
 IS_FILE = click.Path(exists=True, dir_okay=False, path_type=Path)
 IS_FOLDER = click.Path(exists=True, file_okay=False, path_type=Path)
 IS_THERE = click.Path(exists=True, path_type=Path)

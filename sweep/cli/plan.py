@@ -26,10 +26,10 @@ from sweep.report.tables import bound_words
 from sweep.study import Study, load_study
 from sweep.study.space import Axis
 
-# Poses per design that the shares of the effects are counted at, and designs that their rules are tried on.
+# Poses per design for the shares of the effects, and number of designs on which their rules are tested.
 POSES = 100.0
 ADVISED = 64
-NAMED = 24  # outputs that are not computed
+NAMED = 24  # largest number of uncomputed outputs that are listed
 SECONDS_PER_BOX = 20e-6  # of a proof, docs/proof.md
 
 
@@ -44,10 +44,10 @@ def check(study: Path, jobs: int, smoke: bool) -> None:
     """
     model = load_study(study, smoke=smoke)
     if model.optimise is not None and model.optimise.prove is not None:
-        # What searches and proves is imported where a study asks for it: scipy's minimisers take as long as numpy.
+        # Optimiser and proof are imported on demand: scipy's minimisers take as long as numpy.
         from sweep.proof.question import question_of
 
-        question_of(model)  # refuses what cannot be proven
+        question_of(model)  # raises if the proof is not supported
     with Phases(show=True) as phases:
         sent = pilot(model, lambda done, of: phases.say("planning", done, of))
         cost = estimate(model, jobs, known=sent)
@@ -68,8 +68,8 @@ def plan_lines(study: Study, cost: Estimate, others: Sequence[tuple[str, float]]
     ----------
     study : checked study
     cost : its estimate
-    others : what other accuracies would take [s], in words
-    sent : the pilot that was sent for both
+    others : time with other accuracies [s], in words
+    sent : the pilot run of both estimates
     """
     kind = "every combination" if study.space.kind == "product" else "Sobol sample"
     large = without_minus(study.objective.output) if study.objective is not None else None
@@ -98,7 +98,7 @@ def plan_lines(study: Study, cost: Estimate, others: Sequence[tuple[str, float]]
 
 
 def _optimiser(study: Study) -> list[str]:
-    """Return how many starts are searched at most, and what ends the search earlier."""
+    """Describe the largest number of starts and the stopping rule of the optimiser."""
     if study.optimise is None:
         return []
     from sweep.optimise.multistart.survey import MET, wanted
@@ -119,7 +119,7 @@ def _brake(seconds: float | None) -> str:
 
 
 def _searches(cost: Estimate, found: Sequence[tuple[str, float, float]]) -> list[str]:
-    """Return what follows the sweep and what it takes, then the whole run."""
+    """Describe the steps after the sweep with their time, then the whole run."""
     if not found:
         return []
     least, most = (cost.seconds + sum(times) for times in list(zip(*found, strict=True))[1:])
@@ -145,7 +145,7 @@ def _left_out(study: Study) -> list[str]:
 
 
 def _computed(study: Study) -> list[str]:
-    """Return the routes of the sweep in their order, with their cost, outputs and limits."""
+    """Return the routes of the sweep in their order, with cost, outputs and limits."""
     limits = {
         limit.output: bound_words(limit, quantity(limit.output, output(study.family, limit.output).unit))
         for limit in study.output_limits
@@ -159,7 +159,7 @@ def _computed(study: Study) -> list[str]:
 
 
 def _before_and_between(study: Study) -> list[str]:
-    """Parameters that follow from others, made before the sweep's routes or fitted between them; and their limits."""
+    """Describe parameters that follow from others, before the sweep's routes or between them, and their limits."""
     lines = []
     if study.locus is not None:
         made, given = ", ".join(study.locus.made), ", ".join(study.prescribed)
@@ -185,7 +185,7 @@ def _times(ratio: float) -> str:
 
 
 def _front(study: Study) -> list[str]:
-    """Return the front of [pareto]: what is set against what, from where to where, and how much searching that is."""
+    """Describe the front of [pareto]: outputs, range of bounds and number of searches."""
     if study.pareto is None:
         return []
     from sweep.optimise.front.pareto import searches
@@ -202,7 +202,7 @@ def _front(study: Study) -> list[str]:
 
 
 def _proof(study: Study) -> list[str]:
-    """Return what is to be proven of which space, and with which budget."""
+    """Describe the requested proof: gap, space and budget."""
     if study.optimise is None or study.optimise.prove is None:
         return []
     from sweep.proof.question import question_of
@@ -217,7 +217,7 @@ def _proof(study: Study) -> list[str]:
 
 
 def _effects(study: Study, sent: Pilot) -> list[str]:
-    """Return the effects of the scene: what is computed, what is not, and which rules of negligibility hold."""
+    """Describe the effects of the scene: computed ones, others, and the rules of negligibility that hold."""
     bare = study.bare
     out = left_out(bare, study.want)
     if not out and bare is study.family:
@@ -246,7 +246,7 @@ def _effects(study: Study, sent: Pilot) -> list[str]:
 
 
 def _points(study: Study) -> list[str]:
-    """Name the masses that have neither centre nor inertia, of bodies that have no second joint to be rods to."""
+    """Name the point masses: without centre and inertia, on bodies without a second joint that would make them rods."""
     names, fixed = study.family.parameter_names, study.space.fixed
 
     def of(mass: str) -> list[str]:
@@ -278,7 +278,7 @@ def _accuracy(study: Study) -> str:
 
 
 def size(count: float) -> str:
-    """Return a number of bytes, in words."""
+    """Format a number of bytes in words."""
     for unit, scale in (("GB", 1e9), ("MB", 1e6), ("kB", 1e3)):
         if count >= scale:
             return f"{count / scale:.3g} {unit}"

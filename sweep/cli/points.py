@@ -1,4 +1,4 @@
-"""The verbs that make designs of points and tasks, and pass them on: points, export, task."""
+"""The verbs that read designs from points and tasks, and export them: points, export, task."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ from sweep.study.task import load_task
 from sweep.study.toml import design_entries, toml
 from sweep.synthesis.tasks import solve
 
-OF_DATASETS = ("xlsx", "pdf", "svg", "dxf")  # what takes more than a design: its study
+OF_DATASETS = ("xlsx", "pdf", "svg", "dxf")  # formats that need the study of a design
 FILE = click.argument("file", type=IS_FILE)
 
 
@@ -93,13 +93,13 @@ def export(folder: Path, design: str | None, kind: str, out: Path | None, phi: f
 
 
 def _place(folder: Path, name: str) -> Path:
-    """Name a file in the folder ``export`` beside the designs, and make that folder."""
+    """Return the path of a file in the folder ``export`` beside the designs, and create that folder."""
     place = beside(located(folder)) / "export"
     place.mkdir(exist_ok=True)
     return place / name
 
 
-NOTHING = 4  # as of `sweep run`: no design within the limits
+NOTHING = 4  # same exit code as `sweep run`: no design within the limits
 
 
 @click.command()

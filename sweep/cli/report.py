@@ -47,7 +47,7 @@ def report(folder: Path, others: tuple[Path, ...], out: Path | None) -> None:
 
 
 def own_figures(study: Path) -> Path | None:
-    """Return the program beside a study, or in its folder, that draws figures of its own; None where there is none."""
+    """Return the program in a study's folder that draws its own figures, or None if there is none."""
     program = (study if study.is_dir() else study.parent) / FIGURE
     return program if program.exists() else None
 
@@ -70,7 +70,7 @@ ENDINGS = (".svg", ".png", ".pdf")
 
 
 class Options(TypedDict):
-    """Options of the pictures, each of them of some."""
+    """Options of the figures, each used by some of them."""
 
     design: str | None
     row: int
@@ -138,14 +138,14 @@ def _table(source: str, table: Path | None, out: Path, options: Options) -> None
 
 
 def _made(source: str, table: Path | None, options: Options) -> dict[str, tuple[float, float]]:
-    """Angles [deg] between which what is made has an event, by its name: they are known of the optimum of a folder."""
+    """Return the intervals [deg] of manufactured mechanisms' events by name, known for the optimum of a folder."""
     if table is not None or options["design"] not in (None, "optimum"):
         return {}
     return event_bands(read_dataset(located(source)))
 
 
 def _of_one(what: str, source: str, table: Path | None, options: Options) -> Any:
-    """Draw one design, out of a folder or of a family and a table."""
+    """Draw one design of a folder, or of a family and a table."""
     mechanism, design = _design(source, table, options["design"], options["row"], several=what == "motion")
     known: dict[str, dict[str, Any]] = {
         "motion": {"want": options["want"]},
@@ -160,9 +160,9 @@ def _of_one(what: str, source: str, table: Path | None, options: Options) -> Any
 
 
 def _design(source: str, table: Path | None, design: str | None, row: int, several: bool = False) -> tuple[Any, Any]:
-    """Mechanism and design out of a folder, or a family's name and a row of a table.
+    """Return mechanism and design of a folder, or of a family's name and a row of a table.
 
-    Of ``several`` designs, named between commas, it is a table with a row for each.
+    For ``several`` designs, names separated by commas, the design is a table with a row for each.
     """
     if table is None:
         if not Path(source).is_dir():

@@ -42,7 +42,7 @@ def run(
     same, bit for bit, with any number of workers.  The answer comes last; where no design keeps all limits, it says
     which of them have to give way, and the exit code is 4.
     """
-    from sweep.engine.opening import is_part  # the engine takes a second, which --help need not wait for
+    from sweep.engine.opening import is_part  # the engine takes a second to import, which --help avoids
     from sweep.engine.run import run as run_study
     from sweep.engine.searches import stages_of
     from sweep.report.terminal import ending
@@ -53,7 +53,7 @@ def run(
     model = load_study(study, smoke=smoke)
     after: list[str] = []
     if report:
-        from sweep.cli.report import own_figures, written  # pandas and all that draws
+        from sweep.cli.report import own_figures, written  # pandas and everything that draws
 
         figures = own_figures(study)
         after = ["report"] if figures is None else ["figures", "report"]
@@ -64,7 +64,7 @@ def run(
             )
         except SearchCutShort as error:
             late, folder = error, error.folder
-        if is_part(folder):  # the answer is for the whole, once the parts are merged
+        if is_part(folder):  # the answer is for the whole dataset, after the parts are merged
             click.echo(f"part: {folder}")
             return
         found = ending(folder)

@@ -1,4 +1,4 @@
-"""The verbs that take a table of designs: eval and summarise."""
+"""The verbs for a table of designs: eval and summarise."""
 
 from __future__ import annotations
 
@@ -139,25 +139,25 @@ def summarise_table(
 
 
 def refuse_degrees(domain: Domain, phi: float) -> None:
-    """Refuse a crank angle of a folder's design that reads as degrees: a folder is in rad."""
+    """Refuse a crank angle for a folder's design that looks like degrees, since a folder is in rad."""
     if domain.unit == "rad" and not is_plausible(abs(phi), True):
         raise InputError("--phi", phi, f"an angle in rad; {phi:g} deg is {math.radians(phi):.6g}", "command line")
 
 
 def wanted(texts: tuple[str, ...]) -> list[str]:
-    """Names out of ``--want x,y --want z``, without repetition."""
+    """Return the names in ``--want x,y --want z``, without repetition."""
     names = [name.strip() for text in texts for name in text.split(",")]
     return list(dict.fromkeys(name for name in names if name))
 
 
 def kept(texts: tuple[str, ...]) -> bool | list[str]:
-    """Argument ``keep`` of the API that ``--keep`` stands for."""
+    """Return the argument ``keep`` of the API for ``--keep``."""
     names = wanted(texts)
     return True if names == ["all"] else names
 
 
 def checked_format(out: Path | None, table: Path | None = None) -> Path | None:
-    """Refuse an output file that could not be written, or is the table itself, before anything is computed."""
+    """Refuse an output file that could not be written, or is the table itself, before the computation."""
     if out is None:
         return None
     if table is not None and out.resolve() == table.resolve():
@@ -170,7 +170,7 @@ def checked_format(out: Path | None, table: Path | None = None) -> Path | None:
 
 
 def read_table(path: Path) -> pd.DataFrame:
-    """Read designs from Parquet or CSV; a file that is neither is an :class:`InputError`."""
+    """Read designs from Parquet or CSV; any other file is an :class:`InputError`."""
     suffix = path.suffix.lower()
     if suffix not in FORMATS:
         raise InputError("table", path.name, f"a file name ending in {' or '.join(FORMATS)}", str(path))
@@ -181,19 +181,19 @@ def read_table(path: Path) -> pd.DataFrame:
             head = file.readline()
         if b"," not in head and (b";" in head or b"\t" in head):
             raise InputError("table", path.name, "values between commas, with decimal points", str(path))
-        # Not the parser of pandas, whose default was off by an ulp for some numbers up to version 2.
+        # The parser of pandas up to version 2 was off by an ulp for some numbers by default.
         table = csv.read_csv(path)
         frame: pd.DataFrame = table.rename_columns([name.strip() for name in table.column_names]).to_pandas()
         return frame
     except InputError:
         raise
-    except Exception as error:  # damaged metadata end in whatever pandas meets first
+    except Exception as error:  # damaged metadata can raise any exception in pandas
         first = next(iter(str(error).splitlines()), type(error).__name__)  # a schema may follow
         raise InputError("table", path.name, f"readable {suffix[1:]} ({first})", str(path)) from error
 
 
 def write_table(frame: pd.DataFrame, out: Path | None) -> None:
-    """Write a table; a file appears under its name only when it is whole."""
+    """Write a table; a file appears under its name only when it is complete."""
     if out is None:
         click.echo(frame.to_csv(index=False), nl=False)
         return

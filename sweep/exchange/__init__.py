@@ -1,1 +1,1 @@
-"""Points of a drawing in; hardpoints, CAD, animation, simulation models and motion laws out."""
+"""Exchange with other programs: points of a drawing as input; hardpoints, CAD, animation, simulation, motion laws."""

@@ -1,4 +1,4 @@
-"""Views of a mechanism as a drawing: DXF, by ezdxf."""
+"""Views of a mechanism as a DXF drawing, by ezdxf."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     from sweep.evaluation.joints import Part
 
 LAYERS = {"LINKS": 5, "JOINTS": 7, "PIVOTS": 1, "AXES": 8, "PATHS": 3, "TEXT": 7}
-# To the right and upwards: the side is seen from the left, the top from above, where z points down.
+# Axes to the right and upwards: the side is seen from the left, the top from above, with z pointing down.
 VIEWS = {
     "front": np.eye(3)[:2],
     "side": np.eye(3)[[2, 1]],
@@ -25,11 +25,11 @@ VIEWS = {
 UNITS = {"mm": 4, "m": 6}
 
 
-NAMED = "LINKSWEEP"  # application under which entities carry their names
+NAMED = "LINKSWEEP"  # application whose extended data hold the names of entities
 
 
 def ezdxf_or_refuse() -> Any:
-    """Package ezdxf.
+    """Return the package ezdxf.
 
     Raises
     ------
@@ -50,8 +50,8 @@ def write_dxf(placed: list[Placed], path: Path, unit: str) -> None:
     Planar parts are drawn from the front, spatial ones from the side and top as well.
 
     Layers are LINKS, JOINTS, PIVOTS, AXES, PATHS and TEXT.  Every frame has its views side by side, the front view of
-    the first one standing at its own coordinates.  In front views points and axes keep their third coordinate and carry
-    part and name as extended data of the application LINKSWEEP, by which ``sweep points`` reads them.
+    the first one at its own coordinates.  In front views points and axes keep their third coordinate and carry
+    part and name as extended data of the application LINKSWEEP, which ``sweep points`` reads.
 
     Raises
     ------
@@ -84,7 +84,7 @@ def write_dxf(placed: list[Placed], path: Path, unit: str) -> None:
 
 
 def add_tables(path: Path, tables: Sequence[tuple[str, Sequence[str], Sequence[Sequence[str]]]]) -> None:
-    """Write tables, as title, heads and lines, below the views of a drawing of `write_dxf`."""
+    """Write tables (title, heads, lines) below the views of a drawing of `write_dxf`."""
     ezdxf = ezdxf_or_refuse()
     document: Any = ezdxf.readfile(path)
     space = document.modelspace()

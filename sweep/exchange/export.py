@@ -1,6 +1,6 @@
 """``export``: one design as hardpoints, CAD, animation, simulation model or motion law.
 
-The tables that other programs read hold the points of one position, and the motion over one turn with units.
+The tables for other programs hold the points of one position, and the motion over one turn with units.
 """
 
 from __future__ import annotations
@@ -47,9 +47,9 @@ def write_hardpoints(mechanism: Mechanism, design: Table, path: Path, phi: float
 
 
 def _per_angle(family: Family, name: str) -> str:
-    """Say which unit a derivative by the shaft's angle has behind its output's: /rad^2 for the second."""
+    """Return the suffix of a derivative's unit by the shaft's angle, as /rad^2 for the second derivative."""
     if family.domain.unit != "rad":
-        return ""  # a derivative by anything else has its unit
+        return ""  # a derivative by another variable has its own unit
     found = family.split(name) if isinstance(family, Machine) else None
     order = len(family.orders(name) if found is None else found[0].family.orders(found[1]))
     return "" if order == 0 else "/rad" if order == 1 else f"/rad^{order}"
@@ -61,8 +61,8 @@ def write_law(
     """Write position, derivatives by the shaft's angle, deviations and pressure angles at equal steps of one turn.
 
     Over an interval the steps go from one end to the other; a march begins at 0.  With ``speed`` [rad/s] there is a
-    column of time, from 0, but for an interval.  Units stand in the headings of a CSV, ``s [mm]``, and in
-    the field metadata of a Parquet file, where the names stay bare.
+    column of time, from 0, except for an interval.  Units are in the headings of a CSV, ``s [mm]``, and in
+    the field metadata of a Parquet file, where the names have none.
     """
     import pyarrow as pa
 
@@ -103,7 +103,7 @@ def write_law(
 
 FORMATS = {"csv": (".csv",), "glb": (".glb",), "dxf": (".dxf",), "mjcf": (".xml",), "law": (".csv", ".parquet")}
 UNITS = {"mm": 1e-3, "m": 1.0}
-SECONDS = 2.0  # of an animation where no speed is given
+SECONDS = 2.0  # duration of an animation without a speed
 MOST_POSES = 100_000  # a table of a few MB for each column
 
 
@@ -134,9 +134,9 @@ def export(
     phi : angle of the driving shaft in the drawn position, where a turn begins [rad]; over an interval the value of its
         variable
     poses : steps of a turn, 3 to 100000
-    unit : what a length of the design is, "mm" or "m"
-    speed : of the driving shaft [rad/s], or a text such as "7000 rpm": gives the law a column of time and the animation
-        its duration
+    unit : length unit of the design, "mm" or "m"
+    speed : speed of the driving shaft [rad/s], or a text such as "7000 rpm": gives the law a column of time and the
+        animation its duration
     angles : the unit of the angles of ``design`` and ``phi``, "rad" or "deg", as of :func:`sweep.evaluate`
 
     Returns
@@ -181,7 +181,7 @@ def export(
 def _writer(
     kind: str, mechanism: Mechanism, design: Table, phi: float, poses: int, unit: str, speed: float | None
 ) -> Callable[[Path], None]:
-    """Return what writes the file once its path is known; what can be wrong with the design is found here."""
+    """Return a function that writes the file to a path; faults of the design are raised before."""
     if kind == "csv":
         return lambda path: write_hardpoints(mechanism, design, path, phi, unit)
     if kind == "law":
@@ -197,14 +197,14 @@ def _writer(
 
 
 def _numbers(design: Table) -> dict[str, float]:
-    """Columns of one design as numbers."""
+    """Return the columns of one design as numbers."""
     columns: Mapping[Any, Any] = design if isinstance(design, Mapping) else {key: design[key] for key in design}
     found = {}
     for key, value in columns.items():
         try:
             found[str(key)] = float(np.ravel(value)[0])
         except (TypeError, ValueError):
-            continue  # a column of words is none of the model
+            continue  # a column of words does not belong to the model
     return found
 
 

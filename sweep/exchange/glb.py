@@ -1,7 +1,7 @@
 """An animated model: glTF 2.0 in one binary file, which browsers and viewers open without a plug-in.
 
 Every link is a node of its name with a bar for each pair of its joints, every joint a ball, every fixed axis a thin
-cylinder.  Lengths are metres and y points upwards, as the format wants; the node at the root carries both.
+cylinder.  The format requires metres and y upwards; the root node converts to both.
 """
 
 from __future__ import annotations
@@ -35,7 +35,7 @@ SIDES, RINGS = 24, 12
 
 
 class Model:
-    """Nodes, meshes and accessors as they are collected, and the bytes that they point to."""
+    """Nodes, meshes and accessors of a model, and their binary data."""
 
     def __init__(self) -> None:
         self.data = bytearray()
@@ -50,7 +50,7 @@ class Model:
         self.materials = list(COLOURS)
 
     def accessor(self, values: NDArray[Any], kind: str, target: int | None = None) -> int:
-        """Store an array; whole numbers are indices."""
+        """Store an array and return the number of its accessor; integers are indices."""
         whole = values.dtype.kind in "iu"
         stored = np.ascontiguousarray(values, np.uint16 if whole else np.float32)
         self.data += b"\0" * (-len(self.data) % 4)
@@ -71,7 +71,7 @@ class Model:
         return len(self.accessors) - 1
 
     def mesh(self, shape: str, colour: str) -> int:
-        """Mesh of a shape in a colour, made when it is first asked for."""
+        """Return the mesh of a shape in a colour, created at its first use."""
         if (shape, colour) not in self.mesh_of:
             self.mesh_of[shape, colour] = len(self.meshes)
             primitive = self.shapes[shape] | {"material": self.materials.index(colour)}
@@ -79,7 +79,7 @@ class Model:
         return self.mesh_of[shape, colour]
 
     def node(self, **what: Any) -> int:
-        """Add a node."""
+        """Add a node and return its number."""
         self.nodes.append(what)
         return len(self.nodes) - 1
 
@@ -133,7 +133,7 @@ def _material(name: str, rgb: tuple[float, float, float]) -> dict[str, Any]:
 
 
 def _group(model: Model, one: Placed, times: int, size: float) -> int:
-    """Node of a part with those of its links, joints and axes."""
+    """Return the node of a part with those of its links, joints and axes."""
     part, children, thick = one.part, [], 0.008 * size
     for k, link in enumerate(part.links):
         pairs = list(pairwise(link.joints))
@@ -171,12 +171,12 @@ def _group(model: Model, one: Placed, times: int, size: float) -> int:
 
 
 def _slides(part: Part, link: Link) -> bool:
-    """Whether a link is known by one joint only, and that one moves."""
+    """Tell whether a link has a single joint, and that joint moves."""
     return len(link.joints) == 1 and link.joints[0] not in part.kinds
 
 
 def _block(model: Model, part: Part, link: Link, colour: str, times: int, thick: float) -> int:
-    """Return a block on the joint of a slider, along the line it moves on."""
+    """Return a block at the joint of a slider, along its line of motion."""
     slides = [part.axes[name] for name, kind in part.kinds.items() if kind == "slide"]
     axis, reach = slides[0] if slides else np.array([0.0, 0.0, 1.0]), 4.0 * thick
     path = part.joints[link.joints[0]] - reach * axis
@@ -189,7 +189,7 @@ def _block(model: Model, part: Part, link: Link, colour: str, times: int, thick:
 
 
 def _bar(model: Model, name: str, colour: str, start: Array, end: Array, times: int, thick: float) -> int:
-    """Return a bar from one path to the other: turned with its direction, stretched where a joint slides along it."""
+    """Return a bar between two paths, turned with its direction, and stretched if a joint slides along it."""
     along = end - start
     length = np.linalg.norm(along, axis=1)
     rotation = _following(along / np.maximum(length, 1e-300)[:, None])
@@ -207,7 +207,7 @@ def _bar(model: Model, name: str, colour: str, start: Array, end: Array, times: 
 
 
 def _following(directions: Array) -> Array:
-    """Quaternions (x, y, z, w) that turn z into each direction, each from the one before by the shortest way."""
+    """Return quaternions (x, y, z, w) that turn z into each direction, each from the one before by the shortest way."""
     turns = [_from_z(directions[0])]
     for before, after in pairwise(directions):
         turns.append(_shortest(before, after) * turns[-1])
@@ -217,7 +217,7 @@ def _following(directions: Array) -> Array:
 def _from_z(direction: Array) -> Rotation:
     from scipy.spatial.transform import Rotation
 
-    if direction[2] < -0.9:  # by a half turn about x first, away from where the shortest way is none
+    if direction[2] < -0.9:  # a half turn about x first, since the shortest way is undefined near -z
         return _shortest(np.array([0.0, 0.0, -1.0]), direction) * Rotation.from_quat([1.0, 0.0, 0.0, 0.0])
     return _shortest(np.array([0.0, 0.0, 1.0]), direction)
 
@@ -229,7 +229,7 @@ def _shortest(first: Array, second: Array) -> Rotation:
 
 
 def _cylinder() -> tuple[Array, Array, NDArray[np.int64]]:
-    """Return a cylinder of radius 1 from z = 0 to 1, its ends open: the balls of the joints close them."""
+    """Return a cylinder of radius 1 from z = 0 to 1 with open ends, which the joints' balls cover."""
     angle = np.linspace(0.0, 2.0 * math.pi, SIDES, endpoint=False)
     ring = np.stack([np.cos(angle), np.sin(angle), np.zeros(SIDES)], axis=1)
     k = np.arange(SIDES)
@@ -248,7 +248,7 @@ def _ball() -> tuple[Array, Array, NDArray[np.int64]]:
     points = np.stack(np.broadcast_arrays(*parts), axis=-1).reshape(-1, 3)
     here = np.arange(len(points)).reshape(RINGS + 1, SIDES)
     beside = np.roll(here, -1, axis=1)
-    # Two triangles between two rings; at either pole, where a ring is a point, one.
+    # Two triangles between two rings; one at either pole, where a ring is a point.
     lower = np.stack([here[:-2], here[1:-1], beside[1:-1]], axis=-1)
     upper = np.stack([here[1:-1], beside[2:], beside[1:-1]], axis=-1)
     return points, points, np.concatenate([lower, upper]).reshape(-1, 3)

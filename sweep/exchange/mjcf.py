@@ -1,7 +1,7 @@
-"""A simulation model for MuJoCo: crank, coupler and follower, a ``connect`` constraint closes the loop.
+"""A simulation model for MuJoCo: crank, coupler and follower, with a ``connect`` constraint that closes the loop.
 
-The coupler hangs on the link that carries its finger, by the two axes of that universal joint, so that its spin is that
-of the kernels; at the other end it is held by a ball, the constraint.  Hinges are named as the links, so that a
+The coupler is attached to the link that carries its finger by the two axes of that universal joint, so that its spin is
+that of the kernels; at the other end a ball, the constraint, holds it.  Hinges are named like the links, so that a
 position of ``crank`` is phi, one of ``rocker`` psi, one of ``slider`` s.  Lengths are metres, masses kilograms.
 """
 
@@ -25,8 +25,8 @@ from sweep.families.capabilities import JointRecords
 from sweep.families.machines.machine import Machine
 
 METRES = {"mm": 1e-3, "m": 1.0}
-THICK = 0.008  # of a bar, of the extent of all joints
-DRIVING = 1.0  # the finger stands on the crank's end of the coupler
+THICK = 0.008  # thickness of a bar, relative to the extent of all joints
+DRIVING = 1.0  # the finger is at the crank's end of the coupler
 
 
 @dataclass(frozen=True)
@@ -35,12 +35,13 @@ class Loop:
 
     Parameters
     ----------
-    tag : what stands behind names: member and number of the stage
+    tag : suffix of names: member and number of the stage
     follower : "rocker" or "slider"
     A, B, C, D : joints; D is C on a slider
     crank, coupler, driven : axes of the bodies, (3, 3); x along the link, z along its axis
     finger : DRIVING or not
     turn : from the frame in which the family's forces and gravity are, into that of its joints
+    turn : rotation from the frame of the family's forces and gravity to that of its joints
     """
 
     tag: str
@@ -59,13 +60,14 @@ class Loop:
 def write_mjcf(family: Family, placed: list[Placed], design: Mapping[str, float], path: Path, unit: str) -> None:
     """Write the model in its first pose.
 
-    Bodies get the masses, centres and inertias (``m_crank``, ``com_crank_x``, ``j_crank_xx`` ...) of the design, else
-    those of steel bars.  Stages of a chain are coupled at their common shaft, members of a machine to the first one.
+    Bodies get the masses, centres and inertias (``m_crank``, ``com_crank_x``, ``j_crank_xx`` ...) of the design,
+    otherwise those of steel bars.  Stages of a chain are coupled at their common shaft, members of a machine to the
+    first one.
 
     Raises
     ------
     InputError
-        for a stage that has no crank, coupler and rocker or slider, a mass without inertia.
+        for a stage without crank, coupler and rocker or slider, or a mass without inertia.
     """
     root = Xml.Element("mujoco", model=family.name)
     Xml.SubElement(root, "compiler", angle="radian", inertiafromgeom="auto")
@@ -91,29 +93,29 @@ def write_mjcf(family: Family, placed: list[Placed], design: Mapping[str, float]
 
 
 def _tag(part: Part) -> str:
-    """Return what stands behind the names of a stage: member and number, each behind a space."""
+    """Return the suffix of a stage's names: member and number, each after a space."""
     return "".join(f" {word}" for word in (part.member, part.stage) if word)
 
 
 def _of_member(design: Mapping[str, float], member: str) -> dict[str, float]:
-    """Columns of one member without its name, of a family all."""
+    """Return the columns of one member without its name, or for a family all columns."""
     head = f"{member}." if member else ""
     return {name.removeprefix(head): float(value) for name, value in design.items() if name.startswith(head)}
 
 
 def _driver(machine: Machine, name: str, first: str) -> tuple[str, float]:
-    """Joint that drives a member's crank, and the ratio of both; ``first`` is the crank of the first member."""
+    """Return the joint that drives a member's crank, and their ratio; ``first`` is the crank of the first member."""
     members = {member.name: member for member in machine.members}
     member = members[name]
     if member.driver is None:
         return first, member.ratio / machine.members[0].ratio
-    # Of the families that are served, the angle that drives another member is that of a rocker.
+    # In the supported families the angle that drives another member is that of a rocker.
     other, output = member.driver
     return " ".join(word for word in ("rocker", other, names.parts(output).stage) if word), float(member.ratio)
 
 
 def _geared(equality: Xml.Element, joint: str, other: str, ratio: float) -> None:
-    """Couple two joints, from where they stand in the first pose."""
+    """Couple two joints from their positions in the first pose."""
     Xml.SubElement(
         equality, "joint", name=f"shaft of {joint}", joint1=joint, joint2=other,
         polycoef=words(np.array([0.0, ratio, 0.0, 0.0, 0.0])),
@@ -137,7 +139,7 @@ def _loop(one: Placed, finger: float, metres: float) -> Loop:
         part.family, part.parameters | {"finger": finger}, ["n_x", "n_y", "n_z"], phi=part.crank[:1], angles="rad"
     )
     n = found[["n_x", "n_y", "n_z"]].to_numpy(np.float64)[0]
-    # Where the records count from is the crank's axis; where the joints stand, the frame of the family.
+    # The records start at the crank's axis, the joints in the frame of the family.
     crank = np.column_stack([rho_b, tau_b, u])
     turn = _triad(part.joints["b"][0] - part.joints["a"][0], part.axes["a"]) @ crank.T
     slider = records.follower == "slider"
@@ -153,7 +155,7 @@ def _loop(one: Placed, finger: float, metres: float) -> Loop:
 
 
 def _triad(along: Array, axis: Array) -> Array:
-    """Columns x along a link, y across, z its axis."""
+    """Return the columns x along a link, y across it, z its axis."""
     x = along / np.linalg.norm(along)
     return np.column_stack([x, np.cross(axis, x), axis])
 
@@ -162,7 +164,7 @@ def _stage(
     world: Xml.Element, equality: Xml.Element, loop: Loop, part: Part, design: Mapping[str, float], unit: str,
     thick: float,
 ) -> None:  # fmt: skip
-    """Add crank, follower, and the coupler on one of them; x of a body lies along its link, z along its axis."""
+    """Add crank, follower, and the coupler on one of them; x of a body is along its link, z along its axis."""
     tag, follower = loop.tag, loop.follower
     a, b, c = (float(np.linalg.norm(end)) for end in (loop.B - loop.A, loop.C - loop.B, loop.C - loop.D))
     crank = _body(world, f"crank{tag}", loop.A, loop.crank)
@@ -210,25 +212,26 @@ def _body(parent: Xml.Element, name: str, at: Array, frame: Array) -> Xml.Elemen
 
 
 def words(values: Array) -> str:
-    """Return numbers as MuJoCo reads them, to the last bit."""
+    """Return numbers in MuJoCo's format, to the last bit."""
     return " ".join(repr(float(x)) for x in values)
 
 
 MOMENTS = ("xx", "yy", "zz", "xy", "xz", "yz")
 KILOGRAMS = {"mm": 1e3, "m": 1.0}  # masses of designs in mm are tonnes, as N and s want
-SPARE = 2.0  # moments that do not count are made so many times what they have to be at least
+SPARE = 2.0  # factor on the least possible value of moments that do not matter
 
 
 def inertial(design: Mapping[str, float], name: str, stage: str, unit: str) -> Xml.Element:
-    """Mass, centre and inertia of a body.
+    """Return mass, centre and inertia of a body.
 
-    A body about a fixed axis turns by its moment about that axis and its products with it alone, a slider by none: what
-    does not count is filled up, so that the tensor is that of a body.
+    A body about a fixed axis rotates by its moment about that axis and its products with it alone, a slider does not
+    rotate: entries that do not matter are chosen such that the tensor is physical.
 
     Raises
     ------
     InputError
         for a mass without the inertia that counts, or with one that no body has.
+    for a mass without the inertia that matters, or with an unphysical one.
     """
     kilograms, metres = KILOGRAMS[unit], METRES[unit]
     mass = float(design[f"m_{name}{stage}"])

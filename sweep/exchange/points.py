@@ -1,4 +1,4 @@
-"""``from_points``: the mechanism that stands on given points of a drawing."""
+"""``from_points``: the mechanism whose joints have the given points of a drawing."""
 
 from __future__ import annotations
 
@@ -28,19 +28,19 @@ if TYPE_CHECKING:
     import pandas as pd
 
 
-TOLERANCE = 1e-4  # part of the drawing's size: coordinates given to 0.01 mm in a drawing of 100 mm
+TOLERANCE = 1e-4  # share of the drawing's size: coordinates given to 0.01 mm in a drawing of 100 mm
 
 
 @dataclass(frozen=True)
 class PlacedDesign:
-    """A mechanism read off a drawing.
+    """A mechanism read from a drawing.
 
     Parameters
     ----------
-    family : its name
+    family : name of its family
     parameters : its design, ``branch`` included, in the unit of the points and rad
     phi : crank angle of the drawn position [rad], in (-pi, pi]
-    place : where the family's frame stands in the drawing; ``member(place)`` of a machine takes it as it is
+    place : position of the family's frame in the drawing, as ``member(place)`` of a machine takes it
     residual : largest distance between a given point and the mechanism's joint of that name [unit of the points]
     """
 
@@ -52,35 +52,35 @@ class PlacedDesign:
 
     @property
     def branch(self) -> float:
-        """The assembly mode, +1 or -1."""
+        """Assembly mode, +1 or -1."""
         return self.parameters["branch"]
 
 
 def from_points(family: str, *, tolerance: float = TOLERANCE, **points: Sequence[float] | Array) -> PlacedDesign:
-    """Mechanism whose joints stand on given points of a drawing, in one position.
+    """Find the mechanism whose joints have given points of a drawing, in one position.
 
     Parameters
     ----------
-    family : "rssr" (A, axis_A, B, C, D, axis_D), "rssp" (A, axis_A, B, C, axis_D and, if wanted, D), "four_bar"
-        (A, B, C, D; if wanted axis_A, M), "guide" (A, B, C, D, point, axis_line; if wanted axis_A, line),
-        "slider_crank" (A, B, C, axis_D; if wanted axis_A, D)
-    tolerance : largest residual, as a part of the size of the drawing
+    family : "rssr" (A, axis_A, B, C, D, axis_D), "rssp" (A, axis_A, B, C, axis_D and optionally D), "four_bar"
+        (A, B, C, D; optionally axis_A, M), "guide" (A, B, C, D, point, axis_line; optionally axis_A, line),
+        "slider_crank" (A, B, C, axis_D; optionally axis_A, D)
+    tolerance : largest residual, as a share of the size of the drawing
     points : [x, y, z] by name.  A is the centre of the crank circle and ``axis_A`` the crank axis, about which the
         crank turns right-handed; B the crank pin; C the rocker ball or slider; D the centre of the rocker's circle and
         ``axis_D`` its axis, or a point of the slide line and its direction.  A direction may have any length.  Planar
-        families take ``axis_A`` as the normal of their plane, z where it is left out
+        families take ``axis_A`` as the normal of their plane, z by default
 
     Returns
     -------
     PlacedDesign
-        parameters, crank angle, place of the family's frame (docs/frames.md) and residual.  e is not negative; where
-        the axes intersect alpha is in (-pi, 0), where they are parallel f is 0
+        parameters, crank angle, place of the family's frame (docs/frames.md) and residual.  e is not negative; if
+        the axes intersect alpha is in (-pi, 0), if they are parallel f is 0
 
     Raises
     ------
     InputError
-        for a point that is missing, unknown or no three numbers; for points that make no such mechanism, because a link
-        has no length, both axes are one line, the position is a dead point, or a point lies off its place by more than
+        for a point that is missing, unknown or not three numbers; for points of no such mechanism, because a link
+        has length zero, both axes are one line, the position is a dead point, or a point is farther from its place than
         the tolerance.
 
     Examples
@@ -98,7 +98,7 @@ def from_points(family: str, *, tolerance: float = TOLERANCE, **points: Sequence
     reading = reader.fit(given)
     joints = _joints(found, reading, given)
     off = {name: float(np.linalg.norm(given[name] - at)) for name, at in joints.items()}
-    for name, distance in off.items():  # the first one off is named: it puts those behind it off as well
+    for name, distance in off.items():  # the first deviating point is named, since it displaces those after it as well
         if not distance <= tolerance * extent:
             allowed = f"a point at most {tolerance * extent:.3g} from {_words(joints[name])}"
             why = f", where the other points put it; it is {distance:.3g} off (tolerance = {tolerance:g})"
@@ -109,7 +109,7 @@ def from_points(family: str, *, tolerance: float = TOLERANCE, **points: Sequence
 
 
 def drawn(family: str, file: Path, part: str = "", unit: str = "mm", tolerance: float = TOLERANCE) -> PlacedDesign:
-    """Mechanism of a file of points, as `from_points` finds it, in mm; ``unit`` is that of a file that says none.
+    """Find the mechanism of a file of points by `from_points`, in mm; ``unit`` is that of a file without one.
 
     Raises
     ------
@@ -120,12 +120,12 @@ def drawn(family: str, file: Path, part: str = "", unit: str = "mm", tolerance: 
 
 
 def reader_of(family: str) -> Hardpoints:
-    """Return what reads the points of a family.
+    """Return the reader of a family's points.
 
     Raises
     ------
     InputError
-        for a family whose dimensions are not read off points.
+        for a family whose dimensions cannot be read from points.
     """
     found = find_family(family)
     reader = found.find(Hardpoints)
@@ -158,7 +158,7 @@ def _checked(reader: Hardpoints, points: Mapping[str, Sequence[float] | Array]) 
 
 
 def _joints(family: Family, reading: FittedPose, given: Mapping[str, Array]) -> dict[str, Array]:
-    """Return the places, in the drawing's frame, of the joints that have a given point."""
+    """Return the positions, in the drawing's frame, of the joints with a given point."""
     (part,) = parts(family, reading.parameters, reading.phi)
     z, x = reading.z, reading.x
     turn = np.column_stack([x, np.cross(z, x), z])
@@ -167,7 +167,7 @@ def _joints(family: Family, reading: FittedPose, given: Mapping[str, Array]) -> 
         joint = name if name in part.joints else name.lower()
         if joint in part.joints:
             at = turn @ part.joints[joint][0] + reading.at
-            if part.kinds.get(joint) == "slide":  # any point of the line gives it
+            if part.kinds.get(joint) == "slide":  # any point of the line may be given
                 along = turn @ part.axes[joint]
                 at = at + float((point - at) @ along) * along
             found[name] = at
@@ -188,22 +188,21 @@ Groups: TypeAlias = dict[str, Points]
 
 
 def read_points(file: Path, reader: Hardpoints | None = None, *, part: str = "", unit: str = "mm") -> Points:
-    """Return points of one stage or member by name [mm].
+    """Return the points of one stage or member by name [mm].
 
     Parameters
     ----------
-    file : .csv with the columns name, x, y, z, or `x [inch]` and so on (others are not looked at); or .csv, .dxf, .glb
-        of ``sweep export``, which say their unit
-    reader : what of an exported file is wanted; everything if left out.  A table written by hand is not filtered, so
+    file : .csv with the columns name, x, y, z, or `x [inch]` and so on (others are ignored); or .csv, .dxf, .glb
+        of ``sweep export``, which contain their unit
+    reader : selects the points of an exported file; None reads all.  A table written by hand is not filtered, so
         that a wrong name is found
-    part : "stage 2", "needle", "needle stage 1"; may be left out where the file has one part only
-    unit : of coordinates whose file does not say it
+    part : "stage 2", "needle", "needle stage 1"; optional for a file with a single part
+    unit : unit of coordinates if the file has none
 
     Raises
     ------
     InputError
-        for a file that is none of these, a missing column, a name that stands twice, a part that is not there, an
-        unknown unit.
+        for any other file, a missing column, a duplicate name, a missing part, or an unknown unit.
     """
     try:
         scale = factor(unit, "mm")
@@ -251,7 +250,7 @@ _HEADED = re.compile(r"([xyz])\s*\[(.+)\]")
 
 
 def _in_mm(table: pd.DataFrame, file: Path, scale: float) -> pd.DataFrame:
-    """Bring coordinates to mm: from the unit of their heading, as `x [inch]`, of an export's column, else by scale."""
+    """Convert coordinates to mm, by the unit of their heading, as `x [inch]`, of an export's column, or by scale."""
     exported = {"member", "stage", "frame", "unit"} <= set(table)
     for axis in {"x", "y", "z"} & set(table):
         factors = table["unit"].map({"m": 1e3}).fillna(1.0) if exported else scale
@@ -277,7 +276,7 @@ def _label(member: str, stage: str) -> str:
 
 
 def _of_dxf(file: Path) -> tuple[Groups, bool]:
-    """Named points and axes of the front views, whose third coordinate is kept."""
+    """Return named points and axes of the front views, which keep the third coordinate."""
     ezdxf = ezdxf_or_refuse()
     try:
         document = ezdxf.readfile(file)
@@ -298,7 +297,7 @@ def _of_dxf(file: Path) -> tuple[Groups, bool]:
 
 
 def _of_glb(file: Path) -> tuple[Groups, bool]:
-    """Joints of the first pose and the axes; coordinates are float32."""
+    """Return joints of the first pose and axes; coordinates are float32."""
     data = file.read_bytes()
     if len(data) < 20 or data[:4] != b"glTF":
         raise InputError("file", file.name, "a model by sweep export (glTF 2.0, binary)", str(file))

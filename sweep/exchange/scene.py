@@ -1,4 +1,4 @@
-"""What every export begins with: the joints over one whole turn, what stands in different frames side by side."""
+"""Scene of every export: joints over one whole turn, with different frames side by side."""
 
 from __future__ import annotations
 
@@ -20,25 +20,25 @@ from sweep.families.base import Array, Interval, March, equal_steps
 if TYPE_CHECKING:
     from sweep.evaluation.tables import Table
 
-STEPS = 720  # of a march, where one pose of it is asked for
-GAP = 0.25  # between two frames side by side, as a part of the larger one
+STEPS = 720  # steps of a march from which one pose is taken
+GAP = 0.25  # gap between two frames side by side, relative to the larger one
 
 
 @dataclass(frozen=True)
 class Placed:
-    """A part, and by how much its frame is moved so that nothing stands in its way."""
+    """A part, and the displacement of its frame beside other frames."""
 
     part: Part
     shift: Array
 
 
 def turn(mechanism: Mechanism, design: Table, phi: float, poses: int) -> list[Placed]:
-    """All parts over one turn as of :func:`over`, each with its place in the scene.
+    """Return all parts over one turn as in :func:`over`, each with its place in the scene.
 
     Raises
     ------
     InputError
-        where a pose does not exist.
+        if a pose does not exist.
     """
     found = over(mechanism, design, phi, poses)
     domain = find_family(mechanism).domain
@@ -57,10 +57,10 @@ def turn(mechanism: Mechanism, design: Table, phi: float, poses: int) -> list[Pl
 
 
 def over(mechanism: Mechanism, design: Table, phi: float, poses: int) -> list[Part]:
-    """All parts over one turn from ``phi`` on, the last pose being the first one again.
+    """Return all parts over one turn from ``phi`` on, the last pose equal to the first.
 
-    An interval is run through to its end, back to its beginning and to ``phi`` again, which is its beginning if it lies
-    outside.  A march begins at 0.
+    An interval is traversed to its end, back to its beginning and to ``phi`` again, which is replaced by its beginning
+    if it lies outside.  A march begins at 0.
     """
     family = find_family(mechanism)
     if isinstance(family.domain, March):
@@ -81,7 +81,7 @@ def _there_and_back(ends: Array, start: float, poses: int) -> Array:
 
 
 def _closed(part: Part) -> Part:
-    """First pose once more behind the last."""
+    """Return the part with its first pose repeated at the end."""
     return _taken(part, [*range(part.phi.size), 0], np.append(part.phi, 2.0 * math.pi))
 
 
@@ -97,7 +97,7 @@ def finite(phi: float) -> float:
     Raises
     ------
     InputError
-        where it is no finite number.
+        if it is not finite.
     """
     if not math.isfinite(phi):
         raise InputError("phi", phi, "a finite angle [rad]", "export")
@@ -105,12 +105,12 @@ def finite(phi: float) -> float:
 
 
 def pose(mechanism: Mechanism, design: Table, phi: float) -> list[Part]:
-    """All parts in one position.
+    """Return all parts in one position.
 
     Raises
     ------
     InputError
-        for a march, whose poses depend on those before, if ``phi`` is none of its steps of half a degree.
+        for a march, whose poses depend on those before, if ``phi`` is not a multiple of half a degree.
     """
     domain = find_family(mechanism).domain
     if not isinstance(domain, March):
@@ -135,13 +135,13 @@ def side_by_side(found: Sequence[Part]) -> list[Placed]:
 
 
 def extent(found: Sequence[Part]) -> float:
-    """Largest extent of all joints over the turn."""
+    """Return the largest extent of all joints over the turn."""
     points = np.vstack([path for part in found for path in part.joints.values()])
     return float(np.nanmax(np.nanmax(points, axis=0) - np.nanmin(points, axis=0)))
 
 
 def shown_name(joint: str) -> str:
-    """Return a joint as the docs write it: A, B, C1, but point and line."""
+    """Return a joint's name as the docs write it: A, B, C1, but point and line."""
     return joint.upper() if len(joint) < 3 else joint
 
 
@@ -150,19 +150,19 @@ ELEVATION, AZIMUTH = math.radians(24.0), math.radians(-55.0)
 
 
 def first_pose(parts: Sequence[Part]) -> int:
-    """First pose in which every joint exists; 0 where there is none."""
+    """Return the first pose in which every joint exists; 0 if there is none."""
     whole = np.logical_and.reduce([np.isfinite(path).all(axis=1) for part in parts for path in part.joints.values()])
     return int(np.argmax(whole))
 
 
 def exists(parts: Sequence[Part]) -> bool:
-    """Whether there are joints, and a pose in which all of them exist."""
+    """Tell whether there are joints, and a pose in which all of them exist."""
     found: list[Array] = [path for part in parts for path in part.joints.values()]
     return bool(found) and bool(np.logical_and.reduce([np.isfinite(path).all(axis=1) for path in found]).any())
 
 
 def projection(view: str) -> Array:
-    """Return the (2, 3) matrix of a view: "xy", "zy", "xz" square to a plane, "space" from a corner with z upwards."""
+    """Return the (2, 3) matrix of a view: "xy", "zy", "xz" along an axis, "space" from a corner with z upwards."""
     if view in VIEWS:
         return np.eye(3)[list(VIEWS[view])]
     (se, ce), (sa, ca) = ((math.sin(x), math.cos(x)) for x in (ELEVATION, AZIMUTH))
@@ -170,7 +170,7 @@ def projection(view: str) -> Array:
 
 
 def is_spatial(parts: Sequence[Part]) -> bool:
-    """Whether joints leave the plane z = 0, or an axis is not square to it."""
+    """Tell whether joints leave the plane z = 0, or an axis is not perpendicular to it."""
     points = np.vstack([path for part in parts for path in part.joints.values()])
     turned = [axis for part in parts for name, axis in part.axes.items() if part.kinds[name] == "axis"]
     lean = any(abs(axis[0]) + abs(axis[1]) > 1e-9 for axis in turned)
@@ -178,5 +178,5 @@ def is_spatial(parts: Sequence[Part]) -> bool:
 
 
 def frames_of(parts: Sequence[Part]) -> dict[str, list[Part]]:
-    """Parts by the frame that they stand in, in their order."""
+    """Return the parts by their frame, in order."""
     return {frame: [part for part in parts if part.frame == frame] for frame in dict.fromkeys(p.frame for p in parts)}

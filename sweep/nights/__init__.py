@@ -1,4 +1,4 @@
-"""Nights: all studies into dated folders, compared with the last good night, on one page."""
+"""Nightly runs: all studies in dated folders, compared with the last good night, on one page."""
 
 from __future__ import annotations
 

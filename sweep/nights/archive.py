@@ -1,4 +1,4 @@
-"""The folder of the nights: what is known of each and of each study in it, ``latest``, the lock, and which are kept."""
+"""The folder of the nights: records of nights and studies, ``latest``, the lock, and deletion of old nights."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from sweep.dataset.lock import held
 
 NIGHT, HISTORY = "night.json", "history.jsonl"
 LATEST, LOCK = "latest", "_lock"
-# A night that is being deleted has this before its name: nobody takes it for one, and the next night deletes the rest.
+# Prefix of a night that is being deleted: it is ignored, and the next night completes the deletion.
 GOING = "_going-"
 _NAME = re.compile(r"\d{4}-\d\d-\d\dT\d\d-\d\d-\d\dZ(\+\d{3})?")
 EVENTS, WORDS = "log.jsonl", "log.txt"
@@ -30,11 +30,11 @@ State = Literal["complete", "cut", "waiting", "failed"]
 class StudyRecord:
     """One study in one night.
 
-    ``state`` is "complete"; "cut" where the time was over before the end; "waiting" where it was over before the
-    beginning; "failed" with the exit code of the run in ``code``.  ``linked`` chunks come from the night
-    ``linked_from``, ``computed`` ones do not.  ``seconds`` is the time of the run, None where nothing had to be
-    computed.  ``figures`` are the headline figures, with their ``units``.  ``changes`` says in words what moved since
-    the night ``compared_with``, ``changed`` is 0, 10, 11 or 12, and ``moved`` names the figures that moved.
+    ``state`` is "complete"; "cut" if the time ran out during the run; "waiting" if it ran out before the run began;
+    "failed" with the exit code of the run in ``code``.  ``linked`` chunks come from the night ``linked_from``,
+    ``computed`` ones are new.  ``seconds`` is the time of the run, None if nothing had to be computed.  ``figures`` are
+    the headline figures, with their ``units``.  ``changes`` describes in words the changes since the night
+    ``compared_with``, ``changed`` is 0, 10, 11 or 12, and ``moved`` names the changed figures.
     """
 
     state: State
@@ -55,7 +55,7 @@ class StudyRecord:
 
 @dataclass(frozen=True)
 class NightRecord:
-    """One night; it is ``good`` if every study of it is complete."""
+    """One night; it is ``good`` if all its studies are complete."""
 
     name: str
     seconds: float
@@ -64,27 +64,27 @@ class NightRecord:
 
     @property
     def good(self) -> bool:
-        """Whether every study is complete, whatever has changed."""
+        """Whether every study is complete, with or without changes."""
         return all(record.state == "complete" for record in self.studies.values())
 
     @property
     def quiet(self) -> str:
-        """What is said of a night in which nothing moved."""
+        """Words for a night without changes."""
         first = all(record.compared_with is None for record in self.studies.values())
         return "first night, nothing to compare with" if first else "no change"
 
     def as_dict(self) -> dict[str, Any]:
-        """Return the record as JSON has it."""
+        """Return the record as a dict for JSON."""
         return asdict(self) | {"good": self.good}
 
 
 def write_night(folder: Path, record: NightRecord) -> None:
-    """Write the record into the folder of its night, as a whole."""
+    """Write the record into the folder of its night, atomically."""
     write_atomically(folder / NIGHT, (json.dumps(record.as_dict(), indent=1) + "\n").encode())
 
 
 def read_night(folder: Path) -> NightRecord | None:
-    """Return the record of a night; None where the night has not come to its end."""
+    """Return the record of a night, or None if the night has not ended."""
     path = folder / NIGHT
     if not path.is_file():
         return None
@@ -94,7 +94,7 @@ def read_night(folder: Path) -> NightRecord | None:
 
 
 def append_history(into: Path, record: NightRecord) -> None:
-    """Add a night to the history, which outlives the night's folder."""
+    """Add a night to the history, which remains after the night's folder is deleted."""
     before = read_history(into)
     nights = [*(night for night in before if night.name != record.name), record]
     text = "".join(json.dumps(night.as_dict()) + "\n" for night in nights)
@@ -102,9 +102,9 @@ def append_history(into: Path, record: NightRecord) -> None:
 
 
 def read_history(into: Path, tell: Callable[[str], None] = lambda words: None) -> list[NightRecord]:
-    """Return all nights that came to their end, the oldest first.
+    """Return all nights that have ended, the oldest first.
 
-    Lines that cannot be read are left out; ``tell`` is told of them.
+    Unreadable lines are left out and reported to ``tell``.
     """
     path = into / HISTORY
     if not path.is_file():
@@ -128,19 +128,19 @@ def _record(text: bytes) -> NightRecord | None:
 
 
 class Journal:
-    """Writes every event at once, so that a killed night tells how far it came.
+    """Log of a night, written event by event, so that it shows the progress of a killed night.
 
     Parameters
     ----------
-    folder : of the night
-    say : told every line in words as well
+    folder : folder of the night
+    say : called with the words of every event
     """
 
     def __init__(self, folder: Path, say: Callable[[str], None]) -> None:
         self.folder, self.say = folder, say
 
     def note(self, event: str, words: str, **about: Any) -> None:
-        """Write down an event; ``about`` is for programs, ``words`` for people."""
+        """Log an event; ``about`` is for programs, ``words`` for people."""
         now = time.gmtime()
         entry = {"time": time.strftime("%Y-%m-%dT%H:%M:%SZ", now), "event": event, "words": words} | about
         with store_errors(self.folder):
@@ -153,14 +153,14 @@ class Journal:
 
 @contextlib.contextmanager
 def one_at_a_time(into: Path) -> Iterator[None]:
-    """Hold the folder of the nights; the lock dies with its process.
+    """Hold the lock of the nights' folder, which is released when the process ends.
 
     Raises
     ------
     LockedError
-        if another night is at work there
+        if another night holds the lock
     StoreError
-        if the folder cannot be made or written to.
+        if the folder cannot be created or written.
     """
     with store_errors(into):
         into.mkdir(parents=True, exist_ok=True)
@@ -184,7 +184,7 @@ def good_nights(into: Path) -> list[Path]:
 
 
 def new_night(into: Path) -> Path:
-    """Make the folder of a new night, named by the time (UTC); it comes after all others even if the clock jumps."""
+    """Create the folder of a new night, named by the time (UTC); it sorts after all others even if the clock jumps."""
     name = time.strftime("%Y-%m-%dT%H-%M-%SZ", time.gmtime())
     before = [path.name for path in nights(into)]
     if before and name <= before[-1]:
@@ -197,7 +197,7 @@ def new_night(into: Path) -> Path:
 
 
 def point_latest(into: Path, night: Path) -> None:
-    """Let ``latest`` lead to a night; at every moment it leads to the old one or to the new one."""
+    """Let ``latest`` point to a night, by an atomic replacement."""
     fresh = into / f"_tmp-{LATEST}-{os.getpid()}"
     with store_errors(into):
         fresh.unlink(missing_ok=True)
@@ -210,7 +210,7 @@ def drop_old(into: Path, keep: int) -> list[str]:
 
     Returns
     -------
-    names of the nights that were deleted.
+    names of the deleted nights.
     """
     good = good_nights(into)
     kept = {*nights(into)[-keep:], *good[-1:]}

@@ -1,4 +1,4 @@
-"""What an earlier night has computed already: chunks of the same identity are linked, once they have been verified."""
+"""Reuse of an earlier night: verified chunks of the same identity are linked."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ REPORT, FIGURES, SURVIVORS = "report.html", "figures", "survivors.parquet"
 
 @dataclass(frozen=True)
 class Carried:
-    """The night from which chunks were linked, and how many; ``whole`` if nothing is left to compute or to say."""
+    """The night from which chunks were linked, their number, and whether the study is ``whole``: nothing left to do."""
 
     night: str
     chunks: int
@@ -32,18 +32,18 @@ class Carried:
 
 
 def carry(study: Study, earlier: Sequence[Path], target: Path) -> Carried | None:
-    """Link what an earlier night has of the same study, computed by the same sources.
+    """Link the results of an earlier night for the same study, computed by the same sources.
 
     Parameters
     ----------
-    study : as it is tonight
+    study : tonight's study
     earlier : folders of nights, the newest first
-    target : this night's folder of the study; it need not exist
+    target : this night's folder of the study, which need not exist
 
     Returns
     -------
     Carried
-        None where no night has a chunk of this identity.  Every chunk was compared with its hash, and its rows with
+        None if no night has a chunk of this identity.  Every chunk was compared with its hash, and its rows with
         the plan; damaged ones are left out.
     """
     for night in earlier:
@@ -53,7 +53,7 @@ def carry(study: Study, earlier: Sequence[Path], target: Path) -> Carried | None
             continue
         try:
             found = verify(source, designs=0)
-        except LinksweepError:  # whatever is wrong with an earlier night, this one computes
+        except LinksweepError:  # a faulty earlier night is computed again
             continue
         bad = {finding.path for finding in found.findings}
         sound = [path for path in sorted(source.glob("part-*.parquet")) if path not in bad]
@@ -69,10 +69,10 @@ def carry(study: Study, earlier: Sequence[Path], target: Path) -> Carried | None
                 path = files.beside(source) / name
                 if path.is_file() and path not in bad:
                     link_or_copy(path, target / name)
-            # Lines are added to this one, so it is no link.
+            # This file is appended to, so it is copied.
             if (files.beside(source) / files.RUNS).is_file():
                 shutil.copyfile(files.beside(source) / files.RUNS, target / files.RUNS)
-            same = all(noted.get(key) == words for key, words in words_of(study).items())  # a title is in the report
+            same = all(noted.get(key) == words for key, words in words_of(study).items())  # titles are in the report
             whole = not found.findings and bool(noted.get("complete")) and same and searched(study, target)
             if whole:
                 _link_report(files.beside(source), target)
@@ -81,11 +81,11 @@ def carry(study: Study, earlier: Sequence[Path], target: Path) -> Carried | None
 
 
 def searched(study: Study, folder: Path) -> bool:
-    """Whether optimum, proof and front in a folder are the study's own, made by these sources.
+    """Tell whether optimum, proof and front in a folder belong to the study and were made by these sources.
 
-    Those that the study does not ask for do not count.
+    Parts that the study does not ask for do not count.
 
-    A search that time has cut short is made again.
+    A search that ran out of time is repeated.
     """
     note = files.read_plan(folder / files.DESIGNS) or {}
     if study.optimise is not None and note.get("optimised") != optimum_key(replace(study, pareto=None), note):
@@ -103,7 +103,7 @@ def searched(study: Study, folder: Path) -> bool:
 
 
 def _link_report(source: Path, target: Path) -> None:
-    """Link the report and what belongs to it; what a new report would write into is copied."""
+    """Link the report and its files; copy those that a new report would overwrite."""
     if not (source / REPORT).is_file():
         return
     copied = [*(source / FIGURES).glob("*.svg"), *(source / name.removeprefix("_") for name in files.SIDE_FILES)]

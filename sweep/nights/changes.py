@@ -1,4 +1,4 @@
-"""What moved in a study since the last good night, and its headline figures."""
+"""Changes of a study since the last good night, and its headline figures."""
 
 from __future__ import annotations
 
@@ -22,13 +22,13 @@ if TYPE_CHECKING:
     from sweep.nights.archive import NightRecord
     from sweep.study import Study
 
-# A study that samples its extrema has no accuracy of its own: rounding may differ from version to version.
+# Tolerance of a study that samples its extrema, without an accuracy: rounding may differ between versions.
 ROUNDING = {"float64": 1e-12, "float32": 1e-6}
-# Objective and dimensions of an optimum: the search ends within these relative changes, in a flat valley at the second.
+# Relative changes within which a search repeats: of the objective, and of dimensions in a flat valley.
 OBJECTIVE_RTOL, DIMENSION_RTOL = 1e-6, 1e-4
-# Bounds that a front places follow what designs reach and repeat as dimensions do, here of the range of bounds; a gap
-# that gets one is 1/256 wide (`sweep.optimise.front.pareto.NARROWEST`), so none is taken for another.
-# Slower is what took so many times the median of the nights before, twice in a row; fewer nights tell nothing.
+# Bounds that a front places depend on the designs and repeat like dimensions, here relative to the range of bounds; a
+# gap that gets one is 1/256 wide (`sweep.optimise.front.pareto.NARROWEST`), so bounds cannot be confused.  A study is
+# slower if it takes this multiple of the median of earlier nights, twice in a row, with enough nights.
 SLOWER_FACTOR, LEAST_NIGHTS, MOST_NIGHTS = 1.5, 3, 7
 
 DESIGNS, WITHIN, YIELD = "designs", "designs within all limits", "yield"
@@ -36,7 +36,7 @@ DESIGNS, WITHIN, YIELD = "designs", "designs within all limits", "yield"
 
 @dataclass(frozen=True)
 class Changes:
-    """What moved: exit code of ``sweep compare``, in words, and the headline figures that moved."""
+    """Changes between two nights: exit code of ``sweep compare``, words, and the changed headline figures."""
 
     code: int
     lines: tuple[str, ...]
@@ -44,9 +44,9 @@ class Changes:
 
 
 def figures(study: Study, folder: Path) -> tuple[dict[str, float], dict[str, str]]:
-    """Headline figures of a complete dataset and their units: designs, those within the limits, the best objective.
+    """Return the headline figures of a complete dataset and their units: designs, feasible designs, best objective.
 
-    The best objective is that of the optimum, or where the study has none that of the best design of the sweep.
+    The best objective is that of the optimum, or without an optimisation that of the best design of the sweep.
     """
     counts = (files.read_plan(folder) or {}).get("counts") or {}
     number, within = sum(counts.values()), counts.get("OK", 0)
@@ -69,14 +69,14 @@ def figures(study: Study, folder: Path) -> tuple[dict[str, float], dict[str, str
 
 
 def changes(study: Study, old: Path, new: Path) -> Changes:
-    """Compare a study's dataset with the one of an earlier night.
+    """Compare a study's dataset with that of an earlier night.
 
-    Values are compared design by design within the study's accuracy, optimum and front within what their searches
-    promise.
+    Values are compared design by design within the study's accuracy, optimum and front within the accuracy of their
+    searches.
 
     Parameters
     ----------
-    study : as it is tonight
+    study : tonight's study
     old, new : folders of the chunks, both complete
     """
     plans = [files.read_plan(folder) or {} for folder in (old, new)]
@@ -85,7 +85,7 @@ def changes(study: Study, old: Path, new: Path) -> Changes:
         return Changes(ROWS_CHANGED, (f"the study itself was edited: {'; '.join(words) or 'its fixed tables'}",))
     rtol = study.accuracy.target or ROUNDING[study.output.dtype]
     found = compare(old, new, rtol)
-    # The optimum and the reference have promises of their own.
+    # The optimum and the reference have tolerances of their own.
     found.moved = {name: moved for name, moved in found.moved.items() if moved.kind == "design"}
     found.seconds = None
     code = ROWS_CHANGED if found.rows_changed else VALUES_CHANGED if found.values_changed else 0
@@ -115,7 +115,7 @@ def _optimum(study: Study, old: Path, new: Path) -> tuple[list[str], list[str]]:
     if _far(before[name], after[name], OBJECTIVE_RTOL):
         found.append(f"optimum moved: {name} {before[name]:.10g} -> {after[name]:.10g}")
     sizes = {p.name: max(abs(before[p.name]), abs(after[p.name])) for p in study.family.parameters}
-    # A length near zero is measured by the longest one.
+    # A length near zero is compared relative to the longest one.
     largest = max((sizes[p.name] for p in study.family.parameters if p.unit == "length"), default=0.0)
     dimensions = []
     for p in study.family.parameters:
@@ -143,7 +143,7 @@ def _front(study: Study, old: Path, new: Path) -> tuple[list[str], list[str]]:
     found = []
     if not len(at) == len(now) == pairs.sum():
         found.append(f"front: {len(at)} bounds before, {len(now)} now, {pairs.sum()} of them the same")
-    # From one bound to the other a front goes no steeper than to the neighbours; of equal bounds this allows nothing.
+    # Between neighbouring bounds a front is no steeper than to its neighbours; for equal bounds this allows nothing.
     slopes = np.nan_to_num(np.abs(np.diff(values) / np.diff(at)))
     steepest = np.maximum(np.append(slopes, 0.0), np.append(0.0, slopes))
     allowed = OBJECTIVE_RTOL * np.fmax(np.abs(values), np.abs(then[near])) + steepest * apart
@@ -159,12 +159,12 @@ def _front(study: Study, old: Path, new: Path) -> tuple[list[str], list[str]]:
 
 
 def slower(name: str, seconds: float, history: Sequence[NightRecord]) -> Changes:
-    """Return whether a study takes longer than the recent median allows; one slow night by itself is no alarm.
+    """Report a study whose run takes longer than the recent median allows, twice in a row.
 
     Parameters
     ----------
-    name : of the study
-    seconds : of tonight's run, in which every chunk was computed
+    name : name of the study
+    seconds : time of tonight's run, in which every chunk was computed
     history : earlier nights, the oldest first; runs that linked chunks are left out
     """
     times = [
@@ -188,7 +188,7 @@ def _far(old: float, new: float, rtol: float) -> bool:
 
 
 def _role(path: Path, role: str) -> pd.Series[Any] | None:
-    """Return one row of the optimiser's table."""
+    """Return the row of a role in the optimiser's table, or None."""
     if not path.is_file():
         return None
     table = files.read_table(path)

@@ -20,7 +20,7 @@ from sweep.nights.studies import FIGURE, RUN_LOG, Chosen, Ended, call, chosen, d
 from sweep.report.terminal import INFEASIBLE
 from sweep.study import Study
 
-# A run ended so: its own code says why.  Any other end is that of a process that died.
+# Exit codes that a run sets itself; any other is that of a process that died.
 TOLD = (2, 3, 74, 75)
 CUT = (TimeUsedUp.exit_code, 130, 143)
 GRAVEST_FIRST = (11, 10, TimeUsedUp.exit_code, 12)
@@ -28,7 +28,7 @@ GRAVEST_FIRST = (11, 10, TimeUsedUp.exit_code, 12)
 
 @dataclass(frozen=True)
 class Settings:
-    """How a night goes: where to, how long it may take [s], how many nights are kept, workers, whom to tell."""
+    """Settings of a night: folder, time budget [s], number of nights kept, workers, and command for changes."""
 
     into: Path
     budget: float
@@ -46,22 +46,22 @@ def nightly(studies: Iterable[str | Path], settings: Settings, say: Callable[[st
     ----------
     studies : study files, folders with one, or folders of such folders
     settings : see :class:`Settings`
-    say : told what happens, line by line
+    say : called with every line of the log
 
     Returns
     -------
     NightRecord
         ``exit_code`` is 0 if nothing changed; that of the run if one failed, 74 before others; 11 if rows or statuses
-        changed, 10 if values did; 124 if the time was over before all studies were complete; 12 if one was slower.
+        changed, 10 if values did; 124 if the time ran out before all studies were complete; 12 if one was slower.
 
     Raises
     ------
     InputError
         if there are no studies, or a setting is out of range
     LockedError
-        if another night is at work in the folder
+        if another night is running in the folder
     StoreError
-        if the disk is full or refuses.
+        if the disk is full or refuses a write.
     """
     if not settings.budget > 0.0:
         raise InputError("budget", settings.budget, "a time above 0 s", "nightly")
@@ -75,7 +75,7 @@ def nightly(studies: Iterable[str | Path], settings: Settings, say: Callable[[st
 
 
 class _Night:
-    """The state of a night at work."""
+    """State of a running night."""
 
     def __init__(self, settings: Settings, earlier: list[Path], folder: Path, say: Callable[[str], None]) -> None:
         self.settings, self.earlier, self.folder = settings, earlier, folder
@@ -86,11 +86,11 @@ class _Night:
 
     @property
     def left(self) -> float:
-        """Time that is left [s]."""
+        """Remaining time [s]."""
         return self.settings.budget - (time.monotonic() - self.begin)
 
     def through(self, studies: list[Chosen]) -> NightRecord:
-        """Return all studies, then what concerns the night as a whole."""
+        """Process all studies, then the page, old nights and the notification, and return the record."""
         names = ", ".join(one.name for one in studies)
         self.journal.note("night", f"night {self.folder.name}: {names}", studies=[one.name for one in studies])
         records: dict[str, StudyRecord] = {}
@@ -119,14 +119,14 @@ class _Night:
         return result
 
     def written(self, records: Mapping[str, StudyRecord], code: int) -> NightRecord:
-        """Write the record of this night down."""
+        """Write the record of this night to its folder and to the history."""
         result = NightRecord(self.folder.name, time.monotonic() - self.begin, code, records)
         archive.write_night(self.folder, result)
         archive.append_history(self.settings.into, result)
         return result
 
     def interrupted(self, studies: list[Chosen], records: Mapping[str, StudyRecord], code: int) -> None:
-        """Write down what a signal has left of the night, and the page with it."""
+        """Write the record and the page of a night that a signal has interrupted."""
         left = [one.name for one in studies if one.name not in records]
         message = "the night was interrupted"
         at_work, after = StudyRecord("cut", code, message=message), StudyRecord("waiting", code, message=message)
@@ -149,7 +149,7 @@ class _Night:
             carried = carry(one.study, self.earlier, target)
             ended = Ended(0, 0.0, "") if carried and carried.whole else self.run(one, target)
             source, linked = (carried.night, carried.chunks) if carried else (None, 0)
-            # A proof that died leaves designs and optimum behind, which are whole; none feasible is an answer, too.
+            # A proof that died leaves designs and optimum complete; no feasible design is an answer, too.
             died = ended.code not in (0, INFEASIBLE, TimeUsedUp.exit_code)
             if died or not store.is_complete(target / files.DESIGNS):
                 state: State = "cut" if ended.code in CUT else "failed"
@@ -165,13 +165,13 @@ class _Night:
             return StudyRecord("failed", error.exit_code, message=str(error))
 
     def run(self, one: Chosen, target: Path) -> Ended:
-        """Compute what is not there yet, within the time that is left."""
+        """Compute what is missing, within the remaining time."""
         words = ["run", str(one.path.resolve()), "--out", str(target / files.DESIGNS)]
         words += ["--jobs", str(self.settings.jobs), "--backend", self.settings.backend]
         return call([*words, *(["--smoke"] if self.settings.smoke else [])], target / RUN_LOG, self.left)
 
     def finished(self, study: Study, target: Path, carried: Carried | None, ended: Ended) -> StudyRecord:
-        """Return the report, figures and comparison of a complete dataset."""
+        """Write the report of a complete dataset, compare it, and return the record."""
         message, cut = "", ended.message if ended.code == TimeUsedUp.exit_code else ""
         if not (target / REPORT).is_file():
             told = call(["report", str(target)], target / RUN_LOG, max(self.left, 0.0))
@@ -206,12 +206,12 @@ class _Night:
         )
 
     def base(self, name: str) -> Path | None:
-        """Return the last good night that has this study whole."""
+        """Return the last good night with a complete dataset of this study."""
         return next((night for night in self.good if store.is_complete(night / name / files.DESIGNS)), None)
 
 
 def exit_code(studies: Mapping[str, StudyRecord]) -> int:
-    """Return what a night ends with: the gravest of its studies' codes."""
+    """Return the exit code of a night: the most serious of its studies' codes."""
     failed = [record.code for record in studies.values() if record.state == "failed"]
     if failed:
         return StoreError.exit_code if StoreError.exit_code in failed else failed[0]
@@ -222,7 +222,7 @@ def exit_code(studies: Mapping[str, StudyRecord]) -> int:
 
 
 def _words(name: str, record: StudyRecord) -> str:
-    """Return one study in words."""
+    """Describe the result of one study."""
     if record.state == "waiting":
         return f"{name}: not begun, the time was over"
     linked = f", {how_many(record.linked, 'chunk')} linked from {record.linked_from}" if record.linked else ""
@@ -244,7 +244,7 @@ def _words(name: str, record: StudyRecord) -> str:
 
 
 def _verdict(record: NightRecord) -> str:
-    """Return the last line of a night."""
+    """Return the last line of a night's log."""
     changed = [f"{name} ({own.changed})" for name, own in record.studies.items() if own.changed]
     late = [name for name, own in record.studies.items() if own.state in ("cut", "waiting")]
     failed = [name for name, own in record.studies.items() if own.state == "failed"]

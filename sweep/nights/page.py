@@ -1,4 +1,4 @@
-"""The page of the nights: each study's headline figures as trend lines, red where something moved."""
+"""The page of the nights: each study's headline figures as trend lines, red where something changed."""
 
 from __future__ import annotations
 
@@ -17,14 +17,14 @@ from sweep.pages import rendered
 from sweep.report.quantities import number, quantity
 
 INDEX = "index.html"
-SHOWN = 60  # nights on the page
-WIDTH, HEIGHT, EDGE = 240.0, 36.0, 5.0  # of a trend line [px]
+SHOWN = 60  # number of nights on the page
+WIDTH, HEIGHT, EDGE = 240.0, 36.0, 5.0  # size and margin of a trend line [px]
 DIGITS = 6
 SECONDS = "time of the run"
 
 
 class Point(NamedTuple):
-    """A figure in one night, by the night's place among those shown."""
+    """A figure in one night; ``night`` is the index of the night among those shown."""
 
     night: int
     value: float
@@ -33,7 +33,7 @@ class Point(NamedTuple):
 
 
 def write_page(into: Path) -> Path:
-    """Write ``index.html`` from the history, as a whole; it needs no network."""
+    """Write ``index.html`` from the history, atomically; it needs no network."""
     nights = read_history(into)[-SHOWN:]
     names = sorted({name for night in nights for name in night.studies})
     text = rendered(
@@ -49,7 +49,7 @@ def write_page(into: Path) -> Path:
 
 
 def study_rows(name: str, nights: Sequence[NightRecord], into: Path) -> SimpleNamespace:
-    """Return what the page says of one study: its report (if it is still there), its last night, its trends."""
+    """Return the page's data of one study: its report (if it still exists), its last night, its trends."""
     mine = [(night.name, night.studies[name]) for night in nights if name in night.studies]
     last_night, last = mine[-1]
     reports = [night for night, record in mine if record.report and (into / night / name / "report.html").is_file()]
@@ -67,7 +67,7 @@ def study_rows(name: str, nights: Sequence[NightRecord], into: Path) -> SimpleNa
 
 
 def _trend(name: str, mine: Sequence[tuple[str, StudyRecord]], order: Sequence[str]) -> SimpleNamespace:
-    """Return a headline figure, in the unit a designer reads."""
+    """Return the trend of a headline figure, in a designer's unit."""
 
     def shown(record: StudyRecord) -> str:
         value, unit = record.figures[name], record.units.get(name, "")
@@ -86,7 +86,7 @@ def _trend(name: str, mine: Sequence[tuple[str, StudyRecord]], order: Sequence[s
 
 
 def _times(mine: Sequence[tuple[str, StudyRecord]], order: Sequence[str]) -> SimpleNamespace:
-    """Return nights in which something was computed."""
+    """Return the trend of the run's time, over nights in which something was computed."""
     points = [
         Point(order.index(night), record.seconds, record.changed == SLOWER, f"{night}: {record.seconds:.3g} s")
         for night, record in mine
@@ -118,7 +118,7 @@ def _state(record: StudyRecord) -> str:
 
 
 def _night_row(night: NightRecord, into: Path) -> SimpleNamespace:
-    """Return what the page says of a night; there is no log where its folder has been deleted."""
+    """Return the page's data of a night; without a log if its folder has been deleted."""
     kinds = [(name, record) for name, record in night.studies.items() if record.changed or record.state != "complete"]
     return SimpleNamespace(
         name=night.name,

@@ -1,6 +1,6 @@
-"""The studies of a night: which, in which order, and each run in a process of its own.
+"""The studies of a night: selection, order, and each run in a process of its own.
 
-A crash there ends neither the night nor the other studies.
+A crash of a run ends neither the night nor the other studies.
 """
 
 from __future__ import annotations
@@ -21,17 +21,17 @@ from sweep.study import Study, load_study
 
 FILE, FIGURE = "study.toml", "figure.py"
 RUN_LOG = "run.log"
-# For a run to leave once it is told that the time is over [s]; it promises two.
+# Time for a run to end after it is told that the time is over [s]; it promises two seconds.
 GRACE = 10.0
-# The same, where the night itself was told to leave and has promised two.
+# The same if the night itself was told to end and has promised two seconds.
 HURRY = 0.9
-# So long a command of the user's may take [s].
+# Largest time of a user's command [s].
 COMMAND_SECONDS = 60.0
 
 
 @dataclass(frozen=True)
 class Chosen:
-    """A study of the night; ``study`` is None where its file has faults, which ``fault`` tells."""
+    """A study of the night; ``study`` is None if its file has faults, which ``fault`` lists."""
 
     name: str
     path: Path
@@ -40,12 +40,12 @@ class Chosen:
 
 
 def chosen(places: Iterable[Path], smoke: bool) -> list[Chosen]:
-    """Return the studies in these places: study files, folders with one, or folders of such archive.
+    """Return the studies of some places: study files, folders with one, or folders of such folders.
 
     Raises
     ------
     InputError
-        if there is no study, or two have one name: each has a folder of its name in the night.
+        if there is no study, or two have the same name: each has a folder of its name in the night.
     """
     places = list(places)
     found: list[Chosen] = []
@@ -73,19 +73,19 @@ def chosen(places: Iterable[Path], smoke: bool) -> list[Chosen]:
 
 
 def files_of(place: Path) -> list[Path]:
-    """Return the study files of a place; a link that leads nowhere is one, with a fault."""
+    """Return the study files of a place; a broken link counts as a file, with a fault."""
     if not place.is_dir():
         return [place]
     return [place / FILE] if os.path.lexists(place / FILE) else sorted(place.glob(f"*/{FILE}"))
 
 
 def in_order(studies: Sequence[Chosen], earlier: Sequence[Path]) -> list[Chosen]:
-    """Sort the studies: what was cut off or not begun in the last night comes first, the rest in the order given.
+    """Sort the studies: those cut off or not begun in the last night come first, the rest in the given order.
 
     Parameters
     ----------
-    studies : of this night
-    earlier : folders of nights, the newest first; one that was killed has no record, then its datasets tell
+    studies : studies of this night
+    earlier : folders of nights, the newest first; a killed night has no record and is judged by its datasets
     """
     if not earlier:
         return list(studies)
@@ -102,7 +102,7 @@ def in_order(studies: Sequence[Chosen], earlier: Sequence[Path]) -> list[Chosen]
 
 @dataclass(frozen=True)
 class Ended:
-    """How a process ended: exit code (that of the time limit is 124), time [s], and its last line."""
+    """Ending of a process: exit code (124 for the time limit), time [s], and its last line."""
 
     code: int
     seconds: float
@@ -110,26 +110,26 @@ class Ended:
 
 
 def call(words: Sequence[str], log: Path, seconds: float) -> Ended:
-    """Run a verb of the command line; what it says goes to the end of ``log``.
+    """Run a verb of the command line; its output is appended to ``log``.
 
     Parameters
     ----------
     words : the verb and its arguments
-    log : file
-    seconds : after so long it is told to leave
+    log : path of the log file
+    seconds : time after which the process is told to end
     """
     return _process(["-m", "sweep", *words], log, seconds)
 
 
 def draw(figure: Path, folder: Path, log: Path, seconds: float) -> Ended:
-    """Draw the figures that a study has a program of its own for; parameters as for :func:`call`."""
+    """Draw a study's own figures by its program; parameters as for :func:`call`."""
     return _process([str(figure.resolve()), str(folder.resolve())], log, seconds)
 
 
 def _process(words: Sequence[str], log: Path, seconds: float) -> Ended:
     home = str(Path(__file__).resolve().parents[2])
     path = os.pathsep.join([home, *filter(None, [os.environ.get("PYTHONPATH")])])
-    # -P: a folder that happens to be the current one adds no modules.
+    # -P: the current folder adds no modules.
     command = [sys.executable, "-P", *words]
     begin = time.monotonic()
     with store_errors(log):
@@ -148,7 +148,7 @@ def _process(words: Sequence[str], log: Path, seconds: float) -> Ended:
 
 
 def _wait(process: subprocess.Popen[bytes], seconds: float) -> int:
-    """Return the exit code as a shell has it; 124 where the time was over."""
+    """Return the exit code as a shell has it; 124 if the time ran out."""
     try:
         code = process.wait(timeout=max(seconds, 0.0))
     except subprocess.TimeoutExpired:
@@ -170,7 +170,7 @@ def _end(process: subprocess.Popen[bytes], grace: float) -> None:
 
 
 def notify(command: str, night: Path, code: int, text: str) -> str:
-    """Run the user's command in a shell; the summary is its input.  Returns what went wrong, or nothing.
+    """Run the user's command in a shell with the summary as its input; return its error, or an empty text.
 
     The command finds the folder of the night in LINKSWEEP_NIGHT, the exit code in LINKSWEEP_CODE.
     """

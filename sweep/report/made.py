@@ -159,7 +159,7 @@ def _histogram(data: Dataset, limit: Limit, column: NDArray[np.generic]) -> Hist
 
 
 class Spread(NamedTuple):
-    """An output of the optimum as it is made, stored; ``within`` is the share that keeps its limit, nan without one."""
+    """Distribution of an output over manufactured mechanisms; ``within`` is the share that keeps its limit, or nan."""
 
     shown: Quantity
     nominal: float

@@ -51,7 +51,7 @@ class Group:
 
 
 def groups(data: Dataset) -> list[Group]:
-    """Different optima: the answer, the best on paper, then the others by their objective; empty without a search."""
+    """Return the different optima: the answer, the best nominal one, the others by objective; none without a search."""
     if data.optima is None or data.objective is None:
         return []
     kept = data.optima[(data.optima["role"] != "reference") & (data.optima["status"] == codes.OK)]

@@ -59,7 +59,7 @@ class Cells:
         return cls(name, np.linspace(low, high, count + 1), np.full(count, 1.0 / count))
 
     def placed(self, value: float) -> float:
-        """Bring a value onto the axis: an angle that is swept over a whole turn is reduced by whole turns."""
+        """Reduce an angle that is swept over a whole turn to the axis by whole turns; leave any other value alone."""
         low, high = float(self.edges[0]), float(self.edges[-1])
         if abs(high - low - 2.0 * np.pi) > 1e-6 * np.pi:
             return value
