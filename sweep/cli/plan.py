@@ -105,13 +105,14 @@ def _optimiser(study: Study) -> list[str]:
 
     settings = study.optimise
     share = 100.0 * wanted(settings)
-    unlikely = f"better optima are unlikely (under {share:g} %) and " if share < 100.0 else ""
-    most = f"at most {how_many(settings.starts, 'start')} of {how_many(settings.looks, 'look')}"
+    each = f"with at most {how_many(settings.looks, 'evaluation')} of a design from each start"
+    most, source = f"{how_many(settings.starts, 'start')}, {each}", "start"
     if settings.by_populations:
-        most = (
-            f"at most {how_many(settings.populations, 'population')}, with starts of {how_many(settings.looks, 'look')}"
-        )
-    return [f"optimiser: {most}, fewer once {unlikely}the best was found {MET} times{_brake(settings.time_budget)}"]
+        most = f"{how_many(settings.populations, 'population')} (evolutionary searches of their own), {each}"
+        source = "population"
+    unlikely = f" and another {source} finds a new one with a chance under {share:g} %" if share < 100.0 else ""
+    enough = f"fewer once the best local optimum was found from {MET} {source}s{unlikely}"
+    return [f"optimiser: at most {most}; {enough}{_brake(settings.time_budget)}"]
 
 
 def _brake(seconds: float | None) -> str:
@@ -125,7 +126,7 @@ def _searches(cost: Estimate, found: Sequence[tuple[str, float, float]]) -> list
     least, most = (cost.seconds + sum(times) for times in list(zip(*found, strict=True))[1:])
     all_of_it = (*found, ("the whole run", least, most))
     words = [(name, f"about {duration(typical)}, at most {duration(end)}") for name, typical, end in all_of_it]
-    return ["", "what follows the sweep, by looks at a design of this study", *aligned(words)]
+    return ["", "what follows the sweep, by timed evaluations of a design of this study", *aligned(words)]
 
 
 def _mechanism(family: Family) -> list[str]:

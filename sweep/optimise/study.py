@@ -50,10 +50,14 @@ TEXTS = {
     "active": ("", "limits and bounds that hold the result back"),
     "relaxation": ("", "where infeasible: by how much each limit would have to give way, in its internal unit"),
     "agree": ("", "number of starts whose objective is within 1e-4 of the best; 1 for those that are not"),
-    "basin": ("", "number of the value it ended at, 1 for the best, values within 1e-4 are one; 0 where infeasible"),
+    "basin": (
+        "",
+        "number of the local optimum it ended at, 1 for the best, values within 1e-4 are one; 0 where infeasible",
+    ),
     "ended": (
         "",
-        "converged, stalled, differs (the search followed other extrema), infeasible, looks, time, interrupted",
+        "converged, stalled, differs (the search followed other extrema than the true ones), infeasible, "
+        "looks (its evaluations were used up), time, interrupted",
     ),
     "looks": ("", "evaluations of designs by the search from this start"),
     "status": ("", "see kernels.status"),

@@ -11,6 +11,7 @@ from sweep.dataset import files
 from sweep.errors import how_many
 from sweep.optimise.local.descent import KKT
 from sweep.optimise.local.start import DIFFERS
+from sweep.optimise.multistart.survey import optima_words
 from sweep.proof import read_proof
 from sweep.proof.study import EVENT, proof_words
 from sweep.quantities.limits import compared
@@ -149,7 +150,7 @@ def share_words(made: float, asked: float | None, ended: str, agree: int = 1) ->
         return text
     text += f", {100.0 * asked:g} % asked"
     if made < asked:
-        return f"{text}: not reached{', the looks of its search ended before' if ended == 'looks' else ''}"
+        return f"{text}: not reached{', its search used up its evaluations before' if ended == 'looks' else ''}"
     return f"{text}, met by {agree} searches" if agree > 1 else text
 
 
@@ -224,8 +225,8 @@ def search_sentence(data: Dataset, found: Scan) -> str:
     if math.isfinite(agree) and not populations:  # for populations the survey is more detailed
         text += f", {number(agree)} of which ended at this value"
     if data.survey is not None:
-        # Starts of one valley count once, so the survey may count fewer than ended at the value.
-        text += f"; {'' if populations else 'counting distinct valleys, '}{search_words(data, data.survey)}"
+        # Starts close together are one distinct start, so the survey may count fewer than ended at the value.
+        text += f"; {search_words(data, data.survey)}"
     residual, violation = value_of(data.optimum, "kkt_residual"), value_of(data.optimum, "violation")
     wanted = "" if residual <= KKT else f" where {number(KKT)} is wanted"
     words = "" if math.isnan(residual) and proof_sentence(data) else f"{_residual(residual)}{wanted}, "
@@ -257,10 +258,10 @@ def survey_warnings(data: Dataset, found: Survey) -> tuple[str, ...]:
 
 
 def search_words(data: Dataset, found: Survey) -> str:
-    """Describe the basins that the starts met; with a proof of the whole space without the estimate of unseen ones."""
+    """Describe the local optima found; with a proof of the whole space without the chance that one is left."""
     if found.basins == 0 or not _is_proven(data):
         return found.words
-    return f"{how_many(found.basins, 'basin')} met"
+    return f"{optima_words(found.basins)} found"
 
 
 def _is_proven(data: Dataset) -> bool:

@@ -213,7 +213,7 @@ def optima_sentence(data: Dataset, found: list[Group]) -> str:
     difference = change(shown, value, best)
     same = sum(abs(float(group.row[shown.name]) - best) <= AGREE * abs(best) for group in found)
     text = f"The search ended in {len(found)} structurally different optima"
-    text += f", {same} of them in the best basin, whose values agree" if same > 1 else ""
+    text += f", {same} of them with the best value" if same > 1 else ""
     row = found[1].row
     paper = row.get("role") == "nominal"
     text += f"; the {'best on paper' if paper else 'next'} has {shown.show(value)}"

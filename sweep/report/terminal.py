@@ -21,6 +21,7 @@ from sweep.families.base import Angles, Interval
 from sweep.families.capabilities import Assembly
 from sweep.optimise import read_survey
 from sweep.optimise.local.descent import KKT
+from sweep.optimise.multistart.survey import optima_words
 from sweep.quantities.limits import compared
 from sweep.report.answer import proof_sentence, search_words, share_words, survey_warnings
 from sweep.report.dataset import Dataset, read_dataset
@@ -67,7 +68,7 @@ def ending(folder: Path) -> Ending:
         found = read_survey(files.beside(folder) / files.OPTIMUM)
         if found is not None:
             lines.append(f"search: {how_many(found.starts, 'start')}, {search_words(data, found)}")
-            kinds = [f"{words}: {how_many(n, 'start')}, {how_many(b, 'basin')}" for words, n, b in found.kinds]
+            kinds = [f"{words}: {how_many(n, 'start')}, {optima_words(b)}" for words, n, b in found.kinds]
             lines += [f"signs: {'; '.join(kinds)}"] if kinds else []
             lines += [f"warning: {text}" for text in survey_warnings(data, found)]
         lines += [sentence] if (sentence := proof_sentence(data)) else []
@@ -124,7 +125,7 @@ def _optimum(data: Dataset) -> list[str]:
 def held_back(held: list[str], ended: str) -> str:
     """Name what limits the objective of an optimum: limits and bounds, or the ending of its search."""
     if ended == "looks":
-        held = [*held, "the number of looks, which ended its search"]
+        held = [*held, "the number of evaluations (optimise.looks), which ended its search"]
     return "; ".join(held) or "nothing: an optimum in the open"
 
 

@@ -30,7 +30,7 @@ def test_answer_names_the_optimum_what_holds_it_back_and_the_next_command(tmp_pa
     assert "small: 4096 designs, " in text and " within all limits, the best with largest acceleration " in text
     assert f"optimum: largest acceleration {best['max_abs_d2psi'][0]:.5g} rad/rad²" in text
     assert "held back by: " in text and "swing (at least 40°)" in text
-    assert "search: 3 starts, " in text and "estimated unseen" in text
+    assert "search: 3 starts, " in text and "another start finds a new one with an estimated chance of" in text
     assert f"next: sweep report {tmp_path / 'designs'}" in text
 
 
@@ -51,8 +51,8 @@ def test_run_with_report_draws_the_figures_and_writes_the_page_as_stages_of_its_
 def test_an_optimum_is_in_the_open_only_if_its_search_has_settled() -> None:
     assert held_back([], "converged") == "nothing: an optimum in the open"
     assert held_back(["swing"], "converged") == "swing"
-    assert held_back([], "looks") == "the number of looks, which ended its search"
-    assert held_back(["swing"], "looks") == "swing; the number of looks, which ended its search"
+    assert held_back([], "looks") == "the number of evaluations (optimise.looks), which ended its search"
+    assert held_back(["swing"], "looks") == "swing; the number of evaluations (optimise.looks), which ended its search"
 
 
 def test_a_share_that_is_less_than_what_was_asked_says_so_and_why() -> None:
@@ -60,7 +60,7 @@ def test_a_share_that_is_less_than_what_was_asked_says_so_and_why() -> None:
     assert share_words(0.9997, 0.9996, "looks", 2) == "100.0 % within all limits, 99.96 % asked, met by 2 searches"
     missed = "99.95 % within all limits, 99.96 % asked: not reached"  # cut, not rounded: 99.96 of 99.96 would be none
     assert share_words(0.99959, 0.9996, "converged") == missed
-    assert share_words(0.99959, 0.9996, "looks") == f"{missed}, the looks of its search ended before"
+    assert share_words(0.99959, 0.9996, "looks") == f"{missed}, its search used up its evaluations before"
 
 
 def test_no_feasible_design_ends_with_4_and_says_which_limit_gives_way(tmp_path: Path) -> None:

@@ -65,7 +65,10 @@ def test_files_that_pages_name_are_there():
 
 def test_plan_says_when_a_search_ends():
     (line,) = _optimiser(SimpleNamespace(optimise=OptimiseSettings()))
-    assert "fewer once better optima are unlikely (under 2 %) and the best was found 3 times" in line
+    assert (
+        "fewer once the best local optimum was found from 3 starts and another start finds a new one with a chance "
+        "under 2 %" in line
+    )
 
 
 @pytest.mark.parametrize(("best", "words"), [(1, "Only one start reached"), (2, "Only two starts reached")])

@@ -73,7 +73,7 @@ def test_looper_gets_from_an_empty_folder_to_the_drawing(tmp_path, monkeypatch):
         page.get_by_label("c1 may vary").check()
         page.click("#pin")
         page.click("#improve")
-        page.get_by_text("looks").filter(has_text="after").wait_for(timeout=120_000)
+        page.get_by_text("evaluations").filter(has_text="after").wait_for(timeout=120_000)
         assert page.evaluate("design.c1") != page.evaluate("page.first.c1")
         with page.expect_download() as found:
             page.select_option("#save", "study")

@@ -34,7 +34,8 @@ def test_unseen_share_is_the_larger_of_good_turing_and_boender_rinnooy_kan() -> 
     found = survey(bowl(), [Group(starts(10))], [result(k, x) for k, x in enumerate(values)], ASKED, "starts")
     # One of ten was met once; 3 * 4 / (10 * 9) is larger.
     assert (found.basins, found.best) == (3, 6) and found.unseen == pytest.approx(12 / 90)
-    assert found.words == "3 basins met, the best 6 times, estimated unseen 13 %"
+    chance = "another start finds a new one with an estimated chance of 13 %"
+    assert found.words == f"3 local optima found, the best from 6 distinct starts; {chance}"
     singles = [result(k, 1.0 if k < 8 else float(k)) for k in range(12)]
     assert survey(bowl(), [Group(starts(12))], singles, ASKED, "starts").unseen == pytest.approx(4 / 12)
 
@@ -50,9 +51,9 @@ def test_of_a_population_the_best_end_counts_alone() -> None:
     found = survey(bowl(), groups, ends, replace(POPULATIONS, unseen=0.02), "starts")
     assert (found.basins, found.best, found.starts) == (1, 3, 7) and found.unseen == pytest.approx(2 / 6)
     assert found.populations == 3 and not found.enough
-    assert found.words == "1 basin met by 3 populations, the best 3 times, estimated unseen 33 %"
-    asked = "the share of unseen basins is estimated at 33 %, not the 2 % asked: more populations may find a better one"
-    assert found.warnings[-1] == asked
+    chance = "another population finds a new one with an estimated chance of 33 %"
+    assert found.words == f"1 local optimum found, the best by 3 of 3 populations; {chance}"
+    assert found.warnings[-1] == f"{chance}, not the 2 % asked: more populations may find a better one"
     assert survey(bowl(), groups, ends, POPULATIONS, "starts").enough
     twice = survey(bowl(), groups, ends[:5], POPULATIONS, "starts")
     assert (twice.basins, twice.best) == (1, 2) and twice.unseen == 1.0 and not twice.enough
@@ -118,7 +119,8 @@ def test_starts_beside_each_other_count_once() -> None:
 def test_one_start_or_none_feasible_says_nothing_of_the_rest() -> None:
     assert survey(bowl(), [Group(starts(1))], [result(0, 1.0)], ASKED, "starts").unseen == 1.0
     nothing = survey(bowl(), [Group(starts(2))], [result(k, 1.0, st.LIMIT_EXCEEDED) for k in range(2)], ASKED, "starts")
-    assert nothing.unseen == 1.0 and nothing.basins == 0 and "none of 2 starts became feasible" in nothing.words
+    assert nothing.unseen == 1.0 and nothing.basins == 0
+    assert nothing.words == "none of 2 starts led to a design within all limits"
 
 
 def test_search_ends_when_enough_is_known() -> None:
@@ -152,7 +154,8 @@ def test_warnings_name_what_was_not_reached() -> None:
     found = Survey(4, 20, 2, 1, 0.5, 0.02, "starts")
     assert found.warnings[0] == "only 4 starts of the 20 asked: no more were found in the design space"
     assert (found.shortcomings, found.doubts) == (found.warnings[:1], found.warnings[1:])
-    assert "1 of the 3 distinct valleys" in found.warnings[1] and "estimated at 50 %, not the 2 %" in found.warnings[1]
+    assert "1 of the 3 distinct starts" in found.warnings[1]
+    assert "an estimated chance of 50 %, not the 2 %" in found.warnings[1]
     late = replace(found, ended="time", starts=5, asked=12)
     assert late.warnings == ("time ran out: 5 of 12 starts",)
 

@@ -198,6 +198,6 @@ def test_no_yield_without_tolerances_or_limits(missing) -> None:
 def test_a_share_that_was_asked_and_not_reached_is_told(share, reached) -> None:
     best = row("optimum", ended="looks", kkt_residual=1e-9, least_link=12.0, max_pressure_angle=1.0) | {"yield": share}
     data = data_of(best, tolerance=DATA["tolerance"] | {"robust": "95 %"})
-    missed = "93.12 % within all limits, 95 % asked: not reached, the looks of its search ended before"
+    missed = "93.12 % within all limits, 95 % asked: not reached, its search used up its evaluations before"
     told = [] if reached else [f"Not achieved: as it is made: {missed}."]
     assert not_achieved(data, SimpleNamespace(best_row=None)) == told

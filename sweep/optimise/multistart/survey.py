@@ -91,13 +91,19 @@ class Survey:
 
     @property
     def words(self) -> str:
-        """Summary as ``14 basins met, the best 5 times, estimated unseen 1 %``."""
+        """Summary: local optima found, starts that ended in the best, chance that another start finds a new one."""
         if self.basins == 0:
-            return f"none of {how_many(self.starts, 'start')} became feasible"
-        basins = f"{how_many(self.basins, 'basin')} met"
-        times = {1: "once", 2: "twice"}.get(self.best, f"{self.best} times")
-        by = f" by {how_many(self.populations, 'population')}" if self.populations else ""
-        return f"{basins}{by}, the best {times}, estimated unseen {_percent(self.unseen)}"
+            return f"none of {how_many(self.starts, 'start')} led to a design within all limits"
+        by = f"by {self.best} of {how_many(self.populations, 'population')}"
+        best = by if self.populations else f"from {how_many(self.best, 'distinct start')}"
+        return f"{optima_words(self.basins)} found, the best {best}; {self._chance}"
+
+    @property
+    def _chance(self) -> str:
+        another = "population" if self.populations else "start"
+        known = self.unseen < 1.0 or self.basins > 1
+        chance = f"an estimated chance of {_percent(self.unseen)}" if known else "an unknown chance"
+        return f"another {another} finds a new one with {chance}"
 
     @property
     def warnings(self) -> tuple[str, ...]:
@@ -124,12 +130,11 @@ class Survey:
         """Reasons why a better result than that of the search may exist."""
         found = []
         if self.ended == "starts" and self.basins and not self.enough:
-            of = "populations" if self.populations else "distinct valleys"
-            rare = f"the best basin was met from {self.best} of the {MET} {of} wanted"
+            of = "populations" if self.populations else "distinct starts"
+            rare = f"the best local optimum was found from {self.best} of the {MET} {of} wanted"
             parts = [rare] if self.best < MET else []
             if self.unseen > self.wanted:
-                parts.append(f"the share of unseen basins is estimated at {_percent(self.unseen)}, not the "
-                             f"{_percent(self.wanted)} asked")  # fmt: skip
+                parts.append(f"{self._chance}, not the {_percent(self.wanted)} asked")
             more = "populations" if self.populations else "starts"
             found.append(f"{' and '.join(parts)}: more {more} may find a better one")
         return tuple(found)
@@ -168,6 +173,11 @@ def survey(
         len(whole), most_counted(settings), len(met), best, _unseen(met), wanted(settings), ended,
         _kinds(problem, starts, numbered), populations=populations,
     )  # fmt: skip
+
+
+def optima_words(count: int) -> str:
+    """Write a number of basins as ``1 local optimum`` or ``3 local optima``, as users read it."""
+    return "1 local optimum" if count == 1 else f"{count} local optima"
 
 
 def most_counted(settings: OptimiseSettings) -> int:

@@ -232,9 +232,10 @@ async function improve() {
       for (const line of lines.filter(Boolean).map(JSON.parse)) {
         if (line.error) throw new Error(line.error);
         const held = line.active?.length ? `; held back by ${line.active.join(", ")}` : "";
-        const end = `${line.ended} after ${line.looks} looks${line.feasible ? "" : ", some limits are missed"}${held}`;
+        const how = { converged: "converged", time: "stopped" }[line.ended] ?? "not converged";
+        const end = `${line.feasible ? how : "some limits are missed"} after ${line.looks} evaluations${held}`;
         if (line.design) await take(line.design, end);
-        else say(`searching: ${line.looks} looks, ${line.seconds.toFixed(1)} s`);
+        else say(`searching: ${line.looks} evaluations, ${line.seconds.toFixed(1)} s`);
       }
     }
   } catch (error) { say(error.name === "AbortError" ? "stopped" : error.message, error.name !== "AbortError"); }
