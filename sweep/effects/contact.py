@@ -11,7 +11,7 @@ from kernels import status as st
 from kernels.linkage.bodies import TURN
 from kernels.types import Array, Status
 from sweep.effects.base import Effect, Largest
-from sweep.effects.load_effects import loads_of, relative
+from sweep.effects.load_effects import axis_of, loads_of, relative
 from sweep.effects.load_passing import compute_loads
 from sweep.effects.loads import magnitude
 from sweep.effects.scene import Scene, refuse, take_over
@@ -97,8 +97,7 @@ def _of_joint(scene: Scene, joint: LinkJoint, force: Array, status: Status) -> l
             narrow = half_width(force, modulus, both, length) * NARROW < radius
         np.copyto(status, st.NOT_LINEAR, where=~narrow & (status == st.OK))
         mean = force / (2.0 * radius * length)
-        axis = scene.links.axes[:, :, joint.freedom]
-        sliding = np.abs((turn * axis).sum(axis=2)) * radius * speed
+        sliding = np.abs((turn * axis_of(scene, joint)).sum(axis=2)) * radius * speed
     return [sliding, stress, mean * sliding]
 
 

@@ -15,7 +15,7 @@ from sweep.effects.bearing_life import bends as bends_of_shaft
 from sweep.effects.bearing_life import per_turn as turn_of_shaft
 from sweep.effects.bearings import CATALOGUE, REQUIRED_LIFE, permissible_load
 from sweep.effects.link_loads import SUPPORTED, friction_inputs, tree_of
-from sweep.effects.load_effects import friction_of, loads_of, tree_bends
+from sweep.effects.load_effects import axis_of, friction_of, loads_of, tree_bends
 from sweep.effects.load_passing import compute_friction
 from sweep.effects.loads import FRICTION_SUFFIX, FRICTION_TEXT
 from sweep.effects.scene import Scene, refuse, take_over
@@ -86,11 +86,6 @@ def _columns(scene: Scene, inputs: tuple[Parameter, ...], size: int) -> Array:
     return table
 
 
-def _axis(scene: Scene, joint: LinkJoint) -> Array:
-    """Axis of a shaft or a guide, (n, m, 3)."""
-    return np.ascontiguousarray(scene.links.axes[:, :, joint.freedom])
-
-
 def sliding(scene: Scene, wanted: frozenset[str]) -> Columns:
     """Wanted pressures and utilisations under the loads with friction."""
     asked = [j for j in journals(tree_of(scene)) if not wanted.isdisjoint(o.name for o in _sliding_outputs(j))]
@@ -106,7 +101,7 @@ def sliding(scene: Scene, wanted: frozenset[str]) -> Columns:
         along = np.zeros(scene.shape)
         if joint.kind == "shaft":
             force = np.stack(floats(loads, *axial[joint.name]), axis=2)
-            along = (force * _axis(scene, joint)).sum(axis=2)
+            along = (force * axis_of(scene, joint)).sum(axis=2)
             refuse(
                 status, scene.inputs[f"collar_diameter_{joint.name}"] <= scene.inputs[f"journal_diameter_{joint.name}"]
             )
@@ -140,18 +135,18 @@ def _rolling_outputs(joint: LinkJoint) -> tuple[Output, ...]:
 
 def _turning(scene: Scene, joint: LinkJoint) -> Array:
     """Compute the turning of a shaft in its bearings per unit crank speed, (n, m)."""
-    bodies, parents = scene.links.bodies, scene.links.parents
+    bodies, parent = scene.links.bodies, scene.links.parents[joint.body]
     turn = bodies[:, :, joint.body, 9:12]
-    if parents[joint.body] >= 0:
-        turn = turn - bodies[:, :, parents[joint.body], 9:12]
-    rate: Array = (turn * _axis(scene, joint)).sum(axis=2)
+    if parent >= 0:
+        turn = turn - bodies[:, :, parent, 9:12]
+    rate: Array = (turn * axis_of(scene, joint)).sum(axis=2)
     return rate
 
 
 def _shaft(tree: LinkTree, joint: LinkJoint) -> Shaft:
     at = 6 * tree.joints.index(joint)
     return Shaft(
-        joint.name, f"_{joint.name}", (at, at + 3), partial(_axis, joint=joint), partial(_turning, joint=joint)
+        joint.name, f"_{joint.name}", (at, at + 3), partial(axis_of, joint=joint), partial(_turning, joint=joint)
     )
 
 

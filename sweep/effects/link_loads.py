@@ -72,7 +72,8 @@ def rods_of(tree: LinkTree) -> dict[int, tuple[int, int]]:
     sliding = {joint.body for joint in tree.joints if joint.kind == "sleeve"}
     for joint in tree.joints:
         line, body = joint.lines[0], joint.body
-        ends = tree.ends[line] if joint.kind == "ball" else (tree.parents[body],) if joint.kind != "contact" else ()
+        hung = (tree.bodies[body].parent,) if joint.kind != "contact" else ()
+        ends = tree.ends[line] if joint.kind == "ball" else hung
         for k in ends:
             if k >= 0 and k not in sliding and body not in sliding:
                 found.setdefault(k, (-1, line) if joint.kind == "ball" else (body, -1))
@@ -147,7 +148,7 @@ def support_loads(tree: LinkTree) -> dict[str, tuple[int, int, str]]:
 @lru_cache
 def joint_table(tree: LinkTree) -> Index:
     """Joints as the kernels take them, (Q, PER_JOINT)."""
-    rows = [(KINDS[j.kind], j.body, j.freedom, *j.lines, rod(tree, j)) for j in tree.joints]
+    rows = [(KINDS[j.kind], j.body, tree.freedom(j), *j.lines, rod(tree, j)) for j in tree.joints]
     return np.array(rows, np.int64)
 
 

@@ -44,11 +44,8 @@ def tree_bends(tree: LinkTree, outputs: tuple[str, ...]) -> tuple[Bend, ...]:
 
 def reversals(scene: Scene) -> Array:
     """Compute the turning of each shaft in its bearings, (n, m, q)."""
-    rates = []
-    for joint in _shafts(tree_of(scene)):
-        turn, _ = relative(scene, joint)
-        rates.append((turn * scene.links.axes[:, :, joint.freedom]).sum(axis=2))
-    return np.stack(rates, axis=2)
+    shafts = _shafts(tree_of(scene))
+    return np.stack([(relative(scene, joint)[0] * axis_of(scene, joint)).sum(axis=2) for joint in shafts], axis=2)
 
 
 def slowness(scene: Scene) -> Array:
@@ -57,7 +54,7 @@ def slowness(scene: Scene) -> Array:
     for joint in _others(tree_of(scene)):
         turn, slip = relative(scene, joint)
         if joint.kind == "sleeve":
-            axis = scene.links.axes[:, :, joint.freedom]
+            axis = axis_of(scene, joint)
             radius = scene.inputs[f"radius_{joint.name}"][:, None]
             squares.append((radius * (turn * axis).sum(axis=2)) ** 2 + (slip * axis).sum(axis=2) ** 2)
             continue
@@ -65,6 +62,11 @@ def slowness(scene: Scene) -> Array:
         if joint.kind == "contact":
             squares.append((slip * slip).sum(axis=2))
     return np.stack(squares, axis=2)
+
+
+def axis_of(scene: Scene, joint: LinkJoint) -> Array:
+    """Axis of a shaft or a sleeve, (n, m, 3)."""
+    return scene.links.axes[:, :, tree_of(scene).freedom(joint)]
 
 
 def _shafts(tree: LinkTree) -> list[LinkJoint]:

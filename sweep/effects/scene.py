@@ -125,7 +125,7 @@ class Scene:
             raise TypeError(f"{self.family.name} has no tree of links")
         shape, every = motion["status"].shape, (len(tree.bodies), len(tree.freedoms), len(tree.ends))
         bodies, axes, lines = (np.empty((*shape, k, per)) for k, per in zip(every, _PER_LINK, strict=True))
-        parents = np.array(tree.parents, np.int64)
+        parents = np.array([body.parent for body in tree.bodies], np.int64)
         pairs = (np.array(given, np.int64).reshape(-1, 2) for given in (tree.freedoms, tree.ends))
         freedoms, ends = (np.tile(pair, (shape[0], 1, 1)) for pair in pairs)
         found = Links(parents, freedoms, ends, bodies, axes, lines)

@@ -100,9 +100,8 @@ def _drawing(family: Family) -> list[str]:
 def _tree(tree: LinkTree) -> list[str]:
     """Faults of a tree of links: numbers that name nothing, loops closed by too few lines or too many."""
     bodies, faults = range(len(tree.bodies)), []
-    faults += [f"LinkTree: parent {p} of body {k} is no earlier body" for k, p in enumerate(tree.parents) if p >= k]
-    if len(tree.parents) != len(tree.bodies) or any(body not in bodies for body, _ in tree.freedoms):
-        faults.append("LinkTree: give every body its parent, and freedoms of its bodies only")
+    parents = [body.parent for body in tree.bodies]
+    faults += [f"LinkTree: parent {p} of body {k} is no earlier body" for k, p in enumerate(parents) if p >= k]
     undriven = sum(kind != DRIVEN for _, kind in tree.freedoms)
     if undriven != len(tree.ends):
         faults.append(f"LinkTree: {undriven} freedoms that nothing drives need as many lines, not {len(tree.ends)}")

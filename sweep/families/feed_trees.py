@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from kernels.linkage.bodies import DRIVEN, FRAME, TURN, Links
+from kernels.linkage.bodies import DRIVEN, TURN, Links
 from kernels.types import Array
 from sweep.families import link_tree as poses
 from sweep.families.base import Angles, Columns, Parameter
@@ -17,17 +17,16 @@ Parameters = tuple[Parameter, ...]
 _SPIN = ("psi", "dpsi", "d2psi")
 CRANK, COUPLER, ROCKER, ECCENTRIC = range(4)  # bodies of the horizontal chain, then the first eccentric
 _BODIES = (
-    LinkBody("crank", "along the crank, tangential, along its axis, from the centre of its circle"),
-    LinkBody("coupler", "along the coupler of the horizontal chain, from the crank pin", slender=True),
+    LinkBody("crank", "along the crank, tangential, along its axis, from the centre of its circle", free=(DRIVEN,)),
+    LinkBody("coupler", "along the coupler of the horizontal chain, from the crank pin", CRANK, (TURN, TURN), True),
     LinkBody("rocker", "along the rocker of the horizontal chain, tangential, along its axis, from D"),
 )
 _JOINTS = (
-    LinkJoint("a", "bearing of the crank", "shaft", "frame on the crank", body=CRANK, freedom=0),
+    LinkJoint("a", "bearing of the crank", "shaft", "frame on the crank", body=CRANK),
     LinkJoint("b", "ball at the crank pin", "hinge", "crank on the coupler", body=COUPLER),
     LinkJoint("c", "ball of the rocker", "ball", "rocker on the coupler", lines=(0, 3)),
-    LinkJoint("d", "bearing of the rocker", "shaft", "frame on the rocker", body=ROCKER, freedom=3),
+    LinkJoint("d", "bearing of the rocker", "shaft", "frame on the rocker", body=ROCKER),
 )
-_FREEDOMS = ((CRANK, DRIVEN), (COUPLER, TURN), (COUPLER, TURN), (ROCKER, TURN))
 _ENDS = ((COUPLER, ROCKER),) * 3
 
 
@@ -64,8 +63,8 @@ def _eccentric(parameters: Parameters, designs: Array, angles: Angles, links: Li
 def _eccentric_parts(which: str, body: int) -> tuple[LinkBody, LinkJoint]:
     text = f"eccentric{which}"
     axes = f"along the eccentricity of {text}, tangential, along its axis, from its axis"
-    found = LinkJoint(f"l{which}", f"bearing of {text}", "shaft", f"frame on {text}", body=body, freedom=body + 1)
-    return LinkBody(text, axes), found
+    found = LinkJoint(f"l{which}", f"bearing of {text}", "shaft", f"frame on {text}", body=body)
+    return LinkBody(text, axes, free=(DRIVEN,)), found
 
 
 def two_leads(parameters: Parameters) -> LinkTree:
@@ -90,8 +89,8 @@ def two_leads(parameters: Parameters) -> LinkTree:
         bodies=(
             *_BODIES,
             body,
-            LinkBody("lift", "along the lift coupler, across it, along the axes, from E"),
-            LinkBody("rack", "along the rack, across it, along the axes, from H"),
+            LinkBody("lift", "along the lift coupler, across it, along the axes, from E", ECCENTRIC),
+            LinkBody("rack", "along the rack, across it, along the axes, from H", ROCKER),
         ),
         joints=(
             *_JOINTS,
@@ -102,14 +101,11 @@ def two_leads(parameters: Parameters) -> LinkTree:
                 "shaft",
                 "eccentric on the lift coupler",
                 body=4,
-                freedom=5,
                 touch="strap",
             ),
             LinkJoint("f", "pin of the lift coupler", "ball", "rack on the lift coupler", lines=(3, 2)),
-            LinkJoint("h", "pin of the rack on the rocker", "shaft", "rocker on the rack", body=5, freedom=6),
+            LinkJoint("h", "pin of the rack on the rocker", "shaft", "rocker on the rack", body=5),
         ),
-        parents=(FRAME, CRANK, FRAME, FRAME, ECCENTRIC, ROCKER),
-        freedoms=(*_FREEDOMS, (ECCENTRIC, DRIVEN), (4, TURN), (5, TURN)),
         ends=(*_ENDS, (4, 5), (4, 5)),
         needs=("chi", "dchi", "d2chi"),
         fill=fill,
@@ -142,28 +138,29 @@ def three_leads(parameters: Parameters) -> LinkTree:
     parts = [_eccentric_parts(str(2 + k), ECCENTRIC + k) for k in (0, 1)]
     leads = ("rocker", "eccentric 2", "eccentric 3")
     pins = [
-        LinkJoint(f"q{k}", f"pin of link {k} on the {lead}", "shaft", f"{lead} on link {k}", body=4 + k, freedom=5 + k)
+        LinkJoint(f"q{k}", f"pin of link {k} on the {lead}", "shaft", f"{lead} on link {k}", body=4 + k)
         for k, lead in enumerate(leads, start=1)
     ]
     return LinkTree(
         bodies=(
             *_BODIES,
             *(body for body, _ in parts),
-            *(LinkBody(f"link{k}", f"along link {k}, across it, along the axes, from its lead") for k in (1, 2, 3)),
-            LinkBody("rack", "along the rack, across it, along the axes, from the tooth"),
+            *(
+                LinkBody(f"link{k}", f"along link {k}, across it, along the axes, from its lead", ROCKER + k - 1)
+                for k in (1, 2, 3)
+            ),
+            LinkBody("rack", "along the rack, across it, along the axes, from the tooth", links_from),
         ),
         joints=(
             *_JOINTS,
             *(joint for _, joint in parts),
             *pins,
-            LinkJoint("f1", "pin of link 1 on the rack", "shaft", "link 1 on the rack", body=rack, freedom=rack + 1),
+            LinkJoint("f1", "pin of link 1 on the rack", "shaft", "link 1 on the rack", body=rack),
             *(
                 LinkJoint(f"f{k}", f"pin of link {k} on the rack", "ball", f"rack on link {k}", lines=(2 * k - 1, 2))
                 for k in (2, 3)
             ),
         ),
-        parents=(FRAME, CRANK, FRAME, FRAME, FRAME, ROCKER, ECCENTRIC, ECCENTRIC + 1, links_from),
-        freedoms=(*_FREEDOMS, (3, DRIVEN), (4, DRIVEN), (5, TURN), (6, TURN), (7, TURN), (8, TURN)),
         ends=(*_ENDS, (6, rack), (6, rack), (7, rack), (7, rack)),
         needs=("x_t", "y_t", "dx_t", "dy_t", "d2x_t", "d2y_t", "chi", "dchi", "d2chi"),
         fill=fill,

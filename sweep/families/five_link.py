@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from kernels.families import five_link
 from kernels.families.five_link.motion import links as fill_links
-from kernels.linkage.bodies import DRIVEN, FRAME, TURN
+from kernels.linkage.bodies import DRIVEN
 from sweep.families import rssr as crank_rocker
 from sweep.families.base import Family, Output, Parameter
 from sweep.families.capabilities import Assembly, Link, OutputLink, Skeleton
@@ -42,20 +42,18 @@ poses = poses_of(five_link.poses, five_link.Outputs, {"places": PLACE_OUTPUTS})
 _RATES = ("psi", "dpsi", "d2psi", "theta", "beta")
 LINKS = LinkTree(
     bodies=(
-        LinkBody("crank", "along the crank, tangential, along its axis, from A"),
-        LinkBody("cross", "from axis 1 to axis 2, along axis 2, along axis 1, from B"),
-        LinkBody("coupler", "along the coupler, along axis 2, normal to both, from axis 2"),
+        LinkBody("crank", "along the crank, tangential, along its axis, from A", free=(DRIVEN,)),
+        LinkBody("cross", "from axis 1 to axis 2, along axis 2, along axis 1, from B", 0),
+        LinkBody("coupler", "along the coupler, along axis 2, normal to both, from axis 2", 1),
         LinkBody("rocker", "along the rocker, tangential, along its axis, from D"),
     ),
     joints=(
-        LinkJoint("a", "crank bearing", "shaft", "frame on the crank", body=0, freedom=0),
-        LinkJoint("b", "axis 1 at the crank pin", "shaft", "crank on the cross-piece", body=1, freedom=1),
-        LinkJoint("h", "axis 2", "shaft", "cross-piece on the coupler", body=2, freedom=2),
+        LinkJoint("a", "crank bearing", "shaft", "frame on the crank", body=0),
+        LinkJoint("b", "axis 1 at the crank pin", "shaft", "crank on the cross-piece", body=1),
+        LinkJoint("h", "axis 2", "shaft", "cross-piece on the coupler", body=2),
         LinkJoint("c", "rocker ball", "ball", "coupler on the rocker", lines=(0, 3)),
-        LinkJoint("d", "rocker bearing", "shaft", "frame on the rocker", body=3, freedom=3),
+        LinkJoint("d", "rocker bearing", "shaft", "frame on the rocker", body=3),
     ),
-    parents=(FRAME, 0, 1, FRAME),
-    freedoms=((0, DRIVEN), (1, TURN), (2, TURN), (3, TURN)),
     ends=((3, 2),) * 3,
     needs=_RATES,
     fill=filled_by(fill_links, _RATES),

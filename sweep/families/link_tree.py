@@ -8,10 +8,12 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import cached_property
 from typing import TYPE_CHECKING, Literal, NamedTuple, TypeAlias
 
 import numpy as np
 
+from kernels.linkage.bodies import FRAME, TURN
 from kernels.types import Array
 from sweep.families.base import Angles, Columns, Parameter, floats
 from sweep.families.capabilities import DesignMap
@@ -25,11 +27,14 @@ if TYPE_CHECKING:  # families without such kernels do not wait for them
 class LinkBody:
     """A body of a :class:`LinkTree`: its name in the names of inputs, and where its axes x, y, z lie, in words.
 
-    A ``slender`` one is a rod along x between two balls, of which the spin about x has no inertia.
+    It hangs on the ``parent``, which stands before it, with the freedoms ``free``.  A ``slender`` one is a rod along x
+    between two balls, of which the spin about x has no inertia.
     """
 
     name: str
     axes: str
+    parent: int = FRAME
+    free: tuple[int, ...] = (TURN,)
     slender: bool = False
 
 
@@ -43,7 +48,7 @@ class LinkJoint:
     kind : "shaft" turns about an axis on two supports, "sleeve" slides along it too; "hinge" is a ball by which a body
         hangs on its parent, "ball" one that closes a loop; "contact" slides
     acts : which body's force on which it is, in words
-    body, freedom : of a shaft, a sleeve, a hinge the body; the number of the freedom whose axis is its own
+    body : of a shaft, a sleeve, a hinge the body; the axis of its first freedom is that of a shaft, a sleeve
     lines : of a ball, a contact the first of the lines that make it, and how many
     touch : where its surfaces press without fitting: a ball or a pin in a straight slot, a strap on an eccentric
     """
@@ -53,7 +58,6 @@ class LinkJoint:
     kind: Literal["shaft", "hinge", "sleeve", "ball", "contact"]
     acts: str
     body: int = -1
-    freedom: int = -1
     lines: tuple[int, int] = (-1, 0)
     touch: Literal["", "ball", "line", "strap"] = ""
 
@@ -68,7 +72,7 @@ class LinkTree:
     Parameters
     ----------
     bodies, joints : in the order of their numbers
-    parents, freedoms, ends : the tree as :class:`kernels.linkage.bodies.Links` takes it, of an ordinary design
+    ends : both bodies of each line, as :class:`kernels.linkage.bodies.Links` takes them, of an ordinary design
     needs : pose outputs that ``fill(designs, angles, motion, links)`` writes the poses of the bodies from
     carrier : number of the body that a tool hangs on
     tip : place of the tool in the axes of that body, (n, 3); None where it is an input
@@ -80,8 +84,6 @@ class LinkTree:
 
     bodies: tuple[LinkBody, ...]
     joints: tuple[LinkJoint, ...]
-    parents: tuple[int, ...]
-    freedoms: tuple[tuple[int, int], ...]
     ends: tuple[tuple[int, int], ...]
     needs: tuple[str, ...]
     fill: LinkFill
@@ -91,6 +93,16 @@ class LinkTree:
     rubs: bool = True
     arms: tuple[tuple[int, int], ...] = ()
     unit: Parameter | None = None
+
+    @cached_property
+    def freedoms(self) -> tuple[tuple[int, int], ...]:
+        """Body and kind of each freedom, as :class:`kernels.linkage.bodies.Links` takes them."""
+        return tuple((k, kind) for k, body in enumerate(self.bodies) for kind in body.free)
+
+    def freedom(self, joint: LinkJoint) -> int:
+        """Return the number of the freedom whose axis is that of a shaft or a sleeve; -1 for any other joint."""
+        own = joint.kind in ("shaft", "sleeve")
+        return [body for body, _ in self.freedoms].index(joint.body) if own else -1
 
 
 def filled_by(kernel: Callable[..., object], needs: tuple[str, ...]) -> LinkFill:

@@ -11,7 +11,7 @@ from functools import partial
 
 import numpy as np
 
-from kernels.linkage.bodies import DRIVEN, FRAME, SLIDE, TURN, Links
+from kernels.linkage.bodies import DRIVEN, FRAME, SLIDE, Links
 from kernels.types import Array
 from sweep.families import link_tree as poses
 from sweep.families.base import Angles, Columns, Parameter, floats
@@ -22,7 +22,7 @@ Parameters = tuple[Parameter, ...]
 _PSI, _CHI = ("psi", "dpsi", "d2psi"), ("chi", "dchi", "d2chi")
 
 
-_GUIDE = LinkJoint("d", "guide of the follower", "sleeve", "frame on the follower", body=1, freedom=1)
+_GUIDE = LinkJoint("d", "guide of the follower", "sleeve", "frame on the follower", body=1)
 
 
 def at_origin(designs: Array) -> Array:
@@ -30,12 +30,11 @@ def at_origin(designs: Array) -> Array:
     return np.zeros((len(designs), 3))
 
 
-def _cam_body(text: str = "cam") -> LinkBody:
-    return LinkBody(text, f"fixed to the {text}, along x and y at phi = 0, along its axis, from its axis")
+_CAM = LinkBody("cam", "fixed to the cam, along x and y at phi = 0, along its axis, from its axis", free=(DRIVEN,))
 
 
 def _bearing(text: str) -> LinkJoint:
-    return LinkJoint("a", f"bearing of the {text}", "shaft", f"frame on the {text}", body=0, freedom=0)
+    return LinkJoint("a", f"bearing of the {text}", "shaft", f"frame on the {text}", body=0)
 
 
 def _put_cam(angles: Angles, links: Links, at: Path) -> None:
@@ -61,18 +60,16 @@ def slotted_rocker(parameters: Parameters) -> LinkTree:
 
     return LinkTree(
         bodies=(
-            LinkBody("crank", "along the crank, tangential, along its axis, from A"),
+            LinkBody("crank", "along the crank, tangential, along its axis, from A", free=(DRIVEN,)),
             LinkBody("rocker", "along the slot, across it, along its axis, from D"),
-            LinkBody("block", "along the slot, across it, along the axes, from B"),
+            LinkBody("block", "along the slot, across it, along the axes, from B", 1, (SLIDE,)),
         ),
         joints=(
             _bearing("crank"),
             LinkJoint("b", "crank pin", "ball", "crank on the block", lines=(0, 2)),
-            LinkJoint("c", "slot", "sleeve", "rocker on the block", body=2, freedom=2, touch="line"),
-            LinkJoint("d", "rocker bearing", "shaft", "frame on the rocker", body=1, freedom=1),
+            LinkJoint("c", "slot", "sleeve", "rocker on the block", body=2, touch="line"),
+            LinkJoint("d", "rocker bearing", "shaft", "frame on the rocker", body=1),
         ),
-        parents=(FRAME, FRAME, 1),
-        freedoms=((0, DRIVEN), (1, TURN), (2, SLIDE)),
         ends=((2, 0),) * 2,
         needs=_PSI,
         fill=fill,
@@ -109,19 +106,17 @@ def rolling_planet(parameters: Parameters) -> LinkTree:
 
     return LinkTree(
         bodies=(
-            LinkBody("carrier", "along the carrier, tangential, along its axis, from A"),
-            LinkBody("planet", "along the arm of the pin, across it, along its axis, from O"),
+            LinkBody("carrier", "along the carrier, tangential, along its axis, from A", free=(DRIVEN,)),
+            LinkBody("planet", "along the arm of the pin, across it, along its axis, from O", 0),
             LinkBody("link", "along the slot, across it, along its axis, from D"),
         ),
         joints=(
             _bearing("carrier"),
-            LinkJoint("o", "bearing of the planet", "shaft", "carrier on the planet", body=1, freedom=1),
+            LinkJoint("o", "bearing of the planet", "shaft", "carrier on the planet", body=1),
             LinkJoint("teeth", "teeth of the fixed gear", "contact", "fixed gear on the planet", lines=(0, 1)),
             LinkJoint("b", "pin in the slot", "contact", "slotted link on the planet", lines=(1, 1), touch="line"),
-            LinkJoint("d", "bearing of the slotted link", "shaft", "frame on the slotted link", body=2, freedom=2),
+            LinkJoint("d", "bearing of the slotted link", "shaft", "frame on the slotted link", body=2),
         ),
-        parents=(FRAME, 0, FRAME),
-        freedoms=((0, DRIVEN), (1, TURN), (2, TURN)),
         ends=((1, FRAME), (1, 2)),
         needs=_PSI,
         fill=fill,
@@ -132,25 +127,24 @@ def rolling_planet(parameters: Parameters) -> LinkTree:
     )
 
 
-def _cam_and(follower: LinkBody, joint: LinkJoint, kind: int, needs: tuple[str, ...], fill: LinkFill) -> LinkTree:
+def _cam_and(follower: LinkBody, joint: LinkJoint, needs: tuple[str, ...], fill: LinkFill) -> LinkTree:
     """Cam on the driven shaft and a follower that touches it along one line."""
+    slides = follower.free == (SLIDE,)
     return LinkTree(
-        bodies=(_cam_body(), follower),
+        bodies=(_CAM, follower),
         joints=(
             _bearing("cam"),
             LinkJoint("r", "roller on the cam", "contact", f"cam on the {follower.name}", lines=(0, 1)),
             joint,
         ),
-        parents=(FRAME, FRAME),
-        freedoms=((0, DRIVEN), (1, kind)),
         ends=((1, 0),),
         needs=needs,
         fill=fill,
         rubs=False,
         carrier=1,
-        tip=at_origin if kind == SLIDE else None,
+        tip=at_origin if slides else None,
         output=1,
-        arms=((1, 0),) if kind == TURN else (),
+        arms=() if slides else ((1, 0),),
     )
 
 
@@ -166,8 +160,9 @@ def sliding_follower(parameters: Parameters) -> LinkTree:
         links.axes[:, :, 1] = X
         poses.put_line(links, 0, roller.at, np.cross(Z, roller.v - np.cross(Z, roller.at)))
 
-    follower = LinkBody("follower", "along the lift, to the left of it, along the cam's axis, from the roller")
-    return _cam_and(follower, _GUIDE, SLIDE, ("s", "ds", "d2s"), fill)
+    follower = LinkBody("follower", "along the lift, to the left of it, along the cam's axis, from the roller",
+                        free=(SLIDE,))  # fmt: skip
+    return _cam_and(follower, _GUIDE, ("s", "ds", "d2s"), fill)
 
 
 def swinging_follower(parameters: Parameters) -> LinkTree:
@@ -183,8 +178,8 @@ def swinging_follower(parameters: Parameters) -> LinkTree:
         poses.put_line(links, 0, roller.at, np.cross(Z, roller.v - np.cross(Z, roller.at)))
 
     lever = LinkBody("lever", "along the lever, tangential, along its axis, from D")
-    pivot = LinkJoint("d", "bearing of the lever", "shaft", "frame on the lever", body=1, freedom=1)
-    return _cam_and(lever, pivot, TURN, _PSI, fill)
+    pivot = LinkJoint("d", "bearing of the lever", "shaft", "frame on the lever", body=1)
+    return _cam_and(lever, pivot, _PSI, fill)
 
 
 def thread_follower(parameters: Parameters, cam_axis: Callable[[Array], Array]) -> LinkTree:
@@ -200,8 +195,8 @@ def thread_follower(parameters: Parameters, cam_axis: Callable[[Array], Array]) 
         links.axes[:, :, 1] = Y
         poses.put_line(links, 0, end.at, np.cross(Z, end.v - np.cross(Z, end.at - centre.at)))
 
-    follower = LinkBody("follower", "along x, along its way, along the cam's axis, from its end")
-    return _cam_and(follower, _GUIDE, SLIDE, ("S", "dS", "d2S"), fill)
+    follower = LinkBody("follower", "along x, along its way, along the cam's axis, from its end", free=(SLIDE,))
+    return _cam_and(follower, _GUIDE, ("S", "dS", "d2S"), fill)
 
 
 def turning_cam(needs: tuple[str, ...]) -> LinkTree:
@@ -210,9 +205,7 @@ def turning_cam(needs: tuple[str, ...]) -> LinkTree:
     def fill(designs: Array, angles: Angles, motion: Columns, links: Links) -> None:
         _put_cam(angles, links, poses.standing_at(links))
 
-    return LinkTree(
-        (_cam_body(),), (_bearing("cam"),), (FRAME,), ((0, DRIVEN),), (), needs, fill, carrier=0, rubs=False
-    )
+    return LinkTree((_CAM,), (_bearing("cam"),), (), needs, fill, carrier=0, rubs=False)
 
 
 def eyelet_crank(parameters: Parameters) -> LinkTree:
@@ -223,9 +216,8 @@ def eyelet_crank(parameters: Parameters) -> LinkTree:
         centre = poses.standing_at(links, 0.0, f * np.sin(alpha), f * np.cos(alpha))
         poses.put_crank(links, 0, 0, centre, poses.crank_arm(links, angles, alpha, a))
 
-    body = LinkBody("crank", "along the crank, tangential, along its axis, from A")
-    tip = partial(_on_crank, parameters)
-    return LinkTree((body,), (_bearing("crank"),), (FRAME,), ((0, DRIVEN),), (), ("P",), fill, 0, tip, rubs=False)
+    body = LinkBody("crank", "along the crank, tangential, along its axis, from A", free=(DRIVEN,))
+    return LinkTree((body,), (_bearing("crank"),), (), ("P",), fill, 0, partial(_on_crank, parameters), rubs=False)
 
 
 def _on_crank(parameters: Parameters, designs: Array) -> Array:
@@ -263,24 +255,22 @@ def heddle_shaft(parameters: Parameters, line: Callable[[Array], tuple[Array, Ar
 
     return LinkTree(
         bodies=(
-            LinkBody("lever", "along O2B, across it, along its axis, from O2"),
-            LinkBody("rod", "along the rod, across it, along the axes, from B"),
+            LinkBody("lever", "along O2B, across it, along its axis, from O2", free=(DRIVEN,)),
+            LinkBody("rod", "along the rod, across it, along the axes, from B", 0),
             LinkBody("bell", "along O3C, across it, along its axis, from O3"),
             LinkBody("back", "along O4E, across it, along its axis, from O4"),
-            LinkBody("shaft", "along O2O3, along the lift, along the axes, from its rod's end"),
+            LinkBody("shaft", "along O2O3, along the lift, along the axes, from its rod's end", free=(SLIDE,)),
         ),
         joints=(
-            LinkJoint("a", "bearing of the cam lever", "shaft", "frame on the cam lever", body=0, freedom=0),
-            LinkJoint("b", "pin of the rod on the cam lever", "shaft", "cam lever on the rod", body=1, freedom=1),
+            LinkJoint("a", "bearing of the cam lever", "shaft", "frame on the cam lever", body=0),
+            LinkJoint("b", "pin of the rod on the cam lever", "shaft", "cam lever on the rod", body=1),
             LinkJoint("c", "pin of the rod on the bell crank", "ball", "rod on the bell crank", lines=(0, 2)),
-            LinkJoint("o3", "bearing of the bell crank", "shaft", "frame on the bell crank", body=2, freedom=2),
-            LinkJoint("o4", "bearing of the shaft lever", "shaft", "frame on the shaft lever", body=3, freedom=3),
+            LinkJoint("o3", "bearing of the bell crank", "shaft", "frame on the bell crank", body=2),
+            LinkJoint("o4", "bearing of the shaft lever", "shaft", "frame on the shaft lever", body=3),
             LinkJoint("f", "link between the levers", "contact", "link on the shaft lever", lines=(2, 1)),
             LinkJoint("e", "heddle rod", "contact", "heddle rod on the shaft", lines=(3, 1)),
-            LinkJoint("g", "guide of the shaft", "sleeve", "frame on the shaft", body=4, freedom=4),
+            LinkJoint("g", "guide of the shaft", "sleeve", "frame on the shaft", body=4),
         ),
-        parents=(FRAME, 0, FRAME, FRAME, FRAME),
-        freedoms=((0, DRIVEN), (1, TURN), (2, TURN), (3, TURN), (4, SLIDE)),
         ends=((2, 1), (2, 1), (3, 2), (4, 3)),
         needs=(*_CHI, "lam", "y", "dy", "d2y"),
         fill=fill,

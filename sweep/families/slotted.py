@@ -91,20 +91,18 @@ def axis_squared(parameters: tuple[Parameter, ...], designs: Array, angles: Angl
 _RATES = ("cos_psi", "sin_psi", "dpsi", "d2psi", "rho", "drho", "d2rho")
 LINKS = LinkTree(
     bodies=(
-        LinkBody("crank", "along the crank, tangential, along its axis, from A"),
+        LinkBody("crank", "along the crank, tangential, along its axis, from A", free=(DRIVEN,)),
         LinkBody("link", "along the slot, across it, along the driven axis, from D"),
         LinkBody("arm", "bar: along the arm, along the bar, normal to both, from the bar; fork: across the slot, along "
-                 "it, normal to both, from the ball"),
+                 "it, normal to both, from the ball", 1, (SLIDE, TURN)),
     ),
     joints=(
-        LinkJoint("a", "crank bearing", "shaft", "frame on the crank", body=0, freedom=0),
+        LinkJoint("a", "crank bearing", "shaft", "frame on the crank", body=0),
         LinkJoint("b", "ball of the crank", "ball", "crank on the arm, or on the block of the fork", lines=(0, 3)),
         LinkJoint("c", "guide of the driven link", "sleeve", "driven link on the arm, or on the block", body=2,
-                  freedom=2, touch="ball"),
-        LinkJoint("d", "bearing of the driven link", "shaft", "frame on the driven link", body=1, freedom=1),
+                  touch="ball"),
+        LinkJoint("d", "bearing of the driven link", "shaft", "frame on the driven link", body=1),
     ),
-    parents=(FRAME, FRAME, 1),
-    freedoms=((0, DRIVEN), (1, TURN), (2, SLIDE), (2, TURN)),
     ends=((2, 0),) * 3,
     needs=_RATES,
     fill=filled_by(fill_links, _RATES),
@@ -226,16 +224,14 @@ swivel_poses = poses_of(swivel.poses, swivel.Outputs, dict(zip(swivel.Outputs._f
 _ROD_RATES = ("rho", "drho", "x_n", "y_n", "z_n")
 SWIVEL_LINKS = LinkTree(
     bodies=(
-        LinkBody("crank", "along the crank, tangential, along its axis, from A"),
-        LinkBody("rod", "along the rod, from B", slender=True),
+        LinkBody("crank", "along the crank, tangential, along its axis, from A", free=(DRIVEN,)),
+        LinkBody("rod", "along the rod, from B", 0, (TURN, TURN), slender=True),
     ),
     joints=(
-        LinkJoint("a", "crank bearing", "shaft", "frame on the crank", body=0, freedom=0),
+        LinkJoint("a", "crank bearing", "shaft", "frame on the crank", body=0),
         LinkJoint("b", "ball at the crank pin", "hinge", "crank on the rod", body=1),
         LinkJoint("q", "swivel block", "contact", "block on the rod", lines=(0, 2)),
     ),
-    parents=(FRAME, 0),
-    freedoms=((0, DRIVEN), (1, TURN), (1, TURN)),
     ends=((1, FRAME),) * 2,
     needs=_ROD_RATES,
     fill=filled_by(fill_swivel_links, _ROD_RATES),

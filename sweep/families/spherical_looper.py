@@ -8,7 +8,7 @@ import numpy as np
 
 from kernels.families import spherical_looper
 from kernels.families.spherical_looper import links as fill_links
-from kernels.linkage.bodies import DRIVEN, FRAME, TURN
+from kernels.linkage.bodies import DRIVEN, TURN
 from kernels.types import Array
 from sweep.families.base import Family, Output, Parameter
 from sweep.families.capabilities import Arm, Assembly, Dimensions, Fixed, Link, Skeleton
@@ -83,27 +83,25 @@ LOOPER = ("c0x", "c0y", "c0z")  # its ball from Os, where it is held
 _RATES = ("psi", "dpsi", "d2psi", "chi", "dchi", "d2chi")
 LINKS = LinkTree(
     bodies=(
-        LinkBody("crank1", "along crank 1, tangential, along its shaft, from its centre"),
-        LinkBody("crank2", "along crank 2, tangential, along its shaft, from its centre"),
+        LinkBody("crank1", "along crank 1, tangential, along its shaft, from its centre", free=(DRIVEN,)),
+        LinkBody("crank2", "along crank 2, tangential, along its shaft, from its centre", free=(DRIVEN,)),
         LinkBody(
             "carrier", "along the carrier's rocker, tangential, along its axis, from the axis at the ball's height"
         ),
-        LinkBody("looper", "x, y, z of the family's frame at psi = chi = 0, from Os"),
-        LinkBody("coupler1", "along coupler 1, from crank 1", slender=True),
-        LinkBody("coupler2", "along coupler 2, from crank 2", slender=True),
+        LinkBody("looper", "x, y, z of the family's frame at psi = chi = 0, from Os", 2),
+        LinkBody("coupler1", "along coupler 1, from crank 1", 0, (TURN, TURN), slender=True),
+        LinkBody("coupler2", "along coupler 2, from crank 2", 1, (TURN, TURN), slender=True),
     ),
     joints=(
-        LinkJoint("a1", "bearing of crank 1", "shaft", "frame on crank 1", body=0, freedom=0),
+        LinkJoint("a1", "bearing of crank 1", "shaft", "frame on crank 1", body=0),
         LinkJoint("b1", "ball of crank 1", "hinge", "crank 1 on coupler 1", body=4),
         LinkJoint("c1", "carrier's ball", "ball", "coupler 1 on the carrier", lines=(0, 3)),
-        LinkJoint("d1", "carrier's bearing", "shaft", "frame on the carrier", body=2, freedom=2),
-        LinkJoint("a2", "bearing of crank 2", "shaft", "frame on crank 2", body=1, freedom=1),
+        LinkJoint("d1", "carrier's bearing", "shaft", "frame on the carrier", body=2),
+        LinkJoint("a2", "bearing of crank 2", "shaft", "frame on crank 2", body=1),
         LinkJoint("b2", "ball of crank 2", "hinge", "crank 2 on coupler 2", body=5),
         LinkJoint("c2", "looper's ball", "ball", "coupler 2 on the looper", lines=(3, 3)),
-        LinkJoint("os", "looper's bearing in the carrier", "shaft", "carrier on the looper", body=3, freedom=3),
+        LinkJoint("os", "looper's bearing in the carrier", "shaft", "carrier on the looper", body=3),
     ),
-    parents=(FRAME, FRAME, FRAME, 2, 0, 1),
-    freedoms=((0, DRIVEN), (1, DRIVEN), (2, TURN), (3, TURN), (4, TURN), (4, TURN), (5, TURN), (5, TURN)),
     ends=((2, 4),) * 3 + ((3, 5),) * 3,
     needs=_RATES,
     fill=filled_by(fill_links, _RATES),
