@@ -84,9 +84,7 @@ class Batch:
         """Sort the designs by their index; an ordered batch is returned as it is."""
         if bool(np.all(self.index[1:] >= self.index[:-1])):
             return self
-        order = np.argsort(self.index, kind="stable")
-        outputs = {name: values[order] for name, values in self.outputs.items()}
-        return Batch(self.index[order], self.designs[order], outputs, self.status[order])
+        return self.only(np.argsort(self.index, kind="stable"))
 
     @classmethod
     def joined(cls, batches: Sequence[Batch]) -> Batch:

@@ -60,6 +60,12 @@ class Advice:
     threshold: float
     unit: str = ""  # of the values, in words
 
+    @classmethod
+    def of_turning(cls, quantity: str, values: Array, threshold: float, unit: str = "") -> Advice | None:
+        """Leave the designs out whose value is not known all the way; None where there is no other design."""
+        known = values[np.isfinite(values)]
+        return cls(quantity, known, threshold, unit) if known.size else None
+
     @property
     def worst(self) -> float:
         """The value of the design where the effect matters most."""
@@ -86,10 +92,7 @@ class Largest:
     def advice(self, compute: ComputeFunction, scene: Scene) -> Advice | None:
         """Apply it to the designs whose output is known all the way; None where there is no such design."""
         found = np.abs(np.asarray(compute(scene, frozenset({self.name}))[self.name], np.float64))
-        turning = np.isfinite(found).all(axis=1)
-        if not turning.any():
-            return None
-        return Advice(self.quantity, found[turning].max(axis=1), self.threshold, self.unit)
+        return Advice.of_turning(self.quantity, found.max(axis=1), self.threshold, self.unit)
 
 
 @dataclass(frozen=True)

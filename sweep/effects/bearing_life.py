@@ -254,16 +254,8 @@ def _refined(scene: Scene, rows: Rows, size: Array, target: float, shaft: Shaft)
     return found.value, found.err, turns
 
 
-def _rocker_axis(scene: Scene) -> Array:
-    return scene.records[1][:, None, 3:6]
-
-
-def _rocker_turning(scene: Scene) -> Array:
-    return scene.records[0][:, :, 22]
-
-
 # Columns of the joint reactions: force and moment of the frame on the rocker.
-ROCKER = Shaft("d", "", (9, 15), _rocker_axis, _rocker_turning)
+ROCKER = Shaft("d", "", (9, 15), lambda scene: scene.records[1][:, None, 3:6], lambda scene: scene.records[0][:, :, 22])
 _TEXT, _EQUATION = "the rocker's bearings", "B2 (1)-(3)"
 
 EFFECT = replace(

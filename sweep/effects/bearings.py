@@ -134,10 +134,6 @@ def _supports(scene: Scene) -> tuple[Array, Array]:
     return scene.inputs["support_d1"], scene.inputs["support_d2"]
 
 
-def _pressures(scene: Scene) -> Array:
-    return scene.table(tuple(p.name for p in PERMISSIBLE))
-
-
 def permissible_load(scene: Scene, tail: str = "") -> Array:
     """C_dyn (60 n L_h/10^6)^(-1/p) with the turns of the crank, (n, 1); ``tail`` ends the inputs' names."""
     capacity, life, exponent = (
@@ -172,9 +168,10 @@ def _effect(
     )
 
 
+_PRESSURES: Callable[[Scene], Array] = lambda scene: scene.table(tuple(p.name for p in PERMISSIBLE))  # noqa: E731
 _SLIDING = partial(_compute, bearings.sliding_bearings, SLIDING_INPUTS, SLIDING_OUTPUTS, None)
 _ROLLING = partial(_compute, bearings.rolling_bearings, ROLLING_INPUTS, ROLLING_OUTPUTS, None)
-_SLIDING_LIMITS = partial(_compute, permissible.sliding_limits, SLIDING_INPUTS, SLIDING_LIMITS, _pressures)
+_SLIDING_LIMITS = partial(_compute, permissible.sliding_limits, SLIDING_INPUTS, SLIDING_LIMITS, _PRESSURES)
 _ROLLING_LIMITS = partial(_compute, permissible.rolling_limits, ROLLING_INPUTS, ROLLING_LIMITS, permissible_load)
 
 

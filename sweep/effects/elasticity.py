@@ -245,28 +245,20 @@ def _turn(scene: Scene, wanted: frozenset[str], grids: tuple[int, ...]) -> Colum
 def advise_static(scene: Scene) -> Advice | None:
     """Largest quasi-static lag over the turn: an angle, or the share of the coupler's length."""
     found = compute_static(scene, frozenset({"lag"}))
-    lag = np.abs(np.asarray(found["lag"], np.float64))
-    turning = np.isfinite(lag).all(axis=1)
-    if not turning.any():
-        return None
-    reach = _arguments(scene)[3][turning]
+    lag = np.abs(np.asarray(found["lag"], np.float64)).max(axis=1)
     unit = "rad" if loads.follower_of(scene.family) is loads.ROCKER else "of the coupler's length"
-    return Advice("quasi-static lag", lag[turning].max(axis=1) / reach, 1e-4, unit)
+    return Advice.of_turning("quasi-static lag", lag / _arguments(scene)[3], 1e-4, unit)
 
 
 def advise_dynamic(scene: Scene) -> Advice | None:
     """Estimate max|eta_qs''/nu^2|/max|eta_qs|; dynamics adds 0.7 to 2.8 times this share to the lag."""
     found = compute_static(scene.on_grid(GRIDS[-1]), frozenset({"lag", "frequency_ratio"}))
     lag, ratio = floats(found, "lag", "frequency_ratio")
-    turning = np.isfinite(lag).all(axis=1)
-    if not turning.any():
-        return None
-    lag, ratio = lag[turning], ratio[turning]
     orders = np.arange(lag.shape[1] // 2 + 1)
     second = np.fft.irfft(-(orders**2) * np.fft.rfft(lag, axis=1), n=lag.shape[1], axis=1)
     size = np.abs(lag).max(axis=1)
     estimate = np.abs(second / ratio**2).max(axis=1) / np.where(size > 0.0, size, 1.0)
-    return Advice("estimated share that vibration adds to the lag", estimate, 0.01 / 3.0)
+    return Advice.of_turning("estimated share that vibration adds to the lag", estimate, 0.01 / 3.0)
 
 
 def _static(kind: loads.Follower) -> Effect:

@@ -160,11 +160,9 @@ def _share_of_inertia(scene: Scene, name: str, size: Callable[[Array], Array], q
         name: np.zeros_like(x) if name.startswith(("m_", "j_", "line_mass_")) else x for name, x in scene.inputs.items()
     }
     alone = compute_loads(replace(scene, inputs=still, memo={}), names)
-    turning = (np.asarray(whole["status"]) == st.OK).all(axis=1)
-    if not turning.any():
-        return None
-    most, useful = (size(np.asarray(found[name], np.float64)[turning]) for found in (whole, alone))
-    return Advice(quantity, np.abs(most - useful) / np.where(most > 0.0, most, 1.0), 0.1)
+    turns = (np.asarray(whole["status"]) == st.OK).all(axis=1)
+    most, useful = (np.where(turns, size(np.asarray(found[name], np.float64)), np.nan) for found in (whole, alone))
+    return Advice.of_turning(quantity, np.abs(most - useful) / np.where(most > 0.0, most, 1.0), 0.1)
 
 
 def _advise_closed(scene: Scene) -> Advice | None:

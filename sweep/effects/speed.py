@@ -267,10 +267,7 @@ def _lost(grid: Scene, speed: Array, change: Array, status: Status) -> Array:
 def advise(scene: Scene) -> Advice | None:
     """Estimate the unevenness for small fluctuations: [max - min of W - (J - mean J) w^2/2]/(mean J w^2)."""
     inertia, excess = samples(scene.on_grid(FINER[-1] if _late(scene).any() else GRIDS[0]))
-    turning = np.isfinite(excess).all(axis=1)
-    if not turning.any():
-        return None
-    inertia, excess, speed = inertia[turning], excess[turning], scene.inputs["speed"][turning]
+    speed = scene.inputs["speed"]
     harmonics = np.fft.rfft(excess, axis=1)
     orders = np.arange(harmonics.shape[1])
     harmonics = np.where(orders > 0, harmonics / (1j * np.maximum(orders, 1)), 0.0)
@@ -278,7 +275,7 @@ def advise(scene: Scene) -> Advice | None:
     mean = inertia.mean(axis=1)
     swing = work - 0.5 * (inertia - mean[:, None]) * (speed * speed)[:, None]
     estimate = (swing.max(axis=1) - swing.min(axis=1)) / (mean * speed * speed)
-    return Advice("estimated unevenness of the crank speed", estimate, 0.01)
+    return Advice.of_turning("estimated unevenness of the crank speed", estimate, 0.01)
 
 
 def _effect(name: str, title: str, loaded: Effect, rubbing: Effect | None = None) -> Effect:

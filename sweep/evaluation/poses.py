@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Container, Hashable, Mapping, Sequence
+from collections.abc import Container, Mapping, Sequence
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
@@ -18,7 +18,7 @@ from sweep.evaluation.statuses import explained, meanings
 from sweep.evaluation.tables import design_matrix, kept_columns, numbers, plain_columns, wanted_names
 from sweep.families import Mechanism
 from sweep.families import family as find_family
-from sweep.families.base import Angles, Columns, Domain, Family, March, of_family
+from sweep.families.base import Angles, Columns, Domain, Family, March
 from sweep.quantities.resolve import output_names
 
 if TYPE_CHECKING:
@@ -121,17 +121,12 @@ class Question(NamedTuple):
     units: Mapping[str, str]
 
 
-@of_family
-def questions(family: Family) -> dict[Hashable, Question]:
-    """Cache of the requests to a family without loads."""
-    return {}
-
-
 def asked_of_poses(family: Family, want: str | Sequence[str], loads: Loads | None = None) -> Question:
     """Make the request for pose outputs of a family with precise poses."""
     given = wanted_names(want, f"pose outputs of {family.name}")
-    known, key = questions(family), ("poses", *given)
-    if key in known and not loads:
+    # Requests without loads are looked at once.
+    known: dict[tuple[str, ...], Question] = family.derived.setdefault(asked_of_poses, {})
+    if (key := tuple(given)) in known and not loads:
         return known[key]
     names = expanded(family, given, poses=True)
     mechanism = extended(family, names, curves_of(family, loads))

@@ -13,7 +13,7 @@ from sweep.effects.wanted import expanded
 from sweep.errors import InputError
 from sweep.evaluation.angles import AngleUnit, in_radians, plain_names
 from sweep.evaluation.loads import Loads, curves_of
-from sweep.evaluation.poses import Question, questions
+from sweep.evaluation.poses import Question
 from sweep.evaluation.route import Route
 from sweep.evaluation.routes import design_outputs, routes, with_errors
 from sweep.evaluation.statuses import meanings
@@ -130,8 +130,9 @@ def summarise(
 def asked_of_designs(family: Family, want: str | Sequence[str], loads: Loads | None = None) -> Question:
     """Make the request for design outputs of a family."""
     given = wanted_names(want, f"design outputs of {family.name}")
-    known, key = questions(family), ("designs", *given)
-    if key in known and not loads:
+    # Requests without loads are looked at once.
+    known: dict[tuple[str, ...], Question] = family.derived.setdefault(asked_of_designs, {})
+    if (key := tuple(given)) in known and not loads:
         return known[key]
     names = expanded(family, given)
     mechanism = extended(family, names, curves_of(family, loads))

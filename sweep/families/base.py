@@ -250,7 +250,7 @@ class Family:
 
     @cached_property
     def derived(self) -> dict[object, Any]:
-        """What follows from this family alone, by the function that found it: see :func:`of_family`."""
+        """What follows from this family alone, by the function that found it or remembers it: see :func:`of_family`."""
         return {}
 
     @cached_property

@@ -220,12 +220,13 @@ def _measured(family: Family, known: Singular, designs: Array, angles: Angles) -
 
 def of_table(phi: Sequence[float], of: frozenset[str]) -> Switches:
     """Switches of pose outputs at the points of a table that all designs share."""
-    return Switches(partial(_alike, np.array(phi, np.float64)), of)
+    angles = np.array(phi, np.float64)
+    return Switches(lambda designs: np.tile(angles, (len(designs), 1)), of)
 
 
 def of_order(order: int, of: frozenset[str]) -> Waves:
     """Waves of pose outputs under a Fourier series of that order."""
-    return Waves(partial(_many, float(order)), of)
+    return Waves(lambda designs: np.full(len(designs), float(order)), of)
 
 
 def of_stages(stages: Sequence[Stage]) -> list[object]:
@@ -296,14 +297,6 @@ def _turned(member: Member, curves: Callable[..., Array], designs: Array, angles
     """Functions of a member that the main shaft drives, at angles of the main shaft."""
     phase = member.phase(designs)
     return curves(member.designs(designs), Angles.of(member.ratio * angles.phi + phase[:, None]), *found)
-
-
-def _alike(angles: Array, designs: Array) -> Array:
-    return np.tile(angles, (len(designs), 1))
-
-
-def _many(count: float, designs: Array) -> Array:
-    return np.full(len(designs), count)
 
 
 def on_part(part: Callable[[Array], Array], of_design: Callable[[Array], T], designs: Array) -> T:

@@ -279,18 +279,6 @@ def _grid(samples: int) -> tuple[Array, Array]:
     return np.cos(phi), np.sin(phi)
 
 
-def _refined(accuracy: Accuracy) -> bool:
-    return accuracy.target is not None and not accuracy.certify
-
-
-def _certified(accuracy: Accuracy) -> bool:
-    return accuracy.certify
-
-
-def _sampled(accuracy: Accuracy) -> bool:
-    return accuracy.samples is not None
-
-
 CURVES = {
     name: can.Curve(order, can.constant(1.0, 0.0, 0.0))
     for order, name in enumerate(("dpsi", "d2psi", "d3psi"), start=1)
@@ -306,10 +294,10 @@ FAMILY = Family(
     poses=poses,
     steps=(
         Step("margin", MARGIN_OUTPUTS, margin),
-        Step("true maxima", MAXIMA_OUTPUTS, true_maxima, _refined),
+        Step("true maxima", MAXIMA_OUTPUTS, true_maxima, lambda a: a.target is not None and not a.certify),
         Step("limit positions", LIMIT_OUTPUTS, limits),
-        Step("grid", MAXIMA_OUTPUTS, sampled_maxima, _sampled),
-        Step("certified maxima", MAXIMA_OUTPUTS, certified_maxima, _certified, Work.PROOF, certifies=True),
+        Step("grid", MAXIMA_OUTPUTS, sampled_maxima, lambda a: a.samples is not None),
+        Step("certified maxima", MAXIMA_OUTPUTS, certified_maxima, lambda a: a.certify, Work.PROOF, certifies=True),
     ),
     derivative_of=ladders("psi"),
     outward="branch",

@@ -14,7 +14,7 @@ from sweep.families.capabilities import Fixed, skeleton_of
 from sweep.families.machines.machine import Machine
 from sweep.families.parts import Member
 from sweep.families.sites import AXES, TIP
-from sweep.quantities.dimensions import Piece
+from sweep.quantities.dimensions import Piece, of_columns
 
 NAMES = tuple(f"box_{axis}" for axis in AXES)
 ROUNDING = 2.0**-53
@@ -68,7 +68,7 @@ def _own(of: Stage, axis: int) -> Box | None:
         return None
     still: list[Piece] = [partial(_coordinate, fixed, axis, of.columns) for fixed in _standing(family)]
     if None in at.values():
-        still.append(_nothing)
+        still.append(lambda designs: 0.0 * designs[:, 0])
     where = f"stage {stage}: " if stage else ""
     text = f"{where}extent along {AXES[axis]} of all joints over one turn, fixed ones too, in the frame of the {{}}"
     text = text.format("stage" if stage else "mechanism")
@@ -81,7 +81,7 @@ def _of_member(m: Member, found: Box) -> Box:
     """Rename a member's box and its columns for the machine."""
     output = Output(f"{m.name}.{found.output.name}", "length", f"{m.name}: {found.output.text}")
     pairs = tuple((f"{m.name}.{most}", f"{m.name}.{least}") for most, least in found.reductions)
-    still = tuple(partial(_of_columns, piece, m.columns) for piece in found.still)
+    still = tuple(partial(of_columns, piece, m.columns) for piece in found.still)
     return Box(output, tuple(f"{m.name}.{curve}" for curve in found.curves), pairs, still)
 
 
@@ -119,14 +119,6 @@ def _standing(family: Family) -> Iterator[Fixed]:
 
 def _coordinate(fixed: Fixed, axis: int, columns: slice, designs: Any) -> Any:
     return fixed.at(designs[:, columns])[:, axis]
-
-
-def _nothing(designs: Any) -> Any:
-    return 0.0 * designs[:, 0]
-
-
-def _of_columns(piece: Piece, columns: slice, designs: Any) -> Any:
-    return piece(designs[:, columns])
 
 
 def _placed(m: Member, fixed: Fixed, axis: int, columns: slice, designs: Any) -> Any:

@@ -85,10 +85,11 @@ class _Part:
 
     def of(self, piece: Piece) -> Piece:
         """Piece of the part as a function of the whole design."""
-        return partial(_of_columns, piece, self.columns)
+        return partial(of_columns, piece, self.columns)
 
 
-def _of_columns(piece: Piece, columns: NDArray[np.intp], designs: Any) -> Any:
+def of_columns(piece: Piece, columns: slice | NDArray[np.intp], designs: Any) -> Any:
+    """Return a piece of a part of the mechanism, whose parameters are these columns."""
     return piece(designs[:, columns])
 
 

@@ -6,7 +6,7 @@ from dataclasses import replace
 
 from sweep.effects import elsewhere, extended, offered
 from sweep.errors import InputError, listed, nearest
-from sweep.families.base import Event, Family, Interval, Output, Turn, of_family
+from sweep.families.base import Event, Family, Interval, Output, Turn
 from sweep.families.capabilities import Assembly
 from sweep.families.chain import Chain
 from sweep.families.machines.machine import Machine
@@ -52,19 +52,13 @@ def resolve(family: Family, name: str) -> Quantity:
     InputError
         if there is no such output; the message gives the nearest name.
     """
-    known = _resolved(family)
+    known: dict[str, Quantity] = family.derived.setdefault(resolve, {})  # a sweep asks the same for every chunk
     if name not in known:
         found = find(family, name)
         if found is None:
             raise _unknown(family, name)
         known[name] = found
     return known[name]
-
-
-@of_family
-def _resolved(family: Family) -> dict[str, Quantity]:
-    """Cache of resolved names of a family: a sweep resolves the same names for every chunk."""
-    return {}
 
 
 def output(family: Family, name: str) -> Output:
@@ -84,7 +78,9 @@ def find(family: Family, name: str) -> Quantity | None:
     if isinstance(family, Machine):
         found = _of_machine(family, name)
     else:
-        found = _window_angle(family, name) or _from_poses(family, name) or _from_dimensions(family, name)
+        stays = name == STAY.name and isinstance(family.domain, Turn)
+        found = WindowAngle(STAY, of=family.position) if stays else _from_poses(family, name)
+        found = found or _from_dimensions(family, name)
     own = _own(family, name)
     if own is None or found is None:
         return found or own
@@ -103,12 +99,6 @@ def _own(family: Family, name: str) -> OwnOutput | None:
             for o in step.provides:
                 if o.name == own:
                     return OwnOutput(o.of_stage(stage.number), of_part=True)
-    return None
-
-
-def _window_angle(family: Family, name: str) -> WindowAngle | None:
-    if name == STAY.name and isinstance(family.domain, Turn):
-        return WindowAngle(STAY, of=family.position)
     return None
 
 

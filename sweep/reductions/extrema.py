@@ -19,7 +19,7 @@ from sweep.quantities.kinds import Request
 from sweep.reductions import fused, panels, peak_search
 from sweep.reductions.peak_search import LIMIT
 from sweep.reductions.resolution import series_of
-from sweep.reductions.sampling import Extremum, Mask, blocks
+from sweep.reductions.sampling import Extremum, Mask, blocks, put
 from sweep.reductions.window import Window
 
 OVER = 1e-6  # of a limit position from the cut of its angle [rad]
@@ -99,8 +99,7 @@ def true_extrema(
             rows = np.flatnonzero(undecided)
             if rows.size:
                 slow, now[rows] = _searched(family, designs[rows], [one], target, locate, anywhere, None, HARD)
-                for column, values in zip(quick, slow[one], strict=True):
-                    column[rows] = values
+                put(quick, rows, slow[one])
             found[one], status = quick, np.where(status == st.OK, now, status)
     if kinked:
         cut, now = panels.extrema(family, designs, kinked, target, locate)
@@ -134,8 +133,7 @@ def _apart(
         part = None if window is None else window.only(rows)
         some, status[rows] = true_extrema(family, designs[rows], requests, target, locate=locate, window=part)
         for request, extremum in some.items():
-            for column, values in zip(found[request], extremum, strict=True):
-                column[rows] = values
+            put(found[request], rows, extremum)
     return found, status
 
 
@@ -162,6 +160,5 @@ def _searched(
                 over = np.abs(cut[request].value) + 2.0 * cut[request].err > np.pi - OVER
                 now = np.where((now == st.OK) & over, st.NOT_CONVERGED, now)
             search.status[rows] = np.where(search.status[rows] == st.OK, now, search.status[rows])
-            for column, values in zip(search.found[request], cut[request], strict=True):
-                column[rows] = values
+            put(search.found[request], rows, cut[request])
     return search.found, search.status

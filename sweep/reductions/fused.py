@@ -16,7 +16,7 @@ from kernels import status as st
 from kernels.chains.curves import MARGIN
 from kernels.types import EPS, TWO_PI, Status
 from sweep.families.base import Array, Family
-from sweep.families.capabilities import Assembly, Curve, DesignMap, InSeries
+from sweep.families.capabilities import Assembly, Curve, DesignMap, InSeries, constant
 from sweep.families.chain import Chain
 from sweep.quantities.kinds import Request
 from sweep.reductions.peak_search import TIE
@@ -204,11 +204,7 @@ def _least_discriminant(family: Family, forms: tuple[InSeries, ...], request: Re
     number = int(loop.stage) if loop is not None and loop.stage else 1
     if loop is None or number == 1:
         return None
-    return FusedCurve(family, request, forms[:number], MARGIN, _nothing, loop.scale)
-
-
-def _nothing(designs: Array) -> Array:
-    return np.zeros((len(designs), 3))
+    return FusedCurve(family, request, forms[:number], MARGIN, constant(0.0, 0.0, 0.0), loop.scale)
 
 
 def sampled_maxima(family: Family, designs: Array, requests: tuple[Request, ...], samples: int) -> dict[Request, Array]:

@@ -17,7 +17,7 @@ from kernels.types import TWO_PI
 from sweep.families.base import Array
 from sweep.quantities.kinds import Request
 from sweep.reductions.refine import Candidates, Peaks, Sampler
-from sweep.reductions.sampling import Index, Mask
+from sweep.reductions.sampling import Index, Mask, joined, only
 
 # Error of the first guess against the fall to the next samples, from which on a top is looked at closely: 0.04 and 0.1
 # where two tops showed as one; few tops of smooth curves have more.
@@ -89,9 +89,9 @@ def closer_looks(tops: Candidates, beside: Candidates, angles: Array, samples: i
     samples : of the turn
     """
     at, spacing = angles[beside.row], TWO_PI / samples
-    every = beside.only(np.repeat(np.arange(len(at)), at.shape[1]))._replace(column=_column(at.ravel(), samples))
+    every = only(beside, np.repeat(np.arange(len(at)), at.shape[1]))._replace(column=_column(at.ravel(), samples))
     phi = np.concatenate([tops.column[:, None] + CLOSER, at.reshape(-1, 1) / spacing + CROWDED])
-    return tops.joined(every), spacing * phi
+    return joined(tops, every), spacing * phi
 
 
 def tops_of(sample: Sampler, looks: Candidates, phi: Array, samples: int, guess: Array) -> tuple[Candidates, Peaks]:
@@ -104,7 +104,7 @@ def tops_of(sample: Sampler, looks: Candidates, phi: Array, samples: int, guess:
     at, height = phi[look, column + 1], values[look, column + 1]
     gap = np.maximum(at - phi[look, column], phi[look, column + 2] - at)
     shown = np.where(look < guess.size, np.append(guess, 0.0)[np.minimum(look, guess.size)], height)
-    found = looks.only(look)._replace(column=_column(at, samples))
+    found = only(looks, look)._replace(column=_column(at, samples))
     return found, Peaks(at, height, gap, np.full(look.size, np.inf), shown, gap, 0.5 * gap)
 
 

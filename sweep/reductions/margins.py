@@ -13,7 +13,7 @@ from sweep.quantities.dimensions import near_unit_size
 from sweep.quantities.kinds import Request
 from sweep.reductions import fused
 from sweep.reductions.extrema import true_extrema
-from sweep.reductions.sampling import DESIGN_STATUS, Extremum, pose_columns, turn
+from sweep.reductions.sampling import DESIGN_STATUS, Extremum, pose_columns, put, turn
 
 NAMES = ("rotatable", "margin", "max_pressure_angle")
 TRANSMISSION = "least_transmission_angle"
@@ -133,8 +133,7 @@ def _from_poses(family: Family, designs: Array, suffix: str, looked: int) -> Col
     least = Extremum.unknown(len(designs)) if exactly else _apart(family, designs, discriminant, looked)
     turning, unknown = np.flatnonzero(np.isnan(least.value)), np.zeros(len(designs), np.uint8)
     found, unknown[turning] = true_extrema(family, designs[turning], [request], TARGET, anywhere=True)
-    for column, values in zip(least, found[request], strict=True):
-        column[turning] = values
+    put(least, turning, found[request])
     known = np.isfinite(least.value)
     phi = np.where(known, least.phi, 0.0)[:, None]
     poses, state = pose_columns(family, designs, phi, (discriminant, angle))

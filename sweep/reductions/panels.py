@@ -25,7 +25,7 @@ from sweep.quantities.kinds import Request
 from sweep.reductions.refine import hill
 from sweep.reductions.resolution import MATTERS, ends, nearest, zeros
 from sweep.reductions.rounding import order_of, singular_share
-from sweep.reductions.sampling import DESIGN_STATUS, Extremum, Index, Mask, blocks, discriminants, pose_columns
+from sweep.reductions.sampling import DESIGN_STATUS, Extremum, Index, Mask, blocks, discriminants, only, pose_columns
 
 PANELS = 64  # of a turn at first, besides those that begin where a follower reverses
 TAIL = 4  # last coefficients that tell how wrong a polynomial may be; of a tent in the middle three nearly vanish ...
@@ -56,11 +56,6 @@ class Panels(NamedTuple):
     peak: Array
     at: Array
     missed: Array
-
-    def only(self, which: Index | Mask) -> Panels:
-        """Return some of them."""
-        row, *others = self
-        return Panels(row[which], *(column[which] for column in others))
 
 
 class Top(NamedTuple):
@@ -184,12 +179,12 @@ def _climbed(
     size = best if request.mode == 0 else best - least
     tops: list[Top] = []
     while panels.row.size:
-        panels = panels.only(_upper(panels, request.mode) >= best[panels.row])
+        panels = only(panels, _upper(panels, request.mode) >= best[panels.row])
         # Even first panels may all be within the target of each other: a constant, or a dwell.
         crowded = panels.high - panels.low < 0.25 * TWO_PI / PANELS
         crowded &= np.bincount(panels.row[crowded], minlength=n)[panels.row] > CROWD
-        tops.append(_given_up(panels.only(crowded), request.mode))
-        panels = panels.only(~crowded)
+        tops.append(_given_up(only(panels, crowded), request.mode))
+        panels = only(panels, ~crowded)
         halves, miss = _halved(family, designs, panels, request)
         np.maximum.at(best, halves.row, halves.peak)
         tolerance = np.maximum(ALLOWED * target * size, 4.0 * EPS * np.abs(best))[halves.row]
@@ -201,11 +196,11 @@ def _climbed(
         off = _off(family, designs, halves, top, request, np.flatnonzero(settled & ~narrow))
         settled &= off <= tolerance
         top.err[:] += AGAIN * off + np.where(at_end, EDGE * EPS * size[halves.row], 0.0)
-        ends = halves.only(narrow)
+        ends = only(halves, narrow)
         held = _held(ends, np.repeat(panels.peak, 2)[narrow], size)
         held.err[:] += AGAIN * _beside(family, designs, ends, request)
-        tops += [_only(top, settled & ~narrow), held]
-        panels = halves.only(~settled & ~narrow)
+        tops += [only(top, settled & ~narrow), held]
+        panels = only(halves, ~settled & ~narrow)
     return _highest(tops, n), size
 
 
@@ -284,15 +279,10 @@ def _highest(tops: list[Top], n: int) -> Top:
     every = Top(*(np.concatenate(parts) for parts in zip(*tops, strict=True)))
     order = np.lexsort((every.phi, -every.value, every.row))
     row, first = np.unique(every.row[order], return_index=True)
-    highest, ceiling = _only(every, order[first]), np.full(n, -np.inf)
+    highest, ceiling = only(every, order[first]), np.full(n, -np.inf)
     np.maximum.at(ceiling, every.row, every.value + every.err)
     phi, err_phi = hill(every.row, every.phi, every.err_phi, every.value, every.err, order[first])
     return highest._replace(err=np.maximum(highest.err, ceiling[row] - highest.value), phi=phi, err_phi=err_phi)
-
-
-def _only(top: Top, which: Index | Mask) -> Top:
-    row, *others = top
-    return Top(row[which], *(column[which] for column in others))
 
 
 def _upper(panels: Panels, mode: int) -> Array:

@@ -43,8 +43,11 @@ from sweep.reductions.sampling import (
     Index,
     Mask,
     discriminants,
+    joined,
     jumps,
+    only,
     pose_columns,
+    put,
     sample_turn,
 )
 from sweep.reductions.window import Window, edges
@@ -135,12 +138,12 @@ class Search:
         candidates, scales, needed, alone = self._candidates(rows, columns, samples)
         needed = np.maximum(needed, self._samples_by_singularity(columns, samples, rows.size))
         resolved = looked & ((needed <= samples) | (samples == LIMIT))
-        candidates = candidates.only(resolved[candidates.request, candidates.row])
+        candidates = only(candidates, resolved[candidates.request, candidates.row])
         turn = Sampled(rows, columns, samples)
         candidates, peaks = self._refine(turn, candidates, scales, resolved)
         for number, request in enumerate(self.requests):
             mine = candidates.request == number
-            row, found = candidates.row[mine], peaks.only(mine)
+            row, found = candidates.row[mine], only(peaks, mine)
             if self.window is not None and request.windowed:
                 row, found = self._within_window(rows, columns, request, row, found, resolved[number])
             moved = self._keep_best(rows, request, row, found) > DISAGREEMENT * scales[number]
@@ -206,14 +209,14 @@ class Search:
         least = [request.pose for request in self.requests if request.mode == -1 and not self.anywhere]
         angles = switches(self.family, self.designs[turn.rows], least)
         beside = dips(self.requests, turn.columns, resolved) if angles.shape[1] else Candidates.none()
-        looks, phi = closer_looks(candidates.only(hidden), beside, angles, turn.samples)
+        looks, phi = closer_looks(only(candidates, hidden), beside, angles, turn.samples)
         if len(phi):
             sample = self._sampler(self.family, turn, looks)
             more, first = tops_of(sample, looks, phi, turn.samples, peaks.guess[hidden])
             new = apart((candidates, peaks), (more, first))
-            more, first = more.only(new), first.only(new)
-            peaks = peaks.joined(self._sharpened(turn, more, first, size))
-            candidates = candidates.joined(more)
+            more, first = only(more, new), only(first, new)
+            peaks = joined(peaks, self._sharpened(turn, more, first, size))
+            candidates = joined(candidates, more)
         share = self._rounding(turn, candidates, self.guards)
         if self.near is not None:
             near = self.near.only(turn.rows[candidates.row])
@@ -248,7 +251,7 @@ class Search:
         located = self.places(number[rivals])
         tied = (np.bincount(group, minlength=lowest.size)[group] > 1) & located
         tolerance = np.where(tied, np.minimum(tolerance, TIE * size[rivals]), tolerance)
-        mine, peak = candidates.only(rivals), peaks.only(rivals)
+        mine, peak = only(candidates, rivals), only(peaks, rivals)
         sample = self._sampler(self.family.precise(), turn, mine, sign[rivals] * peak.height)
         locate = np.full(rivals.size, np.inf)
         # Without a derivative to polish it by, a place is no better than the rounding of the heights: precise ones.
@@ -259,8 +262,7 @@ class Search:
         peak = confirmed(sample, peak, tolerance, locate, share[rivals] * np.abs(peak.height))
         # The first stage of a chain is given its exact input, those behind it a rounded one.
         rounding = self._rounding(turn, mine, self.guards[1:]) * np.abs(peak.height)
-        for column, found in zip(peaks, peak._replace(err_height=peak.err_height + rounding), strict=True):
-            column[rivals] = found
+        put(peaks, rivals, peak._replace(err_height=peak.err_height + rounding))
 
     def _sampler(self, family: Family, turn: Sampled, candidates: Candidates, middle: Array | None = None) -> Sampler:
         """Measure candidates by the poses of ``family``.
@@ -308,11 +310,11 @@ class Search:
         poses, _ = pose_columns(self.family, self.designs[rows[row]], peaks.phi[:, None], self.names)
         inside = self.window.holds(rows[row], poses[self.window.position])[:, 0]
         edge = edges(self.family, self.designs, rows, self.window, columns, request.pose)
-        edge = edge.only(resolved[edge.row])
+        edge = only(edge, resolved[edge.row])
         height = np.abs(edge.values) if request.mode == 0 else request.mode * edge.values
         none = np.zeros(edge.row.size)
         added = Peaks(edge.phi, height, none + 8.0 * EPS, edge.err, height, none, none)
-        return np.concatenate([row[inside], edge.row]), peaks.only(inside).joined(added)
+        return np.concatenate([row[inside], edge.row]), joined(only(peaks, inside), added)
 
     def _keep_best(self, rows: Index, request: Request, row: Index, peaks: Peaks) -> Array:
         """Store the best candidate of each row; by how much refinement moved it from the guess (0 where none)."""

@@ -10,7 +10,7 @@ import numpy as np
 from kernels.curves import samples as scan
 from kernels.types import EPS, TWO_PI
 from sweep.families.base import Array, Family
-from sweep.reductions.sampling import Index, Mask, pose_columns
+from sweep.reductions.sampling import Index, only, pose_columns, put
 
 Sampler: TypeAlias = Callable[[Index, Array], Array]
 """``sample(candidates, phi)``: measured values (k, m) of the candidates with these numbers at the angles phi (k, m)."""
@@ -42,19 +42,11 @@ class Candidates(NamedTuple):
     column: Index
     sign: Array
 
-    def only(self, which: Index | Mask) -> Candidates:
-        """Return some of them."""
-        return Candidates(self.request[which], self.row[which], self.column[which], self.sign[which])
-
     @classmethod
     def none(cls) -> Candidates:
         """Return none."""
         nothing = np.zeros(0, np.int64)
         return cls(nothing, nothing, nothing, np.zeros(0))
-
-    def joined(self, others: Candidates) -> Candidates:
-        """Join these and others."""
-        return Candidates(*(np.concatenate(pair) for pair in zip(self, others, strict=True)))
 
 
 class Peaks(NamedTuple):
@@ -71,14 +63,6 @@ class Peaks(NamedTuple):
     guess: Array
     spacing: Array
     step: Array
-
-    def only(self, which: Index | Mask) -> Peaks:
-        """Return some of them."""
-        return Peaks(*(column[which] for column in self))
-
-    def joined(self, others: Peaks) -> Peaks:
-        """Join these and others."""
-        return Peaks(*(np.concatenate(pair) for pair in zip(self, others, strict=True)))
 
 
 def first_peaks(centre: Array, spacing: Array, around: Array) -> Peaks:
@@ -185,19 +169,18 @@ def confirmed(
         spoilt = np.maximum(rounded, rounding) > tolerance
         err_phi = np.where(spoilt, np.maximum(peaks.err_phi, fresh), peaks.err_phi)
         step = np.maximum(peaks.step, np.minimum(err_phi, fresh))
-        rough = peaks._replace(step=step, err_phi=err_phi).only(again)
+        rough = only(peaks._replace(step=step, err_phi=err_phi), again)
         sharper = sharpen(lambda active, phi: sample(again[active], phi), rough, tolerance[again], locate[again])
         sharper = attained(sample, sharper, again)
         # Both heights are attained, so the higher one is nearer; a narrow window may see noise, or another peak.
-        rougher = peaks.only(again)
+        rougher = only(peaks, again)
         lower = np.maximum(rougher.height - sharper.height, 0.0)
         moved = np.abs(sharper.phi - rougher.phi)
         kept = lower > 0.0
         sharper.phi[kept], sharper.height[kept] = rougher.phi[kept], rougher.height[kept]
         sharper.err_height[:] += lower
         sharper.err_phi[kept] += moved[kept]
-        for column, found in zip(peaks, sharper, strict=True):
-            column[again] = found
+        put(peaks, again, sharper)
     return peaks
 
 

@@ -32,7 +32,7 @@ from sweep.families.curve_features import (
 from sweep.numerics.events import near_zeros, sign_changes, with_events
 from sweep.numerics.singularities import FAR, SAMPLES, SHORTEST, Curve, Singularities, crowded, singularities
 from sweep.quantities.kinds import Request
-from sweep.reductions.sampling import DESIGN_STATUS, Extremum, Index, Mask, blocks, pose_columns, sample_turn
+from sweep.reductions.sampling import DESIGN_STATUS, Extremum, Index, Mask, blocks, pose_columns, put, sample_turn
 
 PER_WAVE = 2.0  # waves that the fewest samples of any curve resolve
 SHARES = 16.0  # samples of a turn are a multiple of this over the shortest way between two switches
@@ -225,8 +225,7 @@ class Series:
         undecided: Mask = np.ones(len(designs), np.bool_)
         for turns in self._resolved(designs, target, status, False):
             value, phi, err_phi, good = self._top(turns)
-            for column, part in zip(found, (value, phi, turns.err, err_phi), strict=True):
-                column[turns.rows] = part
+            put(found, turns.rows, (value, phi, turns.err, err_phi))
             undecided[turns.rows] = ~good
         return found, status, undecided & (status == st.OK)
 

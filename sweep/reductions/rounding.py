@@ -14,7 +14,7 @@ from sweep.families.capabilities import Assembly
 from sweep.numerics.singularities import Singularities, crowded
 from sweep.reductions.refine import Peaks, confirmed, first_peaks, polish_places
 from sweep.reductions.resolution import nearest
-from sweep.reductions.sampling import Index, Mask, blocks, pose_columns
+from sweep.reductions.sampling import Index, Mask, blocks, only, pose_columns
 
 TRIES = 3
 ALONE = 0.1  # change of a curve's highest sample, against itself, by rounding the inputs: nothing is known of it then
@@ -178,7 +178,7 @@ def sharpen_maxima(
         phi = np.asarray(searched[place], np.float64)
         peaks = precise_maxima(family, designs[rows], pose, phi, target, place in columns)
         better = (peaks.err_height < err[rows]) & (peaks.height >= value[rows] - err[rows] - peaks.err_height)
-        rows, peaks = rows[better], peaks.only(better)
+        rows, peaks = rows[better], only(peaks, better)
         value[rows], err[rows] = peaks.height, peaks.err_height
         if place in columns:
             columns[place][rows], columns[f"err_{place}"][rows] = np.mod(peaks.phi, TWO_PI), peaks.err_phi
@@ -228,7 +228,7 @@ def precise_maxima(family: Family, designs: Array, pose: str, phi: Array, target
     # Several have climbed the same top: the one that knows it best.
     as_high = peaks.height >= (1.0 - LEVEL) * best[row]
     scan.best_candidate(row, np.where(as_high, -peaks.err_height, -np.inf), np.full(phi.size, -np.inf), which)
-    found = peaks.only(which)
+    found = only(peaks, which)
     lost = (which < 0) | ~(found.height + found.err_height >= highest)
     found.err_height[lost] = np.inf
     slope = family.derivative_of.get(pose)

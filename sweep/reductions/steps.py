@@ -16,7 +16,7 @@ from sweep.families.capabilities import Assembly, CrankRockerLoop, GuidedPoint
 from sweep.families.chain import Chain
 from sweep.families.machines.machine import Machine
 from sweep.families.names import at_stage
-from sweep.families.reduction import reduction_of
+from sweep.families.reduction import REDUCTIONS, reduction_of
 from sweep.families.rssr import proven_columns
 from sweep.quantities.dimensions import dimension_step, size_step
 from sweep.quantities.kinds import Group, Reduced, Request, WindowAngle, requests
@@ -36,15 +36,15 @@ def certified_travel(family: Family) -> Step | None:
     if guided is None or any(s.family.find(CrankRockerLoop) is None for s in stages):
         return None
     curves = proven_curves(family, guided)
-    outputs: list[Output] = []
-    for pose in (family.pose_output[name] for name in curves):
-        words = f"largest magnitude over one turn of {pose.name}: {pose.text}"
-        outputs.append(Output(f"max_abs_{pose.name}", pose.unit, words, pose.equation))
-        place = f"crank angle of the largest magnitude of {pose.name}: {pose.text}"
-        outputs.append(Output(f"phi_max_abs_{pose.name}", "rad", place, pose.equation))
+    outputs = [
+        known.output(family.pose_output[name], family.domain)
+        for name in curves
+        for known in REDUCTIONS
+        if known.name == "max_abs"
+    ]
     return Step(
-        "certified maxima", tuple(outputs), partial(_proven, family, stages, guided), _certified, Work.PROOF,
-        certifies=True, cost=lambda accuracy: len(stages) * nanoseconds("work", "certified travel"),
+        "certified maxima", tuple(outputs), partial(_proven, family, stages, guided), lambda accuracy: accuracy.certify,
+        Work.PROOF, certifies=True, cost=lambda accuracy: len(stages) * nanoseconds("work", "certified travel"),
     )  # fmt: skip
 
 
@@ -62,10 +62,6 @@ def proven_curves(family: Family, guided: GuidedPoint) -> dict[str, tuple[int, i
             curves[guided.across[name]] = (1, order)
         name = family.derivative_of.get(name, "")
     return curves
-
-
-def _certified(accuracy: Accuracy) -> bool:
-    return accuracy.certify
 
 
 def _proven(

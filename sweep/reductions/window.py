@@ -67,10 +67,6 @@ class Edges(NamedTuple):
     err: Array
     side: Index
 
-    def only(self, which: Mask) -> Edges:
-        """Return some of them."""
-        return Edges(self.row[which], self.phi[which], self.values[which], self.err[which], self.side[which])
-
 
 def edges(family: Family, designs: Array, rows: Index, window: Window, columns: dict[str, Array], pose: str) -> Edges:
     """Find where the follower enters or leaves the window, and a pose output there.

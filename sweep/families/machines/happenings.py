@@ -67,8 +67,8 @@ def event_angles(machine: Machine, designs: Array) -> tuple[dict[str, Any], NDAr
 
     Each design's are found once: a search asks for its poses many times.
     """
-    known, events = _known(machine), happenings(machine)
-    columns = _columns(machine)
+    known: dict[bytes, Array] = machine.derived.setdefault(event_angles, {})
+    columns, events = _columns(machine), happenings(machine)
     given = np.ascontiguousarray(designs[:, columns].real)
     # The panels of a design stand below one another: its row is looked up once.
     other = np.append(True, (given[1:] != given[:-1]).any(axis=1))[: len(given)]
@@ -114,11 +114,6 @@ def switches_of_threads(machine: Machine) -> list[Switches]:
 
 def _switches(machine: Machine, designs: Array) -> Array:
     return np.concatenate(list(event_angles(machine, designs)[0].values()), axis=1)
-
-
-@of_family
-def _known(machine: Any) -> dict[bytes, Array]:
-    return {}
 
 
 @of_family

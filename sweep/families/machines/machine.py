@@ -12,7 +12,7 @@ import numpy as np
 from kernels.chains.links import chain_rule
 from kernels.status import OK
 from kernels.types import Array
-from sweep.families.base import PER_RADIAN, Angles, Columns, Event, Family, Output, Parameter, of_family
+from sweep.families.base import PER_RADIAN, Angles, Columns, Event, Family, Output, Parameter
 from sweep.families.capabilities import Assembly
 from sweep.families.chain import magnitude
 from sweep.families.curve_features import of_members, on_part
@@ -179,7 +179,8 @@ def _precise_poses(machine: Machine, designs: Array, angles: Angles, wanted: fro
 
 def _poses(machine: Machine, designs: Array, angles: Angles, wanted: frozenset[str]) -> Columns:
     """Compute the wanted outputs of members and relations, and the first status that is not OK."""
-    known = _known_needs(machine)
+    # A search asks for few sets of outputs, many times.
+    known: dict[frozenset[str], _Needs] = machine.derived.setdefault(_needs, {})
     if wanted not in known:
         known[wanted] = _needs(machine, wanted)
     asked = known[wanted]
@@ -224,12 +225,6 @@ class _Needs:
     relations: tuple[Relation, ...]
     inputs: Mapping[str, int]
     events: bool
-
-
-@of_family
-def _known_needs(machine: Any) -> dict[frozenset[str], _Needs]:
-    """Remember what outputs are made of: a search asks for few sets of them, many times."""
-    return {}
 
 
 def _needs(machine: Machine, wanted: frozenset[str]) -> _Needs:

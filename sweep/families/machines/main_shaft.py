@@ -138,11 +138,7 @@ def speed_of(shaft: ShaftTorque, machine: Machine) -> Step:
         columns |= {f"err_{shaft.name}_{key}": known * found["fastest"] * size[key] for key in found}
         return chosen(columns, wanted, status)
 
-    return Step(f"speed of {shaft.name}", shaft.numbers, run, work=Work.LONG, cost=_cost)
-
-
-def _cost(accuracy: Accuracy) -> float:
-    return 5e5
+    return Step(f"speed of {shaft.name}", shaft.numbers, run, work=Work.LONG, cost=lambda accuracy: 5e5)
 
 
 def _numbers(shaft: ShaftTorque, machine: Machine, designs: Array) -> dict[str, Any]:

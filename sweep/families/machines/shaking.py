@@ -183,11 +183,7 @@ def orders_of(shaking: Shaking, machine: Machine) -> Step:
         found, status = on_first_grid(least, GRIDS if accuracy.samples is None else (accuracy.samples,), on_grid)
         return found | {"status": status}
 
-    return Step(f"orders of {shaking.name}", shaking.numbers, run, work=Work.LONG, cost=_cost)
-
-
-def _cost(accuracy: Accuracy) -> float:
-    return 5e4
+    return Step(f"orders of {shaking.name}", shaking.numbers, run, work=Work.LONG, cost=lambda accuracy: 5e4)
 
 
 def _amplitudes(
