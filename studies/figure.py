@@ -1,4 +1,4 @@
-"""What the figure.py of a study has in common with the others: the folder it is called with, a table, a chart."""
+"""Common parts of the studies' figure.py: the folder argument, a table, a chart."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ if TYPE_CHECKING:
 
 
 def folder_asked(about: str | None) -> Path:
-    """Return the folder of results that the command line names; ``about`` is what ``--help`` says."""
+    """Return the folder of results named on the command line; ``about`` is the text of ``--help``."""
     parser = argparse.ArgumentParser(description=about)
     parser.add_argument("folder", type=Path, help="results of the study, with its designs/")
     folder: Path = parser.parse_args().folder
@@ -23,11 +23,11 @@ def folder_asked(about: str | None) -> Path:
 
 
 def print_table(table: pd.DataFrame, form: str, missing: str = "NaN") -> None:
-    """Print a table, its numbers in a form such as ``{:.4g}``."""
+    """Print a table with numbers in a format such as ``{:.4g}``."""
     print(table.to_string(index=False, float_format=form.format, na_rep=missing))  # noqa: T201
 
 
 def save_chart(folder: Path, name: str, chart: Callable[[], Figure]) -> None:
-    """Write a chart as figures/NAME.svg and print where it is."""
+    """Write a chart as figures/NAME.svg and print its path."""
     with house_style():
         print(save(chart(), folder / "figures" / f"{name}.svg").path)  # noqa: T201

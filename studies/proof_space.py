@@ -1,4 +1,4 @@
-"""The space of a proof: what excludes which part of it, from the certificate; for the figures of the proof studies."""
+"""The space of a proof, with the reason that excludes each part, from the certificate; for figures of proof studies."""
 
 from __future__ import annotations
 
@@ -42,29 +42,29 @@ WORDS = {
 }
 INK = "#1d2127"
 STRIPS = 120
-QUARTER, WIDE = 90.0, 180.0  # ticks of an axis wider than WIDE degrees
+QUARTER, WIDE = 90.0, 180.0  # tick distance of an axis wider than WIDE degrees
 
 
 @dataclass(frozen=True)
 class Space:
-    """The boxes of a certificate: ends by coordinate, in the units of WORDS, and what excludes each, of COLOURS."""
+    """Boxes of a certificate: ends by coordinate, in the units of WORDS, and the excluding reason, of COLOURS."""
 
     names: tuple[str, ...]
     low: Array  # (m, n)
     high: Array
     reasons: NDArray[np.int64]
-    ends: Array  # (n, 2) of the whole space
-    optimum: Array  # (n,) of the study, nan where it found none
+    ends: Array  # (n, 2), ends of the whole space
+    optimum: Array  # (n,), of the study, nan without one
 
     @property
     def excluded(self) -> Array:
-        """Share of the space that each of COLOURS excludes."""
+        """Share of the space that each reason of COLOURS excludes."""
         volumes = np.prod((self.high - self.low) / np.diff(self.ends)[:, 0], axis=1)
         return np.array([volumes[self.reasons == k].sum() for k in range(len(COLOURS))])
 
 
 def _reason(outcome: str, kinds: list[int]) -> int:
-    """Return the number of what excludes a box."""
+    """Return the number of the reason that excludes a box."""
     rows = set(kinds)
     if outcome not in ("bound", "empty"):
         word = "open"
@@ -82,7 +82,7 @@ def _reason(outcome: str, kinds: list[int]) -> int:
 
 
 def read(path: Path) -> Space:
-    """Boxes of a certificate."""
+    """Read the boxes of a certificate."""
     table = pq.read_table(path)
     asked = json.loads(table.schema.metadata[b"question"])
     names = tuple(asked["free"])
@@ -108,7 +108,7 @@ def _optimum(path: Path, names: tuple[str, ...]) -> Array:
 
 
 def _map(axes: Axes, space: Space, reach: float) -> None:
-    """Draw the boxes of two free coordinates in the colours of what excludes them; the crank angle up to ``reach``."""
+    """Draw the boxes of two free coordinates in the colours of their reasons, for crank angles up to ``reach``."""
     x = space.names.index("phi_ext")
     y = 1 - x
     (x0, y0), (x1, y1) = space.low[:, [x, y]].T, space.high[:, [x, y]].T
@@ -123,7 +123,7 @@ def _map(axes: Axes, space: Space, reach: float) -> None:
 
 
 def shares(space: Space, k: int) -> tuple[Array, Array]:
-    """Edges of strips across coordinate k, and the share of each strip by reason, (STRIPS, reasons)."""
+    """Return the edges of strips across coordinate k, and the share of each strip by reason, (STRIPS, reasons)."""
     edges = np.linspace(space.ends[k, 0], space.ends[k, 1], STRIPS + 1)
     width = space.high - space.low
     others = np.prod(np.delete(width / np.diff(space.ends)[:, 0], k, axis=1), axis=1)
@@ -136,7 +136,7 @@ def shares(space: Space, k: int) -> tuple[Array, Array]:
 
 
 def _strips(axes: Axes, space: Space, k: int) -> None:
-    """Draw what excludes the space, over one coordinate."""
+    """Draw the excluded shares of the space by reason, over one coordinate."""
     edges, found = shares(space, k)
     base = np.zeros(STRIPS)
     for number, colour in enumerate(COLOURS.values()):
@@ -152,7 +152,7 @@ def _strips(axes: Axes, space: Space, k: int) -> None:
 
 
 def draw(space: Space, reach: float) -> Figure:
-    """Figure of a space: a map of two free coordinates, of more a panel for each."""
+    """Return the figure of a space: a map of two free coordinates, or for more a panel for each."""
     with house_style():
         n = len(space.names)
         columns = 3 if n == 3 else 2

@@ -1,1 +1,1 @@
-"""What accuracy costs in time: errors and times of every way to a number, by region of the design space."""
+"""Cost of accuracy: errors and times of every method, by region of the design space."""

@@ -74,7 +74,7 @@ def measured(smoke: bool, out: Path) -> Measured:
 
 
 def with_effect(found: Measured, name: str) -> Measured:
-    """Measure one row of the price list of effects anew, all else kept."""
+    """Measure one row of the price list of effects again and keep all others."""
     import pandas as pd
 
     kept = found.effects[found.effects["effect"].isin(set(PRICED) - {name})]

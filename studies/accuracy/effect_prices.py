@@ -1,4 +1,4 @@
-"""The price list of the effects: error of what each stands for, and its time, at every accuracy."""
+"""The price list of the effects: error of each effect's outputs, and its time, at every accuracy."""
 
 from __future__ import annotations
 
@@ -29,17 +29,17 @@ SAMPLES, TARGETS = (90, 360, 3600), (1e-3, 1e-6, 1e-9)
 SMOKE_SAMPLES, SMOKE_TARGETS, SMOKE_EVERY = (360,), (1e-6,), 12
 GRID, REFINED = "grid", "accuracy="
 DEAR, DEAR_POSE, DEAREST = 5e6, 1e3, 5e7  # ns per design and per pose; per design
-MASS, ARM, MIXED = 1e-4, 0.4, ("xy", "xz", "yz")  # of bodies without inputs [t]; share of an ordinary length
+MASS, ARM, MIXED = 1e-4, 0.4, ("xy", "xz", "yz")  # masses of bodies without inputs [t]; share of an ordinary length
 MANY, FEW = 8, 2
-SPARE = 4  # ordinary designs for one that is measured: not all of them turn
-ROUNDING = 1e-14  # what two ways to one number may differ by beyond what they say of themselves
+SPARE = 4  # ordinary designs per measured one, since not all of them turn
+ROUNDING = 1e-14  # difference of two methods beyond their own error estimates
 
 
 PRICED = (*NAMES, *SCENES)
 
 
 def effect_prices(smoke: bool, names: Sequence[str] | None = None) -> pd.DataFrame:
-    """Rows of every effect by accuracy, each on the first family that it serves, and of the scenes; or of ``names``."""
+    """Return rows of every effect by accuracy, on the first family it serves, and of the scenes; or of ``names``."""
     import pandas as pd
 
     rows: list[dict[str, object]] = []
@@ -58,9 +58,9 @@ def effect_prices(smoke: bool, names: Sequence[str] | None = None) -> pd.DataFra
 
 
 def loaded(bare: Family, full: Family, designs: int) -> Array:
-    """Ordinary designs with the inputs of an effect; bodies that all have no mass are given some, or all loads vanish.
+    """Return ordinary designs with the inputs of an effect; bodies without any mass get one, or all loads would vanish.
 
-    Where a tool at a tip is all there is, the tip lies off the axis of its link for the same reason.
+    If a tool at a tip is the only mass, the tip is placed off the axis of its link for the same reason.
     """
     own, some = len(bare.parameters), ordinary(full, SPARE * designs)
     matrix = some[moves(bare, some[:, :own])][:designs]
@@ -83,7 +83,7 @@ def loaded(bare: Family, full: Family, designs: int) -> Array:
 
 
 def count(name: str, smoke: bool) -> int:
-    """On how many designs an effect is measured."""
+    """Return the number of designs on which an effect is measured."""
     if effect(name).ns_per_design > DEAREST:
         return 1
     dear = effect(name).ns_per_design > DEAR or effect(name).ns_per_pose > DEAR_POSE
@@ -91,7 +91,7 @@ def count(name: str, smoke: bool) -> int:
 
 
 def outputs_of(name: str, bare: Family) -> tuple[str, ...]:
-    """Names that the effect stands for in ``want``; its numbers of a turn where an output bears the effect's name."""
+    """Return the outputs of an effect in ``want``; for an output with the effect's name those of a whole turn."""
     found = tuple(expanded(bare, [name]))
     whole = effect(name).design_result
     if found != (name,) or whole is None:
@@ -102,7 +102,7 @@ def outputs_of(name: str, bare: Family) -> tuple[str, ...]:
 def prices_of(
     name: str, on: str, given: Effected, wanted: tuple[str, ...], smoke: bool = False
 ) -> list[dict[str, object]]:
-    """Rows of one effect or scene, and of the outputs that it stands for."""
+    """Return rows of one effect or scene, for its outputs."""
     known, words = known_of(name, given, wanted)
     head: dict[str, object] = {
         "effect": name,
@@ -121,7 +121,7 @@ def prices_of(
 def _methods(name: str, smoke: bool) -> Sequence[tuple[str, float, Accuracy]]:
     samples, targets = (SMOKE_SAMPLES, SMOKE_TARGETS) if smoke else (SAMPLES, TARGETS)
     if name in NAMES and effect(name).whole_turn:
-        samples = samples[:1]  # it chooses its own
+        samples = samples[:1]  # the effect chooses its samples
     return [
         *((GRID, float(n), Accuracy(samples=n)) for n in samples),
         *((REFINED, target, Accuracy(target=target)) for target in targets),

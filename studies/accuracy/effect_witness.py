@@ -1,7 +1,7 @@
-"""References of the effects: by another method for what couples a whole turn, by finer sampling for everything else.
+"""References of the effects: by another method if an effect couples a whole turn, otherwise by finer sampling.
 
-A witness gets the family with the effect's poses and a design matrix, and returns what it knows by the name of the
-output.  What no witness knows and what is an extremum of a pose output is judged by ever narrower grids.
+A witness takes the family with the effect's poses and a design matrix, and returns reference values by output.
+Extrema of pose outputs without a witness are compared with ever finer grids.
 """
 
 from __future__ import annotations
@@ -19,26 +19,26 @@ from sweep.reductions.rounding import rounding_alone
 from sweep.reductions.sampling import pose_columns
 
 SAMPLES, MANY = 8192, 131_072
-# The same with a half and a third of the poses; a reference may be off by twice what these differ from it.
+# Divisors of the number of poses; the error of a reference is DOUBT times its difference from these coarser ones.
 COARSER, DOUBT = (2, 3), 2.0
 PASSES, HALVINGS = 12, 200
-LOOKED_AT = 360  # poses that show what is rounding alone
+LOOKED_AT = 360  # poses that show whether an output is rounding alone
 EXTREMA = {"max_abs_": 0, "max_": 1, "min_": -1}
 
 
 class Effected(NamedTuple):
-    """A family, the one with the effect's inputs, and designs of the latter."""
+    """A family, its extension by the effect's inputs, and designs of the latter."""
 
     bare: Family
     full: Family
     designs: Array
 
     def given(self, name: str) -> Array:
-        """Input or parameter of the designs."""
+        """Return an input or parameter of the designs."""
         return self.designs[:, self.full.parameter_names.index(name)]
 
     def poses(self, names: tuple[str, ...], samples: int, changed: Mapping[str, Array] | None = None) -> list[Array]:
-        """Pose outputs over an even grid, (n, samples), also of other effects; inputs ``changed`` pose by pose."""
+        """Return pose outputs over an even grid, (n, samples), of any effects; inputs ``changed`` vary by pose."""
         wider = extended(self.bare, names)
         rows = np.column_stack([self._input(wider, name) for name in wider.parameter_names])
         phi = np.arange(samples) * (TWO_PI / samples)
@@ -60,17 +60,17 @@ class Effected(NamedTuple):
 
 
 Witness: TypeAlias = Callable[[Effected, int], dict[str, Array]]
-"""Outputs by name, from so many poses; a method that chooses its own poses ignores the number."""
+"""Outputs by name, from a number of poses; a method that chooses its own poses ignores the number."""
 
 
 def known_of(name: str, given: Effected, wanted: tuple[str, ...]) -> tuple[dict[str, Known], str]:
-    """Values of an effect's outputs known by other means, and in words by which."""
+    """Return reference values of an effect's outputs, and a description of their methods."""
     entry = WITNESSES.get(kind_of(name)) if name in NAMES else None
     found, words = {}, ""
     if entry is not None:
         witness, samples, words = entry
         fine, *coarse = (witness(given, samples // share) for share in (1, *COARSER))
-        # Of curves with jumps two may agree by accident: a reference is no surer of one design than of the worst.
+        # Curves with jumps may agree by accident: the error of a reference is that of the worst design for all designs.
         found = {
             output: Known(value, DOUBT * np.abs(value) * max(np.abs(one[output] / value - 1.0).max() for one in coarse))
             for output, value in fine.items()
@@ -82,13 +82,13 @@ def known_of(name: str, given: Effected, wanted: tuple[str, ...]) -> tuple[dict[
 
 
 def kind_of(name: str) -> str:
-    """Name of an effect without that of a slider, or of the family with a tree of links that it is for."""
+    """Return the name of an effect without the kind of follower, or without the family of its link tree."""
     entry = effect(name)
     return name.removeprefix("slider_" if entry.tree is None else f"{entry.families[0]}_")
 
 
 def of_samples(given: Effected, wanted: tuple[str, ...]) -> dict[str, Known]:
-    """Largest values and magnitudes and least values of pose outputs, by ever narrower grids."""
+    """Return largest values, magnitudes and least values of pose outputs, by ever finer grids."""
     found = {}
     for name in wanted:
         for prefix, sign in EXTREMA.items():
@@ -101,32 +101,32 @@ def of_samples(given: Effected, wanted: tuple[str, ...]) -> dict[str, Known]:
 
 
 def _is_nothing(given: Effected, pose: str) -> bool:
-    """Whether a pose output is rounding alone, as the moment in a pin of a plane mechanism: no digit of it is right."""
+    """Tell whether a pose output is rounding alone, as the moment in a pin of a planar mechanism."""
     (values,) = given.poses((pose,), LOOKED_AT)
     size, looked_at = np.abs(values).max(axis=1), np.ones(len(values), np.bool_)
     return bool(rounding_alone(given.full, given.designs, pose, values, size, looked_at).any())
 
 
 def pressure(given: Effected, samples: int) -> dict[str, Array]:
-    """Largest and least pressure angle, from the angle itself."""
+    """Return the largest and least pressure angle, from the angle itself."""
     largest, least = (extreme(given.full.precise(), given.designs, "pressure_angle", sign).value for sign in (1, -1))
     return {"pressure_max": largest, "pressure_min": least}
 
 
 def bearing_life(given: Effected, samples: int) -> dict[str, Array]:
-    """Mean loads and lives of the rocker's bearings by even sums over very many poses, kinks or none."""
+    """Return mean loads and lives of the rocker's bearings by even sums over very many poses, with or without kinks."""
     return _lives(given, samples, "d", "", given.bare.derivative_of[given.bare.position])
 
 
-# By the name of a shaft whose angle in its bearings is a pose output: that output, and the turns it makes itself in
-# a turn of the crank that the output does not show; cranks turn evenly.
+# By the name of a shaft whose angle in its bearings is a pose output: that output, and the turns per turn of the crank
+# that the output does not show; cranks turn evenly.
 _ANGLES = {"d": ("psi", 0.0), "d1": ("psi", 0.0), "os": ("chi", 0.0), "b": ("theta", -1.0), "h": ("beta", 0.0)}
 
 
 def bearings_of_shafts(given: Effected, samples: int) -> dict[str, Array]:
-    """Mean loads and lives of the bearings of every shaft of a tree of links."""
+    """Return mean loads and lives of the bearings of every shaft of a link tree."""
     found: dict[str, Array] = {}
-    for name in given.full.parameter_names:  # those of the rocker alone, a massless estimate, have no shaft's name
+    for name in given.full.parameter_names:  # bearings of the rocker alone, a massless estimate, have no shaft's name
         shaft = name.removeprefix("dynamic_capacity_")
         if shaft != name:
             found |= _lives(given, samples, shaft, f"_{shaft}", shaft)
@@ -159,7 +159,7 @@ def _lives(given: Effected, samples: int, shaft: str, tail: str, turning: str) -
 
 
 def _slope(angle: Array) -> Array:
-    """Slope of an angle that grows by full turns, by differences of sixth order."""
+    """Return the slope of an angle that grows by full turns, by differences of sixth order."""
     turns = np.rint((angle[:, -1] - angle[:, 0]) / TWO_PI)
     step = TWO_PI / angle.shape[1]
     swing = angle - turns[:, None] * np.arange(angle.shape[1]) * step
@@ -171,12 +171,12 @@ def _slope(angle: Array) -> Array:
 
 
 def speed(given: Effected, samples: int) -> dict[str, Array]:
-    """Energy of the drive summed pose by pose, its mean level by halving."""
+    """Return the drive's speeds from its energy summed pose by pose, with the mean level found by halving."""
     return _numbers(*_steady(*_energies(given, samples), given.given("speed")), given.given("speed"), _height)
 
 
 def speed_with_friction(given: Effected, samples: int) -> dict[str, Array]:
-    """Speeds with friction, taken anew at every pose with the speed that it makes until that no longer changes."""
+    """Return the speeds with friction, iterated at every pose with the resulting speed until it no longer changes."""
     inertia, slope, excess = _energies(given, samples)
     mean = given.given("speed")
     crank, change = np.tile(mean[:, None], (1, samples)), np.zeros(inertia.shape)
@@ -189,14 +189,14 @@ def speed_with_friction(given: Effected, samples: int) -> dict[str, Array]:
 
 
 def _energies(given: Effected, samples: int) -> tuple[Array, Array, Array]:
-    """Inertia about the crank, its derivative, and the torque that is left over at even speed."""
+    """Return the inertia about the crank, its derivative, and the excess torque at constant speed."""
     inertia, slope, drive = given.poses(("reduced_inertia", "dreduced_inertia", "drive_torque"), samples)
     mean = given.given("speed")[:, None]
     return inertia + given.given("flywheel")[:, None], slope, 0.5 * slope * mean**2 - drive
 
 
 def _steady(inertia: Array, slope: Array, excess: Array, mean: Array) -> tuple[Array, Array]:
-    """Speed and acceleration of d(J w^2/2)/d phi = excess - its mean, with constant motor torque and a mean speed."""
+    """Return speed and acceleration of d(J w^2/2)/d phi = excess - its mean, for constant motor torque."""
     torque = excess - excess.mean(axis=1, keepdims=True)
     step = TWO_PI / inertia.shape[1]
     work = np.concatenate([np.zeros((len(torque), 1)), np.cumsum(_panels(torque), axis=1)[:, :-1]], axis=1) * step
@@ -204,7 +204,7 @@ def _steady(inertia: Array, slope: Array, excess: Array, mean: Array) -> tuple[A
     for _ in range(HALVINGS):
         level = 0.5 * (low + high)
         pace = np.sqrt(inertia / np.maximum(2.0 * (level[:, None] + work), np.finfo(float).tiny)).mean(axis=1)
-        slow = pace > 1.0 / mean  # a turn takes longer than it should
+        slow = pace > 1.0 / mean  # a turn takes too long
         low, high = np.where(slow, level, low), np.where(slow, high, level)
     crank = np.sqrt(2.0 * (0.5 * (low + high)[:, None] + work) / inertia)
     return crank, (torque - 0.5 * slope * crank**2) / inertia
@@ -218,14 +218,14 @@ def _numbers(crank: Array, change: Array, mean: Array, height: Callable[[Array],
 
 
 def _panels(y: Array) -> Array:
-    """Integral of every panel of a periodic curve over its width, by the cubic through four samples."""
+    """Return the integral of every panel of a periodic curve over its width, by the cubic through four samples."""
     left, right, after = np.roll(y, 1, axis=1), np.roll(y, -1, axis=1), np.roll(y, -2, axis=1)
     panels: Array = (13.0 * (y + right) - left - after) / 24.0
     return panels
 
 
 def elastic(given: Effected, samples: int) -> dict[str, Array]:
-    """Periodic vibration by differences of eighth order, its damping by Liouville's formula."""
+    """Return the periodic vibration by differences of eighth order, its damping by Liouville's formula."""
     from scipy.sparse import diags
     from scipy.sparse.linalg import spsolve
 
@@ -251,7 +251,7 @@ def elastic(given: Effected, samples: int) -> dict[str, Array]:
 
 
 def _stencil(order: int, samples: int) -> Any:
-    """Matrix of the first or second derivative of a periodic curve by differences of eighth order."""
+    """Return the matrix of the first or second derivative of a periodic curve by differences of eighth order."""
     from scipy.sparse import diags
 
     half = {1: (4 / 5, -1 / 5, 4 / 105, -1 / 280), 2: (8 / 5, -1 / 5, 8 / 315, -1 / 560)}[order]
@@ -263,7 +263,7 @@ def _stencil(order: int, samples: int) -> Any:
 
 
 def _height(curve: Array) -> Array:
-    """Largest magnitude of a smooth periodic curve from close samples, by the parabola through the highest three."""
+    """Return the largest magnitude of a smooth periodic curve from close samples, by a parabola through the highest."""
     size, rows = np.abs(curve), np.arange(len(curve))
     top = size.argmax(axis=1)
     left, middle, right = (size[rows, (top + k) % size.shape[1]] for k in (-1, 0, 1))
@@ -285,4 +285,4 @@ WITNESSES: Mapping[str, tuple[Witness, int, str]] = {
         elastic, SAMPLES, f"differences of eighth order over {SAMPLES} poses; Liouville's formula",
     ),
 }  # fmt: skip
-"""By the name of the effect without its family or kind of follower: the witness, its poses, in words what it does."""
+"""By effect without its family or kind of follower: the witness, its number of poses, and its description."""

@@ -19,7 +19,7 @@ HEAD = ("effect", "on", "designs", *(f"grid {n}" for n in SAMPLES), *(f"`{power(
 
 
 def effects_parts(m: Measured) -> Parts:
-    """Table of all effects, whether their errors stay below what is told, and by which references they are known."""
+    """Return the table of all effects, a statement on their error estimates, and the table of their references."""
     groups = [(f"`{name}`", part) for name, part in m.effects.groupby("effect", sort=False)]
     firsts = [(name, part.iloc[0]) for name, part in groups]
     words = [[name, f"{first['judged']} of {first['outputs']}", first["reference"]] for name, first in firsts]
@@ -39,7 +39,7 @@ def _row(name: str, rows: pd.DataFrame) -> list[str]:
 
 
 def _honest(table: pd.DataFrame) -> list[str]:
-    """Whether errors stay below what ``err_`` says, and where a status says that a number is not sure."""
+    """State whether errors stay below ``err_``, and which designs have a status other than 0."""
     refined = table[table["method"] == REFINED]
     beyond = refined[refined["exceeded"] > 0]
     unsure = refined[refined["unsure"] > 0]

@@ -1,4 +1,4 @@
-"""Pages docs/accuracy/families.md and crank-rocker.md: error and time of every family by every way, by region."""
+"""Pages docs/accuracy/families.md and crank-rocker.md: error and time of every family by every method and region."""
 
 from __future__ import annotations
 
@@ -21,12 +21,12 @@ PURPOSES = {"For a nightly map": 1e-3, "For a drawing, an optimum, a comparison 
 
 
 def families_parts(m: Measured) -> Parts:
-    """Tables of all families, region by region, and how far timings differ."""
+    """Return tables of all families, region by region, and the spread of timings."""
     return {"regions": _by_region(m.families), "spread": _spread(m.families)}
 
 
 def crank_rocker_parts(m: Measured) -> Parts:
-    """Table of the crank-rocker's own regions, and what to use for what."""
+    """Return the table of the crank-rocker's own regions, and advice for each purpose."""
     texts = m.regions[["region", "text"]].drop_duplicates()
     rows = [_row(str(name), part) for name, part in m.regions.groupby("region", sort=False)]
     return {
@@ -37,19 +37,19 @@ def crank_rocker_parts(m: Measured) -> Parts:
 
 
 def advice(table: pd.DataFrame) -> list[str]:
-    """Name for every purpose the cheapest way that keeps its bound in every region but at change points."""
+    """Return for every purpose the cheapest setting that keeps its bound in every region except change points."""
     plain = table[table["region"] != "change point"]
     lines = [f"**{purpose}** (to {power(bound)}): {_choice(plain, bound)}" for purpose, bound in PURPOSES.items()]
     return [*lines, f"**For a proof that no peak was missed**: {_proof(plain)}"]
 
 
 def _choice(table: pd.DataFrame, bound: float) -> str:
-    """Find the cheapest setting within the bound; of ``accuracy=``, a promise, none coarser than the bound."""
+    """Describe the cheapest setting within the bound; ``accuracy=`` settings are at least as fine as the bound."""
     promised = (table["method"] == GRID) | ((table["method"] == REFINED) & (table["setting"] <= bound * (1.0 + 1e-9)))
     ways: dict[Hashable, pd.DataFrame] = {}
     for (method, _), rows in table[promised].groupby(["method", "setting"]):
         kept = (rows["largest_error"] <= rows["reference_error"].clip(lower=bound)).all()
-        # The groups come by rising settings: the coarsest of a grid is the first, of a target the last.
+        # Groups are in order of their settings: the coarsest grid comes first, the coarsest target last.
         if kept and not rows["unanswered"].any() and (method == REFINED or method not in ways):
             ways[method] = rows
     if not ways:
@@ -67,7 +67,7 @@ def _choice(table: pd.DataFrame, bound: float) -> str:
 
 
 def _proof(table: pd.DataFrame) -> str:
-    """Say what the certificate costs beside the search that it checks."""
+    """Describe the cost of the certificate relative to the search that it checks."""
     proven = table[table["method"] == CERTIFIED]
     searched = table[(table["method"] == REFINED) & (table["setting"] <= PROVEN)]
     searched = searched[searched["setting"] == searched["setting"].max()]
@@ -95,7 +95,7 @@ def _row(name: str, rows: pd.DataFrame) -> list[str]:
 
 
 def _spread(table: pd.DataFrame) -> list[str]:
-    """How far the timings of one call differ, over all rows of the table."""
+    """Describe the spread of the timings of one call, over all rows of the table."""
     width = (table["ns_per_design_upper"] - table["ns_per_design_lower"]) / table["ns_per_design"]
     return prose(
         f"Every time is the median of five; between its quartiles lie {sig(100.0 * width.median())} % of it in the",

@@ -1,4 +1,4 @@
-"""What the first page says: five lines, what to use, and a whole study."""
+"""First page of the accuracy report: five lines, advice, and a whole study."""
 
 from __future__ import annotations
 
@@ -17,19 +17,19 @@ if TYPE_CHECKING:
 
 COARSE, FINE = 1e-3, 1e-9
 CLOSE = 1e-6
-NOTHING = 1.1  # a time that is multiplied by less is the same time
-USUAL = 360.0  # samples of a turn that are taken where nobody thinks about it
+NOTHING = 1.1  # factor below which two times count as equal
+USUAL = 360.0  # samples of a turn in common use
 
 
 def front_parts(m: Measured) -> Parts:
-    """Lines of the first page: five sentences, one whole study, what the times depend on."""
+    """Return the parts of the first page: five sentences, one whole study, the conditions of the times."""
     rough = "Smoke version: few designs, rough figures." if m.smoke else "Every figure here is measured, none is typed."
     told = f"{rough} Machine: {m.machine}. Ratios travel between machines, nanoseconds do not."
     return {"five": [f"* {line}" for line in five(m)], "study": _study(m.whole), "measured": prose(told)}
 
 
 def five(m: Measured) -> list[str]:
-    """Say what a designer should know, a sentence or two each."""
+    """Return five statements for designers, a sentence or two each."""
     return [
         _refined(m.families),
         _grid(m.families),
@@ -40,7 +40,7 @@ def five(m: Measured) -> list[str]:
 
 
 def of_region(table: pd.DataFrame, region: str, method: str, setting: float) -> pd.DataFrame:
-    """Rows of one region and method at one setting, a row per family."""
+    """Return the rows of one region and method at one setting, one per family."""
     return at(table[table["region"] == region], method, setting).set_index("family")
 
 

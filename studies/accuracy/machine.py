@@ -1,4 +1,4 @@
-"""What the times depend on: processor and versions, without the name of any host or folder."""
+"""Conditions of the times: processor and versions, without the name of any host or folder."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ LIBRARIES = ("numba", "llvmlite", "numpy", "scipy", "pandas", "pyarrow")
 
 
 def description() -> str:
-    """One line: processor, usable cores, load at the start, Python and library versions."""
+    """Return one line: processor, usable cores, load at the start, Python and library versions."""
     cores = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count()
     load = f", load {os.getloadavg()[0]:.1f}" if hasattr(os, "getloadavg") else ""
     versions = ", ".join(f"{name} {version(name)}" for name in LIBRARIES)

@@ -1,4 +1,4 @@
-"""The marks: true maxima of 100 000 random designs against a reference, the exact margin, and what both cost."""
+"""Targets of the project: true maxima of 100 000 random designs against a reference, the exact margin, and costs."""
 
 from __future__ import annotations
 
@@ -24,15 +24,15 @@ from sweep.families.base import Array
 from sweep.reductions.sampling import Index, pose_columns, turn
 
 TARGET = 1e-8
-WRONG_PEAK = 1e-4  # relative difference in height that no refinement of the right peak leaves
+WRONG_PEAK = 1e-4  # relative difference in height that excludes the right peak
 GRID = 360
-REPEATS = 15  # of a timing; the shortest counts, and other work on the machine disturbs most of them
-SAMPLES, HALVINGS = 65536, 44  # of the reference; from one sample distance to the rounding of an angle
+REPEATS = 15  # repetitions of a timing; the shortest counts, since other work on the machine disturbs most of them
+SAMPLES, HALVINGS = 65536, 44  # of the reference: from one sample distance to the rounding of an angle
 
 
 @dataclass(frozen=True)
 class Mark:
-    """What was to be reached and what was measured."""
+    """A target and its measured value."""
 
     name: str
     asked: str
@@ -41,7 +41,7 @@ class Mark:
 
 
 def marks(designs: int) -> list[Mark]:
-    """All marks but those of whole programs."""
+    """Return all marks except those of whole programs."""
     turning = rotatable(designs, 2024)
     mixed = drawn(designs, np.random.default_rng(7))
     both = [(mixed, "every random design"), (turning, "every design that turns")]
@@ -49,7 +49,7 @@ def marks(designs: int) -> list[Mark]:
 
 
 def smoke_mark() -> Mark:
-    """Time of the smoke version of this study, run as a user would, with warm kernels."""
+    """Return the time of this study's smoke version, run as a user would, with warm kernels."""
     with tempfile.TemporaryDirectory() as folder:
         start, before = time.perf_counter(), os.times()
         command = [sys.executable, "-m", "studies.accuracy", "--smoke", "--out", folder]
@@ -60,7 +60,7 @@ def smoke_mark() -> Mark:
 
 
 def study_mark(took: float) -> Mark:
-    """Time of the study that measures all this, up to its figures."""
+    """Return the time of the study that measures all marks, up to its figures."""
     used = sum(os.times()[:4])
     text = f"{took / 60.0:.1f}; {used / 60.0:.1f} of processor time"
     return Mark("`make study-accuracy` [min]", "10", text, took <= 600.0)
@@ -81,7 +81,7 @@ def _maxima(designs: Array) -> list[Mark]:
     found, error, status = _true_maxima(designs)()
     exact = even_reference(designs)
     off = np.abs(found - exact) / exact
-    # Where they differ the even samples may be the ones that missed, or their rounding: the slower reference decides.
+    # If they differ, the even samples may have missed the peak, or have rounding errors: the slower reference decides.
     doubtful = np.flatnonzero(~((off <= TARGET) & (off * exact <= error)))
     if doubtful.size:
         exact[doubtful] = reference(family("rssr"), np.ascontiguousarray(designs[doubtful])).value
@@ -112,7 +112,7 @@ def _maxima(designs: Array) -> list[Mark]:
 
 
 def even_reference(designs: Array) -> Array:
-    """Largest |psi''| from even samples by the fused loop, and halving between the neighbours of the top."""
+    """Return the largest |psi''| from even samples by the fused loop, and halving between the neighbours of the top."""
     angles = turn(SAMPLES)
     exact, halves = np.empty(len(designs)), np.array_split(np.arange(len(designs)), 2)
 
@@ -127,7 +127,7 @@ def even_reference(designs: Array) -> Array:
 
 
 def _halved(designs: Array, phi: Array, reach: float) -> Array:
-    """Height of the peak of |psi''| within ``reach`` of each angle, by halving on the sign of its slope."""
+    """Return the height of the peak of |psi''| within ``reach`` of each angle, by halving on the sign of its slope."""
     low, high = phi - reach, phi + reach
     for _ in range(HALVINGS):
         middle = 0.5 * (low + high)
@@ -150,7 +150,7 @@ def _together(work: Callable[[Any, Any], None], parts: Sequence[tuple[Any, Any]]
 def _margin(designs: Array) -> Mark:
     n = len(designs)
     status, margin, turns = np.empty(n, np.uint8), np.empty(n), np.empty(n)
-    # So short that a phase of a slower clock would be all it sees.
+    # A single call is so short that a phase of a slower clock could cover all repetitions.
     repeats = 20 * REPEATS
     took = 1e9 * seconds(lambda: rssr.margin(designs, status, margin, turns, None, None, None), repeats) / n
     return Mark("exact margin with rotatability [ns per design]", "25", f"{took:.0f}", took <= 25.0)

@@ -1,4 +1,4 @@
-"""Everything one run of the study found: its tables, kept as Parquet, from which the pages and figures are made."""
+"""Results of one run of the study: its tables, kept as Parquet, from which pages and figures are made."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ if TYPE_CHECKING:
     import pandas as pd
 
 ABOUT = "about.json"
-# Written by `make bench-peers`, in an environment of its own, if ever.
+# Written by `make bench-peers` in an environment of its own, optionally.
 PEERS = "peers"
 
 
@@ -21,11 +21,11 @@ class Measured:
 
     Parameters
     ----------
-    machine, smoke : what the times depend on; whether all is rough
+    machine, smoke : conditions of the times; whether all values are rough
     families, regions, effects : error and time of every family, of the crank-rocker's own regions, of every effect
     whole : one small study from its file to its optimum
-    marks : what was to be reached, and what was
-    peers : another program on planar four-bars, None where `make bench-peers` has not been run
+    marks : targets and measured values
+    peers : another program on planar four-bars, None if `make bench-peers` has not been run
     """
 
     machine: str
@@ -38,7 +38,7 @@ class Measured:
     peers: pd.DataFrame | None = None
 
     def write(self, folder: Path) -> None:
-        """Keep the tables; that of another program has been written by its own command."""
+        """Write the tables, except that of another program, which its own command has written."""
         folder.mkdir(parents=True, exist_ok=True)
         about = {"machine": self.machine, "smoke": self.smoke}
         (folder / ABOUT).write_text(json.dumps(about, indent=1), encoding="utf-8")
@@ -47,7 +47,7 @@ class Measured:
 
     @classmethod
     def read(cls, folder: Path) -> Measured:
-        """Read what :meth:`write` kept, with the table of another program where it lies beside it."""
+        """Read the tables of :meth:`write`, and the table of another program if it exists."""
         import pandas as pd
 
         about = json.loads((folder / ABOUT).read_text(encoding="utf-8"))
@@ -56,7 +56,7 @@ class Measured:
 
 
 def peers_in(folder: Path) -> pd.DataFrame | None:
-    """Read the table of another program that lies in the folder, if any."""
+    """Read the table of another program in the folder, or return None."""
     import pandas as pd
 
     file = folder / f"{PEERS}.parquet"

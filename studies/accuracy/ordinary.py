@@ -1,4 +1,4 @@
-"""Ordinary linkages with all inputs of their effects: what the accuracy study prices, benches time and tests load."""
+"""Ordinary linkages with all inputs of their effects, for the accuracy study, benchmarks and tests."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ CENTRE = {
     "a": 20.0, "b": 95.0, "c": 60.0, "e": 70.0, "f": 12.0, "g": 8.0, "alpha": 1.2, "branch": 1.0,
     "xi": 100.0, "eta": 3.0, "lam": 0.3, "h": 2.0, "Z1": -30.0, "Z2": 40.0,
 }  # fmt: skip
-# A small machine in mm, t, s; ours.
+# A small machine in mm, t, s, of our own choice.
 INPUTS = {
     "m_crank": 2e-4, "m_coupler": 1e-4, "m_rocker": 3e-4, "m_slider": 3e-4, "com_coupler_x": 45.0, "com_coupler_y": 2.0,
     "com_rocker_x": 25.0, "j_coupler_xx": 0.004, "j_coupler_yy": 0.08, "j_coupler_zz": 0.08, "j_rocker_zz": 0.3,
@@ -27,7 +27,7 @@ INPUTS = {
     "eyelet_radius": 1.0, "mu_eyelet": 0.2,
 }  # fmt: skip
 
-# Of linkages of a few units of length, by the beginning of an input's name.
+# For linkages of a few units of length, by the beginning of an input's name.
 SMALL = {"k": 1.8, "tau": -1.0, "speed": 520.0, "flywheel": 1e-2, "m_tool": 2.5e-5, "tool_x": 2.0, "tool_force_y": -5.0}
 KINDS = {
     "mu_": 0.05, "radius_": 0.1, "m_": 1e-5, "radial_factor_": 0.56, "axial_factor_": 1.5, "e_limit_": 0.3,
@@ -37,7 +37,7 @@ KINDS = {
 
 
 def designs(full: Family, n: int, seed: int = 0) -> Array:
-    """Linkages a few per cent round a regular one, with the inputs of the family's effects."""
+    """Return linkages within a few per cent of a regular one, with the inputs of the family's effects."""
     noise = np.random.default_rng(seed).uniform(-0.05, 0.05, (n, len(full.parameters)))
     values = [_value(full, p) for p in full.parameters]
     matrix = np.array(values, dtype=np.float64) * (1.0 + noise)
@@ -48,10 +48,10 @@ def designs(full: Family, n: int, seed: int = 0) -> Array:
 
 
 def _value(full: Family, p: Parameter) -> float | None:
-    """Choose a parameter's or input's value: of the small machine, of the family's example, or by the kind of input."""
+    """Return the value of a parameter or input: of the small machine, the family's example, or the kind of input."""
     linked = full.find(LinkTree) is not None
     if tool_place(full) == ON_TIP:
-        # a tool at the tip loads whatever else is measured: it is there for its own effect alone
+        # a tool at the tip would load all other effects: it is present for its own effect alone
         at_tip = "tip_load" in full.pose_names
         if p.name in ("m_tool", "tool_x"):
             return (INPUTS | {"tool_x": 75.0})[p.name] if at_tip else 0.0
@@ -64,4 +64,4 @@ def _value(full: Family, p: Parameter) -> float | None:
     default = 0.0 if p.unless else p.default  # centres and inertias are given
     if kind is not None or default is not None:
         return default if kind is None else kind
-    return -0.5 if p.name.endswith("1") else 0.6  # places of supports
+    return -0.5 if p.name.endswith("1") else 0.6  # positions of supports

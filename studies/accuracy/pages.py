@@ -1,4 +1,4 @@
-"""The pages docs/accuracy.md and those behind it, with their figures, from the measured tables alone."""
+"""The pages docs/accuracy.md and below, with their figures, from the measured tables alone."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ TEMPLATES = Path(__file__).parent
 
 
 def marks_parts(m: Measured) -> Parts:
-    """Table of the marks: what was asked, what was measured, whether it was met."""
+    """Return the table of the marks: target, measured value, and whether it was met."""
     rows = [[mark, asked, measured, "yes" if met else "**no**"] for mark, asked, measured, met in m.marks.to_numpy()]
     return {"marks": pipe_table(["mark", "asked", "measured", "met"], rows)}
 
@@ -32,7 +32,7 @@ MAKERS: dict[str, Callable[[Measured], Parts]] = {
 
 
 def pages(m: Measured) -> dict[str, str]:
-    """Text of every page by its place in docs: its template, which bears the same name, with what was measured."""
+    """Return the text of every page by its path in docs: the template of the same name, with measured values."""
     return {path: _filled(TEMPLATES / Path(path).name, make(m)) for path, make in MAKERS.items()}
 
 

@@ -1,4 +1,4 @@
-"""The headline: what a digit costs; and the price lists of families and effects as pictures."""
+"""Headline figure, the cost of a digit, and figures of the price lists of families and effects."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-# Those whose price is shown first; any family has its place in the list of all.
+# Families in the headline figure; every family is in the list.
 SHOWN = {"rssr": "spatial crank-rocker", "rssr+guide": "needle drive, two stages", "four_bar": "planar four-bar"}
 COLOURS = {"rssr": "#D55E00", "rssr+guide": "#0072B2", "four_bar": "#009E73"}
 PEER = "#8a8f98"
@@ -29,7 +29,7 @@ USUAL = 360.0
 
 
 def draw_prices(m: Measured, folder: Path) -> list[Saved]:
-    """Draw the headline and the two lists."""
+    """Draw the headline figure and the two lists."""
     with house_style():
         figures = {"accuracy": headline(m.families, m.peers)}
         ordinary = m.families[m.families["region"] == ORDINARY]
@@ -87,7 +87,7 @@ def _decades(axes: Axes) -> None:
 
 
 def _list(table: pd.DataFrame, key: str, targets: tuple[float, ...]) -> Figure:
-    """Draw a row each: on the left the error, on the right the time, by a usual grid and by every accuracy."""
+    """Draw one row per name, the error on the left and the time on the right, for a usual grid and every accuracy."""
     names = list(dict.fromkeys(table[key]))
     figure = new_figure(8.4, 1.3 + 0.235 * len(names))
     left, right = figure.subplots(1, 2, sharey=True)

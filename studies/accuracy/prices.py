@@ -1,4 +1,4 @@
-"""Price list of the families: error and time of their measure by every way that they offer, region by region."""
+"""Price list of the families: error and time of their measure by every available method, region by region."""
 
 from __future__ import annotations
 
@@ -24,15 +24,15 @@ if TYPE_CHECKING:
 SAMPLES, TARGETS, PROVEN = (90, 360, 3600), (1e-3, 1e-6, 1e-9, 1e-12), 1e-8
 SMOKE_SAMPLES, SMOKE_TARGETS = (360,), (1e-3, 1e-9)
 GRID, REFINED, CERTIFIED = "grid", "accuracy=", "certified, accuracy="
-JUDGED = 1e-2  # a reference that is less sure than that says nothing
-# Designs per region by what a pose takes [ns]: what is dear is measured on few.
+JUDGED = 1e-2  # error of a reference above which it is not used
+# Designs per region by the time of a pose [ns]: slow families are measured on few.
 COUNTS = ((100.0, (48, 48, 16)), (2000.0, (16, 16, 8)), (float("inf"), (3, 3, 2)))
 SMOKE_COUNTS, SMOKE_EVERY = (2, 0, 0), 6
-EACH, SMOKE_EACH, SEED = 100, 4, 1  # crank-rockers of each of their own regions
+EACH, SMOKE_EACH, SEED = 100, 4, 1  # crank-rockers in each of their own regions
 
 
 def family_prices(smoke: bool) -> pd.DataFrame:
-    """One row per family or chain, region and method; in smoke every sixth of them, two designs each."""
+    """Return one row per family or chain, region and method; in smoke every sixth of them, two designs each."""
     import pandas as pd
 
     rows: list[dict[str, object]] = []
@@ -42,7 +42,7 @@ def family_prices(smoke: bool) -> pd.DataFrame:
 
 
 def crank_rocker_prices(smoke: bool) -> pd.DataFrame:
-    """Rows of the crank-rocker in regions that only it has, each with its text."""
+    """Return rows of the crank-rocker in its own regions, each with its text."""
     import pandas as pd
 
     found = regions(SMOKE_EACH if smoke else EACH, SEED)
@@ -51,13 +51,13 @@ def crank_rocker_prices(smoke: bool) -> pd.DataFrame:
 
 
 def counts(name: str) -> tuple[int, int, int]:
-    """How many designs of each region a family is measured on."""
+    """Return the number of designs of each region on which a family is measured."""
     ns = sum(nanoseconds("poses", part) for part in chain_names(name))
     return next(found for limit, found in COUNTS if ns < limit)
 
 
 def prices_of(mechanism: Family, regions: Iterable[Region], smoke: bool = False) -> list[dict[str, object]]:
-    """Rows of one family."""
+    """Return the rows of one family."""
     rows = []
     for region in regions:
         known = reference(mechanism, region.designs)
@@ -69,7 +69,7 @@ def prices_of(mechanism: Family, regions: Iterable[Region], smoke: bool = False)
 
 
 def methods(mechanism: Family, smoke: bool) -> Sequence[tuple[str, float, Accuracy]]:
-    """Name, setting and accuracy of every way to the measure that the family's domain allows."""
+    """Return name, setting and accuracy of every method that the family's domain allows."""
     samples, targets = (SMOKE_SAMPLES, SMOKE_TARGETS) if smoke else (SAMPLES, TARGETS)
     found = [(GRID, float(n), Accuracy(samples=n)) for n in samples]
     if isinstance(mechanism.domain, March):
@@ -78,7 +78,7 @@ def methods(mechanism: Family, smoke: bool) -> Sequence[tuple[str, float, Accura
     proof = Accuracy(target=PROVEN, certify=True)
     try:
         check_certifiable(mechanism, [measure(mechanism)], proof)
-    except InputError:  # this family proves no maxima
+    except InputError:  # this family supports no proof of maxima
         return found
     return [*found, (CERTIFIED, PROVEN, proof)]
 

@@ -1,4 +1,4 @@
-"""Random crank-rockers by region: what is easy and what is hard for float64 and for a grid of crank angles."""
+"""Random crank-rockers by region: easy and hard ones for float64 and for a grid of crank angles."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ PRESSURE = (
 
 @dataclass(frozen=True)
 class Region:
-    """Name as in the tables, and what the designs in it have in common."""
+    """Name as in the tables, and the common property of the region's designs."""
 
     name: str
     text: str
@@ -30,7 +30,7 @@ class Region:
 
 
 def drawn(n: int, generator: np.random.Generator) -> Array:
-    """Designs of general proportions: crank up to 1, other lengths up to 5, any angle between the axes; n rows."""
+    """Return n designs of general proportions: crank up to 1, other lengths up to 5, any angle between the axes."""
     r = generator
     lengths = [r.uniform(0.1, 1.0, n), r.uniform(0.5, 5.0, n), r.uniform(0.5, 4.0, n)]
     offsets = [r.uniform(-3.0, 3.0, n), r.uniform(-2.0, 2.0, n), r.uniform(-2.0, 2.0, n)]
@@ -38,14 +38,14 @@ def drawn(n: int, generator: np.random.Generator) -> Array:
 
 
 def margins(designs: Array) -> Array:
-    """Least cos^2 of the pressure angle over the turn; nan for what does not turn fully."""
+    """Return the least cos^2 of the pressure angle over the turn; nan for a crank that does not turn fully."""
     status, margin = np.empty(len(designs), np.uint8), np.empty(len(designs))
     rssr.margin(designs, status, margin, None, None, None, None)
     return np.where(status == st.OK, margin, np.nan)
 
 
 def rotatable(n: int, seed: int) -> Array:
-    """First n of :func:`drawn` whose crank turns fully."""
+    """Return the first n designs of :func:`drawn` whose crank turns fully."""
     generator = np.random.default_rng(seed)
     found: list[Array] = []
     while sum(map(len, found)) < n:
@@ -55,7 +55,7 @@ def rotatable(n: int, seed: int) -> Array:
 
 
 def regions(n: int, seed: int) -> tuple[Region, ...]:
-    """Seven regions of n rotatable designs each."""
+    """Return seven regions of n rotatable designs each."""
     plain = rotatable(40 * n, seed)
     angle = np.degrees(np.arccos(np.sqrt(margins(plain))))
     found = [
@@ -73,7 +73,7 @@ def regions(n: int, seed: int) -> tuple[Region, ...]:
 
 
 def shortest_couplers(designs: Array) -> Array:
-    """Shortest coupler with which each crank still turns, as near as halving in float64 comes."""
+    """Return the shortest coupler with which each crank still turns, to the resolution of float64."""
     low, high, trial = np.zeros(len(designs)), designs[:, 1].copy(), designs.copy()
     for _ in range(60):
         trial[:, 1] = 0.5 * (low + high)
@@ -83,7 +83,7 @@ def shortest_couplers(designs: Array) -> Array:
 
 
 def _change_points(plain: Array, n: int, seed: int) -> Array:
-    """Couplers just above the shortest that still lets the crank turn."""
+    """Return designs whose coupler is just above the shortest that lets the crank turn."""
     generator = np.random.default_rng(seed + 1)
     designs = plain[: 4 * n].copy()
     designs[:, 1] = shortest_couplers(designs) * (1.0 + 10.0 ** generator.uniform(-9.0, -5.0, len(designs)))
@@ -100,7 +100,7 @@ def _parallel(n: int, seed: int) -> Array:
 
 
 def _long(n: int, seed: int) -> Array:
-    """Make one offset long and measure the coupler between joints that are placed first."""
+    """Return designs with one long offset, whose coupler is the distance of joints placed first."""
     generator = np.random.default_rng(seed + 3)
     designs = drawn(60 * n, generator)
     rows, which = np.arange(len(designs)), generator.integers(3, 6, len(designs))

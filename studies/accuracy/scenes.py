@@ -1,4 +1,4 @@
-"""Designs of what is no effect of the register and yet no family: loads over the turn, the thread of a machine."""
+"""Designs of scenes that are neither effects nor families: loads over the turn, the thread of a machine."""
 
 from __future__ import annotations
 
@@ -17,14 +17,14 @@ from sweep.families.base import Turn
 from sweep.numerics.curves import table_curve
 
 GIVEN = tomllib.loads((Path(__file__).parent / "scenes.toml").read_text(encoding="utf-8"))
-NEAR, SEED = 0.01, 7  # share by which dimensions differ from the centre's
-POINTS = 24  # of the table of the load
+NEAR, SEED = 0.01, 7  # share by which dimensions differ from the nominal ones
+POINTS = 24  # points of the load's table
 
 Scene = Callable[[int], tuple[Effected, tuple[str, ...]]]
 
 
 def loads_over_the_turn(designs: int) -> tuple[Effected, tuple[str, ...]]:
-    """Crank-rockers whose rocker works against a table of torques, and their joint loads."""
+    """Return crank-rockers whose rocker works against a table of torques, and their joint loads."""
     bare, outputs = family("rssr"), tuple(GIVEN["load"]["outputs"])
     phi = 2.0 * np.pi * np.arange(POINTS) / POINTS
     curve = table_curve(phi, -2e4 * (1.0 + np.sin(phi) ** 3) * (phi < np.pi))
@@ -33,7 +33,7 @@ def loads_over_the_turn(designs: int) -> tuple[Effected, tuple[str, ...]]:
 
 
 def thread_balance(designs: int) -> tuple[Effected, tuple[str, ...]]:
-    """Machines with a thread over a take-up and the needle's eye, and what the thread needs and bears."""
+    """Return machines with a thread over a take-up and the needle's eye, and the outputs of the thread."""
     given = GIVEN["thread"]
     made = sweep.machine(given["members"], given["threads"])
     assert isinstance(made.domain, Turn)
@@ -48,4 +48,4 @@ SCENES: Mapping[str, tuple[str, Scene]] = {
     "loads over the turn": ("rssr", loads_over_the_turn),
     "thread balance": ("needle and lever", thread_balance),
 }
-"""By name: on what it is measured; so many designs and the outputs that are judged."""
+"""By name: the mechanism, and a function of the number of designs that returns them with the evaluated outputs."""

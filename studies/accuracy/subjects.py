@@ -1,4 +1,4 @@
-"""What the price list covers: every registered family and two chains, each with designs by region."""
+"""Subjects of the price list: every registered family and two chains, each with designs by region."""
 
 from __future__ import annotations
 
@@ -28,15 +28,15 @@ HALVINGS = 26
 
 
 def subjects() -> tuple[str, ...]:
-    """Names of all families of the register, and of the chains."""
+    """Return the names of all families of the register, and of the chains."""
     return (*NAMES, *CHAINS)
 
 
 def measure(mechanism: Family) -> str:
-    """Design output that the price list is about.
+    """Return the design output of the price list.
 
-    The largest second derivative of the position over the turn, where the register says which output that is; of an
-    interval, a march, or a position without derivatives, how far the position ranges.
+    It is the largest second derivative of the position over the turn, if the register names that output; for an
+    interval, a march, or a position without derivatives, the range of the position.
     """
     first = mechanism.derivative_of.get(mechanism.position, "")
     second = mechanism.derivative_of.get(first, "")
@@ -44,7 +44,7 @@ def measure(mechanism: Family) -> str:
 
 
 def example(mechanism: Family) -> Array:
-    """Ordinary design of a family, or those of a chain's stages together, as one row of the design matrix."""
+    """Return the ordinary design of a family, or of a chain's stages, as one row of the design matrix."""
     given = dict(mechanism.example)
     if isinstance(mechanism, Chain):
         given = {f"{name}{s.number}": value for s in mechanism.stages for name, value in s.family.example.items()}
@@ -52,19 +52,19 @@ def example(mechanism: Family) -> Array:
 
 
 def around(mechanism: Family, count: int, share: float, generator: np.random.Generator) -> Array:
-    """Designs that differ from the ordinary one by at most ``share`` in every parameter that has no choices."""
+    """Return designs that differ from the ordinary one by at most ``share`` in every parameter without choices."""
     fixed = np.array([p.choices is not None for p in mechanism.parameters])
     change = generator.uniform(-share, share, (count, fixed.size))
     return np.ascontiguousarray(example(mechanism) * (1.0 + np.where(fixed, 0.0, change)))
 
 
 def moves(mechanism: Family, designs: Array, grid: Accuracy = COARSE) -> Mask:
-    """Whether each design moves all the way, as far as a grid shows."""
+    """Tell whether each design moves all the way, to the resolution of a grid."""
     return np.isin(design_outputs(mechanism, designs, [measure(mechanism)], grid)["status"], MOVES)
 
 
 def regions_of(name: str, counts: tuple[int, int, int], seed: int = 1) -> Iterator[Region]:
-    """Yield the regions that a family has, with at most so many designs each; a cam has no change points."""
+    """Yield the regions of a family, with at most ``counts`` designs each; a cam has no change points."""
     mechanism, generator = family(name), np.random.default_rng(seed)
     for region, share, count in zip((ORDINARY, VARIED), (NEAR, WIDE), counts, strict=False):
         designs = around(mechanism, max(3 * count, 1), share, generator)
@@ -77,7 +77,7 @@ def regions_of(name: str, counts: tuple[int, int, int], seed: int = 1) -> Iterat
 
 
 def _edge(mechanism: Family, count: int, generator: np.random.Generator) -> Array:
-    """Designs just inside the range of motion, on lines from ordinary ones to such as do not move all the way."""
+    """Return designs just inside the range of motion, on lines from ordinary ones to ones that get stuck."""
     far = around(mechanism, 12 * count, FAR, generator)
     stuck = far[~moves(mechanism, far)][:count]
     inside = around(mechanism, len(stuck), NEAR, generator)

@@ -15,11 +15,11 @@ if TYPE_CHECKING:
 Ways = Iterable[tuple[str, float]]
 """Names of methods, each with a setting."""
 Parts = Mapping[str, Sequence[str]]
-"""Lines of a page by the name of their place in its template."""
+"""Lines of a page by the name of their placeholder in its template."""
 
 
 def significant(value: Any) -> str:
-    """Write a number in two significant digits, short."""
+    """Format a number in two significant digits."""
     x = float(value)
     if not math.isfinite(x):
         return "-"
@@ -27,24 +27,24 @@ def significant(value: Any) -> str:
 
 
 def power(x: float) -> str:
-    """Write a power of ten as 1e-3, anything else as it comes."""
+    """Format a power of ten as 1e-3, and any other number by ``g``."""
     exponent = round(math.log10(x))
     return f"1e{exponent}" if math.isclose(x, 10.0**exponent) and x != 1.0 else f"{x:g}"
 
 
 def prose(*sentences: str) -> list[str]:
-    """Wrap sentences as the pages of the docs are."""
+    """Wrap sentences to the line length of the docs."""
     return textwrap.wrap(" ".join(sentences), 118, break_long_words=False, break_on_hyphens=False)
 
 
 def pipe_table(head: Sequence[str], rows: Iterable[Sequence[object]]) -> list[str]:
-    """Lay out a Markdown table, line by line."""
+    """Return a Markdown table, line by line."""
     lines = ["| " + " | ".join(head) + " |", "|" + "---|" * len(head)]
     return lines + ["| " + " | ".join(str(cell).replace("|", "\\|") for cell in row) + " |" for row in rows]
 
 
 def duration(nanoseconds: Any) -> str:
-    """Write a time in the unit in which it is read."""
+    """Format a time in a suitable unit."""
     ns = float(nanoseconds)
     for unit, size in (("ns", 1.0), ("us", 1e3), ("ms", 1e6), ("s", 1e9)):
         if ns < 1e3 * size or unit == "s":
@@ -53,12 +53,12 @@ def duration(nanoseconds: Any) -> str:
 
 
 def at(table: pd.DataFrame, method: str, setting: float) -> pd.DataFrame:
-    """Rows of one method at one setting."""
+    """Return the rows of one method at one setting."""
     return table[(table["method"] == method) & np.isclose(table["setting"], setting, rtol=1e-9, atol=0.0)]
 
 
 def cells(rows: pd.DataFrame, ways: Ways) -> list[str]:
-    """Largest error and median time of one mechanism by every way; - where it was not measured."""
+    """Return largest error and median time of one mechanism by every method; - if it was not measured."""
     found = []
     for method, setting in ways:
         here = at(rows, method, setting)

@@ -1,4 +1,4 @@
-"""Time of a call, undisturbed as far as repeating allows."""
+"""Time of a call, with other work on the machine excluded as far as repetition allows."""
 
 from __future__ import annotations
 
@@ -11,8 +11,8 @@ import numpy as np
 from sweep.families.base import Array
 
 REPEATS = 5
-ENOUGH, MANY = 0.02, 4096  # seconds that a call over designs takes, and designs it has at most
-LONG = 1.0  # s; what takes longer is timed once
+ENOUGH, MANY = 0.02, 4096  # seconds of a call over designs, and largest number of its designs
+LONG = 1.0  # s; a longer call is timed once
 
 
 class Spread(NamedTuple):
@@ -24,12 +24,12 @@ class Spread(NamedTuple):
 
     @classmethod
     def of(cls, times: Sequence[float]) -> Spread:
-        """Make the spread of given times."""
+        """Return the spread of given times."""
         lower, median, upper = np.percentile(times, [25.0, 50.0, 75.0])
         return cls(float(median), float(lower), float(upper))
 
     def columns(self, units: int, per: str) -> dict[str, float]:
-        """Columns of a table, ns per unit: the median, and both quartiles."""
+        """Return table columns in ns per unit: the median, and both quartiles."""
         names = (f"ns_per_{per}", f"ns_per_{per}_lower", f"ns_per_{per}_upper")
         return {name: 1e9 * took / units for name, took in zip(names, self, strict=True)}
 
@@ -40,17 +40,17 @@ def seconds(
     least: float = 2e-3,
     clock: Callable[[], float] = time.process_time,
 ) -> float:
-    """Shortest of several timings of one call [s], see :func:`timings`."""
+    """Return the shortest of several timings of one call [s], see :func:`timings`."""
     return min(timings(call, repeats, least, clock))
 
 
 def spread(call: Callable[[], object], repeats: int = REPEATS, least: float = 2e-3) -> Spread:
-    """Median and quartiles of several timings of one call, see :func:`timings`."""
+    """Return median and quartiles of several timings of one call, see :func:`timings`."""
     return Spread.of(timings(call, repeats, least))
 
 
 def per_design(run: Callable[[Array], object], designs: Array) -> dict[str, float]:
-    """Columns of the time per design, of the same designs over and over, so that the call itself does not show."""
+    """Return columns of the time per design, with the designs repeated to make the call's own overhead negligible."""
     start = time.process_time()
     run(designs)
     took = time.process_time() - start
@@ -67,10 +67,10 @@ def timings(
     least: float,
     clock: Callable[[], float] = time.process_time,
 ) -> list[float]:
-    """Processor times of one call [s]; the first call, which may compile, is not counted.
+    """Return processor times of one call [s]; the first call, which may compile, is not counted.
 
-    Calls shorter than ``least`` are timed in groups, so that the clock does not show.  Processor time, which other work
-    on the machine disturbs least; what runs in several threads needs ``time.perf_counter``.
+    Calls shorter than ``least`` are timed in groups, to make the clock's resolution negligible.  Processor time is
+    disturbed least by other work on the machine; calls with several threads need ``time.perf_counter``.
     """
     call()
     start = clock()

@@ -1,4 +1,4 @@
-"""One small study from its file to its optimum: how long it takes at every accuracy, and how many digits it gives."""
+"""One small study from its file to its optimum: time and error at every accuracy."""
 
 from __future__ import annotations
 
@@ -20,14 +20,14 @@ if TYPE_CHECKING:
     import pandas as pd
 
 SETTINGS = ("samples = 360", "target = 1e-3", "target = 1e-6", "target = 1e-9")  # of the table [accuracy]
-JUDGED = 200  # of the designs that the study keeps
+JUDGED = 200  # number of kept designs whose error is evaluated
 FAMILY, OBJECTIVE = "rssr", "max_abs_d2psi"
 STUDY = (Path(__file__).parent / "whole.toml").read_text(encoding="utf-8")
-DESIGNS, FINEST = "n = 20000", SETTINGS[-1]  # as they stand there
+DESIGNS, FINEST = "n = 20000", SETTINGS[-1]  # as written in whole.toml
 
 
 def whole_study(designs: int, repeats: int = REPEATS, smoke: bool = False) -> pd.DataFrame:
-    """One row per setting: time of the whole run, error of what is kept, the optimum, how far it is from the finest.
+    """Return one row per setting: time of the whole run, error of kept designs, optimum, difference from the finest.
 
     Wall time and processor time of one worker, as median and quartiles; the first run, which may compile, is not
     counted.
@@ -63,7 +63,7 @@ def _run(folder: Path, setting: str, designs: int) -> tuple[float, float]:
 
 
 def _judged(folder: Path) -> dict[str, object]:
-    """Rows kept, largest relative error of the objective among some of them, and the optimum with its error."""
+    """Return the number of kept rows, the largest relative error of the objective in a subset, and the optimum."""
     import pandas as pd
 
     kept, best = sweep.load(folder / "designs"), pd.read_parquet(folder / OPTIMUM).iloc[:1]

@@ -1,12 +1,12 @@
-"""A reference for any family from its position alone: no derivative of the register and no search enters it.
+"""A reference for any family from its position alone, without derivatives of the register and without a search.
 
-The largest second derivative over a turn: second differences of the position on a fine grid name the peaks, narrower
-grids between their neighbours sharpen the places, and round each the position at Chebyshev nodes is replaced by the
-polynomial through it, whose own second derivative is maximised.  The width of the interval is that at which two
-neighbouring widths agree best; by how much they differ is the error of the reference.  How far a position ranges:
-ever narrower grids round its ends.  Families that have poses in twice the working precision are asked for those.
+The largest second derivative over a turn: second differences of the position on a fine grid locate the peaks, narrower
+grids between their neighbours refine the locations, and around each the position at Chebyshev nodes is replaced by the
+interpolating polynomial, whose own second derivative is maximised.  The width of the interval is that at which two
+neighbouring widths agree best; their difference is the error of the reference.  The range of a position: ever narrower
+grids around its ends.  Families that have poses in twice the working precision are evaluated by those.
 
-A march exists on its own grid only: there the reference is the same march in far finer steps, and no other method.
+A march exists on its own grid only: there the reference is the same march in far finer steps, not another method.
 """
 
 from __future__ import annotations
@@ -23,22 +23,22 @@ from sweep.evaluation.summaries import design_outputs
 from sweep.families.base import Accuracy, Array, Family, March
 from sweep.reductions.sampling import Index, on_closed_turn, pose_columns
 
-GRID, FINER = 2048, 33  # angles of the first grid over a turn, and of each narrower one round a place
-ROUNDS = 3  # of narrower grids that sharpen the place of a peak
-RANGE_ROUNDS = 7  # of those that sharpen a height, which comes nearer by 16 a round at a corner
-ROUGH = 8  # of the last samples, the highest of which show how rough the curve is
-PEAKS = 8  # of the second differences of one design, the highest
-NODES = 33  # of an interval
-WIDEST, NARROWER, WIDTHS = 1.2, 0.75, 40  # half-widths of the intervals [rad], each by that factor from the one before
-INNER = 0.3  # share of an interval in which the polynomial's second derivative is sharp
-STEPS = 4  # of Newton's method from the best of close samples
+GRID, FINER = 2048, 33  # angles of the first grid over a turn, and of each narrower one around a location
+ROUNDS = 3  # narrower grids that refine the location of a peak
+RANGE_ROUNDS = 7  # narrower grids that refine a height; at a corner each gains a factor of 16
+ROUGH = 8  # number of the highest last samples, which show the roughness of the curve
+PEAKS = 8  # highest second differences of one design
+NODES = 33  # Chebyshev nodes of an interval
+WIDEST, NARROWER, WIDTHS = 1.2, 0.75, 40  # half-widths of the intervals [rad], with the factor between neighbours
+INNER = 0.3  # share of an interval in which the polynomial's second derivative is accurate
+STEPS = 4  # steps of Newton's method from the best of close samples
 ALIKE = 5  # neighbouring widths whose heights are compared
-KINK = 1e-3  # a peak whose height differs by more from width to width is a corner of the position, not of its slope
-MARCHED = (14_400, 28_800)  # steps of a march; what the two differ by is its error
-NOISE = 1e-3  # share of a second difference that rounding may be, for it still to sharpen a place
+KINK = 1e-3  # a peak whose height varies more between widths is a corner of the position, not of its slope
+MARCHED = (14_400, 28_800)  # steps of a march; their difference is its error
+NOISE = 1e-3  # largest share of rounding in a second difference that still refines a location
 
 Curve: TypeAlias = Callable[[Index, Array, Array | None], Array]
-"""``curve(rows, phi, near)``: values of some designs at angles (k, m); next to ``near`` where turns may lie between."""
+"""``curve(rows, phi, near)``: values of some designs at angles (k, m), on the turn next to ``near`` if given."""
 
 
 class Known(NamedTuple):
@@ -49,7 +49,7 @@ class Known(NamedTuple):
 
 
 def reference(mechanism: Family, designs: Array) -> Known:
-    """Family's measure by the method of this module."""
+    """Return the reference values of the family's measure."""
     if isinstance(mechanism.domain, March):
         return _marched(mechanism, designs)
     name, precise = measure(mechanism), on_closed_turn(mechanism.precise())
@@ -72,15 +72,15 @@ def _marched(mechanism: Family, designs: Array) -> Known:
 
 
 def position(mechanism: Family, designs: Array, phi: Array) -> Array:
-    """Position at angles (n, m) of each design, made continuous along the row where it is an angle."""
+    """Return the position at angles (n, m) of each design, unwrapped along the row if it is an angle."""
     y = pose_columns(mechanism, designs, np.ascontiguousarray(phi), (mechanism.position,))[0][mechanism.position]
     return np.unwrap(y, axis=1) if mechanism.pose_output[mechanism.position].wraps else y
 
 
 def extreme(mechanism: Family, designs: Array, name: str, sign: int) -> Known:
-    """Largest value (sign 1), least one (-1) or largest magnitude (0) of a pose output over the turn, and its error.
+    """Return the largest value (sign 1), least value (-1) or largest magnitude (0) of a pose output over the turn.
 
-    By ever narrower grids round the highest samples alone, so that corners and jumps do no harm.
+    It is found by ever narrower grids around the highest samples alone, so that corners and jumps do no harm.
     """
     wraps = mechanism.pose_output[name].wraps
 
@@ -95,7 +95,7 @@ def extreme(mechanism: Family, designs: Array, name: str, sign: int) -> Known:
 
 
 def _narrowed(curve: Curve, count: int, turned: int) -> Known:
-    """Highest value of every curve, and how sure it is."""
+    """Return the highest value of every curve, and its error."""
     reach = TWO_PI / GRID
     phi = np.arange(GRID) * reach
     y = curve(np.arange(count), np.tile(phi, (count, 1)), None)
@@ -108,7 +108,7 @@ def _narrowed(curve: Curve, count: int, turned: int) -> Known:
         places = centres[:, None] + reach * np.linspace(-1.0, 1.0, FINER)
         y = curve(rows, places, turned * height)
         centres, top = places[np.arange(rows.size), y.argmax(axis=1)], y.max(axis=1)
-        # What the last grids add, and by how much neighbours differ where only rounding is left of the curve.
+        # The gain of the last grids, and the differences of neighbours when only rounding of the curve is left.
         rise = np.abs(top - height) + top - np.sort(y, axis=1)[:, -ROUGH]
         height = np.fmax(height, top)
         reach /= (FINER - 1) / 2
@@ -122,7 +122,7 @@ def _narrowed(curve: Curve, count: int, turned: int) -> Known:
 
 
 def _sharpest(mechanism: Family, designs: Array) -> Known:
-    """Largest magnitude of the second derivative of the position."""
+    """Return the largest magnitude of the second derivative of the position."""
     rows, centres = _peaks(mechanism, designs)
     heights, errors = _heights(mechanism, designs[rows], centres)
     value, error = np.full(len(designs), np.nan), np.full(len(designs), np.nan)
@@ -138,7 +138,7 @@ def _sharpest(mechanism: Family, designs: Array) -> Known:
 
 
 def _peaks(mechanism: Family, designs: Array) -> tuple[Index, Array]:
-    """Design and place of every peak of the second differences that may be the highest; all as (k,) arrays."""
+    """Return design and location of every peak of the second differences that may be the highest, (k,) each."""
     step = TWO_PI / GRID
     phi = np.tile(np.arange(-1, GRID + 1) * step, (len(designs), 1))
     bend = np.abs(np.diff(position(mechanism, designs, phi), 2, axis=1))
@@ -160,19 +160,19 @@ def _peaks(mechanism: Family, designs: Array) -> tuple[Index, Array]:
 
 
 def _heights(mechanism: Family, designs: Array, centres: Array) -> tuple[Array, Array]:
-    """Largest second derivative next to each centre, and by how much neighbouring widths differ there."""
+    """Return the largest second derivative next to each centre, and its difference between neighbouring widths."""
     nodes, bend = chebyshev.chebpts1(NODES), _bending()
     growth = np.abs(chebyshev.chebvander(np.array([0.0, INNER]), NODES - 3) @ bend).sum(axis=1).max()
     found, noise = np.empty((len(designs), WIDTHS)), np.empty((len(designs), WIDTHS))
     for k, width in enumerate(WIDEST * NARROWER ** np.arange(WIDTHS)):
         y = position(mechanism, designs, centres[:, None] + width * nodes)
-        # Not by BLAS, whose last bits, and with them the width that is chosen, depend on what else the process does.
+        # Not by BLAS, whose last bits, and with them the chosen width, depend on other work of the process.
         series = np.einsum("ij,kj->ik", bend, y - y[:, NODES // 2, None]) / width**2
         found[:, k] = _largest(series)
-        # Positions are right to 0.7 units of 2^-53 of what they are made of; the fit adds its own rounding.
+        # Positions are accurate to 0.7 units of 2^-53 of their terms; the fit adds its own rounding.
         noise[:, k] = 2.0**-52 * np.abs(y).max(axis=1) * growth / width**2
     spread = np.ptp(np.lib.stride_tricks.sliding_window_view(found, ALIKE, axis=1), axis=2)
-    # Narrow intervals agree by accident; what rounding may do there speaks against them.
+    # Narrow intervals agree by accident; their rounding is counted against them.
     middle = ALIKE // 2
     error = np.fmax(spread, noise[:, middle:-middle])
     best, rows = np.argmin(error, axis=1), np.arange(len(designs))
@@ -180,7 +180,7 @@ def _heights(mechanism: Family, designs: Array, centres: Array) -> tuple[Array, 
 
 
 def _bending() -> Array:
-    """Chebyshev coefficients of the second derivative from the values at the nodes in [-1, 1]."""
+    """Return the Chebyshev coefficients of the second derivative from the values at the nodes in [-1, 1]."""
     orders = np.arange(NODES)
     places = np.pi * (np.arange(NODES)[::-1] + 0.5) / NODES
     fit = np.cos(orders[:, None] * places) * np.where(orders > 0, 2.0, 1.0)[:, None] / NODES
@@ -189,7 +189,7 @@ def _bending() -> Array:
 
 
 def _largest(series: Array) -> Array:
-    """Largest magnitude of Chebyshev series (orders, k) about the middle: the best of close samples and Newton's."""
+    """Return the largest magnitude of Chebyshev series (orders, k) near the middle, by samples and Newton's method."""
     places = np.linspace(-INNER, INNER, 41)
     samples = np.abs(chebyshev.chebvander(places, len(series) - 1) @ series)
     x, height = places[samples.argmax(axis=0)], samples.max(axis=0)

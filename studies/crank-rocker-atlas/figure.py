@@ -33,7 +33,7 @@ def atlas(designs: pd.DataFrame) -> pd.DataFrame:
     """Design of least acceleration per radian of swing for every cell, in units of the rocker; angles in deg."""
     rows = designs[designs.status == 0].copy()
     rows["acceleration"] = rows.max_abs_d2psi / rows.swing
-    # What was prescribed comes back with rounding errors; whole degrees name the cell.
+    # Prescribed values return with rounding errors; whole degrees name the cell.
     rows[CELL] = np.degrees(rows[CELL]).round()
     cells = rows.groupby(CELL)
     least = cells.max_pressure_angle.min().rename("least_pressure_angle")
@@ -47,7 +47,7 @@ def atlas(designs: pd.DataFrame) -> pd.DataFrame:
 
 
 def chart(table: pd.DataFrame) -> Figure:
-    """Four panels: acceleration above, pressure angle below, one column per angle of the axes."""
+    """Draw four panels: acceleration above, pressure angle below, one column per angle of the axes."""
     figure = new_figure(WIDTH, 8.6)
     panels = figure.subplots(2, 2, sharex=True, sharey=True)
     quantities = (

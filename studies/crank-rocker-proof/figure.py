@@ -6,4 +6,4 @@ from pathlib import Path
 from studies.proof_space import main
 
 if __name__ == "__main__":
-    main(Path(sys.argv[1]), reach=75.0)  # beyond there is no mechanism at all
+    main(Path(sys.argv[1]), reach=75.0)  # no mechanism exists beyond

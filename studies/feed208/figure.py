@@ -17,13 +17,13 @@ from sweep.report.figures import WIDTH, new_figure
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-RPM = 30.0 / math.pi  # of one rad/s
+RPM = 30.0 / math.pi  # rpm per rad/s
 COLOURS = ("#1f5aa6", "#c8551b", "#2f8f5b")
-LOSSES_OF = 20.0  # preload whose losses of stitch are drawn [N]: the softest one
+LOSSES_OF = 20.0  # preload of the drawn stitch losses [N], the softest one
 
 
 def contact(designs: pd.DataFrame) -> pd.DataFrame:
-    """Least speed of the map at which the foot leaves the rack, for each spring and preload; nan where it never does.
+    """Return the least speed of the map at which the foot leaves the rack, per spring and preload; nan if it stays.
 
     Without rebound: with one the foot hops at every entry.
     """
@@ -34,7 +34,7 @@ def contact(designs: pd.DataFrame) -> pd.DataFrame:
 
 
 def chart(table: pd.DataFrame, designs: pd.DataFrame) -> Figure:
-    """Speed at which contact is lost against the preload; share of the stitch that is lost against the speed."""
+    """Draw the speed at which contact is lost against the preload, and the lost share of the stitch against speed."""
     figure = new_figure(WIDTH, 4.2)
     left, right = figure.subplots(1, 2)
     highest = designs["omega"].max() * RPM

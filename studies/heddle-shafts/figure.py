@@ -20,9 +20,9 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 SHAFTS = 8
-FELL, PITCH = 130.0, 12.0  # mm, from the fell to shaft 1, and between shafts; ours
+FELL, PITCH = 130.0, 12.0  # mm, from the fell to shaft 1, and between shafts; of our own choice
 SPEED = 300.0 * math.pi / 30.0 / 2.0  # rad/s of the cam, which turns once for two picks, at 300 picks a minute
-# The page's lever chain, mm and rad: the stroke of shaft 4, levers, bell crank; rod and roller lever: docs/heddle.md.
+# Lever chain of docs/heddle.md, mm and rad: the stroke of shaft 4, levers, bell crank; rod and roller lever.
 PAGE = {"stroke": 75.0, "O4E": 138.5, "O1O2": 151.0, "O1O3": 311.0, "O3C": 138.5, "kappa": math.radians(155.0)}
 LEVER = {"O2B": 192.5, "side_B": 1.0}
 ROD, ROLLER_LEVER, BASE = 225.0, 69.47, 124.5
@@ -31,7 +31,7 @@ CAM = {"rise": math.radians(120.0), "dwell": math.radians(60.0), "fall": math.ra
 
 
 def table() -> pd.DataFrame:
-    """Stroke of a clear shed for every shaft, the two dimensions that change, and what the cam makes of it."""
+    """Return the stroke of a clear shed for every shaft, the two varying dimensions, and the resulting motion."""
     number = np.arange(1, SHAFTS + 1)
     strokes = shed({"shaft": number, "d1": FELL, "t": PITCH, "stroke": PAGE["stroke"]})["stroke"].to_numpy()
     ends = extremes(PAGE | LEVER | {"BC": ROD}).iloc[0]
@@ -50,12 +50,12 @@ def table() -> pd.DataFrame:
 
 
 def _drive(ends: pd.Series) -> dict[str, float]:
-    """Chain from the cam to the bell crank, common to all shafts; stage 1 is the cam with its roller lever."""
+    """Return the chain from the cam to the bell crank, common to all shafts; stage 1 is the cam with roller lever."""
     first, second = float(ends["lever_angle_1"]), float(ends["lever_angle_2"])
     rest = math.pi - math.acos((151.0**2 + ROLLER_LEVER**2 - BASE**2) / (2.0 * 151.0 * ROLLER_LEVER))
     cam = {f"{name}1": value for name, value in CAM.items()}
     cam |= {"lift1": abs(first - second), "r01": BASE, "c1": ROLLER_LEVER, "e1": 151.0, "branch1": 1.0}
-    # the lever stands at its second extreme while the roller rests, and turns towards the first as psi falls
+    # the lever is at its second extreme while the roller rests, and turns towards the first as psi falls
     sense = 1.0 if first < second else -1.0
     levers = {"O2B": 192.5, "BC": ROD, "O3C": 138.5, "O2O3": 160.0, "O4E": 138.5} | LINK
     heddle = {f"{name}2": value for name, value in levers.items()}
@@ -64,7 +64,7 @@ def _drive(ends: pd.Series) -> dict[str, float]:
 
 
 def chart(rows: pd.DataFrame) -> Figure:
-    """Acceleration and asymmetry from shaft to shaft."""
+    """Draw acceleration and asymmetry by shaft."""
     figure = new_figure(WIDTH, 4.6)
     left, right = figure.subplots(1, 2)
     left.bar(rows["shaft"], rows["acceleration"], color=OPTIMUM)

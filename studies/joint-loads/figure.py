@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-# What tells whether an effect matters, its rule's threshold (docs/effects.md), and the designs' value of it.
+# Measure of each effect, its rule's threshold (docs/effects.md), and the column of its values.
 RULES = {
     "friction: what it adds to the peak torque": (0.01, "friction"),
     "uneven crank speed: unevenness": (0.01, "unevenness"),
@@ -27,12 +27,12 @@ RULES = {
     "vibration: what it adds to the lag": (0.01, "vibration"),
     "plain bearings: utilisation": (0.5, "max_sliding_utilisation"),
 }
-# The torque the bearings must pass is what inertia asks for at the speed: study.toml.
+# The torque that the bearings must transmit is that of inertia at the speed: study.toml.
 TORQUES = {3000: 350.0, 5000: 950.0, 7000: 1850.0}
 
 
 def table(designs: pd.DataFrame) -> pd.DataFrame:
-    """Quantiles of each effect's measure over the feasible designs at every speed, and whether it matters."""
+    """Return quantiles of each effect's measure over the feasible designs at every speed, and whether it matters."""
     rows = []
     for speed, torque in TORQUES.items():
         of_speed = np.isclose(designs["speed"], speed * np.pi / 30.0)
@@ -48,7 +48,7 @@ def table(designs: pd.DataFrame) -> pd.DataFrame:
 
 
 def chart(effects: pd.DataFrame, designs: pd.DataFrame) -> Figure:
-    """Measures over their thresholds against speed; utilisation against the largest pressure angle."""
+    """Draw measures relative to their thresholds against speed, and utilisation against the largest pressure angle."""
     figure = new_figure(WIDTH, 8.4)
     above, below = figure.subplots(2, 1)
     for k, label in enumerate(RULES):

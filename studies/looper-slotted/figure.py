@@ -29,7 +29,7 @@ if TYPE_CHECKING:
 
     from sweep.optimise.local.kkt import Result
 
-# The crank-rockers that are compared: room and pressure angle as in study.toml, the swing of its lower limit.
+# The compared crank-rockers: bounds and pressure angle as in study.toml, the swing of its lower limit.
 CRANK_ROCKER: dict[str, Any] = {
     "study": {"name": "crank-rocker"},
     "mechanism": {"family": "rssr"},
@@ -53,14 +53,14 @@ CRANK_ROCKER: dict[str, Any] = {
     "accuracy": {"target": 1e-6},
 }
 SIGNS = [{"branch": 1.0}, {"branch": -1.0}]
-SEED, KNOWN = 56, 16  # designs whose links say how small they may be
+SEED, KNOWN = 56, 16  # designs whose links determine the bounds
 STARTS, LOOKS = 12, 1000  # of each stroke ratio, counted, so that a busy machine finds the same
 JOBS = 2
 OUTPUTS = ["max_abs_d2psi", "max_pressure_angle", "swing", "stroke_ratio"]
 
 
 def crank_rocker(ratio: float, starts: int) -> Result:
-    """Return the crank-rocker of least acceleration found for a stroke ratio; where there is none the nearest to it."""
+    """Return the crank-rocker of least acceleration for a stroke ratio, or the least infeasible one."""
     locus = CRANK_ROCKER["locus"] | {"phi0": f"{360.0 * ratio / (1.0 + ratio)!r} deg"}
     study = study_from_data(CRANK_ROCKER | {"locus": locus}, Path("crank-rocker"))
     problem = problem_of(study, drawn(study, KNOWN, SEED), on_locus=False)
@@ -68,7 +68,7 @@ def crank_rocker(ratio: float, starts: int) -> Result:
 
 
 def crank_rockers(ratios: list[float], starts: int, say: Say = unsaid) -> pd.DataFrame:
-    """One row per stroke ratio."""
+    """Return one row per stroke ratio."""
     best: list[Result] = []
     for ratio in ratios:
         say("figure", len(best), len(ratios), "stroke ratios")
@@ -82,7 +82,7 @@ def crank_rockers(ratios: list[float], starts: int, say: Say = unsaid) -> pd.Dat
 
 
 def table(front: pd.DataFrame, starts: int, say: Say = unsaid) -> pd.DataFrame:
-    """One row per stroke ratio and mechanism; one that misses a limit has status LIMIT_EXCEEDED."""
+    """Return one row per stroke ratio and mechanism; one that misses a limit has status LIMIT_EXCEEDED."""
     slotted = front.sort_values("bound").assign(mechanism="slotted link", ratio=lambda rows: rows["bound"])
     others = crank_rockers(slotted["ratio"].tolist(), starts, say).assign(mechanism="crank-rocker")
     both = pd.concat([slotted, others], ignore_index=True)
@@ -90,7 +90,7 @@ def table(front: pd.DataFrame, starts: int, say: Say = unsaid) -> pd.DataFrame:
 
 
 def chart(drives: pd.DataFrame) -> Figure:
-    """Acceleration against the stroke ratio."""
+    """Draw acceleration against the stroke ratio."""
     figure = new_figure(WIDTH, 4.6)
     axes = figure.subplots()
     for name, colour in (("slotted link", OPTIMUM), ("crank-rocker", REFERENCE)):

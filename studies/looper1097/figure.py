@@ -29,7 +29,7 @@ LINKS = ["a", "b", "c", "e", "f", "g", "h", "branch"]
 
 
 def along_h(optimum: pd.Series, lengths: list[float]) -> pd.DataFrame:
-    """Best five-links for every h [mm], each started from its neighbour, beginning next to the optimum's h."""
+    """Return the best five-link for every h [mm], each search started from its neighbour's, from the optimum's h on."""
     data = load_study(FOLDER).data
     rows = []
     start = pd.DataFrame([optimum])
@@ -47,7 +47,7 @@ def along_h(optimum: pd.Series, lengths: list[float]) -> pd.DataFrame:
 
 
 def chart(joint: pd.DataFrame) -> Figure:
-    """Acceleration and tilt of the coupler against h."""
+    """Draw acceleration and tilt of the coupler against h."""
     figure = new_figure(WIDTH, 4.6)
     left, right = figure.subplots(1, 2)
     rows = joint[joint["status"] == 0]

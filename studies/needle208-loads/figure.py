@@ -22,7 +22,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 PHI = np.linspace(0.0, 2.0 * np.pi, 721)
-BELOW = 11.0  # mm that the fabric lies above the needle's lowest place
+BELOW = 11.0  # mm, height of the fabric above the needle's lowest position
 PIERCE = 6.0  # N
 CASES = ("links alone", "needle bar 25 g", "and piercing 6 N", "and friction")
 FORCES = ("force_c1", "force_d1", "force_c2", "force_d2")
@@ -32,7 +32,7 @@ SHORT = ("rocker pin 1", "rocker shaft 1", "rocker pin 2", "rocker shaft 2")
 
 
 def inputs(study: Study) -> dict[str, float]:
-    """Bodies, oil and motor of the study, those that nothing wanted takes included."""
+    """Return bodies, oil and motor of the study, including those that no wanted output takes."""
     want = [*study.want, "max_abs_drive_torque_friction1", "unevenness_friction1"]
     scene = {**study.data["scene"], "want": want}
     full = study_from_data({**study.data, "scene": scene}, study.path)
@@ -41,9 +41,9 @@ def inputs(study: Study) -> dict[str, float]:
 
 
 def cases(study: Study, designs: dict[str, dict[str, float]]) -> tuple[pd.DataFrame, dict[str, Array]]:
-    """Largest loads and unevenness per design and case.
+    """Return the largest loads and unevenness per design and case.
 
-    The drive torque of the first design over the turn comes beside them, per case.
+    The drive torque of the first design over the turn is returned as well, per case.
     """
     rows, torques, given = [], {}, inputs(study)
     for label, design in designs.items():
@@ -73,7 +73,7 @@ def cases(study: Study, designs: dict[str, dict[str, float]]) -> tuple[pd.DataFr
 
 
 def chart(table: pd.DataFrame, torques: dict[str, Array]) -> Figure:
-    """Driving torque over the turn; largest joint forces load by load."""
+    """Draw the driving torque over the turn, and the largest joint forces load by load."""
     figure = new_figure(WIDTH, 8.4)
     above, below = figure.subplots(2, 1)
     for case, torque in torques.items():

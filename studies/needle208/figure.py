@@ -37,7 +37,7 @@ LINKS = ["a2", "b2", "c2", "e2"]
 
 
 def mechanisms(study: Study, folder: Path) -> dict[str, Array]:
-    """Return reference, record on paper, best drawing and drive to be built, as far as the run has them."""
+    """Return reference, record on paper, best drawing and drive to be built, if the run has them."""
     found = pd.read_parquet(folder / "_optimum.parquet").drop_duplicates("role").set_index("role")
     record = json.loads((FOLDER / "expected.json").read_text())["record"]["design"]
     names = list(study.family.parameter_names)
@@ -47,7 +47,7 @@ def mechanisms(study: Study, folder: Path) -> dict[str, Array]:
 
 
 def price(study: Study, designs: dict[str, Array], say: Say = unsaid) -> pd.DataFrame:
-    """Acceleration, deviation as drawn and as made, yields, shortest link, arm and size of mechanisms side by side."""
+    """Return acceleration, nominal and manufactured deviation, yields, shortest link, arm and size of mechanisms."""
     if study.tolerance is None:
         raise ValueError("the study has no tolerances")
     names, rows = study.family.parameter_names, list[dict[str, str | float]]()
@@ -79,7 +79,7 @@ def price(study: Study, designs: dict[str, Array], say: Say = unsaid) -> pd.Data
 
 
 def chart(table: pd.DataFrame, most: float) -> Figure:
-    """Acceleration, deviation as drawn and as made, and yield of the mechanisms, side by side."""
+    """Draw acceleration, nominal and manufactured deviation, and yield of the mechanisms, side by side."""
     figure = new_figure(WIDTH, 2.4)
     panels = figure.subplots(1, 3, sharey=True)
     place = np.arange(len(table))[::-1]

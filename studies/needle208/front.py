@@ -31,13 +31,13 @@ if TYPE_CHECKING:
     from sweep.optimise.problem.statement import Problem
 
 FOLDER = Path(__file__).parent
-ROUNDS = ((0.04, 0.07), (0.035, 0.1))  # deviations of 95 % of what is made [mm], away from the study's own limit
-LOOKS = 2000  # of each search
+ROUNDS = ((0.04, 0.07), (0.035, 0.1))  # deviations of 95 % of the mechanisms [mm], on either side of the study's limit
+LOOKS = 2000  # evaluations of each search
 
 
 @dataclass(frozen=True)
 class Bound:
-    """Search the drive to be built for one of some deviations, from its neighbour's design: a task for processes."""
+    """Robust search for one of some deviations, from its neighbour's design: a task for processes."""
 
     problem: Problem
     tolerance: Tolerance
@@ -45,7 +45,7 @@ class Bound:
     designs: tuple[Array, ...]
 
     def __call__(self, number: int, should_stop: Callable[[], bool]) -> Robust:
-        """Return the drive of least acceleration found within a deviation."""
+        """Return the drive of least acceleration within a deviation."""
         limits = tuple(
             Limit(x.output, x.minimum, self.deviations[number]) if x.output == "max_abs_dev" else x
             for x in self.problem.limits
@@ -58,7 +58,7 @@ class Bound:
 
 
 def front(study: Study, optimum: pd.Series, jobs: int, say: Say = unsaid) -> pd.DataFrame:
-    """Least acceleration where 95 % of what is made deviate by at most so much, each from its neighbour's mechanism."""
+    """Return the least acceleration for limits on the deviation of 95 % of mechanisms, from neighbouring designs."""
     if study.tolerance is None:
         raise ValueError("the study has no tolerances")
     design = optimum[list(study.family.parameter_names)].to_numpy(np.float64)
@@ -85,7 +85,7 @@ def front(study: Study, optimum: pd.Series, jobs: int, say: Say = unsaid) -> pd.
 
 
 def chart(table: pd.DataFrame, mechanisms: pd.DataFrame) -> Figure:
-    """Front, with the mechanisms as they are made."""
+    """Draw the front, with the manufactured mechanisms."""
     figure = new_figure(WIDTH, 3.8)
     axes = figure.subplots()
     held = table[table["kept"]]

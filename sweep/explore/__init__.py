@@ -1,1 +1,1 @@
-"""A design in hand: a page on this machine whose sliders move a mechanism, its curves, outputs and limits."""
+"""Interactive page on this machine, whose sliders change a mechanism, its curves, outputs and limits."""

@@ -1,4 +1,4 @@
-"""Feasible designs of a dataset over pairs of its columns, counted in cells: a page shows any number of rows so."""
+"""Feasible designs of a dataset counted in cells over pairs of its columns, for any number of rows."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ class Column(NamedTuple):
     high: float
 
     def bins(self, count: int) -> Places:
-        """Return the number of the cell of every value, NOWHERE where there is none."""
+        """Return the number of the cell of every value, NOWHERE for a missing one."""
         share = (self.values - self.low) / (self.high - self.low)
         known = np.minimum(np.nan_to_num(share) * count, count - 1)
         return np.where(np.isfinite(share), known, NOWHERE).astype(np.uint8)
@@ -41,12 +41,12 @@ def cells(
 ) -> dict[str, Any]:
     """Return counts of feasible designs in the cells of pairs of columns, each with the best design in it.
 
-    ``ranges`` are ends of columns in the units that are shown: only designs within all of them are counted.
+    ``ranges`` are ends of columns in displayed units: only designs within all of them are counted.
 
     Raises
     ------
     InputError
-        where nothing was run, for a column that the dataset has not, or for too many cells.
+        without a run, for a column that the dataset does not have, or for too many cells.
     """
     if hand.folder is None:
         raise InputError("designs", "none", "the folder of a run: sweep explore results/NAME/designs", "explore")
@@ -85,11 +85,11 @@ def cells(
 
 
 def _counted(x: Places, y: Places, bins: int, design: Array) -> list[list[int]]:
-    """Return the filled cells as place, count and the first design, which is the best."""
+    """Return the non-empty cells as position, count and the first design, which is the best."""
     cell = np.where((x == NOWHERE) | (y == NOWHERE), bins * bins, y.astype(np.intp) * bins + x)
     count = np.bincount(cell, minlength=bins * bins)[: bins * bins]
     first = np.zeros(bins * bins + 1, np.intp)
-    first[cell[::-1]] = np.arange(cell.size - 1, -1, -1)  # of several the last one written stays: the first one
+    first[cell[::-1]] = np.arange(cell.size - 1, -1, -1)  # written backwards: the first design of a cell remains
     return [[int(c % bins), int(c // bins), int(count[c]), int(design[first[c]])] for c in np.flatnonzero(count)]
 
 

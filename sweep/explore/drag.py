@@ -1,4 +1,4 @@
-"""A joint of a plane mechanism is dragged: dimensions and crank angle follow so that the other joints stay."""
+"""Dragging a joint of a planar mechanism: dimensions and crank angle change while the other joints stay."""
 
 from __future__ import annotations
 
@@ -13,28 +13,28 @@ from sweep.exchange.scene import is_spatial, shown_name
 from sweep.explore.hand import Hand
 from sweep.families.base import Array, Turn
 
-STEP = 1e-6  # of differences: a part of the mechanism's size, or rad
+STEP = 1e-6  # step of differences: a share of the mechanism's size, or rad
 ROUNDS = 8
-LEAST = 1e-3  # of its length a dimension keeps that may not be negative
-STAY = 0.05  # weight of the joints that should stay beside the one that is dragged
+LEAST = 1e-3  # share of its length that a positive dimension keeps
+STAY = 0.05  # weight of the joints that should stay, relative to the dragged one
 LITTLE = 1e-4  # weight of a change of a dimension by the mechanism's size
 
 
 def dragged(
     hand: Hand, design: Mapping[str, float], phi: float, place: tuple[str, str], to: Sequence[float]
 ) -> tuple[dict[str, float], float]:
-    """Return the design and the crank angle that bring a joint to a point, and others as little as possible.
+    """Return the design and crank angle that bring a joint to a point and move the others as little as possible.
 
     Parameters
     ----------
     phi : crank angle of the picture [rad]
-    place : label of the part, and the joint as the page calls it
+    place : label of the part, and name of the joint on the page
     to : x and y of the point in the frame of the part [mm]
 
     Raises
     ------
     InputError
-        for a spatial mechanism, one that does not turn, or a joint that there is not.
+        for a spatial mechanism, one that does not turn, or an unknown joint.
     """
     ranges = [r for r in hand.ranges if not r.choices]
     free, positive = [r.name for r in ranges], np.array([*(r.positive for r in ranges), False])
@@ -62,13 +62,14 @@ def dragged(
     goal[names.index(place)] = to
 
     steps = np.diag(scale)
-    # What a small step takes apart keeps its value: the sides of a second four-bar that has no lengths.
+    # A dimension keeps its value if a small step makes the mechanism fall apart, as for a second four-bar without
+    # lengths.
     steady = [bool(np.isfinite(_flat(joints(x + STEP * step))).all()) for step in steps]
     steps = steps[steady]
 
     def off(changes: Array) -> Array:
         apart = weight[:, None] * (_flat(joints(x + changes @ steps)) - goal) / size
-        return np.append(np.nan_to_num(apart.ravel(), nan=1.0), LITTLE * changes)  # far off where it comes apart
+        return np.append(np.nan_to_num(apart.ravel(), nan=1.0), LITTLE * changes)  # large if it falls apart
 
     low = np.where(positive, -(1.0 - LEAST) * x / scale, -np.inf)[steady]
     changes = least_squares(

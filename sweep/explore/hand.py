@@ -1,4 +1,4 @@
-"""What the page is about: a study, its dimensions with their ranges, and what any design of it is and does."""
+"""State of the interactive page: a study, its dimensions with their ranges, and the results of any design."""
 
 from __future__ import annotations
 
@@ -25,21 +25,21 @@ from sweep.study.loads import speeds
 from sweep.study.toml import design_entries, toml
 
 Design = Mapping[str, float]
-"""Dimensions in internal units by name; inputs of effects that are left out are those of the study."""
+"""Dimensions in internal units by name; missing inputs of effects have the study's values."""
 
-REACH = 0.5  # of a dimension that no study sweeps, to either side; of an angle in rad
-KEPT = 256  # designs whose outputs are remembered: pins and what is undone
-COUNT, SAMPLE = 25, 65_536  # of a saved study: values of each of two axes, designs over more of them
+REACH = 0.5  # range of a dimension that no study sweeps, on either side, relative; for an angle in rad
+KEPT = 256  # designs whose outputs are cached: pins and undone steps
+COUNT, SAMPLE = 25, 65_536  # of a saved study: values on each of two axes, designs over more axes
 STEADY = "at least one ticked dimension that changes steadily"
-TABLES = ("fit", "locus", "task", "pareto", "reference", "report")  # that a saved study of plain dimensions has not
+TABLES = ("fit", "locus", "task", "pareto", "reference", "report")  # not in a saved study of plain dimensions
 STARTS = 12
-MOST_LETTERS = 64  # of a study's name
+MOST_LETTERS = 64  # largest length of a study's name
 PINS = 3
 
 
 @dataclass(frozen=True)
 class Range:
-    """A dimension of the page; ``factor`` turns the stored value into ``unit``, ``swept`` says that the study does.
+    """A dimension of the page; ``factor`` converts the stored value to ``unit``; ``swept`` if the study sweeps it.
 
     ``positive`` says that it may not be negative.
     """
@@ -56,27 +56,27 @@ class Range:
 
 
 class Hand:
-    """A study with a first design, ready to answer for any other design of the same mechanism."""
+    """A study with a first design that evaluates any other design of the same mechanism."""
 
     def __init__(self, data: Dataset, folder: Path | None, first: Design, pins: Mapping[str, Design]) -> None:
-        # A study whose report has no curves is looked at with them.
+        # Curves are shown even if the report of the study has none.
         study = replace(data.study, output=replace(data.study.output, curves="optimum"))
         self.data, self.folder, self.first, self.pins = replace(data, study=study), folder, first, pins
         self._row = lru_cache(KEPT)(self._computed)
 
     @property
     def study(self) -> Study:
-        """What the designs are judged by."""
+        """The study that evaluates the designs."""
         return self.data.study
 
     @property
     def family(self) -> Family:
-        """The mechanism with the effects that the study asks for."""
+        """The mechanism with the effects that the study needs."""
         return self.study.family
 
     @cached_property
     def own(self) -> list[str]:
-        """Parameters of the mechanism without effects, but for the speeds that the scene gives."""
+        """Parameters of the mechanism without effects, except the speeds that the scene gives."""
         given = speeds(self.family, self.study.speed)
         return [name for name in self.study.bare.parameter_names if name not in given]
 
@@ -101,12 +101,12 @@ class Hand:
         )  # fmt: skip
 
     def design(self, given: Mapping[str, object]) -> dict[str, float]:
-        """Return the whole design of what a page sends: dimensions in internal units.
+        """Return the complete design for the dimensions that a page sends, in internal units.
 
         Raises
         ------
         InputError
-            for a name that is no dimension, or a value that is no number or out of range.
+            for an unknown dimension, or a value that is not a number or out of range.
         """
         if not isinstance(given, Mapping):
             raise InputError("design", given, "dimensions by their names", "explore")
@@ -121,14 +121,14 @@ class Hand:
         return design
 
     def answer(self, designs: Sequence[Mapping[str, object]], names: Sequence[str]) -> dict[str, Any]:
-        """Return everything that the page shows of a design and of the pinned ones, as JSON."""
+        """Return all data that the page shows for a design and the pinned ones, as JSON."""
         return judged(self.data, [self._row(tuple(self.design(one).items())) for one in designs], names)
 
     def _computed(self, design: tuple[tuple[str, float], ...]) -> Row:
         return row_of(self.study, dict(design))
 
     def page(self) -> dict[str, Any]:
-        """Return what the page knows from the beginning."""
+        """Return the initial data of the page."""
         feasible = 0 if self.folder is None else self.data.counts.get(codes.OK, 0)
         stored = [axis.name for axis in self.study.space.axes if axis.varies] if feasible else []
         outputs = [name for name in self.study.want if not is_flag(name)] if feasible else []
@@ -138,19 +138,17 @@ class Hand:
             "first": dict(self.first),
             "pins": [{"name": name, "design": dict(design)} for name, design in self.pins.items()][:PINS],
             "most": PINS,
-            "columns": [*dict.fromkeys([*outputs, *stored])],  # of a [locus] an output is a dimension
+            "columns": [*dict.fromkeys([*outputs, *stored])],  # a prescribed output of [locus] is a dimension
             "swept": stored,
             "empty": self.folder is not None and not feasible,
             "objective": None if self.study.objective is None else self.study.objective.output,
         }
 
     def saved(self, given: Mapping[str, object], swept: Mapping[str, Sequence[float]]) -> str:
-        """Return a study around a design: ``swept`` dimensions between two ends, all others as they are in hand.
+        """Return a study around a design: ``swept`` dimensions vary between two ends, all others keep their values.
 
-        Raises
-        ------
         InputError, StudyError
-            where a search has nothing to vary, or what the study asks does not go with plain dimensions.
+            if a search has nothing to vary, or the study does not allow plain dimensions.
         """
         design = self.design(given)
         entries: dict[str, Any] = dict(design_entries(self.family, design))
@@ -184,19 +182,19 @@ class Hand:
         return toml({"reference": {"design": self._reference_entries(self.design(given), ())}})
 
     def _reference_entries(self, design: Design, swept: Collection[str]) -> dict[str, str | float]:
-        """Return a reference design: the mechanism, and inputs of effects that are not those of the study."""
+        """Return the entries of a reference design: the mechanism, and inputs of effects that differ from the study."""
         fixed = self.study.space.fixed
         own = {*self.own, *swept, *(r.name for r in self.ranges if design[r.name] != fixed.get(r.name))}
         return design_entries(self.family, {name: value for name, value in design.items() if name in own})
 
 
 def of_study(study: Study) -> Hand:
-    """Return a study in hand before it has been run: its reference design, else one from its space.
+    """Return the page state of a study before its run: with its reference design, otherwise one from its space.
 
     Raises
     ------
     InputError
-        where [locus] or [fit] make no design.
+        if [locus] or [fit] make no design.
     """
     names, space = study.family.parameter_names, study.space
     if pins := _reference(study):
@@ -216,13 +214,13 @@ def _middle(values: Array | None, low: float, high: float) -> float:
 
 
 def of_results(folder: Path) -> Hand:
-    """Return the result of a dataset in hand, its reference design pinned."""
+    """Return the page state of a dataset: with its result, and its reference design pinned."""
     data = read_dataset(folder)
     return Hand(data, data.folder, chosen(folder).design, _reference(data.study))
 
 
 def _reference(study: Study) -> dict[str, Design]:
-    """Return the study's reference design under its name, where it has one."""
+    """Return the study's reference design under its name, or an empty dict."""
     if study.reference is None:
         return {}
     matrix, _ = design_matrix(study.family, study.reference)

@@ -1,4 +1,4 @@
-"""Improve a design from where it is: one local search between the ends of the sliders that are ticked."""
+"""Improvement of a design by one local search between the ends of the ticked sliders."""
 
 from __future__ import annotations
 
@@ -12,16 +12,14 @@ from sweep.explore.hand import STEADY, Hand
 from sweep.optimise.local.start import search
 from sweep.optimise.problem.statement import Problem
 
-LOOKS = 20_000  # at designs, as one start of a study has
+LOOKS = 20_000  # evaluations of designs, as for one start of a study
 
 
 def problem_in_hand(hand: Hand, design: Mapping[str, float], free: Mapping[str, Sequence[float]]) -> Problem:
-    """Return the study's problem with other variables: ``free`` dimensions between two ends, the others as they are.
+    """Return the study's problem with ``free`` dimensions between two ends as variables, and the others fixed.
 
-    Raises
-    ------
     InputError
-        where the study has no objective, or nothing may change.
+        if the study has no objective, or nothing may change.
     """
     study = hand.study
     if study.objective is None:
@@ -46,7 +44,7 @@ def problem_in_hand(hand: Hand, design: Mapping[str, float], free: Mapping[str, 
 
 
 def improve(problem: Problem, design: Mapping[str, float], asked: Callable[[], bool]) -> dict[str, Any]:
-    """Search from a design until it settles, or ``asked`` answers true; the best so far is the answer either way."""
+    """Search from a design until it converges or ``asked`` returns true, and return the best result in either case."""
     start = np.array([design[name] for name in problem.family.parameter_names])
     found = search(0, problem, start, asked, LOOKS)
     return {

@@ -1,6 +1,6 @@
-"""The page's server, on this machine alone: a token in every address, no answer to pages from elsewhere.
+"""Server of the page, on this machine only: a token in every address, no answer to pages from elsewhere.
 
-It keeps nothing of its visitors: a request says which designs it asks about, so any number may look at once.
+It stores nothing about its visitors: a request contains its designs, so any number of pages may be open at once.
 """
 
 from __future__ import annotations
@@ -30,8 +30,8 @@ if TYPE_CHECKING:
 
 HOST = "127.0.0.1"
 TOKEN_BYTES = 24
-MOST_BYTES = 100_000  # of a request
-PULSE = 0.2  # seconds between two words about a search
+MOST_BYTES = 100_000  # largest size of a request
+PULSE = 0.2  # seconds between two progress messages of a search
 WORDS = {
     "Cache-Control": "no-store",
     "Content-Security-Policy": "default-src 'none'; img-src data:; style-src 'unsafe-inline'; "
@@ -44,17 +44,18 @@ HEADERS = [(name.lower().encode(), words.encode()) for name, words in WORDS.item
 
 
 class Server:
-    """A hand under an address of its own: ``address`` holds port and token; ``run`` serves until Ctrl-C."""
+    """Server of a page at its own address: ``address`` contains port and token; ``run`` serves until Ctrl-C."""
 
     def __init__(self, hand: Hand, port: int = 0) -> None:
         _needed()
         self.hand, self.token = hand, secrets.token_urlsafe(TOKEN_BYTES)
-        # Named as TCP, or asyncio leaves its delay on: a body waits 40 ms until its head has been acknowledged.
+        # The TCP protocol is named since asyncio otherwise keeps Nagle's delay: a body would wait 40 ms for its head's
+        # ack.
         self.socket = socket.socket(proto=socket.IPPROTO_TCP)
         self.socket.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
         try:
             self.socket.bind((HOST, port))
-            self.socket.listen()  # who is early waits
+            self.socket.listen()  # early requests wait in the queue
         except OSError as error:
             self.socket.close()
             raise InputError("--port", port, f"a port that is free; {error.strerror}", "explore") from error
@@ -69,7 +70,7 @@ class Server:
         uvicorn.Server(settings).run(sockets=[self.socket])
 
     def app(self) -> Callable[..., Any]:
-        """Return the application: the page, and what it asks for."""
+        """Return the application: the page, and its requests."""
         from starlette.applications import Starlette
         from starlette.requests import Request
         from starlette.responses import HTMLResponse, PlainTextResponse
@@ -101,7 +102,7 @@ class Server:
         return checked
 
     def _is_ours(self, request: Request) -> bool:
-        """Whether a request knows the token, names this server, and comes from its own page or from no page at all.
+        """Tell whether a request has the token, names this server, and comes from its own page or from no page.
 
         A browser that was talked into another name for this machine says so in Host; a page in another tab in Origin.
         """
@@ -132,7 +133,7 @@ class Server:
         return {"text": self.hand.saved(asked["design"], asked["free"])}
 
     async def _improve(self, request: Request) -> Response:
-        """Search while the page listens; who goes away, or says stop by going away, ends this search alone."""
+        """Search while the page is connected; a page that disconnects stops its own search only."""
         from starlette.responses import StreamingResponse
 
         asked = await _asked(request)
@@ -199,7 +200,7 @@ async def _asked(request: Request) -> dict[str, Any]:
     body = await request.body()
     try:
         found = json.loads(body) if len(body) <= MOST_BYTES else None
-    except RecursionError:  # brackets within brackets
+    except RecursionError:  # deeply nested brackets
         found = None
     if not isinstance(found, dict):
         raise ValueError(f"a JSON object of at most {MOST_BYTES} bytes")
@@ -207,7 +208,7 @@ async def _asked(request: Request) -> dict[str, Any]:
 
 
 def _json(answer: Callable[[dict[str, Any]], dict[str, Any]]) -> Callable[[Request], Any]:
-    """Return an endpoint that answers JSON by JSON, in a thread."""
+    """Return an endpoint that answers JSON with JSON, in a thread."""
     from starlette.concurrency import run_in_threadpool
     from starlette.responses import JSONResponse
 
@@ -218,7 +219,7 @@ def _json(answer: Callable[[dict[str, Any]], dict[str, Any]]) -> Callable[[Reque
 
 
 def _refused(_: Request, error: Exception) -> Response:
-    """Say what is wrong with a request."""
+    """Return the fault of a request."""
     from starlette.responses import JSONResponse
 
     words = f"{error} is missing" if isinstance(error, KeyError) else str(error)
@@ -226,7 +227,7 @@ def _refused(_: Request, error: Exception) -> Response:
 
 
 def page_text(hand: Hand) -> str:
-    """Return the page with its first answer, its style and its scripts; it needs nothing from anywhere else."""
+    """Return the page with its first answer, style and scripts; it needs no other source."""
     scripts = [*SPATIAL, *PLANE, "live/explore.js"]
     return rendered(
         "explore.html", page=hand.page(), formats=list(FORMATS), live_designs=[], axis="angle", scripts=scripts

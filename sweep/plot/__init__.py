@@ -1,7 +1,7 @@
-"""Pictures of mechanisms and datasets as matplotlib axes, in the style of the report.
+"""Figures of mechanisms and datasets as matplotlib axes, in the style of the report.
 
-Each function returns the axes it drew, an array where there may be several; ``axes.figure.savefig("name.svg")`` writes
-them.  Nothing opens a window.
+Each function returns the axes it drew, as an array if there may be several; ``axes.figure.savefig("name.svg")`` saves
+them.  No window is opened.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""Pictures of a dataset folder: design space, trade-off, tolerances, sensitivities."""
+"""Figures of a dataset folder: design space, trade-off, tolerances, sensitivities."""
 
 from __future__ import annotations
 
@@ -18,16 +18,16 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-SEEN = 0.005  # of the longest bar: shorter ones are no wider than a line
+SEEN = 0.005  # share of the longest bar: shorter ones are no wider than a line
 
 
 def map(folder: str | Path, x: str | None = None, y: str | None = None) -> NDArray[Any]:
-    """Show what the best design of each cell of two swept parameters attains, and the share of feasible designs.
+    """Draw the best objective and the share of feasible designs in each cell of two swept parameters.
 
     Parameters
     ----------
-    folder : what `sweep run` left behind
-    x, y : two swept parameters; if left out the pair over which the objective varies most
+    folder : folder that `sweep run` has written
+    x, y : two swept parameters; by default the pair over which the objective varies most
 
     Returns
     -------
@@ -37,7 +37,7 @@ def map(folder: str | Path, x: str | None = None, y: str | None = None) -> NDArr
     Raises
     ------
     InputError
-        for parameters the study does not sweep, a study without a map.
+        for parameters that the study does not sweep, or a study without a map.
 
     Examples
     --------
@@ -63,11 +63,11 @@ def map(folder: str | Path, x: str | None = None, y: str | None = None) -> NDArr
 
 
 def front(folder: str | Path) -> Axes:
-    """Show the objective against a second criterion: designs of the sweep, and the front where one was searched.
+    """Draw the objective against a second criterion: designs of the sweep, and the front if one was searched.
 
     Parameters
     ----------
-    folder : what ``sweep run`` left behind
+    folder : folder that ``sweep run`` has written
 
     Returns
     -------
@@ -92,14 +92,14 @@ def front(folder: str | Path) -> Axes:
 
 
 def tolerance(folder: str | Path, output: str | None = None) -> Axes:
-    """Return what manufacture makes of the optimum: the spread of its outputs, or one of them as a histogram.
+    """Draw the spread of the optimum's outputs under manufacturing tolerances, or one of them as a histogram.
 
     Parameters
     ----------
-    folder : what ``sweep run`` left behind
-    output : a design output: its histogram over 8192 mechanisms made within the tolerances, what misses its limit in
-        another colour.  If left out all outputs of the study, each in parts of its nominal value; the dot is the mean,
-        the bar holds 95 % of what is made
+    folder : folder that ``sweep run`` has written
+    output : a design output: its histogram over 8192 mechanisms made within the tolerances, bins that miss its limit in
+        another colour.  By default all outputs of the study, each relative to its nominal value; the dot is the mean,
+        the bar holds 95 % of the mechanisms
 
     Returns
     -------
@@ -109,7 +109,7 @@ def tolerance(folder: str | Path, output: str | None = None) -> Axes:
     Raises
     ------
     InputError
-        for a study without tolerances, an output that the mechanism does not have.
+        for a study without tolerances, or an output that the mechanism does not have.
 
     Examples
     --------
@@ -139,7 +139,7 @@ def tolerance(folder: str | Path, output: str | None = None) -> Axes:
 
 
 def draw_histogram(axes: Axes, found: Histogram) -> Axes:
-    """Draw an output over what is made; what misses its limit has another colour, lines are the limit."""
+    """Draw the histogram of an output, with bins that miss its limit in another colour, and lines at the limit."""
     colours = np.where(found.missing, LIMIT, OPTIMUM)
     axes.bar(
         found.edges[:-1], 100.0 * found.shares, 0.92 * np.diff(found.edges), align="edge", color=colours, alpha=0.75
@@ -153,16 +153,16 @@ def draw_histogram(axes: Axes, found: Histogram) -> Axes:
 
 
 def sensitivity(folder: str | Path) -> Axes:
-    """Show by how much a small change of each dimension changes the objective at the optimum, the most telling first.
+    """Draw the changes of the objective at the optimum for a small change of each dimension, the largest first.
 
     Parameters
     ----------
-    folder : what ``sweep run`` left behind
+    folder : folder that ``sweep run`` has written
 
     Returns
     -------
     Axes
-        two bars for each dimension: made larger, made smaller
+        two bars for each dimension: for growth and for shrinkage
 
     Raises
     ------

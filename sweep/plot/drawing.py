@@ -1,4 +1,4 @@
-"""A mechanism as a figure, from a corner or square to a plane."""
+"""Drawing of a mechanism as a figure, from a corner or along an axis."""
 
 from __future__ import annotations
 
@@ -21,14 +21,14 @@ if TYPE_CHECKING:
 
 
 def mechanism_figure(parts: Sequence[Part], unit: str, view: str | None = None, positions: int = 1) -> Figure:
-    """Return a panel for each frame.
+    """Return a figure with a panel for each frame.
 
     Parameters
     ----------
-    parts : over one closed turn, of which at least one pose exists
-    unit : of length, for the axes
-    view : "space" or one of :data:`sweep.exchange.scene.VIEWS`; if left out "space" for what is spatial, else "xy"
-    positions : that are drawn at equal steps, the first in full
+    parts : parts over one closed turn, with at least one existing pose
+    unit : unit of length, for the axes
+    view : "space" or one of :data:`sweep.exchange.scene.VIEWS`; by default "space" for a spatial mechanism, else "xy"
+    positions : number of positions drawn at equal steps, the first in full
     """
     frames = frames_of(parts)
     width = WIDTH if len(frames) > 1 else 5.4
@@ -44,10 +44,10 @@ def mechanism_figure(parts: Sequence[Part], unit: str, view: str | None = None, 
 
 
 def draw(axes: Axes, parts: Sequence[Part], view: str, unit: str, positions: int) -> None:
-    """Draw parts of one frame in several positions over their turn, the first that exists in full."""
+    """Draw parts of one frame in several positions over their turn, the first existing one in full."""
     seen = projection(view)
     first = first_pose(parts)
-    steps = parts[0].phi.size - 1  # the last pose is the first one again
+    steps = parts[0].phi.size - 1  # the last pose equals the first
     for k in range(1, positions):
         for part in parts:
             draw_links(axes, part, seen, (first + round(k * steps / positions)) % steps, faint=True)
@@ -55,15 +55,15 @@ def draw(axes: Axes, parts: Sequence[Part], view: str, unit: str, positions: int
     if view in VIEWS:
         axes.set_xlabel(f"{view[0]} [{unit}]")
         axes.set_ylabel(f"{view[1]} [{unit}]")
-        axes.yaxis.set_inverted(view == "xz")  # seen from above z points down, else it is a mirror image
+        axes.yaxis.set_inverted(view == "xz")  # seen from above z points down, otherwise the view is a mirror image
     else:
         axes.set_axis_off()
 
 
 COLOURS = (OPTIMUM, "#2f8f5b", "#c8551b", "#7a4fa3", "#14808f", "#8c6d1f")
 FRAME = "#14181f"
-CLOSE = 0.01  # of the mechanism's size: joints so near to each other share a line of names
-NAME = "_name of a joint"  # legends leave out what begins so
+CLOSE = 0.01  # share of the mechanism's size: joints closer than this share a line of names
+NAME = "_name of a joint"  # legends omit labels with a leading underscore
 TURN = np.linspace(-0.75 * np.pi, 0.75 * np.pi, 25)
 
 
@@ -92,7 +92,7 @@ def draw_frame(axes: Axes, parts: Sequence[Part], seen: Array, *, pose: int = 0)
 
 
 def spread(figure: Figure) -> None:
-    """Move names of joints to where they cover neither each other nor another joint, once all places are known."""
+    """Move the names of joints so that they cover neither each other nor another joint, once all places are known."""
     figure.draw_without_rendering()
     point = figure.dpi / 72.0
     for axes in figure.axes:
@@ -113,7 +113,7 @@ def spread(figure: Figure) -> None:
 
 
 def _joined(names: Sequence[tuple[Array, str]], near: float) -> list[tuple[Array, str]]:
-    """Write the names of what lies in one place behind each other, not above each other."""
+    """Join the names of joints in the same place, instead of drawing them over each other."""
     found: list[tuple[Array, list[str]]] = []
     for at, name in names:
         same = next((words for place, words in found if np.linalg.norm(at - place) <= near), None)
@@ -125,9 +125,9 @@ def _joined(names: Sequence[tuple[Array, str]], near: float) -> list[tuple[Array
 
 
 def draw_links(axes: Axes, part: Part, seen: Array, pose: int, *, faint: bool = False) -> None:
-    """Draw the links of a part in one pose; a link of more than two joints as the polygon that it is.
+    """Draw the links of a part in one pose; a link of more than two joints as a polygon.
 
-    ``faint`` is for the further positions of a picture that has one in full.
+    ``faint`` is for the further positions of a figure that shows one in full.
     """
     width, alpha, layer = (0.9, 0.35, 3) if faint else (2.2, 1.0, 4)
     for k, link in enumerate(part.links):

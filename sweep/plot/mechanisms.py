@@ -1,4 +1,4 @@
-"""Pictures of one design: its motion, the mechanism itself, the load on a bearing, its cyclogram."""
+"""Figures of one design: its motion, the mechanism itself, the load on a bearing, its cyclogram."""
 
 from __future__ import annotations
 
@@ -34,14 +34,14 @@ if TYPE_CHECKING:
     from sweep.evaluation.tables import Table
 
 TURN = 360.0
-BAR, THIN = 0.5, 0.16  # heights of strokes and dwells, a row being 1
+BAR, THIN = 0.5, 0.16  # heights of strokes and dwells, relative to a row
 FILLS = {"rises": OPTIMUM, "falls": "#a9c1df", "flies": "none", "low": QUIET, "high": QUIET}
 
 
 def cyclogram_figure(rows: pd.DataFrame, made: Mapping[str, tuple[float, float]]) -> Figure:
     """Draw a cyclogram over one turn: rising strokes dark, falling ones light, flights hatched, dwells beneath.
 
-    Events are lines; a band about one shows between which angles [deg] ``made`` what is made has it.
+    Events are lines; a band around one is the interval [deg] of manufactured mechanisms' events, from ``made``.
     """
     members = list(dict.fromkeys(rows["member"][rows["kind"] != "event"]))
     events = rows[rows["kind"] == "event"]
@@ -65,7 +65,7 @@ def cyclogram_figure(rows: pd.DataFrame, made: Mapping[str, tuple[float, float]]
 
 
 def _events(axes: Axes, events: pd.DataFrame, rows: int, made: Mapping[str, tuple[float, float]]) -> None:
-    """Draw each event as a line, its name above the rows, one below the other so that none covers another."""
+    """Draw each event as a line, with its name above the rows, stacked so that names do not overlap."""
     named: Any = zip(events["name"], events["start"], strict=True)
     for k, (name, start) in enumerate(named):
         phi, height = math.degrees(start), rows - 0.35 + 0.34 * k
@@ -76,12 +76,12 @@ def _events(axes: Axes, events: pd.DataFrame, rows: int, made: Mapping[str, tupl
             axes.fill_betweenx([-0.6, height], low, high, color=LIMIT, alpha=0.3, linewidth=0, zorder=1)
             words += f" ({low:.2f} to {high:.2f}°)"
         side, place = ("right", phi - 3) if phi > 0.75 * TURN else ("left", phi + 3)
-        clear = {"facecolor": "white", "edgecolor": "none", "pad": 0.5}  # lines of other events pass behind the words
+        clear = {"facecolor": "white", "edgecolor": "none", "pad": 0.5}  # lines of other events pass behind the text
         axes.text(place, height, words, ha=side, va="top", fontsize=8, zorder=4, bbox=clear)
 
 
 POSES = 720
-MOST_LINES = 20  # in one panel
+MOST_LINES = 20  # lines per panel
 
 
 def motion(
@@ -94,24 +94,24 @@ def motion(
     angles: AngleUnit | None = None,
     axes: Sequence[Axes] | Axes | None = None,
 ) -> NDArray[Any]:
-    """Show curves over one turn, one panel for each.
+    """Draw curves over one turn, one panel for each.
 
     Parameters
     ----------
     mechanism : as of :func:`sweep.joints`
-    design : one design, or several as rows of a table: one line each, called by the table's index
-    want : pose outputs, as a list or in one string between commas; if left out position and derivatives, deviations
+    design : one design, or several as rows of a table: one line each, named by the table's index
+    want : pose outputs, as a list or in one string separated by commas; by default position and derivatives, deviations
         and pressure angles
     unit : the length unit of the design, for the axes
-    speed : of the driving shaft [rad/s], or a text such as "7000 rpm": adds scales of velocity, acceleration and jerk
-        in time
+    speed : speed of the driving shaft [rad/s], or a text such as "7000 rpm": adds scales of velocity, acceleration and
+        jerk in time
     angles : the unit of the angles of ``design``, "rad" or "deg", as of :func:`sweep.evaluate`
-    axes : of a figure of yours to draw into, one for each curve
+    axes : axes of an existing figure to draw into, one for each curve
 
     Returns
     -------
     array of Axes
-        in the order of ``want``.  Crank angles count from the lowest position where the follower has one
+        in the order of ``want``.  Crank angles count from the lowest position if the follower has one
 
     Examples
     --------
@@ -148,7 +148,7 @@ def _panels(
     family: Family, names: list[str], turns: Mapping[str, pd.DataFrame], unit: str, speed: float | None,
     given: list[Any] | None,
 ) -> NDArray[Any]:  # fmt: skip
-    """Draw over the crank angle from the lowest position, so that several designs can be laid over each other."""
+    """Draw curves over the crank angle from the lowest position, so that several designs can be compared."""
     if given is None:
         figure = new_figure(WIDTH, 2.1 * -(-len(names) // 2) + 0.5)
         every = np.atleast_1d(figure.subplots(-(-len(names) // 2), 2)).ravel().tolist()
@@ -175,7 +175,7 @@ def _panels(
 
 
 def aligned_turn(turn: pd.DataFrame, name: str, position: str) -> tuple[Array, Array]:
-    """One closed turn that starts where the position is smallest; the position itself counts from there."""
+    """Return one closed turn that starts at the smallest position; the position itself is relative to it."""
     phi, values = turn["phi"].to_numpy(float), turn[name].to_numpy(float)
     path, free, start = lowest(position, turn[position].to_numpy(float))
     if name == position:
@@ -196,12 +196,12 @@ def cyclogram(
     angles: AngleUnit | None = None,
     made: Mapping[str, tuple[float, float]] | None = None,
 ) -> Axes:
-    """Show what all members of a machine do over one turn: strokes, dwells and events; :func:`sweep.cyclogram`.
+    """Draw the motion of all members of a machine over one turn: strokes, dwells and events; :func:`sweep.cyclogram`.
 
     Parameters
     ----------
     mechanism, design, dwell, angles : as of :func:`sweep.cyclogram`
-    made : by the name of an event, between which angles [deg] what is made has it: drawn as a band
+    made : interval [deg] of manufactured mechanisms' events by event name, drawn as a band
 
     Returns
     -------
@@ -236,8 +236,8 @@ def mechanism(
     ----------
     mechanism, design : as of :func:`sweep.joints`
     phi : angle of the driving shaft [rad]; over an interval the value of its variable
-    view : "space", from a corner with z upwards, or "xy", "zy", "xz"; if left out "space" for what is spatial
-    positions : that are drawn at equal steps over the turn; the first stands out.  The report draws 8
+    view : "space", from a corner with z upwards, or "xy", "zy", "xz"; by default "space" for a spatial mechanism
+    positions : number of positions drawn at equal steps over the turn; the first stands out.  The report draws 8
     unit : the length unit of the design, for the axes
     angles : the unit of the angles of ``design`` and ``phi``, "rad" or "deg", as of :func:`sweep.evaluate`
 
@@ -275,7 +275,7 @@ def polar_load(
     stage: str = "",
     angles: AngleUnit | None = None,
 ) -> Axes:
-    """Show the force on a link at a fixed axis over one turn, its direction as the angle and its size as the radius.
+    """Draw the force on a link at a fixed axis over one turn, its direction as the angle, its size as the radius.
 
     Parameters
     ----------
@@ -288,13 +288,13 @@ def polar_load(
     Returns
     -------
     Axes
-        polar; the angle is counted right-handed about the axis, from x of the frame made square to the axis [force
-        unit of the masses: N where lengths are mm and masses t]
+        polar; the angle is counted right-handed about the axis, from x of the frame projected perpendicular to the axis
+        [force unit of the masses: N if lengths are mm and masses t]
 
     Raises
     ------
     InputError
-        for a joint that has no axis, a family without joint loads, a missing mass or speed.
+        for a joint without an axis, a family without joint loads, or a missing mass or speed.
 
     Examples
     --------
@@ -336,7 +336,7 @@ def polar_load(
 
 
 def _plain(mechanism: Mechanism, design: Table) -> dict[str, Any]:
-    """Columns that are parameters of the mechanism itself."""
+    """Return the columns that are parameters of the mechanism itself."""
     names = find_family(mechanism).parameter_names
     columns: Mapping[Any, Any] = design if isinstance(design, Mapping) else {key: design[key] for key in design}
     return {str(key): values for key, values in columns.items() if str(key) in names}

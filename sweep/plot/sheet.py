@@ -1,4 +1,4 @@
-"""One sheet of a design for the shop: views and tables of its dimensions, joints and limits; as PDF, SVG or DXF."""
+"""Workshop sheet of a design: views and tables of its dimensions, joints and limits; as PDF, SVG or DXF."""
 
 from __future__ import annotations
 
@@ -27,19 +27,19 @@ if TYPE_CHECKING:
 
     from sweep.evaluation.joints import Part
 
-A3 = (16.54, 11.69)  # inches, lying
-VIEWS_HIGH, TABLES_HIGH = 5.7, 6.0  # inches, of the views and of each row of tables; longer ones make the sheet longer
-LINES = 24  # of a table before it goes on in the next one
-WIDTHS = ((1.5, 1.1, 1.0), (1.0, 1.0))  # of the tables in the first row and in those below it, as shares
-POSES = 180  # of the paths of joints
+A3 = (16.54, 11.69)  # inches, landscape
+VIEWS_HIGH, TABLES_HIGH = 5.7, 6.0  # inches, of the views and of each row of tables; the sheet grows with the rows
+LINES = 24  # lines of a table before it continues in the next one
+WIDTHS = ((1.5, 1.1, 1.0), (1.0, 1.0))  # shares of the width for the tables of the first row and of the rows below
+POSES = 180  # poses of the joints' paths
 WORDS = {"xy": "front", "zy": "side, from the left", "xz": "top"}
-LETTERS, PAD, LEAST = 23.0, 1.0, 12.0  # of an inch, of a cell's rim, of the last column
-DIGITS = 6  # of coordinates: a micrometre in half a metre
+LETTERS, PAD, LEAST = 23.0, 1.0, 12.0  # letters per inch, in a cell's margin, in the last column
+DIGITS = 6  # significant digits of coordinates: a micrometre in half a metre
 ENDINGS = (".pdf", ".svg", ".dxf")
 
 
 class Table(NamedTuple):
-    """A table of the sheet: its title, the heads of its columns, and its lines."""
+    """A table of the sheet: title, column headings and lines."""
 
     title: str
     heads: tuple[str, ...]
@@ -52,13 +52,13 @@ def write_sheet(folder: str | Path, design: str | int | None, path: str | Path, 
     Parameters
     ----------
     folder, design : as of `sweep export`
-    path : a file ending in .pdf, .svg or .dxf; of the latter the tables stand below the views
+    path : a file ending in .pdf, .svg or .dxf; in a .dxf the tables are below the views
     phi : crank angle of the drawn position and of the hardpoints [rad]
 
     Raises
     ------
     InputError
-        for another ending, or a mechanism whose joints are not known.
+        for another ending, or a mechanism without known joints.
     StoreError
         if the file cannot be written.
     """
@@ -131,7 +131,7 @@ def _joint(part: Part, name: str) -> str:
 
 
 def _zero(x: float) -> float:
-    return 0.0 if abs(x) < 1e-9 else x  # mm: the rounding of zero
+    return 0.0 if abs(x) < 1e-9 else x  # mm: rounding of zero
 
 
 def _draw(data: Dataset, parts: Sequence[Part], tables: Sequence[Table], target: Path) -> None:
@@ -157,7 +157,7 @@ def _draw(data: Dataset, parts: Sequence[Part], tables: Sequence[Table], target:
 
 
 def _rows(tables: Sequence[Table]) -> list[list[Table]]:
-    """Lay out tables beside and below each other: the beginnings of the first ones, then all that is left."""
+    """Lay out tables in rows: the beginnings of the first ones in the first row, then all the rest."""
     blocks = [
         table._replace(title=table.title + ", continued" * (k > 0), lines=table.lines[k : k + LINES])
         for table in tables
@@ -173,12 +173,12 @@ def _views(parts: Sequence[Part]) -> tuple[str, ...]:
 
 
 def _no_date(target: Path) -> dict[str, None]:
-    """Leave out what would make two files of the same data differ."""
+    """Return the metadata that omit the date, so that files of the same data are equal."""
     return {"CreationDate": None} if target.suffix.lower() == ".pdf" else {"Date": None}
 
 
 def _set(axes: Axes, table: Table | None) -> None:
-    """Set a table whose lines are as high as those of all others."""
+    """Draw a table with the line height of all tables."""
     from matplotlib.transforms import Bbox
 
     axes.set_axis_off()
@@ -202,7 +202,7 @@ def _set(axes: Axes, table: Table | None) -> None:
 
 
 def _fitted(table: Table, wide: float) -> tuple[list[list[str]], list[float]]:
-    """Return lines of a table and shares of its columns, as wide as their longest words; the last one is cut to fit."""
+    """Return lines of a table and shares of its columns, by their longest words; the last column is cut to fit."""
     rows = [table.heads, *table.lines]
     longest = [max(len(row[k]) for row in rows) + 2 * PAD for k in range(len(table.heads))]
     rest = max(wide - sum(longest[:-1]), min(longest[-1], LEAST))
