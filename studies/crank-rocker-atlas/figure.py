@@ -30,7 +30,7 @@ TITLES = {0.0: "parallel axes (planar)", 90.0: "axes at right angles"}
 
 
 def atlas(designs: pd.DataFrame) -> pd.DataFrame:
-    """Design of least acceleration per radian of swing for every cell, in units of the rocker; angles in deg."""
+    """Return the design of least acceleration per radian of swing for every cell, lengths over c; angles in deg."""
     rows = designs[designs.status == 0].copy()
     rows["acceleration"] = rows.max_abs_d2psi / rows.swing
     # Prescribed values return with rounding errors; whole degrees name the cell.

@@ -1,4 +1,4 @@
-"""Headless Chromium for tests: Debian's package driven by playwright, which brings no browser of its own here."""
+"""Headless Chromium for tests: Debian's package controlled by playwright, without playwright's own browser."""
 
 from __future__ import annotations
 
@@ -15,13 +15,13 @@ from PIL import Image
 from playwright.sync_api import Browser, Locator, Page, sync_playwright
 
 NAMES = ("chromium", "chromium-browser", "google-chrome")
-# WebGL by software, so that a machine without a graphics card draws the same.
+# WebGL in software, so that a machine without a graphics card gives the same picture.
 DRAWS = ("--no-sandbox", "--use-angle=swiftshader", "--enable-unsafe-swiftshader")
 FLAT = ("--no-sandbox", "--disable-3d-apis")
 
 
 def executable() -> str:
-    """The installed browser; without one the tests fail."""
+    """Return the path of the installed browser; without one the tests fail."""
     named = os.environ.get("CHROMIUM")
     found = named or next(filter(None, map(shutil.which, NAMES)), None)
     if not found:
@@ -31,14 +31,14 @@ def executable() -> str:
 
 @contextmanager
 def launcher() -> Iterator[Callable[..., Browser]]:
-    """What starts a browser with the arguments of its command line, DRAWS or FLAT; playwright runs once at a time."""
+    """Start browsers by their command-line arguments, DRAWS or FLAT; only one playwright runs at a time."""
     with sync_playwright() as playwright:
         yield lambda *arguments: playwright.chromium.launch(executable_path=executable(), args=list(arguments))
 
 
 @contextmanager
 def opened(browser: Browser, address: str, width: int = 1400, **options: Any) -> Iterator[Page]:
-    """A page that is at rest; at the end it must have loaded one file alone and have had nothing to say."""
+    """Yield a page at rest; at the end it must have loaded one file only and logged nothing."""
     options = {"reduced_motion": "reduce"} | options
     context = browser.new_context(viewport={"width": width, "height": 900}, **options)
     page = context.new_page()
@@ -55,6 +55,6 @@ def opened(browser: Browser, address: str, width: int = 1400, **options: Any) ->
 
 
 def pixels(of: Page | Locator, **options: Any) -> np.ndarray[Any, np.dtype[np.float64]]:
-    """A screenshot as (height, width, 3) in 0 to 1."""
+    """Return a screenshot as (height, width, 3) in 0 to 1."""
     picture = Image.open(io.BytesIO(of.screenshot(**options))).convert("RGB")
     return np.asarray(picture, np.float64) / 255.0

@@ -1,4 +1,4 @@
-"""Exact heights and places of extrema next to those found: by poses in twice the working precision alone."""
+"""Exact heights and places of extrema near given ones, from poses in twice the working precision alone."""
 
 from __future__ import annotations
 
@@ -17,14 +17,14 @@ HALVINGS = 60
 
 
 def values(family, designs, pose, phi):
-    """A pose output at angles (n, m)."""
+    """Return a pose output at angles (n, m)."""
     return family.precise().poses(designs, Angles.of(phi), frozenset([pose]))[pose]
 
 
 def climbed(family, designs, pose, mode, phi, width=1e-3):
-    """Highest measured value (n,) within about ``width`` of ``phi`` (n,): the best of nine poses ever closer together.
+    """Return the largest measured value (n,) within about ``width`` of ``phi`` (n,), by repeatedly refined nine poses.
 
-    It is a value at a pose, so never above the maximum, and no fit is made through values that carry rounding.
+    It is a value at a pose, hence never above the maximum; values with rounding errors are not interpolated.
     """
     at, best = phi.copy(), np.full(phi.size, -np.inf)
     rows = np.arange(phi.size)
@@ -40,7 +40,7 @@ def climbed(family, designs, pose, mode, phi, width=1e-3):
 
 
 def turning_points(family, designs, slope, phi, width=1e-5):
-    """Zeros (n,) of a derivative within ``width`` of ``phi`` (n,) by bisection; nan where its sign does not change."""
+    """Return zeros (n,) of a derivative within ``width`` of ``phi`` (n,) by bisection; nan without a change of sign."""
     low, high = phi - width, phi + width
     at_low, at_high = (np.sign(values(family, designs, slope, x[:, None])[:, 0]) for x in (low, high))
     bracketed = at_low * at_high < 0.0
@@ -52,25 +52,25 @@ def turning_points(family, designs, slope, phi, width=1e-5):
 
 
 def amplified(family, designs):
-    """What a dead point of any stage makes of one rounding: the inverse of the least margin."""
+    """Return the amplification of a rounding error by a stage's dead point: the inverse of the least margin."""
     return 1.0 + 1.0 / design_outputs(family, designs, ["margin"], Accuracy(target=1e-6))["margin"]
 
 
 def assert_fused_extrema_lie_within_their_errors(family, designs, request):
-    """Of precise poses, climbed from what the search on poses finds, the way where places are asked for too."""
+    """Compare fused extrema with precise poses, climbed from the extrema of the search on poses with places."""
     assert fused.curve_of(family, request, False) is not None
     found, status = extrema.true_extrema(family, designs, [request], 1e-8)
     slow, _ = extrema.true_extrema(family, designs, [request], 1e-10, locate=True)
     exact = climbed(family, designs, request.pose, request.mode, slow[request].phi)
     assert (status == st.OK).all()
     off = np.abs(found[request].value - exact)
-    # The chain's precise poses hand a rounded angle from stage to stage.
+    # The chain's precise poses pass a rounded angle from stage to stage.
     assert (off <= found[request].err + 8.0 * EPS * amplified(family, designs) * np.abs(exact)).all()
     assert np.quantile(off / np.abs(exact), 0.9) < 1e-13
 
 
 def assert_fused_margins_are_those_of_poses(family, designs, number):
-    """Of the search on poses for the least discriminant of a later stage, within the errors that both say."""
+    """Compare fused least discriminants of a later stage with the search on poses, within the errors of both."""
     request = Request(f"discriminant{number}", -1)
     loop = next(loop for loop in family.every(Assembly) if loop.stage == str(number))
     found, _, undecided = fused.curve_of(family, request, True).extremum(designs, 1e-10)

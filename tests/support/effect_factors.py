@@ -1,4 +1,4 @@
-"""Effects at single poses against their 25-digit tables, through the public functions."""
+"""Effects at single poses compared with their 25-digit tables, through the public functions."""
 
 from __future__ import annotations
 
@@ -22,12 +22,12 @@ ALLOWED, OF_POINT = 64.0, 16.0
 
 
 def effect_factors(folder: Path) -> list[Worst]:
-    """Return joint forces and torques without and with friction, and points of the coupler."""
+    """Return factors of joint forces and torques without and with friction, and of coupler points."""
     return [*_kinetostatics(folder), *_friction(folder), *_coupler(folder)]
 
 
 def _columns(rows: Sequence[Row]) -> dict[str, Any]:
-    """Return a table of crank-rockers with bodies, a row per pose."""
+    """Return a table of crank-rockers with bodies, one row per pose."""
     table: dict[str, Any] = {name: [float(row[name]) for row in rows] for name in GEOMETRY}
     table |= {"branch": [float(row["sigma"]) for row in rows], "speed": [row["omega"] for row in rows]}
     table |= {"speed_change": [row["epsilon"] for row in rows], "load_torque": [row["M_load"] for row in rows]}
@@ -40,14 +40,14 @@ def _columns(rows: Sequence[Row]) -> dict[str, Any]:
 
 
 def _spread(row: Row, vectors: Mapping[str, str]) -> dict[str, Any]:
-    """Return the row with every component of its vectors under a key of its own."""
+    """Return the row with every component of its vectors under its own key."""
     expected = row["expected"]
     parts = {f"{key}_{x}": expected[key][i] for key in vectors.values() for i, x in enumerate("xyz")}
     return dict(row) | {key: expected[key] for key in ("M_drive", "m_finger") if key in expected} | parts
 
 
 def _forces(suffix: str) -> tuple[dict[str, str], dict[str, tuple[str, list[str]]]]:
-    """Return vectors of the effect by its own name, and what is judged: output, key of the table, keys of its size."""
+    """Return vectors by the effect's names, and for each output its key in the table and keys of its magnitude."""
     vectors = {f"force_{joint}{suffix}": f"R_{joint.upper()}" for joint in "abcd"}
     wanted = {f"{ours}_{x}": (f"{key}_{x}", [f"{key}_{x}"]) for ours, key in vectors.items() for x in "xyz"}
     wanted |= {f"drive_torque{suffix}": ("M_drive", ["M_drive"])}
@@ -59,9 +59,7 @@ def _largest(row: Row, keys: Sequence[str]) -> float:
 
 
 def _kinetostatics(folder: Path) -> list[Worst]:
-    """Measure errors in units of 2^-53 of the tabulated sensitivity;
-    couples carry what one rounding of R_B does at the coupler.
-    """
+    """Measure errors in units of 2^-53 of the tabulated sensitivity, for couples plus b times the largest R_B."""
     rows = read(folder, "kinetostatics")
     vectors, wanted = _forces("")
 
@@ -78,10 +76,8 @@ def _kinetostatics(folder: Path) -> list[Worst]:
 
 
 def _friction(folder: Path) -> list[Worst]:
-    """Measure errors in units of 2^-53 of the largest force, times the coupler for couples:
-    no sensitivity is tabulated.
-    """
-    rows = [row for row in read(folder, "friction") if row["inputs"]["omega"] > 0.0]  # the sense a crank has here
+    """Measure errors in units of 2^-53 of the largest force, times the coupler for couples, without a sensitivity."""
+    rows = [row for row in read(folder, "friction") if row["inputs"]["omega"] > 0.0]  # cranks turn this way
     vectors, wanted = _forces("_friction")
 
     def size(row: Row, key: str) -> float:
@@ -95,7 +91,7 @@ def _friction(folder: Path) -> list[Worst]:
 
 
 def _coupler(folder: Path) -> list[Worst]:
-    """Return points of the coupler and their derivatives; of each the conditions of the lower orders count too."""
+    """Return factors of coupler points and their derivatives, with the conditions of the lower orders included."""
     rows = read(folder, "coupler")
     orders = {"": "P", "d": "dP", "d2": "ddP"}
     table = {name: [float(row[name]) for row in rows] for name in GEOMETRY}

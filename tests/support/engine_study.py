@@ -1,4 +1,4 @@
-"""A small study for the tests of engine and store, and a program that runs it in a process of its own."""
+"""A small study for the tests of engine and store, and a program that runs it in its own process."""
 
 from __future__ import annotations
 
@@ -12,10 +12,10 @@ import sweep.chunks.plan
 from sweep.engine.run import run
 from sweep.errors import LinksweepError
 
-# Plan and log are smaller than this, chunks larger.
+# Plan and log are smaller, chunks are larger.
 SMALL = 6000
 
-# What to set in `sweep.chunks.plan` for chunks of so many designs, whatever they cost.
+# Settings of `sweep.chunks.plan` for chunks of this many designs, whatever they cost.
 CHUNK = 4096
 SMALL_CHUNKS = {"CHUNK_SECONDS": 1e-9, "CHUNK_STEP": CHUNK}
 
@@ -50,7 +50,7 @@ dtype = "{dtype}"
 
 
 def write_study(folder: Path, *, keep: str = "all", dtype: str = "float64", count: int = 100, limits: str = "") -> Path:
-    """A study of 512 * count designs."""
+    """Write a study of 512 * count designs and return its path."""
     folder.mkdir(parents=True, exist_ok=True)
     path = folder / "study.toml"
     path.write_text(STUDY.format(keep=keep, dtype=dtype, count=count, limits=limits))
@@ -58,12 +58,12 @@ def write_study(folder: Path, *, keep: str = "all", dtype: str = "float64", coun
 
 
 def chunk_bytes(folder: Path) -> dict[str, bytes]:
-    """Names and contents of all chunks."""
+    """Return names and contents of all chunks."""
     return {path.name: path.read_bytes() for path in folder.glob("part-*")}
 
 
 def main(study: str, out: str, jobs: str, backend: str, pause: str) -> None:
-    """Run with small chunks and a slow disk, so that signals find chunks half-way to it."""
+    """Run with small chunks and a slow disk, so that signals arrive while chunks are being written."""
     sync = os.fsync
 
     def slow_sync(descriptor: int) -> None:

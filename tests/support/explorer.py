@@ -1,4 +1,4 @@
-"""A running `sweep explore` as another program sees it: a process, an address, requests."""
+"""A running `sweep explore` as seen by another program: a process, an address, requests."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ PATIENCE = 120  # seconds for a request on a busy machine
 
 @contextmanager
 def explored(source: str | Path) -> Iterator[str]:
-    """Address of a server that ends as Ctrl-C ends it; it has to end well."""
+    """Yield the address of a server that ends by SIGINT like Ctrl-C; it has to end without errors."""
     command = [sys.executable, "-m", "sweep", "explore", str(source)]
     environment = os.environ | {"PYTHONPATH": str(ROOT)}
     process = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, env=environment)
@@ -35,6 +35,6 @@ def explored(source: str | Path) -> Iterator[str]:
 
 
 def asked(address: str, what: str, content: object, **headers: str) -> Any:
-    """JSON that the server answers."""
+    """Return the JSON answer of the server."""
     with urlopen(Request(address + what, json.dumps(content).encode(), headers), timeout=PATIENCE) as reply:
         return json.load(reply)

@@ -1,4 +1,4 @@
-"""What the tests of several families measure alike: condition numbers, factors of error, compiled against plain."""
+"""Measurements common to the tests of families: condition numbers, error factors, compiled against plain."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ STEP = 1e-100
 
 
 def conditions(name, design, phi, outputs):
-    """Sum of |x dy/dx| over all lengths, angles and the crank angle, by the complex step."""
+    """Return the sum of |x dy/dx| over all lengths, angles and the crank angle, by the complex step."""
     mechanism = family(name)
     everything = frozenset(mechanism.pose_names)  # one compiled kernel serves all tests
     base = np.array([design], dtype=complex)
@@ -34,7 +34,7 @@ def conditions(name, design, phi, outputs):
 
 
 def ladder(mechanism, name):
-    """An output and its derivatives by the crank angle, lowest first."""
+    """Return an output and its derivatives by the crank angle, lowest first."""
     names = [name]
     while names[-1] in mechanism.derivative_of:
         names.append(mechanism.derivative_of[names[-1]])
@@ -42,7 +42,7 @@ def ladder(mechanism, name):
 
 
 def factors(name, design, phi, expected, got):
-    """Error of every expected output in units of 2^-53 max(cond, |y|), the maximum over the lower orders too."""
+    """Return errors of the outputs in units of 2^-53 max(cond, |y|), maximised over the lower orders too."""
     mechanism = family(name)
     cond = conditions(name, design, phi, list(expected))
     found = {}
@@ -56,7 +56,7 @@ def factors(name, design, phi, expected, got):
 
 
 def of_kernel(function, designs, phi, shapes, dtype):
-    """Status and outputs of a kernel of poses; ``shapes`` are those of its outputs before (n, m)."""
+    """Return status and outputs of a kernel of poses; ``shapes`` are those of its outputs before (n, m)."""
     shape = (len(designs), phi.shape[1])
     status = np.empty(shape, np.uint8)
     rooms = [np.empty((*front, *shape), dtype) for front in shapes]
@@ -66,7 +66,7 @@ def of_kernel(function, designs, phi, shapes, dtype):
 
 
 def assert_compiled_equals_plain(kernel, designs, phi, shapes):
-    """The compiled kernel has the bits of the plain one; with complex numbers to a few roundings (their division)."""
+    """Assert that the compiled kernel has the bits of the plain one; complex division may differ by a few roundings."""
     for dtype, tolerance in ((np.float64, 0.0), (np.complex128, 2.0**-44)):
         fast, slow = (of_kernel(f, designs, phi, shapes, dtype) for f in (kernel, kernel.py_func))
         for one, other in zip(fast, slow, strict=True):
@@ -74,7 +74,7 @@ def assert_compiled_equals_plain(kernel, designs, phi, shapes):
 
 
 def assert_gradients_are_those_of_the_reference(name, design, phi, reference, outputs, step=10.0**-12):
-    """Complex step against a central difference of the 100-digit reference in every length and angle."""
+    """Assert that the complex step equals a central difference of the 100-digit reference in every length and angle."""
     mechanism = family(name)
     for k, parameter in enumerate(mechanism.parameters):
         if parameter.choices is not None:

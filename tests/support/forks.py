@@ -1,4 +1,4 @@
-"""Python processes that have numba imported when they begin, for tests whose own part of a process is short."""
+"""Python processes that start with numba imported, for tests whose own part of a process is short."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ import subprocess
 import sys
 from typing import Any
 
-# Nothing of the house is imported here: what is forked finds kernels, caches and environment as a new process does.
+# Nothing of this package is imported here: a fork finds kernels, caches and environment like a new process.
 SERVER = """
 import json, os, sys, traceback
 
@@ -42,7 +42,7 @@ for line in sys.stdin:
 
 
 class Forks:
-    """A process that forks itself for each program: half a second less than a process of its own."""
+    """A process that forks itself for each program, half a second faster than a new process."""
 
     def __enter__(self) -> Forks:
         own = os.environ | {"PYTHONPATH": "", "PYTHONDONTWRITEBYTECODE": "", "NUMBA_DISABLE_JIT": "0"}
@@ -56,7 +56,7 @@ class Forks:
         self._server.communicate(timeout=60)
 
     def run(self, program: str, path: str, folder: str, environment: dict[str, str]) -> tuple[int, str]:
-        """Exit code and standard output of a program in ``folder`` that imports from ``path`` first."""
+        """Return exit code and standard output of a program in ``folder`` that imports from ``path`` first."""
         assert self._server.stdin is not None and self._server.stdout is not None
         self._server.stdin.write(json.dumps([program, path, folder, environment]) + "\n")
         self._server.stdin.flush()

@@ -1,4 +1,4 @@
-"""Random mechanisms with friction in all joints, and the highest of many poses of each."""
+"""Random mechanisms with friction in all joints, and maxima over many poses."""
 
 from __future__ import annotations
 
@@ -15,11 +15,11 @@ FAMILIES = (
     "friction", "slider_friction", "five_link_friction", "slotted_friction", "swivel_friction",
     "spherical_looper_friction", "cylindrical_looper_friction",
 )  # fmt: skip
-LINKS, INPUTS = 0.05, 0.5  # logarithms that lengths, and inputs of the effect, are spread by
+LINKS, INPUTS = 0.05, 0.5  # spread of the logarithms of lengths, and of the effect's inputs
 
 
 def frictional(name: str, n: int, seed: int = 5) -> tuple[Family, tuple[str, ...], Array]:
-    """Return the family with an effect, its outputs, and designs: with more of them the first ones stay."""
+    """Return the family with an effect, its outputs, and n designs; a larger n keeps the first designs."""
     bare = family(effect(name).families[0])
     wanted = tuple(expanded(bare, [name]))
     full = extended(bare, wanted)
@@ -32,6 +32,6 @@ def frictional(name: str, n: int, seed: int = 5) -> tuple[Family, tuple[str, ...
 
 
 def dense(full: Family, designs: Array, wanted: tuple[str, ...], samples: int) -> dict[str, Array]:
-    """Return the same outputs from a dense grid: values that poses attain, so no maximum is lower."""
+    """Return the outputs from a dense grid: values that poses attain, so no maximum is lower."""
     found = design_outputs(full, designs, wanted=wanted, accuracy=Accuracy(samples=samples))
     return {name: np.asarray(values, np.float64) for name, values in found.items()}

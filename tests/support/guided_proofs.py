@@ -27,7 +27,7 @@ def double_drives(n, seed):
     return np.column_stack([needle_drives(n, seed + 50)[:, :8], first[:, :8], coupling, first[:, 8:], np.zeros((n, 2))])
 
 
-# Family, designs, columns in which its crank-rockers and couplings begin, column of the guide.
+# Family, designs, first columns of crank-rockers and of couplings, column of the guide.
 MAKERS = {
     "guide": (GUIDE, guided_four_bars, (), (), 0),
     "rssr+guide": (NEEDLE, needle_drives, (0,), (17,), 8),
@@ -36,7 +36,7 @@ MAKERS = {
 
 
 def parts(designs, rockers, couplings, last):
-    """Arguments of the kernel out of a design matrix."""
+    """Return the arguments of the kernel from a design matrix."""
     driven_by = np.ascontiguousarray(designs[:, last : last + 9])
     stages = np.stack([*(designs[:, k : k + 8] for k in rockers), as_crank_rocker(driven_by)])
     joined = np.reshape([designs[:, k : k + 2] for k in couplings], (len(couplings), len(designs), 2))
@@ -46,7 +46,7 @@ def parts(designs, rockers, couplings, last):
 
 
 def rotating(name, n, seed, curves=("d2s",)):
-    """Designs that turn fully, with the searched maxima of some curves: (m, n) each."""
+    """Return designs that turn fully, with the searched maxima of some curves: (m, n) each."""
     mechanism, make, *_ = MAKERS[name]
     designs = make(n, seed)
     requests = [Request(curve, 0) for curve in curves]
@@ -57,7 +57,7 @@ def rotating(name, n, seed, curves=("d2s",)):
 
 
 def certify(name, designs, curves, value, phi, target=1e-8, most=1000, function=certify_maxima):
-    """Maxima, places, errors, status and number of enclosures, from claimed maxima."""
+    """Return maxima, places, errors, status and number of enclosures, from claimed maxima."""
     _, _, rockers, couplings, last = MAKERS[name]
     which = np.array([CURVES[curve] for curve in curves], np.int64)
     out = {"status": np.zeros(np.shape(value), np.uint8), "max": np.array(value, float), "phi": np.array(phi, float)}
@@ -67,7 +67,7 @@ def certify(name, designs, curves, value, phi, target=1e-8, most=1000, function=
 
 
 def exact_point(design, rockers, couplings, last):
-    """phi -> travel and deviation in 50 digits."""
+    """Return functions of phi for travel and deviation in 50 digits."""
     numbers = [mp.mpf(float(x)) for x in design]
     turns = [lambda phi, k=k: rocker_angle(tuple(numbers[k : k + 8]), phi) for k in rockers]
     coupled = [(numbers[k], numbers[k + 1]) for k in couplings]

@@ -11,7 +11,7 @@ STEP = 1e-100
 
 
 def dev_sensitivities(design, phi):
-    """Derivatives of dev by phi, a, b, c, e, xi, eta, lam, h, and the status of each."""
+    """Return the derivatives of dev by phi, a, b, c, e, xi, eta, lam, h, and the status of each."""
     designs, angles = np.tile(np.array([design], complex), (9, 1)), np.full((9, 1), phi, complex)
     angles[0] += 1j * STEP
     for k in range(8):

@@ -1,4 +1,4 @@
-"""Seeded hostile tables for every family: sizes of any kind, special designs, things that are no numbers."""
+"""Seeded hostile tables for every family: sizes of any kind, special designs, values that are not numbers."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from sweep.errors import InputError
 from sweep.families import NAMES, family
 from sweep.families.base import Parameter
 
-# Every family of the register, whatever its domain, and chains of them.
+# Every family of the register, with any domain, and chains.
 FAMILIES: tuple[str | list[str], ...] = (
     *NAMES, ["rssr", "guide"], ["rssr", "rssr"], ["rssr", "slotted"], ["rssr", "rssr", "guide"],
 )  # fmt: skip
@@ -26,7 +26,7 @@ THINGS = (None, "x", [1.0], (1.0, 2.0), {}, np.ones(2), np.ones((2, 2)), 1j, np.
 
 
 def value(r: np.random.Generator, p: Parameter) -> float:
-    """A number for one parameter, ordinary as a rule."""
+    """Return a value for one parameter, usually an ordinary one."""
     if p.choices is not None:
         return float(r.choice(p.choices))
     kind = r.random()
@@ -42,7 +42,7 @@ def value(r: np.random.Generator, p: Parameter) -> float:
 
 
 def spoilt(r: np.random.Generator, column: np.ndarray[Any, Any]) -> Any:
-    """The column with something in it that is no number, or as something that is no column."""
+    """Return the column with an item that is not a number, or an object that is not a column."""
     thing = THINGS[r.integers(len(THINGS))]
     kind = r.integers(4)
     if kind == 0:
@@ -57,9 +57,9 @@ def spoilt(r: np.random.Generator, column: np.ndarray[Any, Any]) -> Any:
 
 
 def case(seed: int, requests: int | None = None) -> tuple[Any, dict[str, Any], list[str], dict[str, Any], bool]:
-    """Family, table, wanted design outputs, settings, and whether the table was spoilt.
+    """Return family, table, wanted design outputs, settings, and whether the table was spoilt.
 
-    ``requests`` is how many different families and outputs there are; None leaves it to chance.
+    ``requests`` is the number of different families and outputs; None leaves it to chance.
     """
     r = np.random.default_rng(seed if requests is None else seed % requests)
     chosen = FAMILIES[r.integers(len(FAMILIES))]
@@ -85,7 +85,7 @@ def case(seed: int, requests: int | None = None) -> tuple[Any, dict[str, Any], l
 
 
 def faults(seed: int, requests: int | None = None) -> list[str]:
-    """What is wrong with the answer to one hostile table; nothing, as a rule."""
+    """Return the faults of the answer to one hostile table, usually none."""
     chosen, table, names, settings, _ = case(seed, requests)
     with warnings.catch_warnings():
         warnings.simplefilter("error")
@@ -97,7 +97,7 @@ def faults(seed: int, requests: int | None = None) -> list[str]:
             frames = [frame, sweep.evaluate(chosen, own, poses, phi=[0.0, 1.0, np.pi])]
         except InputError as error:
             return [] if str(error) else ["an error without words"]
-        except Exception as error:  # the fault that is looked for
+        except Exception as error:  # the fault that the test seeks
             return [f"{type(error).__name__}: {error}"]
     found = []
     for columns in frames:

@@ -1,4 +1,4 @@
-"""A package of two kernels around the house's decorators, and processes that use it: for tests of the cache on disk."""
+"""A package of two kernels with this project's decorators, and processes that use it, for tests of the disk cache."""
 
 from __future__ import annotations
 
@@ -44,7 +44,7 @@ FORKS = Forks()
 
 
 def report(tree: Path, program: str = REPORT, **environment: str) -> list[str]:
-    """Words that a program prints; of a process of its own where the environment decides how Python begins."""
+    """Return the words that a program prints; a given environment needs a new process instead of a fork."""
     if environment:
         with process(tree, program, **environment) as running:
             found, _ = running.communicate(timeout=60)
@@ -57,7 +57,7 @@ def report(tree: Path, program: str = REPORT, **environment: str) -> list[str]:
 
 
 def edit(tree: Path, step: int, same_time: bool = False) -> None:
-    """Write the helper anew; a step of two digits changes its size, so Python sees it within the same second too."""
+    """Rewrite the helper; a step of two digits changes its size, so Python notices it within the same second too."""
     helper = tree / "helper.py"
     before = helper.stat()
     helper.write_text(HELPER.format(step=step))

@@ -1,6 +1,6 @@
-"""A whole machine as MuJoCo has it: bodies on hinges and slides in the machine's frame, loops closed by its connects.
+"""A whole machine as a MuJoCo model: bodies on hinges and slides in the machine's frame, loops closed by connects.
 
-The model is made from one pose; every other pose, all rates and accelerations are MuJoCo's own.  Its units are SI.
+The model is built from one pose; every other pose, all rates and accelerations are MuJoCo's own.  Its units are SI.
 """
 
 from __future__ import annotations
@@ -18,11 +18,11 @@ from sweep.families.link_tree import LinkTree
 from tests.effects.test_momentum import poses_of
 
 PAIRS = ("xx", "xy", "xz", "yy", "yz", "zz")
-TINY = 1e-12  # kg and kg m^2: MuJoCo wants a mass of every body that moves
+TINY = 1e-12  # kg and kg m^2: MuJoCo requires a mass for every moving body
 
 
 class Body(NamedTuple):
-    """A body at the pose the model is made from, in the machine's frame [mm, t]."""
+    """A body at the pose from which the model is built, in the machine's frame [mm, t]."""
 
     name: str
     parent: str
@@ -34,7 +34,7 @@ class Body(NamedTuple):
 
 
 def mass_of(given, body, number, slender=False):
-    """Mass, centre, tensor of a body from inputs."""
+    """Return mass, centre and tensor of a body from inputs."""
     m = given.get(f"m_{body}{number}", 0.0)
     centre = np.array([given.get(f"com_{body}_{x}{number}", 0.0) for x in "xyz"])
     if slender:
@@ -45,7 +45,7 @@ def mass_of(given, body, number, slender=False):
 
 
 def stage_bodies(prefix, scene, frame, given, number):
-    """Bodies of a stage and its loops (body, body, place), with the names of joints that the drive turns."""
+    """Return the bodies of a stage and its loops (body, body, place), with the names of its driven joints."""
     turn, at = frame.rotation[0], frame.at[0]
     placed = [(origin[0] @ turn.T + at, axes[0] @ turn.T) for origin, axes in poses_of(scene)]
     tree = scene.family.find(LinkTree)
@@ -88,7 +88,7 @@ def text(values):
 
 
 class WholeMachine:
-    """The model of a machine, made at one angle of its main shaft."""
+    """The model of a machine, built at one angle of its main shaft."""
 
     def __init__(self, machine, design, phi):
         self.start, bodies, loops, self.driven, couplings = phi, [], [], [], []
@@ -144,7 +144,7 @@ class WholeMachine:
         return f'<body name="{b.name}" pos="{text(1e-3 * (b.at - above))}">{inside}</body>'
 
     def at(self, phi, speed):
-        """Close the loops at an angle of the main shaft; give all joints rates and accelerations at even speed."""
+        """Close the loops at an angle of the main shaft; set all joint rates and accelerations at constant speed."""
         model, data = self.model, self.data
         led = np.array([model.joint(name).dofadr[0] for name, _ in self.driven])
         rates = np.array([ratio * speed for _, ratio in self.driven], float)
@@ -159,7 +159,7 @@ class WholeMachine:
                 break
             step = np.zeros(model.nv)
             step[free] = np.linalg.lstsq(rows[:, free], -gap, rcond=None)[0]
-            data.qpos += step  # hinges and slides alone
+            data.qpos += step  # hinges and slides only
         mujoco.mj_forward(model, data)
         rows = data.efc_J.reshape(-1, model.nv)[: data.ne].copy()
         second = np.zeros(model.nv)
@@ -176,7 +176,7 @@ class WholeMachine:
         data.qacc[:] = second
 
     def moving(self, name):
-        """Place, angular velocity, velocity, angular acceleration, acceleration of a body's origin [m, s]."""
+        """Return place, angular velocity, velocity, angular acceleration and acceleration of a body's origin [m, s]."""
         model, data = self.model, self.data
         mujoco.mj_fwdVelocity(model, data)
         mujoco.mj_rnePostConstraint(model, data)
@@ -190,12 +190,12 @@ class WholeMachine:
         return a + np.cross(e, point - at) + np.cross(w, np.cross(w, point - at))
 
     def placed(self, name, point):
-        """Where a point of a body is now [mm] that was at ``point`` when the model was made."""
+        """Return the present place [mm] of a body's point that was at ``point`` when the model was built."""
         body = self.model.body(name).id
         return 1e3 * self.data.xpos[body] + self.data.xmat[body].reshape(3, 3) @ (point - self.place(name))
 
     def shaking(self):
-        """Force [N], moment about the machine's origin [N mm] on the frame, power [N mm/s] of all bodies, (5), (6)."""
+        """Return shaking force [N] and moment about the origin [N mm], power [N mm/s] of all bodies, (5), (6)."""
         force, moment, power = np.zeros(3), np.zeros(3), 0.0
         for b in self.bodies:
             at, w, v, e, a = self.moving(b.name)

@@ -1,8 +1,8 @@
-"""Mechanisms as models of Pinocchio, whose loops are closed and whose forces are found by its own algorithms.
+"""Mechanisms as models of Pinocchio, whose own algorithms close the loops and compute the forces.
 
-From our side come the coordinates of joints in one reference pose, the directions of axes, the bodies and the crank's
-speed.  Other poses follow by Newton's method on Pinocchio's positions, rates and accelerations from its Jacobians,
-forces from its recursive Newton-Euler with the multipliers of the closures.
+This project supplies the coordinates of joints in one reference pose, the directions of axes, the bodies and the
+crank's speed.  Other poses follow by Newton's method on Pinocchio's positions, rates and accelerations from its
+Jacobians, forces from its recursive Newton-Euler with the multipliers of the closures.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ EYE = np.eye(3)
 
 
 class Multibody:
-    """Bodies by joints, world axes at the reference pose; closures; what drives.
+    """Bodies by joints, world axes at the reference pose; closures; driving joints.
 
     ``hang`` adds a body on a parent by a list of one-freedom joints at a place; ``close`` lets two bodies share a
     point, ``couple`` gives a linear equation between joint coordinates.
@@ -53,7 +53,7 @@ class Multibody:
         tensor: ArrayLike | None = None,
         gravity: ArrayLike = (0.0, 0.0, 0.0),
     ) -> None:
-        """Add a body: kinds and axes of freedoms from the parent on; all in world axes at the reference pose."""
+        """Add a body: kinds and axes of freedoms from the parent on, all in world axes at the reference pose."""
         pin, place = self.pin, np.asarray(place, np.float64)
         at = self.ids[parent]
         for k, (kind, axis) in enumerate(freedoms):
@@ -70,34 +70,34 @@ class Multibody:
             self.weights.append((at, np.asarray(centre, np.float64) - place, mass * np.asarray(gravity, np.float64)))
 
     def load(self, body: str, point: ArrayLike, force: ArrayLike) -> None:
-        """Return a constant force in fixed axes at a point that the body carries, given at the reference pose."""
+        """Add a constant force in fixed axes at a point of a body, given at the reference pose."""
         at = self.ids[body]
         place = np.asarray(point, np.float64) - self.origin[at]
         self.weights.append((at, place, np.asarray(force, np.float64)))
 
     def close(self, one: str, other: str, point: ArrayLike) -> int:
-        """Let two bodies share the point; its force on the first is a result."""
+        """Let two bodies share a point, and return the number of the closure, whose force on the first is a result."""
         at = np.asarray(point, np.float64)
         self.balls.append([(self.ids[b], at - self.origin[self.ids[b]]) for b in (one, other)])
         return len(self.balls) - 1
 
     def couple(self, terms: list[tuple[int, float]], constant: float = 0.0) -> int:
-        """Let the sum of factor times joint coordinate stay at a constant."""
+        """Let the sum of factor times joint coordinate stay constant, and return the number of the equation."""
         self.rows.append((terms, constant))
         return len(self.rows) - 1
 
     def drive(self, name: str) -> None:
-        """Name a joint that turns with the shaft."""
+        """Let a joint turn with the shaft."""
         self.cranks.append(self.coordinate[name, 0])
 
     def finish(self) -> Multibody:
-        """Make room for the algorithms; nothing can be added any more."""
+        """Allocate the data of the algorithms; nothing can be added afterwards."""
         self.data: Any = self.model.createData()
         self.q = np.zeros(self.model.nq)
         return self
 
     def point(self, ball: int, side: int) -> Array:
-        """Where one side of a ball stands."""
+        """Return the position of one side of a ball."""
         joint, local = self.balls[ball][side]
         place = self.data.oMi[joint]
         return np.asarray(place.translation + place.rotation @ local)
@@ -108,7 +108,7 @@ class Multibody:
         return np.asarray(six[:3] - self.pin.skew(arm) @ six[3:])
 
     def acceleration(self, joint: int, local: Array) -> Array:
-        """Acceleration of the point of a body that is ``local`` from its joint at the reference pose."""
+        """Return the acceleration of the point of a body that is ``local`` from its joint at the reference pose."""
         frame = self.pin.ReferenceFrame.LOCAL_WORLD_ALIGNED
         linear = self.pin.getClassicalAcceleration(self.model, self.data, joint, frame).linear
         a = self.pin.getAcceleration(self.model, self.data, joint, frame)
@@ -117,7 +117,7 @@ class Multibody:
         return np.asarray(linear + np.cross(a.angular, arm) + np.cross(w, np.cross(w, arm)))
 
     def closure(self, q: Array) -> tuple[Array, Array]:
-        """Residuals and Jacobian of all closures."""
+        """Return residuals and Jacobian of all closures."""
         self.pin.computeJointJacobians(self.model, self.data, q)
         gap = [self.point(k, 0) - self.point(k, 1) for k in range(len(self.balls))]
         rows = [self._jacobian(*ball[0]) - self._jacobian(*ball[1]) for ball in self.balls]
@@ -136,9 +136,7 @@ class Multibody:
         change: float,
         extra: Callable[[Multibody], list[Applied]] | None = None,
     ) -> tuple[list[Array], float, float]:
-        """Return forces where the cranks have turned by an angle from the reference pose,
-        in steps small enough for Newton.
-        """
+        """Return the forces after the cranks have turned by an angle from the reference pose, in small Newton steps."""
         model, data, pin = self.model, self.data, self.pin
         free = [k for k in range(model.nv) if k not in self.cranks]
         start = self.q[self.cranks[0]]
@@ -182,7 +180,7 @@ class Multibody:
         return found
 
     def held(self, body: str, place: Array | None = None) -> tuple[Array, Array]:
-        """Force and moment, about the joint or a place, of a body's parent on it, fixed axes."""
+        """Return force and moment, about the joint or a place, of a body's parent on it, in fixed axes."""
         joint = self.ids[body]
         wrench, frame = self.data.f[joint], self.data.oMi[joint]
         force, moment = frame.rotation @ wrench.linear, frame.rotation @ wrench.angular

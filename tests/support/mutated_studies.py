@@ -1,4 +1,4 @@
-"""Study files as they come from a hurried hand, a broken editor or an attacker: seeded mutations of sound ones."""
+"""Study files with errors of a hurried author, a broken editor or an attacker: seeded mutations of sound ones."""
 
 from __future__ import annotations
 
@@ -164,7 +164,7 @@ SWING, CRANK, K = (
     'a = { from = 10, to = 30, count = 4, unit = "mm" }',
     "k = { from = 1.0, to = 2.0 }",
 )
-# Numbers at the ends of what a number can be: the sound file, what stands in it, and what takes its place.
+# Numbers at the ends of the float range: the sound file, a text in it, and its replacement.
 EDGES = [
     (ROCKER, SWING, "margin = { min = 0, max = 0 }"),
     (ROCKER, SWING, 'swing = { min = 0, max = 0, unit = "deg" }'),
@@ -225,7 +225,7 @@ def _swap(pattern: re.Pattern[str], choices: list[str]) -> Callable[[random.Rand
 
 
 def _line(chance: random.Random, text: str) -> str:
-    """A line goes, comes twice, or moves."""
+    """Delete, duplicate or move a line."""
     lines = text.splitlines()
     line = lines.pop(chance.randrange(len(lines)))
     for _ in range(chance.choice([0, 1, 2])):
@@ -234,7 +234,7 @@ def _line(chance: random.Random, text: str) -> str:
 
 
 def _characters(chance: random.Random, text: str) -> str:
-    """Some characters go, or others come in."""
+    """Delete some characters, or insert others."""
     place = chance.randrange(len(text))
     junk = chance.choice(
         ["", "\x00", "é", "=", "[", "]", '"', "#", "\n", "'''", "\ufeff", "{", "}", ".", ",", "9", "-"]
@@ -252,13 +252,13 @@ def _nested(chance: random.Random, text: str) -> str:
 
 
 def _no_table(chance: random.Random, text: str) -> str:
-    """A table goes as a whole."""
+    """Delete a whole table."""
     tables = re.split(r"(?m)^(?=\[)", text)
     del tables[chance.randrange(1, len(tables))]
     return "".join(tables)
 
 
-# Nearly all of these files say nothing wrong, but ask for something rare.
+# Nearly all of these changes are valid, but ask for something rare.
 GENTLE = [
     *[_swap(_NUMBER, ["0", "0.5", "1", "2", "3", "10", "45", "100", "1e-3", "-5", "180", "1e4", "1e-9", "1e7"])] * 4,
     *[_swap(re.compile(r"count = \d+"), ["count = 1", "count = 2", "count = 7"])] * 2,
@@ -286,7 +286,7 @@ WILD = [
 
 
 def plain(name: str) -> str:
-    """A study of any family: its example in mm, one size swept, the largest position."""
+    """Return a study of any family: its example in mm, one swept size, the largest position."""
     one, lines = family(name), []
     for p in one.parameters:
         x = float(one.example.get(p.name, p.default or 0.0))
@@ -299,7 +299,7 @@ def plain(name: str) -> str:
 
 
 def mutated(seed: int) -> str:
-    """The study file of that seed: one to four changes of a sound one, gentle or wild; each fifth of some family."""
+    """Return a study file by seed: one to four gentle or wild changes to a valid one; every fifth of any family."""
     chance = random.Random(seed)
     text = chance.choice([ROCKER, ROCKER, DWELL, LOCUS, NEEDLE])
     text = plain(NAMES_OF_FAMILIES[seed // 5 % len(NAMES_OF_FAMILIES)]) if seed % 5 == 0 else text

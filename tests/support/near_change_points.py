@@ -1,4 +1,4 @@
-"""Crank-rockers within a hair of a change point, long couplers among them, and their maxima by brute force."""
+"""Crank-rockers very close to a change point, some with long couplers, and their maxima by brute force."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ LONG = (
 
 
 def placed(n, r, longest):
-    """The coupler measured between joints placed first; with ``longest`` one offset is up to so many cranks long."""
+    """Return designs whose coupler connects joints placed first; ``longest`` is the largest offset in cranks."""
     designs = np.column_stack(
         [
             r.uniform(0.1, 1.0, n), np.ones(n), r.uniform(0.5, 4.0, n), r.uniform(-3.0, 3.0, n),
@@ -38,7 +38,7 @@ def placed(n, r, longest):
 
 
 def near_change_points(n, seed, longest=1e5, lowest=1e-10, highest=1e-4):
-    """(n, 8) designs whose margin lies between two small numbers: rockers just long enough to turn."""
+    """Return (n, 8) designs whose margin lies between two small numbers: rockers just long enough to turn."""
     r, found = np.random.default_rng(seed), []
     while sum(map(len, found)) < n:
         designs = placed(8 * n, r, longest)
@@ -55,7 +55,7 @@ def near_change_points(n, seed, longest=1e5, lowest=1e-10, highest=1e-4):
 
 
 def tiny_cranks(n, seed):
-    """Cranks of 1e-12 to 1e-5 of the other links, couplers just longer than the shortest that lets them turn."""
+    """Return designs with cranks of 1e-12 to 1e-5 of the other links, couplers just longer than necessary to turn."""
     r, found = np.random.default_rng(seed), []
     while sum(map(len, found)) < n:
         designs = placed(8 * n, r, 1.0)
@@ -77,7 +77,7 @@ def tiny_cranks(n, seed):
 
 
 def crowded_angles(designs):
-    """Some 2000 crank angles per design, crowding about the deepest dip of the discriminant, by its own kernel."""
+    """Return some 2000 crank angles per design, dense near the least discriminant, found by its own kernel."""
     deepest = margins(designs)["phi_min"]
     away = np.concatenate([[0.0], np.geomspace(1e-9, np.pi, 600)])
     fine = np.concatenate([-away[::-1], away])
@@ -87,7 +87,7 @@ def crowded_angles(designs):
 
 
 def brute_maxima(designs, pose):
-    """Largest magnitude and its place by brute force: the four highest of all those poses, climbed."""
+    """Return the largest magnitude by brute force: the four highest of all crowded poses, climbed."""
     precise = RSSR.precise()
     phi = np.sort(np.mod(crowded_angles(designs), 2.0 * np.pi), axis=1)
     values = np.abs(precise.poses(designs, Angles.of(phi), frozenset([pose]))[pose])
@@ -103,7 +103,7 @@ def brute_maxima(designs, pose):
 
 
 def brute_range(designs):
-    """Largest minus smallest rocker angle: both climbed from the best of the crowded poses."""
+    """Return the largest minus the smallest rocker angle, both climbed from the best of the crowded poses."""
     precise, rows = RSSR.precise(), np.arange(len(designs))
     phi = np.sort(np.mod(crowded_angles(designs), 2.0 * np.pi), axis=1)
     psi = np.unwrap(precise.poses(designs, Angles.of(phi), frozenset(["psi"]))["psi"], axis=1)

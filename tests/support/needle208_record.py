@@ -1,4 +1,4 @@
-"""The study needle208 without what makes it buildable: the limits under which its record on paper stands."""
+"""The study needle208 without the limits that make it buildable, as its record on paper has it."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ FOLDER = Path(__file__).parents[2] / "studies" / "needle208"
 
 
 def record(least: float | None = None, **optimise: Any) -> Study:
-    """The study on paper: 0.015 mm of the drawing alone, links of any length or at least so long [mm]."""
+    """Return the study on paper: 0.015 mm for the nominal design, links of any length or at least ``least`` [mm]."""
     study = load_study(FOLDER)
     links = {
         name: {"max": study.data["limits"][name]["max"], "unit": "mm"} | ({} if least is None else {"min": least})

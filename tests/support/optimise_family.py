@@ -1,4 +1,4 @@
-"""A made-up family in numpy, whose best designs are known in closed form."""
+"""An artificial family in numpy, whose best designs are known in closed form."""
 
 from __future__ import annotations
 

@@ -18,7 +18,7 @@ FINEST = 1e-14
 
 
 def factors(folder: Path) -> list[Worst]:
-    """Factors of every table whose sheet states a tolerance."""
+    """Return the factors of every table whose sheet states a tolerance."""
     judges = (_rssr, _rssp, _needle, _composite, _limits, _pressure, _largest_pressure, _synthesis, _geared_dwell,
               effect_factors)  # fmt: skip
     return [worst for judge in judges for worst in judge(folder)]
@@ -29,7 +29,7 @@ def _column(rows: Sequence[Row], name: str) -> list[float]:
 
 
 def _orders(position: str, name: str) -> dict[str, tuple[str, list[str]]]:
-    """Return outputs of a follower named ``name`` against the keys d1, d2, d3 of the tables."""
+    """Return the outputs of a follower ``name`` with the keys d1, d2, d3 of the tables."""
     ladder = ["d1", "d2", "d3"]
     derivatives = {f"{'d' if k == 0 else f'd{k + 1}'}{name}": (ladder[k], ladder[: k + 1]) for k in range(3)}
     return {name: (position, [position])} | derivatives
@@ -44,7 +44,7 @@ def _rssr(folder: Path) -> list[Worst]:
 
 
 def _unit_size(row: Row, key: str) -> float | None:
-    """Return the size by which errors are measured; an angle is known to a rounding of one radian at best."""
+    """Return the size that is the unit of errors; an angle is known to a rounding of one radian at best."""
     size = size_of(row, key)
     return max(size, 1.0) if size is not None and key == "psi" else size
 
@@ -103,7 +103,7 @@ def _limits(folder: Path) -> list[Worst]:
 
 
 def _pressure(folder: Path) -> list[Worst]:
-    """Return pressure angles of crank-rockers."""
+    """Return the factors of pressure angles of crank-rockers."""
     rows = [row | row["expected"] for row in read(folder, "pressure") if row["kind"] == "rssr"]
     names = ("a", "b", "c", "e", "f", "g", "alpha")
     table = {name: _column([row["inputs"] for row in rows], name) for name in (*names, "phi")}
@@ -119,9 +119,7 @@ def _pressure(folder: Path) -> list[Worst]:
 
 
 def _largest_pressure(folder: Path) -> list[Worst]:
-    """Return the largest pressure angle over the turn;
-    the rows carry no sensitivity, the unit is a rounding of one radian.
-    """
+    """Return factors of the largest pressure angle over the turn, in roundings of one radian without a sensitivity."""
     found = []
     for family, names in (("rssr", ("a", "b", "c", "e", "f", "g", "alpha")), ("rssp", ("a", "b", "e", "f", "alpha"))):
         rows = [row | row["expected"] for row in read(folder, "pressure") if row["kind"] == f"extrema_{family}"]
@@ -136,7 +134,7 @@ def _largest_pressure(folder: Path) -> list[Worst]:
 
 
 def _synthesis(folder: Path) -> list[Worst]:
-    """Return links from a requirement: of the two solutions of every row, the one nearer to the table's crank."""
+    """Return factors of links from requirements; of two solutions per row, that closer to the table's crank."""
     found = []
     for family, mechanism, inputs, outputs in (
         ("rssr", "RSSR", {"swing": "psi0", "psi1": "psi1", "g": "g"}, {"a": "a", "b": "b", "c": "c"}),
@@ -154,9 +152,7 @@ def _synthesis(folder: Path) -> list[Worst]:
 
 
 def _geared_dwell(folder: Path) -> list[Worst]:
-    """Return poses, dwell measures and maxima;
-    the table has no condition numbers (its sheet: 16 roundings of the size).
-    """
+    """Return the factors of poses, dwell measures and maxima, without condition numbers (16 roundings of the size)."""
     everything = [row | row["out"] | row["in"] for row in read(folder, "geared_dwell")]
     points = [row for row in everything if row["kind"] == "point"]
     ladder = ["phi", "dphi", "d2phi", "d3phi"]

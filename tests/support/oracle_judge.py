@@ -1,7 +1,7 @@
-"""Judge of the oracle tables: errors in units of 2^-53 max(cond, |y|), per quantity and kind of row.
+"""Comparison with the oracle tables: errors in units of 2^-53 max(cond, |y|), per quantity and kind of row.
 
 The tables hold 25 digits and the condition number ``cond`` of every value: one rounding of each input moves it by
-2^-53 cond.  For a derivative the condition numbers of the lower ones count too, because a single one may vanish by
+2^-53 cond.  For a derivative the condition numbers of the lower orders count too, because a single one may vanish by
 accident.
 """
 
@@ -26,7 +26,7 @@ Row = Mapping[str, Any]
 
 @dataclass(frozen=True)
 class Worst:
-    """Largest factor of one quantity over the rows of one kind, and what its sheet allows."""
+    """Largest factor of one quantity over the rows of one kind, and the factor that its sheet allows."""
 
     table: str
     quantity: str
@@ -38,7 +38,7 @@ class Worst:
 
 
 def read(folder: Path, name: str) -> list[dict[str, Any]]:
-    """Rows of one table."""
+    """Return the rows of one table."""
     rows: list[dict[str, Any]] = json.loads((folder / f"{name}_open.json").read_text())["rows"]
     return rows
 
@@ -80,7 +80,7 @@ def judge(
 
 
 def size_of(row: Row, key: str) -> float | None:
-    """The larger of condition number and value; None where they leave float64 (scales of 1e+-100)."""
+    """Return the larger of condition number and value; None if they leave float64 (scales of 1e+-100)."""
     from mpmath import mpf
 
     cond, value = row["cond"].get(key), abs(float(row[key]))

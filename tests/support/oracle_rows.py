@@ -1,4 +1,4 @@
-"""Reading the oracle tables and measuring errors in units of 2^-53 times the tabulated sensitivity."""
+"""Reading of the oracle tables, and errors in units of 2^-53 times the tabulated sensitivity."""
 
 from __future__ import annotations
 
@@ -20,13 +20,13 @@ GEOMETRY = ("a", "b", "c", "e", "f", "g", "alpha", "sigma")
 
 
 def rows(table, **equal):
-    """Rows of one table whose fields equal the given values."""
+    """Return the rows of one table whose fields equal the given values."""
     everything = json.loads((FOLDER / f"{table}_open.json").read_text())["rows"]
     return [row for row in everything if all(row[key] == value for key, value in equal.items())]
 
 
 def factor(got, expected, scale):
-    """Largest error of the components of one quantity in units of 2^-53 max(scale, |y|)."""
+    """Return the largest error of a quantity's components in units of 2^-53 max(scale, |y|)."""
     got = np.atleast_1d(got)
     expected = [mp.mpf(y) for y in (expected if isinstance(expected, list) else [expected])]
     error = max(abs(mp.mpf(float(g)) - y) for g, y in zip(got, expected, strict=True))
@@ -35,13 +35,13 @@ def factor(got, expected, scale):
 
 
 def geometry(inputs):
-    """Design matrix and crank angles of rows that carry the names of the crank-rocker."""
+    """Return design matrix and crank angles of rows with the parameter names of the crank-rocker."""
     designs = np.array([[i[name] for name in GEOMETRY] for i in inputs], dtype=float)
     return designs, np.array([i.get("phi", 0.0) for i in inputs])
 
 
 def joint_records(designs, phi):
-    """Joint records and status of crank-rockers, one angle each: the way the effects see a linkage."""
+    """Return joint records and status of crank-rockers, one angle each, as the effects receive a linkage."""
     angles = Angles.of(np.asarray(phi, dtype=float).reshape(len(designs), -1))
     wanted = frozenset({"cos_psi", "sin_psi", "dpsi", "d2psi", "discriminant"})
     motion = family("rssr").poses(designs, angles, wanted)

@@ -1,4 +1,4 @@
-"""Poses whose every set of outputs has machine code of its own at once: what a long study comes to."""
+"""Separate machine code for every set of pose outputs, as a long study compiles it."""
 
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -9,6 +9,6 @@ from sweep.families import poses
 
 @contextmanager
 def own_code() -> Iterator[None]:
-    """Take every call for one of many poses."""
+    """Compile every set of outputs separately, as for many poses."""
     with patch.object(poses, "MANY", 0):
         yield

@@ -1,4 +1,4 @@
-"""Designs of the plain linkages that keep away from dead points, and their outputs at one angle."""
+"""Designs of the plain linkages away from dead points, and their outputs at one angle."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ WAVES = {f"{letter}{k}": 0.3 / k * (1 if letter == "c" else -1) for letter in "c
 
 
 def spread(count, /, **ranges):
-    """Random designs: a pair is an interval, a list the choices, a number itself."""
+    """Return random designs: a pair is an interval, a list the choices, a number itself."""
     columns = {}
     for name, values in ranges.items():
         if isinstance(values, tuple):
@@ -22,7 +22,7 @@ def spread(count, /, **ranges):
     return [dict(zip(columns, row, strict=True)) for row in zip(*columns.values(), strict=True)]
 
 
-# Proportions that keep away from dead points, where no number of digits of the input fixes the output.
+# Proportions away from dead points, where no number of digits of the input fixes the output.
 DESIGNS = {
     "slider_crank": spread(12, a=(0.2, 1.0), b=(2.0, 4.0), e=(-0.8, 0.8), branch=[1, -1]),
     "four_bar": spread(

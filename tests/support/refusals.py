@@ -1,4 +1,4 @@
-"""Which limits a design breaks, in words."""
+"""Limits that a design violates, in words."""
 
 from collections.abc import Iterable, Mapping
 
@@ -8,7 +8,7 @@ from sweep.quantities.limits import Limit, compared, meets
 
 
 def refusals(limits: Iterable[Limit], values: Mapping[str, float]) -> list[str]:
-    """Say in words which limits a design breaks, each with its value and bound; a missing value breaks any."""
+    """Describe the limits that a design violates, each with its value and bound; a missing value violates any."""
     found = []
     for limit in limits:
         value = values[limit.output]

@@ -1,4 +1,4 @@
-"""Builds dataset folders whose contents are known in closed form; no kernel runs.
+"""Dataset folders whose contents are known in closed form; no kernel runs.
 
 The study is a chain rssr + guide.  Its designs are a plain function of a1 and xi2, so best cells, counts and fronts are
 known; the curves are those of links that turn about known pivots.
@@ -52,13 +52,13 @@ REFERENCE = {"max_abs_d2s": 10.0, "stroke": 24.5, "max_abs_dev": 0.1, "max_press
 
 
 def study_data(**changes: Any) -> dict[str, Any]:
-    """A copy of the study's data with some tables replaced; None removes one."""
+    """Return a copy of the study's data with some tables replaced; None removes one."""
     data = copy.deepcopy(DATA) | changes
     return {key: value for key, value in data.items() if value is not None}
 
 
 def designs(study: Study, start: int, stop: int) -> tuple[dict[str, np.ndarray], np.ndarray]:
-    """Outputs and status of some designs: acceleration grows with |a1 - 18|, deviation with |xi2 - 40|."""
+    """Return outputs and status of some designs: acceleration grows with |a1 - 18|, deviation with |xi2 - 40|."""
     columns = study.space.columns(start, stop)
     outputs = {
         "max_abs_d2s": 8.5 + 0.1 * np.abs(columns["a1"] - 18.0) + 0.001 * np.abs(columns["xi2"] - 50.0),
@@ -75,7 +75,7 @@ def designs(study: Study, start: int, stop: int) -> tuple[dict[str, np.ndarray],
 
 
 def write_dataset(folder: Path, data: dict[str, Any] | None = None, *, optimum: dict[str, Any] | None = None) -> Path:
-    """A complete dataset; with ``optimum`` (changes to the optimum's row) also what an optimiser leaves."""
+    """Write a complete dataset; with ``optimum`` (changes to the optimum's row) also the optimiser's tables."""
     data = study_data() if data is None else data
     study = study_from_data(data, "study.toml")
     plan = make_plan(study, CHUNK)
@@ -104,7 +104,7 @@ def write_dataset(folder: Path, data: dict[str, Any] | None = None, *, optimum: 
 
 
 def write_optimum(folder: Path, study: Study, changes: dict[str, Any]) -> None:
-    """One optimum, two other starts, the reference; curves of optimum and reference."""
+    """Write one optimum, two other starts, the reference, and curves of optimum and reference."""
     fixed = dict(study.space.fixed) | {"a1": 18.0, "alpha1": 0.1, "xi2": 40.0}
     about = {"violation": 0.0, "kkt_residual": 1e-9, "active": "max_abs_dev at most 0.05", "agree": 2, "status": 0}
     errors = {f"err_{name}": 1e-10 for name in OPTIMUM}
@@ -123,7 +123,7 @@ def write_optimum(folder: Path, study: Study, changes: dict[str, Any]) -> None:
 
 
 def curve(role: str, half_stroke: float, poses: int = 72) -> pd.DataFrame:
-    """A harmonic needle, a crank of radius 18 about (0, 0, 5), a rocker of 45 about (100, 0, 0), a coupler point."""
+    """Return curves: a harmonic needle, a crank of radius 18 about (0, 0, 5), a rocker of 45 about (100, 0, 0)."""
     phi = np.arange(poses) * (2.0 * np.pi / poses)
     swing = 1.5 + 0.4 * np.sin(phi)
     return pd.DataFrame(

@@ -11,7 +11,7 @@ JOINT_NAMES = ("x_b", "y_b", "z_b", "x_c", "y_c", "z_c")
 
 
 def random_designs(n, seed, *, rotatable=False):
-    """(n, 8) design matrix; with ``rotatable`` only those whose crank turns fully."""
+    """Return an (n, 8) design matrix; with ``rotatable`` only designs whose crank turns fully."""
     found = []
     while sum(map(len, found)) < n:
         designs = _placed(4 * n, seed)
@@ -34,7 +34,7 @@ def _placed(n, seed):
 
 
 def poses(designs, phi, *, function=rssr.poses):
-    """All pose outputs and the status as a dictionary; phi (n, m) or (1, m), real or complex."""
+    """Return all pose outputs and the status as a dictionary; phi (n, m) or (1, m), real or complex."""
     designs, phi = np.asarray(designs), np.asarray(phi)
     shape = (len(designs), phi.shape[1])
     dtype = np.result_type(designs, phi)
@@ -45,7 +45,7 @@ def poses(designs, phi, *, function=rssr.poses):
 
 
 def margins(designs, *, function=rssr.margin):
-    """Outputs of the margin kernel as a dictionary."""
+    """Return the outputs of the margin kernel as a dictionary."""
     n = len(designs)
     out = {name: np.empty(n) for name in ("margin", "rotatable", "max_pressure_angle", "phi_min", "error")}
     status = np.empty(n, np.uint8)
@@ -54,7 +54,7 @@ def margins(designs, *, function=rssr.margin):
 
 
 def limits(designs, *, function=rssr.limits):
-    """Outputs of the limits kernel and their errors as a dictionary."""
+    """Return the outputs of the limits kernel and their errors as a dictionary."""
     n = len(designs)
     status, values, errors = np.empty(n, np.uint8), np.empty((n, 7)), np.empty((n, 7))
     function(designs, status, values, errors)
@@ -67,7 +67,7 @@ def limits(designs, *, function=rssr.limits):
 
 
 def maxima(designs, order, target=1e-8, *, function=rssr.true_maxima):
-    """True maximum of the transfer function of that order, its phi, both errors and the status."""
+    """Return the true maximum of a transfer function of some order, its phi, both errors and the status."""
     n = len(designs)
     out = {name: np.empty((3, n)) for name in ("phi", "error", "phi_error")}
     most, status = np.empty(n), np.empty(n, np.uint8)
@@ -77,7 +77,7 @@ def maxima(designs, order, target=1e-8, *, function=rssr.true_maxima):
 
 
 def dense(designs, order, samples):
-    """Largest sample of the transfer function of that order on a grid, and its position."""
+    """Return the largest sample of a transfer function of some order on a grid, its position, and the least margin."""
     n = len(designs)
     phi = np.arange(samples) * (2.0 * np.pi / samples)
     most, least, at = np.empty(n), np.empty(n), np.empty(n, np.int64)

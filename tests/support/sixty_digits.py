@@ -22,7 +22,7 @@ _TURN = 2.0 * np.pi
 
 
 def transfer_functions(design: Array, phi: float) -> tuple[Any, ...]:
-    """Return the psi, psi', psi'', psi''' as mpmath numbers, for exactly the given doubles."""
+    """Return psi, psi', psi'', psi''' as mpmath numbers, for exactly the given doubles."""
     import mpmath
 
     with mpmath.workdps(DIGITS):
@@ -38,9 +38,7 @@ def position(design: Array, phi: float) -> Any:
 
 
 def _angle(inputs: list[Any], branch: int) -> tuple[Any, ...]:
-    """Solve the implicit equation in the plain letters of the sources by arctangent plus arccosine;
-    no kernel's algebra.
-    """
+    """Solve the implicit equation of the sources by arctangent plus arccosine, other algebra than any kernel's."""
     import mpmath
 
     a, b, c, e, f, g, alpha, phi = inputs
@@ -72,9 +70,7 @@ def _motion(inputs: list[Any], branch: int) -> tuple[Any, ...]:
 
 
 def turning_point(design: Array, phi: float) -> tuple[Any, Any]:
-    """Return the crank angle and rocker angle where the rocker turns back next to phi,
-    by Newton's method in 60 digits.
-    """
+    """Return crank and rocker angle of the rocker's reversal next to phi, by Newton's method in 60 digits."""
     import mpmath
 
     with mpmath.workdps(DIGITS):
@@ -88,9 +84,7 @@ def turning_point(design: Array, phi: float) -> tuple[Any, Any]:
 
 
 def condition(design: Array, phi: float) -> tuple[float, ...]:
-    """Return the absolute condition numbers sum |x dy/dx| of psi and its derivatives over all inputs,
-    by 60-digit differences.
-    """
+    """Return the absolute condition numbers sum |x dy/dx| of psi and its derivatives, by 60-digit differences."""
     import mpmath
 
     with mpmath.workdps(DIGITS):
@@ -110,7 +104,7 @@ def condition(design: Array, phi: float) -> tuple[float, ...]:
 
 
 def angle_error(got: float, exact: Any) -> float:
-    """Return the distance of an angle from the exact one, whatever full turns lie between."""
+    """Return the distance of an angle from the exact one, modulo full turns."""
     import mpmath
 
     with mpmath.workdps(DIGITS):
@@ -118,28 +112,23 @@ def angle_error(got: float, exact: Any) -> float:
 
 
 def extremum(designs: Array, pose: str, sign: int = 0) -> Array:
-    """Return the true maximum (sign 1),
-    minimum (-1) or largest magnitude (0) over the turn of a pose output with a derivative.
+    """Return the maximum (sign 1), minimum (-1) or largest magnitude (0) over the turn of a pose output.
 
     Every local extremum within a tenth of the best sample is refined by halving on the sign of the derivative.  Of the
-    samples 49 152 are evenly spaced; the others crowd about the least discriminant, down to 1e-9 rad, because near a
-    change point the even ones see nothing.  A follower that turns fully has no extremum of its angle: nan.
+    samples 49 152 are evenly spaced; the others are dense near the least discriminant, down to 1e-9 rad, since near a
+    change point the even ones miss the peak.  A follower that turns fully has no extremum of its angle: nan.
     """
     return _extremum(designs, pose, sign)[0]
 
 
 def largest_acceleration(designs: Array) -> Array:
-    """Return the largest |psi''| over the turn:
-    the place as :func:`extremum` finds it, the height sharpened in 60 digits.
-    """
+    """Return the largest |psi''| over the turn, at the place of :func:`extremum`, with the height in 60 digits."""
     _, places = _extremum(designs, "d2psi", 0)
     return np.array([peak_acceleration(*pair) for pair in zip(designs, places, strict=True)])
 
 
 def peak_acceleration(design: Array, phi: float) -> float:
-    """Return the height of the peak of the acceleration next to phi, in 60 digits:
-    secant steps to the zero of the jerk.
-    """
+    """Return the peak acceleration closest to phi, in 60 digits, by secant steps to the zero of the jerk."""
     import mpmath
 
     with mpmath.workdps(DIGITS):
@@ -197,7 +186,7 @@ def swing(designs: Array) -> Array:
 
 
 def refined(designs: Array, pose: str, sign: int, centre: Array, before: Array, after: Array) -> tuple[Array, Array]:
-    """Return the height, times the sign that makes it a maximum, and place of the extremum around each centre."""
+    """Return height, times the sign that makes it a maximum, and place of the extremum around each centre."""
     slope = RSSR.derivative_of[pose]
     low, high = centre - before, centre + after
     for _ in range(_HALVINGS):

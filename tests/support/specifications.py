@@ -1,4 +1,4 @@
-"""Random specifications of a crank-rocker whose rocker has length 1: swing, phi0, pressure angle, box of the rest."""
+"""Random specifications of crank-rockers with c = 1: swing, phi0, pressure angle limit and ranges of the links."""
 
 from __future__ import annotations
 
@@ -14,14 +14,14 @@ from sweep.optimise import Problem
 from sweep.study import Limit
 
 RSSR = family("rssr")
-NAMES = ("a", "b", "e", "f", "g", "alpha")  # in units of c
+NAMES = ("a", "b", "e", "f", "g", "alpha")  # relative to c
 LOW, HIGH = np.array([0.1, 0.5, 0.0, -1.5, -1.5, 0.0]), np.array([0.9, 4.0, 2.5, 1.5, 1.5, math.pi / 2])
 
 
 def specifications(seed: int) -> Iterator[Problem]:
-    """Swing and phi0 of a random mechanism that turns, a limit of the pressure angle at or above its own, a random box.
+    """Yield problems with swing and phi0 of a random turning mechanism, a limit on the pressure angle, a random box.
 
-    The mechanism itself is not told to the search; it makes sure that there is a solution.
+    The mechanism itself is unknown to the search; it ensures that a solution exists.
     """
     rng = np.random.default_rng(seed)
     while True:

@@ -1,4 +1,4 @@
-"""Starts of samples, all at once; and what a search that ended at some values tells of itself."""
+"""Starts of samples, all at once, and the survey of a search that ended at given values."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from tests.support.optimise_family import FAMILY
 
 
 def gathered(groups: Iterable[Group]) -> tuple[np.ndarray, tuple[int, ...]]:
-    """Return the starts (k, P) of some groups, and the number of the sample that each comes from."""
+    """Return the starts (k, P) of some groups, and the number of each start's sample."""
     found = list(groups)
     return np.concatenate([group.designs for group in found]), tuple(g.source for g in found for _ in g.designs)
 
@@ -28,17 +28,17 @@ def from_sample(problem: Problem, signs: Sequence[dict[str, float]], count: int,
 
 
 def bowl() -> Problem:
-    """A problem of two variables."""
+    """Return a problem of two variables."""
     return Problem(FAMILY, ("p", "q"), -4 * np.ones(2), 4 * np.ones(2), {}, "max_abs_bowl")
 
 
 def result(start: int, objective: float, status: int = st.OK, ended: str = "converged") -> Result:
-    """What a search from a start has ended at."""
+    """Return the result of a search from a start."""
     return Result(start, np.zeros(4), objective, 0.0, 0.0, 0.0, (), {}, {}, {}, status, ended)
 
 
 def populations_ended_at(values: Sequence[float], settings: OptimiseSettings) -> Survey:
-    """The survey of populations that ended at these values; what is no finite number is not feasible."""
+    """Return the survey of populations that ended at these values; a value that is not finite is infeasible."""
     ends = [result(k, x, st.OK if math.isfinite(x) else st.LIMIT_EXCEEDED) for k, x in enumerate(values)]
     groups = [Group(np.zeros((1, 4)), k, 1) for k in range(len(values))]
     return survey(bowl(), groups, ends, replace(settings, globally="proportions"), "")

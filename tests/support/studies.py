@@ -1,4 +1,4 @@
-"""Studies that stand no more beside the others: their questions are answered elsewhere, their optima judge code."""
+"""Earlier studies, whose questions are answered elsewhere, and whose optima test the code."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ NEEDLE208 = Path(__file__).parents[2] / "studies" / "needle208"
 
 
 def beside_needle208(name: str, folder: Path) -> Study:
-    """Load an earlier study from a folder in which needle208, of which it takes its needle drive, stands beside it."""
+    """Load an earlier study from a folder beside needle208, from which it takes its needle drive."""
     shutil.copytree(EARLIER / name, folder / name)
     (folder / "needle208").mkdir()
     shutil.copy(NEEDLE208 / "expected.json", folder / "needle208")

@@ -1,4 +1,4 @@
-"""One problem of each of the tasks 1 to 8, its best solution, and what the families say of it."""
+"""One problem of each of the tasks 1 to 8, its best solution, and its evaluation by the families."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ STAGE_BOUNDS = {"b1": (0.3, 8.0), "c1": (0.3, 5.0)}
 
 @cache
 def best(problem):
-    """The best solution; problems are frozen, so each is solved once."""
+    """Return the best solution; problems are frozen, so each is solved once."""
     solutions = solve(problem.build(), candidates=2048, starts=2, samples=1)
     assert solutions
     assert solutions[0].feasible, str(solutions[0])
