@@ -1,1 +1,1 @@
-"""From a motion to numbers of a design: extrema, limit positions, margins, means and times over the turn."""
+"""Reductions of poses to design outputs: extrema, limit positions, margins, means and events over the turn."""

@@ -1,4 +1,4 @@
-"""Events of a family: where a pose output passes a level, found as a root between samples, not as a sample."""
+"""Events of a family: passages of a pose output through a level, computed as roots between samples."""
 
 from __future__ import annotations
 
@@ -17,24 +17,24 @@ from sweep.reductions.resolution import denser
 from sweep.reductions.rounding import shaken
 from sweep.reductions.sampling import DESIGN_STATUS, Index, blocks, pose_columns, sample_turn, variable
 
-START, LIMIT = 256, 16384  # samples of the first look, and those beyond which a design is given up
+START, LIMIT = 256, 16384  # first number of samples, and the last one before a design is given up
 
 
 def event_outputs(family: Family, designs: Array, names: Sequence[str], accuracy: Accuracy) -> Columns:
-    """Compute the first crank angle and the number of the events that are asked for.
+    """Compute the place of the first occurrence, and the count, of the wanted events.
 
     Parameters
     ----------
     family, designs : the (n, P) design matrix; an interval is taken as a closed turn, out and back
     names : see `sweep.quantities.resolve.event_names`
-    accuracy : on samples, events that come and go between two of them are missed; otherwise samples are doubled until a
-        parabola through three of them leaves no room for that
+    accuracy : on samples, two passages between neighbouring samples are missed; otherwise samples are doubled until a
+        parabola through three of them excludes that
 
     Returns
     -------
     Columns
-        the names with their ``err_``, each (n,), and ``status``: NO_EVENT where it does not happen, NOT_CONVERGED where
-        16384 samples leave it open
+        the names with their ``err_``, each (n,), and ``status``: NO_EVENT where the event does not occur, NOT_CONVERGED
+        where 16384 samples are not enough
     """
     n = len(designs)
     columns: Columns = {"status": np.zeros(n, np.uint8)}
@@ -54,7 +54,7 @@ def event_outputs(family: Family, designs: Array, names: Sequence[str], accuracy
 
 
 def _events(family: Family, designs: Array, event: Event, accuracy: Accuracy) -> tuple[Array, Array, Array, Status]:
-    """First angle of the event and its error, how often it happens, and status, each (n,)."""
+    """First angle of the event and its error, count, and status, each (n,)."""
     n = len(designs)
     phi, err, number, status = np.full(n, np.nan), np.full(n, np.nan), np.zeros(n), np.zeros(n, np.uint8)
     samples = accuracy.samples or START
@@ -84,11 +84,11 @@ def _events(family: Family, designs: Array, event: Event, accuracy: Accuracy) ->
 
 
 def _crossings(family: Family, designs: Array, rows: Index, values: Array, event: Event) -> tuple[Array, Array, Array]:
-    """How often samples (r, m) pass the level in the event's sense, and the first place with its error, each (r,)."""
+    """Count the passages of samples (r, m) in the event's sense; also the first place and its error, each (r,)."""
     off = (values - event.level) * (1.0 if event.rising else -1.0)
     passes = (off < 0.0) & (np.roll(off, -1, axis=1) >= 0.0)
     if isinstance(family.domain, Interval):
-        passes[:, values.shape[1] // 2 :] = False  # the way back
+        passes[:, values.shape[1] // 2 :] = False  # the way back is not counted
     number = passes.sum(axis=1).astype(np.float64)
     phi, err = np.full(rows.size, np.nan), np.full(rows.size, np.nan)
     row = np.flatnonzero(number > 0)
@@ -103,7 +103,7 @@ def _crossings(family: Family, designs: Array, rows: Index, values: Array, event
 def _root(
     family: Family, designs: Array, event: Event, left: Array, right: Array, low: Array, high: Array
 ) -> tuple[Array, Array]:
-    """Find a passage between two samples, with the values ``low`` and ``high``; its error is from their slope."""
+    """Find a root between two samples with the values ``low`` and ``high``, from whose slope its error follows."""
 
     def off(which: Index, phi: Array) -> Array:
         return pose_columns(family, designs[which], phi[:, None], [event.of])[0][event.of][:, 0] - event.level

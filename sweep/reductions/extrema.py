@@ -1,8 +1,8 @@
 """True extrema over one turn of any pose output of any family; docs/internals/extrema.md.
 
-Sampled, refined between the samples, and sampled again more densely where the samples do not resolve the curve.  A
-chain of families that can be fused has one kernel for that, and a smooth curve of dear poses is the Fourier series of
-its samples; what they leave open, and everything else, is searched for from poses alone.
+Curves are sampled, refined between the samples, and sampled more densely where the samples do not resolve them.  Fused
+chains have one kernel for that, and a smooth curve of expensive poses is represented by the Fourier series of its
+samples; all other curves, and undecided designs, are searched on poses alone.
 """
 
 from __future__ import annotations
@@ -22,8 +22,8 @@ from sweep.reductions.resolution import series_of
 from sweep.reductions.sampling import Extremum, Mask, blocks, put
 from sweep.reductions.window import Window
 
-OVER = 1e-6  # of a limit position from the cut of its angle [rad]
-HARD = 512  # samples of the first look at what the fused search has left open
+OVER = 1e-6  # distance of a limit position from the angle's branch cut [rad] that counts as beyond it
+HARD = 512  # first number of samples for designs that the fused search has left undecided
 
 
 def true_extrema(
@@ -36,29 +36,29 @@ def true_extrema(
     anywhere: bool = False,
     window: Window | None = None,
 ) -> tuple[dict[Request, Extremum], Status]:
-    """Refined extrema over one turn.
+    """Compute refined extrema over one turn.
 
     Parameters
     ----------
     family, designs : the (n, P) design matrix of any family
-    requests : which extrema of which pose outputs
+    requests : the requested extrema of pose outputs
     target : relative accuracy of each value
     locate : whether all crank angles are wanted, not only those of requests with ``place``
-    anywhere : the requested pose outputs are known also where the links do not reach (discriminants): the whole turn
+    anywhere : the requested pose outputs are defined also where the links do not reach (discriminants): the whole turn
         counts whatever its status, and only nan in it makes the extremum nan
-    window : for windowed requests, between which positions poses count
+    window : for windowed requests, the range of positions whose poses count
 
     Returns
     -------
     extrema : per request; nan where the status is not OK, except NOT_CONVERGED, which keeps its best value
-    status : (n,) OK; NOT_ROTATABLE, UNDECIDABLE, SINGULAR, INVALID_INPUT from poses that the search met;
-        NOT_OSCILLATING where an angle without extremum was asked for; NOT_CONVERGED where 32768 samples do not resolve
-        the curve.  Whether a dead point lies between the samples is for the margin to say (`sweep.reductions.margins`).
+    status : (n,) OK; NOT_ROTATABLE, UNDECIDABLE, SINGULAR, INVALID_INPUT from poses met by the search; NOT_OSCILLATING
+        for an angle without an extremum; NOT_CONVERGED where 32768 samples do not resolve the curve.  Dead points
+        between the samples are found by the margin (`sweep.reductions.margins`).
 
     Notes
     -----
     The search from poses starts with 32 samples.  A design is sampled again, with twice as many or more, if the fourth
-    difference of its samples exceeds a tenth of their size, if they stand wider than a twelfth of the distance of the
+    difference of its samples exceeds a tenth of their size, if their spacing exceeds a twelfth of the distance of the
     nearest complex zero of a discriminant, or if refinement moved the peak by more than 5 % of its height.
     """
     found: dict[Request, Extremum] = {}
@@ -113,7 +113,7 @@ def true_extrema(
 
 
 def _blanked(found: dict[Request, Extremum], status: Status) -> dict[Request, Extremum]:
-    """Take the extrema of designs away, in place, of which nothing is known."""
+    """Replace extrema of failed designs by nan, in place."""
     lost = (status != st.OK) & (status != st.NOT_CONVERGED)
     if lost.any():
         for extremum in found.values():
@@ -126,7 +126,7 @@ def _apart(
     family: Family, designs: Array, requests: Sequence[Request], target: float, locate: bool, window: Window | None,
     apart: Mask,
 ) -> tuple[dict[Request, Extremum], Status]:  # fmt: skip
-    """As `true_extrema`, of the designs that jump and of the others by themselves."""
+    """Compute `true_extrema` separately for designs with jumps (``apart``) and without."""
     found = {request: Extremum.unknown(len(designs)) for request in requests}
     status = np.zeros(len(designs), np.uint8)
     for rows in (np.flatnonzero(apart), np.flatnonzero(~apart)):
@@ -141,7 +141,7 @@ def _searched(
     family: Family, designs: Array, requests: Sequence[Request], target: float, locate: bool, anywhere: bool,
     window: Window | None, start: int | None = None,
 ) -> tuple[dict[Request, Extremum], Status]:  # fmt: skip
-    """As `true_extrema`, from poses alone, ``start`` samples at first; values stand where the status is not OK too."""
+    """Compute `true_extrema` from poses alone, beginning with ``start`` samples; failed designs keep their values."""
     search = peak_search.Search(family, designs, tuple(requests), target, locate, anywhere, window)
     pending, samples = np.arange(len(designs)), start or peak_search.START
     while pending.size:
@@ -156,7 +156,7 @@ def _searched(
         rows = np.flatnonzero(torn)
         if rows.size:
             cut, now = panels.extrema(family, designs[rows], [request], target, locate)
-            if family.pose_output[request.pose].wraps:  # panels do not continue an angle that swings over its cut
+            if family.pose_output[request.pose].wraps:  # panels do not unwrap an angle across its branch cut
                 over = np.abs(cut[request].value) + 2.0 * cut[request].err > np.pi - OVER
                 now = np.where((now == st.OK) & over, st.NOT_CONVERGED, now)
             search.status[rows] = np.where(search.status[rows] == st.OK, now, search.status[rows])

@@ -1,6 +1,7 @@
 """Extrema over the turn of chains whose stages are fused into one kernel, :mod:`kernels.chains`.
 
-A family that can only end a chain is one by itself: a guide whose crank is the main shaft.
+A family that can only be the last stage of a chain is treated as a chain of one stage: a guide whose crank is the main
+shaft.
 """
 
 from __future__ import annotations
@@ -31,15 +32,15 @@ Found: TypeAlias = tuple[Extremum, Status, Mask]
 
 @dataclass(frozen=True)
 class FusedCurve:
-    """A curve over the crank angle of a fused chain.
+    """Curve over the crank angle of a fused chain.
 
     Parameters
     ----------
-    family, request : the chain, and what is asked of it
-    forms : what the stages that the curve needs are fused by
-    order : of the derivative, or the margin's
-    made_of : the numbers of the curve, from the last stage's designs
-    scale : by which the kernel's values are multiplied, from the chain's designs; None for 1
+    family, request : the chain, and the requested extremum
+    forms : fused forms of the stages that the curve needs
+    order : order of the derivative, or MARGIN
+    made_of : coefficients of the curve, from the last stage's designs
+    scale : factor of the kernel's values, from the chain's designs; None for 1
     """
 
     family: Family
@@ -50,29 +51,29 @@ class FusedCurve:
     scale: DesignMap | None = None
 
     def extremum(self, designs: Array, target: float, opened: Opened | None = None) -> Found:
-        """Return what is requested, of every design; as `extrema`."""
+        """Compute the requested extremum of every design, as `extrema` does."""
         return self.extrema((self.request,), designs, target, opened)[0]
 
     def extrema(
         self, requests: tuple[Request, ...], designs: Array, target: float, opened: Opened | None = None
     ) -> list[Found]:
-        """Return one extremum of every design, or the largest and the least value, which share their samples.
+        """Compute one extremum of every design, or the largest and the smallest value, which share their samples.
 
         Parameters
         ----------
-        requests : of this curve, alike but for their modes: one, or those of modes +1 and -1
+        requests : requests of this curve that differ only in their modes: one, or those of modes +1 and -1
         designs : (n, P) matrix of the whole chain
         target : relative accuracy
-        opened : what `opened` gives of these designs, for any curve of the chain, if it is known
+        opened : result of `opened` for these designs and any curve of the chain, if it is known
 
         Returns
         -------
-        extremum : of each request, nan where the status is not OK or nothing is decided
+        extremum : of each request, nan where the status is not OK or the search is undecided
         status : (n,) OK or NOT_ROTATABLE
-        undecided : (n,) where a slower search is to be asked
+        undecided : (n,) where a slower search is needed
         """
         n, (given, made_of, along) = len(designs), self._given(designs, opened)
-        # Which of several is the highest decides on the place.
+        # The place depends on which of several peaks is the highest.
         tie = TIE if self.request.place else -1.0
         modes = np.array([request.mode for request in requests])
         status, found = np.empty((modes.size, n), np.uint8), np.empty((6, modes.size, n))
@@ -94,7 +95,7 @@ class FusedCurve:
             places, err_phi[top] = polished(self.family, many[top], slope, *known)
             phi[top] = np.mod(places, TWO_PI)
         undecided = status == chains.OPEN
-        # A discriminant is known also where the links do not reach, which is for the slower search to say.
+        # A discriminant is defined also where the links do not reach; the slower search computes it there.
         if self.order == MARGIN:
             undecided |= status == st.NOT_ROTATABLE
         status = np.where(undecided | (status == chains.ROUNDED), st.OK, status).astype(np.uint8)
@@ -102,7 +103,7 @@ class FusedCurve:
         return list(zip(each, status, undecided, strict=True))
 
     def mean(self, designs: Array, target: float) -> tuple[Array, Array, Status, Mask]:
-        """Return root mean squares over the turn, their errors, the status and what is undecided, as `extremum`."""
+        """Compute root mean squares over the turn, their errors, status and undecided designs, as in `extremum`."""
         n, (given, made_of, along) = len(designs), self._given(designs, None)
         status, found = np.empty(n, np.uint8), np.empty((2, n))
         chains.mean_squares(_chained(self.forms), self.order, along)(
@@ -112,9 +113,9 @@ class FusedCurve:
         return found[0], found[1], np.where(undecided, st.OK, status).astype(np.uint8), undecided
 
     def opened(self, designs: Array) -> Opened:
-        """Return what all curves of a chain have in common.
+        """Compute the part that all curves of a chain share.
 
-        These are the designs as the kernels take them, whether the first stage turns, and the distance of its nearest
+        It consists of the designs in the kernels' form, the status of the first stage, and the distance of its nearest
         singularity.
         """
         n, designs = len(designs), np.ascontiguousarray(designs)
@@ -127,16 +128,16 @@ class FusedCurve:
         return designs, opening, distance
 
     def _given(self, designs: Array, opened: Opened | None) -> tuple[Opened, Array, bool]:
-        """Designs and how they open, what the curve is made of, and whether it needs nothing across."""
+        """Return the opened designs, the curve's coefficients, and whether the part across a line is zero."""
         stage = self.family.stages[len(self.forms) - 1]
         made_of = np.ascontiguousarray(self.made_of(designs[:, stage.columns]))
-        # Positions along and across a line are often asked for together: they share a kernel, which has to be compiled.
+        # Positions along and across a line are often wanted together: they share a kernel, which saves compiling.
         return opened or self.opened(designs), made_of, self.order >= 1 and not made_of[:, 1].any()
 
     def _confirm(
         self, designs: Array, found: Extremum, rows: Index, modes: Index, tolerance: Array, spacing: Array
     ) -> None:
-        """Replace extrema that rounding may have moved too far by what precise poses say, in place."""
+        """Replace extrema that rounding may have moved too far by those of precise poses, in place."""
         precise, pose = self.family.precise(), self.request.pose
         phi = found.phi[rows]
         there = self._precisely(precise, designs[rows], phi)
@@ -160,7 +161,7 @@ class FusedCurve:
         found.err[rows] = peaks.err_height + self._behind(designs[rows], there) * np.abs(peaks.height)
 
     def _precisely(self, precise: Family, designs: Array, phi: Array) -> dict[str, Array]:
-        """Pose output and the discriminants of the later stages, each at one crank angle of each design."""
+        """Evaluate the pose output and the later stages' discriminants at one crank angle of each design."""
         names = [self.request.pose, *(loop.discriminant for loop in self._later())]
         poses, _ = pose_columns(precise, designs, phi[:, None], list(dict.fromkeys(names)))
         return {name: values[:, 0].copy() for name, values in poses.items()}
@@ -169,7 +170,7 @@ class FusedCurve:
         return [loop for loop in self.family.every(Assembly) if loop.stage and 2 <= int(loop.stage) <= len(self.forms)]
 
     def _behind(self, designs: Array, there: dict[str, Array]) -> Array:
-        """Share of a value by which the rounded input angles of the later stages' precise poses may change it."""
+        """Relative change of a value due to the rounded input angles of the later stages' precise poses."""
         amplified = np.ones(len(designs))
         for loop in self._later():
             amplified += np.abs(loop.scale(designs) / there[loop.discriminant])
@@ -177,12 +178,12 @@ class FusedCurve:
 
 
 def curve_of(family: Family, request: Request, anywhere: bool, mean: bool = False) -> FusedCurve | None:
-    """Fused curve of what is requested; None where there is none.
+    """Fused curve of a request; None where there is none.
 
-    ``anywhere`` as of `sweep.reductions.extrema.true_extrema`: then the least discriminant of a later stage.
+    ``anywhere`` is that of `sweep.reductions.extrema.true_extrema`: then the smallest discriminant of a later stage.
     """
     forms = _forms(family)
-    # What can drive another stage has steps of its own for its largest magnitudes, none for a ``mean``.
+    # A family that can drive another stage has its own steps for largest magnitudes, but not for a ``mean``.
     if forms is None or (len(forms) == 1 and forms[0].form.turn is not None and request.mode == 0 and not mean):
         return None
     if anywhere:
@@ -190,7 +191,7 @@ def curve_of(family: Family, request: Request, anywhere: bool, mean: bool = Fals
     output, last = family.pose_output[request.pose], family.stages[-1]
     if output.stage not in ("", str(last.number)) or (request.place and request.pose not in family.derivative_of):
         return None
-    # Derivatives that carry the number of their stage are not with respect to the crank angle of the chain.
+    # Derivatives with a stage number are not with respect to the crank angle of the chain.
     curve: Curve | None = forms[-1].curves.get(output.base)
     if curve is None or (output.stage and curve.order > 0):
         return None
@@ -208,9 +209,9 @@ def _least_discriminant(family: Family, forms: tuple[InSeries, ...], request: Re
 
 
 def sampled_maxima(family: Family, designs: Array, requests: tuple[Request, ...], samples: int) -> dict[Request, Array]:
-    """Largest magnitudes on a grid of equidistant crank angles, of those requests that a fused chain serves at once.
+    """Largest magnitudes on a grid of equidistant crank angles, for the requests that one fused kernel serves.
 
-    Each is (n,), nan where a discriminant on the grid is not surely positive: what the status is, poses say.
+    Each is (n,), nan where a discriminant on the grid is not surely positive: poses then determine the status.
     """
     forms = _forms(family) if isinstance(family, Chain) else None
     wanted = {} if forms is None else {r: name for r in requests if (name := _component(family, forms, r)) is not None}
@@ -239,9 +240,9 @@ def _component(family: Family, forms: tuple[InSeries, ...], request: Request) ->
 
 
 def _forms(family: Family) -> tuple[InSeries, ...] | None:
-    """Return what the stages of a chain are fused by; None for any other family, and for poses of higher precision.
+    """Fused forms of a chain's stages; None for any other family, and for poses of higher precision.
 
-    Where rounding counts precise poses decide, so a family without them is not searched this way.
+    Precise poses decide where rounding matters, so a family without them is not searched this way.
     """
     if family.precise_poses is None or family.poses is family.precise_poses:
         return None

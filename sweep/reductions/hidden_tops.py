@@ -1,9 +1,9 @@
-"""Tops that even samples hide: one of two that stand closer than samples, and what begins where a curve switches.
+"""Maxima that even samples hide: a second one closer than a sample, or one next to an angle where a curve switches.
 
-Samples that resolve a curve to a tenth of its size may show two tops as one.  Then the quartic through them is off at
-the top by more than a top of that width explains, and a closer look tells.  Beside an angle at which a curve switches,
-as a phase of a cam begins, a force may fall to nothing and rise again within a hundredth of a sample: places that crowd
-about it show a top at any distance.
+Samples that resolve a curve to a tenth of its size may show two maxima as one.  Then the error of the quartic at the
+maximum exceeds that of a single maximum of this width, and a closer look decides.  Beside an angle at which a curve
+switches, as at the beginning of a cam's phase, a force may fall to zero and rise again within a hundredth of a sample:
+places that crowd about the angle show a maximum at any distance.
 """
 
 from __future__ import annotations
@@ -19,23 +19,23 @@ from sweep.quantities.kinds import Request
 from sweep.reductions.refine import Candidates, Peaks, Sampler
 from sweep.reductions.sampling import Index, Mask, joined, only
 
-# Error of the first guess against the fall to the next samples, from which on a top is looked at closely: 0.04 and 0.1
-# where two tops showed as one; few tops of smooth curves have more.
+# Error of the first guess relative to the fall to the next samples above which a maximum is looked at closely: it was
+# 0.04 and 0.1 where two maxima appeared as one; few maxima of smooth curves exceed it.
 NARROW = 0.02
 RUNGS = np.exp2(np.arange(-12.0, 1.0))
-CROWDED = np.concatenate([-RUNGS[::-1], RUNGS])  # places about a switch, in samples
-CLOSER = np.linspace(-2.25, 2.25, CROWDED.size)  # places about a top
+CROWDED = np.concatenate([-RUNGS[::-1], RUNGS])  # places about a switch, in sample spacings
+CLOSER = np.linspace(-2.25, 2.25, CROWDED.size)  # places about a maximum, in sample spacings
 
 
 class Sampled(NamedTuple):
-    """Samples of a turn: numbers of the designs (n,), pose outputs (n, m) by name, and how many samples there are."""
+    """Samples of a turn: indices of the designs (n,), pose outputs (n, m) by name, and number of samples."""
 
     rows: Index
     columns: dict[str, Array]
     samples: int
 
     def around(self, requests: Sequence[Request], candidates: Candidates, near: Index) -> Array:
-        """Return the samples about candidates, (k, q); ``near`` (q,) says which, counted from the one of each."""
+        """Return the samples around candidates, (k, q), at offsets ``near`` (q,) from each candidate's own sample."""
         number, row, column, _ = candidates
         found = np.empty((row.size, near.size))
         for k, request in enumerate(requests):
@@ -45,15 +45,15 @@ class Sampled(NamedTuple):
 
 
 def doubtful(candidates: Candidates, peaks: Peaks, around: Array, tolerance: Array) -> Index:
-    """Return the refined peaks beside which samples may hide a higher one.
+    """Select the refined peaks beside which samples may hide a higher one.
 
     Parameters
     ----------
-    candidates, peaks, tolerance : k peaks, and the error allowed in each height
-    around : (k, 7) measured samples about each
+    candidates, peaks, tolerance : k peaks, and the allowed error of each height
+    around : (k, 7) samples around each, times the candidate's sign
     """
     off = np.abs(peaks.guess - peaks.height)
-    # A magnitude that nearly vanishes has no lower value beside.
+    # A minimum of a magnitude cannot be below zero, so it cannot be missed by more than its own height.
     off = np.where((candidates.sign < 0.0) & (around <= 0.0).all(axis=1), np.minimum(off, np.abs(peaks.height)), off)
     fall = around[:, 3] - 0.5 * (around[:, 2] + around[:, 4])
     curve = _curve(candidates, 1 + candidates.request.max(initial=0))
@@ -64,12 +64,12 @@ def doubtful(candidates: Candidates, peaks: Peaks, around: Array, tolerance: Arr
 
 
 def dips(requests: Sequence[Request], columns: Mapping[str, Array], resolved: Mask) -> Candidates:
-    """Return the curves that may fall to nothing beside a switch: magnitudes whose least value is wanted.
+    """List the curves that may fall to zero beside a switch: magnitudes whose smallest value is wanted.
 
     Parameters
     ----------
     requests, columns : (r,) and the samples of the pose outputs, (n, m) each
-    resolved : (r, n) which requests are answered by these samples
+    resolved : (r, n) requests that these samples resolve
     """
     wanted = resolved.copy()
     for k, request in enumerate(requests):
@@ -79,14 +79,14 @@ def dips(requests: Sequence[Request], columns: Mapping[str, Array], resolved: Ma
 
 
 def closer_looks(tops: Candidates, beside: Candidates, angles: Array, samples: int) -> tuple[Candidates, Array]:
-    """Return what is to be looked at closely, about tops and about switches: candidates and their rising angles (q, m).
+    """List candidates for a closer look, at maxima and at switches, with their rising angles (q, m).
 
     Parameters
     ----------
-    tops : beside which a higher one may be hidden
+    tops : candidates beside which a higher maximum may be hidden
     beside : curves to be looked at beside switches
     angles : (n, k) at which the curves of each design switch [rad]
-    samples : of the turn
+    samples : number of samples of the turn
     """
     at, spacing = angles[beside.row], TWO_PI / samples
     every = only(beside, np.repeat(np.arange(len(at)), at.shape[1]))._replace(column=_column(at.ravel(), samples))
@@ -95,9 +95,9 @@ def closer_looks(tops: Candidates, beside: Candidates, angles: Array, samples: i
 
 
 def tops_of(sample: Sampler, looks: Candidates, phi: Array, samples: int, guess: Array) -> tuple[Candidates, Peaks]:
-    """Return the places of closer looks that are higher than both of their neighbours, as peaks to be refined.
+    """Find the places of closer looks that are higher than both neighbours, as peaks to be refined.
 
-    ``guess`` are the heights that samples showed where the first looks are.
+    ``guess`` are the heights by the even samples of the first looks.
     """
     values = sample(np.arange(len(phi)), phi)
     look, column = np.nonzero((values[:, 1:-1] > values[:, :-2]) & (values[:, 1:-1] >= values[:, 2:]))
@@ -109,9 +109,9 @@ def tops_of(sample: Sampler, looks: Candidates, phi: Array, samples: int, guess:
 
 
 def apart(known: tuple[Candidates, Peaks], found: tuple[Candidates, Peaks]) -> Index:
-    """Return which of the peaks found are none of those known of the same curve: these are farther away than the gap.
+    """Select the found peaks that differ from all known ones of the same curve: they are farther away than the gap.
 
-    One top listed twice, with different errors, would make a tie of which rounding chooses the place.
+    One maximum listed twice, with different errors, would make a tie whose place is chosen by rounding.
     """
     requests = 1 + max(which.request.max(initial=0) for which, _ in (known, found))
     low, high = (2.0 * TWO_PI * _curve(which, requests) + np.mod(peaks.phi, TWO_PI) for which, peaks in (known, found))
@@ -122,12 +122,12 @@ def apart(known: tuple[Candidates, Peaks], found: tuple[Candidates, Peaks]) -> I
 
 
 def _curve(candidates: Candidates, requests: int) -> Index:
-    """Return the number of the curve that each candidate belongs to."""
+    """Index of each candidate's curve."""
     numbers: Index = candidates.row * requests + candidates.request
     return numbers
 
 
 def _column(phi: Array, samples: int) -> Index:
-    """Return the nearest samples."""
+    """Index of the nearest sample."""
     nearest: Index = np.rint(phi * (samples / TWO_PI)).astype(np.int64) % samples
     return nearest

@@ -17,13 +17,13 @@ from sweep.reductions.sampling import DESIGN_STATUS, Extremum, pose_columns, put
 
 NAMES = ("rotatable", "margin", "max_pressure_angle")
 TRANSMISSION = "least_transmission_angle"
-# Smallest values are refined to this part of themselves: their sign is what matters.
+# Relative accuracy of the smallest discriminants: their sign is what matters.
 TARGET = 1e-10
-FEW = 16  # poses that show of most designs which do not turn that they do not
+FEW = 16  # number of poses that identify most non-rotatable designs
 
 
 def margin_suffixes(family: Family) -> tuple[str, ...]:
-    """Return what follows the names of a stage's margin: nothing for a single family, the stage numbers for a chain.
+    """List the suffixes of a stage's margin names: "" for a single family, the stage numbers for a chain.
 
     Stages without a discriminant (a geared drive turns always) are left out.
     """
@@ -33,15 +33,15 @@ def margin_suffixes(family: Family) -> tuple[str, ...]:
 def margins(
     family: Family, designs: Array, suffixes: tuple[str, ...], accuracy: Accuracy, valued: bool = True
 ) -> Columns:
-    """Whether the stages turn fully, their smallest cos^2(pressure angle) and largest pressure angle over the turn.
+    """Compute whether the stages turn fully, their smallest cos^2(pressure angle) and largest pressure angle.
 
     Parameters
     ----------
     family, designs : the (n, P) design matrix
-    suffixes : which stages (see `margin_suffixes`); a later stage is only asked where the earlier ones turn
-    accuracy : handed to the families' own steps, which are preferred; with ``samples`` the margin of what does not
-        turn is the least of so many poses, unless such a step or a fused kernel has it exactly
-    valued : whether that margin counts; if not, it is the least of few poses
+    suffixes : of the stages (see `margin_suffixes`); a later stage is only computed where the earlier ones turn
+    accuracy : passed to the families' own steps, which are preferred; with ``samples`` the margin of a non-rotatable
+        design is the minimum over the samples, unless such a step or a fused kernel computes it exactly
+    valued : whether the margin of non-rotatable designs is used; if not, it is the minimum over few poses
 
     Returns
     -------
@@ -51,8 +51,8 @@ def margins(
 
     Notes
     -----
-    The margin of what does not turn is the least discriminant over 4 b^2 c^2, or over b^2 if it is a squared length:
-    where the links reach this equals cos^2(pressure angle), so the margin is smooth across zero.
+    The margin of a non-rotatable design is the smallest discriminant over 4 b^2 c^2, or over b^2 if it is a squared
+    length: where the links reach this equals cos^2(pressure angle), so the margin is smooth across zero.
     """
     n = len(designs)
     columns: Columns = {}
@@ -60,7 +60,7 @@ def margins(
     looked = FEW if not valued else accuracy.samples or 0
     for suffix in suffixes:
         alive = np.flatnonzero(status == st.OK)
-        with np.errstate(all="ignore"):  # what is no number, or leaves float64, has its status
+        with np.errstate(all="ignore"):  # invalid values and overflows have their status
             part = _stage_margin(family, designs[alive], suffix, accuracy, looked)
         status[alive] = part["status"]
         for name in NAMES:
@@ -72,7 +72,7 @@ def margins(
 
 
 def combined(columns: Columns, suffixes: tuple[str, ...]) -> Columns:
-    """Whole chain's margins from those of its stages: the weakest stage decides."""
+    """Combine the margins of a chain's stages: the weakest stage decides."""
     rotatable = np.logical_and.reduce([columns[f"rotatable{s}"] for s in suffixes])
     result: Columns = {"rotatable": rotatable, "err_rotatable": np.zeros(rotatable.size)}
     for name, sign in (("margin", -1.0), ("max_pressure_angle", 1.0)):
@@ -89,7 +89,7 @@ def combined(columns: Columns, suffixes: tuple[str, ...]) -> Columns:
 def with_transmission(columns: Columns, suffixes: tuple[str, ...]) -> Columns:
     """Add the least transmission angle of each suffix to the columns: 90 degrees less the largest pressure angle.
 
-    It is made of the cosine and the sine of that angle, so that it stays exact where the linkage nearly locks.
+    It is computed from cosine and sine of the pressure angle, so that it stays exact where the linkage nearly locks.
     """
     for suffix in suffixes:
         margin = np.asarray(columns[f"margin{suffix}"], np.float64)
@@ -101,7 +101,7 @@ def with_transmission(columns: Columns, suffixes: tuple[str, ...]) -> Columns:
 
 
 def own_step(family: Family, suffix: str, accuracy: Accuracy) -> tuple[Step, Stage] | None:
-    """Return the family's own exact route to the margin, if it has one; a chain's first stage turns by itself."""
+    """Find the family's own exact step for the margin; that of a chain's first stage also applies to the chain."""
     first = family.stages[0]
     if first.tail and suffix != first.tail:
         return None
@@ -124,7 +124,7 @@ def _stage_margin(family: Family, designs: Array, suffix: str, accuracy: Accurac
 
 
 def _from_poses(family: Family, designs: Array, suffix: str, looked: int) -> Columns:
-    """Margin from the family's discriminant, refined to its least value but where ``looked`` poses tell enough."""
+    """Compute the margin from the family's discriminant, refined unless ``looked`` poses are enough."""
     designs, _ = near_unit_size(family, designs)  # no discriminant overflows
     loop = next(found for found in family.every(Assembly) if found.stage == suffix)
     discriminant, angle = loop.discriminant, loop.pressure_angle
@@ -138,14 +138,14 @@ def _from_poses(family: Family, designs: Array, suffix: str, looked: int) -> Col
     phi = np.where(known, least.phi, 0.0)[:, None]
     poses, state = pose_columns(family, designs, phi, (discriminant, angle))
     at_least = DESIGN_STATUS[state[:, 0]]
-    # A discriminant with nan in it: the status of the poses that have none says why.
+    # A discriminant with nan in it: the status of those poses gives the reason.
     status = np.where(known, at_least, np.where(unknown == st.OK, st.NOT_CONVERGED, unknown)).astype(np.uint8)
     turns = status == st.OK
     scale = loop.scale(designs)
     pressure = np.where(turns, poses[angle][:, 0], np.nan)
     err_margin = least.err / scale
     margin = np.where(turns, np.cos(pressure) ** 2, least.value / scale)
-    # d(angle) = d(cos^2) / sin(2 angle), and sqrt(d(cos^2)) where that is too steep to be linear.
+    # d(angle) = d(cos^2) / sin(2 angle), and sqrt(d(cos^2)) where the linearisation fails.
     err_angle = np.minimum(err_margin / np.abs(np.sin(2.0 * pressure)), np.sqrt(err_margin)) + 2.0**-51
     return {
         f"rotatable{suffix}": turns,
@@ -159,7 +159,7 @@ def _from_poses(family: Family, designs: Array, suffix: str, looked: int) -> Col
 
 
 def _apart(family: Family, designs: Array, discriminant: str, looked: int) -> Extremum:
-    """Least discriminant among so many poses of designs whose links do not reach in one of them; nan for all others."""
+    """Smallest discriminant among ``looked`` poses of designs that fail to assemble in one of them; nan for others."""
     least = Extremum.unknown(len(designs))
     columns, status = pose_columns(family, designs, turn(looked).phi, (discriminant,))
     values = np.where(status == st.NOT_ASSEMBLED, columns[discriminant], 0.0)

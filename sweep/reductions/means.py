@@ -1,8 +1,8 @@
 """Root mean square over one turn of any pose output: equidistant precise poses, or adaptive quadrature on panels.
 
-A smooth curve settles on equidistant poses.  Panels are for what does not: they crowd about the nearest singularities,
-begin and end where a curve has kinks or jumps, and are halved where needed.  Chains whose stages are fused have a
-kernel for it, which leaves the hard designs to panels.
+The mean of a smooth curve converges on equidistant poses.  All other curves need panels, which crowd about the nearest
+singularities, begin and end where a curve has kinks or jumps, and are halved adaptively.  Fused chains have a kernel
+for the mean, which leaves difficult designs to panels.
 """
 
 from __future__ import annotations
@@ -25,18 +25,18 @@ from sweep.reductions.resolution import denser, ends, nearest, series_of
 from sweep.reductions.rounding import shaken
 from sweep.reductions.sampling import DESIGN_STATUS, Index, blocks, pose_columns, sample_turn
 
-SAMPLES = 128  # of a turn at first
-NEAR = 0.3  # distance of a singularity [rad] from which on it is looked at closely
-PANEL = 1.0  # length of the first panels against that distance; the rule of 15 points errs by 1e-13 there
+SAMPLES = 128  # first number of samples of a turn
+NEAR = 0.3  # distance of a singularity [rad] below which panels are used
+PANEL = 1.0  # length of the first panels relative to that distance, for which the 15-point rule errs by 1e-13
 PANELS_AT_ONCE = 1024
-LOOKS = 512  # samples among which a curve with kinks or jumps is searched for what cuts it
-EVEN = 16  # first panels of a curve with kinks, jumps or waves, beside those between its known ones
-KNOWN = 4  # of one all of whose kinks are known
+LOOKS = 512  # samples on which kinks and jumps of a curve are searched
+EVEN = 16  # first panels of a curve with kinks, jumps or waves, in addition to cuts at its known kinks
+KNOWN = 4  # first panels of a curve all of whose kinks are known
 PREFIX = "rms_"
 
 
 def mean_squares(family: Family, designs: Array, names: Sequence[str], accuracy: Accuracy) -> Columns:
-    """Root mean squares over one turn, on samples, or refined until they have settled.
+    """Compute root mean squares over one turn, on samples or refined until they converge.
 
     Parameters
     ----------
@@ -48,7 +48,7 @@ def mean_squares(family: Family, designs: Array, names: Sequence[str], accuracy:
     -------
     Columns
         the names and ``err_<name>`` (nan on samples), each (n,), and ``status``: as of extrema, NOT_CONVERGED where
-        panels do not settle the value; it stays, with its error.  Errors include the rounding of the poses.
+        panels do not converge; the value is kept, with its error.  Errors include the rounding of the poses.
     """
     n, poses = len(designs), [name.removeprefix(PREFIX).replace(f".{PREFIX}", ".") for name in names]
     if accuracy.samples is not None:
@@ -59,14 +59,14 @@ def mean_squares(family: Family, designs: Array, names: Sequence[str], accuracy:
     columns: Columns = {}
     status = np.zeros(n, np.uint8)
     for name, pose in zip(names, poses, strict=True):
-        # Each by itself, so that no bit of it depends on what is wanted beside it.
+        # Each by itself, so that no bit of it depends on the other wanted names.
         columns[name], columns[f"err_{name}"], now = _of_one(family, designs, pose, accuracy.target)
         status = np.where(status == st.OK, now, status)
     return columns | {"status": status}
 
 
 def _of_one(family: Family, designs: Array, pose: str, target: float) -> tuple[Array, Array, Status]:
-    """Means of one pose output and their errors (n,), and the status: of a fused chain by its kernel, else by poses."""
+    """Mean of one pose output, its error, and status, each (n,): by the kernel of a fused chain, else from poses."""
     known = family.pose_output[pose]
     request = Request(pose, 0)
     smooth = not known.kinks and not known.jumps
@@ -81,10 +81,10 @@ def _of_one(family: Family, designs: Array, pose: str, target: float) -> tuple[A
 
 
 def _refined(family: Family, designs: Array, pose: str, target: float) -> tuple[Array, Array, Status]:
-    """Means of one pose output and their errors (n,), and the status, from poses alone."""
+    """Mean of one pose output, its error, and status, each (n,), from poses alone."""
     mean, err, status, top = _on_turn(family.precise(), designs, pose)
     output = family.pose_output[pose]
-    # What jumps, bends or waves is cut there.
+    # Curves with jumps, kinks or waves are cut into panels.
     cut = crossed(family, designs, (pose,)) | (denser(family, designs, (pose,)) > 1.0) | output.kinks | output.jumps
     even = KNOWN if switching(family, (pose,)) and pose not in family.dear else EVEN
     alive = np.flatnonzero(status == st.OK)
@@ -102,16 +102,16 @@ def _refined(family: Family, designs: Array, pose: str, target: float) -> tuple[
     lost = (status != st.OK) & (status != st.NOT_CONVERGED)
     mean[lost], err[lost] = np.nan, np.nan
     if family.precise_poses is None and alive.size:
-        # Badly scaled designs lose digits in every pose: what the largest one loses, the mean may lose.
+        # Badly scaled designs lose digits in every pose: the mean may lose as much as the largest value.
         err[alive] = np.maximum(err[alive], shaken(family, designs[alive], top[alive], pose))
     return mean, err, status
 
 
 def _on_turn(family: Family, designs: Array, pose: str) -> tuple[Array, Array, Status, Array]:
-    """Means over equidistant samples, their errors, the status and where a curve is largest [rad], (n,) each.
+    """Means over equidistant samples, their errors, status, and place of the largest value [rad], each (n,).
 
-    Every other sample gives the mean before.  Of a periodic curve without near singularities the error falls by its
-    square when samples are doubled.
+    The error is estimated from the mean of every other sample.  For a periodic curve without near singularities it is
+    squared when samples are doubled.
     """
     n = len(designs)
     mean, err, top, status = np.full(n, np.nan), np.full(n, np.nan), np.empty(n), np.empty(n, np.uint8)
@@ -129,7 +129,7 @@ def _on_turn(family: Family, designs: Array, pose: str) -> tuple[Array, Array, S
 
 
 def _on_panels(family: Family, designs: Array, pose: str, edges: Array, target: float) -> tuple[Array, Array, Status]:
-    """Means, their errors and the status by adaptive quadrature of precise poses: plain ones may be noise alone."""
+    """Compute means, errors and status by adaptive quadrature of precise poses: others may be dominated by rounding."""
     family, n = family.precise(), len(designs)
     status, wraps = np.zeros(n, np.uint8), family.pose_output[pose].wraps
     columns, codes = pose_columns(family, designs, edges, [pose])
@@ -157,26 +157,26 @@ def _on_panels(family: Family, designs: Array, pose: str, edges: Array, target: 
     integrals = integrate(squares, edges, 2.0 * target)  # the root halves a relative error
     mean = np.sqrt(integrals.value[:, 0] / TWO_PI)
     state = DESIGN_STATUS[status].astype(np.uint8)
-    state[(state == st.OK) & ~np.isfinite(starts).all(axis=1)] = st.INVALID_INPUT  # a pose that leaves float64
+    state[(state == st.OK) & ~np.isfinite(starts).all(axis=1)] = st.INVALID_INPUT  # a pose beyond float64
     state[(state == st.OK) & ~integrals.settled] = st.NOT_CONVERGED
     return size * mean, size * _rounded(integrals.err[:, 0] + blur, mean), state
 
 
 def _rounded(off: Array, mean: Array) -> Array:
-    """Return the error of means whose integrals of squares are wrong by ``off``, their own rounding included."""
+    """Error of means whose integrals of squares are off by ``off``, rounding included."""
     half: Array = np.divide(0.5 * off, TWO_PI * mean, out=np.sqrt(off / TWO_PI), where=mean > 0.0)
     return half + 16.0 * EPS * mean
 
 
 def _blur(squares: Array) -> Array:
-    """Bound what the rounding of the crank angles may do to the integral of squares: their variation times that."""
-    # One after the other: repeated angles add nothing, however many there are.
+    """Bound the effect of rounded crank angles on the integral of squares by the total variation of the squares."""
+    # A running sum: repeated angles add nothing, however many there are.
     variation: Array = np.cumsum(np.abs(squares - np.roll(squares, 1, axis=1)), axis=1)[:, -1]
     return 2.0 * EPS * TWO_PI * variation
 
 
 def _on_grid(family: Family, designs: Array, samples: int, poses: Sequence[str]) -> tuple[Array, Status]:
-    """Means (q, n) of q pose outputs over equidistant samples, and the status."""
+    """Compute means (q, n) of q pose outputs over equidistant samples, and the status."""
     n = len(designs)
     found, status = np.full((len(poses), n), np.nan), np.empty(n, np.uint8)
     names = list(dict.fromkeys(poses))
@@ -184,7 +184,7 @@ def _on_grid(family: Family, designs: Array, samples: int, poses: Sequence[str])
         columns, worst, winds = sample_turn(family, designs[part], samples, names)
         status[part] = np.where((worst == st.OK) & winds, st.NOT_OSCILLATING, DESIGN_STATUS[worst])
         for mean, pose in zip(found, poses, strict=True):
-            # Not by einsum: from 8192 samples on it adds up one row otherwise than several.
+            # Not by einsum: from 8192 samples on it sums one row in another order than several.
             values = np.sqrt(np.square(columns[pose]).sum(axis=1) / samples)
             mean[part] = np.where(status[part] == st.OK, values, np.nan)
     return found, status

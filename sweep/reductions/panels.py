@@ -1,10 +1,10 @@
-"""True extrema of curves with kinks and jumps: panels of a turn, halved wherever the curve may still be highest.
+"""True extrema of curves with kinks and jumps: panels of a turn, halved wherever the curve may have its maximum.
 
 Friction changes its direction where a joint stops turning.  There loads jump or have a kink, and between two such
 places a curve may rise and fall within a hundredth of a radian.  So the turn is cut where the followers reverse, which
-are roots of known functions, and into even panels between.  On each panel a polynomial goes through the poses; a panel
-whose polynomial, and what it may be wrong by, stays below the highest pose is left.  The others are halved until the
-poses of both halves agree with the polynomial before (docs/internals/extrema.md).
+are roots of known functions, and into even panels between.  On each panel a polynomial interpolates the poses; a panel
+whose polynomial plus its error bound stays below the highest pose is discarded.  The others are halved until the poses
+of both halves agree with the polynomial before (docs/internals/extrema.md).
 """
 
 from __future__ import annotations
@@ -27,26 +27,26 @@ from sweep.reductions.resolution import MATTERS, ends, nearest, zeros
 from sweep.reductions.rounding import order_of, singular_share
 from sweep.reductions.sampling import DESIGN_STATUS, Extremum, Index, Mask, blocks, discriminants, only, pose_columns
 
-PANELS = 64  # of a turn at first, besides those that begin where a follower reverses
-TAIL = 4  # last coefficients that tell how wrong a polynomial may be; of a tent in the middle three nearly vanish ...
-CAREFUL = 3.0  # ... times this: the tip of a tent, wherever on the panel, is up to 2.91 times their sum above the rest
-LATELY = 0.25  # of what the polynomial before was wrong by: halving takes a kink's share to a half
-# Next to a reversal friction takes its direction from a speed that is all rounding: nearer poses are noise.
+PANELS = 64  # first even panels of a turn, besides cuts where a follower reverses
+TAIL = 4  # last coefficients that bound a polynomial's error; for a tent in the middle three of them nearly vanish ...
+CAREFUL = 3.0  # ... times this: a tent's tip, anywhere on the panel, is up to 2.91 times their sum above the others
+LATELY = 0.25  # share of the previous polynomial's error in the bound: halving a panel halves the error of a kink
+# Next to a reversal the sign of friction comes from a speed that is only rounding: nearer poses are noise.
 NARROWEST = 1e-11  # width of a panel [rad] that can only hold a jump
-VANISHED = 1e-6  # of the size: a root of what is zero to rounding
-EDGE = 2.0**17  # times EPS of the size: what a curve that rises by six sizes a radian may do in a quarter of that
-CROWD = 48  # panels of one curve beyond which rounding alone is halved
-ALLOWED = 1.0 / 32.0  # of the target: what two successive polynomials may differ by
-AGAIN = 8.0  # times that difference is claimed: poses see a kink between them as low as that
-STEADY = 10.0 * AGAIN  # times EPS of a value: what is claimed at most of a curve that is level but for its rounding
-SLOPE = 2.0 * (NODES - 1) ** 2  # of a polynomial bounded by 1 on a panel of width 1 (Markov)
+VANISHED = 1e-6  # share of the size below which a root counts as a zero
+EDGE = 2.0**17  # times EPS of the size: change over NARROWEST/4 of a curve with a slope of six sizes per radian
+CROWD = 48  # number of small panels of one curve beyond which only rounding is being halved
+ALLOWED = 1.0 / 32.0  # share of the target by which two successive polynomials may differ
+AGAIN = 8.0  # factor from that difference to the claimed error: poses may see only 1/8 of a kink between them
+STEADY = 10.0 * AGAIN  # times EPS of a value: largest error claimed for a curve that is constant but for rounding
+SLOPE = 2.0 * (NODES - 1) ** 2  # bound of the slope of a polynomial bounded by 1 on a panel of width 1 (Markov)
 
 
 class Panels(NamedTuple):
-    """Panels of several curves, (k,).
+    """Panels of several curves, each (k,).
 
-    The curve's row, ends [rad]; coefficients (k, NODES); the highest pose seen on each and its place [rad];
-    by how much poses missed the polynomial of the panel that it is a half of.
+    Row of the curve; ends [rad]; coefficients (k, NODES); highest pose on the panel and its place [rad]; difference
+    between the poses and the polynomial of the panel before it was halved.
     """
 
     row: Index
@@ -59,7 +59,7 @@ class Panels(NamedTuple):
 
 
 class Top(NamedTuple):
-    """Highest points of k panels: place [rad], value, error of the value, error of the place [rad]."""
+    """Maxima of k panels: place [rad], value, error of the value, error of the place [rad]."""
 
     row: Index
     phi: Array
@@ -69,7 +69,7 @@ class Top(NamedTuple):
 
 
 def has_kinks(family: Family, request: Request, jumps: bool = False) -> bool:
-    """Whether an extremum is to be searched for on panels; ``jumps``: all curves of these designs may jump."""
+    """Whether an extremum is searched on panels; with ``jumps`` all curves of these designs may jump."""
     output = family.pose_output[request.pose]
     return (output.kinks or output.jumps or jumps) and not output.wraps and not request.windowed
 
@@ -77,20 +77,20 @@ def has_kinks(family: Family, request: Request, jumps: bool = False) -> bool:
 def extrema(
     family: Family, designs: Array, requests: Sequence[Request], target: float, locate: bool
 ) -> tuple[dict[Request, Extremum], Status]:
-    """Extrema over one turn of curves with kinks and jumps.
+    """Compute extrema over one turn of curves with kinks and jumps.
 
     Parameters
     ----------
-    family : with its most accurate poses; designs : (n, P)
-    requests : extrema wanted
+    family, designs : the (n, P) design matrix
+    requests : requested extrema
     target : relative accuracy; of a place [rad]
     locate : whether all crank angles are wanted
 
     Returns
     -------
     extrema : values are suprema: beside a jump the limit from its higher side
-    status : (n,) OK; what the poses of the turn say; NOT_CONVERGED where an error exceeds the target, and the rounding
-        of the poses too
+    status : (n,) OK; status of the turn's poses; NOT_CONVERGED where an error exceeds both the target and the rounding
+        of the poses
     """
     n = len(designs)
     found = {request: Extremum.unknown(n) for request in requests}
@@ -103,7 +103,7 @@ def extrema(
 
 
 def _cut_alike(family: Family, requests: Sequence[Request]) -> list[list[Request]]:
-    """Group the requests for which the turn is cut at the same crank angles."""
+    """Group the requests whose curves are cut at the same crank angles."""
     groups: dict[tuple[Bends, ...], list[Request]] = {}
     for request in requests:
         groups.setdefault(bends(family, request.pose), []).append(request)
@@ -128,17 +128,17 @@ def _block(
         panels = _fitted(row, low, high, values, request.mode)
         top, size = _climbed(family, designs[rows], panels, request, target, locate or request.place)
         rounding = _rounding(guards, poses, good, row, top, family.precise_poses is not None)
-        lost = np.zeros(top.row.size, np.bool_)  # no digit is left next to a singularity
+        lost = np.zeros(top.row.size, np.bool_)  # no correct digit next to a singularity
         if singular(family, (request.pose,)):
             near = nearest(family, designs[rows[top.row]], (request.pose,), MATTERS)
             order = np.full(top.row.size, order_of(family, request.pose))
             share = singular_share(near, top.phi, order)
             rounding, lost = rounding + share * np.abs(top.value), share >= 1.0
-        # the size of a level curve is rounding, and no target for its error
+        # the range of a constant curve is rounding, which no target can refer to
         allowed = np.maximum(target * size[top.row], STEADY * EPS * np.abs(top.value))
         if request.mode == -1:
             _vanish(family, designs[rows], request.pose, top, size)
-        if family.pose_output[request.pose].jumps:  # constant in pieces: a polynomial only adds rounding
+        if family.pose_output[request.pose].jumps:  # piecewise constant: a polynomial only adds rounding
             attained, _ = pose_columns(family, designs[rows[top.row]], top.phi[:, None], [request.pose])
             top = top._replace(value=_measured(attained[request.pose][:, 0], request.mode))
         late = lost | ((top.err > allowed) & (top.err > rounding))
@@ -150,10 +150,10 @@ def _block(
 
 
 def _vanish(family: Family, designs: Array, pose: str, top: Top, size: Array) -> None:
-    """Make the least value 0, in place, of curves that pass zero at a known place, like a root of the distance."""
+    """Set the minimum to 0, in place, for curves with a known zero, like the square root of a squared distance."""
     row, phi = zeros(family, designs, pose)
     values, _ = pose_columns(family, designs[row], phi[:, None], [pose])
-    passes = values[pose][:, 0] <= VANISHED * size[row]  # at a jump the function has another sign, but no zero
+    passes = values[pose][:, 0] <= VANISHED * size[row]  # at a jump the function changes its sign without a zero
     first = np.full(len(designs), np.inf)
     np.minimum.at(first, row[passes], np.mod(phi[passes], TWO_PI))
     at = np.flatnonzero(first[top.row] < np.inf)
@@ -161,7 +161,7 @@ def _vanish(family: Family, designs: Array, pose: str, top: Top, size: Array) ->
 
 
 def _cut(family: Family, designs: Array, output: str) -> tuple[Index, Array, Array]:
-    """Design and ends of the first panels for curves of a pose output."""
+    """Design index and ends of the first panels for curves of a pose output."""
     edges = ends(family, designs, PANELS, PANELS * NODES, output)
     low, high = edges[:, :-1], edges[:, 1:]
     row, column = np.nonzero(high - low > NARROWEST)
@@ -171,7 +171,7 @@ def _cut(family: Family, designs: Array, output: str) -> tuple[Index, Array, Arr
 def _climbed(
     family: Family, designs: Array, panels: Panels, request: Request, target: float, locate: bool
 ) -> tuple[Top, Array]:
-    """Highest point of every curve that has panels, and the sizes of these curves."""
+    """Find the maximum of every curve that has panels; also return the sizes of the curves."""
     n = len(designs)
     best, least = np.full(n, -np.inf), np.full(n, np.inf)
     np.maximum.at(best, panels.row, panels.peak)
@@ -180,7 +180,7 @@ def _climbed(
     tops: list[Top] = []
     while panels.row.size:
         panels = only(panels, _upper(panels, request.mode) >= best[panels.row])
-        # Even first panels may all be within the target of each other: a constant, or a dwell.
+        # The even first panels may all be within the target: a constant, or a dwell.
         crowded = panels.high - panels.low < 0.25 * TWO_PI / PANELS
         crowded &= np.bincount(panels.row[crowded], minlength=n)[panels.row] > CROWD
         tops.append(_given_up(only(panels, crowded), request.mode))
@@ -205,7 +205,7 @@ def _climbed(
 
 
 def _halved(family: Family, designs: Array, panels: Panels, request: Request) -> tuple[Panels, Array]:
-    """Both halves of each panel, and how far their poses are from its polynomial."""
+    """Halve each panel; also return the largest difference between the new poses and the panel's polynomial."""
     middle = 0.5 * (panels.low + panels.high)
     low, high = (np.stack(ends, axis=1).ravel() for ends in ((panels.low, middle), (middle, panels.high)))
     row = np.repeat(panels.row, 2)
@@ -218,7 +218,7 @@ def _halved(family: Family, designs: Array, panels: Panels, request: Request) ->
     before = product(panels.series, rising(inner))
     miss = np.abs(values.reshape(-1, 2 * NODES) - before).max(axis=1)
     halves = _fitted(row, low, high, values, request.mode)
-    # The highest pose seen may stand alone, as one in the very place of a jump: it is kept by the half it lies in.
+    # The highest pose may be isolated, as at the place of a jump: the half that contains it keeps it.
     peak, at = np.repeat(panels.peak, 2), np.repeat(panels.at, 2)
     kept = (peak > halves.peak) & (low <= at) & (at <= high)
     best, at, miss = np.where(kept, peak, halves.peak), np.where(kept, at, halves.at), np.repeat(miss, 2)
@@ -226,7 +226,7 @@ def _halved(family: Family, designs: Array, panels: Panels, request: Request) ->
 
 
 def _off(family: Family, designs: Array, panels: Panels, top: Top, request: Request, which: Index) -> Array:
-    """How far poses at some tops are from these: a kink next to an end is seen by no other pose."""
+    """Difference between maxima and poses at their places: no other pose sees a kink next to an end."""
     off, place = np.zeros(top.row.size), _inside(top.phi, panels.low, panels.high)
     for some in blocks(which, 1):
         poses, _ = pose_columns(family, designs[top.row[some]], place[some, None], [request.pose])
@@ -235,12 +235,12 @@ def _off(family: Family, designs: Array, panels: Panels, top: Top, request: Requ
 
 
 def _tops(panels: Panels, mode: int, err: Array) -> Top:
-    """Highest points of the polynomials, whose heights are wrong by ``err`` at most."""
+    """Maxima of the polynomials, whose heights are off by ``err`` at most."""
     x, value = summits(panels.series, mode)
     derived = (chebyshev.chebder(panels.series, order, axis=1).T for order in (1, 2))
     slope, bow = (np.abs(chebyshev.chebval(x, of, tensor=False)) for of in derived)
     half = 0.5 * (panels.high - panels.low)
-    # At an end the slope is what holds the place, inside it is the bend; poses stand a little inside of a jump there.
+    # The slope bounds the error of a place at an end, the bend that of a place inside; poses avoid a jump at the end.
     inside = np.abs(x) < 1.0
     held = np.where(inside, bow / SLOPE, slope)
     blur = np.divide(err, held, out=np.full(x.size, 2.0), where=held > 0.0)
@@ -249,16 +249,16 @@ def _tops(panels: Panels, mode: int, err: Array) -> Top:
 
 
 def _held(panels: Panels, before: Array, size: Array) -> Top:
-    """Highest poses of panels as narrow as crank angles can be told apart; ``before`` they were halved."""
+    """Highest poses of panels at the limit of resolvable crank angles; ``before`` are those before halving."""
     err = np.abs(panels.peak - before) + EDGE * EPS * np.maximum(size[panels.row], np.abs(panels.peak))
     return Top(panels.row, panels.at, panels.peak, err, panels.high - panels.low + 8.0 * EPS * np.pi)
 
 
 def _beside(family: Family, designs: Array, panels: Panels, request: Request) -> Array:
-    """How far the highest poses of narrow panels are from poses beside them, on the side where that is less.
+    """Smaller of the differences between the highest poses of narrow panels and the poses on either side.
 
-    Beside a jump the curve is level on its higher side.  Next to a cusp it goes on rising where no pose can be, by as
-    much again, and a few times that where it rises like a small power of the distance.
+    Beside a jump the curve is level on its higher side.  Next to a cusp it rises further where no pose can be, by as
+    much again, and by a few times that where it rises like a small power of the distance.
     """
     off = np.zeros(panels.row.size)
     for some in blocks(np.arange(panels.row.size), 2):
@@ -270,12 +270,12 @@ def _beside(family: Family, designs: Array, panels: Panels, request: Request) ->
 
 
 def _given_up(panels: Panels, mode: int) -> Top:
-    """Highest poses of panels that are no longer halved, and how much higher their polynomials may be."""
+    """Highest poses of panels that are no longer halved, with the upper bounds of their polynomials as error."""
     return Top(panels.row, panels.at, panels.peak, _upper(panels, mode) - panels.peak, panels.high - panels.low)
 
 
 def _highest(tops: list[Top], n: int) -> Top:
-    """Highest top of each row; what another one may be higher by is part of its error, and so is how far that is."""
+    """Select the highest maximum of each row; rivals that may be higher increase its error and that of its place."""
     every = Top(*(np.concatenate(parts) for parts in zip(*tops, strict=True)))
     order = np.lexsort((every.phi, -every.value, every.row))
     row, first = np.unique(every.row[order], return_index=True)
@@ -286,7 +286,7 @@ def _highest(tops: list[Top], n: int) -> Top:
 
 
 def _upper(panels: Panels, mode: int) -> Array:
-    """Return an upper bound of a curve on each panel, estimated from its coefficients."""
+    """Estimate an upper bound of a curve on each panel from its coefficients."""
     dense = product(panels.series, rising(np.linspace(-1.0, 1.0, DENSE)))
     doubt = CAREFUL * np.abs(panels.series[:, -TAIL:]).sum(axis=1) + LATELY * panels.missed
     upper: Array = np.maximum(_measured(dense, mode).max(axis=1), panels.peak) + doubt
@@ -294,7 +294,7 @@ def _upper(panels: Panels, mode: int) -> Array:
 
 
 def _rounding(guards: Sequence[str], poses: dict[str, Array], good: Mask, row: Index, top: Top, precise: bool) -> Array:
-    """Return how far rounding near a dead point may have moved each height (as in `sweep.reductions.peak_search`)."""
+    """Bound the effect of rounding near a dead point on each height (as in `sweep.reductions.peak_search`)."""
     amplified = np.zeros(top.row.size)
     for name in guards[1:] if precise else guards:
         values = poses[name][good]
@@ -311,7 +311,7 @@ def _measured(values: Array, mode: int) -> Array:
 
 
 def _places(low: Array, high: Array) -> Array:
-    """Nodes of panels; at the very end the curve may already have jumped, so it is not touched."""
+    """Nodes of panels, kept off the ends, where the curve may already have jumped."""
     nodes, _ = basis()
     places = 0.5 * (low + high)[:, None] + 0.5 * (high - low)[:, None] * nodes
     return _inside(places, low[:, None], high[:, None])
@@ -322,7 +322,7 @@ def _inside(phi: Array, low: Array, high: Array) -> Array:
 
 
 def _fitted(row: Index, low: Array, high: Array, values: Array, mode: int) -> Panels:
-    """Panels with the polynomials through their poses."""
+    """Make panels with the polynomials through their poses."""
     measured, every = _measured(values, mode), np.arange(row.size)
     top = measured.argmax(axis=1)
     series: Array = product(values, basis()[1].T)
@@ -330,7 +330,7 @@ def _fitted(row: Index, low: Array, high: Array, values: Array, mode: int) -> Pa
 
 
 def _worst(row: Index, each: Status, n: int) -> Status:
-    """Gravest status of each design from the poses of its panels."""
+    """Worst status of each design's poses."""
     first = np.searchsorted(row, np.arange(n))
     count = np.bincount(row, minlength=n)
     turn = np.zeros((n, int(count.max(initial=0)), NODES), np.uint8)

@@ -1,4 +1,4 @@
-"""The search behind `true_extrema`: samples, candidates, refinement and the best of them, block by block."""
+"""Search of `true_extrema` on poses: samples, candidates, refinement and selection of the highest, block by block."""
 
 from __future__ import annotations
 
@@ -52,24 +52,24 @@ from sweep.reductions.sampling import (
 )
 from sweep.reductions.window import Window, edges
 
-START = 32  # samples of the first look
-LIMIT = 32768  # samples beyond which a design is given up as NOT_CONVERGED
-SHARE = 0.6  # a peak below this share of the best sample is not refined
-ROUGH = 0.1  # fourth difference of samples against their size, above which they do not resolve the curve
+START = 32  # first number of samples
+LIMIT = 32768  # largest number of samples, after which a design is NOT_CONVERGED
+SHARE = 0.6  # a peak below this share of the highest sample is not refined
+ROUGH = 0.1  # fourth difference of samples relative to their size above which they do not resolve the curve
 PER_SINGULARITY = 12.0  # samples per distance of the nearest complex singularity
-NARROWEST = 2.0 * PER_SINGULARITY / LIMIT  # such a distance [rad] below which panels resolve a peak with fewer poses
-BREAKING = 512  # samples from which on what is still rough may be a jump
-DISAGREEMENT = 0.05  # between the peak guessed from the samples and the refined one
-SEARCHED = 0.25  # of the error allowed that the search may leave: the rest is for what precise poses may find
-RIVALS = 1e-3  # peaks lower than the best by no more of its size may turn out the highest
+NARROWEST = 2.0 * PER_SINGULARITY / LIMIT  # distance [rad] below which panels resolve a peak with fewer poses
+BREAKING = 512  # samples from which on a rough curve may be a jump
+DISAGREEMENT = 0.05  # allowed between the peak guessed from the samples and the refined one
+SEARCHED = 0.25  # share of the allowed error for the search: the rest is for differences to precise poses
+RIVALS = 1e-3  # peaks lower than the highest by this share of the size may turn out to be the highest
 NEVER = 2**40  # more samples than are ever needed
-CLOSE = 0.1  # distance of a singularity [rad] from which on it is measured what rounding does
-TIE = 1e-10  # to which peaks are told apart where their places are wanted
+CLOSE = 0.1  # distance of a singularity [rad] below which the effect of rounding is measured
+TIE = 1e-10  # relative accuracy to which peaks are compared where their places are wanted
 
 
 @dataclass
 class Search:
-    """The state of one search: what is found so far, and how many samples each design still needs."""
+    """State of a search: extrema found so far, and number of samples that each design still needs."""
 
     family: Family
     designs: Array
@@ -90,17 +90,17 @@ class Search:
         n = len(self.designs)
         self.found = {request: Extremum.unknown(n) for request in self.requests}
         self.status = np.zeros(n, np.uint8)
-        # A discriminant is a smooth function whatever its sign; the motion is not where it vanishes.
+        # A discriminant is smooth whatever its sign; the motion is not smooth where it vanishes.
         self.guards = [] if self.anywhere else list(discriminants(self.family))
         position = [self.window.position] if self.window is not None else []
         self.names = list(dict.fromkeys([*(r.pose for r in self.requests), *position, *self.guards]))
-        # Samples that each request still needs of each design; 0 once it is found.
+        # Samples that each request still needs for each design; 0 once its extremum is found.
         curves = [request.pose for request in self.requests]
         sharp = bool(singular(self.family, curves))
         self.near = nearest(self.family, self.designs, curves, MATTERS) if sharp else None
         fewest = (START * denser(self.family, self.designs, self.names, self.near)).astype(np.int64)
         self.undone = np.tile(fewest, (len(self.requests), 1))
-        self.torn = np.zeros(self.undone.shape, np.bool_)  # curves that jump, or nearly so: panels are to search them
+        self.torn = np.zeros(self.undone.shape, np.bool_)  # curves with (near) jumps, to be searched on panels
         if self.near is not None and not self.anywhere:
             broken(self.family, self.designs, self.near, self.status)
             self.undone[:, self.status != st.OK] = 0
@@ -110,7 +110,7 @@ class Search:
             self.undone[self.torn] = 0
 
     def needed(self, rows: Index) -> Index:
-        """Fewest samples that a request of these designs still needs, 0 where all are found."""
+        """Smallest number of samples that a request of these designs still needs, 0 where all are found."""
         left = np.where(self.undone[:, rows] > 0, self.undone[:, rows], NEVER).min(axis=0, initial=NEVER)
         fewest: Index = np.where(left < NEVER, left, 0)
         return fewest
@@ -149,7 +149,7 @@ class Search:
             moved = self._keep_best(rows, request, row, found) > DISAGREEMENT * scales[number]
             again = moved & resolved[number] & ~alone[number]
             needed[number, again] = np.maximum(needed[number, again], 2 * samples)
-        # Everything is looked at with LIMIT samples before it is given up.
+        # Every design is sampled LIMIT times before it is given up.
         needed = np.minimum(needed, LIMIT if samples < LIMIT else 2 * LIMIT)
         now = np.where(needed > samples, needed, 0)
         self.undone[:, rows] = np.where(looked, now, self.undone[:, rows])
@@ -157,14 +157,14 @@ class Search:
     def _candidates(
         self, rows: Index, columns: dict[str, Array], samples: int
     ) -> tuple[Candidates, Array, Index, Mask]:
-        """Candidates of all requests, sizes of their curves, samples needed, and which need no more: noise, jumps."""
+        """Return candidates, sizes of the curves, samples needed, and a mask of noise and jumps, which need no more."""
         needed, pieces = np.full((len(self.requests), rows.size), START), []
         scales, alone = np.empty(needed.shape), np.zeros(needed.shape, np.bool_)
         for number, request in enumerate(self.requests):
             values = columns[request.pose]
             allowed, share = None, SHARE
             if self.window is not None and request.windowed:
-                # A top may stand between two samples that are both outside, beside a higher one that does not count.
+                # A maximum may lie between two samples that are both outside, beside a higher one that does not count.
                 allowed, share = self.window.nears(rows, columns[self.window.position]), 0.0
                 needed[number, self.window.grazed(rows, columns[self.window.position])] = 2 * samples
             scale, rough = scales[number], np.empty(rows.size)
@@ -192,18 +192,18 @@ class Search:
             one, largest = np.empty(count), columns[name].max(axis=1)
             scan.nearest_singularity(columns[name], one)
             distance = np.where(tells(largest), np.minimum(distance, one), distance)
-        # The first looks see a near zero only roughly: at most eight times as many samples at once.
+        # Coarse samples show a near zero only roughly: at most eight times as many samples at once.
         wanted = np.minimum(PER_SINGULARITY / np.maximum(distance, 1e-300), 8.0 * samples)
         samples_needed: Index = np.exp2(np.ceil(np.log2(np.maximum(wanted, 1.0)))).astype(np.int64)
         return samples_needed
 
     def _refine(self, turn: Sampled, candidates: Candidates, size: Array, resolved: Mask) -> tuple[Candidates, Peaks]:
-        """Peaks of the candidates, and those that closer looks find beside them and beside switches."""
+        """Refine the candidates, and add the peaks that closer looks find beside them and beside switches."""
         spacing = np.full(candidates.row.size, TWO_PI / turn.samples)
         around = candidates.sign[:, None] * turn.around(self.requests, candidates, np.arange(-3, 4))
         first = first_peaks(np.multiply(candidates.column, spacing, dtype=np.float64), spacing, around)
         peaks = self._sharpened(turn, candidates, first, size)
-        # Which of several is the highest decides on the place, at every target.
+        # The place depends on which of several peaks is the highest, at every target.
         enough = np.where(self.places(candidates.request), min(TIE, self.target), SEARCHED * self.target)
         hidden = doubtful(candidates, peaks, around, enough * size[candidates[:2]])
         least = [request.pose for request in self.requests if request.mode == -1 and not self.anywhere]
@@ -223,7 +223,7 @@ class Search:
             share += singular_share(near, peaks.phi, self._orders(candidates))
         peaks = peaks._replace(err_height=peaks.err_height + share * np.abs(peaks.height))
         if self.family.precise_poses is None:
-            # A quartic may say less than nothing of what touches zero; a value at a pose is one that there is.
+            # A quartic may fall below zero where a curve touches zero; a value at a pose is attained.
             sample = self._sampler(self.family, turn, candidates)
             return candidates, attained(sample, peaks, np.arange(len(peaks.phi)))
         self._confirm(turn, candidates, peaks, size[candidates[:2]], share)
@@ -236,38 +236,38 @@ class Search:
         return sharpen(self._sampler(self.family, turn, candidates), first, tolerance, place)
 
     def _confirm(self, turn: Sampled, candidates: Candidates, peaks: Peaks, size: Array, share: Array) -> None:
-        """Replace the peaks that may be the highest by what the family's precise poses say of them.
+        """Replace the peaks that may be the highest by those of the family's precise poses.
 
-        ``share`` of a height is what rounding may have changed.
+        ``share`` of a height is the possible effect of rounding.
         """
         number, row, _, sign = candidates
-        windowed = np.array([request.windowed for request in self.requests])[number]  # which of them count, shows later
+        windowed = np.array([request.windowed for request in self.requests])[number]  # those outside are dropped later
         group, doubt = number * turn.rows.size + row, peaks.err_height + RIVALS * size
         lowest = np.full(len(self.requests) * turn.rows.size, -np.inf)
         np.maximum.at(lowest, group, peaks.height - doubt)
         rivals = np.flatnonzero((peaks.height + doubt >= lowest[group]) | windowed)
         group, tolerance = group[rivals], self.target * size[rivals]
-        # Which of several is the highest decides on the place.
+        # The place depends on which of several peaks is the highest.
         located = self.places(number[rivals])
         tied = (np.bincount(group, minlength=lowest.size)[group] > 1) & located
         tolerance = np.where(tied, np.minimum(tolerance, TIE * size[rivals]), tolerance)
         mine, peak = only(candidates, rivals), only(peaks, rivals)
         sample = self._sampler(self.family.precise(), turn, mine, sign[rivals] * peak.height)
         locate = np.full(rivals.size, np.inf)
-        # Without a derivative to polish it by, a place is no better than the rounding of the heights: precise ones.
+        # Without a derivative to polish it, a place is limited by the rounding of the heights: precise poses locate it.
         bare = np.array([request.pose not in self.family.derivative_of for request in self.requests])[mine.request]
         bare &= located
         locate[bare] = self.target
         peak.err_phi[bare] = np.maximum(peak.step, SHRINK**3 * peak.spacing)[bare]
         peak = confirmed(sample, peak, tolerance, locate, share[rivals] * np.abs(peak.height))
-        # The first stage of a chain is given its exact input, those behind it a rounded one.
+        # The first stage of a chain gets its exact input angle, later stages a rounded one.
         rounding = self._rounding(turn, mine, self.guards[1:]) * np.abs(peak.height)
         put(peaks, rivals, peak._replace(err_height=peak.err_height + rounding))
 
     def _sampler(self, family: Family, turn: Sampled, candidates: Candidates, middle: Array | None = None) -> Sampler:
-        """Measure candidates by the poses of ``family``.
+        """Make a function that evaluates candidates by the poses of ``family``.
 
-        An angle is continued from ``middle`` (k,), its sample next to the candidate if that is left out.
+        An angle is continued from ``middle`` (k,), by default the sample at the candidate.
         """
         number, row, _, sign = candidates
         if middle is None:
@@ -292,12 +292,12 @@ class Search:
         return sample
 
     def _rounding(self, turn: Sampled, candidates: Candidates, guards: list[str]) -> Array:
-        """Share of a value that rounding may have changed alike at neighbouring poses."""
+        """Share of a value by which rounding may have changed it and its neighbours alike."""
         given = self.designs[turn.rows], turn.columns, candidates.row, candidates.column
         return rounding_share(self.family, *given, guards, self._orders(candidates))
 
     def _orders(self, candidates: Candidates) -> Index:
-        """Return of which derivative each candidate is; a discriminant rounds as a position does."""
+        """Order of derivative of each candidate; a discriminant rounds like a position."""
         orders = np.array([0 if self.anywhere else order_of(self.family, request.pose) for request in self.requests])
         found: Index = orders[candidates.request]
         return found
@@ -305,7 +305,7 @@ class Search:
     def _within_window(
         self, rows: Index, columns: dict[str, Array], request: Request, row: Index, peaks: Peaks, resolved: Mask
     ) -> tuple[Index, Peaks]:
-        """Drop the peaks outside the window; its edges are candidates too."""
+        """Drop the peaks outside the window, and add its edges as candidates."""
         assert self.window is not None
         poses, _ = pose_columns(self.family, self.designs[rows[row]], peaks.phi[:, None], self.names)
         inside = self.window.holds(rows[row], poses[self.window.position])[:, 0]
@@ -317,7 +317,7 @@ class Search:
         return np.concatenate([row[inside], edge.row]), joined(only(peaks, inside), added)
 
     def _keep_best(self, rows: Index, request: Request, row: Index, peaks: Peaks) -> Array:
-        """Store the best candidate of each row; by how much refinement moved it from the guess (0 where none)."""
+        """Store the highest candidate of each row; return its distance from the first guess (0 where none)."""
         best, which = np.full(rows.size, -np.inf), np.full(rows.size, -1)
         scan.best_candidate(row, peaks.height, best, which)
         has, found = which >= 0, self.found[request]
@@ -325,10 +325,10 @@ class Search:
         found.value[rows[has]] = peaks.height[chosen] * (-1.0 if request.mode == -1 else 1.0)
         ceiling = np.full(rows.size, -np.inf)
         np.maximum.at(ceiling, row, peaks.height + peaks.err_height)
-        # A top that is known less well may be higher.
+        # A less accurate maximum may be higher.
         err = np.maximum(peaks.err_height[chosen], ceiling[has] - peaks.height[chosen])
         if self.family.precise_poses is None and chosen.size:
-            # Badly scaled designs lose digits before any discriminant is formed of them.
+            # Badly scaled designs lose digits before any discriminant is computed.
             off = shaken(self.family, self.designs[rows[has]], peaks.phi[chosen], request.pose)
             err = np.maximum(err, off)
             if self.near is not None:

@@ -1,4 +1,4 @@
-"""Refine peaks between samples: all candidates of all designs at the same time, from poses alone."""
+"""Refinement of peaks between samples, from poses alone, vectorised over all candidates of all designs."""
 
 from __future__ import annotations
 
@@ -13,29 +13,29 @@ from sweep.families.base import Array, Family
 from sweep.reductions.sampling import Index, only, pose_columns, put
 
 Sampler: TypeAlias = Callable[[Index, Array], Array]
-"""``sample(candidates, phi)``: measured values (k, m) of the candidates with these numbers at the angles phi (k, m)."""
+"""``sample(candidates, phi)``: values (k, m), times their signs, of candidates (k,) at the angles phi (k, m)."""
 
 OFFSETS = np.arange(-2.0, 3.0)
 SHRINK = 0.125
 SHRINK_KINKED = 0.25  # the quartic misplaces the tip of a kink by up to a quarter of a step
 PASSES = 20
 POLISHES = 3
-NARROW, WIDE = 1e-8, 1e-4  # secants [rad]: shorter ones would see the rounding of the crank angle
-# The quartic over a five-point window errs in proportion to at least the fourth power of its width, so one pass to the
-# next divides the error by at least 8^4; a sixty-fourth of the last change is claimed, which leaves a factor of 64.
+NARROW, WIDE = 1e-8, 1e-4  # secants [rad]: the crank angle's rounding would dominate shorter ones
+# The error of the quartic over a five-point window is proportional to at least the fourth power of its width, so each
+# pass divides it by at least 8^4; a sixty-fourth of the last change is claimed, which leaves a factor of 64.
 CLAIM = 1.0 / 64.0
-RIPPLE = 0.25  # of the fourth difference: eight times the noise of one sample on average, and what a quartic leaves out
-# Second differences of five samples that follow a smooth top are nearly equal.  Where they are not, a kink may lie
-# between them: there a fourth difference vanishes by chance, and halving the window halves the error, no more.
-BENT, CLOSELY_BENT = 0.4, 0.15  # change of second differences against the largest, of first samples and of later ones
-LEARNT = 0.8  # of the error before: what a narrower window about a kink leaves of it at most
-SHORTEST, SHORTEST_KINKED = 1e-6, 1e-12  # of the spacing of the samples: steps of the last windows
-NEIGHBOURS = TWO_PI / 64.0  # rad between tops of neighbouring pieces at most
-VARIES = 8.0  # times the rounding at one pose: what that of its neighbours may be
+RIPPLE = 0.25  # error per fourth difference, which is eight times the noise of one sample on average
+# Second differences of five samples at a smooth maximum are nearly equal.  Where they are not, a kink may lie between
+# them: there a fourth difference may vanish by chance, and halving the window only halves the error.
+BENT, CLOSELY_BENT = 0.4, 0.15  # change of second differences relative to the largest, of first and of later samples
+LEARNT = 0.8  # largest share of the previous error that a narrower window about a kink leaves
+SHORTEST, SHORTEST_KINKED = 1e-6, 1e-12  # steps of the last windows relative to the samples' spacing
+NEIGHBOURS = TWO_PI / 64.0  # largest distance of maxima of neighbouring pieces [rad]
+VARIES = 8.0  # ratio of the rounding at neighbouring poses to that at one pose, at most
 
 
 class Candidates(NamedTuple):
-    """Samples next to a possible extremum, each (k,): request, row of the block, column, sign that makes it large."""
+    """Samples next to a possible extremum, each (k,): request, row of the block, column, sign to make it a maximum."""
 
     request: Index
     row: Index
@@ -44,7 +44,7 @@ class Candidates(NamedTuple):
 
     @classmethod
     def none(cls) -> Candidates:
-        """Return none."""
+        """Make an empty record."""
         nothing = np.zeros(0, np.int64)
         return cls(nothing, nothing, nothing, np.zeros(0))
 
@@ -52,7 +52,7 @@ class Candidates(NamedTuple):
 class Peaks(NamedTuple):
     """Refined peaks of k candidates, each (k,).
 
-    Place [rad], measured value, their errors, first guess from samples, spacing of those and step of the next five
+    Place [rad], height, their errors, first guess of the height, spacing of the samples, and step of the next five
     points [rad].
     """
 
@@ -66,15 +66,15 @@ class Peaks(NamedTuple):
 
 
 def first_peaks(centre: Array, spacing: Array, around: Array) -> Peaks:
-    """Peaks of the quartics through five samples.
+    """Compute the peaks of the quartics through five samples.
 
     Parameters
     ----------
-    centre, spacing : (k,) crank angles of the best samples, and their distance from the next [rad]
-    around : (k, 7) measured values at the best sample and its three neighbours on either side
+    centre, spacing : (k,) crank angles of the highest samples, and their distance from the next [rad]
+    around : (k, 7) values at the highest sample and its three neighbours on either side
     """
     place, height, ripple, blur = _quartic(np.ascontiguousarray(around[:, 1:6]))
-    # A sample two steps away may be higher: that is another peak, which has a first guess of its own.
+    # A sample two steps away may be higher: it belongs to another peak, with its own first guess.
     rival = np.abs(place) == 2.0
     place[rival], height[rival] = 0.0, around[rival, 3]
     # One fourth difference may vanish by chance where the curve is not yet resolved; three in a row do not.
@@ -82,7 +82,7 @@ def first_peaks(centre: Array, spacing: Array, around: Array) -> Peaks:
     widest = fourth.max(axis=1)
     error = RIPPLE * widest + 4.0 * EPS * np.abs(height) + _kink(around[:, 1:6], BENT)
     err_height = np.where(rival, np.inf, error)
-    # A floor in proportion to the curve: lengths have any size, and scaling them by 2^k changes no bit.
+    # The floor is proportional to the curve: scaling lengths by 2^k changes no bit.
     least = np.maximum(ripple, EPS * EPS * widest)
     blurred = np.divide(blur * widest, least, out=np.zeros(widest.size), where=least > 0.0)
     err_phi = spacing * np.minimum(blurred, 2.0)
@@ -90,20 +90,19 @@ def first_peaks(centre: Array, spacing: Array, around: Array) -> Peaks:
 
 
 def sharpen(sample: Sampler, peaks: Peaks, tolerance: Array, locate: Array) -> Peaks:
-    """Highest points near the given ones, by quartics through five points ever closer together.
+    """Refine peaks by quartics through five points with shrinking spacing.
 
     Parameters
     ----------
-    sample : evaluates the measured quantity; called with the candidates that are not finished yet
+    sample : evaluates the curves; called with the candidates that are not finished yet
     peaks : k peaks as known so far
-    tolerance : (k,) error allowed in the height
-    locate : (k,) error allowed in the place [rad]; inf leaves the place as good as the height makes it
+    tolerance : (k,) allowed error of the height
+    locate : (k,) allowed error of the place [rad]; inf accepts the place that the height needs
 
     Notes
     -----
-    No derivative is needed, so every pose output is refined by the same few passes of five poses each: none for
-    1e-2, one for 1e-4, two for 1e-8, three or four where the place is wanted.  A peak that leaves its window is
-    followed.
+    No derivative is needed, so every pose output is refined by the same few passes of five poses each: none for 1e-2,
+    one for 1e-4, two for 1e-8, three or four where the place is wanted.  A peak that leaves its window is followed.
     """
     phi, height, err_phi, err_height, guess, spacing, step = (column.copy() for column in peaks)
     looked = step.copy()  # widths of the last windows that held their peaks
@@ -117,11 +116,11 @@ def sharpen(sample: Sampler, peaks: Peaks, tolerance: Array, locate: Array) -> P
         kink = _kink(values, CLOSELY_BENT)
         inside = np.abs(place) < 2.0
         claim = np.where(inside, CLAIM, 1.0)
-        # Samples that no longer follow a quartic are noise, and noise does not shrink with the window.
+        # Samples that deviate from a quartic are noise, which does not shrink with the window.
         error = claim * np.abs(top - height[active]) + RIPPLE * ripple + 4.0 * EPS * np.abs(top) + kink
-        # Too small a window sees only noise: it may sharpen the height but must not spoil the place.
+        # Too small a window shows only noise: it may refine the height, but must not change the place.
         err_place = u * (claim * np.abs(place) + blur) + 4.0 * EPS * np.pi
-        # At a kink the error shrinks with the window.  Noise looks bent too, but stays: nothing is learnt from it.
+        # At a kink the error shrinks with the window.  Noise looks bent too, but its error stays, and it is ignored.
         noisy = inside & (kink > 0.0) & (error >= LEARNT * err_height[active]) & (u < looked[active])
         looked[active] = np.where(inside, u, looked[active])
         sharper = ~inside | (((err_place < err_phi[active]) | (kink > 0.0)) & ~noisy)
@@ -130,7 +129,7 @@ def sharpen(sample: Sampler, peaks: Peaks, tolerance: Array, locate: Array) -> P
         err_height[active] = error
         err_phi[active[sharper]] = err_place[sharper]
         enough = inside & (error <= tolerance[active]) & ((err_phi[active] <= locate[active]) | ~sharper)
-        # A window that has lost its peak was too small for its place.
+        # A window that has lost its peak was too small.
         shrink = np.where(kink > 0.0, SHRINK_KINKED, SHRINK)
         step[active] = np.where(inside, shrink * u, np.minimum(u / SHRINK, SHRINK * spacing[active]))
         shortest = np.where(kink > 0.0, SHORTEST_KINKED, SHORTEST)
@@ -142,19 +141,18 @@ def confirmed(
     sample: Sampler, peaks: Peaks, tolerance: Array, locate: Array, rounding: Array | float = 0.0,
     there: Array | None = None,
 ) -> Peaks:  # fmt: skip
-    """Peaks as poses of higher precision have them: their heights are values at their places.
+    """Replace the heights of peaks by values of precise poses at their places, and refine them again if needed.
 
-    One pose at the place of a peak measures how far rounding, and what was left of interpolation, have moved its
-    value.  Only where that is more than the ``tolerance``, or the place is not known to ``locate``, the peak is
-    sharpened again.
+    One pose at the place of a peak measures how far rounding and interpolation have moved its value.  The peak is
+    refined again only where that exceeds the ``tolerance``, or the place is not known to ``locate``.
 
     Parameters
     ----------
-    sample : evaluates the measured quantity with less rounding than what the peaks come from
+    sample : evaluates the curves with less rounding than the poses that the peaks come from
     peaks, tolerance, locate : as in `sharpen`
-    rounding : (k,) how far rounding may have moved the heights that the peaks come from.  Even where one pose shows
-        no such error by chance, the place may be wrong
-    there : (k,) what ``sample`` says at the places of the peaks, where that is known
+    rounding : (k,) possible effect of rounding on the heights of the given peaks: the place may be wrong even where one
+        pose shows no error by chance
+    there : (k,) values of ``sample`` at the places of the peaks, if they are known
     """
     before = peaks.height
     peaks = attained(sample, peaks, np.arange(peaks.phi.size)) if there is None else reaching(there, peaks)
@@ -163,8 +161,8 @@ def confirmed(
     # The same rounding has moved the places; it varies along the curve, and one pose sees one value of it.
     peaks.err_height[:] += VARIES * rounded
     if again.size:
-        # Rounding may have spoilt the place too, and rounding that is alike at neighbouring poses hides that: where it
-        # has changed the height begin anew, else as wide as the place is uncertain.
+        # Rounding may have moved the place too, which stays hidden if neighbouring poses round alike: where the height
+        # has changed the search starts anew, otherwise with a window as wide as the error of the place.
         fresh = SHRINK * peaks.spacing
         spoilt = np.maximum(rounded, rounding) > tolerance
         err_phi = np.where(spoilt, np.maximum(peaks.err_phi, fresh), peaks.err_phi)
@@ -172,7 +170,7 @@ def confirmed(
         rough = only(peaks._replace(step=step, err_phi=err_phi), again)
         sharper = sharpen(lambda active, phi: sample(again[active], phi), rough, tolerance[again], locate[again])
         sharper = attained(sample, sharper, again)
-        # Both heights are attained, so the higher one is nearer; a narrow window may see noise, or another peak.
+        # Both heights are attained, so the higher one is closer; a narrow window may show noise, or another peak.
         rougher = only(peaks, again)
         lower = np.maximum(rougher.height - sharper.height, 0.0)
         moved = np.abs(sharper.phi - rougher.phi)
@@ -185,19 +183,19 @@ def confirmed(
 
 
 def attained(sample: Sampler, peaks: Peaks, which: Index) -> Peaks:
-    """Heights at the very places: there the slope is zero and the rounding of the crank angle has no effect."""
+    """Evaluate the heights at the places themselves, where the slope and the effect of a rounded angle vanish."""
     return reaching(sample(which, peaks.phi[:, None])[:, 0], peaks)
 
 
 def reaching(height: Array, peaks: Peaks) -> Peaks:
-    """Peaks of these heights, and by how much that changes them added to their errors."""
+    """Set the heights of peaks, and add the changes to their errors."""
     return peaks._replace(height=height, err_height=peaks.err_height + np.abs(height - peaks.height))
 
 
 def first_of_equals(row: Index, peaks: Peaks, chosen: Index) -> Index:
-    """Return, for the highest peaks ``chosen`` of some rows, the first of the turn that is as high as each.
+    """Return the first of equally high peaks in the turn, for the highest peaks ``chosen`` of some rows.
 
-    Tops of a symmetric motion are as high as each other: rounding would choose another one at every accuracy.
+    A symmetric motion has equally high maxima: rounding would choose another one at every accuracy.
 
     Parameters
     ----------
@@ -209,7 +207,7 @@ def first_of_equals(row: Index, peaks: Peaks, chosen: Index) -> Index:
 def _first(row: Index, phi: Array, err_phi: Array, height: Array, err: Array, chosen: Index) -> Index:
     best = _of_row(row, chosen)
     known = 2.0 * np.minimum(err, err[best])
-    # A place just before the end of the turn, by no more than its error, is its beginning, behind one that is there.
+    # A place closer to the end of the turn than its error counts as just after its beginning.
     place = np.mod(phi, TWO_PI)
     place = np.where(place + err_phi < TWO_PI, place, err_phi)
     late = np.where(height >= height[best] - known, -place, -np.inf)
@@ -220,18 +218,18 @@ def _first(row: Index, phi: Array, err_phi: Array, height: Array, err: Array, ch
 
 
 def _of_row(row: Index, chosen: Index) -> Index:
-    """Return for every peak the one that is chosen in its row."""
+    """Chosen peak of each peak's row."""
     found = np.full(row.max(initial=0) + 1, chosen[0] if chosen.size else 0)
     found[row[chosen]] = chosen
     return found[row]
 
 
 def hill(row: Index, phi: Array, err_phi: Array, height: Array, err: Array, chosen: Index) -> tuple[Array, Array]:
-    """Return the places of the highest tops ``chosen`` of some rows, and their errors.
+    """Find the places of the highest maxima ``chosen`` of some rows, and their errors.
 
-    A top at the end of a piece of the curve may belong a little beyond it, and one of a dwell anywhere on it: the
-    place errs as far as tops go that may be as high, without a gap of more than `NEIGHBOURS`.  Of several such hills
-    the first of the turn counts, as in `first_of_equals`.
+    A maximum at the end of a piece of the curve may lie a little beyond it, and that of a dwell anywhere on it: the
+    error of the place spans all maxima that may be as high, without a gap of more than `NEIGHBOURS`.  Of several such
+    hills the first of the turn counts, as in `first_of_equals`.
     """
     first = _first(row, phi, err_phi, height, err, chosen)
     rival = np.flatnonzero(height + 2.0 * err >= height[_of_row(row, chosen)])
@@ -249,18 +247,17 @@ def hill(row: Index, phi: Array, err_phi: Array, height: Array, err: Array, chos
 
 
 def polish_places(slope: Sampler, phi: Array, err_phi: Array) -> tuple[Array, Array]:
-    """Return places of extrema from the zeros of the derivative, and their errors.
+    """Refine the places of extrema by the roots of the derivative; return places and errors.
 
     Parameters
     ----------
-    slope : evaluates the derivative; called with numbers of places (k,) and angles (k, 3)
-    phi, err_phi : (n,) places and their errors [rad] as `sharpen` left them
+    slope : evaluates the derivative; called with indices of places (k,) and angles (k, 3)
+    phi, err_phi : (n,) places and their errors [rad] from `sharpen`
 
     Notes
     -----
-    Secant steps, each as wide as the place is uncertain; one much longer than the error it should remove, or than the
-    secant, is not taken.  The height of a top fixes its place to the square root of its rounding only, the derivative
-    to its own rounding.
+    Secant steps, each as wide as the place is uncertain; one longer than the secant is not taken.  The height of a
+    maximum determines its place to the square root of its rounding only, the derivative to its own rounding.
     """
     every = np.arange(phi.size)
     phi, err_phi = phi.copy(), err_phi.copy()
@@ -272,16 +269,16 @@ def polish_places(slope: Sampler, phi: Array, err_phi: Array) -> tuple[Array, Ar
         move = -np.divide(here, bend, out=np.full(phi.size, np.inf), where=bend != 0.0)
         better = np.abs(move) <= step
         phi[better] += move[better]
-        # The last steps are as long as the noise of the derivative lets them be; one may be short by chance.
+        # The noise of the derivative determines the last steps; one may be short by chance.
         err_phi[better] = 4.0 * np.maximum(np.abs(move), last)[better] + 8.0 * EPS * np.pi
         last = SHRINK * np.abs(move)
     return phi, err_phi
 
 
 def polished(family: Family, designs: Array, slope: str, phi: Array, err_phi: Array) -> tuple[Array, Array]:
-    """Return places of tops, one of each design, as `polish_places` does; ``slope`` is the pose output that is zero.
+    """Refine the places of maxima, one of each design, by roots of the pose output ``slope``, with `polish_places`.
 
-    A top is flat, its slope is steep there; the family's most accurate poses give it.
+    A maximum is flat but its slope is steep; the family's most accurate poses are used.
     """
     precise = family.precise()
 
@@ -292,7 +289,7 @@ def polished(family: Family, designs: Array, slope: str, phi: Array, err_phi: Ar
 
 
 def _kink(values: Array, bent: float) -> Array:
-    """Return by how much a kink between five samples (k, 5) may hide the top; 0 where they bend alike."""
+    """Bound the height that a kink between five samples (k, 5) may hide; 0 where they bend alike."""
     a, b, c, d, e = values.T
     left, middle, right = a - 2.0 * b + c, b - 2.0 * c + d, c - 2.0 * d + e
     change = np.maximum(np.abs(middle - left), np.abs(right - middle))

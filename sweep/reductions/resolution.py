@@ -1,6 +1,6 @@
-"""How finely a turn is looked at: how many samples a curve needs at least, and where it is cut into panels.
+"""Resolution of a turn: least number of samples that a curve needs, and edges of its panels.
 
-A family says what it knows of its curves by capabilities (`sweep.families.curve_features`).
+Families describe their curves by capabilities (`sweep.families.curve_features`).
 """
 
 from __future__ import annotations
@@ -34,28 +34,28 @@ from sweep.numerics.singularities import FAR, SAMPLES, SHORTEST, Curve, Singular
 from sweep.quantities.kinds import Request
 from sweep.reductions.sampling import DESIGN_STATUS, Extremum, Index, Mask, blocks, pose_columns, put, sample_turn
 
-PER_WAVE = 2.0  # waves that the fewest samples of any curve resolve
-SHARES = 16.0  # samples of a turn are a multiple of this over the shortest way between two switches
+PER_WAVE = 2.0  # waves per turn that the least number of samples resolves
+SHARES = 16.0  # the least number of samples is enough for switches at a distance of a turn over this
 PER_SINGULARITY = 12.0  # samples per distance of the nearest complex singularity
-FEWEST = 32.0  # samples of any curve
-MOST = 1024.0  # times the fewest samples
-# Distance of a singularity [rad] up to which it is looked at closely: twice that from which on it decides on samples.
+FEWEST = 32.0  # least number of samples of any curve
+MOST = 1024.0  # largest factor of the least number of samples
+# Distance of a singularity [rad] below which it is refined: twice the distance below which it determines the samples.
 MATTERS = 2.0 * PER_SINGULARITY / FEWEST
 
 
 def denser(family: Family, designs: Array, outputs: Collection[str], near: Singularities | None = None) -> Array:
-    """Return by which power of two the fewest samples of pose outputs over a turn are multiplied, (n,).
+    """Return the power of two by which the least number of samples over a turn is multiplied, (n,).
 
     ``near`` are the nearest singularities if they are known.
 
-    Between two switches stand several samples, in a wave at least half of what else stands in a turn, and 12 in the
-    distance of a singularity that the samples themselves would not see.
+    The samples resolve the distance between two switches, the waves of a curve, and with 12 samples the distance of a
+    singularity that even samples would not see.
     """
     factor = np.maximum(waves(family, designs, outputs) / PER_WAVE, 1.0)
     angles = np.sort(switches(family, designs, outputs), axis=1)
     if angles.shape[1] > 1:
         gaps = np.concatenate([np.diff(angles, axis=1), angles[:, :1] + TWO_PI - angles[:, -1:]], axis=1)
-        # Two switches in one place are one.
+        # Coinciding switches count as one.
         shortest = np.where(gaps > 1e-9, gaps, TWO_PI).min(axis=1)
         factor = np.maximum(factor, TWO_PI / (SHARES * shortest))
     if singular(family, outputs):
@@ -67,9 +67,9 @@ def denser(family: Family, designs: Array, outputs: Collection[str], near: Singu
 
 
 def nearest(family: Family, designs: Array, outputs: Collection[str], within: float = FAR) -> Singularities:
-    """Nearest singularities of some pose outputs of a family's designs, from its most accurate poses.
+    """Find the nearest singularities of pose outputs of a family's designs, from its most accurate poses.
 
-    Those farther away than ``within`` [rad] are as good as even samples show them.
+    Singularities farther away than ``within`` [rad] are not refined beyond even samples.
     """
     curves = singular_curves(family.precise(), outputs)
 
@@ -86,9 +86,9 @@ def nearest(family: Family, designs: Array, outputs: Collection[str], within: fl
 
 
 def broken(family: Family, designs: Array, near: Singularities, status: Status) -> None:
-    """Write the status of designs that have no pose next to a singularity, as near as angles can be distinguished.
+    """Set the status of designs that have no pose next to a singularity, within the resolution of angles.
 
-    The gap may be narrower than any samples.
+    The gap may be narrower than any spacing of samples.
     """
     close = np.flatnonzero((near.rho <= SHORTEST).any(axis=1))
     for rows in blocks(close, near.phi.shape[1]):
@@ -98,24 +98,24 @@ def broken(family: Family, designs: Array, near: Singularities, status: Status) 
         status[rows[gap]] = DESIGN_STATUS[each[gap, (each[gap] != st.OK).argmax(axis=1)]]
 
 
-FAR, CLOSE = 10.0, 0.1  # distances of singularities [rad]; from the latter on panels crowd about one
-BENDING = 128  # even samples among which functions of effects are seen to pass zero
-LOOK = 0.25  # spacing of further samples against the distance of a singularity
-PER_PANEL = 0.25  # waves that a first panel may hold
+FAR, CLOSE = 10.0, 0.1  # distances of singularities [rad]; panels crowd about one that is nearer than the latter
+BENDING = 128  # even samples on which roots of effects' functions are bracketed
+LOOK = 0.25  # spacing of further samples relative to the distance of a singularity
+PER_PANEL = 0.25  # waves per first panel, at most
 
 
 def ends(family: Family, designs: Array, even: int, looks: int, output: str) -> Array:
-    """Return the ends of panels of a turn for curves of a pose output, in rising order, (n, p + 1).
+    """Compute the panel edges of a turn for curves of a pose output, in rising order, (n, p + 1).
 
     There are ``even`` panels, and more about singularities.  They are cut at angles known beforehand, and where one of
     ``looks`` samples or the next shows that a pose output passes its level, that a follower reverses, or that a
-    function passes zero at which curves of the output bend.
+    function at whose zeros curves of the output have kinks passes zero.
     """
     n = len(designs)
     edges = np.tile(np.linspace(0.0, TWO_PI, even + 1), (n, 1))
     known = switches(family, designs, (output,))
     edges = with_events(edges, np.repeat(np.arange(n), known.shape[1]), known.ravel())
-    fast = np.ceil(waves(family, designs, (output,)) / PER_PANEL).astype(np.int64)  # even ends of so many panels
+    fast = np.ceil(waves(family, designs, (output,)) / PER_PANEL).astype(np.int64)  # even panels for waves
     more = np.repeat(np.arange(n), np.where(fast > even, fast, 0))
     place = np.arange(more.size) - np.searchsorted(more, more)
     edges = with_events(edges, more, TWO_PI * place / fast[more])
@@ -131,13 +131,13 @@ def ends(family: Family, designs: Array, even: int, looks: int, output: str) -> 
 
 
 def events(family: Family, designs: Array, looks: int, outputs: Collection[str]) -> tuple[Index, Array]:
-    """Return designs (k,) and angles (k,) where a pose output passes its level, a follower reverses, or a curve bends.
+    """Find designs (k,) and angles (k,) where a pose output passes its level, a follower reverses, or a curve bends.
 
-    They are looked for between ``looks`` even samples of the turn, as far as ``outputs`` depend on them.
+    The roots are searched between ``looks`` even samples of the turn, as far as ``outputs`` depend on them.
     """
     looked = np.tile(np.arange(looks) * (TWO_PI / looks), (len(designs), 1))
     found = [_passed(family, designs, outputs, looked)]
-    # Beside what nearly vanishes a curve is steep, and has no kink.
+    # Near the minimum of a squared function a curve is steep, but has no kink.
     known = dict.fromkeys(bent for output in outputs for bent in bends(family, output) if not bent.squares)
     found += [_bent(bent, designs, looked) for bent in known]
     rows, phi = (np.concatenate(parts) for parts in zip(*found, strict=True))
@@ -145,14 +145,14 @@ def events(family: Family, designs: Array, looks: int, outputs: Collection[str])
 
 
 def zeros(family: Family, designs: Array, output: str) -> tuple[Index, Array]:
-    """Return designs (k,) and angles (k,) where a pose output that is nowhere negative is known to vanish, or jumps."""
+    """Find designs (k,) and angles (k,) where a non-negative pose output is known to vanish, or jumps."""
     looked = _looked(len(designs), BENDING, np.zeros(0, np.intp), np.zeros((0, 0)))
     found = [_bent(bent, designs, looked) for bent in bends(family, output) if bent.zero]
     return found[0] if found else (np.zeros(0, np.intp), np.zeros(0))
 
 
 def _bent(bent: Bends, designs: Array, looked: Array) -> tuple[Index, Array]:
-    """Return designs and angles where functions pass zero at which curves bend, as seen at ``looked``."""
+    """Find designs and angles where functions pass zero at which curves bend, bracketed by the angles ``looked``."""
 
     def bending(rows: Index, phi: Array) -> Array:
         return np.nan_to_num(bent.curves(designs[rows], Angles.of(phi)))
@@ -161,9 +161,9 @@ def _bent(bent: Bends, designs: Array, looked: Array) -> tuple[Index, Array]:
 
 
 def _passed(family: Family, designs: Array, outputs: Collection[str], looked: Array) -> tuple[Index, Array]:
-    """Return designs and angles where an output passes its level or a speed passes zero, as seen at ``looked``."""
+    """Find designs and angles where an output passes its level or a speed passes zero, bracketed by ``looked``."""
     passed_levels = crossings(family, outputs)
-    # What reverses is felt by friction and loads, of effects; a family knows its own kinks.
+    # Reversals affect friction and loads, which belong to effects; a family knows its own kinks.
     speeds = () if family.dear.keys().isdisjoint(outputs) else reversing(family)
     if not speeds and not passed_levels:
         return np.zeros(0, np.intp), np.zeros(0)
@@ -178,27 +178,27 @@ def _passed(family: Family, designs: Array, outputs: Collection[str], looked: Ar
 
 
 def _looked(n: int, even: int, close: Index, angles: Array) -> Array:
-    """Even angles of a turn, (n, m), and further ones of the designs ``close``."""
+    """Even angles of a turn, (n, m), with further angles of the designs ``close``."""
     looked = np.tile(np.arange(even) * (TWO_PI / even), (n, 1))
     return with_events(looked, np.repeat(close, angles.shape[1]), angles.ravel())
 
 
 def reversing(family: Family) -> tuple[str, ...]:
-    """Pose outputs whose zeros cut the turn: the speeds of all positions of the family."""
+    """Pose outputs whose zeros cut the turn: the velocities of all positions of the family."""
     speeds = set(family.derivative_of.values())
     dear = set(family.dear)
     return tuple(rate for of, rate in family.derivative_of.items() if of not in speeds and rate not in dear)
 
 
-FIRST, LAST = 48, 384  # samples of a series at first, and at most: what needs more is searched between its poses
-FIRST_OF_MEAN = 32  # its error falls with the square of what the samples leave out
-FINER = 2  # times as many points show which tops of a series may be the highest
-RIVALS = 0.2  # of the range of a curve that the tops between its points may add
-DOUBT = 3.0  # times what the falling coefficients say of those beyond
+FIRST, LAST = 48, 384  # first and largest number of samples of a series: other curves are searched between poses
+FIRST_OF_MEAN = 32  # first number for a mean, whose error is quadratic in the truncated coefficients
+FINER = 2  # ratio of the points on which maxima of a series are bracketed to its samples
+RIVALS = 0.2  # share of a curve's range by which a maximum may exceed the points beside it
+DOUBT = 3.0  # factor on the truncation error that the decay of the coefficients predicts
 
 
 class Turns(NamedTuple):
-    """Designs whose samples resolve a curve: their numbers, values (r, q, N), coefficients, error and size, (r,)."""
+    """Designs whose samples resolve a curve: indices (r,), values (r, q, N), coefficients, error and size, (r,)."""
 
     rows: Index
     values: Array
@@ -209,18 +209,18 @@ class Turns(NamedTuple):
 
 @dataclass(frozen=True)
 class Series:
-    """A smooth curve of dear poses as the Fourier series of its samples, with the two questions of a fused curve.
+    """Fourier series of the samples of a smooth curve of expensive poses, with the interface of `FusedCurve`.
 
-    Coefficients of a smooth periodic curve fall by the same factor from order to order.  How they fall tells what those
-    beyond the samples add up to: the error, several times over.
+    Coefficients of a smooth periodic curve decay geometrically.  Their decay predicts the sum of those beyond the
+    samples, which is the error, with a safety factor.
     """
 
     family: Family
     request: Request
-    parts: tuple[str, ...]  # the curve is the length of the vector that they make
+    parts: tuple[str, ...]  # components of the vector whose length is the curve
 
     def extremum(self, designs: Array, target: float) -> tuple[Extremum, Status, Mask]:
-        """Return what is requested of every design, its status, and where a slower search is to be asked."""
+        """Compute the requested extremum of every design, its status, and where a slower search is needed."""
         found, status = Extremum.unknown(len(designs)), np.zeros(len(designs), np.uint8)
         undecided: Mask = np.ones(len(designs), np.bool_)
         for turns in self._resolved(designs, target, status, False):
@@ -230,7 +230,7 @@ class Series:
         return found, status, undecided & (status == st.OK)
 
     def mean(self, designs: Array, target: float) -> tuple[Array, Array, Status, Mask]:
-        """Return root mean squares over the turn, their errors, the status and what is undecided, as `extremum`."""
+        """Compute root mean squares over the turn, their errors, status and undecided designs, as in `extremum`."""
         mean, err = np.full((2, len(designs)), np.nan)
         status = np.zeros(len(designs), np.uint8)
         for turns in self._resolved(designs, target, status, True):
@@ -246,7 +246,7 @@ class Series:
     def _doubled(
         self, rows: Index, samples: int, designs: Array, target: float, status: Status, mean: bool
     ) -> Iterator[Turns]:
-        """Yield some of the designs from so many samples on; where these do not suffice, those between follow."""
+        """Yield resolved designs, beginning with ``samples`` samples and doubling them for the others."""
         known = np.empty((rows.size, len(self.parts), 0))
         while rows.size and samples <= LAST:
             left, between = [], known.shape[2] > 0
@@ -269,7 +269,7 @@ class Series:
             (rows, known), samples = (np.concatenate(both) for both in zip(*left, strict=True)), 2 * samples
 
     def _top(self, turns: Turns) -> tuple[Array, Array, Array, Mask]:
-        """Highest point of each series: value, place, its error, and whether it was reached."""
+        """Find the maximum of each series: value, place, its error, and whether the search has converged."""
         mode, (count, parts, orders) = self.request.mode, turns.series.shape
         size = FINER * 2 * (orders - 1)
         fine = np.fft.irfft(turns.series, size, norm="forward")
@@ -289,7 +289,7 @@ class Series:
         scan.best_candidate(row, height, np.full(count, -np.inf), best)
         good: Mask = (best >= 0) & (np.bincount(row[~still], minlength=count) == 0)
         value = np.sqrt(np.maximum(height[best], 0.0)) if square else mode * height[best]
-        # the curve, or its square, may be off by so much at its flat top
+        # error of the curve, or of its square, at its flat maximum
         off = 2.0 * (turns.size if square else 1.0) * turns.err
         err_phi = np.sqrt(2.0 * off / np.maximum(-bend[best], 1e-300))
         return value, np.mod(phi[best], TWO_PI), err_phi, good
@@ -306,15 +306,14 @@ def _root_mean_square(values: Array) -> Array:
     return found
 
 
-BANDS = (12, 16)  # of a turn's samples: so narrow are the bands of orders that tell how coefficients fall
+BANDS = (12, 16)  # number of samples over the width of the bands of orders that measure the decay of coefficients
 
 
 def _beyond(coefficients: Array) -> Array:
-    """Bound what orders beyond the samples may add to a curve, (n,), from its coefficients, (n, K + 1).
+    """Bound the sum of the orders beyond the samples, (n,), from the coefficients (n, K + 1).
 
-    Three bands of the highest orders tell how they fall, in the slower of their two steps.  Where rounding or a kink
-    lets them fall no further, the orders beyond count as if they were as high as the last ones, as many as there are
-    samples.
+    Three bands of the highest orders measure the decay, as the slower of their two steps.  Where rounding or a kink
+    stops the decay, the orders beyond count as if they were as large as the last ones, as many as there are samples.
     """
     half, found = coefficients.shape[1] - 1, np.zeros(len(coefficients))
     for share in BANDS:
@@ -328,9 +327,9 @@ def _beyond(coefficients: Array) -> Array:
 
 
 def _beyond_mean(coefficients: Array) -> Array:
-    """Bound the error of a root mean square, (n,): products of two orders that make up N count as a mean.
+    """Bound the error of a root mean square, (n,): products of two orders with sum N alias to the mean.
 
-    All of them are as large as that of the two in the middle, where coefficients fall evenly.
+    If coefficients decay evenly, all these products are as large as that of the two middle orders.
     """
     half = coefficients.shape[1] - 1
     last = coefficients[:, half - half // 8 : half].max(axis=1)
@@ -340,7 +339,7 @@ def _beyond_mean(coefficients: Array) -> Array:
 
 
 def series_of(family: Family, request: Request) -> Series | None:
-    """Return the series of what is requested; None for a curve that is not known to be smooth and dear."""
+    """Fourier series of a request; None unless the curve is known to be smooth and expensive."""
     known = next((smooth for smooth in family.every(Smooth) if smooth.of == request.pose), None)
     if known is None or request.place or request.windowed or switching(family, known.parts):
         return None

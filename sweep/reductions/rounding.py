@@ -1,4 +1,4 @@
-"""What rounding may have changed at a pose near a dead point, alike at its neighbours, so that it leaves no ripple."""
+"""Rounding errors of poses near a dead point, which neighbouring poses share, so that samples show no ripple."""
 
 from __future__ import annotations
 
@@ -17,20 +17,20 @@ from sweep.reductions.resolution import nearest
 from sweep.reductions.sampling import Index, Mask, blocks, only, pose_columns
 
 TRIES = 3
-ALONE = 0.1  # change of a curve's highest sample, against itself, by rounding the inputs: nothing is known of it then
-FAINT = 1e-10  # range against size from which on the rounding of a signed curve is looked at
-CONSTANT = 64.0 * EPS  # of its size: a curve that varies by no more tells nothing but rounding
+ALONE = 0.1  # relative change of a curve's highest sample by rounded inputs from which on the curve is only rounding
+FAINT = 1e-10  # ratio of range to size below which the rounding of a signed curve is checked
+CONSTANT = 64.0 * EPS  # relative range below which a curve is constant but for rounding
 
 
 def measure_constants(values: Array, scale: Array, rough: Array) -> None:
-    """Make the size of a curve that is constant but for rounding the scale of its signed extrema, in place.
+    """Use the size of a curve that is constant but for rounding as the scale of its signed extrema, in place.
 
-    The range of such a curve is noise, which no target relative to it can be met by, and no denser samples resolve.
+    The range of such a curve is noise: no relative target can be met by it, and no denser samples resolve it.
 
     Parameters
     ----------
     values : (n, m) samples of one turn
-    scale, rough : (n,) range of each curve, and what share of that the samples do not resolve
+    scale, rough : (n,) range of each curve, and the share of it that the samples do not resolve
     """
     size = np.abs(values).max(axis=1)
     constant = np.ptp(values, axis=1) <= CONSTANT * size
@@ -41,20 +41,19 @@ def rounding_share(
     family: Family, designs: Array, columns: dict[str, Array], row: Index, column: Index, guards: list[str],
     order: Index,
 ) -> Array:  # fmt: skip
-    """Share of values that rounding may have changed (docs/internals/extrema.md).
+    """Estimate the share of values that rounding may have changed (docs/internals/extrema.md).
 
     Parameters
     ----------
     family, designs : the (n, P) design matrix
     columns : the discriminants ``guards`` over one turn, (n, m) each
     row, column : (k,) design and sample of each value
-    order : (k,) of the derivative that each value is, as of :func:`order_of`
+    order : (k,) order of derivative of each value, as of :func:`order_of`
 
     Notes
     -----
-    A pose near a dead point amplifies the rounding of its discriminant.  What is rounded are terms of the size that
-    the discriminant has where the links meet at a right angle: a tiny crank may keep it far below that over the whole
-    turn.
+    A pose near a dead point amplifies the rounding of its discriminant.  The rounded terms have the size of the
+    discriminant where the links meet at a right angle: with a tiny crank it may be far smaller over the whole turn.
     """
     amplified = np.ones(row.size)
     sizes = {loop.discriminant: loop.scale for loop in family.every(Assembly)}
@@ -67,32 +66,32 @@ def rounding_share(
 
 
 def singular_share(near: Singularities, phi: Array, order: Index) -> Array:
-    """Return what rounding may have changed near a singularity that no discriminant of an assembly tells of.
+    """Estimate the rounding near singularities that no discriminant of an assembly shows.
 
-    What is rounded there falls with the square of the distance of its complex zero.
+    The rounded quantity falls with the square of the distance of its complex zero.
 
     Parameters
     ----------
     near : the singularities of the design of each value
-    phi, order : (k,) crank angle [rad] of each value, and of which derivative it is
+    phi, order : (k,) crank angle [rad] and order of derivative of each value
     """
     return _of_order(order, np.maximum(near.distance(phi) ** -2.0 - 1.0, 0.0))
 
 
 def _of_order(order: Index, amplified: Array) -> Array:
-    """Share of rounding: a derivative of order n grows like the power 1/2 - n of what vanishes."""
+    """Share of rounding: a derivative of order n grows like the power 1/2 - n of the vanishing quantity."""
     found: Array = 4.0 * EPS * np.where(order == 0, np.sqrt(amplified), np.where(order < 3, amplified, 2.0 * amplified))
     return found
 
 
 def shaken(family: Family, designs: Array, phi: Array, name: str) -> Array:
-    """Return by how much a pose output changes where the inputs of a design are rounded otherwise, (n,).
+    """Measure the change of a pose output under rounding of the inputs of a design, (n,).
 
-    A kernel that is as exact as its inputs errs by as much again.  It is the largest change of TRIES poses, at one
-    crank angle of each design; a pose that is lost by that tells nothing.
+    A kernel as exact as its inputs has an error of this size.  It is the largest change of TRIES poses, at one crank
+    angle of each design; poses that fail are ignored.
     """
     free = np.array([p.choices is None and p.unit != "count" for p in family.parameters])
-    # By the name of each input: what else is asked for brings in others, and moves none of these.
+    # Signs depend on the name of each input, so that further inputs of other outputs do not change them.
     bits = np.array([crc32(p.name.encode()) for p in family.parameters]) >> np.arange(TRIES)[:, None]
     signs = np.where(free, 1.0 - 2.0 * (bits & 1), 0.0)
     every = np.concatenate([designs, *(designs * (1.0 + 2.0 * EPS * sign) for sign in signs)])
@@ -106,18 +105,18 @@ def shaken(family: Family, designs: Array, phi: Array, name: str) -> Array:
 
 
 def rounding_alone(family: Family, designs: Array, pose: str, values: Array, scale: Array, rough: Mask) -> Mask:
-    """Return which of the rough curves are rounding alone, such as the moment in a pin whose forces lie in one plane.
+    """Select the rough curves that are rounding only, such as the moment in a pin whose forces lie in one plane.
 
-    No denser samples resolve them.  Where the inputs are rounded otherwise they are other curves: the error of their
-    largest magnitude is as large as itself.  So is that of a signed extremum as the range, where forces cancel, as the
-    shaking force of a balanced linkage does, or leave one that turns with the crank.
+    No denser samples resolve them.  With rounded inputs they change by as much as their largest magnitude.  The same
+    holds for signed extrema, relative to the range, where forces cancel, as the shaking force of a balanced linkage
+    does, or leave a constant one that turns with the crank.
 
     Parameters
     ----------
     family, designs, pose : the (n, P) design matrix, and the pose output
     values : (n, m) samples of one turn
     scale : (n,) largest magnitude of each curve, of signed extrema its range
-    rough : (n,) which of them the samples do not resolve; of signed extrema faint ranges are looked at too
+    rough : (n,) curves that the samples do not resolve; of signed extrema faint ranges are checked too
     """
     found = np.zeros(len(designs), np.bool_)
     which = np.flatnonzero(rough | (scale < FAINT * np.abs(values).max(axis=1)))
@@ -129,7 +128,7 @@ def rounding_alone(family: Family, designs: Array, pose: str, values: Array, sca
 
 
 def order_of(family: Family, pose: str) -> int:
-    """Order of the derivative that a pose output is; 3 for what may be made of any: a magnitude, a force."""
+    """Order of derivative of a pose output; 3 for outputs of unknown order, such as magnitudes and forces."""
     lower = {derivative: of for of, derivative in family.derivative_of.items()}
     if pose not in lower:
         return 0 if pose in family.derivative_of else 3
@@ -137,14 +136,14 @@ def order_of(family: Family, pose: str) -> int:
 
 
 def tells(discriminant: Array) -> Mask:
-    """Whether a discriminant is a number to rely on: at scales such as 1e100 or 1e-80 it leaves float64."""
+    """Whether a discriminant is within the range of float64: at scales such as 1e100 or 1e-80 it is not."""
     usable: Mask = (discriminant > 1e-280) & (discriminant < 1e280)
     return usable
 
 
-SPACING = 1.0 / 6.0  # of poses, against the distance of the nearest singularity
-RIVAL = 0.9  # share of the highest pose above which a local maximum may turn out the highest
-POSES = 512  # of a turn, roughly: how many designs are looked at together
+SPACING = 1.0 / 6.0  # of poses, relative to the distance of the nearest singularity
+RIVAL = 0.9  # share of the highest pose above which a local maximum may turn out to be the highest
+POSES = 512  # poses per turn, roughly, that determine the size of blocks
 LEVEL = 8.0 * EPS
 AROUND = np.arange(-3.0, 4.0)
 
@@ -152,26 +151,26 @@ AROUND = np.arange(-3.0, 4.0)
 def sharpen_maxima(
     family: Family, step: Step, designs: Array, pose: str, name: str, columns: Columns, target: float
 ) -> None:
-    """Replace those maxima of a step whose errors exceed the target by more accurate ones, in place.
+    """Replace maxima of a step whose errors exceed the target by more accurate ones, in place.
 
     Parameters
     ----------
     family : with precise poses;  step : provides ``name`` and its place
     designs : the (n, P) design matrix
-    pose : the pose output x;  name : the largest magnitude of it
-    columns : what the step found, with ``err_<name>``, and perhaps the place and its error; changed in place
+    pose : the pose output x;  name : its largest magnitude
+    columns : results of the step, with ``err_<name>``, and perhaps the place and its error; changed in place
     target : relative accuracy
 
     Notes
     -----
-    A maximum below what the step has found, by more than both errors, is another peak: then the step's stands.
+    A maximum that is lower than the step's by more than both errors is another peak: then the step's value is kept.
     """
     place = f"{family.domain.name}_{name}"
     value, err = (np.asarray(columns[key], np.float64) for key in (name, f"err_{name}"))
     wanting = np.flatnonzero(err > target * np.abs(value))
     if not wanting.size:
         return
-    # The larger its error the nearer the singularity, as a rule, and the more poses a block of such designs takes.
+    # A larger error usually means a nearer singularity, and more poses for a block of such designs.
     wanting = wanting[np.argsort(err[wanting] / np.abs(value[wanting]), kind="stable")]
     for rows in blocks(wanting, POSES):
         searched = step.run(designs[rows], frozenset((name, place)), Accuracy(target=target))
@@ -185,22 +184,22 @@ def sharpen_maxima(
 
 
 def precise_maxima(family: Family, designs: Array, pose: str, phi: Array, target: float, locate: bool) -> Peaks:
-    """Largest magnitudes (n,) over the turn from the family's precise poses alone; error inf where they are lost.
+    """Compute the largest magnitudes (n,) over the turn from the family's precise poses alone; error inf if lost.
 
     Parameters
     ----------
     family, designs : with precise poses; the (n, P) design matrix
-    pose : which output is largest
+    pose : the pose output
     phi : (n,) places of the maxima as known so far [rad]
     target : relative accuracy
     locate : whether the places are wanted too
 
     Notes
     -----
-    Near a change point there are tops of nearly equal height a few distances of the singularity apart, on either side
-    of a sharp zero, or across the turn: only precise poses tell them apart.  So the whole turn is looked at again, by
-    poses that stand no wider than a sixth of that distance.  The known place is a candidate of its own, and a maximum
-    below the highest of all poses seen is none.
+    Near a change point there are maxima of nearly equal height a few distances of the singularity apart, on either side
+    of a sharp zero, or across the turn: only precise poses distinguish them.  So the whole turn is searched again, by
+    poses no wider apart than a sixth of that distance.  The known place is one of the candidates, and a maximum below
+    the highest pose is rejected.
     """
     precise = family.precise()
 
@@ -225,7 +224,7 @@ def precise_maxima(family: Family, designs: Array, pose: str, phi: Array, target
     )
     best, which = np.full(phi.size, -np.inf), np.full(phi.size, -1)
     scan.best_candidate(row, peaks.height, best, which)
-    # Several have climbed the same top: the one that knows it best.
+    # Of several candidates at the same maximum the most accurate one is used.
     as_high = peaks.height >= (1.0 - LEVEL) * best[row]
     scan.best_candidate(row, np.where(as_high, -peaks.err_height, -np.inf), np.full(phi.size, -np.inf), which)
     found = only(peaks, which)

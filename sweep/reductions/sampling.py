@@ -1,4 +1,4 @@
-"""Poses over whole turns: the same angles for many designs, in blocks that stay in the cache."""
+"""Poses over whole turns: the same angles for many designs, in blocks that fit into the cache."""
 
 from __future__ import annotations
 
@@ -19,41 +19,41 @@ from sweep.families.capabilities import Assembly
 Index: TypeAlias = NDArray[np.int64]
 Mask: TypeAlias = NDArray[np.bool_]
 
-BLOCK = 2**17  # samples handled at once: a few columns of that many stay in the cache
-FEW = 4  # columns from which on there are fewer samples at once
+BLOCK = 2**17  # samples handled at once: a few columns of this length stay in the cache
+FEW = 4  # number of columns above which blocks have fewer samples
 
 
 @lru_cache(maxsize=32)
 def turn(samples: int, between: bool = False) -> Angles:
-    """Equidistant crank angles of one turn from 0, (1, samples); ``between`` what half as many do not have."""
-    # Not locked: kernels would be compiled once more, for arrays that cannot be written.
+    """Equidistant crank angles of one turn from 0, (1, samples); with ``between`` only those of odd index."""
+    # Writable: kernels would be compiled once more for read-only arrays.
     phi: Array = np.arange(int(between), samples, 1 + between, dtype=np.float64)[None, :] * (TWO_PI / samples)
     return Angles.of(phi)
 
 
 def blocks(rows: Index, samples: int, columns: int = 1) -> Iterator[Index]:
-    """Yield pieces of ``rows`` small enough that their samples of so many columns stay in the cache."""
+    """Yield pieces of ``rows`` so small that their samples of ``columns`` columns stay in the cache."""
     size = max(1, BLOCK * FEW // (samples * max(columns, FEW)))
     for start in range(0, rows.size, size):
         yield rows[start : start + size]
 
 
 def discriminants(family: Family) -> tuple[str, ...]:
-    """Pose outputs that tell how near a stage is to a dead point: one per stage of a chain."""
+    """Pose outputs that vanish at a dead point: one per stage of a chain."""
     return tuple(loop.discriminant for loop in family.every(Assembly))
 
 
 def sample_turn(
     family: Family, designs: Array, samples: int, names: Sequence[str], between: bool = False
 ) -> tuple[dict[str, Array], Status, Mask]:
-    """Pose outputs over one turn, (n, samples), with angles made continuous; the first crank angle is 0.
+    """Compute pose outputs over one turn, (n, samples), with unwrapped angles; the first crank angle is 0.
 
-    With ``between`` only those of the crank angles that half as many samples do not have, (n, samples/2).
+    With ``between`` only the crank angles that a grid of half as many samples does not have, (n, samples/2).
 
     Returns
     -------
     columns : the pose outputs
-    worst : (n,) gravest status of the turn
+    worst : (n,) worst status of the turn
     winds : (n,) whether a wanted follower's angle makes full turns, so that it has no extremum
     """
     columns, status = _evaluate(family, designs, turn(samples, between), names)
@@ -68,7 +68,7 @@ def sample_turn(
 
 
 def pose_columns(family: Family, designs: Array, phi: Array, names: Sequence[str]) -> tuple[dict[str, Array], Status]:
-    """Pose outputs of each design at its own crank angles, (n, m), and their status."""
+    """Compute pose outputs of each design at its own crank angles, (n, m), and their status."""
     return _evaluate(family, designs, Angles.of(phi), names)
 
 
@@ -80,7 +80,7 @@ def _evaluate(family: Family, designs: Array, angles: Angles, names: Sequence[st
 
 @of_family
 def on_closed_turn(family: Family) -> Family:
-    """Family with poses over a closed turn; the family itself unless its domain is an interval."""
+    """Map an interval to a closed turn, out and back; a family over any other domain is returned as it is."""
     domain = family.domain
     if not isinstance(domain, Interval):
         return family
@@ -94,12 +94,12 @@ def on_closed_turn(family: Family) -> Family:
 
 
 def variable(family: Family, designs: Array, turned: Array, err: Array) -> tuple[Array, Array]:
-    """Return the domain's variable at angles of the closed turn, (n,), and its error from that of the angle."""
+    """Return the domain's variable at angles of the closed turn, (n,), and its error from the angle's error."""
     if not isinstance(family.domain, Interval):
         return turned, err
     low, high = family.domain.ends(designs)
     half = 0.5 * (high - low)
-    # Near an end x is stationary in t: the second order counts there.
+    # Near an end x is stationary in t: the second-order term matters there.
     return _place(low, high, np.cos(turned)), np.abs(half) * (np.abs(np.sin(turned)) * err + 0.5 * err**2)
 
 
@@ -134,7 +134,7 @@ def put(record: tuple[Any, ...], rows: Index | Mask, values: tuple[Any, ...]) ->
 
 
 class Extremum(NamedTuple):
-    """Extremum of every design, each (n,): the measured value, its crank angle in [0, 2 pi), and their errors."""
+    """Extremum of every design, each (n,): value, crank angle in [0, 2 pi), and their errors."""
 
     value: Array
     phi: Array
@@ -143,31 +143,31 @@ class Extremum(NamedTuple):
 
     @classmethod
     def unknown(cls, count: int) -> Extremum:
-        """Return a record that is all nan."""
+        """Make a record of nan."""
         return cls(*(np.full(count, np.nan) for _ in range(4)))
 
 
-# What a pose's status means for its design; the others keep their meaning.
+# Status of a design by that of a pose; all others are the same.
 DESIGN_STATUS = np.arange(256, dtype=np.uint8)
 DESIGN_STATUS[st.NOT_ASSEMBLED] = st.NOT_ROTATABLE
 DESIGN_STATUS[st.DEAD_POINT] = st.UNDECIDABLE
 
 
 JUMPS = 32  # of a turn; a curve with more is not resolved
-STEP = 1.0 / 60.0  # of the curve's size; smaller steps are left to the samples
-SHARPER = 6.0  # times the differences beside it
+STEP = 1.0 / 60.0  # least jump relative to the curve's size; samples resolve smaller ones
+SHARPER = 6.0  # least ratio of a jump to the differences beside it
 
 
 def jumps(values: Array, size: Array, rough: float) -> Mask:
-    """Tell which rows of samples jump, and are resolved apart from that.
+    """Select the curves that jump and are resolved apart from their jumps.
 
-    Friction changes its direction where the follower reverses, an angle of a direction leaps by pi: no number of
+    Friction changes its direction where the follower reverses, the angle of a direction jumps by pi: no number of
     samples resolves such a place.
 
     Parameters
     ----------
     values : (n, m) equidistant samples of whole turns;  size : (n,) of the curves
-    rough : fourth difference against the size above which samples do not resolve a curve
+    rough : fourth difference relative to the size above which samples do not resolve a curve
     """
     step = np.abs(np.roll(values, -1, axis=1) - values)
     beside = np.maximum.reduce([np.roll(step, k, axis=1) for k in (-2, -1, 1, 2)])

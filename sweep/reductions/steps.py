@@ -1,4 +1,4 @@
-"""A family's own routes to design outputs, the one that serves an accuracy, and what can be proven, travel included."""
+"""A family's own steps to design outputs: choice by accuracy, costs, and proofs of maxima, travel included."""
 
 from __future__ import annotations
 
@@ -26,11 +26,11 @@ from sweep.reductions.fused import curve_of
 from sweep.reductions.margins import margin_suffixes, own_step
 
 MOST_CELLS = 1000  # enclosures of one design before its proof is given up
-ORDERS = 3  # derivatives that the proof knows
+ORDERS = 3  # highest order of derivative that the proof covers
 
 
 def certified_travel(family: Family) -> Step | None:
-    """Step that proves maxima of a guided point's travel and deviation; None for a family that has none to prove."""
+    """Make the step that proves maxima of a guided point's travel and deviation; None for other families."""
     stages = family.stages
     guided = stages[-1].family.find(GuidedPoint)
     if guided is None or any(s.family.find(CrankRockerLoop) is None for s in stages):
@@ -49,9 +49,9 @@ def certified_travel(family: Family) -> Step | None:
 
 
 def proven_curves(family: Family, guided: GuidedPoint) -> dict[str, tuple[int, int]]:
-    """Pose outputs whose maxima the proof knows.
+    """Pose outputs whose maxima can be proven.
 
-    To each: 0 for the travel along the line, 1 for the deviation across it, and the order of the derivative.
+    Each maps to 0 for the travel along the line or 1 for the deviation across it, and the order of derivative.
     """
     curves: dict[str, tuple[int, int]] = {}
     name = family.position
@@ -72,7 +72,7 @@ def _proven(
     wanted: frozenset[str],
     accuracy: Accuracy,
 ) -> Columns:
-    from kernels.families.rssr.certify import InSeries, certify_maxima  # here: only proofs wait for its import
+    from kernels.families.rssr.certify import InSeries, certify_maxima  # here, so that only proofs wait for the import
 
     assert accuracy.target is not None
     n = len(designs)
@@ -110,13 +110,13 @@ def _loop(stage: Stage, designs: Array) -> Array:
 
 @of_family
 def steps_of(family: Family) -> tuple[Step, ...]:
-    """Return the family's own routes, and those that are made for it here."""
+    """List the family's own steps and the general ones made here."""
     made = (size_step(family), dimension_step(family), certified_travel(family))
     return (*family.steps, *(step for step in made if step is not None))
 
 
 def own_steps(family: Family, name: str) -> list[tuple[Step, Output, Stage]]:
-    """List the own routes to an output, and those of a chain's first stage, which turns as if it were alone."""
+    """List the steps to an output, including those of a chain's first stage, which turns as if it were alone."""
     found = [(step, o, family.whole) for step in steps_of(family) for o in step.provides if o.name == name]
     if isinstance(family, Chain) and (own := at_stage(name, "1")):
         stage = family.stages[0]
@@ -125,13 +125,13 @@ def own_steps(family: Family, name: str) -> list[tuple[Step, Output, Stage]]:
 
 
 def applying_step(family: Family, name: str, accuracy: Accuracy) -> tuple[Step, Stage] | None:
-    """Own route to an output that serves this accuracy; there is one at most (tests/run/test_costs.py)."""
+    """Find the step to an output that serves this accuracy; there is one at most (tests/run/test_costs.py)."""
     able = ((step, stage) for step, _, stage in own_steps(family, name) if step.applies(accuracy.of(name)))
     return next(able, None)
 
 
 def step_ns(family: Family, step: Step, accuracy: Accuracy) -> float:
-    """Estimated time of a family's own step [ns per design]."""
+    """Estimate the time of a family's own step [ns per design]."""
     if step.cost is not None:
         return step.cost(accuracy)
     row = f"{family.name}: {step.name}"
@@ -139,7 +139,7 @@ def step_ns(family: Family, step: Step, accuracy: Accuracy) -> float:
 
 
 def certified_names(family: Family) -> tuple[str, ...]:
-    """Return the outputs whose maxima can be proven, those of a chain's first stage included."""
+    """List the outputs whose maxima can be proven, including those of a chain's first stage."""
     names = [o.name for step in steps_of(family) if step.certifies for o in step.provides]
     if isinstance(family, Chain):
         names += [f"{o.name}1" for step in family.stages[0].family.steps if step.certifies for o in step.provides]
@@ -147,12 +147,12 @@ def certified_names(family: Family) -> tuple[str, ...]:
 
 
 def place_names(family: Family) -> set[str]:
-    """Return names of the proven maxima's places, whose errors stay estimates."""
+    """Names of the proven maxima's places, whose errors stay estimates."""
     return {name for name in certified_names(family) if (found := reduction_of(family, name)) and found[0].place}
 
 
 def proofs(certify: bool | Sequence[str]) -> tuple[bool, tuple[str, ...]]:
-    """Return what ``certify=`` asks for, as ``certify`` and ``proven`` of `Accuracy`."""
+    """Convert the argument ``certify=`` to ``certify`` and ``proven`` of `Accuracy`."""
     if isinstance(certify, bool):
         return certify, ()
     names = (certify,) if isinstance(certify, str) else tuple(dict.fromkeys(certify))
@@ -165,11 +165,11 @@ def is_proven(family: Family, name: str, accuracy: Accuracy) -> bool:
 
 
 def check_certifiable(family: Family, wanted: Sequence[str], accuracy: Accuracy, windowed: bool = False) -> None:
-    """Refuse a proof for what has none.
+    """Raise if a wanted proof is not possible.
 
-    Exact outputs need no proof; limit positions, margins and means are no maxima that a search could miss a peak of.
-    Where ``accuracy.proven`` names outputs, it is they that must have one.  With ``windowed`` some outputs count in a
-    part of the stroke only; what is proven is the whole turn.
+    Exact outputs need no proof; limit positions, margins and means are no maxima, so a search misses no peak of theirs.
+    If ``accuracy.proven`` names outputs, these must have a proof.  With ``windowed`` some outputs count in a part of
+    the stroke only, but a proof covers the whole turn.
 
     Raises
     ------
@@ -201,21 +201,21 @@ def check_certifiable(family: Family, wanted: Sequence[str], accuracy: Accuracy,
 
 
 def is_windowed(family: Family, name: str) -> bool:
-    """Tell whether an output counts in the window alone, where a window is given."""
+    """Whether an output uses only poses in the window, if a window is given."""
     return any(request.windowed for request in requests(family, resolve(family, name), True))
 
 
-# Poses per design on average: of a margin, a mean, an event, of a search without its peaks, per refined extremum.
+# Poses per design on average: for a margin, a mean, an event, a search without its peaks, a refined extremum.
 POSES_MARGIN = 64.0
 POSES_MEAN = 110.0
 POSES_EVENT = 340.0
 POSES_SEARCH = 180.0
 POSES_PEAK = 30.0
-POSES_PLACE = 240.0  # of a place after a fused search: nine precise poses take as long as so many others
+POSES_PLACE = 240.0  # for a place after a fused search: nine precise poses take as long as this many others
 
 
 class Beyond(NamedTuple):
-    """What a pose output is computed by beside the motion, "" for nothing: place among routes, cost [ns per pose]."""
+    """Effect or relation that a pose output needs beyond the motion ("" for none), its order and cost [ns per pose]."""
 
     name: str = ""
     order: tuple[Work, int] = (Work.EFFECT, 0)
@@ -226,7 +226,7 @@ EVENTS = 1e4  # ns per pose: angles of events are found once per design, in some
 
 
 def beyond_motion(family: Family, pose: str) -> Beyond:
-    """Return the effect or the relation of a machine that a pose output is of."""
+    """Return the effect or the machine's relation that computes a pose output."""
     return _beyond(family).get(pose, Beyond())
 
 
@@ -239,17 +239,17 @@ def _beyond(family: Family) -> dict[str, Beyond]:
             needs = relation.needs(frozenset((name,)))
             ns = sum(dict(family.dear[one] for one in needs if one in family.dear).values())
             if any(one.startswith("phi_") for one in needs):
-                # behind the routes that find events, and their limits
+                # after the routes that find events, and their limits
                 found[name] = Beyond(relation.name, (Work.LONG, len(family.steps) + number), ns + EVENTS)
             elif ns:
                 found[name] = Beyond(relation.name, (Work.EFFECT, len(effects) + number), ns)
-            else:  # poses of several members: behind all that one of them says alone
+            else:  # poses of several members: after all outputs of single members
                 found[name] = Beyond("of relations", (Work.SEARCH, len(family.pose_names)), 0.0)
     return found
 
 
 def group_ns(family: Family, group: Group, names: Sequence[str], accuracy: Accuracy, windowed: bool = False) -> float:
-    """Estimated time of a general route [ns per design], made of measured times of poses and of searches."""
+    """Estimate the time of a general route [ns per design] from measured times of poses and of searches."""
     stages, pose = _stages(family), pose_ns(family)
     if group == "margin":
         return sum(_margin_ns(family, suffix, accuracy) for suffix in margin_suffixes(family))
@@ -257,7 +257,7 @@ def group_ns(family: Family, group: Group, names: Sequence[str], accuracy: Accur
     if group == "events":
         return POSES_EVENT * pose + nanoseconds("work", "event") * len(asked)
     requested = {r for one in asked for r in requests(family, one, windowed)}
-    # What effects add is paid once per effect and pose, and far outweighs the motion.
+    # The cost of effects counts once per effect and pose, and far outweighs the motion.
     effects = sum({(name, ns): ns for name, _, ns in (beyond_motion(family, one.of) for one in asked)}.values())
     if accuracy.samples is not None or group == "means":
         scans = len(asked) if group == "means" else len(requested)
@@ -277,7 +277,7 @@ def group_ns(family: Family, group: Group, names: Sequence[str], accuracy: Accur
 
 
 def _margin_ns(family: Family, suffix: str, accuracy: Accuracy) -> float:
-    """Estimated time of the margin of a stage, which all stages before it drive."""
+    """Estimate the time of the margin of a stage, which all stages before it drive."""
     if isinstance(family, Machine):
         name, own = suffix.split(".")
         return _margin_ns(family.member(name).family, own, accuracy)
@@ -299,14 +299,14 @@ def _stages(family: Family) -> int:
 
 
 def pose_ns(family: Family) -> float:
-    """Estimated time of the motion of a pose: of a chain or a machine that of all its stages and members."""
+    """Estimate the time of a pose's motion [ns]: of a chain or a machine the sum over stages and members."""
     if isinstance(family, Machine):
         return sum(pose_ns(member.family) for member in family.members)
     return sum(nanoseconds("poses", stage.family.name) for stage in family.stages)
 
 
 def group_order(family: Family, group: Group, names: Sequence[str]) -> tuple[Work, int]:
-    """Place of a general route among others: what shows that a design does not turn first, then the fewest extrema."""
+    """Order of a general route: routes that detect non-rotatable designs first, then those with the fewest extrema."""
     asked = [resolve(family, name) for name in names]
     beyond = next((found for one in asked if (found := beyond_motion(family, one.of)).name), None)
     if beyond is not None:

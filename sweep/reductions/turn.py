@@ -1,4 +1,4 @@
-"""The general routes to design outputs over one turn: margins, limit positions, reductions of pose outputs."""
+"""General routes to design outputs over one turn: margins, limit positions, reductions of pose outputs."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ Found: TypeAlias = dict[Request, Extremum]
 
 
 def margin_group(family: Family, designs: Array, names: Sequence[str], accuracy: Accuracy) -> Columns:
-    """Rotatability, margins and largest pressure angles; only the stages that the names need, all if there are none."""
+    """Compute rotatability, margins and pressure angles of the stages that the names need; of all without names."""
     asked = [one for name in names if isinstance(one := resolve(family, name), Margin)]
     known = margin_suffixes(family)
     valued = any(one.kind == "margin" for one in asked)
@@ -42,7 +42,7 @@ def margin_group(family: Family, designs: Array, names: Sequence[str], accuracy:
 def _of_members(
     family: Family, designs: Array, asked: Sequence[Margin], known: Sequence[str], accuracy: Accuracy, valued: bool
 ) -> Columns:
-    """Margins of members of a machine under their dotted names; a chain's weakest stage speaks for the member."""
+    """Compute margins of a machine's members under their dotted names; a chain's weakest stage decides."""
     members = {f"{one.stage.rpartition('.')[0]}." for one in asked}
     suffixes = tuple(s for s in known if any(s.startswith(member) for member in members))
     columns = with_transmission(margins(family, designs, suffixes, accuracy, valued), suffixes)
@@ -61,12 +61,12 @@ def limits_and_reductions(
     accuracy: Accuracy,
     part: tuple[float, float] | None = None,
 ) -> Columns:
-    """Limit positions and extrema of pose outputs over one turn, on samples or refined.
+    """Compute limit positions and extrema of pose outputs over one turn, on samples or refined.
 
     Parameters
     ----------
     family, designs : the (n, P) design matrix of any family
-    names : design outputs of the grammar and of the limit positions
+    names : reductions and limit positions
     accuracy : dense grid or refined
     part : the window of the stroke for deviations
 
@@ -101,7 +101,7 @@ def limits_and_reductions(
 
 
 def _window(position: str, found: Found, accuracy: Accuracy, part: tuple[float, float] | None) -> Window:
-    """Return the window of a follower whose ends are found."""
+    """Make the window of a follower whose limit positions are found."""
     if part is None:
         raise MissingInput("window", f"two fractions of the stroke, as {STAY.name} is wanted", "design outputs")
     most, least = found[Request(position, 1)], found[Request(position, -1)]
@@ -123,7 +123,7 @@ def _extrema(
 def sampled_extrema(
     family: Family, designs: Array, requests: Sequence[Request], samples: int, window: Window | None = None
 ) -> tuple[Found, Status]:
-    """Extrema on a grid of ``samples`` equidistant crank angles from 0; nan where the status is not OK.
+    """Compute extrema on a grid of ``samples`` equidistant crank angles from 0; nan where the status is not OK.
 
     Errors are not estimated (nan).  A window without a sample in it gives NOT_CONVERGED.
     """
@@ -155,7 +155,7 @@ def _best_samples(
     family: Family, rows: Index, columns: dict[str, Array], request: Request, samples: int, window: Window | None,
     found: Extremum,
 ) -> Index:  # fmt: skip
-    """Write the best sample of some designs and its crank angle; returns the designs that have none in the window."""
+    """Write the extreme sample of designs and its crank angle; return the designs without a sample in the window."""
     allowed = None
     if window is not None and request.windowed:
         allowed = window.holds(rows, columns[window.position])
@@ -167,7 +167,7 @@ def _best_samples(
 
 
 def _value(family: Family, designs: Array, one: Quantity, found: Found, windowed: bool) -> tuple[Array, Array]:
-    """Return a design output and its error from the extrema it is made of."""
+    """Compute a design output and its error from its extrema."""
     first, *others = (found[r] for r in requests(family, one, windowed))
     match one:
         case Reduced(reduction=reduction) if reduction.place:
@@ -186,7 +186,7 @@ def _value(family: Family, designs: Array, one: Quantity, found: Found, windowed
 
 
 def _extended_is_largest(family: Family, designs: Array, position: str) -> Mask:
-    """Whether crank and coupler are in line outward where the follower is farthest: so in assembly mode +1 (3.2)."""
+    """Whether the largest position is the extended one, with crank and coupler in line outward (3.2)."""
     sign = family.outward_sign(position)
     if not sign:
         return np.ones(len(designs), np.bool_)
@@ -195,7 +195,7 @@ def _extended_is_largest(family: Family, designs: Array, position: str) -> Mask:
 
 
 def _limit(kind: str, wraps: bool, most: Extremum, least: Extremum, outward: Mask) -> tuple[Array, Array]:
-    """Return what the two limit positions say; ``wraps`` is about the position.
+    """Compute a quantity of the two limit positions; ``wraps`` for a position that is an angle.
 
     ``outward`` (n,) tells where the largest position is the extended one.
     """
@@ -217,5 +217,5 @@ def _limit(kind: str, wraps: bool, most: Extremum, least: Extremum, outward: Mas
 
 
 def _principal(angle: Array) -> Array:
-    """Angle in (-pi, pi], as atan2 has it."""
+    """Reduce an angle to (-pi, pi], the range of atan2."""
     return angle - TWO_PI * np.ceil((angle - np.pi) / TWO_PI)

@@ -1,4 +1,4 @@
-"""The part of a turn in which the follower's position lies between two limits: where it begins and ends."""
+"""Window of a follower's position: the parts of a turn in which it lies between two limits."""
 
 from __future__ import annotations
 
@@ -13,11 +13,11 @@ from sweep.numerics.events import zeros
 from sweep.reductions.resolution import denser
 from sweep.reductions.sampling import Index, Mask, blocks, pose_columns, sample_turn
 
-BESIDE = 1e-5  # [rad] of the difference quotient that tells how a value changes with the position
+BESIDE = 1e-5  # [rad] step of the difference quotient of a value over the position
 
 
 class Window(NamedTuple):
-    """Positions between which poses count, of every design, each (n,), their error, and the output that they are of."""
+    """Limits of the positions whose poses count, each (n,), their error, and the name of the position's output."""
 
     low: Array
     high: Array
@@ -26,14 +26,14 @@ class Window(NamedTuple):
 
     @classmethod
     def of_stroke(cls, position: str, least: Array, most: Array, err: Array, part: tuple[float, float]) -> Window:
-        """Part (fractions of the stroke, from the smallest position) of a motion between two positions."""
+        """Window between fractions ``part`` of the stroke, measured from the smallest position."""
         # A fraction 0 or 1 is open: rounding of the extreme position must not cut off the pose that reaches it.
         low = least + part[0] * (most - least) if part[0] > 0.0 else np.full(least.size, -np.inf)
         high = least + part[1] * (most - least) if part[1] < 1.0 else np.full(least.size, np.inf)
         return cls(low, high, err, position)
 
     def only(self, rows: Index | Mask) -> Window:
-        """Return that of some of the designs."""
+        """Select designs by index or mask."""
         return Window(self.low[rows], self.high[rows], self.err[rows], self.position)
 
     def holds(self, rows: Index, positions: Array) -> Mask:
@@ -41,14 +41,14 @@ class Window(NamedTuple):
         return (positions >= self.low[rows, None]) & (positions <= self.high[rows, None])
 
     def nears(self, rows: Index, positions: Array) -> Mask:
-        """Whether the motion is in the window at samples (k, m) of a turn, or on the way to a neighbour of theirs."""
+        """Whether the motion is in the window at samples (k, m) of a turn, or between a sample and its neighbour."""
         after = np.roll(positions, -1, axis=1)
         low, high = np.minimum(positions, after), np.maximum(positions, after)
         passed = (high >= self.low[rows, None]) & (low <= self.high[rows, None])
         return passed | np.roll(passed, 1, axis=1)
 
     def grazed(self, rows: Index, positions: Array) -> Mask:
-        """Whether the motion may enter or leave the window between two samples and come back at once."""
+        """Whether the motion may pass a limit of the window twice between two samples."""
         doubtful = np.zeros(rows.size, np.bool_)
         for level in (self.low[rows], self.high[rows]):
             scan.grazes(positions, level, doubtful)
@@ -58,7 +58,7 @@ class Window(NamedTuple):
 class Edges(NamedTuple):
     """Poses at which a window begins or ends, each (k,): row of the block, angle, values there and their errors.
 
-    ``side`` is 0 where the follower is at the lower end of the window, 1 where it is at the upper one.
+    ``side`` is 0 at the lower limit of the window, 1 at the upper one.
     """
 
     row: Index
@@ -75,12 +75,12 @@ def edges(family: Family, designs: Array, rows: Index, window: Window, columns: 
     ----------
     family, designs : the whole (n, P) design matrix
     rows : (r,) designs of the block
-    columns : (r, m) position and that pose output over one turn
-    pose : which pose output is wanted at the edges
+    columns : (r, m) position and the pose output over one turn
+    pose : name of the pose output that is wanted at the edges
 
     Notes
     -----
-    The error is what is left of the position's error, and the error of the stroke's ends, carried over by the slope.
+    The error is the residual of the position plus the error of the window's limits, multiplied by the slope.
     """
     positions, samples = columns[window.position], columns[pose].shape[1]
     spacing, wraps = TWO_PI / samples, family.pose_output[window.position].wraps
@@ -107,7 +107,7 @@ def edges(family: Family, designs: Array, rows: Index, window: Window, columns: 
 
 
 def _brackets(rows: Index, window: Window, positions: Array) -> tuple[Index, Index, Index]:
-    """Row, sample before it and side of each crossing."""
+    """Find row, sample before it and side of each crossing."""
     row, column = np.empty(positions.size, np.int64), np.empty(positions.size, np.int64)
     found = []
     for side, level in enumerate((window.low[rows], window.high[rows])):
@@ -117,23 +117,23 @@ def _brackets(rows: Index, window: Window, positions: Array) -> tuple[Index, Ind
     return first, second, sides
 
 
-SAMPLES, MOST = 512, 16384  # of the first look, and of the last one at what may pass a level twice between two of them
+SAMPLES, MOST = 512, 16384  # first number of samples, and the largest one where a level may be passed twice between two
 
 
 def window_angle(family: Family, designs: Array, window: Window) -> tuple[Array, Array]:
-    """Crank angle over which the position lies in the window, of every design, and its error, each (n,) [rad].
+    """Compute the crank angle over which the position lies in the window, and its error, each (n,) [rad].
 
     Parameters
     ----------
     family, designs : the (n, P) design matrix of any family whose crank turns fully
-    window : positions of every design; nan gives nan
+    window : limits of every design; nan gives nan
 
     Notes
     -----
-    The angle above a level is the sum of the angles where the follower goes down through it, less those where it goes
-    up, plus a turn if it starts above.  Between two levels it is what is above the lower and not above the upper one.
-    Every crossing is refined to rounding.  Samples are doubled where a parabola through three of them leaves room for
-    two crossings between; what the last ones leave open is part of the error.
+    The angle above a level is the sum of the angles where the follower passes it downwards, less those where it passes
+    it upwards, plus a turn if it starts above.  Between two levels it is the angle above the lower one less that above
+    the upper one.  Every crossing is refined to rounding.  Samples are doubled where a parabola through three of them
+    allows two crossings between; two spacings of the last samples are then part of the error.
     """
     angle, err = np.full(len(designs), np.nan), np.full(len(designs), np.nan)
     names = (window.position, family.derivative_of[window.position])
