@@ -1,8 +1,7 @@
-"""The register of effects, from which a scene's plan, ``sweep effects`` and docs/effects.md are made.
+"""The register of effects, which ``sweep effects``, docs/effects.md and a scene's plan are generated from.
 
-:func:`extended` gives a family the outputs and inputs of exactly those effects that some wanted output belongs to; to
-everything downstream the result is a `Family` like any other.  What is not wanted is not imported, not compiled, and
-asks for no input.
+:func:`extended` adds to a family the outputs and inputs of exactly those effects that provide some wanted output; all
+other code sees a `Family` like any other.  Other effects are not imported, not compiled, and need no input.
 """
 
 from __future__ import annotations
@@ -24,7 +23,7 @@ from sweep.families.names import at_stage, stem
 from sweep.families.reduction import reduced
 from sweep.numerics.curves import Curve
 
-# Name of each effect's entry: module and constant.  A new effect is a kernel file, an entry file and its line here.
+# Module and constant of each effect's entry.  A new effect is a kernel file, an entry file and its line here.
 _ENTRIES = {
     "pressure": ("pressure", "EFFECT"),
     "pressure_extrema": ("pressure", "EXTREMA_EFFECT"),
@@ -53,7 +52,7 @@ _ENTRIES = {
     "thread_speed": ("thread", "SPEED"),
     "capstan": ("thread", "CAPSTAN"),
 }
-# Of the effects of every family with a tree of links: module, and the function of the family's name that makes it.
+# Effects of every family with a tree of links: module, and the function that makes the entry from the family's name.
 _OF_TREES = {
     "loads": ("load_effects", "loads_of"),
     "friction": ("load_effects", "friction_of"),
@@ -87,7 +86,7 @@ _MADE |= {f"{name}_contact": (name, "contact", "contact_of") for name in _SLOTS}
 _MADE |= {f"{name}_roller": (name, "cam_roller", "roller_of") for name in ("cam", "cam_lever")}
 NAMES = (*_ENTRIES, *_MADE)
 
-# In the stages behind the first, speed and acceleration are those of the first stage's crank.
+# In later stages, speed and acceleration are those of the first stage's crank.
 _FIRST_ONLY = ("speed", "speed_change")
 
 NO_CURVES: Mapping[str, Curve] = MappingProxyType({})
@@ -97,7 +96,7 @@ _INPUTS: dict[tuple[tuple[str, str], ...], Mapping[str, Parameter]] = {}
 
 @lru_cache
 def effect(name: str) -> Effect:
-    """Look up the register's entry of that name."""
+    """Look up an effect's entry in the register."""
     if name in _MADE:
         tree, module, function = _MADE[name]
         made: Effect = getattr(import_module(f"sweep.effects.{module}"), function)(tree)
@@ -109,7 +108,7 @@ def effect(name: str) -> Effect:
 
 @of_family
 def serving(family: Family) -> tuple[Effect, ...]:
-    """Effects that a family has what they require for, in the order of the register.
+    """Effects whose requirements a family meets, in the order of the register.
 
     Entries of other families' trees of links are not made for it.
     """
@@ -119,9 +118,10 @@ def serving(family: Family) -> tuple[Effect, ...]:
 
 @of_family
 def applicable(family: Family) -> tuple[Placed, ...]:
-    """Effects that can be asked of a family or of the stages of a chain, in the order of the register.
+    """Effects of a family or of the stages of a chain, in the order of the register.
 
-    A later stage of a chain turns unevenly; a stage whose load comes from stages behind it needs them to hand it back.
+    A later stage of a chain turns unevenly; an effect whose load includes that of later stages needs them all to return
+    it.
     """
     stages = family.stages
     found = [
@@ -138,8 +138,8 @@ def applicable(family: Family) -> tuple[Placed, ...]:
 
 
 def called_for(family: Family, wanted: Iterable[str]) -> tuple[Placed, ...]:
-    """Effects that some wanted output or reduction belongs to, in the order of the register."""
-    # max_abs_force_d asks for force_d; what the family has itself asks for no effect, so that none is imported.
+    """Effects that provide some wanted output or the output of a wanted reduction, in the order of the register."""
+    # max_abs_force_d needs force_d; outputs of the family itself need no effect, so that none is imported.
     asked = (reduced(name, family.domain) for name in wanted)
     names = {about for abouts in asked if family.pose_output.keys().isdisjoint(abouts) for about in abouts}
     names -= {o.name for step in family.steps for o in step.provides}
@@ -151,12 +151,12 @@ def called_for(family: Family, wanted: Iterable[str]) -> tuple[Placed, ...]:
 
 @of_family
 def _effect_names(family: Family) -> frozenset[str]:
-    """Names of the outputs of all effects that can be asked of a family."""
+    """Names of the outputs of all effects of a family."""
     return frozenset(o.name for placed in applicable(family) for o in placed.outputs)
 
 
 def _carriers(family: Family, placed: Placed) -> list[Placed]:
-    """Effects of the later stages that give the load on this one."""
+    """Effects of the later stages that return the load on this one."""
     key = placed.entry.takes_load
     return [
         Placed(entry, k, stage.tail, False)
@@ -167,7 +167,7 @@ def _carriers(family: Family, placed: Placed) -> list[Placed]:
 
 
 def _handing(family: Family, placed: Placed) -> list[Placed]:
-    """Effects of all later stages that give the load on this one; empty if one of these stages has none."""
+    """Effects of all later stages that return the load on this one; empty if one of these stages has none."""
     found = _carriers(family, placed)
     return found if len(found) == len(family.stages) - 1 - placed.stage else []
 
@@ -176,7 +176,7 @@ def all_inputs(family: Family) -> Mapping[str, Parameter]:
     """Collect the inputs of all effects of a family, by name with the number of a stage or the name of a member."""
     if isinstance(family, Machine):
         return {f"{m.name}.{name}": p for m in family.members for name, p in all_inputs(m.family).items()}
-    # Asked at every call of the reductions; it depends on nothing but the names of the stages.
+    # Called by every reduction; it depends only on the names of the stages.
     stages = tuple((stage.family.name, stage.tail) for stage in family.stages)
     if stages not in _INPUTS:
         _INPUTS[stages] = {p.name: p for p in inputs(family, applicable(family))}
@@ -184,17 +184,17 @@ def all_inputs(family: Family) -> Mapping[str, Parameter]:
 
 
 def input_names(family: Family) -> frozenset[str]:
-    """Collect the names of the inputs of all effects that can be asked of a family, or of the stages of a chain."""
+    """Collect the names of the inputs of all effects of a family, or of the stages of a chain."""
     return frozenset(all_inputs(family))
 
 
 def inputs_beside(family: Family, given: Iterable[str]) -> Mapping[str, Parameter]:
-    """Return :func:`all_inputs` if one of the given names is not the family's own; effects need no import otherwise."""
+    """Return :func:`all_inputs` if a given name is not the family's own; otherwise no effect is imported."""
     return {} if {*family.parameter_names, family.domain.name}.issuperset(given) else all_inputs(family)
 
 
 def curved_inputs(family: Family) -> tuple[str, ...]:
-    """List the inputs of effects that a load over the turn can add to, for a family, a chain or a machine."""
+    """List the inputs to which a load over the turn can be added, for a family, a chain or a machine."""
     if isinstance(family, Machine):
         return tuple(f"{m.name}.{name}" for m in family.members for name in curved_inputs(m.family))
     known = {f"{own}{stage.tail}" for own in CURVED for stage in family.stages}
@@ -202,14 +202,14 @@ def curved_inputs(family: Family) -> tuple[str, ...]:
 
 
 def offered(family: Family) -> tuple[Output, ...]:
-    """Pose and design outputs of all effects that can be asked of a family, or of the stages of a chain."""
+    """Pose and design outputs of all effects of a family, or of the stages of a chain."""
     if isinstance(family, Machine):
         return tuple(replace(o, name=f"{m.name}.{o.name}") for m in family.members for o in offered(m.family))
     return tuple(o for placed in applicable(family) for o in placed.outputs)
 
 
 def elsewhere(family: Family, name: str) -> str:
-    """Words for an error: effects with an output that this family, or this stage of a chain, cannot be asked for."""
+    """Words for an error: effects with this output that the family, or the stage of a chain, does not have."""
     if isinstance(family, Machine):
         found = family.split(name)
         return elsewhere(found[0].family, found[1]) if found else ""
@@ -226,11 +226,11 @@ def elsewhere(family: Family, name: str) -> str:
 
 
 def extended(family: Family, wanted: Iterable[str], curves: Mapping[str, Curve] = NO_CURVES) -> Family:
-    """Family with the effects that ``wanted`` calls for; the family itself where it calls for none.
+    """Add the effects that ``wanted`` needs to a family; without any the family itself is returned.
 
     The inputs of the effects become further parameters, after the family's own.  In a chain an effect belongs to a
     stage, and its inputs and outputs carry the stage's number.  ``curves`` are loads over the turn of the crank, by the
-    input that they add to; what no wanted effect takes is left out.
+    input to which they are added; inputs that no wanted effect has are ignored.
     """
     if isinstance(family, Machine):
         asked = asked_of_machine(family, wanted)
@@ -249,12 +249,12 @@ def extended(family: Family, wanted: Iterable[str], curves: Mapping[str, Curve] 
 
 
 def asks_speed(names: Iterable[str]) -> bool:
-    """Tell whether one of these inputs is the speed of a crank, of a chain that of its first stage."""
+    """Whether one of the inputs is the speed of a crank, of a chain that of its first stage."""
     return any(stem(name) == "speed" for name in names)
 
 
 def _check_even(machine: Machine, found: Mapping[str, Family]) -> None:
-    """Refuse effects that need a speed of a member that another drives: its crank does not turn evenly."""
+    """Raise if a member that another one drives has an effect that needs its speed: its crank turns unevenly."""
     for m in machine.members:
         added = found[m.name].parameter_names[len(m.family.parameter_names) :]
         if m.driver is not None and asks_speed(added):
@@ -265,7 +265,7 @@ def _check_even(machine: Machine, found: Mapping[str, Family]) -> None:
 
 
 def asked_of_machine(machine: Machine, wanted: Iterable[str]) -> set[str]:
-    """Find the outputs that wanted names are reductions of, with those of members that relations are made of."""
+    """Find the outputs that wanted reductions, timings and relations of a machine need, members' outputs included."""
     names = {about for name in wanted for about in reduced(name, machine.domain)}
     asked = [timing for timing in machine.timings if timing.name in names]
     places = [place for timing in asked for place in timing.places]
@@ -278,7 +278,7 @@ def asked_of_machine(machine: Machine, wanted: Iterable[str]) -> set[str]:
 
 
 def with_effects(family: Family, effects: tuple[Placed, ...], curves: Mapping[str, Curve] = NO_CURVES) -> Family:
-    """Family with the outputs and inputs of these effects."""
+    """Add the outputs and inputs of the given effects to a family."""
     if not effects:
         return family
     added = Added(family, inputs(family, effects), curves)
@@ -308,7 +308,7 @@ def with_effects(family: Family, effects: tuple[Placed, ...], curves: Mapping[st
 
 
 def _felt(family: Family, effects: tuple[Placed, ...], name: str) -> frozenset[str]:
-    """Names of the pose outputs that depend on an input, of a later stage through the load that it puts on this one."""
+    """Names of the pose outputs that depend on an input, also through the load of a later stage."""
 
     def takes(source: Placed) -> bool:
         own = at_stage(name, source.number) if source.number else name
@@ -323,9 +323,9 @@ def _design_ns(entry: Effect, accuracy: Accuracy) -> float:
 
 
 def inputs(family: Family, effects: Iterable[Placed]) -> tuple[Parameter, ...]:
-    """List the inputs of these effects and of the later stages' effects that give their load, with stage numbers.
+    """List the inputs of effects, and of the later stages' effects that return their load, with stage numbers.
 
-    One that several share stands once, and is required if any of them requires it.
+    An input that several effects share is listed once, and is required if any of them requires it.
     """
     merged: dict[str, Parameter] = {}
     users: dict[str, list[str]] = {}

@@ -1,4 +1,4 @@
-"""Which effects a scene computes, in which order and at what cost, and which of them will matter there."""
+"""Advice on a scene's effects: which are computed, in which order and at what cost, and which of them matter."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ SAMPLES = 64
 
 
 class _Part(NamedTuple):
-    """What effects are asked of: a family or a chain by itself, or a member of a machine, with what stands before."""
+    """Family, chain or machine's member with effects, the prefix of its names, and its wanted outputs."""
 
     before: str
     family: Family
@@ -27,7 +27,7 @@ class _Part(NamedTuple):
 
     @property
     def offered(self) -> list[Placed]:
-        """Effects that can be asked of it: none that asks for a speed if another member drives it."""
+        """Effects of the part, without those that need a speed if another member drives it."""
         of = self.family
         return [p for p in applicable(of) if self.even or not asks_speed(one.name for one in inputs(of, [p]))]
 
@@ -42,7 +42,7 @@ def _parts(family: Family, wanted: Iterable[str]) -> list[_Part]:
 
 
 class Finding(NamedTuple):
-    """What an effect's rule of negligibility says of a scene."""
+    """Result of an effect's rule of negligibility for a scene."""
 
     name: str
     wanted: bool
@@ -50,7 +50,7 @@ class Finding(NamedTuple):
 
     @property
     def words(self) -> str:
-        """One sentence with the number."""
+        """The finding as one sentence with the number."""
         advice, side = self.advice, "below" if self.advice.negligible else "not below"
         numbers = f"{advice.worst:.3g}, {side} {advice.threshold:.3g}{advice.unit and f' {advice.unit}'}"
         if not (self.wanted or advice.negligible):
@@ -64,7 +64,7 @@ class Finding(NamedTuple):
 
 
 def closure(effects: Iterable[Effect]) -> tuple[Effect, ...]:
-    """Effects with all they need, each after what it needs."""
+    """Effects with all the effects that they need, each after those it needs."""
     found: dict[str, Effect] = {}
 
     def visit(entry: Effect) -> None:
@@ -78,10 +78,10 @@ def closure(effects: Iterable[Effect]) -> tuple[Effect, ...]:
 
 
 def tree(family: Family, wanted: Iterable[str], poses: float) -> list[tuple[str, str, str, str]]:
-    """Rows of a small tree: effect, key, cost, share.
+    """List the rows of a small tree: effect, key, cost, share.
 
-    What an effect needs stands below it and is part of its cost.  ``poses`` is the number of poses of one
-    design, for the cost of what is computed per design.
+    Effects needed by an effect are listed below it and included in its cost.  ``poses`` is the number of poses of one
+    design, for the cost per design.
     """
     parts = _parts(family, wanted)
     each = [(part, placed) for part in parts for placed in called_for(part.family, part.wanted)]
@@ -99,7 +99,7 @@ def tree(family: Family, wanted: Iterable[str], poses: float) -> list[tuple[str,
 
 
 def cost(placed: Placed, wanted: frozenset[str], poses: float) -> float:
-    """Nanoseconds per design of what is wanted of an effect."""
+    """Time of an effect's wanted outputs [ns per design]."""
     per_design = not wanted.isdisjoint(o.name for o in placed.design_outputs)
     reduced = (name for name in wanted if not any(name == o.name for o in placed.design_outputs))
     per_pose = any(name.endswith(o.name) for name in reduced for o in placed.pose_outputs)
@@ -111,7 +111,7 @@ def _needs(entry: Effect, depth: int) -> list[tuple[int, Effect]]:
 
 
 def left_out(family: Family, wanted: Iterable[str]) -> tuple[str, ...]:
-    """Names of the effects that could be asked for and are not needed here."""
+    """List the effects that the family has but that are not computed."""
     found: list[str] = []
     for part in _parts(family, wanted):
         used = _computed(part)
@@ -120,7 +120,7 @@ def left_out(family: Family, wanted: Iterable[str]) -> tuple[str, ...]:
 
 
 def _computed(part: _Part) -> set[str]:
-    """Return names of the effects that what is wanted of it calls for, with those that these need."""
+    """Names of the effects that the wanted outputs need, directly or through other effects."""
     called = called_for(part.family, part.wanted)
     return {f"{entry.name}{placed.number}" for placed in called for entry in closure([placed.entry])}
 
@@ -130,7 +130,7 @@ def findings(bare: Family, full: Family, designs: Array, wanted: Iterable[str]) 
 
     Parameters
     ----------
-    bare : the family without effects, or the chain, or the machine
+    bare : the family, chain or machine without effects
     full : the family the design matrix belongs to;  designs : (n, P)
     wanted : names of outputs
     """
@@ -148,7 +148,7 @@ def _findings(part: _Part, columns: dict[str, Array]) -> list[Finding]:
     angles = Angles.of(2.0 * np.pi * np.arange(SAMPLES)[None] / SAMPLES)
     needs = {placed.name: inputs(bare, [placed]) for placed in part.offered}
     defaults = {p.name: p.left_out(columns) for some in needs.values() for p in some}
-    # A rule may look at more than its effect's own inputs, so it gets all that is known of the scene.
+    # A rule may need more than its effect's own inputs, so it gets all inputs of the scene.
     given = {name: np.full(len(own), x) for name, x in defaults.items() if x is not None} | columns
     found = []
     for placed in part.offered:

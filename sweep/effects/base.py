@@ -1,4 +1,4 @@
-"""How an effect presents itself: what it gives, what it needs, what it costs, and when a scene calls for it."""
+"""Entry of an effect in the register: outputs, inputs, cost, and rule of negligibility."""
 
 from __future__ import annotations
 
@@ -18,11 +18,11 @@ from sweep.families.capabilities import JointRecords, OutputLink, ToolPoint
 from sweep.families.link_tree import LinkTree
 from sweep.families.names import ends_in_digit
 
-ON_LINE, ON_COUPLER, ON_TIP = 0, 1, 2  # where a tool can hang, in the order of Effect.tool_inputs
+ON_LINE, ON_COUPLER, ON_TIP = 0, 1, 2  # places of a tool, in the order of Effect.tool_inputs
 
-# Loads that a curve over the turn can add to.
+# Loads to which a curve over the turn can be added.
 CURVED = ("load_torque", "load_force", "tool_force", "tool_force_x", "tool_force_y", "tool_force_z")
-# Inputs that stand in [loads] of a study; the others but the speed stand in [bodies].
+# Inputs in [loads] of a study; all others except the speed are in [bodies].
 STUDY_LOADS = (
     *CURVED,
     "pierce_force",
@@ -39,11 +39,11 @@ DesignFunction: TypeAlias = Callable[[Scene, frozenset[str], Accuracy], Columns]
 
 @dataclass(frozen=True)
 class DesignResult:
-    """Outputs an effect gives per design instead of per pose: a whole-turn effect's, or a closed form.
+    """Outputs of an effect per design instead of per pose: of a whole-turn effect, or in closed form.
 
-    ``run(scene, wanted, accuracy)`` gets a scene of a single crank angle, whose ``on_grid`` makes whole turns; it
-    returns the wanted outputs, perhaps their ``err_``, and ``status``.  ``block`` is how many designs it gets at once:
-    few where it needs hundreds of poses of each, more where it asks for a few poses many times.
+    ``run(scene, wanted, accuracy)`` gets a scene of a single crank angle, whose ``on_grid`` samples whole turns; it
+    returns the wanted outputs, perhaps their ``err_``, and ``status``.  ``block`` is the number of designs per call:
+    small if it needs hundreds of poses of each, larger if it needs a few poses many times.
     """
 
     outputs: tuple[Output, ...]
@@ -53,10 +53,10 @@ class DesignResult:
 
 @dataclass(frozen=True)
 class Advice:
-    """Whether an effect matters, estimated from a few designs: the quantity that tells, and where it starts to."""
+    """Estimate of whether an effect matters, from a few designs: the measured quantity and its threshold."""
 
     quantity: str
-    values: Array  # (n,) of the designs that could be estimated
+    values: Array  # (n,) of the designs with an estimate
     threshold: float
     unit: str = ""  # of the values, in words
 
@@ -68,12 +68,12 @@ class Advice:
 
     @property
     def worst(self) -> float:
-        """The value of the design where the effect matters most."""
+        """Largest value, of the design where the effect matters most."""
         return float(self.values.max())
 
     @property
     def negligible(self) -> bool:
-        """Whether it matters for none of the designs."""
+        """Whether the effect matters for none of the designs."""
         return self.worst < self.threshold
 
 
@@ -82,7 +82,7 @@ AdviceFunction: TypeAlias = Callable[[Scene], Advice | None]
 
 @dataclass(frozen=True)
 class Largest:
-    """Rule of negligibility: the largest magnitude of the output ``name`` over the turn tells, called ``quantity``."""
+    """Rule of negligibility by the largest magnitude of the output ``name`` over the turn, called ``quantity``."""
 
     name: str
     quantity: str
@@ -90,7 +90,7 @@ class Largest:
     unit: str = ""
 
     def advice(self, compute: ComputeFunction, scene: Scene) -> Advice | None:
-        """Apply it to the designs whose output is known all the way; None where there is no such design."""
+        """Apply the rule to the designs whose output is known over the whole turn; None if there are none."""
         found = np.abs(np.asarray(compute(scene, frozenset({self.name}))[self.name], np.float64))
         return Advice.of_turning(self.quantity, found.max(axis=1), self.threshold, self.unit)
 
@@ -99,9 +99,8 @@ class Largest:
 class Bend:
     """Functions of the crank angle at whose zeros some pose outputs of an effect have kinks, jumps or narrow peaks.
 
-    ``curves(scene)`` gives their values, (n, m, q); ``outputs`` are the effect's own names.  Of ``squares``, which are
-    never negative, the places count where they nearly vanish.  With ``zero`` the outputs vanish there, too, and are
-    nowhere negative.
+    ``curves(scene)`` gives their values, (n, m, q); ``outputs`` are the effect's own names.  ``squares`` are
+    non-negative functions, whose near zeros count.  With ``zero`` the outputs are non-negative and vanish there, too.
     """
 
     outputs: tuple[str, ...]
@@ -111,7 +110,7 @@ class Bend:
 
 
 def tool_place(family: Family) -> int | None:
-    """Find where a tool can hang on a family with joint records, ON_LINE, ON_COUPLER or ON_TIP; None for nowhere."""
+    """Find the place of a tool on a family with joint records: ON_LINE, ON_COUPLER or ON_TIP; else None."""
     if family.find(JointRecords) is None:
         return None
     point = family.find(ToolPoint)
@@ -122,21 +121,21 @@ def tool_place(family: Family) -> int | None:
 
 @dataclass(frozen=True)
 class Effect:
-    """One row of the register; ``compute(scene, wanted)`` returns the wanted outputs (n, m) and ``status`` (n, m).
+    """Entry of the register; ``compute(scene, wanted)`` returns the wanted outputs (n, m) and ``status`` (n, m).
 
-    ``whole_turn`` effects couple different crank angles: they sample the turn themselves, whatever is asked for.
-    ``even_crank`` effects presume a crank that turns evenly, so they are no effects of a chain's later stages.
-    ``takes_load`` is the key of the effect that hands back the load of a chain's later stages; without it their load
-    does not enter. ``may_drive_nothing`` says that those stages are massless unless their bodies are given, so that
-    none of their inputs is required, and stages without known loads may follow. ``requires`` is the capability that
-    a family must have, ``followers`` are the kinds of follower that the effect is made for, ``tool_inputs`` are
-    further inputs where a tool can hang on the coupler and moves along a line, where it moves freely, and where it
-    hangs on the tip of a rocker. ``least`` are pose outputs of which the least value over the turn counts, as a
-    life, not the largest (:func:`sweep.effects.wanted.expanded`). ``tree`` is the tree of links of the one family
-    that it is for, if any; ``carried_at`` the place of a tool that a family must have, if any. ``only_for`` are the
-    outputs that need an input, by the input, where not all do: it is no input where none of these is wanted.
-    ``bends`` are where curves of outputs have kinks. ``advise`` is the rule of negligibility, ``advise(scene)`` applies
-    it to some designs over a turn and gives None where none turns.
+    ``whole_turn`` effects couple different crank angles: they sample the turn themselves, whatever poses are wanted.
+    ``even_crank`` effects need a crank that turns evenly, so later stages of a chain do not have them. ``takes_load``
+    is the key of the effect that returns the load of a chain's later stages; without it their load is ignored.
+    ``may_drive_nothing`` means that later stages are massless unless their bodies are given, so that none of their
+    inputs is required, and stages without known loads may follow. ``requires`` is the capability that a family must
+    have, ``followers`` are the kinds of follower that the effect covers, ``tool_inputs`` are further inputs for a tool
+    on the coupler that moves along a line, for one that moves freely, and for one at the tip of a rocker. ``least`` are
+    pose outputs whose smallest value over the turn matters, such as a life, not the largest
+    (:func:`sweep.effects.wanted.expanded`). ``tree`` is the tree of links of the only family with this effect, if any;
+    ``carried_at`` is the place of a tool that a family must have, if any. ``only_for`` maps an input to the outputs
+    that need it, if not all do: it is no input where none of these is wanted. ``bends`` are the kinks of outputs'
+    curves. ``advise`` is the rule of negligibility: ``advise(scene)`` applies it to some designs over a turn and
+    returns None if none of them turns.
     """
 
     key: str
@@ -166,12 +165,12 @@ class Effect:
     bends: tuple[Bend, ...] = ()
 
     def inputs_of(self, family: Family) -> tuple[Parameter, ...]:
-        """List the inputs, with those of a tool where the family has a place that one can hang on."""
+        """List the inputs for a family, with those of a tool if the family has a place for one."""
         place = tool_place(family)
         return self.inputs if place is None else (*self.inputs, *self.tool_inputs[place])
 
     def serves(self, family: Family) -> bool:
-        """Whether the family has what the effect requires, with a kind of follower that it is made for."""
+        """Whether the family meets the effect's requirements and has a follower that the effect covers."""
         joints = family.find(JointRecords)
         follows = joints is None or joints.follower in self.followers
         own = self.tree is None or family.find(LinkTree) is self.tree
@@ -191,23 +190,23 @@ class Effect:
 
     @cached_property
     def families(self) -> tuple[str, ...]:
-        """Names of the register's families that it serves."""
+        """Names of the register's families that have the effect."""
         return tuple(name for name in FAMILY_NAMES if self.serves(find_family(name)))
 
     @property
     def ns_per_pose(self) -> float:
-        """Measured time of all pose outputs together, without the motion; 0 where there are none."""
+        """Measured time of all pose outputs together [ns], without the motion; 0 if there are none."""
         return nanoseconds("effects", self.name) if self.outputs else 0.0
 
     @property
     def ns_per_design(self) -> float:
-        """Measured time of all design outputs together; 0 where there are none."""
+        """Measured time of all design outputs together [ns]; 0 if there are none."""
         return nanoseconds("effects_design", self.name) if self.design_result is not None else 0.0
 
 
 @dataclass(frozen=True)
 class Placed:
-    """An effect at the stage of index ``stage``; the outputs of the last stage also stand without its number."""
+    """An effect at the stage of index ``stage``; outputs of the last stage can also be named without its number."""
 
     entry: Effect
     stage: int = 0
@@ -220,7 +219,7 @@ class Placed:
         return f"{self.entry.name}{self.number}"
 
     def narrowed(self, wanted: Iterable[str]) -> Placed:
-        """Leave out inputs that only outputs which are not wanted need, and those outputs."""
+        """Leave out inputs that no wanted output needs, and the outputs that need them."""
         only_for, names = self.entry.only_for, {self.own[name] for name in wanted if name in self.own}
         left = {name for name, outputs in only_for.items() if names.isdisjoint(outputs)}
         if not left:
@@ -238,12 +237,12 @@ class Placed:
 
     @property
     def pose_outputs(self) -> tuple[Output, ...]:
-        """Pose outputs under all the names they have."""
+        """Pose outputs under all their names."""
         return self._numbered(self.entry.outputs)
 
     @property
     def design_outputs(self) -> tuple[Output, ...]:
-        """Design outputs under all the names they have."""
+        """Design outputs under all their names."""
         return self._numbered(self.entry.design_outputs)
 
     @property
@@ -253,7 +252,7 @@ class Placed:
 
     @cached_property
     def own(self) -> dict[str, str]:
-        """The effect's own names of its outputs by the names they have here."""
+        """Map from the names of the outputs here to the effect's own names."""
         names = [o.name for o in (*self.entry.outputs, *self.entry.design_outputs)]
         found = {f"{name}{self.number}": name for name in names}
         return found | {name: name for name in names if self._stands_alone(name)}
@@ -269,5 +268,5 @@ class Placed:
 
 
 def no_poses(scene: Scene, wanted: frozenset[str]) -> Columns:
-    """Give the motion's status alone, for an effect that has no outputs per pose."""
+    """Return only the motion's status, for an effect without pose outputs."""
     return {"status": scene.status()}

@@ -1,4 +1,4 @@
-"""B2: loads, mean load over the turn and life of the two rolling bearings of a shaft; the entry of the rocker's."""
+"""B2: loads, mean load over the turn and life of a shaft's two rolling bearings; entry of the rocker's bearings."""
 
 from __future__ import annotations
 
@@ -30,10 +30,10 @@ FORMULAS = (
     "(2) P_m = (integral of P^p |w| d phi/integral of |w| d phi)^(1/p), w the shaft's turning per crank angle, ours",
     "(3) life = 10^6 (C/P_m)^p turns; the shaft's travel counts in full turns, ours",
 )
-PANEL = 1.0  # length of the first panels of a turn against the distance of the nearest singularity
-LOOK = 1.0 / 16.0  # spacing of the poses among which kinks and jumps are looked for, against that distance
-SIZING = 64  # poses from which the size of the loads is taken, so that no power of them leaves float64
-BLOCK = 256  # designs at once: bisections ask for one pose of each kink
+PANEL = 1.0  # length of the first panels of a turn relative to the distance of the nearest singularity
+LOOK = 1.0 / 16.0  # spacing of the poses that bracket kinks and jumps, relative to that distance
+SIZING = 64  # poses that determine the size of the loads, so that no power of a load overflows
+BLOCK = 256  # designs at once: bisections need one pose of each kink
 
 
 def load_names(shaft: str) -> tuple[str, ...]:
@@ -43,9 +43,9 @@ def load_names(shaft: str) -> tuple[str, ...]:
 
 
 def load_outputs(shaft: str, text: str, equation: str) -> tuple[Output, ...]:
-    """List the loads of a shaft's two bearings; ``text`` says of which shaft.
+    """List the loads of a shaft's two bearings; ``text`` names the shaft.
 
-    An equivalent load jumps where the axial one passes e_limit.
+    An equivalent load jumps where the axial load exceeds e_limit.
     """
     words = (
         "radial load of support 1", "radial load of support 2", "axial load", "equivalent load of rolling bearing 1",
@@ -77,11 +77,11 @@ class Shaft:
 
     Parameters
     ----------
-    name : in the names of outputs and of its supports
-    tail : what the names of its catalogue inputs end on
+    name : name of the shaft in the names of outputs and supports
+    tail : suffix of the names of its catalogue inputs
     columns : of its force and its moment among the reactions of :func:`sweep.effects.load_passing.reactions`
-    axis : the axis that it turns about, (n, m or 1, 3), of a scene
-    turning : its angular velocity in its bearings per unit crank speed, (n, m), of a scene
+    axis : returns the axis of rotation, (n, m or 1, 3), of a scene
+    turning : returns the angular velocity in the bearings per unit crank speed, (n, m), of a scene
     """
 
     name: str
@@ -91,17 +91,17 @@ class Shaft:
     turning: Callable[[Scene], Array]
 
     def given(self, scene: Scene, name: str) -> Array:
-        """Input of its catalogue, (n,)."""
+        """Input of the shaft's catalogue, (n,)."""
         return scene.inputs[f"{name}{self.tail}"]
 
     def data(self, scene: Scene) -> Array:
-        """Columns as :mod:`kernels.effects.bearings` has them; the radius, which nothing reads here, is 0."""
+        """Columns of :mod:`kernels.effects.bearings`; the radius, which is not used here, is 0."""
         supports = (f"support_{self.name}{k}" for k in "12")
         names = (*supports, *(f"{p.name}{self.tail}" for p in CATALOGUE))
         return np.column_stack([np.zeros(len(scene.designs)), scene.table(names)])
 
     def loads(self, scene: Scene, wanted: frozenset[str]) -> Columns:
-        """Wanted ones of :func:`load_outputs`, and the status."""
+        """Compute the wanted loads of :func:`load_outputs`, and the status."""
         forces, status = reactions(scene)
         status, names = status.copy(), load_names(self.name)
         refuse(status, loads.together(scene, self.name))
@@ -110,26 +110,26 @@ class Shaft:
 
 
 def bends(shaft: Shaft, *more: str) -> tuple[Bend, ...]:
-    """Where the equivalent loads of a shaft's bearings, and outputs made of them, bend.
+    """Kinks of the equivalent loads of a shaft's bearings, and of outputs computed from them.
 
-    That is where they change their formula, and where a support is nearly free.
+    They occur where the equivalent load changes its formula, and where a support is nearly unloaded.
     """
     names = (*load_names(shaft.name)[3:], *more)
     return Bend(names, partial(formula, shaft=shaft)), Bend(names, partial(squares, shaft=shaft), squares=True)
 
 
 def per_turn(scene: Scene, wanted: frozenset[str], accuracy: Accuracy, shaft: Shaft) -> Columns:
-    """Mean loads and lives, on samples without errors, or with the integrals refined to the accuracy asked for.
+    """Compute mean loads and lives, on samples without errors, or with integrals refined to the accuracy.
 
-    The travel has a kink where the shaft turns back, and a load jumps where the axial one passes e_limit: the integrals
-    are split at these places, and on panels that close in on whatever else there is.  A bearing that carries nothing,
-    or a shaft that does not turn, has no life: INVALID_INPUT.
+    The travel has a kink where the shaft turns back, and a load jumps where the axial load exceeds e_limit: the
+    integrals are split at these places, and refined on panels elsewhere.  An unloaded bearing, or a shaft that does not
+    turn, has no life: INVALID_INPUT.
     """
     n = len(scene.designs)
     look = scene.on_grid(accuracy.samples or SIZING)
     load, way, worst = _loads(look, shaft)
     size = np.maximum(load.max(axis=1, initial=0.0), np.finfo(float).tiny)
-    # Poses that do not assemble, or lie at a dead point, are those of a crank that does not turn.
+    # Poses that do not assemble, or lie at a dead point, belong to a crank that does not turn.
     status = _of_turn(worst)
     good = np.flatnonzero(status == st.OK)
     exponent = shaft.given(scene, "life_exponent")
@@ -177,9 +177,9 @@ def _integrands(load: Array, way: Array, size: Array, exponent: Array) -> Array:
 
 
 def _switches(scene: Scene, shaft: Shaft) -> Array:
-    """Compute what changes its sign where the integrands have kinks or jumps, (k, m, 3).
+    """Functions that change sign where the integrands have kinks or jumps, (k, m, 3).
 
-    The shaft's turning; the axial load; and by how much it exceeds the part e V of the radial load of its bearing.
+    They are the shaft's turning, the axial load, and its excess over the part e V of the radial load of its bearing.
     """
     names = load_names(shaft.name)[:3]
     found = shaft.loads(scene, frozenset(names))
@@ -190,7 +190,7 @@ def _switches(scene: Scene, shaft: Shaft) -> Array:
 
 
 def _pierced(scene: Scene) -> list[Array]:
-    """Compute what changes its sign where a tool begins or ceases to pierce, and its load jumps, (k, m, 2) each."""
+    """Functions that change sign where a tool begins or ceases to pierce and its load jumps, (k, m, 2) each."""
     found = []
     for which, inputs in enumerate((scene.inputs, *(driven.inputs for driven in scene.after))):
         if "pierce_force" not in inputs:
@@ -205,12 +205,12 @@ def _pierced(scene: Scene) -> list[Array]:
 
 
 def formula(scene: Scene, shaft: Shaft) -> Array:
-    """Compute what changes its sign where an equivalent load has a kink or jumps, (n, m, 2)."""
+    """Functions that change sign where an equivalent load has a kink or jumps, (n, m, 2)."""
     return _switches(scene, shaft)[:, :, 1:]
 
 
 def squares(scene: Scene, shaft: Shaft) -> Array:
-    """Squares of the loads across the shaft of both supports, (n, m, 2)."""
+    """Squares of the supports' radial loads, (n, m, 2)."""
     names = load_names(shaft.name)[:2]
     found = shaft.loads(scene, frozenset(names))
     return np.stack([np.square(np.asarray(found[name], np.float64)) for name in names], axis=2)
@@ -222,7 +222,7 @@ def _discriminant(scene: Scene, rows: Rows, stage: int, name: str, which: Rows, 
 
 
 def _refined(scene: Scene, rows: Rows, size: Array, target: float, shaft: Shaft) -> tuple[Array, Array, Status]:
-    """Three integrals over the turn of some designs, their errors and the status."""
+    """Integrate the three integrands over the turn of some designs; return integrals, errors and status."""
     status, scene = np.zeros(rows.size, np.uint8), scene.precise()  # plain poses may be noise near a change point
     exponent = shaft.given(scene, "life_exponent")[rows]
 

@@ -1,4 +1,4 @@
-"""B1: sliding and rolling bearings of the rocker under the coupler force of a resisting torque, massless estimate."""
+"""B1: sliding and rolling bearings of the rocker under a resisting torque, massless estimate."""
 
 from __future__ import annotations
 
@@ -87,7 +87,7 @@ ROLLING_LIMITS = (
 
 
 def _data(scene: Scene, inputs: tuple[Parameter, ...]) -> Array:
-    """Columns of the bearing kernels: the radius c at which the coupler force acts, then the inputs but the torque."""
+    """Columns of the bearing kernels: radius c at which the coupler force acts, then all inputs except the torque."""
     return np.column_stack([scene.records[1][:, 14], scene.table(tuple(p.name for p in inputs[1:]))])
 
 
@@ -107,12 +107,12 @@ def _compute(
 
 
 def _thrust(scene: Scene) -> Array:
-    """Component of the coupler direction along the shaft, of which the collar sees the magnitude."""
+    """Component of the coupler direction along the shaft, whose magnitude loads the collar."""
     return components(scene)[0][2][:, :, None]
 
 
 def _formula(scene: Scene) -> Array:
-    """Compute the same, and by how much the axial load exceeds the share e V of the radial one of its bearing."""
+    """Axial component of the coupler direction, and the excess of the axial load over e V times the radial one."""
     (t_tau, t_rho, t_k), _ = components(scene)
     c, z1, z2 = (x[:, None] for x in (scene.records[1][:, 14], *_supports(scene)))
     z = np.where(scene.inputs["axial_support"][:, None] == 1.0, z2, z1)
@@ -121,9 +121,9 @@ def _formula(scene: Scene) -> Array:
 
 
 def _eased(scene: Scene) -> Array:
-    """Functions that vanish where what the bearings permit has narrow peaks and kinks.
+    """Functions at whose zeros the permissible values of the bearings have narrow peaks and kinks.
 
-    No force acts along the shaft there, or none radially, or theta1 does not load one support.
+    There no force acts along the shaft, or none radially, or theta1 does not load one of the supports.
     """
     (_, t_rho, t_k), _ = components(scene)
     c, z1, z2 = (x[:, None] for x in (scene.records[1][:, 14], *_supports(scene)))
@@ -135,7 +135,7 @@ def _supports(scene: Scene) -> tuple[Array, Array]:
 
 
 def permissible_load(scene: Scene, tail: str = "") -> Array:
-    """C_dyn (60 n L_h/10^6)^(-1/p) with the turns of the crank, (n, 1); ``tail`` ends the inputs' names."""
+    """C_dyn (60 n L_h/10^6)^(-1/p) at the turns of the crank, (n, 1); ``tail`` is the suffix of the inputs' names."""
     capacity, life, exponent = (
         scene.inputs[f"{n}{tail}"] for n in ("dynamic_capacity", "required_life", "life_exponent")
     )

@@ -1,4 +1,4 @@
-"""Roller on a cam: whether the profile is undercut, its curvature, and the stress of the line of contact."""
+"""Roller on a cam: undercut and curvature of the profile, and stress of the line contact."""
 
 from __future__ import annotations
 
@@ -35,7 +35,7 @@ OUTPUTS = (
 
 
 def _pitch(scene: Scene) -> tuple[NDArray[np.complex128], NDArray[np.complex128]]:
-    """First and second derivative of the roller's centre as the cam sees it, in directions of the frame, (n, m)."""
+    """First and second derivative of the roller's centre in the cam's frame, in fixed directions, (n, m)."""
     body, centre, at = scene.links.bodies[:, :, 1], scene.links.bodies[:, :, 0, :3], scene.links.lines[:, :, 0, :3]
     omega, arm = body[:, :, 9:12], at - body[:, :, :3]
     v = body[:, :, 3:6] + np.cross(omega, arm)
@@ -45,14 +45,14 @@ def _pitch(scene: Scene) -> tuple[NDArray[np.complex128], NDArray[np.complex128]
 
 
 def pitch_curvature(scene: Scene) -> Array:
-    """Curvature of the path of the roller's centre in the cam's frame, (12), (n, m)."""
+    """Curvature of the roller centre's path in the cam's frame, (12), (n, m)."""
     first, second = _pitch(scene)
     found: Array = -(np.conj(first) * second).imag / np.abs(first) ** 3
     return found
 
 
 def normal_force(scene: Scene) -> Array:
-    """Force on the roller across the pitch curve, with its sign and in units of the speed of its centre, (n, m, 1)."""
+    """Signed force on the roller normal to the pitch curve, times the speed of its centre, (n, m, 1)."""
     loads = compute_loads(scene, frozenset({"force_r_x", "force_r_y"}))
     along, (x, y) = _pitch(scene)[0], floats(loads, "force_r_x", "force_r_y")
     found: Array = along.real * y - along.imag * x
@@ -60,7 +60,7 @@ def normal_force(scene: Scene) -> Array:
 
 
 def compute(scene: Scene, wanted: frozenset[str]) -> Columns:
-    """Wanted outputs; a profile that is undercut has no curvature and no contact of its own."""
+    """Compute the wanted outputs; an undercut profile has no curvature and no contact."""
     status, kappa = scene.status(), pitch_curvature(scene)
     columns: Columns = {"undercut": kappa * scene.inputs[ROLLER.name][:, None]} if "undercut" in wanted else {}
     if wanted <= {"undercut"}:
@@ -83,7 +83,7 @@ def compute(scene: Scene, wanted: frozenset[str]) -> Columns:
 
 @lru_cache
 def roller_of(name: str) -> Effect:
-    """Entry of the roller of a cam."""
+    """Make the entry of the roller of a cam."""
     bare = loads_of(name)
     return replace(
         bare,

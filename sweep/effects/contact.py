@@ -29,7 +29,7 @@ FORMULAS = (
 # Steel on steel; from both moduli 1/E* = (1 - nu1^2)/E1 + (1 - nu2^2)/E2.
 MODULUS = Parameter("contact_modulus", "pressure", "E* of both surfaces: 1/E* = sum of (1 - nu^2)/E", default=115e3,
                     positive=True)  # fmt: skip
-NARROW = 3.0  # R1 over half the width of a strap's contact, from which on it counts as narrow
+NARROW = 3.0  # least ratio of R1 to half the width of a strap's contact for which Hertz's formula is used
 
 
 def ball_stress(force: Array, modulus: Array, radius: Array) -> Array:
@@ -38,17 +38,17 @@ def ball_stress(force: Array, modulus: Array, radius: Array) -> Array:
 
 
 def line_stress(force: Array, modulus: Array, radius: Array, length: Array) -> Array:
-    """Largest pressure of a contact along a line, (11)."""
+    """Largest pressure of a line contact, (11)."""
     return np.sqrt(force * modulus / (np.pi * length * radius))
 
 
 def half_width(force: Array, modulus: Array, radius: Array, length: Array) -> Array:
-    """Half the width of a contact along a line, (11)."""
+    """Half the width of a line contact, (11)."""
     return np.sqrt(4.0 * force * radius / (np.pi * length * modulus))
 
 
 def touching(tree: LinkTree) -> tuple[LinkJoint, ...]:
-    """Joints of a tree that touch in a point, in a line, or as a strap."""
+    """Joints of a tree with a point contact, a line contact, or a strap."""
     return tuple(joint for joint in tree.joints if joint.touch)
 
 
@@ -74,13 +74,13 @@ def _outputs(joint: LinkJoint) -> tuple[Output, ...]:
 
 
 def _of_joint(scene: Scene, joint: LinkJoint, force: Array, status: Status) -> list[Array]:
-    """Sliding speed, largest pressure, mean pressure times speed, (n, m)."""
+    """Compute sliding speed, largest pressure, and mean pressure times speed of a joint, (n, m)."""
     given = {p.name.removesuffix(f"_{joint.name}"): scene.inputs[p.name][:, None] for p in _inputs(joint)}
     modulus, radius = scene.inputs[MODULUS.name][:, None], given["contact_radius"]
     speed = np.abs(scene.crank()[0])
     turn, slip = relative(scene, joint)
     if joint.touch == "ball":
-        # a block that also turns is an arm on a bar
+        # a block that also turns on the bar is no ball in a slot
         kinds = scene.links.freedoms
         refuse(status, np.any((kinds[:, :, 0] == joint.body) & (kinds[:, :, 1] == TURN), axis=1))
         stress = ball_stress(force, modulus, radius)
@@ -102,7 +102,7 @@ def _of_joint(scene: Scene, joint: LinkJoint, force: Array, status: Status) -> l
 
 
 def compute(scene: Scene, wanted: frozenset[str], tree: LinkTree) -> Columns:
-    """Wanted outputs of the joints that touch."""
+    """Compute the wanted outputs of the joints with contacts."""
     joints = [joint for joint in touching(tree) if not wanted.isdisjoint(o.name for o in _outputs(joint))]
     loads = compute_loads(scene, frozenset(f"force_{joint.name}" for joint in joints))
     status = scene.status()
@@ -119,7 +119,7 @@ def compute(scene: Scene, wanted: frozenset[str], tree: LinkTree) -> Columns:
 
 @lru_cache
 def contact_of(name: str) -> Effect:
-    """Entry of the contacts of a family with a tree of links."""
+    """Make the entry of the contacts of a family with a tree of links."""
     bare = loads_of(name)
     tree = bare.tree
     assert tree is not None

@@ -1,4 +1,4 @@
-"""What an elastic coupler drives besides its own follower: the stages behind it, and a tool at the rocker's tip."""
+"""Load on an elastic coupler beyond its own follower: the later stages, and a tool at the rocker's tip."""
 
 from __future__ import annotations
 
@@ -15,14 +15,14 @@ from sweep.effects.load_passing import INERTIAS, LOADS, behind, compute_loads, i
 from sweep.effects.scene import Driven, Scene
 from sweep.families.base import Array, Parameter
 
-# Units of what a stage has to be given to need a torque.
+# Units of the inputs by which a stage needs a torque.
 WEIGHING = frozenset({"mass", "line_mass", "inertia", "force", "torque"})
 
-STEP = 2e-3  # of the follower's angle, for the slope of the load: error of fourth order against rounding
+STEP = 2e-3  # of the follower's angle in the load's slope: balances truncation of fourth order and rounding
 
 
 class DrivenSide(NamedTuple):
-    """Along the rigid motion, (n, m): the torque that it needs, its slopes, and its inertia.
+    """Torque that the driven side needs along the rigid motion, its derivatives, and its inertia, (n, m) each.
 
     ``torque`` T(psi, psi', psi'') about the follower's axis; ``slope`` dT/dpsi at the same rates; ``inertia`` J and
     ``bend`` dJ/dpsi.
@@ -35,7 +35,7 @@ class DrivenSide(NamedTuple):
 
 
 def _behind_weighs(scene: Scene) -> NDArray[np.bool_]:
-    """Whether any stage behind has a mass or a load in each design, (n,)."""
+    """Whether any later stage has a mass or a load in each design, (n,)."""
     found = np.zeros(len(scene.designs), np.bool_)
     for stage in scene.after:
         found |= _weighs(stage, stage.inputs, inputs_of_loads(stage.family))
@@ -43,7 +43,7 @@ def _behind_weighs(scene: Scene) -> NDArray[np.bool_]:
 
 
 def _weighs(stage: Scene | Driven, given: dict[str, Array], inputs: Sequence[Parameter]) -> NDArray[np.bool_]:
-    """Whether one of these inputs that are a mass, an inertia or a load is not zero, (n,)."""
+    """Whether any of the inputs that are a mass, an inertia or a load is not zero, (n,)."""
     found = np.zeros(len(stage.designs), np.bool_)
     for p in inputs:
         if p.unit in WEIGHING:
@@ -53,7 +53,7 @@ def _weighs(stage: Scene | Driven, given: dict[str, Array], inputs: Sequence[Par
 
 
 def driven_side(scene: Scene, slopes: bool) -> DrivenSide | None:
-    """Compute torque and inertia of what the follower drives, None for nothing; slopes are 0 unless asked for."""
+    """Compute torque and inertia of the driven side, None without one; slopes are 0 unless wanted."""
     found = _stages(scene, slopes) if _behind_weighs(scene).any() else None
     tip = _tip(scene)
     if found is None or tip is None:
@@ -62,13 +62,13 @@ def driven_side(scene: Scene, slopes: bool) -> DrivenSide | None:
 
 
 def _stages(scene: Scene, slopes: bool) -> DrivenSide | None:
-    """Compute what the stages behind need: phi of the next one is kappa psi + offset."""
+    """Compute torque and inertia of the later stages; phi of the next one is kappa psi + offset."""
     handed_back = behind(scene, LOADS)
     if handed_back is None:
         return None
     kappa, weighs = scene.after[0].kappa[:, None], _behind_weighs(scene)[:, None]
     good = np.where(np.asarray(handed_back["status"]) == 0, 1.0, np.nan)
-    # A massless stage needs nothing, also where it does not move.
+    # A massless stage needs no torque, even where it cannot move.
     torque, inertia, bend = (
         np.where(weighs, np.asarray(handed_back[n], np.float64) * good, 0.0) for n in ("drive_torque", *INERTIAS)
     )
@@ -81,7 +81,7 @@ def _stages(scene: Scene, slopes: bool) -> DrivenSide | None:
 
 
 def _moved(scene: Scene, angle: float) -> Array:
-    """Torque that the next stage needs of a rocker which stands further by an angle, at the same rates.
+    """Torque of the next stage with the rocker turned further by an angle, at the same rates.
 
     A force that jumps where a tool pierces has no slope: it is left out of the difference.
     """
@@ -100,7 +100,7 @@ def _moved(scene: Scene, angle: float) -> Array:
 
 
 def _tip(scene: Scene) -> DrivenSide | None:
-    """Compute what a tool at the tip of the rocker needs."""
+    """Compute torque and inertia of a tool at the tip of the rocker."""
     if tool_place(scene.family) != ON_TIP or "m_tool" not in scene.inputs:
         return None
     names = tuple(p.name for p in loads.FREE_TOOL[1:])
@@ -111,7 +111,7 @@ def _tip(scene: Scene) -> DrivenSide | None:
     poses = scene.records[0]
     rho, tau = poses[:, :, 15:18], poses[:, :, 18:21]
     along, aside = tip[:, 0, None, None], tip[:, 1, None, None]
-    moved, turned = along * tau - aside * rho, -along * rho - aside * tau  # dP/dpsi and its own slope
+    moved, turned = along * tau - aside * rho, -along * rho - aside * tau  # dP/dpsi and d2P/dpsi2
     weight = force + mass[:, :, None] * scene.table(tuple(p.name for p in loads.GRAVITY))[:, None, :]
     inertia = np.broadcast_to(mass * (tip[:, :1] ** 2 + tip[:, 1:2] ** 2), scene.shape)
     speed = scene.inputs["speed"][:, None]

@@ -1,4 +1,4 @@
-"""E1, E2: lag of the follower through the coupler's elasticity, quasi-static and in the periodic steady state."""
+"""E1, E2: lag of the follower by the coupler's elasticity, quasi-static and in the periodic steady state."""
 
 from __future__ import annotations
 
@@ -74,22 +74,22 @@ def _dynamic_outputs(kind: loads.Follower) -> tuple[Output, ...]:
     )
 
 
-# A tool on the coupler itself moves with its elongation: it is not seen.
+# A tool on the coupler itself moves with its elongation, which is not modelled.
 _AT_TIP = ((), (), (*loads.TOOLS[2], *loads.GRAVITY))
 _KERNEL_NAMES = ("lag", "lag_displacement", "frequency_ratio")
 FLOQUET = Output(
     "floquet", "1", "largest modulus of the Floquet multipliers; stable below 1, exactly 1 without damping", EQUATION
 )
 
-# Odd grids of the steady state: the next one is tried for designs that the one before does not resolve.
+# Odd grids of the steady state: the next one is tried for designs that the previous one does not resolve.
 MULTIPLIER_ERROR = 1e-6
 GRIDS = (31, 61, 121, 241)
-# Stiff couplers of designs near a dead point: psi'' peaks within a few degrees.
+# For stiff couplers near a dead point, where psi'' peaks within a few degrees.
 FINER = (481, 961, 1921)
 
 
 def _arguments(scene: Scene) -> tuple[Array, Array, Array, Array, Array]:
-    """Give p = c t_tau, the rigid acceleration analogue, c, what a lag is compared with, and the inputs."""
+    """Return p = c t_tau, the rigid acceleration analogue, c, the reference length of a lag, and the inputs."""
     per_pose, per_design = scene.records
     c, turns = np.ascontiguousarray(per_design[:, 14]), per_design[:, 16]
     reach = np.where(turns == 1.0, 1.0, per_design[:, 13])
@@ -99,7 +99,7 @@ def _arguments(scene: Scene) -> tuple[Array, Array, Array, Array, Array]:
 
 
 def _varying(scene: Scene, driven: DrivenSide | None = None) -> Array | None:
-    """Sum what a curve and the driven side add to the constant load, (n, m); None where the load is constant."""
+    """Load of the curve and the driven side in addition to the constant one, (n, m); None if there is none."""
     load = loads.follower_of(scene.family).load.name
     if load not in scene.curves and driven is None:
         return None
@@ -108,7 +108,7 @@ def _varying(scene: Scene, driven: DrivenSide | None = None) -> Array | None:
 
 
 def compute_static(scene: Scene, wanted: frozenset[str]) -> Columns:
-    """Wanted pointwise quantities; status NOT_LINEAR where the deflection is no longer small."""
+    """Compute the wanted quasi-static outputs; status NOT_LINEAR where the deflection is not small."""
     scene, outputs = scene.even(), optional_outputs(_KERNEL_NAMES, wanted, scene.shape)
     lag, displacement, ratio = outputs
     status = scene.status()
@@ -132,14 +132,15 @@ def _status_behind(scene: Scene) -> Status:
 
 
 def compute_dynamic(scene: Scene, wanted: frozenset[str]) -> Columns:
-    """Steady state on its own grid, carried to the wanted angles."""
+    """Solve the steady state on its own grid, and interpolate it to the wanted angles."""
     return at_poses(scene, *on_finer_grids(scene, scene.angles.phi, GRIDS + FINER, _solve), wanted)
 
 
 def _solve(grid: Scene, phi: Array, last: bool) -> tuple[dict[str, Array], Status]:
-    """Solve designs on one grid.
+    """Solve the steady state of designs on one grid.
 
-    A crank that turns backwards is one that turns forwards in -phi: only so do multipliers below 1 mean stability.
+    A crank that turns backwards is treated as one that turns forwards in -phi: only so do multipliers below 1 mean
+    stability.
     """
     grid, speed, size = grid.even(), grid.inputs["speed"], grid.shape[1]
     _, _, c, reach, _ = _arguments(grid)
@@ -151,7 +152,7 @@ def _solve(grid: Scene, phi: Array, last: bool) -> tuple[dict[str, Array], Statu
         part, own = grid.only(bent), phi[bent] if phi.shape[0] > 1 else phi
         fine = _equation(part.on_grid(3 * (-(-FINER[-1] // size) | 1) * size))
         given = equation[0][bent], speed[bent], c[bent], reach[bent]
-        # Each third sample, begun at two places: a jump halfway between samples is so in one of them at most.
+        # Every third sample, from two starts: a jump is halfway between samples in one of them at most.
         (whole, codes), *thirds = (_bent(fine, *taken, given, own, last) for taken in ((0, 1), (0, 3), (1, 3)))
         lag = whole["lag_dynamic"]
         change, most = (np.abs(x).max(axis=-1) for x in ([y["lag_dynamic"] - lag for y, _ in thirds], lag))
@@ -171,9 +172,9 @@ def _solve(grid: Scene, phi: Array, last: bool) -> tuple[dict[str, Array], Statu
 def _bent(
     fine: list[Array], start: int, step: int, given: tuple[Array, ...], phi: Array, last: bool
 ) -> tuple[dict[str, Array], Status]:
-    """Solve under loads with kinks or jumps, of which a grid would fold what it does not carry into the rest.
+    """Solve under loads with kinks or jumps, whose higher harmonics are removed so that they do not alias.
 
-    ``fine`` is the equation on a finer grid, of whose samples from ``start`` on each of ``step`` are taken.
+    ``fine`` is the equation on a finer grid, from which every ``step``-th sample from ``start`` on is taken.
     """
     p, speed, c, reach = given
     n, size = fine[0].shape[1], p.shape[1]
@@ -197,7 +198,7 @@ def _steady(
 
 
 def _equation(scene: Scene) -> list[Array]:
-    """Give p, the factors of eta' and of eta, and the right side, over the factor of eta''; (3) with (5), (n, N)."""
+    """Compute p, the factors of eta' and eta, and the right side, over the factor of eta''; (3) with (5), (n, N)."""
     p, d2psi, _, _, data = _arguments(scene)
     driven = driven_side(scene, True)
     inertia, stiffness, damping, speed, _ = (data[:, k, None] for k in range(5))
@@ -217,14 +218,14 @@ def _equation(scene: Scene) -> list[Array]:
 
 
 def turn(scene: Scene, wanted: frozenset[str], accuracy: Accuracy) -> Columns:
-    """Floquet multiplier and reductions of lag and elongation, on finer grids for the designs that need them."""
+    """Compute the Floquet multiplier and reductions of lag and elongation, on finer grids where needed."""
     columns = _turn(scene, wanted, GRIDS)
     unseen = (scene.least_samples > GRIDS[-1]) & (wanted != {"floquet"})
     late = np.flatnonzero((columns["status"] == st.NOT_CONVERGED) | unseen)
     if late.size:
         for name, values in _turn(scene.only(late), wanted, FINER).items():
             before = columns[name][late]
-            # A multiplier that is known stays: it is the same asked alone and beside the lag.
+            # A known multiplier is kept: it must not depend on whether the lag is wanted too.
             kept = np.isfinite(before) & name.endswith("floquet")
             columns[name][late] = np.where(kept, before, values)
     return columns

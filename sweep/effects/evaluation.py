@@ -1,6 +1,6 @@
-"""How effects are computed beside the motion: in blocks whose joint records stay in the cache.
+"""Computation of effects together with the motion, in blocks whose joint records stay in the cache.
 
-What effects bring to the curves of a family between even samples is the matter of :mod:`sweep.families.curve_features`.
+Kinks and waves that effects add to the curves of a family are described by :mod:`sweep.families.curve_features`.
 """
 
 from __future__ import annotations
@@ -23,17 +23,17 @@ from sweep.families.curve_features import Bends, Crossing, Singular, of_order, o
 from sweep.families.poses import blocks, differenced
 from sweep.numerics.curves import Curve, TableCurve
 
-# Poses per block: so many that what a block costs by itself, some milliseconds, is little for each.
+# Poses per block: many enough that the overhead of a block, some milliseconds, is small per pose.
 BLOCK = 32768
-# Designs per block of an effect that samples the turn itself, some hundred poses of each.
+# Designs per block of an effect that samples the turn itself, with some hundred poses of each.
 TURNS = 32
-# Of the joint records (kernels/linkage/joints.py): the crank axis u, and the direction s of the coupler.
+# Columns of the joint records (kernels/linkage/joints.py): crank axis u, and direction s of the coupler.
 _CRANK_AXIS, _ALONG_COUPLER = slice(0, 3), slice(6, 9)
 
 
 @dataclass(frozen=True)
 class Added:
-    """A family or a chain with inputs of effects behind its own parameters, and loads over the turn by input."""
+    """A family or a chain with inputs of effects after its own parameters, and loads over the turn by input."""
 
     family: Family
     inputs: tuple[Parameter, ...]
@@ -44,7 +44,7 @@ class Added:
         return np.ascontiguousarray(designs[:, : len(self.family.parameters)])
 
     def scene(self, designs: Array, angles: Angles) -> Scene:
-        """Scene of the first stage, of all designs at their angles."""
+        """Make the scene of the first stage, of all designs at their angles."""
         columns = np.ascontiguousarray(designs[:, len(self.family.parameters) :].T)
         given = {p.name: column for p, column in zip(self.inputs, columns, strict=True)}
         return first_scene(self.family, self.own(designs), angles, given, self.curves)
@@ -53,12 +53,12 @@ class Added:
 def effect_poses(
     added: Added, effects: tuple[Placed, ...], designs: Array, angles: Angles, wanted: frozenset[str]
 ) -> Columns:
-    """Family's own poses, then each effect with a wanted output; the status is the first that is not OK.
+    """Compute the family's own poses and each effect with a wanted output; the status is the first that is not OK.
 
     Parameters
     ----------
-    added, effects : what is extended, and by what
-    designs : (n, P) with the inputs behind the family's own columns;  angles : (n, m) or (1, m)
+    added, effects : the extended family and the effects
+    designs : (n, P) with the inputs after the family's own columns;  angles : (n, m) or (1, m)
     wanted : pose outputs of family and effects
     """
     family = added.family
@@ -70,7 +70,7 @@ def effect_poses(
     asked = [(placed, [name for name in placed.own if name in wanted]) for placed in effects]
     asked = [(placed, names) for placed, names in asked if names]
     last, shape = len(family.stages) - 1, (len(designs), angles.cos.shape[1])
-    # Without an output of the family's own its motion is that of the scenes, pose by pose.
+    # Without a wanted output of the family its motion is computed by the scenes only.
     bare = not own and bool(asked) and not any(placed.entry.whole_turn for placed, _ in asked)
     columns: Columns = {} if bare else family.poses(added.own(designs), angles, own)
     if not asked:
@@ -79,7 +79,7 @@ def effect_poses(
     columns |= {name: np.empty(shape) for _, names in asked for name in names}
     pointwise = [pair for pair in asked if not pair[0].entry.whole_turn]
     whole = [pair for pair in asked if pair[0].entry.whole_turn]
-    # A whole-turn effect solves the turn of a design once, however many poses are asked for.
+    # A whole-turn effect solves the turn of a design once, however many poses are wanted.
     turns = ((slice(i, i + TURNS), slice(None)) for i in range(0, shape[0], TURNS))
     for parts, where in ((pointwise, blocks(shape, BLOCK)), (whole, turns)):
         for rows, poses in where if parts else ():
@@ -95,7 +95,7 @@ def effect_poses(
 
 
 def run_design(added: Added, placed: Placed, designs: Array, wanted: frozenset[str], accuracy: Accuracy) -> Columns:
-    """Design outputs of an effect, block by block."""
+    """Compute design outputs of an effect, block by block."""
     whole_turn = placed.entry.design_result
     assert whole_turn is not None
     names = frozenset(placed.own[name] for name in wanted)
@@ -114,7 +114,7 @@ def run_design(added: Added, placed: Placed, designs: Array, wanted: frozenset[s
 
 
 def bend_curves(added: Added, placed: Placed, bend: Bend, designs: Array, angles: Angles) -> Array:
-    """Functions at whose zeros outputs of an effect bend, (n, m, q), block by block."""
+    """Evaluate the functions at whose zeros outputs of an effect bend, (n, m, q), block by block."""
     shape = len(designs), angles.cos.shape[1]
     found: list[Array] = []
     for rows, poses in blocks(shape, BLOCK):
@@ -126,7 +126,7 @@ def bend_curves(added: Added, placed: Placed, bend: Bend, designs: Array, angles
 
 
 def on_own_columns(step: Step, own: int) -> Step:
-    """Adapt a family's own step to a design matrix with further columns behind the family's."""
+    """Adapt a family's own step to a design matrix with further columns after the family's."""
 
     def run(designs: Array, wanted: frozenset[str], accuracy: Accuracy) -> Columns:
         return step.run(np.ascontiguousarray(designs[:, :own]), wanted, accuracy)
@@ -135,13 +135,13 @@ def on_own_columns(step: Step, own: int) -> Step:
 
 
 Feeling: TypeAlias = Callable[[str], frozenset[str]]
-"""Names of the pose outputs of effects that an input enters."""
+"""Function that names the pose outputs of effects that depend on an input."""
 
 
 def bent(family: Family, effects: tuple[Placed, ...], curves: Mapping[str, Curve], feeling: Feeling) -> list[Output]:
-    """Pose outputs of effects: between the points of a table of loads they may have a narrow peak.
+    """Pose outputs of effects, marked with kinks where a table of loads may cause a narrow peak.
 
-    Where a thread comes to lie on its take-up and leaves it, what is made of it jumps as it does.
+    Outputs of a thread are also marked where it comes to lie on its take-up and leaves it.
     """
     felt = frozenset().union(*(feeling(name) for name, curve in curves.items() if isinstance(curve, TableCurve)))
     path = family.find(ThreadPath)
@@ -152,7 +152,7 @@ def bent(family: Family, effects: tuple[Placed, ...], curves: Mapping[str, Curve
 
 
 def paces(curves: Mapping[str, Curve], feeling: Feeling) -> list[object]:
-    """Where the tables among loads bend, and how many waves the series have."""
+    """Features of load curves: kinks of tables, and number of waves of series."""
     return [
         of_table(c.phi, feeling(name))
         if isinstance(c, TableCurve)
@@ -162,7 +162,7 @@ def paces(curves: Mapping[str, Curve], feeling: Feeling) -> list[object]:
 
 
 def piercing(family: Family, added: tuple[Parameter, ...], feeling: Feeling) -> list[Crossing]:
-    """Where a tool pierces: at a place of the follower of its stage."""
+    """Crossings at which a tool pierces: a position of its stage's follower."""
     columns = {p.name: len(family.parameters) + k for k, p in enumerate(added)}
     found = []
     for stage in family.stages:
@@ -175,7 +175,7 @@ def piercing(family: Family, added: tuple[Parameter, ...], feeling: Feeling) -> 
 
 
 def bends(added: Added, effects: tuple[Placed, ...]) -> list[Bends]:
-    """Where outputs of effects bend, from the most accurate poses: a cut beside a narrow peak is none."""
+    """Bends of outputs of effects, from the most accurate poses: a cut must hit a narrow peak."""
     precise, found = replace(added, family=added.family.precise()), []
     for placed in effects:
         for bend in placed.entry.bends:
@@ -185,7 +185,7 @@ def bends(added: Added, effects: tuple[Placed, ...]) -> list[Bends]:
 
 
 def fingers(added: Added, feeling: Feeling) -> list[Singular]:
-    """Where a finger in the ball joint of the crank holds the coupler: next to the crank axis it turns it at once."""
+    """Singularities of a finger in the crank's ball joint, where the coupler is along the crank axis."""
     precise, own = replace(added, family=added.family.precise()), len(added.family.parameters)
     columns = {p.name: own + k for k, p in enumerate(added.inputs)}
     names = [f"finger{stage.tail}" for stage in added.family.stages]
@@ -210,7 +210,7 @@ def _finger_sine(added: Added, stage: int, column: int, designs: Array, angles: 
 
 
 def features(added: Added, effects: tuple[Placed, ...], feeling: Feeling) -> list[object]:
-    """Return what effects and loads bring to curves between even samples."""
+    """Kinks, waves and singularities that effects and loads add to curves."""
     pierced = piercing(added.family, added.inputs, feeling)
     return [*paces(added.curves, feeling), *pierced, *bends(added, effects), *fingers(added, feeling)]
 

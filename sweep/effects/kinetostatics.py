@@ -1,7 +1,7 @@
 """D1-D3 in closed form: reactions, driving torque and friction of crank, coupler and a rocker or a slider.
 
-What a family needs for this is :class:`sweep.families.capabilities.JointRecords`.  The same of any number of links,
-at three times the time without friction and 4.6 times with it: :mod:`sweep.effects.link_loads`.
+A family needs :class:`sweep.families.capabilities.JointRecords` for this.  :mod:`sweep.effects.link_loads` computes the
+same for any number of links, in three times the time without friction and 4.6 times with it.
 """
 
 from __future__ import annotations
@@ -34,7 +34,7 @@ CONTRACTION = "friction_contraction"
 
 
 def joint_forces(follower: str, suffix: str = "", text: str = "") -> Named:
-    """Six vectors in the order in which the kernel gives them, with unit and meaning."""
+    """Six joint vectors in the order of the kernel, with unit and meaning."""
     about = "about D" if follower == "rocker" else "about C"
     found = {
         "force_a": ("force", "force of the frame on the crank"),
@@ -51,7 +51,7 @@ FORCES = tuple(joint_forces("rocker"))
 
 
 def vectors(follower: str, suffix: str = "", text: str = "") -> Named:
-    """Vectors that are given: the six of the joints, and what the frame bears."""
+    """Vector outputs: the six of the joints, and force and moment on the frame."""
     return joint_forces(follower, suffix, text) | loads.frame(suffix, text)
 
 
@@ -59,7 +59,7 @@ _JOINTS = {"a": "crank bearing", "b": "ball joint at B", "c": "ball joint at C"}
 
 
 def friction_inputs(kind: loads.Follower) -> tuple[Parameter, ...]:
-    """Coefficients, radii and places of supports of the four joints."""
+    """Coefficients, radii and support positions of the four joints."""
     rocker = kind is loads.ROCKER
     joints = _JOINTS | {"d": f"{kind.name} bearing" if rocker else "slide"}
     along, place = ("rocker axis", "D") if rocker else ("slide, moving with the slider", "C")
@@ -93,7 +93,7 @@ _OF_A_SLIDE = {"radius_d": 1.0, "thrust_radius_d": 0.0}
 
 
 def losses(kind: loads.Follower) -> Named:
-    """Name what the kernel gives as losses, in its order."""
+    """Losses in the order of the kernel, with unit and meaning."""
     follower = ("torque", "friction torque on the rocker about its axis")
     of_slide = {"slide_friction": ("force", "friction force on the slider")}
     found = {
@@ -113,7 +113,7 @@ def load_name(scene: Scene) -> str:
 
 
 def force_name(scene: Scene) -> str:
-    """Name of a force that leaves all reactions in the scene when it is computed."""
+    """Name of a force whose computation stores all reactions in the scene."""
     return "force_d"
 
 
@@ -136,7 +136,7 @@ def _bodies(scene: Scene) -> Array:
 
 
 def frictionless(scene: Scene, load: Array, wanted: frozenset[str], status: Status) -> Columns:
-    """Wanted reactions and inertias; a group none of whose outputs is wanted is not compiled."""
+    """Compute the wanted reactions and inertias; a group without a wanted output is not compiled."""
     groups = loads.asked(FORCES, wanted), not wanted.isdisjoint(COUPLES), not wanted.isdisjoint(INERTIAS)
     sizes = zip((18, 2, 2), groups, strict=True)
     forces, couples, inertia = (np.empty((*scene.shape, size)) if asked else None for size, asked in sizes)
@@ -156,7 +156,7 @@ def frictionless(scene: Scene, load: Array, wanted: frozenset[str], status: Stat
 
 
 def with_friction(scene: Scene, load: Array, wanted: frozenset[str], status: Status) -> Columns:
-    """Wanted quantities with friction; status JAMMED where the iteration does not contract."""
+    """Compute the wanted quantities with friction; status JAMMED where the iteration does not contract."""
     refuse(status, together(scene, "a") | together(scene, "d"))
     lost = tuple(losses(loads.follower_of(scene.family)))
     sizes = (
@@ -184,7 +184,7 @@ def with_friction(scene: Scene, load: Array, wanted: frozenset[str], status: Sta
 
 
 def _frame(scene: Scene, given: Loading, status: Status, wanted: frozenset[str], suffix: str = "") -> Columns:
-    """Wanted force and moment on the frame, which friction inside does not change; nan where the status is not OK."""
+    """Compute the wanted force and moment on the frame, which friction does not change; nan if not OK."""
     on_frame = loads.frame_room(scene.shape, wanted, suffix)
     if all(part is None for part in on_frame):
         return {}
@@ -193,7 +193,7 @@ def _frame(scene: Scene, given: Loading, status: Status, wanted: frozenset[str],
 
 
 def _vector_columns(forces: Array | None, wanted: frozenset[str], suffix: str = "") -> Columns:
-    """Wanted magnitudes and components of the six vectors, (n, m, 18)."""
+    """Extract the wanted magnitudes and components of the six vectors, (n, m, 18)."""
     if forces is None:
         return {}
     found = {f"{name}{suffix}": forces[:, :, 3 * k : 3 * k + 3] for k, name in enumerate(FORCES)}

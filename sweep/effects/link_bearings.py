@@ -37,17 +37,17 @@ ROLLING_FORMULAS = (
 
 
 def shafts(tree: LinkTree) -> tuple[LinkJoint, ...]:
-    """Joints that roll in two bearings: those that turn about an axis and do not slide along it."""
+    """Joints on two rolling bearings: those that turn about an axis and do not slide along it."""
     return tuple(j for j in tree.joints if j.kind == "shaft")
 
 
 def journals(tree: LinkTree) -> tuple[LinkJoint, ...]:
-    """Joints that slide in two journals: shafts, and guides, which have no collar."""
+    """Joints on two journals: shafts, and guides, which have no collar."""
     return tuple(j for j in tree.joints if j.kind in SUPPORTED)
 
 
 def _sliding_inputs(joint: LinkJoint) -> tuple[Parameter, ...]:
-    """Dimensions of the journals, of the collar of a shaft, in the order of the kernel's columns."""
+    """Dimensions of the journals, and of a shaft's collar, in the order of the kernel's columns."""
     j, words = joint.name, joint.text
     found = [Parameter(f"journal_diameter_{j}", "length", f"diameter of both journals: {words}", positive=True)]
     found += [Parameter(f"journal_length_{j}{k}", "length", f"length of journal {k}: {words}", positive=True)
@@ -79,7 +79,7 @@ def _sliding_outputs(joint: LinkJoint) -> tuple[Output, ...]:
 
 
 def _columns(scene: Scene, inputs: tuple[Parameter, ...], size: int) -> Array:
-    """Put inputs side by side, (n, size); zeros behind those that the joint has."""
+    """Stack inputs side by side, (n, size); the remaining columns are zero."""
     table = np.zeros((len(scene.designs), size))
     for k, p in enumerate(inputs):
         table[:, k] = scene.inputs[p.name]
@@ -87,7 +87,7 @@ def _columns(scene: Scene, inputs: tuple[Parameter, ...], size: int) -> Array:
 
 
 def sliding(scene: Scene, wanted: frozenset[str]) -> Columns:
-    """Wanted pressures and utilisations under the loads with friction."""
+    """Compute the wanted pressures and utilisations under the loads with friction."""
     asked = [j for j in journals(tree_of(scene)) if not wanted.isdisjoint(o.name for o in _sliding_outputs(j))]
     supports = {j.name: [f"load_support_{j.name}{k}" for k in "12"] for j in asked}
     axial = {j.name: [f"force_{j.name}{FRICTION_SUFFIX}_{x}" for x in AXES] for j in asked if j.kind == "shaft"}
@@ -134,7 +134,7 @@ def _rolling_outputs(joint: LinkJoint) -> tuple[Output, ...]:
 
 
 def _turning(scene: Scene, joint: LinkJoint) -> Array:
-    """Compute the turning of a shaft in its bearings per unit crank speed, (n, m)."""
+    """Angular velocity of a shaft in its bearings per unit crank speed, (n, m)."""
     bodies, parent = scene.links.bodies, scene.links.parents[joint.body]
     turn = bodies[:, :, joint.body, 9:12]
     if parent >= 0:
@@ -151,7 +151,7 @@ def _shaft(tree: LinkTree, joint: LinkJoint) -> Shaft:
 
 
 def rolling(scene: Scene, wanted: frozenset[str]) -> Columns:
-    """Wanted loads of bearings, and the share that they make of the permissible load."""
+    """Compute the wanted bearing loads, and their ratio to the permissible load."""
     columns: Columns = {}
     status = scene.status()
     tree = tree_of(scene)
@@ -172,7 +172,7 @@ def rolling(scene: Scene, wanted: frozenset[str]) -> Columns:
 
 
 def rolling_turn(scene: Scene, wanted: frozenset[str], accuracy: Accuracy) -> Columns:
-    """Mean loads and lives of the shafts asked for; see :mod:`sweep.effects.bearing_life`."""
+    """Compute mean loads and lives of the wanted shafts; see :mod:`sweep.effects.bearing_life`."""
     columns: Columns = {}
     status = np.zeros(len(scene.designs), np.uint8)
     tree = tree_of(scene)
@@ -186,7 +186,7 @@ def rolling_turn(scene: Scene, wanted: frozenset[str], accuracy: Accuracy) -> Co
 
 
 def sliding_of(name: str) -> Effect:
-    """Entry of the sliding bearings of a family with a tree of links."""
+    """Make the entry of the sliding bearings of a family with a tree of links."""
     rubbing = friction_of(name)
     tree = rubbing.tree
     assert tree is not None
@@ -214,7 +214,7 @@ def sliding_of(name: str) -> Effect:
 
 
 def rolling_of(name: str) -> Effect:
-    """Entry of the rolling bearings of a family with a tree of links."""
+    """Make the entry of the rolling bearings of a family with a tree of links."""
     bare = loads_of(name)
     tree = bare.tree
     assert tree is not None

@@ -1,4 +1,4 @@
-"""D1-D3 of any number of links: reactions, driving torque, friction, a tool; what :class:`LinkTree` is needed for."""
+"""D1-D3 of any number of links: reactions, driving torque, friction and a tool, from a :class:`LinkTree`."""
 
 from __future__ import annotations
 
@@ -39,7 +39,7 @@ SUPPORTED = ("shaft", "sleeve")
 
 
 def tree_of(scene: Scene) -> LinkTree:
-    """Find the tree of links of a scene's family."""
+    """Tree of links of a scene's family."""
     tree = scene.family.find(LinkTree)
     assert tree is not None
     return tree
@@ -62,11 +62,11 @@ def _whole(name: str, axes: str) -> tuple[Parameter, ...]:
 
 @lru_cache
 def rods_of(tree: LinkTree) -> dict[int, tuple[int, int]]:
-    """Bodies that may be slender rods, by number: from their joint with the parent to where they carry another body.
+    """Bodies that may be slender rods, by number, with the body or line at their far end, (body, line).
 
-    That is the joint of a body that hangs on it, or the line of a ball that closes a loop: the body's or the line's
-    number, the other -1.  What slides on a body, or touches it, makes no end of a rod; a body with nothing else reaches
-    to the point of its arm, or, both numbers -1, to the place of the tool that it carries.
+    The far end is the joint of a body that hangs on the rod, (body, -1), or the line of a ball that closes a loop, (-1,
+    line).  A body that slides on another, or touches it, is no end of a rod; a body with nothing else reaches to the
+    point of its arm, or, (-1, -1), to the place of the tool that it carries.
     """
     found: dict[int, tuple[int, int]] = {}
     sliding = {joint.body for joint in tree.joints if joint.kind == "sleeve"}
@@ -89,14 +89,14 @@ def inputs(tree: LinkTree) -> tuple[Parameter, ...]:
 
 
 def useful(tree: LinkTree) -> Parameter | None:
-    """Return the useful load: a torque on an output link that turns, a force on one that slides; None without one."""
+    """Return the useful load: torque on an output link that turns, force on one that slides; None without one."""
     if tree.output < 0:
         return None
     return loads.LINK_FORCE if tree.freedoms[tree.output][1] == SLIDE else loads.LINK_TORQUE
 
 
 def friction_inputs(joint: LinkJoint) -> tuple[Parameter, ...]:
-    """List the inputs of a joint in the order of the kernel's columns: those that it has."""
+    """List the friction inputs that a joint has, in the order of the kernel's columns."""
     j, text = joint.name, joint.text
     bare = 0.0 if joint.kind in ("contact", "sleeve") else None
     found = [
@@ -115,7 +115,7 @@ def friction_inputs(joint: LinkJoint) -> tuple[Parameter, ...]:
 
 
 def vectors(tree: LinkTree, suffix: str = "", text: str = "") -> Named:
-    """Vectors that are given: forces and moments of the joints, and what the frame bears."""
+    """Vector outputs: forces and moments of the joints, and force and moment on the frame."""
     found = {}
     for joint in tree.joints:
         found[f"force_{joint.name}{suffix}"] = ("force", f"{joint.text}: force of the {joint.acts}{text}")
@@ -136,7 +136,7 @@ def losses(tree: LinkTree) -> Named:
 
 
 def support_loads(tree: LinkTree) -> dict[str, tuple[int, int, str]]:
-    """Name the loads of supports: the number of the joint, that of the support, in words."""
+    """Map the names of support loads to joint number, support number and text."""
     return {
         f"load_support_{j.name}{k + 1}": (q, k, f"load across the axis of support {k + 1}: {j.text}{FRICTION_TEXT}")
         for q, j in enumerate(tree.joints)
@@ -153,19 +153,19 @@ def joint_table(tree: LinkTree) -> Index:
 
 
 def rod(tree: LinkTree, joint: LinkJoint) -> int:
-    """Find the slender body among those of a joint; -1 where there is none."""
+    """Return the number of the slender body among those of a joint; -1 if there is none."""
     ends = (joint.body,) if joint.lines[1] == 0 else tree.ends[joint.lines[0]]
     return next((k for k in ends if k >= 0 and tree.bodies[k].slender), -1)
 
 
 def load_name(scene: Scene) -> str | None:
-    """Name of the useful load on the output link; None where the tree has no such link."""
+    """Name of the useful load on the output link; None without such a link."""
     load = useful(tree_of(scene))
     return None if load is None else load.name
 
 
 def force_name(scene: Scene) -> str:
-    """Name of a force that leaves all reactions in the scene when it is computed."""
+    """Name of a force whose computation stores all reactions in the scene."""
     return f"force_{tree_of(scene).joints[0].name}"
 
 
@@ -186,7 +186,7 @@ def _bodies(scene: Scene) -> Array:
 
 
 def _rod_ends(scene: Scene, k: int, child: int, line: int) -> tuple[Array, Array]:
-    """Find both ends of a rod in the axes of its body, each (n, 3); ``child`` and ``line`` as of :func:`rods_of`."""
+    """Both ends of a rod in the axes of its body, each (n, 3); ``child`` and ``line`` as in :func:`rods_of`."""
     links = scene.still_links  # joints stand still in a body
     record = links.bodies[:, 0, k]
 
@@ -216,7 +216,7 @@ def _loading(scene: Scene, load: Array) -> link_loads.TreeLoading:
 
 
 def _vector_columns(tree: LinkTree, forces: Array | None, wanted: frozenset[str], suffix: str = "") -> Columns:
-    """Wanted magnitudes and components of joint reactions (n, m, Q, 6)."""
+    """Extract the wanted magnitudes and components of joint reactions (n, m, Q, 6)."""
     if forces is None:
         return {}
     found = {}
@@ -227,14 +227,14 @@ def _vector_columns(tree: LinkTree, forces: Array | None, wanted: frozenset[str]
 
 
 def _reactions(scene: Scene, wanted: frozenset[str], suffix: str = "") -> Array | None:
-    """Room for the reactions of the joints; None where none of them is wanted."""
+    """Allocate the reactions of the joints; None if none of them is wanted."""
     tree, frame = tree_of(scene), loads.frame(suffix)
     joints = tuple(name for name in vectors(tree, suffix) if name not in frame)
     return np.empty((*scene.shape, len(tree.joints), 6)) if loads.asked(joints, wanted) else None
 
 
 def _fill(scene: Scene, load: Array, status: Status, *out: Array | None) -> None:
-    """Let the kernel write the wanted ones of its results, (n, ...) each, some designs after others."""
+    """Run the kernel, which writes the results that are not None, (n, ...) each, in blocks of designs."""
     tree, given = tree_of(scene), _loading(scene, load)
     for rows, links in scene.links_by_parts():
         some = given._replace(bodies=given.bodies[rows], tool=given.tool[rows], drive=given.drive[rows])
@@ -243,7 +243,7 @@ def _fill(scene: Scene, load: Array, status: Status, *out: Array | None) -> None
 
 
 def frictionless(scene: Scene, load: Array, wanted: frozenset[str], status: Status) -> Columns:
-    """Wanted reactions, driving torque and inertias; what is not wanted is not compiled."""
+    """Compute the wanted reactions, driving torque and inertias; other results are not compiled."""
     tree, shape = tree_of(scene), scene.shape
     forces, on_frame = _reactions(scene, wanted), loads.frame_room(scene.shape, wanted)
     torque = np.empty(shape) if "drive_torque" in wanted else None
@@ -263,7 +263,7 @@ def frictionless(scene: Scene, load: Array, wanted: frozenset[str], status: Stat
 
 
 def _friction_data(scene: Scene) -> Array:
-    """Columns of the friction kernel of each joint, (n, Q, 5); 0 for what a kind of joint does not have."""
+    """Columns of the friction kernel of each joint, (n, Q, 5); 0 for inputs that a joint does not have."""
     zero, rows = np.zeros(len(scene.designs)), []
     for j in (joint.name for joint in tree_of(scene).joints):
         names = (f"mu_{j}", f"radius_{j}", f"thrust_radius_{j}", f"support_{j}1", f"support_{j}2")
@@ -272,7 +272,7 @@ def _friction_data(scene: Scene) -> Array:
 
 
 def with_friction(scene: Scene, load: Array, wanted: frozenset[str], status: Status) -> Columns:
-    """Wanted quantities with friction; status JAMMED where the iteration does not settle."""
+    """Compute the wanted quantities with friction; status JAMMED where the iteration does not converge."""
     tree, shape = tree_of(scene), scene.shape
     same: NDArray[np.bool_] = np.zeros(len(scene.designs), np.bool_)
     for joint in tree.joints:
@@ -289,7 +289,7 @@ def with_friction(scene: Scene, load: Array, wanted: frozenset[str], status: Sta
     )  # fmt: skip
     columns = _vector_columns(tree, forces, wanted, FRICTION_SUFFIX)
     on_frame = loads.frame_room(scene.shape, wanted, FRICTION_SUFFIX)
-    if any(part is not None for part in on_frame):  # friction is inside: it changes nothing of what the frame bears
+    if any(part is not None for part in on_frame):  # friction is internal: it does not change the load on the frame
         _fill(scene, load, status, None, *on_frame, None, None, None)
     columns |= loads.frame_columns(on_frame, wanted, FRICTION_SUFFIX)
     if torque is not None:

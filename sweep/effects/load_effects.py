@@ -1,6 +1,6 @@
 """Entries of D1-D3: reactions, driving torque and inertia without friction and with it, for every kind of linkage.
 
-With friction outputs turn at once where a joint nearly stops: functions that vanish there say where.
+Outputs with friction change abruptly where a joint nearly stops: the functions here vanish at these places.
 """
 
 from __future__ import annotations
@@ -27,7 +27,7 @@ _V, _OMEGA, _ALONG, _PLACE = slice(3, 6), slice(9, 12), slice(15, 18), slice(24,
 
 
 def ball_slowness(scene: Scene) -> Array:
-    """Squares of the turning of coupler against crank and against follower per unit crank speed, (n, m, 2)."""
+    """Squared angular velocities of the coupler relative to crank and follower per unit crank speed, (n, m, 2)."""
     poses, designs = scene.records
     omega, origin = np.empty((*scene.shape, 3)), np.zeros((len(designs), 3))
     coupler_point(poses, designs, origin, scene.inputs["finger"], scene.status(), CouplerMotion(omega=omega))
@@ -37,19 +37,19 @@ def ball_slowness(scene: Scene) -> Array:
 
 
 def tree_bends(tree: LinkTree, outputs: tuple[str, ...]) -> tuple[Bend, ...]:
-    """Places where outputs with friction bend: where a shaft reverses, and where another joint nearly stops."""
+    """Bends of outputs with friction: where a shaft reverses, and where another joint nearly stops."""
     found = [Bend(outputs, reversals)]
     return (*found, Bend(outputs, slowness, squares=True)) if _others(tree) else tuple(found)
 
 
 def reversals(scene: Scene) -> Array:
-    """Compute the turning of each shaft in its bearings, (n, m, q)."""
+    """Angular velocity of each shaft in its bearings, (n, m, q)."""
     shafts = _shafts(tree_of(scene))
     return np.stack([(relative(scene, joint)[0] * axis_of(scene, joint)).sum(axis=2) for joint in shafts], axis=2)
 
 
 def slowness(scene: Scene) -> Array:
-    """Squares of the turning, and of the sliding, of all other joints, (n, m, q)."""
+    """Squared angular velocities, and sliding velocities, of all other joints, (n, m, q)."""
     squares = []
     for joint in _others(tree_of(scene)):
         turn, slip = relative(scene, joint)
@@ -78,9 +78,9 @@ def _others(tree: LinkTree) -> list[LinkJoint]:
 
 
 def relative(scene: Scene, joint: LinkJoint) -> tuple[Array, Array]:
-    """Compute turning and sliding of one body of a joint against the other, (n, m, 3), as friction sees them.
+    """Compute angular and sliding velocity of one body of a joint relative to the other, (n, m, 3), for friction.
 
-    A rod is free about its own axis, a contact slides across its lines.
+    The components about a rod's own axis and along a contact's lines are removed.
     """
     bodies, first = scene.links.bodies, joint.lines[0]
     if joint.lines[1] == 0:
@@ -100,7 +100,7 @@ def relative(scene: Scene, joint: LinkJoint) -> tuple[Array, Array]:
 
 
 def _rates(bodies: Array, body: Index, place: Array) -> tuple[Array, Array]:
-    """Compute the turning of one body of each design and its velocity at a place, (n, m, 3); none of the frame."""
+    """Compute angular velocity of one body of each design and its velocity at a place, (n, m, 3); 0 for the frame."""
     every = np.take_along_axis(bodies, np.maximum(body, 0)[:, None, None, None], axis=2)[:, :, 0]
     omega = every[:, :, _OMEGA]
     velocity = every[:, :, _V] + np.cross(omega, place - every[:, :, :3])
@@ -153,7 +153,7 @@ TREE_FRICTION_FORMULAS = (
 
 
 def _share_of_inertia(scene: Scene, name: str, size: Callable[[Array], Array], quantity: str) -> Advice | None:
-    """Share of the ``size`` of one output over the turn that inertia and weight make; 1 without a useful load."""
+    """Share of the ``size`` of an output over the turn due to inertia and weight; 1 without a useful load."""
     names = frozenset({name})
     whole = compute_loads(scene, names)
     still = {
@@ -233,7 +233,7 @@ def _closed_friction(kind: loads.Follower) -> Effect:
 
 @lru_cache
 def loads_of(name: str) -> Effect:
-    """Entry of the loads of a family with a tree of links."""
+    """Make the entry of the loads of a family with a tree of links."""
     found = family(name)
     tree = found.find(LinkTree)
     assert tree is not None
@@ -260,7 +260,7 @@ def loads_of(name: str) -> Effect:
 
 @lru_cache
 def friction_of(name: str) -> Effect:
-    """Entry of the friction of a family with a tree of links."""
+    """Make the entry of the friction of a family with a tree of links."""
     bare = loads_of(name)
     tree = bare.tree
     assert tree is not None

@@ -1,8 +1,8 @@
-"""Loads of a stage of a chain, and the torque and inertia that the stage driving it feels.
+"""Loads of a stage of a chain, and the torque and inertia that a later stage returns to the stage driving it.
 
-A family with joint records has its loads in closed form, one with a tree of links by virtual power.  The tree alone
-would do: for crank-rockers, slider-cranks and guides at 360 angles both agree to 2e-15.  But it takes, with the poses
-of its bodies, 3.1 times the closed form without friction (0.40 us per pose) and 4.6 times with it (1.36 us).
+Families with joint records have their loads in closed form, families with a tree of links by virtual power.  The tree
+would do for all: for crank-rockers, slider-cranks and guides at 360 angles both agree to 2e-15.  But with the poses of
+its bodies it takes 3.1 times the closed form without friction (0.40 us per pose) and 4.6 times with it (1.36 us).
 """
 
 from __future__ import annotations
@@ -20,21 +20,21 @@ from sweep.families.base import Array, Columns, Family, Parameter, floats
 from sweep.families.capabilities import JointRecords
 from sweep.families.link_tree import LinkTree
 
-LOADS, FRICTION = "D1, D3", "D2"  # keys of the effects that hand something back
+LOADS, FRICTION = "D1, D3", "D2"  # keys of the effects that return a load to the driving stage
 INERTIAS = ("reduced_inertia", "dreduced_inertia")
 _TORQUE = {LOADS: "drive_torque", FRICTION: "drive_torque_friction"}
 _SHAKING_FORCE = frozenset(f"shaking_force{tail}" for tail in ("", "_x", "_y", "_z"))
 _HANDED_BACK = {LOADS: frozenset({_TORQUE[LOADS], *INERTIAS}), FRICTION: frozenset({_TORQUE[FRICTION]})}
 
 Reactions: TypeAlias = Callable[[Scene, Array, frozenset[str], Status], Columns]
-"""``(scene, load, wanted, status)``: wanted columns under a load on the output; the status is written on."""
+"""``(scene, load, wanted, status)``: wanted columns under a load on the output; ``status`` is updated."""
 
 
 class Route(NamedTuple):
-    """How the loads of families with a capability are found.
+    """Computation of loads for families with a capability.
 
-    ``inputs(family)`` are those of its loads, ``load(scene)`` names the useful one on its output, if any, and
-    ``force(scene)`` an output that leaves all reactions in the scene when it is computed.
+    ``inputs(family)`` lists the inputs of its loads, ``load(scene)`` names the useful load on its output, if any, and
+    ``force(scene)`` an output whose computation stores all reactions in the scene.
     """
 
     frictionless: Reactions
@@ -63,20 +63,20 @@ _ROUTES = {
 
 
 def route(family: Family) -> Route | None:
-    """How the loads of a family are found; None where it has nothing to find them from."""
+    """Return how a family's loads are computed; None if it has neither joint records nor a tree of links."""
     return next((found for capability, found in _ROUTES.items() if family.find(capability) is not None), None)
 
 
 def inputs_of_loads(family: Family) -> tuple[Parameter, ...]:
-    """List the inputs of the effect that gives the load on the stage before; empty without such an effect."""
+    """List the inputs of the effect that returns the load to the driving stage; empty without such an effect."""
     found = route(family)
     return () if found is None else found.inputs(family)
 
 
 def compute_loads(scene: Scene, wanted: frozenset[str]) -> Columns:
-    """Wanted reactions, driving torque and inertias of one stage, those of the later stages included."""
+    """Compute the wanted reactions, driving torque and inertias of one stage, including later stages."""
     found, status = _route_of(scene), scene.status()
-    # A torque that the next stage hands back leaves the force on the frame as it is.
+    # The torque of the next stage does not change the force on the frame.
     handed_back = None if wanted <= _SHAKING_FORCE else behind(scene, LOADS)
     columns = found.frictionless(scene, _on_output(scene, found, handed_back, LOADS), wanted, status)
     if handed_back is not None:
@@ -88,7 +88,7 @@ def compute_loads(scene: Scene, wanted: frozenset[str]) -> Columns:
 
 
 def compute_friction(scene: Scene, wanted: frozenset[str]) -> Columns:
-    """Wanted reactions, driving torque and losses of one stage with friction."""
+    """Compute the wanted reactions, driving torque and losses of one stage with friction."""
     found, status, handed_back = _route_of(scene), scene.status(), behind(scene, FRICTION)
     if handed_back is not None:
         take_over(status, handed_back["status"])
@@ -97,12 +97,12 @@ def compute_friction(scene: Scene, wanted: frozenset[str]) -> Columns:
 
 
 def computed(scene: Scene, key: str, wanted: frozenset[str]) -> Columns:
-    """Compute outputs of the effect of that key for one stage."""
+    """Compute outputs of the effect with a key for one stage."""
     return (compute_loads if key == LOADS else compute_friction)(scene, wanted)
 
 
 def behind(scene: Scene, key: str) -> Columns | None:
-    """Compute torque, inertia and status of the next stage, as this one feels them; None at the end of the chain."""
+    """Compute torque, inertia and status that the next stage returns to this one; None at the end of the chain."""
     if scene.driven is None:
         return None
     memo = f"behind {key}"
@@ -113,7 +113,7 @@ def behind(scene: Scene, key: str) -> Columns | None:
 
 
 def reactions(scene: Scene) -> tuple[Array, Status]:
-    """All reactions side by side as the kernel of the family's route gives them, (n, m, F), and the status.
+    """Return all reactions side by side as the family's kernel gives them, (n, m, F), and the status.
 
     They are computed once for all bearings of a scene.
     """
@@ -139,7 +139,7 @@ def _carried(scene: Scene, handed_back: Columns) -> dict[str, Array]:
 
 
 def _on_output(scene: Scene, found: Route, handed_back: Columns | None, key: str) -> Array:
-    """Load of the output link, less the driving torque that the next stage takes from it."""
+    """Load of the output link, less the driving torque of the next stage."""
     name = found.load(scene)
     load = np.zeros((len(scene.designs), 1)) if name is None else scene.load(name)
     if handed_back is None:

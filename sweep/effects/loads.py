@@ -1,4 +1,4 @@
-"""What the load effects share: inputs of bodies, weight, speed, load; outputs that are vectors and their columns."""
+"""Common parts of the load effects: inputs of bodies, weight, speed and load; vector outputs and their columns."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from sweep.families.capabilities import JointRecords
 from sweep.families.sites import AXES
 
 FRICTION_SUFFIX, FRICTION_TEXT = "_friction", ", friction included"
-GRAM = "; a gram is 1e-6"  # kilograms are what one types
+GRAM = "; a gram is 1e-6"  # users tend to type kilograms
 
 Named: TypeAlias = dict[str, tuple[str, str]]
 """Unit and meaning by name."""
@@ -31,7 +31,7 @@ _FRAMES = {
 
 
 def body_inputs(body: str, frame: str, default: float | None = None) -> tuple[Parameter, ...]:
-    """Mass, centre of mass and inertia of a body whose axes lie as ``frame`` says; ``default`` mass."""
+    """Mass, centre of mass and inertia of a body whose axes ``frame`` describes; ``default`` is that of the mass."""
     centre = (
         Parameter(f"com_{body}_{axis}", "length", f"centre of mass of the {body} ({frame})", default=0.0)
         for axis in "xyz"
@@ -54,7 +54,7 @@ def _body(body: str) -> tuple[Parameter, ...]:
 
 
 def as_rod(body: str, own: tuple[Parameter, ...]) -> tuple[Parameter, ...]:
-    """Whether a body is a rod as far as nothing is said of its centre and inertia, its mass per length, its thickness.
+    """List the inputs that make a body a rod, unless its centre or inertia is given: switch, line mass, gyration.
 
     ``own`` are its mass, centre and inertia.
     """
@@ -71,18 +71,18 @@ def as_rod(body: str, own: tuple[Parameter, ...]) -> tuple[Parameter, ...]:
     )
 
 
-ROD = ("rod", "line_mass", "gyration")  # what the names of these begin with
+ROD = ("rod", "line_mass", "gyration")  # prefixes of the names of these inputs
 
 
 POINT = "in its joint where its centre and inertia are left out"
 
 
 def as_point(mass: Parameter) -> Parameter:
-    """Mass of a body that has no second joint to be a rod to."""
+    """Mass of a body without a second joint, which cannot be a rod."""
     return replace(mass, text=f"{mass.text}; {POINT}")
 
 
-# Entries of a tensor in the order of its inputs.
+# Indices of a tensor's entries in the order of its inputs.
 _FIRST, _SECOND = np.array([0, 0, 0, 1, 1, 2]), np.array([0, 1, 2, 1, 2, 2])
 _UNIT = np.array([1.0, 0.0, 0.0, 1.0, 0.0, 1.0])
 
@@ -90,13 +90,13 @@ _UNIT = np.array([1.0, 0.0, 0.0, 1.0, 0.0, 1.0])
 def put_rod(columns: Array, rod: Array, line_mass: Array, gyration: Array, start: Array, end: Array) -> None:
     """Make bodies rods where ``rod`` is 1: masses, centres and moments of inertia (n, BODY), in place.
 
-    The inertia is m l^2/12 across the rod, and m k^2 more with the radius of gyration k of a section that is the same
-    about all lines across the rod; along the rod it is 2 m k^2.
+    The inertia across the rod is m l^2/12 plus m k^2, with the radius of gyration k of a section that is the same about
+    all lines across the rod; along the rod it is 2 m k^2.
 
     Parameters
     ----------
     rod, line_mass, gyration : (n,)
-    start, end : (n, 3) its joints in the axes of the body
+    start, end : (n, 3) joints of the rod in the axes of the body
     """
     along = end - start
     lengths = along * along
@@ -127,7 +127,7 @@ GRAVITY = tuple(
 SPEED = Parameter("speed", "speed", "speed of the crank (scene.speed of a study); negative: it turns backwards",
                   not_zero=True)  # fmt: skip
 CHANGE = Parameter("speed_change", "angular_acceleration", "angular acceleration of the crank", default=0.0)
-# Of a tool that moves along a line; without mass and force nothing is computed for it.
+# Inputs of a tool that moves along a line; without mass and force it is not computed.
 _MASS = Parameter("m_tool", "mass", "mass of the tool, such as a needle bar", default=0.0, not_negative=True)
 TOOL = (
     _MASS,
@@ -138,7 +138,7 @@ TOOL = (
     Parameter("pierce_sense", "sign", "side of pierce_at on which the fabric lies: towards growing or falling s",
               default=1.0, choices=(-1.0, 1.0)),
 )  # fmt: skip
-# Of a tool at a point that moves freely in space.
+# Inputs of a tool at a point that moves freely in space.
 FREE_TOOL = (
     _MASS,
     *(
@@ -150,8 +150,8 @@ _ALONG = {"x": "the output link", "y": "its tangent", "z": "its axis, from z = 0
 TIP = tuple(
     Parameter(f"tool_{axis}", "length", f"place of the tool along {way}", default=0.0) for axis, way in _ALONG.items()
 )
-# Of families with a point of the coupler that a tool hangs on: one that moves along a line, one that moves freely; and
-# of families whose rocker can carry a tool at its tip.
+# Tool inputs of families with a coupler point that moves along a line, with one that moves freely, and of families
+# whose rocker can carry a tool at its tip.
 TOOLS = (TOOL, FREE_TOOL, (*FREE_TOOL, *TIP))
 _TORQUE = Parameter(
     "load_torque", "torque", "torque on the rocker about its axis; a resisting one opposes dpsi", default=0.0
@@ -162,13 +162,13 @@ _FORCE = Parameter(
 
 
 class Follower(NamedTuple):
-    """What the load effects of one kind of follower take: its name, its useful load, its bodies, all their inputs."""
+    """Inputs of the load effects for a kind of follower: name, useful load, bodies, and all inputs."""
 
     name: str
     prefix: str  # of the names of its effects
     load: Parameter
     bodies: tuple[str, ...]  # columns of kernels.effects.kinetostatics in order
-    rods: tuple[str, ...]  # those that may be slender rods, in the order of the bodies
+    rods: tuple[str, ...]  # bodies that may be slender rods, in order
     parameters: tuple[Parameter, ...]
 
 
@@ -180,7 +180,7 @@ def _follower(name: str, prefix: str, load: Parameter) -> Follower:
     return Follower(name, prefix, load, tuple(p.name for p in bodies), rods, parameters)
 
 
-# On the output link of a tree of links that turns, and on one that slides.
+# Useful loads of a tree of links whose output link turns, or slides.
 LINK_TORQUE = replace(_TORQUE, text="torque on the output link about its axis; a resisting one opposes dpsi")
 LINK_FORCE = replace(_FORCE, text="force on the output link along its guide; a resisting one opposes its derivative")
 ROCKER = _follower("rocker", "", _TORQUE)
@@ -194,7 +194,7 @@ def follower_of(family: Family) -> Follower:
 
 
 def vector_outputs(named: Named, equation: str) -> tuple[Output, ...]:
-    """Magnitude and components of vectors."""
+    """Magnitude and components of vectors as outputs."""
     found = []
     for name, (unit, text) in named.items():
         found.append(Output(name, unit, f"magnitude: {text}", equation))
@@ -203,7 +203,7 @@ def vector_outputs(named: Named, equation: str) -> tuple[Output, ...]:
 
 
 def scalar_outputs(named: Named, equation: str, jumps: str = "") -> tuple[Output, ...]:
-    """List outputs that are no vectors; the one called ``jumps`` jumps."""
+    """List scalar outputs; the output named ``jumps`` has jumps."""
     return tuple(Output(name, unit, text, equation, name == jumps) for name, (unit, text) in named.items())
 
 
@@ -217,24 +217,24 @@ def frame(suffix: str = "", text: str = "") -> Named:
 
 
 def frame_room(shape: tuple[int, int], wanted: frozenset[str], suffix: str = "") -> tuple[Array | None, Array | None]:
-    """Room for force and moment on the frame, (n, 3, m) each; None for what is not wanted."""
+    """Allocate force and moment on the frame, (n, 3, m) each; None if not wanted."""
     force, moment = (np.empty((shape[0], 3, shape[1])) if asked((name,), wanted) else None for name in frame(suffix))
     return force, moment
 
 
 def frame_columns(on_frame: tuple[Array | None, Array | None], wanted: frozenset[str], suffix: str = "") -> Columns:
-    """Wanted magnitudes and components of force and moment on the frame, (n, 3, m) or None each."""
+    """Extract the wanted magnitudes and components of force and moment on the frame, (n, 3, m) or None each."""
     named = zip(frame(suffix), on_frame, strict=True)
     return vector_columns({name: np.moveaxis(x, 1, 2) for name, x in named if x is not None}, wanted)
 
 
 def asked(names: Collection[str], wanted: frozenset[str]) -> bool:
-    """Whether a vector, or a component of one, is wanted."""
+    """Whether a vector or one of its components is wanted."""
     return any(f"{name}{tail}" in wanted for name in names for tail in ("", "_x", "_y", "_z"))
 
 
 def vector_columns(found: Mapping[str, Array], wanted: frozenset[str]) -> Columns:
-    """Wanted magnitudes and components of vectors, (n, m, 3) each."""
+    """Extract the wanted magnitudes and components of vectors, (n, m, 3) each."""
     columns: Columns = {}
     for name, values in found.items():
         if name in wanted:
@@ -244,7 +244,7 @@ def vector_columns(found: Mapping[str, Array], wanted: frozenset[str]) -> Column
 
 
 def scalar_columns(names: Collection[str], values: Array | None, wanted: frozenset[str]) -> Columns:
-    """Wanted columns of an array (n, m, len(names)); none where there is no array."""
+    """Extract the wanted columns of an array (n, m, len(names)); none if it is None."""
     return {} if values is None else {name: values[:, :, k] for k, name in enumerate(names) if name in wanted}
 
 
@@ -255,7 +255,7 @@ def magnitude(vectors: Array) -> Array:
 
 
 def tip_from(scene: Scene, heights: Array) -> Array:
-    """Place of a tool at the tip of the output link, (n, 3), from the point of its axis at these heights, (n,).
+    """Place of a tool at the tip of the output link, (n, 3), relative to the point of its axis at ``heights`` (n,).
 
     Inputs count from the point with z = 0, as tips of a machine do; bodies and loads count from D.
     """
@@ -265,6 +265,6 @@ def tip_from(scene: Scene, heights: Array) -> Array:
 
 
 def together(scene: Scene, shaft: str) -> NDArray[np.bool_]:
-    """Designs both of whose supports of a shaft stand at one place, (n,)."""
+    """Whether both supports of a shaft coincide, (n,)."""
     same: NDArray[np.bool_] = scene.inputs[f"support_{shaft}1"] == scene.inputs[f"support_{shaft}2"]
     return same

@@ -1,4 +1,4 @@
-"""C0, M1: motion of the coupler and of a point of it, and of the common centre of mass of links of one section."""
+"""C0, M1: motion of the coupler and its point, and acceleration of the common centre of mass of uniform links."""
 
 from __future__ import annotations
 
@@ -56,7 +56,7 @@ _POINT = ("x_point", "y_point", "z_point")
 
 
 def compute(scene: Scene, wanted: frozenset[str]) -> Columns:
-    """Wanted components; each group of three costs what one of them does."""
+    """Compute the wanted components; a group of three takes as long as one component."""
     status = scene.status()
     groups = [[name.format(axis=axis) for axis in "xyz"] for name, _, _ in _GROUPS.values()]
     out = [None if wanted.isdisjoint(names) else np.empty((*scene.shape, 3)) for names in groups]
@@ -126,7 +126,7 @@ _SHAKING_NAMES = tuple(o.name for o in SHAKING_OUTPUTS)
 
 
 def compute_shaking(scene: Scene, wanted: frozenset[str]) -> Columns:
-    """Magnitude and components of every pose; in a chain with respect to the crank angle of stage 1."""
+    """Compute magnitude and components at every pose; in a chain with respect to the crank angle of stage 1."""
     first, second = scene.rates or (np.ones(scene.shape), np.zeros(scene.shape))
     rates = np.ascontiguousarray(first), np.ascontiguousarray(second)
     return filled_each(centre_acceleration, (*scene.records, *rates), _SHAKING_NAMES, wanted, scene.status())

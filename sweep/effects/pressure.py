@@ -35,12 +35,12 @@ _NAMES = tuple(o.name for o in OUTPUTS)
 
 
 def compute(scene: Scene, wanted: frozenset[str]) -> Columns:
-    """Wanted directions and angles of every pose."""
+    """Compute the wanted directions and angles of every pose."""
     return filled_each(directions, scene.records, _NAMES, wanted, scene.status())
 
 
 def components(scene: Scene) -> tuple[tuple[Array, ...], Status]:
-    """Components t_tau, t_rho and t_k, which the bearing criteria take, and a fresh status."""
+    """Components t_tau, t_rho and t_k for the bearing criteria, and a copy of the status."""
     if "direction" not in scene.memo:
         scene.memo["direction"] = compute(scene, frozenset({"t_tau", "t_rho", "t_k"}))
     found = scene.memo["direction"]
@@ -85,12 +85,12 @@ EXTREMA = (
     Output("pressure_extrema", "1", "number of extrema of the pressure angle, 0, 2 or 4", EXTREMA_EQUATION, jumps=True),
     *(Output(name, "rad", text, EXTREMA_EQUATION) for name, text in _ANGLES.items()),
 )
-# Accepted for pressure angles below 89 degrees: rounding of the components through the arcsine.
+# Accepted error for pressure angles below 89 degrees: rounding of the components through the arcsine.
 EXTREMA_ERROR = 1e-14
 
 
 def extrema(scene: Scene, wanted: frozenset[str], accuracy: Accuracy) -> Columns:
-    """Wanted extrema and status, each (n,)."""
+    """Compute the wanted extrema and the status, each (n,)."""
     ellipse = scene.family.find(PressureEllipse)
     if ellipse is None:
         raise TypeError(f"{scene.family.name} has no ellipse of the coupler direction")

@@ -1,4 +1,4 @@
-"""Designs at their crank angles as the effects see them: joint records or links, inputs, the stages of a chain."""
+"""Scene of the effects: designs at their crank angles with joint records or links, inputs, and stages of a chain."""
 
 from __future__ import annotations
 
@@ -24,14 +24,14 @@ from sweep.families.names import at_stage
 from sweep.numerics.curves import Curve
 
 _PER_LINK = (PER_BODY, 3, PER_LINE)
-PART = 4096  # poses of bodies at once where their loads are written design by design
+PART = 4096  # poses of bodies per block where their loads are computed design by design
 
 Rows: TypeAlias = NDArray[np.intp]
 Index: TypeAlias = NDArray[np.int64]
 
 
 class Driven(NamedTuple):
-    """A later stage of a chain, as the stage before it drives it: phi = kappa psi + offset."""
+    """A later stage of a chain, driven by the stage before: phi = kappa psi + offset."""
 
     family: Family
     designs: Array
@@ -41,18 +41,18 @@ class Driven(NamedTuple):
     curves: Mapping[str, Curve] = {}
 
     def only(self, rows: Rows) -> Driven:
-        """Keep some of the designs."""
+        """Select designs by index."""
         given = {name: x[rows] for name, x in self.inputs.items()}
         return Driven(self.family, self.designs[rows], self.kappa[rows], self.offset[rows], given, self.curves)
 
 
 @dataclass
 class Scene:
-    """One block of designs at their crank angles, as the effects see it; what two effects share is computed once.
+    """One block of designs at their crank angles; results that effects share are computed once.
 
-    In a chain it is one stage: ``after`` are the stages behind it, ``before`` the scene that drives it.  ``curves`` are
-    loads over the turn of the first crank, by the input they add to.  ``uneven`` are its speed and acceleration at the
-    poses, (n, m); None where they are the constants among the inputs.
+    In a chain it is one stage: ``after`` are the later stages, ``before`` the scene that drives it.  ``curves`` are
+    loads over the turn of the first crank, by the input to which they are added.  ``uneven`` are the crank's speed and
+    acceleration at the poses, (n, m); None if they are the constants among the inputs.
     """
 
     family: Family
@@ -67,12 +67,12 @@ class Scene:
 
     @property
     def shape(self) -> tuple[int, int]:
-        """Number of designs and of poses of each."""
+        """Number of designs and number of poses of each."""
         return len(self.designs), self.angles.cos.shape[1]
 
     @cached_property
     def motion(self) -> Columns:
-        """Pose outputs of the family that its joint records, or its links, and the next stage's crank are made of."""
+        """Pose outputs needed for the family's joint records or links, and for the next stage's crank."""
         tree = self.family.find(LinkTree)
         needs = set(self._gears if self.after else ())
         if tree is not None:
@@ -106,13 +106,13 @@ class Scene:
 
     @cached_property
     def still_links(self) -> Links:
-        """The bodies at the first pose of each design that is assembled, (n, 1): what stands still in them is seen."""
+        """Bodies at the first assembled pose of each design, (n, 1), for points that are fixed in a body."""
         at = np.arange(len(self.designs))[:, None], (np.asarray(self.motion["status"]) != st.OK).argmin(axis=1)[:, None]
         angles = Angles(*(np.broadcast_to(x, self.shape)[at] for x in self.angles))
         return self._links(slice(None), angles, {name: x[at] for name, x in self.motion.items()})
 
     def links_by_parts(self) -> Iterator[tuple[slice, Links]]:
-        """Yield the bodies of some designs after others, so few that their poses stay in the cache."""
+        """Yield the bodies in blocks of designs whose poses stay in the cache."""
         n, m = self.shape
         size = max(1, PART // max(m, 1))
         for rows in (slice(start, start + size) for start in range(0, n, size)):
@@ -131,9 +131,9 @@ class Scene:
         found = Links(parents, freedoms, ends, bodies, axes, lines)
         tree.fill(self.designs[rows], angles, motion, found)
         if tree.unit is not None:
-            default = np.full(len(self.designs), tree.unit.default)  # of a family by itself, which has no inputs
+            default = np.full(len(self.designs), tree.unit.default)  # for a family alone, which has no inputs
             unit = self.inputs.get(tree.unit.name, default)[rows, None, None, None]
-            # Origins with their rates, joints, and points of lines; see PER_BODY and PER_LINE.
+            # Origins and their rates, joints, and points of lines; see PER_BODY and PER_LINE.
             for lengths in (bodies[..., :9], bodies[..., 24:], lines[..., :3]):
                 lengths *= unit
         return found
@@ -147,7 +147,7 @@ class Scene:
 
     @cached_property
     def driven(self) -> Scene | None:
-        """The stage that this one drives, at its own crank angles; None at the end of the chain."""
+        """Scene of the next stage at its own crank angles; None at the end of the chain."""
         if not self.after:
             return None
         following, *rest = self.after
@@ -155,7 +155,7 @@ class Scene:
         return Scene(following.family, following.designs, angles, following.inputs, tuple(rest), self, following.curves)
 
     def stage(self, index: int) -> Scene:
-        """Scene of the stage ``index`` places behind this one."""
+        """Scene of the stage ``index`` places after this one."""
         scene = self
         for _ in range(index):
             assert scene.driven is not None
@@ -171,7 +171,7 @@ class Scene:
 
     @cached_property
     def rates(self) -> tuple[Array, Array] | None:
-        """First and second derivative of the crank angle with respect to that of stage 1; None where it is that one."""
+        """First and second derivative of the crank angle with respect to that of stage 1; None in stage 1."""
         if self.before is None:
             return None
         first, second = self.before.gear
@@ -190,7 +190,7 @@ class Scene:
         return speed * first, speed * speed * second + change * first
 
     def status(self) -> Status:
-        """Copy the motion's status afresh for a kernel to write on; stages before speak first."""
+        """Copy the motion's status, for a kernel to update; the status of earlier stages has precedence."""
         status = np.array(self.motion["status"], dtype=np.uint8)
         if self.before is not None:
             earlier = self.before.status()
@@ -198,11 +198,11 @@ class Scene:
         return status
 
     def table(self, names: tuple[str, ...]) -> Array:
-        """Put inputs side by side, (n, len(names))."""
+        """Stack inputs side by side, (n, len(names))."""
         return np.column_stack([self.inputs[name] for name in names])
 
     def load(self, name: str) -> Array:
-        """Give a load at the poses: (n, 1) where it is constant, (n, m) where a curve adds to it."""
+        """Evaluate a load at the poses: (n, 1) if it is constant, (n, m) if a curve is added to it."""
         constant, curve = self.inputs[name][:, None], self.curves.get(name)
         return constant if curve is None else constant + curve(self._first.angles.phi)
 
@@ -216,7 +216,7 @@ class Scene:
 
     @property
     def every_curve(self) -> tuple[Curve, ...]:
-        """Loads over the turn of this stage and of those behind it."""
+        """Loads over the turn of this stage and of later ones."""
         return (*self.curves.values(), *(curve for driven in self.after for curve in driven.curves.values()))
 
     @property
@@ -225,16 +225,16 @@ class Scene:
 
     @property
     def least_samples(self) -> Array:
-        """So many even samples of a turn show what loads and waves do, (n,); inf where a tool pierces: a load jumps."""
+        """Least number of even samples that resolves loads and waves, (n,); inf where a tool pierces: a load jumps."""
         of_loads = max((curve.samples for curve in self.every_curve), default=0.0)
         return np.where(self.pierces, np.inf, np.maximum(samples_of_waves(self.family, self.designs), of_loads))
 
     def only(self, rows: Rows) -> Scene:
-        """Keep some of the designs; the scene itself where these are all."""
+        """Select designs by index; the scene itself if these are all."""
         return self if rows.size == len(self.designs) else self._of(rows, self.angles.part(rows))
 
     def posed(self, rows: Rows, phi: Array) -> Scene:
-        """Take some of the designs, each as often as wanted, at crank angles (k, m) of their own."""
+        """Select designs by index, perhaps repeatedly, at their own crank angles (k, m)."""
         return self._of(rows, Angles.of(phi))
 
     def _of(self, rows: Rows, angles: Angles) -> Scene:
@@ -242,7 +242,7 @@ class Scene:
         return Scene(self.family, self.designs[rows], angles, given, after, curves=self.curves)
 
     def even(self) -> Scene:
-        """Give the scene of a crank that keeps its speed, for what presumes one; itself where it does."""
+        """Scene with a crank of constant speed, for effects that need one; the scene itself if it is so."""
         if not self.inputs["speed_change"].any():
             return self
         still = {"speed_change": np.zeros(len(self.designs))}
@@ -250,12 +250,12 @@ class Scene:
         return Scene(self.family, self.designs, self.angles, self.inputs | still, after, curves=self.curves)
 
     def precise(self) -> Scene:
-        """Give the same scene with the most accurate poses that its families have."""
+        """Scene with the most accurate poses of its families."""
         after = tuple(d._replace(family=d.family.precise()) for d in self.after)
         return Scene(self.family.precise(), self.designs, self.angles, self.inputs, after, curves=self.curves)
 
     def on_grid(self, size: int) -> Scene:
-        """Sample a whole turn: the same designs at ``size`` equidistant crank angles."""
+        """Scene of the same designs at ``size`` equidistant crank angles of a turn."""
         angles = Angles.of(2.0 * np.pi * np.arange(size)[None] / size)
         return Scene(self.family, self.designs, angles, self.inputs, self.after, curves=self.curves)
 
@@ -267,9 +267,9 @@ def first_scene(
     given: dict[str, Array],
     curves: Mapping[str, Curve] = MappingProxyType({}),
 ) -> Scene:
-    """Scene of a family, or of a chain's first stage with those behind it.
+    """Make the scene of a family, or of a chain's first stage with the later ones.
 
-    ``given`` are the inputs by name, each (n,), ``curves`` what adds to some of them over the turn.
+    ``given`` are the inputs by name, each (n,), ``curves`` the loads over the turn that are added to some of them.
     """
     still, first = {"speed_change": 0.0 * designs[:, 0]}, family.stages[0].tail
     crank = still | {name: given[f"{name}{first}"] for name in ("speed", "speed_change") if f"{name}{first}" in given}
@@ -287,10 +287,10 @@ def first_scene(
 
 
 def take_over(status: Status, later: NDArray[np.generic]) -> None:
-    """Make ``later`` the status of what is OK so far, in place."""
+    """Set the status to ``later`` where it is OK, in place."""
     np.copyto(status, later, where=status == st.OK)
 
 
 def refuse(status: Status, designs: NDArray[np.bool_]) -> None:
-    """Make INVALID_INPUT the status of these designs, (n,), where it is OK so far, in place."""
+    """Set the status of a mask of designs (n,) to INVALID_INPUT where it is OK, in place."""
     np.copyto(status, st.INVALID_INPUT, where=designs[:, None] & (status == st.OK))

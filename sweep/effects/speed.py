@@ -46,14 +46,14 @@ MOTOR = Parameter(
 )  # fmt: skip
 
 FINEST = GRIDS + FINER
-RUBBING = (129, *FINER[1:])  # friction has kinks where the follower turns back: few designs end on the first grid
-LEFT_OF_CURVE = 1e-4  # and of a curve: more than this is a jump, beside which a series overshoots
-ROUNDED = 1024.0 * EPS  # of speed^2 that rounding makes of no acceleration; seen 324
-SUFFIX = ("", FRICTION_SUFFIX)  # of the outputs, by whether the joints rub
+RUBBING = (129, *FINER[1:])  # friction has kinks where the follower turns back: few designs are resolved by 65
+LEFT_OF_CURVE = 1e-4  # share of a curve that the grid may miss: more is a jump, beside which a series overshoots
+ROUNDED = 1024.0 * EPS  # share of speed^2 to which rounding may raise a zero acceleration; 324 was observed
+SUFFIX = ("", FRICTION_SUFFIX)  # of the outputs, without and with friction
 _NEEDED_NAMES = ("reduced_inertia", "dreduced_inertia", "drive_torque")
 _NEEDED = frozenset(_NEEDED_NAMES)
 
-# Friction grows with the loads, and these with the speed: it is computed again with the speed that it makes.
+# Friction grows with the loads, and these with the speed: it is iterated with the resulting speed.
 PASSES = 24
 SETTLED = 1e-7  # share of the largest torque excess or loss by which the last pass changes the loss
 
@@ -67,7 +67,7 @@ def _outputs(suffix: str, text: str) -> tuple[Output, ...]:
 
 
 def _numbers(suffix: str, text: str) -> tuple[Output, ...]:
-    """List outputs of which a turn has one."""
+    """List the outputs per turn."""
     return (
         Output(f"unevenness{suffix}", "1", f"(largest - smallest crank speed)/mean{text}", EQUATION),
         Output(f"fastest{suffix}", "rad/s", f"largest magnitude of the crank speed{text}", EQUATION),
@@ -87,7 +87,7 @@ def _solve(rubs: bool, finest: int, grid: Scene, phi: Array, last: bool) -> tupl
     mean = grid.inputs["speed"]
     found, status = steady(inertia, excess, mean, motor, phi, coarsest)
     found["even_torque"] = -excess.mean(axis=1)
-    if motor is not None:  # over the turn it gives what the loads take
+    if motor is not None:  # over the turn the motor supplies the work of the loads
         turning, _ = steady(inertia, excess, mean, motor, grid.angles.phi, coarsest)
         found["even_torque"] += slope * (turning["crank_speed"].mean(axis=1) - mean)
     np.copyto(status, jammed, where=jammed != st.OK)
@@ -103,19 +103,19 @@ def samples(grid: Scene) -> tuple[Array, Array]:
 
 
 def _late(scene: Scene) -> NDArray[np.bool_]:
-    """Which designs need finer grids than most, as their tool pierces or their planet turns fast."""
+    """Whether designs need finer grids than usual, because a tool pierces or a planet turns fast, (n,)."""
     late: NDArray[np.bool_] = scene.least_samples > GRIDS[-1]
     return late
 
 
 def _bent(scene: Scene) -> NDArray[np.bool_]:
-    """Which designs take finer grids from the beginning: besides late ones all whose loads or motion have kinks."""
+    """Whether designs need finer grids from the beginning, because loads or motion have kinks or are `_late`, (n,)."""
     kinks = bool(scene.every_curve) or bool(scene.family.every(Switches))
     return _late(scene) | kinks
 
 
 def _refined(scene: Scene, rubs: bool, run: Callable[[Scene, tuple[int, ...]], Columns]) -> Columns:
-    """Run on coarse grids, and for designs that these do not suit, and outputs they do not resolve, on finer ones."""
+    """Run on coarse grids, then on finer ones for designs with kinks and for outputs that are not resolved."""
     if rubs:
         return run(scene, RUBBING)
     bent = _bent(scene)
@@ -125,7 +125,7 @@ def _refined(scene: Scene, rubs: bool, run: Callable[[Scene, tuple[int, ...]], C
     if bent.all() or not again.size:
         return found
     finer = run(scene.only(again), FINEST)
-    # An output that the coarse grids resolve keeps its bits, whatever is asked beside it.
+    # An output that the coarse grids resolve keeps its bits, whatever else is wanted.
     lost = {name: np.isnan(x[again]) for name, x in found.items() if not name.startswith("err_")}
     lost["status"] = np.ones(found["status"][again].shape, np.bool_)
     for name, x in found.items():
@@ -135,13 +135,13 @@ def _refined(scene: Scene, rubs: bool, run: Callable[[Scene, tuple[int, ...]], C
 
 
 def _solved(scene: Scene, phi: Array, rubs: bool, grids: tuple[int, ...]) -> tuple[dict[str, Array], Status]:
-    """Numbers and curves at phi by their names, and the status."""
+    """Return design outputs and curves at phi by name, and the status."""
     found, status = on_finer_grids(scene, phi, grids, partial(_solve, rubs, grids[-1]))
     return {f"{name}{SUFFIX[rubs]}": x for name, x in found.items()}, status
 
 
 def compute(scene: Scene, wanted: frozenset[str], rubs: bool = False) -> Columns:
-    """Speed and acceleration of the crank at the wanted angles."""
+    """Compute speed and acceleration of the crank at the wanted angles."""
     return _refined(scene, rubs, partial(_compute, wanted=wanted, rubs=rubs))
 
 
@@ -155,9 +155,9 @@ def _compute(scene: Scene, grids: tuple[int, ...], wanted: frozenset[str], rubs:
 
 
 def _balanced(scene: Scene, speed: Array, change: Array, even: Array, rubs: bool) -> Array:
-    """Acceleration from the balance of torques at each pose: beside kinks of the loads a series of samples is off.
+    """Acceleration from the balance of torques at each pose: beside kinks of the loads a Fourier series is inaccurate.
 
-    ``even`` (n,) is the motor's torque at the mean speed; ``change`` is the acceleration that friction is taken at.
+    ``even`` (n,) is the motor's torque at the mean speed; ``change`` is the acceleration at which friction is computed.
     """
     loads = compute_loads(scene.even(), _NEEDED)
     inertia, slope, drive = floats(loads, *_NEEDED_NAMES)
@@ -170,7 +170,7 @@ def _balanced(scene: Scene, speed: Array, change: Array, even: Array, rubs: bool
 
 
 def turn(scene: Scene, wanted: frozenset[str], accuracy: Accuracy, rubs: bool = False) -> Columns:
-    """Unevenness, extreme speeds and the reductions of speed and acceleration."""
+    """Compute unevenness, extreme speeds and the reductions of speed and acceleration."""
     return _refined(scene, rubs, partial(_turn, wanted=wanted, rubs=rubs))
 
 
@@ -180,12 +180,12 @@ def _turn(scene: Scene, grids: tuple[int, ...], wanted: frozenset[str], rubs: bo
     columns: Columns = {f"{name}{suffix}": found[f"{name}{suffix}"] for name in ("unevenness", "fastest", "slowest")}
     one, fastest = np.ones(len(scene.designs)), found[f"fastest{suffix}"]
     known = found[f"energy_error{suffix}"]
-    # What is missed of the energy is a share of the largest: of a slow speed it is a larger share.
+    # The missed energy is a share of the largest energy: of a slow speed it is a larger share.
     steep = fastest / found[f"slowest{suffix}"]
     size = {"unevenness": steep / np.abs(scene.inputs["speed"]), "fastest": one, "slowest": steep}
     columns |= {f"err_{name}{suffix}": known * fastest * share for name, share in size.items()}
     limit = RESOLVED if grids == GRIDS else LEFT_OF_CURVE
-    # What is missed of the torque is a share of J omega^2: of a small acceleration it is a larger share.
+    # The missed torque is a share of J omega^2: of a small acceleration it is a larger share.
     torque = found[f"torque_error{suffix}"]
     if grids != GRIDS:
         torque = np.maximum(torque, PER_LEFT * found[f"missed{suffix}"])
@@ -198,10 +198,10 @@ def _turn(scene: Scene, grids: tuple[int, ...], wanted: frozenset[str], rubs: bo
 
 
 def _friction_loss(grid: Scene, slope: Array) -> tuple[Array, Status]:
-    """Torque on the crank that friction takes, (n, N), at the speed over the turn that it makes, and the status.
+    """Compute the torque loss by friction on the crank, (n, N), at the resulting speed, and the status.
 
-    The speed is found on a grid of GRIDS[-1] poses: what that misses of it changes the loss by as small a share.  Where
-    that grid resolves no steady state, the speed is found on the whole grid.
+    The speed is computed on a grid of GRIDS[-1] poses, whose error changes the loss by as small a share.  Where that
+    grid resolves no steady state, the speed is computed on the whole grid.
     """
     if grid.shape[1] <= GRIDS[-1]:
         lost, status, _ = _settled(grid, grid, slope)
@@ -215,9 +215,9 @@ def _friction_loss(grid: Scene, slope: Array) -> tuple[Array, Status]:
 
 
 def _settled(coarse: Scene, grid: Scene, slope: Array) -> tuple[Array, Status, Status]:
-    """Loss on the grid at a speed that is found on a coarse one, and the status, NOT_CONVERGED if it does not settle.
+    """Iterate the loss on the grid and the speed on a coarse grid; NOT_CONVERGED if they do not converge.
 
-    The second status is what the last search for a steady state said.
+    The second status is that of the last steady state.
     """
     inertia, excess = samples(coarse)
     mean, motor = grid.inputs["speed"], slope if slope.any() else None
@@ -244,7 +244,7 @@ def _settled(coarse: Scene, grid: Scene, slope: Array) -> tuple[Array, Status, S
 def _turning(
     inertia: Array, excess: Array, mean: Array, motor: Array | None, phi: Array
 ) -> tuple[Array, Array, Status]:
-    """Speed and acceleration over the turn, and the status; without a steady state the turning is even."""
+    """Compute speed and acceleration over the turn, and the status; without a steady state the speed is constant."""
     found, status = steady(inertia, excess, mean, motor, phi, LEFT)
     usable = np.logical_and.reduce(np.isfinite(found["crank_speed"]), axis=1, keepdims=True)
     speed = np.where(usable, found["crank_speed"], mean[:, None])
@@ -252,7 +252,7 @@ def _turning(
 
 
 def _lost(grid: Scene, speed: Array, change: Array, status: Status) -> Array:
-    """Driving torque with friction minus that without, where the crank turns like this; ``status`` is worsened."""
+    """Compute the driving torque with friction minus that without, at the given speed; update ``status``."""
     turning = Scene(
         grid.family, grid.designs, grid.angles, grid.inputs, grid.after, curves=grid.curves, uneven=(speed, change)
     )
@@ -279,7 +279,7 @@ def advise(scene: Scene) -> Advice | None:
 
 
 def _effect(name: str, title: str, loaded: Effect, rubbing: Effect | None = None) -> Effect:
-    """Entry for the mechanisms whose loads ``loaded`` gives; with the friction of ``rubbing``, where it is given."""
+    """Make the entry for mechanisms with the load effect ``loaded`` and, if given, the friction of ``rubbing``."""
     rubs = rubbing is not None
     suffix, text = SUFFIX[rubs], FRICTION_TEXT if rubs else ""
     curves = _outputs(suffix, f" of constant mean speed{text}")
@@ -308,12 +308,12 @@ def _effect(name: str, title: str, loaded: Effect, rubbing: Effect | None = None
 
 
 def of_tree(name: str) -> Effect:
-    """Entry of a family with a tree of links."""
+    """Make the entry of a family with a tree of links."""
     return _effect(f"{name}_speed_fluctuation", f"{TITLE}: {family(name).title}", load_effects.loads_of(name))
 
 
 def rubbing_tree(name: str) -> Effect:
-    """Entry of a family with a tree of links, friction included."""
+    """Make the entry of a family with a tree of links, friction included."""
     return _effect(
         f"{name}_speed_fluctuation", f"{TITLE}: {family(name).title}", load_effects.loads_of(name),
         load_effects.friction_of(name),

@@ -24,7 +24,7 @@ from sweep.families.machines.thread_balance import (
 )
 from sweep.families.poses import chosen, filled_each
 
-# Under words of their own: a take-up has symbols such as alpha for its geometry.
+# Inputs have names of their own: a take-up uses symbols such as alpha for its geometry.
 BEFORE = Parameter("thread_tension", "none", "tension in front of the eyelet, gf", not_negative=True)
 CONTOUR_INPUTS = (
     BEFORE,
@@ -85,7 +85,7 @@ def _per_pose(scene: Scene, name: str) -> Array:
 
 
 def contour(scene: Scene, wanted: frozenset[str]) -> Columns:
-    """Tension behind the eyelet and its parts."""
+    """Compute the tension after the eyelet and its components."""
     wrap, status = _wrap(scene)
     names = ("eyelet_radius", "thread_adhesion", "thread_friction", "thread_bending", "thread_count", "thread_density")
     # The constants are per degree.
@@ -95,14 +95,14 @@ def contour(scene: Scene, wanted: frozenset[str]) -> Columns:
 
 
 def euler(scene: Scene, wanted: frozenset[str]) -> Columns:
-    """Tension by Euler's law and force on the eyelet."""
+    """Compute the tension by Euler's law and the force on the eyelet."""
     wrap, status = _wrap(scene)
     arguments = _per_pose(scene, "thread_tension"), wrap, scene.inputs["mu_eyelet"]
     return filled_each(capstan, arguments, tuple(o.name for o in CAPSTAN_OUTPUTS), wanted, status)
 
 
 def speed(scene: Scene, wanted: frozenset[str]) -> Columns:
-    """Speed and acceleration of the thread, and the ratio of tensions that the speed makes."""
+    """Compute speed and acceleration of the thread, and the ratio of tensions due to the speed."""
     path = _path(scene)
     found = scene.family.poses(scene.designs, scene.angles, frozenset({path.rate, path.rate2}))
     first, second = floats(found, path.rate, path.rate2)

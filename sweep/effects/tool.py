@@ -1,4 +1,4 @@
-"""A tool on the coupler or at the tip of the rocker: what it weighs on the joints, and its own entry."""
+"""A tool on the coupler or at the tip of the rocker: its load on the linkage, and its own entry."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ _FORCES = tuple(p.name for p in loads.FREE_TOOL[1:])
 
 
 class Weighs(NamedTuple):
-    """What a tool puts on coupler and rocker, (n, m, 6) each, and the inertia it adds, (n, m, 2); None for nothing."""
+    """Wrenches of a tool on coupler and rocker, (n, m, 6) each, and its inertia, (n, m, 2); None for absent ones."""
 
     coupler: Array | None
     follower: Array | None
@@ -40,7 +40,7 @@ class Weighs(NamedTuple):
 
 
 def _loaded(scene: Scene) -> bool:
-    """Whether a tool with mass or force hangs on the linkage: without one nothing is computed."""
+    """Whether a tool with mass or force hangs on the linkage; otherwise it is not computed."""
     names = ("m_tool", "tool_force", "pierce_force", *_FORCES)
     given = [scene.inputs[name] for name in names if name in scene.inputs]
     return not scene.curves.keys().isdisjoint(names) or any(bool(values.any()) for values in given)
@@ -66,9 +66,9 @@ def _free_data(scene: Scene) -> tuple[Array, Array]:
 
 
 def weighs(scene: Scene, drive: Array, reduced: bool) -> Weighs:
-    """Compute what the tool puts on the links, and the inertia that it adds if ``reduced``.
+    """Compute the wrenches of the tool on the links, and its reduced inertia if ``reduced``.
 
-    The status of the poses is what the kernel of loads finds as well.
+    The status of the poses is also determined by the kernel of loads.
     """
     place = tool_place(scene.family)
     if place is None or not _loaded(scene):
@@ -80,7 +80,7 @@ def weighs(scene: Scene, drive: Array, reduced: bool) -> Weighs:
 
 
 def _fill(scene: Scene, drive: Array, status: Status, out: ToolLoad) -> None:
-    """Let the kernel of a tool on a line, or of one that moves freely, write its results."""
+    """Run the kernel of a tool on a line, or of one that moves freely."""
     place, finger = tool_place(scene.family), scene.inputs["finger"]
     if place == ON_LINE:
         data, force = _data(scene)
@@ -91,14 +91,14 @@ def _fill(scene: Scene, drive: Array, status: Status, out: ToolLoad) -> None:
 
 
 def compute(scene: Scene, wanted: frozenset[str]) -> Columns:
-    """Force at the working point and its share in the driving torque."""
+    """Compute the force at the working point and its share in the driving torque."""
     speed, change = scene.crank()
     drive = np.stack(np.broadcast_arrays(np.zeros_like(speed), speed, change), axis=2)
     status, place = scene.status(), tool_place(scene.family)
     along = np.empty((*scene.shape, 3 if place == ON_LINE else 2))
     _fill(scene, drive, status, ToolLoad(along=along))
     load, torque = along[:, :, 0], along[:, :, 1]
-    if place == ON_LINE:  # the kernel gives the way per radian instead of the torque
+    if place == ON_LINE:  # the kernel returns the travel per radian instead of the torque
         torque = load * torque
     first, second = TIP_OUTPUTS if place == ON_TIP else OUTPUTS
     return chosen({first.name: load, second.name: torque}, wanted, status)

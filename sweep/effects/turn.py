@@ -1,4 +1,4 @@
-"""Design outputs of whole-turn effects: reductions of curves that the effect knows as Fourier series."""
+"""Design outputs of whole-turn effects: reductions of curves that are Fourier series."""
 
 from __future__ import annotations
 
@@ -21,14 +21,14 @@ RESOLVED = 1e-9
 NONE: Mapping[str, Array] = MappingProxyType({})
 
 Solver: TypeAlias = Callable[[Scene, Array, bool], tuple[dict[str, Array], Status]]
-"""``solve(scene, phi, last)``: numbers (n,) and curves (n, m) at phi from a scene on a grid, and status (n,)."""
+"""``solve(scene, phi, last)``: design outputs (n,) and curves (n, m) at phi from a scene on a grid, status (n,)."""
 
 
 def on_finer_grids(scene: Scene, phi: Array, grids: Sequence[int], solve: Solver) -> tuple[dict[str, Array], Status]:
     """Solve every design on the first of the ``grids`` that resolves it.
 
-    ``phi`` is (n, m) or (1, m); what ``solve`` calls NOT_CONVERGED is tried again on the next grid.  A grid that does
-    not show what the loads do is left out, but for the last one.
+    ``phi`` is (n, m) or (1, m); designs for which ``solve`` returns NOT_CONVERGED are solved again on the next grid.  A
+    grid that does not resolve the loads is skipped, except the last one.
     """
 
     def on_grid(rows: Rows, size: int) -> tuple[dict[str, Array], Status]:
@@ -39,7 +39,7 @@ def on_finer_grids(scene: Scene, phi: Array, grids: Sequence[int], solve: Solver
 
 
 def at_poses(scene: Scene, found: dict[str, Array], turn: Status, wanted: frozenset[str]) -> Columns:
-    """Curves of a whole-turn effect at the scene's poses; a turn that is not OK speaks for all of them."""
+    """Return curves of a whole-turn effect at the scene's poses; the turn's status holds for all of them."""
     status = scene.status()
     take_over(status, np.broadcast_to(turn[:, None], status.shape))
     return chosen(found, wanted, status)
@@ -55,9 +55,9 @@ def per_turn(
     known: Array | float = RESOLVED,
     known_of: Mapping[str, Array] = NONE,
 ) -> Columns:
-    """Wanted ones of ``numbers``, and reductions of ``curves`` that are sampled on an odd grid in ``found``.
+    """Select the wanted ones of ``numbers`` and of the reductions of ``curves``, sampled on an odd grid in ``found``.
 
-    ``limit`` is the share of a curve that the grid may miss, ``known`` the relative error of what it is made of,
+    ``limit`` is the share of a curve that the grid may miss, ``known`` the relative error of the steady state,
     ``known_of`` that of single curves.
     """
     columns = dict(numbers)
@@ -68,7 +68,7 @@ def per_turn(
 
 
 def reduction_outputs(outputs: Sequence[Output]) -> tuple[Output, ...]:
-    """Reductions over the turn of these pose outputs, as design outputs of the effect itself."""
+    """Reductions over the turn of pose outputs, as design outputs of the effect itself."""
     return tuple(reduction.output(o, Turn()) for o in outputs for reduction in REDUCTIONS)
 
 
@@ -77,8 +77,8 @@ def reductions(
 ) -> Columns:
     """Compute all reductions of one curve from its samples on a uniform odd grid, (n, N), with their errors.
 
-    ``status`` (n,) becomes NOT_CONVERGED where the grid misses more than the share ``limit`` of the curve; what is not
-    OK gives nan.
+    ``status`` (n,) becomes NOT_CONVERGED where the grid misses more than the share ``limit`` of the curve; failed
+    designs give nan.
     """
     n = len(values)
     largest, phi_largest, least, phi_least, rms, missed = (np.empty(n) for _ in range(6))
@@ -86,13 +86,13 @@ def reductions(
     status[(status == st.OK) & ~(missed < limit)] = st.NOT_CONVERGED
     upward = np.abs(largest) >= np.abs(least)
     size = np.maximum(np.abs(largest), np.abs(least))
-    # The curve itself is known as well as the steady state it comes from was resolved.
+    # The curve is as accurate as the steady state that it comes from.
     err = (missed + known) * size
     found = {
         "max": (largest, err),
         "min": (least, err),
         "max_abs": (size, err),
-        # The slope's zero is as sharp as the square root of the value's error.
+        # The slope's zero is as accurate as the square root of the value's error.
         "phi_max_abs": (np.where(upward, phi_largest, phi_least), np.full(n, np.sqrt(known))),
         "phi_max": (phi_largest, np.full(n, np.sqrt(known))),
         "phi_min": (phi_least, np.full(n, np.sqrt(known))),

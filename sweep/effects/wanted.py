@@ -1,4 +1,4 @@
-"""Names of effects among what is wanted: each stands for the outputs of that effect."""
+"""Names of effects among the wanted names, each of which stands for the outputs of its effect."""
 
 from __future__ import annotations
 
@@ -15,13 +15,13 @@ AXES = ("_x", "_y", "_z")
 
 
 def expanded(family: Family, wanted: Iterable[str], *, poses: bool = False) -> list[str]:
-    """Wanted names, with the outputs of an effect in place of its name.
+    """Replace the names of effects among the wanted names by their outputs.
 
-    ``friction`` stands for the design outputs that the friction effect has of its own, and for the largest magnitude
-    over the turn of each of its pose outputs; of some, such as a life, for the least value.  A vector counts by its
-    length, and what jumps or is known up to full turns is left out.  With ``poses`` it stands for all its pose outputs.
-    An output of the same name goes before.  In a chain ``friction2`` is the effect at stage 2, ``friction`` that of
-    every stage which can be asked; in a machine a member's name stands before it.
+    ``friction`` stands for the friction effect's own design outputs, and for the largest magnitude over the turn of
+    each of its pose outputs; for some, such as a life, for the smallest value.  A vector counts by its length, and
+    outputs that jump or wrap are left out.  With ``poses`` the name stands for all pose outputs of the effect.  An
+    output of the same name has precedence.  In a chain ``friction2`` is the effect at stage 2, ``friction`` that of
+    every stage that has it; in a machine the member's name is a prefix.
 
     Parameters
     ----------
@@ -37,7 +37,7 @@ def expanded(family: Family, wanted: Iterable[str], *, poses: bool = False) -> l
 
 
 def names_of_effects(family: Family, poses: bool = False) -> dict[str, tuple[str, ...]]:
-    """List the outputs that the name of each effect stands for, by the name."""
+    """Map the name of each effect to the outputs that it stands for."""
     found: dict[str, tuple[str, ...]] = {}
     if isinstance(family, Machine):
         for m in family.members:
