@@ -1,4 +1,4 @@
-"""The register of mechanism families: a new family is one folder of kernels, one entry here, and its name below."""
+"""The register of mechanism families: a new family is one folder of kernels, one entry file, and its name below."""
 
 from __future__ import annotations
 
@@ -46,7 +46,7 @@ NAMES = (
     "foot",
     "feed_foot",
 )
-# Families that stand in the file of a relative: the file, and the name there.
+# Families defined in the file of a related one: the file, and the name there.
 _IN_FILE_OF = {
     "slider_crank": ("rssp", "PLANAR"),
     "inverted_slider_crank": ("slotted", "PLANAR"),
@@ -61,11 +61,11 @@ _IN_FILE_OF = {
 }
 
 Mechanism: TypeAlias = "str | Sequence[str] | Mapping[str, Any] | Specification | Family"
-"""A family's name, a list of them for a chain, a table of members for a machine, or what `sweep.machine` made."""
+"""A family's name, a list of names for a chain, a table of members for a machine, or a result of `sweep.machine`."""
 
 
 def chain_names(text: str) -> tuple[str, ...]:
-    """Names of the families of a chain in one text.
+    """Split the names of a chain's families in one text.
 
     >>> chain_names("rssr+guide"), chain_names("rssr, guide"), chain_names("rssr")
     (('rssr', 'guide'), ('rssr', 'guide'), ('rssr',))
@@ -74,7 +74,7 @@ def chain_names(text: str) -> tuple[str, ...]:
 
 
 def family(name: Mechanism) -> Family:
-    """Find the family of a name, the chain of those in a list or in "rssr+guide", or the machine of members.
+    """Return the family of a name, the chain of a list or of "rssr+guide", or the machine of a table of members.
 
     Raises
     ------
@@ -109,7 +109,7 @@ def machine(
     Parameters
     ----------
     members : by name, each a family, a list of families, or a table with ``family`` or ``chain`` and, as wanted,
-        ``ratio`` (whole turns of its crank for one of what drives it, default 1), ``offset`` (its crank angle where the
+        ``ratio`` (whole turns of its crank per turn of its driver, default 1), ``offset`` (its crank angle where the
         driving angle is 0 [rad]), ``driver`` ("shaft", or an angle of an earlier member such as "needle.psi1"),
         ``place`` (``at``, ``axis``, ``zero``: origin, z and x of the member's frame, for a chain the last stage's, in
         the machine's frame), ``tip`` (a point fixed to the output link: along it, across it, along its axis) and
@@ -126,15 +126,15 @@ def machine(
     Returns
     -------
     Machine
-        parameters and outputs carry the member's name: ``needle.a1``, ``looper.swing``.  ``offset``, ``x_at`` ... and
-        ``x_tip`` ... are parameters with what is given here as default.  Relations are outputs: of a distance
+        parameters and outputs have the member's name: ``needle.a1``, ``looper.swing``.  ``offset``, ``x_at`` ... and
+        ``x_tip`` ... are parameters whose defaults are given here.  Relations are outputs: of a distance
         ``clearance`` there are ``min_clearance``, ``phi_min_clearance`` ...; of an event ``arrive``, where a pose
         output passes a level, there are ``phi_arrive`` and ``count_arrive``
 
     Raises
     ------
     InputError
-        for anything that makes no machine; the message says what may stand there.
+        for an invalid member, relation, shaft or tool; the message gives the allowed values.
 
     Examples
     --------

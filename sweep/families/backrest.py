@@ -1,7 +1,7 @@
-"""Registry entries of the moving back-rest, whose bracket angle is set over the radius of the yarn on the beam.
+"""Registry entries of the moving back-rest, evaluated over the radius of the yarn on the beam.
 
-A let-off regulator sets it (`backrest`); or it is the one that holds a wanted warp tension (`backrest_tension`), or
-that of the closure of the source, for comparison: f N2 H = f N1 r0 (`backrest_closure`).
+The bracket angle is set by a let-off regulator (`backrest`), or it is the one that holds a wanted warp tension
+(`backrest_tension`), or that of the source's closure, for comparison: f N2 H = f N1 r0 (`backrest_closure`).
 """
 
 from __future__ import annotations
@@ -114,7 +114,7 @@ _COLUMNS = backrest.Design._fields
 
 
 def kernel_matrix(designs: Array, names: tuple[str, ...]) -> Array:
-    """Design matrix of the kernel from that of an entry; what the entry lacks is 0, the root the first."""
+    """Design matrix of the kernel from that of an entry; missing columns are 0, the root is the first."""
     matrix = np.zeros((len(designs), len(_COLUMNS)), designs.dtype)
     matrix[:, -1] = 1.0
     for k, name in enumerate(names):
@@ -124,9 +124,9 @@ def kernel_matrix(designs: Array, names: tuple[str, ...]) -> Array:
 
 
 def solved(matrix: Array, modes: np.ndarray, angles: Angles, wanted: frozenset[str], position: str) -> Columns:
-    """Wanted outputs and status from the kernel; ``position`` is the entry's name of the bracket angle."""
+    """Compute the wanted outputs and status by the kernel; ``position`` is the entry's name of the bracket angle."""
     shape, dtype = (len(matrix), angles.phi.shape[1]), np.result_type(matrix, angles.phi)
-    # the complex step goes through the radius too, or no extremum over the beam could be followed
+    # the complex step covers the radius too, so that extrema over the beam can be followed
     matrix, radius = matrix.astype(dtype, copy=False), np.ascontiguousarray(angles.phi, dtype)
     status = np.empty(shape, np.uint8)
     needed = wanted | ({"K_couple"} if DRIFT.name in wanted else set())
@@ -143,18 +143,18 @@ def solved(matrix: Array, modes: np.ndarray, angles: Angles, wanted: frozenset[s
 
 
 def mode_of(mode: backrest.Mode, designs: Array) -> np.ndarray:
-    """Choose the same equation of the bracket angle for all designs."""
+    """Select the same equation of the bracket angle for all designs."""
     return np.full(len(designs), int(mode), np.uint8)
 
 
 def tension_mode(couple: int, designs: Array) -> np.ndarray:
-    """Choose the equation that holds the tension: with a couple at the slider, or without one."""
+    """Select the equation that holds the tension: with a couple at the slider, or without one."""
     with_couple, without = int(backrest.Mode.COUPLE), int(backrest.Mode.TENSION)
     return np.where(designs[:, couple].real == 1.0, with_couple, without).astype(np.uint8)
 
 
 def beam_of(names: tuple[str, ...]) -> Interval:
-    """Make the domain: beam radii from empty to full, for an entry with those parameters."""
+    """Make the domain, beam radii from empty to full, of an entry with these parameters."""
     empty, full = names.index("rho_empty"), names.index("rho_full")
 
     def ends(designs: Array) -> tuple[Array, Array]:
@@ -171,7 +171,7 @@ LINKS = (
 
 
 def skeleton(parameters: tuple[Parameter, ...], angle: str) -> Skeleton:
-    """Draw the back-rest in the plane of the beam; ``angle`` is the entry's output of the bracket's angle."""
+    """Make the skeleton in the plane of the beam; ``angle`` is the entry's output of the bracket angle."""
 
     def column(name: str, designs: Array) -> Array:
         return parameter(parameters, name, designs)[:, None]
@@ -181,7 +181,7 @@ def skeleton(parameters: tuple[Parameter, ...], angle: str) -> Skeleton:
         return np.stack([-np.cos(psi), np.sin(psi), 0.0 * psi], axis=1)
 
     def made(needs: tuple[str, ...], at: Callable[..., tuple[Array, Array]]) -> Made:
-        """Make a point of the plane: ``at(column, designs, rho, *needs)`` gives its x and y, each (n, m)."""
+        """Make a point of the plane: ``at(column, designs, rho, *needs)`` returns its x and y, each (n, m)."""
 
         def place(designs: Array, angles: Angles, found: Columns) -> Array:
             values = floats(found, *needs)
@@ -249,7 +249,7 @@ def _entry(
     name: str, title: str, parameters: tuple[Parameter, ...], modes: Callable[[Array], np.ndarray],
     outputs: tuple[Output, ...], position: str, example: dict[str, float],
 ) -> Family:  # fmt: skip
-    """Make a family of the back-rest; its first output is the bracket angle, ``modes`` the equation that gives it."""
+    """Make an entry of the back-rest; its first output is the bracket angle, ``modes`` selects the equation."""
     names, angle = tuple(p.name for p in parameters), outputs[0].name
 
     def poses(designs: Array, angles: Angles, wanted: frozenset[str]) -> Columns:

@@ -1,4 +1,4 @@
-"""How a mechanism family presents itself to the sweep: its domain, its parameters, its outputs, its kernels."""
+"""The type of a mechanism family: its domain, parameters, outputs and kernels."""
 
 from __future__ import annotations
 
@@ -35,7 +35,8 @@ class Turn:
 class Interval:
     """An interval of an input variable; its ends are candidates for extrema.
 
-    ``ends(designs)``, of (n, P), gives both (n,).  ``poses`` gets it as ``angles.phi``; cosine and sine mean nothing.
+    ``ends(designs)``, of (n, P), returns both ends, (n,) each.  ``poses`` gets the variable as ``angles.phi``; cosine
+    and sine have no meaning.
     """
 
     kind: ClassVar[str] = "interval"
@@ -47,10 +48,10 @@ class Interval:
 
 @dataclass(frozen=True)
 class March:
-    """A motion with history: what a pose is depends on the poses before it, in the order of the crank angle.
+    """A motion with history: a pose depends on the poses before it, in the order of the crank angle.
 
     The family marches over ``turns`` turns in equal steps and keeps the last one, so its values exist only on the grid
-    that was marched: ``poses`` takes one row of equally spaced crank angles of one turn, from 0.
+    of the march: ``poses`` takes one row of equally spaced crank angles of one turn, from 0.
     """
 
     kind: ClassVar[str] = "march"
@@ -64,7 +65,7 @@ Domain: TypeAlias = Turn | Interval | March
 
 
 def equal_steps(domain: Domain, designs: Array, poses: int) -> Array:
-    """Spread values of the variable for the first design: one turn from 0 in equal steps, or a whole interval."""
+    """Equal steps of the variable for the first design: one turn from 0, or a whole interval."""
     if isinstance(domain, Interval):
         first, last = domain.ends(designs)
         return np.linspace(float(first[0]), float(last[0]), poses, dtype=np.float64)
@@ -75,7 +76,7 @@ Columns: TypeAlias = dict[str, NDArray[np.generic]]
 
 
 def floats(columns: Mapping[str, NDArray[np.generic]], *names: str) -> list[Array]:
-    """Return some columns as float64 numbers."""
+    """Return some columns as float64 arrays."""
     return [np.asarray(columns[name], np.float64) for name in names]
 
 
@@ -92,21 +93,21 @@ class Angles(NamedTuple):
         return cls(phi, np.cos(phi), np.sin(phi))
 
     def part(self, rows: Any, poses: slice = slice(None)) -> Angles:
-        """Take those of some designs, or of all where they share them, at some poses."""
+        """Select designs, unless all share the angles, and poses."""
         return Angles(*(np.ascontiguousarray(x[rows if len(x) > 1 else slice(None), poses]) for x in self))
 
 
 @dataclass(frozen=True)
 class Event:
-    """Something that happens where a pose output passes a level: entry, landing, loss of contact.
+    """An event where a pose output passes a level: entry, landing, loss of contact.
 
     Parameters
     ----------
-    name : of the event; ``phi_NAME`` is where it first happens, ``count_NAME`` how often
+    name : of the event; ``phi_NAME`` is the place of its first occurrence, ``count_NAME`` the number of occurrences
     of : the pose output that passes the level
     text : what happens, in words
     level : in the unit of the output
-    rising : whether it passes upwards
+    rising : whether the level is passed upwards
     """
 
     name: str
@@ -118,7 +119,7 @@ class Event:
 
 @dataclass(frozen=True)
 class Accuracy:
-    """How extrema over the turn are found: on a dense grid of ``samples``, or refined to relative error ``target``.
+    """Accuracy of extrema over the turn: a dense grid of ``samples``, or refinement to relative error ``target``.
 
     With ``certify`` it is also proven that no peak of a maximum was missed (docs/extrema.md, section 5): of all wanted
     maxima, or of those that ``proven`` names.
@@ -130,28 +131,28 @@ class Accuracy:
     proven: tuple[str, ...] = ()
 
     def of(self, name: str) -> Accuracy:
-        """Accuracy of one output: without proof where only others are to be proven."""
+        """Accuracy of one output: without proof if it is not among the outputs to be proven."""
         return replace(self, certify=False) if self.certify and self.proven and name not in self.proven else self
 
 
-DEFAULT_TARGET = 1e-8  # relative error of what nobody asks more or less of
+DEFAULT_TARGET = 1e-8  # relative error where no accuracy is given
 PoseFunction: TypeAlias = Callable[[Array, Angles, frozenset[str]], Columns]
 StepFunction: TypeAlias = Callable[[Array, frozenset[str], Accuracy], Columns]
 Capability = TypeVar("Capability")
 
 
 class Work(IntEnum):
-    """What kind of work a route is; routes are taken in this order.
+    """Kind of work of a route; routes are run in this order.
 
-    The order decides which limit a design meets first, and what is no longer computed of it then.  So it is part of the
-    sources, like everything that decides values, and no matter of measured times.
+    The order decides which limit a design meets first, and which outputs are then not computed.  So it is part of the
+    sources, like all that determines values, and does not depend on measured times.
     """
 
     PARAMETERS = 0  # reads parameters only
-    QUICK = 1  # a family's own, a few microseconds at most: closed forms, a few roots
+    QUICK = 1  # a family's own step of a few microseconds at most: closed forms, a few roots
     SEARCH = 2  # extrema, means and events over poses
     EFFECT = 3  # the same with an effect at every pose
-    LONG = 4  # a family's own that takes tens of microseconds or more: curves, motion in time
+    LONG = 4  # a family's own step of tens of microseconds or more: curves, motion in time
     PROOF = 5
 
 
@@ -160,10 +161,10 @@ class Step:
     """A family's own route to some design outputs: exact, or faster than the general reductions over sampled poses.
 
     ``run(designs, wanted, accuracy)`` returns the wanted ones of ``provides`` and ``status``, each of shape (n,).
-    ``applies`` says for which accuracy it serves (a dense kernel does not serve ``accuracy=``).  ``certifies``: its
-    maxima are proven, and serve ``Accuracy.certify`` only.  Steps of the same kind of work are taken in the order in
-    which the family lists them.  ``cost`` estimates its time [ns per design]; without it the row "family: step" of
-    sweep/costs.toml does.  ``analytic``: it takes complex designs, for exact gradients by the complex step.
+    ``applies`` tells the accuracies it serves (a dense kernel does not serve ``accuracy=``).  ``certifies``: its maxima
+    are proven, and serve ``Accuracy.certify`` only.  Steps of the same kind of work are run in the order in which the
+    family lists them.  ``cost`` estimates its time [ns per design]; by default it is the row "family: step" of
+    sweep/costs.toml.  ``analytic``: it takes complex designs, for exact gradients by the complex step.
     """
 
     name: str
@@ -182,29 +183,29 @@ Coordinates: TypeAlias = tuple[str | None, str | None, str | None]
 
 @dataclass(frozen=True)
 class Family:
-    """A mechanism family, or a chain of them, which looks the same from outside.
+    """A mechanism family, or a chain of them, which has the same interface.
 
     Parameters
     ----------
-    name, title : for the register and for people
+    name, title : name in the register, and title for people
     parameters : the columns of the (n, P) design matrix
-    position : the pose output that is the follower's coordinate; limit positions, swing or stroke are about it
-    pose_outputs : everything a single pose gives
+    position : the pose output that is the follower's coordinate; limit positions, swing or stroke refer to it
+    pose_outputs : all outputs of a single pose
     poses : ``poses(designs, angles, wanted)`` returns the wanted pose outputs and ``status``, each (n, m)
-    domain : over what it is evaluated
+    domain : domain of evaluation
     steps : its own routes to design outputs, exact or faster than the general reductions over poses
     derivative_of : for a pose output its derivative with respect to the domain's variable
-    events : what happens at roots of pose outputs
+    events : events at roots of pose outputs
     outward : the sign parameter whose +1 makes the extended limit position the one with the largest position; without
         one the extended position always is
-    uses_phi : False for poses that need no more than cos(phi) and sin(phi); in a chain that saves an arctangent a pose
+    uses_phi : False for poses that need only cos(phi) and sin(phi); in a chain that saves an arctangent per pose
     analytic : whether poses take complex designs and angles, for exact gradients by the complex step
     points : named moving points
-    capabilities : typed objects that effects, proofs, drawings and fits ask for (:mod:`sweep.families.capabilities`)
-    example : an ordinary design, by parameter, whose poses all exist; hard inputs are made from it
-    dear : for pose outputs that cost far more than the motion, what they are computed by and its cost [ns per pose],
-        in the order in which such routes are taken
-    precise_poses : slower poses whose errors are a few roundings of what is given, where the family has them
+    capabilities : typed objects for effects, proofs, drawings and fits (:mod:`sweep.families.capabilities`)
+    example : an ordinary design, by parameter, whose poses all exist; hard inputs are derived from it
+    dear : for pose outputs that cost far more than the motion, the name of what computes them and its cost [ns per
+        pose], in the order in which such routes are run
+    precise_poses : slower poses whose errors are a few roundings of the inputs, if the family has them
     """
 
     name: str
@@ -227,30 +228,30 @@ class Family:
     precise_poses: PoseFunction | None = None
 
     def precise(self) -> Family:
-        """Give the same family with the most accurate poses it has: for single poses, not for sweeps."""
+        """Family with the most accurate poses it has: for single poses, not for sweeps."""
         return self if self.precise_poses is None else self._precise
 
     def values(self, designs: Array, angles: Angles, *names: str) -> list[Array]:
-        """Return some pose outputs, (n, m) each, without their status."""
+        """Compute some pose outputs, (n, m) each, without their status."""
         return floats(self.poses(designs, angles, frozenset(names)), *names)
 
     @cached_property
     def _precise(self) -> Family:
-        """The family with precise poses, made once: results that are cached with it serve every call."""
+        """The family with precise poses, made once, so that results cached with it are reused."""
         assert self.precise_poses is not None
         return replace(self, poses=self.precise_poses)
 
     def find(self, kind: type[Capability]) -> Capability | None:
-        """First capability of a type, None where the family has none."""
+        """First capability of a type, None if the family has none."""
         return next(iter(self.every(kind)), None)
 
     def every(self, kind: type[Capability]) -> tuple[Capability, ...]:
-        """All capabilities of a type: a chain has one of each stage."""
+        """All capabilities of a type: a chain has one per stage."""
         return tuple(found for found in self.capabilities if isinstance(found, kind))
 
     @cached_property
     def derived(self) -> dict[object, Any]:
-        """What follows from this family alone, by the function that found it or remembers it: see :func:`of_family`."""
+        """Cache of results that depend on this family only, by the function: see :func:`of_family`."""
         return {}
 
     @cached_property
@@ -265,11 +266,11 @@ class Family:
 
     @cached_property
     def pose_output(self) -> Mapping[str, Output]:
-        """The pose outputs by name."""
+        """Pose outputs by name."""
         return {o.name: o for o in self.pose_outputs}
 
     def orders(self, name: str) -> list[str]:
-        """List the derivatives 1..k up to ``name`` of the output it derives from; empty if it is no derivative."""
+        """List the derivatives 1..k up to ``name`` of the output that it derives from; empty if it is no derivative."""
         lower = {derivative: of for of, derivative in self.derivative_of.items()}
         names: list[str] = []
         while name in lower:
@@ -283,12 +284,12 @@ class Family:
         return {self.position: ""}
 
     def follower(self, pose: str) -> str:
-        """Name the position of the follower that a pose output belongs to."""
+        """Name of the follower's position that a pose output belongs to."""
         return self.position
 
     @cached_property
     def whole(self) -> Stage:
-        """The whole mechanism, as if it were the stage of a chain."""
+        """The whole mechanism as the stage of a chain."""
         return Stage(0, self, slice(0, len(self.parameters)))
 
     @cached_property
@@ -297,13 +298,13 @@ class Family:
         return (self.whole,)
 
     def outward_sign(self, position: str) -> str:
-        """Name the sign parameter that tells extended from folded limits of a position; "" where there is none."""
+        """Name of the sign parameter that distinguishes a position's extended and folded limits; "" without one."""
         return self.outward
 
 
 @dataclass(frozen=True)
 class Stage:
-    """One mechanism of a chain: its number from 1, and where its parameters stand in the chain's design matrix.
+    """One mechanism of a chain: its number from 1, and the columns of its parameters in the chain's design matrix.
 
     A family alone is a stage of number 0.
     """
@@ -313,17 +314,17 @@ class Stage:
     columns: slice
     kappa: int | None = None  # columns of the coupling to the stage before; none for stage 1
     offset: int | None = None
-    shift: int | None = None  # columns of its place on the shaft between; none where the families name no such axis
+    shift: int | None = None  # columns of its place on the shaft between; None if the families define no such axis
     turn: int | None = None
 
     @property
     def tail(self) -> str:
-        """What follows its names: the number in a chain, nothing where it is alone."""
+        """Suffix of the stage's names: its number in a chain, "" for a family alone."""
         return str(self.number) if self.number else ""
 
     @property
     def is_placed(self) -> bool:
-        """Whether it is known where its frame stands in that of the stage before."""
+        """Whether the place of its frame in that of the previous stage is known."""
         return self.shift is not None
 
     def designs(self, designs: Array) -> Array:
@@ -335,9 +336,9 @@ Found = TypeVar("Found")
 
 
 def of_family(function: Callable[[Family], Found]) -> Callable[[Family], Found]:
-    """Let a function of a family, which never changes, find its result once.
+    """Cache the result of a function of a family, which never changes.
 
-    The result is shared by all who ask for it, so it must not be changed.
+    The result is shared by all callers, so it must not be changed.
     """
 
     @wraps(function)

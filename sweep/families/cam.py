@@ -56,12 +56,12 @@ _LAW = ("rise", "dwell", "fall", "start", "law")
 
 
 def with_kinks(outputs: tuple[Output, ...]) -> tuple[Output, ...]:
-    """Return the outputs of a cam, whose phases meet in kinks or jumps; an angle made continuous is left as it is."""
+    """Mark the outputs of a cam as kinked, since its phases meet in kinks or jumps; angles are left unmarked."""
     return tuple(replace(o, kinks=not o.wraps) for o in outputs)
 
 
 def phase_ends(designs: Array) -> Array:
-    """Cam angles at which a phase, or a piece of the modified sine, ends; of a Fourier table 0 (n, 8)."""
+    """Cam angles at which a phase, or a piece of the modified sine, begins or ends, (n, 8); 0 for a Fourier table."""
     rise, dwell, fall, start, kind = dimensions(PARAMETERS, designs, *_LAW)
     shares = np.array([0.0, 0.125, 0.875, 1.0])
     ends = np.concatenate([start + rise * shares, start + rise + dwell + fall * shares], axis=1)
@@ -78,7 +78,7 @@ def poses(designs: Array, angles: Angles, wanted: frozenset[str]) -> Columns:
     if of_roller:
         s: Any = found["s"] if "s" in wanted else found.pop("s")
         r0, e = dimensions(PARAMETERS, designs, "r0", "e")
-        with np.errstate(invalid="ignore"):  # an offset beyond the prime circle has its status
+        with np.errstate(invalid="ignore"):  # an offset beyond the prime circle is reported by the status
             places = {"x_r": np.sqrt((r0 - e) * (r0 + e)) + s, "y_r": -e + 0.0 * s}
         found |= {name: places[name] for name in of_roller}
     return found

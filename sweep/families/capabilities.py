@@ -1,7 +1,7 @@
-"""Capabilities: what a family offers besides its motion, as typed objects.
+"""Capabilities: typed objects that a family offers besides its motion.
 
-An effect, a proof, a drawing or a fit names the type of what it needs; a family that offers an object of that type is
-served.  Nothing asks for a family's name.
+An effect, a proof, a drawing or a fit names the type that it needs, and works for every family with an object of that
+type.  No code asks for a family's name.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from kernels.types import Array, Numbers
 from sweep.families.base import Angles, Columns, Family, Output, PoseFunction
 
-if TYPE_CHECKING:  # families without such kernels do not wait for them
+if TYPE_CHECKING:  # families without fused kernels do not wait for the import
     from kernels.chains.form import Form
 
 DesignMap: TypeAlias = Callable[[Array], Array]
@@ -25,11 +25,11 @@ FillFunction: TypeAlias = Callable[[Array, Angles, Columns, Array, Array], None]
 
 @dataclass(frozen=True)
 class Assembly:
-    """A loop of links that may fail to reach, or lock: what rotatability, margin and pressure angle are made of.
+    """A loop of links that may fail to assemble, or lock: the basis of rotatability, margin and pressure angle.
 
     ``discriminant`` is the pose output that is negative where the links do not reach; it is a smooth function of the
-    crank angle whatever its sign.  ``scale(designs)``, (n,), divides it so that the quotient is the squared cosine of
-    the pose output ``pressure_angle`` wherever the links reach.  In a chain ``stage`` is the number of the stage.
+    crank angle whatever its sign.  Divided by ``scale(designs)``, (n,), it is the squared cosine of the pose output
+    ``pressure_angle`` wherever the links reach.  In a chain ``stage`` is the number of the stage.
     """
 
     discriminant: str
@@ -39,17 +39,18 @@ class Assembly:
 
 
 def constant(*numbers: float) -> DesignMap:
-    """Return the same numbers for every design, (n, k)."""
+    """Make a function that returns the same numbers for every design, (n, k)."""
     return lambda designs: np.tile(np.array(numbers), (len(designs), 1))
 
 
 @dataclass(frozen=True)
 class JointRecords:
-    """Positions, directions and their rates at the joints, from which the effects of loads work.
+    """Positions, directions and their rates at the joints, the input of the load effects.
 
     ``fill(designs, angles, motion, per_pose, per_design)`` writes the records that :mod:`kernels.linkage.joints`
-    describes, from the pose outputs ``needs`` in ``motion``, in the frame of the family.  ``follower`` is what the
-    coupler drives.  ``moved`` gives these outputs where the family has them not: plain poses and precise ones.
+    describes, from the pose outputs ``needs`` in ``motion``, in the frame of the family.  ``follower`` is the link that
+    the coupler drives.  ``moved`` computes these outputs if the family does not have them: plain poses and precise
+    ones.
     """
 
     fill: FillFunction
@@ -60,17 +61,17 @@ class JointRecords:
 
 @dataclass(frozen=True)
 class PressureEllipse:
-    """The curve of the coupler direction across the follower's motion, (n, 7), for its extrema in closed form."""
+    """Curve of the coupler direction across the follower's motion, (n, 7), for its extrema in closed form."""
 
     curve: DesignMap
 
 
 @dataclass(frozen=True)
 class Curve:
-    """A pose output as a fused chain has it: a derivative of a x + b y + c of what its last stage moves.
+    """A pose output of a fused chain: a derivative of a x + b y + c of the motion of its last stage.
 
-    ``order`` is that of the derivative by the crank angle, 0, 1 or 2; ``made_of(designs)``, (n, 3), gives a, b, c of
-    the stage's own designs.
+    ``order`` is that of the derivative by the crank angle, 0, 1 or 2; ``made_of(designs)``, (n, 3), returns a, b, c
+    from the stage's own designs.
     """
 
     order: int
@@ -79,16 +80,16 @@ class Curve:
 
 @dataclass(frozen=True)
 class InSeries:
-    """A stage whose motion can be fused with that of the stages before and behind it (:mod:`kernels.chains`).
+    """A stage whose motion can be fused with that of the previous and next stages (:mod:`kernels.chains`).
 
     Parameters
     ----------
     form : its inline closures
-    curves : the pose outputs whose extrema a fused search finds where it is the last stage
-    components : of those pose outputs that a grid has at once, the component: "x1", "x2", "x3", "y0", "y1", "y2"
-    opening : of a family that can be the first stage, ``opening(designs, status, distance)``: does it turn, and how
-        far is its nearest singularity
-    matrix : of a family that moves as another one, the designs of that; then it is fused by itself alone
+    curves : the pose outputs whose extrema a fused search finds if it is the last stage
+    components : for pose outputs that a grid computes at once, the component: "x1", "x2", "x3", "y0", "y1", "y2"
+    opening : of a family that can be the first stage, ``opening(designs, status, distance)`` writes whether it turns,
+        and the distance of its nearest singularity
+    matrix : for a family that moves like another one, maps its designs to those of the other; it is fused only alone
     """
 
     form: Form
@@ -100,7 +101,7 @@ class InSeries:
 
 @dataclass(frozen=True)
 class CrankRockerLoop:
-    """The loop of the family is that of a crank-rocker whose output angle is the family's.
+    """The loop of the family is that of a crank-rocker with the same output angle.
 
     ``matrix(designs)`` is the design matrix of that crank-rocker, (n, 8): a b c e f g alpha branch.
     """
@@ -110,14 +111,14 @@ class CrankRockerLoop:
 
 @dataclass(frozen=True)
 class GuidedPoint:
-    """A coupler point that runs along a line: its position is linear in the directions of crank, coupler and rocker.
+    """A coupler point along a line, whose position is linear in the directions of crank, coupler and rocker.
 
-    ``shares(designs)``, (n, 8), are the factors that the proof of its maxima takes (:mod:`sweep.reductions.extrema`).
-    The coupler point, the line and the scale can be fitted: ``fitted`` are the parameters of the point along and across
-    the coupler, of the line's direction and of its distance from the origin, ``scaled`` the lengths that grow with the
+    ``shares(designs)``, (n, 8), are the factors for the proof of its maxima (:mod:`sweep.reductions.extrema`). The
+    coupler point, the line and the scale can be fitted: ``fitted`` are the parameters of the point along and across the
+    coupler, of the line's direction and of its distance from the origin, ``scaled`` the lengths that grow with the
     stroke, ``direction`` the third of the fitted ones.  ``links`` are the crank, the coupler and the other lengths of
-    the linkage, ``arms`` the point along and across the coupler, ``offset`` that of the line.  ``across`` names the
-    pose output across the line beside each one along it.
+    the linkage, ``arms`` the point along and across the coupler, ``offset`` that of the line.  ``across`` maps each
+    pose output along the line to the one across it.
     """
 
     shares: DesignMap
@@ -132,12 +133,11 @@ class GuidedPoint:
 
 @dataclass(frozen=True)
 class LimitLocus:
-    """The limit positions of the follower can be prescribed; the links that keep them lie on a locus.
+    """Prescribed limit positions of the follower; the links that have them lie on a locus.
 
-    The loci of a family are those of :data:`sweep.synthesis.locus.LOCI`.  ``travel`` is the design output for the way
-    between both limit positions.  ``sized`` are the length of the follower and the offsets of its axis, along the
-    common perpendicular and along the axis, where the length can be given instead of the offsets; empty where it
-    cannot.
+    The loci of a family are those of :data:`sweep.synthesis.locus.LOCI`.  ``travel`` is the design output for the
+    distance between both limit positions.  ``sized`` are the length of the follower and the offsets of its axis, along
+    the common perpendicular and along the axis, if the length can be given instead of the offsets; otherwise empty.
     """
 
     travel: str
@@ -146,19 +146,19 @@ class LimitLocus:
 
 @dataclass(frozen=True)
 class ProvableLocus:
-    """Bounds of an output can be proven for whole boxes of designs on the locus of limit positions.
+    """Proofs of an output's bounds for whole boxes of designs on the locus of limit positions.
 
-    ``coordinates`` are what a box is made of, the swing first; ``links`` the lengths that follow and may have limits.
-    ``objectives`` has the outputs that can be proven, with the numbers by which the kernels know them; ``rows`` says
-    for each kind of row what it is about.  ``explore(question, search, leaves)`` fills arrays (low, high, outcome,
-    bound, kinds, theta, factors) with the boxes that were not halved; it gives their number and that of the boxes
-    judged.  Lengths are in one unit, angles in rad.
+    ``coordinates`` span a box, the swing first; ``links`` are the resulting lengths, which may have limits.
+    ``objectives`` maps the outputs that can be proven to their numbers in the kernels; ``rows`` describes each kind of
+    row.  ``explore(question, search, leaves)`` fills arrays (low, high, outcome, bound, kinds, theta, factors) with the
+    boxes that were not halved, and returns their number and that of the boxes judged.  Lengths are in one unit, angles
+    in rad.
 
-    ``question`` : the branch; the number of the objective; the least squared cosine of the pressure angle; least and
-    most of all links; the target of the objective; the tube, crank angles with the least and most angle of a follower
-    that reaches it (:mod:`kernels.boxes.tube`), empty where none is known.  ``search`` : low and high ends and known
-    bounds of the boxes it starts from; widths of the whole space; numbers of the free coordinates, and all of them as
-    given; the share of the whole below which a box is not halved; the most boxes to judge.
+    ``question`` : branch; number of the objective; least squared cosine of the pressure angle; minimum and maximum of
+    all links; target of the objective; the tube, crank angles with the least and greatest angle of a follower that
+    reaches the target (:mod:`kernels.boxes.tube`), empty if none is known.  ``search`` : lower and upper ends and known
+    bounds of the first boxes; widths of the whole space; numbers of the free coordinates, and all coordinates as given;
+    share of the whole space below which a box is not halved; largest number of boxes to judge.
     """
 
     coordinates: tuple[str, ...]
@@ -179,7 +179,7 @@ class OutputLink:
     origin: DesignMap
 
     def carried(self, designs: Array, angle: Array, point: Iterable[Any]) -> list[Array]:
-        """Return x, y, z, (n, m) each, of a point of the link, given by three numbers or columns (n, 1)."""
+        """Compute x, y, z, (n, m) each, of a point of the link, given by three numbers or columns (n, 1)."""
         x, y, z = point
         cos, sin, origin = np.cos(angle), np.sin(angle), self.origin(designs)
         return [origin[:, [0]] + x * cos - y * sin, origin[:, [1]] + x * sin + y * cos, origin[:, [2]] + z + 0.0 * cos]
@@ -200,10 +200,10 @@ class ThreadPath:
 
 @dataclass(frozen=True)
 class ToolPoint:
-    """A point of the coupler that a tool hangs on, such as a needle bar, which may move along a fixed direction.
+    """A point of the coupler that carries a tool, such as a needle bar, which may move along a fixed direction.
 
     ``point(designs)``, (n, 3), is its place from B along the coupler, across it (k x s) and along the rocker's axis;
-    ``direction(designs)``, (n, 3), the unit vector of the tool's way in the family's frame, None where the tool moves
+    ``direction(designs)``, (n, 3), the unit vector of the tool's motion in the family's frame, None if the tool moves
     freely with the point.
     """
 
@@ -213,12 +213,12 @@ class ToolPoint:
 
 @dataclass(frozen=True)
 class PresserFoot:
-    """A presser foot that a rack lifts: the march over its turns that tells what it does.
+    """A presser foot that a rack lifts, with the march over its turns that computes its motion.
 
     ``march(designs, nodes)`` returns the columns of ``outputs``, ``status`` and the ``changes`` of
-    :func:`kernels.effects.foot_fabric.march`; the path of the rack, heights and forces of the foot at so many equal
-    crank angles, ``nodes`` where nobody asks for others.  On a feed mechanism it takes a sense besides: a crank that
-    turns backwards has the sense -1, and its angles are counted as it turns.
+    :func:`kernels.effects.foot_fabric.march`; the path of the rack, and heights and forces of the foot, at ``nodes``
+    equal crank angles (the attribute ``nodes`` is the default number).  On a feed mechanism ``march`` also takes a
+    sense: for a crank that turns backwards it is -1, and angles are counted in the direction of rotation.
     """
 
     march: Callable[..., tuple[Columns, Array, Array, Array]]
@@ -232,11 +232,11 @@ class Fixed:
 
     Parameters
     ----------
-    at : where it stands, (n, 3), in the family's frame
+    at : its place, (n, 3), in the family's frame
     axis : unit vector (n, 3) about which its link turns right-handed, or along which its slider moves; None for a point
-        about which a link may turn anyhow
-    kind : "axis" of a link that turns, "slide" of one that moves along a line, "point" for neither
-    foot : of a crank axis, the point from which lengths along it count, (n, 3); None is ``at``
+        about which a link turns in any direction
+    kind : "axis" of a link that turns, "slide" of one that moves along a line, "point" otherwise
+    foot : of a crank axis, the origin of lengths along it, (n, 3); None is ``at``
     zero : of a crank axis, unit vector (n, 3) to the crank pin at phi = 0; None is x
     """
 
@@ -249,7 +249,7 @@ class Fixed:
 
 @dataclass(frozen=True)
 class Link:
-    """A part of the mechanism, by the joints it connects; the first is the pivot of a link that turns about one."""
+    """A link of the mechanism with the joints it connects; the first is the pivot of a link that turns about one."""
 
     name: str
     joints: tuple[str, ...]
@@ -265,9 +265,9 @@ class Made:
 
 @dataclass(frozen=True)
 class Skeleton:
-    """What stands still in the family's frame, what else moves, and which joints each link connects.
+    """Fixed points of the family's frame, further moving points, and the joints that each link connects.
 
-    Moving joints are the family's points and those of ``made``.  Drawings and exports are made from it.
+    Moving joints are the family's points and those of ``made``.  Drawings and exports are generated from it.
     """
 
     fixed: Mapping[str, Fixed]
@@ -276,7 +276,7 @@ class Skeleton:
 
 
 def skeleton_of(family: Family) -> Skeleton:
-    """Skeleton of a family; an empty one of a chain, a machine, or a mechanism without joints."""
+    """Skeleton of a family; an empty one for a chain, a machine, or a mechanism without joints."""
     return family.find(Skeleton) or Skeleton({}, ())
 
 
@@ -284,8 +284,8 @@ def skeleton_of(family: Family) -> Skeleton:
 class Arm:
     """A point that a link carries: its coordinates and those of the link's other joint, both from its first joint.
 
-    Each is the names of one to three parameters, along perpendicular directions fixed to the link; the first of both
-    is the same direction.
+    Both are names of one to three parameters, along perpendicular directions fixed to the link; their first directions
+    are the same.
     """
 
     point: tuple[str, ...]
@@ -294,13 +294,13 @@ class Arm:
 
 @dataclass(frozen=True)
 class Dimensions:
-    """Parameters that are dimensions of the moving links, on which limits of manufacture bear.
+    """Parameters that are dimensions of the moving links, for limits of manufacture.
 
     Parameters
     ----------
-    links : of every link the parameters of the vector between its two joints: its length, or the coordinates of one
+    links : for every link the parameters of the vector between its two joints: its length, or the coordinates of one
         joint from the other
-    optional : lengths of links that a design may lack; 0 stands for a link that is not there
+    optional : lengths of links that a design may lack; 0 means that the link is absent
     arms : points that links carry beyond their joints
     """
 
@@ -310,18 +310,18 @@ class Dimensions:
 
     @property
     def names(self) -> tuple[str, ...]:
-        """All these parameters."""
+        """Names of all these parameters."""
         vectors = (*self.links, self.optional, *(side for arm in self.arms for side in (arm.point, arm.link)))
         return tuple(dict.fromkeys(name for vector in vectors for name in vector))
 
 
 @dataclass(frozen=True)
 class Hardpoints:
-    """The family's dimensions can be read off points of a drawing.
+    """Fit of the family's dimensions to points of a drawing.
 
-    ``needs`` and ``may`` are the names of points and directions that must or may be given.  ``fit(points)``
-    returns parameters, the crank angle [rad], and origin, z and x of the family's frame in that of the drawing; it
-    raises :class:`sweep.errors.InputError` for points that make no such mechanism.
+    ``needs`` and ``may`` are the names of points and directions that must or may be given.  ``fit(points)`` returns
+    parameters, the crank angle [rad], and origin, z and x of the family's frame in that of the drawing; it raises
+    :class:`sweep.errors.InputError` for points that no such mechanism has.
     """
 
     needs: tuple[str, ...]

@@ -1,4 +1,4 @@
-"""Several families in series as one `Family`: numbered parameters, composed derivatives, every stage's own outputs."""
+"""Several families in series as one `Family`: numbered parameters, composed derivatives, outputs of every stage."""
 
 from __future__ import annotations
 
@@ -20,18 +20,18 @@ from sweep.families.frames import Frame, can_be_placed, stage_frames
 from sweep.families.names import ends_in_digit
 from sweep.families.poses import blocks
 
-BLOCK = 16384  # poses per block: its ten or so arrays (1.3 MB) stay in the caches; half or four times this is slower
+BLOCK = 16384  # poses per block: about ten arrays (1.3 MB) stay in the caches; half or four times this is slower
 
 
 @dataclass(frozen=True)
 class Chain(Family):
-    """A family made of stages; the output angle of each drives the crank of the next."""
+    """A family of stages in series; the output angle of each stage drives the crank of the next."""
 
     stages: tuple[Stage, ...] = ()
 
     @property
     def is_placed(self) -> bool:
-        """Whether all stages stand in one frame."""
+        """Whether all stages are placed in one frame."""
         return self.stages[-1].is_placed
 
     def frames(self, designs: Array) -> list[Frame]:
@@ -44,7 +44,7 @@ class Chain(Family):
         return {self.position: ""} | {f"{s.family.position}{s.number}": str(s.number) for s in self.stages}
 
     def outward_sign(self, position: str) -> str:
-        """Return the sign parameter of the stage whose position it is."""
+        """Return the sign parameter of the stage with this position."""
         stage = self.positions[position]
         own = self.stages[int(stage) - 1].family.outward if stage else ""
         return own and f"{own}{stage}" if stage else self.outward
@@ -60,17 +60,17 @@ class Chain(Family):
 
 @dataclass
 class _Plan:
-    """What one call computes: per stage its own outputs, and how many derivatives are composed."""
+    """Plan of a call: outputs needed from each stage, and derivatives that are composed by the chain rule."""
 
     order: int = 0
     needed: list[set[str]] = field(default_factory=list)
     composed: list[list[str]] = field(default_factory=list)  # of the last stage: derivatives 1..k of one output
-    source: dict[str, tuple[int, str]] = field(default_factory=dict)  # name -> stage index, its own name
-    sizes: dict[str, tuple[str, ...]] = field(default_factory=dict)  # magnitudes, of what was composed
+    source: dict[str, tuple[int, str]] = field(default_factory=dict)  # name -> stage index, own name
+    sizes: dict[str, tuple[str, ...]] = field(default_factory=dict)  # magnitudes of composed vectors
 
 
 def driven_guide(family: Family) -> tuple[Stage, Stage] | None:
-    """Find both stages of a chain in which a crank-rocker drives a guided point; None for any other family.
+    """Return both stages of a chain in which a crank-rocker drives a guided point; None for any other family.
 
     The crank-rocker is one whose limit positions can be prescribed (`LimitLocus`).
     """
@@ -83,15 +83,15 @@ def driven_guide(family: Family) -> tuple[Stage, Stage] | None:
 
 
 def chain(families: tuple[Family, ...]) -> Chain:
-    """Return the chain of these families, each driven by the one before it.
+    """Make the chain of families, each driven by the previous one.
 
-    Parameters and the stages' own outputs carry the stage number; the outputs of the last stage also stand without a
-    number, unless they end in a digit; their derivatives are those with respect to phi of stage 1.
+    Parameters and the stages' own outputs have the stage number as suffix; outputs of the last stage also exist without
+    a number, unless they end in a digit; their derivatives are with respect to phi of stage 1.
 
     Raises
     ------
     InputError
-        if a stage other than the last has no output angle: a slider cannot drive a crank; if it has several loops.
+        if a stage other than the last has no output angle (a slider cannot drive a crank), or has several loops.
     """
     place = f"chain {[f.name for f in families]}"
     for number, family in enumerate(families, start=1):
@@ -143,7 +143,7 @@ def _precise(stages: tuple[Stage, ...]) -> tuple[Stage, ...]:
 
 
 def _loops(stage: Stage) -> list[Assembly]:
-    """Return the loops of a stage under the chain's names."""
+    """Rename the loops of a stage for the chain."""
     return [
         Assembly(
             f"{loop.discriminant}{stage.number}",
@@ -156,7 +156,7 @@ def _loops(stage: Stage) -> list[Assembly]:
 
 
 def _of_last(stage: Stage) -> list[object]:
-    """Carry over the output link of the last stage."""
+    """Transfer the output link of the last stage to the chain."""
     return [OutputLink(partial(on_part, stage.designs, link.origin)) for link in stage.family.every(OutputLink)]
 
 
@@ -234,7 +234,7 @@ def _plan(stages: tuple[Stage, ...], outputs: Mapping[str, Output], wanted: froz
 
 
 def driving_names(family: Family, driven: Family) -> set[str]:
-    """Name the outputs of a stage that give the next one its input angle: cosine and sine where it has them."""
+    """Names of a stage's outputs that determine the next input angle: cosine and sine if it has them."""
     angle = family.position
     turned = {f"cos_{angle}", f"sin_{angle}"}
     if not turned <= set(family.pose_names):
@@ -259,7 +259,7 @@ def _poses(
 ) -> Columns:
     """Compute the wanted pose outputs and status, in blocks so that intermediate arrays stay in the cache.
 
-    ``plans`` keeps what was planned before: the optimiser asks the same of one design at a time.
+    ``plans`` caches plans by the wanted names: the optimiser asks for the same names of one design at a time.
     """
     plan = plans.get(wanted)
     if plan is None:
@@ -277,7 +277,7 @@ def _poses(
 
 
 def _block(stages: tuple[Stage, ...], plan: _Plan, designs: Array, angles: Angles, wanted: frozenset[str]) -> Columns:
-    """Return what is wanted of all stages of one block, the derivatives carried along by the chain rule."""
+    """Compute the wanted outputs of all stages for one block, composing derivatives by the chain rule."""
     results: list[dict[str, Any]] = []
     inner: list[Any] = []  # derivatives of the angle that drives the present stage
     status = np.zeros((designs.shape[0], angles.cos.shape[1]), np.uint8)
@@ -312,9 +312,9 @@ def magnitude(columns: Mapping[str, Any], parts: tuple[str, ...]) -> Any:
 
 
 def drive(result: dict[str, Any], angle: str, kappa: Array, offset: Array) -> Angles:
-    """Make the input angles of the stage driven by ``result``: status, and ``angle`` or its cosine and sine."""
+    """Compute the input angles of the stage driven by ``result``, from ``angle`` or its cosine and sine."""
     shape = result["status"].shape
-    # a family that says it works from cos and sin alone gets no angle at all
+    # a family that needs cos and sin only gets nan as angle
     phi: Array = np.broadcast_to(np.float64(np.nan), shape)
     if angle in result:
         phi = kappa[:, None] * result[angle] + offset[:, None]

@@ -1,4 +1,4 @@
-"""What an entry of the register must be: each rule is checked when the family is first asked for."""
+"""Rules for an entry of the register, checked when the family is first used."""
 
 from __future__ import annotations
 
@@ -15,20 +15,20 @@ from sweep.families.parameter import WORDS, is_known, of_derivative
 
 _NAME = re.compile(r"[a-z][a-z0-9_]*")
 _LETTERS = re.compile(r"[A-Za-z][A-Za-z0-9_]*")
-RESERVED = ("design", "status", "offset")  # and the variable of the domain, phi for a turn
+RESERVED = ("design", "status", "offset")  # and the domain's variable, phi for a turn
 
 
 class FamilyError(TypeError):
-    """An entry of the register breaks a rule; the message names the remedy.  For who writes the entry."""
+    """An entry of the register breaks a rule; the message gives the remedy to the entry's author."""
 
 
 def check_family(family: Family) -> Family:
-    """Family itself, once every rule of an entry is kept.
+    """Return the family if it keeps every rule of an entry.
 
     Raises
     ------
     FamilyError
-        naming the family, what is wrong and how it is mended.
+        naming the family, the faults and their remedies.
     """
     faults = [*_names(family), *output_faults(family), *_drawing(family), *_capabilities(family), *_example(family)]
     if faults:
@@ -98,7 +98,7 @@ def _drawing(family: Family) -> list[str]:
 
 
 def _tree(tree: LinkTree) -> list[str]:
-    """Faults of a tree of links: numbers that name nothing, loops closed by too few lines or too many."""
+    """List faults of a tree of links: invalid numbers, and loops closed by too few or too many lines."""
     bodies, faults = range(len(tree.bodies)), []
     parents = [body.parent for body in tree.bodies]
     faults += [f"LinkTree: parent {p} of body {k} is no earlier body" for k, p in enumerate(parents) if p >= k]
@@ -146,7 +146,7 @@ def _capabilities(family: Family) -> list[str]:
 
 
 def output_faults(family: Family) -> list[str]:
-    """List what is wrong with the outputs of an entry, each with its remedy."""
+    """List the faults of an entry's outputs, each with its remedy."""
     return [*_definitions(family), *_position(family), *_derivatives(family), *_events(family), *_steps(family)]
 
 
@@ -211,7 +211,7 @@ def _derivatives(family: Family) -> list[str]:
 
 
 def _orders(family: Family) -> list[str]:
-    """Demand the position's derivatives over a turn: limits are their roots, an angle may drive a next stage."""
+    """Require derivatives of the position over a turn: limits are their roots, and an angle may drive a next stage."""
     position = family.pose_output.get(family.position)
     if position is None or not isinstance(family.domain, Turn):
         return []
@@ -225,7 +225,7 @@ def _orders(family: Family) -> list[str]:
 
 
 def _returns(of: Mapping[str, str], name: str) -> bool:
-    """Whether the derivatives of an output lead back to it."""
+    """Whether the derivatives of an output form a cycle through it."""
     start = name
     passed: set[str] = set()
     while name in of and name not in passed:

@@ -1,7 +1,7 @@
-"""What curves over a turn hold between any even samples: fast waves, narrow peaks, kinks at angles known beforehand.
+"""Features of curves that even samples may miss: fast waves, narrow peaks, kinks at known angles.
 
-A family says so by capabilities; a chain, a machine and a family with loads make theirs of those of their parts.  The
-searches for extrema, means and events begin with samples that are dense enough, and cut the turn where it switches.
+Families declare them by capabilities; a chain, a machine and a family with loads derive theirs from their parts.  The
+searches for extrema, means and events start with sufficiently dense samples, and cut the turn where curves switch.
 """
 
 from __future__ import annotations
@@ -20,8 +20,8 @@ from sweep.families.capabilities import Assembly, DesignMap
 from sweep.families.parts import Member
 from sweep.numerics.curves import PER_GAP
 
-NARROWEST = 1e-9  # angles [rad] that are nearer to each other are one
-SAMPLES_PER_WAVE = 32.0  # of a mechanism: they tell its order and the fifteen next multiples of that
+NARROWEST = 1e-9  # angles [rad] closer than this count as one
+SAMPLES_PER_WAVE = 32.0  # of a mechanism: they resolve its order and the next fifteen multiples
 
 T = TypeVar("T")
 Feature = TypeVar("Feature", "Waves", "Switches", "Singular")
@@ -30,10 +30,10 @@ SingularCurve: TypeAlias = Callable[[Array, Angles], Array]
 
 @dataclass(frozen=True)
 class Waves:
-    """How many waves, or turns of the fastest part, one turn of the crank holds: ``count(designs)``, (n,).
+    """Number of waves, or turns of the fastest part, per turn of the crank: ``count(designs)``, (n,).
 
-    A wave as fast as the samples stand would look like a constant to all of them.  ``of`` names the pose outputs that
-    have these waves; None: all of them.
+    A wave as fast as the samples would look constant on all of them.  ``of`` names the pose outputs with these waves;
+    None: all.
     """
 
     count: DesignMap
@@ -42,12 +42,12 @@ class Waves:
 
 @dataclass(frozen=True)
 class Singular:
-    """A smooth function of the crank angle that is positive where the motion is regular, beside those of `Assembly`.
+    """A smooth function of the crank angle that is positive where the motion is regular, besides those of `Assembly`.
 
-    Near a complex zero of it lies a narrow peak, whose width is the distance of that zero from the real angles.
-    ``curve(designs, angles, found)`` gives its values, (n, m), from the pose outputs ``needs``.  As the motion has to
-    exist all over the turn, what it is where the links do not reach does not count.  ``of`` names the pose outputs that
-    have the peak; None: all of them.
+    Near a complex zero of it there is a narrow peak, whose width is the distance of that zero from the real angles.
+    ``curve(designs, angles, found)`` returns its values, (n, m), from the pose outputs ``needs``.  Since the motion has
+    to exist over the whole turn, its values where the links do not reach do not matter.  ``of`` names the pose outputs
+    with the peak; None: all.
     """
 
     curve: Callable[[Array, Angles, Columns], Array]
@@ -56,11 +56,11 @@ class Singular:
 
     @classmethod
     def where_small(cls, *names: str) -> Singular:
-        """Make the sum of the squares of pose outputs: where they nearly vanish something turns or moves at once."""
+        """Sum of the squares of pose outputs, near whose zeros a link turns or moves abruptly."""
 
         def curve(designs: Array, angles: Angles, found: Columns) -> Array:
             values = np.stack(floats(found, *names))
-            # To one size by a power of two: the square of a determinant of large lengths leaves float64.
+            # Scaled by a power of two: the square of a determinant of large lengths would overflow.
             power = np.frexp(np.fmax.reduce(np.abs(values), axis=(0, 2)))[1]
             squared: Array = np.square(np.ldexp(values, -power[:, None])).sum(axis=0)
             return squared
@@ -70,10 +70,10 @@ class Singular:
 
 @dataclass(frozen=True)
 class Switches:
-    """Crank angles, known beforehand, at which outputs have a kink or a jump: ``angles(designs)``, (n, k) [rad].
+    """Known crank angles at which outputs have a kink or a jump: ``angles(designs)``, (n, k) [rad].
 
     They are the ends of a law's phases, or the points of a table of loads.  ``of`` names the pose outputs that switch
-    there; None: all of them may.
+    there; None: possibly all.
     """
 
     angles: DesignMap
@@ -82,10 +82,10 @@ class Switches:
 
 @dataclass(frozen=True)
 class Crossing:
-    """Outputs jump where the pose output ``of`` passes ``level(designs)``, (n,), in designs that it ``matters`` for.
+    """Jump of outputs where the pose output ``of`` passes ``level(designs)``, (n,), in designs where it ``matters``.
 
-    A tool that pierces is loaded from there to its turning point: perhaps for less of the turn than two samples span.
-    ``felt`` names the pose outputs that may jump.
+    A tool that pierces is loaded from there to its turning point, perhaps for less of the turn than the spacing of two
+    samples.  ``felt`` names the pose outputs that may jump.
     """
 
     of: str
@@ -98,11 +98,11 @@ class Crossing:
 class Bends:
     """Smooth functions of the crank angle at whose zeros the pose outputs ``of`` have kinks, jumps or narrow peaks.
 
-    ``curves(designs, angles)`` gives their values, (n, m, q).  A bearing's load changes its formula where the load
-    along the shaft passes a share of that across it, friction turns where a joint stops, and what a bearing permits
-    has a narrow peak where nothing acts along the shaft.  Of ``squares``, which are never negative, the places count
-    where they nearly vanish: the direction of a velocity turns at once there.  With ``zero`` the outputs vanish where
-    the functions do, and are nowhere negative: the pressure of a contact goes like a root of its force.
+    ``curves(designs, angles)`` returns their values, (n, m, q).  For example, a bearing's load changes its formula
+    where the axial load exceeds a share of the radial one, friction reverses where a joint stops, and the permissible
+    value of a bearing has a narrow peak where no axial load acts.  ``squares`` are non-negative functions, whose near
+    zeros count: the direction of a velocity changes abruptly there.  With ``zero`` the outputs are non-negative and
+    vanish at the zeros: the pressure of a contact goes like a root of its force.
     """
 
     of: frozenset[str]
@@ -113,9 +113,9 @@ class Bends:
 
 @dataclass(frozen=True)
 class Smooth:
-    """A dear pose output that is smooth all over the turn: the length of the vector that the outputs ``parts`` make.
+    """An expensive pose output that is smooth over the whole turn: the length of the vector with components ``parts``.
 
-    A number is its own only part.
+    A scalar is its only component.
     """
 
     of: str
@@ -123,12 +123,12 @@ class Smooth:
 
 
 def _about(family: Family, kind: type[Feature], outputs: Collection[str]) -> list[Feature]:
-    """Return what a family says of that kind about one of some pose outputs, or about all."""
+    """List the features of a kind that concern one of the given pose outputs, or all outputs."""
     return [known for known in family.every(kind) if known.of is None or not known.of.isdisjoint(outputs)]
 
 
 def waves(family: Family, designs: Array, outputs: Collection[str]) -> Array:
-    """How many waves of some pose outputs one turn holds at least, (n,)."""
+    """Return the number of waves per turn of the given pose outputs, at least 1, (n,)."""
     most = np.ones(len(designs))
     for fast in _about(family, Waves, outputs):
         count = np.abs(fast.count(designs))
@@ -137,24 +137,24 @@ def waves(family: Family, designs: Array, outputs: Collection[str]) -> Array:
 
 
 def switching(family: Family, outputs: Collection[str]) -> list[Switches]:
-    """Return what tells at which crank angles one of some pose outputs switches."""
+    """List the switches of the given pose outputs."""
     return _about(family, Switches, outputs)
 
 
 def switches(family: Family, designs: Array, outputs: Collection[str]) -> Array:
-    """Angles at which one of some pose outputs switches, in [0, 2 pi), (n, k); 0 for what is no number."""
+    """Angles at which one of the given pose outputs switches, in [0, 2 pi), (n, k); 0 for invalid ones."""
     every = [np.zeros((len(designs), 0)), *(known.angles(designs) for known in switching(family, outputs))]
     angles = np.mod(np.concatenate(every, axis=1), TWO_PI)
     return np.where(np.isfinite(angles), angles, 0.0)
 
 
 def crossings(family: Family, outputs: Collection[str]) -> list[Crossing]:
-    """Return what tells where one of some pose outputs jumps as another one passes a level."""
+    """List the crossings at which one of the given pose outputs jumps."""
     return [known for known in family.every(Crossing) if not known.felt.isdisjoint(outputs)]
 
 
 def crossed(family: Family, designs: Array, outputs: Collection[str]) -> NDArray[np.bool_]:
-    """Which designs have one of some pose outputs that jumps where another one passes a level, (n,)."""
+    """Whether a design has a crossing at which one of the given pose outputs jumps, (n,)."""
     found: NDArray[np.bool_] = np.zeros(len(designs), np.bool_)
     for known in crossings(family, outputs):
         found = found | known.matters(designs)
@@ -162,17 +162,17 @@ def crossed(family: Family, designs: Array, outputs: Collection[str]) -> NDArray
 
 
 def samples_of_waves(family: Family, designs: Array) -> Array:
-    """Return so many even samples of a turn that the waves of a mechanism are resolved, (n,); 0 where it has none.
+    """Return a number of even samples of a turn that resolves the waves of a mechanism, (n,); 0 without waves.
 
-    Curves of a planet that turns m times have orders about multiples of m and none between.  Too few samples fold the
-    higher ones onto lower orders and show nothing at their own highest, so they seem to resolve the curve.
+    Curves of a planet that turns m times have orders about multiples of m and none between.  Too few samples alias the
+    higher orders onto lower ones, and show nothing at their own highest orders, so that they seem to resolve the curve.
     """
     count = waves(family, designs, ())
     return np.where(count > 1.0, SAMPLES_PER_WAVE * count, 0.0)
 
 
 def least_samples(family: Family, designs: Array, outputs: Collection[str]) -> Array:
-    """Return even samples of a turn, (n,), of which some lie on each wave and between known angles; inf if it jumps."""
+    """Return a number of even samples that resolves waves and gaps between known angles, (n,); inf with a jump."""
     angles = np.sort(switches(family, designs, outputs), axis=1)
     gaps = np.diff(np.concatenate([angles, angles[:, :1] + TWO_PI], axis=1), axis=1)
     narrowest = np.where(gaps > NARROWEST, gaps, TWO_PI).min(axis=1, initial=TWO_PI)
@@ -182,21 +182,21 @@ def least_samples(family: Family, designs: Array, outputs: Collection[str]) -> A
 
 
 def bends(family: Family, output: str) -> tuple[Bends, ...]:
-    """Return what tells at which crank angles curves of a pose output bend."""
+    """List the bends of curves of a pose output."""
     return tuple(known for known in family.every(Bends) if output in known.of)
 
 
 def singular(family: Family, outputs: Collection[str]) -> list[Singular]:
-    """Return what tells where one of some pose outputs has a narrow peak, beside the discriminants."""
+    """List the functions near whose zeros the given pose outputs have narrow peaks, without discriminants."""
     return _about(family, Singular, outputs)
 
 
 def singular_curves(family: Family, outputs: Collection[str]) -> Sequence[SingularCurve]:
-    """Functions of designs (n, P) and angles whose complex zeros are the singularities of some pose outputs."""
+    """List functions of designs (n, P) and angles whose complex zeros are the singularities of the pose outputs."""
     found = [partial(_measured, family, known) for known in singular(family, outputs)]
     discriminants = [loop.discriminant for loop in family.every(Assembly)]
     if set(outputs) <= set(discriminants):
-        # They are smooth where they vanish, and go on where the links do not reach.
+        # Discriminants are smooth where they vanish, and defined where the links do not reach.
         return [partial(_where_reached, curve) for curve in found]
     return [*(partial(_measured, family, Singular(_only, (name,))) for name in discriminants), *found]
 
@@ -208,7 +208,7 @@ def _where_reached(curve: SingularCurve, designs: Array, angles: Angles) -> Arra
 
 
 def _only(designs: Array, angles: Angles, found: Columns) -> Array:
-    """One pose output that is needed."""
+    """Return the only pose output among the columns."""
     (value,) = (np.asarray(values, np.float64) for name, values in found.items() if name != "status")
     return value
 
@@ -225,12 +225,12 @@ def of_table(phi: Sequence[float], of: frozenset[str]) -> Switches:
 
 
 def of_order(order: int, of: frozenset[str]) -> Waves:
-    """Waves of pose outputs under a Fourier series of that order."""
+    """Waves of pose outputs under a Fourier series of the given order."""
     return Waves(lambda designs: np.full(len(designs), float(order)), of)
 
 
 def of_stages(stages: Sequence[Stage]) -> list[object]:
-    """Return what the stages of a chain bring in: waves multiply; the switches of stage 1 are at known angles."""
+    """List the features of a chain: waves of stages multiply; switches of stage 1 are at known angles."""
     first = stages[0]
     found: list[object] = [
         Switches(partial(on_part, first.designs, known.angles)) for known in first.family.every(Switches)
@@ -246,9 +246,9 @@ def of_stages(stages: Sequence[Stage]) -> list[object]:
 
 
 def of_members(members: Sequence[Member], sums: frozenset[str]) -> list[object]:
-    """Return what the members of a machine bring in: their ratios, and the switches of those that the shaft drives.
+    """List the features of a machine: ratios of its members, and switches of members driven by the shaft.
 
-    ``sums`` are the pose outputs that are sums over members, and feel what an output of one of them does.
+    ``sums`` are the pose outputs that are sums over members, and share the features of their terms.
     """
     found: list[object] = [Waves(partial(_of_member, tuple(members)))]
     for m in members:
@@ -294,13 +294,13 @@ def _of_shaft(member: Member, known: Bends) -> Bends:
 
 
 def _turned(member: Member, curves: Callable[..., Array], designs: Array, angles: Angles, *found: Columns) -> Array:
-    """Functions of a member that the main shaft drives, at angles of the main shaft."""
+    """Functions of a member driven by the main shaft, at angles of the main shaft."""
     phase = member.phase(designs)
     return curves(member.designs(designs), Angles.of(member.ratio * angles.phi + phase[:, None]), *found)
 
 
 def on_part(part: Callable[[Array], Array], of_design: Callable[[Array], T], designs: Array) -> T:
-    """Return a function of the designs of a stage or a member for those of the whole."""
+    """Evaluate a function of a stage's or member's designs on designs of the whole."""
     return of_design(part(designs))
 
 

@@ -73,7 +73,7 @@ _beside = poses_of(cylindrical_looper.coupled_poses, cylindrical_looper.Outputs,
 
 def poses(designs: Array, angles: Angles, wanted: frozenset[str]) -> Columns:
     """Compute the wanted pose outputs and status of every design at its crank angles, each (n, m)."""
-    # what is no number counts even where the place of the ball does not
+    # invalid values count even if the place of the ball does not
     beside = (designs[:, _D2] != 0.0) | ~np.isfinite(designs[:, _D2:]).all(axis=1)
     if beside.any() and not beside.all():
         return _of_both(designs, angles, wanted, beside)
@@ -81,7 +81,7 @@ def poses(designs: Array, angles: Angles, wanted: frozenset[str]) -> Columns:
 
 
 def _of_both(designs: Array, angles: Angles, wanted: frozenset[str], beside: np.ndarray) -> Columns:
-    """Return poses of designs some of which have the second ball beside the axis."""
+    """Compute poses of designs some of which have the second ball beside the axis."""
     found: Columns = {}
     for rows in (beside, ~beside):
         for name, values in poses(np.ascontiguousarray(designs[rows]), angles.part(rows), wanted).items():
@@ -92,12 +92,12 @@ def _of_both(designs: Array, angles: Angles, wanted: frozenset[str], beside: np.
 
 
 def rocker_foot(designs: Array, angles: Angles, motion: Columns) -> Array:
-    """Point of the shaft at the height of the rocker's ball, (n, m, 3)."""
+    """Return the point of the shaft at the height of the rocker's ball, (n, m, 3)."""
     return _on_shaft(designs, np.asarray(motion["z_c1"], np.float64))
 
 
 def looper_foot(designs: Array, angles: Angles, motion: Columns) -> Array:
-    """Point of the shaft at the height of the working point, (n, m, 3)."""
+    """Return the point of the shaft at the height of the working point, (n, m, 3)."""
     return _on_shaft(designs, np.asarray(motion["z_p"], np.float64))
 
 

@@ -1,4 +1,4 @@
-"""Registry entry of the thread take-up by an eyelet on a crank; as second stage of a chain, on a rocker."""
+"""Registry entry of the thread take-up by an eyelet on a crank, or, as second stage of a chain, on a rocker."""
 
 from __future__ import annotations
 
@@ -47,7 +47,7 @@ poses = poses_of(eyelet.poses, eyelet.Outputs)
 
 
 def guide(number: int) -> Fixed:
-    """Guide 1 or 2, where the thread comes from and goes to."""
+    """Make the fixed point of guide 1 or 2, at the ends of the thread."""
 
     def at(designs: Array) -> Array:
         e, x, y, z = (parameter(PARAMETERS, name.format(number), designs) for name in ("e", "dX{}", "dY{}", "Z{}"))
@@ -60,7 +60,7 @@ EYELET = ("X_E", "Y_E", "Z_E")
 
 
 def thread_squared(number: int, designs: Array, angles: Angles, found: Columns) -> Array:
-    """Squared length of thread from a guide to the eyelet, (n, m): near the guide it turns fast."""
+    """Squared length of thread from a guide to the eyelet, (n, m): where it is small the thread turns fast."""
     place = guide(number).at(designs)
     squares = [np.square(np.asarray(found[name], np.float64) - place[:, [k]]) for k, name in enumerate(EYELET)]
     return squares[0] + squares[1] + squares[2]

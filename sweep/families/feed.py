@@ -136,12 +136,12 @@ def rocker_loop(parameters: tuple[Parameter, ...], designs: Array, angles: Angle
 
 
 def horizontal_chain(designs: Array, parameters: tuple[Parameter, ...] = PARAMETERS) -> Array:
-    """Take the crank-rocker of the horizontal chain out of the designs of a rack, as its design matrix (n, 8)."""
+    """Extract the crank-rocker of the horizontal chain from the designs of a rack, as its design matrix (n, 8)."""
     return np.column_stack([designs[:, [0, 1, 2, 3, 4, 5, 6]], parameter(parameters, SIGMA.name, designs)])
 
 
 def chain_joints(parameters: tuple[Parameter, ...]) -> dict[str, Made]:
-    """Return crank pin and rocker ball of the horizontal chain."""
+    """Points of the skeleton: crank pin and rocker ball of the horizontal chain."""
 
     def joint(name: str, designs: Array, angles: Angles, found: Columns) -> Array:
         return np.stack(_of_chain(parameters, designs, angles, *(f"{axis}_{name}" for axis in AXES)), axis=-1)
@@ -153,7 +153,7 @@ CHAIN_LINKS = (CRANK, COUPLER, Link("rocker", ("d", "c", "h")))
 
 
 def lift_loop(designs: Array, angles: Angles, found: Columns) -> Array:
-    """Return Heron's product of the triangle H, E, F, (n, m): 16 times its squared area."""
+    """Compute Heron's product of the triangle H, E, F, (n, m): 16 times its squared area."""
     x_h, y_h, x_e, y_e = floats(found, "x_h", "y_h", "x_e", "y_e")
     q, fx, fy = dimensions(PARAMETERS, designs, "q", "fx", "fy")
     w, f = np.hypot(x_h - x_e, y_h - y_e), np.hypot(fx, fy)
@@ -162,14 +162,14 @@ def lift_loop(designs: Array, angles: Angles, found: Columns) -> Array:
 
 
 def events(designs: Array, wanted: frozenset[str], accuracy: Accuracy) -> Columns:
-    """Find entry, leaving and what lies between, with errors estimated from the rounding of a tooth's height."""
+    """Compute entry, leaving and feed between them, with errors estimated from the rounding of a tooth's height."""
     status, values = np.empty(len(designs), np.uint8), np.empty((len(_EVENTS), len(designs)))
     feed.feeding(designs, status, values)
     columns: dict[str, Array] = dict(zip(_EVENTS, values, strict=True))
     with np.errstate(all="ignore"):
         height = 16.0 * EPS * np.abs(designs[:, _LENGTHS]).sum(axis=1)
         angle = height * (1.0 / np.abs(columns["entry_speed"]) + 1.0 / np.abs(columns["leave_speed"]))
-        # accelerations of a tooth are of the size of the eccentricities: a shift of the event changes speeds by that
+        # accelerations of a tooth are of the size of the lengths: a shift of the event changes speeds accordingly
         size = np.abs(designs[:, _LENGTHS]).sum(axis=1)
         errors = {
             "phi_entry": angle, "phi_leave": angle, "feed_angle": angle, "entry_speed": height + angle * size,
@@ -251,14 +251,14 @@ TRIAD_OUTPUTS = (
 
 
 def rocker_pin(designs: Array, angles: Angles, found: Columns) -> Array:
-    """Return H, on the arm of the horizontal chain's rocker."""
+    """Compute the point H on the arm of the horizontal chain's rocker, (n, m, 3)."""
     (psi,) = _of_chain(TRIAD_PARAMETERS, designs, angles, "psi")
     e, arm, ahead = dimensions(TRIAD_PARAMETERS, designs, "h_e", "rh", "dh")
     return np.stack([e + arm * np.cos(psi + ahead), arm * np.sin(psi + ahead), 0.0 * psi], axis=-1)
 
 
 def eccentric(number: int) -> Made:
-    """Centre of an eccentric."""
+    """Point of the skeleton: centre of an eccentric."""
 
     def at(designs: Array, angles: Angles, found: Columns) -> Array:
         names = (f"{name}{number}" for name in ("xE", "yE", "rE", "dE"))
@@ -270,7 +270,7 @@ def eccentric(number: int) -> Made:
 
 
 def rack_joint(number: int) -> Made:
-    """Joint of a link on the rack."""
+    """Point of the skeleton: joint of a link on the rack."""
 
     def at(designs: Array, angles: Angles, found: Columns) -> Array:
         x, y, chi = floats(found, "x_t", "y_t", "chi")
@@ -281,11 +281,11 @@ def rack_joint(number: int) -> Made:
     return Made(("x_t", "y_t", "chi"), at)
 
 
-_SURELY = 1e-6  # of the others' sum a link is longer: more than rounding moves a rocker pin
+_SURELY = 1e-6  # relative excess of a side over the sum of the others, above rounding of a rocker pin
 
 
 def _apart(designs: Array) -> NDArray[np.bool_]:
-    """Designs that no guess assembles: two links, the rack and the distance of their leads cannot close at phi = 0."""
+    """Whether designs cannot assemble at phi = 0: two links, rack and leads do not close from any initial guess."""
     start = Angles.of(np.zeros((1, 1)))
     leads = [at(designs, start, {})[:, 0] for at in (rocker_pin, eccentric(2).at, eccentric(3).at)]
     x, y, q = ([dimensions(TRIAD_PARAMETERS, designs, name.format(k))[0] for k in (1, 2, 3)]
@@ -299,7 +299,7 @@ def _apart(designs: Array) -> NDArray[np.bool_]:
 
 
 def triad_poses(designs: Array, angles: Angles, wanted: frozenset[str]) -> Columns:
-    """Compute the wanted pose outputs and status; designs of which two leads are too far apart are NOT_ASSEMBLED."""
+    """Compute the wanted pose outputs and status; designs with two leads too far apart are NOT_ASSEMBLED."""
     columns = _poses(feed.triad_poses, triad.OUTPUTS, ("phi",), designs, angles, wanted)
     lost = columns["status"] == NOT_CONVERGED
     rows = np.flatnonzero(lost.any(axis=1))

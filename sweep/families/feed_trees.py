@@ -1,4 +1,4 @@
-"""Trees of links of feed racks: the crank-rocker that moves them to and fro, the eccentrics that lift them."""
+"""Trees of links of feed racks: the crank-rocker that moves the rack to and fro, and the eccentrics that lift it."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ _ENDS = ((COUPLER, ROCKER),) * 3
 
 
 def _horizontal(parameters: Parameters, designs: Array, angles: Angles, links: Links) -> Path:
-    """Write crank, coupler and rocker; return the pin H of the rack on the rocker's arm."""
+    """Write crank, coupler and rocker; return the path of the rack's pin H on the rocker's arm."""
     a, c, e, f, g, alpha, arm, ahead, sigma = dimensions(
         parameters, designs, "h_a", "h_c", "h_e", "h_f", "h_g", "h_alpha", "rh", "dh", "h_sigma"
     )
@@ -51,7 +51,7 @@ def _horizontal(parameters: Parameters, designs: Array, angles: Angles, links: L
 
 
 def _eccentric(parameters: Parameters, designs: Array, angles: Angles, links: Links, body: int, which: str) -> Path:
-    """Write an eccentric, whose freedom has the number after that of the body; return its centre."""
+    """Write an eccentric, whose freedom has the body's number plus 1; return the path of its centre."""
     x, y, radius, ahead = dimensions(parameters, designs, *(f"{name}{which}" for name in ("xE", "yE", "rE", "dE")))
     turned = poses.crank_angle(links, angles, ahead=ahead)
     centre = poses.standing_at(links, x, y)
@@ -68,7 +68,7 @@ def _eccentric_parts(which: str, body: int) -> tuple[LinkBody, LinkJoint]:
 
 
 def two_leads(parameters: Parameters) -> LinkTree:
-    """Rack on the pin of the rocker and the coupler of the lift eccentric; a tool stands at the tooth."""
+    """Tree of a rack on the pin of the rocker and the coupler of the lift eccentric; a tool is at the tooth."""
 
     def at_tooth(designs: Array) -> Array:
         tx, ty, number, pitch = dimensions(parameters, designs, "tx", "ty", "tooth", "pitch")
@@ -116,7 +116,7 @@ def two_leads(parameters: Parameters) -> LinkTree:
 
 
 def three_leads(parameters: Parameters) -> LinkTree:
-    """Rack on links of the rocker and of two eccentrics; a tool stands at the tooth."""
+    """Tree of a rack on links of the rocker and of two eccentrics; a tool is at the tooth."""
     links_from = 5  # bodies: horizontal chain, two eccentrics, links 1 to 3, rack
     rack = links_from + 3
 

@@ -85,12 +85,12 @@ EVENT_OUTPUTS = (
 
 TURNS = 4
 NODES = 720
-CHANGES = 128  # of what a foot does in a turn that are told: bounces with a restitution of 0.7 need as many
-FEET = [0, 1, 2, 3, 6, 8, 9]  # columns of what the march takes
+CHANGES = 128  # changes of contact in a turn that are recorded: bounces with a restitution of 0.7 need as many
+FEET = [0, 1, 2, 3, 6, 8, 9]  # columns of the march's inputs
 
 
 def marched(path: Array, feet: Array) -> tuple[Columns, Array, Array]:
-    """Events, changes and status, and the heights and forces at the nodes of the last turn.
+    """Compute events, changes and status, and the heights and forces at the nodes of the last turn.
 
     ``feet`` (n, 7) are mass, spring, preload, speed, restitution, stiffness and damping of the fabric.
     """
@@ -107,13 +107,13 @@ def marched(path: Array, feet: Array) -> tuple[Columns, Array, Array]:
 
 
 def nodes_for(poses: int) -> tuple[int, int]:
-    """How many nodes are marched for so many poses of a turn, and how many nodes apart the poses stand."""
+    """Return the number of nodes marched for ``poses`` poses of a turn, and that from pose to pose."""
     apart = -(-NODES // poses)
     return poses * apart, apart
 
 
 def happening(columns: Columns, wanted: frozenset[str]) -> Columns:
-    """Wanted columns and the status: NO_EVENT where one of them is about an event that does not happen."""
+    """Select the wanted columns; status NO_EVENT where one of them belongs to an event that does not occur."""
     status = np.array(columns["status"], np.uint8)
     for name in wanted:
         status[(status == OK) & np.isnan(columns[name])] = NO_EVENT
@@ -121,7 +121,7 @@ def happening(columns: Columns, wanted: frozenset[str]) -> Columns:
 
 
 def pose_columns(designs: Array, path: Array, heights: Array, forces: Array, apart: int) -> Columns:
-    """Pose outputs at every so many nodes; ``designs`` are m, k, F0; (17)."""
+    """Compute pose outputs at every ``apart``-th node; ``designs`` are m, k, F0; (17)."""
     _, k, preload = (designs[:, j, None] for j in range(3))
     return {
         "y_rack": path[:, 0, ::apart],
@@ -134,7 +134,7 @@ def pose_columns(designs: Array, path: Array, heights: Array, forces: Array, apa
 
 
 def path_of(designs: Array, nodes: int) -> Array:
-    """Path of the rack at so many equal crank angles, (n, 6, nodes)."""
+    """Path of the rack at ``nodes`` equal crank angles, (n, 6, nodes)."""
     path = np.empty((len(designs), 6, nodes))
     foot.rack_path(designs, path)
     return path
@@ -144,7 +144,7 @@ Marched = tuple[Columns, Array, Array, Array]
 
 
 def on_rack(designs: Array, nodes: int) -> Marched:
-    """Events with the status, the path of a harmonic rack, and the heights and forces at so many nodes."""
+    """March on a harmonic rack: events with the status, path of the rack, heights and forces at the nodes."""
     path = path_of(designs, nodes)
     columns, heights, forces = marched(path, designs[:, FEET])
     return columns, path, heights, forces
@@ -162,7 +162,7 @@ def _poses(
 
 
 def closed(designs: Array, wanted: frozenset[str], accuracy: Accuracy) -> Columns:
-    """Entry, first jump, limits of spring and preload."""
+    """Compute entry, first jump, and limits of spring and preload in closed form."""
     status, values = np.empty(len(designs), np.uint8), np.empty((len(_CLOSED), len(designs)))
     foot.closed_forms(designs, status, values)
     columns: Columns = dict(zip(_CLOSED, values, strict=True))
@@ -172,18 +172,18 @@ def closed(designs: Array, wanted: frozenset[str], accuracy: Accuracy) -> Column
 def _events(
     run: Callable[[Array, int], Marched], designs: Array, wanted: frozenset[str], accuracy: Accuracy
 ) -> Columns:
-    """Find loss of contact, landing, impacts and what they cost, of the last turn marched."""
+    """Compute loss of contact, landing, impacts and lost feed of the last turn marched."""
     return happening(run(designs, NODES)[0], wanted)
 
 
 def foot_place(designs: Array, angles: Angles, found: Columns) -> Array:
-    """Foot, above the middle of the rack's travel."""
+    """Compute the point of the foot, above the middle of the rack's travel."""
     y = np.asarray(found["y_foot"], np.float64)
     return np.stack([0.0 * y, y, 0.0 * y], axis=-1)
 
 
 def rack_place(designs: Array, angles: Angles, found: Columns) -> Array:
-    """Return the rack's tooth."""
+    """Compute the point of the rack's tooth."""
     y = np.asarray(found["y_rack"], np.float64)
     return np.stack([-parameter(PARAMETERS, "X", designs)[:, None] * np.cos(angles.phi) + 0.0 * y, y, 0.0 * y], axis=-1)
 
@@ -232,22 +232,22 @@ def feed_path(designs: Array, nodes: int, sense: int = 1) -> tuple[Array, np.nda
     path = np.ascontiguousarray(outputs[_ROWS].transpose(1, 0, 2))
     path[:, 0] -= rack[:, _PLATE, None]
     path[:, [1, 4]] *= sense
-    # the first pose that is not ok speaks for the turn
+    # the first pose that is not ok determines the status of the turn
     worst = np.take_along_axis(status, np.argmax(status != 0, axis=1)[:, None], axis=1)[:, 0]
     return path, worst
 
 
 def on_feed(designs: Array, nodes: int, sense: int = 1) -> Marched:
-    """As :func:`on_rack`, on the rack of a feed mechanism; for a crank that turns backwards, by minus its angle."""
+    """March as :func:`on_rack` on the rack of a feed mechanism; a backward crank is marched over minus its angle."""
     path, linkage = feed_path(designs, nodes, sense)
     columns, heights, forces = marched(path, designs[:, _FEET])
-    # A rack that is not assembled has no path: the linkage's status stands for what the march found invalid.
+    # A rack that does not assemble has no path: the linkage's status replaces that of the march.
     columns["status"] = np.where(linkage != 0, linkage, columns["status"]).astype(np.uint8)
     return columns, path, heights, forces
 
 
 def contact(designs: Array, wanted: frozenset[str], accuracy: Accuracy) -> Columns:
-    """Find the softest spring and the least preload that keep a rigid foot on the rack from entry to leaving."""
+    """Compute the softest spring and least preload that keep a rigid foot on the rack from entry to leaving."""
     mass, _, preload, omega = designs[:, _FEET[:4]].T
     unit = mass * omega * omega
     path, status = feed_path(designs, NODES)
@@ -265,7 +265,7 @@ def contact(designs: Array, wanted: frozenset[str], accuracy: Accuracy) -> Colum
 
 
 def feeding(designs: Array, wanted: frozenset[str], accuracy: Accuracy) -> Columns:
-    """Entry, leaving and path of the tooth, as of the rack alone."""
+    """Compute entry, leaving and path of the tooth, as for the rack alone."""
     return feed.events(np.ascontiguousarray(designs[:, :_RACK_COLUMNS]), wanted, accuracy)
 
 
@@ -274,7 +274,7 @@ def _rack(designs: Array, angles: Angles, *names: str) -> list[Array]:
 
 
 def of_rack(joint: str) -> Made:
-    """Return a joint of the feed mechanism."""
+    """Point of the skeleton: joint of the feed mechanism."""
 
     def at(designs: Array, angles: Angles, found: Columns) -> Array:
         x, y = _rack(designs, angles, f"x_{joint}", f"y_{joint}")
@@ -284,13 +284,13 @@ def of_rack(joint: str) -> Made:
 
 
 def plate(designs: Array) -> Array:
-    """Return the place of the foot on the needle plate: above the tooth's place at phi = 0."""
+    """Return the place of the foot on the needle plate, above the tooth at phi = 0."""
     (x,) = _rack(designs, Angles.of(np.zeros((1, 1))), "x_t")
     return np.stack([x[:, 0], designs[:, _PLATE], 0.0 * x[:, 0]], axis=1)
 
 
 def feed_foot_place(designs: Array, angles: Angles, found: Columns) -> Array:
-    """Foot."""
+    """Compute the point of the foot, (n, m, 3)."""
     y = np.asarray(found["y_foot"], np.float64)
     return plate(designs)[:, None, :] + np.stack([0.0 * y, y, 0.0 * y], axis=-1)
 

@@ -21,7 +21,7 @@ from sweep.families.outputs import ALONG_FRAME, coordinate_outputs, joint_output
 from sweep.families.poses import step_of
 from sweep.families.skeletons import CRANK, ORIGIN, ROCKER, links, standing
 
-# a b c e; the coupler point need not be given; branch
+# a b c e; the coupler point, which is optional; branch
 PARAMETERS = (
     *guide.PARAMETERS[:4],
     *(replace(p, default=0.0) for p in guide.PARAMETERS[4:6]),
@@ -48,7 +48,7 @@ _POINT = {"x_m": "s", "y_m": "dev", "dx_m": "ds", "dy_m": "ddev", "d2x_m": "d2s"
 
 
 def as_crank_rocker(designs: Array) -> Array:
-    """Design matrix of the same linkage as a crank-rocker, (n, 8); nan where the coupler point is no number."""
+    """Design matrix of the same linkage as a crank-rocker, (n, 8); nan if the coupler point is invalid."""
     matrix = np.zeros((len(designs), len(crank_rocker.PARAMETERS)), designs.dtype)
     matrix[:, :4], matrix[:, 7] = designs[:, :4], designs[:, 6]
     with np.errstate(invalid="ignore"):
@@ -74,7 +74,7 @@ def _poses(
         columns = {name: found[_POINT[name]] for name in wanted if name in _POINT} | {"status": found["status"]}
     if rest or not asked:
         turned = rocker(as_crank_rocker(designs), angles, rest)
-        if asked:  # the status of the point where the rocker has nothing to say
+        if asked:  # the status of the rocker has precedence over that of the point
             turned["status"] = np.where(turned["status"] == st.OK, columns["status"], turned["status"])
         columns |= turned
     return columns

@@ -1,4 +1,4 @@
-"""Frames of stages and members: each crank axis lies on a turning axis, and the frame of the mechanism follows."""
+"""Frames of stages and members, determined by placing each crank axis on a turning axis."""
 
 from __future__ import annotations
 
@@ -12,12 +12,12 @@ from kernels.types import Array
 from sweep.families.base import Family, Parameter, Stage
 from sweep.families.capabilities import OutputLink, skeleton_of
 
-CRANKS = ("a", "a1", "o2")  # what families call the joint on the axis of their first crank
+CRANKS = ("a", "a1", "o2")  # families' names of the joint on the axis of their first crank
 X, Z = (1.0, 0.0, 0.0), (0.0, 0.0, 1.0)
 
 
 class Frame(NamedTuple):
-    """A frame in another one: a vector v of it is ``rotation`` v there, from ``at``; one for each design, or for all.
+    """A frame in an outer frame, for each design or for all: a vector v becomes ``rotation`` v, its origin is ``at``.
 
     ``rotation`` is (n, 3, 3) or (1, 3, 3), ``at`` (n, 3) or (1, 3); complex designs give complex frames.
     """
@@ -26,29 +26,29 @@ class Frame(NamedTuple):
     at: Array
 
     def turned(self, vector: list[Any]) -> list[Any]:
-        """Return components in the other frame of a vector of this one, each (n, m)."""
+        """Transform a vector to the outer frame; components (n, m) each."""
         x, y, z = vector
         return [r[:, 0, None] * x + r[:, 1, None] * y + r[:, 2, None] * z for r in np.moveaxis(self.rotation, 1, 0)]
 
     def placed(self, point: list[Any]) -> list[Any]:
-        """Return coordinates in the other frame of a point of this one, each (n, m)."""
+        """Transform a point to the outer frame; coordinates (n, m) each."""
         return [self.at[:, [k]] + part for k, part in enumerate(self.turned(point))]
 
     def within(self, outer: Frame) -> Frame:
-        """Return this frame in the one that ``outer``, in which it stands, is given in."""
+        """Return this frame, given in ``outer``, relative to the frame that ``outer`` is given in."""
         if self is WHOLE:
             return outer
         return Frame(outer.rotation @ self.rotation, outer.at + _times(outer.rotation, self.at))
 
     @property
     def inverse(self) -> Frame:
-        """The other frame in this one."""
+        """The outer frame in this one."""
         back = np.swapaxes(self.rotation, 1, 2)
         return Frame(back, -_times(back, self.at))
 
 
 class Axis(NamedTuple):
-    """An axis that turns: a point of it, its direction, and the direction from which angles about it count; (n, 3)."""
+    """A turning axis: a point of it, its direction, and the zero direction of angles about it; each (n, 3)."""
 
     at: Array
     along: Array
@@ -59,7 +59,7 @@ WHOLE = Frame(np.eye(3)[None], np.zeros((1, 3)))
 
 
 def tilted(rotation: Array, tilts: Array) -> Array:
-    """Return a rotation (1, 3, 3) turned by angles (n, 3) about x, y, z of the outer frame, one after another."""
+    """Turn a rotation (1, 3, 3) by angles (n, 3) about x, y, z of the outer frame, one after another."""
     if not tilts.any():
         return rotation
     rows = np.broadcast_to(rotation, (len(tilts), 3, 3)).astype(tilts.dtype)
@@ -70,12 +70,12 @@ def tilted(rotation: Array, tilts: Array) -> Array:
 
 
 def product(a: Array, b: Array) -> Array:
-    """Return the vector products of vectors, (..., 3)."""
+    """Cross product of vectors, (..., 3)."""
     return a[..., [1, 2, 0]] * b[..., [2, 0, 1]] - a[..., [2, 0, 1]] * b[..., [1, 2, 0]]
 
 
 def place_parameters(what: str, at: Sequence[float]) -> tuple[Parameter, ...]:
-    """Return parameters for place and tilt of a part in the machine's frame, which may have tolerances."""
+    """Make the parameters of a part's place and tilt in the machine's frame, which may have tolerances."""
     return (
         *(
             Parameter(f"{axis}_at", "length", f"{axis} of {what} in the machine's frame", default=x)
@@ -93,11 +93,11 @@ def _times(matrix: Array, vector: Array) -> Array:
 
 
 def mounted(axis: Axis, crank: Axis, sense: Any, shift: Any, turn: Any) -> Frame:
-    """Return the frame whose crank axis lies on a turning axis, machine-and-stitch (1) and (4).
+    """Compute the frame whose crank axis lies on a turning axis, machine-and-stitch (1) and (4).
 
     Parameters
     ----------
-    axis : what turns
+    axis : the turning axis
     crank : the crank axis in the wanted frame, with the direction of the crank at phi = 0
     sense : +1 or -1: whether the crank axis runs along the turning axis or against it
     shift : from the point of the axis, along it, to the point of the crank axis, (n,)
@@ -115,7 +115,7 @@ def _triad(zero: Array, along: Array, axis: int) -> Array:
 
 
 def crank_axis(family: Family, designs: Array) -> Axis | None:
-    """Return the axis of the first crank in the family's frame; None where the family has none."""
+    """Return the axis of the first crank in the family's frame; None if the family has none."""
     fixed = skeleton_of(family).fixed
     crank = next((fixed[name] for name in CRANKS if name in fixed), None)
     if crank is None or crank.axis is None or crank.kind != "axis":
@@ -126,7 +126,7 @@ def crank_axis(family: Family, designs: Array) -> Axis | None:
 
 
 def output_axis(family: Family, designs: Array) -> Axis | None:
-    """Return the axis of the output link in the family's frame, from its point with z = 0; None without such a link."""
+    """Return the output link's axis in the family's frame, from its point with z = 0; None without such a link."""
     link = family.find(OutputLink)
     if link is None:
         return None
@@ -135,7 +135,7 @@ def output_axis(family: Family, designs: Array) -> Axis | None:
 
 
 def stage_frames(stages: Sequence[Stage], designs: Array) -> list[Frame]:
-    """Return the frames of all stages of a chain in that of the first, from designs of the chain."""
+    """Compute the frames of all stages of a chain in that of the first, from designs of the chain."""
     found = [WHOLE]
     for before, stage in pairwise(stages):
         axis = output_axis(before.family, before.designs(designs))
@@ -147,7 +147,7 @@ def stage_frames(stages: Sequence[Stage], designs: Array) -> list[Frame]:
 
 
 def can_be_placed(families: Sequence[Family]) -> bool:
-    """Tell whether each of these families drives the crank of the next about an axis that both name."""
+    """Whether each family drives the crank of the next about an axis that both define."""
     return all(
         before.find(OutputLink) is not None and crank_axis(family, np.ones((1, len(family.parameters)))) is not None
         for before, family in pairwise(families)

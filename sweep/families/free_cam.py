@@ -51,7 +51,7 @@ EDGE = {"k1": -1.0, "k2": -0.5, "k3": 0.5, "k4": 1.0}
 
 
 def edge_point(share: float) -> Made:
-    """Return a point of the edge, at a share of the larger distance of a guide from the cam axis."""
+    """Make a point of the edge, at a share of the larger distance of a guide from the cam axis."""
 
     def at(designs: Array, angles: Angles, found: Columns) -> Array:
         x1, y1, x2, y2, a = (parameter(PARAMETERS, name, designs) for name in ("X1", "Y1", "X2", "Y2", "a"))
@@ -62,14 +62,14 @@ def edge_point(share: float) -> Made:
 
 
 def turned(x: Array, y: Array, angles: Angles) -> Array:
-    """Return points of the cam, (n,) or (n, m) each in its own axes, turned with it: (n, m, 3)."""
+    """Rotate points of the cam, (n,) or (n, m) each in its own axes, with the cam: (n, m, 3)."""
     x, y = (values if values.ndim == 2 else values[:, None] for values in (x, y))
     x, y = x * angles.cos - y * angles.sin, x * angles.sin + y * angles.cos
     return np.stack([x, y, 0.0 * x], axis=-1)
 
 
 def straight(designs: Array) -> Array:
-    """Return the point of the plane of the cam through which the straight line between the guides passes, (n, 3)."""
+    """Intersect the straight line between the guides with the plane of the cam, (n, 3)."""
     guides = (np.stack([parameter(PARAMETERS, f"{axis}{k}", designs) for axis in "XYZ"], axis=1) for k in (1, 2))
     first, second = guides
     point: Array = first + (second - first) * (first[:, 2:] / (first[:, 2:] - second[:, 2:]))
@@ -77,7 +77,7 @@ def straight(designs: Array) -> Array:
 
 
 def depth(designs: Array, angles: Angles) -> Array:
-    """Return how far that point is within the material of the cam, (n, m, 1): the thread comes to lie where it is 0."""
+    """Depth of the point `straight` within the cam, (n, m, 1): at zeros the thread comes to lie on the edge."""
     place = straight(designs)[:, None, :]
     x = place[..., 0] * angles.cos + place[..., 1] * angles.sin
     y = place[..., 1] * angles.cos - place[..., 0] * angles.sin
@@ -137,7 +137,7 @@ DOMAIN = March(text="cam angle")
 
 
 def sliding_poses(designs: Array, angles: Angles, wanted: frozenset[str]) -> Columns:
-    """Compute the wanted pose outputs and status, each (n, m), of the last of the turns that are marched."""
+    """Compute the wanted pose outputs and status, each (n, m), of the last turn of the march."""
     needed = wanted | {"L"} if "P" in wanted else wanted
     own = np.ascontiguousarray(designs[:, :_FRICTIONLESS])
     friction = np.ascontiguousarray(designs[:, [_FRICTIONLESS + 1, _FRICTIONLESS + 2, _FRICTIONLESS]])
@@ -149,7 +149,7 @@ def sliding_poses(designs: Array, angles: Angles, wanted: frozenset[str]) -> Col
 
 
 def contact_place(designs: Array, angles: Angles, found: Columns) -> Array:
-    """Place where the thread passes the plane of the cam: on the edge, or on the line between the guides."""
+    """Compute where the thread passes the cam's plane: on the edge, or on the line between the guides."""
     y, on = floats(found, "y_contact", "contact")
     at = turned(parameter(PARAMETERS, "a", designs)[:, None] * y * y, y, angles)
     return np.where(on[..., None] == 1.0, at, straight(designs)[:, None, :])
