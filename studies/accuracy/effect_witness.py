@@ -1,7 +1,7 @@
 """References of the effects: by another method if an effect couples a whole turn, otherwise by finer sampling.
 
 A witness takes the family with the effect's poses and a design matrix, and returns reference values by output.
-Extrema of pose outputs without a witness are compared with ever finer grids.
+Extrema of pose outputs without a witness are compared with successively finer grids.
 """
 
 from __future__ import annotations
@@ -88,7 +88,7 @@ def kind_of(name: str) -> str:
 
 
 def of_samples(given: Effected, wanted: tuple[str, ...]) -> dict[str, Known]:
-    """Return largest values, magnitudes and least values of pose outputs, by ever finer grids."""
+    """Return largest values, magnitudes and least values of pose outputs, by successively finer grids."""
     found = {}
     for name in wanted:
         for prefix, sign in EXTREMA.items():
@@ -101,7 +101,7 @@ def of_samples(given: Effected, wanted: tuple[str, ...]) -> dict[str, Known]:
 
 
 def _is_nothing(given: Effected, pose: str) -> bool:
-    """Tell whether a pose output is rounding alone, as the moment in a pin of a planar mechanism."""
+    """Tell whether a pose output is only rounding, like the moment in a pin of a planar mechanism."""
     (values,) = given.poses((pose,), LOOKED_AT)
     size, looked_at = np.abs(values).max(axis=1), np.ones(len(values), np.bool_)
     return bool(rounding_alone(given.full, given.designs, pose, values, size, looked_at).any())

@@ -1,4 +1,4 @@
-"""The pages docs/accuracy.md and below, with their figures, from the measured tables alone."""
+"""The pages docs/accuracy.md and below, with their figures, from the measured tables only."""
 
 from __future__ import annotations
 

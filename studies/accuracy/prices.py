@@ -32,7 +32,7 @@ EACH, SMOKE_EACH, SEED = 100, 4, 1  # crank-rockers in each of their own regions
 
 
 def family_prices(smoke: bool) -> pd.DataFrame:
-    """Return one row per family or chain, region and method; in smoke every sixth of them, two designs each."""
+    """Return one row per family or chain, region and method; smoke runs take every sixth row and two designs each."""
     import pandas as pd
 
     rows: list[dict[str, object]] = []

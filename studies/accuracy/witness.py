@@ -1,9 +1,9 @@
-"""A reference for any family from its position alone, without derivatives of the register and without a search.
+"""A reference for any family, computed from positions only, without the register's derivatives and without a search.
 
 The largest second derivative over a turn: second differences of the position on a fine grid locate the peaks, narrower
 grids between their neighbours refine the locations, and around each the position at Chebyshev nodes is replaced by the
 interpolating polynomial, whose own second derivative is maximised.  The width of the interval is that at which two
-neighbouring widths agree best; their difference is the error of the reference.  The range of a position: ever narrower
+neighbouring widths agree best; their difference is the error of the reference.  The range of a position: narrowing
 grids around its ends.  Families that have poses in twice the working precision are evaluated by those.
 
 A march exists on its own grid only: there the reference is the same march in far finer steps, not another method.
@@ -80,7 +80,7 @@ def position(mechanism: Family, designs: Array, phi: Array) -> Array:
 def extreme(mechanism: Family, designs: Array, name: str, sign: int) -> Known:
     """Return the largest value (sign 1), least value (-1) or largest magnitude (0) of a pose output over the turn.
 
-    It is found by ever narrower grids around the highest samples alone, so that corners and jumps do no harm.
+    It is found by successively narrower grids around the highest samples, which corners and jumps do not disturb.
     """
     wraps = mechanism.pose_output[name].wraps
 

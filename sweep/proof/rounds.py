@@ -141,13 +141,13 @@ def _read(path: Path) -> Explored:
 def explored(
     question: Question, target: float, asked: ProveSettings, folder: Path, cores: Cores, tell: Tell
 ) -> Explored:
-    """Halve boxes until all is proven or the allowed number of boxes was evaluated.
+    """Halve boxes until every box is proven or the allowed number of boxes was evaluated.
 
     Parameters
     ----------
     question : the space, objective and limits
     target : in the unit of the proof's rows
-    asked : number of boxes to evaluate, and their smallest size
+    asked : largest number of boxes to evaluate, and their smallest size
     folder : folder of finished units; the same question must have the same folder
     cores : executor of the units, and its stop flag
     tell : called with the numbers of boxes evaluated so far and expected in all: a round ends early if units prove all

@@ -238,7 +238,7 @@ def _made(data: Dataset, row: dict[str, Any]) -> str:
 
 
 def _extras(data: Dataset, row: dict[str, Any]) -> list[tuple[str, str]]:
-    """Return outputs of the dimensions alone that matter for building the mechanism."""
+    """Return the design outputs that matter for building the mechanism."""
     family = data.study.bare
     design = np.array([[float(row[name]) for name in family.parameter_names]])
     found = []

@@ -75,7 +75,7 @@ class Faults:
         self._add(key, f"{spelled(key)}: unknown {what}; allowed: {allowed}")
 
     def number(self, text: str, internal: str, key: Key) -> float | None:
-        """Convert a text such as "7000 rpm" to the internal unit; None, with a fault, if it is no such quantity."""
+        """Convert a text such as "7000 rpm" to the internal unit; None, with a fault, if it is not one."""
         try:
             return units.read(text, internal)
         except units.UnitFault as fault:

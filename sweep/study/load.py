@@ -47,7 +47,7 @@ def load_study(path: str | Path, smoke: bool = False) -> Study:
     Parameters
     ----------
     path : a study.toml, or the folder that holds one
-    smoke : lay smoke.toml, which lies beside it and holds only the keys that differ, over it
+    smoke : override keys of the study by those in smoke.toml in the same folder
 
     Raises
     ------

@@ -286,7 +286,7 @@ def with_effects(file: StudyFile, bare: Family, others: Iterable[str], curves: M
     Parameters
     ----------
     bare : the mechanism
-    others : names of outputs that other tables ask for
+    others : names of outputs requested by other tables
     curves : the loads over the turn
     """
     asked = file.texts("scene", "want")

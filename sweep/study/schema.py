@@ -74,7 +74,7 @@ def _entry() -> Schema:
 
 
 def _of_family(entry: Family) -> Schema:
-    """Return the schema of [design] for a mechanism of this family alone."""
+    """Return the schema of [design] for mechanisms of one family."""
     own = {p.name: {"description": _described(p), "allOf": [ENTRY]} for p in entry.parameters}
     known = [*own, *sorted(input_names(entry) - own.keys()), "sample", FROM, HASH]
     design = {"properties": own, "propertyNames": {"enum": known}}

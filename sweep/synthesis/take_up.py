@@ -54,7 +54,7 @@ class TakeUpFit:
 def fit_eyelet(
     phi: ArrayLike, P: ArrayLike, starts: Table, weights: ArrayLike | None = None, fixed: tuple[str, ...] = ()
 ) -> TakeUpFit:
-    """Find the eyelet on a crank that takes up the wanted thread, with the least sum of squared errors of P.
+    """Fit an eyelet on a crank to the wanted thread take-up, with the least sum of squared errors of P.
 
     Parameters
     ----------

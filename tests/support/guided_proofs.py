@@ -1,4 +1,4 @@
-"""Guided points alone and behind crank-rockers, for the tests of their proofs."""
+"""Guided points, single and driven by crank-rockers, for the tests of their proofs."""
 
 from __future__ import annotations
 

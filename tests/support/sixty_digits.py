@@ -30,7 +30,7 @@ def transfer_functions(design: Array, phi: float) -> tuple[Any, ...]:
 
 
 def position(design: Array, phi: float) -> Any:
-    """Return the angle psi alone, up to full turns, as an mpmath number."""
+    """Return the angle psi, up to full turns, as an mpmath number."""
     import mpmath
 
     with mpmath.workdps(DIGITS):

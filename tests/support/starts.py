@@ -1,4 +1,4 @@
-"""Starts of samples, all at once, and the survey of a search that ended at given values."""
+"""Starts from samples as one list, and the survey of a search that ended at given values."""
 
 from __future__ import annotations
 

@@ -42,7 +42,7 @@ class Descent:
 
     Parameters
     ----------
-    problem, program : what to minimise
+    problem, program : problem to be minimised, and its program
     start : (P,) design; its signs are kept
     stop : asked at every evaluation; true ends the search by :class:`sweep.optimise.local.model.Stopped`
     allowed : number of evaluations after which the search ends as well

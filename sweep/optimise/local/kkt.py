@@ -49,7 +49,7 @@ def multipliers(form: Form, rows: Array, jacobian: Array, fractions: Array, with
     rows : (R,) its rows there
     jacobian : (R, n) their gradients by the scaled variables
     fractions : (n,) scaled variables
-    within : scaled distance from its bound at which a row may carry a multiplier
+    within : largest scaled distance from the bound of a row with a multiplier
     """
     n = len(fractions)
     active = np.flatnonzero((rows <= within) | form.equal)

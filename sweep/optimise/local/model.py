@@ -73,7 +73,7 @@ class Model:
 
     Parameters
     ----------
-    problem, program : what to minimise
+    problem, program : problem to be minimised, and its program
     start : (P,) design; its signs are kept
     stop : asked at every evaluation; true ends the search by :class:`Stopped`
     allowed : number of evaluations after which the search ends by :class:`LooksUsedUp`; ``looks`` counts them

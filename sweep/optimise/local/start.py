@@ -30,7 +30,7 @@ def search(number: int, problem: Problem, start: Array, asked: Callable[[], bool
     Parameters
     ----------
     number : number of the start, for the result
-    problem : what to minimise
+    problem : problem to be minimised
     start : (P,) design
     asked : true ends the search with the best checked design so far, after the first design in any case
     allowed : number of evaluations after which the search ends likewise, on any machine

@@ -57,7 +57,7 @@ def minimise(
 
     Parameters
     ----------
-    problem : what to minimise
+    problem : problem to be minimised
     starts : (k, P) designs, which set the signs and the initial values of the variables
     settings, stop, jobs : as for :func:`explore`
 
@@ -86,7 +86,7 @@ def explore(
 
     Parameters
     ----------
-    problem : what to minimise
+    problem : problem to be minimised
     groups : groups of starts, each requested after the search from the previous one
     settings : ``looks`` evaluations are allowed per start; the search ends when ``unseen`` and the best basin meet the
         rule (:class:`sweep.optimise.multistart.survey.Survey`); ``time_budget`` [s] or None is an emergency deadline
@@ -152,7 +152,7 @@ def explore(
 
 
 def _done(begun: Sequence[Group], results: Sequence[Result]) -> int:
-    """Return the number of finished starts, of those that count."""
+    """Return the number of finished starts that count."""
     counts = counted(begun)
     return sum(counts[r.start] for r in results)
 

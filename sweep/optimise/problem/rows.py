@@ -148,7 +148,7 @@ def box(
     first: int,
     above: bool,
 ) -> list[tuple[Term, float]]:
-    """Return the foremost ends of the joints minus the rearmost ones, including joints that stand still.
+    """Return the largest coordinates of the joints minus the smallest ones, fixed joints included.
 
     ``maxima`` and ``minima`` are the extreme values of the joints' coordinates, with their places among the atoms; the
     result is empty if the design has none.

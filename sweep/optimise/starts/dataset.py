@@ -200,7 +200,7 @@ def sample_seconds(problem: Problem, base: Array, count: int) -> float:
 
 
 def apart(problem: Problem, starts: Array, more: Array, count: int) -> Array:
-    """Return the starts and those designs ``more`` that are not near one of them, up to ``count`` in all."""
+    """Return the starts and those of ``more`` designs that are not near any of them, at most ``count`` in all."""
     both = np.concatenate([starts, more])
     place = problem.scaled(both)
     others = [c for c in range(both.shape[1]) if c not in problem.columns]

@@ -1,6 +1,6 @@
-"""Starts without a dataset: the best of large samples, improved by ever smaller samples around them.
+"""Starts without a dataset: the best of large samples, improved by successively smaller samples around them.
 
-Every six starts come from a sample of their own, since one sample may hit a region that another one misses.
+Every six starts come from a separate sample, since one sample may hit a region that another one misses.
 """
 
 from __future__ import annotations
@@ -45,7 +45,7 @@ def samples(
 
     Parameters
     ----------
-    problem : what is to be minimised
+    problem : problem to be minimised
     signs : combinations of the parameters that are not varied (branches), among which each sample is divided
     count : largest number of designs, equally many of each sample, up to six
     seed : seed of the samples

@@ -1,6 +1,6 @@
 """Interface of a task for the solver: unknowns in a box, equations, limits, a curve whose maximum is minimised.
 
-What tasks are given is checked when a task is made: every number in its range, every choice among its words.
+Fields are validated when a task is created: every number must be in range, every choice one of its words.
 """
 
 from __future__ import annotations
