@@ -203,8 +203,7 @@ class Family:
     points : named moving points
     capabilities : typed objects for effects, proofs, drawings and fits (:mod:`sweep.families.capabilities`)
     example : an ordinary design, by parameter, whose poses all exist; hard inputs are derived from it
-    dear : for pose outputs that cost far more than the motion, the name of what computes them and its cost [ns per
-        pose], in the order in which such routes are run
+    dear : for pose outputs far more costly than the motion, their effect and its cost [ns per pose], in running order
     precise_poses : slower poses whose errors are a few roundings of the inputs, if the family has them
     """
 
