@@ -62,7 +62,7 @@ class Advice:
 
     @classmethod
     def of_turning(cls, quantity: str, values: Array, threshold: float, unit: str = "") -> Advice | None:
-        """Leave the designs out whose value is not known all the way; None where there is no other design."""
+        """Drop the designs whose values are not finite over the whole turn; None if no design is left."""
         known = values[np.isfinite(values)]
         return cls(quantity, known, threshold, unit) if known.size else None
 

@@ -1,4 +1,4 @@
-"""Registry entries of the geared dwell drives with a slotted output link: gears of one size, or of any whole ratio."""
+"""Registry entries of the geared dwell drives with a slotted output link: equal gears, or any whole gear ratio."""
 
 from __future__ import annotations
 
@@ -67,9 +67,9 @@ poses = poses_of(geared_dwell.poses, geared_dwell.Outputs, angles="phi cos sin")
 
 
 def dwell(designs: Array, wanted: frozenset[str], accuracy: Accuracy) -> Columns:
-    """Dwell measures from their closed forms and a bracketed root; to rounding, whatever the accuracy asked.
+    """Compute dwell measures from closed forms and a bracketed root, to rounding at any accuracy.
 
-    The errors are bounds of those measured: below 8 roundings on the oracle table.
+    The error bounds exceed the errors measured on the oracle table, below 8 roundings.
     """
     columns = _computed(geared_dwell.dwell_measures, (designs,), DWELL_OUTPUTS, wanted)
     for name in wanted & set(columns) if accuracy.target is not None else ():
@@ -79,15 +79,15 @@ def dwell(designs: Array, wanted: frozenset[str], accuracy: Accuracy) -> Columns
 
 
 def exact_maxima(designs: Array, wanted: frozenset[str], accuracy: Accuracy) -> Columns:
-    """Maxima over the turn from all stationary points, to rounding.
+    """Compute maxima over the turn from all stationary points, to rounding.
 
-    The errors are bounds of those measured against 60 digits on 1100 designs: below 40 roundings, growing towards
+    The error bounds follow from errors measured against 60 digits on 1100 designs: below 40 roundings, growing towards
     k = 1, a = -1, where three singularities meet, as the distance to the power -5/4, within 1e-6 as that to the power
-    -3/2.  They are relative for a maximum, absolute for its place.  Where no digit is left, within some 4e-10, nothing
-    bounds them: the status is NOT_CONVERGED.
+    -3/2.  They are relative for a maximum, absolute for its place.  Within about 4e-10 no digit is left: the status is
+    NOT_CONVERGED.
     """
     columns = _computed(geared_dwell.turn_maxima, (designs,), MAX_OUTPUTS, wanted)
-    with np.errstate(all="ignore"):  # what is no number has its status
+    with np.errstate(all="ignore"):  # invalid designs have their status
         away = np.hypot(designs[:, 0] - 1.0, designs[:, 1] + 1.0)
         growth = EPS * (128.0 * (1.0 + away**-1.25) + 64.0 * away**-1.5)
     status = np.asarray(columns["status"])
@@ -99,7 +99,7 @@ def exact_maxima(designs: Array, wanted: frozenset[str], accuracy: Accuracy) -> 
 
 
 def sampled_maxima(designs: Array, wanted: frozenset[str], accuracy: Accuracy) -> Columns:
-    """Maxima over ``accuracy.samples`` equidistant carrier angles, the first at phi = 0."""
+    """Compute maxima over ``accuracy.samples`` equidistant carrier angles, the first at phi = 0."""
     assert accuracy.samples is not None
     return _computed(geared_dwell.dense_maxima, (designs, *half_turn(accuracy.samples)), _SAMPLED_OUTPUTS, wanted)
 
@@ -108,8 +108,8 @@ def sampled_maxima(designs: Array, wanted: frozenset[str], accuracy: Accuracy) -
 def half_turn(samples: int) -> tuple[Array, Array]:
     """Tabulate one turn, folded: rows 1 -+ cos(phi), sin(phi) and its square around phi = 0 and around phi = pi.
 
-    phi and -phi have the same magnitudes, so half of the samples stand for all.  The last angle is repeated up to a
-    multiple of 16, which the vectorised loop takes without a remainder; the grid of an odd number misses phi = pi.
+    phi and -phi have the same magnitudes, so half of the samples represent all.  The last angle is repeated up to a
+    multiple of 16, which the vectorised loop processes without a remainder; a grid of an odd number misses phi = pi.
     """
     quarters = np.arange(samples // 2 + 1) * 4  # phi in units of pi/(2 samples)
     return _table(quarters[quarters <= samples], samples), _table(2 * samples - quarters[quarters > samples], samples)
@@ -131,7 +131,7 @@ def _computed(
 
 
 def skeleton(parameters: tuple[Parameter, ...]) -> Skeleton:
-    """Draw carrier, planet and slotted link, in planet radii; without a ratio both gears are of one size."""
+    """Make the skeleton of carrier, planet and slotted link, in planet radii; without a ratio both gears are equal."""
     whole = "n" in [p.name for p in parameters]
 
     def centre(designs: Array, angles: Angles, motion: Columns) -> Array:
@@ -192,7 +192,7 @@ epicyclic_poses = poses_of(epicyclic_dwell.poses, epicyclic_dwell.Outputs)
 
 
 def epicyclic_measures(designs: Array, wanted: frozenset[str], accuracy: Accuracy) -> Columns:
-    """Dwell measures to rounding: every root is bisected."""
+    """Compute dwell measures to rounding: every root is bisected."""
     n = len(designs)
     status, values = np.empty(n, np.uint8), [np.empty(n) for _ in EPICYCLIC_DWELL]
     epicyclic_dwell.dwell_measures(designs, status, *values)
@@ -200,7 +200,7 @@ def epicyclic_measures(designs: Array, wanted: frozenset[str], accuracy: Accurac
 
 
 def planet_turns(designs: Array) -> Array:
-    """How often the planet turns while the carrier turns once, (n,)."""
+    """Return the number of turns of the planet per turn of the carrier, (n,)."""
     n, mesh = (parameter(EPICYCLIC_PARAMETERS, name, designs) for name in ("n", "mesh"))
     return np.abs(n + mesh)
 

@@ -68,7 +68,7 @@ def _precise_motion(designs: Array, angles: Angles, wanted: frozenset[str]) -> C
 
 
 def _with_point(motion: PoseFunction, designs: Array, angles: Angles, wanted: frozenset[str]) -> Columns:
-    """Return the outputs of a motion, and the coupler point's rates along and across the line turned into the frame."""
+    """Compute the outputs of a motion, with the coupler point's rates transformed from the line to the frame."""
     own = [name for name in _POINT if name in wanted]
     if not own:
         return motion(designs, angles, wanted)
@@ -81,7 +81,7 @@ def _with_point(motion: PoseFunction, designs: Array, angles: Angles, wanted: fr
     return {name: found[name] for name in (*wanted, "status")}
 
 
-# Wanted pose outputs and status of every design at its crank angles, each (n, m); also in twice the working precision.
+# Wanted pose outputs and status of every design at its crank angles, each (n, m); plain and in doubled precision.
 poses, precise_poses = partial(_with_point, _motion), partial(_with_point, _precise_motion)
 
 
@@ -93,7 +93,7 @@ def as_crank_rocker(designs: Array) -> Array:
 
 
 def point_shares(designs: Array) -> Array:
-    """Factors by which the directions of the links enter travel along the line and deviation across it, (n, 8)."""
+    """Factors of the links' directions in travel along the line and deviation across it, (n, 8)."""
     shares = np.empty((len(designs), 8))
     guide.point_shares(np.ascontiguousarray(designs), shares)
     return shares
@@ -117,19 +117,19 @@ def tool_direction(designs: Array) -> Array:
 
 
 def _in_frame(designs: Array, along: Array, across: Array) -> Array:
-    """Return a coordinate of the coupler point from s and dev, (n, 3): what it takes of each, and a constant."""
+    """Coefficients of s, dev and 1 in a coordinate of the coupler point, (n, 3)."""
     h = parameter(PARAMETERS, "h", designs)
     return np.column_stack([along, across, across * h])
 
 
 def x_of_point(designs: Array) -> Array:
-    """x_m as a combination of s, dev and 1, (n, 3)."""
+    """Coefficients of s, dev and 1 in x_m, (n, 3)."""
     lam = parameter(PARAMETERS, "lam", designs)
     return _in_frame(designs, np.cos(lam), -np.sin(lam))
 
 
 def y_of_point(designs: Array) -> Array:
-    """y_m as a combination of s, dev and 1, (n, 3)."""
+    """Coefficients of s, dev and 1 in y_m, (n, 3)."""
     lam = parameter(PARAMETERS, "lam", designs)
     return _in_frame(designs, np.sin(lam), np.cos(lam))
 
@@ -138,9 +138,9 @@ _ALONG, _ACROSS = can.constant(1.0, 0.0, 0.0), can.constant(0.0, 1.0, 0.0)
 
 
 def opening(designs: Array, status: NDArray[np.uint8], distance: Array) -> None:
-    """Tell whether the crank turns, and how near the motion's nearest singularity is; as of the crank-rocker."""
+    """Write whether the crank turns, and the distance of the nearest singularity, as for the crank-rocker."""
     rssr_kernels.opening(as_crank_rocker(designs), status, distance)
-    # The loop of the crank-rocker has neither the guided point nor the line.
+    # The crank-rocker does not check the guided point and the line.
     known = np.isfinite(designs).all(axis=1) & (np.abs(parameter(PARAMETERS, "lam", designs)) < 1e5)
     status[~known] = st.INVALID_INPUT
 

@@ -59,16 +59,16 @@ def poses(designs: Array, angles: Angles, wanted: frozenset[str]) -> Columns:
     columns = _poses(designs, angles, asked)
     if WRAP.name in wanted:
         x1, z1, e = (designs[:, [k]] for k in (1, 2, 3))
-        # The guides stand symmetrically, so the thread makes the same angle with their line on both sides.
+        # The guides are symmetric, so the thread makes the same angle with their line on both sides.
         columns[WRAP.name] = 2.0 * np.arctan(np.asarray(columns["S"]) / np.sqrt(z1 * z1 + (e - x1) ** 2))
     return {name: columns[name] for name in (*wanted, "status")}
 
 
 def size(designs: Array, wanted: frozenset[str], accuracy: Accuracy) -> Columns:
-    """Find the least radius and what it is made of: maxima of smooth functions, to rounding whatever is asked.
+    """Compute the least radius and related maxima of smooth functions, to rounding at any accuracy.
 
-    The errors are bounds of those measured against 10^5 samples: a maximum to 64 roundings of the lengths it is made
-    of, its place to the root of them.
+    The error bounds exceed the errors measured against 10^5 samples: 64 roundings of the lengths for a maximum, and
+    their square root for its place.
     """
     n = len(designs)
     status, columns = np.empty(n, np.uint8), {o.name: np.empty(n) for o in DESIGN_OUTPUTS}
@@ -82,26 +82,26 @@ def size(designs: Array, wanted: frozenset[str], accuracy: Accuracy) -> Columns:
 
 
 def cam_axis(designs: Array) -> Array:
-    """Place the cam's centre on the follower's way: R0 behind the least displacement of the whole turn."""
+    """Compute the cam's centre on the follower's line: R0 behind the least displacement of the whole turn."""
     least = np.asarray(size(designs, frozenset({"least_displacement"}), Accuracy())["least_displacement"], np.float64)
     e, radius = (parameter(PARAMETERS, name, designs) for name in ("e", "R0"))
     return np.stack([e, least - radius, np.zeros(len(designs))], axis=1)
 
 
 def follower_line(designs: Array) -> tuple[Array, Array]:
-    """Return the follower's way: across the line of the guides."""
+    """Return a point and the direction of the follower's line, across the line of the guides, each (n, 3)."""
     e = parameter(PARAMETERS, "e", designs)
     return np.stack([e, 0.0 * e, 0.0 * e], axis=1), np.tile(np.array(Y), (len(designs), 1))
 
 
 def follower(designs: Array, angles: Angles, found: Columns) -> Array:
-    """End of the follower, which lies on the cam and carries the thread."""
+    """Compute the end of the follower, which lies on the cam and carries the thread, (n, m, 3)."""
     s = np.asarray(found["S"], np.float64)
     return np.stack([np.broadcast_to(parameter(PARAMETERS, "e", designs)[:, None], s.shape), s, 0.0 * s], axis=-1)
 
 
 def guide(side: float) -> Fixed:
-    """One of the two guides, on either side of the plane of the cam."""
+    """Make one of the two guides, on either side of the plane of the cam."""
 
     def at(designs: Array) -> Array:
         x, z = (parameter(PARAMETERS, name, designs) for name in ("X1", "Z1"))

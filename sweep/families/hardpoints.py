@@ -1,7 +1,7 @@
-"""From points of a drawing to the dimensions of crank-rockers and slider-cranks: the frames of docs/frames.md.
+"""Fit of crank-rockers and slider-cranks to points of a drawing; frames as in docs/frames.md.
 
-Points come in one length unit in the drawing's frame; directions come with length 1.  The order of work is the same
-everywhere: common perpendicular, frame, offsets along the axes, links, angles, sign of the assembly mode.
+Points are in one length unit in the drawing's frame; directions have length 1.  The steps are the same for all
+families: common perpendicular, frame, offsets along the axes, links, angles, sign of the assembly mode.
 """
 
 from __future__ import annotations
@@ -16,13 +16,13 @@ from kernels.types import Array
 from sweep.errors import InputError
 from sweep.families.capabilities import FittedPose, Hardpoints
 
-PARALLEL = 1e-9  # sine of the angle below which two directions are read as one
-NOTHING = 1e-12  # part of the size of a drawing that is a rounding error of its coordinates
+PARALLEL = 1e-9  # sine of the angle below which two directions count as parallel
+NOTHING = 1e-12  # share of a drawing's size that counts as rounding of its coordinates
 PLACE = "points"
 
 
 def crank_rocker(points: Mapping[str, Array]) -> FittedPose:
-    """Dimensions of a spatial crank-rocker from A, axis_A, B, C, D, axis_D."""
+    """Compute the dimensions of a spatial crank-rocker from A, axis_A, B, C, D, axis_D."""
     a, b, c, d, u, z = (points[name] for name in ("A", "B", "C", "D", "axis_A", "axis_D"))
     small = NOTHING * size(points)
     x, e, crossed = _common_perpendicular(d - a, u, z, small)
@@ -46,7 +46,7 @@ def crank_rocker(points: Mapping[str, Array]) -> FittedPose:
 
 
 def slider_crank(points: Mapping[str, Array]) -> FittedPose:
-    """Read a spatial slider-crank off A, axis_A, B, C, axis_D and, if the line is given by a point, D."""
+    """Compute the dimensions of a spatial slider-crank from A, axis_A, B, C, axis_D and optionally D on the line."""
     a, b, c, u, y = (points[name] for name in ("A", "B", "C", "axis_A", "axis_D"))
     d = points.get("D", c)
     small = NOTHING * size(points)
@@ -65,14 +65,14 @@ def slider_crank(points: Mapping[str, Array]) -> FittedPose:
 
 
 def four_bar(points: Mapping[str, Array]) -> FittedPose:
-    """Read a planar four-bar off A, B, C, D and, if wanted, axis_A (else z) and the coupler point M."""
+    """Compute the dimensions of a planar four-bar from A, B, C, D, optionally axis_A (else z) and coupler point M."""
     return _planar(points, points.get("M"))
 
 
 def guide(points: Mapping[str, Array]) -> FittedPose:
-    """Read what :func:`four_bar` does, the coupler ``point``, and ``axis_line`` and ``line`` of a line.
+    """Compute the dimensions of a :func:`four_bar` with the coupler ``point``, ``axis_line`` and a point ``line``.
 
-    Without ``line`` the guiding line runs through the coupler point, which then is where it deviates by 0.
+    Without ``line`` the guiding line runs through the coupler point, whose deviation is then 0 in this position.
     """
     found = _planar(points, points["point"])
     y = np.cross(found.z, found.x)
@@ -84,7 +84,7 @@ def guide(points: Mapping[str, Array]) -> FittedPose:
 
 
 def planar_slider_crank(points: Mapping[str, Array]) -> FittedPose:
-    """Dimensions of a planar slider-crank from A, B, C, axis_D and, if wanted, D and axis_A (else z)."""
+    """Compute the dimensions of a planar slider-crank from A, B, C, axis_D, optionally D and axis_A (else z)."""
     a, b, c = (points[name] for name in ("A", "B", "C"))
     z, small = points.get("axis_A", np.array([0.0, 0.0, 1.0])), NOTHING * size(points)
     x = points["axis_D"] - (points["axis_D"] @ z) * z
@@ -103,7 +103,7 @@ def planar_slider_crank(points: Mapping[str, Array]) -> FittedPose:
 
 
 def _planar(points: Mapping[str, Array], point: Array | None) -> FittedPose:
-    """Read a crank-rocker with parallel axes, and a point of its coupler if one is given."""
+    """Compute a crank-rocker with parallel axes, and a point of its coupler if one is given."""
     b, c, z = points["B"], points["C"], points.get("axis_A", np.array([0.0, 0.0, 1.0]))
     found = crank_rocker({**points, "axis_A": z, "axis_D": z})
     parameters = {name: found.parameters[name] for name in ("a", "b", "c", "e", "branch")}
@@ -122,7 +122,7 @@ def size(points: Mapping[str, Array]) -> float:
 def _common_perpendicular(way: Array, first: Array, second: Array, small: float) -> tuple[Array, float, bool]:
     """Direction and length of the common perpendicular of two axes, and whether they are not parallel.
 
-    ``way`` leads from a point of the first axis to one of the second.
+    ``way`` is a vector from a point of the first axis to one of the second.
     """
     across = np.cross(second, first)
     sine = float(np.linalg.norm(across))
@@ -134,7 +134,7 @@ def _common_perpendicular(way: Array, first: Array, second: Array, small: float)
 
 
 def _square(vector: Array, axis: Array, small: float) -> Array:
-    """Direction of the part of a vector that is square to an axis."""
+    """Direction of the component of a vector perpendicular to an axis."""
     rest = vector - (vector @ axis) * axis
     length = float(np.linalg.norm(rest))
     if length <= small:

@@ -61,26 +61,26 @@ def _column(name: str, designs: Array) -> Array:
 
 
 def shaft_pivot(designs: Array) -> Array:
-    """Return O4, along O2O3 behind O3: the picture lays both frames along one line."""
+    """Return O4, along O2O3 behind O3: the drawing puts both frames on one line."""
     x = _column("O2O3", designs) + _column("O3O4", designs)
     return np.stack([x, 0.0 * x, 0.0 * x], axis=1)
 
 
 def shaft_line(designs: Array) -> tuple[Array, Array]:
-    """Place the vertical on which the shaft moves: through its rod's slide, or through E at mid-stroke."""
+    """Return a point and the direction of the shaft's vertical: through its rod's slide, or through E at mid-stroke."""
     at = shaft_pivot(designs)
     at[:, 0] += np.where(_column("EG", designs) > 0.0, _column("x_s", designs), _column("O4E", designs))
     return at, np.tile(np.array(Y), (len(designs), 1))
 
 
 def _arm(pivot: Array, length: Array, angle: Array) -> Array:
-    """End of an arm at an angle from x, (n, m, 3)."""
+    """Compute the end of an arm at an angle from x, (n, m, 3)."""
     end: Array = np.stack([np.cos(angle), np.sin(angle), 0.0 * angle], axis=-1) * length[:, None, None]
     return pivot[:, None, :] + end
 
 
 def lower_arm(designs: Array, angles: Angles, found: Columns) -> Array:
-    """Return D: the lower arm of the bell crank, square to O3O4 at mid-stroke."""
+    """Compute D: the lower arm of the bell crank, perpendicular to O3O4 at mid-stroke."""
     x = _column("O2O3", designs)
     turn = np.asarray(found["chi"], np.float64) - _column("chi_mid", designs)[:, None]
     pivot = np.stack([x, 0.0 * x, 0.0 * x], axis=1)
@@ -88,18 +88,18 @@ def lower_arm(designs: Array, angles: Angles, found: Columns) -> Array:
 
 
 def shaft_lever(designs: Array, angles: Angles, found: Columns) -> Array:
-    """Return E: the arm of the shaft lever to the heddle rod, horizontal at mid-stroke."""
+    """Compute E: the arm of the shaft lever to the heddle rod, horizontal at mid-stroke."""
     return _arm(shaft_pivot(designs), _column("O4E", designs), np.asarray(found["lam"], np.float64))
 
 
 def shaft_lever_back(designs: Array, angles: Angles, found: Columns) -> Array:
-    """Return F: the arm of the shaft lever to the link, square to the other one."""
+    """Compute F: the arm of the shaft lever to the link, perpendicular to the other arm."""
     length = _column("O4F", designs) * _column("side_F", designs)
     return _arm(shaft_pivot(designs), length, np.asarray(found["lam"], np.float64) + 0.5 * np.pi)
 
 
 def shaft(designs: Array, angles: Angles, found: Columns) -> Array:
-    """Return G: the heddle shaft on its vertical."""
+    """Compute G: the heddle shaft on its vertical."""
     y = np.asarray(found["y"], np.float64)
     return shaft_line(designs)[0][:, None, :] + np.stack([0.0 * y, y, 0.0 * y], axis=-1)
 

@@ -1,6 +1,6 @@
 """Registry entry of the spatial crank-rocker of Kim and Dison: the crank-rocker with perpendicular axes and g = 0.
 
-It has its own symbols and its own frame, and the kernels of the crank-rocker: a = r, b = l, c = h, e = a, f = b, g = 0,
+It has its own symbols and frame, and uses the kernels of the crank-rocker: a = r, b = l, c = h, e = a, f = b, g = 0,
 alpha = 90 deg, branch = -branch; psi is its alpha.
 """
 
@@ -32,7 +32,7 @@ PARAMETERS = (
     Parameter("branch", "sign", "assembly mode: +1 or -1, the source's sign s", default=1.0, choices=(-1.0, 1.0)),
 )
 
-# The crank-rocker's x runs from axis to axis, its z along the rocker's axis, its origin stands b above this one.
+# The crank-rocker's x runs from axis to axis, its z along the rocker's axis, its origin is b above this one.
 _FROM_CRANK_ROCKER = np.array([[0.0, 0.0, -1.0], [1.0, 0.0, 0.0], [0.0, -1.0, 0.0]])
 
 MOTION_OUTPUTS = (
@@ -59,7 +59,7 @@ SWING_OUTPUTS = (
     Output("swing", "rad", "angle between the two limit positions, not negative", "(8)"),
 )
 
-# Of what is asked here, the pose outputs of the crank-rocker that it is made of.
+# Pose outputs of the crank-rocker needed for the outputs here.
 _NEEDS = {
     "omega3": ("dpsi",),
     "epsilon3": ("dpsi", "d2psi"),
@@ -78,7 +78,7 @@ def _ours(name: str) -> str:
 
 
 def as_crank_rocker(designs: Array) -> Array:
-    """Design matrix of the same linkage as a crank-rocker, (n, 8); nan where the crank's motion is no number."""
+    """Design matrix of the same linkage as a crank-rocker, (n, 8); nan if the crank's motion is invalid."""
     matrix = np.zeros((len(designs), len(crank_rocker.PARAMETERS)), designs.dtype)
     matrix[:, :5] = designs[:, :5]
     with np.errstate(invalid="ignore"):
@@ -114,7 +114,7 @@ def _poses(run: PoseFunction, designs: Array, angles: Angles, wanted: frozenset[
 
 
 def swing(designs: Array, wanted: frozenset[str], accuracy: Accuracy) -> Columns:
-    """Both limit positions, where the crank is in the plane of the rocker, and the angle between them, to rounding."""
+    """Compute both limit positions, with the crank in the plane of the rocker, and their angle, to rounding."""
     n = len(designs)
     status, values = np.empty(n, np.uint8), np.empty((n, len(rssr.LIMIT_NAMES)))
     errors = np.empty_like(values)
@@ -122,7 +122,7 @@ def swing(designs: Array, wanted: frozenset[str], accuracy: Accuracy) -> Columns
     rssr.limits(matrix, status, values, errors)
     names = rssr.LIMIT_NAMES
     ext, fold, whole = (names.index(name) for name in ("psi_ext", "psi_fold", "swing"))
-    # Extended is phi = 0 or pi, whichever places the ball beyond the crank pin: y_C > 0 or < 0.
+    # The extended position is phi = 0 or pi, where the ball is beyond the crank pin: y_C > 0 or < 0.
     first = np.cos(values[:, names.index("phi_ext")]) > 0.0
     found = {
         "alpha_at_phi0": [np.where(first, x[:, ext], x[:, fold]) for x in (values, errors)],

@@ -1,6 +1,6 @@
-"""Bodies and joints of a linkage as a tree with loops: the capability from which loads of any linkage follow.
+"""Bodies and joints of a linkage as a tree with loops: the capability from which the loads of any linkage follow.
 
-Families whose trees of links need no kernel make the poses of their bodies here, out of points and angles with their
+Families whose trees of links need no kernel compute the poses of their bodies here, from points and angles with their
 rates.
 """
 
@@ -19,16 +19,16 @@ from sweep.families.base import Angles, Columns, Parameter, floats
 from sweep.families.capabilities import DesignMap
 from sweep.families.frames import product
 
-if TYPE_CHECKING:  # families without such kernels do not wait for them
+if TYPE_CHECKING:  # families without kernels of trees do not wait for the import
     from kernels.linkage.bodies import Links
 
 
 @dataclass(frozen=True)
 class LinkBody:
-    """A body of a :class:`LinkTree`: its name in the names of inputs, and where its axes x, y, z lie, in words.
+    """A body of a :class:`LinkTree`: its name in the names of inputs, and a description of its axes x, y, z.
 
-    It hangs on the ``parent``, which stands before it, with the freedoms ``free``.  A ``slender`` one is a rod along x
-    between two balls, of which the spin about x has no inertia.
+    It hangs on the ``parent``, an earlier body, with the freedoms ``free``.  A ``slender`` one is a rod along x between
+    two balls, whose spin about x has no inertia.
     """
 
     name: str
@@ -40,17 +40,17 @@ class LinkBody:
 
 @dataclass(frozen=True)
 class LinkJoint:
-    """A joint of a :class:`LinkTree` whose reaction is given.
+    """A joint of a :class:`LinkTree` whose reaction is computed.
 
     Parameters
     ----------
-    name, text : in the names of outputs; what it is
+    name, text : name in the names of outputs, and description
     kind : "shaft" turns about an axis on two supports, "sleeve" slides along it too; "hinge" is a ball by which a body
         hangs on its parent, "ball" one that closes a loop; "contact" slides
-    acts : which body's force on which it is, in words
-    body : of a shaft, a sleeve, a hinge the body; the axis of its first freedom is that of a shaft, a sleeve
-    lines : of a ball, a contact the first of the lines that make it, and how many
-    touch : where its surfaces press without fitting: a ball or a pin in a straight slot, a strap on an eccentric
+    acts : the bodies of the reaction in words, "frame on the crank"
+    body : body of a shaft, a sleeve or a hinge; the axis of a shaft or sleeve is that of the body's first freedom
+    lines : of a ball or a contact, its first line and the number of its lines
+    touch : kind of a non-conforming contact: a ball or a pin in a straight slot, a strap on an eccentric
     """
 
     name: str
@@ -67,19 +67,19 @@ LinkFill: TypeAlias = "Callable[[Array, Angles, Columns, Links], None]"
 
 @dataclass(frozen=True)
 class LinkTree:
-    """Bodies of any number with the joints between them, from which loads are computed: :mod:`kernels.linkage.bodies`.
+    """Any number of bodies with the joints between them, for the computation of loads: :mod:`kernels.linkage.bodies`.
 
     Parameters
     ----------
     bodies, joints : in the order of their numbers
     ends : both bodies of each line, as :class:`kernels.linkage.bodies.Links` takes them, of an ordinary design
-    needs : pose outputs that ``fill(designs, angles, motion, links)`` writes the poses of the bodies from
-    carrier : number of the body that a tool hangs on
-    tip : place of the tool in the axes of that body, (n, 3); None where it is an input
-    output : number of the freedom that is the family's position, on which a load acts; -1 where no load does
+    needs : pose outputs from which ``fill(designs, angles, motion, links)`` computes the poses of the bodies
+    carrier : number of the body that carries a tool
+    tip : place of the tool in the axes of that body, (n, 3); None if it is an input
+    output : number of the freedom that is the family's position, on which a load acts; -1 without a load
     rubs : whether its joints have dimensions for friction and bearings
     arms : numbers of bodies without a second joint, each with the line whose point is their end
-    unit : input that is the length in which the family's dimensions, and what ``fill`` writes, are; None where it is mm
+    unit : input that is the length unit of the family's dimensions and of the results of ``fill``; None for mm
     """
 
     bodies: tuple[LinkBody, ...]
@@ -106,7 +106,7 @@ class LinkTree:
 
 
 def filled_by(kernel: Callable[..., object], needs: tuple[str, ...]) -> LinkFill:
-    """Fill by a kernel(designs, cos, sin, motion, out) that takes the pose outputs ``needs`` in one array."""
+    """Make a fill function from a kernel(designs, cos, sin, motion, out) with the outputs ``needs`` in one array."""
 
     def fill(designs: Array, angles: Angles, motion: Columns, out: Links) -> None:
         given = np.stack(floats(motion, *needs))
@@ -161,17 +161,17 @@ def crank_angle(links: Links, angles: Angles, per: Array | float = 1.0, ahead: A
 
 
 def turning(motion: Columns, *names: str) -> Turning:
-    """Return an angle and its derivatives out of pose outputs."""
+    """Make an angle with its derivatives from pose outputs."""
     return Turning(*floats(motion, *names))
 
 
 def sliding(motion: Columns, names: tuple[str, str, str], way: tuple[float, float, float]) -> Path:
-    """Return a vector along a fixed way, of pose outputs that are its length and derivatives."""
+    """Make a vector of fixed direction, whose length and derivatives are pose outputs."""
     return Path(*(np.asarray(motion[name], np.float64)[..., None] * np.array(way) for name in names))
 
 
 def standing_at(links: Links, x: Array | float = 0.0, y: Array | float = 0.0, z: Array | float = 0.0) -> Path:
-    """Return a fixed point at every pose of the bodies, from coordinates that are numbers or (n, 1)."""
+    """Make a fixed point at every pose of the bodies, from coordinates that are numbers or (n, 1)."""
     shape = links.bodies.shape[:2]
     at = np.stack([np.broadcast_to(np.asarray(part, np.float64), shape) for part in (x, y, z)], axis=-1)
     return Path(at, np.zeros_like(at), np.zeros_like(at))
@@ -188,7 +188,7 @@ def crank_arm(links: Links, angles: Angles, alpha: Array, length: Array) -> Path
 
 
 def put_about(links: Links, body: int, at: Path, turned: Turning) -> None:
-    """Write a body that turns about z, first axis at the angle; its joint is its origin."""
+    """Write a body that turns about z, with the first axis at the angle; its joint is its origin."""
     x = turned.arm(np.ones((1, 1))).at
     _put(links, body, at, x, product(_Z, x), turned.rate[..., None] * _Z, turned.bend[..., None] * _Z)
 
@@ -200,7 +200,7 @@ def put_shifted(links: Links, body: int, at: Path) -> None:
 
 
 def put_crank(links: Links, body: int, freedom: int, at: Path, arm: Path) -> None:
-    """Write a crank that turns with the crank angle, first axis along its arm, and the axis that drives it."""
+    """Write a crank with its first axis along its arm, and the axis that drives it."""
     x = arm.at / np.linalg.norm(arm.at, axis=-1, keepdims=True)
     y = arm.v / np.linalg.norm(arm.v, axis=-1, keepdims=True)
     u = product(x, y)
@@ -209,9 +209,9 @@ def put_crank(links: Links, body: int, freedom: int, at: Path, arm: Path) -> Non
 
 
 def put_between(links: Links, body: int, start: Path, end: Path) -> None:
-    """Write a body between two points of one distance, first axis along it; it does not spin about that.
+    """Write a body between two points of constant distance, with the first axis along it and no spin about that axis.
 
-    The second axis lies in the plane z = 0 where the points do.
+    If the points are in the plane z = 0, so is the second axis.
     """
     along = end.minus(start)
     square = (along.at * along.at).sum(axis=-1, keepdims=True)
@@ -229,7 +229,7 @@ def _put(links: Links, body: int, at: Path, x: Array, y: Array, omega: Array, ep
 
 
 def put_pin(links: Links, first: int, at: Array) -> None:
-    """Write the two lines of a pin square to the plane z = 0."""
+    """Write the two lines of a pin perpendicular to the plane z = 0."""
     put_line(links, first, at, np.array([1.0, 0.0, 0.0]))
     put_line(links, first + 1, at, np.array([0.0, 1.0, 0.0]))
 
@@ -247,6 +247,6 @@ def put_line(links: Links, line: int, at: Array, way: Array) -> None:
 
 
 def turn_about_z(links: Links, *freedoms: int) -> None:
-    """Make z the axis of these freedoms."""
+    """Set the axes of the given freedoms to z."""
     for freedom in freedoms:
         links.axes[:, :, freedom] = _Z

@@ -89,7 +89,7 @@ class _Part:
 
 
 def of_columns(piece: Piece, columns: slice | NDArray[np.intp], designs: Any) -> Any:
-    """Return a piece of a part of the mechanism, whose parameters are these columns."""
+    """Evaluate a piece of a part of the mechanism on the part's parameter columns."""
     return piece(designs[:, columns])
 
 

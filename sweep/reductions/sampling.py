@@ -118,12 +118,12 @@ Record = TypeVar("Record", bound=tuple[Any, ...])
 
 
 def only(record: Record, which: Index | Mask) -> Record:
-    """Take some rows of a named tuple of columns."""
+    """Select rows of a named tuple of columns by index or mask."""
     return type(record)(*(column[which] for column in record))
 
 
 def joined(*records: Record) -> Record:
-    """Join the rows of named tuples of columns."""
+    """Concatenate the rows of named tuples of columns."""
     return type(records[0])(*(np.concatenate(columns) for columns in zip(*records, strict=True)))
 
 

@@ -1,4 +1,4 @@
-"""Zeros of pose outputs of many designs at once: extremes first, then one root between neighbours of opposite sign."""
+"""Roots of pose outputs of many designs at once: extrema first, then one root between neighbours of opposite sign."""
 
 from __future__ import annotations
 
@@ -19,37 +19,37 @@ from sweep.numerics.events import bottoms, zeros
 if TYPE_CHECKING:
     from sweep.families.machines.machine import Machine
 
-SAMPLES, MOST = 512, 16384  # of a turn, and those beyond which an event is given up
+SAMPLES, MOST = 512, 16384  # samples of a turn, and largest number before an event is given up
 BLOCK = 256  # designs at once: their samples stay in the caches
-TANGENT = 64.0 * 2.0**-53  # of the coordinates that a distance is a difference of
-NEAR = 1e-3  # of a sample's step: a polynomial that is so near is trusted in its slope
+TANGENT = 64.0 * 2.0**-53  # relative rounding of a distance, which is a difference of coordinates
+NEAR = 1e-3  # share of a sample's step: the slope of a polynomial this close to the poses is trusted
 
 Places: TypeAlias = dict[str, Any]
-"""Angles (n,) of each design by what they are, "count" and "status"."""
+"""Crank angles (n,) of the designs by name, "count" and "status"."""
 
 Find: TypeAlias = Callable[["Poses", int, frozenset[str]], Places]
 Read: TypeAlias = Callable[["Machine", Any, Places, frozenset[str]], Columns]
-"""Outputs, ``status``, and ``steep``: of how many roundings of a coordinate the outputs are, see `steepness`."""
+"""Function that returns outputs, ``status``, and ``steep``, the amplification of rounding (`steepness`)."""
 
 
 @dataclass
 class CrankAngles:
-    """Crank angles of several designs, one after another: the row of its design for each."""
+    """Crank angles of several designs, with the row of the design of each."""
 
     row: NDArray[np.intp]
     phi: Array
 
     def take(self, which: NDArray[Any]) -> CrankAngles:
-        """Return some of them."""
+        """Select crank angles by index or mask."""
         return CrankAngles(self.row[which], self.phi[which])
 
 
 def step_of(name: str, provides: Sequence[Output], machine: Machine, find: Find, read: Read) -> Step:
-    """Return the machine's own route to what is read at places of its turn."""
+    """Make the machine's own step to outputs that are evaluated at crank angles found by ``find``."""
     last: dict[str, tuple[bytes, Places]] = {}
 
     def places_of(designs: Array, wanted: frozenset[str], samples: int) -> Places:
-        """Find the places of designs, unless they were the last ones: a search asks for values, then for slopes."""
+        """Find the places of designs, cached for the last designs: a search needs values, then slopes."""
         asked = designs.tobytes() + repr((samples, sorted(wanted))).encode()
         known = last.get(name)
         if known is None or known[0] != asked:
@@ -60,7 +60,7 @@ def step_of(name: str, provides: Sequence[Output], machine: Machine, find: Find,
         if not np.iscomplexobj(designs):
             return read(machine, designs, places_of(designs, wanted, samples), wanted)
         real = np.ascontiguousarray(designs.real)
-        if (real == real[:1]).all():  # the complex step: one design, moved along each variable
+        if (real == real[:1]).all():  # the complex step: one design, perturbed along each variable
             places = {key: np.repeat(x, len(real)) for key, x in places_of(real[:1], wanted, samples).items()}
         else:
             places = places_of(real, wanted, samples)
@@ -83,9 +83,9 @@ def step_of(name: str, provides: Sequence[Output], machine: Machine, find: Find,
 
 
 def steepness(speed: Any, *slopes: Any) -> Array:
-    """Return by how much what is read at roots is off for each unit of what vanishes there, (n,), not below 1.
+    """Return the factor from the rounding of a function at its roots to that of outputs read there, (n,), at least 1.
 
-    A root moves by one over its slope, and with it what changes at that ``speed``.
+    A root moves by the rounding over the function's slope, and outputs change at that ``speed``.
     """
     fast = np.maximum(np.real(speed), 1.0)
     with np.errstate(divide="ignore", invalid="ignore"):
@@ -95,7 +95,7 @@ def steepness(speed: Any, *slopes: Any) -> Array:
 def outputs_at(
     machine: Machine, designs: Any, places: Mapping[str, Any], names: Sequence[str]
 ) -> dict[str, dict[str, Any]]:
-    """Return outputs of designs at angles of each, (n,) by output and place; precise ones, or complex ones."""
+    """Evaluate outputs of designs at angles of each, (n,) by output and place; precise ones, or complex ones."""
     phi = np.stack(list(places.values()), axis=1)
     known = np.isfinite(phi)
     family = machine if np.iscomplexobj(phi) else machine.precise()
@@ -104,9 +104,9 @@ def outputs_at(
 
 
 def moved(machine: Machine, designs: Any, phi: Array, names: Sequence[str]) -> Any:
-    """Return where complex designs have the roots (n, k) of outputs, one of each column: phi - f_p/f'.
+    """Compute the roots (n, k) of outputs, one per column, for complex designs: phi - f_p/f'.
 
-    The imaginary parts are the derivatives, by the theorem of the implicit function.
+    The imaginary parts are the derivatives, by the implicit function theorem.
     """
     step, wanted, known = 1e-100, frozenset(names), np.isfinite(phi)
     at: Any = np.where(known, phi, 0.0)
@@ -118,7 +118,7 @@ def moved(machine: Machine, designs: Any, phi: Array, names: Sequence[str]) -> A
 
 @dataclass(frozen=True)
 class Poses:
-    """Pose outputs of several designs, at one angle of each or some: found quickly, read precisely."""
+    """Pose outputs of several designs, at one or several angles each: roots by quick poses, values by precise ones."""
 
     quick: Family
     precise: Family
@@ -126,11 +126,11 @@ class Poses:
     sampled: dict[tuple[str, int], tuple[NDArray[np.uint8], Array]] = field(default_factory=dict)
 
     def at(self, rows: Any, phi: Array, *names: str) -> list[Array]:
-        """Return outputs of these designs at these angles, (k,) or (k, m) as the angles are."""
+        """Evaluate outputs of designs ``rows`` at angles (k,) or (k, m), with precise poses."""
         return self._of(self.precise, rows, phi, names)
 
     def near(self, rows: Any, phi: Array, name: str) -> Array:
-        """Return an output as the search for a root needs it."""
+        """Evaluate an output with quick poses, for the search of a root."""
         return self._of(self.quick, rows, phi, (name,))[0]
 
     def _of(self, family: Family, rows: Any, phi: Array, names: Sequence[str]) -> list[Array]:
@@ -139,7 +139,7 @@ class Poses:
         return [np.asarray(found[name], np.float64).reshape(phi.shape) for name in names]
 
     def samples(self, names: Sequence[str], count: int) -> tuple[NDArray[np.uint8], list[Array]]:
-        """Return status (n,), and samples (n, count) of outputs over the turn; nan without status 0."""
+        """Sample outputs over the turn: status (n,), and samples (n, count); nan without status 0."""
         new = [name for name in names if (name, count) not in self.sampled]
         if new:
             grid: Array = np.arange(count) * np.float64(TWO_PI / count)
@@ -153,17 +153,17 @@ class Poses:
         return np.maximum.reduce([status for status, _ in kept]), [values for _, values in kept]
 
     def turning(self, rate: str, slope: Array) -> CrankAngles:
-        """Return where samples (n, m) of an output, a derivative, change their sign, closed to its roots."""
+        """Find where samples (n, m) of a derivative change their sign, refined to its roots."""
         after = np.roll(slope, -1, axis=1)
         row, column = np.nonzero((slope > 0.0) & (after <= 0.0) | (slope < 0.0) & (after >= 0.0))
         step = TWO_PI / slope.shape[1]
         return CrankAngles(row, self._root(row, column * step, (column + 1) * step, rate, slope))
 
     def roots(self, extremes: CrankAngles, at_extremes: Array, name: str, rate: str, values: Array) -> CrankAngles:
-        """Return the zeros of an output, of each design in order: between neighbours of opposite sign.
+        """Find the zeros of an output, of each design in order, between neighbours of opposite sign.
 
-        Neighbours are samples (n, m) and extremes: two zeros between samples have an extreme between them.  Each is
-        closed to rounding, and polished by a step of Newton on precise poses.
+        Neighbours are samples (n, m) and extrema: two zeros between samples have an extremum between them.  Each is
+        refined to rounding, and polished by a Newton step on precise poses.
         """
         n, count = values.shape
         grid = np.arange(count) * (TWO_PI / count)
@@ -183,9 +183,9 @@ class Poses:
         return CrankAngles(row, found).take(np.lexsort((found, row)))
 
     def first(self, name: str, level: float, sense: float, count: int = SAMPLES) -> tuple[NDArray[np.uint8], Array]:
-        """Return status and where an output first passes a level in a sense, each (n,); nan where it does not.
+        """Find status and first passage of an output through a level in a sense, each (n,); nan without one.
 
-        Designs whose samples may touch the level between two of them have twice as many, as events by themselves.
+        Designs whose samples may touch the level between two of them are sampled twice as densely, as for events alone.
         """
         status, (values,) = self.samples([name], count)
         off = sense * (values - level)
@@ -207,10 +207,10 @@ class Poses:
     def _root(
         self, row: NDArray[np.intp], left: Array, right: Array, name: str, values: Array, level: float = 0.0
     ) -> Array:
-        """Return a place in each bracket where an output passes a level.
+        """Find a root in each bracket where an output passes a level.
 
-        It is found on polynomials through samples (n, m), then closed by one step on poses; where that step is not
-        small the curve is no such polynomial, and poses alone tell.
+        It is computed on polynomials through samples (n, m), then corrected by one step on poses; where that step is
+        not small, the polynomial is inaccurate and the root is found on poses alone.
         """
         if not row.size:
             return np.zeros(0)
@@ -232,7 +232,7 @@ class Poses:
         return np.asarray(better, np.float64)
 
     def least(self, row: NDArray[np.intp], start: Array, end: Array, name: str, samples: int = 64) -> Array:
-        """Return where an output is least between two angles of each of these designs, (k,)."""
+        """Find where an output is smallest between two angles of each design, (k,)."""
         if not row.size:
             return np.zeros(0)
         step = 1.0 / (samples - 1)  # one sample beyond either end, so that a dip next to an end has neighbours
@@ -243,19 +243,19 @@ class Poses:
         place = np.where(which == 1, start, np.where(which == samples, end, place))
         k, j = np.nonzero((values[:, 1:-1] <= values[:, :-2]) & (values[:, 1:-1] <= values[:, 2:]))
         if k.size:
-            # To rounding, not to its root: where axes meet the curve is a wedge, as steep as the bodies are fast.
+            # To rounding, not to its square root: where axes meet the curve is a wedge as steep as the bodies are fast.
             phi = bottoms(lambda places: self.near(row[k], places, name), grid[k, j], grid[k, j + 2])
             phi = np.clip(phi, start[k], end[k])
             height = self.at(row[k], phi, name)[0]
             least = values[:, 1:-1].min(axis=1)
-            for one in np.argsort(-height, kind="stable"):  # the least one last
+            for one in np.argsort(-height, kind="stable"):  # the smallest one last
                 if height[one] < least[k[one]]:
                     place[k[one]] = phi[one]
         return place
 
 
 def _neighbours(ordered: CrankAngles) -> tuple[Array, Array, NDArray[np.intp]]:
-    """Return of each angle, sorted by design, itself, the next one of its design around the turn, and where that is."""
+    """Return each angle, sorted by design, the next angle of its design around the turn, and the index of that."""
     row, phi = ordered.row, ordered.phi
     first = np.searchsorted(row, row)
     last = np.append(row[1:] != row[:-1], True)[: row.size]
@@ -264,20 +264,20 @@ def _neighbours(ordered: CrankAngles) -> tuple[Array, Array, NDArray[np.intp]]:
 
 
 def largest(row: NDArray[np.intp], values: Array, n: int) -> Array:
-    """Return the largest value of each design; nan where there is none."""
+    """Largest value of each design; nan for designs without one."""
     most = np.full(n, -np.inf)
     np.maximum.at(most, row, values)
     return np.where(np.isfinite(most), most, np.nan)
 
 
 def where_largest(found: CrankAngles, values: Array, n: int) -> Array:
-    """Return the angle of each design at which the value is largest; nan where there is none."""
+    """Angle of each design at which the value is largest; nan for designs without one."""
     order = np.argsort(values, kind="stable")
     return scattered(n, found.row[order], found.phi[order])
 
 
 def scattered(n: int, row: NDArray[np.intp], values: Array) -> Array:
-    """Lay values of some designs out over all; nan in the others."""
+    """Expand values of some designs to all; nan for the others."""
     column = np.full(n, np.nan)
     column[row] = values
     return column
@@ -286,7 +286,7 @@ def scattered(n: int, row: NDArray[np.intp], values: Array) -> Array:
 def verdict(
     status: NDArray[np.uint8], touching: NDArray[np.bool_], right: NDArray[Any], wrong: NDArray[Any]
 ) -> NDArray[np.uint8]:
-    """Return the status of designs with so many passages in the stated sense and against it."""
+    """Status of designs from the numbers of passages in the stated sense and against it."""
     return np.select(
         [status != st.OK, touching, right > 1, (right == 0) & (wrong > 0), right == 0],
         [status.astype(np.int64), st.TANGENT, st.TWICE, st.WRONG_WAY, st.NEVER], st.OK,

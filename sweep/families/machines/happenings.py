@@ -1,4 +1,4 @@
-"""Crank angles of the events of a machine at which the paths of its threads change."""
+"""Crank angles of a machine's events at which the paths of its threads change."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ from sweep.families.machines.triangles import Entering, entries
 if TYPE_CHECKING:
     from sweep.families.machines.machine import Machine
 
-MOST = 65536  # designs whose events are remembered
+MOST = 65536  # designs whose events are cached
 
 Happening = Event | Taking | Entering
 
@@ -36,12 +36,12 @@ def happenings(machine: Machine) -> dict[str, Happening]:
 
 
 def check_happenings(machine: Machine) -> None:
-    """Refuse a thread whose path changes at something that is no event, or at one of a thread that changes at events.
+    """Raise if a thread changes at something that is no event, or at an event of a thread that changes at events.
 
     Raises
     ------
     InputError
-        that names the thread and the nearest right name.
+        with the thread and the nearest right name.
     """
     every = _every(machine)
     threads = [r for r in machine.relations if isinstance(r, ThreadBalance)]
@@ -63,14 +63,14 @@ def _every(machine: Machine) -> dict[str, Happening]:
 
 
 def event_angles(machine: Machine, designs: Array) -> tuple[dict[str, Any], NDArray[np.uint8]]:
-    """Return crank angles of the events by ``phi_NAME``, (n, 1), and status (n,); complex ones for complex designs.
+    """Find the crank angles of the events by ``phi_NAME``, (n, 1), and status (n,); complex for complex designs.
 
-    Each design's are found once: a search asks for its poses many times.
+    The angles of a design are cached: a search needs its poses many times.
     """
     known: dict[bytes, Array] = machine.derived.setdefault(event_angles, {})
     columns, events = _columns(machine), happenings(machine)
     given = np.ascontiguousarray(designs[:, columns].real)
-    # The panels of a design stand below one another: its row is looked up once.
+    # The rows of a design's panels are adjacent: it is looked up once.
     other = np.append(True, (given[1:] != given[:-1]).any(axis=1))[: len(given)]
     first = np.flatnonzero(other)
     rows = [row.tobytes() for row in given[first]]
@@ -90,7 +90,7 @@ def event_angles(machine: Machine, designs: Array) -> tuple[dict[str, Any], NDAr
 
 
 def bends_of_threads(machine: Machine) -> list[Bends]:
-    """Return where tensions and rates of threads have kinks between events."""
+    """List the bends of tensions and rates of threads between events."""
     threads = [r for r in machine.relations if isinstance(r, ThreadBalance) and r.bent]
     return [Bends(frozenset(f"{r.name}_{name}" for name in r.bent), partial(_bending, machine, r)) for r in threads]
 
@@ -105,7 +105,7 @@ def _bending(machine: Machine, thread: ThreadBalance, designs: Array, angles: An
 
 
 def switches_of_threads(machine: Machine) -> list[Switches]:
-    """Return where curves of threads have kinks and jumps: at events, and at the points of what is allowed."""
+    """List the switches of threads' curves: events, and points of the table of the allowed excess."""
     threads = [r for r in machine.relations if isinstance(r, ThreadBalance)]
     tables = [of_table(r.allowed.phi, frozenset({f"{r.name}_excess"})) for r in threads if r.allowed]
     of = frozenset(output.name for thread in threads for output in thread.outputs)
@@ -118,7 +118,7 @@ def _switches(machine: Machine, designs: Array) -> Array:
 
 @of_family
 def _columns(machine: Any) -> NDArray[np.intp]:
-    """Return the columns of the members, shafts and relations that the events depend on."""
+    """Columns of the members, shafts and relations that the events depend on."""
     needs: set[str] = set()
     for event in happenings(machine).values():
         of = {event.of} if isinstance(event, Event) else set(event.rates)
@@ -134,13 +134,13 @@ def _columns(machine: Any) -> NDArray[np.intp]:
 
 
 def _search(machine: Machine, events: dict[str, Happening], designs: Array) -> Array:
-    """Return the angles of each design, and the first status that is not OK, (n, k + 1)."""
+    """Find the event angles of each design, and the first status that is not OK, (n, k + 1)."""
     poses = Poses(machine, machine.precise(), designs)
     found, status = [], np.zeros(len(designs), np.uint8)
     names = [
         {event.of} if isinstance(event, Event) else {*event.rates, *event.rates.values()} for event in events.values()
     ]
-    poses.samples(sorted(set().union(*names)), SAMPLES)  # at once
+    poses.samples(sorted(set().union(*names)), SAMPLES)  # all outputs at once
     for name, event in events.items():
         if isinstance(event, Event):
             now, phi = poses.first(event.of, event.level, 1.0 if event.rising else -1.0)

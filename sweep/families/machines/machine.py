@@ -1,4 +1,4 @@
-"""Several mechanisms on one main shaft as one `Family`: dotted names, every point in the machine's frame."""
+"""Several mechanisms on one main shaft as one `Family`: dotted names, all points in the machine's frame."""
 
 from __future__ import annotations
 
@@ -34,9 +34,9 @@ from sweep.families.sites import AXES
 class Machine(Family):
     """A family made of members.
 
-    Pose outputs of a member carry its name, derivatives are with respect to the angle of the main shaft.  A point
-    ``point`` of a member gives ``point_x``, ``point_y``, ``point_z`` in the machine's frame, and ``dpoint_x`` ... where
-    the member's outputs give its velocity.
+    Pose outputs of a member have its name as prefix, derivatives are with respect to the angle of the main shaft.  A
+    point ``point`` of a member has ``point_x``, ``point_y``, ``point_z`` in the machine's frame, and ``dpoint_x`` ...
+    if the member's outputs determine its velocity.
     """
 
     members: tuple[Member, ...] = ()
@@ -44,11 +44,11 @@ class Machine(Family):
     timings: tuple[Timing | EventValue, ...] = ()
 
     def member(self, name: str) -> Member:
-        """Return the member of that name."""
+        """Return the member of a name."""
         return next(m for m in self.members if m.name == name)
 
     def split(self, name: str) -> tuple[Member, str] | None:
-        """Return the member and the name there of a dotted name; None for a name of the machine itself."""
+        """Split a dotted name into member and own name; None for a name of the machine itself."""
         return next(((m, m.own(name)) for m in self.members if m.own(name)), None)
 
     @cached_property
@@ -57,12 +57,12 @@ class Machine(Family):
         return {f"{m.name}.{p}": f"{m.name}.{stage}" for m in self.members for p, stage in m.family.positions.items()}
 
     def follower(self, pose: str) -> str:
-        """Name the position of the follower of the member that a pose output belongs to."""
+        """Name of the follower's position of the member that a pose output belongs to."""
         found = self.split(pose)
         return self.position if found is None else f"{found[0].name}.{found[0].family.position}"
 
     def outward_sign(self, position: str) -> str:
-        """Return the sign parameter of the member whose position it is."""
+        """Return the sign parameter of the member with this position."""
         found = self.split(position)
         assert found is not None
         own = found[0].family.outward_sign(found[1])
@@ -77,14 +77,14 @@ class Machine(Family):
         return _built(self, tuple(replace(m, family=m.family.precise()) for m in self.members))
 
     def with_families(self, families: Mapping[str, Family]) -> Machine:
-        """Return the same machine with other families of its members: those that effects extended."""
+        """Return the machine with other families of its members, such as those extended by effects."""
         return _built(self, tuple(replace(m, family=families.get(m.name, m.family)) for m in self.members))
 
 
 def assemble(
     name: str, members: tuple[Member, ...], relations: tuple[Relation | Timing | EventValue | Event, ...]
 ) -> Machine:
-    """Return the machine of these members; each may be driven by one that stands before it."""
+    """Make the machine of members, each of which may be driven by an earlier one."""
     timings = tuple(r for r in relations if isinstance(r, Timing | EventValue))
     events = tuple(r for r in relations if isinstance(r, Event))
     others = tuple(r for r in relations if not isinstance(r, Timing | EventValue | Event))
@@ -134,7 +134,7 @@ def _built(machine: Machine, members: tuple[Member, ...]) -> Machine:
         dear={f"{m.name}.{k}": (f"{m.name}.{what}", ns) for m in placed for k, (what, ns) in m.family.dear.items()},
         members=tuple(placed),
     )
-    found = replace(found, poses=partial(_poses, found))  # events of a thread are looked for on poses of the others
+    found = replace(found, poses=partial(_poses, found))  # events of a thread are searched on poses of the others
     precise = partial(_precise_poses, found) if any(m.family.precise_poses for m in placed) else None
     smooth = (one for r in sums for one in r.smooth)
     known = (*found.capabilities, *switches_of_threads(found), *bends_of_threads(found), *smooth)
@@ -208,7 +208,7 @@ def _poses(machine: Machine, designs: Array, angles: Angles, wanted: frozenset[s
 
 @dataclass(frozen=True)
 class _OfMember:
-    """What is needed of a member: outputs by its own names, and what they are made of."""
+    """Outputs needed of a member, by own names, and the motion and points that they are computed from."""
 
     member: Member
     own: frozenset[str]
@@ -219,7 +219,7 @@ class _OfMember:
 
 @dataclass(frozen=True)
 class _Needs:
-    """What some wanted outputs are made of: members, relations, columns of the design matrix, angles of events."""
+    """Members, relations, columns of the design matrix and event angles needed for some wanted outputs."""
 
     members: tuple[_OfMember, ...]
     relations: tuple[Relation, ...]
@@ -253,7 +253,7 @@ def _of_member(m: Member, own: frozenset[str]) -> _OfMember:
 
 
 def _frames(machine: Machine, designs: Array) -> dict[str, Frame]:
-    """Return the frames of all stages, of "looper2" or "looper"."""
+    """Compute the frames of all stages, by names such as "looper2" or "looper"."""
     found: dict[str, Frame] = {}
     for m in machine.members:
         placed = zip(m.family.stages, m.frames(designs), strict=True)
@@ -262,12 +262,12 @@ def _frames(machine: Machine, designs: Array) -> dict[str, Frame]:
 
 
 def _whole(values: Any, shape: tuple[int, int]) -> Any:
-    """Spread what was computed for one design over all, pose beside pose: sums over the turn keep their bits."""
+    """Expand values of one design to all, contiguous along poses, so that sums over the turn keep their bits."""
     return values if values.shape == shape else np.array(np.broadcast_to(values, shape), order="C")
 
 
 def _driving(member: Member, own: frozenset[str]) -> set[str]:
-    """Name what a member's driver has to give: its output and the derivatives that the member's outputs need."""
+    """Names of the driver's outputs that a member needs: its angle, and derivatives for the member's outputs."""
     if member.driver is None or not own:
         return set()
     driver, output = member.driver
@@ -279,7 +279,7 @@ def _driving(member: Member, own: frozenset[str]) -> set[str]:
 
 
 def _member(needs: _OfMember, designs: Array, angles: Angles, found: Mapping[str, Any]) -> dict[str, Any]:
-    """Return pose outputs of a member by their own names, and ``status``; what no design varies is computed once."""
+    """Compute pose outputs of a member by own names, and ``status``; only once if no design varies it."""
     m = needs.member
     own_designs, phase = m.designs(designs), m.phase(designs)
     once = m.driver is None and angles.cos.shape[0] == 1 and len(designs) > 1
@@ -294,7 +294,7 @@ def _member(needs: _OfMember, designs: Array, angles: Angles, found: Mapping[str
 
 
 def _placed(needs: _OfMember, designs: Array, result: Mapping[str, Any]) -> dict[str, Any]:
-    """Return coordinates and velocities of places of a member in the machine's frame, which its frames do not leave."""
+    """Compute coordinates and velocities of a member's points in the machine's frame."""
     m, found = needs.member, dict[str, Any]()
     last = len(m.family.stages) - 1
     alone = all(m.sites[name].stage == last for name in needs.placed)
@@ -311,7 +311,7 @@ def _placed(needs: _OfMember, designs: Array, result: Mapping[str, Any]) -> dict
 
 
 def _turned(m: Member, phase: Array, angles: Angles, found: Mapping[str, Any]) -> Angles:
-    """Return the input angles of a member: of its driver, times its ratio, plus its phase."""
+    """Compute the input angles of a member: the driver's angle times its ratio, plus its phase."""
     if m.driver is not None:
         return Angles.of(m.ratio * found[".".join(m.driver)] + phase[:, None])
     if m.ratio == 1 and not phase.any():
@@ -322,7 +322,7 @@ def _turned(m: Member, phase: Array, angles: Angles, found: Mapping[str, Any]) -
 
 
 def _with_respect_to_shaft(m: Member, result: dict[str, Any], found: Mapping[str, Any]) -> None:
-    """Make derivatives by the member's crank angle those by the angle of the main shaft, in place."""
+    """Convert derivatives by the member's crank angle to those by the main shaft's angle, in place."""
     if m.driver is None and m.ratio == 1:
         return
     tops = [name for name in result if name in m.derivatives and m.family.derivative_of.get(name) not in result]
@@ -337,7 +337,7 @@ def _with_respect_to_shaft(m: Member, result: dict[str, Any], found: Mapping[str
         for _ in names:
             inner.append(m.drives[inner[-1]])
         outer: list[Any] = [result[name] for name in names]
-        # a driver that no design varies is computed once
+        # a driver that no design varies has a single row
         whole = [np.broadcast_to(found[f"{driver}.{name}"], outer[0].shape) for name in inner[1:]]
         given: list[Any] = [np.ascontiguousarray(rate) for rate in whole]
         missing: list[Any] = [None] * (3 - len(names))

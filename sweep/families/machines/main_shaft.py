@@ -1,7 +1,7 @@
 """The main shaft of a machine: torque, inertia, friction and speed over the turn of all members with one flywheel.
 
-Machine-and-stitch, 2: power is the same on both sides of every gear, so that on the main shaft a member of ratio r has
-r times its torque, r^2 times its inertia and, by the angle of the main shaft, r^3 times the derivative of that.
+Machine-and-stitch, 2: power is the same on both sides of every gear, so on the main shaft a member of ratio r has r
+times its torque, r^2 times its inertia and r^3 times the derivative of its inertia.
 """
 
 from __future__ import annotations
@@ -31,13 +31,13 @@ NUMBERS = {
     "fastest": ("rad/s", "largest magnitude of its speed"),
     "slowest": ("rad/s", "smallest magnitude of its speed"),
 }
-SAME = 1e-12  # of the speed: gears round it
+SAME = 1e-12  # relative difference of speeds that is rounding of gear ratios
 _RATE = {"reduced_inertia": 2, "dreduced_inertia": 3, "drive_torque": 1, "drive_torque_friction": 1}
 
 
 @dataclass(frozen=True)
 class Driven:
-    """A member, the number of its first stage if it has several, and its turns for one of the main shaft."""
+    """A member, the number of its first stage if it has several, and its turns per turn of the main shaft."""
 
     member: str
     stage: str
@@ -50,9 +50,9 @@ class Driven:
 
 @dataclass(frozen=True)
 class ShaftTorque(Relation):
-    """What drives the main shaft: the torque on it, by its name, and what else turns there.
+    """Torque on the main shaft of the members that it drives, with inertia, friction and speed.
 
-    ``rubs`` says that friction of all members is known.
+    ``rubs``: friction of all members is known.
     """
 
     driven: tuple[Driven, ...]
@@ -60,7 +60,7 @@ class ShaftTorque(Relation):
 
     @property
     def outputs(self) -> tuple[Output, ...]:
-        """Torque, inertia with its derivative, and what friction takes."""
+        """Torque, inertia with its derivative, and friction loss."""
         words = ", ".join(one.member for one in self.driven)
         found = (
             Output(self.name, "torque", f"torque on the main shaft that drives {words} and the flywheel", "2"),
@@ -72,7 +72,7 @@ class ShaftTorque(Relation):
 
     @property
     def smooth(self) -> tuple[Smooth, ...]:
-        """Torque and inertia are smooth over the turn; friction is not."""
+        """Torque and inertia, which are smooth over the turn; friction is not."""
         return tuple(Smooth(name, (name,)) for name in (self.name, f"{self.name}_inertia", f"{self.name}_dinertia"))
 
     @property
@@ -101,11 +101,11 @@ class ShaftTorque(Relation):
         return set().union(*(made for name, made in (of | speed).items() if name in wanted))
 
     def needs(self, wanted: frozenset[str]) -> frozenset[str]:
-        """Return what of all members the wanted outputs are sums of, and the acceleration where a flywheel feels it."""
+        """Names of the members' outputs that the wanted sums need, with the acceleration for the flywheel."""
         return frozenset(one.named(name) for one in self.driven for name in self._made_of(wanted))
 
     def compute(self, found: Mapping[str, Any], wanted: frozenset[str]) -> dict[str, Any]:
-        """Return the wanted sums, (n, m)."""
+        """Compute the wanted sums, (n, m)."""
         flywheel, first = found[f"{self.name}_flywheel"], self.driven[0]
         columns = {}
         if self.name in wanted:
@@ -125,12 +125,12 @@ class ShaftTorque(Relation):
 
 
 def speed_of(shaft: ShaftTorque, machine: Machine) -> Step:
-    """Return the machine's route to the speed of its main shaft over the turn."""
+    """Make the machine's step to the speed of its main shaft over the turn."""
 
     def run(designs: Array, wanted: frozenset[str], accuracy: Accuracy) -> Columns:
         found = _numbers(shaft, machine, designs)
         known = found.pop("energy_error")
-        # What is missed of the energy is a share of the largest: of a slow speed it is a larger share.
+        # The missed energy is a share of the largest energy: of a slow speed it is a larger share.
         mean, steep = found.pop("mean"), found["fastest"] / found["slowest"]
         size = {"unevenness": steep / mean, "fastest": np.ones(len(designs)), "slowest": steep}
         status = found.pop("status")
@@ -142,7 +142,7 @@ def speed_of(shaft: ShaftTorque, machine: Machine) -> Step:
 
 
 def _numbers(shaft: ShaftTorque, machine: Machine, designs: Array) -> dict[str, Any]:
-    """Return unevenness, extreme speeds, error of the energy and status, (n,), on the first grid that resolves."""
+    """Compute unevenness, extreme speeds, error of the energy and status, (n,), on the first resolving grid."""
     names, first = list(machine.parameter_names), shaft.driven[0]
     designs = np.array(designs, np.float64)
     for one in shaft.driven:
@@ -168,7 +168,7 @@ def _numbers(shaft: ShaftTorque, machine: Machine, designs: Array) -> dict[str, 
 def _samples(
     shaft: ShaftTorque, machine: Machine, designs: Array, speed: Array, size: int
 ) -> tuple[Array, Array, Status]:
-    """Inertia and torque excess J' w^2/2 - M(w, 0) on the main shaft over the turn, (n, N), and the worst status."""
+    """Sample inertia and torque excess J' w^2/2 - M(w, 0) on the main shaft, (n, N), and the worst status, (n,)."""
     angles = Angles.of(2.0 * np.pi * np.arange(size)[None] / size)
     names = [shaft.name, f"{shaft.name}_inertia", f"{shaft.name}_dinertia"]
     poses = machine.poses(designs, angles, frozenset(names))

@@ -1,6 +1,6 @@
-"""The moment A, where a looper's tip passes the needle and takes its loop: machine-and-stitch, 5.1 and 5.2.
+"""Moment A, where a looper's tip passes the needle and takes its loop: machine-and-stitch, 5.1 and 5.2.
 
-In the needle's frame, n along the needle to its point, w out of the scarf and square to n, u = n x w, the tip stands
+In the needle's frame, n along the needle to its point, w out of the scarf and perpendicular to n, u = n x w, the tip is
 at X = (T - G).u across, Y = (T - G).w aside, Z = (T - G).n along the needle from the guided point G.
 """
 
@@ -20,15 +20,15 @@ from sweep.families.machines.segments import Gap, cross, dot, minus
 from sweep.families.machines.tools import Blade, Needle, rate_of
 from sweep.families.sites import AXES
 
-PARALLEL = 1e-6  # of the scarf's size: what is square to the needle says no direction below
+PARALLEL = 1e-6  # share of the scarf vector below which its part normal to the needle gives no direction
 
 
 @dataclass(frozen=True)
 class RiseWindow:
-    """Where the rise of the needle at A may lie: what two or more fields of work permit in common, 5.4.
+    """Window of the needle's rise at A: the range that two or more fields of work permit in common, 5.4.
 
-    ``fields`` are their names with the least and the most rise that each permits.  Where ``vary`` holds these are
-    defaults of parameters of the machine, ``of`` being the name of the moment.
+    ``fields`` are their names with the least and the greatest rise that each permits.  With ``vary`` these are defaults
+    of parameters of the machine; ``of`` is the name of the moment.
     """
 
     of: str
@@ -37,7 +37,7 @@ class RiseWindow:
 
     @property
     def parameters(self) -> tuple[Parameter, ...]:
-        """Both ends of every field, where these vary."""
+        """Both ends of every field, if they vary."""
         texts = {"least": "least rise that {} permits", "most": "largest rise that {} permits"}
         return tuple(
             Parameter(f"{self.of}_{end}_{_word(field)}", "length", text.format(field), default=value, not_negative=True)
@@ -46,7 +46,7 @@ class RiseWindow:
         )
 
     def ends(self, designs: Any, names: Sequence[str]) -> tuple[Any, Any]:
-        """Return the least and the most rise that every field permits, each (n, F), of designs with these columns."""
+        """Least and greatest rise that every field permits, each (n, F), of designs with these columns."""
         if self.vary:
             found = designs[:, [names.index(p.name) for p in self.parameters]]
             return found[:, 0::2], found[:, 1::2]
@@ -54,14 +54,14 @@ class RiseWindow:
         return given[:, :, 0], given[:, :, 1]
 
     def binding(self, design: Array, names: Sequence[str]) -> tuple[tuple[str, float], tuple[str, float]]:
-        """Return which fields set the least and the most rise of a design (P,), each with that rise."""
+        """Name the fields that set the least and the greatest rise of a design (P,), each with that rise."""
         low, high = (one[0] for one in self.ends(design[None, :], names))
         first, last = int(low.argmax()), int(high.argmin())
         return (self.fields[first][0], float(low[first])), (self.fields[last][0], float(high[last]))
 
     @property
     def words(self) -> str:
-        """What is left to the rise, with the fields that bind."""
+        """Description of the window, with the fields that bind."""
         text = "how far the rise lies inside its window"
         if self.vary:
             return f"{text}, which {' and '.join(field for field, *_ in self.fields)} leave"
@@ -76,9 +76,9 @@ def _word(field: str) -> str:
 
 @dataclass(frozen=True)
 class Taking(Relation):
-    """A blade's tip in the frame of a needle, pose by pose; where it passes: :mod:`sweep.families.machines.passages`.
+    """A blade's tip in the frame of a needle, pose by pose; its passage: :mod:`sweep.families.machines.passages`.
 
-    ``sense`` is +1 or -1: the tip passes towards u or against it; ``window`` is where the rise may lie.
+    ``sense`` is +1 or -1: the tip passes towards u or against it; ``window`` is that of the rise.
     """
 
     needle: Needle
@@ -88,16 +88,16 @@ class Taking(Relation):
 
     @property
     def gap(self) -> Gap:
-        """Of needle and blade as capsules."""
+        """Gap of needle and blade as capsules."""
         return Gap(f"{self.name}_gap", (self.needle.body, self.blade.body))
 
     def beside(self, height: Any) -> Any:
-        """Tell whether a height is one of the needle's."""
+        """Whether a height lies between the needle's top and point."""
         return (height > self.needle.top) & (height < self.needle.point)
 
     @property
     def rates(self) -> Mapping[str, str]:
-        """Of each pose output its derivative by the angle of the main shaft."""
+        """Derivative by the angle of the main shaft of each pose output."""
         return {f"{self.name}_{what}": f"{self.name}_d{what}" for what in ("across", "side", "height", "depth")}
 
     @property
@@ -122,11 +122,11 @@ class Taking(Relation):
 
     @property
     def parameters(self) -> tuple[Parameter, ...]:
-        """Those of the window of the rise."""
+        """Parameters of the rise window."""
         return self.window.parameters if self.window else ()
 
     def needs(self, wanted: frozenset[str]) -> frozenset[str]:
-        """Return coordinates of both points and the line, and velocities where they are wanted."""
+        """Names of coordinates of both points and the line, and of velocities if they are wanted."""
         names = [self.needle.on, self.blade.tip, self.needle.line]
         moving = {*self.rates.values(), f"{self.name}_speed"}
         if not moving.isdisjoint(wanted):
@@ -136,7 +136,7 @@ class Taking(Relation):
         return frozenset(f"{name}_{axis}" for name in names for axis in AXES)
 
     def compute(self, found: Mapping[str, Any], wanted: frozenset[str]) -> dict[str, Any]:
-        """Return the wanted outputs, (n, m); nan where the scarf lies along the needle."""
+        """Compute the wanted outputs, (n, m); nan where the scarf is along the needle."""
         point, tip, line = (_vector(found, name) for name in (self.needle.on, self.blade.tip, self.needle.line))
         n = [self.needle.sense * x for x in line]
         scarf = self.needle.scarf

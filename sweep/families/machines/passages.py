@@ -1,4 +1,4 @@
-"""The moment A: where a looper's tip passes the needle, and what is read there (machine-and-stitch, 5.2)."""
+"""Passage of a looper's tip past the needle at moment A, and the outputs evaluated there (machine-and-stitch, 5.2)."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ from sweep.families.machines.thread_way import turned as turned_back
 if TYPE_CHECKING:
     from sweep.families.machines.machine import Machine
 
-MEET = 1e-9  # rad of the tip's way: nearer axes meet, as quick poses know the place of a least distance no better
+MEET = 1e-9  # rad of the tip's travel: axes closer than this meet, the accuracy of a minimum's place by quick poses
 TEXTS = {
     "lag": ("rad", "crank angle from the needle's lowest point to the passage"),
     "rise": ("length", "rise of the needle at the passage since its lowest point"),
@@ -54,7 +54,7 @@ WINDOW = {
 
 
 def taking_step(taking: Taking, machine: Machine) -> Step:
-    """Return the machine's own route to where and how the tip passes."""
+    """Make the machine's step to the passage of the tip and its outputs."""
     name = taking.name
     place = Output(
         f"phi_{name}", "rad", "crank angle at which the tip passes the needle, in its sense, beside it", "5.2"
@@ -66,15 +66,15 @@ def taking_step(taking: Taking, machine: Machine) -> Step:
 
 
 def passages(taking: Taking, machine: Machine, poses: Poses, samples: int) -> Columns:
-    """Return outputs of the passage that need no search of their own, each (n,), and status."""
+    """Compute outputs of the passage that need no further search, each (n,), and status."""
     return _read(taking, machine, poses.designs, _found(taking, poses, samples, frozenset()), frozenset())
 
 
 def _found(taking: Taking, poses: Poses, samples: int, wanted: frozenset[str]) -> Places:
-    """Return where the tip passes, where it passes next, and where the other outputs are read.
+    """Find the passage of the tip, the next one, and the places of the other outputs.
 
-    Extremes of the way across are found first, on a grid and then as roots of its derivative; between neighbours of
-    opposite sign lies one passage.  A pair of extremes between two samples is missed.
+    Extrema of the tip's coordinate across the needle are found first, on a grid and then as roots of its derivative;
+    between neighbours of opposite sign there is one passage.  A pair of extrema between two samples is missed.
     """
     name, sense, n = taking.name, float(taking.sense), len(poses.designs)
     at = _Tip(taking, poses)
@@ -108,7 +108,7 @@ def _found(taking: Taking, poses: Poses, samples: int, wanted: frozenset[str]) -
 
 
 def _read(taking: Taking, machine: Machine, designs: Any, places: Places, wanted: frozenset[str]) -> Columns:
-    """Return all outputs of the passage, each (n,), and status; complex designs carry the places along."""
+    """Evaluate all outputs of the passage, each (n,), and status; with complex designs the places move too."""
     name, sense = taking.name, float(taking.sense)
     status = np.array(places["status"])
     angles = {key: values for key, values in places.items() if key not in ("count", "status")}
@@ -117,9 +117,9 @@ def _read(taking: Taking, machine: Machine, designs: Any, places: Places, wanted
         before = np.stack([angles[key] for key in roots], axis=1)
         after = moved(machine, designs, before, [f"{name}_{what}" for what in roots.values()])
         now = dict(zip(roots, after.T, strict=True))
-        for end in ("low", "top") if "near" in angles else ():  # an end of the needle's way takes the least gap along
+        for end in ("low", "top") if "near" in angles else ():  # a least gap at an end of the stroke moves with it
             now["near"] = np.where(places["near"] == places[end], now[end], now.get("near", places["near"]))
-        angles |= now  # extremes need no account of their own motion
+        angles |= now  # an extremum's value does not depend on the motion of its place
     del angles["top"]
     names = ["across", "side", "height", "dacross", "depth", "speed", *(["gap"] if "near" in angles else [])]
     found = outputs_at(machine, designs, angles, [f"{name}_{what}" for what in names])
@@ -145,7 +145,7 @@ def _read(taking: Taking, machine: Machine, designs: Any, places: Places, wanted
         status[(status == st.OK) & (np.real(least) > np.real(most))] = st.NO_WINDOW
     if gap:
         free, radii = gap[0]["near"], sum(body.radius for body in taking.gap.bodies)
-        # Axes that meet do so on every design near by: the least gap stays what it is, and has no slope.
+        # Axes that meet do so for every neighbouring design: the least gap is constant, and its slope is zero.
         values["free"] = np.where(np.real(free) + radii > MEET * np.real(speed["near"]), free, np.real(free))
     status[np.real(side["at"]) <= 0.0] = st.WRONG_SIDE
     columns: Columns = {f"phi_{name}": angles["at"], f"count_{name}": places["count"], "status": status}
@@ -160,11 +160,11 @@ class _Tip:
         self.taking, self.poses = taking, poses
 
     def __call__(self, where: CrankAngles, *what: str) -> list[Array]:
-        """Return outputs by their own names."""
+        """Evaluate outputs by their own names."""
         return self.poses.at(where.row, where.phi, *(f"{self.taking.name}_{one}" for one in what))
 
     def touches(self, extremes: CrankAngles, across: Array) -> NDArray[np.bool_]:
-        """Tell of each design whether an extreme beside the needle is 0 within rounding of its coordinates."""
+        """Whether an extremum beside the needle is 0 within rounding of its coordinates, per design (n,)."""
         side, height = self(extremes, "side", "height")
         designs = self.poses.designs
         size = np.abs(designs[extremes.row]).max(axis=1) + np.abs(side) + np.abs(height)
@@ -173,10 +173,10 @@ class _Tip:
 
 
 def _last(stops: CrankAngles, depth: Array, size: Array, phi: Array) -> Array:
-    """Return where the needle is lowest; of several such places, alike to rounding, the last one before ``phi``.
+    """Find where the needle is lowest; of several places equal to rounding, the last one before ``phi``.
 
-    A guide whose own dead point is passed on the way down and up is lowest twice, and one that turns twice.  Depths are
-    differences of coordinates of that ``size``, (n,).
+    A guide whose own dead point is passed on the way down and up is lowest twice, and so is one that turns twice.
+    Depths are differences of coordinates of that ``size``, (n,).
     """
     lag = np.mod(np.where(np.isnan(phi), TWO_PI, phi)[stops.row] - stops.phi, TWO_PI)
     deepest = largest(stops.row, depth, size.size)
@@ -187,7 +187,7 @@ def _last(stops: CrankAngles, depth: Array, size: Array, phi: Array) -> Array:
 
 
 def _following(roots: CrankAngles, taken: NDArray[np.intp]) -> NDArray[np.intp]:
-    """Return of each passage the next one of its design, around the turn."""
+    """Index of the next passage of the same design, around the turn."""
     after = taken + 1
     same = np.append(roots.row, -1)[after] == roots.row[taken]
     return np.where(same, after, np.searchsorted(roots.row, roots.row[taken]))

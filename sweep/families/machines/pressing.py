@@ -1,6 +1,6 @@
-"""The presser foot of a machine: what a feed's rack does to it, by the angle of the main shaft; docs/foot.md.
+"""The presser foot of a machine on a feed's rack, by the angle of the main shaft; docs/foot.md.
 
-A foot has a history: it is marched over turns of its own, on the rack of the member alone.  So it gives no poses.
+A foot has a history: it is marched over its own turns, on the rack of the member alone.  So it has no pose outputs.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ if TYPE_CHECKING:
     from sweep.families.machines.machine import Machine
 
 RACK, ON_RACK = "feed", "feed_foot"
-SPEED = {"omega": "speed"}  # as threads call it: the scene gives it
+SPEED = {"omega": "speed"}  # the name in threads, whose value the scene provides
 
 
 @dataclass(frozen=True)
@@ -33,11 +33,11 @@ class Pressing(Relation):
 
     Parameters
     ----------
-    name : stands before the names of parameters and outputs
+    name : prefix of the names of parameters and outputs
     rack : the member
-    lifted : how many parameters its family has of its own
+    lifted : number of parameters of the member's own family
     foot : the march
-    of_foot : its parameters
+    of_foot : parameters of the foot
     """
 
     rack: str
@@ -47,31 +47,31 @@ class Pressing(Relation):
 
     @property
     def parameters(self) -> tuple[Parameter, ...]:
-        """Those of the foot."""
+        """Parameters of the foot."""
         return self.of_foot
 
     @property
     def by_output_of_foot(self) -> Mapping[str, Output]:
-        """Design outputs, by the name of each in the family of the foot alone."""
+        """Design outputs, by their names in the family of the foot alone."""
         return {o.name: replace(o, name=self.named(o.name), text=f"{self.name}: {o.text}") for o in self.foot.outputs}
 
     def named(self, output: str) -> str:
-        """Return the machine's name of an output of the foot: an angle is that of an event of the machine."""
+        """Return the machine's name of an output of the foot; an angle is named like that of an event."""
         return f"phi_{self.name}_{output.removeprefix('phi_')}" if is_place(output) else f"{self.name}_{output}"
 
     def marched(self, machine: Machine, designs: Array, nodes: int) -> tuple[Columns, Array, Array]:
-        """Return what the march tells, the path of the rack, and the angle (n,) of both where the main shaft has 0."""
+        """March the foot: columns of the march, path of the rack, and angle (n,) of both at 0 of the main shaft."""
         m, first = machine.member(self.rack), machine.parameter_names.index(self.parameters[0].name)
         own = np.hstack([m.designs(designs)[:, : self.lifted], designs[:, first : first + len(self.parameters)]])
         columns, path, _, _ = self.foot.march(own, nodes, m.ratio)
         return columns, path, m.ratio * m.phase(designs)
 
     def step(self, machine: Machine) -> Step:
-        """Return the machine's route to what the foot does."""
+        """Make the machine's step to the outputs of the foot."""
 
         def run(designs: Array, wanted: frozenset[str], accuracy: Accuracy) -> Columns:
             columns, _, ahead = self.marched(machine, designs, self.foot.nodes)
-            # an extremum read at nodes is off by four times as much as with twice as many, or both have the same node
+            # the error of an extremum at nodes is four times that with twice as many, unless both have the same node
             finer = columns if accuracy.target is None else self.marched(machine, designs, 2 * self.foot.nodes)[0]
             status: Status = np.array(columns["status"], np.uint8)
             found: Columns = {}
@@ -94,7 +94,7 @@ def read_pressing(
     Raises
     ------
     InputError
-        for another key, no member or one without such a rack, a rack that does not rise once per turn.
+        for another key, an unknown member, one without such a rack, or a rack that does not rise once per turn.
     """
     where, given = f"machine.relations.{name}", table["press"]
     if len(table) != 1:

@@ -1,4 +1,4 @@
-"""What two or more members of a machine are to each other, pose by pose: distances, speeds, torques."""
+"""Relations between members of a machine, pose by pose: distances, speeds, torques."""
 
 from __future__ import annotations
 
@@ -15,36 +15,36 @@ from sweep.families.sites import AXES
 
 @dataclass(frozen=True)
 class Relation:
-    """A quantity of several members; by itself it has no pose outputs and no parameters."""
+    """A quantity of several members; the base class has no pose outputs and no parameters."""
 
     name: str
 
     @property
     def outputs(self) -> tuple[Output, ...]:
-        """Its pose outputs, made of those of the members."""
+        """Pose outputs, computed from those of the members."""
         return ()
 
     @property
     def numbers(self) -> tuple[Output, ...]:
-        """Its own design outputs whose members need effects."""
+        """Design outputs whose members need effects."""
         return ()
 
     @property
     def parameters(self) -> tuple[Parameter, ...]:
-        """Parameters of the machine that it adds."""
+        """Parameters that the relation adds to the machine."""
         return ()
 
     @property
     def rates(self) -> Mapping[str, str]:
-        """Of each pose output that has one its derivative by the angle of the main shaft."""
+        """Derivative by the angle of the main shaft of each pose output that has one."""
         return {}
 
     def needs(self, wanted: frozenset[str]) -> frozenset[str]:
-        """Return the pose outputs of members that the wanted outputs are made of."""
+        """Names of the members' pose outputs that the wanted outputs need."""
         return frozenset()
 
     def compute(self, found: Mapping[str, Any], wanted: frozenset[str]) -> dict[str, Any]:
-        """Return the wanted outputs, (n, m), from those of the members."""
+        """Compute the wanted outputs, (n, m), from those of the members."""
         return {}
 
 
@@ -52,8 +52,8 @@ class Relation:
 class Timing:
     """Difference of two crank angles of the main shaft, the second minus the first, in (-pi, pi].
 
-    ``places`` are design outputs such as "needle.phi_ext" or "phi_min_clearance"; those of a member count as the angle
-    of the main shaft.
+    ``places`` are design outputs such as "needle.phi_ext" or "phi_min_clearance"; those of a member are converted to
+    the angle of the main shaft.
     """
 
     name: str
@@ -61,17 +61,17 @@ class Timing:
 
     @property
     def output(self) -> Output:
-        """The difference."""
+        """The difference as an output."""
         first, second = self.places
         return Output(self.name, "rad", f"crank angle from {first} to {second}, in (-pi, pi]", "ours")
 
 
 @dataclass(frozen=True)
 class EventValue:
-    """Value of a pose output where something happens, such as the speed of a tip where it arrives.
+    """Value of a pose output at an event, such as the speed of a tip where it arrives.
 
-    ``of`` is the pose output as the machine has it; ``places`` holds one design output that is a crank angle of the
-    main shaft, such as "phi_arrive".
+    ``of`` is the machine's pose output; ``places`` holds one design output that is a crank angle of the main shaft,
+    such as "phi_arrive".
     """
 
     name: str
@@ -80,13 +80,13 @@ class EventValue:
 
     @property
     def output(self) -> Output:
-        """The value."""
+        """The value as an output."""
         return Output(self.name, self.of.unit, f"{self.of.name} at {self.places[0]}", "ours", wraps=self.of.wraps)
 
 
 @dataclass(frozen=True)
 class Distance(Relation):
-    """Distance of two points; ``points`` are dotted names such as "needle.point"."""
+    """Distance of two points, whose dotted names are such as "needle.point"."""
 
     points: tuple[str, str]
 
@@ -101,11 +101,11 @@ class Distance(Relation):
         return size, *parts
 
     def needs(self, wanted: frozenset[str]) -> frozenset[str]:
-        """Return coordinates of both points."""
+        """Names of the coordinates of both points."""
         return frozenset(f"{point}_{axis}" for point in self.points for axis in AXES)
 
     def compute(self, found: Mapping[str, Any], wanted: frozenset[str]) -> dict[str, Any]:
-        """Return the distance and components, (n, m)."""
+        """Compute the distance and its components, (n, m)."""
         a, b = self.points
         parts = [found[f"{b}_{axis}"] - found[f"{a}_{axis}"] for axis in AXES]
         return with_size(self.name, parts, wanted)
@@ -113,7 +113,7 @@ class Distance(Relation):
 
 @dataclass(frozen=True)
 class Speed(Relation):
-    """Speed of a point in the machine's frame, or of a second point as the first one sees it.
+    """Speed of a point in the machine's frame, or of a second point relative to the first.
 
     ``points`` are one or two dotted names such as "looper.tip".
     """
@@ -127,11 +127,11 @@ class Speed(Relation):
         return (Output(self.name, PER_RADIAN, f"{text}, per radian of the main shaft", "ours"),)
 
     def needs(self, wanted: frozenset[str]) -> frozenset[str]:
-        """Return velocities of the points."""
+        """Names of the velocities of the points."""
         return frozenset(velocity for point in self.points for velocity in _velocities(point))
 
     def compute(self, found: Mapping[str, Any], wanted: frozenset[str]) -> dict[str, Any]:
-        """Return the speed, (n, m)."""
+        """Compute the speed, (n, m)."""
         parts = [found[name] for name in _velocities(self.points[-1])]
         if len(self.points) == 2:
             parts = [part - found[name] for part, name in zip(parts, _velocities(self.points[0]), strict=True)]
@@ -144,13 +144,13 @@ def _velocities(point: str) -> tuple[str, ...]:
 
 
 def with_size(name: str, parts: list[Any], wanted: frozenset[str]) -> dict[str, Any]:
-    """Return the components, and the magnitude where it is wanted."""
+    """Return the components, and the magnitude if it is wanted."""
     columns = {f"{name}_{axis}": part for axis, part in zip(AXES, parts, strict=True)}
     return columns | ({name: np.sqrt(parts[0] ** 2 + parts[1] ** 2 + parts[2] ** 2)} if name in wanted else {})
 
 
 def check_unique(names: Sequence[str]) -> None:
-    """Refuse an output or parameter that two relations have: one would be read where the other is meant."""
+    """Raise for an output or parameter that two relations have, since its name would be ambiguous."""
     seen: set[str] = set()
     for name in names:
         if name in seen:
@@ -160,7 +160,7 @@ def check_unique(names: Sequence[str]) -> None:
 
 
 def two_names(given: tuple[str, ...], known: Sequence[str] | None, what: str, where: str) -> tuple[str, str]:
-    """Return two names out of what a user gives, of those that are known if any are."""
+    """Check that a user gives two names, among the known ones if these are given."""
     if len(given) != 2:
         raise InputError(what, given, f"two {what}", where)
     first, second = given if known is None else known_names(given, known, what, where)
@@ -168,7 +168,7 @@ def two_names(given: tuple[str, ...], known: Sequence[str] | None, what: str, wh
 
 
 def known_names(given: tuple[str, ...], known: Sequence[str], what: str, where: str) -> tuple[str, ...]:
-    """Return names out of what a user gives; refuse one that is not known."""
+    """Check that a user's names are known."""
     for part in given:
         if part not in known:
             raise InputError(what, part, f"{what}: {choices(part, known)}", where)

@@ -1,7 +1,7 @@
-"""Gaps between bodies of a machine, taken as capsules: distances and sides of segments; machine-and-stitch, 4.
+"""Gaps between bodies of a machine, modelled as capsules: distances and sides of segments; machine-and-stitch, 4.
 
-A point is a list of its coordinates, arrays of one shape; all of it takes complex numbers, for gradients by the complex
-step: what is nearest is decided by real parts.
+A point is a list of its coordinates, arrays of one shape; all functions take complex numbers, for gradients by the
+complex step: comparisons use real parts.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ Point: TypeAlias = Sequence[Any]
 
 
 class Closest(NamedTuple):
-    """Distance of two segments, and where along each its end of the shortest connection lies, 0 to 1."""
+    """Distance of two segments, and the places of the shortest connection along each, 0 to 1."""
 
     distance: Any
     first: Any
@@ -28,25 +28,25 @@ class Closest(NamedTuple):
 
 
 def dot(a: Point, b: Point) -> Any:
-    """Return the product of two vectors without conjugation."""
+    """Dot product without conjugation."""
     return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
 
 
 def cross(a: Point, b: Point) -> list[Any]:
-    """Return the product vector."""
+    """Cross product."""
     return [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]]
 
 
 def minus(a: Point, b: Point) -> list[Any]:
-    """Return the vector from b to a."""
+    """Vector from b to a."""
     return [x - y for x, y in zip(a, b, strict=True)]
 
 
 def closest(p1: Point, q1: Point, p2: Point, q2: Point) -> Closest:
-    """Return the least distance of the segments p1 q1 and p2 q2, (9).
+    """Compute the distance of the segments p1 q1 and p2 q2, (9).
 
-    The least of a convex function over a square: at one of four ends against the other segment, or inside both.  Each
-    candidate is the length of an actual difference, so none is too small; parallel segments need no threshold.
+    It is the minimum of a convex function over a square: at one of four ends against the other segment, or inside both.
+    Each candidate is the length of an actual difference, so none is too small; parallel segments need no threshold.
     """
     d1, d2, w = minus(q1, p1), minus(q2, p2), minus(p2, p1)
     n = cross(d1, d2)
@@ -75,7 +75,7 @@ def closest(p1: Point, q1: Point, p2: Point, q2: Point) -> Closest:
 def triple_product(p1: Point, q1: Point, p2: Point, q2: Point) -> Any:
     """Return d1 . ((p2 - p1) x (q2 - p1)), (11): the signed distance of the lines, times the size of d1 x d2.
 
-    It changes its sign where the lines meet or are parallel.
+    Its sign changes where the lines meet or are parallel.
     """
     return -dot(minus(p2, p1), cross(minus(q1, p1), minus(q2, p2)))
 
@@ -85,7 +85,7 @@ def _within(x: Any) -> Any:
 
 
 def _foot(v: Point, d: Point) -> Any:
-    """Return the place along d, 0 to 1, that is nearest to v; 0 on a segment of no length."""
+    """Place along d, 0 to 1, that is nearest to v; 0 for a segment of zero length."""
     square = dot(d, d)
     some = np.real(square) > 0.0
     t = dot(v, d) / np.where(some, square, 1.0)
@@ -96,7 +96,8 @@ def _foot(v: Point, d: Point) -> Any:
 class Body:
     """A segment with a radius.
 
-    ``ends`` are dotted names of two points, or of a point and of a direction along which both ends lie, at ``reach``.
+    ``ends`` are dotted names of two points, or of a point and a direction along which both ends lie at distances
+    ``reach``.
     """
 
     name: str
@@ -106,11 +107,11 @@ class Body:
 
     @property
     def needs(self) -> frozenset[str]:
-        """Return the coordinates of its ends."""
+        """Names of the coordinates of its ends."""
         return frozenset(f"{end}_{axis}" for end in self.ends for axis in AXES)
 
     def segment(self, found: Mapping[str, Any]) -> tuple[list[Any], list[Any]]:
-        """Return both ends, coordinates (n, m)."""
+        """Both ends, coordinates (n, m)."""
         start, end = ([found[f"{name}_{axis}"] for axis in AXES] for name in self.ends)
         if self.reach is None:
             return start, end
@@ -120,7 +121,7 @@ class Body:
 
 @dataclass(frozen=True)
 class Gap(Relation):
-    """Least distance of two bodies, less their radii."""
+    """Distance of two bodies, less their radii."""
 
     bodies: tuple[Body, Body]
 
@@ -142,11 +143,11 @@ class Gap(Relation):
         )
 
     def needs(self, wanted: frozenset[str]) -> frozenset[str]:
-        """Return the ends of both bodies."""
+        """Names of the coordinates of both bodies' ends."""
         return self.bodies[0].needs | self.bodies[1].needs
 
     def compute(self, found: Mapping[str, Any], wanted: frozenset[str]) -> dict[str, Any]:
-        """Return the gap, where it is, and the side, (n, m)."""
+        """Compute the gap, its places along the bodies, and the side, (n, m)."""
         (p1, q1), (p2, q2) = (body.segment(found) for body in self.bodies)
         nearest = closest(p1, q1, p2, q2)
         columns = {self.name: nearest.distance - sum(body.radius for body in self.bodies)}

@@ -1,9 +1,9 @@
-"""Whether a machine sews at every speed: room that the moments A, B and C leave while the window of the loop moves.
+"""Room of the moments A, B and C of a machine at several speeds, while the window of the loop moves.
 
 Each field of work permits a rise of the needle at A (machine-and-stitch, 5.4).  The first field is that of the least
-speed, the last one that of the greatest; between them the window runs linearly with the speed, which is ours.  The
-shaft's own unevenness makes the needle pass faster or slower than the mean: the rise has to suit both.  Where a member
-that carries the looper's blade has an elastic lag, its tip is late by that, which grows with the square of the speed.
+speed, the last one that of the greatest; between them the window varies linearly with the speed, which is ours.  By the
+shaft's unevenness the needle passes faster or slower than the mean: the rise has to suit both.  If a member that
+carries the looper's blade has an elastic lag, its tip is late by the lag, which grows with the square of the speed.
 """
 
 from __future__ import annotations
@@ -42,8 +42,8 @@ class Sewing(Relation):
     name : of the relation
     taking : moment A, with at least one field of work
     entering : moments B and C, or one of them
-    speeds : of the main shaft, growing [rad/s]; the fields of A belong to the first and to the last
-    clearance : least and largest distance of tip and needle at A that takes the loop
+    speeds : of the main shaft, increasing [rad/s]; the fields of A belong to the first and to the last
+    clearance : least and largest distance of tip and needle at A at which the loop is taken
     shaft : torque of the main shaft whose unevenness counts; None for an even one
     """
 
@@ -55,7 +55,7 @@ class Sewing(Relation):
 
     @property
     def numbers(self) -> tuple[Output, ...]:
-        """Design outputs: what is to spare at each speed."""
+        """Design outputs: room at each speed."""
         moments = ", ".join((self.taking.name, *(one.name for one in self.entering)))
         texts = ENDS | {"": f"least room of moments {moments}"}
         return tuple(
@@ -65,7 +65,7 @@ class Sewing(Relation):
 
     @property
     def readings(self) -> Mapping[str, tuple[str, int]]:
-        """Of each design output what it tells, "" for the least room of all moments, and the place of its speed."""
+        """Kind of room ("" for the least of all moments) and index of the speed, by design output."""
         return {
             f"{self.name}_{part}{'_' if part else ''}at_{speed / RPM:.6g}": (part, k)
             for part in ("", *ENDS)
@@ -74,7 +74,7 @@ class Sewing(Relation):
 
     @property
     def ends(self) -> dict[str, str]:
-        """Names of what the rise leaves to both ends of its window, among the rooms: no relation has such names."""
+        """Keys of the room that the rise leaves to both ends of its window; they differ from all names of relations."""
         return {end: f"{self.taking.name} {end}" for end in ENDS}
 
     def fields(self) -> tuple[str, str]:
@@ -84,17 +84,17 @@ class Sewing(Relation):
         return first[0], last[0]
 
     def needs(self, wanted: frozenset[str]) -> frozenset[str]:
-        """Return what the speeds of an uneven shaft are made of: poses give nothing of it."""
+        """Names of the outputs for the speeds of an uneven shaft; no pose outputs are computed from them."""
         shaft = self.shaft
         return frozenset() if shaft is None else shaft.needs(frozenset(o.name for o in shaft.numbers))
 
     def binding(self, machine: Machine, design: Array) -> tuple[tuple[str, float], tuple[str, float]]:
-        """Return which fields set the least and the most rise of a design (P,) that suits all, each with that rise."""
+        """Name the fields that set the least and the greatest rise of a design (P,), each with that rise."""
         assert self.taking.window is not None
         return self.taking.window.binding(design, machine.parameter_names)
 
     def window(self, machine: Machine, designs: Array, speeds: Array) -> tuple[Array, Array]:
-        """Return the least and the most rise that are permitted, each (n, S), of designs at speeds (S,) or (n, S)."""
+        """Compute the least and the greatest permitted rise, each (n, S), of designs at speeds (S,) or (n, S)."""
         assert self.taking.window is not None
         first, last = self.speeds[0], self.speeds[-1]
         part = np.atleast_2d((speeds - first) / (last - first))
@@ -105,11 +105,11 @@ class Sewing(Relation):
     def rooms(
         self, machine: Machine, designs: Array, speeds: Array, accuracy: Accuracy
     ) -> tuple[dict[str, Array], Status]:
-        """Return what each moment has to spare at each speed, (n, S) by the name of its relation, and status (n,).
+        """Compute the room of each moment at each speed, (n, S) by the name of its relation, and status (n,).
 
-        Of A the least of what rise, clearance, scarf and eye leave, of B and C the margin of the triangle; nan where
-        there is no such moment.  Negative: the stitch is missed.  ``ends`` are what the rise at A leaves to the
-        least and to the most rise permitted: parts of A.
+        The room of A is the smallest of those of rise, clearance, scarf and eye, that of B and C the margin of the
+        triangle; nan without such a moment, negative if the stitch is missed.  ``ends`` are the parts of A's room that
+        the rise leaves to the least and to the greatest permitted rise.
         """
         lag = self._lag(machine)
         slow, fast, status = self._unevenness(machine, designs, accuracy)
@@ -129,7 +129,7 @@ class Sewing(Relation):
         return rooms, status
 
     def _moments(self, machine: Machine, designs: Array, accuracy: Accuracy, status: Status) -> dict[str, Array]:
-        """Return rise and room of A without its window, margins of B and C, (n,); the status is written on."""
+        """Compute rise and room of A without its window, and margins of B and C, (n,); update the status."""
         name, (least, most) = self.taking.name, self.clearance
         names = [f"{name}_{key}" for key in ("rise", "clearance", "above_eye", "below_scarf_end")]
         a = taking_step(self.taking, machine).run(designs, frozenset(names), accuracy)
@@ -146,7 +146,7 @@ class Sewing(Relation):
         return found
 
     def _unevenness(self, machine: Machine, designs: Array, accuracy: Accuracy) -> tuple[Array, Array, Status]:
-        """Return slowest and fastest speed as shares of the mean, (n,), at the speed of the scene, and the status."""
+        """Slowest and fastest speed as shares of the mean, (n,), at the speed of the scene, and the status."""
         if self.shaft is None:
             return np.ones(len(designs)), np.ones(len(designs)), np.zeros(len(designs), np.uint8)
         names = [f"{self.shaft.name}_{key}" for key in ("slowest", "fastest")]
@@ -157,7 +157,7 @@ class Sewing(Relation):
         return slow, fast, np.array(found["status"], np.uint8)
 
     def _lag(self, machine: Machine) -> tuple[str, str, int, int] | None:
-        """Return lag and rate of the output of A's looper, and the columns of its phase and speed; None without lag."""
+        """Names of lag and rate of A's looper, and the columns of its phase and speed; None without a lag."""
         member = machine.member(self.taking.blade.tip.partition(".")[0])
         lag, names = f"{member.name}.lag", machine.parameter_names
         rate = member.family.derivative_of.get(member.family.position, "")
@@ -169,7 +169,7 @@ class Sewing(Relation):
     def _moved(
         self, machine: Machine, lag: tuple[str, str, int, int], designs: Array, speed: float, accuracy: Accuracy
     ) -> Array:
-        """Return designs whose looper stands where its lag at A puts it at a speed: its crank is moved instead."""
+        """Shift the crank of the looper so that the looper is where its lag at A puts it at a speed."""
         bent, rate, phase, own = lag
         member = machine.member(bent.partition(".")[0])
         moved = designs.copy()
@@ -177,7 +177,7 @@ class Sewing(Relation):
         phi = f"phi_{self.taking.name}"
         at = np.asarray(taking_step(self.taking, machine).run(designs, frozenset({phi}), accuracy)[phi], np.float64)
         poses = machine.poses(moved, Angles.of(at[:, None]), frozenset((bent, rate)))
-        # by the angle of the main shaft: sense and ratio of the crank turn it into one of the key or offset
+        # an angle of the main shaft: sense and ratio of the crank convert it to one of the key or offset
         ahead = np.asarray(poses[bent], np.float64)[:, 0] / np.asarray(poses[rate], np.float64)[:, 0]
         sign = member.ratio if member.mount is None else member.ratio * member.mount.sense
         moved = designs.copy()
@@ -186,14 +186,14 @@ class Sewing(Relation):
 
 
 def sewing_step(sewing: Sewing, machine: Machine) -> Step:
-    """Return the machine's route to the least room of all moments at each speed."""
+    """Make the machine's step to the least room of all moments at each speed."""
 
     def run(designs: Array, wanted: frozenset[str], accuracy: Accuracy) -> Columns:
         rooms, status = sewing.rooms(machine, designs, np.array(sewing.speeds), accuracy)
         least = np.minimum.reduce(list(rooms.values()))
         rooms[""] = least
         status = np.where((status == st.OK) & np.isnan(least).any(axis=1), st.NEVER, status).astype(np.uint8)
-        # lengths that the rooms are differences of
+        # size of the lengths whose differences are the rooms
         most = sewing.window(machine, designs, np.array(sewing.speeds))[1].max(axis=1)
         columns: Columns = {}
         for name, (part, k) in sewing.readings.items():

@@ -1,4 +1,4 @@
-"""Shaking of a machine: force and moment of any stages of its members on the frame (machine-and-stitch, 2)."""
+"""Shaking force and moment on the frame of stages of a machine's members (machine-and-stitch, 2)."""
 
 from __future__ import annotations
 
@@ -25,8 +25,8 @@ from sweep.numerics.grids import on_first_grid
 if TYPE_CHECKING:
     from sweep.families.machines.machine import Machine
 
-ORDERS = {1: "first", 2: "second"}  # in waves of one turn of the main shaft
-GRIDS = (64, 128, 256, 512, 1024)  # samples of a turn, the first that tell the orders
+ORDERS = {1: "first", 2: "second"}  # harmonics of the main shaft's turn
+GRIDS = (64, 128, 256, 512, 1024)  # samples of a turn; the first grid that resolves the orders is used
 
 
 @dataclass(frozen=True)
@@ -35,9 +35,9 @@ class Shaken:
 
     Parameters
     ----------
-    member, stage : its names; the stage is empty where there is one only
-    rod : whether a tool runs along a line beside which its point may stand: the guides of the line bear the couple
-    driving : the stage before that drives it, if that is part of the machine's shaking too; "" for the shaft
+    member, stage : its names; the stage is empty if there is only one
+    rod : whether a tool runs along a line beside which its point may be: the guides of the line bear the couple
+    driving : the previous stage that drives it, if that is part of the machine's shaking too; "" for the shaft
     crank : its joint on the crank axis
     """
 
@@ -53,16 +53,16 @@ class Shaken:
 
     @property
     def axis(self) -> list[str]:
-        """Names of the components of its crank axis in the machine's frame."""
+        """Names of the components of the crank axis in the machine's frame."""
         return [f"{self.member}.{self.crank}{self.stage}_axis_{axis}" for axis in AXES]
 
     def vector(self, found: Mapping[str, Any], output: str) -> list[Any]:
-        """Return a vector in the frame of the stage."""
+        """Return a vector output in the frame of the stage."""
         return [found[self.named(f"{output}_{axis}")] for axis in AXES]
 
 
 def shaken(member: str, stage: str, family: Family, listed: Sequence[tuple[str, str]]) -> Shaken:
-    """Return a stage of the given family; ``listed`` are all that are asked together.
+    """Describe a stage of the given family; ``listed`` are all stages of the relation.
 
     Raises
     ------
@@ -100,7 +100,7 @@ class Shaking(Relation):
 
     @property
     def numbers(self) -> tuple[Output, ...]:
-        """Design outputs: root mean squares of the orders that counterweights act on."""
+        """Design outputs: root mean squares of the orders that counterweights can reduce."""
         found = []
         for name, unit, what in ((self.name, "force", "force"), (self._moment, "torque", "moment")):
             for order, word in ORDERS.items():
@@ -110,7 +110,7 @@ class Shaking(Relation):
 
     @property
     def smooth(self) -> tuple[Smooth, ...]:
-        """Its outputs are smooth over the turn: each component, and both vectors."""
+        """All outputs, which are smooth over the turn: each component, and both vectors."""
         vectors = {name: tuple(f"{name}_{x}" for x in AXES) for name in (self.name, self._moment)}
         alone = (Smooth(part, (part,)) for parts in vectors.values() for part in parts)
         return (*(Smooth(name, parts) for name, parts in vectors.items()), *alone)
@@ -124,7 +124,7 @@ class Shaking(Relation):
         return not wanted.isdisjoint(names)
 
     def needs(self, wanted: frozenset[str]) -> frozenset[str]:
-        """Name the forces of the frame on every stage, and moments where one is wanted."""
+        """Names of the forces of the frame on every stage, and of moments if one is wanted."""
         names: set[str] = set()
         for one in self.stages:
             vectors = ["shaking_force", *(["shaking_moment"] if self._turning(wanted) else [])]
@@ -136,7 +136,7 @@ class Shaking(Relation):
         return frozenset(names)
 
     def on_frame(self, found: Mapping[str, Any], frames: Mapping[str, Frame], wanted: frozenset[str]) -> dict[str, Any]:
-        """Return the force and moment on the frame, (n, m); ``frames`` are those of all stages, of "looper2"."""
+        """Compute force and moment on the frame, (n, m); ``frames`` of all stages have names such as "looper2"."""
         force: list[Any] = [0.0, 0.0, 0.0]
         moment: list[Any] = [0.0, 0.0, 0.0]
         for one in self.stages:
@@ -148,7 +148,7 @@ class Shaking(Relation):
                 arm = cross([frame.at[:, [k]] for k in range(3)], own)
                 moment = [total + a + b for total, a, b in zip(moment, about, arm, strict=True)]
                 if one.driving:
-                    # The stage before turns its crank, not the frame: what its own moment counts in is inside.
+                    # The previous stage drives its crank, not the frame: the driving torque in its moment is internal.
                     inside = [found[name] for name in one.axis]
                     torque = found[one.named("drive_torque")]
                     moment = [total + torque * part for total, part in zip(moment, inside, strict=True)]
@@ -156,16 +156,16 @@ class Shaking(Relation):
         return with_size(self.name, force, wanted) | moments
 
     def _about_own(self, one: Shaken, found: Mapping[str, Any]) -> list[Any]:
-        """Return the moment about the origin of the stage's frame, with the couple of the tool's guides."""
+        """Moment about the origin of the stage's frame, with the couple of the tool's guides."""
         moment = one.vector(found, "shaking_moment")
         if one.rod:
-            # The bar's force acts on its point, beside the line by dev; its guides take the couple up.
+            # The bar's force acts on its point, at distance dev from the line; its guides bear the couple.
             moment[2] = moment[2] - found[one.named("dev")] * found[one.named("tool_load")]
         return moment
 
 
 def orders_of(shaking: Shaking, machine: Machine) -> Step:
-    """Return the machine's route to the first orders of its shaking."""
+    """Make the machine's step to the first orders of its shaking."""
 
     def run(designs: Array, wanted: frozenset[str], accuracy: Accuracy) -> Columns:
         asked = [o.name for o in shaking.numbers if o.name in wanted]
@@ -189,9 +189,10 @@ def orders_of(shaking: Shaking, machine: Machine) -> Step:
 def _amplitudes(
     shaking: Shaking, machine: Machine, designs: Array, asked: Sequence[str], samples: int
 ) -> tuple[Status, dict[str, tuple[Array, Array, Array]]]:
-    """Return the status, and of each order its root mean square, the error, and that of the whole curve, (n,).
+    """Compute the status, and of each order its root mean square, the error, and that of the whole curve, (n,).
 
-    What every other sample would give is as far off as the orders beyond a quarter of the samples are high.
+    The error is estimated by the difference to every other sample, which is that of the orders beyond a quarter of the
+    samples.
     """
     made_of = {name: name.rpartition("_order") for name in asked}
     parts = frozenset(f"{vector}_{x}" for vector, _, _ in made_of.values() for x in AXES)
