@@ -97,15 +97,7 @@ def completed(study: Study, index: NDArray[np.int64], designs: Array) -> Array:
     names = study.family.parameter_names[designs.shape[1] :]
     if not names:
         return designs
-    return _beside([*designs.T, *study.space.columns_at(index, names).values()], index.size)
-
-
-def _beside(columns: Iterable[Array], n: int) -> Array:
-    columns = list(columns)
-    matrix = np.empty((n, len(columns)))
-    for k, column in enumerate(columns):
-        matrix[:, k] = column
-    return matrix
+    return np.column_stack([designs, *study.space.columns_at(index, names).values()])
 
 
 def _is_valid(study: Study) -> bool:

@@ -16,49 +16,38 @@ from sweep.families.machines.machine import Machine
 from sweep.families.machines.specification import Specification, built
 from sweep.families.machines.specification import specification as specified
 
-NAMES = (
-    "rssr",
-    "rssp",
-    "guide",
-    "geared_dwell",
-    "five_link",
-    "kim_dison",
-    "slotted",
-    "swivel",
-    "spherical_looper",
-    "cylindrical_looper",
-    "slider_crank",
-    "four_bar",
-    "inverted_slider_crank",
-    "epicyclic_dwell",
-    "cam",
-    "cam_lever",
-    "eyelet",
-    "guided_cam",
-    "free_cam",
-    "free_cam_friction",
-    "heddle",
-    "backrest",
-    "backrest_tension",
-    "backrest_closure",
-    "feed",
-    "feed_triad",
-    "foot",
-    "feed_foot",
-)
-# Families defined in the file of a related one: the file, and the name there.
-_IN_FILE_OF = {
-    "slider_crank": ("rssp", "PLANAR"),
-    "inverted_slider_crank": ("slotted", "PLANAR"),
-    "swivel": ("slotted", "SWIVEL"),
-    "epicyclic_dwell": ("geared_dwell", "EPICYCLIC"),
-    "cam_lever": ("cam", "LEVER"),
-    "free_cam_friction": ("free_cam", "WITH_FRICTION"),
-    "backrest_tension": ("backrest", "TENSION"),
-    "backrest_closure": ("backrest", "CLOSURE"),
-    "feed_triad": ("feed", "TRIAD"),
-    "feed_foot": ("foot", "ON_FEED"),
+# Where the entry of each family stands: the file, and the name there.
+_ENTRIES = {
+    "rssr": "rssr.FAMILY",
+    "rssp": "rssp.FAMILY",
+    "guide": "guide.FAMILY",
+    "geared_dwell": "geared_dwell.FAMILY",
+    "five_link": "five_link.FAMILY",
+    "kim_dison": "kim_dison.FAMILY",
+    "slotted": "slotted.FAMILY",
+    "swivel": "slotted.SWIVEL",
+    "spherical_looper": "spherical_looper.FAMILY",
+    "cylindrical_looper": "cylindrical_looper.FAMILY",
+    "slider_crank": "rssp.PLANAR",
+    "four_bar": "four_bar.FAMILY",
+    "inverted_slider_crank": "slotted.PLANAR",
+    "epicyclic_dwell": "geared_dwell.EPICYCLIC",
+    "cam": "cam.FAMILY",
+    "cam_lever": "cam.LEVER",
+    "eyelet": "eyelet.FAMILY",
+    "guided_cam": "guided_cam.FAMILY",
+    "free_cam": "free_cam.FAMILY",
+    "free_cam_friction": "free_cam.WITH_FRICTION",
+    "heddle": "heddle.FAMILY",
+    "backrest": "backrest.FAMILY",
+    "backrest_tension": "backrest.TENSION",
+    "backrest_closure": "backrest.CLOSURE",
+    "feed": "feed.FAMILY",
+    "feed_triad": "feed.TRIAD",
+    "foot": "foot.FAMILY",
+    "feed_foot": "foot.ON_FEED",
 }
+NAMES = tuple(_ENTRIES)
 
 Mechanism: TypeAlias = "str | Sequence[str] | Mapping[str, Any] | Specification | Family"
 """A family's name, a list of names for a chain, a table of members for a machine, or a result of `sweep.machine`."""
@@ -152,7 +141,7 @@ def machine(
 def _single(name: str) -> Family:
     if name not in NAMES:
         raise InputError("family", name, f"one of {choices(name, NAMES)}", "family")
-    file, attribute = _IN_FILE_OF.get(name, (name, "FAMILY"))
+    file, _, attribute = _ENTRIES[name].partition(".")
     entry: Family = getattr(import_module(f"sweep.families.{file}"), attribute)
     return check_family(entry)
 

@@ -198,7 +198,7 @@ class Family:
     events : events at roots of pose outputs
     outward : the sign parameter whose +1 makes the extended limit position the one with the largest position; without
         one the extended position always is
-    uses_phi : False for poses that need only cos(phi) and sin(phi); in a chain that saves an arctangent per pose
+    uses_phi : whether poses need more than cos(phi) and sin(phi); in a chain that costs an arctangent per pose
     analytic : whether poses take complex designs and angles, for exact gradients by the complex step
     points : named moving points
     capabilities : typed objects for effects, proofs, drawings and fits (:mod:`sweep.families.capabilities`)
@@ -218,7 +218,7 @@ class Family:
     derivative_of: Mapping[str, str] = field(default_factory=dict)
     events: tuple[Event, ...] = ()
     outward: str = ""
-    uses_phi: bool = True
+    uses_phi: bool = False
     analytic: bool = True
     points: Mapping[str, Coordinates] = field(default_factory=dict)
     capabilities: tuple[object, ...] = ()

@@ -152,7 +152,6 @@ FAMILY = Family(
         "a2": 0.5, "b2": 3.0, "e2": 0.3, "f2": 0.1, "alpha2": 0.2, "offset2": 0.5, "slides": 1.0,
         "p0x": 2.0, "p0y": 0.3, "p0z": 3.0,
     },
-    uses_phi=False,
     points={name: (f"x_{name}", f"y_{name}", f"z_{name}") for name in ("b1", "c1", "p")},
     capabilities=(
         Dimensions(links("a1 b1 c1 a2 b2")),

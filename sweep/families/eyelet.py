@@ -74,7 +74,6 @@ FAMILY = Family(
     pose_outputs=POSE_OUTPUTS,
     poses=poses,
     derivative_of=ladders("P", orders=2) | {"L": "dP"},
-    uses_phi=False,
     example={"a": 2.0, "e": 3.0, "f": 1.0, "alpha": 0.5, "Z1": -3.0, "Z2": 4.0, "P_h": 8.0},
     points={"eyelet": EYELET},
     capabilities=(

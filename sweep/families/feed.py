@@ -211,7 +211,6 @@ FAMILY = Family(
     steps=(Step("feeding", FEEDING_OUTPUTS, events, work=Work.LONG),),
     example=EXAMPLE,
     derivative_of={"psi_plus_dh": "dpsi", "dpsi": "d2psi"} | ladders("chi", "x_t", "y_t", orders=2),
-    uses_phi=False,
     points={k: (f"x_{k}", f"y_{k}", None) for k in ("h", "e", "f", "t")},
     capabilities=(
         Singular(partial(rocker_loop, PARAMETERS)),
@@ -323,6 +322,7 @@ TRIAD = Family(
     position="x_t",
     pose_outputs=TRIAD_OUTPUTS,
     poses=triad_poses,
+    uses_phi=True,
     example=TRIAD_EXAMPLE,
     derivative_of=ladders("x_t", "y_t", "chi", orders=2),
     points={"t": ("x_t", "y_t", None)},

@@ -71,7 +71,6 @@ FAMILY = Family(
     example={"a": 1.0, "b": 3.9, "c": 3.2, "e": 2.9, "f": 0.6, "g": -0.4, "alpha": 0.7, "h": 0.3, "s2": 0.1},
     derivative_of=ladders("psi"),
     outward="branch",
-    uses_phi=False,
     points={name: (f"x_{name}", f"y_{name}", f"z_{name}") for name in ("b", "h", "c")},
     capabilities=(
         CRANK_ROCKER_SIZES,

@@ -91,7 +91,6 @@ FAMILY = Family(
     steps=tuple(step_of(step, as_crank_rocker) for step in crank_rocker.FAMILY.steps),
     derivative_of=ladders("psi") | ladders("x_m", "y_m", orders=2),
     outward="branch",
-    uses_phi=False,
     points={name: (f"x_{name}", f"y_{name}", None) for name in ("b", "c", "m")},
     capabilities=(
         can.Dimensions(links("a b c"), arms=(can.Arm(("xi", "eta"), ("b",)),)),

@@ -105,7 +105,6 @@ FAMILY = Family(
     pose_outputs=tuple(replace(o, kinks=not o.jumps) for o in POSE_OUTPUTS),  # where the thread comes to lie and leaves
     poses=poses,
     derivative_of=ladders("P", orders=2) | {"L": "dP"},
-    uses_phi=False,
     example={"a": 0.4, "X1": 0.83, "Y1": -2.08, "Z1": -3.56, "X2": 3.3, "Y2": -0.85, "Z2": 3.7},
     points={"contact": ("X", "Y", None)},
     capabilities=(

@@ -154,6 +154,7 @@ FAMILY = Family(
     position="psi",
     pose_outputs=POSE_OUTPUTS,
     poses=poses,
+    uses_phi=True,
     steps=(
         Step("dwell", DWELL_OUTPUTS, dwell),
         Step("stationary points", MAX_OUTPUTS, exact_maxima, lambda accuracy: accuracy.target is not None),
@@ -215,7 +216,6 @@ EPICYCLIC = Family(
     example={"k": 1.3, "a": 0.2, "n": 3.0},
     steps=(Step("dwell", EPICYCLIC_DWELL, epicyclic_measures, work=Work.LONG),),
     derivative_of=ladders("psi"),
-    uses_phi=False,
     points={"b": ("x_b", "y_b", None)},
     capabilities=(
         Singular.where_small("x_b", "y_b"),

@@ -165,7 +165,6 @@ FAMILY = Family(
     poses=poses,
     derivative_of=ladders("s") | ladders("dev", "x_m", "y_m", orders=2),
     outward="branch",
-    uses_phi=False,
     points={"b": ("x_b", "y_b", None), "c": ("x_c", "y_c", None), "point": ("x_m", "y_m", None)},
     capabilities=(
         can.Dimensions(links("a b c"), arms=(can.Arm(("xi", "eta"), ("b",)),)),

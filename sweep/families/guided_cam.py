@@ -119,7 +119,6 @@ FAMILY = Family(
     poses=poses,
     steps=(Step("cam body", DESIGN_OUTPUTS, size, work=Work.LONG),),
     derivative_of={"P": "dP", "dP": "d2P", "L": "dP", "S": "dS", "dS": "d2S"},
-    uses_phi=False,
     example={"P_h": 60.0, "X1": 3.0, "Z1": 12.0, "e": 5.0, "R0": 30.0, "A1": 10.0, "B2": 3.0},
     points={"profile": ("X_P", "Y_P", None)},
     capabilities=(

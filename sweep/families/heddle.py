@@ -116,7 +116,6 @@ FAMILY = Family(
     poses=poses,
     example=EXAMPLE,
     derivative_of=ladders("chi", "y"),
-    uses_phi=False,
     points={"b": ("x_b", "y_b", None), "c": ("x_c", "y_c", None)},
     capabilities=(
         Dimensions(links("O2B BC O3C O4E"), optional=("O3D", "O4F", "DF", "EG")),

@@ -115,24 +115,15 @@ def _poses(run: PoseFunction, designs: Array, angles: Angles, wanted: frozenset[
 
 def swing(designs: Array, wanted: frozenset[str], accuracy: Accuracy) -> Columns:
     """Compute both limit positions, with the crank in the plane of the rocker, and their angle, to rounding."""
-    n = len(designs)
-    status, values = np.empty(n, np.uint8), np.empty((n, len(rssr.LIMIT_NAMES)))
-    errors = np.empty_like(values)
-    matrix = as_crank_rocker(designs)
-    rssr.limits(matrix, status, values, errors)
-    names = rssr.LIMIT_NAMES
-    ext, fold, whole = (names.index(name) for name in ("psi_ext", "psi_fold", "swing"))
+    found = crank_rocker.limits(as_crank_rocker(designs), frozenset(rssr.LIMIT_NAMES), accuracy)
     # The extended position is phi = 0 or pi, where the ball is beyond the crank pin: y_C > 0 or < 0.
-    first = np.cos(values[:, names.index("phi_ext")]) > 0.0
-    found = {
-        "alpha_at_phi0": [np.where(first, x[:, ext], x[:, fold]) for x in (values, errors)],
-        "alpha_at_phipi": [np.where(first, x[:, fold], x[:, ext]) for x in (values, errors)],
-        "swing": [np.abs(values[:, whole]), errors[:, whole]],
-    }
-    columns = {name: value for name, (value, _) in found.items()}
-    if accuracy.target is not None:
-        columns |= {f"err_{name}": error for name, (_, error) in found.items()}
-    return chosen(columns, wanted, status)
+    first = np.cos(np.asarray(found["phi_ext"])) > 0.0
+    columns: Columns = {}
+    for err in ("", "err_") if accuracy.target is not None else ("",):
+        ext, fold, whole = (found[f"{err}{name}"] for name in ("psi_ext", "psi_fold", "swing"))
+        columns |= {f"{err}alpha_at_phi0": np.where(first, ext, fold), f"{err}swing": np.abs(np.asarray(whole))}
+        columns[f"{err}alpha_at_phipi"] = np.where(first, fold, ext)
+    return chosen(columns, wanted, np.asarray(found["status"], np.uint8))
 
 
 FAMILY = Family(
@@ -152,7 +143,6 @@ FAMILY = Family(
         ),
     ),
     derivative_of=ladders("alpha"),
-    uses_phi=False,
     points={"b": ("x_b", "y_b", "z_b"), "c": ("x_c", "y_c", "z_c")},
     capabilities=(
         can.Dimensions(links("r l h")),

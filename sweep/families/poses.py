@@ -178,12 +178,8 @@ def together(*outputs: Sequence[Output]) -> Callable[[PoseFunction], PoseFunctio
 _POINTS_OF_POSE, _POINTS_OF_DESIGN = (0, 3), (6, 9)
 
 
-def _same(name: str) -> str:
-    return name
-
-
 def step_of(
-    step: Step, matrix: DesignMap, ours: Callable[[str], str] = _same, theirs: Callable[[str], str] = _same
+    step: Step, matrix: DesignMap, ours: Callable[[str], str] = str, theirs: Callable[[str], str] = str
 ) -> Step:
     """Take a step of the other family for designs of this one, whose design matrix there is ``matrix(designs)``.
 
@@ -199,11 +195,6 @@ def step_of(
 
     provides = tuple(replace(o, name=ours(o.name), equation="") for o in step.provides)
     return replace(step, provides=provides, run=run)
-
-
-def of_matrix(of_theirs: DesignMap, matrix: DesignMap) -> DesignMap:
-    """Take what the other family has of each design, for designs of this one."""
-    return lambda designs: of_theirs(matrix(designs))
 
 
 def move_records(rotation: Array, origin: Array, per_pose: Array, per_design: Array) -> None:

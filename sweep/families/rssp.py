@@ -157,7 +157,6 @@ FAMILY = Family(
     ),
     derivative_of=ladders("s"),
     outward="branch",
-    uses_phi=False,
     points={"b": ("x_b", "y_b", "z_b"), "c": ("x_c", "y_c", "z_c")},
     capabilities=(
         SLIDER_CRANK_SIZES,
@@ -254,7 +253,6 @@ PLANAR = Family(
     steps=tuple(_planar_step(step) for step in FAMILY.steps),
     derivative_of=ladders("s"),
     outward="branch",
-    uses_phi=False,
     points={"b": ("x_b", "y_b", None), "c": ("x_c", "y_c", None)},
     capabilities=(
         SLIDER_CRANK_SIZES,

@@ -14,7 +14,7 @@ from sweep.families import capabilities as can
 from sweep.families.base import Accuracy, Angles, Columns, Family, Output, Parameter, PoseFunction, Step, Work, floats
 from sweep.families.hardpoints import CRANK_ROCKER_POINTS
 from sweep.families.outputs import coordinate_outputs, joint_outputs, ladders
-from sweep.families.poses import chosen, move_records, of_matrix, optional_outputs, poses_of, together
+from sweep.families.poses import chosen, move_records, optional_outputs, poses_of, together
 from sweep.families.provable import CRANK_ROCKER_BY_AXES, CRANK_ROCKER_BY_ROCKER
 from sweep.families.skeletons import CRANK_ROCKER, CRANK_ROCKER_SIZES, crank_axis, standing
 
@@ -133,7 +133,7 @@ def moving_alike(
 
     moved = None if itself else (partial(turned, poses), partial(turned, precise_poses))
     records = can.JointRecords(fill, JOINT_NEEDS, "rocker", moved)
-    return records, can.PressureEllipse(of_matrix(ellipse, matrix)), can.CrankRockerLoop(matrix)
+    return records, can.PressureEllipse(lambda designs: ellipse(matrix(designs))), can.CrankRockerLoop(matrix)
 
 
 def discriminant_scale(designs: Array) -> Array:
@@ -301,7 +301,6 @@ FAMILY = Family(
     ),
     derivative_of=ladders("psi"),
     outward="branch",
-    uses_phi=False,
     points={"b": ("x_b", "y_b", "z_b"), "c": ("x_c", "y_c", "z_c")},
     capabilities=(
         CRANK_ROCKER_SIZES,

@@ -10,7 +10,7 @@ import numpy as np
 
 from kernels.types import Array
 from sweep.families.base import Parameter
-from sweep.families.capabilities import DesignMap, Dimensions, Fixed, Link
+from sweep.families.capabilities import DesignMap, Dimensions, Fixed, Link, constant
 
 X, Y, Z = (1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0)
 CRANK, COUPLER, ROCKER = Link("crank", ("a", "b")), Link("coupler", ("b", "c")), Link("rocker", ("d", "c"))
@@ -47,7 +47,7 @@ def squared(parameters: tuple[Parameter, ...], name: str) -> DesignMap:
 def crank_axis(parameters: tuple[Parameter, ...], f: str, alpha: str) -> Fixed:
     """Return the crank's centre, ``f`` along the axis (0, sin alpha, cos alpha) from the origin."""
     at, axis = partial(_along, parameters, f, alpha), partial(_along, parameters, None, alpha)
-    return Fixed(at, axis, foot=partial(_same, (0.0, 0.0, 0.0)))
+    return Fixed(at, axis, foot=constant(0.0, 0.0, 0.0))
 
 
 def _along(parameters: tuple[Parameter, ...], f: str | None, alpha: str, designs: Array) -> Array:
@@ -67,25 +67,16 @@ def standing(
     zero: tuple[float, float, float] = X,
 ) -> Fixed:
     """Fix a point whose coordinates are parameters, or 0 where none is named, and a constant direction."""
-    along = None if axis is None else partial(_same, axis)
-    return Fixed(partial(_coordinates, parameters, (x, y, z)), along, kind, zero=partial(_same, zero))
 
+    def at(designs: Array) -> Array:
+        return np.stack([parameter(parameters, name, designs) for name in (x, y, z)], axis=1)
 
-def _coordinates(parameters: tuple[Parameter, ...], names: tuple[str | None, ...], designs: Array) -> Array:
-    return np.stack([parameter(parameters, name, designs) for name in names], axis=1)
-
-
-def _same(vector: tuple[float, float, float], designs: Array) -> Array:
-    return np.tile(np.array(vector), (len(designs), 1))
+    return Fixed(at, None if axis is None else constant(*axis), kind, zero=constant(*zero))
 
 
 def line(of: Callable[[Array], tuple[Array, Array]]) -> Fixed:
     """Return a line along which something moves: ``of`` gives a point of it and its direction, each (n, 3)."""
-    return Fixed(partial(_one_of, of, 0), partial(_one_of, of, 1), "slide")
+    return Fixed(lambda designs: of(designs)[0], lambda designs: of(designs)[1], "slide")
 
 
-def _one_of(of: Callable[[Array], tuple[Array, Array]], which: int, designs: Array) -> Array:
-    return of(designs)[which]
-
-
-ORIGIN = Fixed(partial(_same, (0.0, 0.0, 0.0)), partial(_same, Z))
+ORIGIN = Fixed(constant(0.0, 0.0, 0.0), constant(*Z))

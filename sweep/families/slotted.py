@@ -119,7 +119,6 @@ FAMILY = Family(
     poses=poses,
     derivative_of=ladders("psi", "rho"),
     example={"a": 1.0, "e": 2.6, "f": 0.7, "g": -0.4, "alpha": 0.6, "s": 0.5},
-    uses_phi=False,
     points={"b": ("x_b", "y_b", "z_b"), "c": ("x_c", "y_c", "z_c")},
     capabilities=(
         Singular(partial(axis_squared, PARAMETERS), ("x_b", "y_b")),
@@ -180,7 +179,6 @@ PLANAR = Family(
     poses=planar_poses,
     example={"a": 1.0, "e": 2.2, "h": 0.3, "branch": -1.0},
     derivative_of=ladders("psi") | ladders("s", orders=2),
-    uses_phi=False,
     points={"b": ("x_b", "y_b", None)},
     capabilities=(
         Singular(partial(axis_squared, PLANAR_PARAMETERS), ("x_b", "y_b")),
@@ -248,7 +246,6 @@ SWIVEL = Family(
     poses=swivel_poses,
     derivative_of=ladders("rho", "x_p", "y_p", "z_p"),
     example={"a": 1.0, "e": 2.6, "f": 0.7, "g": -0.4, "alpha": 0.6, "Lw": 5.0},
-    uses_phi=False,
     points={"b": ("x_b", "y_b", "z_b"), "p": ("x_p", "y_p", "z_p")},
     capabilities=(
         Singular.where_small("rho"),

@@ -123,7 +123,6 @@ FAMILY = Family(
         "o": 1.5, "delta": 1.2, "gamma": 2.5, "c0x": -1.0, "c0y": 1.4, "c0z": 0.3, "p0x": -3.0, "p0y": 2.0, "p0z": 2.5,
         "a2": 0.3, "b2": 7.0, "x2": 0.0, "y2": -4.0, "z2": -4.0, "theta2": 1.0, "beta2": 1.57, "offset2": 0.5,
     },
-    uses_phi=False,
     points={name: (f"x_{name}", f"y_{name}", f"z_{name}") for name in ("b1", "c1", "b2", "c2", "p")},
     capabilities=(
         Dimensions((*links("a1 b1 c1 a2 b2"), LOOPER), arms=(Arm(("p0x", "p0y", "p0z"), LOOPER),)),

@@ -11,9 +11,9 @@ from mpmath import mp
 import sweep
 from kernels import status as st
 from kernels.chains import links as kernel
+from sweep.families import NAMES, family
 from sweep.families import chain as chains
-from sweep.families import family
-from sweep.families.base import Angles, Family, Output, Parameter
+from sweep.families.base import Angles, Family, Output, Parameter, Turn
 from tests.reference import chain as naive
 from tests.reference import guide as naive_guide
 from tests.reference import rssp as naive_rssp
@@ -248,3 +248,14 @@ def test_chain_computes_only_what_is_wanted():
         assert set(spied.poses(design, angles, frozenset(wanted))) == wanted | {"status"}
         assert first == [frozenset(of_first)]
         assert second == ([] if of_second is None else [frozenset(of_second)])
+
+
+@pytest.mark.parametrize("name", [name for name in NAMES if isinstance(family(name).domain, Turn)])
+def test_poses_that_do_not_use_the_angle_are_those_of_its_cosine_and_sine(name):
+    found, angles = family(name), Angles.of(np.linspace(0.1, 6.0, 5)[None, :])
+    design = np.array([[found.example.get(p.name, p.default) for p in found.parameters]], float)
+    wanted = frozenset(found.pose_names)
+    bare = found.poses(design, angles._replace(phi=np.full((1, 5), np.nan)), wanted)
+    whole = found.poses(design, angles, wanted)
+    same = all(np.array_equal(bare[output], whole[output], equal_nan=True) for output in (*wanted, "status"))
+    assert same is not found.uses_phi
