@@ -127,12 +127,6 @@ def content_hash(data: bytes) -> str:
     return hashlib.sha256(data).hexdigest()[:16]
 
 
-def part_of(path: Path) -> Part | None:
-    """Parse the file name of a chunk; None for any other name."""
-    match = _PART.fullmatch(path.name)
-    return None if match is None else Part(path, int(match[1]), match[2], match[3])
-
-
 def parts(folder: Path) -> list[Part]:
     """List the chunk files of a folder in design order.
 
@@ -156,7 +150,8 @@ def listing(folder: Path) -> tuple[list[Part], list[Path]]:
     """
     with store_errors(folder):
         entries = sorted(path for path in folder.iterdir() if path.name[0] != ".") if folder.is_dir() else []
-    chunks = {path: part for path in entries if (part := part_of(path)) is not None}
+    named = {path: match for path in entries if (match := _PART.fullmatch(path.name)) is not None}
+    chunks = {path: Part(path, int(match[1]), match[2], match[3]) for path, match in named.items()}
     ordered = sorted(chunks.values(), key=lambda part: (part.index, part.path.name))
     return ordered, [path for path in entries if path not in chunks]
 

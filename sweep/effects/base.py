@@ -80,19 +80,14 @@ class Advice:
 AdviceFunction: TypeAlias = Callable[[Scene], Advice | None]
 
 
-@dataclass(frozen=True)
-class Largest:
+def largest(compute: ComputeFunction, name: str, quantity: str, threshold: float, unit: str = "") -> AdviceFunction:
     """Rule of negligibility by the largest magnitude of the output ``name`` over the turn, called ``quantity``."""
 
-    name: str
-    quantity: str
-    threshold: float
-    unit: str = ""
+    def advise(scene: Scene) -> Advice | None:
+        found = np.abs(np.asarray(compute(scene, frozenset({name}))[name], np.float64))
+        return Advice.of_turning(quantity, found.max(axis=1), threshold, unit)
 
-    def advice(self, compute: ComputeFunction, scene: Scene) -> Advice | None:
-        """Apply the rule to the designs whose output is known over the whole turn; None if there are none."""
-        found = np.abs(np.asarray(compute(scene, frozenset({self.name}))[self.name], np.float64))
-        return Advice.of_turning(self.quantity, found.max(axis=1), self.threshold, self.unit)
+    return advise
 
 
 @dataclass(frozen=True)
@@ -154,7 +149,7 @@ class Effect:
     takes_load: str = ""
     may_drive_nothing: bool = False
     design_result: DesignResult | None = None
-    advise: AdviceFunction | Largest | None = None
+    advise: AdviceFunction | None = None
     requires: type = JointRecords
     tool_inputs: tuple[tuple[Parameter, ...], ...] = ((), (), ())
     least: tuple[str, ...] = ()
@@ -179,8 +174,6 @@ class Effect:
 
     def advice(self, scene: Scene) -> Advice | None:
         """Apply the rule of negligibility to designs over a turn; None without a rule, or where none turns."""
-        if isinstance(self.advise, Largest):
-            return self.advise.advice(self.compute, scene)
         return None if self.advise is None else self.advise(scene)
 
     @property

@@ -9,7 +9,7 @@ from functools import partial
 import numpy as np
 
 from kernels.effects import bearings, permissible
-from sweep.effects.base import Bend, ComputeFunction, Effect, Largest
+from sweep.effects.base import Bend, ComputeFunction, Effect, largest
 from sweep.effects.loads import SPEED, together
 from sweep.effects.pressure import components
 from sweep.effects.scene import Scene, refuse
@@ -164,7 +164,7 @@ def _effect(
         even_crank=SPEED in inputs,
         least=tuple(o.name for o in results if o.name.startswith(("life", "permissible", "theta1_reserve"))),
         bends=bends,
-        advise=Largest(f"{kind}_utilisation", f"utilisation of the {kind} bearings", 0.5) if kind else None,
+        advise=largest(compute, f"{kind}_utilisation", f"utilisation of the {kind} bearings", 0.5) if kind else None,
     )
 
 

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from kernels import status as st
 from kernels.types import Array
-from sweep.effects.base import Bend, Effect, Largest
+from sweep.effects.base import Bend, Effect, largest
 from sweep.effects.contact import MODULUS, line_stress
 from sweep.effects.load_effects import loads_of
 from sweep.effects.load_passing import compute_loads
@@ -100,5 +100,5 @@ def roller_of(name: str) -> Effect:
         bends=(Bend(("stress_r",), normal_force, zero=True),),
         called_for="a cam that can be made, wear of the roller",
         negligible="a pitch curve whose least radius is far above the roller's",
-        advise=Largest("undercut", "undercut", 0.3),
+        advise=largest(compute, "undercut", "undercut", 0.3),
     )

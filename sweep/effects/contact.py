@@ -3,14 +3,15 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from functools import lru_cache, partial
+from functools import lru_cache
 
 import numpy as np
 
 from kernels import status as st
 from kernels.linkage.bodies import TURN
 from kernels.types import Array, Status
-from sweep.effects.base import Effect, Largest
+from sweep.effects.base import Effect, largest
+from sweep.effects.link_loads import tree_of
 from sweep.effects.load_effects import axis_of, loads_of, relative
 from sweep.effects.load_passing import compute_loads
 from sweep.effects.loads import magnitude
@@ -101,9 +102,9 @@ def _of_joint(scene: Scene, joint: LinkJoint, force: Array, status: Status) -> l
     return [sliding, stress, mean * sliding]
 
 
-def compute(scene: Scene, wanted: frozenset[str], tree: LinkTree) -> Columns:
+def compute(scene: Scene, wanted: frozenset[str]) -> Columns:
     """Compute the wanted outputs of the joints with contacts."""
-    joints = [joint for joint in touching(tree) if not wanted.isdisjoint(o.name for o in _outputs(joint))]
+    joints = [joint for joint in touching(tree_of(scene)) if not wanted.isdisjoint(o.name for o in _outputs(joint))]
     loads = compute_loads(scene, frozenset(f"force_{joint.name}" for joint in joints))
     status = scene.status()
     columns: dict[str, Array] = {}
@@ -135,8 +136,8 @@ def contact_of(name: str) -> Effect:
         inputs=(*bare.inputs, MODULUS, *(p for joint in joints for p in _inputs(joint))),
         only_for={p.name: tuple(o.name for o in _outputs(joint)) for joint in joints for p in _inputs(joint)},
         outputs=tuple(o for joint in joints for o in _outputs(joint)),
-        compute=partial(compute, tree=tree),
+        compute=compute,
         called_for="wear and stress of slots, eccentrics, balls",
         negligible="largest pressure below 100 MPa",
-        advise=Largest(f"stress_{joints[0].name}", "pressure", 100.0, "MPa"),
+        advise=largest(compute, f"stress_{joints[0].name}", "pressure", 100.0, "MPa"),
     )

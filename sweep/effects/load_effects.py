@@ -14,7 +14,7 @@ import numpy as np
 from kernels import status as st
 from kernels.effects.coupler import CouplerMotion, coupler_point
 from sweep.effects import kinetostatics, link_loads, loads
-from sweep.effects.base import Advice, Bend, Effect, Largest
+from sweep.effects.base import Advice, Bend, Effect, largest
 from sweep.effects.link_loads import rod, tree_of
 from sweep.effects.load_passing import FRICTION, LOADS, compute_friction, compute_loads
 from sweep.effects.loads import FRICTION_SUFFIX, FRICTION_TEXT
@@ -227,7 +227,7 @@ def _closed_friction(kind: loads.Follower) -> Effect:
         negligible="contraction rho(L) below 0.01: joint loads change by less than 1 %",
         takes_load=FRICTION,
         bends=(Bend(tuple(o.name for o in outputs), ball_slowness, squares=True),),
-        advise=Largest(kinetostatics.CONTRACTION, "contraction rho(L)", 0.01),
+        advise=largest(compute_friction, kinetostatics.CONTRACTION, "contraction rho(L)", 0.01),
     )
 
 
@@ -286,7 +286,7 @@ def friction_of(name: str) -> Effect:
         negligible="a few passes settle it: joint loads change by less than 1 %",
         takes_load=FRICTION,
         bends=tree_bends(tree, tuple(o.name for o in outputs)),
-        advise=Largest(next(iter(loads.PASSES)), "number of passes of the friction iteration", 4.0),
+        advise=largest(compute_friction, next(iter(loads.PASSES)), "number of passes of the friction iteration", 4.0),
     )
 
 

@@ -6,7 +6,7 @@ import numpy as np
 
 from kernels.effects.pressure import directions, pressure_extrema
 from kernels.types import Status
-from sweep.effects.base import DesignResult, Effect, Largest, no_poses
+from sweep.effects.base import DesignResult, Effect, largest, no_poses
 from sweep.effects.scene import Scene
 from sweep.families.base import Accuracy, Array, Columns, Output
 from sweep.families.capabilities import PressureEllipse
@@ -57,7 +57,7 @@ EFFECT = Effect(
     compute=compute,
     called_for="choice of the follower's and the crank's bearings",
     negligible="axial component of the coupler direction below 0.05 (planar linkage: theta2 = theta3 = 0)",
-    advise=Largest("t_k", "axial force", 0.05, "of the coupler force"),
+    advise=largest(compute, "t_k", "axial force", 0.05, "of the coupler force"),
 )
 
 

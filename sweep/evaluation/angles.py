@@ -14,7 +14,7 @@ from numpy.typing import ArrayLike
 from kernels.types import TWO_PI
 from sweep.errors import InputError
 from sweep.evaluation.tables import Parametrised, numbers
-from sweep.families.base import Array, Domain, Parameter
+from sweep.families.base import Domain, Parameter
 from sweep.families.names import stem
 from sweep.families.parameter import reads_as_degrees
 from sweep.quantities.units import heading_factor, internal_unit, plain
@@ -79,7 +79,10 @@ def in_radians(
         name, unit = (found[1], found[2]) if found is not None and found[1] in known else (str(key), None)
         values = columns[key]
         if unit is not None:
-            renamed[key] = _plain_name(name, unit, table)
+            if name in map(str, table):
+                here = f"column {name} [{unit}]"
+                raise InputError("column", name, f"either {name} or {name} [{unit}], not both", here)
+            renamed[key] = name
             scale = heading_factor(name, unit, _internal(name, family, others, domain))
             if scale != 1.0:
                 changed[name] = numbers(values, name, f"column {key}, row") * scale
@@ -137,13 +140,6 @@ def _check_unit(angles: object) -> None:
         raise InputError("angles", angles, '"rad" or "deg"', "angles")
 
 
-def _plain_name(name: str, unit: str, table: Iterable[Any]) -> str:
-    """Return the name without its unit; raise if the table has a column of that name too."""
-    if name in map(str, table):
-        raise InputError("column", name, f"either {name} or {name} [{unit}], not both", f"column {name} [{unit}]")
-    return name
-
-
 def _check_plausible(name: str, values: Any, turns_on: bool) -> None:
     try:
         found = np.abs(numbers(values, name, "column"))
@@ -156,7 +152,7 @@ def _check_plausible(name: str, values: Any, turns_on: bool) -> None:
     row = int(np.argmax(np.where(np.isfinite(found), found, 0.0)))
     raise InputError(
         name,
-        _first(values, row),
+        float(np.atleast_1d(numbers(values, "angle", "column")).flat[row]),
         f"{'rad, which this does not look like' if turns_on else 'at most 2 pi, in rad'}; " + REMEDY.format(name=name),
         f"{'' if turns_on else 'column '}{name}, row {row}",
     )
@@ -165,8 +161,3 @@ def _check_plausible(name: str, values: Any, turns_on: bool) -> None:
 def is_plausible(largest: float, turns_on: bool) -> bool:
     """Whether the largest magnitude of an angle may be in rad; ``turns_on`` marks angles that count full turns."""
     return not largest > MOST or (turns_on and not reads_as_degrees(largest))
-
-
-def _first(values: Any, row: int) -> float:
-    found: Array = np.atleast_1d(numbers(values, "angle", "column"))
-    return float(found.flat[row])

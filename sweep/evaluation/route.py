@@ -9,6 +9,7 @@ from numbers import Real
 from typing import Literal, NamedTuple, TypeAlias
 
 import numpy as np
+from numpy.typing import NDArray
 
 from kernels import status as st
 from kernels.types import TWO_PI
@@ -152,16 +153,22 @@ def _run_step(
 SLOPE = 1e-5  # rad, step of the finite difference that propagates an angle's error to a value there
 
 
-def negative(name: str, of: str, designs: Array, found: Columns, accuracy: Accuracy) -> Columns:
+Composed: TypeAlias = tuple[Array, Array, NDArray[np.generic]]
+"""Values of an output that is composed of others, their errors (of no meaning on samples), and the status."""
+
+
+def _error(found: Columns, name: str) -> Array:
+    """Error of an output; 0 on samples, where it has none."""
+    return np.asarray(found.get(error_of(name), 0.0), np.float64)
+
+
+def negative(of: str, designs: Array, found: Columns) -> Composed:
     """Compute the negative of an output, which is minimised to maximise the output."""
     values = np.asarray(found[of], np.float64)
-    columns: Columns = {name: -np.abs(values) if by_magnitude(of) else -values, "status": found["status"]}
-    if accuracy.target is not None:
-        columns[error_of(name)] = found[error_of(of)]
-    return columns
+    return -np.abs(values) if by_magnitude(of) else -values, _error(found, of), found["status"]
 
 
-def extent(box: Box, designs: Array, found: Columns, accuracy: Accuracy) -> Columns:
+def extent(box: Box, designs: Array, found: Columns) -> Composed:
     """Compute the extent of a mechanism from the largest and smallest coordinates of its joints."""
     still = [np.asarray(piece(designs), np.float64) for piece in box.still]
     ends = []
@@ -170,27 +177,20 @@ def extent(box: Box, designs: Array, found: Columns, accuracy: Accuracy) -> Colu
         names = [pair[which] for pair in box.reductions]
         values = floats(found, *names)
         ends.append(take.reduce([*values, *still]))  # nan where a joint's extremum is nan: its status says why
-        if accuracy.target is not None:
-            errors = errors + np.maximum.reduce([np.asarray(found[error_of(name)], np.float64) for name in names])
-    name = box.output.name
-    columns: Columns = {name: ends[0] - ends[1], "status": found["status"]}
-    if accuracy.target is not None:
-        columns[error_of(name)] = errors + 4.0 * ROUNDING * np.maximum(np.abs(ends[0]), np.abs(ends[1]))
-    return columns
+        errors = errors + np.maximum.reduce([_error(found, name) for name in names])
+    errors = errors + 4.0 * ROUNDING * np.maximum(np.abs(ends[0]), np.abs(ends[1]))
+    return ends[0] - ends[1], errors, found["status"]
 
 
-def difference(timing: Timing, designs: Array, found: Columns, accuracy: Accuracy) -> Columns:
+def difference(timing: Timing, designs: Array, found: Columns) -> Composed:
     """Compute the difference of two crank angles, in (-pi, pi]."""
     first, second = floats(found, *timing.places)
     apart = second - first
-    columns: Columns = {timing.name: apart - TWO_PI * np.ceil((apart - np.pi) / TWO_PI), "status": found["status"]}
-    if accuracy.target is not None:
-        errors = [np.asarray(found[error_of(name)], np.float64) for name in timing.places]
-        columns[error_of(timing.name)] = errors[0] + errors[1]
-    return columns
+    error = _error(found, timing.places[0]) + _error(found, timing.places[1])
+    return apart - TWO_PI * np.ceil((apart - np.pi) / TWO_PI), error, found["status"]
 
 
-def value_at(machine: Machine, reading: EventValue, designs: Array, found: Columns, accuracy: Accuracy) -> Columns:
+def value_at(machine: Machine, reading: EventValue, designs: Array, found: Columns) -> Composed:
     """Compute a pose output at a crank angle of each design; the angle's error times the slope adds to its error."""
     place = reading.places[0]
     phi = np.asarray(found[place], np.float64)
@@ -199,9 +199,6 @@ def value_at(machine: Machine, reading: EventValue, designs: Array, found: Colum
     poses, at = pose_columns(machine, designs, near, [reading.of.name])
     values = np.where(known[:, None], poses[reading.of.name], np.nan)
     status = np.where(found["status"] == st.OK, at[:, 0], found["status"]).astype(np.uint8)
-    columns: Columns = {reading.name: np.where(status == st.OK, values[:, 0], np.nan), "status": status}
-    if accuracy.target is not None:
-        slope = np.abs(values[:, 2] - values[:, 1]) / (2.0 * SLOPE)
-        rounded = shaken(machine, designs, near[:, 0], reading.of.name) + 4.0 * ROUNDING * np.abs(values[:, 0])
-        columns[error_of(reading.name)] = slope * np.asarray(found[error_of(place)], np.float64) + rounded
-    return columns
+    slope = np.abs(values[:, 2] - values[:, 1]) / (2.0 * SLOPE)
+    rounded = shaken(machine, designs, near[:, 0], reading.of.name) + 4.0 * ROUNDING * np.abs(values[:, 0])
+    return np.where(status == st.OK, values[:, 0], np.nan), slope * _error(found, place) + rounded, status

@@ -41,7 +41,7 @@ PARTIAL = (
 )  # fmt: skip
 GOES_ON = np.isin(np.arange(256), PARTIAL)
 
-Compose: TypeAlias = Callable[[Array, Columns, Accuracy], Columns]
+Compose: TypeAlias = Callable[[Array, Columns], route.Composed]
 """Function that composes an output from designs (n, P) and the columns of other outputs."""
 
 
@@ -198,7 +198,7 @@ def _composed(family: Family, asked: Negative | Extent | TimingOf, accuracy: Acc
     match asked:
         case Negative(inner=inner):
             of = (inner.output.name,)
-            title, compose = f"negative of {of[0]}", partial(route.negative, name, of[0])
+            title, compose = f"negative of {of[0]}", partial(route.negative, of[0])
         case Extent(box=box):
             of, title, compose = box.asked, f"box {name}", partial(route.extent, box)
         case TimingOf(timing=timing):
@@ -214,13 +214,16 @@ def _composed(family: Family, asked: Negative | Extent | TimingOf, accuracy: Acc
     # Not before the outputs it is composed of: the margin of non-rotatable designs would be left out.
     order = max([least, *(route.order for route in parts)])
     whole = isinstance(asked, Extent)  # an extent is about the whole motion; the window is for deviations only
-    return Route(title, (name,), cost, partial(_run_composed, family, of, compose, whole), order=order)
+    return Route(title, (name,), cost, partial(_run_composed, family, name, of, compose, whole), order=order)
 
 
 def _run_composed(
-    family: Family, of: Sequence[str], compose: Compose, whole: bool, designs: Array, accuracy: Accuracy, window: Part
-) -> Columns:
-    return compose(designs, design_outputs(family, designs, of, accuracy, None if whole else window), accuracy)
+    family: Family, name: str, of: Sequence[str], compose: Compose, whole: bool,
+    designs: Array, accuracy: Accuracy, window: Part,
+) -> Columns:  # fmt: skip
+    found = design_outputs(family, designs, of, accuracy, None if whole else window)
+    value, error, status = compose(designs, found)
+    return {name: value, error_of(name): error, "status": status}
 
 
 def _of_members(

@@ -3,11 +3,10 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable
 from functools import reduce
 
 import numpy as np
-from numpy.typing import NDArray
 
 from kernels.status import INVALID_INPUT, MEANING, OK
 from sweep.families.base import Columns
@@ -33,7 +32,8 @@ def explained(columns: Columns, names: Iterable[str]) -> Columns:
     status = np.array(columns["status"], np.uint8)
     changed: Columns = {}
     names = [name for name in names if columns[name].dtype.kind == "f"]
-    if _all_finite([columns[name] for name in names]):
+    # A missing value makes the sum of all missing; an overflow of the sum only leads to a closer check.
+    if not names or math.isfinite(np.add.reduce(reduce(np.add, [columns[name] for name in names]), axis=None)):
         return columns | {"status": status}
     for name in names:
         missing = ~np.isfinite(columns[name])
@@ -44,13 +44,3 @@ def explained(columns: Columns, names: Iterable[str]) -> Columns:
             if key in columns and not (np.isnan(columns[key]) | ~missing).all():
                 changed[key] = np.where(missing, np.nan, columns[key])
     return columns | changed | {"status": status}
-
-
-def _all_finite(values: Sequence[NDArray[np.generic]]) -> bool:
-    """Whether equally shaped columns hold finite values only; False may be a false alarm.
-
-    A missing value makes the sum missing; an overflow of the sum only leads to a closer check.
-    """
-    if not values:
-        return True
-    return math.isfinite(np.add.reduce(reduce(np.add, values), axis=None))

@@ -79,7 +79,8 @@ def find(family: Family, name: str) -> Quantity | None:
         found = _of_machine(family, name)
     else:
         stays = name == STAY.name and isinstance(family.domain, Turn)
-        found = WindowAngle(STAY, of=family.position) if stays else _from_poses(family, name)
+        found = WindowAngle(STAY, of=family.position) if stays else _margin(family, name)
+        found = found or _limit(family, name) or _event(family, name) or _reduction(family, name)
         found = found or _from_dimensions(family, name)
     own = _own(family, name)
     if own is None or found is None:
@@ -100,10 +101,6 @@ def _own(family: Family, name: str) -> OwnOutput | None:
                 if o.name == own:
                     return OwnOutput(o.of_stage(stage.number), of_part=True)
     return None
-
-
-def _from_poses(family: Family, name: str) -> Quantity | None:
-    return _margin(family, name) or _limit(family, name) or _event(family, name) or _reduction(family, name)
 
 
 def _from_dimensions(family: Family, name: str) -> Quantity | None:
