@@ -16,11 +16,12 @@ import uuid
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
+from functools import partial
 from importlib.metadata import version
 from pathlib import Path
 from typing import Any
 
-from numba.core.event import install_recorder
+from numba.core.event import Event, Listener, install_listener
 
 from sweep import optimise
 from sweep.chunks.chunk import asked_outputs, warm, warm_step
@@ -200,6 +201,30 @@ class KernelStep:
             optimise.compile_descents(self.study)
         return number
 
+    def words(self, number: int, functions: int) -> str:
+        """Describe a step for progress: the functions compiled for it so far, and its outputs."""
+        asked = asked_outputs(self.study)
+        names = asked[number] if number < len(asked) else ["the search over proportions"]
+        return (
+            f"steps, {how_many(functions, 'function')} compiled for {', '.join(names[:3])}{' ...' * (len(names) > 3)}"
+        )
+
+
+class Compiled(Listener):
+    """Counts the functions that numba has compiled, and tells each number."""
+
+    def __init__(self, tell: Callable[[int], None]) -> None:
+        self.functions, self.tell = 0, tell
+        tell(0)
+
+    def on_start(self, event: Event) -> None:
+        """Wait for the end."""
+
+    def on_end(self, event: Event) -> None:
+        """Count one more."""
+        self.functions += 1
+        self.tell(self.functions)
+
 
 def _compile(study: Study, jobs: int, phases: Phases) -> None:
     """Load or compile every kernel the study needs; after the first that had to be compiled, in processes.
@@ -210,17 +235,22 @@ def _compile(study: Study, jobs: int, phases: Phases) -> None:
     step = KernelStep(study)
     count = step.count
     few = ALIKE if count == len(asked_outputs(study)) else 1
+
+    def tell(number: int, functions: int) -> None:
+        phases.say("compiling", number, count, step.words(number, functions))
+
     for k in range(count):
-        phases.say("compiling", k, count)
-        with install_recorder("numba:compile") as compiled:
+        compiled = Compiled(partial(tell, k))
+        with install_listener("numba:compile", compiled):
             step(k)
-        if compiled.buffer and min(jobs, os.cpu_count() or 1) > 1 and count - k - 1 > few:
+        if compiled.functions and min(jobs, os.cpu_count() or 1) > 1 and count - k - 1 > few:
             with stop_on_signal() as stop:
                 ready = executor("loky", jobs).outcomes(step, reversed(range(k + 1, count)), jobs, stop)
                 for done, _ in enumerate(ready, k + 2):
-                    phases.say("compiling", done, count)
+                    phases.say("compiling", done, count, f"steps, the others in {how_many(jobs, 'process', 'es')}")
             stop.raise_if_signalled("compiling", "what is compiled is")
             jobs = 1  # all later steps are loaded
+    phases.say("compiling", count, count)
 
 
 def _within_budget(study: Study, jobs: int, tell: Callable[[int, int], None]) -> int:

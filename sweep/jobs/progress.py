@@ -176,7 +176,8 @@ class Progress:
         text = f"{self.shown}: "
         if self.total:
             share = "" if self.at_most else f" ({self.done / self.total:.0%})"
-            text += f"{self.done} of {self.total} {self.unit}{share}, "
+            unit, comma, more = self.unit.partition(", ")
+            text += f"{self.done} of {self.total} {unit}{share}{comma}{more}, "
         text += f"{seconds:.0f} s"
         if self.foreseen and (left := self._left(self.said)) > 0.0:
             text += f", {left:.0f} s left"

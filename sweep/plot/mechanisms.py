@@ -36,6 +36,7 @@ if TYPE_CHECKING:
 TURN = 360.0
 BAR, THIN = 0.5, 0.16  # heights of strokes and dwells, relative to a row
 FILLS = {"rises": OPTIMUM, "falls": "#a9c1df", "flies": "none", "low": QUIET, "high": QUIET}
+KEY = {"rises": "rising stroke", "falls": "falling stroke", "flies": "flight of the foot"}
 
 
 def cyclogram_figure(rows: pd.DataFrame, made: Mapping[str, tuple[float, float]]) -> Figure:
@@ -45,7 +46,7 @@ def cyclogram_figure(rows: pd.DataFrame, made: Mapping[str, tuple[float, float]]
     """
     members = list(dict.fromkeys(rows["member"][rows["kind"] != "event"]))
     events = rows[rows["kind"] == "event"]
-    figure = new_figure(WIDTH, 0.62 * len(members) + 1.0 + 0.14 * len(events))
+    figure = new_figure(WIDTH, 0.62 * len(members) + 1.3 + 0.14 * len(events))
     axes = figure.subplots()
     spans: Any = zip(*(rows[column] for column in ("member", "kind", "name", "start", "end")), strict=True)
     for member, kind, name, begin, end in spans:
@@ -56,11 +57,14 @@ def cyclogram_figure(rows: pd.DataFrame, made: Mapping[str, tuple[float, float]]
         bottom, high = (height - 0.5 * BAR - THIN - 0.04, THIN) if kind == "dwell" else (height - 0.5 * BAR, BAR)
         pieces = [(start, min(length, TURN - start)), (0.0, max(start + length - TURN, 0.0))]
         bars = axes.broken_barh(pieces, (bottom, high), facecolor=FILLS[name], linewidth=0, zorder=2)
-        bars.set(edgecolor=LIMIT, hatch="/////" if kind == "flight" else None)
+        bars.set(edgecolor=LIMIT, hatch="/////" if kind == "flight" else None, label=KEY.get(name, "dwell"))
     _events(axes, events, len(members), made)
     axes.set_yticks(range(len(members)), members[::-1])
     axes.set_ylim(-0.6, len(members) - 0.3 + 0.34 * len(events))
     crank_axis(axes, "angle of the main shaft [°]")
+    handles, labels = axes.get_legend_handles_labels()
+    once = dict(zip(labels, handles, strict=True))
+    figure.legend(once.values(), once.keys(), loc="outside lower center", ncols=len(once))
     return figure
 
 
@@ -69,11 +73,12 @@ def _events(axes: Axes, events: pd.DataFrame, rows: int, made: Mapping[str, tupl
     named: Any = zip(events["name"], events["start"], strict=True)
     for k, (name, start) in enumerate(named):
         phi, height = math.degrees(start), rows - 0.35 + 0.34 * k
-        axes.plot([phi, phi], [-0.6, height], color=LIMIT, linewidth=1.0, zorder=3)
+        axes.plot([phi, phi], [-0.6, height], color=LIMIT, linewidth=1.0, zorder=3, label="event")
         words = f"{name} {phi:.1f}°"
         if name in made:
             low, high = made[name]
-            axes.fill_betweenx([-0.6, height], low, high, color=LIMIT, alpha=0.3, linewidth=0, zorder=1)
+            band = axes.fill_betweenx([-0.6, height], low, high, color=LIMIT, alpha=0.3, linewidth=0, zorder=1)
+            band.set_label("event of 95 % of what is made")
             words += f" ({low:.2f} to {high:.2f}°)"
         side, place = ("right", phi - 3) if phi > 0.75 * TURN else ("left", phi + 3)
         clear = {"facecolor": "white", "edgecolor": "none", "pad": 0.5}  # lines of other events pass behind the text

@@ -124,6 +124,12 @@ def _of_machine(machine: Machine, name: str) -> Quantity | None:
         return _timing(machine, timing)
     # A machine has no limit positions of its own, only its members have.
     found = _margin(machine, name) or _event(machine, name) or _reduction(machine, name)
+    if isinstance(found, Reduced) and machine.split(found.of) is not None:
+        part, _, pose = found.of.partition(".")
+        right = f"{part}.{name.removesuffix(found.of)}{pose}"
+        raise InputError(
+            "output", name, f"{right}: a member's outputs begin with its name", "design outputs of machine"
+        )
     return found or _from_dimensions(machine, name)
 
 

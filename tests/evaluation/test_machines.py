@@ -221,6 +221,8 @@ def test_what_makes_no_machine_is_refused_with_the_remedy(members: dict, relatio
 def test_a_misspelt_dotted_name_names_the_right_one() -> None:
     with pytest.raises(sweep.InputError, match="did you mean 'swing'"):
         sweep.summarise(two(), TABLE, ["looper.swong"])
+    with pytest.raises(sweep.InputError, match=r"output = 'phi_max_looper.psi'; allowed: looper.phi_max_psi: a member"):
+        sweep.summarise(two(), TABLE, ["phi_max_looper.psi"])
     with pytest.raises(sweep.InputError, match=r"looper\.a"):
         sweep.summarise(two(), TABLE.drop(columns="looper.a"), ["looper.swing"])
 

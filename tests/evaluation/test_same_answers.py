@@ -100,10 +100,10 @@ def test_what_feels_no_load_has_its_bits_beside_loads(output, kind):
     more, loads = LOADS[kind]
     for mechanism, dot in (("guide", ""), (sweep.machine({"needle": {"family": "guide", "ratio": -2}}), "needle.")):
         row = {f"{dot}{name}": value for name, value in (DRIVE | HEAVY | more).items()}
-        wanted = [f"{kind}_{dot}{output}" for kind in ("max_abs", "phi_max", "rms")]
+        wanted = [f"{dot}{kind}_{output}" for kind in ("max_abs", "phi_max", "rms")]
         alone = sweep.summarise(mechanism, row, wanted, accuracy=TARGET)
         given = {f"{dot}{name}": load for name, load in loads.items()}
-        beside = sweep.summarise(mechanism, row, [*wanted, f"max_{dot}force_d"], accuracy=TARGET, loads=given)
+        beside = sweep.summarise(mechanism, row, [*wanted, f"{dot}max_force_d"], accuracy=TARGET, loads=given)
         names = [*wanted, *map(error_of, wanted)]
         assert alone[names].iloc[0].tolist() == beside[names].iloc[0].tolist()
 

@@ -64,9 +64,9 @@ def test_a_mean_of_a_curve_that_switches_stands_where_another_member_of_a_machin
     machine = sweep.machine({"needle": "slider_crank", "thread": {"family": "cam", "ratio": -3}})
     given = {f"needle.{name}": value for name, value in family("slider_crank").example.items()}
     given |= {f"thread.{name}": value for name, value in family("cam").example.items()}
-    asked = ["max_needle.d2s", "rms_needle.d2s", "rms_thread.d2s"]
+    asked = ["needle.max_d2s", "needle.rms_d2s", "thread.rms_d2s"]
     turning = sweep.summarise(machine, given, asked, accuracy=1e-8).iloc[0]
     lost = sweep.summarise(machine, given | {"needle.b": 0.5 * given["needle.a"]}, asked, accuracy=1e-8).iloc[0]
     assert turning["status"] == st.OK and lost["status"] == st.NOT_ROTATABLE
-    assert lost["rms_thread.d2s"] == pytest.approx(turning["rms_thread.d2s"], rel=1e-8)  # as accurate as asked for
-    assert np.isnan(lost["rms_needle.d2s"]) and np.isnan(lost["max_needle.d2s"])
+    assert lost["thread.rms_d2s"] == pytest.approx(turning["thread.rms_d2s"], rel=1e-8)  # as accurate as asked for
+    assert np.isnan(lost["needle.rms_d2s"]) and np.isnan(lost["needle.max_d2s"])

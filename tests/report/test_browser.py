@@ -181,6 +181,12 @@ def test_nothing_overflows(address, browser, width):
         assert pixels(page).std() > 0.05
 
 
+def test_first_tables_fit_a_telephone(address, browser):
+    with opened(browser, address, 390) as page:
+        for name in ("result", "limits", "robustness"):
+            assert page.locator(f"#{name} .table").first.evaluate("(t) => t.scrollWidth - t.clientWidth") == 0
+
+
 def test_dark_mode_is_dark_and_paper_is_white(address, browser):
     with opened(browser, address, color_scheme="dark") as page:
         assert pixels(page, full_page=True).mean() < 0.2

@@ -75,6 +75,8 @@ def test_command_draws_the_bands_of_the_page(folder, tmp_path):
     design = {name: best[name] for name in family.parameter_names}
     axes = sweep.plot.cyclogram(family, design, angles="rad", made={"passes": (low, high)})
     assert f"passes {event['from [deg]']:.1f}° ({low:.2f} to {high:.2f}°)" in [text.get_text() for text in axes.texts]
+    key = [text.get_text() for text in axes.figure.legends[0].get_texts()]
+    assert sorted(key) == ["dwell", "event", "event of 95 % of what is made", "falling stroke", "rising stroke"]
     (band,) = (one for one in axes.collections if one.get_alpha() == 0.3)
     ends = band.get_paths()[0].vertices[:, 0]
     assert (ends.min(), ends.max()) == (low, high)

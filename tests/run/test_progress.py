@@ -179,6 +179,8 @@ def test_every_part_of_a_run_is_told(tmp_path, quick, monkeypatch, capsys) -> No
     ):
         counted = [line for line in lines if re.match(rf"{label}: \d+ of \d+ {unit} ", line)]
         assert any(line.endswith(" left") for line in counted), (label, counted)
+    told = r"1/6 compiling: \d+ of 4 steps \(\d+%\), \d+ functions? compiled for "
+    assert any(re.match(told, line) for line in lines)
     # Of a maximum no share and no remaining time is known, but the best value so far.
     searched = [line for line in lines if line.startswith("4/6 search: 3 of 3 starts at most, the best ")]
     assert searched and not any("%" in line or "left" in line for line in searched)
