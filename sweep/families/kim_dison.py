@@ -108,7 +108,9 @@ def _poses(run: PoseFunction, designs: Array, angles: Angles, wanted: frozenset[
             columns[name] = matrix[:, 7, None] * np.sqrt(square) / (2.0 * matrix[:, 1, None] * matrix[:, 2, None])
         elif name in ("x_b", "x_c"):
             columns[name] = -parts[0]
-        elif name in ("z_b", "z_c"):
+        elif name == "z_b":
+            columns[name] = parts[0] - parts[0]  # the pin stays in the crank plane; a difference to b leaves rounding
+        elif name == "z_c":
             columns[name] = offset - parts[0]
     return columns
 

@@ -139,8 +139,11 @@ def _block(
         if request.mode == -1:
             _vanish(family, designs[rows], request.pose, top, size)
         if family.pose_output[request.pose].jumps:  # piecewise constant: a polynomial only adds rounding
-            attained, _ = pose_columns(family, designs[rows[top.row]], top.phi[:, None], [request.pose])
-            top = top._replace(value=_measured(attained[request.pose][:, 0], request.mode))
+            beside = top.phi[:, None] + NARROWEST * np.array([-1.0, 0.0, 1.0])  # it may jump at the place itself
+            near_by, _ = pose_columns(family, designs[rows[top.row]], beside, [request.pose])
+            heights = _measured(near_by[request.pose], request.mode)
+            side = np.abs(heights - top.value[:, None]).argmin(axis=1)
+            top = top._replace(value=np.take_along_axis(heights, side[:, None], axis=1)[:, 0])
         late = lost | ((top.err > allowed) & (top.err > rounding))
         status[top.row[late]] = np.where(status[top.row[late]] == st.OK, st.NOT_CONVERGED, status[top.row[late]])
         at = rows[top.row]

@@ -156,3 +156,15 @@ def test_of_two_tops_as_high_as_each_other_the_first_of_the_turn_counts(target: 
     found = sweep.summarise("kim_dison", links, names, accuracy=target)
     assert (found["status"] == 0).all()
     assert (found[names] <= np.pi + 1e-7).all(axis=None)
+
+
+def test_the_crank_pin_stays_in_the_plane_of_the_crank() -> None:
+    """Its height over that plane was a rounding of b, so `box_z` of every sixth linkage was NOT_CONVERGED."""
+    rng = np.random.default_rng(5)
+    ordinary = {"r": 3.7, "l": 22.2, "h": 11.84, "a": 10.73, "b": 14.8, "branch": -1.0}
+    table = {name: x * np.exp(rng.uniform(-0.05, 0.05, 200)) for name, x in ordinary.items() if name != "branch"}
+    got = sweep.summarise("kim_dison", {**table, "branch": -1.0}, ["box_z", "range_z_b", "max_z_c", "min_z_c"])
+    assert (got["status"] == st.OK).all()
+    assert (got["range_z_b"] == 0.0).all()
+    heights = np.column_stack([np.zeros(200), table["b"], got["max_z_c"], got["min_z_c"]])
+    np.testing.assert_allclose(got["box_z"], np.ptp(heights, axis=1), rtol=1e-8)  # the accuracy asked
