@@ -112,7 +112,7 @@ def test_the_largest_count_is_that_of_a_phase_shorter_than_the_first_samples_and
 
 
 def test_a_count_that_is_least_up_to_a_jump_is_that_of_its_own_side():
-    """A thread is off its edge for 70 % of the turn: of such curves two in five had a least `contact` of 1, status 0."""
+    """A thread is off its edge for 70 % of the turn: two in five had a least `contact` of 1, with status 0."""
     rng = np.random.default_rng(4)
     ordinary = family("free_cam").example
     table = pd.DataFrame({name: x * np.exp(rng.uniform(-0.1, 0.1, 40)) for name, x in ordinary.items()})
