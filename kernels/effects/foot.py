@@ -10,6 +10,7 @@ from __future__ import annotations
 import math
 from typing import NamedTuple
 
+from kernels import status as st
 from kernels.jit import inline, kernel  # long helpers are kernels: folded into one another they took 17 s to compile
 from kernels.types import TWO_PI, Array
 
@@ -317,3 +318,23 @@ def march_cell(path: Array, foot: Foot, state: State, j: int, tally: Array) -> t
         note(tally, phi, following.mode)
         state, s = following, at
     return state, False
+
+
+@inline
+def checked(feet: Array, known: bool, lowest: float) -> int:
+    """Status by the numbers of a foot and the least height of its rack, ``known`` where all its heights are numbers."""
+    mass, stiffness, preload, speed, restitution, soft, damping = (
+        feet[0], feet[1], feet[2], feet[3], feet[4], feet[5], feet[6],
+    )  # fmt: skip
+    rigid, unit = soft == 0.0 and damping == 0.0, mass * speed * speed
+    valid = mass > 0.0 and stiffness >= 0.0 and preload > 0.0 and speed > 0.0 and 0.0 <= restitution < 1.0
+    valid = valid and (rigid or (soft > 0.0 and damping >= 0.0 and restitution == 0.0))
+    if not (valid and known and unit > 0.0 and unit < math.inf):
+        return st.INVALID_INPUT
+    return st.NO_EVENT if lowest > 0.0 else st.OK
+
+
+@inline
+def apart(one: State, other: State, spring: float) -> float:
+    """Return the height of the swing about its rest that is the difference of two states."""
+    return math.hypot(one.y - other.y, (one.v - other.v) / math.sqrt(spring))

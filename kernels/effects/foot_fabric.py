@@ -19,6 +19,8 @@ from kernels.effects.foot import (
     RACK,
     Foot,
     State,
+    apart,
+    checked,
     edge_force,
     extremes,
     flown,
@@ -229,9 +231,26 @@ def _cell(
 
 
 @inline
-def _apart(one: State, other: State, spring: float) -> float:
-    """Return the height of the swing about its rest that is the difference of two states."""
-    return math.hypot(one.y - other.y, (one.v - other.v) / math.sqrt(spring))
+def _either(
+    path: Array, foot: Foot, fabric: Fabric, state: State, j: int, parts: int, work: Array, tally: Array
+) -> tuple[State, bool]:
+    """March over one cell, on fabric if there is any."""
+    if fabric.stiffness > 0.0:
+        return _cell(path, foot, fabric, state, j, parts, work, tally)
+    return march_cell(path, foot, state, j, tally)
+
+
+@kernel
+def _landed(
+    path: Array, foot: Foot, fabric: Fabric, state: State, j: int, parts: int, work: Array, tally: Array
+) -> float:
+    """Crank angle at which the first flight of a turn ends; ``state`` is that at its end, where cell j begins."""
+    later = tally.copy()
+    for k in range(j, j + 4 * path.shape[1]):  # no flight is longer than a few turns
+        if math.isnan(later[1]) or not math.isnan(later[2]):
+            break
+        state, _ = _either(path, foot, fabric, state, k, parts, work, later)
+    return float(later[2])
 
 
 @inline
@@ -247,20 +266,6 @@ def _borne(path: Array, node: int, foot: Foot, fabric: Fabric, state: State, phi
         y, bend = (path[0, node], path[2, node]) if state.mode == RACK else (0.0, 0.0)
         force = held(foot, y, bend)
     return y, force
-
-
-@inline
-def _checked(feet: Array, known: bool, lowest: float) -> int:
-    """Status by the numbers of a foot and the least height of its rack, ``known`` where all its heights are numbers."""
-    mass, stiffness, preload, speed, restitution, soft, damping = (
-        feet[0], feet[1], feet[2], feet[3], feet[4], feet[5], feet[6],
-    )  # fmt: skip
-    rigid, unit = soft == 0.0 and damping == 0.0, mass * speed * speed
-    valid = mass > 0.0 and stiffness >= 0.0 and preload > 0.0 and speed > 0.0 and 0.0 <= restitution < 1.0
-    valid = valid and (rigid or (soft > 0.0 and damping >= 0.0 and restitution == 0.0))
-    if not (valid and known and unit > 0.0 and unit < math.inf):
-        return st.INVALID_INPUT
-    return st.NO_EVENT if lowest > 0.0 else st.OK
 
 
 @kernel
@@ -298,40 +303,36 @@ def march(
         rigid, step, unit = soft == 0.0 and damping == 0.0, TWO_PI / count, mass * speed * speed
         outputs[:, i], heights[i, :], forces[i, :], changes[i, :] = math.nan, math.nan, math.nan, math.nan
         known, lowest, quickest, highest = extremes(rack)
-        status[i] = _checked(feet[i], known, rack[0, lowest])
+        status[i] = checked(feet[i], known, rack[0, lowest])
         if status[i] != st.OK:
             continue
         foot = Foot(math.sqrt(stiffness / mass) / speed, preload / unit, restitution, 1e-9 * quickest)
         fabric = Fabric(soft / unit, damping / (mass * speed))
         spring = foot.kappa * foot.kappa + fabric.stiffness
-        quick = max(math.sqrt(spring), fabric.damping) * step
-        parts = max(PARTS, math.ceil(min(quick, 2.0 * MOST_PARTS)))
+        parts = max(PARTS, math.ceil(min(max(math.sqrt(spring), fabric.damping) * step, 2.0 * MOST_PARTS)))
         if parts > MOST_PARTS and not rigid:
             status[i] = st.NOT_CONVERGED
             continue
         rest = 0.0 if rigid else -foot.g0 / spring
-        begin = 0.0 if rigid else lowest * step
-        state = State(PLATE if rigid else LYING, begin, rest, 0.0, begin)
+        state = State(PLATE if rigid else LYING, lowest * step, rest, 0.0, lowest * step)
         first, before = state, math.inf
         for turn in range(turns):
             tally[:] = 0.0
             tally[1], tally[2], tally[8] = math.nan, math.nan, math.inf
             if turn > 0:
-                before = _apart(state, first, spring)
+                before = apart(state, first, spring)
             first = state
             for k in range(count):
                 j, node = turn * count + lowest + k, (lowest + k) % count
                 y, force = _borne(rack, node, foot, fabric, state, j * step)
                 heights[i, node], forces[i, node] = y, unit * force
-                if rigid:
-                    state, ended = march_cell(rack, foot, state, j, tally)
-                else:
-                    state, ended = _cell(rack, foot, fabric, state, j, parts, work, tally)
+                state, ended = _either(rack, foot, fabric, state, j, parts, work, tally)
                 if not ended:
                     status[i] = st.NOT_CONVERGED
         if status[i] != st.OK:
             heights[i, :], forces[i, :] = math.nan, math.nan
             continue
+        tally[2] = _landed(rack, foot, fabric, state, turns * count + lowest, parts, work, tally)
         settled = first.mode == state.mode and state.mode == (PLATE if rigid else LYING)
         most = unit * tally[7]
         if rigid:
@@ -342,7 +343,7 @@ def march(
         else:
             # A foot that lies still rises and sinks on its fabric.  Turns are alike once it comes back where it was.
             # What it moves by shrinks like a geometric series; its sum is what all later turns will differ by.
-            moved, size = _apart(state, first, spring), max(-rest, highest)
+            moved, size = apart(state, first, spring), max(-rest, highest)
             left = moved / (1.0 - moved / before) if moved < before < math.inf else math.inf
             settled = settled and (moved <= ROUNDING * size or left <= ALIKE * size)
         written(outputs, i, tally, feet[i], most, settled)

@@ -178,6 +178,13 @@ def _travel(arm: float, lever: float, frame: float, end: float, half: float) -> 
     return -end * cos, -end * other, code
 
 
+@inline
+def _too_long(arm: float, lever: float, frame: float, end: float, half: float, stroke: float, beyond: bool) -> bool:
+    """Whether an arm gives the stroke or more, or passes a dead point; ``beyond``: one at -half counts as short."""
+    up, down, code = _travel(arm, lever, frame, end, half)
+    return up - down >= stroke or (code != st.OK and not (beyond and up == up))
+
+
 @kernel
 def heddle_shaft_arms(shafts: Array, arms: Array, status: Status) -> None:
     """Arm O3D that gives a shaft its stroke, the link's other lengths being common to the shafts; (12), (13).
@@ -191,7 +198,8 @@ def heddle_shaft_arms(shafts: Array, arms: Array, status: Status) -> None:
     Notes
     -----
     DF lets both arms stand square to O3O4 at mid-stroke.  The stroke grows with the arm until the link reaches a dead
-    point; the arm is bisected to the last bit.
+    point at one end of the swing, and beyond that until it reaches one at the other end; the arm is bisected to the
+    last bit, first on this side of the first dead point.
     """
     for i in range(shafts.shape[0]):
         stroke, end, lever, frame, half = shafts[i, 0], shafts[i, 1], shafts[i, 2], shafts[i, 3], shafts[i, 4]
@@ -199,24 +207,25 @@ def heddle_shaft_arms(shafts: Array, arms: Array, status: Status) -> None:
         if not (stroke > 0.0 and end > 0.0 and lever > 0.0 and frame > 0.0 and 0.0 < half < 0.5 * math.pi):
             status[i] = st.INVALID_INPUT
             continue
-        # Upwards from the first-order arm; what passes a dead point is too long, as what has the stroke is.
-        low, high = 0.0, lever * (0.5 * stroke / end) / math.sin(half)
-        for _ in range(_MOST_STEPS):
+        status[i] = st.NOT_ADMISSIBLE
+        for beyond in (False, True):
+            # Upwards from the first-order arm; what passes a dead point is too long, as what has the stroke is.
+            low, high = 0.0, lever * (0.5 * stroke / end) / math.sin(half)
+            for _ in range(_MOST_STEPS):
+                if _too_long(high, lever, frame, end, half, stroke, beyond):
+                    break
+                low, high = high, 1.03125 * high
+            for _ in range(_MOST_STEPS):
+                middle = 0.5 * (low + high)
+                if middle in (low, high):
+                    break
+                if _too_long(middle, lever, frame, end, half, stroke, beyond):
+                    high = middle
+                else:
+                    low = middle
             up, down, code = _travel(high, lever, frame, end, half)
-            if code != st.OK or up - down >= stroke:
+            if code == st.OK and up - down >= stroke:
+                status[i] = st.OK
+                arms[i, 0], arms[i, 1] = high, math.hypot(frame, high - lever)
+                arms[i, 2], arms[i, 3] = up, down
                 break
-            low, high = high, 1.03125 * high
-        for _ in range(_MOST_STEPS):
-            middle = 0.5 * (low + high)
-            if middle in (low, high):
-                break
-            up, down, code = _travel(middle, lever, frame, end, half)
-            if code != st.OK or up - down >= stroke:
-                high = middle
-            else:
-                low = middle
-        up, down, code = _travel(high, lever, frame, end, half)
-        status[i] = st.OK if code == st.OK and up - down >= stroke else st.NOT_ADMISSIBLE
-        if status[i] == st.OK:
-            arms[i, 0], arms[i, 1] = high, math.hypot(frame, high - lever)
-            arms[i, 2], arms[i, 3] = up, down

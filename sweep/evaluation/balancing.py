@@ -62,7 +62,8 @@ def orders(values: Array, most: int) -> Orders:
     """Return the Fourier coefficients of samples (m, ...) at equal steps of a turn from 0; exact up to aliasing."""
     m = len(values)
     found = np.fft.rfft(values, axis=0) / m
-    return Orders(found[0].real, 2.0 * found[1 : most + 1].real, -2.0 * found[1 : most + 1].imag)
+    found[1 : (m + 1) // 2] *= 2.0  # order m/2 has one cosine and no pair
+    return Orders(found[0].real, found[1 : most + 1].real, -found[1 : most + 1].imag)
 
 
 def rms(values: Array) -> float:

@@ -110,9 +110,17 @@ def test_friction_on_the_main_shaft_is_that_of_all_members():
     assert (found["shaft_friction"] > 0.0).all()
 
 
-def test_members_of_two_speeds_have_no_speed_of_one_shaft():
-    found = sweep.summarise(machine(), table(**{"looper.speed": 1.9 * OMEGA}), ["shaft_unevenness"], accuracy=1e-8)
-    assert found["status"][0] == st.INVALID_INPUT
+@pytest.mark.parametrize("unfit", [{"looper.speed": 1.9 * OMEGA}, {"looper.speed_change": 1.0}])
+def test_members_of_two_speeds_are_not_on_one_shaft(unfit):
+    """Torque and shaking were sums of what each member has at its own speed, with status 0."""
+    shaken = {"f": {"shaking": ["needle1", "needle2", "looper"]}}
+    both = sweep.machine(MEMBERS, shaken | {"shaft": {"torque": ["needle", "looper"]}})
+    wanted = ["max_shaft", "f_order1", *(["shaft_unevenness"] if "looper.speed" in unfit else [])]
+    for name in wanted:
+        found = sweep.summarise(both, table(**unfit), [name])
+        assert found["status"][0] == st.INVALID_INPUT and np.isnan(found[name][0])
+    posed = sweep.evaluate(both, table(**unfit), ["shaft", "f_x"], phi=[0.0, 1.0])
+    assert (posed["status"] == st.INVALID_INPUT).all() and posed[["shaft", "f_x"]].isna().all(axis=None)
 
 
 def test_a_later_stage_or_one_named_twice_is_refused():

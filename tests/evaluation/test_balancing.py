@@ -90,6 +90,16 @@ def test_orders_and_the_best_counterweight_are_those_of_the_table():
         assert rms(best.force) == pytest.approx(numbers(row, "rms_force_after")[0], rel=1e-12)
 
 
+@pytest.mark.parametrize("samples", [7, 8])
+def test_orders_add_up_to_the_samples(samples):
+    """The highest order of an even number of samples has a cosine alone; its amplitude was doubled."""
+    values = np.random.default_rng(3).normal(size=samples)
+    found = orders(values, samples // 2)
+    angle = np.outer(2.0 * np.pi * np.arange(samples) / samples, np.arange(1, samples // 2 + 1))
+    again = found.mean + np.cos(angle) @ found.cos + np.sin(angle) @ found.sin
+    np.testing.assert_allclose(again, values, atol=1e-14)
+
+
 def test_two_shafts_remove_what_one_leaves_and_a_moment_counts_by_its_length():
     phi = np.arange(256) * (2.0 * np.pi / 256)
     force = np.stack([np.cos(phi), np.zeros(256), np.zeros(256)], axis=1)  # half of it turns backwards

@@ -24,7 +24,7 @@ from sweep.families.machines.passages import taking_step
 from sweep.families.machines.pressing import Pressing
 from sweep.families.machines.relations import EventValue, Relation, Timing
 from sweep.families.machines.sewing import Sewing, sewing_step
-from sweep.families.machines.shaking import Shaking, orders_of
+from sweep.families.machines.shaking import Shaking, orders_of, refused
 from sweep.families.machines.triangles import Entering, entering_step
 from sweep.families.parts import Member
 from sweep.families.sites import AXES
@@ -198,11 +198,9 @@ def _poses(machine: Machine, designs: Array, angles: Angles, wanted: frozenset[s
         found |= events
     found |= {name: designs[:, [column]] for name, column in asked.inputs.items()}
     frames = _frames(machine, designs) if any(isinstance(r, Shaking) for r in asked.relations) else {}
-    for relation in asked.relations:
-        if isinstance(relation, Shaking):
-            found |= relation.on_frame(found, frames, wanted)
-        else:
-            found |= relation.compute(found, wanted)
+    for r in asked.relations:
+        found |= r.on_frame(found, frames, wanted) if isinstance(r, Shaking) else r.compute(found, wanted)
+        found |= refused(machine, r, designs, wanted, found, status)
     return {name: _whole(found[name], shape) for name in wanted} | {"status": status}
 
 

@@ -31,7 +31,6 @@ NUMBERS = {
     "fastest": ("rad/s", "largest magnitude of its speed"),
     "slowest": ("rad/s", "smallest magnitude of its speed"),
 }
-SAME = 1e-12  # relative difference of speeds that is rounding of gear ratios
 _RATE = {"reduced_inertia": 2, "dreduced_inertia": 3, "drive_torque": 1, "drive_torque_friction": 1}
 
 
@@ -149,8 +148,6 @@ def _numbers(shaft: ShaftTorque, machine: Machine, designs: Array) -> dict[str, 
         designs[:, names.index(one.named("speed_change"))] = 0.0
     speed = designs[:, names.index(first.named("speed"))] / first.ratio
     slope = designs[:, names.index(f"{shaft.name}_motor_slope")]
-    theirs = np.stack([designs[:, names.index(one.named("speed"))] / one.ratio for one in shaft.driven])
-    apart = np.any(np.abs(theirs - speed) > SAME * np.abs(speed), axis=0)
 
     def on_grid(rows: NDArray[np.intp], size: int) -> tuple[dict[str, Array], Status]:
         inertia, excess, poses = _samples(shaft, machine, designs[rows], speed[rows], size)
@@ -158,7 +155,6 @@ def _numbers(shaft: ShaftTorque, machine: Machine, designs: Array) -> dict[str, 
         coarsest = LEFT if size == FINER[-1] else RESOLVED
         part, codes = steady(inertia, excess, speed[rows], motor, np.zeros((1, 1)), coarsest)
         np.copyto(codes, poses, where=poses != st.OK)
-        codes[apart[rows]] = st.INVALID_INPUT
         return {key: np.where(codes == st.OK, part[key], np.nan) for key in (*NUMBERS, "energy_error")}, codes
 
     found, status = on_first_grid(least_samples(machine, designs, (shaft.name,)), (*GRIDS, *FINER), on_grid)

@@ -17,6 +17,7 @@ from sweep.families.capabilities import GuidedPoint, JointRecords, ToolPoint, sk
 from sweep.families.curve_features import Smooth, least_samples
 from sweep.families.frames import CRANKS, Frame
 from sweep.families.link_tree import LinkTree
+from sweep.families.machines.main_shaft import ShaftTorque
 from sweep.families.machines.relations import Relation, with_size
 from sweep.families.machines.segments import cross
 from sweep.families.sites import AXES
@@ -26,6 +27,7 @@ if TYPE_CHECKING:
     from sweep.families.machines.machine import Machine
 
 ORDERS = {1: "first", 2: "second"}  # harmonics of the main shaft's turn
+SAME = 1e-12  # relative difference of speeds that is rounding of gear ratios
 GRIDS = (64, 128, 256, 512, 1024)  # samples of a turn; the first grid that resolves the orders is used
 
 
@@ -162,6 +164,29 @@ class Shaking(Relation):
             # The bar's force acts on its point, at distance dev from the line; its guides bear the couple.
             moment[2] = moment[2] - found[one.named("dev")] * found[one.named("tool_load")]
         return moment
+
+
+def refused(
+    machine: Machine,
+    relation: Relation,
+    designs: Array,
+    wanted: frozenset[str],
+    found: Mapping[str, Any],
+    codes: Status,
+) -> dict[str, Any]:
+    """Return the wanted sums as nan, with their status, where members turn or speed up otherwise than their ratios."""
+    if not isinstance(relation, Shaking | ShaftTorque):
+        return {}
+    listed = {one.member for one in (relation.stages if isinstance(relation, Shaking) else relation.driven)}
+    unfit: NDArray[np.bool_] = np.zeros((len(designs), 1), np.bool_)
+    for key in ("speed", "speed_change"):
+        ratios = {f"{m.name}.{key}{m.family.stages[0].tail}": m.ratio for m in machine.members if m.name in listed}
+        shaft = [designs[:, [k]].real / ratios[p] for k, p in enumerate(machine.parameter_names) if p in ratios]
+        for one in shaft[1:]:
+            unfit |= np.abs(one - shaft[0]) > SAME * np.abs(shaft[0])
+    np.copyto(codes, st.INVALID_INPUT, where=unfit & (codes == st.OK))
+    names = [o.name for o in relation.outputs if o.name in wanted] if unfit.any() else []
+    return {name: np.where(unfit, np.nan, found[name]) for name in names}
 
 
 def orders_of(shaking: Shaking, machine: Machine) -> Step:

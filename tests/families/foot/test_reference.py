@@ -74,6 +74,20 @@ def test_foot_whose_last_hop_is_lower_than_rounding_lies_still_from_there():
     assert sweep.summarise("foot", p, ["lost_angle"]).lost_angle[0] == pytest.approx(flown, abs=1e-4)
 
 
+@pytest.mark.parametrize("restitution", [0.1, 0.4])
+def test_foot_whose_first_flight_ends_in_the_next_turn_lands_there(restitution):
+    """It was NO_EVENT beside a `phi_loss`: of 2698 random feet with flights 1063."""
+    p = HEAVY | {"m": 0.1325, "k": 3446.5, "F0": 7.8, "omega": 653.3, "Y": 2.24e-3, "p": 4.7e-5}
+    p |= {"restitution": restitution}
+    got = sweep.summarise("foot", p, ["phi_loss", "phi_land", "settled"]).iloc[0]
+    begin, end = (2.0 * TURNS - 2.5) * math.pi, (2.0 * TURNS - 0.5) * math.pi
+    first = next(f for f in naive.flights(p, TURNS + 2, 4000) if f[0] >= begin)
+    assert got.settled == 0.0 and first[0] < end < first[1]
+    # both find the same events by halving; three turns of flights feed rounding back
+    assert got.phi_loss == pytest.approx(first[0] % (2.0 * math.pi), abs=1e-9)
+    assert got.phi_land == pytest.approx(first[1] % (2.0 * math.pi), abs=1e-9)
+
+
 def test_foot_first_landing_of_the_march_is_the_time_of_the_closed_form():
     for row in (r for r in ROWS if r["case"] == "rebound"):
         table = {name: [row["inputs"].get(name, 0.0)] for name in NAMES}
