@@ -142,7 +142,7 @@ class Turning(NamedTuple):
     bend: Array
 
     def arm(self, along: Array, across: Array | float = 0.0) -> Path:
-        """Return a vector that turns with the angle: along its direction and to the left of it, (n, 1) or (n, m)."""
+        """Return a vector that turns with the angle: parts along its direction and to its left, (n, 1) or (n, m)."""
         cos, sin = np.cos(self.angle), np.sin(self.angle)
         at = _stacked(along * cos - across * sin, along * sin + across * cos)
         turned = product(_Z, at)

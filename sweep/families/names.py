@@ -1,4 +1,4 @@
-"""The one place where names of quantities are taken apart: ``needle.max_abs_d2s2`` is member, stem and stage."""
+"""Names of quantities and their parts: ``needle.max_abs_d2s2`` is member, stem and stage."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from typing import NamedTuple
 
 
 class Parts(NamedTuple):
-    """A name without what tells where it belongs: the member of a machine, and the stage of a chain ("" for none)."""
+    """The member of a machine and the stage of a chain in a name ("" for none), and the stem between them."""
 
     member: str
     stem: str
@@ -17,7 +17,7 @@ class Parts(NamedTuple):
 
 @lru_cache(maxsize=4096)
 def parts(name: str) -> Parts:
-    """Take a name apart.
+    """Split a name into member, stem and stage.
 
     >>> parts("needle.phi01")
     Parts(member='needle', stem='phi0', stage='1')
@@ -27,7 +27,7 @@ def parts(name: str) -> Parts:
     Parts(member='needle', stem='minus_stroke', stage='')
     """
     member, _, rest = name.rpartition(".")
-    if member.startswith(MINUS):  # the negative is no swing, stroke or flag, in a machine as alone
+    if member.startswith(MINUS):  # the prefix belongs to the stem: the negative of a swing is no swing
         member, rest = member.removeprefix(MINUS), f"{MINUS}{rest}"
     if rest == "phi0" or rest.endswith("_phi0"):
         return Parts(member, rest, "")
@@ -44,9 +44,9 @@ def stem(name: str) -> str:
 
 @lru_cache(maxsize=4096)
 def at_stage(name: str, number: str) -> str:
-    """Name at the stage of that number without the number; "" for a name of another stage.
+    """Name without the given number of its stage; "" for a name of another stage.
 
-    Names such as ``support_d1`` end in a digit of their own, so that the stage has to be known.
+    Names such as ``support_d1`` end in a digit of their own, so that the stage has to be given.
 
     >>> at_stage("support_d12", "2")
     'support_d1'
@@ -55,7 +55,7 @@ def at_stage(name: str, number: str) -> str:
 
 
 def ends_in_digit(name: str) -> bool:
-    """Tell whether a name of a chain's last stage needs its number: ``b1`` is joint b of stage 1, not pin 1 of it."""
+    """Tell whether a name of the last stage needs the stage's number: ``b1`` is joint b of stage 1, not a joint b1."""
     return name[-1].isdigit()
 
 
@@ -70,7 +70,7 @@ def reduced(prefix: str, name: str) -> str:
 
 
 def is_error(name: str) -> bool:
-    """Whether a column holds the error of another."""
+    """Whether a column holds the error of another column."""
     return without_error(name) != name
 
 
@@ -80,7 +80,7 @@ def without_error(name: str) -> str:
 
 
 def error_of(name: str) -> str:
-    """Name of the column that holds the error of another."""
+    """Name of the column that holds the error of the given column."""
     return f"{ERROR}{name}"
 
 
@@ -88,12 +88,12 @@ ERROR = "err_"
 
 
 def negative(name: str) -> str:
-    """Name of the negative of a design output, which is small where the output is to be large."""
+    """Name of the negative of a design output, minimised in place of maximising the output."""
     return f"{MINUS}{name}"
 
 
 def without_minus(name: str) -> str:
-    """Output that a name is the negative of; "" for any other name."""
+    """Name of the output whose negative a name stands for; "" for any other name."""
     return name.removeprefix(MINUS) if name.startswith(MINUS) else ""
 
 
@@ -101,7 +101,7 @@ MINUS = "minus_"
 
 
 def is_place(name: str) -> bool:
-    """Whether a design output is a crank angle at which something happens, not a size that could be compared."""
+    """Whether a design output is the crank angle of an event or extremum, not a size that can be compared."""
     return parts(name).stem.startswith("phi_")
 
 
@@ -111,12 +111,12 @@ def is_largest(name: str, *, magnitude: bool = False) -> bool:
 
 
 def is_flag(name: str) -> bool:
-    """Whether a design output is a yes or no."""
+    """Whether a design output is a truth value."""
     return stem(name) == "rotatable"
 
 
 def judged_by(name: str) -> str:
-    """Return the number whose sign decides a yes or no; the name itself where it is one already.
+    """Return the output whose sign decides a truth value; the name itself for any other output.
 
     >>> judged_by("needle.rotatable2")
     'needle.margin2'

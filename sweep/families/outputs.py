@@ -1,4 +1,4 @@
-"""Outputs that several families have: a coordinate with its derivatives, joints, a working point."""
+"""Outputs common to several families: a coordinate with its derivatives, joints, a working point."""
 
 from __future__ import annotations
 
@@ -12,21 +12,21 @@ from sweep.families.sites import AXES
 _KINDS = ("", "velocity analogue of the ", "acceleration analogue of the ", "jerk analogue of the ")
 _ORDERS = ("", "d", "d2", "d3")
 _CIRCLE = (("sin", "sine"), ("cos", "cosine"))
-ALONG_FRAME = ("along the frame", "across the frame")  # of planar families
+ALONG_FRAME = ("along the frame", "across the frame")  # axes of planar families
 
 
 def coordinate_outputs(
     name: str, unit: str, text: str, *equations: str, kind: str = "", of_name: bool = False, circle: str = ""
 ) -> tuple[Output, ...]:
-    """Define an angle or a place along something and its first three derivatives by phi.
+    """Define an angle or a coordinate and its first three derivatives by phi.
 
     Parameters
     ----------
     name, unit, text : of the coordinate; "rad" makes it an angle
     equations : of the coordinate, and of its derivatives together or each
-    kind : what stands before the words of the derivatives, such as "sliding "
+    kind : prefix of the descriptions of the derivatives, such as "sliding "
     of_name : whether its name is repeated in them
-    circle : of an angle that comes with its sine and cosine, what they are of
+    circle : description of the angle, if its sine and cosine are outputs too
     """
     own, rates = equations[0], equations[1:] * (3 if len(equations) == 2 else 1)
     of = f" of {name}" if of_name else ""
@@ -42,7 +42,7 @@ def coordinate_outputs(
 
 
 def point_outputs(equation: str) -> tuple[tuple[Output, ...], ...]:
-    """Place, velocity, acceleration and jerk of the working point, three components each."""
+    """Position, velocity, acceleration and jerk of the working point, three components each."""
     return tuple(
         tuple(Output(f"{order}{axis}_p", "length", f"{kind}working point along {axis}", equation) for axis in AXES)
         for order, kind in zip(_ORDERS, _KINDS, strict=True)
@@ -61,7 +61,7 @@ def magnitude_outputs(equation: str) -> tuple[Output, ...]:
 def joint_outputs(
     joints: Mapping[str, str], equation: str, ways: Sequence[str] = ("along x", "along y", "along z")
 ) -> tuple[Output, ...]:
-    """Coordinates of joints, from what each is by the end of their names, along two or three ways."""
+    """Coordinates of joints along two or three directions, from the suffix of their names and a description."""
     return tuple(
         Output(f"{axis}_{name}", "length", f"{text}, {way}", equation)
         for name, text in joints.items()
@@ -70,5 +70,5 @@ def joint_outputs(
 
 
 def ladders(*names: str, orders: int = 3) -> dict[str, str]:
-    """Of each name and its derivatives, but the last of so many orders, the next derivative."""
+    """Map each name and its derivatives, up to the given order, to the next derivative."""
     return {f"{low}{name}": f"{high}{name}" for name in names for low, high in pairwise(_ORDERS[: orders + 1])}

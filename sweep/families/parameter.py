@@ -1,6 +1,6 @@
-"""Parameters and outputs of a mechanism family, and the words in which they say their units.
+"""Parameters and outputs of a mechanism family, and the words of their units.
 
-Internal units are mm, t, s and rad and what follows from them.  A word may be a product such as "force/length".
+Internal units are mm, t, s, rad and units derived from these.  A unit may be a product such as "force/length".
 """
 
 from __future__ import annotations
@@ -27,9 +27,9 @@ Unit = Literal[
 class Parameter:
     """One column of the design matrix.
 
-    ``places`` says that it tells where a part stands, not how large it is.  ``unless`` are names that put 0 in place of
-    its default where one of them is given: pairs of a part of its own name and of what stands there in the other name,
-    so that they hold under the name of a stage or a member too.
+    ``places`` marks a place of a part, as opposed to a size.  ``unless`` names the parameters that, if given, make the
+    default 0: pairs of a part of its own name and the text in its place in the other name, so that they hold with the
+    name of a stage or a member too.
     """
 
     name: str
@@ -44,17 +44,17 @@ class Parameter:
     unless: tuple[tuple[str, str], ...] = ()
 
     def left_out(self, given: Container[str]) -> float | None:
-        """Value where it is left out beside the given names; None where it must not be."""
+        """Default of the parameter beside the given names; None if it has to be given."""
         return 0.0 if any(self.name.replace(*pair) in given for pair in self.unless) else self.default
 
     @cached_property
     def sign(self) -> str:
-        """What its sign may be, in a word; empty if anything."""
+        """Permitted sign in a word; empty without a restriction."""
         words = ((self.positive, "positive"), (self.not_negative, "non-negative"), (self.not_zero, "non-zero"))
         return next((word for holds, word in words if holds), "")
 
     def wrong_sign(self, values: NDArray[np.float64] | float) -> NDArray[np.bool_]:
-        """Which values have a sign that it may not have."""
+        """Mask of the values with a sign that is not permitted."""
         if self.not_zero:
             return np.asarray(values == 0.0)
         if not self.sign:
@@ -63,7 +63,7 @@ class Parameter:
 
     @property
     def choice(self) -> str:
-        """The values it may have, in words; signs are shown where they are the choice."""
+        """Permitted values in words, with signs where one of them is negative."""
         choices = self.choices or ()
         if len(choices) > 4 and choices == tuple(np.arange(choices[0], choices[-1] + 1.0)):
             return f"a whole number, {choices[0]:g} to {choices[-1]:g}"
@@ -88,13 +88,13 @@ WORDS = {
     "acceleration": "mm/s^2",
     "time": "s",
 }
-PER_RADIAN = "length/rad"  # of a speed by the crank angle whose name does not say so, as that of ds does
+PER_RADIAN = "length/rad"  # of a speed by the crank angle with a name that is no derivative's, unlike ds
 _WORD = re.compile(r"[a-z_]{2,}")
 _PRODUCT = re.compile(r"(1|rad|s|N|[a-z_]{2,})(\^[2-9])?([*/](rad|s|N|[a-z_]{2,})(\^[2-9])?)*")
 
 
 def spelt_out(word: str) -> str:
-    """Return the internal unit of a product of words.
+    """Return a product of unit words in internal units.
 
     >>> spelt_out("length^4"), spelt_out("force/length"), spelt_out("1/length")
     ('mm^4', 'N/mm', '1/mm')
@@ -103,7 +103,7 @@ def spelt_out(word: str) -> str:
 
 
 def is_known(word: str) -> bool:
-    """Whether a unit is written in these words, so that study files can convert it and results can name it.
+    """Whether a unit consists of known words, so that study files can convert it and results can name it.
 
     >>> is_known("length/time"), is_known("parsec"), is_known("N s")
     (True, False, False)
@@ -124,17 +124,17 @@ def of_derivative(unit: str, variable: str) -> str:
 
 @dataclass(frozen=True)
 class Output:
-    """One quantity that can be wanted: unit in SI words ("rad", "length", "1"), definition, equation of its page.
+    """One quantity of a family: unit in SI words ("rad", "length", "1"), definition, equation of its page.
 
     Parameters
     ----------
     name, unit, text, equation : as they are printed
-    jumps : it is a whole number or otherwise constant in pieces, so no slope leads an optimiser to it
-    wraps : an angle that is known only up to full turns; curves of it are made continuous
-    windowed : a deviation, of which only the part inside the window of the stroke counts where a window is given
-    stage, own : in a chain the number of the stage that gives it, and its name there
-    parts : of the magnitude of a rate, its components
-    kinks : curves of it have kinks or jumps where something reverses, as all with friction: extrema are then searched
+    jumps : it is a whole number or otherwise piecewise constant, so that optimisers have no gradient
+    wraps : an angle that is known only up to full turns; its curves are made continuous
+    windowed : a deviation, of which only the part inside the window of the stroke counts if a window is given
+    stage, own : in a chain the number of its stage, and its name there
+    parts : components of a rate, for its magnitude
+    kinks : its curves have kinks or jumps where a velocity or force reverses, as with friction: extrema are searched
         for panel by panel
     """
 
@@ -152,11 +152,11 @@ class Output:
 
     @property
     def base(self) -> str:
-        """The name without the number of a stage."""
+        """Name without the number of a stage."""
         return self.own or self.name
 
     def of_stage(self, number: int) -> Output:
-        """Return the same output of the stage of that number in a chain, under its name there."""
+        """Return the output as the one of a stage in a chain, with the number of the stage in its name."""
         words = f"stage {number}: {self.text}"
         return replace(self, name=f"{self.name}{number}", text=words, stage=str(number), own=self.name)
 
@@ -165,10 +165,10 @@ TWO_TURNS, TWO_TURNS_DEG = 2.0 * TWO_PI * (1.0 + 1e-9), 720.0
 
 
 def reads_as_degrees(largest: float) -> bool:
-    """Whether crank angles, the largest of which is given, were written in degrees though rad were expected.
+    """Whether crank angles with the given largest value were written in degrees where rad are expected.
 
-    Crank angles may run on over many turns.  Between two turns in rad and two turns in degrees a grid whose largest
-    value is a whole or half number was written in degrees: one in rad ends at a multiple of pi.
+    Crank angles may exceed a turn.  Between two turns in rad and two turns in degrees a grid whose largest value is a
+    whole or half number was written in degrees: one in rad ends at a multiple of pi.
 
     >>> reads_as_degrees(180.0), reads_as_degrees(12.5), reads_as_degrees(62.83185)
     (True, False, False)

@@ -19,14 +19,14 @@ from sweep.families.sites import AXES, EYE, TIP, Site, sites_of
 
 @dataclass(frozen=True)
 class Placement:
-    """A member's frame in the machine's frame.
+    """Frame of a member in the machine's frame.
 
     Parameters
     ----------
-    at : where the origin of the member's frame stands [length]
+    at : origin of the member's frame [length]
     axis : direction of the member's z, of any length
-    zero : direction of the member's x; what it has along ``axis`` does not count
-    stage : of a chain, 1 where the first stage stands there, 0 for the last one
+    zero : direction of the member's x; its component along ``axis`` is ignored
+    stage : of a chain, 1 to place the first stage, 0 to place the last one
     """
 
     at: tuple[float, float, float] = (0.0, 0.0, 0.0)
@@ -44,12 +44,12 @@ class Placement:
 
 
 def placement(member: str, given: Placement | dict[str, Any] | None) -> Placement:
-    """Placement of a member from what a user gives, checked.
+    """Read and check the placement of a member.
 
     Raises
     ------
     InputError
-        for a key that is none, a vector without three finite numbers, an axis of no length or along ``zero``.
+        for an unknown key, a vector without three finite numbers, an axis of zero length or along ``zero``.
     """
     if given is None:
         return Placement()
@@ -71,7 +71,7 @@ def placement(member: str, given: Placement | dict[str, Any] | None) -> Placemen
 
 
 def vector(value: object, where: str) -> tuple[float, float, float]:
-    """Three finite numbers out of what a user gives.
+    """Read three finite numbers.
 
     Raises
     ------
@@ -96,19 +96,19 @@ class Member:
 
     Parameters
     ----------
-    name : what stands before the dot of its parameters and outputs
+    name : prefix of its parameters and outputs, before the dot
     family : a family or chain, evaluated over a closed turn
-    ratio : whole turns of its crank for one of what drives it, with the sense; not 0
+    ratio : whole turns of its crank per turn of its driver, with the sense; not 0
     offset : its crank angle where the driving angle is 0 [rad]; the default of the parameter ``offset``
     driver : member and pose output that drive it, as ("needle", "psi1"); None is the main shaft
     place : its frame in the machine's frame; ``at`` is the default of the parameters ``x_at``, ``y_at``, ``z_at``
-    drives : of the driver's outputs, the derivative of each
+    drives : derivative of each output of the driver
     tip : a point fixed to the output link: along it, across it, along its axis; the defaults of ``x_tip`` ...
     eye : a point of the coupler: along it from its first joint; of a planar one also across it and along the axes; the
         defaults of ``x_eye`` ...
-    columns : where its own parameters stand in the machine's design matrix
-    mount : how its first crank sits on a shaft of the machine, instead of place, ratio, offset and driver
-    carried : named points that turn with its output link, as a tip: those of the blade that it carries
+    columns : columns of its own parameters in the machine's design matrix
+    mount : seat of its first crank on a shaft of the machine, instead of place, ratio, offset and driver
+    carried : named points that turn with its output link, as a tip: those of the blade on it
     """
 
     name: str
@@ -126,7 +126,7 @@ class Member:
 
     @property
     def alone(self) -> bool:
-        """Whether it turns with the main shaft, so that its extrema over a turn are those of its family."""
+        """Whether the crank turns as the main shaft does, so that extrema over a turn are those of the family."""
         return self.driver is None and self.ratio == 1
 
     def designs(self, designs: Array) -> Array:
@@ -134,12 +134,12 @@ class Member:
         return np.ascontiguousarray(designs[:, self.columns])
 
     def column(self, designs: Array, name: str) -> Array:
-        """Column of one of the added parameters, (n,)."""
+        """Column of a parameter that the machine adds to those of the family, (n,)."""
         return designs[:, self.columns.stop + self._place[name]]
 
     @cached_property
     def _place(self) -> Mapping[str, int]:
-        """Of each added parameter where it stands behind those of the family."""
+        """Position of each added parameter behind those of the family."""
         return {p.name: k for k, p in enumerate(self.added)}
 
     def phase(self, designs: Array) -> Array:
@@ -149,7 +149,7 @@ class Member:
         return self.mount.phase(designs, self.column(designs, "turn"), self.column(designs, "key"))
 
     def frame(self, designs: Array) -> Frame:
-        """Frame of its family, of a chain that of the last stage, in the machine's."""
+        """Frame of the family, of a chain the frame of the last stage, in the machine's frame."""
         if self.mount is None and not self.place.stage:
             return self._given(designs)
         found = self.frames(designs)[-1]
@@ -157,12 +157,12 @@ class Member:
         return found
 
     def _given(self, designs: Array) -> Frame:
-        """Frame of the stage that ``place`` is given for."""
+        """Frame of the stage to which ``place`` applies, in the machine's frame."""
         at, tilt = (self.columns.stop + self._place[name] for name in ("x_at", "x_tilt"))
         return Frame(tilted(self.place.rotation[None], designs[:, tilt : tilt + 3]), designs[:, at : at + 3])
 
     def frames(self, designs: Array) -> list[Frame | None]:
-        """Frames of all stages in the machine's; None where a chain does not say how they stand to each other."""
+        """Frames of all stages in the machine's frame; None where a chain does not define the place of its stages."""
         own, stages = self.designs(designs), self.family.stages
         if len(stages) > 1 and not stages[-1].is_placed:
             return [None] * (len(stages) - 1) + [self.frame(designs)]
@@ -180,18 +180,18 @@ class Member:
         return [frame.within(first) for frame in inner]
 
     def own(self, name: str) -> str:
-        """Give a dotted name as the member's family knows it; "" for a name of another member."""
+        """Return the family's name for a dotted name; "" for a name of another member."""
         prefix = f"{self.name}."
         return name.removeprefix(prefix) if name.startswith(prefix) else ""
 
     def geared_parts(self, name: str) -> tuple[str, ...]:
-        """Name the components of a magnitude that is computed again: the crank does not turn as the main shaft does."""
+        """Return the components of a magnitude that a crank with another motion than the main shaft's changes."""
         output = self.family.pose_output.get(name)
         return () if output is None or self.alone else output.parts
 
     @cached_property
     def added(self) -> tuple[Parameter, ...]:
-        """Its parameters beside those of its family: phase and place, tip, eye."""
+        """Parameters beside those of the family: phase and place, tip, eye."""
         place = [
             Parameter("offset", "angle", "crank angle where the driving angle is 0", default=self.offset),
             *place_parameters("the member", self.place.at),
@@ -218,7 +218,7 @@ class Member:
 
     @cached_property
     def site_of(self) -> Mapping[str, str]:
-        """Of the name of each coordinate of a site, that of the site."""
+        """Name of the site of each coordinate."""
         return {f"{name}_{axis}": name for name in self.sites for axis in AXES}
 
     @cached_property

@@ -1,7 +1,7 @@
-"""Trees of links of planar families and of thread take-ups: which bodies move how, from their pose outputs alone.
+"""Trees of links of planar families and of thread take-ups: poses of the bodies from the pose outputs alone.
 
-A body that hangs on another by a pin in the plane bears there what acts across the plane too; pins and contacts that
-close a loop bear forces in the plane.
+A body on another by a pin in the plane bears there the loads across the plane too; pins and contacts that close a loop
+bear forces in the plane.
 """
 
 from __future__ import annotations
@@ -38,7 +38,7 @@ def _bearing(text: str) -> LinkJoint:
 
 
 def _put_cam(angles: Angles, links: Links, at: Path) -> None:
-    """Write a cam on the driven shaft, at the angle of that."""
+    """Write the pose of a cam on the driven shaft, at the crank angle."""
     poses.put_about(links, 0, at, poses.crank_angle(links, angles))
     poses.turn_about_z(links, 0)
 
@@ -83,8 +83,8 @@ def rolling_planet(parameters: Parameters) -> LinkTree:
     """Carrier, planet that rolls on a fixed gear, and the slotted link in which its pin slides.
 
     Teeth press along the tangent of the pitch circles, ours: a pressure angle of the teeth adds a radial force that the
-    carrier bears.  Where ``parameters`` name no fixed gear, it is of one size with the planet.  Lengths of these
-    families are in planet radii: loads have the radius as an input.
+    carrier bears.  Without a fixed gear in ``parameters`` it has the size of the planet.  Lengths of these families are
+    in planet radii: loads have the radius as an input.
     """
     whole = "n" in [p.name for p in parameters]
 
@@ -149,7 +149,7 @@ def _cam_and(follower: LinkBody, joint: LinkJoint, needs: tuple[str, ...], fill:
 
 
 def sliding_follower(parameters: Parameters) -> LinkTree:
-    """Cam and the follower that its roller lifts along x."""
+    """Cam and a follower whose roller moves along x."""
 
     def fill(designs: Array, angles: Angles, motion: Columns, links: Links) -> None:
         r0, e = dimensions(parameters, designs, "r0", "e")
@@ -166,7 +166,7 @@ def sliding_follower(parameters: Parameters) -> LinkTree:
 
 
 def swinging_follower(parameters: Parameters) -> LinkTree:
-    """Cam and the lever that its roller swings."""
+    """Cam and a lever whose roller moves on an arc."""
 
     def fill(designs: Array, angles: Angles, motion: Columns, links: Links) -> None:
         c, e = dimensions(parameters, designs, "c", "e")
@@ -183,7 +183,7 @@ def swinging_follower(parameters: Parameters) -> LinkTree:
 
 
 def thread_follower(parameters: Parameters, cam_axis: Callable[[Array], Array]) -> LinkTree:
-    """Cam of a thread take-up and the follower that it pushes along y into the thread; that pulls as a tool's force."""
+    """Cam of a thread take-up and its follower, which moves along y; the thread acts on it as a tool's force."""
 
     def fill(designs: Array, angles: Angles, motion: Columns, links: Links) -> None:
         axis = cam_axis(designs)
@@ -200,7 +200,7 @@ def thread_follower(parameters: Parameters, cam_axis: Callable[[Array], Array]) 
 
 
 def turning_cam(needs: tuple[str, ...]) -> LinkTree:
-    """Cam alone, whose bare edge carries a thread."""
+    """Cam alone, with a thread on its bare edge."""
 
     def fill(designs: Array, angles: Angles, motion: Columns, links: Links) -> None:
         _put_cam(angles, links, poses.standing_at(links))
@@ -209,7 +209,7 @@ def turning_cam(needs: tuple[str, ...]) -> LinkTree:
 
 
 def eyelet_crank(parameters: Parameters) -> LinkTree:
-    """Crank with an eyelet at its end, in which the thread pulls as a tool's force."""
+    """Crank with an eyelet at its end, on which the thread acts as a tool's force."""
 
     def fill(designs: Array, angles: Angles, motion: Columns, links: Links) -> None:
         a, f, alpha = dimensions(parameters, designs, "a", "f", "alpha")
@@ -227,8 +227,8 @@ def _on_crank(parameters: Parameters, designs: Array) -> Array:
 def heddle_shaft(parameters: Parameters, line: Callable[[Array], tuple[Array, Array]]) -> LinkTree:
     """Cam lever, rod, bell crank, shaft lever and shaft of a heddle drive.
 
-    The link between both levers and the heddle rod bear force along themselves and have no mass: give halves of it to
-    what they join.  Levers of the parallel linkage without dimensions have the arm O4E to it.
+    The link between both levers and the heddle rod bear axial force only and have no mass: add half of it to each of
+    their neighbours.  Levers of the parallel linkage without dimensions have the arm O4E to it.
     """
 
     def fill(designs: Array, angles: Angles, motion: Columns, links: Links) -> None:
@@ -283,7 +283,7 @@ def heddle_shaft(parameters: Parameters, line: Callable[[Array], tuple[Array, Ar
 
 
 def _shaft_lever(parameters: Parameters, designs: Array, motion: Columns) -> Turning:
-    """Return the turning of the shaft lever: of its rates the family gives those of the shaft, (7)."""
+    """Return the angle of the shaft lever and its rates, from the rates of the shaft, (7)."""
     arm, heddle, slide = dimensions(parameters, designs, "O4E", "EG", "x_s")
     lam, first, second = floats(motion, "lam", "dy", "d2y")
     x, y = arm * np.cos(lam), arm * np.sin(lam)

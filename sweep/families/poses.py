@@ -1,15 +1,15 @@
-"""How kernels of poses are called: for the wanted outputs, guarded against what is no number, one set from another.
+"""Calls of the kernels of poses: for the wanted outputs, with checks of non-finite values, one set from another.
 
-A kernel of poses is compiled for every set of outputs that it gives: what is not in the set is not in the machine code.
-That takes a quarter of a second per set, and a study with an optimum asks for dozens of sets, most of them on a few
-thousand poses.  So in :class:`Together` a set on few poses is taken from a larger one, and gets machine code of its own
-as soon as it is asked for on many.  The larger set is that of all outputs; in twice the working precision that of all
-values, with the joints only where one of them is wanted: a loop that writes all of these is not vector code, and takes
-five times as long.  Where arguments are complex, which takes longer to compile, it is the first set that was asked for,
-as long as that will do: who wants slopes asks for all curves first.  The bits are the same.
+A kernel of poses is compiled for every set of outputs: code of outputs outside the set is left out.  That takes a
+quarter of a second per set, and a study with an optimum asks for dozens of sets, most of them on a few thousand poses.
+So in :class:`Together` a set on few poses is taken from a larger one, and gets machine code of its own once it is asked
+for on many.  The larger set is that of all outputs; in twice the working precision that of all values, with the joints
+only where one of them is wanted: a loop that writes all of these is not vectorised, and takes five times as long.
+Where arguments are complex, which takes longer to compile, the larger set is the first set asked for, as long as it
+includes the wanted one: optimisers ask for all curves first.  The bits are the same.
 
-Families that take no complex numbers answer a complex step by central differences (:func:`differentiable`).  Families
-that have the kernels of another one, with other symbols or in another frame, carry its steps and records over.
+For families without complex arithmetic :func:`differentiable` answers a complex step by central differences.  Families
+with the kernels of another family, but other symbols or another frame, convert the steps and joint records of that.
 """
 
 from __future__ import annotations
@@ -29,13 +29,13 @@ from sweep.families.capabilities import DesignMap
 
 
 def guarded(poses: PoseFunction) -> PoseFunction:
-    """Return poses that answer a parameter that is no number, and a value beyond float64, by INVALID_INPUT and nan.
+    """Wrap poses so that a parameter that is not finite, or a value beyond float64, gives INVALID_INPUT and nan.
 
     For kernels that read some parameters only where they matter.
     """
 
     def safe(designs: Array, angles: Angles, wanted: frozenset[str]) -> Columns:
-        with np.errstate(all="ignore"):  # what is no number has its status
+        with np.errstate(all="ignore"):  # results that are not finite get a status
             columns = poses(designs, angles, wanted)
         status = np.array(columns["status"], np.uint8)
         bad = np.zeros(status.shape, np.bool_)
@@ -51,7 +51,7 @@ def guarded(poses: PoseFunction) -> PoseFunction:
 
 
 def chosen(columns: Mapping[str, Any], wanted: frozenset[str], status: Status) -> Columns:
-    """Return the wanted ones of some outputs, their errors, and the status."""
+    """Return the wanted outputs with their errors, and the status."""
     return {name: x for name, x in columns.items() if name.removeprefix("err_") in wanted} | {"status": status}
 
 
@@ -59,7 +59,7 @@ def filled_each(
     kernel: Callable[..., object], arguments: Sequence[object], names: tuple[str, ...], wanted: frozenset[str],
     status: Status,
 ) -> Columns:  # fmt: skip
-    """Call ``kernel(*arguments, status, *arrays)`` of an effect, which takes one array or None per output."""
+    """Call ``kernel(*arguments, status, *arrays)`` of an effect, with one array or None per output."""
     arrays = optional_outputs(names, wanted, status.shape)
     kernel(*arguments, status, *arrays)
     columns: Columns = {name: array for name, array in zip(names, arrays, strict=True) if array is not None}
@@ -89,7 +89,7 @@ def poses_of(
     ----------
     outputs : the kernel's namedtuple of arrays or None; a field is an output, or one of the ``blocks``
     blocks : fields that are several outputs in one array (k, n, m), computed where one of them is wanted
-    angles : which of phi, cos and sin the kernel takes
+    angles : arguments of the kernel, of phi, cos and sin
     """
     of_block = {field: [o.name for o in block] for field, block in (blocks or {}).items()}
     names = {field: of_block.get(field, [field]) for field in outputs._fields}
@@ -127,13 +127,13 @@ def optional_outputs(
 
 
 MANY = 2**16  # poses of one call: dense samples, or the price of an output being measured
-# Poses of all calls so far.  All outputs take up to 40 ns more per pose than a few, 60 ns more where they are complex:
-# for so many, less than a set takes to compile.
+# Number of poses above which a set is compiled.  All outputs take up to 40 ns more per pose than a few, 60 ns more
+# where they are complex: for this number, less than the compilation of a set.
 PAID = 2**21
 
 
 class Together:
-    """Poses whose kernel gives each of the ``sets``, every one within the next; ``poses`` calls it for any."""
+    """Poses of a kernel with nested ``sets`` of outputs, of which each is compiled; ``poses`` calls it for any set."""
 
     def __init__(self, poses: PoseFunction, sets: Sequence[frozenset[str]]) -> None:
         update_wrapper(self, poses)
@@ -143,11 +143,11 @@ class Together:
         self._first: frozenset[str] | None = None  # set that was asked for with complex arguments
 
     def __reduce__(self) -> str:
-        """By its name, as a function: a process that gets it has its own."""
+        """Pickle by name, as functions are: each process has its own counts."""
         return self._poses.__qualname__
 
     def __call__(self, designs: Array, angles: Angles, wanted: frozenset[str]) -> Columns:
-        """Wanted outputs and the status of every design at its angles, each (n, m)."""
+        """Return the wanted outputs and the status of every design at its angles, each (n, m)."""
         key = wanted, np.iscomplexobj(angles.cos) or np.iscomplexobj(designs)
         if key[1]:  # one code for complex designs, complex angles, and both
             whole: list[Any] = [np.ascontiguousarray(x, np.complex128) for x in (designs, *angles)]
@@ -160,7 +160,7 @@ class Together:
         return {name: found[name] for name in (*wanted, "status")}
 
     def _larger(self, wanted: frozenset[str], is_complex: bool) -> frozenset[str]:
-        """Set that a set on few poses is taken from."""
+        """Return the set from which a set on few poses is taken."""
         if is_complex:
             if self._first is None:
                 self._first = wanted
@@ -169,21 +169,21 @@ class Together:
 
 
 def together(*outputs: Sequence[Output]) -> Callable[[PoseFunction], PoseFunction]:
-    """Decorate poses whose kernel gives these outputs; few poses give all up to the last of them that is wanted."""
+    """Decorate poses of a kernel with groups of outputs; few poses give all groups up to the last wanted one."""
     sets = [frozenset(o.name for part in outputs[: k + 1] for o in part) for k in range(len(outputs))]
     return lambda poses: Together(poses, sets)
 
 
-# Where a record per pose and one per design have points (kernels/linkage/joints.py); the other vectors are directions.
+# Columns of points in a record per pose and per design (kernels/linkage/joints.py); other vectors are directions.
 _POINTS_OF_POSE, _POINTS_OF_DESIGN = (0, 3), (6, 9)
 
 
 def step_of(
     step: Step, matrix: DesignMap, ours: Callable[[str], str] = str, theirs: Callable[[str], str] = str
 ) -> Step:
-    """Take a step of the other family for designs of this one, whose design matrix there is ``matrix(designs)``.
+    """Convert a step of another family to one for designs of this family; ``matrix`` maps these to designs of that.
 
-    ``theirs`` gives the other family's name of an output, ``ours`` the way back.
+    ``theirs`` gives the other family's name of an output, ``ours`` the inverse.
     """
 
     def run(designs: Array, wanted: frozenset[str], accuracy: Accuracy) -> Columns:
@@ -198,10 +198,10 @@ def step_of(
 
 
 def move_records(rotation: Array, origin: Array, per_pose: Array, per_design: Array) -> None:
-    """Bring joint records that were filled in the frame of another family into a family's own frame, in place.
+    """Transform joint records from the frame of another family to a family's own frame, in place.
 
-    A vector v of the other frame is ``rotation`` v in the own one, (3, 3), and its origin stands at ``origin``, (n, 3).
-    Quarter turns, which have one 1 or -1 a row, change no digit.
+    A vector v of the other frame is ``rotation`` v in the own frame, (3, 3), and its origin is at ``origin``, (n, 3).
+    Quarter turns, with one 1 or -1 per row, are exact.
     """
     for vectors, points, shift in (
         (per_pose, _POINTS_OF_POSE, origin[:, None, :]),
@@ -213,12 +213,12 @@ def move_records(rotation: Array, origin: Array, per_pose: Array, per_design: Ar
             vectors[..., k : k + 3] += shift
 
 
-# Of the size of what is moved: error of second order against rounding, some 1e-10 of the derivative.
+# Relative step: its error of second order and its rounding are some 1e-10 of the derivative.
 DIFFERENCE = 1e-5
 
 
 def differentiable(family: Family) -> Family:
-    """Family with poses that take complex designs and angles; the family itself where they do already."""
+    """Family with poses of complex designs and angles; the family itself where its poses already take them."""
     if family.analytic:
         return family
     return replace(family, poses=partial(_poses, family.poses), analytic=True)
@@ -231,18 +231,18 @@ def _poses(poses: PoseFunction, designs: Array, angles: Angles, wanted: frozense
 
 
 def differenced(poses: PoseFunction, designs: Array, angles: Angles, wanted: frozenset[str]) -> Columns:
-    """Answer a complex step of poses that are not analytic, such as norms, friction, a march, by a central difference.
+    """Answer a complex step of poses that are not analytic (norms, friction, a march) by a central difference.
 
-    Along the direction of the imaginary parts; measured, its relative error is about 1e-9.
+    The difference is along the imaginary parts; its measured relative error is about 1e-9.
     """
     steps = [np.abs(x.imag) / np.maximum(np.abs(x.real), 1e-3) for x in (designs, angles.cos, angles.sin)]
     # An interval's variable may move where no cosine does; near 0 an angle is small against a turn, not against itself.
     steps.append(np.abs(angles.phi.imag) / np.maximum(np.abs(angles.phi.real), 1.0))
-    # Each design moves along its own direction: a step that suits a small dimension drowns those of others in rounding.
+    # Each design has its own step: that of the smallest dimension of all would lose other designs in rounding.
     largest = [np.broadcast_to(x.max(axis=1, initial=0.0), len(designs)) for x in steps]
     t = DIFFERENCE / np.maximum(np.max(largest, axis=0), 1e-300)[:, None]
 
-    # All three at once: a search asks for a few poses at a time, of which a call costs more than they do.
+    # All three in one call: a search asks for a few poses at a time, which take less than the call.
     shape = len(designs), angles.cos.shape[1]
     moves = (0.0, t, -t)
     x = np.concatenate([designs.real + move * designs.imag for move in moves])
@@ -259,7 +259,7 @@ def differenced(poses: PoseFunction, designs: Array, angles: Angles, wanted: fro
 
 
 def blocks(shape: tuple[int, ...], size: int) -> Iterator[tuple[slice, slice]]:
-    """Cut (designs, poses) into blocks of at most ``size`` poses, so small that what they need stays in the caches."""
+    """Split (designs, poses) into blocks of at most ``size`` poses, which fit the caches."""
     rows, poses = max(1, size // max(shape[1], 1)), min(max(shape[1], 1), size)
     for i in range(0, shape[0], rows):
         for j in range(0, shape[1], poses):

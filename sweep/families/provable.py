@@ -1,6 +1,6 @@
-"""Loci of limit positions over whose boxes bounds can be proven.
+"""Loci of limit positions with proven bounds over boxes.
 
-The kernels of the proof are imported by it alone: whoever asks a crank-rocker for a number would wait for them.
+The kernels of the proof are imported by a proof alone, because other evaluations would wait for the import.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 def _explored(
     coordinates: str, question: tuple[Any, ...], search: tuple[Any, ...], leaves: tuple[Numbers, ...]
 ) -> tuple[int, int]:
-    """Leaves filled and boxes judged by :func:`kernels.families.rssr.proof.explore`."""
+    """Return the numbers of leaves filled and boxes judged by :func:`kernels.families.rssr.proof.explore`."""
     from kernels.families.rssr import proof
     from kernels.families.rssr.box_problem import BoxQuestion
 
@@ -35,7 +35,7 @@ def _recorded(coordinates: str) -> Formulas:
 
 
 def _tests(lengths: tuple[str, ...]) -> tuple[str, ...]:
-    """Return what each kind of row says where it fails."""
+    """Return the reasons for failure, one for each kind of row."""
     room = 5 - len(lengths)
     return (
         "ball on the other side of the crank axis", "limits change places", "crank not positive",

@@ -1,4 +1,4 @@
-"""The reductions of a pose output over its domain: one row here adds one to sweeps, optimiser, report and help."""
+"""The reductions of a pose output over its domain: sweeps, optimiser, report and help read them from this table."""
 
 from __future__ import annotations
 
@@ -10,21 +10,21 @@ from sweep.families.base import Domain, Family, Output, Turn
 from sweep.families.names import without_minus
 
 Mode: TypeAlias = Literal[-1, 0, 1]
-"""Which extremum: 0 the largest magnitude, +1 the largest value, -1 the least."""
+"""Kind of extremum: 0 the largest magnitude, +1 the largest value, -1 the smallest."""
 
 
 @dataclass(frozen=True)
 class Reduction:
-    """A number made of a pose output over its domain.
+    """A number from a pose output over its domain.
 
     Parameters
     ----------
-    name : what stands before the pose output's name
+    name : prefix of the pose output's name
     text : definition, with the words for the domain in place of ``{over}`` and ``{variable}``
-    symbol, words : how a figure and a table write it, ``{}`` stands for the pose output
-    modes : extrema that it is made of; none for a mean
-    place : whether it is the value of the domain's variable where the extremum is; the variable's name comes first then
-    domains : kinds of domain that it serves
+    symbol, words : text in figures and tables, ``{}`` stands for the pose output
+    modes : extrema in its definition; none for a mean
+    place : whether it is the value of the domain's variable at the extremum; the variable's name then stands first
+    domains : kinds of domain to which it applies
     """
 
     name: str
@@ -37,11 +37,11 @@ class Reduction:
 
     @property
     def kind(self) -> str:
-        """How the optimiser calls it: a mean is a number without inner structure."""
+        """Name of the kind in the optimiser: a mean is a scalar."""
         return "scalar" if not self.modes else f"phi_{self.name}" if self.place else self.name
 
     def prefix(self, domain: Domain) -> str:
-        """Return what stands before the name of a pose output."""
+        """Return the prefix of a pose output's name."""
         return f"{domain.name}_{self.name}_" if self.place else f"{self.name}_"
 
     def output(self, of: Output, domain: Domain) -> Output:
@@ -68,17 +68,17 @@ REDUCTIONS = (
               domains=("turn", "march")),
 )  # fmt: skip
 
-# Longer prefixes first: max_abs_x is no max_x of abs_x.
+# Longer prefixes first: max_abs_x is not the largest value of abs_x.
 _BY_LENGTH = sorted(REDUCTIONS, key=lambda reduction: -len(reduction.name) - reduction.place)
 
 
 def prefixes(domain: Domain) -> tuple[str, ...]:
-    """Prefixes of all reductions that serve a domain."""
+    """Prefixes of all reductions that apply to a domain."""
     return tuple(reduction.prefix(domain) for reduction in REDUCTIONS if domain.kind in reduction.domains)
 
 
 def split(name: str, domain: Domain) -> Iterator[tuple[Reduction, str]]:
-    """Yield the ways to read a name as a reduction and the name of a pose output."""
+    """Yield each division of a name into a reduction and the name of a pose output."""
     for reduction in _BY_LENGTH:
         prefix = reduction.prefix(domain)
         if name.startswith(prefix):
@@ -86,13 +86,13 @@ def split(name: str, domain: Domain) -> Iterator[tuple[Reduction, str]]:
 
 
 def reduced(name: str, domain: Domain) -> set[str]:
-    """Return what a name may be about: itself, or what follows the prefix of a reduction."""
+    """Return the name itself and its remainders behind prefixes of reductions."""
     name = without_minus(name) or name
     return {name, *(rest for _, rest in split(name, domain))}
 
 
 def reduction_of(family: Family, name: str) -> tuple[Reduction, Output] | None:
-    """Reduction and the pose output that a name stands for; None where it stands for none."""
+    """Reduction and pose output in a name; None for a name without a reduction."""
     for reduction, rest in split(name, family.domain):
         pose = family.pose_output.get(rest)
         if pose is not None:

@@ -1,7 +1,7 @@
 """Registry entries of the slider-cranks: the spatial one (RSSP), and the planar one, also offset.
 
-The planar one is the spatial one with alpha = 0, turned by a quarter, and has its kernels; its x runs along the slide
-line and its phi is counted from there.
+The planar one is the spatial one with alpha = 0, rotated by a quarter turn, and has its kernels; its x runs along the
+slide line and its phi is measured from there.
 """
 
 from __future__ import annotations
@@ -65,12 +65,12 @@ precise_poses = poses_of(rssp.precise_poses, rssp.Outputs, {"joints": JOINT_OUTP
 
 
 def margins(designs: Array, wanted: frozenset[str], accuracy: Accuracy) -> Columns:
-    """Rotatability, margin and largest pressure angle, exact."""
+    """Compute rotatability, margin and largest pressure angle, exact."""
     n = len(designs)
     status = np.empty(n, np.uint8)
     least, turns, angle = np.empty(n), np.empty(n), np.empty(n)
     rssp.margin(designs, status, least, turns, angle, None)
-    with np.errstate(all="ignore"):  # lengths beyond any drawing have their status
+    with np.errstate(all="ignore"):  # lengths that overflow have a status
         scale = designs[:, 1] ** 2
         # Rounding errors of sin^2 = (m^2 + n^2)/b^2, taken where m and n are largest; cos^2 has that of b^2 as well.
         size = (np.abs(designs[:, 2]) + designs[:, 0]) ** 2 + (np.abs(designs[:, 3]) + designs[:, 0]) ** 2
@@ -90,7 +90,7 @@ def margins(designs: Array, wanted: frozenset[str], accuracy: Accuracy) -> Colum
 
 
 def limit_positions(designs: Array, wanted: frozenset[str], accuracy: Accuracy) -> Columns:
-    """Both limit positions of the slider, to rounding; the errors are bounds of the rounding errors."""
+    """Compute both limit positions of the slider to rounding; errors are bounds of the rounding errors."""
     n = len(designs)
     status = np.empty(n, np.uint8)
     outputs = np.empty((len(LIMIT_OUTPUTS) + 2, n))
@@ -122,7 +122,7 @@ _JOINT_NEEDS = ("s", "ds", "d2s", "discriminant")
 
 
 def joint_records(designs: Array, angles: Angles, motion: Columns, per_pose: Array, per_design: Array) -> None:
-    """Fill the joint records that effects work from; ``motion`` holds the pose outputs they are made of."""
+    """Fill the joint records of the effects from the pose outputs in ``motion``."""
     given = np.stack(floats(motion, *_JOINT_NEEDS))
     rssp.joints(designs, angles.cos, angles.sin, given, per_pose, per_design)
 
@@ -140,7 +140,7 @@ COMPONENTS = {"ds": "x1", "d2s": "x2", "d3s": "x3"}
 
 
 def opening(designs: Array, status: NDArray[np.uint8], distance: Array) -> None:
-    """Tell whether the crank turns, and how near the motion's nearest singularity is."""
+    """Write status and distance [rad] of the nearest complex singularity, for every design."""
     rssp.opening(np.ascontiguousarray(designs), status, distance)
 
 
@@ -204,7 +204,7 @@ def as_spatial(designs: Array) -> Array:
 
 
 def turned(angles: Angles) -> Angles:
-    """Crank angles counted from the common perpendicular, with the same bits."""
+    """Crank angles measured from the common perpendicular, with the same bits."""
     return Angles(angles.phi + 0.5 * np.pi, np.ascontiguousarray(-angles.sin), angles.cos)
 
 
@@ -218,7 +218,7 @@ def _turned_poses(run: PoseFunction, designs: Array, angles: Angles, wanted: fro
 
 
 def _planar_step(step: Step) -> Step:
-    """Take a step of the spatial slider-crank with the planar one's crank angle."""
+    """Convert a step of the spatial slider-crank to the planar one's crank angle."""
     spatial = step_of(step, as_spatial)
 
     def run(designs: Array, wanted: frozenset[str], accuracy: Accuracy) -> Columns:
@@ -232,13 +232,13 @@ def _planar_step(step: Step) -> Step:
 
 
 def planar_joint_records(designs: Array, angles: Angles, motion: Columns, per_pose: Array, per_design: Array) -> None:
-    """Fill the joint records that effects work from."""
+    """Fill the joint records of the effects."""
     joint_records(as_spatial(designs), turned(angles), motion, per_pose, per_design)
     move_records(_FROM_SPATIAL, np.zeros((len(designs), 3)), per_pose, per_design)
 
 
 def planar_opening(designs: Array, status: NDArray[np.uint8], distance: Array) -> None:
-    """Tell whether the crank turns, and how near the motion's nearest singularity is."""
+    """Write status and distance [rad] of the nearest complex singularity, for every design."""
     rssp.opening(as_spatial(designs), status, distance)
 
 

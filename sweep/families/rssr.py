@@ -29,7 +29,7 @@ PARAMETERS = (
     Parameter("branch", "sign", "assembly mode: sign of dF/dpsi", default=1.0, choices=(-1.0, 1.0)),
 )
 
-# Of joints in the frame of the rocker.
+# Axes of joint coordinates in the frame of the rocker.
 WAYS = ("along the common perpendicular of the axes", "across it and the rocker axis", "along the rocker axis")
 VALUE_OUTPUTS = (
     *coordinate_outputs(
@@ -91,7 +91,7 @@ def poses(designs: Array, angles: Angles, wanted: frozenset[str]) -> Columns:
 
 @together(VALUE_OUTPUTS, JOINT_OUTPUTS)
 def precise_poses(designs: Array, angles: Angles, wanted: frozenset[str]) -> Columns:
-    """As :func:`poses`, with the closure in twice the working precision; for float64 only."""
+    """Pose outputs of :func:`poses`, with the closure in twice the working precision; for float64 only."""
     return _precise_poses(designs, angles, wanted)
 
 
@@ -99,7 +99,7 @@ JOINT_NEEDS = ("cos_psi", "sin_psi", "dpsi", "d2psi", "discriminant")
 
 
 def joint_records(designs: Array, angles: Angles, motion: Columns, per_pose: Array, per_design: Array) -> None:
-    """Fill the joint records that effects work from; ``motion`` holds the pose outputs they are made of."""
+    """Fill the joint records of the effects from the pose outputs in ``motion``."""
     given = np.stack(floats(motion, *JOINT_NEEDS))
     rssr.joints(designs, angles.cos, angles.sin, given, per_pose, per_design)
 
@@ -114,13 +114,13 @@ def ellipse(designs: Array) -> Array:
 def moving_alike(
     matrix: can.DesignMap, place: tuple[Array, can.DesignMap] | None = None, itself: bool = False
 ) -> tuple[object, ...]:
-    """Return what a family that moves as a crank-rocker can be asked for: joint records, pressure ellipse, proofs.
+    """Return the capabilities of a family with a crank-rocker's motion: joint records, pressure ellipse, proofs.
 
     Parameters
     ----------
-    matrix : the crank-rocker's designs of those of the family
-    place : rotation (3, 3) and origin (n, 3) of the crank-rocker's frame in that of the family; None where it is that
-    itself : whether the family has what joint records are made of, under the crank-rocker's names
+    matrix : the crank-rocker's designs from those of the family
+    place : rotation (3, 3) and origin (n, 3) of the crank-rocker's frame in that of the family; None if it is the same
+    itself : whether the family has the pose outputs of joint records, under the crank-rocker's names
     """
 
     def fill(designs: Array, angles: Angles, motion: Columns, per_pose: Array, per_design: Array) -> None:
@@ -137,14 +137,14 @@ def moving_alike(
 
 
 def discriminant_scale(designs: Array) -> Array:
-    """(2 b c)^2 of every design: the discriminant over it is the squared cosine of the pressure angle."""
+    """(2 b c)^2 of every design: the discriminant divided by it is the squared cosine of the pressure angle."""
     return (2.0 * designs[:, 1] * designs[:, 2]) ** 2
 
 
 def margin(designs: Array, wanted: frozenset[str], accuracy: Accuracy) -> Columns:
-    """Rotatability, margin and largest pressure angle from the exact minimum of the discriminant.
+    """Compute rotatability, margin and largest pressure angle from the exact minimum of the discriminant.
 
-    The errors are bounds: of the least Delta, and what it does to the angle.
+    The errors are bounds: of the least discriminant, and of its effect on the angle.
     """
     n = len(designs)
     status = np.empty(n, np.uint8)
@@ -154,7 +154,7 @@ def margin(designs: Array, wanted: frozenset[str], accuracy: Accuracy) -> Column
     if with_error:
         needed |= {"error", "angle_error"} if "max_pressure_angle" in wanted else {"error"}
     if "max_pressure_angle" in wanted:
-        # Beside its arctangent they take no time, but code for each set of outputs takes half a second to compile.
+        # They cost little beside the arctangent, but each set of outputs takes half a second to compile.
         needed |= {"margin", "rotatable"}
     least, turns, angle, error, angle_error = optional_outputs(names, frozenset(needed), (n,))
     rssr.margin(designs, status, least, turns, angle, None, error, angle_error)
@@ -165,7 +165,7 @@ def margin(designs: Array, wanted: frozenset[str], accuracy: Accuracy) -> Column
 
 
 def limits(designs: Array, wanted: frozenset[str], accuracy: Accuracy) -> Columns:
-    """Limit positions, swing and stroke ratio to rounding, whatever the accuracy asked; errors are estimates of it."""
+    """Compute limit positions, swing and stroke ratio to rounding, for any accuracy; errors estimate the rounding."""
     n = len(designs)
     status, values = np.empty(n, np.uint8), np.empty((n, len(rssr.LIMIT_NAMES)))
     errors = np.empty_like(values) if accuracy.target is not None else None
@@ -177,13 +177,13 @@ def limits(designs: Array, wanted: frozenset[str], accuracy: Accuracy) -> Column
 
 
 def true_maxima(designs: Array, wanted: frozenset[str], accuracy: Accuracy) -> Columns:
-    """Maxima over the turn refined between samples to ``accuracy.target``, with error estimates."""
+    """Compute maxima over the turn refined between samples to ``accuracy.target``, with error estimates."""
     assert accuracy.target is not None
     n, names = len(designs), ("dpsi", "d2psi", "d3psi")
     status, phi, error, phi_error = np.empty(n, np.uint8), *(np.empty((3, n)) for _ in range(3))
     most = [np.empty(n) if wanted & {f"max_abs_{x}", f"phi_max_abs_{x}"} else None for x in names]
     rssr.true_maxima(designs, sampling_tables(), accuracy.target, status, phi, error, phi_error, *most)
-    # Square axes and g = 0: the way back is the way forth, and of two tops the first of the turn counts.
+    # Perpendicular axes and g = 0: return and forward stroke are alike; of two maxima the first of the turn counts.
     even = (designs[:, 5] == 0.0) & (np.abs(np.cos(designs[:, 6])) < 1e-15)
     phi[:, even] = np.minimum(phi, TWO_PI - phi)[:, even]
     columns: Columns = {"status": status}
@@ -198,7 +198,7 @@ def true_maxima(designs: Array, wanted: frozenset[str], accuracy: Accuracy) -> C
 def certified_maxima(designs: Array, wanted: frozenset[str], accuracy: Accuracy) -> Columns:
     """Find true maxima with the proof that no peak was missed: their errors are bounds, not estimates.
 
-    The place of a maximum is one where its value is taken; how far it is from the exact place stays an estimate.
+    The angle of a maximum is one at which its value is taken; its distance from the exact angle is an estimate.
     """
     from kernels.families.rssr.certify import InSeries, certify_maxima  # here: only proofs wait for its import
 
@@ -228,9 +228,9 @@ def proven_columns(
     name: str, wanted: frozenset[str], target: float, height: tuple[Array, Array], place: Array,
     searched: tuple[Array, Array],
 ) -> Columns:  # fmt: skip
-    """Wanted columns of a proven maximum: height and its bound, its place; the searched place and its error.
+    """Return wanted columns of a proven maximum, from height and its bound, its angle, and the searched angle.
 
-    Where the proof found a higher peak it climbed it to a thousandth of the target.
+    A higher peak found by the proof was refined to a thousandth of the target.
     """
     before, far = searched
     far = np.where(np.abs(place - before) > far, np.maximum(far, np.sqrt(target)), far)
@@ -242,7 +242,7 @@ sampling_tables = lru_cache(rssr.sampling_tables)
 
 
 def sampled_maxima(designs: Array, wanted: frozenset[str], accuracy: Accuracy) -> Columns:
-    """Maxima over ``accuracy.samples`` equidistant crank angles, the first at phi = 0.
+    """Compute maxima over ``accuracy.samples`` equidistant crank angles, the first at phi = 0.
 
     Whether the crank turns between the samples too is decided by the exact margin, not by the grid.
     """

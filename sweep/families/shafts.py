@@ -1,4 +1,4 @@
-"""Shafts of a machine, and how the crank of a member sits on one: machine-and-stitch, 1.3."""
+"""Shafts of a machine, and mounts of members' cranks on them: machine-and-stitch, 1.3."""
 
 from __future__ import annotations
 
@@ -25,10 +25,10 @@ class Shaft:
     Parameters
     ----------
     name : for messages
-    at : the point from which lengths along it count
+    at : origin of the lengths along it
     along : its direction, a unit vector
-    zero : unit vector square to it, to its mark at angle 0
-    ratio : whole turns for one of the main shaft, with the sense
+    zero : unit vector perpendicular to it, to its mark at angle 0
+    ratio : whole turns per turn of the main shaft, with the sense
     phase : its angle where that of the main shaft is 0 [rad]; the default of its parameter
     """
 
@@ -56,16 +56,16 @@ class Shaft:
 
 @dataclass(frozen=True)
 class Mount:
-    """How the first crank of a member sits on a shaft.
+    """Seat of the first crank of a member on a shaft.
 
     Parameters
     ----------
     shaft : the shaft
     sense : +1 or -1, whether its crank axis runs along the shaft or against it
     shift : place of its origin along the shaft; the default of the parameter ``shift``
-    turn : angle about the shaft, from its zero direction, to the direction that its crank has at phi = 0
+    turn : angle about the shaft, from its zero direction, to the direction of its crank at phi = 0
     key : angle of its crank on the shaft, from the shaft's mark
-    columns : where the parameters of the shaft stand in the machine's design matrix
+    columns : columns of the parameters of the shaft in the machine's design matrix
     """
 
     shaft: Shaft
@@ -77,12 +77,12 @@ class Mount:
 
     @property
     def ratio(self) -> int:
-        """Turns of its crank, in its own sense, for one of the main shaft."""
+        """Turns of the crank, in its own sense, per turn of the main shaft."""
         return self.sense * self.shaft.ratio
 
     @property
     def parameters(self) -> tuple[Parameter, ...]:
-        """What a study may vary."""
+        """Parameters that a study can vary: key, shift and turn."""
         on = f"shaft {self.shaft.name}"
         return (
             Parameter("key", "angle", f"angle of its crank on the {on}, from the mark", default=self.key),
@@ -98,19 +98,19 @@ class Mount:
         return self.sense * (phase + key - turn)
 
     def frame(self, designs: Array, crank: Axis, shift: Array, turn: Array) -> Frame:
-        """Return the frame of the member's first stage in the machine's."""
+        """Return the frame of the member's first stage in the machine's frame."""
         return mounted(self.shaft.axis(designs[:, self.columns]), crank, float(self.sense), shift, turn)
 
 
 def read_shafts(
     given: Mapping[str, Mapping[str, Any]], placed: Callable[[str, dict[str, Any]], Any]
 ) -> dict[str, Shaft]:
-    """Return the shafts of a machine from what a user gives, checked; ``placed`` reads at, axis and zero.
+    """Read and check the shafts of a machine; ``placed`` reads at, axis and zero.
 
     Raises
     ------
     InputError
-        for an unknown key, a ratio that is no whole number, a main shaft with a ratio or phase, or none of that name.
+        for an unknown key, a ratio that is no whole number, a main shaft with a ratio or phase, or no main shaft.
     """
     if given and MAIN not in given:
         raise InputError("shafts", list(given), "one of them named main", "machine.shafts")
@@ -129,12 +129,12 @@ def read_shafts(
 
 
 def read_mount(table: Mapping[str, Any], shafts: Mapping[str, Shaft], where: str) -> Mount:
-    """Return how a member sits on the shaft that its table names, checked.
+    """Read and check the mount of a member on the shaft that its table names.
 
     Raises
     ------
     InputError
-        for an unknown shaft, a key that the shaft already decides, a sense that is none.
+        for an unknown shaft, a key that the shaft already decides, a sense other than +1 and -1.
     """
     name = table["shaft"]
     if name not in shafts:
@@ -149,7 +149,7 @@ def read_mount(table: Mapping[str, Any], shafts: Mapping[str, Shaft], where: str
 
 
 def turns(table: Mapping[str, Any], where: str) -> int:
-    """Return how often something turns while the main shaft turns once, with the sense; from the ``ratio`` given."""
+    """Return the whole turns per turn of the main shaft, with the sense, from the key ``ratio``."""
     allowed = "a whole number but 0: the machine's turn is one of the main shaft, so choose its slowest shaft as that"
     ratio = number("ratio", table.get("ratio", 1), where, allowed)
     if ratio != int(ratio) or ratio == 0.0:

@@ -1,4 +1,4 @@
-"""Points and axes of a member that relations and tools refer to: joints of all stages, fixed axes, tip, eye, blades."""
+"""Points and axes of a member for relations and tools: joints of all stages, fixed axes, tip, eye, blades."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ TIP = "tip"
 EYE = "eye"  # on the coupler, the link between the points b and c
 
 Vector: TypeAlias = Callable[[Array, Mapping[str, Any]], list[Any]]
-"""Of designs of the machine and pose outputs of the member x, y, z in the frame of a stage, numbers or (n, m) each."""
+"""Coordinates x, y, z in the frame of a stage from designs of the machine and pose outputs of the member."""
 
 
 class Site(NamedTuple):
@@ -29,11 +29,11 @@ class Site(NamedTuple):
 
     Parameters
     ----------
-    stage : its place among the stages, from 0
+    stage : index of the stage, from 0
     made_of : pose outputs of the member
-    at : what they make: where it is
+    at : coordinates from these pose outputs
     free : whether it is a direction
-    rates, velocity : the same of its derivative by the crank angle; none where no outputs give it
+    rates, velocity : pose outputs and function of the derivative by the crank angle; empty and None if not available
     """
 
     stage: int
@@ -70,14 +70,14 @@ def sites_of(member: Member) -> dict[str, Site]:
 
 
 def _tails(stages: Sequence[Stage], k: int, *names: str) -> list[str]:
-    """Return what can stand behind names of the stage of index k: its number, in the last one also nothing."""
+    """Return the permitted suffixes of names of stage k: its number, for the last stage also nothing."""
     tail = stages[k].tail
     bare = tail and k + 1 == len(stages) and not any(map(ends_in_digit, names))
     return [tail, ""] if bare else [tail]
 
 
 def links_of(member: Member) -> dict[str, tuple[str, str]]:
-    """Return the links of a member as segments, the names of two sites each, where both ends have places."""
+    """Return the links of a member as segments, by the names of their two sites, if both ends are sites."""
     found, known, stages = {}, member.sites, member.family.stages
     for k, stage in enumerate(stages):
         for link in skeleton_of(stage.family).links:
@@ -89,7 +89,7 @@ def links_of(member: Member) -> dict[str, tuple[str, str]]:
 
 
 def _moving(member: Member, stage: int, at: Coordinates) -> Site:
-    """Make a point that pose outputs give, as most joints."""
+    """Make a point whose coordinates are pose outputs, as for most joints."""
     of = member.family.derivative_of
     known = all(x is None or x in of for x in at)
     rates = [x and of[x] for x in at] if known else []
@@ -111,7 +111,7 @@ def _standing(member: Member, stage: Stage, of: DesignMap, designs: Array, resul
 
 
 def _on_link(member: Member, fixed: tuple[float, float, float] | None = None) -> Site:
-    """Make a point that turns with the output link: the tip, whose place designs say, or one that is fixed there."""
+    """Make a point that turns with the output link: the tip, with its place in the designs, or a ``fixed`` one."""
     family = member.family
     link, position, rate = family.find(OutputLink), family.position, family.derivative_of.get(family.position)
 
@@ -135,13 +135,13 @@ def _on_link(member: Member, fixed: tuple[float, float, float] | None = None) ->
 
 
 def coupler_joints(member: Member) -> tuple[Coordinates, Coordinates] | None:
-    """Coordinates of both joints of the coupler; None where the family does not give them."""
+    """Coordinates of both joints of the coupler; None if the family has none of that name."""
     points = member.family.points
     return (points["b"], points["c"]) if {"b", "c"} <= points.keys() else None
 
 
 def is_planar(member: Member) -> bool:
-    """Whether the coupler moves in a plane z = constant, so that its two joints tell how it stands."""
+    """Whether the coupler moves in a plane z = constant, so that its two joints define its position."""
     joints = coupler_joints(member)
     return joints is not None and all(at[2] is None for at in joints)
 

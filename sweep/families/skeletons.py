@@ -1,4 +1,4 @@
-"""Parts of which the skeletons of families are made: fixed axes and points out of parameters, common sets of links."""
+"""Parts of the skeletons of families: fixed axes and points from parameters, common sets of links."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ SLIDER_CRANK = (CRANK, COUPLER, Link("slider", ("c",)))
 
 
 def links(names: str) -> tuple[tuple[str, ...], ...]:
-    """Links that are each given by one length, the names with blanks between."""
+    """Links with one length each, from the names separated by blanks."""
     return tuple((name,) for name in names.split())
 
 
@@ -28,24 +28,24 @@ SLIDER_CRANK_SIZES = Dimensions(links("a b"))
 
 
 def parameter(parameters: tuple[Parameter, ...], name: str | None, designs: Array) -> Array:
-    """Column of a parameter, (n,); zeros where there is none."""
+    """Column of a parameter, (n,); zeros for None."""
     if name is None:
         return np.zeros(len(designs))
     return designs[:, [p.name for p in parameters].index(name)]
 
 
 def dimensions(parameters: tuple[Parameter, ...], designs: Array, *names: str) -> list[Array]:
-    """Values of some parameters, (n, 1) each, beside poses (n, m)."""
+    """Values of some parameters, each (n, 1) to combine with poses (n, m)."""
     return [parameter(parameters, name, designs)[:, None] for name in names]
 
 
 def squared(parameters: tuple[Parameter, ...], name: str) -> DesignMap:
-    """Square of a parameter, (n,), such as the coupler's that makes a discriminant a squared cosine."""
+    """Square of a parameter, (n,), such as the coupler length that scales a discriminant to a squared cosine."""
     return lambda designs: np.square(parameter(parameters, name, designs))
 
 
 def crank_axis(parameters: tuple[Parameter, ...], f: str, alpha: str) -> Fixed:
-    """Return the crank's centre, ``f`` along the axis (0, sin alpha, cos alpha) from the origin."""
+    """Return the crank axis: its centre is ``f`` along (0, sin alpha, cos alpha) from the origin."""
     at, axis = partial(_along, parameters, f, alpha), partial(_along, parameters, None, alpha)
     return Fixed(at, axis, foot=constant(0.0, 0.0, 0.0))
 
@@ -66,7 +66,7 @@ def standing(
     kind: Literal["axis", "slide", "point"] = "axis",
     zero: tuple[float, float, float] = X,
 ) -> Fixed:
-    """Fix a point whose coordinates are parameters, or 0 where none is named, and a constant direction."""
+    """Return a fixed point with parameters as coordinates, 0 for None, and a constant direction."""
 
     def at(designs: Array) -> Array:
         return np.stack([parameter(parameters, name, designs) for name in (x, y, z)], axis=1)
@@ -75,7 +75,7 @@ def standing(
 
 
 def line(of: Callable[[Array], tuple[Array, Array]]) -> Fixed:
-    """Return a line along which something moves: ``of`` gives a point of it and its direction, each (n, 3)."""
+    """Return a fixed line of motion: ``of`` gives a point and the direction, each (n, 3)."""
     return Fixed(lambda designs: of(designs)[0], lambda designs: of(designs)[1], "slide")
 
 

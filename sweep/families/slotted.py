@@ -1,6 +1,6 @@
-"""Registry entries of cranks whose pin slides along another link, which turns with it.
+"""Registry entries of cranks whose pin slides along another link that turns.
 
-The slotted link is spatial, with a fork slot or a bar; the inverted slider-crank is the planar one with a slot; of the
+The slotted link is spatial, with a fork slot or a bar; the inverted slider-crank is the planar one with a slot; in the
 swivel linkage the rod slides through a block that swivels, with a working point on the rod.
 """
 
@@ -73,12 +73,12 @@ def poses(designs: Array, angles: Angles, wanted: frozenset[str]) -> Columns:
 
 
 def unit(designs: Array) -> Array:
-    """Return 1 for every design: the discriminant is the squared cosine of the pressure angle itself."""
+    """Return 1 for every design: the discriminant itself is the squared cosine of the pressure angle."""
     return np.ones(len(designs))
 
 
 def axis_squared(parameters: tuple[Parameter, ...], designs: Array, angles: Angles, found: Columns) -> Array:
-    """Squared distance of the pin from the driven axis, in cranks, (n, m): a slot without offset turns at once there.
+    """Squared distance of the pin from the driven axis in crank lengths, (n, m); at 0 a slot without offset jumps.
 
     Its pressure angle is 0 everywhere, so that the discriminant does not show it.
     """
@@ -164,7 +164,7 @@ planar_poses = poses_of(inverted_slider_crank.poses, inverted_slider_crank.Outpu
 
 
 def slot_foot(designs: Array, angles: Angles, motion: Columns) -> Array:
-    """Foot of the rocker pivot on the slot, (n, m, 3): ``h`` from the pivot, square to the slot."""
+    """Foot of the perpendicular from the rocker pivot on the slot, (n, m, 3), at the distance ``h``."""
     psi = np.asarray(motion["psi"], np.float64)
     h, e = dimensions(PLANAR_PARAMETERS, designs, "h", "e")
     return np.stack([e - h * np.sin(psi), h * np.cos(psi), np.zeros_like(psi)], axis=-1)

@@ -77,7 +77,7 @@ def second_shaft(designs: Array) -> Array:
     return np.stack([np.sin(theta) * np.cos(beta), np.sin(theta) * np.sin(beta), np.cos(theta)], axis=1)
 
 
-LOOPER = ("c0x", "c0y", "c0z")  # its ball from Os, where it is held
+LOOPER = ("c0x", "c0y", "c0z")  # ball of the looper, from the joint Os
 
 
 _RATES = ("psi", "dpsi", "d2psi", "chi", "dchi", "d2chi")

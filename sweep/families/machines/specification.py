@@ -1,4 +1,4 @@
-"""Machines from what a user writes: members and relations as plain words, checked."""
+"""Machines from the members, shafts, tools and relations that a user writes, with all checks."""
 
 from __future__ import annotations
 
@@ -60,7 +60,7 @@ FindFamily = Callable[[str | Sequence[str]], Family]
 
 @dataclass(frozen=True)
 class Specification:
-    """A machine as it was written: hashable, so that the machine it makes is made once."""
+    """The text of a machine as nested tuples: hashable, so that each machine is built once."""
 
     members: tuple[tuple[str, tuple[tuple[str, Any], ...]], ...]
     relations: tuple[tuple[str, tuple[tuple[str, Any], ...]], ...]
@@ -74,7 +74,7 @@ def specification(
     shafts: Mapping[str, Any] | None = None,
     tools: Mapping[str, Any] | None = None,
 ) -> Specification:
-    """Return what a user wrote, brought to one form.
+    """Convert the tables that a user wrote to a hashable specification.
 
     Raises
     ------
@@ -116,7 +116,7 @@ def _hashable(value: Any) -> Any:
 
 
 def built(given: Specification, find: FindFamily) -> Machine:
-    """Machine of a specification.
+    """Build and check the machine of a specification.
 
     Raises
     ------
@@ -192,7 +192,7 @@ def _member(
 
 
 def _mount(table: dict[str, Any], family: Family, shafts: Mapping[str, Shaft], where: str) -> Mount | None:
-    """Read how a member sits on a shaft; without one, and without another member that drives it, none may be known."""
+    """Read the mount of a member on a shaft; None where the machine has no shafts or another member drives it."""
     if "shaft" not in table:
         for key in MOUNT_KEYS[1:]:
             if key in table:
@@ -208,7 +208,7 @@ def _mount(table: dict[str, Any], family: Family, shafts: Mapping[str, Shaft], w
 
 
 def _eye(member: Member, given: Any, where: str) -> tuple[float, ...]:
-    """Read a point of the coupler; of a spatial one it lies on its line, as its rotation about that is undetermined."""
+    """Read a point of the coupler; on a spatial one only along its line, as its spin about that is undetermined."""
     x, y, z = vector(given, where)
     if coupler_joints(member) is None:
         raise InputError("eye", given, f"a member with a coupler; {member.family.name} has none", where)
@@ -237,7 +237,7 @@ def _driver(given: object, earlier: Mapping[str, Member], where: str) -> tuple[s
 
 
 def _derivatives(family: Family, output: str) -> int:
-    """Return how many derivatives of an output a family gives."""
+    """Return the number of derivatives of an output that a family gives."""
     number = 0
     while output in family.derivative_of:
         output, number = family.derivative_of[output], number + 1
@@ -245,7 +245,7 @@ def _derivatives(family: Family, output: str) -> int:
 
 
 def _reading(name: str, table: dict[str, Any], before: Machine) -> EventValue:
-    """Value of a pose output, of a member or a relation before, at a crank angle."""
+    """Make the relation that reads a pose output of a member or an earlier relation at a crank angle."""
     where, given = f"machine.relations.{name}", table["value"]
     if len(table) != 1:
         raise InputError(name, dict(table), "value alone", where)
@@ -261,7 +261,7 @@ def _reading(name: str, table: dict[str, Any], before: Machine) -> EventValue:
 
 
 def _event(name: str, table: dict[str, Any], before: Machine) -> Event:
-    """Event where a pose output of the machine, a relation's or a member's, passes a level."""
+    """Make the event at which a pose output of the machine, a relation's or a member's, passes a level."""
     where = f"machine.relations.{name}"
     known_keys(table, ("event", "level", "rising"), where)
     of, rising = table["event"], table.get("rising", True)
@@ -314,7 +314,7 @@ def _relation(
 
 
 def _shaft_torque(name: str, listed: list[tuple[str, str]], members: Mapping[str, Member], where: str) -> ShaftTorque:
-    """Return what the first stages of members need of the main shaft: that of a later one is handed on to the first."""
+    """Make the torque that members take from the main shaft, at the first stage of each."""
     for member, stage in listed:
         if stage not in ("", "1") or listed.count((member, stage)) > 1:
             raise InputError("torque", f"{member}{stage}", "members each once: a chain takes torque at stage 1", where)
@@ -327,7 +327,7 @@ def _shaft_torque(name: str, listed: list[tuple[str, str]], members: Mapping[str
 
 
 def _shaken(members: Mapping[str, Member], listed: list[tuple[str, str]], where: str) -> Iterator[Shaken]:
-    """Yield the stages whose shaking is asked, each once and in a frame that is known."""
+    """Yield the stages whose shaking force is asked for, each once and in a known frame."""
     for member, stage in listed:
         m = members[member]
         stages = m.family.stages

@@ -1,4 +1,4 @@
-"""The moments of the stitch and its threads from what a user writes: machine-and-stitch, 5 and 7."""
+"""Readers of the relations of a stitch: its moments, its program and its threads; machine-and-stitch, 5 and 7."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ THREAD_KEYS = (
 
 
 def read_taking(name: str, table: dict[str, Any], tools: Mapping[str, Tool], where: str) -> Taking:
-    """Read a relation ``take``: a needle, a blade, the sense, fields of work."""
+    """Read a relation ``take``: needle, blade, sense and fields of work."""
     known_keys(table, ("take", "sense", "fields", "vary"), where)
     needle, blade = (tools[one] for one in two_names(table["take"], list(tools), "tools", where))
     if not isinstance(needle, Needle) or not isinstance(blade, Blade):
@@ -43,7 +43,7 @@ def read_taking(name: str, table: dict[str, Any], tools: Mapping[str, Tool], whe
 
 
 def _rise_window(name: str, given: tuple[tuple[str, Any], ...], vary: bool, where: str) -> RiseWindow:
-    """Read what rise each field of work permits."""
+    """Read the least and the largest permitted rise of each field of work."""
     fields = []
     for field, ends in given:
         if not isinstance(ends, tuple) or len(ends) != 2:
@@ -56,7 +56,7 @@ def _rise_window(name: str, given: tuple[tuple[str, Any], ...], vary: bool, wher
 
 
 def read_entering(name: str, table: dict[str, Any], tools: Mapping[str, Tool], where: str) -> Entering:
-    """Read a relation ``enter``: what passes, a blade, the seam, the sense, a window."""
+    """Read a relation ``enter``: the tool that enters, a blade, the seam, the sense and a window."""
     known_keys(table, ("enter", "sense", "window"), where)
     if len(table["enter"]) != 3:
         raise InputError("enter", table["enter"], "three tools: what passes, a blade, the seam", where)
@@ -78,7 +78,7 @@ def read_entering(name: str, table: dict[str, Any], tools: Mapping[str, Tool], w
 
 
 def read_sewing(name: str, table: dict[str, Any], known: Mapping[str, Any]) -> Sewing:
-    """Read a relation ``sew``: the moments, speeds, the clearance that takes a loop, the torque of the main shaft."""
+    """Read a relation ``sew``: moments, speeds, permitted clearance at moment A and torque of the main shaft."""
     where = f"machine.relations.{name}"
     known_keys(table, ("sew", "speeds", "clearance", "shaft"), where)
     moments = list(known_names(table["sew"], list(known), "relations", where))
@@ -103,13 +103,12 @@ def read_sewing(name: str, table: dict[str, Any], known: Mapping[str, Any]) -> S
 def read_thread(
     name: str, table: Mapping[str, Any], members: Mapping[str, Member], tools: Mapping[str, Tool]
 ) -> ThreadBalance:
-    """Read a relation ``thread``: its path, tension and stock, and when it is sewn in and drawn.
+    """Read a relation ``thread``: path, tension, stock, and the events that begin and end sewing and drawing.
 
     Raises
     ------
     InputError
-        for an unknown key, point or member, fewer than two places, a number that is none, radii that are not as many as
-        bends.
+        for an unknown key, point or member, fewer than two places, a value that is no number, a wrong number of radii.
     """
     where = f"machine.relations.{name}"
     known_keys(table, THREAD_KEYS, where)
@@ -146,7 +145,7 @@ def read_thread(
 
 
 def _bends(path: Sequence[Waypoint]) -> int | None:
-    """Count the bends along a path, take-ups and what lies between two points; None if no piece is straight."""
+    """Return the number of bends of a path, one for each take-up and inner point; None if no piece is straight."""
     bends, pieces = 0, 0
     ends = [-1, *(k for k, place in enumerate(path) if isinstance(place.on, TakeUp)), len(path)]
     for first, last in pairwise(ends):
@@ -161,7 +160,7 @@ def _bends(path: Sequence[Waypoint]) -> int | None:
 
 
 def _place(given: Any, members: Mapping[str, Member], tools: Mapping[str, Tool], where: str) -> Waypoint:
-    """Read a place of a path: a name, coordinates, or a table with either and with when it counts."""
+    """Read a place of a path: a name, coordinates, or a table with one of these, a wrap angle and events."""
     table = dict(given) if isinstance(given, tuple) and given and isinstance(given[0], tuple) else {"on": given}
     known_keys(table, ("on", "held", "wrap", "fixed"), f"{where}.thread")
     held, fixed = (_events(key, table.get(key, ()), f"{where}.thread") for key in ("held", "fixed"))
@@ -170,7 +169,7 @@ def _place(given: Any, members: Mapping[str, Member], tools: Mapping[str, Tool],
 
 
 def _on(given: Any, members: Mapping[str, Member], tools: Mapping[str, Tool], where: str) -> Spot | Edge | TakeUp:
-    """Read what a thread runs over: a point of the frame or of a member, a take-up, a tool or the eye of a blade."""
+    """Read the place over which a thread runs: a point of the frame or a member, a take-up, a tool, a blade's eye."""
     if not isinstance(given, str):
         return Spot(at=vector(given, f"{where}.thread"))
     known: dict[str, Spot | Edge | TakeUp] = {}

@@ -1,19 +1,19 @@
-"""Thread of a machine: how much the stitch needs, how much the take-ups give, what is left over, and how it pulls.
+"""Thread of a machine: length that the stitch needs, length that the take-ups give, surplus and tension.
 
 The thread runs over places of the machine in order, from the tensioner to the stitch, straight from one to the next.
-Over some of them it runs between two events only: from where a blade takes its loop to where it lets it go.  A take-up
-among them (an eyelet, a cam) takes up P more thread than at its zero.  With the length needed by all straight pieces,
-what is sewn in and what is drawn from the bobbin since either began, between 0 and 2 pi of the main shaft, and the
-stock, the thread between tensioner and stitch that nothing has taken up,
+Over some of them it runs between two events only: from the moment a blade takes its loop to the moment it casts it off.
+A take-up among them (an eyelet, a cam) takes up P more thread than at its zero.  With the length needed by all straight
+pieces, and the lengths sewn in and drawn from the bobbin since these began, between 0 and 2 pi of the main shaft, and
+the stock, the thread between tensioner and stitch that no take-up holds,
 
     demand = needed + sewn - drawn,     given = stock - sum of P,     surplus = given - demand          (10), (11)
 
-A negative surplus means that the thread has to come through the tensioner, or stretches.  The tension at the tensioner,
+A negative surplus means that thread comes through the tensioner, or stretches.  The tension at the tensioner,
 
-    T1 = tension - stiffness surplus, not below 0, times what the thread's speed makes of it             (12)
+    T1 = tension - stiffness surplus, not below 0, times a factor of the thread's speed                  (12)
 
 grows over every bend at which the thread slides by the law of contours, docs/thread.md (3).  All outputs are analytic
-but for these kinks and where the path changes, so optimisers get exact gradients.
+except at these kinks and where the path changes, so optimisers get exact gradients.
 """
 
 from __future__ import annotations
@@ -52,7 +52,7 @@ EQUATION = "docs/thread.md (9)-(15)"
 
 
 class Range(NamedTuple):
-    """The values of a quantity between which the reported constants were measured."""
+    """Interval of a quantity in which the reported constants were measured."""
 
     name: str
     unit: str
@@ -60,7 +60,7 @@ class Range(NamedTuple):
     high: float
 
 
-# Polukhin 1971, chapter VI; what is assumed is said so (docs/thread.md, section 3).
+# Polukhin 1971, chapter VI; texts name assumed values as such (docs/thread.md, section 3).
 ALPHA = Parameter("alpha", "none", "adhesion, gf/(mm deg); reported 6.17e-3", not_negative=True, default=6.17e-3)
 BETA = Parameter("beta", "none", "friction, 1/deg; reported 1.12e-2", not_negative=True, default=1.12e-2)
 BENDING = Parameter("B", "none", "bending, gf mm^2; reported 0.714", not_negative=True, default=0.714)
@@ -80,19 +80,19 @@ MEASURED_SPEED = Range("v", "m/s", 0.08, 7.4)
 
 @dataclass(frozen=True)
 class ThreadBalance(Relation):
-    """Thread needed, given, left over; its tension at the stitch.
+    """Thread needed, given and left over, and its tension at the stitch.
 
     Parameters
     ----------
-    name : stands before the names of the outputs
+    name : prefix of the names of the outputs
     path : from tensioner to stitch
-    stock : thread between tensioner and stitch when nothing is taken up; the default of the parameter ``NAME_stock``
+    stock : thread between tensioner and stitch with all take-ups at zero; the default of the parameter ``NAME_stock``
     tension : at the tensioner, while the thread is just tight [force]
     stiffness : force per length by which the thread is slack or stretched
     radii : of the contour at each bend, in the order of the path [mm]
-    allowed : most surplus over the turn, None for none
-    sewn : thread that a stitch takes; the default of the parameter ``NAME_sewn``
-    feeding, drawing : two events each: between them it is sewn in, and comes from the bobbin
+    allowed : largest permitted surplus over the turn, None without a limit
+    sewn : thread in one stitch; the default of the parameter ``NAME_sewn``
+    feeding, drawing : two events each, between which thread is sewn in, and drawn from the bobbin
     moves : whether the velocities of all its points are known
     """
 
@@ -109,7 +109,7 @@ class ThreadBalance(Relation):
 
     @property
     def outputs(self) -> tuple[Output, ...]:
-        """The balance, and the tension."""
+        """Outputs of the balance, the bends and the tension."""
         who, speed = self.name, "its speed, the length that it gains per time"
         found = [
             ("needed", "length", f"thread {who} along the straight pieces of its path"),
@@ -135,14 +135,14 @@ class ThreadBalance(Relation):
 
     @property
     def bent(self) -> frozenset[str]:
-        """What has a kink where one of :meth:`bending` passes zero."""
-        if any(isinstance(place.on, Edge) for place in self.path):  # over which it slides, not beyond an end
+        """Outputs with a kink where one of the curves of :meth:`bending` passes zero."""
+        if any(isinstance(place.on, Edge) for place in self.path):  # its ends bound the range of sliding
             return frozenset(("wrap", "tension", "rate", "velocity"))
         return frozenset(("tension",) if self.moves or self.stiffness else ())
 
     @property
     def parameters(self) -> tuple[Parameter, ...]:
-        """Stock and stitch, which a study can vary, and the speed."""
+        """Stock, length of a stitch and speed: parameters that a study can vary."""
         text = f"thread {self.name} between tensioner and stitch when nothing is taken up"
         found = [Parameter(f"{self.name}_stock", "length", text, default=self.stock)]
         if self.feeding:
@@ -155,17 +155,17 @@ class ThreadBalance(Relation):
 
     @property
     def happens(self) -> tuple[str, ...]:
-        """Events at which something of it changes."""
+        """Events at which the path or the sliding changes, or sewing in or drawing begins or ends."""
         ends = [end for place in self.path for end in (*place.held, *place.fixed)]
         return tuple(dict.fromkeys((*ends, *self.feeding, *self.drawing)))
 
     @property
     def rates(self) -> Mapping[str, str]:
-        """Of the demand its derivative, where all velocities are known and the path does not change."""
+        """Derivative of the demand, where all velocities are known and no event changes the path."""
         return {f"{self.name}_demand": f"{self.name}_rate"} if self.moves and not self.happens else {}
 
     def needs(self, wanted: frozenset[str]) -> frozenset[str]:
-        """Name coordinates of the moving points, what the take-ups give, their bends and velocities if wanted."""
+        """Return names of the coordinates of points and take-up curves, with bends and velocities if wanted."""
         moving, bent = self._asked(wanted)
         names = {name for place in self.path for spot in spots(place) for name in spot.needs(moving)}
         ups = [place.on for place in self.path if isinstance(place.on, TakeUp)]
@@ -173,13 +173,13 @@ class ThreadBalance(Relation):
         return frozenset(names.union((up.taken for up in ups), (up.wrap for up in ups if bent)))
 
     def _asked(self, wanted: frozenset[str]) -> tuple[bool, bool]:
-        """Tell whether velocities and bends are needed."""
+        """Tell whether the wanted outputs need velocities, and whether they need bends."""
         own = {name.removeprefix(f"{self.name}_") for name in wanted}
         pulls = "tension" in own
         return self.moves and (pulls or not own.isdisjoint(("rate", "velocity"))), pulls or "wrap" in own
 
     def compute(self, found: Mapping[str, Any], wanted: frozenset[str]) -> dict[str, Any]:
-        """Return the outputs, (n, m); ``found`` has the main shaft's angle and events as "phi...", and parameters."""
+        """Return the outputs, (n, m); ``found`` holds "phi" of the main shaft, events as "phi_...", parameters."""
         phi, (moving, bent) = found[PHI], self._asked(wanted)
         needed, rate, taken = 0.0 * phi, 0.0 * phi, 0.0 * phi
         wraps: list[tuple[Waypoint, Any, Piece]] = []
@@ -213,9 +213,9 @@ class ThreadBalance(Relation):
         return {f"{self.name}_{key}": values for key, values in columns.items()}
 
     def bending(self, found: Mapping[str, Any]) -> Any:
-        """Return what passes zero where the tension or the rate has a kink, (n, m, q); ``found`` as of `compute`.
+        """Return the curves whose zeros are kinks of tension or rate, (n, m, q); ``found`` as in :meth:`compute`.
 
-        The thread becomes slack, its speed leaves the measured range, or it comes to the end of a blade.
+        At these the thread becomes slack, its speed leaves the measured range, or it comes to the end of a blade.
         """
         curves: list[Any] = []
         if self.stiffness:
@@ -228,7 +228,7 @@ class ThreadBalance(Relation):
         return np.stack(np.broadcast_arrays(*curves), axis=2)
 
     def _passed(self, when: str, found: Mapping[str, Any]) -> tuple[Any, Any]:
-        """Return the thread that has passed since it began to in the turn, ``NAME_sewn`` each, and its derivative."""
+        """Return the thread sewn in or drawn in this turn, at most ``NAME_sewn``, and its derivative."""
         ends: tuple[str, ...] = getattr(self, when)
         if not ends:
             return 0.0, 0.0
@@ -242,7 +242,7 @@ class ThreadBalance(Relation):
         return whole * passed, whole * (1.0 - np.cos(TWO_PI * share)) / lasts
 
     def _hurried(self, columns: Mapping[str, Any], found: Mapping[str, Any]) -> Any:
-        """Return what the speed makes of the tension, (7), within the measured range; 1 where none is known."""
+        """Return the factor of the speed on the tension, (7), within the measured range; 1 without a speed."""
         if "velocity" not in columns:
             return 1.0
         reference, share, exponent = (float(p.default or 0.0) for p in SPEED_CONSTANTS)
@@ -253,7 +253,7 @@ class ThreadBalance(Relation):
         return np.where(found[f"{self.name}_speed"] == 0.0, 1.0, ratio)
 
     def _tension(self, pull: Any, wraps: Sequence[Any]) -> Any:
-        """Tension behind the last bend by the law of contours, with the reported constants of the thread."""
+        """Return the tension behind the last bend by the law of contours, with the reported constants."""
         pull = np.where(np.real(pull) > 0.0, pull, 0.0) / GF
         alpha, beta, bending, count, density = (float(p.default or 0.0) for p in CONTOUR_CONSTANTS)
         own = 1.0 / np.sqrt(np.pi * density * count)
@@ -268,7 +268,7 @@ def _is_take_up(place: Waypoint) -> bool:
 
 
 def _past_ends(run: Run, found: Mapping[str, Any]) -> list[Any]:
-    """Return how far along each blade of a run, from either end, the way over its line is shortest."""
+    """Return the place of the shortest way along each blade of a run, measured from either end."""
     pieces, past = placed_points(run, found, False), []
     for k, place in enumerate(run):
         if isinstance(place.on, Edge):
@@ -279,7 +279,7 @@ def _past_ends(run: Run, found: Mapping[str, Any]) -> list[Any]:
 
 
 def _over(curve: TableCurve, phi: Any) -> Any:
-    """Curve at real or complex angles (derivative by the complex step)."""
+    """Evaluate a curve at real or complex angles (derivative by the complex step)."""
     if not np.iscomplexobj(phi):
         return curve(phi)
     return curve(phi.real) + 1j * phi.imag * curve.slope(phi.real)

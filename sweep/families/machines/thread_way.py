@@ -1,4 +1,4 @@
-"""The way of a thread over points, blades and take-ups of a machine: its length, the rate of that, and its bends."""
+"""Path of a thread over points, blades and take-ups of a machine: length, its derivative, and bends."""
 
 from __future__ import annotations
 
@@ -17,9 +17,9 @@ PHI = "phi"
 
 @dataclass(frozen=True)
 class TakeUp:
-    """A take-up in the path: the dotted pose outputs of the thread it takes up and of its wrap angle.
+    """A take-up in the path: the dotted names of the pose outputs for the thread it takes up and its wrap angle.
 
-    ``kinks`` tells whether these have kinks and jumps, as where the thread comes to lie on a bare edge.
+    ``kinks`` tells whether these outputs have kinks and jumps, as where the thread comes to lie on a bare edge.
     """
 
     taken: str
@@ -29,7 +29,7 @@ class TakeUp:
 
 @dataclass(frozen=True)
 class Edge:
-    """A blade over which the thread slides without friction: it lies where the way over it is shortest."""
+    """A blade over which the thread slides without friction, at the place of the shortest way."""
 
     tip: Spot
     back: Spot
@@ -37,14 +37,14 @@ class Edge:
 
 @dataclass(frozen=True)
 class Waypoint:
-    """What a thread runs over.
+    """A place over which a thread runs.
 
     Parameters
     ----------
     on : a point, a blade, a take-up
-    held : two events, from and to: between them the thread runs over it; () for the whole turn
-    wrap : by which it is bent there beside the bend of its path, as in a needle's eye [rad]
-    fixed : two events: between them it does not slide there, which leaves the bend out of the tension; () for never
+    held : two events, from and to, between which the thread runs over the place; () for the whole turn
+    wrap : angle of wrap there beside the bend of the path, as in a needle's eye [rad]
+    fixed : two events between which the thread does not slide there, so that the bend adds no tension; () for never
     """
 
     on: Spot | Edge | TakeUp
@@ -54,7 +54,7 @@ class Waypoint:
 
 
 class Piece(NamedTuple):
-    """A place as it stands: coordinates, velocity, and where over the turn the thread runs over it; None is always."""
+    """A place at every pose: coordinates, velocity, and the mask of the poses at which thread lies on it, or None."""
 
     at: Point
     rate: Point
@@ -65,19 +65,19 @@ Run: TypeAlias = tuple[Waypoint, ...]
 
 
 def spots(place: Waypoint) -> tuple[Spot, ...]:
-    """Return the points that a place of a path is made of."""
+    """Return the points of a place of a path."""
     if isinstance(place.on, TakeUp):
         return ()
     return (place.on,) if isinstance(place.on, Spot) else (place.on.tip, place.on.back)
 
 
 def turned(angle: Any) -> Any:
-    """Return an angle within one turn from 0; complex ones by their real part."""
+    """Reduce an angle to one turn from 0; complex angles by their real part."""
     return angle - TWO_PI * np.floor(np.real(angle) / TWO_PI)
 
 
 def outside(ends: tuple[str, ...], found: Mapping[str, Any], inside: bool = False) -> Any:
-    """Tell where over the turn two events are not between, or are; None for the whole turn."""
+    """Return the mask of the poses outside two events, or between them for ``inside``; None for the whole turn."""
     if not ends:
         return None
     start, end = (np.real(found[f"phi_{name}"]) for name in ends)
@@ -85,7 +85,7 @@ def outside(ends: tuple[str, ...], found: Mapping[str, Any], inside: bool = Fals
 
 
 def masked(where: Any, values: Any) -> Any:
-    """Return values where the thread runs so, else 0."""
+    """Return the values where the mask holds, 0 elsewhere; all values for None."""
     return values if where is None else np.where(where, values, 0.0)
 
 
@@ -94,7 +94,7 @@ def _chosen(where: Any, a: Point, b: Point) -> Point:
 
 
 def placed_points(run: Sequence[Waypoint], found: Mapping[str, Any], moving: bool) -> list[Piece]:
-    """Place the points of a run, those on blades last: each lies between two that do not depend on it."""
+    """Place the points of a run; first those not on blades, which lie between points that do not depend on them."""
     pieces: list[Piece] = []
     for place in run:
         spot = place.on.tip if isinstance(place.on, Edge) else place.on
@@ -108,14 +108,14 @@ def placed_points(run: Sequence[Waypoint], found: Mapping[str, Any], moving: boo
             # the length is convex along the line: beyond an end the end is nearest
             t = np.where(np.real(t) < 0.0, 0.0, np.where(np.real(t) > 1.0, 1.0, t))
             on = [a + t * (b - a) for a, b in zip(tip.at, back, strict=True)]
-            # of a shortest way the place on the blade does not count in its derivative, the blade's own motion does
+            # the length is stationary in the place on the blade: its derivative has the motion of the blade alone
             ends = zip(tip.rate, place.on.back.velocity(found), strict=True) if moving else ()
             pieces[k] = tip._replace(at=on, rate=[a + t * (b - a) for a, b in ends])
     return pieces
 
 
 def beside(pieces: Sequence[Piece], k: int, step: int) -> Piece:
-    """Return the place before or after one, of those that the thread runs over; the ends it always does."""
+    """Return the next place before or after a place over which the thread runs; at the ends it always runs."""
     piece = pieces[k + step]
     if piece.on is None:
         return piece
@@ -142,9 +142,9 @@ def length_and_bends(pieces: Sequence[Piece], moving: bool, bent: bool) -> tuple
 
 
 def nearest_way(p: Point, q: Point, start: Point, end: Point) -> Any:
-    """Return where along the line of a segment, 0 and 1 at its ends, the way from p over it to q is shortest, (14).
+    """Return the place on the line of a segment over which the way from p to q is shortest, 0 and 1 at its ends, (14).
 
-    Turned about the line into one plane, on either side of it, p and q see each other straight across it.
+    Turned about the line into one plane, on either side of it, p and q have a straight line between them.
     """
     d = minus(end, start)
     square = dot(d, d)
@@ -171,7 +171,7 @@ def _size(parts: Point) -> Any:
 
 
 def _piece(start: Point, end: Point) -> tuple[Any, Point]:
-    """Length and direction of a straight piece; a piece of no length has no direction (nan)."""
+    """Return length and direction of a straight piece; a piece of zero length has no direction (nan)."""
     parts = minus(end, start)
     length = _size(parts)
     with np.errstate(divide="ignore", invalid="ignore"):

@@ -1,4 +1,4 @@
-"""Tools of a machine: needles that a guided point carries along its line, blades of an output link, seam and plate."""
+"""Tools of a machine: needles on a guided point, blades on an output link, the seam and the throat plate."""
 
 from __future__ import annotations
 
@@ -30,9 +30,9 @@ NEEDED = {
 
 @dataclass(frozen=True)
 class Spot:
-    """A point of a tool: one that a member carries, or one ``far`` along a line from it; without any it stands still.
+    """A point of a tool: one of a member, or one at the distance ``far`` along a line from it, or a fixed point ``at``.
 
-    ``on`` and ``line`` are dotted names of the point and of the direction.
+    ``on`` and ``line`` are dotted names of the point and of the direction, "" for none.
     """
 
     on: str = ""
@@ -41,12 +41,12 @@ class Spot:
     at: tuple[float, float, float] = (0.0, 0.0, 0.0)
 
     def needs(self, moving: bool) -> set[str]:
-        """Return the coordinates that it is made of, and velocities where it is ``moving``."""
+        """Return the names of the coordinates of point and line, with velocities if ``moving``."""
         names = [name for name in (self.on, self.line, rate_of(self.on) if moving else "") if name]
         return {f"{name}_{axis}" for name in names for axis in AXES}
 
     def position(self, found: Mapping[str, Any]) -> list[Any]:
-        """Return its coordinates, (n, m)."""
+        """Return the coordinates of the point, each (n, m) or a number."""
         if not self.on:
             return list(self.at)
         start = [found[f"{self.on}_{axis}"] for axis in AXES]
@@ -55,19 +55,19 @@ class Spot:
         return [x + self.far * found[f"{self.line}_{axis}"] for x, axis in zip(start, AXES, strict=True)]
 
     def velocity(self, found: Mapping[str, Any]) -> list[Any]:
-        """Return its velocity by the angle of the main shaft, (n, m): a needle keeps its direction."""
+        """Return the derivative of the coordinates by the main shaft's angle, (n, m): a needle keeps its direction."""
         return [found[f"{rate_of(self.on)}_{axis}"] for axis in AXES] if self.on else [0.0, 0.0, 0.0]
 
 
 def rate_of(name: str) -> str:
-    """Return the name of the velocity of a point, both dotted; "" for none."""
+    """Return the dotted name of the velocity of a point; "" for a name without a dot."""
     member, dot, own = name.partition(".")
     return f"{member}.d{own}" if dot else ""
 
 
 @dataclass(frozen=True)
 class Needle:
-    """A needle, machine-and-stitch 5.1; lengths count along it from the guided point.
+    """A needle, machine-and-stitch 5.1; lengths are measured along its axis from the guided point.
 
     Parameters
     ----------
@@ -77,8 +77,8 @@ class Needle:
     sense : +1 or -1: whether the needle points along the line or against it
     scarf : a vector out of the scarf, in the machine's frame
     diameter : of the blade above the scarf
-    floor : from the axis to the floor of the scarf
-    top, scarf_end, eye, point : where the needle begins, the scarf ends, the eye stands, the needle ends
+    floor : distance from the axis to the floor of the scarf
+    top, scarf_end, eye, point : places of the upper end, the end of the scarf, the eye and the point
     """
 
     name: str
@@ -95,24 +95,24 @@ class Needle:
 
     @property
     def body(self) -> Body:
-        """The needle from its top to its point."""
+        """Capsule of the needle from its top to its point."""
         reach = (self.sense * self.top, self.sense * self.point)
         return Body(self.name, (self.on, self.line), reach, 0.5 * self.diameter)
 
     @property
     def working(self) -> Spot:
-        """Its point."""
+        """Point of the needle."""
         return Spot(self.on, self.line, self.sense * self.point)
 
     @property
     def radius(self) -> float:
-        """Of the capsule."""
+        """Radius of the capsule."""
         return 0.5 * self.diameter
 
 
 @dataclass(frozen=True)
 class Blade:
-    """A blade that an output link carries: its tip, the back end, its radius; points by their dotted names.
+    """A blade on an output link: its tip, its back end, its radius; points by their dotted names.
 
     ``eye`` is where its thread leaves it and ``hold`` where it holds a loop or meets the seam's plane; "" unknown.
     """
@@ -126,18 +126,18 @@ class Blade:
 
     @property
     def body(self) -> Body:
-        """The blade from its tip to its back."""
+        """Capsule of the blade from its tip to its back end."""
         return Body(self.name, (self.tip, self.back), None, self.radius)
 
     @property
     def working(self) -> Spot:
-        """Its tip."""
+        """Tip of the blade."""
         return Spot(self.tip)
 
 
 @dataclass(frozen=True)
 class Seam:
-    """The last stitch, a point that stands still."""
+    """The last stitch, a fixed point."""
 
     name: str
     at: tuple[float, float, float]
@@ -145,14 +145,14 @@ class Seam:
 
 @dataclass(frozen=True)
 class Plate:
-    """The throat plate, a plane that stands still, with fabric on it.
+    """The throat plate, a fixed plane, with fabric on it.
 
     Parameters
     ----------
     name : of the tool
     at : a point of its upper side
     normal : unit vector out of that side
-    fabric : thickness of what lies on it
+    fabric : thickness of the fabric
     """
 
     name: str
@@ -166,7 +166,7 @@ Tool: TypeAlias = Needle | Blade | Seam | Plate
 
 @dataclass(frozen=True)
 class Height(Relation):
-    """How high a point stands above a throat plate, and above the fabric on it."""
+    """Height of a point above a throat plate, and above the fabric on it."""
 
     of: str
     spot: Spot
@@ -174,7 +174,7 @@ class Height(Relation):
 
     @property
     def rates(self) -> Mapping[str, str]:
-        """Of each pose output its derivative by the angle of the main shaft."""
+        """Derivative by the angle of the main shaft, common to both heights."""
         return {self.name: f"d{self.name}", f"{self.name}_fabric": f"d{self.name}"}
 
     @property
@@ -216,12 +216,12 @@ def read_height(
 
 
 def read_tools(given: Mapping[str, Mapping[str, Any]], members: dict[str, Member]) -> dict[str, Tool]:
-    """Return the tools of a machine from what a user gives; members get the points of the blades that they carry.
+    """Read the tools of a machine; the points of blades are added to the members that carry these.
 
     Raises
     ------
     InputError
-        for unknown or missing keys, a point without line, a member without output link, a number that is none.
+        for unknown or missing keys, a point without line, a member without output link, a value that is no number.
     """
     found: dict[str, Tool] = {}
     for name, table in given.items():
@@ -297,7 +297,7 @@ def _blade(name: str, table: Mapping[str, Any], members: dict[str, Member], wher
 
 
 def length(key: str, value: object, where: str, what: str = "a length") -> float:
-    """Return a length, or ``what`` it is, that a user gives; refuse what is none or negative."""
+    """Read a length, or another quantity named by ``what``; refuse a value that is no number or negative."""
     found = number(key, value, where)
     if found < 0.0:
         raise InputError(key, value, f"{what} that is not negative", where)
@@ -305,7 +305,7 @@ def length(key: str, value: object, where: str, what: str = "a length") -> float
 
 
 def bodies(members: Mapping[str, Member], tools: Mapping[str, Tool]) -> dict[str, Body]:
-    """Return what gaps can be between: tools by their name, links by member and name."""
+    """Return the bodies between which gaps are defined: tools by name, links by "member.link"."""
     found = {name: tool.body for name, tool in tools.items() if isinstance(tool, Needle | Blade)}
     for m in members.values():
         for link, (first, second) in links_of(m).items():
@@ -314,7 +314,7 @@ def bodies(members: Mapping[str, Member], tools: Mapping[str, Tool]) -> dict[str
 
 
 def read_gap(name: str, table: dict[str, Any], known: Mapping[str, Body], where: str) -> Gap:
-    """Read the gap between two of the known bodies, with radii of its own if they are given."""
+    """Read a gap between two bodies, with radii of its own if they are given."""
     known_keys(table, ("gap", "radii"), where)
     first, second = (known[one] for one in two_names(table["gap"], list(known), "bodies", where))
     if "radii" in table:

@@ -1,4 +1,4 @@
-"""The moments B and C, where a tip enters the triangle of a blade, its thread and the seam: machine-and-stitch, 5.3.
+"""Moments B and C, at which a tip enters the triangle of a blade, its thread and the seam: machine-and-stitch, 5.3.
 
 B: the upper looper takes the lower looper's thread.  C: the needle takes that of the upper looper.  Corners are the eye
 P1 of the blade, the place P2 where it holds a loop or meets the plane of the seam, and the seam P3.
@@ -34,8 +34,8 @@ from sweep.families.machines.tools import Spot
 if TYPE_CHECKING:
     from sweep.families.machines.machine import Machine
 
-FLAT = 1e-6  # sine of the angle between two sides: what is flatter has no plane
-SIDES = {"seam": (1, 2), "thread": (2, 0), "blade": (0, 1)}  # the two corners of each, in the order around
+FLAT = 1e-6  # least sine of the angle between two sides: flatter triangles have no plane
+SIDES = {"seam": (1, 2), "thread": (2, 0), "blade": (0, 1)}  # both corners of each side, in cyclic order
 TEXTS = {
     "from_blade": "from the side eye - hold, positive inside the triangle",
     "from_thread": "from the side seam - eye, positive inside the triangle",
@@ -47,15 +47,15 @@ TEXTS = {
 
 @dataclass(frozen=True)
 class Entering(Relation):
-    """A tip and the plane of a triangle, pose by pose; :func:`entering_step` finds where the tip passes it.
+    """A tip and the plane of a triangle, pose by pose; :func:`entering_step` finds the passage of the tip.
 
     Parameters
     ----------
     name : of the relation
-    tip : what passes;  corners : eye and hold of the blade, seam
-    radius : of what passes
-    sense : +1 or -1: it passes along the normal (P2 - P1) x (P3 - P1), or against it
-    window : from, to: crank angles of the main shaft between which it is looked for, modulo a turn; the whole turn
+    tip : point that enters;  corners : eye and hold of the blade, seam
+    radius : of the body that enters
+    sense : +1 or -1: passage along the normal (P2 - P1) x (P3 - P1), or against it
+    window : from, to: crank angles of the main shaft between which the passage is sought, modulo a turn; None for all
     """
 
     tip: Spot
@@ -66,12 +66,12 @@ class Entering(Relation):
 
     @property
     def rates(self) -> Mapping[str, str]:
-        """Of each pose output its derivative by the angle of the main shaft."""
+        """Derivative of the height above the plane by the angle of the main shaft."""
         return {f"{self.name}_above": f"{self.name}_dabove"}
 
     @property
     def outputs(self) -> tuple[Output, ...]:
-        """The tip above the plane, its derivative, and its distances from the sides."""
+        """Height of the tip above the plane, its derivative, and the distances of the tip from the sides."""
         of = "of the tip above the plane of the triangle"
         return (
             Output(f"{self.name}_above", "length", f"height {of}", "(13)"),
@@ -87,7 +87,7 @@ class Entering(Relation):
         return frozenset().union(*(spot.needs(moving) for spot in (self.tip, *self.corners)))
 
     def compute(self, found: Mapping[str, Any], wanted: frozenset[str]) -> dict[str, Any]:
-        """Return the wanted outputs, (n, m); nan where the corners lie in one line."""
+        """Return the wanted outputs, (n, m); nan where the corners are collinear."""
         tip, *corners = (spot.position(found) for spot in (self.tip, *self.corners))
         first, second, reach = (minus(point, corners[0]) for point in (corners[1], corners[2], tip))
         normal = cross(first, second)
@@ -109,7 +109,7 @@ class Entering(Relation):
 
 
 def entering_step(entering: Entering, machine: Machine) -> Step:
-    """Return the machine's own route to where and how the tip enters the triangle."""
+    """Make the step that finds the crank angle and the distances at which the tip enters the triangle."""
     name = entering.name
     place = Output(f"phi_{name}", "rad", "crank angle at which the tip passes the plane of the triangle", "(13)")
     count = Output(f"count_{name}", "1", "passages of the plane in the stated sense and window", "(13)", jumps=True)
@@ -125,7 +125,7 @@ def entries(entering: Entering, machine: Machine, poses: Poses, samples: int) ->
 
 
 def _found(entering: Entering, poses: Poses, samples: int, wanted: frozenset[str]) -> Places:
-    """Return where the tip enters; found as the passage of a needle is."""
+    """Find the crank angle at which the tip enters, by the method for the passage of a needle."""
     name, sense, n = entering.name, float(entering.sense), len(poses.designs)
     above, dabove = f"{name}_above", f"{name}_dabove"
     status, (x, slope) = poses.samples([above, dabove], samples)
@@ -147,7 +147,7 @@ def _found(entering: Entering, poses: Poses, samples: int, wanted: frozenset[str
 
 
 def _read(entering: Entering, machine: Machine, designs: Any, places: Places, wanted: frozenset[str]) -> Columns:
-    """Return all outputs of the entry, each (n,), and status; complex designs carry the place along."""
+    """Return all outputs of the entry, each (n,), and status; complex designs move the crank angle to first order."""
     name, status, at = entering.name, np.array(places["status"]), places["at"]
     if np.iscomplexobj(designs):
         at = moved(machine, designs, at[:, None], [f"{name}_above"])[:, 0]
@@ -164,7 +164,7 @@ def _read(entering: Entering, machine: Machine, designs: Any, places: Places, wa
 
 
 def _within(entering: Entering, phi: Any) -> Any:
-    """Tell which angles lie in the window asked for, modulo a turn."""
+    """Return the mask of the angles in the window, modulo a turn."""
     if entering.window is None:
         return np.ones(np.shape(phi), np.bool_)
     start, end = entering.window
