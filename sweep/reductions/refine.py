@@ -237,6 +237,13 @@ def hill(row: Index, phi: Array, err_phi: Array, height: Array, err: Array, chos
     apart = (np.diff(row[rival]) != 0) | (np.diff(phi[rival]) > NEIGHBOURS)
     number = np.zeros(row.size, np.int64)
     number[rival[1:]] = np.cumsum(apart)
+    # What goes on across the angle 0 is one hill: the last of its row stands before the first.
+    begin = np.flatnonzero(np.diff(row[rival], prepend=-1))
+    head, tail = rival[begin], rival[np.append(begin[1:], rival.size) - 1]
+    around = (phi[head] + TWO_PI - phi[tail] <= NEIGHBOURS) & (number[head] != number[tail])
+    same = np.arange(row.size)
+    same[number[tail[around]]] = number[head[around]]
+    phi, number = phi - TWO_PI * (same[number] != number), same[number]
     low, high, top = np.full(row.size, np.inf), np.full(row.size, -np.inf), np.full(row.size, -1)
     np.minimum.at(low, number[rival], (phi - err_phi)[rival])
     np.maximum.at(high, number[rival], (phi + err_phi)[rival])

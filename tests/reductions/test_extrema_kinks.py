@@ -166,14 +166,12 @@ def test_the_place_of_a_top_errs_by_no_more_than_it_says(curve, target):
 
 
 def test_the_place_of_a_dwell_errs_by_as_much_as_the_dwell_is_long():
-    """Level from 2 to 3.5 rad, but for rounding; of one across the angle 0 the part on one side of it counts."""
+    """Level from 2 to 3.5 rad, but for rounding; of 13 across the angle 0 the part on one side of it counted alone."""
     _, _, away, err_phi, _ = placed(lambda x: 1.0 - np.maximum(np.abs(x - 2.75) - 0.75, 0.0) ** 2, 1, 1e-8)
     # Rounding takes the dwell on by sqrt(4 eps) to either side; a panel is 0.1 rad.
     assert (away >= 2.0 - 1e-3).all() and (away <= 3.5 + 1e-3).all()
-    begin, end = (np.mod(SHIFTS[:, 0] + x, 2.0 * np.pi) for x in (2.0, 3.5))
-    whole = begin < end
-    assert whole.sum() > 20
-    assert (np.maximum(away - 2.0, 3.5 - away) <= err_phi + 0.1)[whole].all()
+    assert (np.maximum(away - 2.0, 3.5 - away) <= err_phi + 0.1).all()
+    assert (err_phi <= 1.5 + 0.1).all()
 
 
 def test_a_curve_that_is_all_noise_is_not_converged_and_its_error_says_so():

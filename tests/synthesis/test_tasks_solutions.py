@@ -92,7 +92,7 @@ def test_task2_swing_and_phi0_are_found_with_the_least_acceleration():
         check_position(table, turn, position)
     assert 0.5 <= solution.unknowns["swing"] <= 1.2
     true = sweep.summarise("rssr", table, "max_abs_d2psi")["max_abs_d2psi"][0]
-    assert true == pytest.approx(solution.objective, rel=2e-3)  # the task looks at 180 poses
+    assert true == pytest.approx(solution.objective, rel=2e-5)  # the task looks at parabolas through 180 poses
     # Fixing swing and phi0 elsewhere costs acceleration.
     for swing in (0.7, 0.85):
         others = solve(Task1(swing, 3.1, **SPACE, positions=TASK2.numbers["positions"], bounds=BOUNDS,

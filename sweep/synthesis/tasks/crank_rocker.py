@@ -80,7 +80,20 @@ def motion(designs: Array, angles: Angles, *wanted: str) -> list[Array]:
 
 def acceleration(designs: Array) -> Array:
     """Return the acceleration analogue of the rocker over a turn, (n, POSES)."""
-    return motion(designs, turn(), "d2psi")[0]
+    return with_tops(motion(designs, turn(), "d2psi")[0])
+
+
+def with_tops(curve: Array) -> Array:
+    """Raise samples of a turn, (n, m), next to an extreme to that of the parabola through three of them.
+
+    So the largest magnitude has no corner where another sample becomes the highest.  Farther away than half a sample
+    what is added dies out: it stays continuous.
+    """
+    before, after = np.roll(curve, 1, axis=1), np.roll(curve, -1, axis=1)
+    slope, bend = 0.5 * (after - before), after - 2.0 * curve + before
+    away = np.abs(np.divide(slope, bend, out=np.full(curve.shape, np.inf), where=bend != 0.0))
+    raised: Array = curve - 0.5 * bend * np.minimum(away, 0.5) ** 2 * np.clip(1.5 - away, 0.0, 1.0)
+    return raised
 
 
 def least_cos2(designs: Array) -> Array:

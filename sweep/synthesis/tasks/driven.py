@@ -12,7 +12,7 @@ from sweep.errors import InputError
 from sweep.evaluation.summaries import design_outputs
 from sweep.families import slotted
 from sweep.families.base import Accuracy, Angles, Array, floats
-from sweep.synthesis.tasks.crank_rocker import OnLocus, motion, named, pressure_limit, turn
+from sweep.synthesis.tasks.crank_rocker import OnLocus, motion, named, pressure_limit, turn, with_tops
 from sweep.synthesis.tasks.problem import Found, Unknown, ranges, turning
 from sweep.synthesis.tasks.second_stage import RSSP, chain_motion, second_pressure_limit
 
@@ -92,7 +92,7 @@ class Task5(OnLocus):
             return slot(a2, e2, t1[:, None] + self.kappa * (psi - psi1[:, None])), dpsi, d2psi
 
         here, dpsi, d2psi = rho_at(turn().phi)
-        curve = self.kappa * d2psi * here.first + dpsi * dpsi * here.second
+        curve = with_tops(self.kappa * d2psi * here.first + dpsi * dpsi * here.second)
         start = slot(a2, e2, t1[:, None]).rho[:, 0]
         equations = {
             f"rho at position {k}": (rho_at(np.array([[one.dphi]]))[0].rho[:, 0] - start - one.drho) / abs(self.rho0)
@@ -183,7 +183,7 @@ class Task8(OnLocus):
             # all steps of the slider have the direction of the whole stroke
             "no return of the slider": (np.diff(slide, axis=1) * np.sign(travel)[:, None]).min(axis=1),
         }
-        return Found({}, limits, d2s, columns | {"dwell_deviation": deviation})
+        return Found({}, limits, with_tops(d2s), columns | {"dwell_deviation": deviation})
 
     def _deviation(self, designs: Array, phi1: Array, psi1: Array, theta: Array, lengths: Array) -> Array:
         """Return the largest distance from the dwell position during the dwell."""

@@ -18,7 +18,7 @@ from sweep.evaluation.summaries import design_outputs
 from sweep.evaluation.tables import design_matrix
 from sweep.families import family
 from sweep.families.base import Accuracy, Angles, Array
-from sweep.synthesis.tasks.crank_rocker import RSSR, motion, named, turn
+from sweep.synthesis.tasks.crank_rocker import RSSR, motion, named, turn, with_tops
 from sweep.synthesis.tasks.problem import Found, Task, Unknown, turning
 
 RSSP = family("rssp")
@@ -66,7 +66,7 @@ def chain_motion(second: str, columns: Mapping[str, Array], *wanted: str) -> lis
 
 def second_pressure_limit(angle: Array, largest: float) -> Array:
     """Return the slack of the limit on the pressure angle of stage 2 over a turn, cos^2 - cos^2[largest]."""
-    slack: Array = (np.cos(angle) ** 2).min(axis=1) - np.cos(largest) ** 2
+    slack: Array = with_tops(np.cos(angle) ** 2).min(axis=1) - np.cos(largest) ** 2
     return slack
 
 
@@ -229,7 +229,9 @@ class Task6(Task):
             family(["rssr", self.second]).parameter_names
         )
         named_columns = {name: column for name, column in columns.items() if name not in beyond}
-        return Found(equations, limits, d2s, named_columns | {"x0": origin.real, "y0": origin.imag, "beta0": beta})
+        return Found(
+            equations, limits, with_tops(d2s), named_columns | {"x0": origin.real, "y0": origin.imag, "beta0": beta}
+        )
 
 
 @dataclass(frozen=True)
@@ -313,4 +315,4 @@ class Task7(Task):
             equations[f"acceleration at the {end}"] = self.kappa * second * ds[:, k] / value - 1.0
         d2s, angle = chain_motion("rssp", columns, "d2s", "pressure_angle2")
         limits = {"pressure angle 2": second_pressure_limit(angle, self.max_pressure_angle)}
-        return Found(equations, limits, d2s if self.objective == "acceleration" else np.sin(angle), columns)
+        return Found(equations, limits, with_tops(d2s if self.objective == "acceleration" else np.sin(angle)), columns)
