@@ -8,7 +8,7 @@ from __future__ import annotations
 from importlib.util import find_spec
 from pathlib import Path
 
-# A file that the other package may have too, with words that only ours contains; and a file that only ours has.
+# A file of both packages with words that only this one contains; and a file that only this package has.
 FILE, WORDS = "__init__.py", "Mechanics only: jitted, floats in, arrays out"
 OWN_FILE = "jit.py"
 

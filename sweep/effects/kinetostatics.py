@@ -118,7 +118,7 @@ def force_name(scene: Scene) -> str:
 
 
 def _drive(scene: Scene, load: Array) -> Array:
-    """Load of the follower, speed of the crank and its rate, (n, m or 1, 3), as the kernels take them."""
+    """Load of the follower, speed of the crank and its rate for the kernels, (n, m or 1, 3)."""
     return np.stack(np.broadcast_arrays(load, *scene.crank()), axis=2)
 
 

@@ -147,7 +147,7 @@ def support_loads(tree: LinkTree) -> dict[str, tuple[int, int, str]]:
 
 @lru_cache
 def joint_table(tree: LinkTree) -> Index:
-    """Joints as the kernels take them, (Q, PER_JOINT)."""
+    """Table of joints for the kernels, (Q, PER_JOINT)."""
     rows = [(KINDS[j.kind], j.body, tree.freedom(j), *j.lines, rod(tree, j)) for j in tree.joints]
     return np.array(rows, np.int64)
 

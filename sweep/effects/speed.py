@@ -59,7 +59,7 @@ SETTLED = 1e-7  # share of the largest torque excess or loss by which the last p
 
 
 def _outputs(suffix: str, text: str) -> tuple[Output, ...]:
-    """Curves over the turn."""
+    """Speed and angular acceleration of the crank over the turn."""
     return (
         Output(f"crank_speed{suffix}", "rad/s", f"speed of the crank in the steady state{text}", EQUATION),
         Output(f"crank_acceleration{suffix}", "rad/s^2", f"its angular acceleration{text}", EQUATION),
@@ -109,7 +109,7 @@ def _late(scene: Scene) -> NDArray[np.bool_]:
 
 
 def _bent(scene: Scene) -> NDArray[np.bool_]:
-    """Whether designs need finer grids from the beginning, because loads or motion have kinks or are `_late`, (n,)."""
+    """Whether designs need finer grids from the start: loads or motion have kinks, a tool pierces, a planet is fast."""
     kinks = bool(scene.every_curve) or bool(scene.family.every(Switches))
     return _late(scene) | kinks
 

@@ -58,7 +58,7 @@ def per_turn(
     """Select the wanted ones of ``numbers`` and of the reductions of ``curves``, sampled on an odd grid in ``found``.
 
     ``limit`` is the share of a curve that the grid may miss, ``known`` the relative error of the steady state,
-    ``known_of`` that of single curves.
+    ``known_of`` the errors of single curves.
     """
     columns = dict(numbers)
     for o in curves:

@@ -110,7 +110,7 @@ def old_name() -> str:
 
 
 def words_of(study: Study) -> dict[str, Any]:
-    """Return what a plan notes of its study, reporting sections included, so that reports need no study file."""
+    """Return the texts of a plan about its study, reporting sections included, so that reports need no study file."""
     return {"about": {"name": study.name, "title": study.title, "question": study.question}, "data": study.data}
 
 

@@ -211,17 +211,17 @@ class KernelStep:
 
 
 class Compiled(Listener):
-    """Counts the functions that numba has compiled, and tells each number."""
+    """Counts the functions that numba has compiled, and reports each new count."""
 
     def __init__(self, tell: Callable[[int], None]) -> None:
         self.functions, self.tell = 0, tell
         tell(0)
 
     def on_start(self, event: Event) -> None:
-        """Wait for the end."""
+        """Ignore the start of a compilation."""
 
     def on_end(self, event: Event) -> None:
-        """Count one more."""
+        """Count a finished compilation, and report the count."""
         self.functions += 1
         self.tell(self.functions)
 

@@ -96,7 +96,7 @@ class LinkTree:
 
     @cached_property
     def freedoms(self) -> tuple[tuple[int, int], ...]:
-        """Body and kind of each freedom, as :class:`kernels.linkage.bodies.Links` takes them."""
+        """Body and kind of each freedom, for :class:`kernels.linkage.bodies.Links`."""
         return tuple((k, kind) for k, body in enumerate(self.bodies) for kind in body.free)
 
     def freedom(self, joint: LinkJoint) -> int:
@@ -126,11 +126,11 @@ class Path(NamedTuple):
     a: Array
 
     def plus(self, other: Path) -> Path:
-        """Return the sum."""
+        """Return the sum of two paths."""
         return Path(*(x + y for x, y in zip(self, other, strict=True)))
 
     def minus(self, other: Path) -> Path:
-        """Return the difference."""
+        """Return the difference of two paths."""
         return Path(*(x - y for x, y in zip(self, other, strict=True)))
 
 

@@ -1,4 +1,4 @@
-"""A member of a machine with its place in the machine's frame."""
+"""Member of a machine with its place in the machine's frame."""
 
 from __future__ import annotations
 

@@ -39,7 +39,7 @@ class Task(Protocol[T_co]):
 
 
 class Executor(Protocol):
-    """Runs a task for many numbers."""
+    """Runs a task for many numbers, in this thread, in threads or in processes."""
 
     def outcomes(self, task: Task[T], numbers: Iterator[int], jobs: int, stop: Stop) -> Iterator[T]:
         """Yield the results of the task in the order in which they become ready.
@@ -60,7 +60,7 @@ class Executor(Protocol):
 
 
 class Here:
-    """Runs tasks one after the other in the calling thread."""
+    """Runs tasks one after the other in this thread."""
 
     def outcomes(self, task: Task[T], numbers: Iterator[int], jobs: int, stop: Stop) -> Iterator[T]:
         """Yield results as `Executor.outcomes` does."""

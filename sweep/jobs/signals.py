@@ -121,7 +121,7 @@ def unheard() -> Iterator[None]:
 
 
 class Terminated(KeyboardInterrupt):
-    """SIGTERM, where the program can only leave; ``number`` is that of the signal."""
+    """SIGTERM where the program can only exit; ``number`` is the signal's number."""
 
     number = signal.SIGTERM
 

@@ -109,7 +109,7 @@ def sizes(family: Family) -> dict[str, Size]:
 
 
 def dimension_step(family: Family) -> Step | None:
-    """Route to all sizes; None where a family has none."""
+    """Step that computes all sizes; None for a family without sizes."""
     found = sizes(family)
     if not found:
         return None

@@ -1,9 +1,9 @@
 """Room of the moments A, B and C of a machine at several speeds, while the window of the loop moves.
 
-Each field of work permits a rise of the needle at A (machine-and-stitch, 5.4).  The first field is that of the least
-speed, the last one that of the greatest; between them the window varies linearly with the speed, which is ours.  By the
-shaft's unevenness the needle passes faster or slower than the mean: the rise has to suit both.  If a member that
-carries the looper's blade has an elastic lag, its tip is late by the lag, which grows with the square of the speed.
+Each field of work permits a rise of the needle at A (machine-and-stitch, 5.4).  The first field is the one of the least
+speed, the last one that of the greatest; between them the window varies linearly with the speed, which is ours.  With
+an uneven shaft the needle passes faster or slower than the mean: the rise has to suit both.  If a member with the
+looper's blade has an elastic lag, its tip is late by the lag, which grows with the square of the speed.
 """
 
 from __future__ import annotations
@@ -107,9 +107,9 @@ class Sewing(Relation):
     ) -> tuple[dict[str, Array], Status]:
         """Compute the room of each moment at each speed, (n, S) by the name of its relation, and status (n,).
 
-        The room of A is the smallest of those of rise, clearance, scarf and eye, that of B and C the margin of the
-        triangle; nan without such a moment, negative if the stitch is missed.  ``ends`` are the parts of A's room that
-        the rise leaves to the least and to the greatest permitted rise.
+        The room of A is the smallest of the rooms of rise, clearance, scarf and eye; the room of B and C is the margin
+        of the triangle; nan without such a moment, negative if the stitch is missed.  ``ends`` are the distances of A's
+        rise from the least and the greatest permitted rise.
         """
         lag = self._lag(machine)
         slow, fast, status = self._unevenness(machine, designs, accuracy)

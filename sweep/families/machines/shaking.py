@@ -174,7 +174,7 @@ def refused(
     found: Mapping[str, Any],
     codes: Status,
 ) -> dict[str, Any]:
-    """Return the wanted sums as nan, with their status, where members turn or speed up otherwise than their ratios."""
+    """Return nan and a status for the wanted sums where the speeds of members contradict their ratios."""
     if not isinstance(relation, Shaking | ShaftTorque):
         return {}
     listed = {one.member for one in (relation.stages if isinstance(relation, Shaking) else relation.driven)}
@@ -214,9 +214,9 @@ def orders_of(shaking: Shaking, machine: Machine) -> Step:
 def _amplitudes(
     shaking: Shaking, machine: Machine, designs: Array, asked: Sequence[str], samples: int
 ) -> tuple[Status, dict[str, tuple[Array, Array, Array]]]:
-    """Compute the status, and of each order its root mean square, the error, and that of the whole curve, (n,).
+    """Compute the status, and for each order the root mean squares of order, error and whole curve, (n,).
 
-    The error is estimated by the difference to every other sample, which is that of the orders beyond a quarter of the
+    The error is estimated by the difference to every other sample, which holds the orders beyond a quarter of the
     samples.
     """
     made_of = {name: name.rpartition("_order") for name in asked}
