@@ -20,8 +20,8 @@ SLOWEST = 0.9  # largest ratio of the last two eighths of the harmonics: 0.87 wi
 def beyond(values: Array, order: int = 0) -> Array:
     """Estimate the sum of the unresolved harmonics of samples (n, N) on an even grid of the turn, (n,).
 
-    The last two eighths of the resolved harmonics are extrapolated as a geometric series, which underestimates the sum
-    of a kink by 2.7; aliasing adds the same amount.  ``order`` is the order of a derivative whose harmonics are summed.
+    The last two eighths of the resolved harmonics are extrapolated as a geometric series, which underestimates a kink
+    by a factor of 2.7; aliasing adds the same amount.  ``order`` is the order of the derivative.
     """
     size = np.abs(np.fft.rfft(values, axis=1)) * (2.0 / values.shape[1])
     size *= np.arange(size.shape[1]) ** order

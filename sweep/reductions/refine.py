@@ -237,7 +237,7 @@ def hill(row: Index, phi: Array, err_phi: Array, height: Array, err: Array, chos
     apart = (np.diff(row[rival]) != 0) | (np.diff(phi[rival]) > NEIGHBOURS)
     number = np.zeros(row.size, np.int64)
     number[rival[1:]] = np.cumsum(apart)
-    # What goes on across the angle 0 is one hill: the last of its row stands before the first.
+    # Peaks on both sides of the angle 0 belong to one hill: the last one of a row precedes its first one.
     begin = np.flatnonzero(np.diff(row[rival], prepend=-1))
     head, tail = rival[begin], rival[np.append(begin[1:], rival.size) - 1]
     around = (phi[head] + TWO_PI - phi[tail] <= NEIGHBOURS) & (number[head] != number[tail])
