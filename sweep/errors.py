@@ -247,6 +247,11 @@ def nearest(word: str, known: Iterable[str]) -> str:
     return f", did you mean '{guess}'?" if guess else ""
 
 
+def extra(name: str) -> str:
+    """Say how to install an extra of this package, with pip and in a clone."""
+    return f"pip install 'linksweep[{name}]', in a clone .venv/bin/pip install -e '.[{name}]'"
+
+
 def listed(names: Iterable[str]) -> str:
     """Join names by commas; a long list is cut and ends with the number of omitted names."""
     every = list(names)

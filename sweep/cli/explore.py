@@ -27,7 +27,7 @@ def explore(source: str, port: int, opened: bool) -> None:
 
     SOURCE is a STUDY, the FOLDER of a run, whose optimum is taken in hand, or a FAMILY, of which it is the example.
     The page is served on this machine only, under an address that nobody can guess; Ctrl-C ends it.  It needs
-    `pip install 'linksweep[explore]'`.
+    `pip install 'linksweep[explore]'`, in a clone `.venv/bin/pip install -e '.[explore]'`.
     """
     hand = in_hand(source)
     server = Server(hand, port)

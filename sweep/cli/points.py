@@ -70,10 +70,10 @@ def export(folder: Path, design: str | None, kind: str, out: Path | None, phi: f
     over one turn with units, .csv or .parquet.
 
     pdf, svg, dxf: a sheet with three views, dimensions and tolerances, hardpoints, limits, and a machine's cyclogram.
-    dxf needs `pip install 'linksweep[cad]'`.
+    dxf needs `pip install 'linksweep[cad]'`, in a clone `.venv/bin/pip install -e '.[cad]'`.
 
     xlsx: the whole dataset as a workbook, best designs first, with optimum, curves and definitions; it needs
-    `pip install 'linksweep[excel]'`.
+    `pip install 'linksweep[excel]'`, in a clone `.venv/bin/pip install -e '.[excel]'`.
     """
     if kind == "xlsx":
         click.echo(f"xlsx: {write_workbook(folder, out or _place(folder, 'results.xlsx'))}")

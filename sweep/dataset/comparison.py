@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from sweep.dataset import chunk_files, files
 from sweep.dataset.files import check_tables
 from sweep.errors import InputError, StoreError, how_many
+from sweep.evaluation.statuses import meaning
 from sweep.families.names import is_error
 
 if TYPE_CHECKING:
@@ -248,12 +249,16 @@ def _compare_optima(result: Comparison, old: Path, new: Path, rtol: float) -> No
         before, after = (table.to_dict("index")[role].get("status") for table in tables)
         if before != after:
             result.status_changed += 1
-            result.notes += (f"status of the {role}: {before} before, {after} now",)
+            result.notes += (f"status of the {role}: {_in_words(before)} before, {_in_words(after)} now",)
         for name in [name for name in result.moved if all(name in table.columns for table in tables)]:
             before, after = (np.array([table.loc[role, name]], np.float64) for table in tables)
             moved = Moved(f"{name} of the {role}", kind="")
             result.moved[moved.name] = moved
             moved.look(before, after, np.array([role]), rtol)
+
+
+def _in_words(status: Any) -> str:
+    return f"{status} ({meaning(status)})"
 
 
 def _notes(old: Path, new: Path) -> tuple[str, ...]:

@@ -55,7 +55,7 @@ def foreign(folder: Path, found: str, plan: Plan) -> InputError:
     """Make the error for data of another study or code, which are never mixed."""
     allowed = (
         f"data of this study, as its file is now, and of this version of the program (identity {plan.identity}); "
-        "take another folder with --out, or set what is there aside with --force"
+        "take another folder with --out, or set what is there aside with sweep run --force"
     )
     return InputError("dataset", found, allowed, str(folder))
 

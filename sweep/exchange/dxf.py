@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from sweep.errors import InputError
+from sweep.errors import InputError, extra
 from sweep.exchange.scene import Placed, extent, frames_of, shown_name
 from sweep.families.base import Array
 
@@ -40,7 +40,7 @@ def ezdxf_or_refuse() -> Any:
         import ezdxf
         import ezdxf.bbox
     except ImportError as error:
-        raise InputError("format", "dxf", "the package ezdxf: pip install 'linksweep[cad]'", "export") from error
+        raise InputError("format", "dxf", f"the package ezdxf: {extra('cad')}", "export") from error
     return ezdxf
 
 

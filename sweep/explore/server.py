@@ -15,7 +15,7 @@ from collections.abc import AsyncIterator, Callable
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from sweep.errors import InputError, LinksweepError
+from sweep.errors import InputError, LinksweepError, extra
 from sweep.exchange.export import FORMATS, export
 from sweep.explore.cells import cells, design_of
 from sweep.explore.drag import dragged
@@ -192,7 +192,7 @@ def _needed() -> None:
         import starlette  # noqa: F401
         import uvicorn  # noqa: F401
     except ImportError as error:
-        needed = f"the package {error.name}: pip install 'linksweep[explore]'"
+        needed = f"the package {error.name}: {extra('explore')}"
         raise InputError("explore", "a page", needed, "explore") from error
 
 

@@ -15,7 +15,7 @@ from concurrent.futures import FIRST_COMPLETED, CancelledError, Future, wait
 from contextlib import suppress
 from typing import TYPE_CHECKING, Any, TypeVar
 
-from sweep.errors import InputError, WorkerDied
+from sweep.errors import InputError, WorkerDied, extra
 from sweep.jobs.signals import Stop, unheard
 
 if TYPE_CHECKING:
@@ -80,7 +80,7 @@ class Dask:
         try:
             from distributed import Client, LocalCluster
         except ImportError as error:
-            allowed = f"a backend whose package is installed: pip install 'linksweep[dask]' ({error})"
+            allowed = f"a backend whose package is installed: {extra('dask')} ({error})"
             raise InputError("backend", "dask", allowed, "run") from None
         with unheard():
             try:

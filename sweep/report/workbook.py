@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 from sweep.dataset.files import replacing
 from sweep.dataset.reading import best
 from sweep.dataset.store import load
-from sweep.errors import InputError
+from sweep.errors import InputError, extra
 from sweep.report.dataset import Dataset, read_dataset
 from sweep.report.quantities import quantity
 
@@ -51,7 +51,7 @@ def write_workbook(folder: str | Path, path: str | Path) -> Path:
     try:
         import openpyxl
     except ModuleNotFoundError as error:
-        allowed = "pip install 'linksweep[excel]' first: openpyxl is missing"
+        allowed = f"the package openpyxl: {extra('excel')}"
         raise InputError("format", "xlsx", allowed, "export") from error
     book = openpyxl.Workbook(write_only=True)
     for name, frame in written.items():

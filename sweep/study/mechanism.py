@@ -68,7 +68,7 @@ BY_MEMBER = (("design",), ("bodies",), ("loads",), ("limits",), ("reference", "d
 class MechanismSection(Section):
     """Table [mechanism]."""
 
-    family: str | None = holds("the name of a family")
+    family: str | None = holds('the name of a family; a row of them is chain = ["rssr", "guide"]')
     chain: list[str] | None = holds("a list of names of families", min_length=1)
 
 
@@ -210,6 +210,11 @@ def _families(section: MechanismSection, data: Mapping[str, Any], faults: Faults
     if isinstance(raw, dict) and "family" not in raw and "chain" not in raw:
         faults.missing(("mechanism", "family"), f"one of {', '.join(NAMES)}; or chain, a list of them", instead="chain")
     if section.family is not None:
+        names = section.family.split("+")
+        if len(names) > 1:
+            right = ", ".join(f'"{name.strip()}"' for name in names)
+            faults.value(("mechanism", "family"), section.family, f"one family; a row of them is chain = [{right}]")
+            return ()
         return (section.family,)
     return tuple(section.chain or ())
 

@@ -158,7 +158,8 @@ def test_an_optimum_that_no_longer_keeps_its_limits_is_found(study: Study, datas
     optimum.to_parquet(files.beside(old) / files.OPTIMUM)
     optimum.assign(status=[5, 0]).to_parquet(files.beside(new) / files.OPTIMUM)
     found = sweep.compare(old, new)
-    assert found.exit_code == 11 and "status of the optimum: 0 before, 5 now" in found.lines()
+    words = "status of the optimum: 0 (ok) before, 5 (a limit of the study is exceeded) now"
+    assert found.exit_code == 11 and words in found.lines()
 
 
 def test_other_code_another_study_and_an_unfinished_one_are_said(study: Study, dataset: Path, tmp_path: Path) -> None:

@@ -96,7 +96,7 @@ def test_without_the_packages_the_extra_is_named(monkeypatch, folder):
         return real(name, *rest, **options)
 
     monkeypatch.setattr(builtins, "__import__", missing)
-    with pytest.raises(InputError, match=r"pip install 'linksweep\[explore\]'"):
+    with pytest.raises(InputError, match=r"'linksweep\[explore\]', in a clone .venv/bin/pip install -e '.\[explore\]'"):
         Server(in_hand(str(folder)))
 
 

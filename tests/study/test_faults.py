@@ -79,6 +79,7 @@ FAULTS = {
     "unknown family": ('"rssr"', '"rsrs"', ["mechanism.family = 'rsrs'", "did you mean 'rssr'?"]),
     "family and chain": ('"rssr"', '"rssr"\nchain = ["rssr"]', ["mechanism.chain", "not both"]),
     "no family": ('family = "rssr"', "", ["mechanism.family is missing", "rssr"]),
+    "chain as a family": ('"rssr"', '"rssr+guide"', ['chain = ["rssr", "guide"]']),
     "empty chain": ('family = "rssr"', "chain = []", ["mechanism.chain = []", "a list of names"]),
     "misspelt chain": ('family = "rssr"', 'chian = ["rssr"]', ["mechanism.chian", "did you mean 'chain'?"]),
     "speed without unit": ('"7000 rpm"', "7000", ["scene.speed = 7000", "7000 rpm"]),
