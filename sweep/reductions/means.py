@@ -22,7 +22,7 @@ from sweep.numerics.singularities import FAR, turn_edges
 from sweep.quantities.kinds import Request
 from sweep.reductions.fused import curve_of
 from sweep.reductions.resolution import denser, ends, nearest, series_of
-from sweep.reductions.rounding import shaken
+from sweep.reductions.rounding import ALONE, shaken, shaken_anywhere
 from sweep.reductions.sampling import DESIGN_STATUS, Index, blocks, pose_columns, sample_turn
 
 SAMPLES = 128  # first number of samples of a turn
@@ -104,6 +104,12 @@ def _refined(family: Family, designs: Array, pose: str, target: float) -> tuple[
     if family.precise_poses is None and alive.size:
         # Badly scaled designs lose digits in every pose: the mean may lose as much as the largest value.
         err[alive] = np.maximum(err[alive], shaken(family, designs[alive], top[alive], pose))
+    late = np.flatnonzero(status == st.NOT_CONVERGED)
+    if late.size:
+        off = shaken_anywhere(family, designs[late], top[late], pose)
+        alone = off >= ALONE * mean[late]  # the mean of rounding never settles, and its error is as large as itself
+        rows, off = late[alone], off[alone]
+        status[rows], err[rows] = st.OK, np.maximum(err[rows], np.maximum(off, mean[rows]))
     return mean, err, status
 
 

@@ -17,6 +17,7 @@ from sweep.reductions.resolution import nearest
 from sweep.reductions.sampling import Index, Mask, blocks, only, pose_columns
 
 TRIES = 3
+PLACES = 8
 ALONE = 0.1  # relative change of a curve's highest sample by rounded inputs from which on the curve is only rounding
 FAINT = 1e-10  # ratio of range to size below which the rounding of a signed curve is checked
 CONSTANT = 64.0 * EPS  # relative range below which a curve is constant but for rounding
@@ -104,6 +105,12 @@ def shaken(family: Family, designs: Array, phi: Array, name: str) -> Array:
     return found
 
 
+def shaken_anywhere(family: Family, designs: Array, phi: Array, name: str) -> Array:
+    """Return the largest of these changes at PLACES poses of a turn: of a few roundings any one pose may keep all."""
+    found: Array = np.max([shaken(family, designs, phi + k * (TWO_PI / PLACES), name) for k in range(PLACES)], axis=0)
+    return found
+
+
 def rounding_alone(family: Family, designs: Array, pose: str, values: Array, scale: Array, rough: Mask) -> Mask:
     """Select the rough curves that are rounding only, such as the moment in a pin whose forces lie in one plane.
 
@@ -122,7 +129,7 @@ def rounding_alone(family: Family, designs: Array, pose: str, values: Array, sca
     which = np.flatnonzero(rough | (scale < FAINT * np.abs(values).max(axis=1)))
     if which.size:
         top = np.abs(values[which]).argmax(axis=1)
-        off = shaken(family, designs[which], top * (TWO_PI / values.shape[1]), pose)
+        off = shaken_anywhere(family, designs[which], top * (TWO_PI / values.shape[1]), pose)
         found[which] = off >= ALONE * scale[which]
     return found
 

@@ -77,3 +77,12 @@ def test_shaking_force_of_a_balanced_four_bar_is_that_of_its_crank_alone(beside)
         # Some hundred roundings of the inertia force that the pin of the coupler has, 540 N.
         assert abs(found[name][0] - true) <= found[f"err_{name}"][0] + 1e-13 * 540.0
         assert found[f"err_{name}"][0] <= 1e-12 * 540.0
+
+
+def test_mean_shaking_force_of_a_balanced_four_bar_is_rounding_with_an_error_as_large():
+    """It was NOT_CONVERGED, so that a limit on it dropped the balanced ones."""
+    names = ["rms_shaking_force", "rms_shaking_force_x", "rms_shaking_force_y"]
+    found = sweep.summarise("four_bar", balanced_four_bar(0.0), names, accuracy=TARGET)
+    assert (found.status == st.OK).all()
+    for name in names:
+        assert found[name][0] <= found[f"err_{name}"][0] <= 1e-12 * 540.0
