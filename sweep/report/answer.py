@@ -215,18 +215,14 @@ def search_sentence(data: Dataset, found: Scan) -> str:
         return ""
     if data.optimum is None:
         return f"{NO_PROOF}: no optimiser was run, and the best of the sweep is as fine as the spacing of its designs."
-    starts, agree = data.starts, value_of(data.optimum, "agree")
+    starts = data.starts
     kind = "" if found.feasible else "random "
     head = "The" if proof_sentence(data) else f"{NO_PROOF}: the"
     text = f"{head} optimiser started from {how_many(starts, f'{kind}design')}"
     populations = 0 if data.survey is None else data.survey.populations
     some = "most of them " if starts > 2 * populations else ""  # at most two per population, others from the sweep
     text += f", {some}ends of {how_many(populations, 'population')}" if populations else " of the sweep"
-    if math.isfinite(agree) and not populations:  # for populations the survey is more detailed
-        text += f", {number(agree)} of which ended at this value"
-    if data.survey is not None:
-        # Starts close together are one distinct start, so the survey may count fewer than ended at the value.
-        text += f"; {search_words(data, data.survey)}"
+    text += "" if data.survey is None else f"; {search_words(data, data.survey)}"
     residual, violation = value_of(data.optimum, "kkt_residual"), value_of(data.optimum, "violation")
     wanted = "" if residual <= KKT else f" where {number(KKT)} is wanted"
     words = "" if math.isnan(residual) and proof_sentence(data) else f"{_residual(residual)}{wanted}, "

@@ -100,7 +100,7 @@ class Front:
         given, begun = len(set(self.settings.bounds)), len(self.points)
         wanted = (self.settings.points or given) if self.data.front_steps else given
         late = sum(p["ended"] == "time" and not p["kkt_residual"] <= KKT for p in self.points)
-        text = "Every row is a search of its own, a local optimum if its residual is small."
+        text = "Every row is a search of its own, a local optimum where it has settled."
         text += f" {begun - given} of the bounds were placed where the front bends." if begun > given else ""
         text += f" Time was up before {wanted - begun} more bounds." if begun < wanted else ""
         text += self._gap()

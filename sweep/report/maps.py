@@ -139,7 +139,7 @@ def trade_off_figure(
     scatter = found.scatter * (objective.factor, second.factor)
     beaten = found.front * (objective.factor, second.factor)
     if len(scatter):
-        size = 3 if len(scatter) > 5000 else 9
+        size = 3 if len(scatter) > 5000 else 9 if len(scatter) > 500 else 25
         look: dict[str, Any] = {"color": QUIET, "alpha": 0.35, "linewidths": 0, "rasterized": True}
         axes.scatter(scatter[:, 0], scatter[:, 1], s=size, label="feasible designs of the sweep", **look)
         axes.step(*beaten.T, where="post", color="#2f8f5b", linewidth=1.2, zorder=3)

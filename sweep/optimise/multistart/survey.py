@@ -93,7 +93,7 @@ class Survey:
     def words(self) -> str:
         """Summary: local optima found, starts that ended in the best, chance that another start finds a new one."""
         if self.basins == 0:
-            return f"none of {how_many(self.starts, 'start')} led to a design within all limits"
+            return "none led to a design within all limits"
         by = f"by {self.best} of {how_many(self.populations, 'population')}"
         best = by if self.populations else f"from {how_many(self.best, 'distinct start')}"
         return f"{optima_words(self.basins)} found, the best {best}; {self._chance}"
