@@ -7,9 +7,9 @@ from __future__ import annotations
 
 import csv
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -21,7 +21,7 @@ from sweep.evaluation.poses import evaluate
 from sweep.evaluation.tables import design_matrix
 from sweep.exchange.dxf import write_dxf
 from sweep.exchange.glb import write_glb
-from sweep.exchange.mjcf import write_mjcf
+from sweep.exchange.mjcf import METRES, write_mjcf
 from sweep.exchange.scene import finite, pose, shown_name, turn
 from sweep.families import Mechanism
 from sweep.families import family as find_family
@@ -102,7 +102,6 @@ def write_law(
 
 
 FORMATS = {"csv": (".csv",), "glb": (".glb",), "dxf": (".dxf",), "mjcf": (".xml",), "law": (".csv", ".parquet")}
-UNITS = {"mm": 1e-3, "m": 1.0}
 SECONDS = 2.0  # duration of an animation without a speed
 MOST_POSES = 100_000  # a table of a few MB for each column
 
@@ -162,7 +161,7 @@ def export(
     """
     target = Path(path)
     kind = _format(target, format)
-    if unit not in UNITS:
+    if unit not in METRES:
         raise InputError("unit", unit, "mm or m", "export")
     if not 3 <= poses <= MOST_POSES:
         raise InputError("poses", poses, f"at least 3, at most {MOST_POSES}", "export")
@@ -190,7 +189,7 @@ def _writer(
     family = find_family(mechanism)
     if kind == "glb":
         seconds = SECONDS if speed is None else 2.0 * math.pi / speed
-        return lambda path: write_glb(family.name, placed, path, UNITS[unit], seconds)
+        return lambda path: write_glb(family.name, placed, path, METRES[unit], seconds)
     if kind == "dxf":
         return lambda path: write_dxf(placed, path, unit)
     return lambda path: write_mjcf(family, placed, _numbers(design), path, unit)
@@ -198,9 +197,8 @@ def _writer(
 
 def _numbers(design: Table) -> dict[str, float]:
     """Return the columns of one design as numbers."""
-    columns: Mapping[Any, Any] = design if isinstance(design, Mapping) else {key: design[key] for key in design}
     found = {}
-    for key, value in columns.items():
+    for key, value in design.items():
         try:
             found[str(key)] = float(np.ravel(value)[0])
         except (TypeError, ValueError):

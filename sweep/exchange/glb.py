@@ -145,7 +145,8 @@ def _group(model: Model, one: Placed, times: int, size: float) -> int:
             if np.abs(end - start).max() > 1e-9 * size:  # the fork slot has an arm of no length
                 name = f"{link.name} {shown_name(a)}-{shown_name(b)}"
                 bars.append(_bar(model, name, colour, start, end, times, thick))
-        bars += [_block(model, part, link, colour, times, thick)] if _slides(part, link) else []
+        if len(link.joints) == 1 and link.joints[0] not in part.kinds:  # a slider, known by one joint
+            bars.append(_block(model, part, link, colour, times, thick))
         if bars:
             children.append(model.node(name=link.name, children=bars))
     for joint, path in part.joints.items():
@@ -168,11 +169,6 @@ def _group(model: Model, one: Placed, times: int, size: float) -> int:
         )  # fmt: skip
     name = part.label if part.member or part.stage else "stage"
     return model.node(name=name, translation=one.shift.tolist(), children=children)
-
-
-def _slides(part: Part, link: Link) -> bool:
-    """Tell whether a link has a single joint, and that joint moves."""
-    return len(link.joints) == 1 and link.joints[0] not in part.kinds
 
 
 def _block(model: Model, part: Part, link: Link, colour: str, times: int, thick: float) -> int:

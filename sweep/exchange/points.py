@@ -103,8 +103,7 @@ def from_points(family: str, *, tolerance: float = TOLERANCE, **points: Sequence
             allowed = f"a point at most {tolerance * extent:.3g} from {_words(joints[name])}"
             why = f", where the other points put it; it is {distance:.3g} off (tolerance = {tolerance:g})"
             raise InputError(name, _words(given[name]), allowed + why, f"points of {found.name}")
-    x, y, z = reading.at.tolist()
-    place = Placement((x, y, z), _triple(reading.z), _triple(reading.x))
+    place = Placement(_triple(reading.at), _triple(reading.z), _triple(reading.x))
     return PlacedDesign(found.name, reading.parameters, reading.phi, place, max(off.values()))
 
 
@@ -233,7 +232,10 @@ def _of_csv(file: Path, scale: float) -> tuple[Groups, bool]:
         if column not in table:
             raise InputError("column", column, "the columns name, x, y, z", str(file))
     exported = {"member", "stage", "frame"} <= set(table)
-    labels = [_label(member, stage) for member, stage in _parts(table)] if exported else [""] * len(table)
+    labels = [""] * len(table)
+    if exported:
+        columns = (table[name].fillna("").astype(str) for name in ("member", "stage"))
+        labels = [_label(member, stage) for member, stage in zip(*columns, strict=True)]
     groups: Groups = {}
     for label, name, *at in zip(labels, table["name"], *(table[axis] for axis in "xyz"), strict=True):
         points = groups.setdefault(label, {})
@@ -264,11 +266,6 @@ def _in_mm(table: pd.DataFrame, file: Path, scale: float) -> pd.DataFrame:
         except UnitFault as fault:
             raise InputError("column", heading, str(fault), str(file)) from None
     return table
-
-
-def _parts(table: pd.DataFrame) -> list[tuple[str, str]]:
-    columns = (table[name].fillna("").astype(str) for name in ("member", "stage"))
-    return list(zip(*columns, strict=True))
 
 
 def _label(member: str, stage: str) -> str:

@@ -8,6 +8,7 @@ from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
+from numpy.typing import NDArray
 
 from sweep.errors import InputError
 from sweep.evaluation.joints import Part, parts
@@ -151,14 +152,18 @@ ELEVATION, AZIMUTH = math.radians(24.0), math.radians(-55.0)
 
 def first_pose(parts: Sequence[Part]) -> int:
     """Return the first pose in which every joint exists; 0 if there is none."""
-    whole = np.logical_and.reduce([np.isfinite(path).all(axis=1) for part in parts for path in part.joints.values()])
-    return int(np.argmax(whole))
+    return int(np.argmax(_whole(parts)))
 
 
 def exists(parts: Sequence[Part]) -> bool:
     """Tell whether there are joints, and a pose in which all of them exist."""
-    found: list[Array] = [path for part in parts for path in part.joints.values()]
-    return bool(found) and bool(np.logical_and.reduce([np.isfinite(path).all(axis=1) for path in found]).any())
+    return any(part.joints for part in parts) and bool(_whole(parts).any())
+
+
+def _whole(parts: Sequence[Part]) -> NDArray[np.bool_]:
+    """Return the mask of poses in which every joint exists."""
+    there = [np.isfinite(path).all(axis=1) for part in parts for path in part.joints.values()]
+    return np.asarray(np.logical_and.reduce(there))
 
 
 def projection(view: str) -> Array:

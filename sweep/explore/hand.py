@@ -16,7 +16,7 @@ from sweep.evaluation.tables import design_matrix
 from sweep.families.base import Array, Family, Parameter
 from sweep.families.names import is_flag
 from sweep.optimise.starts.dataset import drawn
-from sweep.report.dataset import Dataset, Row, chosen, read_dataset, row_of, without_rows
+from sweep.report.dataset import Dataset, Row, chosen, read_dataset, reference_of, row_of, without_rows
 from sweep.report.page import judged
 from sweep.report.quantities import quantity
 from sweep.study import Study
@@ -221,7 +221,4 @@ def of_results(folder: Path) -> Hand:
 
 def _reference(study: Study) -> dict[str, Design]:
     """Return the study's reference design under its name, or an empty dict."""
-    if study.reference is None:
-        return {}
-    matrix, _ = design_matrix(study.family, study.reference)
-    return {"reference": dict(zip(study.family.parameter_names, matrix[0].tolist(), strict=True))}
+    return {} if study.reference is None else {"reference": reference_of(study)}

@@ -11,6 +11,7 @@ from sweep.errors import InputError, MissingInput
 from sweep.explore.hand import STEADY, Hand
 from sweep.optimise.local.start import search
 from sweep.optimise.problem.statement import Problem
+from sweep.quantities.limits import Limit, tightest
 
 LOOKS = 20_000  # evaluations of designs, as for one start of a study
 
@@ -28,10 +29,7 @@ def problem_in_hand(hand: Hand, design: Mapping[str, float], free: Mapping[str, 
     for p in study.family.parameters:
         if p.name not in free or p.choices is not None:
             continue
-        own = [limit for limit in study.parameter_limits if limit.output == p.name]
-        low, high = sorted(map(float, free[p.name]))
-        low = max([low, *(x.minimum for x in own if x.minimum is not None)])
-        high = min([high, *(x.maximum for x in own if x.maximum is not None)])
+        low, high = tightest([Limit(p.name, *sorted(map(float, free[p.name]))), *study.parameter_limits], p.name)
         bounds[p.name] = (min(low, design[p.name]), max(high, design[p.name]))
     if not bounds:
         raise InputError("dimensions", "none", STEADY, "explore")

@@ -175,12 +175,7 @@ def nights(into: Path) -> list[Path]:
 
 def good_nights(into: Path) -> list[Path]:
     """Return the nights in which every study is complete, the oldest first."""
-    found = []
-    for path in nights(into):
-        record = read_night(path)
-        if record is not None and record.good:
-            found.append(path)
-    return found
+    return [path for path in nights(into) if (record := read_night(path)) is not None and record.good]
 
 
 def new_night(into: Path) -> Path:

@@ -26,9 +26,9 @@ REPORT, FIGURES, SURVIVORS = "report.html", "figures", "survivors.parquet"
 class Carried:
     """The night from which chunks were linked, their number, and whether the study is ``whole``: nothing left to do."""
 
-    night: str
-    chunks: int
-    whole: bool
+    night: str | None = None
+    chunks: int = 0
+    whole: bool = False
 
 
 def carry(study: Study, earlier: Sequence[Path], target: Path) -> Carried | None:

@@ -48,7 +48,8 @@ def figures(study: Study, folder: Path) -> tuple[dict[str, float], dict[str, str
 
     The best objective is that of the optimum, or without an optimisation that of the best design of the sweep.
     """
-    counts = (files.read_plan(folder) or {}).get("counts") or {}
+    plan = files.read_plan(folder) or {}
+    counts = plan.get("counts") or {}
     number, within = sum(counts.values()), counts.get("OK", 0)
     found: dict[str, float] = {DESIGNS: number, WITHIN: within, YIELD: within / number if number else 0.0}
     units = {DESIGNS: "", WITHIN: "", YIELD: ""}
@@ -63,7 +64,6 @@ def figures(study: Study, folder: Path) -> tuple[dict[str, float], dict[str, str
         value = float(rows[name].iloc[0]) if len(rows) else math.nan
     if math.isfinite(value):
         found[name] = value
-        plan = files.read_plan(folder) or {}
         units[name] = next((c["unit"] for c in plan.get("columns", []) if c["name"] == name), "")
     return found, units
 

@@ -144,19 +144,18 @@ class _Night:
         if self.left <= 0.0:
             return StudyRecord("waiting", TimeUsedUp.exit_code)
         target = self.folder / one.name
-        carried: Carried | None = None
         try:
-            carried = carry(one.study, self.earlier, target)
-            ended = Ended(0, 0.0, "") if carried and carried.whole else self.run(one, target)
-            source, linked = (carried.night, carried.chunks) if carried else (None, 0)
+            carried = carry(one.study, self.earlier, target) or Carried()
+            ended = Ended(0, 0.0, "") if carried.whole else self.run(one, target)
             # A proof that died leaves designs and optimum complete; no feasible design is an answer, too.
             died = ended.code not in (0, INFEASIBLE, TimeUsedUp.exit_code)
             if died or not store.is_complete(target / files.DESIGNS):
                 state: State = "cut" if ended.code in CUT else "failed"
                 code = ended.code if ended.code in (*TOLD, *CUT) else WorkerDied.exit_code
-                return StudyRecord(state, code, source, linked, seconds=ended.seconds, message=ended.message)
+                linked = (carried.night, carried.chunks)
+                return StudyRecord(state, code, *linked, seconds=ended.seconds, message=ended.message)
             figure = one.path.parent / FIGURE
-            if figure.is_file() and not (carried and carried.whole):
+            if figure.is_file() and not carried.whole:
                 drawn = draw(figure, target, target / RUN_LOG, self.left)
                 if drawn.code:
                     self.journal.note("figure", f"{one.name}: {FIGURE} ended with {drawn.code}: {drawn.message}")
@@ -170,7 +169,7 @@ class _Night:
         words += ["--jobs", str(self.settings.jobs), "--backend", self.settings.backend]
         return call([*words, *(["--smoke"] if self.settings.smoke else [])], target / RUN_LOG, self.left)
 
-    def finished(self, study: Study, target: Path, carried: Carried | None, ended: Ended) -> StudyRecord:
+    def finished(self, study: Study, target: Path, carried: Carried, ended: Ended) -> StudyRecord:
         """Write the report of a complete dataset, compare it, and return the record."""
         message, cut = "", ended.message if ended.code == TimeUsedUp.exit_code else ""
         if not (target / REPORT).is_file():
@@ -184,17 +183,17 @@ class _Night:
         values, units = figures(study, designs)
         base = self.base(study.name)
         found = Changes(0, ())
-        if base is not None and not (carried and carried.whole and carried.night == base.name):
+        if base is not None and not (carried.whole and carried.night == base.name):
             found = changes(study, base / study.name / files.DESIGNS, designs)
-        if carried is None:
+        if not carried.chunks:
             late = slower(study.name, ended.seconds, self.history)
             found = Changes(found.code or late.code, (*found.lines, *late.lines), found.moved)
         return StudyRecord(
             "complete",
-            linked_from=carried.night if carried else None,
-            linked=carried.chunks if carried else 0,
-            computed=chunks - (carried.chunks if carried else 0),
-            seconds=None if carried and carried.whole else ended.seconds,
+            linked_from=carried.night,
+            linked=carried.chunks,
+            computed=chunks - carried.chunks,
+            seconds=None if carried.whole else ended.seconds,
             figures=values,
             units=units,
             compared_with=base.name if base else None,

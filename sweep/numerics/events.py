@@ -36,12 +36,7 @@ def sign_changes(functions: Functions, angles: Array) -> tuple[Index, Array]:
     -----
     Roots are found by bracketing.  Two roots between samples appear as a dip: its bottom is found by golden sections.
     """
-    n = len(angles)
-    before = np.concatenate([angles[:, -1:] - TWO_PI, angles[:, :-1]], axis=1)
-    after = np.concatenate([angles[:, 1:], angles[:, :1] + TWO_PI], axis=1)
-    values = functions(np.arange(n), angles)
-    left, right = np.roll(values, 1, axis=1), np.roll(values, -1, axis=1)
-
+    before, after, values, left, right = _with_neighbours(functions, angles)
     row, column, which = np.nonzero((values < 0.0) != (right < 0.0))
     brackets = [(row, which, angles[row, column], after[row, column])]
 
@@ -149,10 +144,7 @@ def near_zeros(functions: Functions, angles: Array, reach: float) -> tuple[Index
     turn quickly there decay like the inverse of the distance: a panel that begins close by and ends far away would
     not resolve that.  The bottom is found by golden sections.
     """
-    before = np.concatenate([angles[:, -1:] - TWO_PI, angles[:, :-1]], axis=1)
-    after = np.concatenate([angles[:, 1:], angles[:, :1] + TWO_PI], axis=1)
-    values = functions(np.arange(len(angles)), angles)
-    left, right = np.roll(values, 1, axis=1), np.roll(values, -1, axis=1)
+    before, after, values, left, right = _with_neighbours(functions, angles)
     row, column, which = np.nonzero((values <= left) & (values < right))
     sides = values[row, column, which], left[row, column, which], right[row, column, which]
     # A parabola falls below its lowest sample by an eighth of the bend at most: dips that stay above have no near zero.
@@ -163,12 +155,21 @@ def near_zeros(functions: Functions, angles: Array, reach: float) -> tuple[Index
     beside = 0.5 * (_one(functions, row, which, bottom - step) + _one(functions, row, which, bottom + step))
     rise = np.maximum(beside - lowest, np.finfo(float).tiny)
     away = step * np.sqrt(np.maximum(lowest, 0.0) / rise)
-    row, bottom, away = (x[away < reach] for x in (row, bottom, away))
+    close = away < reach
+    row, bottom, away = row[close], bottom[close], away[close]
     widths = away[:, None] * WIDER ** np.arange(1.0 + np.ceil(np.log(reach / SHORTEST) / np.log(WIDER)))
     which, column = np.nonzero((widths < reach) & ((away >= SHORTEST)[:, None] | (np.arange(widths.shape[1]) == 0)))
     middle, aside = bottom[which], widths[which, column]
     places = np.concatenate([bottom, middle - aside, middle + aside])
     return np.concatenate([row, row[which], row[which]]), np.mod(places, TWO_PI)
+
+
+def _with_neighbours(functions: Functions, angles: Array) -> tuple[Array, Array, Array, Array, Array]:
+    """Return the angles before and after each sample of a turn, the values there, and those at both neighbours."""
+    before = np.concatenate([angles[:, -1:] - TWO_PI, angles[:, :-1]], axis=1)
+    after = np.concatenate([angles[:, 1:], angles[:, :1] + TWO_PI], axis=1)
+    values = functions(np.arange(len(angles)), angles)
+    return before, after, values, np.roll(values, 1, axis=1), np.roll(values, -1, axis=1)
 
 
 def _one(functions: Functions, row: Index, which: Index, phi: Array) -> Array:

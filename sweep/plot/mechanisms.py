@@ -343,5 +343,4 @@ def polar_load(
 def _plain(mechanism: Mechanism, design: Table) -> dict[str, Any]:
     """Return the columns that are parameters of the mechanism itself."""
     names = find_family(mechanism).parameter_names
-    columns: Mapping[Any, Any] = design if isinstance(design, Mapping) else {key: design[key] for key in design}
-    return {str(key): values for key, values in columns.items() if str(key) in names}
+    return {str(key): values for key, values in design.items() if str(key) in names}

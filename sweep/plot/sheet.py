@@ -136,7 +136,7 @@ def _zero(x: float) -> float:
 
 def _draw(data: Dataset, parts: Sequence[Part], tables: Sequence[Table], target: Path) -> None:
     frames = frames_of(parts)
-    panels = [(frame, view) for frame, same in frames.items() for view in (_views(same))]
+    panels = [(frame, view) for frame, same in frames.items() for view in (WORDS if is_spatial(same) else ("xy",))]
     rows = _rows(tables)
     with house_style():
         figure = new_figure(A3[0], VIEWS_HIGH + TABLES_HIGH * len(rows))
@@ -166,10 +166,6 @@ def _rows(tables: Sequence[Table]) -> list[list[Table]]:
     first = [next(x for x in blocks if x.title == table.title) for table in tables[: len(WIDTHS[0])]]
     rest, wide = [x for x in blocks if x not in first], len(WIDTHS[1])
     return [first, *(rest[k : k + wide] for k in range(0, len(rest), wide))]
-
-
-def _views(parts: Sequence[Part]) -> tuple[str, ...]:
-    return ("xy", "zy", "xz") if is_spatial(parts) else ("xy",)
 
 
 def _no_date(target: Path) -> dict[str, None]:

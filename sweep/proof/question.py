@@ -14,10 +14,10 @@ from sweep.families.base import Array
 from sweep.families.capabilities import ProvableLocus
 from sweep.families.chain import Chain
 from sweep.optimise.multistart.multistart import listed
-from sweep.quantities.limits import meets
+from sweep.quantities.limits import Limit, meets, tightest
 
 if TYPE_CHECKING:
-    from sweep.study import Limit, Study
+    from sweep.study import Study
 
 MOST_FREE = 4
 HUGE = 1e9  # not an acceleration: a larger target stands for none
@@ -175,9 +175,9 @@ def _entries(study: Study, coordinates: tuple[str, ...], place: str) -> dict[str
 
 def _narrowed(study: Study, name: str, low: float, high: float) -> tuple[float, float]:
     """Return the interval of a coordinate reduced by the limits on it; unchanged if nothing would remain."""
-    own = [x for x in study.limits if x.output == name and name not in study.prescribed]
-    least = max([low, *(x.minimum for x in own if x.minimum is not None)])
-    most = min([high, *(x.maximum for x in own if x.maximum is not None)])
+    if name in study.prescribed:
+        return low, high
+    least, most = tightest([*study.limits, Limit(name, low, high)], name)
     return (least, most) if least <= most else (low, high)
 
 
@@ -200,17 +200,11 @@ def _limits(
         elif name == "margin" and limit.minimum is not None:
             cos2 = max(cos2, limit.minimum * WEAKER)
         elif name in provable.links:
-            _put(links, provable.links.index(name), limit)
+            ends = links[2 * provable.links.index(name) :][:2]
+            ends[:] = max(ends[0], limit.ends[0]), min(ends[1], limit.ends[1])
         elif name not in known and not (name in entries and meets(limit, np.array(entries[name])).all()):
             left_out.append(name)
     return cos2, links, tuple(left_out)
-
-
-def _put(links: Array, number: int, limit: Limit) -> None:
-    if limit.minimum is not None:
-        links[2 * number] = max(links[2 * number], limit.minimum)
-    if limit.maximum is not None:
-        links[2 * number + 1] = min(links[2 * number + 1], limit.maximum)
 
 
 def described(question: Question) -> Mapping[str, Any]:

@@ -33,8 +33,7 @@ OUTCOMES = ("open", "too small", "bound", "empty")  # indexed by the numbers of 
 Tell: TypeAlias = Callable[[int, int], None]
 
 
-@dataclass(frozen=True)
-class Leaves:
+class Leaves(NamedTuple):
     """Boxes that were not halved: their bounds, outcome and proving rows."""
 
     low: Array  # (m, n)
@@ -53,7 +52,7 @@ class Leaves:
 
     def taken(self, which: Numbers) -> Leaves:
         """Select rows of the table by index or mask."""
-        return Leaves(*(getattr(self, name)[which] for name in self.__dataclass_fields__))
+        return Leaves(*(column[which] for column in self))
 
 
 def empty(rows: int, free: int) -> Leaves:
@@ -66,7 +65,7 @@ def empty(rows: int, free: int) -> Leaves:
 
 def joined(parts: list[Leaves]) -> Leaves:
     """Return the rows of all tables as one."""
-    return Leaves(*(np.concatenate([getattr(p, n) for p in parts]) for n in Leaves.__dataclass_fields__))
+    return Leaves(*map(np.concatenate, zip(*parts, strict=True)))
 
 
 class Explored(NamedTuple):
@@ -116,10 +115,9 @@ class Unit:
         about = (asked.branch, provable.objectives[asked.objective], asked.cos2, asked.links, self.target)
         question, starts = (*about, asked.tube(self.target)), (mine.low, mine.high, mine.bound)
         search = (starts, asked.high - asked.low, asked.free, asked.given, self.smallest)
-        out = tuple(getattr(leaves, n) for n in Leaves.__dataclass_fields__)
-        provable.explore(question, (*search, 0), out)  # evaluates no box, but compiles the kernels
+        provable.explore(question, (*search, 0), tuple(leaves))  # evaluates no box, but compiles the kernels
         begin = time.thread_time()
-        filled, judged = provable.explore(question, (*search, self.most), out)
+        filled, judged = provable.explore(question, (*search, self.most), tuple(leaves))
         _write(self.path(number), leaves.taken(np.arange(filled)), judged, time.thread_time() - begin)
         return number, judged
 
@@ -127,14 +125,14 @@ class Unit:
 def _write(path: Path, leaves: Leaves, judged: int, seconds: float) -> None:
     import io
 
-    buffer, columns = io.BytesIO(), {n: getattr(leaves, n) for n in Leaves.__dataclass_fields__}
-    np.savez_compressed(buffer, judged=judged, seconds=seconds, **columns)
+    buffer = io.BytesIO()
+    np.savez_compressed(buffer, judged=judged, seconds=seconds, **leaves._asdict())
     files.write_atomically(path, buffer.getvalue())
 
 
 def _read(path: Path) -> Explored:
     with np.load(path) as data:
-        leaves = Leaves(*(data[name] for name in Leaves.__dataclass_fields__))
+        leaves = Leaves(*(data[name] for name in Leaves._fields))
         return Explored(leaves, int(data["judged"]), False, float(data["seconds"]))
 
 

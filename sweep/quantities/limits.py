@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+import math
+from collections.abc import Iterable
+from dataclasses import dataclass, replace
 from typing import TypeVar
 
 import numpy as np
@@ -30,6 +32,22 @@ class Limit:
         """Whether the bounds are equal and prescribe a value, which no toleranced design can keep."""
         return self.minimum is not None and self.minimum == self.maximum
 
+    @property
+    def ends(self) -> tuple[float, float]:
+        """Both bounds, infinite if there is none."""
+        return -math.inf if self.minimum is None else self.minimum, math.inf if self.maximum is None else self.maximum
+
+    def drawn_in(self, room: float) -> Limit:
+        """Return the limit tightened by a margin; a band narrower than both margins becomes infeasible."""
+        low, high = (None if x is None else x + d for x, d in ((self.minimum, room), (self.maximum, -room)))
+        return replace(self, minimum=low, maximum=high)
+
+
+def tightest(limits: Iterable[Limit], output: str) -> tuple[float, float]:
+    """Return the largest minimum and the smallest maximum of an output under some limits, infinite without one."""
+    lows, highs = zip((-math.inf, math.inf), *(x.ends for x in limits if x.output == output), strict=True)
+    return max(lows), min(highs)
+
 
 def compared(name: str, values: Number) -> Number:
     """Value that limits and objectives compare: the magnitude of a swing or stroke, any other output as it is."""
@@ -39,9 +57,5 @@ def compared(name: str, values: Number) -> Number:
 def meets(limit: Limit, values: NDArray[np.generic]) -> NDArray[np.bool_]:
     """Test which values keep the limit, (n,); nan fails, and a swing or stroke is compared by magnitude."""
     x = compared(limit.output, np.asarray(values, dtype=np.float64))
-    good = np.isfinite(x)
-    if limit.minimum is not None:
-        good &= x >= limit.minimum
-    if limit.maximum is not None:
-        good &= x <= limit.maximum
-    return good
+    low, high = limit.ends
+    return np.isfinite(x) & (x >= low) & (x <= high)

@@ -15,7 +15,7 @@ from sweep.optimise.multistart.survey import optima_words
 from sweep.proof import read_proof
 from sweep.proof.study import EVENT, proof_words
 from sweep.quantities.limits import compared
-from sweep.report.dataset import Dataset, Row
+from sweep.report.dataset import Dataset
 from sweep.report.front import Front
 from sweep.report.quantities import Quantity, change, number, quantity, rpm
 from sweep.report.tables import LimitState, fates, limit_state, limit_states, limited, parameter_rows, value_of
@@ -47,7 +47,7 @@ def answer(data: Dataset, found: Scan, further: Sequence[str] = ()) -> list[str]
     if data.objective is not None:
         sentences.append(_headline(data, who, data.objective))
     second = data.second
-    if second is not None and _is_number(data.result, second):
+    if second is not None and math.isfinite(value_of(data.result, second)):
         sentences.append(_comparison(data, second))
     proven = proof_sentence(data)
     sentences += [f"{proven[0].upper()}{proven[1:]}."] if proven else []
@@ -227,10 +227,6 @@ def search_sentence(data: Dataset, found: Scan) -> str:
     wanted = "" if residual <= KKT else f" where {number(KKT)} is wanted"
     words = "" if math.isnan(residual) and proof_sentence(data) else f"{_residual(residual)}{wanted}, "
     return f"{text}. {words}{'l' if words else 'L'}argest violation of a limit {number(violation, 3)}."
-
-
-def _is_number(row: Row, name: str) -> bool:
-    return math.isfinite(value_of(row, name))
 
 
 def _count(n: float) -> str:

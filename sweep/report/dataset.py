@@ -332,10 +332,14 @@ def gather(folder: Path) -> tuple[Dataset, Scan, list[Cells]]:
     found.best_row |= _absent(data.study, found.best_row) if found.best_row else {}
     data = replace(data, best=found.best_row or None)
     if data.optima is None and data.study.reference is not None:
-        matrix, _ = design_matrix(data.study.family, data.study.reference)
-        own = dict(zip(data.study.family.parameter_names, matrix[0].tolist(), strict=True))
-        data = replace(data, computed_reference=row_of(data.study, own))
+        data = replace(data, computed_reference=row_of(data.study, reference_of(data.study)))
     return data, found, cells
+
+
+def reference_of(study: Study) -> dict[str, float]:
+    """Return the reference design of a study that has one, with what it leaves out."""
+    matrix, _ = design_matrix(study.family, study.reference or {})
+    return dict(zip(study.family.parameter_names, matrix[0].tolist(), strict=True))
 
 
 def row_of(study: Study, design: Mapping[str, float]) -> Row:

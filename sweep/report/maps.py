@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
@@ -121,18 +121,15 @@ def line_figure(
     return figure
 
 
-def trade_off_figure(
-    found: Scan,
-    objective: Quantity,
-    second: Quantity,
-    marks: dict[str, tuple[float, float]],
-    limit: float | None,
-    front: Callable[[Axes], None] | None = None,
-) -> Figure:
+def trade_off(data: Dataset, found: Scan) -> Figure | None:
     """Draw feasible designs by objective and second criterion, with the non-dominated ones.
 
-    ``front`` draws the front of the optimiser.
+    The front of the optimiser is drawn if one was searched.
     """
+    objective, against = data.objective, data.against
+    if objective is None or against is None or not (len(found.scatter) or data.front is not None):
+        return None
+    second, front = data.shown(against), Front.of(data)
     figure = new_figure(WIDTH, 4.4, None)
     figure.subplots_adjust(left=0.08, right=0.98, bottom=0.2, top=0.97)
     axes = figure.subplots()
@@ -152,12 +149,18 @@ def trade_off_figure(
             label=f"of these, non-dominated ({len(beaten)})",
         )
     if front is not None:
-        front(axes)
+        front.draw(axes)
+    limit = next((limit.maximum for limit in data.study.limits if limit.output == second.name), None)
     if limit is not None:
         axes.axhline(
             limit * second.factor, color=LIMIT, linewidth=0.9, linestyle=":", label=f"limit of {second.symbol}"
         )
-    _place(axes, marks, objective.factor, second.factor)
+    both = {
+        role: (compared(objective.name, float(row[objective.name])), compared(second.name, float(row[second.name])))
+        for role, row in marked(data).items()
+        if row is not None
+    }
+    _place(axes, both, objective.factor, second.factor)
     for axis, k in ((axes.set_xscale, 0), (axes.set_yscale, 1)):
         positive = scatter[:, k][scatter[:, k] > 0.0]
         if positive.size == len(scatter) and positive.size and positive.max() > 30.0 * positive.min():
@@ -231,21 +234,6 @@ def design_map(data: Dataset, found: Scan, cells: list[Cells], pair: tuple[str, 
             found.lines[name], side, data.designs, shown, {r: float(row[name]) for r, row in marks.items()}
         )
     return None
-
-
-def trade_off(data: Dataset, found: Scan) -> Figure | None:
-    """Draw the objective against a second criterion, with the front if one was searched."""
-    study, shown = data.study, data.objective
-    against = data.against
-    if shown is None or against is None or not (len(found.scatter) or data.front is not None):
-        return None
-    second = data.shown(against)
-    first, other = shown.name, second.name
-    marks = {role: row for role, row in marked(data).items() if row is not None}
-    at = {role: (compared(first, float(r[first])), compared(other, float(r[other]))) for role, r in marks.items()}
-    bound = next((limit.maximum for limit in study.limits if limit.output == second.name), None)
-    front = Front.of(data)
-    return trade_off_figure(found, shown, second, at, bound, None if front is None else front.draw)
 
 
 def axis_quantity(data: Dataset, name: str) -> Quantity:

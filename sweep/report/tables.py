@@ -58,12 +58,8 @@ def limit_state(
         state = "unknown" if math.isnan(value) else "met" if meets(limit, np.array([value]))[0] else "missed"
         return LimitState(shown, bound_words(limit, shown), words.get(value, "–"), words.get(other, "–"), "", state)
     size = compared(limit.output, value)
-    rooms = []
-    if limit.minimum is not None:
-        rooms.append((size - limit.minimum, limit.minimum))
-    if limit.maximum is not None:
-        rooms.append((limit.maximum - size, limit.maximum))
-    room, bound = min(rooms, key=lambda pair: pair[0]) if not math.isnan(size) else (math.nan, math.nan)
+    low, high = limit.ends
+    room, bound = min((size - low, low), (high - size, high), key=lambda pair: pair[0])
     tolerance = ACTIVE * max(abs(bound), 1e-12)
     known = value_of(row, error_of(limit.output))
     if bound == 0.0 and known > tolerance:

@@ -14,6 +14,7 @@ import numpy as np
 from kernels import status as codes
 from sweep.chunks.plan import spread_designs
 from sweep.dataset import files
+from sweep.dataset.reading import best
 from sweep.errors import how_many
 from sweep.evaluation.statuses import meaning
 from sweep.evaluation.summaries import design_outputs
@@ -86,21 +87,8 @@ def _best_of_sweep(data: Dataset, feasible: int) -> str:
     shown = data.objective
     if shown is None or not feasible:
         return ""
-    best = math.inf
-    for path in data.parts:
-        best = min(best, float(np.min(compared(shown.name, _column(path, shown.name)), initial=math.inf)))
-    if not math.isfinite(best):
-        return ""
-    return f", the best with {shown.words} {shown.show(best)}"
-
-
-def _column(path: Path, name: str) -> Any:
-    """Return the finite values of a column in rows with status OK."""
-    import pyarrow.parquet as pq
-
-    table = pq.read_table(path, columns=[name, "status"])
-    values = table[name].to_numpy().astype(np.float64)
-    return values[(table["status"].to_numpy() == codes.OK) & np.isfinite(values)]
+    first = best(data.folder, shown.name, 1)[shown.name]
+    return f", the best with {shown.words} {shown.show(compared(shown.name, float(first[0])))}" if len(first) else ""
 
 
 def _optimum(data: Dataset) -> list[str]:
@@ -213,8 +201,7 @@ def _give_way(data: Dataset, row: Mapping[str, Any], who: str) -> list[str]:
 def _shortfall(limit: Limit, values: Any) -> tuple[Any, Any]:
     """Return the violation of a limit, in its unit and relative to its bound; large for missing values."""
     x = compared(limit.output, np.asarray(values, np.float64))
-    low = -math.inf if limit.minimum is None else limit.minimum
-    high = math.inf if limit.maximum is None else limit.maximum
+    low, high = limit.ends
     short = np.maximum(np.maximum(low - x, x - high), 0.0)
     size = max(abs(limit.minimum or 0.0), abs(limit.maximum or 0.0)) or 1.0
     return short, np.nan_to_num(short / size, nan=1e6)

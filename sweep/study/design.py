@@ -16,7 +16,7 @@ from typing import Any, Literal
 from sweep.errors import choices
 from sweep.families.base import Family
 from sweep.quantities.units import internal_unit
-from sweep.study.file import Faults, Key, Section, Seed, StudyFile, holds, read_section
+from sweep.study.file import Faults, Key, Section, Seed, StudyFile, holds, own_table, read_section
 from sweep.study.parameter import Entry, forms, missing_parameter, read_entry
 from sweep.study.sobol import DIMENSIONS
 from sweep.study.space import Axis, DesignSpace
@@ -146,15 +146,11 @@ def read_reference(
 
 def _check_needless(raw: Mapping[str, Any], other: Elsewhere, faults: Faults) -> None:
     """Report parameters in [design] that another table sets."""
-    for name in other.given:
-        if name in raw:
-            faults.value(("design", name), raw[name], "nothing here: [scene] gives it")
-    for name in other.fitted:
-        if name in raw and not name.startswith("lam"):
-            faults.value(("design", name), raw[name], "nothing here: [fit] finds it")
-    for name in other.made:
-        if name in raw:
-            faults.value(("design", name), raw[name], "nothing here: it follows from [locus]")
+    words = dict.fromkeys(other.given, "[scene] gives it")
+    words |= {name: "[fit] finds it" for name in other.fitted if not name.startswith("lam")}
+    words |= dict.fromkeys(other.made, "it follows from [locus]")
+    for name in [name for name in words if name in raw]:
+        faults.value(("design", name), raw[name], f"nothing here: {words[name]}")
 
 
 def _check_names(
@@ -198,7 +194,7 @@ def take(file: StudyFile, family: Family, elsewhere: Collection[str]) -> None:
     """
     notes: list[str] = []
     for key in (("design",), ("reference", "design")):
-        table = _table(file.data, key)
+        table = own_table(file.data, key)
         for name in [name for name in table or () if name.rpartition(".")[2] == FROM]:
             assert table is not None
             member = name.removesuffix(FROM)
@@ -215,26 +211,15 @@ def take(file: StudyFile, family: Family, elsewhere: Collection[str]) -> None:
             left_out = {x for x in elsewhere if not x.startswith("lam")} if key == ("design",) else set()
             _fill(file, table, (*key, name), member, design, family, left_out)
             notes.append(f"{'.'.join((*key, member.rstrip('.'))).rstrip('.')}: {source} {own}")
-    about = _table(file.data, ("study",))
+    about = own_table(file.data, ("study",))
     if notes and about is not None:
         about["taken"] = notes
 
 
 def taken_reference(file: StudyFile, section: ReferenceSection) -> ReferenceSection:
     """Return the section with the design that `take` has filled in."""
-    table = _table(file.data, ("reference", "design"))
+    table = own_table(file.data, ("reference", "design"))
     return section if section.design is None else section.model_copy(update={"design": table})
-
-
-def _table(data: Mapping[str, Any], key: tuple[str, ...]) -> dict[str, Any] | None:
-    """Replace a table of the file by a copy that may be changed, and return the copy; None if it does not exist."""
-    found: Any = data
-    for part in key:
-        if not isinstance(found, dict) or not isinstance(found.get(part), dict):
-            return None
-        found[part] = dict(found[part])
-        found = found[part]
-    return found if isinstance(found, dict) else None
 
 
 def _accepted(file: StudyFile, key: Key, source: object) -> dict[str, float] | None:

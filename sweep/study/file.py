@@ -144,6 +144,17 @@ class StudyFile:
             raise StudyError(str(self.path), self.faults.lines)
 
 
+def own_table(data: Mapping[str, Any], key: tuple[str, ...]) -> dict[str, Any] | None:
+    """Replace a table of the file by a copy that may be changed, and return the copy; None if it does not exist."""
+    found: Any = data
+    for part in key:
+        if not isinstance(found, dict) or not isinstance(found.get(part), dict):
+            return None
+        found[part] = dict(found[part])
+        found = found[part]
+    return found if isinstance(found, dict) else None
+
+
 def spelled(key: Key) -> str:
     """Write a key path as messages show it: scene.want[2]."""
     text = "".join(f"[{part}]" if isinstance(part, int) else f".{part}" for part in key)

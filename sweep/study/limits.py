@@ -51,7 +51,10 @@ SETTINGS = {
 def limits_of_settings(file: StudyFile) -> list[Limit]:
     """Return the limits of every relation that names a machine's settings, and report unknown names."""
     found = []
-    for relation, table in _settled(file.data.get("relations")).items():
+    relations = file.data.get("relations")
+    for relation, table in relations.items() if isinstance(relations, dict) else ():
+        if not isinstance(table, dict) or "settings" not in table:
+            continue
         key: Key = ("relations", relation, "settings")
         name = table["settings"]
         if "take" not in table:
@@ -64,11 +67,6 @@ def limits_of_settings(file: StudyFile) -> list[Limit]:
         bounds = {what: ends for what, ends in setting._asdict().items() if what != "source" and ends is not None}
         found += [Limit(f"{relation}_{what}", *ends) for what, ends in bounds.items()]
     return found
-
-
-def _settled(relations: Any) -> dict[str, dict[str, Any]]:
-    tables = relations.items() if isinstance(relations, dict) else ()
-    return {name: table for name, table in tables if isinstance(table, dict) and "settings" in table}
 
 
 UPPER, LOWER = ("<=", "\u2264"), (">=", "\u2265")

@@ -112,9 +112,8 @@ def merged(base: Mapping[str, Any], over: Mapping[str, Any], key: tuple[str, ...
     result = copy.deepcopy(dict(base))
     for name, new in over.items():
         old = result.get(name)
-        if not isinstance(old, dict) or not isinstance(new, dict) or (*key, name) in (("accuracy",), ("objective",)):
-            result[name] = copy.deepcopy(new)
-        elif {"value", "values"}.isdisjoint({*old, *new}):
+        one = (*key, name) in (("accuracy",), ("objective",))
+        if isinstance(old, dict) and isinstance(new, dict) and not one and {"value", "values"}.isdisjoint({*old, *new}):
             result[name] = merged(old, new, (*key, name))
         else:
             result[name] = copy.deepcopy(new)

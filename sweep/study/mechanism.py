@@ -28,6 +28,7 @@ from sweep.study.file import (
     ThreeLengths,
     TwoLengths,
     holds,
+    own_table,
     quantity,
     read_section,
 )
@@ -154,25 +155,13 @@ def flattened(data: Mapping[str, Any], members: object) -> dict[str, Any]:
     if not isinstance(members, dict):
         return result
     for key in BY_MEMBER:
-        _flatten(result, key, members)
+        table, flat = own_table(result, key) or {}, dict[str, Any]()
+        for name, entry in table.items():
+            nested = name in members and isinstance(entry, dict)
+            flat |= {f"{name}.{own}": value for own, value in entry.items()} if nested else {name: entry}
+        table.clear()
+        table |= flat
     return result
-
-
-def _flatten(data: dict[str, Any], key: tuple[str, ...], members: Mapping[str, Any]) -> None:
-    table = data.get(key[0])
-    if not isinstance(table, dict):
-        return
-    if len(key) > 1:
-        data[key[0]] = dict(table)
-        _flatten(data[key[0]], key[1:], members)
-        return
-    flat: dict[str, Any] = {}
-    for name, entry in table.items():
-        if name in members and isinstance(entry, dict):
-            flat |= {f"{name}.{own}": value for own, value in entry.items()}
-        else:
-            flat[name] = entry
-    data[key[0]] = flat
 
 
 def read_mechanism(
@@ -274,7 +263,7 @@ def _machine(
     except InputError as error:
         place: Key = tuple(error.place.removeprefix("machine.").split(".")) if error.place != "machine" else ()
         if place[:1] == ("relations",) and place[1:] and place[1] in threads:
-            part = _key_of_thread(error)
+            part = "path" if error.name == "thread" or error.place.endswith(".thread") else error.name
             written = error.value if part == "path" else data["thread"][place[1]].get(part, error.value)
             faults.value(("thread", place[1], part), written, error.allowed)
             return None
@@ -298,11 +287,6 @@ def _written(data: Any, key: Key, value: object) -> object:
             return value
         data = data[part]
     return value if isinstance(value, str) else data
-
-
-def _key_of_thread(error: InputError) -> str:
-    """Return the key of [thread] to which an error in a thread belongs; faults of the places belong to path."""
-    return "path" if error.name == "thread" or error.place.endswith(".thread") else error.name
 
 
 def _hangs_on_events(table: Mapping[str, Any]) -> bool:

@@ -118,20 +118,11 @@ class Sobol:
         chosen = range(len(self._shift)) if which is None else which
         out = np.empty((len(chosen), index.size))
         for row, k in zip(out, chosen, strict=True):
-            row[:] = self._upper(k, high) ^ self._tables[k, 0, first]
-        return self._scaled(out)
-
-    def _upper(self, k: int, high: NDArray[np.int64]) -> NDArray[np.int64]:
-        """Return the exclusive or of the shift of dimension k and the direction numbers of the ``high`` digits."""
-        x = np.full(high.size, self._shift[k])
-        for part, table in enumerate(self._tables[k, 1:]):
-            x ^= table[(high >> (part * TABLE_BITS)) & (RUN - 1)]
-        return x
-
-    def _scaled(self, out: Array) -> Array:
-        out += self._centre
-        out *= 2.0**-BITS
-        return out
+            x = self._shift[k] ^ self._tables[k, 0, first]
+            for part, table in enumerate(self._tables[k, 1:]):
+                x ^= table[(high >> (part * TABLE_BITS)) & (RUN - 1)]
+            row[:] = x
+        return (out + self._centre) * 2.0**-BITS
 
 
 def direction_numbers(dimension: int) -> list[int]:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Literal
@@ -144,23 +144,16 @@ class DesignSpace:
         """Return parameter values of designs by their numbers, in any order, one array per parameter."""
         swept = self._swept(names)
         if self.kind == "product":
-            return self._collected(names, index.size, swept, self._lattice(index, swept))
-        return self._collected(names, index.size, swept, self._sequence.at(index, swept))
+            values = self._lattice(index, swept)
+        else:
+            values = [self.axes[k].at(place) for k, place in zip(swept, self._sequence.at(index, swept), strict=True)]
+        found = {self.axes[k].name: own for k, own in zip(swept, values, strict=True)}
+        wanted = self.names if names is None else names
+        return {name: found[name] if name in found else np.full(index.size, self.fixed[name]) for name in wanted}
 
     def _swept(self, names: Sequence[str] | None) -> list[int]:
         """Return the indices of the wanted axes."""
         return [k for k, axis in enumerate(self.axes) if names is None or axis.name in names]
-
-    def _collected(
-        self, names: Sequence[str] | None, n: int, swept: Sequence[int], places: Iterable[Array]
-    ) -> dict[str, Array]:
-        """Return the wanted columns; ``places`` are the coordinates of the designs on the swept axes."""
-        found = {self.axes[k].name: self._on_axis(k, u) for k, u in zip(swept, places, strict=True)}
-        wanted = self.names if names is None else names
-        return {name: found[name] if name in found else np.full(n, self.fixed[name]) for name in wanted}
-
-    def _on_axis(self, k: int, place: Array) -> Array:
-        return place if self.kind == "product" else self.axes[k].at(place)
 
     def _lattice(self, index: NDArray[np.int64], wanted: Sequence[int]) -> list[Array]:
         columns: list[Array] = []

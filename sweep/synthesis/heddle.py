@@ -105,9 +105,8 @@ def extremes(table: Table, mode: Mode = "exact") -> pd.DataFrame:
     columns: dict[str, Array] = {"mu": found[:, 0], "xi_1": xi[0], "xi_2": xi[1]}
     columns |= {"O2C_1": found[:, 3], "O2C_2": found[:, 4], "vertical_travel": found[:, 5]}
     if with_rod:
-        angles, closed = np.empty((len(matrix), 3)), np.empty(len(matrix), np.uint8)
-        kernels.heddle_lever_angles(_closure(matrix, found, matrix[:, 6:9]), angles, closed)
-        columns |= dict(zip(("lever_angle_1", "lever_angle_2", "lever_swing"), angles.T, strict=True))
+        angles, closed = _lever_angles(_closure(matrix, found, matrix[:, 6:9]))
+        columns |= angles
         status = np.where(status == st.OK, closed, status)
     return _frame(columns | {"status": status}, index_of(table, len(matrix)))
 
@@ -142,12 +141,10 @@ def rods(table: Table, mode: Mode = "exact") -> pd.DataFrame:
     which = np.repeat(np.arange(len(matrix)), shown)
     number = np.arange(len(which)) - (np.cumsum(shown) - shown)[which]
     rod = lengths[which, number]
-    angles, closed = np.empty((len(which), 3)), np.empty(len(which), np.uint8)
     lever = np.column_stack([matrix[which, 6], np.where(np.isnan(rod), 1.0, rod), matrix[which, 8]])
-    kernels.heddle_lever_angles(_closure(matrix[which], found[which], lever), angles, closed)
-    angles[np.isnan(rod)] = np.nan
-    columns = {"rod": number + 1, "BC": rod}
-    columns |= dict(zip(("lever_angle_1", "lever_angle_2", "lever_swing"), angles.T, strict=True))
+    angles, _ = _lever_angles(_closure(matrix[which], found[which], lever))
+    angles = {name: np.where(np.isnan(rod), np.nan, angle) for name, angle in angles.items()}
+    columns = {"rod": number + 1, "BC": rod} | angles
     return _frame(columns | {"status": code[which]}, index_of(table, len(matrix))[which])
 
 
@@ -221,6 +218,13 @@ def _positions(matrix: Array, mode: Mode) -> tuple[Array, np.ndarray]:
     if mode == "exact":
         return both[:, :6], status
     return both[:, 6:], np.where(status == st.NOT_ASSEMBLED, st.OK, status).astype(np.uint8)
+
+
+def _lever_angles(closure: Array) -> tuple[dict[str, Array], np.ndarray]:
+    """Return the angles of the cam lever in both positions and its swing, and the status of the closure."""
+    angles, status = np.empty((len(closure), 3)), np.empty(len(closure), np.uint8)
+    kernels.heddle_lever_angles(closure, angles, status)
+    return dict(zip(("lever_angle_1", "lever_angle_2", "lever_swing"), angles.T, strict=True)), status
 
 
 def _closure(matrix: Array, found: Array, lever: Array) -> Array:

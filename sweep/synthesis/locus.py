@@ -29,6 +29,9 @@ if TYPE_CHECKING:
     from sweep.evaluation.tables import Table
 
 
+ARC_ENDS = 8
+
+
 class Found(NamedTuple):
     """Mechanisms of a requirement: the design matrix, and per row its status and the failed acceptance test, (n,) each.
 
@@ -48,18 +51,22 @@ class Found(NamedTuple):
 class Locus:
     """One form of a requirement on the motion of a follower.
 
-    ``chosen_by`` is the column that distinguishes this form from the others of its family; ``solve`` takes the (n, P)
-    matrix with the columns of ``parameters``; with phi1 it may be complex128, for gradients by the complex step.
-    ``arc_ends`` takes it too and returns the possible ends of arcs of phi1, (n, k), nan for missing ones; None if
-    unknown.
+    ``chosen_by`` is the column that distinguishes this form from the others of its family; ``kernel`` computes designs
+    and the fields of `Found` in ``gives``.  ``arc_ends`` computes the possible ends of arcs of phi1, at most ARC_ENDS,
+    nan for missing ones; None if unknown.
     """
 
     family: str
-    name: str
     parameters: tuple[Parameter, ...]
     chosen_by: str
-    solve: Callable[[Array], Found]
-    arc_ends: Callable[[Array], Array] | None = None
+    kernel: Callable[..., None]
+    gives: tuple[str, ...]
+    arc_ends: Callable[[Array, Array], None] | None = None
+
+    @property
+    def name(self) -> str:
+        """Name of the table in messages."""
+        return f"requirement of {self.family}"
 
     @property
     def parameter_names(self) -> tuple[str, ...]:
@@ -84,6 +91,18 @@ class Locus:
             refuse_rows(bad, matrix[:, self.parameter_names.index(name)], name, allowed)
         return matrix
 
+    def solve(self, matrix: Array) -> Found:
+        """Compute the mechanisms of (n, P) requirements; with phi1 these may be complex128, for exact gradients."""
+        n, names = len(matrix), ({"psi1": "start", "s1": "start"}.get(name, name) for name in self.parameter_names)
+        columns = dict(zip(names, matrix.T, strict=True))
+        status, failed = np.empty(n, np.uint8), np.empty(n, np.uint8)
+        designs = np.empty((n, len(find_family(self.family).parameters)), matrix.dtype)
+        found = {name: np.empty(n, matrix.dtype) for name in self.gives}
+        roots = [np.ascontiguousarray(columns["root"])] if self.has_roots else []
+        self.kernel(matrix, *roots, status, failed, designs, *found.values())
+        known = columns | found
+        return Found(designs, status, failed, known["phi1"], known["start"], known["phi0"])
+
     def _ranges(self, matrix: Array) -> list[tuple[str, str, NDArray[np.bool_]]]:
         columns = dict(zip(self.parameter_names, matrix.T, strict=True))
         ranges = []
@@ -96,37 +115,6 @@ class Locus:
             phi0 = columns["phi0"]
             ranges.append(("phi0", "an angle between 0 and 2 pi", ~((phi0 > 0) & (phi0 < TWO_PI))))
         return ranges
-
-
-def _solved(
-    kernel: Callable[..., None], parameters: int, gives: str, columns: Mapping[str, int], root: int | None = None
-) -> Callable[[Array], Found]:
-    """Return the solver of a requirement by a kernel, for a family with ``parameters`` columns.
-
-    ``columns`` are columns of the requirement copied to :class:`Found`, ``root`` is the column that selects the
-    solution; ``gives`` names the results of the kernel besides the designs.
-    """
-
-    def solve(matrix: Array) -> Found:
-        n = len(matrix)
-        status, failed, designs = np.empty(n, np.uint8), np.empty(n, np.uint8), np.empty((n, parameters), matrix.dtype)
-        found = {name: np.empty(n, matrix.dtype) for name in gives.split()}
-        roots = [] if root is None else [np.ascontiguousarray(matrix[:, root])]
-        kernel(matrix, *roots, status, failed, designs, *found.values())
-        return Found(designs, status, failed, **{name: matrix[:, k] for name, k in columns.items()}, **found)
-
-    return solve
-
-
-def _ends(kernel: Callable[..., None], most: int) -> Callable[[Array], Array]:
-    """Return the function that computes the possible ends of arcs, at most ``most``, by a kernel."""
-
-    def ends(matrix: Array) -> Array:
-        found = np.empty((len(matrix), most))
-        kernel(matrix, found)
-        return found
-
-    return ends
 
 
 _SWING = Parameter("swing", "angle", "rocker angle from the extended to the folded position, with its sign")
@@ -143,22 +131,16 @@ _C = Parameter("c", "length", "rocker", positive=True)
 _DIRECTION = Parameter("direction", "angle", "atan2(g, e): how the offsets of the two axes are to each other")
 _ROOT = Parameter("root", "sign", "which of the two solutions", choices=(-1.0, 1.0), default=1.0)
 
-_rssr_on_locus = _solved(kernels.rssr_on_locus, 8, "start", {"phi0": 1, "phi1": 2})
-_rssr_at_direction = _solved(kernels.rssr_at_direction, 8, "phi1", {"phi0": 1, "start": 2}, root=7)
-_rssr_of_size = _solved(kernels.rssr_of_size, 8, "start", {"phi0": 1, "phi1": 2})
-_rssp_on_locus = _solved(kernels.rssp_on_locus, 6, "start", {"phi0": 1, "phi1": 2})
-_rssp_at_place = _solved(kernels.rssp_at_place, 6, "phi0 phi1", {"start": 1})
-_rssp_at_offset = _solved(kernels.rssp_at_offset, 6, "start phi1", {"phi0": 1}, root=5)
-_rssr_ends, _rssp_ends = _ends(kernels.rssr_arc_ends, 8), _ends(kernels.rssp_arc_ends, 4)
-_RSSR, _RSSP = "requirement of rssr", "requirement of rssp"
 LOCI = (
-    Locus("rssr", _RSSR, (_SWING, _PHI0, _PHI1, _E, _F, _G, _ALPHA), "phi1", _rssr_on_locus, _rssr_ends),
-    Locus("rssr", _RSSR, (_SWING, _PHI0, _PSI1, _E, _F, _G, _ALPHA, _ROOT), "psi1", _rssr_at_direction),
-    Locus("rssr", _RSSR, (_SWING, _PHI0, _PHI1, _C, _F, _DIRECTION, _ALPHA), "direction", _rssr_of_size),
-    Locus("rssp", _RSSP, (_STROKE, _PHI0, _PHI1, _F, _ALPHA), "phi1", _rssp_on_locus, _rssp_ends),
-    Locus("rssp", _RSSP, (_STROKE, _S1, _E, _F, _ALPHA), "s1", _rssp_at_place),
-    Locus("rssp", _RSSP, (_STROKE, _PHI0, _E, _F, _ALPHA, _ROOT), "e", _rssp_at_offset),
-)
+    Locus("rssr", (_SWING, _PHI0, _PHI1, _E, _F, _G, _ALPHA), "phi1", kernels.rssr_on_locus, ("start",),
+          kernels.rssr_arc_ends),
+    Locus("rssr", (_SWING, _PHI0, _PSI1, _E, _F, _G, _ALPHA, _ROOT), "psi1", kernels.rssr_at_direction, ("phi1",)),
+    Locus("rssr", (_SWING, _PHI0, _PHI1, _C, _F, _DIRECTION, _ALPHA), "direction", kernels.rssr_of_size, ("start",)),
+    Locus("rssp", (_STROKE, _PHI0, _PHI1, _F, _ALPHA), "phi1", kernels.rssp_on_locus, ("start",),
+          kernels.rssp_arc_ends),
+    Locus("rssp", (_STROKE, _S1, _E, _F, _ALPHA), "s1", kernels.rssp_at_place, ("phi0", "phi1")),
+    Locus("rssp", (_STROKE, _PHI0, _E, _F, _ALPHA, _ROOT), "e", kernels.rssp_at_offset, ("start", "phi1")),
+)  # fmt: skip
 
 
 def locus(family: str, names: tuple[str, ...]) -> Locus:
@@ -237,7 +219,8 @@ def admissible_arcs(family: str, requirement: Mapping[str, float]) -> list[tuple
         known = [other for other in LOCI if other.family == way.family and other.arc_ends is not None]
         allowed = "; or ".join(", ".join(n for n in other.parameter_names if n != "phi1") for other in known)
         raise InputError("columns", ", ".join(requirement), allowed, "requirement")
-    ends = way.arc_ends(row)
+    ends = np.full((1, ARC_ENDS), np.nan)
+    way.arc_ends(row, ends)
     marks = np.unique(ends[np.isfinite(ends)])
     following = np.append(marks[1:], marks[0] + TWO_PI)
     middles = np.repeat(row, marks.size, axis=0)

@@ -19,7 +19,6 @@ from sweep.errors import InputError
 from sweep.evaluation.angles import AngleUnit, in_radians, plain_names
 from sweep.evaluation.summaries import design_outputs
 from sweep.evaluation.tables import Sheet, design_matrix, index_of, parameter_units, refuse_rows
-from sweep.families import family
 from sweep.families import family as find_family
 from sweep.families.base import Accuracy, Array, Parameter
 from sweep.synthesis.locus import Found, Locus, locus
@@ -226,7 +225,7 @@ def five_links_with_limits(table: Table, h: float) -> pd.DataFrame:
     """
     import pandas as pd
 
-    designs, _ = design_matrix(family("rssr"), table)
+    designs, _ = design_matrix(find_family("rssr"), table)
     n = len(designs)
     state, limits = np.empty(n, np.uint8), np.empty((n, len(rssr.LIMIT_NAMES)))
     rssr.limits(designs, state, limits, None)
@@ -238,14 +237,14 @@ def five_links_with_limits(table: Table, h: float) -> pd.DataFrame:
         [a, b, designs[:, 2:7], np.full(n, float(h)), np.zeros(n), designs[:, 7], np.ones(n)]
     )  # fmt: skip
     there = np.flatnonzero(status == st.OK)
-    turning = design_outputs(family("five_link"), matrix[there], ["psi_ext", "psi_fold"], Accuracy(target=1e-9))
+    turning = design_outputs(find_family("five_link"), matrix[there], ["psi_ext", "psi_fold"], Accuracy(target=1e-9))
     status[there] = turning["status"]
     # the stroke may end elsewhere than at the two places found, if they belong to different assembly modes
     places: Array = np.column_stack([turning["psi_ext"], turning["psi_fold"]])
     apart = places - np.column_stack([ext, fold])[there]
     defect = there[(np.abs(np.sin(0.5 * apart)) > LIMITS_APART).any(axis=1)]
     status[defect], matrix[defect, :2] = st.NOT_ADMISSIBLE, np.nan
-    frame = pd.DataFrame(matrix, index_of(table, n), list(family("five_link").parameter_names))
+    frame = pd.DataFrame(matrix, index_of(table, n), list(find_family("five_link").parameter_names))
     frame["status"] = status
-    frame.attrs["units"] = parameter_units(family("five_link").parameters)
+    frame.attrs["units"] = parameter_units(find_family("five_link").parameters)
     return frame

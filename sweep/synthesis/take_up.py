@@ -9,6 +9,7 @@ parameters in six combinations, (28) of docs/takeup.md.  Fixing e, a or alpha re
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import partial
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -120,15 +121,9 @@ class _Problem:
         scale = np.array([unit if SOUGHT[k] in LENGTHS else 1.0 for k in self.sought])
         low = np.array([1e-9 * unit if SOUGHT[k] == "a" else -np.inf for k in self.sought])
 
-        def errors(x: Array) -> Array:
-            return self.errors(start, x)
-
-        def slopes(x: Array) -> Array:
-            return self.slopes(start, x)
-
         found = least_squares(
-            errors, start[self.sought], slopes, x_scale=scale, bounds=(low, np.inf),
-            xtol=1e-15, ftol=1e-15, gtol=1e-15, max_nfev=500,
+            partial(self.errors, start), start[self.sought], partial(self.slopes, start), x_scale=scale,
+            bounds=(low, np.inf), xtol=1e-15, ftol=1e-15, gtol=1e-15, max_nfev=500,
         )  # fmt: skip
         design = self.design(start, found.x)
         left = self.lengths(design) - self.wanted

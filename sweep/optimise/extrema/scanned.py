@@ -18,7 +18,8 @@ from sweep.reductions.resolution import FEWEST, denser, events
 if TYPE_CHECKING:
     from sweep.optimise.extrema.points import Points
 
-STATIONARY, CROSSING, STATIC, EDGE = 0, 1, 2, 4  # kinds of points (``how``); 3 is PASSING below
+# Kinds of points (``how``): an extremum that approaches a level is stationary, PASSING is a passage of the level.
+STATIONARY, CROSSING, STATIC, PASSING, EDGE = range(5)
 
 Row: TypeAlias = tuple[int, float, float, int, float, float]
 
@@ -72,12 +73,7 @@ def tops(n: int, phi: Array, which: Array, values: Array, curve: Array) -> list[
     return rows
 
 
-NEARING, PASSING = 0, 3  # kinds of points (``how``): an extremum that approaches the level, and a passage of the level
-
-
-def passages(
-    n: int, phi: Array, x: Array, level: float, sense: float
-) -> list[tuple[int, float, float, int, float, float]]:
+def passages(n: int, phi: Array, x: Array, level: float, sense: float) -> list[Row]:
     """Find where samples over the turn pass the level in the given sense, and where they only approach it.
 
     Rows are those of :meth:`sweep.optimise.extrema.points.Points.of`.  The extrema that approach the level without
@@ -90,7 +86,7 @@ def passages(
     found = np.flatnonzero((off < 0.0) & (after >= 0.0))
     near = np.flatnonzero((off < 0.0) & (off > before) & (off >= after))
     passing = [(n, float(phi[j] + step * off[j] / (off[j] - after[j])), sense, PASSING, level, level) for j in found]
-    return passing + [(n, float(phi[j]), sense, NEARING, level, float(x[j])) for j in near]
+    return passing + [(n, float(phi[j]), sense, STATIONARY, level, float(x[j])) for j in near]
 
 
 def first_passage(phi: Array, how: NDArray[np.intp], own: Sequence[int]) -> tuple[int | None, list[int]]:

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import math
-import time
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
@@ -14,6 +12,7 @@ from kernels import status as st
 from sweep.errors import InputError
 from sweep.evaluation.summaries import design_outputs
 from sweep.families.base import Array
+from sweep.jobs.signals import Deadline
 from sweep.optimise.local.kkt import Result
 from sweep.optimise.multistart.multistart import minimise
 from sweep.optimise.multistart.survey import CUT
@@ -166,12 +165,7 @@ def advance(
     if settings.output == problem.objective:
         raise InputError("second output", settings.output, "another output than the objective", PLACE)
     own = [np.atleast_2d(s) for s in ([starts] * len(front.bounds) if isinstance(starts, np.ndarray) else starts)]
-    end = math.inf if settings.time_budget is None else time.monotonic() + settings.time_budget
-
-    def asked() -> bool:
-        return time.monotonic() >= end or (stop is not None and stop())
-
-    plan = steps(front.given)
+    asked, plan = Deadline(settings.time_budget, stop), steps(front.given)
     for number in range(front.taken, len(plan)):
         step = plan[number]
         begin = _begin(front, step, number, own[step.target])

@@ -122,17 +122,14 @@ def _write(
     columns |= {name: designs[:, k] for k, name in enumerate(study.family.parameter_names)}
     columns |= outputs(study, designs) | certificates(results)
     side = "lower" if settings.at_least else "upper"
-    texts = {"bound": (_unit(study, settings.output), f"{side} bound on {settings.output}")}
+    unit = internal_unit(output(study.family, settings.output).unit)
+    texts = {"bound": (unit, f"{side} bound on {settings.output}")}
     state = asdict(replace(kept, results=())) | {"results": [r and noted(r) for r in kept.results]}
     about = {"output": settings.output, "side": "at least" if settings.at_least else "at most"}
     about |= {"complete": str(best.complete).lower(), "steps": f"{kept.taken} of {kept.steps}"}
     about |= {"ended": ended} if ended else {}
     about |= {KEY.decode(): key, STATE.decode(): json.dumps(state)}
     write(path, columns, study, texts, about)
-
-
-def _unit(study: Study, name: str) -> str:
-    return internal_unit(output(study.family, name).unit)
 
 
 def _searched(study: Study, folder: Path) -> tuple[Array, Array]:

@@ -171,8 +171,7 @@ def _differing(problem: Problem, kept: Result, far: dict[str, tuple[float, float
     short, missed = {}, []
     for limit in problem.limits:
         value = far[limit.output][0] if limit.output in far else math.nan
-        low = -math.inf if limit.minimum is None else limit.minimum
-        high = math.inf if limit.maximum is None else limit.maximum
+        low, high = limit.ends
         if limit.output in far and not low <= value <= high:
             short[limit.output] = max(low - value, value - high)
             missed.append(short[limit.output] / (abs(low if value < low else high) or 1.0))

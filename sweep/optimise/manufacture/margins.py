@@ -40,7 +40,7 @@ Levels = Mapping[str, float]
 def bounded(problem: Problem) -> list[Limit]:
     """Return the inequality limits on outputs, which get a margin; limits on parameters apply to the nominal design."""
     own = [x for x in problem.limits if x.output not in problem.family.parameter_names]
-    return [x for x in own if x.minimum is None or x.minimum != x.maximum]
+    return [x for x in own if not x.is_equation]
 
 
 def keyed(problem: Problem) -> dict[str, str]:
@@ -108,7 +108,8 @@ def with_margins(scatter: Scatter, design: Array, levels: Levels, radius: float 
     scatter.look(design)
     curves = {key: curve.times(levels[key]) for key, curve in scatter.curves.items()}
     fixed = {name: (levels[keys[name]] * spread, value) for name, (spread, value) in scatter.single.items()}
-    limits = tuple(_drawn_in(x, fixed[x.output][0]) if x.output in fixed else x for x in problem.limits)
+    # A band narrower than both margins becomes infeasible until a design needs smaller ones.
+    limits = tuple(x.drawn_in(fixed[x.output][0]) if x.output in fixed else x for x in problem.limits)
     close = [x.output for x in problem.limits if x.output in fixed and _close(x, *fixed[x.output])]
     given = {name: change.times(levels[keys[name]]) for name, change in scatter.changes(close).items()}
     lower, upper = problem.lower, problem.upper
@@ -142,7 +143,7 @@ def prices(scatter: Scatter, design: Array, levels: Levels) -> dict[str, Price]:
     model = Model(whole, Program(whole), design, lambda: False)
     state = model.state(whole.scaled(design[None, :])[0])
     found, form, points = model.certificate(state), state.form, state.form.points
-    moved = tuple(_drawn_in(x, MOVED * spreads[x.output][0]) if x.output in spreads else x for x in whole.limits)
+    moved = tuple(x.drawn_in(MOVED * spreads[x.output][0]) if x.output in spreads else x for x in whole.limits)
     other = Program(replace(whole, limits=moved)).lay_out(model.curves, design, points, form.complete, model.scale)
     change = (form.rows(state.atoms, 0.0) - other.rows(state.atoms, 0.0)) / MOVED
     price, weight = dict.fromkeys(keys.values(), 0.0), dict.fromkeys(units, 0.0)
@@ -181,8 +182,7 @@ def excesses(problem: Problem, found: Mapping[str, Array], known: Mapping[str, P
         if key is None:
             lost |= ~meets(limit, values)
             continue
-        low = -math.inf if limit.minimum is None else limit.minimum
-        high = math.inf if limit.maximum is None else limit.maximum
+        low, high = limit.ends
         beyond, unit = np.maximum(low - values, values - high), known[key].spread
         own = beyond / unit if unit > 0.0 else np.where(beyond > 0.0, math.inf, -math.inf)
         own = np.where(np.isnan(own), math.inf, own)
@@ -192,8 +192,8 @@ def excesses(problem: Problem, found: Mapping[str, Array], known: Mapping[str, P
 
 def _close(limit: Limit, room: float, value: float) -> bool:
     """Tell whether a limit is so close that the change of its margin may matter."""
-    low = limit.minimum is not None and value - CLOSE * room < limit.minimum
-    return low or (limit.maximum is not None and value + CLOSE * room > limit.maximum)
+    low, high = limit.ends
+    return value - CLOSE * room < low or value + CLOSE * room > high
 
 
 def _spreads(problem: Problem, design: Array, sigma: Array, names: Sequence[str]) -> dict[str, tuple[float, float]]:
@@ -209,13 +209,6 @@ def _spreads(problem: Problem, design: Array, sigma: Array, names: Sequence[str]
         variance[output] += steep * steep if math.isfinite(steep) else 0.0
         values[output] = value
     return {name: (math.sqrt(v), values[name]) for name, v in variance.items()}
-
-
-def _drawn_in(limit: Limit, room: float) -> Limit:
-    """Return a limit tightened by its margin; a band narrower than both margins becomes infeasible."""
-    low = None if limit.minimum is None else limit.minimum + room
-    high = None if limit.maximum is None else limit.maximum - room
-    return replace(limit, minimum=low, maximum=high)
 
 
 def risk_allocation(excess: Array, prices: Array, share: float, reach: float = math.inf) -> tuple[Array, float]:

@@ -219,7 +219,7 @@ def tolerance_rows(
     ``missing`` (share without it), ``within`` (share that keeps its limits; nan without a limit); a last row
     "all limits" has only ``within``.  The share of 2048 designs is accurate to about 1 %.
     """
-    limits = [limit for limit in limits if limit.minimum is None or limit.minimum != limit.maximum]
+    limits = [limit for limit in limits if not limit.is_equation]
     designs = np.concatenate(
         [design[None, :], deviating(family, design, tolerance, seed, min(SAMPLES, tolerance.samples))]
     )
@@ -337,9 +337,7 @@ def _costs(
 
 def _near(limit: Limit, column: NDArray[np.generic]) -> bool:
     """Tell whether a value violates the limit, or is within one standard deviation of it."""
-    room = math.sqrt(_variance({limit.output: column}, limit))
-    low, high = (None if x is None else x + d for x, d in ((limit.minimum, room), (limit.maximum, -room)))
-    return not meets(replace(limit, minimum=low, maximum=high), column).all()
+    return not meets(limit.drawn_in(math.sqrt(_variance({limit.output: column}, limit))), column).all()
 
 
 def _variance(columns: dict[str, NDArray[np.generic]], limit: Limit) -> float:

@@ -7,7 +7,6 @@ from __future__ import annotations
 
 import math
 import signal
-import time
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import replace
@@ -18,7 +17,7 @@ import numpy as np
 
 from sweep.errors import InputError
 from sweep.families.base import Array
-from sweep.jobs.signals import Stop, stop_on_signal
+from sweep.jobs.signals import Deadline, Stop, stop_on_signal
 from sweep.optimise.local.kkt import Result
 from sweep.optimise.local.model import refuse_dependent
 from sweep.optimise.multistart.parallel import SearchTask, spread_over
@@ -108,7 +107,7 @@ def explore(
     WorkerDied
         if a worker process was killed.
     """
-    end = math.inf if settings.time_budget is None else time.monotonic() + settings.time_budget
+    deadline = Deadline(settings.time_budget, stop)
     begun, results, ended = list[Group](), list[Result](), "starts"
     seen: list[Result] = []
 
@@ -122,7 +121,7 @@ def explore(
     with _signals() as own:
 
         def asked() -> bool:
-            return time.monotonic() >= end or bool(own) or (stop is not None and stop())
+            return bool(own) or deadline()
 
         for group in groups:
             first = len(results)

@@ -224,14 +224,13 @@ def _unseen(met: Counter[int]) -> float:
 def _distinct(problem: Problem, starts: Array, numbers: list[int], source: Sequence[int]) -> int:
     """Return the number of starts that are far apart or come from different sources."""
     place = problem.scaled(starts)
-    others = [c for c in range(starts.shape[1]) if c not in problem.columns]
     least = DISTINCT * math.sqrt(place.shape[1] / 6.0)
     taken: list[int] = []
     for k in sorted(numbers):
         near = (
             np.linalg.norm(place[k] - place[j]) < least
             and source[k] == source[j]
-            and np.array_equal(starts[k, others], starts[j, others])
+            and np.array_equal(starts[k, problem.others], starts[j, problem.others])
             for j in taken
         )
         if not any(near):
@@ -241,8 +240,7 @@ def _distinct(problem: Problem, starts: Array, numbers: list[int], source: Seque
 
 def _kinds(problem: Problem, starts: Array, results: Sequence[Result]) -> tuple[tuple[str, int, int], ...]:
     """Return numbers of starts and basins for each combination of the parameters that are not varied."""
-    others = [c for c in range(starts.shape[1]) if c not in problem.columns]
-    differ = [c for c in others if len(np.unique(starts[:, c])) > 1]
+    differ = [c for c in problem.others if len(np.unique(starts[:, c])) > 1]
     names = problem.family.parameter_names
     count: Counter[str] = Counter()
     basins: dict[str, set[int]] = {}

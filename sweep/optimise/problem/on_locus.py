@@ -17,6 +17,7 @@ from sweep.evaluation.summaries import design_outputs
 from sweep.families.base import Accuracy, Array, Family
 from sweep.families.capabilities import LimitLocus
 from sweep.optimise.problem.statement import Problem
+from sweep.quantities.limits import tightest
 from sweep.study import Limit
 from sweep.synthesis.locus import OnLocus
 
@@ -170,10 +171,9 @@ def _around(problem: Problem, design: Array, links: tuple[str, ...], name: str) 
     names = problem.family.parameter_names
     reach = float(np.abs([design[names.index(link)] for link in links]).max())
     here, parameter = float(design[names.index(name)]), problem.family.parameters[names.index(name)]
-    limits = [limit for limit in problem.limits if limit.output == name]
+    low, high = tightest(problem.limits, name)
     least = SHORTEST * here if parameter.positive else here - reach
-    low = max((x.minimum for x in limits if x.minimum is not None), default=least)
-    return low, min((x.maximum for x in limits if x.maximum is not None), default=here + reach)
+    return least if math.isinf(low) else low, here + reach if math.isinf(high) else high
 
 
 def _directions(

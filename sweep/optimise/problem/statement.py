@@ -105,6 +105,11 @@ class Problem:
         return tuple(k for k, name in enumerate(self.family.parameter_names) if name in changed)
 
     @cached_property
+    def others(self) -> list[int]:
+        """Columns that the variables leave alone: signs, listed and fixed parameters."""
+        return [k for k in range(len(self.family.parameters)) if k not in self.columns]
+
+    @cached_property
     def span(self) -> Array:
         """Upper minus lower bounds (n,)."""
         return np.asarray(self.upper, np.float64) - np.asarray(self.lower, np.float64)

@@ -95,11 +95,10 @@ def kinds(study: Study, problem: Problem, known: Array) -> list[dict[str, float]
     known : (k, P) designs whose combinations come first
     """
     names = problem.family.parameter_names
-    others = [c for c in range(len(names)) if c not in problem.columns]
     designs = np.concatenate([known, drawn(study, LOOKED_AT, study.optimise.seed if study.optimise else 0)])
-    _, first = np.unique(designs[:, others], axis=0, return_index=True)
+    _, first = np.unique(designs[:, problem.others], axis=0, return_index=True)
     chosen = designs[np.sort(first)][:MOST_KINDS]
-    return [{names[c]: float(design[c]) for c in others} for design in chosen]
+    return [{names[c]: float(design[c]) for c in problem.others} for design in chosen]
 
 
 @dataclass(frozen=True)
@@ -203,7 +202,7 @@ def apart(problem: Problem, starts: Array, more: Array, count: int) -> Array:
     """Return the starts and those of ``more`` designs that are not near any of them, at most ``count`` in all."""
     both = np.concatenate([starts, more])
     place = problem.scaled(both)
-    others = [c for c in range(both.shape[1]) if c not in problem.columns]
+    others = problem.others
     least = ALIKE * math.sqrt(place.shape[1] / 6.0)
     taken = list(range(len(starts)))
     for k in range(len(starts), len(both)):

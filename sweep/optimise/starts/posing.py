@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -9,13 +10,14 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from sweep.errors import InputError, MissingInput
-from sweep.families.base import Array, Parameter
+from sweep.families.base import Array
 from sweep.optimise.multistart.multistart import listed
 from sweep.optimise.multistart.survey import Group
 from sweep.optimise.problem.on_locus import LocusCoordinates
 from sweep.optimise.problem.statement import Problem
 from sweep.optimise.starts.dataset import best_rows, drawn, swept_and_sampled
 from sweep.optimise.starts.global_starts import descend_once, from_populations, holding
+from sweep.quantities.limits import Limit, tightest
 
 if TYPE_CHECKING:
     from sweep.study import Study
@@ -83,7 +85,8 @@ def _wanted(study: Study) -> bool:
 def _bounds(study: Study, name: str, designs: Array) -> tuple[float, float] | None:
     """Return the bounds of a parameter or of a prescribed output; None if it is fixed, or a sign."""
     names = study.family.parameter_names
-    parameter = next(p for p in (*study.family.parameters, *_prescribed(study)) if p.name == name)
+    prescribed = () if study.locus is None else study.locus.prescribed
+    parameter = next(p for p in (*study.family.parameters, *prescribed) if p.name == name)
     if parameter.choices is not None:
         return None
     ends = _limited(study, name)
@@ -102,10 +105,7 @@ def _bounds(study: Study, name: str, designs: Array) -> tuple[float, float] | No
     else:
         return None
     least, most, width = low, high, high - low
-    for limit in study.parameter_limits:
-        if limit.output == name:
-            low = low if limit.minimum is None else max(low, limit.minimum)
-            high = high if limit.maximum is None else min(high, limit.maximum)
+    low, high = tightest([Limit(name, low, high), *study.parameter_limits], name)
     if name in (*study.made, *study.rescaled):  # perhaps no design of [locus] or [fit] comes near the limits
         if high <= least:
             low = max(high - width, SHORTEST * high) if parameter.positive else high - width
@@ -116,15 +116,10 @@ def _bounds(study: Study, name: str, designs: Array) -> tuple[float, float] | No
 
 def _limited(study: Study, name: str) -> tuple[float, float] | None:
     """Return the limits of a guide's length, which are its bounds in a global search over proportions."""
-    limits = [x for x in study.parameter_limits if x.output == name and x.maximum is not None]
-    if not _by_populations(study) or not limits:
+    low, high = tightest(study.parameter_limits, name)
+    if study.optimise is None or not study.optimise.by_populations or math.isinf(high):
         return None
-    high = min(x.maximum for x in limits if x.maximum is not None)
-    return max((x.minimum for x in limits if x.minimum is not None), default=SHORTEST * high), high
-
-
-def _prescribed(study: Study) -> tuple[Parameter, ...]:
-    return () if study.locus is None else study.locus.prescribed
+    return SHORTEST * high if math.isinf(low) else low, high
 
 
 def problem_and_starts(
@@ -165,7 +160,8 @@ def problem_of_dataset(study: Study, folder: Path, found: Array) -> Problem:
         if nothing can change, or neither rows nor a sample give a design.
     """
     problem = _known(study, folder)[2]
-    return holding(study, problem, found) if _by_populations(study) else problem
+    by_populations = study.optimise is not None and study.optimise.by_populations
+    return holding(study, problem, found) if by_populations else problem
 
 
 def _known(study: Study, folder: Path) -> tuple[Array, Array, Problem]:
@@ -182,7 +178,3 @@ def _known(study: Study, folder: Path) -> tuple[Array, Array, Problem]:
         allowed = "at least one design that [locus] and [fit] can make"
         raise InputError("design space", study.space.count, allowed, str(study.path))
     return designs, merit, problem_of(study, designs)
-
-
-def _by_populations(study: Study) -> bool:
-    return study.optimise is not None and study.optimise.by_populations

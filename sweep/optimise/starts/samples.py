@@ -284,8 +284,7 @@ def diverse(problem: Problem, designs: Array, merit: Array, count: int, least: f
     """
     order = np.argsort(merit, kind="stable")
     ranked = designs[order[np.isfinite(merit[order])]]
-    others = [c for c in range(designs.shape[1]) if c not in problem.columns]
-    _, kind = np.unique(ranked[:, others], axis=0, return_inverse=True)
+    _, kind = np.unique(ranked[:, problem.others], axis=0, return_inverse=True)
     return ranked[spread(problem.scaled(ranked), kind.reshape(-1), count, least)]
 
 

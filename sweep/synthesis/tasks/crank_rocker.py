@@ -5,7 +5,7 @@ Task 4 is its planar case, the problem of Alt.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 from functools import lru_cache
 from typing import Literal, TypeAlias
@@ -34,7 +34,7 @@ def turn(poses: int = POSES) -> Angles:
     return Angles.of(phi)
 
 
-def _rows(*columns: Array | float) -> Array:
+def side_by_side(*columns: Array | float) -> Array:
     """Return columns, or numbers that represent whole columns, side by side."""
     return np.column_stack(np.broadcast_arrays(*columns)).astype(np.float64)
 
@@ -43,44 +43,16 @@ def designs_on_locus(
     swing: Number, phi0: Number, phi1: Array, e: Number, f: Number, g: Number, alpha: Number
 ) -> tuple[Array, Array]:
     """Return designs (n, 8) and rocker angles psi1 (n,) of the extended position; nan if a test (i)-(iii) fails."""
-    requirements = _rows(swing, phi0, phi1, e, f, g, alpha)
+    requirements = side_by_side(swing, phi0, phi1, e, f, g, alpha)
     n = len(requirements)
     designs, psi1 = np.empty((n, 8)), np.empty(n)
     kernels.rssr_on_locus(requirements, np.empty(n, np.uint8), np.empty(n, np.uint8), designs, psi1)
     return designs, psi1
 
 
-@dataclass(frozen=True)
-class LocusPoint:
-    """Points of the locus before the choice of f, a, b, (n,) each: ball X, Y about the rocker axis, rho1 and rho2."""
-
-    x: Array
-    y: Array
-    rho1: Array
-    rho2: Array
-
-    @classmethod
-    def of(cls, swing: Number, phi0: Number, phi1: Array, e: float, g: Number, alpha: Number) -> LocusPoint:
-        """Return the points at crank angles phi1."""
-        requirements = _rows(swing, phi0, phi1, e, 0.0, g, alpha)
-        points = np.empty((len(requirements), 4))
-        kernels.rssr_points(requirements, points)
-        return cls(*points.T)
-
-    def turned(self, angle: Number) -> tuple[Array, Array]:
-        """Return X, Y after the rocker has turned by an angle."""
-        c, s = np.cos(angle), np.sin(angle)
-        return self.x * c - self.y * s, self.x * s + self.y * c
-
-
-def motion(designs: Array, angles: Angles, *wanted: str) -> list[Array]:
-    """Return pose outputs of crank-rockers, (n, m) each, nan if there is no mechanism."""
-    return RSSR.values(designs, angles, *wanted)
-
-
 def acceleration(designs: Array) -> Array:
     """Return the acceleration analogue of the rocker over a turn, (n, POSES)."""
-    return with_tops(motion(designs, turn(), "d2psi")[0])
+    return with_tops(RSSR.values(designs, turn(), "d2psi")[0])
 
 
 def with_tops(curve: Array) -> Array:
@@ -96,13 +68,19 @@ def with_tops(curve: Array) -> Array:
     return raised
 
 
+def outputs_of(designs: Array, names: Iterable[str], accuracy: Accuracy) -> dict[str, Array]:
+    """Return design outputs of crank-rockers, (n,) each; nan if there is no mechanism."""
+    alive = np.isfinite(designs).all(axis=1)
+    found = design_outputs(RSSR, designs[alive], list(names), accuracy)
+    whole = {name: np.full(len(designs), np.nan) for name in names}
+    for name, column in whole.items():
+        column[alive] = found[name]
+    return whole
+
+
 def least_cos2(designs: Array) -> Array:
     """Return the smallest cos^2 of the pressure angle over the turn, exact; nan if there is no mechanism."""
-    whole = np.full(len(designs), np.nan)
-    alive = np.isfinite(designs).all(axis=1)
-    found = design_outputs(RSSR, designs[alive], ["margin"], _EXACT)
-    whole[alive] = found["margin"]
-    return whole
+    return outputs_of(designs, ["margin"], _EXACT)["margin"]
 
 
 def pressure_limit(designs: Array, largest: float) -> Array:
@@ -191,7 +169,7 @@ class EngineeringMethod(OnLocus):
         """
         f: Array = np.linspace(*self.f_range, offsets, dtype=np.float64)
         phi1: Array = np.arange(places, dtype=np.float64) * (2.0 * np.pi / places)
-        kept = np.array([(self.evaluate(_rows(phi1, one)).limits >= 0.0).all(axis=1).any() for one in f])
+        kept = np.array([(self.evaluate(side_by_side(phi1, one)).limits >= 0.0).all(axis=1).any() for one in f])
         edges = np.flatnonzero(np.diff(np.concatenate([[False], kept, [False]]).astype(np.int8)))
         return [(float(f[a]), float(f[b - 1])) for a, b in edges.reshape(-1, 2)]
 

@@ -12,7 +12,7 @@ from sweep.errors import InputError
 from sweep.evaluation.summaries import design_outputs
 from sweep.families import slotted
 from sweep.families.base import Accuracy, Angles, Array, floats
-from sweep.synthesis.tasks.crank_rocker import OnLocus, motion, named, pressure_limit, turn, with_tops
+from sweep.synthesis.tasks.crank_rocker import RSSR, OnLocus, named, pressure_limit, turn, with_tops
 from sweep.synthesis.tasks.problem import Found, Unknown, ranges, turning
 from sweep.synthesis.tasks.second_stage import RSSP, chain_motion, second_pressure_limit
 
@@ -88,7 +88,7 @@ class Task5(OnLocus):
         e2 = x["ratio"] * a2
 
         def rho_at(dphi: Array) -> tuple[Slot, Array, Array]:
-            psi, dpsi, d2psi = motion(designs, Angles.of(phi1[:, None] + dphi), "psi", "dpsi", "d2psi")
+            psi, dpsi, d2psi = RSSR.values(designs, Angles.of(phi1[:, None] + dphi), "psi", "dpsi", "d2psi")
             return slot(a2, e2, t1[:, None] + self.kappa * (psi - psi1[:, None])), dpsi, d2psi
 
         here, dpsi, d2psi = rho_at(turn().phi)
@@ -188,7 +188,7 @@ class Task8(OnLocus):
     def _deviation(self, designs: Array, phi1: Array, psi1: Array, theta: Array, lengths: Array) -> Array:
         """Return the largest distance from the dwell position during the dwell."""
         window = np.linspace(-0.5 * self.dwell, 0.5 * self.dwell, WINDOW)
-        turned = motion(designs, Angles.of(phi1[:, None] + window), "psi")[0] - psi1[:, None]
+        turned = RSSR.values(designs, Angles.of(phi1[:, None] + window), "psi")[0] - psi1[:, None]
         rest = np.full((len(designs), 2), [self.alpha2, float(self.branch)])
         stage = np.column_stack([lengths, rest])
         (s,) = RSSP.values(stage, Angles.of(theta[:, None] + self.kappa * turned), "s")

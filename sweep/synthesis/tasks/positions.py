@@ -12,16 +12,17 @@ from typing import NamedTuple
 
 import numpy as np
 
+from kernels import synthesis as kernels
 from sweep.errors import InputError
 from sweep.families.base import Array
 from sweep.synthesis.tasks.crank_rocker import (
-    LocusPoint,
     Number,
     OnLocus,
     acceleration,
     designs_on_locus,
     named,
     pressure_limit,
+    side_by_side,
 )
 from sweep.synthesis.tasks.problem import Found, Task, Unknown, ranges, turning
 
@@ -35,42 +36,34 @@ class Position(NamedTuple):
     dpsi: float
 
 
-class Through(NamedTuple):
-    """Crank-rockers (n, 8) through positions: residuals of their closure and slacks of their branch by name, (n,)."""
-
-    designs: Array
-    residuals: dict[str, Array]
-    slacks: dict[str, Array]
-
-
 def through_positions(
-    swing: Number,
-    phi0: Number,
-    phi1: Array,
-    e: float,
-    g: Number,
-    alpha: Number,
-    positions: tuple[Position, ...],
-    f: float = 0.0,
-) -> Through:
+    task: Task1 | Task2, swing: Number, phi0: Number, phi1: Array, g: Number, alpha: Number, f: float = 0.0
+) -> Found:
     """Return crank-rockers on the locus whose f puts them through the first position, with residuals of the others.
 
     Equation (15) of docs/synthesis.md.  With sin(alpha) = 0 the closure does not contain f: the given f is used and
     the first position is a residual like the others.  Residuals are relative to the squared mean distance of the rocker
     ball from the crank axis.
     """
-    point = LocusPoint.of(swing, phi0, phi1, e, g, alpha)
+    points, e = np.empty((len(phi1), 4)), task.e
+    kernels.rssr_points(side_by_side(swing, phi0, phi1, e, 0.0, g, alpha), points)
+    x1, y1, rho1, rho2 = points.T  # of the ball, about the rocker axis
+
+    def turned(angle: Number) -> tuple[Array, Array]:
+        c, s = np.cos(angle), np.sin(angle)
+        return x1 * c - y1 * s, x1 * s + y1 * c
+
     sa, ca = np.sin(alpha), np.cos(alpha)
     h = g * sa
-    x2, y2 = point.turned(swing)
-    both = point.rho1 + point.rho2
-    a0, a1 = e * (point.x - x2) / both, -sa * (point.y - y2) / both
+    x2, y2 = turned(swing)
+    both = rho1 + rho2
+    a0, a1 = e * (x1 - x2) / both, -sa * (y1 - y2) / both
     moved = []
-    for position in positions:
-        x, y = point.turned(position.dpsi)
+    for position in task.positions:
+        x, y = turned(position.dpsi)
         angle = phi1 + position.dphi
-        ahead = np.cos(angle) * (e + x) + np.sin(angle) * (ca * y - h) - point.rho1
-        moved.append((e * (x - point.x) - a0 * ahead, sa * (y - point.y) + a1 * ahead))
+        ahead = np.cos(angle) * (e + x) + np.sin(angle) * (ca * y - h) - rho1
+        moved.append((e * (x - x1) - a0 * ahead, sa * (y - y1) + a1 * ahead))
     free = bool((np.abs(sa) > PLANAR).all())
     with np.errstate(divide="ignore", invalid="ignore"):
         offset = moved[0][0] / moved[0][1] if free else np.full(len(phi1), f)
@@ -78,11 +71,10 @@ def through_positions(
     designs, psi1 = designs_on_locus(swing, phi0, phi1, e, offset, g, alpha)
     scale = (0.5 * both) ** 2
     residuals = {f"position {k}": (p - offset * q) / scale for k, (p, q) in enumerate(moved, 1) if k > free}
-    slacks = {
-        f"branch at position {k}": _branch_slack(designs, psi1 + p.dpsi, phi1 + p.dphi)
-        for k, p in enumerate(positions, 1)
-    }
-    return Through(designs, residuals, slacks)
+    limits = {"pressure angle": pressure_limit(designs, task.max_pressure_angle)}
+    for k, p in enumerate(task.positions, 1):
+        limits[f"branch at position {k}"] = _branch_slack(designs, psi1 + p.dpsi, phi1 + p.dphi)
+    return Found(residuals, limits, acceleration(designs), named(designs))
 
 
 def _branch_slack(designs: Array, psi: Array, phi: Array) -> Array:
@@ -91,11 +83,6 @@ def _branch_slack(designs: Array, psi: Array, phi: Array) -> Array:
     x, y = e - a * np.cos(phi), f * np.sin(alpha) + a * np.cos(alpha) * np.sin(phi)
     slack: Array = -branch * (x * np.sin(psi) + y * np.cos(psi)) / b
     return slack
-
-
-def _passing(task: Task, through: Through) -> Found:
-    limits = {"pressure angle": pressure_limit(through.designs, task.max_pressure_angle)} | through.slacks
-    return Found(through.residuals, limits, acceleration(through.designs), named(through.designs))
 
 
 @dataclass(frozen=True)
@@ -131,8 +118,7 @@ class Task1(OnLocus):
 
     def found(self, x: Mapping[str, Array]) -> Found:
         """Compute equations, limits, curve and mechanisms of candidates from their unknowns, (n,) each."""
-        given = (self.swing, self.phi0, x["phi1"], self.e, self.g, self.alpha)
-        return _passing(self, through_positions(*given, self.positions, self.f))
+        return through_positions(self, self.swing, self.phi0, x["phi1"], self.g, self.alpha, self.f)
 
 
 @dataclass(frozen=True)
@@ -180,4 +166,4 @@ class Task2(Task):
     def found(self, x: Mapping[str, Array]) -> Found:
         """Compute equations, limits, curve and mechanisms of candidates from their unknowns, (n,) each."""
         g, alpha = x.get("g", self.g), x.get("alpha", self.alpha)
-        return _passing(self, through_positions(x["swing"], x["phi0"], x["phi1"], self.e, g, alpha, self.positions))
+        return through_positions(self, x["swing"], x["phi0"], x["phi1"], g, alpha)

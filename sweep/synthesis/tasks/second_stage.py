@@ -18,7 +18,7 @@ from sweep.evaluation.summaries import design_outputs
 from sweep.evaluation.tables import design_matrix
 from sweep.families import family
 from sweep.families.base import Accuracy, Angles, Array
-from sweep.synthesis.tasks.crank_rocker import RSSR, motion, named, turn, with_tops
+from sweep.synthesis.tasks.crank_rocker import RSSR, named, turn, with_tops
 from sweep.synthesis.tasks.problem import Found, Task, Unknown, turning
 
 RSSP = family("rssp")
@@ -127,7 +127,7 @@ class RockerSlider(FourBar):
     def over_the_turn(self, drive: Drive, columns: Mapping[str, Array]) -> tuple[Array, Array | None]:
         """Return acceleration along ``lam2`` and pressure angle over a turn of the drive, (n, m)."""
         d2s, angle = chain_motion(self.family, columns, "d2s", "pressure_angle2")
-        psi, dpsi, d2psi = motion(drive.row[None, :], turn(), "psi", "dpsi", "d2psi")
+        psi, dpsi, d2psi = RSSR.values(drive.row[None, :], turn(), "psi", "dpsi", "d2psi")
         kappa, offset, lam = (columns[name][:, None] for name in ("kappa2", "offset2", "lam2"))
         with np.errstate(invalid="ignore"):  # if a linkage does not reach, all its values are nan
             share = ((columns["xi2"] + 1j * columns["eta2"]) / columns["b2"])[:, None]
@@ -283,8 +283,9 @@ class Task7(Task):
                 raise InputError(name, value, "the sign with which the slider turns round there", "Task7")
         first = Drive.of(self.drive, "Task7")
         ends = Angles.of(np.array([[first.phi_ext, first.phi_fold]]))
+        (accelerations,) = RSSR.values(first.row[None, :], ends, "d2psi")
         object.__setattr__(self, "_first", first)
-        object.__setattr__(self, "_second_derivatives", tuple(motion(first.row[None, :], ends, "d2psi")[0][0].tolist()))
+        object.__setattr__(self, "_second_derivatives", tuple(accelerations[0].tolist()))
 
     @property
     def unknowns(self) -> tuple[Unknown, ...]:

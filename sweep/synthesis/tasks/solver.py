@@ -6,13 +6,14 @@ are central differences, all rows in one call of the problem, whose kernels are 
 
 from __future__ import annotations
 
-from typing import Any, NamedTuple
+from collections.abc import Sequence
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from sweep.families.base import Array
-from sweep.synthesis.tasks.problem import Solution, SynthesisTask
+from sweep.synthesis.tasks.problem import Candidates, Solution, SynthesisTask
 
 BLOCK = 1024
 STEP = 3e-6  # step of central differences, in units of the box
@@ -22,12 +23,6 @@ WIDEST = 0.15  # initial radius of a step, in units of the box
 MET = 1e-9  # largest residual and violation of a feasible solution
 ENOUGH, ALIKE = 4, 1e-4  # number of samples that have to end at the best objective, to this relative difference
 APART = 1e-2  # share of the box: closer solutions count as the same
-
-
-class _Value(NamedTuple):
-    equations: Array
-    limits: Array
-    curve: Array
 
 
 class _Scaled:
@@ -44,25 +39,23 @@ class _Scaled:
         x: Array = self.low + self.span * np.where(self.periodic, z % 1.0, z)
         return x
 
-    def rows(self, z: Array) -> _Value:
+    def rows(self, z: Array) -> Candidates:
         """Return equations, limits and curves at points (n, k)."""
-        found = self.problem.evaluate(self.real(np.atleast_2d(z)))
-        return _Value(found.equations, found.limits, found.curve)
+        return self.problem.evaluate(self.real(np.atleast_2d(z)))
 
-    def with_gradient(self, z: Array) -> tuple[_Value, _Value]:
+    def with_gradient(self, z: Array) -> tuple[Candidates, Candidates]:
         """Return the values at z and their derivatives, (k, ...) each; one-sided if a neighbour has no mechanism."""
         k = z.size
         steps = STEP * np.eye(k)
-        both = self.rows(np.vstack([z[None, :], z + steps, z - steps]))
-        here, slopes = [], []
-        for values in both:
+
+        def slope(values: Array) -> Array:
             centre, ahead, behind = values[0], values[1 : k + 1], values[k + 1 :]
-            slope = (ahead - behind) / (2.0 * STEP)
-            slope = np.where(np.isnan(slope), (ahead - centre) / STEP, slope)
-            slope = np.where(np.isnan(slope), (centre - behind) / STEP, slope)
-            here.append(centre)
-            slopes.append(np.nan_to_num(slope))
-        return _Value(*here), _Value(*slopes)
+            found = (ahead - behind) / (2.0 * STEP)
+            found = np.where(np.isnan(found), (ahead - centre) / STEP, found)
+            return np.nan_to_num(np.where(np.isnan(found), (centre - behind) / STEP, found))
+
+        at, limits, curve, _ = self.rows(np.vstack([z[None, :], z + steps, z - steps]))
+        return Candidates(at[0], limits[0], curve[0], {}), Candidates(slope(at), slope(limits), slope(curve), {})
 
 
 def solve(
@@ -93,11 +86,12 @@ def solve(
     best: list[float] = []
     while len(best) < samples and not _met(best):
         ends = [_refined(scaled, z) for z in _starts(scaled, candidates, starts, (seed, len(best)))]
-        found = [_solution(problem, scaled, z) for z in ends]
+        found = [_solution(problem, scaled.real(z)) for z in ends]
         best.append(min((s.objective for s in found if s.feasible), default=np.inf))
         solutions += found
     solutions.sort(key=lambda s: (not s.feasible, s.objective if s.feasible else _miss(s)))
-    return _distinct(scaled, solutions)[:starts]
+    places = [(np.array([*s.unknowns.values()]) - scaled.low) / scaled.span for s in solutions]
+    return [solutions[n] for n in _apart(scaled, places, APART, starts)]
 
 
 def _met(best: list[float]) -> bool:
@@ -129,15 +123,17 @@ def _starts(scaled: _Scaled, candidates: int, starts: int, seed: tuple[int, int]
     points, miss, height = points[alive], miss[alive], height[alive]
     # Candidates violate equations anyway: rank them by violation, then by objective.
     rank = np.log(np.maximum(miss, 1e-3)) + np.log(height / np.median(height) + 1e-12)
-    chosen: list[Array] = []
-    apart = 0.5 * starts ** (-1.0 / k) * 0.5
-    for index in np.argsort(rank, kind="stable"):
-        z = points[index]
-        if all(_distance(scaled, z, other) > apart for other in chosen):
-            chosen.append(z)
-        if len(chosen) == starts:
-            break
-    return chosen
+    ranked = points[np.argsort(rank, kind="stable")]
+    return [ranked[n] for n in _apart(scaled, ranked, 0.5 * starts ** (-1.0 / k) * 0.5, starts)]
+
+
+def _apart(scaled: _Scaled, places: Sequence[Array] | Array, least: float, most: int) -> list[int]:
+    """Return the indices of the first places that are farther than ``least`` from those before them."""
+    kept: list[int] = []
+    for n, z in enumerate(places):
+        if len(kept) < most and all(_distance(scaled, z, places[other]) > least for other in kept):
+            kept.append(n)
+    return kept
 
 
 def _distance(scaled: _Scaled, one: Array, other: Array) -> float:
@@ -145,13 +141,13 @@ def _distance(scaled: _Scaled, one: Array, other: Array) -> float:
     return float(np.where(scaled.periodic, np.minimum(gap % 1.0, 1.0 - gap % 1.0), gap).max())
 
 
-def _violation(value: _Value) -> Array:
+def _violation(value: Candidates) -> Array:
     rows = [np.abs(value.equations), np.maximum(-value.limits, 0.0)]
     worst: Array = np.concatenate(rows, axis=1).max(axis=1, initial=0.0)
     return worst
 
 
-def _feasible(value: _Value) -> bool:
+def _feasible(value: Candidates) -> bool:
     """Tell whether one point is a mechanism that satisfies equations and limits."""
     return bool(np.isfinite(value.curve).all() and _violation(value)[0] <= MET)
 
@@ -256,22 +252,10 @@ def _descended(scaled: _Scaled, z: Array, top: float, used: NDArray[np.bool_], r
     return point if np.isfinite(point).all() else z
 
 
-def _distinct(scaled: _Scaled, solutions: list[Solution]) -> list[Solution]:
-    """Return the solutions that differ from all better ones."""
-    places = [(np.array([*s.unknowns.values()]) - scaled.low) / scaled.span for s in solutions]
-    kept: list[int] = []
-    for k in range(len(places)):
-        if all(_distance(scaled, places[k], places[other]) > APART for other in kept):
-            kept.append(k)
-    return [solutions[k] for k in kept]
-
-
-def _solution(problem: SynthesisTask, scaled: _Scaled, z: Array) -> Solution:
-    x = scaled.real(z)
+def _solution(problem: SynthesisTask, x: Array) -> Solution:
     found = problem.evaluate(x[None, :])
-    value = _Value(found.equations, found.limits, found.curve)
     return Solution(
-        _feasible(value),
+        _feasible(found),
         float(np.abs(found.curve).max()),
         _named([u.name for u in problem.unknowns], x),
         {name: float(column[0]) for name, column in found.results.items()},

@@ -14,7 +14,7 @@ from sweep.errors import InputError
 from sweep.evaluation.summaries import design_outputs
 from sweep.evaluation.tables import design_matrix
 from sweep.families.base import Accuracy, Array, floats
-from sweep.synthesis.tasks.crank_rocker import RSSR, acceleration, designs_on_locus, named, pressure_limit
+from sweep.synthesis.tasks.crank_rocker import RSSR, acceleration, designs_on_locus, named, outputs_of, pressure_limit
 from sweep.synthesis.tasks.problem import Found, Task, Unknown, ranges, turning
 
 if TYPE_CHECKING:
@@ -99,24 +99,13 @@ class Task3(Task):
             results[self._value(k)] = design[:, RSSR.parameter_names.index(self.adjusted)] = x[self._value(k)]
             design[np.isnan(first).any(axis=1) | (design[:, :3] <= 0.0).any(axis=1)] = np.nan
             designs.append(design)
-            equations |= {f"{name} of setting {k}": missed for name, missed in _missed(design, setting).items()}
+            reached = outputs_of(design, setting.asked, _EXACT)
+            equations |= {f"{name} of setting {k}": reached[name] - value for name, value in setting.asked.items()}
         limits = {
             f"pressure angle of setting {k}": pressure_limit(design, self.max_pressure_angle)
             for k, design in enumerate(designs, 1)
         }
         return Found(equations, limits, np.hstack([acceleration(design) for design in designs]), results)
-
-
-def _missed(designs: Array, setting: Setting) -> dict[str, Array]:
-    """Return the errors of designs against the requirements of a setting; nan if there is no mechanism."""
-    alive = np.flatnonzero(np.isfinite(designs).all(axis=1))
-    found = design_outputs(RSSR, designs[alive], list(setting.asked), _EXACT)
-    missed = {}
-    for name, value in setting.asked.items():
-        column = np.full(len(designs), np.nan)
-        column[alive] = np.asarray(found[name], np.float64) - value
-        missed[name] = column
-    return missed
 
 
 def adjustments(design: Mapping[str, float]) -> pd.DataFrame:
