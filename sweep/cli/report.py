@@ -29,7 +29,7 @@ from sweep.report.page import write_comparison, write_report
 @click.command()
 @FOLDER
 @click.argument("others", nargs=-1, type=IS_FOLDER)
-@click.option("--out", type=A_FOLDER, help="Default: beside the chunks.")
+@click.option("--out", type=A_FOLDER, help="A folder; default: beside the chunks.")
 def report(folder: Path, others: tuple[Path, ...], out: Path | None) -> None:
     """Write report.html, figures and tables about a dataset.
 
@@ -40,6 +40,8 @@ def report(folder: Path, others: tuple[Path, ...], out: Path | None) -> None:
     With OTHERS, folders of the same mechanism, comparison.html instead: all results side by side, dimensions, outputs,
     limits, curves and motion, judged by the study of FOLDER.
     """
+    if out is not None and out.suffix == ".html":
+        raise InputError("--out", out.name, "a folder, into which the page is written", "command line")
     if others:
         click.echo(f"report: {write_comparison([folder, *others], out or beside(located(folder)))}")
         return
@@ -96,9 +98,7 @@ class Options(TypedDict):
 @click.option("--phi", type=float, default=0.0, show_default=True, help="Of mechanism: crank angle [rad].")
 @ANGLES
 @click.option("--view", help="Of mechanism: space, xy, zy or xz.")
-@click.option(
-    "--positions", type=click.IntRange(min=1), default=1, show_default=True, help="Of mechanism, over its turn."
-)
+@click.option("--positions", type=click.IntRange(min=1), default=1, show_default=True, help="Of mechanism, in a turn.")
 @click.option("--output", help="Of tolerance: the output whose histogram is drawn; all in percent if left out.")
 def draw(what: str, source: str, table: Path | None, out: Path, **options: Unpack[Options]) -> None:
     """Draw one picture.

@@ -230,7 +230,7 @@ def _of_csv(file: Path, scale: float) -> tuple[Groups, bool]:
     table = _in_mm(table.rename(columns=str.strip), file, scale)
     for column in ("name", "x", "y", "z"):
         if column not in table:
-            raise InputError("column", column, "the columns name, x, y, z", str(file))
+            raise MissingInput(column, "the columns name, x, y, z", str(file))
     exported = {"member", "stage", "frame"} <= set(table)
     labels = [""] * len(table)
     if exported:

@@ -46,6 +46,7 @@ finally:
         (("run", ".", "--jobs", "0"), "0 is not in the range x>=1"),
         (("eval", "rssr", "nowhere.csv", "--want", "psi"), "does not exist"),
         (("report", "."), "a dataset folder, with a readable _plan.json"),
+        (("report", ".", "--out", "page.html"), "allowed: a folder, into which the page is written"),
     ],
 )
 def test_wrong_use_ends_with_2_and_no_traceback(tmp_path: Path, arguments: tuple[str, ...], words: str) -> None:

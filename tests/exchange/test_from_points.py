@@ -229,4 +229,4 @@ def test_verb_reads_a_table_of_points_and_writes_a_design(tmp_path):
         assert done.exit_code == 2 and "row 1: z" in done.output and "'2 mm'; allowed: a number" in done.output
     file.write_text("name,x,y\nA,0,0\n")
     done = CliRunner().invoke(main, ["points", "rssr", str(file)])
-    assert done.exit_code == 2 and "the columns name, x, y, z" in done.output
+    assert done.exit_code == 2 and "is missing; needed: the columns name, x, y, z" in done.output

@@ -74,13 +74,13 @@ function show(answer) {
   steady = true;
   const heads = ["in hand", ...pins.map((p) => p.name)];
   const limits = answer.limits.map((row) => [[row.symbol, row.name], [row.bound], ...row.values.map((value, k) => {
-    const slack = row.slack[k], words = { missed: slack ? `by ${slack}` : "missed", active: "just", unknown: "?" }[row.states[k]];
-    return [value, "", words ?? (slack ? `${slack} left` : "kept"), `state ${row.states[k]}`];
+    const slack = row.slack[k], words = { missed: slack ? `by ${slack}` : "missed", active: "active", unknown: "?" }[row.states[k]];
+    return [value, "", words ?? (slack ? `${slack} to spare` : "met"), `state ${row.states[k]}`];
   })]);
   const outputs = answer.outputs.map((row) => [[row.symbol, row.text], ...row.values.map((value, k) => [value, "", row.fast[k], "fast"])]);
   const frame = by("limits").parentElement;
   frame.hidden = frame.previousElementSibling.hidden = !limits.length;
-  table(by("limits"), ["limit", "asked", ...heads], limits, 2);
+  table(by("limits"), ["limit", "required", ...heads], limits, 2);
   table(by("outputs"), ["output", ...heads], outputs, 1);
   answer.outputs.forEach((row, k) => { by("outputs").tBodies[0].rows[k].cells[1].dataset.output = row.name; });
 }
