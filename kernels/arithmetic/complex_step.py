@@ -1,4 +1,4 @@
-"""Angles of numbers that may be complex: what the kernels need so that exact gradients come by the complex step.
+"""Arctangent and magnitude of numbers that may be complex, for exact gradients by the complex step.
 
 A kernel fed with complex128 designs (p + i h) returns y(p) + i h dy/dp through the same source.  Sums, products and
 ``np.sqrt`` do this by themselves; decisions are taken on the real part; only the four-quadrant arctangent and the
@@ -96,6 +96,6 @@ def _hypotenuse_typed(x: Any, y: Any) -> Any:
 
 @inline
 def unit_near(size: Any) -> tuple[float, float]:
-    """Power of two near a number and one over it, by which lengths are brought to the unit range without rounding."""
+    """Power of two near a number, and its reciprocal: factors that bring lengths near 1 without rounding."""
     _, exponent = math.frexp(size.real)
     return math.ldexp(1.0, exponent), math.ldexp(1.0, -exponent)

@@ -39,7 +39,7 @@ _fma: Any = intrinsic(_fused_typed)
 
 
 def fused(a: float, b: float, c: float) -> float:
-    """Compute a b + c rounded once; a processor without such an instruction takes a library, with the same bits."""
+    """Compute a b + c with one rounding; without that instruction a library does it, to the same bits."""
     if not (math.isfinite(a) and math.isfinite(b) and math.isfinite(c)):
         return a * b + c
     return float(Fraction(a) * Fraction(b) + Fraction(c))
@@ -55,9 +55,9 @@ def _fused_overload(a: float, b: float, c: float) -> Any:
 
 @inline
 def two_sum(a: float, b: float) -> Twofold:
-    """Give the rounded sum of a and b and its rounding error, which is exact (Knuth)."""
+    """Compute the rounded sum of a and b and its rounding error, which is exact (Knuth)."""
     s = a + b
-    # t is the part of b that arrived in s; what is lacking of a and of b is the error, whichever of them is larger.
+    # t is the part of b that s contains; the error is what s lacks of a and of b, whichever of the two is larger.
     t = s - a
     return s, (a - (s - t)) + (b - t)
 
@@ -71,41 +71,41 @@ def normal(high: float, low: float) -> Twofold:
 
 @inline
 def two_product(a: float, b: float) -> Twofold:
-    """Give the rounded product of a and b and its rounding error, exact while the error is a normal number."""
+    """Compute the rounded product of a and b and its rounding error, exact while the error is a normal number."""
     p = a * b
     return p, fused(a, b, -p)
 
 
 @inline
 def add(a: Twofold, b: Twofold) -> Twofold:
-    """Give the sum a + b; its error is relative to |a| + |b|, not to the sum."""
+    """Compute the sum a + b; its error is relative to |a| + |b|, not to the sum."""
     s, e = two_sum(a[0], b[0])
     return normal(s, e + (a[1] + b[1]))
 
 
 @inline
 def subtract(a: Twofold, b: Twofold) -> Twofold:
-    """Give the difference a - b; its error is relative to |a| + |b|, not to the difference."""
+    """Compute the difference a - b; its error is relative to |a| + |b|, not to the difference."""
     return add(a, (-b[0], -b[1]))
 
 
 @inline
 def multiply(a: Twofold, b: Twofold) -> Twofold:
-    """Give the product a b."""
+    """Compute the product a b."""
     p, e = two_product(a[0], b[0])
     return normal(p, fused(a[0], b[1], fused(a[1], b[0], e)))
 
 
 @inline
 def scale(a: Twofold, b: float) -> Twofold:
-    """Give the product a b for a plain number b."""
+    """Compute the product a b for a plain number b."""
     p, e = two_product(a[0], b)
     return normal(p, fused(a[1], b, e))
 
 
 @inline
 def divide(a: Twofold, b: Twofold, per_b: float) -> Twofold:
-    """Give the quotient a/b; ``per_b`` is 1/b as a plain number, which several quotients share.
+    """Compute the quotient a/b; ``per_b`` is 1/b as a plain number, which several quotients share.
 
     One step of long division: the remainder of the rounded quotient corrects it.
     """
@@ -116,7 +116,7 @@ def divide(a: Twofold, b: Twofold, per_b: float) -> Twofold:
 
 @inline
 def root(a: Twofold) -> Twofold:
-    """Give the square root of a positive number: one step of Newton's method on the rounded root."""
+    """Compute the square root of a positive number: one step of Newton's method on the rounded root."""
     q = math.sqrt(a[0])
     return normal(q, (fused(-q, q, a[0]) + a[1]) / (q + q))
 
@@ -133,7 +133,7 @@ def unit_vector(x: float, y: float) -> tuple[Twofold, Twofold]:
 
 @inline
 def sine_cosine(x: float) -> tuple[Twofold, Twofold]:
-    """Give sine and cosine for |x| <= 1e5 with a relative error below 2^-84; nan for nan and infinity.
+    """Compute sine and cosine for |x| <= 1e5 with a relative error below 2^-84; nan for nan and infinity.
 
     The angle is reduced as in :mod:`kernels.arithmetic.sincos`; of Taylor's series the first five terms have twice the
     precision.

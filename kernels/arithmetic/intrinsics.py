@@ -1,12 +1,11 @@
-"""Single instructions that Python has no word for, through numba's intrinsics.
+"""Single machine instructions that Python does not have, by numba's intrinsics.
 
-Maximum and minimum that LLVM can vectorise, the lowest bit of an integer, the binade of a float without a call, and the
-prefetch to the cache of what will be read soon while something else is computed.
+Maximum and minimum that LLVM can vectorise, the lowest set bit of an integer, the binade of a float without a call, and
+the prefetch of data into the cache.
 
 ``if v > m: m = v`` stays a scalar loop, even under fast-math, because LLVM must keep the order of comparisons with nan.
 ``llvm.maxnum`` with the flags nnan and nsz on this one instruction is a plain ``vmaxpd``.  The flags promise that no
-operand is nan: the sweep loops clamp what goes under the square root, so none is, and they report the clamp through a
-status.
+operand is nan: the sweep loops clamp the arguments of square roots, so none is, and they report the clamp by a status.
 """
 
 from __future__ import annotations
@@ -71,10 +70,10 @@ def _smallest_typed(a: Any, b: Any) -> Any:
 
 @intrinsic
 def _lowest_bit(typingctx: Any, bits: Any) -> Any:
-    """Return the number of the lowest bit that is set in an int64; 64 where none is."""
+    """Return the number of the lowest set bit of an int64; 64 where none is set."""
 
     def codegen(context: Any, builder: Any, signature: Any, args: Any) -> Any:
-        # The second argument says that zero is a value like others: then the result is defined for it too.
+        # With the second argument false the result is defined for zero too.
         return builder.cttz(args[0], ir.Constant(ir.IntType(1), 0))
 
     return types.int64(types.int64), codegen
@@ -84,7 +83,7 @@ _cttz: Any = _lowest_bit
 
 
 def lowest_bit(bits: Any) -> Any:
-    """Find the lowest bit that is set in an int64; 64 where none is."""
+    """Find the lowest set bit of an int64; 64 where none is set."""
     return (bits & -bits).bit_length() - 1 if bits else 64
 
 
@@ -100,9 +99,9 @@ _EXPONENT = 0x7FF0000000000000  # the bits of a float64 that hold its exponent
 
 
 def power_below(x: Any) -> Any:
-    """Largest power of two that is not above abs(x), for a float of 2^-1022 at least.
+    """Largest power of two not above abs(x); 0 for subnormal numbers, infinity where x is not finite.
 
-    Below that it is 0, of what is not finite infinity.  In kernels it is vector code, which `math.frexp` is not.
+    In kernels it is vector code, which `math.frexp` is not.
     """
     if not math.isfinite(x):
         return math.inf
@@ -111,7 +110,7 @@ def power_below(x: Any) -> Any:
 
 @intrinsic
 def _exponent_of(typingctx: Any, x: Any) -> Any:
-    """Return the float64 that has the exponent of x and nothing else."""
+    """Return the float64 with the exponent bits of x; sign and mantissa bits are 0."""
 
     def codegen(context: Any, builder: Any, signature: Any, args: Any) -> Any:
         bits = builder.bitcast(args[0], ir.IntType(64))
@@ -131,13 +130,13 @@ def _power_below_typed(x: Any) -> Any:
     return power
 
 
-LINE = 8  # float64 in a line of the cache
-_FOR_READING, _SECOND_LEVEL, _DATA = 0, 2, 1  # how the instruction is told
+LINE = 8  # float64 numbers in a cache line
+_FOR_READING, _SECOND_LEVEL, _DATA = 0, 2, 1  # operands of llvm.prefetch
 
 
 @intrinsic
 def _fetch_line(typingctx: Any, memory: Any, place: Any) -> Any:
-    """Fetch the line of the cache with number ``place`` of a C-contiguous array."""
+    """Prefetch the cache line that holds element number ``place`` of a C-contiguous array."""
 
     def codegen(context: Any, builder: Any, signature: Any, args: Any) -> Any:
         array = context.make_array(signature.args[0])(context, builder, args[0])
@@ -155,7 +154,7 @@ _fetch: Any = _fetch_line
 
 
 def _asked(table: Any, place: Any) -> None:
-    """Ask for a line of the cache; in plain Python there is nothing to ask for."""
+    """Prefetch the cache line of an element; does nothing in plain Python."""
 
 
 @overload(_asked, inline="always")
@@ -168,7 +167,7 @@ def _asked_typed(table: Any, place: Any) -> Any:
 
 @inline
 def prefetch_rows(table: Any, begin: int, end: int) -> None:
-    """Have rows begin, ..., end - 1 of a C-contiguous (n, P) table of float64 fetched to the second-level cache."""
+    """Prefetch rows begin, ..., end - 1 of a C-contiguous (n, P) table of float64 into the second-level cache."""
     columns = table.shape[1]
     for line in range(0, (min(end, table.shape[0]) - begin) * columns, LINE):
         _asked(table, begin * columns + line)

@@ -13,20 +13,20 @@ from kernels.types import Array
 
 Integers = NDArray[np.int64]
 
-BITS = 52  # of a point; its integer is exact in float64
-TABLE_BITS = 10  # binary digits of the number of a point that one table stands for
+BITS = 52  # of a coordinate as an integer, which float64 holds exactly
+TABLE_BITS = 10  # binary digits of a point's Gray code per table
 RUN = 2**TABLE_BITS
 
 
 class Digits(NamedTuple):
-    """What the digits of a point's number make of each dimension.
+    """Exclusive ors of the direction numbers of each dimension, tabulated by digits of a point's Gray code.
 
     Parameters
     ----------
-    first_runs : (dimensions, 2, RUN) what the lowest digits of the Gray code make in an even and in an odd run
-    tables : (dimensions, parts, RUN) the same of each group of TABLE_BITS digits; that of the lowest is not used
+    first_runs : (dimensions, 2, RUN) of the lowest TABLE_BITS digits, for the points of an even and of an odd run
+    tables : (dimensions, parts, RUN) of each group of TABLE_BITS digits; the lowest group is not used
     shift : (dimensions,) digital shift
-    centre : added to the integer of a point before it is scaled to (0, 1)
+    centre : added to the integer of a coordinate before it is scaled to (0, 1)
     """
 
     first_runs: Integers
@@ -39,19 +39,19 @@ class Digits(NamedTuple):
 def sobol_points(
     start: int, stop: int, of: Digits, which: Integers, low: Array, high: Array, columns: Integers, out: Array
 ) -> None:
-    """Compute the points start, ..., stop - 1 in some dimensions, stretched from (0, 1) to between two ends.
+    """Compute the points start, ..., stop - 1 in the wanted dimensions, scaled from (0, 1) to given intervals.
 
-    Numbers that differ in the lowest digits alone make a run.  Their Gray codes are those of the first run, or of the
-    second, with other high digits; so one exclusive or per point is left.
+    A run is a set of numbers that differ in the lowest TABLE_BITS digits alone.  The low digits of their Gray codes are
+    those of the first run or of the second, so each coordinate takes one exclusive or.
 
     Parameters
     ----------
     start, stop : numbers of the first point and of the one after the last
     of : the sequence
     which : (k,) dimensions wanted
-    low, high : (k,) ends of each, low <= high; a point at the share x of the way is low (1 - x) + high x, clipped
-    columns : (k,) where each stands in ``out``
-    out : (stop - start, P) out, these columns of it
+    low, high : (k,) ends of each interval, low <= high; coordinate x in (0, 1) becomes low (1 - x) + high x, clipped
+    columns : (k,) column of ``out`` for each dimension
+    out : (stop - start, P) out; only ``columns`` are written
     """
     scale = 2.0**-BITS
     values = np.empty((which.size, RUN))
@@ -64,7 +64,7 @@ def sobol_points(
             for part in range(1, of.tables.shape[1]):
                 upper ^= of.tables[dimension, part, digits & (RUN - 1)]
                 digits >>= TABLE_BITS
-            # Whole rows and whole runs: so the compiler sees that no index counts from the end, and makes vector code.
+            # Whole rows and runs show the compiler that no index counts from the end: the loop becomes vector code.
             these, to = of.first_runs[dimension, run & 1], values[k]
             for j in range(RUN):
                 share = (np.float64(these[j] ^ upper) + of.centre) * scale

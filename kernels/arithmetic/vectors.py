@@ -54,7 +54,7 @@ def norm(a: Vector) -> float:
 
 @inline
 def turned(first: Vector, second: Vector, third: Vector, a: Vector) -> Vector:
-    """Components along a triad brought to fixed axes: a_1 first + a_2 second + a_3 third."""
+    """Vector in fixed axes from its components along a triad: a_1 first + a_2 second + a_3 third."""
     return (
         a[0] * first[0] + a[1] * second[0] + a[2] * third[0],
         a[0] * first[1] + a[1] * second[1] + a[2] * third[1],
