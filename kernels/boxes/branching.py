@@ -1,8 +1,8 @@
-"""Branch and bound over boxes of designs: what the rows of a box prove together, and which box is next.
+"""Branch and bound over boxes of designs: the bound that the rows of a box prove together, and the queue of boxes.
 
 A row is a function of the design, enclosed over a box as a form (:mod:`kernels.boxes.taylor`).  Rows of the objective
 are at most the value t of a design; rows of limits are at least 0 in a feasible one.  With multipliers that are not
-negative, l_j for the first and m_i for the others,
+negative, l_j for rows a_j of the objective and m_i for rows b_i of limits,
 
     t >= t sum l_j >= sum l_j a_j(x) - sum m_i b_i(x),   sum l_j <= 1                                                (1)
 
@@ -26,15 +26,15 @@ Flags = NDArray[np.uint8]
 
 MOST_ROWS = 40
 COMBINED = 7  # rows that a proof combines at most: two more than the linear program may have variables
-LENT = 1e-4  # root of the curvature lent to d, in units of the box, and to t
+LENT = 1e-4  # root of the curvature added in d, in units of the box, and in t
 PROGRAM_ROUNDING = 1e-12
-# What became of a box: not decided, not decided and too small to be halved, no design below the target, none feasible.
+# Outcome of a box: undecided, undecided and too small to be halved, no design below the target, none feasible.
 OPEN, TOO_SMALL, BOUND, EMPTY = range(4)
 
 
 @inline
 def halves(low: Array, high: Array, centre: Array, half: Array) -> None:
-    """Compute the centre of a box, rounded, and half widths that reach both ends from it."""
+    """Compute the rounded centre of a box, and half widths that reach both ends from it."""
     for k in range(centre.shape[0]):
         centre[k] = 0.5 * (low[k] + high[k])
         half[k] = max(up(high[k] - centre[k]), up(centre[k] - low[k]))
@@ -42,28 +42,28 @@ def halves(low: Array, high: Array, centre: Array, half: Array) -> None:
 
 @kernel
 def multipliers(rows: Array, count: int, objective: NDArray[np.uint8], half: Array, out: Array) -> int:
-    """Find the multipliers that make the best bound of the rows over a box: a small linear program.
+    """Find the multipliers of the best bound (1) over a box by a small linear program.
 
         minimise t   subject to   a_j + g_j d <= t,   b_i + h_i d >= 0,   |d_k| <= half_k,   t >= 0                  (2)
 
-    With a very small curvature lent to d and t it is the point nearest to a centre far away that keeps linear rows
-    (:mod:`kernels.linear.nearest`).  Where (2) has no solution, the rows that say so are a proof that the box holds no
+    With a very small curvature added in d and t the solution is the feasible point nearest to a centre far away
+    (:mod:`kernels.linear.nearest`).  Where (2) has no solution, the contradicting rows prove that the box holds no
     feasible design.
 
-    The multipliers come from ordinary rounding.  What they prove is computed afterwards with outward rounding
+    The multipliers come from ordinary rounding.  The bound is computed from them with outward rounding
     (:func:`combined`), so a wrong digit here can cost tightness and nothing else.
 
     Parameters
     ----------
     rows : (m, 1 + n), the first ``count`` of them used: value at the centre and slopes of each row
-    objective : (m,) whether the row is one that t exceeds; the others are limits
+    objective : (m,) whether a row is of the objective; the other rows are limits
     half : (n,) half the widths of the box
     out : (m,) the multipliers, not negative
 
     Returns
     -------
-    OK; LIMIT_EXCEEDED where the rows contradict each other on the box; NOT_CONVERGED, with multipliers that still
-    serve.
+    OK; LIMIT_EXCEEDED where the rows contradict each other on the box; NOT_CONVERGED, with multipliers that are valid
+    but not the best.
     """
     n, scale = half.shape[0], 0.0
     sides, needs = np.zeros((n + 1, count + 2 * n + 1)), np.zeros(count + 2 * n + 1)
@@ -90,9 +90,9 @@ def multipliers(rows: Array, count: int, objective: NDArray[np.uint8], half: Arr
 
 @kernel
 def combined(rows: Array, factors: Array, count: int, n: int, total: Array) -> float:
-    """Return a number below sum factors_j row_j over the whole box, rounding included.
+    """Lower bound of the sum of factors_j row_j over the box, rounding included.
 
-    The sum is left in ``total``, one form.
+    The form of the sum is written to ``total``.
     """
     last, size = total.shape[0] - 1, 0.0
     total[:] = 0.0
@@ -111,7 +111,7 @@ def combined(rows: Array, factors: Array, count: int, n: int, total: Array) -> f
 
 @kernel
 def _linear(rows: Array, count: int, objective: Flags, n: int, out: Array, sizes: Array) -> None:
-    """Compute rows as a linear program sees them: value and slopes, and all that is not linear at its worst."""
+    """Linearise the rows: value at the centre, moved by the bound of all nonlinear terms, and slopes; limits scaled."""
     last = rows.shape[1] - 1
     for j in range(count):
         sign = -1.0 if objective[j] else 1.0
@@ -133,7 +133,7 @@ def _linear(rows: Array, count: int, objective: Flags, n: int, out: Array, sizes
 def best_bound(
     rows: Array, count: int, objective: Flags, half: Array, linear: Array, sizes: Array, factors: Array, total: Array
 ) -> tuple[float, bool]:
-    """Best bound (1) of a box, and whether it is one of limits alone: then a positive one empties the box.
+    """Compute the best bound (1) of a box, and whether limits alone make it: a positive one then empties the box.
 
     Parameters
     ----------
@@ -149,7 +149,7 @@ def best_bound(
     for j in range(count):
         if objective[j]:
             scale = max(scale, abs(linear[j, 0]))
-    # The objective in the size of the limits, so that one notion of rounding serves both.
+    # Rows of the objective are scaled to the size of the limits, so that one tolerance serves both.
     per_scale = 1.0 / scale if scale > 0.0 else 1.0
     for j in range(count):
         if objective[j]:
@@ -172,10 +172,10 @@ def best_bound(
 
 @kernel
 def looseness(rows: Array, factors: Array, count: int, n: int, total: Array, out: Array) -> None:
-    """Compute what each variable's width costs the bound, to decide which one to halve.
+    """Compute how much each variable's width loosens the bound, to choose the variable to halve.
 
-    The cost is that of the combined linear and quadratic terms; what is left open goes to the variables by the size of
-    the rows' own linear terms.
+    It is the size of the variable's linear and quadratic terms in the sum of the rows.  The remainder of the sum is
+    shared out in proportion to the linear terms of the single rows.
     """
     combined(rows, factors, count, n, total)
     own = 0.0
@@ -199,7 +199,7 @@ def looseness(rows: Array, factors: Array, count: int, n: int, total: Array, out
 
 @kernel
 def surely_negative(rows: Array, j: int, n: int, total: Array) -> bool:
-    """Whether no design of the box has a value of the row that is not negative."""
+    """Whether the row is proven to be negative on the whole box."""
     for k in range(total.shape[0] - 1):
         total[k] = -rows[j, k]
     total[total.shape[0] - 1] = rows[j, total.shape[0] - 1]
@@ -208,7 +208,7 @@ def surely_negative(rows: Array, j: int, n: int, total: Array) -> bool:
 
 @inline
 def _before(bounds: Array, depths: Indices, one: int, other: int) -> bool:
-    """Whether a box comes before another: the one of lower bound, among equals the larger one."""
+    """Whether a box comes before another: by the lower bound, among equal bounds by the smaller depth."""
     if bounds[one] != bounds[other]:
         return bool(bounds[one] < bounds[other])
     return bool(depths[one] < depths[other])
@@ -216,7 +216,7 @@ def _before(bounds: Array, depths: Indices, one: int, other: int) -> bool:
 
 @kernel
 def push(heap: Indices, count: int, bounds: Array, depths: Indices, box: int) -> None:
-    """Add a box to the ``count`` of a heap whose first has the least bound."""
+    """Add a box to a heap of ``count`` boxes, of which the first has the least bound."""
     place = count
     while place > 0:
         above = (place - 1) // 2
@@ -229,7 +229,7 @@ def push(heap: Indices, count: int, bounds: Array, depths: Indices, box: int) ->
 
 @kernel
 def pop(heap: Indices, count: int, bounds: Array, depths: Indices) -> int:
-    """Take the box of least bound from the ``count`` of a heap."""
+    """Remove the box of least bound from a heap of ``count`` boxes, and return it."""
     first, last = heap[0], heap[count - 1]
     place, size = 0, count - 1
     while 2 * place + 1 < size:

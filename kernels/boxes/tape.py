@@ -1,4 +1,4 @@
-"""Formulas as data: what Taylor models are to compute, written once in Python and run by one small kernel.
+"""Formulas as data: recorded once in Python, evaluated in Taylor models by one small kernel.
 
 A :class:`Tape` records the operations of a formula on :class:`Number` objects; :func:`run` carries them out on forms
 (:mod:`kernels.boxes.taylor`).  So a formula of a hundred operations reads as a formula, and only the few operations
@@ -23,7 +23,7 @@ COMBINE, MULTIPLY, INVERSE, ROOT, SINE, CONSTANT = range(6)
 
 @dataclass(frozen=True)
 class Number:
-    """One number of a formula: the row of the array of forms where its enclosure will stand."""
+    """Number of a formula: the row of its enclosure in the array of forms."""
 
     tape: Tape
     form: int
@@ -64,7 +64,7 @@ class Number:
 
 @dataclass
 class Tape:
-    """A formula in the making: inputs first, then operations, in parts that can be run one after the other."""
+    """Record of a formula: inputs first, then operations, in parts that can be run one after the other."""
 
     inputs: int
     forms: int = 0
@@ -80,7 +80,7 @@ class Tape:
         return Number(self, number)
 
     def new(self) -> Number:
-        """Take the next form that no number has yet."""
+        """Reserve the next free form for a number."""
         self.forms += 1
         return Number(self, self.forms - 1)
 
@@ -90,14 +90,14 @@ class Tape:
         return self.put(CONSTANT, zero, zero, 1.0)
 
     def put(self, operation: int, a: Number, b: Number, p: float = 0.0, q: float = 0.0) -> Number:
-        """Record one operation."""
+        """Record one operation and return its result."""
         out = self.new()
         self.operations.append((operation, out.form, a.form, b.form))
         self.factors.append((p, q))
         return out
 
     def end(self) -> int:
-        """End a part of the formula; return the number to run it by."""
+        """End a part of the formula; return the part's number for :func:`run`."""
         self.ends.append(len(self.operations))
         return len(self.ends) - 1
 
@@ -108,7 +108,7 @@ class Tape:
 
 @kernel
 def run(operations: Operations, factors: Array, ends: Operations, part: int, at: Array, n: int) -> bool:
-    """Carry out one part of a tape on the forms of a box; false where an operation has no enclosure there.
+    """Evaluate one part of a tape in the forms of a box; false where an operation has no enclosure.
 
     Parameters
     ----------

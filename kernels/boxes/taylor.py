@@ -1,4 +1,4 @@
-"""Taylor models of second order: enclosures of a function over a box of designs, with the third power of its width.
+"""Taylor models of second order: enclosures of functions over a box, with a remainder of third order in its width.
 
 Over the box |x_k - c_k| <= h_k, with xi_k = (x_k - c_k)/h_k between -1 and 1, a *form* holds a function as
 
@@ -10,9 +10,8 @@ every operation adds to R more than its coefficients can have lost.  What severa
 cancels in the coefficients, where intervals would add their widths.  ``make bench-enclosures`` compares them with
 intervals and balls (docs/proof.md).
 
-Forms lie in the rows of one array: F0, L, Q (k, l = 11, 12, ..., 22, ...), R.  Where nothing can be enclosed, an
-operation answers false.  A number that leaves the range of float64 makes R infinite or nan, and every question about
-such a form is answered with no.
+Forms lie in the rows of one array: F0, L, Q (k, l = 11, 12, ..., 22, ...), R.  An operation returns false where it has
+no enclosure.  A number that leaves the range of float64 makes R infinite or nan, and every test of such a form fails.
 """
 
 from __future__ import annotations
@@ -33,13 +32,13 @@ VALUE, LINEAR = 0, 1
 
 @inline
 def up(x: float) -> float:
-    """Return a number that a sum or product rounded to x cannot lie above."""
+    """Upper bound of any sum or product that was rounded to x."""
     return x + (abs(x) * 2.0**-52 + 1e-300)
 
 
 @inline
 def width(variables: int) -> int:
-    """Count the columns of a form."""
+    """Return the number of columns of a form in ``variables`` variables."""
     return 2 + variables + variables * (variables + 1) // 2
 
 
@@ -57,7 +56,7 @@ def sizes(at: Array, a: int, n: int) -> tuple[float, float, float]:
 
 @kernel
 def constant(at: Array, out: int, low: float, high: float) -> None:
-    """Make a number that does not depend on the design and lies between the two ends."""
+    """Write the form of an unknown constant between two ends."""
     at[out, :] = 0.0
     at[out, VALUE] = 0.5 * (low + high)
     if high > low:
@@ -66,7 +65,7 @@ def constant(at: Array, out: int, low: float, high: float) -> None:
 
 @kernel
 def variable(at: Array, out: int, centre: float, half: Array, k: int) -> None:
-    """Make the k-th variable itself."""
+    """Write the form of the k-th variable."""
     at[out, :] = 0.0
     at[out, VALUE], at[out, LINEAR + k] = centre, half[k]
 
@@ -85,7 +84,7 @@ def combine(at: Array, out: int, p: float, a: int, q: float, b: int) -> None:
 
 @kernel
 def multiply(at: Array, out: int, a: int, b: int, n: int) -> None:
-    """Compute the product a b; ``out`` must be neither."""
+    """Compute the product a b; ``out`` must be neither a nor b."""
     rest = at.shape[1] - 1
     p, q = at[a, VALUE], at[b, VALUE]
     la, qa, ra = sizes(at, a, n)
@@ -109,7 +108,7 @@ def multiply(at: Array, out: int, a: int, b: int, n: int) -> None:
 def _composed(
     at: Array, out: int, a: int, n: int, value: float, first: float, second: float, third: float, unit: float
 ) -> None:
-    """Compute value + first d + second d^2 + [-third, third] for d, ``unit`` times a without its value.
+    """Compute value + first d + second d^2 + [-third, third] with d = unit (a - F0 of a).
 
     The four numbers are known to 2 ROUNDING of value, and of what they multiply.
     """
@@ -136,7 +135,7 @@ def _composed(
 
 @kernel
 def inverse(at: Array, out: int, a: int, n: int) -> bool:
-    """Whether 1/a could be computed: not where a may be zero.  ``out`` must not be a.
+    """Compute 1/a and return whether that is possible: not where a may be zero.  ``out`` must not be a.
 
     1/(1 + d) = 1 - d + d^2 - d^3/(1 + d).
     """
@@ -155,7 +154,7 @@ def inverse(at: Array, out: int, a: int, n: int) -> bool:
 
 @kernel
 def root(at: Array, out: int, a: int, n: int) -> bool:
-    """Whether the positive square root could be computed: not where a may be zero or less.
+    """Compute the positive square root of a and return whether that is possible: not where a may be zero or less.
 
     sqrt(1 + d) = 1 + d/2 - d^2/8 + d^3/16 (1 + d')^(-5/2) for some d' between 0 and d.  ``out`` must not be a.
     """
@@ -189,10 +188,9 @@ def sine_cosine(at: Array, sine: int, cosine: int, a: int, factor: float, n: int
 
 @kernel
 def least(form: Array, n: int) -> float:
-    """Return a number below a form over its whole box.
+    """Lower bound of a form over its box.
 
-    Every variable's own linear and quadratic term are taken together; where that parabola opens upwards with its lowest
-    point inside, -L^2/(4 Q).
+    Linear and square term of a variable are bounded together: by -L^2/(4 Q) if their parabola has its minimum inside.
     """
     bound, size, place = form[VALUE], abs(form[VALUE]), LINEAR + n
     for k in range(n):

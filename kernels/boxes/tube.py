@@ -1,4 +1,4 @@
-"""Where a follower can be that goes from rest to rest and whose acceleration is limited.
+"""Bounds of the angle of a follower that goes from rest to rest with limited acceleration.
 
 Between two rests, a time T and a stroke s apart, no motion with abs(psi'') <= A is above
 
@@ -6,7 +6,7 @@ Between two rests, a time T and a stroke s apart, no motion with abs(psi'') <= A
 
 for psi - high starts from rest and is concave up to t1 and, seen from the other rest, back to t2: there it is not
 positive.  In between it is convex, so it is not positive there either.  Seen from the other end and upside down, (1) is
-the least motion.  Without A >= 4 s/T^2 no motion gets there in time.
+the least motion.  With A < 4 s/T^2 no motion covers the stroke in time.
 """
 
 from __future__ import annotations
@@ -18,18 +18,18 @@ import numpy as np
 from kernels.types import Array
 
 POSES = 16  # per stroke
-# What the formulas of this module can have lost to rounding, and far less than a proof would notice.
+# More than the formulas of this module can lose to rounding, and far too little to weaken a proof.
 ROUNDING = 1e-12
 THETA, LOW, HIGH, COSINES = range(4)
 
 
 def least_acceleration(stroke: float, time: float) -> float:
-    """Least largest acceleration of any motion from rest to rest, rounded down."""
+    """Least peak acceleration of a motion from rest to rest over a stroke in the given time, rounded down."""
     return 4.0 * abs(stroke) / time**2 * (1.0 - ROUNDING)
 
 
 def _high(at: float, stroke: float, time: float, most: float) -> float:
-    """Angle of the greatest motion (1) at a time."""
+    """Upper bound (1) of the angle at a time."""
     first = 0.25 * time + stroke / (most * time)
     if at < first:
         return 0.5 * most * at * at
@@ -39,7 +39,7 @@ def _high(at: float, stroke: float, time: float, most: float) -> float:
 
 
 def tube(swing: float, phi0: float, most: float) -> Array:
-    """Where a rocker is that swings from limit to limit with abs(psi'') of at most ``most``.
+    """Bound the rocker angle of any motion between the limits with abs(psi'') <= ``most``.
 
     Parameters
     ----------
