@@ -1,6 +1,6 @@
-"""Cells of crank angle of several designs side by side: bounds of curves on them, and which of them are closed.
+"""Cells of crank angle, one per lane (a lane is a design): bounds of the curves on the cells, and the closing of cells.
 
-What :mod:`kernels.certified.covering` does in all lanes alike, without a branch, so that the loops are vector code.
+These are the steps of :mod:`kernels.certified.covering` that all lanes make alike, without a branch, as vector code.
 """
 
 from __future__ import annotations
@@ -15,24 +15,24 @@ from kernels.jit import inline, kernel
 from kernels.types import EPS, TWO_PI, Array
 
 # Rows of a walk.  START is the edge furthest back, KEPT the reach of the march while a peak is climbed, HERE and THERE
-# the highest value of that climb and its place, WHICH its curve, or the one that has kept a cell open; ROOM the factor
-# of the next reach, ALONE whether the lane needs a decision of its own.
+# the highest value of that climb and its place, WHICH the number of the curve that is climbed or has kept a cell open;
+# ROOM the factor of the next reach, ALONE whether the lane needs a decision of its own.
 MODE, CENTRE, REACH, START, END, LEFT, KEPT, BARREN, HERE, THERE, WHICH, CELLS, ROOM, AHEAD, ALONE = (
     k * LANES for k in range(15)
 )
 WALK = 15 * LANES
 # Rows of a curve: the edge up to which it is closed; best known value, its place and rounding error; proven bound; the
-# next two closed arcs, by their middles and half their widths.  Then what is known of it on the cell.
+# next two closed arcs, by their middles and half their widths.  Then its coefficients and bounds on the present cell.
 EDGE, BEST, PLACE, BLUR, UPPER, TOP, HALF, TOP2, HALF2 = (k * LANES for k in range(9))
 Y0, Y1, Y2, Y3, Y4, Y5, Y6, OF_NOISE, OF_TAIL, WHOLE, PART, MIDDLE = (k * LANES for k in range(9, 21))
-KEEP, CURVE = 9 * LANES, 21 * LANES  # of the walk, and all
+KEEP, CURVE = 9 * LANES, 21 * LANES  # rows that last for the whole walk, and all rows
 CLIMB, COVER, MARCH, DONE = 0.0, 1.0, 2.0, 3.0
 SHARE = 0.67  # half a cell's width in reaches of its jet
 WIDEST, FIRST, FINEST = 1.0, 0.4, 1e-9
 LEAST_GROWTH, MOST_GROWTH = 0.8, 1.4
 REFUSED, NARROWED, HALVED = 0.4, 0.5, 0.75  # factors of the reach: no enclosure, nothing closed, the first half closed
 RIVAL = 0.99  # of the best known value: a peak above this share gets an arc of its own
-# What is closed is narrower than what was bounded, by far more than angles below 16 are rounded by.
+# The closed part is narrower than the bounded one by SLACK, which is far above the rounding of angles below 16.
 SLACK = 2.0**-47
 SHARE_MOST = SHARE + SLACK / FINEST + 2.0**-20
 _ORDERS = 3
@@ -40,10 +40,10 @@ _NEVER_NEGATIVE = 1023
 
 
 def _factors() -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
-    """Tabulate what the n-th derivative makes of x^k, of noise and of tail on |x| <= SHARE_MOST.
+    """Tabulate the factors of the n-th derivative of x^k, of the noise and of the tail on |x| <= SHARE_MOST.
 
-    The first is k (k-1) ... (k-n+1); the others are its largest product with SHARE_MOST^(k-n), over all k and over the
-    k beyond ORDER.  It falls with k from k = 2 ORDER on.
+    The factor of x^k is k (k-1) ... (k-n+1).  Those of noise and tail are its largest product with SHARE_MOST^(k-n),
+    over all k and over k > ORDER; the product falls with k from k = 2 ORDER on.
     """
     table = np.zeros((_ORDERS + 1, 2 * ORDER))
     for n in range(_ORDERS + 1):
@@ -61,11 +61,11 @@ def weigh(lanes: int, walk: Array, curve: Array, jets: Array, order: int) -> Non
 
     Parameters
     ----------
-    lanes : in use
+    lanes : number of lanes in use
     walk : (WALK,)
-    curve : (CURVE,); out: the coefficients Y of the curve in z/reach, bounds of its noise and tail, WHOLE and
-        PART, what it does not exceed there and from the edge to the MIDDLE of that part
-    jets : of the motion, of which the curve is the derivative of that ``order``, 0 to 3
+    curve : (CURVE,); out: the coefficients Y of the curve in z/reach, bounds of its noise and tail, its bound WHOLE on
+        that part and its bound PART from the edge to the MIDDLE of that part
+    jets : of the motion; the curve is its derivative of ``order`` 0 to 3
     """
     for i in range(lanes):
         per = 1.0 / walk[REACH + i]
@@ -88,7 +88,7 @@ def weigh(lanes: int, walk: Array, curve: Array, jets: Array, order: int) -> Non
 
 @inline
 def _bound(lanes: int, walk: Array, curve: Array) -> None:
-    """Bound |y| by parabolas that hold all coefficients beyond the second at their worst.
+    """Bound |y| by a parabola whose curvature includes the magnitudes of all higher coefficients.
 
     |y(x)| <= |y0| + b x + c x^2 on |x| <= SHARE_MOST =: q, with c = +-y2 + sum |y_k| q^(k-2) + tail/q^2: a tail begins
     with x^4 at least.  About a summit of |y| in the middle of the cell the bound is sharp to third order.
@@ -129,21 +129,21 @@ def _bound(lanes: int, walk: Array, curve: Array) -> None:
 
 @inline
 def past_arc(marching: bool, edge: float, top: float, half: float) -> tuple[float, float]:
-    """Edge behind a closed arc that it has reached, and the arc's next copy; both as they were otherwise."""
+    """Move an edge that has reached a closed arc to the arc's end, and the arc to its copy a turn further."""
     past, end = marching & (edge >= top - half), top + half
     return (end if past & (end > edge) else edge), (top + TWO_PI if past else top)
 
 
 @kernel
 def advance(lanes: int, walk: Array, curve: Array, good: Array, target: float, number: int) -> None:
-    """Close the cells of the lanes that march for a curve, the whole or the first half, where its bound holds.
+    """Close the cells of the marching lanes for one curve, wholly or the first half, where the curve's bound holds.
 
     Parameters
     ----------
-    lanes, walk, curve : weighed
+    lanes, walk, curve : as of :func:`weigh`, after it
     good : (LANES,) 0 where the motion could not be enclosed
     target : relative error within which no other peak may be higher
-    number : of the curve, for WHICH
+    number : of the curve, written to WHICH where it keeps a cell open
 
     Before the first curve ROOM is to be MOST_GROWTH, AHEAD infinite and ALONE 0.
     """
@@ -179,7 +179,7 @@ def advance(lanes: int, walk: Array, curve: Array, good: Array, target: float, n
         summit = (bend < 0.0) & (abs(slope) < -SHARE * bend) & (walk[BARREN + i] == 0.0)
         rival = (y0 > limit) | (summit & (y0 - 0.5 * slope * slope / bend > RIVAL * limit))
         walk[ALONE + i] = 1.0 if asked & (not closed) & rival else walk[ALONE + i]
-        # Closed arcs that the edge has reached are passed; of those the next copy, a turn further, lies ahead.
+        # The edge passes closed arcs that it has reached; their next copies, a turn further, lie ahead.
         here, curve[TOP + i] = past_arc(marching, here, curve[TOP + i], curve[HALF + i])
         here, curve[TOP2 + i] = past_arc(marching, here, curve[TOP2 + i], curve[HALF2 + i])
         here, curve[TOP + i] = past_arc(marching, here, curve[TOP + i], curve[HALF + i])  # the second may end in it
@@ -189,7 +189,7 @@ def advance(lanes: int, walk: Array, curve: Array, good: Array, target: float, n
 
 @kernel
 def march(lanes: int, walk: Array, good: Array) -> None:
-    """Ask for the next cells of the lanes that march, or mark what needs a decision of its own as ALONE."""
+    """Set the next cells of the marching lanes, and mark lanes that need a decision of their own as ALONE."""
     for i in range(lanes):
         enclosed, reach, begin = good[i] != 0.0, walk[REACH + i], walk[START + i]
         marching = walk[MODE + i] == MARCH

@@ -3,7 +3,7 @@
 The turn is divided into cells of crank angle.  In each the family encloses its motion in jets
 (:mod:`kernels.certified.jets`), which bound |y| there.  A cell is closed for a curve when its bound exceeds the best
 known value by no more than the wanted relative error.  At the end there is a value that |y| takes somewhere, and a
-bound that it exceeds nowhere.  One enclosure serves all curves that are made of the motion.
+bound that it exceeds nowhere.  One enclosure serves all curves of the motion.
 
 * First the peak of every curve is climbed and an arc about it is closed by a cell centred at the summit, where the
   bound is sharpest.
@@ -11,11 +11,11 @@ bound that it exceeds nowhere.  One enclosure serves all curves that are made of
   that lies furthest back and takes along all curves whose bound holds, as far as their next closed arc, or half way
   where it holds on half of the cell only.
 * Where a curve turns out to be higher than its best known value, or nearly as high, that peak is climbed and gets an
-  arc of its own.  A higher best value leaves what was closed before closed.
+  arc of its own.  Cells closed before stay closed when the best value rises.
 * A curve that cannot be proven is given up, and the others go on.
 
-Cells are bounded and closed in all lanes at once (:mod:`kernels.certified.cells`); what needs a decision of its own,
-which is climbing and closing arcs and what fails, is done lane by lane (:func:`decide`).  Only the truncation of a jet
+Cells are bounded and closed in all lanes at once (:mod:`kernels.certified.cells`); climbing, closing arcs and failures
+need decisions of their own, which are made lane by lane (:func:`decide`).  Only the truncation of a jet
 decides; rounding errors are added to the bound afterwards: a motion that float64 knows badly then gets a wide bound,
 and the cells do not become shorter without end.
 """
@@ -87,7 +87,7 @@ SHARPENED = 0.6  # factor of the reach where an arc cannot be closed
 
 @inline
 def begin(lane: int, walk: Array, curves: Array, places: Array, i: int, most: int) -> None:
-    """Prepare the walk of design i from the places (curves, n) of the maxima found, with ``most`` enclosures."""
+    """Prepare the walk of design i from the places (curves, n) of the maxima found; ``most`` enclosures are allowed."""
     for row in range(0, WALK, LANES):
         walk[row + lane] = 0.0
     walk[REACH + lane], walk[LEFT + lane], walk[HERE + lane] = FIRST, most, -1.0
@@ -95,7 +95,7 @@ def begin(lane: int, walk: Array, curves: Array, places: Array, i: int, most: in
         for row in range(0, KEEP, LANES):
             curves[j, row + lane] = 0.0
         place = places[j, i] - TURN * math.floor(places[j, i] / TURN)
-        place = place if 0.0 <= place <= TURN else 0.0  # any place is a beginning
+        place = place if 0.0 <= place <= TURN else 0.0  # of a nan: any place will do
         curves[j, BEST + lane], curves[j, PLACE + lane] = -1.0, place
         curves[j, TOP + lane], curves[j, TOP2 + lane] = math.inf, math.inf
     walk[CENTRE + lane] = walk[THERE + lane] = curves[0, PLACE + lane]
@@ -106,12 +106,12 @@ def close(
     lanes: int, walk: Array, curves: Array, jets: Array, places: NDArray[np.int64], orders: NDArray[np.int64],
     good: Array, target: float,
 ) -> None:  # fmt: skip
-    """Close the cells that the lanes in use asked for, and ask for the next ones where that needs no decision.
+    """Close the present cells of all lanes in use, and set the next cells where no decision is needed.
 
     Parameters
     ----------
     lanes, walk, curves, good, target : as of :func:`decide` and :func:`kernels.certified.cells.advance`
-    jets, places, orders : of each curve the place of the jet that it is a derivative of, and the order
+    jets, places, orders : jets of the motion; each curve is the derivative of that order of the jet at that place
     """
     for i in range(lanes):
         walk[ROOM + i], walk[AHEAD + i], walk[ALONE + i] = MOST_GROWTH, math.inf, 0.0
@@ -124,19 +124,19 @@ def close(
 
 @kernel
 def decide(lane: int, encloses: bool, walk: Array, curves: Array, target: float, most: int) -> None:
-    """Decide about the cell of a lane that is ALONE, and ask for the next one.
+    """Decide about the cell of a lane that is marked ALONE, and set the lane's next cell.
 
     Parameters
     ----------
-    lane : of the design
-    encloses : whether its motion could be enclosed
+    lane : number of the lane
+    encloses : whether the motion of its design could be enclosed
     walk, curves : (WALK,) and (number of curves, CURVE), after :func:`close`
     target : relative error within which no other peak may be higher
     most : enclosures until a curve is given up
     """
     marching = walk[MODE + lane] == MARCH
     stuck = not (walk[LEFT + lane] > 0.0 and walk[REACH + lane] > FINEST)
-    if marching and not stuck:  # a rival
+    if marching and not stuck:  # the peak of a rival is climbed
         walk[MODE + lane], walk[BARREN + lane], walk[HERE + lane] = CLIMB, 1.0, -1.0
         walk[KEPT + lane] = NARROWED * walk[REACH + lane]
     if not stuck and not encloses:
@@ -153,16 +153,16 @@ def decide(lane: int, encloses: bool, walk: Array, curves: Array, target: float,
 
 @inline
 def _next(lane: int, walk: Array) -> None:
-    """Ask for the cell that begins at the edge."""
+    """Set the cell that begins at the edge furthest back."""
     walk[REACH + lane] = min(walk[REACH + lane], WIDEST)
     walk[CENTRE + lane] = walk[START + lane] + SHARE * walk[REACH + lane]
 
 
 @inline
 def _climb(lane: int, walk: Array, curves: Array, target: float) -> bool:
-    """Make one step of Newton's method towards the summit of |y|.
+    """Make one step of Newton's method towards the summit of |y|; true if the cell can be closed at once.
 
-    Returns true when the summit is reached and the cell is centred at it, so that it can be closed at once.
+    That is when the summit is reached and the cell is centred at it.
     """
     j = int(walk[WHICH + lane])
     y0, centre, reach = curves[j, Y0 + lane], walk[CENTRE + lane], walk[REACH + lane]
@@ -192,7 +192,7 @@ def _climb(lane: int, walk: Array, curves: Array, target: float) -> bool:
 
 @inline
 def _cover(lane: int, walk: Array, curves: Array, target: float) -> None:
-    """Close an arc about a summit, or ask for a shorter one."""
+    """Close an arc about a summit; where the bound does not hold, set a shorter cell."""
     j, first = int(walk[WHICH + lane]), walk[END + lane] == 0.0
     here, blur = abs(curves[j, Y0 + lane]), curves[j, OF_NOISE + lane]
     best = here if first else max(here, curves[j, BEST + lane])
@@ -214,13 +214,13 @@ def _cover(lane: int, walk: Array, curves: Array, target: float) -> None:
             _resume(lane, walk)
     else:
         walk[REACH + lane] *= SHARPENED
-        if not first and walk[REACH + lane] < 0.02 * walk[KEPT + lane]:  # no summit, then
+        if not first and walk[REACH + lane] < 0.02 * walk[KEPT + lane]:  # there is no summit
             _resume(lane, walk)
 
 
 @inline
 def _bring_arcs_ahead(lane: int, curves: Array, j: int) -> None:
-    """Take of each closed arc the copy that ends ahead of the edge, and move the edge over those that it reaches."""
+    """Shift a curve's closed arcs by whole turns to end ahead of its edge; move the edge past arcs it has reached."""
     edge, top, half = curves[j, EDGE + lane], curves[j, TOP + lane], curves[j, HALF + lane]
     top2, half2 = curves[j, TOP2 + lane], curves[j, HALF2 + lane]
     top += TURN * math.ceil((edge - top - half) / TURN)
@@ -234,7 +234,7 @@ def _bring_arcs_ahead(lane: int, curves: Array, j: int) -> None:
 
 @inline
 def _furthest_back(lane: int, curves: Array) -> float:
-    """Edge at which the next cell begins; infinite where all curves are given up."""
+    """Least edge of all curves, at which the next cell begins; infinite where all curves are given up."""
     start = math.inf
     for j in range(curves.shape[0]):
         start = min(start, curves[j, EDGE + lane])
@@ -243,7 +243,7 @@ def _furthest_back(lane: int, curves: Array) -> float:
 
 @inline
 def _resume(lane: int, walk: Array) -> None:
-    """Go on with the march after a climb."""
+    """Resume the march after a climb, with the reach that it had."""
     walk[MODE + lane] = MARCH if walk[START + lane] < walk[END + lane] else DONE
     walk[REACH + lane] = walk[KEPT + lane]
     _next(lane, walk)
@@ -251,7 +251,7 @@ def _resume(lane: int, walk: Array) -> None:
 
 @inline
 def _next_curve(lane: int, walk: Array, curves: Array) -> None:
-    """Climb the peak of the next curve; behind the last one set out on the march, from the end of the first arc."""
+    """Begin to climb the peak of the next curve; after the last curve begin the march, at the end of the first arc."""
     j = int(walk[WHICH + lane]) + 1
     if j < curves.shape[0]:
         walk[MODE + lane], walk[WHICH + lane], walk[HERE + lane] = CLIMB, j, -1.0
@@ -273,7 +273,7 @@ def _next_curve(lane: int, walk: Array, curves: Array) -> None:
 
 @inline
 def _give_up(lane: int, walk: Array, curves: Array, most: int) -> None:
-    """Leave out the curve that keeps the others waiting."""
+    """Give up the curve that holds up the walk."""
     first, which = walk[END + lane] == 0.0, int(walk[WHICH + lane])
     if not first and curves[which, EDGE + lane] > walk[START + lane]:
         for j in range(curves.shape[0]):
@@ -291,7 +291,7 @@ def _give_up(lane: int, walk: Array, curves: Array, most: int) -> None:
 def conclude(
     lane: int, curves: Array, j: int, i: int, status: NDArray[np.uint8], maximum: Array, phi: Array, error: Array
 ) -> None:
-    """Write what the walk of design i has proven of curve j; the arguments are those of the kernel that certifies."""
+    """Write the proven maximum of curve j of design i and its error; arguments as of the kernel that certifies."""
     least, bound = (curves[j, BEST + lane] - curves[j, BLUR + lane]) / GUARD, curves[j, UPPER + lane]
     if bound < math.inf:
         if not least <= maximum[j, i] <= bound:

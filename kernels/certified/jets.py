@@ -9,7 +9,7 @@ truncation.  The size of a power series is the sum of the magnitudes of its coef
 most the product of the sizes, which keeps every rule here short.  The size also bounds the function itself and, on a
 smaller disc, its derivatives.
 
-The processor's rounding mode is left at nearest: every operation adds to ``noise`` what it can have rounded by.  Bounds
+The processor's rounding mode is left at nearest: every operation adds a bound of its rounding to ``noise``.  Bounds
 are sums and products of non-negative numbers only, and the factor GUARD covers their own rounding.  An operation whose
 numbers overflow or become nan reports failure; it never returns an enclosure.
 
@@ -17,7 +17,7 @@ The rules are written out for the ORDER of the polynomials and have no branch.  
 side by side is vector code, and the same rules serve one design alone.
 
 Each of several designs has a lane.  A jet of all lanes is WIDTH rows of LANES numbers, and other numbers stand in rows
-alike.  The lanes in use are the first ones; what stands in the others is never read.  All jets are one array, and
+alike.  The lanes in use are the first ones; the others are never read.  All jets are one array, and
 functions take their places in it: an array of its own for each would have its references counted, which took a third
 of the time.
 """
@@ -74,14 +74,14 @@ class Jet(NamedTuple):
 
 @inline
 def get(at: Array, i: int, step: int) -> Jet:
-    """Read the jet whose numbers stand ``step`` apart from place i on."""
+    """Read a jet whose numbers stand from place i on, ``step`` apart."""
     p = (at[i], at[i + step], at[i + 2 * step], at[i + 3 * step], at[i + 4 * step], at[i + 5 * step], at[i + 6 * step])
     return Jet(p, at[i + NORM * step], at[i + NOISE * step], at[i + TAIL * step])
 
 
 @inline
 def put(at: Array, i: int, step: int, jet: Jet) -> None:
-    """Write a jet as `get` reads it."""
+    """Write a jet from place i on, its numbers ``step`` apart."""
     p0, p1, p2, p3, p4, p5, p6 = jet.p
     at[i], at[i + step], at[i + 2 * step], at[i + 3 * step] = p0, p1, p2, p3
     at[i + 4 * step], at[i + 5 * step], at[i + 6 * step] = p4, p5, p6
@@ -90,7 +90,7 @@ def put(at: Array, i: int, step: int, jet: Jet) -> None:
 
 @inline
 def norm_of(p: Any) -> Any:
-    """Bound the size of a polynomial, which all bounds are made of."""
+    """Bound the size of a polynomial, the sum of the magnitudes of its coefficients."""
     p0, p1, p2, p3, p4, p5, p6 = p
     return (abs(p0) + abs(p1) + abs(p2) + abs(p3) + abs(p4) + abs(p5) + abs(p6)) * GUARD
 
@@ -117,7 +117,7 @@ def double_harmonic(c0: Any, c1: Any, c2: Any, c3: Any, c4: Any, reach: Any, err
 def triple_harmonic(c0: Any, c1: Any, c2: Any, c3: Any, c4: Any, c5: Any, c6: Any, reach: Any, error: Any) -> Jet:
     """Enclose c0 + c1 s + c2 m + c3 s m + c4 m^2 + c5 s m^2 + c6 m^3 on |z| <= reach <= 1.
 
-    s is sin z, and m is 1 - cos z; ``error`` bounds the size of the function that the errors of c0 ... c6 make.
+    s is sin z, and m is 1 - cos z; ``error`` bounds the error of the function due to the errors of c0 ... c6.
     """
     r2 = reach * reach
     r3, r4 = r2 * reach, r2 * r2
@@ -147,7 +147,7 @@ def sum_of(a: Jet, b: Jet) -> Jet:
 
 @inline
 def combined(c: Any, p: Any, a: Jet, q: Any, b: Jet, error: Any) -> Jet:
-    """Enclose c + p a + q b; ``error`` bounds what the errors of c, p, q make of it."""
+    """Enclose c + p a + q b; ``error`` bounds its error due to the errors of c, p, q."""
     noise = abs(p) * a.noise + abs(q) * b.noise + error
     noise += 3.0 * EPS * (abs(c) + abs(p) * a.norm + abs(q) * b.norm)
     a0, a1, a2, a3, a4, a5, a6 = a.p
@@ -161,7 +161,7 @@ def combined(c: Any, p: Any, a: Jet, q: Any, b: Jet, error: Any) -> Jet:
 
 @inline
 def beyond(a: Any, b: Any) -> Any:
-    """Bound the size of those terms of the product of two polynomials whose degree is beyond ORDER."""
+    """Bound the size of the terms beyond ORDER in the product of two polynomials."""
     _, a1, a2, a3, a4, a5, a6 = a
     _, b1, b2, b3, b4, b5, b6 = b
     s6 = abs(b6)
