@@ -1,11 +1,10 @@
 """One fused kernel per chain: a loop over the crank angle in which each stage hands its output angle to the next.
 
-``form`` says what is needed of a stage, ``links`` hands motion on between stages, ``chain`` composes the stages'
+``form`` lists the closures of a stage, ``links`` passes motion on between stages, ``chain`` composes the stages'
 closures into those of the chain, ``dense``, ``search`` and ``means`` generate the kernels from them.
 
-Parts of the search: ``curves``; their samples (``halves``) of a block of designs (``abreast``) or of one (``look``);
-the ``listing`` of local maxima among them and their refinement (``peaks``).  Which families have a form is theirs to
-say.
+Parts of the search: ``curves``; their samples (``halves``) of a block of designs (``lanes``) or of one (``look``);
+the ``listing`` of local maxima among them and their refinement (``peaks``).  Families define their own forms.
 docs/chain.md, docs/internals/extrema.md.
 """
 

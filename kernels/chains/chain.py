@@ -1,7 +1,7 @@
 """The generator: closures of stages composed into closures of their chain.
 
-Every function made here has a name that tells the families it is made of, in order: two chains of the same families
-share their machine code (`kernels.jit.generated`).
+Every generated function is named after its families in order: two chains of the same families share their machine code
+(`kernels.jit.generated`).
 """
 
 from __future__ import annotations
@@ -17,17 +17,17 @@ from kernels.chains.form import BLOCK, STRIDE, Form, Helper, Travel, Turned
 from kernels.chains.links import NUMBERS, Input, blurred_through, enter, get_link, link_of, put_link, through
 from kernels.jit import generated_inline
 
-COUPLING = 2  # columns kappa and offset of the design matrix behind those of each stage but the first
+COUPLING = 2  # columns kappa and offset of the design matrix, behind the columns of each stage but the first
 
 
 @dataclass(frozen=True)
 class Record:
-    """The constants of some stages in a row, as nested tuples: (stage 1), ((stage 1), link, stage 2), ...
+    """Constants of consecutive stages, as nested tuples: (stage 1), ((stage 1), link, stage 2), ...
 
-    ``constants(designs, i)`` gives those of a design.  So does ``loaded(block, k)``, as vector code, from what
-    ``load(designs, i, block, k)`` has written to place k of a block of ``wide`` rows; only sines and cosines of angles
-    among its columns come from `rounded_sincos` instead of the C library.  ``doubts(c)`` gives for each stage a bound
-    of the rounding error of its discriminant, nan where it is not valid.
+    ``constants(designs, i)`` computes the constants of a design.  So does ``loaded(block, k)``, as vector code, from
+    the columns that ``load(designs, i, block, k)`` has copied to place k of a block of ``wide`` rows; only sines and
+    cosines of angles among the columns come from `rounded_sincos` instead of the C library.  ``doubts(c)`` bounds the
+    rounding error of each stage's discriminant, nan where the stage is not valid.
     """
 
     name: str
@@ -44,9 +44,9 @@ class Record:
 
 @dataclass(frozen=True)
 class Driving:
-    """Some stages in a row, the last of which drives another.
+    """Consecutive stages of which the last one drives a further stage.
 
-    ``turn(c, kappa, u, v)`` gives the output angle, in that sense, as `Turned` by the crank angle of the chain and the
+    ``turn(c, kappa, u, v)`` gives kappa times the output angle, as `Turned` by the crank angle of the chain, and the
     discriminants of all stages; ``blur(c, kappa, u, v)`` the same `Turned` and the rounding errors of its angle and
     first three derivatives.
     """
@@ -62,10 +62,10 @@ class Chained:
 
     Parameters
     ----------
-    stages : how many
-    record : its constants
+    stages : number of stages
+    record : their constants
     travel : (c, u, v) -> `Travel` by the crank angle of the chain, discriminants of all stages
-    drive : (c, u, v) -> `Input` of the last stage, discriminants of those before
+    drive : (c, u, v) -> `Input` of the last stage, discriminants of the stages before
     land : (c, input) -> `Travel` by the crank angle of the chain
     dip : (c, input) -> squared cosine of the last stage's pressure angle and its first two derivatives
     blur : (c, u, v) -> rounding errors of x, x', x'', x''', y, y', y'', y''' and of that squared cosine
@@ -82,7 +82,7 @@ class Chained:
 
 @lru_cache(maxsize=64)
 def chained(forms: tuple[Form, ...]) -> Chained:
-    """Compose the closures of stages each of which drives the next; a stage alone moves by the chain's crank itself."""
+    """Compose the closures of stages of which each drives the next; a single stage is driven by the crank itself."""
     if len(forms) == 1:
         return _alone(forms[0])
     driving = _first(forms[0])
@@ -196,7 +196,7 @@ def _ended(driving: Driving, form: Form, stages: int) -> Chained:
 
 
 def _recorded_first(form: Form) -> Record:
-    """Constants of a first stage."""
+    """Record of the first stage alone."""
 
     def doubts(c: Any) -> Any:
         return (c.doubt,)
@@ -217,7 +217,7 @@ def _recorded_first(form: Form) -> Record:
 
 
 def _recorded(before: Record, form: Form) -> Record:
-    """Constants of some stages and of one more, coupled to them."""
+    """Record of consecutive stages and of one more, coupled to the last of them."""
     end, link = before.columns + form.columns, before.wide + form.columns
     link_row, stage_row = before.numbers * STRIDE, (before.numbers + NUMBERS) * STRIDE
     constants_before, put_before, get_before, doubts_before = before.constants, before.put, before.get, before.doubts
@@ -253,9 +253,9 @@ def _recorded(before: Record, form: Form) -> Record:
 
 
 def _from_columns(form: Form, name: str, start: int, row: int) -> tuple[Helper, ...]:
-    """Return ``constants``, ``load`` and ``loaded`` of one stage, as of a `Record`.
+    """Make ``constants``, ``load`` and ``loaded`` of one stage, as a `Record` has them.
 
-    Its columns begin at ``start``, in a block at row ``row``.
+    The stage's columns begin at column ``start`` of the designs, and at row ``row`` of a block.
     """
     constants_here, columns = form.constants, form.columns
     angle = None if form.angle is None else start + form.angle

@@ -1,7 +1,7 @@
-"""The curves over the crank angle whose extrema are searched: a derivative of what the last stage moves, or its margin.
+"""Curves over the crank angle whose extrema are searched: derivatives of the last stage's output, or its margin.
 
-Of a chain that moves (x, y) a curve is a x + b y + c, or a derivative of it, with three numbers per design; so
-travel, deviation and the coordinates of a guided point in any frame are one kernel.
+With (x, y) the output of a chain, a curve is a x + b y + c, or a derivative of it, with three numbers per design; so
+one kernel serves travel, deviation and the coordinates of a guided point in any frame.
 """
 
 from __future__ import annotations
@@ -23,22 +23,22 @@ AHEAD = 1e-5  # [rad] of the difference quotient for the fifth derivative, which
 
 @dataclass(frozen=True)
 class Curve:
-    """Closures of a curve; k are the constants of a design, (a, b, c) what it is made of, (u, v) cosine and sine.
+    """Closures of a curve; k: constants of a design, (a, b, c): coefficients, (u, v): cosine and sine of the crank.
 
-    Samples are taken in two loops, up to the last stage and from there on: half as long, two rounds of each are under
-    way in the processor at the same time, which hides that a root waits for a root.
+    Samples are taken in two loops, one up to the last stage and one for the last stage: the loops are half as long, and
+    the processor overlaps two rounds of each, which hides that a root waits for a root.
 
     Parameters
     ----------
-    name : for the functions that are made of it
-    guarded : how many stages behind the first have a discriminant that the curve needs to be positive
+    name : for the functions that are generated from the curve
+    guarded : number of stages behind the first whose discriminant must be positive
     ends : whether the last stage is one of them
-    samples : per distance of the nearest singularity, at least
-    drive : (k, u, v) -> `Input` of the last stage, discriminants of those before
+    samples : least number of samples per distance of the nearest singularity
+    drive : (k, u, v) -> `Input` of the last stage, discriminants of the stages before
     jet : (k, a, b, c, u, v) -> the curve and its first two derivatives
     sample : (k, a, b, c, input) -> the curve, and the discriminant of the last stage
-    hand, take : (rows, i, input) and (rows, i) -> input: what a sample needs of it, to and from place i of five rows
-    rounding : (k, a, b, u, v) -> estimate of its rounding error
+    hand, take : (rows, i, input) and (rows, i) -> input: write and read the input of a sample at place i of five rows
+    rounding : (k, a, b, u, v) -> estimate of the curve's rounding error
     """
 
     name: str
@@ -54,7 +54,7 @@ class Curve:
 
 
 def curve(chain: Chained, order: int, along: bool) -> Curve:
-    """Return the derivative of that order, 0 to 3, or the `MARGIN`; with ``along`` b is 0 for all designs."""
+    """Make the curve that is the derivative of ``order`` 0 to 3, or the `MARGIN`; with ``along`` every b is 0."""
     kind = "margin" if order == MARGIN else f"{'along' if along else 'order'}{order}"
     name = f"{kind}_{chain.record.name}"
     jet, sample, rounding = (
@@ -69,7 +69,7 @@ def curve(chain: Chained, order: int, along: bool) -> Curve:
 
 
 def _handing(order: int) -> tuple[Helper, Helper]:
-    """Functions that put an `Input` with so many derivatives to rows, and get it, the others 0."""
+    """Make the functions that write an `Input` with ``order`` derivatives to rows and read it; higher ones are 0."""
 
     def hand(rows: Any, i: int, t: Any) -> None:
         rows[0][i], rows[1][i] = t.u, t.v
@@ -106,13 +106,13 @@ def _first(value: Any, constant: Any) -> Any:
 
 @inline
 def _along(a: Any, b: Any, x: Any, y: Any) -> Any:
-    return a * x  # then nothing of y is computed
+    return a * x  # so the compiler drops the computation of y
 
 
 def _derivative(chain: Chained, order: int, made: Helper) -> tuple[Helper, Helper, Helper]:
     travel, land, blur = chain.travel, chain.land, chain.blur
     x, y = order, Y0 + order  # places in `Travel`
-    e, f = order, JERK + 1 + order  # and among the rounding errors
+    e, f = order, JERK + 1 + order  # places among the rounding errors
     plus = _plus if order == 0 else _first
 
     def jet(k: Any, a: Any, b: Any, c: Any, u: Any, v: Any) -> Any:

@@ -19,8 +19,8 @@ def dense_maxima(chain: Chained) -> Helper:
     """Make the kernel ``dense(designs, cos, sin, least, x1, x2, x3, y0, y1, y2)`` of a chain.
 
     Its arguments: designs (n, P); the grid (m,), shared by all designs, m a multiple of 8 is fastest; ``least``
-    (n, stages) out, smallest discriminant of each stage on the grid less a bound of its rounding error, nan for what is
-    no valid design: where one is not positive the maxima mean nothing; then per design the largest |x'|, |x''|,
+    (n, stages) out, smallest discriminant of each stage on the grid less a bound of its rounding error, nan for an
+    invalid design; where one is not positive the maxima mean nothing; then per design the largest |x'|, |x''|,
     |x'''|, |y|, |y'|, |y''| of `Travel`, (n,) out, or None: neither computed nor compiled.
     """
     constants, travel, doubts, stages = chain.record.constants, chain.travel, chain.record.doubts, chain.stages
@@ -37,7 +37,7 @@ def dense_maxima(chain: Chained) -> Helper:
             for j in range(cos.size):
                 m, deltas = travel(c, cos[j], sin[j])
                 low = lower(low, deltas)
-                # What nobody stores below is dropped by the compiler, with all that it is made of.
+                # The compiler drops the maxima that are not stored below, with all that only they need.
                 a1, a2, a3 = largest(a1, abs(m.x1)), largest(a2, abs(m.x2)), largest(a3, abs(m.x3))
                 b0, b1, b2 = largest(b0, abs(m.y0)), largest(b1, abs(m.y1)), largest(b2, abs(m.y2))
             doubt = doubts(c)
@@ -60,7 +60,7 @@ def dense_maxima(chain: Chained) -> Helper:
 
 
 def _lower(stages: int, name: str) -> Helper:
-    """Smaller of two tuples, number by number."""
+    """Make the function that takes the smaller of two numbers at each place of two tuples."""
     last = stages - 1
     if last == 0:
 

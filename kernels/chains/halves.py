@@ -1,7 +1,7 @@
 """Samples of a curve in two loops: the stages before the last one, then the last one.
 
 A loop over whole poses is some 240 vector instructions long, and in it one root waits for another.  The processor looks
-ahead by less than two rounds of that loop; of its halves several rounds overlap.
+ahead by less than two rounds of that loop; with loops half as long several rounds overlap.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ HANDED = 5 * TOGETHER
 
 @inline
 def handed_rows(memory: Array, begin: int, end: int) -> Rows:
-    """Return the places begin, ..., end - 1 of the five rows of inputs in a memory of `HANDED` numbers."""
+    """Places begin, ..., end - 1 of the five rows of inputs in a memory of `HANDED` numbers."""
     return (
         memory[begin:end], memory[TOGETHER + begin : TOGETHER + end],
         memory[2 * TOGETHER + begin : 2 * TOGETHER + end], memory[3 * TOGETHER + begin : 3 * TOGETHER + end],
@@ -30,11 +30,11 @@ def handed_rows(memory: Array, begin: int, end: int) -> Rows:
 
 
 def keepers(curve: Curve) -> tuple[Helper, Helper, Helper]:
-    """Make the functions by which samples leave the discriminants that a curve needs.
+    """Make the functions that store the discriminants of the stages which a curve needs to be positive.
 
-    ``rows(guards, gap, begin, end)`` gives the places begin, ..., end - 1 of each, those of one stage ``gap`` behind
-    those of the stage before; ``keep(rows, deltas, i)`` writes those of the stages before the last to place i, and
-    ``keep_last(rows, delta, i)`` that of the last.
+    ``rows(guards, gap, begin, end)`` gives the places begin, ..., end - 1 of each stage's row, the rows ``gap`` apart;
+    ``keep(rows, deltas, i)`` writes the discriminants of the stages before the last to place i, and
+    ``keep_last(rows, delta, i)`` the discriminant of the last.
     """
     rows, keep, last = _no_rows, _keep_none, curve.guarded if curve.ends else 0
     for stage in range(1, curve.guarded + 1):
@@ -51,7 +51,7 @@ def keepers(curve: Curve) -> tuple[Helper, Helper, Helper]:
 
 @inline
 def _no_rows(guards: Array, gap: int, begin: int, end: int) -> Rows:
-    return (guards,)  # in the place of the first stage, whose discriminant is known beforehand
+    return (guards,)  # stands for the first stage, whose discriminant is known beforehand
 
 
 @inline

@@ -1,8 +1,8 @@
-"""The first look at a block of designs: 32 samples of each, all designs side by side.
+"""First look at a block of designs: 32 samples of each, all designs side by side.
 
-It is for designs whose first stage is resolved by so few.  For most of them it is enough, and then nothing of it
-costs a loop over the samples of one design: neither the nearest zero of a later discriminant, nor the local maxima,
-which come as bits of one number.  What needs more samples :mod:`kernels.chains.look` takes by itself.
+It is for designs whose first stage is resolved by 32 samples.  Most of them need no more, and then no step loops over
+the samples of one design: neither the nearest zero of a later discriminant, nor the local maxima, which come as bits
+of one number.  Designs that need more samples are sampled one by one in :mod:`kernels.chains.look`.
 """
 
 from __future__ import annotations
@@ -17,18 +17,18 @@ from kernels.jit import generated_inline, inline
 from kernels.types import TWO_PI as TURN
 from kernels.types import Array, CosSin
 
-# Rows of BLOCK numbers: what the samples say, then the least of each later discriminant.
+# Rows of BLOCK numbers: results of the samples, then the least discriminant of each later stage.
 SCALE_AT, ROUGHNESS, CLOSE, _MOST, _LEAST, _FLOOR, MARKS, _MARKS_TOO, LOW = (k * BLOCK for k in range(9))
-RESOLVED, UNRESOLVED, FLAT_CURVE = 0.0, 1.0, 2.0  # what ROUGHNESS says
-ANGLES = TOGETHER // BLOCK  # crank angles together
-AT_ONCE = 4  # samples: so a row is fetched less often
+RESOLVED, UNRESOLVED, FLAT_CURVE = 0.0, 1.0, 2.0  # values of ROUGHNESS
+ANGLES = TOGETHER // BLOCK  # crank angles per round of both loops
+AT_ONCE = 4  # samples per round, so that a row is fetched less often
 SAMPLES = (FEWEST + 4) * BLOCK  # closed periodically by two rows on either side
-DIPS = (FEWEST + 2) * BLOCK  # by one row, per later stage
+DIPS = (FEWEST + 2) * BLOCK  # discriminants of a later stage, closed by one row on either side
 
 
 @inline
 def _row(rows: Array, i: int) -> Array:
-    """One row; an index into it is seen not to be negative, one that is a sum would be written to one by one."""
+    """Row number i.  The compiler sees that an index into it is not negative; of an index that is a sum it does not."""
     return rows[i * BLOCK : (i + 1) * BLOCK]
 
 
@@ -46,7 +46,7 @@ def _close(count: int, rows: Array, first: int, beyond: int) -> None:
 
 @inline
 def _spread(count: int, values: Array, said: Array, mode: int) -> None:
-    """Write what counts as the size of each curve, and whether the samples resolve it."""
+    """Write the size of each curve (largest magnitude, or range), and whether the samples resolve the curve."""
     fourth, most, least = _row(said, ROUGHNESS // BLOCK), _row(said, _MOST // BLOCK), _row(said, _LEAST // BLOCK)
     scale = _row(said, SCALE_AT // BLOCK)
     for i in range(count):
@@ -70,7 +70,7 @@ def _spread(count: int, values: Array, said: Array, mode: int) -> None:
 
 @inline
 def _mark(count: int, values: Array, said: Array, which: int, mode: int) -> None:
-    """Mark the local maxima that count, as a sum of powers of two."""
+    """Mark the local maxima that are above the floor, as a sum of powers of two."""
     floor, marks = _row(said, _FLOOR // BLOCK), _row(said, MARKS // BLOCK + which)
     most, least, scale = _row(said, _MOST // BLOCK), _row(said, _LEAST // BLOCK), _row(said, SCALE_AT // BLOCK)
     # A magnitude is the curve times its own sign, a least value the largest of the negative curve.
@@ -92,7 +92,7 @@ def _mark(count: int, values: Array, said: Array, which: int, mode: int) -> None
 
 @inline
 def _peak_bit(before: float, y: float, after: float, up: float, down: float, floor: float) -> float:
-    """Return 1 for a local maximum that counts, else 0."""
+    """Return 1 for a local maximum that is not below the floor, else 0."""
     sign = up if y >= 0.0 else down
     z = sign * y
     return 1.0 if (z >= floor) & (z > sign * before) & (z >= sign * after) else 0.0
@@ -100,10 +100,10 @@ def _peak_bit(before: float, y: float, after: float, up: float, down: float, flo
 
 @inline
 def _dip(count: int, guards: Array, said: Array, slot: int, enough: float) -> None:
-    """Write the least of a discriminant, and 1 where a complex zero of it may be nearer than ``enough`` asks for.
+    """Write the least discriminant of a stage, and 1 where its nearest complex zero may be too near for the samples.
 
-    ``enough`` is a squared distance [samples], that of
-    :func:`kernels.chains.look.zero_beside`, here without a division.
+    That is nearer than ``enough``, a squared distance [samples] as of :func:`kernels.chains.look.zero_beside`, which is
+    tested here without a division.
     """
     low, near, row = _row(said, LOW // BLOCK + slot), _row(said, CLOSE // BLOCK), slot * (FEWEST + 2)
     for i in range(count):
@@ -121,7 +121,7 @@ def _dip(count: int, guards: Array, said: Array, slot: int, enough: float) -> No
 
 @inline
 def _dip_bit(left: float, here: float, right: float, enough: float) -> float:
-    """Return 1 where a parabola has its complex zero nearer than ``enough``, else 0."""
+    """Return 1 where the parabola through three samples has its complex zero nearer than ``enough``, else 0."""
     bend, slope = 0.5 * (left + right) - here, 0.5 * (right - left)
     dips = (here <= left) & (here <= right) & (bend > 0.0)
     return 1.0 if dips & (here * bend - 0.25 * slope * slope < enough * (bend * bend)) else 0.0
@@ -146,7 +146,7 @@ def first_looker(curve: Curve, get: Helper) -> Helper:
     """
     guarded, drive, sample, hand, take = curve.guarded, curve.drive, curve.sample, curve.hand, curve.take
     guard_rows, keep, keep_last = keepers(curve)
-    # A little more than asked for: the exact distance of those few is computed afterwards.
+    # A little more than needed: where the test holds the exact distance is computed afterwards.
     enough = (1.0 + 1e-6) * (curve.samples / TURN) ** 2
 
     def look(

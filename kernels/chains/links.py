@@ -1,6 +1,6 @@
-"""How motion, and its rounding errors, pass from one stage to the next; equation numbers of docs/chain.md.
+"""Motion and its rounding errors passed on from one stage to the next; equation numbers of docs/chain.md.
 
-The kernels at the end do so for (n, m) blocks of poses and know no family; their arrays may be complex128 (exact
+The kernels at the end do this for (n, m) blocks of poses of any family; their arrays may be complex128 (exact
 gradients by the complex step).
 """
 
@@ -40,7 +40,7 @@ class Input(NamedTuple):
 
 @inline
 def link_of(kappa: Any, offset: Any) -> Link:
-    """Coupling of that sense and angle [rad]; kappa is nan if one of them is refused."""
+    """Coupling of sense kappa and angle ``offset`` [rad]; its kappa is nan where sense or angle is not valid."""
     sine, cosine = sincos(offset)
     return Link(kappa if (kappa * kappa == 1.0) & (abs(offset) < 1e5) else math.nan, cosine, sine)
 
@@ -53,7 +53,7 @@ def put_link(at: Any, place: int, link: Link) -> None:
 
 @inline
 def get_link(at: Any, place: int) -> Link:
-    """Read what :func:`put_link` wrote."""
+    """Read a link from rows of `STRIDE` numbers."""
     return Link(at[place], at[place + STRIDE], at[place + 2 * STRIDE])
 
 
@@ -66,7 +66,7 @@ def enter(link: Link, m: Turned) -> Input:
 
 @inline
 def through(t: Input, y1: Any, y2: Any, y3: Any, y4: Any) -> tuple[Any, Any, Any, Any]:
-    """Turn derivatives by the input angle of a stage into those by the chain's crank angle; (22) to order four."""
+    """Convert derivatives by the input angle of a stage into derivatives by the chain's crank angle; (22), order 4."""
     t1, t2, square = t.t1, t.t2, t.t1 * t.t1
     second = t2 * y1 + square * y2
     third = t.t3 * y1 + t1 * (3.0 * t2 * y2 + square * y3)
@@ -78,10 +78,10 @@ def through(t: Input, y1: Any, y2: Any, y3: Any, y4: Any) -> tuple[Any, Any, Any
 def blurred_through(
     t: Input, b0: Any, b1: Any, b2: Any, b3: Any, y1: Any, y2: Any, y3: Any, y4: Any, e: tuple[Any, ...]
 ) -> tuple[Any, Any, Any, Any]:
-    """Errors of a function of the input angle and its first three derivatives, to first order.
+    """Errors of a function of the input angle and its first three derivatives by the crank angle, to first order.
 
-    ``b0`` to ``b3`` are the errors of the input angle and its derivatives, ``e`` those of the function and its
-    derivatives y1, y2, y3 by the input angle at an exact one.
+    ``b0`` to ``b3`` are the errors of the input angle and its derivatives; ``e`` are the errors that the function and
+    its derivatives y1, y2, y3 by the input angle have at an exact input angle.
     """
     t1, t2, t3, square = abs(t.t1), abs(t.t2), abs(t.t3), t.t1 * t.t1
     y1, y2, y3, y4 = abs(y1), abs(y2), abs(y3), abs(y4)

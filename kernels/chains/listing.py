@@ -1,4 +1,4 @@
-"""The list of local maxima of a block of designs: samples that resolve each curve, and the peaks among them."""
+"""List of the local maxima of a block of designs: samples that resolve each curve, and the peaks among the samples."""
 
 from __future__ import annotations
 
@@ -43,17 +43,17 @@ from kernels.jit import generated_inline, generated_part, inline
 from kernels.types import TWO_PI as TURN
 from kernels.types import Array, CosSin, Status
 
-ZERO = np.int64(0)  # a plain one in a call is a type of its own, for which `gather` would be compiled once more
-CHUNK = FEWEST  # samples whose peaks are looked for together
+ZERO = np.int64(0)  # a literal 0 in a call is a type of its own, for which `gather` would be compiled once more
+CHUNK = FEWEST  # samples whose peaks are marked together
 ROW = 2**62 - 1  # as `kernels.chains.peaks.PLACE`, for rows of a table
 ANGLE = 2**15 - 1  # as `kernels.chains.peaks.PLACE`, for samples and crank angles
-LINE = 8  # numbers in a line of the cache
-ABREAST = MOST + LINE  # where the samples of a block begin, behind those of one design
+LINE = 8  # numbers in a cache line
+ABREAST = MOST + LINE  # begin of the samples of a block, behind the samples of one design
 
 
 @inline
 def aligned(numbers: int) -> Array:
-    """Memory that begins where a line of the cache does: a vector that lies across two is fetched twice."""
+    """Memory that begins at a cache line: a vector that lies across two lines would be fetched twice."""
     memory = np.empty(numbers + LINE)
     begin = -(memory.ctypes.data // memory.itemsize) % LINE
     return memory[begin : begin + numbers]
@@ -61,7 +61,7 @@ def aligned(numbers: int) -> Array:
 
 @inline
 def new_room(guarded: int, wide: int) -> Scratch:
-    """Memory for a curve that so many later stages enter, and for designs of so many columns."""
+    """Memory of the search for a curve with ``guarded`` later stages and designs of ``wide`` columns."""
     stages = max(guarded, 1)
     return Scratch(
         aligned(ABREAST + SAMPLES), aligned(stages * GUARD_ROW), aligned(stages * DIPS), aligned(LOW + stages * BLOCK),
@@ -72,7 +72,7 @@ def new_room(guarded: int, wide: int) -> Scratch:
 
 @inline
 def _enough(distance: float, per_rho: float) -> int:
-    """How many samples resolve a curve whose nearest singularity is so far away; 0 if more than the search takes."""
+    """Find the number of samples that resolves a singularity at a distance [rad]; 0 if above MOST."""
     n = FEWEST
     while n <= MOST and not n * distance >= per_rho:
         n *= 2
@@ -81,7 +81,7 @@ def _enough(distance: float, per_rho: float) -> int:
 
 @inline
 def _counting(mode: int, most: float, least: float) -> tuple[float, float]:
-    """Size of a curve by its extreme samples, and from where on one of its peaks may be the highest."""
+    """Size of a curve by its extreme samples, and the floor above which a peak may be the highest."""
     if mode == 0:
         scale = max(most, -least)
         return scale, SHARE * scale
@@ -90,7 +90,7 @@ def _counting(mode: int, most: float, least: float) -> tuple[float, float]:
 
 
 class Sampled(NamedTuple):
-    """Samples of designs: whether taken of one alone, how many; of one alone their largest and least."""
+    """Samples of one design alone or of a block: their number, and for one alone the largest and the least."""
 
     alone: bool
     n: int
@@ -103,13 +103,13 @@ def enlister(chain: Chained, of: Curve) -> Helper:
 
     It samples designs begin, ..., end - 1 once for all modes and returns the length of the list, in whole vectors.
 
-    ``near`` has for each the distance of its nearest singularity, 0 for one that is left out.
+    ``near`` is the distance of each design's nearest singularity [rad], 0 for a design that is left out.
     """
     get, doubts, seat, gather = chain.record.get, chain.record.doubts, _placer(chain), _gatherer(chain)
     look, look_abreast, guarded = looker(of), first_looker(of, get), of.guarded
     last, per_rho = chain.stages - 1, of.samples
 
-    # One function without a return half way: with more the references to each array are counted, which takes time.
+    # One function with a single return: with more the references to each array are counted, which takes time.
     def enlist(
         designs: Array, begin: int, end: int, near: Array, table: CosSin, made_of: Array, modes: Counts, m: Array,
         status: Status, room: Scratch,
@@ -138,7 +138,7 @@ def enlister(chain: Chained, of: Curve) -> Helper:
             if status[0, i] == LOOKING:
                 k: Any = get(m, (place[i - begin] & PLACE) + CONSTANTS)
                 a, b, c = made_of[i, 0], made_of[i, 1], made_of[i, 2]
-                # What a largest and a least value need is the same.
+                # Largest and least value need the same samples.
                 n, most, least, code = look(k, a, b, c, needed[i - begin], table, modes[0], doubts(k), room)
                 by_itself = Sampled(True, n, most, least)
                 for which in range(modes.size):
@@ -153,7 +153,7 @@ def enlister(chain: Chained, of: Curve) -> Helper:
 def _gatherer(chain: Chained) -> Helper:
     """Make the function ``gather(begin, end, at, which, mode, table, m, status, length, room)``.
 
-    It appends to the list the maxima of those designs of a block whose status is OK, and returns its length.
+    It appends the local maxima of all designs with status OK to the list, and returns the length of the list.
     """
     get, put = chain.record.get, chain.record.put
 
@@ -200,10 +200,10 @@ def _gatherer(chain: Chained) -> Helper:
 
 
 def _placer(chain: Chained) -> Helper:
-    """Make the function ``seat(designs, begin, end, near, per_rho, ...)``: which designs are sampled, and where.
+    """Make the function ``seat(designs, begin, end, near, per_rho, ...)``, which gives the designs places in the list.
 
-    It writes their constants into the list, and returns how many are sampled abreast and how many in all, in whole
-    vectors; what stands in the surplus is never read.
+    It writes the constants of all designs to be sampled into the list, and returns how many are sampled abreast and how
+    many in all, each rounded up to whole vectors; the surplus is never read.
     """
     load, loaded, put = chain.record.load, chain.record.loaded, chain.record.put
 
@@ -211,7 +211,7 @@ def _placer(chain: Chained) -> Helper:
         designs: Array, begin: int, end: int, near: Array, per_rho: float, made_of: Array, m: Array, room: Scratch
     ) -> tuple[int, int]:
         abreast, count = 0, 0
-        # Those for which the first look is enough as far as is known come first.
+        # Designs whose first stage needs no more than the first look come first.
         for some in range(2):
             abreast = count
             for i in range(begin, end):
@@ -232,9 +232,9 @@ def _placer(chain: Chained) -> Helper:
 
 @inline
 def _judge(limits: Any, lane: int, dips: Array, said: Array, guarded: int, samples: float) -> tuple[int, int]:
-    """How many samples a design needs by its first look.
+    """Find the number of samples that a design needs by its first look, and its status.
 
-    Its status is that of :func:`kernels.chains.look.looker`; LOOKING if more are needed than the first 32.
+    The status is that of :func:`kernels.chains.look.looker`, or LOOKING if the first 32 samples are too few.
     """
     code, n = LOOKING, FEWEST
     for slot in range(guarded):
@@ -253,7 +253,7 @@ def _judge(limits: Any, lane: int, dips: Array, said: Array, guarded: int, sampl
 
 @inline
 def _peaks(chunk: int, values: Array, up: float, down: float, floor: float) -> int:
-    """Local maxima that count among the next samples, one bit each; without a branch, so that it is vector code."""
+    """Local maxima above the floor among CHUNK samples, one bit each; without a branch, so that it is vector code."""
     found = 0
     end = chunk + CHUNK
     before, here, after = values[chunk - 1 : end - 1], values[chunk:end], values[chunk + 1 : end + 1]

@@ -1,8 +1,8 @@
-"""Samples of a curve over the turn, as many as resolve it; and the local maxima among them.
+"""Samples of a curve over the turn, as many as resolve the curve.
 
 Samples stand no wider than a twelfth (of the jerk an eighteenth) of the distance of the nearest complex singularity:
-that of the first stage is known beforehand, those of the others show as dips of their discriminants.  Where the fourth
-difference of the samples says that they do not resolve the curve all the same, twice as many are taken.
+that of the first stage is known beforehand, those of the other stages show as dips of their discriminants.  Where the
+fourth difference of the samples shows that they do not resolve the curve all the same, twice as many are taken.
 """
 
 from __future__ import annotations
@@ -24,12 +24,12 @@ from kernels.types import TWO_PI, Array, CosSin
 Counts: TypeAlias = NDArray[np.int64]
 Spans: TypeAlias = NDArray[np.int64]
 
-OPEN = 255  # instead of a status: nothing is decided here, a slower search is to be asked
+OPEN = 255  # instead of a status: nothing is decided here, a slower search has to decide
 LOOKING = 252  # more samples are needed
 FEWEST, MOST = 32, 8192
-AT_ONCE = 8.0  # times as many samples at most: the first look sees a near zero only roughly
+AT_ONCE = 8.0  # factor of the number of samples at most: the first look sees a near zero only roughly
 SHARE = 0.6  # a peak below this share of the best sample is not refined
-ROUGH = 0.5  # fourth difference against the size of the curve; at a pole a twelfth of a turn of samples away it is 0.6
+ROUGH = 0.5  # fourth difference over the size of the curve; at a pole a twelfth of a turn of samples away it is 0.6
 FLAT = 1e-9  # a curve that varies by less of its size is left to the slower search
 GUARD_ROW = MOST + 2
 
@@ -51,7 +51,7 @@ def fourth_difference(first: float, left: float, here: float, right: float, last
 def _spread(n: int, values: Array) -> tuple[float, float, float]:
     """Largest fourth difference, largest and least of n samples that stand in values[2 ... n + 1]."""
     fourth, most, least = 0.0, -1e300, 1e300
-    # Indices into such parts are seen not to count from the end; with sums as indices each number is fetched alone.
+    # The compiler sees that indices into these slices do not count from the end; with sums as indices it would not.
     first, left, here, right, last = (
         values[:n], values[1 : n + 1], values[2 : n + 2], values[3 : n + 3], values[4 : n + 4],
     )  # fmt: skip
@@ -75,7 +75,7 @@ def dips(n: int, guards: Array, begin: int) -> tuple[float, float]:
 
 @inline
 def zero_beside(left: float, here: float, right: float) -> float:
-    """Squared distance [samples] of the complex zero of a parabola, 1e300 unless the middle is lowest."""
+    """Squared distance [samples] of the complex zero of a parabola through three samples; 1e300 where it has no dip."""
     bend, slope = 0.5 * (left + right) - here, 0.5 * (right - left)
     dips = (here <= left) & (here <= right) & (bend > 0.0)
     per_bend = 1.0 / (bend if dips else 1.0)
@@ -85,7 +85,7 @@ def zero_beside(left: float, here: float, right: float) -> float:
 
 @inline
 def samples_for(per_distance: float, n: int, nearest: float, needed: int) -> int:
-    """How many samples a zero asks for that n samples see at that squared distance, ``needed`` at least."""
+    """Find the number of samples, at least ``needed``, that resolves a zero at a squared distance [samples of n]."""
     wanted = per_distance * n / (TWO_PI * math.sqrt(largest(nearest, 1e-12)))
     while needed < min(wanted, AT_ONCE * n):
         needed *= 2
@@ -95,9 +95,10 @@ def samples_for(per_distance: float, n: int, nearest: float, needed: int) -> int
 class Scratch(NamedTuple):
     """Memory of the search.
 
-    Samples of one design and of a block, discriminants of one and of the other, what a first look says; the designs of
-    a block, column by column, where they stand in it and how many samples each needs; of each mode and design where
-    its maxima are: the first, and where the others begin and end.
+    ``values``: samples, ``guards``, ``dips``: discriminants of one design and of a block, ``said``: results of the
+    first look, ``block``: designs column by column, ``handed``: inputs of the last stage, ``place``: place of each
+    design in the list, ``needed``: its number of samples, ``span``: places of the local maxima of each mode and design
+    in the list: the first, and begin and end of the rest.
     """
 
     values: Array
@@ -114,8 +115,8 @@ class Scratch(NamedTuple):
 def looker(curve: Curve) -> Helper:
     """Make the function ``look(k, a, b, c, n, table, mode, doubts, room)`` of a curve.
 
-    It samples a design, n times at first, and returns the number of samples that resolve the curve, their largest and
-    least, and a status: OK; NOT_ROTATABLE, where a later stage does not reach; OPEN.  The samples stand in
+    It samples one design, with n samples at first, and returns the number of samples that resolve the curve, their
+    largest and least, and a status: OK; NOT_ROTATABLE, where a later stage does not reach; OPEN.  The samples stand in
     room.values[2 ... n + 1], closed periodically.
     """
     guarded, samples, take = curve.guarded, curve.samples, taker(curve)
@@ -123,7 +124,7 @@ def looker(curve: Curve) -> Helper:
     def look(
         k: Any, a: float, b: float, c: float, n: int, table: CosSin, mode: int, doubts: Any, room: Scratch
     ) -> tuple[int, float, float, int]:  # fmt: skip
-        # One way out only: with several each array's references are counted, which takes as long as the samples do.
+        # One return only: with several the references to each array are counted, which takes as long as the samples.
         code, most, least, values, guards = LOOKING, 0.0, 0.0, room.values, room.guards
         while code == LOOKING and n <= MOST:
             take(k, a, b, c, n, table, values, guards, room.handed)
@@ -137,7 +138,7 @@ def looker(curve: Curve) -> Helper:
 def _resolved(
     n: int, values: Array, guards: Array, mode: int, doubts: Any, guarded: int, samples: float
 ) -> tuple[int, float, float, int]:
-    """How many samples n samples ask for, the largest and least of these, and a status: LOOKING if n are too few."""
+    """Judge n samples: number of samples needed, largest and least of the n, and a status, LOOKING if n are too few."""
     code, needed = LOOKING, n
     for s in range(guarded):
         low, nearest = dips(n, guards, s * GUARD_ROW)

@@ -1,9 +1,9 @@
 """Root mean square over the turn of a curve of a chain: the trapezoid rule on samples that resolve it, generated.
 
-The rule errs by the amplitude of the harmonic whose number is that of the samples.  Amplitudes fall from one to the
-next by the factor exp(-rho), rho being the distance of the nearest singularity, and grow with a power of the number
-that the order of the singularity sets.  Those of a quarter and an eighth of the number show in the samples, whatever
-their phase, and say whether they really fall so fast.  Where the error is above the target, samples are doubled.
+With n samples the rule errs by the amplitude of harmonic n.  From harmonic to harmonic amplitudes fall by the factor
+exp(-rho), rho being the distance of the nearest singularity, and grow with a power of the harmonic's number that the
+order of the singularity sets.  Harmonics n/4 and n/8 are computed from the samples, whatever their phase, and tell
+whether amplitudes really fall so fast.  Where the error is above the target, the samples are doubled.
 """
 
 from __future__ import annotations
@@ -25,12 +25,12 @@ from kernels.jit import generated, generated_inline, inline
 from kernels.types import EPS, TWO_PI, Array, CosSin, Status
 
 PER_TARGET, PER_POWER = 1.2, 1.4  # samples times distance, per logarithm of the target: mostly enough at first
-SLOWEST = 0.3  # fall over an eighth above which the samples do not resolve the curve
-SURE = 8.0  # times the amplitude of the harmonic, which counts twice
-ARCS = 8  # sums of samples, by their number
+SLOWEST = 0.3  # ratio of amplitudes n/8 apart above which the samples do not resolve the curve
+SURE = 8.0  # factor of the amplitude of the harmonic, which counts twice
+ARCS = 8  # sums of samples, by their number modulo 8
 _HALF = math.sqrt(0.5)
-THIN, FEW = 4, MOST // 4  # every so many samples show what rounding does; how many at most
-ROUGH = 64.0 * EPS  # share of a mean below which rounding is no reason to ask precise poses
+THIN, FEW = 4, MOST // 4  # every fourth sample is used to estimate the rounding; their largest number
+ROUGH = 64.0 * EPS  # share of a mean below which rounding is no reason to compute precise poses
 NOISE = 64.0 * EPS  # share of the mean square below which an amplitude is rounding
 
 
@@ -86,16 +86,17 @@ def mean_squares(chain: Chained, order: int, along: bool = False) -> Helper:
 
 @inline
 def _shortened(rho: float) -> float:
-    """Lower bound of the area hyperbolic sine of a distance that is known to leading order.
+    """Lower bound of asinh of a distance of a zero that is known to leading order.
 
-    That is how far the zero is where a discriminant bends by its second harmonic; by its first it is a little farther.
+    Asinh is the distance where the discriminant's curvature comes from its second harmonic; from the first it is a
+    little larger.
     """
     return rho / math.sqrt(1.0 + rho * rho / 3.0)
 
 
 @inline
 def _trapezoid(n: int, values: Array, rho: float, power: float, sums: Array) -> tuple[float, float]:
-    """Return the mean square of n samples that stand in values[2 ... n + 1], and what the rule may be off by."""
+    """Mean square of the n samples in values[2 ... n + 1], and an estimate of the trapezoid rule's error."""
     for r in range(ARCS):
         sums[r] = 0.0
     here = values[2 : n + 2]
@@ -108,7 +109,7 @@ def _trapezoid(n: int, values: Array, rho: float, power: float, sums: Array) -> 
     quarter = math.sqrt(re * re + im * im) / n
     re, im = (s0 - s4) + _HALF * ((s1 - s5) - (s3 - s7)), (s2 - s6) + _HALF * ((s1 - s5) + (s3 - s7))
     eighth = math.sqrt(re * re + im * im) / n
-    # Of two singularities equally near the amplitude of one number may vanish, but not of both and not of all.
+    # With two singularities equally near, one of the two amplitudes may vanish, but not both.
     grows = 2.0**power
     falls = math.exp(-rho * n / ARCS)
     falls = max(falls, quarter / (grows * eighth)) if eighth > 0.0 else falls
@@ -119,7 +120,7 @@ def _trapezoid(n: int, values: Array, rho: float, power: float, sums: Array) -> 
 
 
 def _blur(of: Curve) -> Helper:
-    """Make the function that estimates half of what rounding adds to the mean square, by some of the samples."""
+    """Make the function that estimates half the rounding error of the mean square from every fourth sample."""
     rounding = of.rounding
 
     def blur(k: Any, a: float, b: float, n: int, table: CosSin, values: Array, thin: Array) -> float:

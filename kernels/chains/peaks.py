@@ -1,8 +1,8 @@
-"""The list of local maxima under refinement: all those of a block of designs, side by side.
+"""Refinement of the list of local maxima: all maxima of a block of designs, side by side.
 
-As in :mod:`kernels.families.rssr.sampling`: Newton steps on the next derivative, and what a refined maximum must keep
-to be trusted (docs/internals/extrema.md).  A minimum, or a negative peak of a magnitude, is a maximum of the curve
-times a sign.
+As in :mod:`kernels.families.rssr.sampling`: Newton steps on the next derivative, and the conditions under which a
+refined maximum is trusted (docs/internals/extrema.md).  A minimum, or a negative peak of a magnitude, is a maximum of
+the curve times a sign.
 """
 
 from __future__ import annotations
@@ -18,27 +18,27 @@ from kernels.curves.polynomials import rotate
 from kernels.jit import generated_part, inline
 from kernels.types import EPS, Array
 
-MOST_PEAKS = 16  # of one design; with more it is left to the slower search
+MOST_PEAKS = 16  # of one design; a design with more is left to the slower search
 CAPACITY = STRIDE - 8  # a list is padded to whole vectors
-# Places "and" this are themselves, and the compiler sees that they are not negative.  Otherwise it would look at each
-# index whether it counts from the end.
+# Bitwise "and" with this leaves a place unchanged and shows the compiler that it is not negative.  Otherwise every
+# index would be tested whether it counts from the end.
 PLACE = 1023
-# What a maximum is made of, place and spacing of its samples, three samples times the sign, results.
+# Rows of a maximum: coefficients of the curve, place and spacing of its samples, three samples times the sign, results.
 (
     A, B, C, U, V, WIDTH, START, _LEFT, _PEAK, _RIGHT, _SIGN, SCALE, _GUESS, MOVED, LAST, HEIGHT, ERROR, ROUNDING,
     REACH,
 ) = (k * STRIDE for k in range(19))  # fmt: skip
-CONSTANTS = 19 * STRIDE  # where those of the design begin
+CONSTANTS = 19 * STRIDE  # begin of the constants of the design
 _NEAREST, _NEXT = 0.6, 0.2  # least fall to the sample beside the top and to the next ones, against the parabola's
 _LEVEL = 1e-10  # a fall by less than this share of the curve's size counts as none
-_MOVED = 0.05  # by how much of that size refinement may lift a peak above the parabola through its samples
+_MOVED = 0.05  # share of the size by which refinement may lift a peak above the parabola through its samples
 
 
 @inline
 def append(
     m: Array, i: int, u: float, v: float, width: float, start: float, samples: Vector, sign: float, scale: float
 ) -> None:
-    """Put a local maximum at place i of the list: its angle, and the sample there between two, times the sign."""
+    """Put a local maximum at place i of the list: its angle, and the three samples around it, times the sign."""
     m[i + U], m[i + V], m[i + WIDTH], m[i + START] = u, v, width, start
     m[i + _LEFT], m[i + _PEAK], m[i + _RIGHT] = samples
     m[i + _SIGN], m[i + SCALE] = sign, scale
@@ -58,7 +58,7 @@ def begin_at_vertex(count: int, m: Array) -> None:
 
 
 def refiner(curve: Curve, get: Helper) -> Helper:
-    """Make the part ``refine(count, m, rounds)``: Newton steps, uphill where the curve is not concave."""
+    """Make the part ``refine(count, m, rounds)``: Newton steps, or steps uphill where the curve is not concave."""
     jet = curve.jet
 
     def refine(count: int, m: Array, rounds: int) -> None:
@@ -77,7 +77,7 @@ def refiner(curve: Curve, get: Helper) -> Helper:
 
 
 def finisher(curve: Curve, get: Helper) -> Helper:
-    """Make the part ``finish(count, m, target)``: heights, what is left of the way to the tops, rounding errors.
+    """Make the part ``finish(count, m, target)``: heights, remaining steps to the tops, and rounding errors.
 
     A height is that of the parabola through the last point.  Its error is infinite where the maximum is not trusted:
     where it left its samples, rose too far above them, or does not fall towards them as a single top would.
@@ -101,7 +101,7 @@ def finisher(curve: Curve, get: Helper) -> Helper:
             blur = rounding(k, m[i + A], m[i + B], m[i + U], m[i + V]) + 8.0 * EPS * abs(peak)
             m[i + HEIGHT], m[i + LAST], m[i + ROUNDING] = peak, step, blur
             m[i + ERROR] = rise if trusted else math.inf
-            # Rounding fixes the place of a top to the width at which it falls by as much.
+            # Within this width of the top the curve falls by less than its rounding, so the place is not known better.
             m[i + REACH] = 4.0 * abs(step) + 2.0 * math.sqrt(blur / largest(bend, 1e-300))
 
     return generated_part(f"finish_{curve.name}", finish)

@@ -1,8 +1,8 @@
 """True extrema of a chain over the turn, refined between samples: the generated kernel (docs/internals/extrema.md).
 
 Per design: samples that resolve the curve (`kernels.chains.listing`); every local maximum of at least 60 % of the best
-is refined, vectorised over the maxima of a block of designs (`kernels.chains.peaks`).  What is not trusted, or what
-rounding may have changed by more than 2^-14 of the target, is left to precise poses.
+is refined, vectorised over the maxima of a block of designs (`kernels.chains.peaks`).  Maxima that are not trusted, or
+that rounding may have changed by more than 2^-14 of the target, are left to precise poses.
 """
 
 from __future__ import annotations
@@ -40,13 +40,13 @@ from kernels.types import TWO_PI as TURN
 from kernels.types import Array, CosSin, Status
 
 PLAIN = 2.0**-14  # of the target: larger rounding errors are left to precise poses
-RIVALS = 64.0  # times the rounding error: peaks lower by no more may turn out the highest where it has moved them
-LEVEL = 2.0**-4  # of the target: rounding errors up to which tops as high as each other need no precise poses
-# A part is compiled once more for a plain number that is written into its call, a type of its own: these are not.
+RIVALS = 64.0  # factor of the rounding error: a peak lower by no more may be the highest without rounding
+LEVEL = 2.0**-4  # of the target: rounding errors up to which tops of equal height need no precise poses
+# A literal number in a call is a type of its own, for which a part is compiled once more: these are no literals.
 ONE = np.int64(1)
 SETTLING = np.int64(8)  # more steps for a maximum that is not trusted after the usual ones
-MORE = 4  # times as many samples for a design of which a maximum is not trusted even so
-ROUNDED, UNTRUSTED = 254, 253  # instead of a status; the first see `find_extrema`
+MORE = 4  # factor of the number of samples for a design of which a maximum is not trusted even so
+ROUNDED, UNTRUSTED = 254, 253  # instead of a status; ROUNDED is explained in `find_extrema`
 VALUE, PHI, VALUE_ERROR, PHI_ERROR, SCALE_ROW, SPACING = range(6)
 
 
@@ -54,20 +54,20 @@ VALUE, PHI, VALUE_ERROR, PHI_ERROR, SCALE_ROW, SPACING = range(6)
 def find_extrema(chain: Chained, order: int, along: bool = False) -> Helper:
     """Make the kernel ``find(designs, opening, distance, table, made_of, modes, target, tie, status, found)``.
 
-    It finds extrema over the turn of a curve of a chain, one of `kernels.chains.curves`, of that order or the
-    `MARGIN`; with ``along`` of curves whose number b is 0, by fewer operations and with the same bits.
+    It finds extrema over the turn of a chain's curve of that order, or of its `MARGIN` (`kernels.chains.curves`); with
+    ``along`` every b is 0, which takes fewer operations and gives the same bits.
 
     Its arguments: designs (n, P); opening (n,), OK where the first stage turns, NOT_ROTATABLE where it does not;
     distance (n,) [rad] of its nearest singularity from the real axis; `sampling_tables`; made_of (n, 3), the numbers a,
-    b, c of the curve; modes (w,): 0 for the largest magnitude, +1 for the largest value, -1 for the least, or both of
-    the last, which share samples and have the bits that each has by itself; target: relative error wanted, of the
-    magnitude or of the curve's range; tie: share of that size by which no other peak may come near the highest one,
-    negative where it does not matter which of two is higher.  Then out: status (w, n), and found (6, w, n) with the
-    rows VALUE; PHI, its crank angle in [0, 2 pi); estimates of the errors of both; SCALE, what the target is relative
-    to; SPACING of the samples [rad].
+    b, c of the curve; modes (w,): 0 for the largest magnitude, or +1 for the largest value, -1 for the least, or both,
+    which share samples and have the same bits as each alone; target: relative error wanted, of the magnitude or of the
+    curve's range; tie: share of that size by which every other peak must be lower than the highest one, negative where
+    it does not matter which of two is higher.  Then out: status (w, n), and found (6, w, n) with the rows VALUE; PHI,
+    its crank angle in [0, 2 pi); estimates of the errors of both; SCALE, the size that the target is relative to;
+    SPACING of the samples [rad].
 
     The status is OK; ROUNDED, where rounding may have moved a single highest peak by more than its share of the target;
-    NOT_ROTATABLE, where a stage does not reach; OPEN, where nothing is decided.  With the last two the others are nan.
+    NOT_ROTATABLE, where a stage does not reach; OPEN, where nothing is decided.  With the last two ``found`` is nan.
     """
     of = curve(chain, order, along)
     get, rows = chain.record.get, CONSTANTS + chain.record.numbers * STRIDE
@@ -94,7 +94,7 @@ def find_extrema(chain: Chained, order: int, along: bool = False) -> Helper:
             finish(length, m, target)
             for which in range(modes.size):
                 decide(start, end, m, room.span[which], modes[which], target, tie, status[which], found[:, which])
-            # Now the list is free for those, one by one, whose tops were not single ones between their samples.
+            # Now the list is free for single designs with a maximum that is not trusted: they get more samples.
             for which in range(modes.size):
                 one, code, into = modes[which : which + 1], status[which : which + 1], found[:, which]
                 for i in range(start, end):
@@ -117,7 +117,7 @@ def find_extrema(chain: Chained, order: int, along: bool = False) -> Helper:
 
 
 def _decider(of: Curve, refine: Helper, finish: Helper, allowed: float) -> Helper:
-    """Make the function ``decide(start, end, m, span, mode, target, tie, status, found)``, of one mode."""
+    """Make the function ``decide(start, end, m, span, ...)``, which writes the highest maxima for one mode."""
 
     def decide(
         start: int, end: int, m: Array, span: Spans, mode: int, target: float, tie: float, status: Status, found: Array
@@ -141,9 +141,9 @@ def _decider(of: Curve, refine: Helper, finish: Helper, allowed: float) -> Helpe
 def _decide(
     own: int, begin: int, end: int, m: Array, mode: int, allowed: float, target: float, tie: float, i: int, found: Array
 ) -> int:
-    """Write the highest maximum of design i, of the one at ``own`` and those from ``begin`` on.
+    """Write the highest maximum of design i, among place ``own`` and places ``begin``, ..., ``end`` - 1 of the list.
 
-    Return OK, ROUNDED, UNTRUSTED, or OPEN where it is not sure which is highest.
+    Return OK, ROUNDED, UNTRUSTED, or OPEN where it is not certain which is highest.
     """
     own, second, third = _first_three(own, begin, end)
     winner = second if m[second + HEIGHT] > m[own + HEIGHT] else own
@@ -159,7 +159,7 @@ def _decide(
             peak = (own if slot < begin else slot) & PLACE
             if peak != winner and m[peak + HEIGHT] + m[peak + ROUNDING] >= height - blur - apart:
                 code, error = OPEN, max(error, m[peak + ERROR] + m[peak + ROUNDING])
-        # A follower that turns back within the swing of its driver stands twice at one end, as high both times.
+        # A follower that reverses within the swing of its driver reaches one end twice, at equal heights.
         code = st.OK if code == OPEN and tie < 0.0 and error <= LEVEL * target * scale else code
     place = m[winner + START] + m[winner + MOVED] + m[winner + LAST]
     found[VALUE, i], found[PHI, i] = -height if mode < 0 else height, place - TURN * np.floor(place / TURN)
@@ -170,9 +170,9 @@ def _decide(
 
 @inline
 def _first_three(own: int, begin: int, end: int) -> tuple[int, int, int]:
-    """Return the places of a design's first three maxima, the first again for those it does not have.
+    """Places of a design's first three maxima; a missing one is replaced by the first.
 
-    Few designs have more, and how many they have the processor cannot foresee: these are chosen without a branch.
+    Few designs have more, and the processor cannot predict how many: these are chosen without a branch.
     """
     own = own & PLACE
     return own, (begin if end > begin else own) & PLACE, (begin + 1 if end > begin + 1 else own) & PLACE
@@ -180,7 +180,7 @@ def _first_three(own: int, begin: int, end: int) -> tuple[int, int, int]:
 
 @inline
 def _trusted(own: int, begin: int, end: int, m: Array) -> bool:
-    """Tell whether all maxima of a design are trusted."""
+    """Whether all maxima of a design are trusted."""
     own, second, third = _first_three(own, begin, end)
     sure: bool = (m[own + ERROR] < math.inf) & (m[second + ERROR] < math.inf) & (m[third + ERROR] < math.inf)
     for slot in range(begin + 2, end):
