@@ -15,13 +15,13 @@ from typing import Any
 from kernels.jit import generated_part, inline
 from kernels.types import Array
 
-MOST = 8  # roots that are kept; who asks has at most four, and rounding at a double root may show it as a few
+MOST = 8  # roots that are kept; the callers' functions have at most four, and rounding may split a double root
 _GOLDEN = 0.5 * (math.sqrt(5.0) - 1.0)
 
-# ``scan(k, centre, half, noise, count, at)`` appends the roots on an arc to ``at`` (MOST numbers) and gives how many
-# there are now, and the least and the largest value met; a place where the function comes as near to zero as ``noise``
-# without crossing it counts as one.  ``dip(k, centre, half, lo, hi, sign)`` gives the tau between two places where
-# sign times the function is least, and that.
+# ``scan(k, centre, half, noise, count, at)`` appends the roots on an arc to ``at`` (MOST numbers) and returns their new
+# number and the least and the largest value met; a place where the function comes as near to zero as ``noise`` without
+# crossing it counts as a root.  ``dip(k, centre, half, lo, hi, sign)`` returns the tau between two places where sign
+# times the function is least, and that value.
 ArcSearch = namedtuple("ArcSearch", "scan dip")
 
 
@@ -33,13 +33,13 @@ def angle_at(centre: float, half: float, tau: float) -> float:
 
 @inline
 def way_of(half: float) -> tuple[float, float]:
-    """Where tau begins, and how far it goes."""
+    """Begin and length of the interval of tau."""
     return (-math.pi, 2.0 * math.pi) if half >= math.pi else (0.0, math.pi)
 
 
 def _bracketing(name: str, value: Callable[[Any, float], float], halvings: int) -> Callable[..., Any]:
     def bracketed(k: Any, centre: float, half: float, lo: float, hi: float, f_lo: float) -> float:
-        """Find the angle of the root between two places of opposite sign, by bisection, which no shape misleads."""
+        """Find the angle of the root between two places of opposite sign by bisection, which is safe for any shape."""
         for _ in range(halvings):
             mid = 0.5 * (lo + hi)
             if (value(k, angle_at(centre, half, mid)) > 0.0) == (f_lo > 0.0):
@@ -53,11 +53,11 @@ def _bracketing(name: str, value: Callable[[Any, float], float], halvings: int) 
 
 def _dipping(name: str, value: Callable[[Any, float], float]) -> Callable[..., Any]:
     def dip(k: Any, centre: float, half: float, lo: float, hi: float, sign: float) -> tuple[float, float]:
-        """Find where sign times the value is least between two places, by the golden section."""
+        """Find the place between two places where sign times the value is least, and that value, by golden section."""
         p, q = hi - _GOLDEN * (hi - lo), lo + _GOLDEN * (hi - lo)
         f_p = sign * value(k, angle_at(centre, half, p))
         f_q = sign * value(k, angle_at(centre, half, q))
-        # 0.618^45 = 4e-10 of the cells: nearer to the least the value no longer changes by a rounding
+        # 0.618^45 = 4e-10 of the cells: within that of the minimum the value changes by less than its rounding
         for _ in range(45):
             if f_p <= f_q:
                 hi, q, f_q = q, p, f_p
@@ -73,19 +73,19 @@ def _dipping(name: str, value: Callable[[Any, float], float]) -> Callable[..., A
 
 
 def arc_search(name: str, value: Callable[[Any, float], float], samples: int, halvings: int) -> ArcSearch:
-    """Make the search for roots of ``value(k, psi)``.
+    """Make the functions that find the roots of ``value(k, psi)`` on arcs.
 
     Parameters
     ----------
     name : under which the machine code is kept
-    value : an inline helper; ``k`` is whatever it takes
+    value : an inline helper; ``k`` holds its parameters
     samples : cells per arc
-    halvings : of a cell that has a root
+    halvings : number of bisections of a cell that has a root
     """
     bracketed, dip = _bracketing(name, value, halvings), _dipping(name, value)
 
     def scan(k: Any, centre: float, half: float, noise: float, count: int, at: Array) -> tuple[int, float, float]:
-        """See :data:`ArcSearch`."""
+        """Append the roots on an arc to ``at``, as :data:`ArcSearch` explains."""
         whole = half >= math.pi
         begin, width = way_of(half)
         step = width / samples
@@ -104,7 +104,7 @@ def arc_search(name: str, value: Callable[[Any, float], float], samples: int, ha
             elif (
                 abs(here) <= abs(after) and (before == math.inf or sign * before >= abs(here)) and not (whole and last)
             ):
-                # the samples on both sides have the same sign and are no nearer to zero; beyond an end counts as far
+                # the samples on both sides have the same sign and are no nearer to zero, or lie beyond an end
                 lo = tau if before == math.inf else tau - step
                 hi = tau if after == math.inf else tau + step
                 place, least = dip(k, centre, half, lo, hi, sign)
@@ -113,7 +113,7 @@ def arc_search(name: str, value: Callable[[Any, float], float], samples: int, ha
                     at[count] = bracketed(k, centre, half, lo, place, sign)
                     at[count + 1] = bracketed(k, centre, half, place, hi, -sign)
                     count += 2
-                # zero within the noise is a double root, which rounding may have lifted off
+                # a minimum within the noise is a double root, which rounding may have lifted off zero
                 elif least <= noise and count < MOST:
                     at[count] = angle_at(centre, half, place)
                     count += 1

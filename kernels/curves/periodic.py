@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from kernels.jit import inline, kernel
 from kernels.types import EPS, Array
 
-NOTHING = 1e-14  # share of the largest coefficient that the rotations' drift leaves in the others
+NOTHING = 1e-14  # error of the coefficients by the drift of the rotations, as a share of the largest coefficient
 
 
 @kernel
@@ -72,7 +72,7 @@ def on_grid(cosines: Array, sines: Array, turn: Array, values: Array) -> None:
 
 @inline
 def series(cosines: Array, sines: Array, phi: float) -> tuple[float, float]:
-    """Evaluate the series with these coefficients, and its derivative, at any angle phi [rad]."""
+    """Evaluate a Fourier series and its derivative at any angle phi [rad]."""
     value, slope = cosines[0], 0.0
     step_c, step_s = math.cos(phi), math.sin(phi)
     # cos k phi and sin k phi come by rotation, so that one cosine and one sine serve all harmonics
@@ -86,7 +86,7 @@ def series(cosines: Array, sines: Array, phi: float) -> tuple[float, float]:
 
 @inline
 def significant(cosines: Array, sines: Array, nothing: float = NOTHING) -> int:
-    """Count the coefficients worth keeping: all behind them are rounding, below a share of the largest one."""
+    """Count the leading coefficients to keep: all behind them are rounding, below a share of the largest one."""
     largest = 0.0
     for k in range(cosines.size):
         largest = max(largest, math.hypot(cosines[k], sines[k]))
@@ -98,7 +98,7 @@ def significant(cosines: Array, sines: Array, nothing: float = NOTHING) -> int:
 
 @inline
 def tail(cosines: Array, sines: Array, size: float) -> float:
-    """Estimate what the grid misses: the two highest harmonics, divided by the largest one or by ``size`` if larger."""
+    """Estimate what the grid misses: its two highest harmonics over the largest one, or over ``size`` if larger."""
     largest = size
     for k in range(cosines.size):
         largest = max(largest, math.hypot(cosines[k], sines[k]))
@@ -108,9 +108,9 @@ def tail(cosines: Array, sines: Array, size: float) -> float:
     return highest / largest if largest > 0.0 else 0.0
 
 
-FINER = 8  # looks per harmonic before a peak is refined
+FINER = 8  # samples per harmonic before a peak is refined
 BISECTIONS = 54
-LEVEL = 16.0 * EPS  # of the size: differences that say nothing
+LEVEL = 16.0 * EPS  # of the size: differences that are rounding
 
 
 @kernel
@@ -124,7 +124,7 @@ def turn_extremes(
     values : (n, N) samples at phi_j = 2 pi j / N, N odd
     largest, phi_largest, least, phi_least : (n,) out; extremes and their crank angles [rad]
     rms : (n,) out, by Parseval's sum
-    missed : (n,) out; size of the two highest harmonics against the largest: what the grid may have missed
+    missed : (n,) out; size of the two highest harmonics over the largest, an estimate of what the grid has missed
     """
     n = values.shape[1]
     half = (n + 1) // 2
@@ -160,7 +160,7 @@ def _climbed(c: Array, s: Array, sign: float, low: float, high: float) -> float:
 
 @inline
 def _peak(c: Array, s: Array, sign: float, look: Array) -> float:
-    """Find the crank angle in [0, 2 pi) where sign times the series is largest, from samples that may be next to it."""
+    """Find the crank angle in [0, 2 pi) where sign times the series is largest, starting from equidistant samples."""
     step, n, best, size = 2.0 * math.pi / look.size, look.size, 0, 0.0
     for j in range(n):
         best = j if sign * look[j] > sign * look[best] else best
@@ -172,7 +172,7 @@ def _peak(c: Array, s: Array, sign: float, look: Array) -> float:
         fall = 2.0 * here - before - after
         if j == best or here < before or here < after or not fall > 0.0:
             continue
-        # Twice what a parabola adds is more than any top has; a level curve has tops of rounding alone.
+        # No top rises above its sample by more than twice the parabola's rise; a level curve has rounding tops alone.
         if here + 0.25 * (after - before) * (after - before) / fall > highest + LEVEL * size:
             angle = _climbed(c, s, sign, step * (j - 1), step * (j + 1))
             top = sign * series(c, s, angle)[0]
@@ -181,7 +181,7 @@ def _peak(c: Array, s: Array, sign: float, look: Array) -> float:
     return where + 2.0 * math.pi if where < 0.0 else where
 
 
-STEPS, STILL = 6, 1e-6  # steps to a top; one that is shorter [rad] leaves an error far below rounding
+STEPS, STILL = 6, 1e-6  # most steps to a top; a step shorter than STILL [rad] leaves an error far below rounding
 
 
 @kernel
@@ -200,11 +200,11 @@ def climb(
     Parameters
     ----------
     series : (n, q, K + 1) complex coefficients of 2 K samples of q curves
-    row : (k,) which of the n
+    row : (k,) number of the design, one of the n
     mode : +1 for the curve, -1 for its negative, 0 for the sum of squares of the q curves
     spacing : longest step [rad]
     phi : (k,) in and out, places [rad]
-    height, bend : (k,) out; what is climbed at the place, and its second derivative
+    height, bend : (k,) out; the climbed curve at the place, and its second derivative
     still : (k,) out; whether the last step was short enough
     """
     for i in range(row.size):
@@ -222,13 +222,13 @@ def climb(
 
 @inline
 def _slopes(series: NDArray[np.complex128], phi: float, mode: int) -> tuple[float, float, float]:
-    """Value with two derivatives of what is climbed, of the series (q, K + 1) at one place."""
+    """Value and first two derivatives of the climbed curve at one angle, from the series (q, K + 1)."""
     height, rising, bend, last = 0.0, 0.0, 0.0, series.shape[1] - 1
     turn = complex(math.cos(phi), math.sin(phi))
     for part in range(series.shape[0]):
         waves, first, second = 0j, 0j, 0j
         for order in range(last, 0, -1):  # the small ones first
-            # the highest order of an even number of samples stands alone
+            # the highest order of an even number of samples has no conjugate partner
             term = (2.0 if order < last else 1.0) * series[part, order]
             waves = (waves + term) * turn
             first = (first + order * term) * turn

@@ -8,9 +8,9 @@ halved in the logarithm, and a root keeps its relative accuracy.
 
 The minimum of a trigonometric polynomial of degree 2 is exact, with a proof that it is the global one.
 
-``p(t) = c1 cos t + s1 sin t + c2 cos 2t + s2 sin 2t`` (a constant term is left to the caller) is what the discriminants
-of RSSR, RSSP and the four-bar and the squared sine of the pressure angle are.  Angles are carried as (cos, sin), so no
-trigonometric function is called.
+``p(t) = c1 cos t + s1 sin t + c2 cos 2t + s2 sin 2t`` (a constant term is left to the caller) is the form of the
+discriminants of RSSR, RSSP and the four-bar and of the squared sine of the pressure angle.  Angles are carried as
+(cos, sin), so no trigonometric function is called.
 
 Write the polynomial about a stationary point t0 as ``c cos d + s sin d + C cos 2d + S sin 2d``, d = t - t0, s = -2 S:
 
@@ -18,8 +18,8 @@ Write the polynomial about a stationary point t0 as ``c cos d + s sin d + C cos 
 
 so t0 is the global minimum if and only if ``-c - 2 C >= 2 hypot(C, S)``, and if it is not, the direction (C, S) of d
 leads below p(t0).  A polynomial of degree 2 has at most two minima, so one restart from there finds the global one.
-The proof needs t0 itself: a place beside it by r is judged wrong where the two minima differ by less than about r, so
-where it is that close both are found and their values decide.
+The proof needs t0 itself: at a distance r from it the verdict may be wrong where the two minima differ by less than
+about r, so where the criterion is that close both minima are found and their values decide.
 """
 
 from __future__ import annotations
@@ -43,7 +43,7 @@ def value_and_slope(p: Array, degree: int, x: float) -> tuple[float, float]:
 
 @inline
 def middle(low: float, high: float) -> float:
-    """Return a point that halves the bracket, in the logarithm where it spans more than a factor of four."""
+    """Middle of a bracket, in the logarithm where the bracket spans more than a factor of four."""
     if low == 0.0:
         return high * 2.0**-8
     if high > 4.0 * low:
@@ -53,7 +53,7 @@ def middle(low: float, high: float) -> float:
 
 @inline
 def bracketed_root(p: Array, degree: int, low: float, high: float, at_low: float) -> float:
-    """Find by bracketed Newton steps where p changes its sign between low and high; nan if they do not settle."""
+    """Find the root of p between low and high, where its signs differ, by bracketed Newton steps; nan on failure."""
     x, before = middle(low, high), math.inf
     for _ in range(200):
         value, slope = value_and_slope(p, degree, x)
@@ -74,7 +74,7 @@ def bracketed_root(p: Array, degree: int, low: float, high: float, at_low: float
 
 @inline
 def roots_up_to(end: float, p: Array, degree: int, derivatives: Array, found: Array) -> int:
-    """Roots of p in (0, end) in ascending order; the roots of each derivative part those of the one before it.
+    """Find the roots of p in (0, end) in ascending order; roots of each derivative separate those of the one before.
 
     Parameters
     ----------
@@ -86,7 +86,7 @@ def roots_up_to(end: float, p: Array, degree: int, derivatives: Array, found: Ar
     Returns
     -------
     count
-        of the roots in ``found``; a root of even order may be missing, as p does not change its sign there.
+        number of roots in ``found``; a root of even order may be missing, as p does not change its sign there.
     """
     for j in range(degree + 1):
         derivatives[0, j] = p[j]
@@ -109,14 +109,14 @@ def roots_up_to(end: float, p: Array, degree: int, derivatives: Array, found: Ar
 
 
 LAST_STEP = 1e-4  # a cubically converging step below this leaves 1e-11, which float64 does not show in the value
-NEARLY = 1e-3  # of the coefficients: the proof changes by less over 1e-4, what is left of the way to a flat minimum
+NEARLY = 1e-3  # share of the coefficients: the criterion changes by less over 1e-4, the error of a flat minimum
 _R = 0.5**0.5
 _C = 0.5 * (2.0 + 2.0**0.5) ** 0.5  # cos(pi/8)
 _S = 0.5 * (2.0 - 2.0**0.5) ** 0.5  # sin(pi/8)
 
 
 class Minimum(NamedTuple):
-    """Cosine and sine of the place where the polynomial is smallest, its value there, its second derivative there."""
+    """Minimum of a polynomial: cosine and sine of its place, value and second derivative there."""
 
     cos: float
     sin: float
@@ -128,7 +128,7 @@ class Minimum(NamedTuple):
 def rotate(u: float, v: float, angle: float) -> tuple[float, float]:
     """Turn the unit vector (u, v) by ``angle``, |angle| <= 0.5, without a trigonometric call or a division.
 
-    The angle is met to 3e-6 angle^9.  The length is restored to 1 up to the square of its defect, so that after a
+    The error of the angle is 3e-6 angle^9.  The length is restored to 1 up to the square of its error, so that after a
     last turn by less than 0.1 it is 1 to 2^-52.
     """
     q = angle * angle
@@ -182,9 +182,9 @@ def lowest_of_16(c1: float, s1: float, c2: float, s2: float) -> tuple[float, flo
 
 @inline
 def approach(c1: float, s1: float, c2: float, s2: float, u: float, v: float) -> tuple[float, float, float]:
-    """Take two cubically converging steps downhill without a branch, so that they vectorise; the size of the last.
+    """Take two cubically converging steps downhill, without a branch; return the place and the length of the last step.
 
-    From the lowest of 16 points the second is 2e-4 rad long on average, what is left after it 1e-12.
+    From the lowest of 16 points the second step is 2e-4 rad long on average, and the error after it 1e-12.
     """
     step = _step(c1, s1, c2, s2, u, v)
     u, v = rotate(u, v, step)
@@ -195,14 +195,14 @@ def approach(c1: float, s1: float, c2: float, s2: float, u: float, v: float) -> 
 
 @inline
 def shortfall(c1: float, s1: float, c2: float, s2: float, u: float, v: float) -> float:
-    """Return a number that is positive if and only if the stationary point (u, v) is not the global minimum."""
+    """Criterion that is positive if and only if the stationary point (u, v) is not the global minimum."""
     even = c2 * ((u - v) * (u + v)) + s2 * (2.0 * u * v)
     return 2.0 * math.sqrt(c2 * c2 + s2 * s2) + (c1 * u + s1 * v) + 2.0 * even
 
 
 @inline
 def far_minimum(c2: float, s2: float, u: float, v: float) -> tuple[float, float]:
-    """Direction from the minimum (u, v) to the other one if there are two; c2, s2 not both zero."""
+    """Start (cosine and sine) for the other minimum than (u, v), if there are two; c2, s2 not both zero."""
     cos2, sin2 = (u - v) * (u + v), 2.0 * u * v
     even, cross = c2 * cos2 + s2 * sin2, s2 * cos2 - c2 * sin2
     per = 1.0 / math.sqrt(c2 * c2 + s2 * s2)
@@ -211,7 +211,7 @@ def far_minimum(c2: float, s2: float, u: float, v: float) -> tuple[float, float]
 
 @inline
 def point(c1: float, s1: float, c2: float, s2: float, u: float, v: float) -> Minimum:
-    """Value and second derivative at (u, v)."""
+    """Value and second derivative of the polynomial at (u, v)."""
     first, even = c1 * u + s1 * v, c2 * ((u - v) * (u + v)) + s2 * (2.0 * u * v)
     return Minimum(u, v, first + even, -first - 4.0 * even)
 
@@ -236,7 +236,7 @@ def minimum(c1: float, s1: float, c2: float, s2: float) -> Minimum:
     Returns
     -------
     Minimum
-        its value is right to a few 2^-53 (|c1| + |s1| + |c2| + |s2|); nan coefficients give nan
+        with a value right to a few 2^-53 (|c1| + |s1| + |c2| + |s2|); nan coefficients give nan
     """
     u, v = lowest_of_16(c1, s1, c2, s2)
     u, v = _descend(c1, s1, c2, s2, u, v)

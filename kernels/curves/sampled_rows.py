@@ -1,8 +1,8 @@
-"""Limits on sampled curves as rows of a program, with the least value of a parabola where a curve is lowest.
+"""Limits on sampled curves as rows of a program, with the vertex of a parabola in place of the extreme samples.
 
 The greatest of 64 samples is up to 2 in 1000 below the peak, and has a kink wherever the peak passes between two
-poses.  A descent on such values comes to rest at kinks that the motion does not have.  The parabola through three
-samples is off by 1 or 2 in 10 000 where links are short, by 1 in 100 000 elsewhere, and its kinks are as small.
+poses.  A descent on such values comes to rest at kinks that the motion does not have.  The vertex of the parabola
+through three samples is off by 1 or 2 in 10 000 where links are short, by 1 in 100 000 elsewhere, with kinks as small.
 """
 
 from __future__ import annotations
@@ -18,13 +18,14 @@ from kernels.types import Array
 
 Index = NDArray[np.int64]
 
-EVERY, HIGHEST, LOWEST, RANGE = 0, 1, 2, 3  # where a limit holds: at all poses, at an end of the curve, for its range
+EVERY, HIGHEST, LOWEST, RANGE = 0, 1, 2, 3  # limit at all poses, on the largest or the least value, on the range
 
 
 class Limits(NamedTuple):
     """Limits on sampled curves, each array (l,): ``sign * curve <= bound`` in units of ``size``.
 
-    ``which`` is the number of the curve, ``at`` says where: a limit at every pose has m rows, the others one.
+    ``which`` is the number of the curve, ``at`` one of EVERY, HIGHEST, LOWEST, RANGE: a limit at every pose has m rows,
+    any other limit one.
     """
 
     which: Index
@@ -36,7 +37,7 @@ class Limits(NamedTuple):
 
 @inline
 def _parabola(before: float, here: float, after: float) -> tuple[float, float, float]:
-    """Weights of three neighbours, the middle one the lowest, in the least value of the parabola through them."""
+    """Weights of three neighbouring samples, the middle one the lowest, in the minimum of the parabola through them."""
     bend = before - 2.0 * here + after
     place = 0.5 * (before - after) / bend if bend > 0.0 else 0.0
     half = 0.5 * place * place
@@ -45,7 +46,7 @@ def _parabola(before: float, here: float, after: float) -> tuple[float, float, f
 
 @inline
 def _end(y: Array, sign: float) -> tuple[int, int, int, float, float, float]:
-    """Three poses and their weights in the highest value of ``sign * y``, between the poses too."""
+    """Three poses and their weights in the largest value of ``sign * y``, interpolated between the poses."""
     last, at, best = len(y) - 1, 0, -math.inf
     for p in range(last + 1):
         if sign * y[p] > best:
@@ -57,7 +58,7 @@ def _end(y: Array, sign: float) -> tuple[int, int, int, float, float, float]:
 
 @inline
 def _every(y: Array, of: Array, level: float, factor: float, values: Array, slopes: Array) -> None:
-    """Rows at every pose: ``level + factor y``, and their gradients where ``of`` has any."""
+    """Write the rows at every pose, ``level + factor y``, and their gradients where ``of`` has any."""
     m = len(y)
     for p in range(m):
         values[p] = level + factor * y[p]
@@ -78,16 +79,16 @@ def _every(y: Array, of: Array, level: float, factor: float, values: Array, slop
 def sampled_rows(curves: Array, moved: Array, limits: Limits, values: Array, slopes: Array) -> None:
     """Write the rows ``(bound - sign * curve) / size`` of limits on sampled curves of one design, and their gradients.
 
-    A value that is lowest among its neighbours is replaced by the least of the parabola there.  The place between the
-    poses is where the parabola is lowest, so to first order its own motion changes nothing.
+    A value that is lowest among its neighbours is replaced by the minimum of the parabola there.  The place of the
+    minimum moves with the design, but to first order that does not change the minimum.
 
     Parameters
     ----------
     curves : (c, m) at m poses of a turn
-    moved : (c, n, m) their derivatives; n is 0 where no gradients are asked for
+    moved : (c, n, m) derivatives of the curves; n is 0 where no gradients are wanted
     limits : in the order of their rows
-    values : (r,) out, the first rows are written
-    slopes : (n, r) out
+    values : (r,) out, of which the first rows are written
+    slopes : (n, r) out, gradients of the rows
     """
     m, r = curves.shape[1], 0
     for j in range(len(limits.which)):

@@ -1,9 +1,9 @@
 """Reductions of sampled turns, (n, m): a row is a design, its samples are a curve over the crank angle.
 
-The search for extrema, the windows and the events are made of them.
+The search for extrema, the windows and the events use them.
 
 The samples of a row stand at equidistant crank angles of one full turn, so a row is periodic: the neighbour of the last
-sample is the first.  ``mode`` chooses the quantity that is made large: 0 the magnitude, +1 the value, -1 its negative.
+sample is the first.  ``mode`` chooses the quantity to be maximised: 0 the magnitude, +1 the value, -1 its negative.
 """
 
 from __future__ import annotations
@@ -31,12 +31,12 @@ def _measured(value: float, mode: int) -> float:
 
 @kernel
 def worst_status(status: Status, worst: Status) -> None:
-    """Choose one status for the whole turn: of those in the row, the one whose cause comes before the others.
+    """Choose the gravest status of each row for the whole turn.
 
     Parameters
     ----------
     status : (n, m) of the poses
-    worst : (n,) out; INVALID_INPUT before NOT_ASSEMBLED, SINGULAR, DEAD_POINT and whatever else is not OK
+    worst : (n,) out; INVALID_INPUT before NOT_ASSEMBLED, SINGULAR, DEAD_POINT and any other status but OK
     """
     for i in range(status.shape[0]):
         grave, worst_code = 0, st.OK
@@ -124,12 +124,12 @@ def peaks(
     allowed : (n, m) which samples count (and their neighbours, where a peak may hide), or None for all
     scale : (n,) out; size of the row: the best magnitude, or the range of the samples for signed modes
     rough : (n,) out; largest fourth difference of neighbouring samples against ``scale``; small when they resolve it
-    row, column : out, at least n (m/2 + 1) long; where the candidates are
+    row, column : out, at least n (m/2 + 1) long; places of the candidates
 
     Returns
     -------
     int
-        how many candidates were written.  A row that is flat within its rounding yields its best sample alone.
+        number of candidates written.  A row that is flat within its rounding yields its best sample alone.
     """
     count, m = 0, values.shape[1]
     for i in range(values.shape[0]):
@@ -171,10 +171,10 @@ def peaks(
 
 @kernel
 def nearest_singularity(discriminant: Array, distance: Array) -> None:
-    """Estimate how near the discriminant has a complex zero to the real crank angles [rad]; 0 if it may be a real one.
+    """Estimate the distance of the discriminant's nearest complex zero from the real crank angles [rad]; 0 if real.
 
     The parabola through each local minimum and its neighbours gives the zero phi0 +- i rho with
-    rho^2 = D / (D''/2).  There the derivatives of the motion are singular, so it says how dense samples must stand.
+    rho^2 = D / (D''/2).  There the derivatives of the motion are singular, so rho sets the spacing of samples.
 
     Parameters
     ----------
@@ -201,7 +201,7 @@ def nearest_singularity(discriminant: Array, distance: Array) -> None:
 
 @kernel
 def crossings(values: Array, level: Array, row: Index, column: Index) -> int:
-    """List where each row passes its level: between the sample at ``column`` and the next one.
+    """List the places where rows cross their level: between the sample at ``column`` and the next one.
 
     Parameters
     ----------
@@ -212,7 +212,7 @@ def crossings(values: Array, level: Array, row: Index, column: Index) -> int:
     Returns
     -------
     int
-        how many passages were written
+        number of crossings written
     """
     count, m = 0, values.shape[1]
     for i in range(values.shape[0]):
@@ -242,7 +242,7 @@ def grazes(values: Array, level: Array, doubtful: Mask) -> None:
             bend = left + right - 2.0 * here
             if (left - here) * (right - here) >= 0.0 and bend != 0.0:
                 slope = 0.5 * (right - left)
-                # Twice the parabola's overshoot: it is an estimate.
+                # Twice the parabola's overshoot, as it is only an estimate.
                 beyond = here - slope * (slope / bend)
                 if (here >= level[i]) != (beyond >= level[i]):
                     doubtful[i] = True
@@ -258,7 +258,7 @@ def quartic_peak(z: Array, place: Array, height: Array, ripple: Array, blur: Arr
     place : (n,) out; of the peak in steps, within one step of the best sample; -2 or +2 if an end sample is the best
     height : (n,) out; value of the quartic there, not below the best sample
     ripple : (n,) out; fourth difference of the samples: their noise, once the steps are small
-    blur : (n,) out; how far that noise can shift the peak, in steps; at most 2
+    blur : (n,) out; largest shift of the peak by that noise, in steps; at most 2
     """
     for i in range(z.shape[0]):
         a, b, c, d, e = z[i, 0], z[i, 1], z[i, 2], z[i, 3], z[i, 4]
