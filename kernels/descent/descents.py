@@ -1,4 +1,4 @@
-"""Descents by sequential quadratic programs at fixed poses, the linear part solved anew after every step."""
+"""Descents by sequential quadratic programs at fixed poses; the linear unknowns are solved again after every step."""
 
 from __future__ import annotations
 
@@ -15,17 +15,17 @@ from kernels.descent.unknowns import solved, unknowns_of
 from kernels.jit import folded, inline, kernel, part
 from kernels.types import Array
 
-LOCKED = 1e6  # above what any design is worth that turns
-RADIUS, LARGEST, LEAST = 0.1, 0.3, 1e-6  # of the first box about a place, of any, of one that has come to rest
-SPENT = 1e-6  # gain promised, as a share of the objective, at which a descent has come to rest
-RENEWED = 1e-5  # gain since it came to rest before, as a share of the objective, after which it begins anew
-CORRECTIONS = 3  # of a step that rows bend away from: without them a valley of 0.015 mm is crossed in steps of 1e-3
+LOCKED = 1e6  # above the merit of any design that turns
+RADIUS, LARGEST, LEAST = 0.1, 0.3, 1e-6  # half widths of the box: at the start, at most, and where a descent is at rest
+SPENT = 1e-6  # promised gain, as a share of the objective, at which a descent has come to rest
+RENEWED = 1e-5  # gain since the last rest, as a share of the objective, above which a descent is started again
+CORRECTIONS = 3  # second-order ones of a step: without them a valley of 0.015 mm is crossed in steps of 1e-3
 TRUSTED, GOOD = 0.1, 0.6  # share of the promised gain below which the box shrinks, and above which it grows
 WORTH, BOX, RESTED, LOOKS = 0, 1, 2, 3  # elements of ``state``
 
 
 class Design(NamedTuple):
-    """A place with its columns, motion, unknowns, room and rows."""
+    """Design at a place: its columns, motion, linear unknowns, room and rows."""
 
     place: Array
     row: Array
@@ -58,7 +58,7 @@ def _with_room(task: Task, kind: int, d: Design, moved: Array) -> None:
 
 @folded
 def _begun(task: Task, kind: int, d: Design) -> float:
-    """Solve the unknowns of a design whose place is set; what it is worth, infinite where it does not turn."""
+    """Find the linear unknowns of a design at its place; return its merit, infinite where it does not turn."""
     none = np.empty((0, len(d.room)))
     columns_of(task, kind, d.place, d.row)
     if not moving(d.row, task.cos, task.sin, d.at) > 0.0:
@@ -83,7 +83,7 @@ def _known(worth: float) -> float:
 
 @kernel
 def begun(task: Task, kinds: Index, places: Array, x: Array, worth: Array) -> None:
-    """Compute the best unknowns (k, 5) of places (k, n), and what they are worth (k,): infinite where nothing turns."""
+    """Compute the best linear unknowns (k, 5) at places (k, n), and merits (k,), infinite where nothing turns."""
     d = _no_design(task)
     for i in range(len(places)):
         _copy(places[i], d.place)
@@ -93,7 +93,7 @@ def begun(task: Task, kinds: Index, places: Array, x: Array, worth: Array) -> No
 
 @part
 def _look(task: Task, kind: int, d: Design, slopes: Array) -> bool:
-    """Rows and gradients of a design; whether they are finite."""
+    """Compute the rows and gradients of a design; return whether the gradients are finite."""
     n, m = len(task.columns), len(task.cos)
     by, moved = nothing_moved(n, m), np.zeros((n + UNKNOWNS, m + 1))
     gradients(d.row, d.at, task.columns, task.cos, task.sin, by)
@@ -108,7 +108,7 @@ def _look(task: Task, kind: int, d: Design, slopes: Array) -> bool:
 
 @folded
 def _try(task: Task, kind: int, d: Design, step: Array, out: Design, spare: Design) -> float:
-    """Go a step with its own unknowns or with the best ones of the proportions there, whichever are worth more."""
+    """Evaluate a step with its own linear unknowns and with the best ones there; keep the better; return its merit."""
     n, none = len(d.place), np.empty((0, len(d.room)))
     for k in range(n):
         out.place[k] = min(max(d.place[k] + step[k], 0.0), 1.0)
@@ -153,7 +153,7 @@ def _copied(d: Design, out: Design) -> None:
 
 @part
 def _lagrangian(slopes: Array, weights: Array, sign: float, out: Array) -> None:
-    """Add the gradients of the rows that hold, by their weights."""
+    """Add the gradients of the active rows, weighted by their multipliers, times ``sign``."""
     for j in range(len(weights)):
         if weights[j] != 0.0:
             for k in range(len(out)):
@@ -162,7 +162,7 @@ def _lagrangian(slopes: Array, weights: Array, sign: float, out: Array) -> None:
 
 @inline
 def _largest(values: Array, count: int) -> float:
-    """Magnitude of the objective that the first rows tell."""
+    """Magnitude of the objective, from its ``count`` rows."""
     t = -math.inf
     for j in range(count):
         t = max(t, -values[j])
@@ -173,7 +173,7 @@ def _largest(values: Array, count: int) -> float:
 def _tried(
     task: Task, kind: int, here: Design, worth: float, slopes: Array, q: Program, weights: Array, best: Design
 ) -> tuple[float, float]:
-    """Find the best design that a step leads to, tried anew where rows bend away; its worth, and the gain promised."""
+    """Solve for a step, correct it while rows are curved, keep the best design; return merit and promised gain."""
     n, r = len(q.size), len(weights)
     there, spare, step, ignored = _no_design(task), _no_design(task), np.empty(n), np.empty(r)
     t = _largest(here.values, 2 * len(task.cos))
@@ -201,17 +201,17 @@ def _tried(
 
 @kernel
 def descend(task: Task, kind: int, place: Array, x: Array, state: Array, curvature: Array, steps: int) -> None:
-    """Take so many steps of a descent, unless it comes to rest before.
+    """Take ``steps`` steps of a descent, fewer if it comes to rest.
 
     Parameters
     ----------
     task : the problem
-    kind : number of its signs
-    place, x : (n,) and (5,) where it stands, written
-    state : (4,) its worth, the size of its box, its worth when it came to rest before, and looks with gradients;
-        written.  A descent begins with (worth, RADIUS, inf, 0), at rest where it is worth LOCKED or more.
-    curvature : (n + 5, n + 5), written; see :func:`begin`
-    steps : at most
+    kind : number of the combination of signs
+    place, x : (n,) and (5,) present place and linear unknowns, in and out
+    state : (4,) merit, half width of the box (0 at rest), merit at the last rest, number of gradient evaluations; in
+        and out.  A descent begins with (merit, RADIUS, inf, 0), at rest where the merit is LOCKED or more.
+    curvature : (n + 5, n + 5), in and out; see :func:`begin`
+    steps : largest number of steps
     """
     here, best, q = _no_design(task), _no_design(task), no_program(task)
     n = len(q.size)
@@ -263,7 +263,7 @@ def descend(task: Task, kind: int, place: Array, x: Array, state: Array, curvatu
         if promised <= SPENT * abs(state[WORTH]):
             state[BOX] = 0.0
         if state[BOX] <= LEAST and state[RESTED] - state[WORTH] > RENEWED * abs(state[WORTH]):
-            # What was learnt may promise less than there is.
+            # The learnt curvature may promise less gain than there is.
             state[RESTED], state[BOX], new = state[WORTH], RADIUS, True
             begin(curvature)
     _copy(here.place, place)

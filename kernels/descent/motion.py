@@ -1,11 +1,11 @@
-"""A crank-rocker that drives a guided point, at fixed poses: all that is not linear in point, line and scale.
+"""Motion of a crank-rocker that drives a guided point, at fixed poses: the part not linear in point, line and scale.
 
 With the crank pin B of the guide and the way w from it to the rocker pin, both complex and for a crank of length 1,
 
     s + i (dev + h) = z1 B + z2 w,      z1 = scale e^{-i lam},  z2 = scale (xi + i eta)/b e^{-i lam}
 
-(docs/internals/optimiser.md, Proportions).  Gradients of the crank-rocker and of the rocker pin are those of the
-complex step; what the first stage moves goes on by the chain rule.
+(docs/internals/optimiser.md, Proportions).  Gradients of the crank-rocker and of the rocker pin come by the complex
+step; the effect of the first stage on the second follows by the chain rule.
 """
 
 from __future__ import annotations
@@ -26,18 +26,19 @@ Complex = NDArray[np.complex128]
 Index = NDArray[np.int64]
 
 STEP = 1e-30  # of the complex step
-GUIDE, SENSE, OFFSET, COLUMNS = 8, 17, 18, 19  # columns of stage 2, of the coupling, and how many there are
+GUIDE, SENSE, OFFSET, COLUMNS = 8, 17, 18, 19  # first column of stage 2, columns of the coupling, number of columns
 ORDERS = 3  # position, velocity and acceleration
 TURN, SINE, RATE, BEND, MARGIN = 0, 1, 2, 3, 4  # rows of ``driver``: cosine, sine, first and second derivative
 U, V, FIRST, SECOND = 0, 1, 2, 3  # rows of ``driven``: cosine and sine of the input angle, its derivatives
-P, Q, J, DIP, SLOPE = 2, 3, 4, 5, 6  # rows of ``pin`` behind cosine and sine: derivatives; the margin and its first
+P, Q, J, DIP, SLOPE = 2, 3, 4, 5, 6  # rows of ``pin`` behind cosine and sine: 3 derivatives; margin, its derivative
 
 
 class Motion(NamedTuple):
-    """One design at m poses.
+    """Motion of one design at m poses.
 
-    ``driver`` (5, m) is the rocker of stage 1, ``driven`` (4, m) the input of stage 2, ``pin`` (7, m) its rocker by
-    that input, ``b`` and ``w`` (3, m) B and w of the module with two derivatives by the crank angle.
+    ``driver`` (5, m) is the rocker of stage 1, ``driven`` (4, m) the input of stage 2, ``pin`` (7, m) the rocker of
+    stage 2 with derivatives by that input, ``b`` and ``w`` (3, m) B and w of the module docstring with two derivatives
+    by the crank angle.
     """
 
     driver: Array
@@ -48,7 +49,7 @@ class Motion(NamedTuple):
 
 
 class Moved(NamedTuple):
-    """Derivatives of a motion by n places: both margins (2, n, m), the angle of stage 1 (n, m), ``b``, ``w``."""
+    """Derivatives of a motion by n columns: both margins (2, n, m), angle of stage 1 (n, m), ``b``, ``w`` (3, n, m)."""
 
     margins: Array
     angle: Array
@@ -58,7 +59,7 @@ class Moved(NamedTuple):
 
 @inline
 def no_motion(m: int) -> Motion:
-    """Room for a motion at m poses."""
+    """Allocate a motion at m poses."""
     return Motion(
         np.empty((5, m)), np.empty((4, m)), np.empty((7, m)), np.empty((ORDERS, m), np.complex128),
         np.empty((ORDERS, m), np.complex128),
@@ -67,7 +68,7 @@ def no_motion(m: int) -> Motion:
 
 @inline
 def nothing_moved(n: int, m: int) -> Moved:
-    """Room for derivatives by n places at m poses."""
+    """Allocate derivatives of a motion at m poses by n columns."""
     return Moved(
         np.zeros((2, n, m)), np.zeros((n, m)), np.empty((ORDERS, n, m), np.complex128),
         np.empty((ORDERS, n, m), np.complex128),
@@ -76,7 +77,7 @@ def nothing_moved(n: int, m: int) -> Moved:
 
 @inline
 def _rocker_of(r: Any, u: float, v: float) -> tuple[Any, Any, Any, Any, Any]:
-    """Cosine and sine of the angle of stage 1, two derivatives by the crank angle, squared cosine of its pressure."""
+    """Cosine and sine of the rocker of stage 1, two derivatives by the crank angle, squared cosine of the pressure."""
     at = rssr.place(r.e, r.y0, r.ca, r.k0, r.k1, r.k2, u, v)
     t = np.sqrt(at.delta)
     to = rocker(at, t, 1.0 / (at.rr * t))
@@ -87,7 +88,7 @@ def _rocker_of(r: Any, u: float, v: float) -> tuple[Any, Any, Any, Any, Any]:
 
 @inline
 def _pin_of(r: Any, u: float, v: float) -> tuple[Any, ...]:
-    """Cosine and sine of the rocker of stage 2 and two derivatives by its input, the margin, its derivative, and T."""
+    """Cosine and sine of the rocker of stage 2, three derivatives by its input angle, the margin and its derivative."""
     at = guide.place(r, u, v)
     t = r.branch * np.sqrt(at.delta)
     c, s = -(at.x * at.w + at.y * t) / at.rr, (at.y * at.w - at.x * t) / at.rr
@@ -106,7 +107,7 @@ def first_stage(row: Any) -> Any:
 
 @inline
 def second_stage(row: Any) -> Any:
-    """Constants of the guiding four-bar, whose point and line do not matter here."""
+    """Constants of the guiding four-bar; its point and line are not used here and set to zero."""
     k, none = GUIDE, 0.0 * row[GUIDE]
     d = (row[k], row[k + 1], row[k + 2], row[k + 3], none, none, none, none, row[k + 8])
     return guide.reduce_along(d, 1.0 + none, none)
@@ -118,13 +119,13 @@ def moving(row: Array, cos: Array, sin: Array, out: Motion) -> float:
 
     Parameters
     ----------
-    row : (P,) its columns
+    row : (P,) columns of the design
     cos, sin : (m,) of the crank angles
     out : written
 
     Returns
     -------
-    The least of both margins; negative, or nan, where the mechanism does not turn, and then the rest is not known.
+    Least of both margins over the turn; negative or nan where the mechanism does not turn, and ``out`` is meaningless.
     """
     one, two = first_stage(row), second_stage(row)
     least = math.inf if one.valid and two.valid else math.nan
@@ -139,7 +140,7 @@ def moving(row: Array, cos: Array, sin: Array, out: Motion) -> float:
         c, s, p1, p2, p3, dip, slope = _pin_of(two, u, v)
         out.pin[0, p], out.pin[1, p], out.pin[P, p], out.pin[Q, p], out.pin[J, p] = c, s, p1, p2, p3
         out.pin[DIP, p], out.pin[SLOPE, p] = dip, slope
-        # A comparison with nan is false: what does not reach in stage 1 has a negative margin there.
+        # A comparison with nan is false: where stage 1 does not reach, its negative margin counts, not the nan behind.
         least = margin if margin < least else least
         least = dip if dip < least else least
         b = row[GUIDE] * complex(u, v)
@@ -155,10 +156,11 @@ def moving(row: Array, cos: Array, sin: Array, out: Motion) -> float:
 
 @inline
 def _put(out: Moved, k: int, p: int, b: Any, arm: Any, of_b: Any, of_arm: Any, stretch: float, frame: float) -> None:
-    """Write what B and w do when their angles and the derivatives of these move.
+    """Write the derivatives of B and w by a column, from those of their angles.
 
-    ``b`` is B with the first and second derivative of its angle, ``of_b`` how these three angles move; so of the arm
-    from the rocker pivot to its pin, which is also longer by ``stretch``, and the frame by ``frame``.
+    ``b`` is B with the first and second derivative of its angle by the crank angle; ``of_b`` are the derivatives of the
+    angle and these two by the column.  ``arm`` and ``of_arm`` are the same of the arm from the rocker pivot to its pin;
+    ``stretch`` is the derivative of the logarithm of the arm's length, ``frame`` that of the frame's length.
     """
     for which in range(2):
         (z, first, second), (d0, d1, d2) = (b, of_b) if which == 0 else (arm, of_arm)
@@ -175,7 +177,7 @@ def _put(out: Moved, k: int, p: int, b: Any, arm: Any, of_b: Any, of_arm: Any, s
 
 @inline
 def _turned(out: Moved, k: int, p: int, row: Array, at: Motion, d0: float, d1: float, d2: float) -> None:
-    """Go on with what the input angle of stage 2 and its derivatives do."""
+    """Write the derivatives of stage 2 by a column that moves its input angle (d0) and two derivatives (d1, d2)."""
     first, second = at.driven[FIRST, p], at.driven[SECOND, p]
     p1, p2, p3 = at.pin[P, p], at.pin[Q, p], at.pin[J, p]
     t1, t2 = p1 * first, p2 * first * first + p1 * second
@@ -188,13 +190,13 @@ def _turned(out: Moved, k: int, p: int, row: Array, at: Motion, d0: float, d1: f
 
 @part
 def gradients(row: Array, at: Motion, columns: Index, cos: Array, sin: Array, out: Moved) -> None:
-    """Compute derivatives of the motion of a design that turns by some of its columns.
+    """Compute the derivatives of a motion by some columns of its design, which must turn.
 
     Parameters
     ----------
     row : (P,) the design
     at : its motion
-    columns : (n,) of either stage, or the angle between them
+    columns : (n,) numbers of columns, of either stage or of the angle between them
     cos, sin : (m,) of the crank angles
     out : written
     """

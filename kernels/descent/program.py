@@ -1,4 +1,4 @@
-"""The quadratic program of one step of a descent: its curvature as learnt, its box, its solution."""
+"""Quadratic program of one step of a descent: the learnt curvature, the box, the solution."""
 
 from __future__ import annotations
 
@@ -13,21 +13,21 @@ from kernels.jit import kernel, part
 from kernels.linear.nearest_of_many import CurveRows, Nearest, nearest_of_many
 from kernels.types import Array
 
-EXACT = 1e-11  # distance by which the point nearest to the centre may miss a row
-NEAR = 0.15  # rows further from their bound join the quadratic program only where its step would miss them
-JOINED, MISSED = 6, 1e-6  # times that they may, and what is no miss
-SOFT, LINEAR = 1.0, 1e-2  # curvature to begin with, of the places and of the linear unknowns
-REACH = 10.0  # of the linear unknowns in one step, in units of their size and of the radius
-DAMPED = 0.2  # least curvature along a step, as a share of what was believed (Powell 1978)
+EXACT = 1e-11  # distance by which the point nearest to the centre may violate a row
+NEAR = 0.15  # rows further from their bound join the quadratic program only where its step would violate them
+JOINED, MISSED = 6, 1e-6  # most rounds in which rows join, and the largest violation that is none
+SOFT, LINEAR = 1.0, 1e-2  # initial curvature, of the places and of the linear unknowns
+REACH = 10.0  # largest step of the linear unknowns, in units of their size and of the radius
+DAMPED = 0.2  # least curvature along a step, as a share of the estimate before it (Powell 1978)
 FLAT = 1e-6  # smallest curvature: the objective is about 1, the places run from 0 to 1
-LENT = 1e-4  # curvature lent to t and to the violation, which have none
+LENT = 1e-4  # curvature added in t and in the violation, which have none
 
 
 class Program(NamedTuple):
-    """A quadratic program in the step, in t and in the violation; ``held`` are the rows that held last, for the next.
+    """Quadratic program in the step, in t and in the violation; ``held`` are the active rows, for the next program.
 
-    ``rows`` (n, r) are its rows, ``back`` leads from where its objective is the distance from ``centre`` to the step.
-    ``size`` are the units of the step.
+    ``rows`` (n, r) are the gradients of its rows.  ``back`` leads to the step from coordinates in which the objective
+    is the distance from ``centre``.  ``size`` are the units of the step.
     """
 
     rows: Array
@@ -43,7 +43,7 @@ class Program(NamedTuple):
 
 @part
 def no_program(task: Task) -> Program:
-    """Room for a program."""
+    """Allocate a program."""
     n, r = len(task.columns) + UNKNOWNS + 2, len(task.kinds)
     return Program(
         np.empty((n, r)), np.zeros((n, n)), np.empty(n), np.empty(n), np.empty(n - 2), np.empty(n - 2), np.empty(r),
@@ -53,7 +53,7 @@ def no_program(task: Task) -> Program:
 
 @part
 def units(x: Array, size: Array) -> None:
-    """Units of the linear unknowns, the last of ``size``: their own sizes; 1 for all that is varied before them."""
+    """Write the units of a step: 1 for the places, the magnitudes of the linear unknowns for these, which come last."""
     n = len(size) - UNKNOWNS
     for k in range(n):
         size[k] = 1.0
@@ -64,7 +64,7 @@ def units(x: Array, size: Array) -> None:
 
 @part
 def prepare(task: Task, slopes: Array, curvature: Array, q: Program) -> None:
-    """Write what stays of a program while a descent stands where it is."""
+    """Write the part of a program that depends on the present design and curvature, but not on the box."""
     n, objective = len(q.size), 2 * len(task.cos)
     for k in range(n):
         for j in range(slopes.shape[1]):
@@ -93,7 +93,7 @@ def prepare(task: Task, slopes: Array, curvature: Array, q: Program) -> None:
 
 @part
 def solve(task: Task, t: float, worth: float, q: Program, step: Array, weights: Array) -> float:
-    """Step (n + 5,) and multipliers of the rows (r,) for ``q.right``, the rows for t = 0; the gain it promises."""
+    """Compute step (n + 5,) and multipliers (r,) for the rows ``q.right`` at t = 0; return the promised gain."""
     n, objective = len(q.size), 2 * len(task.cos)
     for j in range(objective):
         q.right[j] = (q.right[j] + t) / task.unit
@@ -115,7 +115,7 @@ def solve(task: Task, t: float, worth: float, q: Program, step: Array, weights: 
 
 @part
 def box(place: Array, t: float, unit: float, radius: float, q: Program) -> None:
-    """Write the ends of the box about a design."""
+    """Write the bounds of a step: the box around a design, and the range of the places."""
     n = len(place)
     for k in range(len(q.size)):
         reach = radius if k < n else REACH * radius
@@ -126,7 +126,7 @@ def box(place: Array, t: float, unit: float, radius: float, q: Program) -> None:
 
 @part
 def learn(curvature: Array, moved: Array, change: Array) -> None:
-    """BFGS update, damped so that the curvature stays positive."""
+    """Update the curvature by BFGS, damped so that it stays positive definite."""
     along = np.zeros(len(moved))
     for i in range(len(moved)):
         for j in range(len(moved)):
@@ -148,7 +148,7 @@ def learn(curvature: Array, moved: Array, change: Array) -> None:
 
 @kernel
 def begin(curvature: Array) -> None:
-    """Write the curvature to begin with."""
+    """Write the initial curvature."""
     for k in range(len(curvature)):
         for i in range(len(curvature)):
             curvature[k, i] = 0.0

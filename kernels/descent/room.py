@@ -1,4 +1,7 @@
-"""What tolerances do to the deviation and to the range of a needle drive, to first order, at fixed poses."""
+"""Room for tolerances of the deviation and the range of a needle drive, to first order, at fixed poses.
+
+Room is the scatter by the tolerances: the distance that a design keeps from its limits.
+"""
 
 from __future__ import annotations
 
@@ -28,11 +31,11 @@ from kernels.descent.rows import Task, columns_of
 from kernels.jit import inline, part
 from kernels.types import Array
 
-EVERY_SECOND = 2  # pose tells what tolerances do: that changes slowly along the turn
+EVERY_SECOND = 2  # pose is enough: the effect of tolerances changes slowly along the turn
 DRIVER = 7  # dimensions of stage 1
-NUMBERS = 6  # of its closure that depend on them
+NUMBERS = 6  # of the closure of stage 1 that depend on its dimensions
 DIMENSIONS = DRIVER + 9  # and a, b, c, e, xi, eta, lam, h of stage 2 and the angle between both
-MOVED = 1e-6  # of a place, for differences
+MOVED = 1e-6  # step of a place for difference quotients
 
 
 @inline
@@ -63,7 +66,7 @@ def _of_pin(row: Array, at: Motion, p: int, out: Array) -> None:
 def _by_dimensions(
     row: Array, x: Array, at: Motion, closure: Array, p: int, place: int, cos: Array, sin: Array, out: Complex
 ) -> None:
-    """Compute derivatives of the point along (real) and across the line by all dimensions, (16,) in row ``place``."""
+    """Compute derivatives of the point, along the line (real) and across, by all dimensions: row ``place``, (16,)."""
     z1, z2 = complex(x[0], x[1]), complex(x[2], x[3])
     scale, one, turned = abs(z1), first_stage(row), np.empty(4)
     b, w = at.b[0, p], at.w[0, p]
@@ -90,13 +93,13 @@ def _by_dimensions(
 
 @part
 def room_of(task: Task, row: Array, x: Array, at: Motion, cos: Array, sin: Array, ends: Array, out: Array) -> None:
-    """Room of the deviation at m poses and of the range of the position, (2 m + 1,) with the poses between.
+    """Compute the room of the deviation, at m poses and between them, and of the range of the position: (2 m + 1,).
 
     Parameters
     ----------
     task : with ``sigma``
     row, x, at : a design that turns, its unknowns and its motion at the m poses ``cos``, ``sin``
-    ends : (2,) the poses where the position is highest and lowest; looked for where the first is negative
+    ends : (2,) poses where the position is highest and lowest; found and written if the first is negative
     out : written
     """
     m = len(cos)
@@ -128,15 +131,15 @@ def room_of(task: Task, row: Array, x: Array, at: Motion, cos: Array, sin: Array
 
 @inline
 def _column(k: int) -> int:
-    """Column of a dimension: those of both signs and of the sense of the coupling are left out."""
+    """Column of a dimension; the columns of branches and of the coupling's sense are no dimensions."""
     return k if k < DRIVER else OFFSET if k == DIMENSIONS - 1 else k + 1
 
 
 @part
 def rooms(task: Task, kind: int, place: Array, x: Array, room: Array, moved: Array) -> None:
-    """Room (m + 1,) of a design, and its derivatives (n + 5, m + 1) by places and unknowns; without n by none.
+    """Compute the room (m + 1,) of a design and its derivatives (n + 5, m + 1) by places and linear unknowns.
 
-    The derivatives are differences: of exact first derivatives they are good to six digits.
+    The derivatives are difference quotients of exact first derivatives, good to six digits; none if ``moved`` is empty.
     """
     n, half = len(place), len(task.cos) // EVERY_SECOND
     cos, sin = task.cos[::EVERY_SECOND].copy(), task.sin[::EVERY_SECOND].copy()

@@ -1,4 +1,4 @@
-"""Curves of a needle drive at fixed poses as rows of a program: of its places and of the linear unknowns."""
+"""Curves of a needle drive at fixed poses as rows of a program in its places and linear unknowns."""
 
 from __future__ import annotations
 
@@ -12,23 +12,24 @@ from kernels.descent.motion import DIP, MARGIN, SINE, TURN, Index, Motion, Moved
 from kernels.jit import inline, part
 from kernels.types import Array
 
-# Codes of curves: both margins, the angle of stage 1, the coupler point in the frame of stage 2, then what it does
-# along and across the line by order of the derivative, and the deviation with its room added or taken off.
+# Codes of curves: both margins, the angle of stage 1, the coupler point in the frame of stage 2, then the point along
+# and across the line, two codes per order of the derivative, and the deviation plus and minus its room.
 FIRST_MARGIN, SECOND_MARGIN, ANGLE, POINT_X, POINT_Y, ALONG, ACROSS, HIGH, LOW = 0, 1, 2, 3, 4, 5, 6, 11, 12
-UNKNOWNS = 5  # that the motion is linear in: z1, z2 and the offset
+UNKNOWNS = 5  # in which the motion is linear: z1, z2 (complex) and the offset
 
 
 class Task(NamedTuple):
-    """What all descents of one problem share; places (n,) are between 0 and 1.
+    """Data that all descents of one problem share; places (n,) are scaled variables between 0 and 1.
 
     ``bases`` (k, P) are designs of all combinations of signs, with 1 for the crank of stage 2. A place moves its column
     from ``low`` to ``high``, on a logarithmic scale of that width where ``wide`` is not 0. ``codes`` (c,) are the
-    curves that ``limits`` name, first the one whose magnitude is to be small, twice. ``lengths`` (q,) are columns of
-    stage 2 with bounds. ``turns`` (T, m) are the numbers of rows around one turn. ``kinds`` (r,) say what a linear
-    program in the unknowns makes of a row (:mod:`kernels.descent.unknowns`). ``ranges`` are the rows of the position's
-    range, in units of ``spans``. ``bound`` and ``stroke`` are the largest deviation and the least such range. ``unit``
-    is that of the objective, ``price`` that of a limit missed by its size. ``sigma`` (P,) are standard deviations of
-    what is made, times how many of them are kept away from limits on deviation and range; empty for a drawing.
+    curves of ``limits``; the first two limits are the objective, a largest magnitude. ``lengths`` (q,) are columns of
+    stage 2 with bounds. ``turns`` (T, m) are the numbers of rows around one turn. ``kinds`` (r,) are the parts of the
+    rows in the linear program of the unknowns (:mod:`kernels.descent.unknowns`). ``ranges`` are the rows of the
+    position's range, in units of ``spans``. ``bound`` and ``stroke`` are the largest deviation and the least range
+    allowed. ``unit`` is the unit of the objective, ``price`` the penalty of a limit missed by its own size. ``sigma``
+    (P,) are standard deviations of the columns in manufacture, times the number of them that is kept from limits on
+    deviation and range; empty without tolerances.
     """
 
     bases: Array
@@ -56,7 +57,7 @@ class Task(NamedTuple):
 
 @part
 def columns_of(task: Task, kind: int, place: Array, row: Array) -> None:
-    """Columns of a design at a place."""
+    """Write the columns of the design at a place."""
     for k in range(len(row)):
         row[k] = task.bases[kind, k]
     for k in range(len(task.columns)):
@@ -68,13 +69,13 @@ def columns_of(task: Task, kind: int, place: Array, row: Array) -> None:
 
 @inline
 def _part_of(z: complex, code: int) -> float:
-    """Coordinate of a point that a curve is."""
+    """Coordinate of a complex point that a curve shows: the real part along, the imaginary part across."""
     return z.real if code in (POINT_X, ALONG, ALONG + 2, ALONG + 4) else z.imag
 
 
 @inline
 def _shares(code: int, x: Array) -> tuple[int, complex, complex]:
-    """Order of the derivative, and how much of B and of w there is in the point that a curve is a coordinate of."""
+    """Order of the derivative, and the factors of B and w in the point of which a curve is a coordinate."""
     z1, z2 = complex(x[0], x[1]), complex(x[2], x[3])
     if code in (POINT_X, POINT_Y):
         size = abs(z1)
@@ -84,7 +85,7 @@ def _shares(code: int, x: Array) -> tuple[int, complex, complex]:
 
 @part
 def curve(code: int, at: Motion, x: Array, room: Array, y: Array) -> None:
-    """One curve (m,)."""
+    """Write one curve at m poses."""
     m = len(y)
     if code <= SECOND_MARGIN:
         for p in range(m):
@@ -107,7 +108,7 @@ def curve(code: int, at: Motion, x: Array, room: Array, y: Array) -> None:
 
 @part
 def _by_places(code: int, by: Moved, x: Array, of: Array) -> None:
-    """Compute derivatives (n, m) of a curve by the places, but for what the tolerances do; in units of the columns."""
+    """Compute derivatives (n, m) of a curve by the columns that places move, without the room for tolerances."""
     n, m = by.angle.shape
     order, first, second = _shares(code, x)
     for k in range(n):
@@ -122,7 +123,7 @@ def _by_places(code: int, by: Moved, x: Array, of: Array) -> None:
 
 @part
 def by_unknowns(code: int, at: Motion, x: Array, of: Array) -> None:
-    """Compute derivatives (5, m) of a curve by the unknowns."""
+    """Compute derivatives (5, m) of a curve by the linear unknowns."""
     if code <= ANGLE:
         for k in range(UNKNOWNS):
             for p in range(of.shape[1]):
@@ -147,7 +148,7 @@ def by_unknowns(code: int, at: Motion, x: Array, of: Array) -> None:
 
 @part
 def _lengths(task: Task, row: Array, x: Array, values: Array) -> None:
-    """Last rows: lengths of stage 2 within their bounds."""
+    """Write the last rows: lengths of stage 2 within their bounds."""
     r, scale = len(values) - 2 * len(task.lengths), math.sqrt(x[0] * x[0] + x[1] * x[1])
     for j in range(len(task.lengths)):
         length = row[task.lengths[j]] * scale
@@ -156,7 +157,7 @@ def _lengths(task: Task, row: Array, x: Array, values: Array) -> None:
 
 @part
 def values_of(task: Task, row: Array, at: Motion, x: Array, room: Array, values: Array) -> None:
-    """Rows (r,) of a design, each to be at least zero; the first 2 m are minus the objective's magnitude.
+    """Compute the rows (r,) of a design: minus the objective's magnitude in the first 2 m, then limits, 0 at least.
 
     Parameters
     ----------
@@ -181,7 +182,7 @@ def values_of(task: Task, row: Array, at: Motion, x: Array, room: Array, values:
 def slopes_of(
     task: Task, row: Array, at: Motion, by: Moved, x: Array, room: Array, moved: Array, values: Array, slopes: Array
 ) -> None:
-    """Rows and their gradients (n + 5, r) by places and unknowns; ``moved`` (n + 5, m + 1) are those of the room."""
+    """Compute rows and their gradients (n + 5, r) by places and unknowns; ``moved`` (n + 5, m + 1) are the room's."""
     n, m = len(by.angle), len(task.cos)
     y, of = np.empty((len(task.codes), m)), np.empty((len(task.codes), n + UNKNOWNS, m))
     for c in range(len(task.codes)):
@@ -217,7 +218,7 @@ def slopes_of(
 
 @part
 def worth_of(task: Task, values: Array) -> float:
-    """Objective of a design that turns plus what missed limits cost, from its rows."""
+    """Merit of a design that turns, from its rows: the objective plus the penalty of the worst missed limit."""
     own, others = math.inf, math.inf
     for j in range(len(values)):
         if j < 2 * len(task.cos):

@@ -1,9 +1,9 @@
-"""The best linear unknowns of a design: point, line and scale of the guide for the least objective under its limits.
+"""Best linear unknowns of a design: point, line and scale of the guide for the least objective under its limits.
 
     minimise t + price v   subject to   value_j + slopes_j x + (t, v or 0) >= 0,   v >= 0
 
-is a linear program.  A very small curvature lent to it makes the solution the point nearest to a centre far away that
-keeps linear rows (:mod:`kernels.linear.nearest`), and changes nothing where the solution stands at a vertex.
+is a linear program.  A very small curvature added to it makes the solution the feasible point nearest to a centre far
+away (:mod:`kernels.linear.nearest`), and changes nothing where the solution is at a vertex.
 """
 
 from __future__ import annotations
@@ -20,29 +20,29 @@ from kernels.jit import kernel, part
 from kernels.linear.nearest import nearest
 from kernels.types import Array
 
-LEFT_OUT, WANTED, SOFT, NEEDED = 0, 1, 2, 3  # rows: of other things, with t, with v, and those that may not be missed
-FLAT = 1e-8  # curvature lent to the unknowns, in units of their size and of the objective
+LEFT_OUT, WANTED, SOFT, NEEDED = 0, 1, 2, 3  # kinds of rows: left out, with t, with v, and rows that must be kept
+FLAT = 1e-8  # curvature added in the unknowns, in units of their size and of the objective
 EXCESS = 0.5  # price of a deviation twice as large as allowed, in strokes
-SMALLEST = 1e-9  # scale of a guide that has any
-DIRECTIONS = 3  # in which the least scale of a guide is asked for
-FAR = 0.3  # share of its bound, or of the objective, from which on a row does not join
+SMALLEST = 1e-9  # scale below which there is no guide
+DIRECTIONS = 3  # most directions along which the least scale of a guide is imposed
+FAR = 0.3  # distance from its bound, in shares of the bound or of the objective, from which on a row is left out
 
 
 @kernel
 def best_unknowns(values: Array, slopes: Array, kinds: Index, size: Array, unit: float, price: float, x: Array) -> bool:
-    """Go to the best linear unknowns.
+    """Solve the linear program for the best linear unknowns.
 
     Parameters
     ----------
-    values, slopes : (r,) and (5, r) of the rows at ``x``, those with t without it
+    values, slopes : (r,) and (5, r) of the rows at ``x``, without t and v
     kinds : (r,) of the rows
-    size, unit : (5,) of the unknowns, and of t
+    size, unit : (5,) units of the unknowns, and unit of t
     price : of a unit of v
-    x : (5,) written
+    x : (5,) in and out
 
     Returns
     -------
-    Whether some unknowns keep the rows that may not be missed; without any x stays.
+    Whether there is a solution that keeps the NEEDED rows; if not, x is unchanged.
     """
     count, n = 1, UNKNOWNS + 2
     for kind in kinds:
@@ -70,7 +70,7 @@ def best_unknowns(values: Array, slopes: Array, kinds: Index, size: Array, unit:
 
 @part
 def solved(task: Task, row: Array, at: Motion, x: Array, room: Array, out: Array) -> None:
-    """Best linear unknowns (5,) of a design, what bends taken for straight about ``x``; x where there are none."""
+    """Compute the best linear unknowns (5,) of a design, its rows linearised at ``x``; x itself without a solution."""
     m, r = len(task.cos), len(task.kinds)
     values, slopes, size, kinds = np.empty(r), np.empty((UNKNOWNS, r)), np.empty(UNKNOWNS), task.kinds.copy()
     slopes_of(task, row, at, nothing_moved(0, m), x, room, np.zeros((UNKNOWNS, m + 1)), values, slopes)
@@ -88,10 +88,10 @@ def solved(task: Task, row: Array, at: Motion, x: Array, room: Array, out: Array
 
 @part
 def unknowns_of(task: Task, row: Array, at: Motion, room: Array, x: Array) -> bool:
-    """Best linear unknowns (5,) of a design as long as the lengths of stage 2 allow it; whether there are any.
+    """Compute the best linear unknowns (5,) of a design under the least lengths of stage 2; whether there are any.
 
-    That these are at least so long is a bound on the modulus of z1 from below, which no linear program knows.  It is
-    asked for in the direction that z1 has without it, then in the one it has with it.
+    Least lengths bound the modulus of z1 from below, which is not linear.  The bound is imposed on the component of z1
+    along its direction without the bound, then along its direction with it.
     """
     m, none, angle = len(task.cos), np.zeros(UNKNOWNS), np.empty(len(task.cos))
     values, slopes, by = np.zeros(4 * m + 2), np.zeros((UNKNOWNS, 4 * m + 2)), np.empty((UNKNOWNS, m))
