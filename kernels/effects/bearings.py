@@ -69,7 +69,7 @@ def in_plane(t_tau: float, t_rho: float, t_k: float) -> tuple[float, float, floa
 
 @inline
 def support_arms(c: float, z1: float, z2: float, cos1: float, sin1: float, axial: float) -> tuple[float, float]:
-    """Compute support forces times their distance, Pi_1 and Pi_2 per unit of P; the axial force turns about c."""
+    """Compute Pi_1 and Pi_2, support forces times their distance per unit of P; the axial force acts at radius c."""
     return math.hypot(z2 * cos1, z2 * sin1 + c * axial), math.hypot(z1 * cos1, z1 * sin1 + c * axial)
 
 
@@ -219,7 +219,7 @@ def journal_pressures(
     ----------
     first, second, axial : (n, m) loads of the journals and of the collar
     journals : (n, 4) diameter, lengths of journal 1 and 2, diameter of the collar; 0 for a shaft without one
-    limits : (n, 3); permissible pressures of journal 1, journal 2, collar; 0 where nobody asks for the share
+    limits : (n, 3); permissible pressures of journal 1, journal 2, collar; 0 where the share is not wanted
     status : (n, m), in; nan where it is not OK
     out : (4, n, m); pressures of the journals and the collar, the largest one over its permissible value
     """

@@ -15,7 +15,7 @@ Rods of one mass per length have their centres in the middle, so with lengths a,
 
 primes being derivatives with respect to the crank angle; the centres of the fixed pivots do not move.  A slider has no
 length and counts for nothing.  Where the crank turns unevenly, as that of a chain's later stage, its rates w, w' with
-respect to the angle that counts make P'' into w^2 P'' + w' P' (2).
+respect to the independent angle make P'' into w^2 P'' + w' P' (2).
 """
 
 from __future__ import annotations
@@ -81,7 +81,7 @@ def orientation(j: Joints, construction: float) -> Coupler:
 
 @inline
 def euler_angles(j: Joints, body: Coupler, construction: float) -> tuple[float, float]:
-    """Return Euler angles of the coupler but for its precession, in all quadrants.
+    """Euler angles of the coupler without the precession, in all quadrants.
 
     Finger on C: Rz(psi) Rx(Theta) Rz(Phi) turns x to s and z to n.  Finger on B: the precession is 90 deg - alpha about
     x, which brings z to u; Theta turns about u, Phi about the new x, and y becomes s.
@@ -95,7 +95,7 @@ def euler_angles(j: Joints, body: Coupler, construction: float) -> tuple[float, 
 
 
 class CouplerMotion(NamedTuple):
-    """What is wanted of the motion of a coupler and a point on it; None for what is not.
+    """Outputs of the motion of a coupler and a point on it; None where an output is not wanted.
 
     Parameters
     ----------
@@ -125,7 +125,7 @@ def coupler_point(
     point : (n, 3), coordinates along (s, n x s, n) from B [length]
     finger : (n,) DRIVEN or DRIVING, which ball joint carries the finger
     status : (n, m), in and out; poses that are not OK give nan, SINGULAR where the finger axis meets the coupler
-    out : what is wanted
+    out : the wanted outputs
     """
     for i in range(poses.shape[0]):
         p = (point[i, 0], point[i, 1], point[i, 2])
@@ -178,7 +178,7 @@ def centre_acceleration(
     Parameters
     ----------
     poses : (n, m, PER_POSE), designs : (n, PER_DESIGN), records of :mod:`kernels.linkage.joints`
-    first, second : (n, m) first and second derivative of the crank angle with respect to the angle that counts
+    first, second : (n, m) first and second derivative of the crank angle with respect to the independent angle
     status : (n, m), in; nan where it is not OK
     size, x, y, z : (n, m) or None; magnitude and components along the fixed axes
     """

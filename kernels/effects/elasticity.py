@@ -35,7 +35,7 @@ COLUMNS = ("inertia", "stiffness", "damping", "speed", "torque")
 LINEAR = 0.1
 RESOLVED = 1e-9
 PHASE_STEP = 0.1
-KEPT = 1e-12  # share of its largest harmonic below which a coefficient is the rounding of what it is made of
+KEPT = 1e-12  # share of its largest harmonic below which a Fourier coefficient is rounding
 
 
 @kernel
@@ -57,10 +57,10 @@ def quasi_static(
     ----------
     p : (n, m), c t_tau, signed [length];  d2psi : (n, m), acceleration analogue of the rigid linkage
     c : (n,), radius of the driven joint, 1 of a slider;  data : (n, 5), see COLUMNS
-    reach : (n,), what a lag is compared with: 1 of an angle, the coupler's length of a displacement
+    reach : (n,), scale of the lag: 1 for an angle, the coupler's length for a displacement
     status : (n, m), in and out; NOT_LINEAR where |eta| > 0.1 reach cos(pressure angle); the number stays
     eta, displacement, frequency_ratio : (n, m) or None; [rad], c eta [length], sqrt(k/J) |p| / speed
-    varying : (n, m) or None; what is added to the torque M over the turn
+    varying : (n, m) or None; torque that is added to M over the turn
     """
     for i in range(p.shape[0]):
         inertia, stiffness, speed, torque = data[i, 0], data[i, 1], data[i, 3], data[i, 4]
@@ -81,7 +81,7 @@ def quasi_static(
 
 
 class Steady(NamedTuple):
-    """Periodic steady state of the lag: what comes out.
+    """Periodic steady state of the lag.
 
     Parameters
     ----------
@@ -152,7 +152,7 @@ def steady_state(
 
 @inline
 def _harmonic(cosines: Array, sines: Array, step: int) -> complex:
-    """Complex coefficient of a series; harmonics that it does not have are zero."""
+    """Complex coefficient of harmonic ``step`` of a series; harmonics beyond its end are zero."""
     k = abs(step)
     if k >= cosines.size:
         return complex(0.0, 0.0)
@@ -186,7 +186,7 @@ def periodic_solution(bc: Array, bs: Array, cc: Array, cs: Array, c: Array, s: A
 def solve_band(band: NDArray[np.complex128], x: NDArray[np.complex128], w: int, c: Array, s: Array) -> None:
     """Solve a banded system for the harmonics -K..K of eta, by elimination with row pivoting; write its series.
 
-    ``band`` (2 K + 1, 3 w + 1) has the diagonal in column w; it and the right side ``x`` are used up.
+    ``band`` (2 K + 1, 3 w + 1) has the diagonal in column w; ``band`` and the right side ``x`` are overwritten.
     """
     order, size = c.size - 1, x.size
     for column in range(size):
@@ -235,13 +235,13 @@ def largest_multiplier(bc: Array, bs: Array, cc: Array, cs: Array) -> float:
         q2, d2 = series(cc, cs, end)[0], series(bc, bs, end)[0]
         m11, m12, m21, m22 = magnus_step((m11, m12, m21, m22), step, (q0, q1, q2), (d0, d1, d2))
         q0, d0 = q2, d2
-    # The product of the multipliers is what the mean of b alone makes of it (Liouville).
+    # The product of the multipliers depends on the mean of b alone (Liouville).
     return modulus_of(m11 + m22, math.exp(-math.pi * bc[0]))
 
 
 @inline
 def magnus_step(m: Matrix, step: float, q: Vector, d: Vector) -> Matrix:
-    """Take (eta, eta') over one step of eta'' + d eta' + q eta = 0; q and d at its begin, middle and end."""
+    """Take (eta, eta') over one step of eta'' + d eta' + q eta = 0; q and d at its start, middle and end."""
     mean_q, mean_d = (q[0] + 4.0 * q[1] + q[2]) / 6.0, (d[0] + 4.0 * d[1] + d[2]) / 6.0
     # A = [[0, 1], [-q, -d]]; [A1, A2 - A0] = [[-dq, -dd], [d1 dq - q1 dd, dq]].
     dq, dd = q[2] - q[0], d[2] - d[0]
@@ -263,6 +263,6 @@ def magnus_step(m: Matrix, step: float, q: Vector, d: Vector) -> Matrix:
 
 @inline
 def modulus_of(trace: float, modulus: float) -> float:
-    """Larger modulus of two multipliers with that sum and with the square of ``modulus`` as product."""
+    """Larger modulus of two multipliers with the sum ``trace`` and the product ``modulus`` squared."""
     discriminant = 0.25 * trace * trace - modulus * modulus
     return modulus if discriminant < 0.0 else abs(0.5 * trace) + math.sqrt(discriminant)

@@ -19,7 +19,7 @@ _PARTS = 4
 _MOST_EVENTS = 64
 _MOST_STEPS = 100
 
-# What a march returns of its last turn, in order.
+# Outputs of a march, of its last turn, in order.
 OUTPUTS = (
     "flights", "phi_loss", "phi_land", "lost_angle", "lost_travel", "travel", "impact_speed", "impulse", "least_force",
     "most_force", "settled",
@@ -27,22 +27,22 @@ OUTPUTS = (
 
 
 class Foot(NamedTuple):
-    """A foot in units of the crank's turning: kappa = natural frequency/speed, g0 = preload/(m omega^2)."""
+    """Foot with the crank angle as its time: kappa = natural frequency/speed, g0 = preload/(m omega^2)."""
 
     kappa: float
     g0: float
     restitution: float
-    still: float  # relative speeds below this one are none: bounces end
+    still: float  # relative speed below which a bounce is the last
 
 
 class State(NamedTuple):
-    """What the foot does: resting on the plate, following the rack, or flying since ``since`` from y with speed v."""
+    """State of the foot: resting on the plate, following the rack, or flying since ``since`` from y with speed v."""
 
     mode: int
     since: float
     y: float
     v: float
-    clear: float  # crank angle from which a new flight is surely above what it left
+    clear: float  # crank angle at which a new flight is surely above the surface that it left
 
 
 @inline
@@ -68,7 +68,7 @@ def rack_height(path: Array, j: int, s: float) -> tuple[float, float, float]:
 
 @inline
 def extremes(rack: Array) -> tuple[bool, int, float, float]:
-    """Whether the rack's heights are numbers, the node where it is lowest, its greatest speed and height."""
+    """Whether all heights of the rack are finite, its lowest node, its greatest speed and its greatest height."""
     known, lowest, quickest, highest = True, 0, 0.0, 0.0
     for j in range(rack.shape[1]):
         known = known and abs(rack[0, j]) < math.inf
@@ -91,7 +91,7 @@ def _along(path: Array, j: int, s: float) -> float:
 
 @inline
 def quintic(path: Array, row: int, j: int, at: float, size: float, out: Array) -> None:
-    """Compute coefficients (6,) of the path in cell j by x, with the cell's share = at + size x; (4)."""
+    """Compute coefficients (6,) of a row of the path in cell j as a polynomial in x, at the share at + size x; (4)."""
     n = path.shape[1]
     h, j, k = TWO_PI / n, j % n, (j + 1) % n
     p0, m0, c0 = path[row, j], path[row + 1, j] * h, path[row + 2, j] * h * h
@@ -99,7 +99,7 @@ def quintic(path: Array, row: int, j: int, at: float, size: float, out: Array) -
     d, e, f = p1 - p0 - m0 - 0.5 * c0, m1 - m0 - c0, c1 - c0
     out[0], out[1], out[2] = p0, m0, 0.5 * c0
     out[3], out[4], out[5] = 10.0 * d - 4.0 * e + 0.5 * f, -15.0 * d + 7.0 * e - f, 6.0 * d - 3.0 * e + 0.5 * f
-    # about the share ``at``: Horner's scheme, again and again
+    # repeated Horner's scheme moves the origin to the share ``at``
     for k in range(5):
         for i in range(4, k - 1, -1):
             out[i] += at * out[i + 1]
@@ -111,7 +111,7 @@ def quintic(path: Array, row: int, j: int, at: float, size: float, out: Array) -
 
 @inline
 def power_series(series: Array, count: int, x: float) -> tuple[float, float]:
-    """Return a power series and its derivative at x."""
+    """Value and derivative at x of a power series of ``count`` terms."""
     y, slope = series[count - 1], 0.0
     for i in range(count - 2, -1, -1):
         slope = slope * x + y
@@ -134,13 +134,13 @@ def flown(foot: Foot, state: State, phi: float) -> tuple[float, float]:
 
 @inline
 def held(foot: Foot, y: float, bend: float) -> float:
-    """Contact force of a foot that follows the rack, divided by m omega^2; (5)."""
+    """Contact force over m omega^2 on a foot that follows the rack at height y, curvature ``bend``; (5)."""
     return foot.g0 + foot.kappa * foot.kappa * y + bend
 
 
 @inline
 def _measure(path: Array, foot: Foot, state: State, j: int, s: float, which: int) -> float:
-    """Measure that changes sign at an event: height of the rack 0, contact force 1, gap below the flying foot 2."""
+    """Measure that changes sign at an event: height of the rack (0), contact force (1), gap below the foot (2)."""
     y, _, bend = rack_height(path, j, s)
     if which == 0:
         return y
@@ -151,7 +151,7 @@ def _measure(path: Array, foot: Foot, state: State, j: int, s: float, which: int
 
 @kernel
 def _root(path: Array, foot: Foot, state: State, j: int, low: float, high: float, which: int) -> float:
-    """Share of the cell at which a measure passes zero: false position, the end that stays halved (Illinois)."""
+    """Find the share of a cell where a measure passes zero by false position, halving a retained end (Illinois)."""
     f_low, f_high = _measure(path, foot, state, j, low, which), _measure(path, foot, state, j, high, which)
     for _ in range(_MOST_STEPS):
         if f_low == f_high:
@@ -184,7 +184,7 @@ def _struck(path: Array, foot: Foot, j: int, s: float, speed: float) -> tuple[St
     push = held(foot, ground, bend if on_rack else 0.0)
     rebound = foot.restitution * max(closing, 0.0)
     if rebound > foot.still:
-        # The hop is highest after rebound/push at a constant push; a longer one is seen by the parts of a cell.
+        # The hop is highest after rebound/push at a constant push; the parts of a cell resolve longer hops.
         part = TWO_PI / path.shape[1] / _PARTS
         clear = phi + (min(rebound / push, part) if push > 0.0 else 0.0)
         return State(FLIGHT, phi, ground, surface + rebound, clear), closing
@@ -195,7 +195,7 @@ def _struck(path: Array, foot: Foot, j: int, s: float, speed: float) -> tuple[St
 
 @kernel
 def _next_event(path: Array, foot: Foot, state: State, j: int, s: float) -> tuple[float, int]:
-    """Share of the cell at which the state ends, and by which measure; 2 and -1 if it lasts beyond the cell."""
+    """Find the share of the cell at which the state ends, and the measure; 2 and -1 if it lasts beyond the cell."""
     if state.mode == PLATE:
         if _measure(path, foot, state, j, 1.0, 0) > 0.0:
             return _root(path, foot, state, j, s, 1.0, 0), 0
@@ -220,8 +220,8 @@ def _next_event(path: Array, foot: Foot, state: State, j: int, s: float) -> tupl
             if which >= 0:
                 return first, which
         elif _measure(path, foot, state, j, after, 2) < 0.0:
-            # A launch begins with no gap: halve towards it until there is one.  A hop that shows none ends here, a
-            # rebound where it is highest.
+            # A flight begins without a gap: halve towards its begin until there is one.  Where none is found, a rebound
+            # ends at its highest point, a launch at the end of this part.
             clear = before
             for n in range(1, 30):
                 if _measure(path, foot, state, j, clear, 2) > 0.0:
@@ -234,7 +234,7 @@ def _next_event(path: Array, foot: Foot, state: State, j: int, s: float) -> tupl
 
 @inline
 def _above(path: Array, foot: Foot, state: State, j: int, low: float, high: float) -> tuple[float, float]:
-    """Crank angle and way along the feed between two shares of a cell while the rack is above the plate."""
+    """Crank angle and feed between two shares of a cell during which the rack is above the plate."""
     one, two = rack_height(path, j, low)[0], rack_height(path, j, high)[0]
     if one <= 0.0 and two <= 0.0:
         return 0.0, 0.0
@@ -247,9 +247,9 @@ def _above(path: Array, foot: Foot, state: State, j: int, low: float, high: floa
 
 @kernel
 def edge_force(path: Array, foot: Foot, j: int, forces: Array) -> float:
-    """Force over m omega^2 on a foot that follows the rack where that passes the plate in cell j, else 0; (5).
+    """Force over m omega^2 on a foot that follows the rack where the rack passes the plate in cell j, else 0; (5).
 
-    It follows where the node on the rack's side has a force.
+    The foot follows if it bears a force at the node where the rack is above the plate.
     """
     k = (j + 1) % path.shape[1]
     if (path[0, j] > 0.0) == (path[0, k] > 0.0) or forces[j if path[0, j] > 0.0 else k] == 0.0:
@@ -260,7 +260,7 @@ def edge_force(path: Array, foot: Foot, j: int, forces: Array) -> float:
 
 @inline
 def written(outputs: Array, i: int, tally: Array, foot: Array, most: float, settled: bool) -> None:
-    """Write what the last turn has told of a foot, in the order of :data:`kernels.effects.foot.OUTPUTS`."""
+    """Write the outputs of a foot from the sums of its last turn, in the order of :data:`OUTPUTS`."""
     mass, speed, restitution, rigid = foot[0], foot[3], foot[4], foot[5] == 0.0 and foot[6] == 0.0
     unit = mass * speed * speed
     outputs[0, i], outputs[1, i], outputs[2, i] = tally[0], tally[1] % TWO_PI, tally[2] % TWO_PI
@@ -273,7 +273,7 @@ def written(outputs: Array, i: int, tally: Array, foot: Array, most: float, sett
 
 @inline
 def note(tally: Array, phi: float, mode: int) -> None:
-    """Write down what the foot does from a crank angle on, while there is room: behind the sums of the turn."""
+    """Append a crank angle and the state that begins there to the list behind the sums of the turn, if it has room."""
     k = 10 + 2 * int(tally[9])
     tally[9] += 1.0
     if k < tally.size:
@@ -282,7 +282,7 @@ def note(tally: Array, phi: float, mode: int) -> None:
 
 @inline
 def _record(tally: Array, path: Array, foot: Foot, state: State, j: int, low: float, high: float) -> None:
-    """Add a piece of a cell to the sums of the turn: travel, and what is lost of it in flight."""
+    """Add a piece of a cell to the sums of the turn: feed, and the crank angle and feed lost in flight."""
     angle, way = _above(path, foot, state, j, low, high)
     tally[5] += way
     if state.mode == FLIGHT:
@@ -292,7 +292,7 @@ def _record(tally: Array, path: Array, foot: Foot, state: State, j: int, low: fl
 
 @kernel
 def march_cell(path: Array, foot: Foot, state: State, j: int, tally: Array) -> tuple[State, bool]:
-    """March over one cell; the state at its end, false if the events did not come to an end."""
+    """March over one cell; return the state at its end, and false if there were too many events."""
     s, step = 0.0, TWO_PI / path.shape[1]
     for _ in range(_MOST_EVENTS):
         at, which = _next_event(path, foot, state, j, s)
@@ -322,7 +322,7 @@ def march_cell(path: Array, foot: Foot, state: State, j: int, tally: Array) -> t
 
 @inline
 def checked(feet: Array, known: bool, lowest: float) -> int:
-    """Status by the numbers of a foot and the least height of its rack, ``known`` where all its heights are numbers."""
+    """Status by a foot's parameters and its rack's least height; ``known``: whether all heights of it are finite."""
     mass, stiffness, preload, speed, restitution, soft, damping = (
         feet[0], feet[1], feet[2], feet[3], feet[4], feet[5], feet[6],
     )  # fmt: skip
@@ -336,5 +336,5 @@ def checked(feet: Array, known: bool, lowest: float) -> int:
 
 @inline
 def apart(one: State, other: State, spring: float) -> float:
-    """Return the height of the swing about its rest that is the difference of two states."""
+    """Amplitude of the free swing that is the difference of two states."""
     return math.hypot(one.y - other.y, (one.v - other.v) / math.sqrt(spring))

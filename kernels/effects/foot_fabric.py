@@ -35,16 +35,16 @@ from kernels.effects.foot import (
 from kernels.jit import inline, kernel
 from kernels.types import TWO_PI, Array, Status
 
-LYING = 3  # in place of PLATE and RACK
-TERMS = 22  # of the power series: over a radian the next one is below 2^-53
-PARTS = 4  # of a cell at least
-MOST_PARTS = 4096  # of a cell: a fabric so stiff that it swings 650 times within a five-hundredth of a turn
+LYING = 3  # on the fabric, in place of PLATE and RACK
+TERMS = 22  # of the power series: over a radian the next term is below 2^-53
+PARTS = 4  # least number per cell
+MOST_PARTS = 4096  # per cell: with more the fabric would swing 650 times within a five-hundredth of a turn
 _HALVINGS = 60
-_SECTIONS = 40  # golden ones: a peak's place to 4e-9 of a piece, its height to rounding
+_SECTIONS = 40  # golden sections: a peak's place to 4e-9 of a piece, its height to rounding
 _GOLDEN = 0.6180339887498949
 _MOST_EVENTS = 64
-ALIKE = 1e-6  # share of the height of foot or rack by which turns that are alike may differ
-ROUNDING = 2.0**-36  # share of it by which a foot that repeats itself comes back elsewhere, with angles of many turns
+ALIKE = 1e-6  # largest difference of turns that count as equal, as a share of the height of foot or rack
+ROUNDING = 2.0**-36  # the same between two turns by rounding alone, as angles are counted over many turns
 
 
 class Fabric(NamedTuple):
@@ -55,7 +55,7 @@ class Fabric(NamedTuple):
 
 
 class Piece(NamedTuple):
-    """A part of a cell: its place, its length in crank angle, and whether the rack is the ground there."""
+    """Part of a cell: its place, its length in crank angle, and whether the rack is the ground there."""
 
     j: int
     low: float
@@ -81,7 +81,7 @@ def _motion(foot: Foot, fabric: Fabric, y: float, v: float, angle: float, ground
 
 @inline
 def _press(fabric: Fabric, ground: Array, y: float, v: float, x: float, angle: float) -> tuple[float, float]:
-    """Force of the fabric, and how deep the foot stands in it, for a foot at height y with speed v; (14)."""
+    """Force and compression of the fabric under a foot at height y with speed v; (14)."""
     g, slope = power_series(ground, 6, x)
     return fabric.stiffness * (g - y) + fabric.damping * (slope / angle - v), g - y
 
@@ -90,7 +90,7 @@ def _press(fabric: Fabric, ground: Array, y: float, v: float, x: float, angle: f
 def _look(
     foot: Foot, fabric: Fabric, state: State, piece: Piece, ground: Array, series: Array, x: float
 ) -> tuple[float, float, float]:
-    """Return what is negative after an event, at the share x of the piece; height and speed of the foot there."""
+    """Measure at the share x of the piece that is negative after an event; height and speed of the foot there."""
     if state.mode == FLIGHT:
         y, v = flown(foot, state, piece.begin + x * piece.angle)
         force, depth = _press(fabric, ground, y, v, x, piece.angle)
@@ -102,7 +102,7 @@ def _look(
 
 @kernel
 def _event(foot: Foot, fabric: Fabric, state: State, piece: Piece, ground: Array, series: Array) -> float:
-    """Share of the piece at which the state ends; 2 if it lasts beyond."""
+    """Find the share of the piece at which the state ends; 2 if it lasts beyond the piece."""
     low = 0.0
     for k in range(1, 5):
         high = 0.25 * k
@@ -124,10 +124,10 @@ def _event(foot: Foot, fabric: Fabric, state: State, piece: Piece, ground: Array
 def _borne_between(
     foot: Foot, fabric: Fabric, state: State, piece: Piece, ground: Array, series: Array, end: float, tally: Array
 ) -> None:
-    """Take the least and the greatest force on the first share of a piece into the tally; the foot lies there.
+    """Update the tally with least and greatest force on a lying foot, up to the share ``end`` of a piece.
 
-    The force jumps where the ground does, so the piece's begin counts.  Over a radian of the swing it has one extreme
-    at most between the ends: golden sections find it where a parabola has its own there, or nearly so.
+    The force jumps where the ground does, so the piece's start counts.  Over a radian of the swing it has at most one
+    extremum between the ends: golden sections find it where a parabola has its extremum there, or nearly there.
     """
     first = _look(foot, fabric, state, piece, ground, series, 0.0)[0]
     middle = _look(foot, fabric, state, piece, ground, series, 0.5 * end)[0]
@@ -155,9 +155,9 @@ def _borne_between(
 def _stretch(
     path: Array, foot: Foot, fabric: Fabric, state: State, piece: Piece, work: Array, tally: Array
 ) -> tuple[State, float]:
-    """March over a piece until its end or the first event; the state there, and the share of the piece.
+    """March over a piece to its end or its first event; return the state there, and the share of the piece.
 
-    ``work`` has a row each for the ground, the way along the feed and the foot's series.
+    ``work`` is scratch, with a row each for the series of the ground, the feed and the foot.
     """
     ground, along, series = work[0], work[1], work[2]
     size = piece.high - piece.low
@@ -202,7 +202,7 @@ def _stretch(
 def _cell(
     path: Array, foot: Foot, fabric: Fabric, state: State, j: int, parts: int, work: Array, tally: Array
 ) -> tuple[State, bool]:
-    """March over one cell; the state at its end, false if the events did not come to an end."""
+    """March over one cell; return the state at its end, and false if there were too many events."""
     step = TWO_PI / path.shape[1]
     for k in range(parts):
         low, last = k / parts, (k + 1) / parts
@@ -234,7 +234,7 @@ def _cell(
 def _either(
     path: Array, foot: Foot, fabric: Fabric, state: State, j: int, parts: int, work: Array, tally: Array
 ) -> tuple[State, bool]:
-    """March over one cell, on fabric if there is any."""
+    """March over one cell, of a foot on fabric or of a rigid one, as :func:`_cell`."""
     if fabric.stiffness > 0.0:
         return _cell(path, foot, fabric, state, j, parts, work, tally)
     return march_cell(path, foot, state, j, tally)
@@ -244,7 +244,7 @@ def _either(
 def _landed(
     path: Array, foot: Foot, fabric: Fabric, state: State, j: int, parts: int, work: Array, tally: Array
 ) -> float:
-    """Crank angle at which the first flight of a turn ends; ``state`` is that at its end, where cell j begins."""
+    """Crank angle where the first flight of a turn ends; ``state`` is that at the turn's end, where cell j starts."""
     later = tally.copy()
     for k in range(j, j + 4 * path.shape[1]):  # no flight is longer than a few turns
         if math.isnan(later[1]) or not math.isnan(later[2]):
@@ -255,7 +255,7 @@ def _landed(
 
 @inline
 def _borne(path: Array, node: int, foot: Foot, fabric: Fabric, state: State, phi: float) -> tuple[float, float]:
-    """Height of the foot at a node, and the force that it bears over m omega^2; (5), (14)."""
+    """Height of the foot at a node, and the force on the foot over m omega^2; (5), (14)."""
     y, force = state.y, 0.0
     if state.mode == FLIGHT:
         y = flown(foot, state, phi)[0]
@@ -280,7 +280,7 @@ def march(
         their first and second derivatives by phi in the rows behind each [length]
     feet : (n, 7) mass, spring stiffness, preload (weight included), speed [rad per time], restitution, stiffness and
         damping of the fabric; both 0 for none.  On fabric restitution is 0: its damper takes the energy of an impact
-    turns : how many turns are marched, from rest on the plate where the rack is lowest
+    turns : number of turns to march, from rest on the plate where the rack is lowest
     status : (n,) out; OK, NO_EVENT (the rack never lies below the plate), NOT_CONVERGED (bounces without end, or a
         fabric that swings more than 650 times a cell) or INVALID_INPUT
     outputs : (11, n) out of the last turn in the order of :data:`kernels.effects.foot.OUTPUTS`; angles in [0, 2 pi),
@@ -288,12 +288,12 @@ def march(
         force of the fabric while the rack stands above the plate
     heights, forces : (n, N) out; height of the foot and force between it and rack or plate at every node.  On fabric
         heights count from the unpressed fabric on the plate, so a foot that lies is below 0
-    changes : (n, 1 + 2 k) out; how often the foot begins something else in the last turn, then of the first k times the
-        crank angle, counted on over all turns, and what it does from there: PLATE, RACK, FLIGHT or LYING
+    changes : (n, 1 + 2 k) out; number of changes of state in the last turn, then for the first k of them the crank
+        angle, counted on over all turns, and the state that begins: PLATE, RACK, FLIGHT or LYING
 
     Notes
     -----
-    A bounce with less than 1e-9 of the greatest speed of the rack is taken for the last.
+    A bounce with less than 1e-9 of the greatest speed of the rack counts as the last.
     """
     tally, work = np.empty(9 + changes.shape[1]), np.empty((3, TERMS))
     for i in range(path.shape[0]):
@@ -341,8 +341,8 @@ def march(
                     tally[8] = min(tally[8], held(foot, rack[0, j], rack[2, j]))
                 most = max(most, forces[i, j], unit * edge_force(rack, foot, j, forces[i]))
         else:
-            # A foot that lies still rises and sinks on its fabric.  Turns are alike once it comes back where it was.
-            # What it moves by shrinks like a geometric series; its sum is what all later turns will differ by.
+            # A foot that lies on its fabric may still rise and sink.  Turns are alike once its state comes back.
+            # The changes of the state shrink like a geometric series; their sum is the difference of all later turns.
             moved, size = apart(state, first, spring), max(-rest, highest)
             left = moved / (1.0 - moved / before) if moved < before < math.inf else math.inf
             settled = settled and (moved <= ROUNDING * size or left <= ALIKE * size)

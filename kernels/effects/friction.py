@@ -3,7 +3,7 @@
 The friction couples follow from the latest reactions, the reactions are solved again with these couples, and so on.
 Reactions are linear in the couples, and couples are norms of reactions, so the iteration contracts for ordinary
 lubrication (6 to 15 passes) and diverges where the linkage jams.  If five passes in a row do not shrink the correction,
-or the largest number of passes is reached, the status is JAMMED; the last iterate is never given out.  Near jamming the
+or the largest number of passes is reached, the status is JAMMED; the last iterate is never returned.  Near jamming the
 corrections form a slow geometric series, whose remainder is added every tenth pass.
 
 Because the reactions are linear, those to each of the three couples (B, C, guidance) are found once per pose, and a
@@ -34,9 +34,9 @@ from kernels.linkage.joints import Joints, read
 from kernels.types import Array, Status
 
 TOLERANCE = 1e-14
-PASSES = 5000  # a pose that all but jams settles slowly
+PASSES = 5000  # a pose that nearly jams converges slowly
 STALLED = 5
-LEAP = 10  # every so many passes the rest of the geometric series is gone at once (Aitken)
+LEAP = 10  # passes after which the rest of the geometric series is added at once (Aitken)
 STRAIGHT = 0.9  # squared cosine of the angle between two steps, below which they are no geometric series
 STILL = 2.0**-44  # relative angular velocity of a ball joint below this share of its links' is rounding
 ANSWER = 20  # the six vectors of :func:`kernels.effects.kinetostatics.store_forces`, finger couple, driving torque
@@ -91,7 +91,7 @@ def _of_moving(f: Friction, load: Loads) -> Friction:
 
 @inline
 def support_forces(force: Vector, moment: Vector, axis: Vector, z1: float, z2: float) -> tuple[Vector, Vector, float]:
-    """Return the forces across a shaft on its supports and that along it; force and moment about the origin of z."""
+    """Compute forces across a shaft on both supports, and the force along it; the moment is about the origin of z."""
     axial = dot(force, axis)
     radial = mix(1.0, force, -axial, axis)
     second = scale(1.0 / (z2 - z1), mix(1.0, cross(moment, axis), -z1, radial))
@@ -190,7 +190,7 @@ def friction_loads(
 def _answers(
     j: Joints, coupler: Coupler, load: Loads, finger: float, f: Friction, speed_d: float, answers: Array
 ) -> Vector:
-    """Solve the reactions without friction, then those to each couple alone; return the three couples' sizes."""
+    """Solve for the reactions without friction, then to each friction couple alone; return the sizes of the couples."""
     turn_b = unit_vector(sub(load.omega2, load.omega1))
     turn_c = unit_vector(sub(load.omega2, load.omega3))
     unit_b, unit_c, unit_d = 0.0, 0.0, 0.0
@@ -201,7 +201,7 @@ def _answers(
         store_forces(answers[which], 1.0, r)
         answers[which, 18], answers[which, 19] = r.finger, r.drive
         if which == 0:
-            # Couples of the size that the largest force makes: a joint at rest at first may be loaded later.
+            # Couples sized by the largest force: a joint without load at first may be loaded later.
             size = max(norm(r.r_b), max(norm(r.r_c), norm(r.r_d)))
             unit_b, unit_c = f.mu_b * f.r_b * size, f.mu_c * f.r_c * size
             unit_d = _shaft_torque(f.mu_d, f.r_d, f.rt_d, (size, size, size), speed_d)
@@ -228,7 +228,7 @@ class Couples(NamedTuple):
 def _settled(
     assembled: bool, answers: Array, f: Friction, axis: Vector, speed_d: float, unit: Vector, total: Array
 ) -> Couples:
-    """Find by successive approximations the couples that agree with the reactions which they cause."""
+    """Find the friction couples that agree with the reactions they cause, by successive approximations."""
     x, y, z, size_b, size_c, t_d = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
     dx0, dy0, dz0, last, least = 0.0, 0.0, 0.0, math.inf, math.inf
     stalled, count, converged = 0, 0, False
@@ -240,11 +240,11 @@ def _settled(
         t_d = _shaft_torque(f.mu_d, f.r_d, f.rt_d, _guidance(total, axis, f), speed_d)
         dx, dy, dz = _share(size_b, unit[0]) - x, _share(size_c, unit[1]) - y, _share(t_d, unit[2]) - z
         change = _largest_change(x, dx, y, dy, z, dz)
-        # The last digits wander: a change at rounding level is convergence, not a stall.
+        # The last digits fluctuate: a change at rounding level is convergence, not a stall.
         converged = change <= TOLERANCE or (count > 3 and change < 1e-12 and change >= last)
         converged = converged and math.isfinite(dx + dy + dz)
         last = change
-        # In proportion to themselves couples change less and less even while they grow without end.
+        # The relative change of couples decreases even while they grow without bound, so absolute steps are compared.
         step = max(abs(dx), max(abs(dy), abs(dz)))
         stalled = 0 if step < least else stalled + 1
         least = step
@@ -264,7 +264,7 @@ def _share(size: float, unit: float) -> float:
 
 @inline
 def _total(answers: Array, x: float, y: float, z: float, total: Array) -> None:
-    """Sum the reactions without friction and those to the three couples, given as multiples of their first guesses."""
+    """Sum the reactions without friction and to the three couples, which are multiples of their first guesses."""
     for at in range(ANSWER):
         total[at] = answers[0, at] + x * answers[1, at] + y * answers[2, at] + z * answers[3, at]
 
@@ -308,9 +308,9 @@ def _contraction(answers: Array, m: Array, f: Friction, axis: Vector, units: Vec
 
 @inline
 def leap(along: float, square: float, size: float) -> float:
-    """Sum what remains of a geometric series of steps, in units of the next one: 1/(1 - q) with q = along/square.
+    """Sum of the remaining geometric series of steps, in units of the next step: 1/(1 - q) with q = along/square.
 
-    It is 1, the plain step, where the steps do not shrink, or turn: those are no such series.
+    It is 1, the plain step, where the steps do not shrink or change direction: these are no geometric series.
     """
     straight = along < 0.0 or along * along > STRAIGHT * square * size
     return square / (square - along) if abs(along) < square and straight else 1.0
@@ -318,7 +318,7 @@ def leap(along: float, square: float, size: float) -> float:
 
 @inline
 def _largest_change(x: float, dx: float, y: float, dy: float, z: float, dz: float) -> float:
-    """Largest change of a couple in proportion to that couple."""
+    """Largest relative change of a couple."""
     worst = 0.0
     for old, change in ((x, dx), (y, dy), (z, dz)):
         size = max(abs(old), abs(old + change))

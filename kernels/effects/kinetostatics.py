@@ -40,15 +40,15 @@ class Body(NamedTuple):
 
 
 class Loading(NamedTuple):
-    """What loads the links.
+    """Loads on the links.
 
     Parameters
     ----------
     bodies : (n, 3 BODY + 3): per body m, centre of mass, inertia about it (body axes: crank rho_B, tau_B, u from A;
         coupler s, n x s, n from B; follower rho, tau, k from D); gravity
     drive : (n, m, 3) or (n, 1, 3): torque on the rocker about k or force on the slider along tau; crank speed; its rate
-    on_coupler : (n, m, 6) or None; force and moment about B that act on the coupler besides, fixed axes
-    on_follower : (n, m, 6) or None; force and moment about D that act on the follower besides, fixed axes
+    on_coupler : (n, m, 6) or None; external force on the coupler and its moment about B, fixed axes
+    on_follower : (n, m, 6) or None; external force on the follower and its moment about D, fixed axes
     """
 
     bodies: Array
@@ -149,14 +149,14 @@ def inertia_loads(j: Joints, coupler: Coupler, bodies: Array, drive: Array) -> L
 
 @inline
 def put_plane(out: Array | None, i: int, k: int, good: float, a: Vector) -> None:
-    """Write what the frame bears, (n, 3, m), of what it puts on the bodies; without ``out`` nothing is compiled."""
+    """Write the load on the frame, (n, 3, m), from the load of the frame on the bodies; compiled only with ``out``."""
     if out is not None:
         out[i, 0, k], out[i, 1, k], out[i, 2, k] = -good * a[0], -good * a[1], -good * a[2]
 
 
 @inline
 def borne(j: Joints, on: Loads) -> tuple[Vector, Vector]:
-    """Force and moment about the origin that the frame puts on all bodies: what they need, less the useful load."""
+    """Force and moment of the frame on all bodies, about the origin: their inertia loads less the useful load."""
     slides = 1.0 - j.turns
     pushed = scale(slides * on.torque, j.tau)
     force = sub(add(add(on.f1, on.f2), on.f3), pushed)
@@ -168,16 +168,16 @@ def borne(j: Joints, on: Loads) -> tuple[Vector, Vector]:
 
 @inline
 def loads_of(j: Joints, coupler: Coupler, given: Loading, i: int, k: int) -> Loads:
-    """Inertia loads of pose k of design i, with what acts on coupler and follower besides."""
+    """Inertia loads of pose k of design i, with the external loads on coupler and follower."""
     on = inertia_loads(j, coupler, given.bodies[i], given.drive[i, k if given.drive.shape[1] > 1 else 0])
     return _follower_loaded(_coupler_loaded(on, given.on_coupler, i, k), given.on_follower, i, k)
 
 
 @inline
 def _coupler_loaded(on: Loads, wrenches: Array | None, i: int, k: int) -> Loads:
-    """Return the loads with a force and a moment about B that act on the coupler from outside.
+    """Include an external force on the coupler and its moment about B in the loads.
 
-    F2 - F takes the place of F2 everywhere; T2 is moved by what that changes in the moment about B.
+    F2 - F takes the place of F2 everywhere; T2 is corrected so that the moment about B is right.
     """
     if wrenches is None:
         return on
@@ -193,7 +193,7 @@ def _coupler_loaded(on: Loads, wrenches: Array | None, i: int, k: int) -> Loads:
 
 @inline
 def _follower_loaded(on: Loads, wrenches: Array | None, i: int, k: int) -> Loads:
-    """Return the loads with a force and a moment about D that act on the follower from outside."""
+    """Include an external force on the follower and its moment about D in the loads."""
     if wrenches is None:
         return on
     wrench = wrenches[i, k]
@@ -218,7 +218,7 @@ def solve(
 ) -> Reactions:
     """Reactions of one pose under the friction couples e_b, e_c on the coupler and torques t_d, t_a on the shafts.
 
-    On a slider t_d is the friction force of its way along tau.
+    On a slider t_d is the friction force of its guide along tau.
     """
     q_c = sub(sub(sub(add(on.t2, cross(on.d2, on.f2)), scale(j.b, cross(j.s, on.f2))), e_b), e_c)
     q = cross(coupler.n, coupler.w)
@@ -256,13 +256,13 @@ def kinetostatics(
     frame_force: Array | None = None,
     frame_moment: Array | None = None,
 ) -> None:
-    """Compute the frictionless joint reactions, driving torque and reduced inertia, and what the frame bears.
+    """Compute the frictionless joint reactions, driving torque, reduced inertia, and the load on the frame.
 
     Parameters
     ----------
     poses : (n, m, PER_POSE), designs : (n, PER_DESIGN), records of :mod:`kernels.linkage.joints`
     finger : (n,) DRIVEN or DRIVING, which ball joint carries the finger
-    given : masses, inertias, and what acts on the links
+    given : masses, inertias and loads of the links
     status : (n, m), in and out; DEAD_POINT where cos(pressure angle) < LEAST_COSINE, SINGULAR where the finger axis
         meets the coupler: both give nan
     forces : (n, m, 18) or None, fixed axes; force frame on crank, crank on coupler, coupler and frame on follower;
@@ -270,7 +270,7 @@ def kinetostatics(
     couples : (n, m, 2) or None; couple of the finger along n x w, torque on the crank about u
     inertia : (n, m, 2) or None; inertia reduced to the crank and its derivative
     frame_force, frame_moment : (n, 3, m) or None; force on the frame, and moment about its origin, that of the drive
-        included.  They are what the bodies need: nothing is solved for them, and friction inside changes nothing
+        included.  They follow from the inertia loads alone: nothing is solved, and internal friction has no effect
 
     Notes
     -----
@@ -300,7 +300,7 @@ def kinetostatics(
 
 @inline
 def pose_status(code: int, j: Joints, coupler: Coupler) -> int:
-    """Status of a pose for forces: its own, or the reason why its reactions have no digits."""
+    """Status of a pose for forces: its own, or the reason why its reactions have no correct digits."""
     if code != st.OK:
         return code
     if not abs(j.t_tau) >= LEAST_COSINE:

@@ -1,10 +1,10 @@
 """D2 for any number of links: friction of shafts, balls, guides and contacts, by successive approximations.
 
-What rubs at a joint is a wrench of known direction times the joint's load: the directions follow from the motion, the
-load from the reactions.  Loads from the latest reactions give new reactions, until the loads change by less than
+Friction at a joint is a wrench of known direction times the joint's load: directions follow from the motion, the load
+from the reactions.  Loads from the latest reactions give new reactions, until the loads change by less than
 TOLERANCE.  Reactions are linear in the loads, and loads are norms of reactions, so the iteration contracts for ordinary
 lubrication (6 to 15 passes) and diverges where the linkage jams: if five passes in a row do not shrink the correction,
-or the largest number of passes is reached, the status is JAMMED; the last iterate is never given out.  Near jamming the
+or the largest number of passes is reached, the status is JAMMED; the last iterate is never returned.  Near jamming the
 corrections form a slow geometric series, whose remainder is added every tenth pass.
 Equation numbers are of docs/links.md.
 """
@@ -45,12 +45,12 @@ from kernels.linkage.bodies import DRIVEN, Links, Moving, latter, moving, posed,
 from kernels.types import Array, Status
 
 MU, RADIUS, THRUST, FIRST, SECOND, PER_FRICTION = 0, 1, 2, 3, 4, 5
-PART = 7  # of a shaft or a guide the loads of both supports across the axis, then the force along it; else the force
+PART = 7  # of a shaft or a guide the forces on both supports across the axis, then that along it; else the force
 
 
 @inline
 def _rates(record: Array, body: int) -> Moving:
-    """Return rates of a body from its record; the frame stands still."""
+    """Rates of a body from its record; zero for the frame."""
     moves, found = (1.0 if body >= 0 else 0.0), moving(record)
     return Moving(
         found.at, scale(moves, found.v), scale(moves, found.a), scale(moves, found.omega), scale(moves, found.eps)
@@ -59,7 +59,7 @@ def _rates(record: Array, body: int) -> Moving:
 
 @inline
 def _moved(a: Vector, b: Vector) -> Vector:
-    """Difference of two rates, zero where it is rounding: nothing moves then, and friction has no direction.
+    """Difference of two rates, zero where it is rounding: without motion friction has no direction.
 
     In planar linkages coupler and rocker turn together where the crank points along the frame.
     """
@@ -86,11 +86,11 @@ def direction(
     sense = math.copysign(1.0, speed) if speed != 0.0 else 0.0
     turn, slip = _moved(one.omega, two.omega), (0.0, 0.0, 0.0)
     if slender >= 0:
-        # A rod is free about its own axis: it spins so that nothing turns it there.
+        # A rod is free to turn about its own axis: it spins so that no couple acts about it.
         turn = mix(1.0, turn, -dot(turn, rod), rod)
     if kind in (GUIDE, CONTACT):
         slip = _moved(velocity_at(one, place), velocity_at(two, place))
-    # What the joint does not allow is rounding: next to a reversal it would be seen as a share of the sliding.
+    # Sliding that the joint does not allow is rounding; next to a reversal it would be a share of the true sliding.
     if kind == GUIDE:
         slip = scale(dot(slip, axis), axis)
     for which in range(joint[LINE], joint[LINE] + joint[LINES]):
@@ -108,7 +108,7 @@ def direction(
 
 @inline
 def _put_parts(links: Links, i: int, k: int, joints: Index, friction: Array, room: Room, parts: Array) -> None:
-    """Write the vectors whose norms are the loads of each joint, to every answer, (Q, A, PART)."""
+    """Write the vectors whose norms are the loads of each joint, for every solution, (Q, A, PART)."""
     for which in range(joints.shape[0]):
         data, axis = friction[which], vector(links.axes[i, k, max(joints[which, FREEDOM], 0)])
         held = joints[which, KIND] == SHAFT or joints[which, KIND] == GUIDE
@@ -133,7 +133,7 @@ def _sizes(joint: Index, data: Array, part: Array) -> tuple[float, float, float]
 
 @inline
 def _sum(answers: Array, loads: Array, total: Array) -> None:
-    """Sum what is known without friction and per load of each joint: (A, N) at the loads (Q,), into (N,)."""
+    """Sum the solutions (A, N), without friction and per unit load of each joint, at the loads (Q,), into (N,)."""
     for at in range(total.shape[0]):
         total[at] = answers[0, at]
     for which in range(loads.shape[0]):
@@ -143,7 +143,7 @@ def _sum(answers: Array, loads: Array, total: Array) -> None:
 
 @inline
 def _settled(joints: Index, friction: Array, parts: Array, loads: Array, new: Array, steps: Array) -> int:
-    """Iterate the loads, (Q,); passes it took, -1 where they do not settle.  ``new`` (Q,), ``steps`` (Q,) are room."""
+    """Iterate the loads (Q,) to convergence; return the passes, -1 without.  ``new``, ``steps`` are scratch."""
     last, least, stalled, part, passes, count = math.inf, math.inf, 0, steps[1], -1, 0
     for which in range(loads.shape[0]):
         loads[which], steps[0, which] = 0.0, 0.0
@@ -162,11 +162,11 @@ def _settled(joints: Index, friction: Array, parts: Array, loads: Array, new: Ar
                 along += apart * before
                 square += before * before
                 whole += apart * apart
-        # The last digits wander: a change at rounding level is convergence, not a stall.
+        # The last digits fluctuate: a change at rounding level is convergence, not a stall.
         if math.isfinite(step) and (change <= TOLERANCE or (count > 3 and change < 1e-12 and change >= last)):
             passes = count
         last = change
-        # In proportion to themselves loads change less and less even while they grow without end.
+        # The relative change of loads decreases even while they grow without bound, so absolute steps are compared.
         stalled = 0 if step < least else stalled + 1
         least, further = step, 1.0
         if count % LEAP == 0 and passes < 0:
@@ -188,14 +188,14 @@ def link_friction(
     lost: Array | None,
     on_supports: Array | None,
 ) -> None:
-    """Compute joint reactions and driving torque with friction; what is not named here as in :mod:`.link_loads`.
+    """Compute joint reactions and driving torque with friction; further arguments as in :mod:`.link_loads`.
 
     Parameters
     ----------
     friction : (n, Q, PER_FRICTION), of each joint coefficient, friction radius, mean thrust radius, places of its two
         supports along its axis from its place; a ball or a contact reads the first two
-    status : also JAMMED where the loads do not settle
-    forces : (n, m, Q, 6) or None; with what rubs, but of a driven joint with the drive torque in its place
+    status : also JAMMED where the loads do not converge
+    forces : (n, m, Q, 6) or None; friction included, but at a driven joint the drive torque in its place
     lost : (n, m, Q + 1) or None; share of each joint's friction in the driving torque; passes of the iteration
     on_supports : (n, m, Q, 2) or None; loads of the supports across the axis; 0 for balls and contacts
     """
@@ -254,7 +254,7 @@ def _store(
     total: Array,
     forces: Array,
 ) -> None:
-    """Write what each joint bears with what rubs there."""
+    """Write the force and moment of each joint, friction included."""
     lines = room.rows.shape[0]
     for which in range(joints.shape[0]):
         _sum(room.found[which], loads, total)

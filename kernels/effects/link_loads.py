@@ -1,13 +1,13 @@
 """D1-D3 for any number of links: joint reactions, driving torque, reduced inertia of a tree of bodies with loops.
 
 Equation numbers are of docs/links.md.  The loops are cut at the lines of :class:`kernels.linkage.bodies.Links`.  Each
-body needs a wrench for its inertia and weight; the force x_k of each line adds one that is linear in x_k.  What hangs
-on a joint is summed towards the frame, so the joint's wrench is known but for the x_k.  A freedom that nothing drives
+body needs a wrench for its inertia and weight; the force x_k of each line adds one that is linear in x_k.  The wrenches
+of all bodies beyond a joint are summed, so the joint's wrench is known but for the x_k.  A freedom that nothing drives
 bears no moment about its axis, or no force along it: as many linear equations as there are lines.  They are solved by
 Gaussian elimination; every reaction and the driving torque then follow by adding up.
 
 Friction at a joint is a wrench of known direction times the joint's load: one more line, whose force is known once the
-loads are.  Reactions are linear in the loads, so the reactions without friction and those to the friction of each joint
+loads are.  Reactions are linear in the loads, so the reactions without friction and those due to each joint's friction
 at unit load are found once, as columns of one elimination; successive approximations then sum vectors.
 """
 
@@ -34,13 +34,13 @@ SPEED, CHANGE, LOAD, FORCE = 0, 1, 2, 3  # of the drive: speed, its rate, torque
 WRENCH = 6  # force, moment about the origin of the family's frame
 
 # Of a joint: its kind; the body whose joint with its parent it is, and the freedom whose axis is its own; or the first
-# of the lines that make it, and how many; the slender rod among its bodies, or FRAME.
+# of the lines that make it, and their number; the slender rod among its bodies, or FRAME.
 KIND, BODY_OF, FREEDOM, LINE, LINES, ROD, PER_JOINT = 0, 1, 2, 3, 4, 5, 6
 SHAFT, HINGED_BALL, GUIDE, BALL, CONTACT = 0, 1, 2, 3, 4
 
 
 class TreeLoading(NamedTuple):
-    """What loads a tree of B bodies.
+    """Loads on a tree of B bodies.
 
     Parameters
     ----------
@@ -59,21 +59,21 @@ class TreeLoading(NamedTuple):
 
 
 class Room(NamedTuple):
-    """What the loads of one pose are worked out in: B bodies, F freedoms, K lines, Q joints, R of them rub, A = 1 + R.
+    """Scratch for the loads of one pose: B bodies, F freedoms, K lines, Q joints, R of them with friction, A = 1 + R.
 
     Parameters
     ----------
     ends : (Q, 2) the body that a joint's force acts on, and the one that it acts on reversed
     order : (F,) freedoms that nothing drives, as many as lines, then those that the drive turns
-    signs : (B, K + R) whether a line, or a joint's friction, is taken off (-1) or added to (1) what a body needs with
-        all that hangs on it
-    need : (B, 6) that without lines and friction
+    signs : (B, K + R) sign with which a line's force, or a joint's friction, enters the wrench that a body and all
+        beyond it need: -1, 0 or 1
+    need : (B, 6) that wrench without lines and friction
     places : (Q, 3) of the joints
-    units : (K + R, 6) wrenches of the lines' unit forces and of what rubs
-    screws : (F, 6) what weighs a wrench on a freedom
+    units : (K + R, 6) wrenches of the lines' unit forces and of the joints' friction
+    screws : (F, 6) of the freedoms, for :func:`weighed`
     rows : (K, K + A) the equations
     x : (K, A) their last columns, in the end the lines' forces
-    found : (Q, A, 6) force and moment of each joint, without friction, then to the friction of each
+    found : (Q, A, 6) force and moment of each joint, without friction, then due to the friction of each joint
     """
 
     ends: Index
@@ -88,13 +88,13 @@ class Room(NamedTuple):
     found: Array
 
 
-# Below, no array is last used inside a branch, and every helper has one way out: otherwise numba counts references to
-# the arrays at every pose, which took half of the time.
+# Below, no array is last used inside a branch, and every helper has a single return: otherwise numba counts references
+# to the arrays at every pose, which took half of the time.
 
 
 @inline
 def room_for(links: Links, joints: int, rubbing: int) -> Room:
-    """Room for the loads of one pose."""
+    """Allocate the scratch for the loads of one pose."""
     count, lines, freedoms = links.parents.shape[0], links.lines.shape[2], links.axes.shape[2]
     rows = np.empty((lines, lines + 1 + rubbing))
     return Room(
@@ -107,10 +107,10 @@ def room_for(links: Links, joints: int, rubbing: int) -> Room:
 
 @inline
 def _put_signs(parents: Index, on: int, by: int, column: Array) -> None:
-    """Write of every body whether a wrench on ``on``, reversed on ``by``, lowers or raises what its joint gives."""
+    """Write the sign with which a wrench on body ``on``, reversed on ``by``, enters the wrench at each body's joint."""
     for body in range(column.shape[0]):
         column[body] = 0.0
-    # both ways to the frame are gone; where they meet nothing is left
+    # along both paths to the frame; where the paths coincide the two cancel
     while on >= 0:
         column[on] -= 1.0
         on = parents[on]
@@ -121,7 +121,7 @@ def _put_signs(parents: Index, on: int, by: int, column: Array) -> None:
 
 @inline
 def prepare(links: Links, i: int, joints: Index, room: Room) -> None:
-    """Write what is the same at all poses of a design."""
+    """Write the part of the scratch that is the same at all poses of a design."""
     lines, ends, first, last = room.rows.shape[0], links.ends[i], 0, room.order.shape[0] - 1
     for which in range(room.order.shape[0]):
         driven = links.freedoms[i, which, 1] == DRIVEN
@@ -141,9 +141,9 @@ def prepare(links: Links, i: int, joints: Index, room: Room) -> None:
 def needed(
     links: Links, i: int, k: int, given: TreeLoading, drive: Array, room: Room
 ) -> tuple[float, float, Vector, Vector]:
-    """Write what each body and all that hangs on it need, (1), (3); reduced inertia and half its derivative, (6), tool.
+    """Write the wrench that each body and all beyond it need, (1), (3).
 
-    Of the tool the force on it, (2), and its velocity.
+    Return reduced inertia and half its derivative, (6), the force on the tool, (2), and the tool's velocity.
     """
     need, parents, records = room.need, links.parents, links.bodies[i, k]
     bodies, tool, carrier, output = given.bodies[i], given.tool[i], given.carrier, given.output
@@ -210,7 +210,7 @@ def weighed(screw: Array, wrench: Array) -> float:
 
 @inline
 def solve(links: Links, i: int, room: Room) -> bool:
-    """Find the forces of the lines, (4), without friction and to the friction of each joint; false at a dead point."""
+    """Find the forces of the lines, (4), without friction and due to each joint's friction; false at a dead point."""
     rows, signs, units = room.rows, room.signs, room.units
     lines = rows.shape[0]
     for row in range(lines):
@@ -225,7 +225,7 @@ def solve(links: Links, i: int, room: Room) -> bool:
 
 @inline
 def wrench_on(room: Room, body: int, answer: int) -> tuple[Vector, Vector]:
-    """Compute what a body's parent puts on it, about the origin: without friction, or to the friction of a joint."""
+    """Wrench of its parent on a body, about the origin: without friction, or due to the friction of one joint."""
     need, units, signs, x = room.need, room.units, room.signs, room.x
     lines = x.shape[0]
     force, moment = vector(need[body]), latter(need[body])
@@ -241,7 +241,7 @@ def wrench_on(room: Room, body: int, answer: int) -> tuple[Vector, Vector]:
 
 @inline
 def put_reactions(joints: Index, room: Room) -> None:
-    """Write force and moment about its place of every joint, to every answer."""
+    """Write the force of every joint and the moment about its place, for every solution."""
     for which in range(joints.shape[0]):
         place, body = vector(room.places[which]), joints[which, BODY_OF]
         for answer in range(room.x.shape[1]):
@@ -267,7 +267,7 @@ def driving(links: Links, i: int, room: Room, answer: int) -> float:
 
 @inline
 def borne_force(links: Links, i: int, k: int, given: TreeLoading, drive: Array) -> Vector:
-    """Force that the frame puts on all bodies and the tool: what they need, less the useful load."""
+    """Force of the frame on all bodies and the tool: their inertia forces and weights less the useful load."""
     bodies, tool, carrier, output = given.bodies[i], given.tool[i], given.carrier, given.output
     records, count, total = links.bodies[i, k], links.parents.shape[0], scale(-1.0, vector(drive[FORCE:]))
     gravity, square, change = vector(bodies[BODY * count :]), drive[SPEED] * drive[SPEED], drive[CHANGE]
@@ -282,7 +282,7 @@ def borne_force(links: Links, i: int, k: int, given: TreeLoading, drive: Array) 
 
 @inline
 def borne_moment(parents: Index, need: Array) -> Vector:
-    """Moment about the origin that the frame puts on all bodies; forces between them change nothing of it."""
+    """Moment of the frame on all bodies about the origin; internal forces have no effect on it."""
     x, y, z = 0.0, 0.0, 0.0
     for b in range(parents.shape[0]):
         held = 1.0 if parents[b] < 0 else 0.0
@@ -308,8 +308,8 @@ def link_loads(
     Parameters
     ----------
     links : tree and poses
-    joints : (Q, PER_JOINT) what forces are given of
-    given : what loads the bodies
+    joints : (Q, PER_JOINT) joints whose forces are wanted
+    given : loads on the bodies
     status : (n, m), in and out; DEAD_POINT where the forces of the lines have no digits left; gives nan
     forces : (n, m, Q, 6) or None; force and moment of each joint, about its place, fixed axes
     frame_force, frame_moment : (n, 3, m) or None; on the frame, that of the drive included; needs no forces of lines

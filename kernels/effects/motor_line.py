@@ -1,4 +1,4 @@
-"""D4 with a motor line: kinetic energy of a drive over the turn while its motor gives more torque the slower it turns.
+"""D4 with a motor line: kinetic energy over the turn of a drive whose motor torque falls with the speed.
 
 Near the mean speed the torque of a motor is M + slope (mean speed - omega).  With T = J omega^2/2 and the excess X of
 loads and weights, its mean removed,
@@ -6,9 +6,9 @@ loads and weights, its mean removed,
     dT/dphi = X + M - slope (omega - mean speed),     omega = sqrt(2 T/J)
 
 The energy is periodic and the mean speed in time is given: two conditions for T(0) and M, found by shooting with
-Newton's method; the derivatives run along.  A motor line damps, so the solution is unique and Newton starts from that
-of constant torque.  Runge and Kutta's fourth order on steps that follow the motor's time constant, halved until the
-energy stands still.
+Newton's method; the derivatives are integrated too.  A motor line damps, so the solution is unique and Newton's method
+starts from that of constant torque.  The integration is Runge and Kutta's of fourth order, with steps that follow the
+motor's time constant, halved until the energy no longer changes.
 """
 
 from __future__ import annotations
@@ -39,7 +39,7 @@ def steady_energy(
     still: float,
     energy: Array,
 ) -> bool:
-    """Kinetic energy in the steady state; False where the machine stalls or the motor is too stiff for the steps.
+    """Compute the kinetic energy in the steady state; false where the machine stalls or the motor is too stiff.
 
     Parameters
     ----------
@@ -80,7 +80,7 @@ def _shoot(
     between: int,
     energy: Array,
 ) -> tuple[float, float]:
-    """Return T(0) and M of the periodic solution with this mean speed; nan where Newton's method finds none."""
+    """Find T(0) and M of the periodic solution with the given mean speed; nan where Newton's method finds none."""
     wanted = 2.0 * math.pi / mean_speed
     for _ in range(NEWTON):
         end, by_start, by_torque, time, time_start, time_torque = _march(
@@ -97,7 +97,7 @@ def _shoot(
         start, torque = start + share * more_start, torque + share * more_torque
         if share == 1.0 and abs(more_start) <= 1e-14 * scale and abs(more_torque) <= 1e-13 * scale:
             return start, torque
-    # The last digits wander; what is still far away after so many steps is no solution.
+    # The last digits fluctuate; a correction that is still large after all steps means no solution.
     near = abs(more_start) <= 1e-10 * scale and abs(more_torque) <= 1e-10 * scale
     return (start, torque) if near else (math.nan, math.nan)
 
@@ -113,7 +113,7 @@ def _march(
     between: int,
     energy: Array,
 ) -> tuple[float, float, float, float, float, float]:
-    """March one turn: T at its end, its time, and the derivatives of both by T(0) and M; T is written on the grid."""
+    """Integrate one turn: T at its end, its time, and derivatives of both by T(0) and M; T is written on the grid."""
     points = inertia.size
     step = 4.0 * math.pi / points
     t, by_start, by_torque, time, time_start, time_torque = start, 1.0, 0.0, 0.0, 0.0, 0.0

@@ -1,4 +1,4 @@
-"""B1: how far the bearings of the rocker are used, and the radial pressure angle they permit.
+"""B1: utilisation of the rocker's bearings, and the radial pressure angle that they permit.
 
 At a given axial angle theta2 the loads grow with the radial angle theta1.  The permissible theta1 is the first at which
 the utilisation passes 1.  Utilisation is the largest mean pressure, or equivalent load, over its
@@ -15,8 +15,8 @@ from kernels.effects.bearings import equivalent_load, in_plane, sliding_criteria
 from kernels.jit import inline, kernel
 from kernels.types import EPS, Array, Status
 
-# Mean pressures rise with theta1 all the way: one bracket holds.  An equivalent load rises on both sides of its step.
-BEFORE = 1.0 - 1e-12  # of the step: where the first formula holds surely
+# Mean pressures rise with theta1 everywhere: one bracket is enough.  An equivalent load rises on both sides of a step.
+BEFORE = 1.0 - 1e-12  # share of tan(theta1/2) at the step, where the first formula surely holds
 STEPS = 100
 
 
@@ -46,7 +46,7 @@ def rolling_utilisation(
 
 @inline
 def _spare(utilisation: Any, bearings: Array, limits: Array, i: int, moment: float, half: float, tan2: float) -> float:
-    """Return 1/utilisation - 1 at theta1 = 2 arctan(half): near to linear, finite where friction locks."""
+    """Reserve 1/utilisation - 1 at theta1 = 2 arctan(half): nearly linear, and finite where friction locks."""
     per = 1.0 / (1.0 + half * half)
     sin1 = 2.0 * half * per
     used: float = utilisation(bearings, limits, i, moment, (1.0 - half) * (1.0 + half) * per, sin1, sin1 * tan2)
@@ -68,7 +68,7 @@ def _first_crossing(
     utilisation: Any, step: float, bearings: Array, limits: Array, i: int, moment: float, tan2: float
 ) -> float:
     """Largest theta1 from 0 on with utilisation <= 1 all the way; 0 if there is none.  ``step``: see :func:`_step`."""
-    # In half = tan(theta1/2) there is no sine to call; what is spare falls through zero at the crossing.
+    # With half = tan(theta1/2) no sine is called; the reserve falls through zero at the crossing.
     low, high, at_high = 0.0, 1.0, -1.0
     at_low = _spare(utilisation, bearings, limits, i, moment, 0.0, tan2)
     if at_low < 0.0:
@@ -82,7 +82,7 @@ def _first_crossing(
             low, at_low = half, value
     side, before, half = 0, math.inf, low
     for _ in range(STEPS):
-        # Regula falsi that halves the value of an end which stays (Illinois), in the bracket always.
+        # Regula falsi that halves the value of an end which stays (Illinois), kept in the bracket.
         half = (low * at_high - high * at_low) / (at_high - at_low)
         if not low < half < high:
             half = 0.5 * (low + high)

@@ -68,7 +68,7 @@ def directions(
                 theta3[i, k] = good * math.atan2(side * dot(j.s, j.u), abs(radial))
 
 
-# The turn is cut into quarters from here; a root on a cut might be found twice or not at all, so others are tried.
+# Angles from which the turn is cut into quarters, tried in order: a root on a cut may be found twice or not at all.
 CUTS = (0.2137, 0.8521, 1.3179)
 NEWTON = 3
 # Rounding of the components, in units of 2^-53 of the terms they are made of.
@@ -77,7 +77,7 @@ ROUNDING = 16.0
 
 @inline
 def slope_coefficients(r0: float, rc: float, rs: float, k0: float, kc: float, ks: float) -> tuple[float, ...]:
-    """Give a1, b1, a2, b2, the coefficients of half the derivative of the squared distance."""
+    """Coefficients a1, b1, a2, b2 of half the derivative of the squared distance."""
     a1, b1 = r0 * rs + k0 * ks, -(r0 * rc + k0 * kc)
     a2, b2 = rc * rs + kc * ks, 0.5 * ((rs - rc) * (rs + rc) + (ks - kc) * (ks + kc))
     return a1, b1, a2, b2
@@ -85,9 +85,9 @@ def slope_coefficients(r0: float, rc: float, rs: float, k0: float, kc: float, ks
 
 @inline
 def extrema_expected(a1: float, b1: float, a2: float, b2: float) -> float:
-    """Say how many extrema there are: 4 if the origin lies inside the ellipse's evolute, 2 outside, 3 on it.
+    """Find the number of extrema: 4 if the origin lies inside the ellipse's evolute, 2 outside, 3 on it.
 
-    0 if the curve is a point.
+    It is 0 if the curve is a point.
     """
     size = math.hypot(a2, b2)
     if size == 0.0:
@@ -105,7 +105,7 @@ def extrema_expected(a1: float, b1: float, a2: float, b2: float) -> float:
 def zeros(
     a1: float, b1: float, a2: float, b2: float, cut: float, quartic: Array, scratch: Array, found: Array, phi: Array
 ) -> int:
-    """Zeros of a1 cos + b1 sin + a2 cos 2 + b2 sin 2 in a turn from ``cut``, ascending; their number, or -1."""
+    """Find the zeros of a1 cos + b1 sin + a2 cos 2 + b2 sin 2 from ``cut`` on; return their number, -1 if above 4."""
     count = 0
     for quarter in range(4):
         start = cut + 0.5 * math.pi * quarter

@@ -3,7 +3,7 @@
 W is the integral of the excess of torque over the crank angle, less its mean.  The speed is omega = sqrt(2 (E + W)/J).
 The constant E follows from the mean speed in time: 2 pi / omega_mean is the integral of d phi / omega, which falls
 strictly with E.  The effect needs the whole turn and takes samples on a uniform odd grid.
-A motor whose torque falls with the speed answers to it: kernels/effects/motor_line.py.
+A motor whose torque falls with the speed is in kernels/effects/motor_line.py.
 """
 
 from __future__ import annotations
@@ -21,14 +21,14 @@ from kernels.types import Array, Status
 
 NEWTON = 60
 RESOLVED = 1e-9
-FINER = 4  # looks per sample before an extreme speed is refined
-# The period is summed on FINER times as many angles until E stands still; more than MOST mean a stall for a moment.
+FINER = 4  # points per sample before an extreme speed is refined
+# The period is summed on FINER times as many angles until E no longer changes; more than MOST mean a near stall.
 MOST = 20000
 STILL = 1e-12
 
 
 class Uneven(NamedTuple):
-    """Steady state of a crank that turns unevenly: what comes out.
+    """Steady state of a crank that turns unevenly.
 
     Parameters
     ----------
@@ -124,7 +124,7 @@ def speed_fluctuation(
 
 @inline
 def _checked(jc: Array, js: Array, wc: Array, left: float, coarsest: float) -> int:
-    """Status by the harmonics of inertia and excess; ``left`` is the share of the excess that its highest ones have."""
+    """Status by the harmonics of inertia and excess; ``left`` is the share of the excess in its highest harmonics."""
     if not math.isfinite(jc[0] + wc[0]):
         return st.NOT_ROTATABLE
     if not jc[0] > 0.0:
@@ -134,7 +134,7 @@ def _checked(jc: Array, js: Array, wc: Array, left: float, coarsest: float) -> i
 
 @inline
 def _integrate(c: Array, s: Array) -> None:
-    """Put the integral over the crank angle in the place of a series without a mean."""
+    """Integrate a Fourier series without a mean over the crank angle, in place."""
     for k in range(1, c.size):
         c[k], s[k] = -s[k] / k, c[k] / k
 
@@ -170,7 +170,7 @@ def _settled(
 
 @inline
 def _energy(inertia: Array, work: Array, mean_speed: float, e: float) -> float:
-    """Find E by Newton's method on the period, from e; E stays above -min W, and nan says that the machine stalls."""
+    """Find E by Newton's method on the period, from e; E stays above -min W, and is nan where the machine stalls."""
     n, low = work.size, -math.inf
     for j in range(n):
         low = max(low, -work[j])

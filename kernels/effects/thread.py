@@ -9,7 +9,7 @@ integrates to T2 = T1 e^x + (B/(R + r)^2) (e^x - 1) + alpha R theta (e^x - 1)/x 
 With expm1 all limits are regular: beta = 0, R = 0, alpha = B = 0 (Euler).  All terms are positive: nothing cancels.
 The unit of angle is that of beta and alpha, whichever it is.
 
-Its limit alpha = B = 0 is Euler's law, (5), (6).  What the speed of the thread makes of the tension: (7), (8).
+Its limit alpha = B = 0 is Euler's law, (5), (6).  The tension depends on the speed of the thread by (7), (8).
 
 The thread runs from guide N1 over E to guide N2; its wrap angle, length L = |E - N1| + |E - N2| and the derivatives of
 the length hold for an eyelet on any link.

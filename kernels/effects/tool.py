@@ -5,8 +5,8 @@ with the point M of the coupler that it hangs on.  Its momentum along lam gives 
 
     F_M = -(m (s'' omega^2 + s' eps - g . lam) - F) lam,      s' = v_M . lam, s'' = a_M . lam                 (1), (2)
 
-with F the working force on the rod along lam, of which a part may act while the rod pierces the fabric (5).  What the
-rod's own guide bears across lam is statically undetermined: the coupler guides the point already.  Its least value is
+with F the working force on the rod along lam, of which a part may act while the rod pierces the fabric (5).  The load
+across lam on the rod's own guide is statically undetermined: the coupler guides the point already.  Its least value is
 zero, and zero is taken.
 
 A tool whose point moves freely, on the coupler or at the tip of a rocker, puts -(m (a_P - g) - F) on its link, (6).
@@ -31,7 +31,7 @@ COLUMNS = 13
 
 
 class ToolLoad(NamedTuple):
-    """What is wanted of a tool; None for what is not.
+    """Outputs of a tool; None where an output is not wanted.
 
     Parameters
     ----------
@@ -62,7 +62,7 @@ def _put(out: Array | None, i: int, k: int, values: tuple[float, ...]) -> None:
 
 @inline
 def arm(j: Joints, data: Array) -> Vector:
-    """Point from B in fixed axes; ``across`` is k x s, so the finger of the ball joints does not matter."""
+    """Vector from B to the tool's point, fixed axes; across is along k x s, whichever ball joint has the finger."""
     return add(mix(data[1], j.s, data[2], cross(j.k, j.s)), scale(data[3], j.k))
 
 
@@ -93,7 +93,7 @@ def tool_load(
     working : (n, m or 1), force F on the tool along lam; a resisting one opposes s'
     finger : (n,) DRIVEN or DRIVING
     status : (n, m), in and out, as of :func:`kernels.effects.kinetostatics.kinetostatics`; what is not OK gives nan
-    out : what is wanted
+    out : the wanted outputs
     """
     for i in range(poses.shape[0]):
         mass, lam = data[i, 0], (data[i, 4], data[i, 5], data[i, 6])
