@@ -1,1 +1,1 @@
-"""What compiled loops need of linear algebra, and nothing else."""
+"""Linear algebra for compiled loops: elimination, nearest points under linear rows, a straight-line fit."""

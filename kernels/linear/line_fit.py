@@ -1,4 +1,4 @@
-"""The coupler point that runs straightest: the inner linear problem of a guided four-bar (docs/guide.md, section 9.2).
+"""Straightest coupler point: the inner linear problem of a guided four-bar (docs/guide.md, section 9.2).
 
 For a coupler with the pin B and the direction d = (C - B)/|C - B|, both complex, and a line of direction lam,
 
@@ -142,7 +142,7 @@ def _first_reference(
 
 @inline
 def _rounding(target: Array, x: Array) -> float:
-    """Return the rounding of residuals: where the point runs straight to that, one reference is as good as another."""
+    """Estimate the rounding error of residuals, below which every reference is as good as another."""
     size: float = abs(x[0]) + abs(x[1]) + abs(x[2])
     for j in range(target.size):
         size = max(size, abs(target[j]))
@@ -160,7 +160,7 @@ def _exchange(
     y: Array,
     points: NDArray[np.int64],
 ) -> bool:
-    """Minimax x = (w_x, w_y, h) of |target + w_x dy + w_y dx - h| over the masked points, started at least squares."""
+    """Find the minimax x = (w_x, w_y, h) of |target + w_x dy + w_y dx - h| over masked points, from least squares."""
     m = dx.size
     if not _first_reference(target, dx, dy, inside, x, points):
         return False
@@ -195,7 +195,7 @@ def _exchange(
                     worst, worst_size = j, r
         if worst < 0 or worst_size <= abs(level) * (1.0 + 1e-9) + rounding:
             return True
-        # Stiefel's rule: the new row in terms of the reference decides who leaves, so the level can only rise.
+        # Stiefel's rule: the new row in terms of the reference decides which point leaves; the level can only rise.
         sign = math.copysign(1.0, target[worst] + x[0] * dy[worst] + x[1] * dx[worst] - x[2])
         for k in range(3):
             for i in range(3):
@@ -215,7 +215,7 @@ def _exchange(
 
 @inline
 def _couplers(b_x: Array, b_y: Array, c_x: Array, c_y: Array, bx: Array, by: Array, dx: Array, dy: Array) -> bool:
-    """Pin B and direction d of the coupler at every position; false if one of them is not assembled."""
+    """Compute pin B and direction d of the coupler at every position; false if a position is not assembled."""
     good = True
     for j in range(b_x.size):
         bx[j], by[j] = b_x[j], b_y[j]
@@ -226,7 +226,7 @@ def _couplers(b_x: Array, b_y: Array, c_x: Array, c_y: Array, bx: Array, by: Arr
 
 
 class Straightest(NamedTuple):
-    """The point that runs straightest: what comes out of :func:`line_fit`.
+    """Straightest coupler point and its line: the result of :func:`line_fit`.
 
     Parameters
     ----------
@@ -249,7 +249,7 @@ class Straightest(NamedTuple):
 def line_fit(
     b_x: Array, b_y: Array, c_x: Array, c_y: Array, window: Array, lam: Array, free_direction: bool, found: Straightest
 ) -> None:
-    """Compute the coupler point and line with the smallest largest deviation over the working part of the travel.
+    """Compute the coupler point and line with the least maximum deviation over the working part of the travel.
 
     Parameters
     ----------

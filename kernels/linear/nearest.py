@@ -1,8 +1,8 @@
-"""The nearest point that keeps linear rows: the dual active-set method of Goldfarb and Idnani (1983).
+"""Nearest point that satisfies linear inequalities (rows): the dual active-set method of Goldfarb and Idnani (1983).
 
-It begins at the centre, which keeps none of them, and takes in the row that is missed most until none is.  Every step
-costs one look at all rows and some hundred products, so it is quick where few of many rows hold in the end.  Rows that
-join later need no new beginning: the point reached is still the nearest one that keeps those before.
+It begins at the centre without active rows and adds the most violated row until none is violated.  Every step costs one
+evaluation of all rows and some hundred products, so it is quick where few of many rows are active in the end.  Rows
+that join later need no restart: the point reached is still the nearest one that satisfies the rows before.
 """
 
 from __future__ import annotations
@@ -19,16 +19,16 @@ from kernels.types import Array
 
 Index = NDArray[np.int64]
 
-STEPS = 20  # per unknown after which it is given up
-DEPENDENT = 1e-20  # square of what is left of a row across those that hold, relative to its own, that is rounding
+STEPS = 20  # per unknown, after which the search is given up
+DEPENDENT = 1e-20  # square of a row's remainder across the active rows, relative to the row's, that is rounding
 
 
 class Held(NamedTuple):
-    """Rows that hold, as an orthogonal triangle: ``q`` (n, n) and ``r`` (n, n), their numbers and their weights.
+    """Active rows in an orthogonal factorisation, ``q`` (n, n) and ``r`` (n, n); their numbers and multipliers.
 
-    Behind the numbers of those that hold stands that of a row that none of the points keeps, whose ``share`` of the
-    others says so.  ``inside`` (m,) is 1 for rows that hold; ``d``, ``z`` and ``share`` (n,) and ``room`` (m,) are used
-    on the way.
+    Where no point satisfies all rows, the number of the contradicting row stands behind those of the active rows, and
+    ``share`` combines the active rows into it.  ``inside`` (m,) is 1 for active rows; ``d``, ``z`` and ``share`` (n,)
+    and ``room`` (m,) are scratch.
     """
 
     q: Array
@@ -44,7 +44,7 @@ class Held(NamedTuple):
 
 @inline
 def nothing_held(n: int, m: int) -> Held:
-    """Begin with no row."""
+    """Allocate the state without active rows."""
     return Held(
         np.eye(n), np.zeros((n, n)), np.empty(n + 1, np.int64), np.zeros(n + 1), np.zeros(m, np.int64), np.empty(n),
         np.empty(n), np.empty(n), np.empty(m),
@@ -53,7 +53,7 @@ def nothing_held(n: int, m: int) -> Held:
 
 @inline
 def _most_missed(rows: Array, needs: Array, size: Array, m: int, y: Array, h: Held, tolerance: float) -> int:
-    """Row that a point misses most, relative to its size; -1 where it keeps the first m of them."""
+    """Find the row that a point violates most, relative to the row's size; -1 where it satisfies the first m rows."""
     for j in range(m):
         h.room[j] = -needs[j]
     for i in range(len(y)):
@@ -69,7 +69,7 @@ def _most_missed(rows: Array, needs: Array, size: Array, m: int, y: Array, h: He
 
 @inline
 def shares(rows: Array, p: int, count: int, h: Held) -> float:
-    """Where a row leads while the others hold (z), and how much of each of them it takes; the square of z."""
+    """Split row p into a remainder z across the active rows and a ``share`` of each of them; return the square of z."""
     n = rows.shape[0]
     square = 0.0
     for k in range(n):
@@ -95,7 +95,7 @@ def shares(rows: Array, p: int, count: int, h: Held) -> float:
 
 @inline
 def taken_in(p: int, count: int, square: float, h: Held) -> None:
-    """Take a row in: a reflection turns what is left of it across the others, of that square, into one column."""
+    """Add row p to the active rows: a reflection turns its remainder, of that square, into one column."""
     n = len(h.d)
     first = h.d[count]
     length = -math.sqrt(square) if first > 0.0 else math.sqrt(square)
@@ -116,7 +116,7 @@ def taken_in(p: int, count: int, square: float, h: Held) -> None:
 
 @inline
 def dropped(place: int, count: int, h: Held) -> None:
-    """Take a row out of those that hold; rotations make the rest a triangle again."""
+    """Remove the active row at ``place``; rotations make the rest a triangle again."""
     n = len(h.d)
     h.inside[h.numbers[place]] = 0
     for k in range(place, count - 1):
@@ -142,7 +142,7 @@ def dropped(place: int, count: int, h: Held) -> None:
 def pursued(
     rows: Array, needs: Array, size: Array, m: int, tolerance: float, y: Array, h: Held, count: int
 ) -> tuple[int, int]:
-    """Go on from a point that is the nearest with ``count`` rows held to the nearest that keeps the first m rows."""
+    """Continue from the nearest point with ``count`` active rows to the nearest that satisfies the first m rows."""
     n = rows.shape[0]
     left, status = STEPS * n, int(st.OK)
     while status == st.OK:
@@ -182,7 +182,7 @@ def pursued(
 
 @kernel
 def nearest_with(rows: Array, needs: Array, centre: Array, tolerance: float, y: Array, h: Held) -> tuple[int, int]:
-    """Point of :func:`nearest`; how many rows hold, and the status.  ``h`` begins as :func:`nothing_held`."""
+    """Find the point of :func:`nearest`; return number of active rows and status.  ``h`` is that of `nothing_held`."""
     n, m = rows.shape
     size = np.zeros(m)
     for i in range(n):
@@ -196,25 +196,25 @@ def nearest_with(rows: Array, needs: Array, centre: Array, tolerance: float, y: 
 
 @kernel
 def nearest(rows: Array, needs: Array, centre: Array, tolerance: float, y: Array, weights: Array) -> int:
-    """Point nearest to a centre with ``rows.T y >= needs``.
+    """Find the point nearest to a centre that satisfies ``rows.T y >= needs``.
 
     Parameters
     ----------
     rows : (n, m), one column for each row
     needs : (m,)
     centre : (n,)
-    tolerance : distance by which a row may be missed
+    tolerance : distance by which a row may be violated
     y : (n,) out
     weights : (m,) out; ``y - centre = rows weights``, none is negative
 
     Returns
     -------
-    OK, LIMIT_EXCEEDED where no point keeps all rows, or NOT_CONVERGED after twenty exchanges per unknown; then y and
-    weights are as far as it came.
+    OK, LIMIT_EXCEEDED where no point satisfies all rows, or NOT_CONVERGED after twenty exchanges per unknown; then y
+    and weights are those of the last step.
 
     Notes
     -----
-    Goldfarb and Idnani 1983, with an orthogonal triangle of the rows that hold.  Against scipy's least-distance
+    Goldfarb and Idnani 1983, with an orthogonal factorisation of the active rows.  Against scipy's least-distance
     programs: 1e-12.
     """
     h = nothing_held(*rows.shape)

@@ -1,6 +1,6 @@
-"""The nearest point among hundreds of rows along turns, of which few matter: these join one after the other.
+"""Nearest point under hundreds of rows along turns, of which few are active: rows join where they are needed.
 
-A program like the one before begins with the rows that held there.
+A program similar to the one before starts from the active rows of that one.
 """
 
 from __future__ import annotations
@@ -15,12 +15,12 @@ from kernels.jit import inline, kernel, part
 from kernels.linear.nearest import Held, Index, dropped, nothing_held, pursued, shares, taken_in
 from kernels.types import Array
 
-INDEPENDENT = 1e-12  # square of what is left of a row that held before, across the others, that may hold again
+INDEPENDENT = 1e-12  # square of a formerly active row's remainder, relative to the row's, to be activated again
 
 
 @inline
 def _place_of(place: Index, count: int, number: int) -> int:
-    """Place of a number that is among the first ``count``."""
+    """Place of a number among the first ``count``; -1 if it is not there."""
     for k in range(count):
         if place[k] == number:
             return k
@@ -29,9 +29,9 @@ def _place_of(place: Index, count: int, number: int) -> int:
 
 @part
 def _resumed(rows: Array, needs: Array, size: Array, begin: Index, centre: Array, y: Array, h: Held) -> int:
-    """Let rows hold that held before, but for those with a negative weight; how many do.
+    """Activate formerly active rows, without those of negative multiplier; return the number of active rows.
 
-    The nearest point that keeps rows as equations is where the method may go on from, as long as no weight is negative.
+    The method may start from the nearest point with these rows as equations, as long as no multiplier is negative.
     """
     n, count = rows.shape[0], 0
     for k in range(begin[0]):
@@ -70,9 +70,9 @@ def _resumed(rows: Array, needs: Array, size: Array, begin: Index, centre: Array
 
 @inline
 def _peaks(values: Array, below: float, turns: Index, lowest: Index, found: Index) -> None:
-    """Mark the values below a bound that are the lowest among their neighbours along a turn, or stand beside such one.
+    """Mark the values below a bound that are local minima along a turn, or neighbours of one.
 
-    Those of no turn are marked wherever they are below.
+    Values that belong to no turn are marked wherever they are below.
     """
     last = turns.shape[1] - 1
     for j in range(len(values)):
@@ -103,7 +103,7 @@ def _box_rows(low: Array, high: Array, back: Array, rows: Array, needs: Array, s
 
 @inline
 def _own_row(slopes: Array, j: int, back: Array, rows: Array, place: int) -> float:
-    """Write row j of the program in the step's own axes; its size."""
+    """Write row j of the program in the coordinates y; return its size."""
     square = 0.0
     for a in range(slopes.shape[0]):
         value = 0.0
@@ -116,7 +116,7 @@ def _own_row(slopes: Array, j: int, back: Array, rows: Array, place: int) -> flo
 
 @inline
 def _stepped(values: Array, slopes: Array, back: Array, y: Array, step: Array, there: Array) -> None:
-    """Write the step of a point y, and the rows after it."""
+    """Write the step of a point y, and the values of the rows after the step."""
     for j in range(len(values)):
         there[j] = values[j]
     for i in range(len(y)):
@@ -133,7 +133,7 @@ class CurveRows(NamedTuple):
     Parameters
     ----------
     values, slopes : (r,) and (n, r)
-    turns : (T, m) numbers of the rows that are one curve around its turn
+    turns : (T, m) numbers of the rows that form one curve around its turn
     """
 
     values: Array
@@ -142,13 +142,13 @@ class CurveRows(NamedTuple):
 
 
 class Nearest(NamedTuple):
-    """What comes out of a program.
+    """Solution of a program.
 
     Parameters
     ----------
-    step, there, weights : (n,), (r,) and (r,): the step, the rows after it, and their weights, none negative
-    begin : (n + 1,) in: rows that held in a program like this one, and their count first, from which it goes on: those
-        of the box count backwards from -1.  Out: those that hold in this one
+    step, there, weights : (n,), (r,) and (r,): the step, the rows after it, and their multipliers, none negative
+    begin : (n + 1,) in: number of the active rows of a similar program, then these rows, from which to start; bounds of
+        the box count backwards from -1.  Out: the same for this program
     """
 
     step: Array
@@ -162,19 +162,19 @@ def nearest_of_many(
     of: CurveRows, back: Array, centre: Array, low: Array, high: Array, near: tuple[float, float], rounds: int,
     tolerance: float, found: Nearest,
 ) -> int:  # fmt: skip
-    """Step of a quadratic program with hundreds of rows along turns, of which few matter.
+    """Solve a quadratic program with hundreds of rows along turns, of which few are active.
 
     The step is ``back y`` with y nearest to a centre.  Rows join where they are near their bound and lowest among their
-    neighbours along a turn, and later where the step found would miss them.
+    neighbours along a turn, and later where the step found would violate them.
 
     Parameters
     ----------
     of : rows
-    back : (n, n) the step's axes
+    back : (n, n) matrix that turns y into the step
     centre : (n,)
     low, high : (n,) and (h,) bounds of the step, of its first h elements from above
-    near : values from which on rows do not join at first, and by how much a row has to be missed to join later
-    rounds : of joining at most
+    near : value below which a row joins at first, and violation above which a row joins later
+    rounds : most rounds in which rows join
     tolerance : see :func:`kernels.linear.nearest.nearest`
     found : out
 
