@@ -1,1 +1,1 @@
-"""What families share: closures of cranks and sliders, joints, bodies, a thread's path, the scheme of a status."""
+"""Common parts of the families: closures of cranks and sliders, joints, bodies, a thread's path, statuses."""

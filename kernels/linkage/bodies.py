@@ -1,11 +1,11 @@
-"""What loads know of a mechanism of any number of links: bodies in a tree, what closes its loops, never the family.
+"""Mechanism of any number of links as its loads see it: bodies in a tree, lines that close loops, never the family.
 
 Each body hangs on its parent, or on the frame, by a joint that leaves it some freedoms.  Forces along given lines close
-the loops: a ball joint is three of them, a contact is one or two.  So many lines close the loops as there are freedoms
-besides those that the drive turns; :mod:`kernels.effects.link_loads` finds their forces by virtual power.
+the loops: a ball joint is three lines, a contact is one or two.  There are as many lines as freedoms that the drive
+does not turn; :mod:`kernels.effects.link_loads` finds the lines' forces by virtual power.
 
-A family fills :class:`Links` for its poses.  Rates are with respect to the
-crank angle, in fixed axes.  A link between two balls is a slender rod: what it does about its own axis has no inertia.
+A family fills :class:`Links` for its poses.  Rates are with respect to the crank angle, in fixed axes.  A link between
+two balls is a slender rod: turning about its own axis has no inertia.
 """
 
 from __future__ import annotations
@@ -26,16 +26,16 @@ Index = NDArray[np.int64]
 # and the point of its joint with the parent.
 PER_BODY = 27
 PER_LINE = 6  # a point and a direction
-FRAME = -1  # parent of what hangs on the frame, and the second end of a line between a body and the frame
+FRAME = -1  # parent of a body that hangs on the frame, and the second end of a line between a body and the frame
 
 TURN, SLIDE, DRIVEN = 0, 1, 2  # kinds of freedom; DRIVEN is a turn that the drive imposes
 
 
 class Links(NamedTuple):
-    """How the bodies of a mechanism hang together, and their poses; see PER_BODY and PER_LINE.
+    """Tree of the bodies of a mechanism, lines that close its loops, and its poses; see PER_BODY and PER_LINE.
 
-    A parent has a lower number than what hangs on it.  Freedoms and ends are given to a family filled with those of its
-    ordinary design; it changes them where a design is another kind.
+    A parent has a lower number than its children.  Freedoms and ends come filled with those of the family's ordinary
+    design; the family changes them where a design is of another kind.
     """
 
     parents: Index  # (B,) FRAME or the number of a body
@@ -83,19 +83,19 @@ def posed(body: Array) -> Posed:
 
 @inline
 def vector(a: Array) -> Vector:
-    """First three numbers."""
+    """First three numbers of an array as a vector."""
     return a[0], a[1], a[2]
 
 
 @inline
 def latter(a: Array) -> Vector:
-    """Second three numbers; a slice would cost its bounds."""
+    """Second three numbers of an array as a vector; a slice would cost its bounds."""
     return a[3], a[4], a[5]
 
 
 @inline
 def point(body: Posed, data: Array) -> tuple[Vector, Vector, Vector]:
-    """Point of a body from its origin, in fixed axes, with velocity and acceleration; ``data`` has it behind a mass."""
+    """Point of a body from its origin, in fixed axes, with velocity and acceleration; ``data``: a mass, the point."""
     arm = turned(body.x, body.y, body.z, (data[1], data[2], data[3]))
     return arm, add(body.v, cross(body.omega, arm)), add(body.a, spun(body.omega, body.eps, arm))
 
@@ -110,13 +110,13 @@ def put_wrench(out: Array, force: Vector, at: Vector, couple: Vector) -> None:
 
 @inline
 def put(out: Array, a: Vector) -> None:
-    """Write three numbers."""
+    """Write a vector to the first three numbers of an array."""
     out[0], out[1], out[2] = a[0], a[1], a[2]
 
 
 @inline
 def moving(body: Array) -> Moving:
-    """Return rates of a body from its record, (PER_BODY,)."""
+    """Rates of a body from its record, (PER_BODY,)."""
     all_of = posed(body)
     return Moving(all_of.at, all_of.v, all_of.a, all_of.omega, all_of.eps)
 
@@ -149,7 +149,7 @@ def put_body(out: Array, body: Moving, x: Vector, y: Vector, z: Vector, joint: V
 
 @inline
 def turning(at: Vector, axis: Vector, first: float, second: float) -> Moving:
-    """Return a body that turns about a fixed axis through its origin."""
+    """Rates of a body that turns about a fixed axis through its origin."""
     none = (0.0, 0.0, 0.0)
     return Moving(at, none, none, scale(first, axis), scale(second, axis))
 
@@ -166,7 +166,7 @@ def put_turning(out: Array, at: Vector, axis: Vector, x: Vector, first: float, s
 def put_rod(out: Array, axes: Array, on: Moving, at: Vector, to: Moving, end: Vector) -> Moving:
     """Write a rod between balls of two bodies and its two freedoms; its first axis points from ``at`` to ``end``.
 
-    Its spin is zero.  The other axes are any across it: a slender rod does not tell them apart.
+    Its spin is zero.  The other axes are any two across it: a slender rod has the same inertia about all of them.
     """
     v, a = velocity_at(on, at), acceleration_at(on, at)
     along = sub(end, at)
@@ -185,7 +185,7 @@ def put_rod(out: Array, axes: Array, on: Moving, at: Vector, to: Moving, end: Ve
 
 @inline
 def across(s: Vector) -> Vector:
-    """Return a unit vector across a unit vector."""
+    """Any unit vector across a unit vector."""
     x, y, z = abs(s[0]), abs(s[1]), abs(s[2])
     found = (0.0, -s[2], s[1])
     if y <= x and y <= z:

@@ -1,4 +1,4 @@
-"""The closure ``X C - Y S + W = 0`` of a crank that drives a rocker through a coupler, in its smallest set of numbers.
+"""Closure ``X C - Y S + W = 0`` of a crank that drives a rocker through a coupler, in its smallest set of numbers.
 
 The spatial crank-rocker and the five-link share it; Polukhin 1971, chapter II, in the corrected and stable forms of
 docs/rssr.md; the equation numbers are of that page.  Everything is computed in units of the crank length, mirrored to

@@ -1,4 +1,4 @@
-"""What an effect knows of a linkage: joint positions, directions and the follower's motion, never the family.
+"""Linkage as an effect sees it: joint positions, directions and the follower's motion, never the family.
 
 A crank turns about ``u`` at A and carries the ball joint B; a coupler runs from B to the ball joint C.  C is carried by
 a follower: a rocker, which turns about ``k`` at D (``turns`` = 1), or a slider, which moves along ``tau``
@@ -19,7 +19,7 @@ PER_DESIGN = 17
 
 
 class Joints(NamedTuple):
-    """One pose; primes are derivatives with respect to the crank angle."""
+    """Linkage at one pose: positions, directions, follower's rates; primes are derivatives by the crank angle."""
 
     B: Vector  # crank pin
     C: Vector  # driven ball joint

@@ -1,4 +1,4 @@
-"""Writing of outputs that may not be wanted: single arrays (n, m), and the blocks (k, n, m) of a working point."""
+"""Writing of optional outputs: single arrays (n, m), and the blocks (k, n, m) of a working point."""
 
 from __future__ import annotations
 
@@ -15,14 +15,14 @@ from kernels.types import Numbers
 
 @inline
 def write(out: Numbers | None, i: int, j: int, value: Any) -> None:
-    """Write a value where it is wanted; through a function, since a field that is None cannot be written to."""
+    """Write a value if the output is wanted; through a function, since a field that is None cannot be written to."""
     if out is not None:
         out[i, j] = value
 
 
 @inline
 def has_point(out: Any) -> bool:
-    """Tell whether anything of the working point is wanted, which is known when the kernel is compiled."""
+    """Whether any output of the working point is wanted, which is known when the kernel is compiled."""
     return (
         out.point is not None or out.velocity is not None or out.acceleration is not None
         or out.jerk is not None or out.magnitudes is not None
@@ -43,7 +43,7 @@ def put_angle(out: Numbers | None, i: int, j: int, link: Swung, undefined: float
 def put_loop(
     out: Numbers | None, i: int, j: int, delta: Any, along: Any, across: Any, unit: Any, undefined: float
 ) -> None:
-    """Write discriminant [length^2] and pressure angle [rad] of a loop; ``across`` is the square of the idle part."""
+    """Write discriminant [length^2] and pressure angle [rad] of a loop; ``across``: square of the part without work."""
     if out is not None:
         # one factor after the other: the square of the unit leaves float64 before the discriminant does
         out[0, i, j] = (delta * unit) * unit + undefined

@@ -1,4 +1,4 @@
-"""The closure of a crank that drives a slider through a coupler: Q = b^2 - m^2 - n^2, s = y_B + branch sqrt(Q).
+"""Closure of a crank that drives a slider through a coupler: Q = b^2 - m^2 - n^2, s = y_B + branch sqrt(Q).
 
 The spatial slider-crank and the slide of the cylindrical looper share it; Polukhin 1971, section 2.7, in the corrected
 and stable forms of docs/rssp.md, whose equation numbers these are.  The slide line is y, the frame that of the family.
@@ -80,7 +80,7 @@ def derivatives(r: Reduced, u: Any, v: Any, y: Any, per_w: Any) -> tuple[Any, An
 
     y is y_B, ``per_w`` is branch/sqrt(Q), nan where that does not exist.
 
-    What the caller does not use leaves no instruction.
+    Derivatives that the caller does not use are not compiled.
     """
     w1, w2, w3 = root_derivatives(r, u, v, y, per_w)
     return r.ka * u + w1, w2 - r.ka * v, w3 - r.ka * u

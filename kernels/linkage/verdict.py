@@ -1,4 +1,4 @@
-"""The scheme of statuses of every family: of a pose it follows from its discriminant, of a turn from the least."""
+"""Statuses of every family: of a pose by its discriminant, of a turn by the least discriminant."""
 
 from __future__ import annotations
 
@@ -8,11 +8,11 @@ from kernels.jit import inline
 
 @inline
 def pose_status(valid: bool, discriminant: float, tolerance: float, square: float | None) -> int:
-    """Whether the links reach at a pose: OK, NOT_ASSEMBLED, DEAD_POINT, SINGULAR or INVALID_INPUT.
+    """Decide whether the links reach at a pose: OK, NOT_ASSEMBLED, DEAD_POINT, SINGULAR or INVALID_INPUT.
 
     Parameters
     ----------
-    valid : whether the parameters of the design are
+    valid : whether the parameters of the design are valid
     discriminant : its real part; the links reach where it is positive
     tolerance : bound of its rounding error
     square : squared distance of the crank pin from the axis of the follower, in the unit of the discriminant.  A pin on
@@ -44,7 +44,7 @@ def follower_status(valid: bool, undefined: bool, discriminant: float, tolerance
 
 @inline
 def turning_status(least: float, tolerance: float, valid: bool) -> int:
-    """Whether the crank turns fully: OK, NOT_ROTATABLE, UNDECIDABLE or INVALID_INPUT.
+    """Decide whether the crank turns fully: OK, NOT_ROTATABLE, UNDECIDABLE or INVALID_INPUT.
 
     ``least`` is the smallest discriminant of the turn and ``tolerance`` the bound of its rounding error.
     """
