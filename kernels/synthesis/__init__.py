@@ -1,7 +1,7 @@
-"""Link lengths from what the follower has to do: the loci of the driven joint and the tests a mechanism must pass.
+"""Link lengths from the required motion of the follower: loci of the driven joint and tests a mechanism must pass.
 
-``rssr_locus`` and ``rssp_locus`` give the mechanisms of requirements, ``arcs`` where the loci are admissible,
-``acceptance`` numbers the tests.
+``rssr_locus`` and ``rssp_locus`` find the mechanisms of requirements; ``acceptance`` has the tests, the ends of the
+admissible arcs and the sensitivities of limit positions; ``heddle`` synthesises heddle drives.
 """
 
 from kernels.synthesis.acceptance import limit_sensitivities as limit_sensitivities

@@ -1,4 +1,4 @@
-"""What a synthesised mechanism must pass, where the admissible arcs of its locus end, and how its limits move.
+"""Acceptance tests of a synthesised mechanism, ends of the admissible arcs of its locus, sensitivities of its limits.
 
 The acceptance tests are made in the order of docs/synthesis.md, section 3; the arcs end at crank angles phi1 at which
 the side condition changes; the limit positions of a crank-rocker move with its dimensions by equation (16) there.
@@ -35,7 +35,7 @@ MEANING: dict[int, str] = {
 
 @inline
 def first_failure(point: bool, ahead: float, back: float, a: float, t_ext: float, t_fold: float, branch: float) -> int:
-    """Return the number of the first of the tests (i)-(iii) that is failed, or PASSED.
+    """Find the first of the tests (i)-(iii) that is failed, or return PASSED.
 
     Parameters
     ----------
@@ -104,7 +104,7 @@ def rssr_arc_ends(requirements: Array, ends: Array) -> None:
 
 @kernel
 def rssp_arc_ends(requirements: Array, ends: Array) -> None:
-    """Crank angles phi1 at which the slider ball would lie on the crank axis; equation (10) of docs/synthesis.md.
+    """Compute crank angles phi1 at which the slider ball would lie on the crank axis; (10) of docs/synthesis.md.
 
     Parameters
     ----------
@@ -164,7 +164,7 @@ def limit_sensitivities(
 ) -> None:
     """Compute derivatives of both limit positions with respect to every dimension.
 
-    At a limit dpsi/dphi = 0, so the limit angle of the rocker moves as the rocker does at that crank angle held fixed.
+    At a limit dpsi/dphi = 0, so the derivative of the rocker's limit angle is that of psi at a fixed crank angle.
 
     Parameters
     ----------

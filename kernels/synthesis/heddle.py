@@ -18,7 +18,7 @@ _MOST_STEPS = 200
 
 @inline
 def half_angle(stroke: float, arm: float, exact: bool) -> float:
-    """Half of the swing of the shaft lever: by the chord of its end (exact), or by the printed arc tangent; (1)."""
+    """Half of the swing of the shaft lever: by the chord of its end (exact), or by the source's arc tangent; (1)."""
     if exact:
         return math.atan2(stroke, math.sqrt((2.0 * arm - stroke) * (2.0 * arm + stroke)))
     return math.atan2(stroke, 2.0 * arm)
@@ -37,7 +37,7 @@ def heddle_extremes(requirements: Array, extremes: Array, status: Status) -> Non
 
     Parameters
     ----------
-    requirements : (n, 6); stroke, O4E, O1O2, O1O3, O3C [length], kappa = angle C-O3-D [rad]; printed half angle below
+    requirements : (n, 6); stroke, O4E, O1O2, O1O3, O3C [length], kappa = angle C-O3-D [rad]
     extremes : (n, 12) out; mu, xi_1, xi_2 [rad], O2C_1, O2C_2, vertical travel of E [length], first by the chord
         (columns 0-5), then by the arc tangent that the source prints (columns 6-11)
     status : (n,) out; OK, NOT_ASSEMBLED (the stroke is longer than the lever can make it) or INVALID_INPUT
@@ -103,7 +103,7 @@ def heddle_lever_angles(positions: Array, angles: Array, status: Status) -> None
 
 @inline
 def _kept_rod(x: float, y: float, one: tuple[float, float], two: tuple[float, float], side: float) -> float:
-    """Length of the rod from B = (x, y) to the first C, or nan if B stands on the wrong side of a ray."""
+    """Length of the rod from B = (x, y) to the first C; nan if B is on the wrong side of a ray from O2 to C."""
     if side * (one[0] * y - one[1] * x) > 0.0 and side * (two[0] * y - two[1] * x) > 0.0:
         return math.hypot(x - one[0], y - one[1])
     return math.nan
@@ -111,7 +111,7 @@ def _kept_rod(x: float, y: float, one: tuple[float, float], two: tuple[float, fl
 
 @kernel
 def heddle_rods(positions: Array, rods: Array, count: Status, status: Status) -> None:
-    """Rods BC that give the cam lever a wanted swing between the extreme positions; (11) of docs/heddle.md.
+    """Find the rods BC that give the cam lever a wanted swing between the extreme positions; (11) of docs/heddle.md.
 
     Turn the second position about O2 by the swing: B coincides in both, so it stands on the circle of radius O2B and on
     the perpendicular bisector of the two places of C.  That gives two points for each sense of the swing; those on the
@@ -121,8 +121,8 @@ def heddle_rods(positions: Array, rods: Array, count: Status, status: Status) ->
     ----------
     positions : (n, 7); O2O3, O3C [length], xi_1, xi_2 [rad], O2B [length], magnitude of the swing [rad], side_B
     rods : (n, 4) out; ascending, nan last [length]
-    count : (n,) out; how many there are
-    status : (n,) out; OK, NOT_ADMISSIBLE (no rod), SINGULAR (C does not move: every rod gives it) or INVALID_INPUT
+    count : (n,) out; number of rods
+    status : (n,) out; OK, NOT_ADMISSIBLE (no rod), SINGULAR (C does not move: every rod will do) or INVALID_INPUT
     """
     for i in range(positions.shape[0]):
         frame, arm, lever, side = positions[i, 0], positions[i, 1], positions[i, 4], positions[i, 6]
@@ -170,7 +170,7 @@ def heddle_rods(positions: Array, rods: Array, count: Status, status: Status) ->
 
 @inline
 def _travel(arm: float, lever: float, frame: float, end: float, half: float) -> tuple[float, float, int]:
-    """Height of E above mid-stroke when the bell crank stands at +half and at -half; (12)."""
+    """Height of E above mid-stroke with the bell crank at +half and at -half, and the status; (12)."""
     bar = four_bar(arm, math.hypot(frame, arm - lever), lever, frame, 1.0)
     cos, _, _, _, up = driven(bar, -math.sin(half), math.cos(half))
     other, _, _, _, down = driven(bar, math.sin(half), math.cos(half))
@@ -180,20 +180,20 @@ def _travel(arm: float, lever: float, frame: float, end: float, half: float) -> 
 
 @inline
 def _too_long(arm: float, lever: float, frame: float, end: float, half: float, stroke: float, beyond: bool) -> bool:
-    """Whether an arm gives the stroke or more, or passes a dead point; ``beyond``: one at -half counts as short."""
+    """Whether an arm gives the stroke or more, or passes a dead point; ``beyond``: one at -half does not count."""
     up, down, code = _travel(arm, lever, frame, end, half)
     return up - down >= stroke or (code != st.OK and not (beyond and up == up))
 
 
 @kernel
 def heddle_shaft_arms(shafts: Array, arms: Array, status: Status) -> None:
-    """Arm O3D that gives a shaft its stroke, the link's other lengths being common to the shafts; (12), (13).
+    """Find the arm O3D that gives a shaft its stroke; the other lengths are common to all shafts; (12), (13).
 
     Parameters
     ----------
     shafts : (n, 5); stroke, O4E, O4F, O3O4 [length], mu_3 = half swing of the bell crank [rad]
     arms : (n, 4) out; O3D, DF [length], highest and lowest place of E against mid-stroke [length]
-    status : (n,) out; OK, NOT_ADMISSIBLE (no arm gives it) or INVALID_INPUT
+    status : (n,) out; OK, NOT_ADMISSIBLE (no arm gives the stroke) or INVALID_INPUT
 
     Notes
     -----
@@ -209,7 +209,7 @@ def heddle_shaft_arms(shafts: Array, arms: Array, status: Status) -> None:
             continue
         status[i] = st.NOT_ADMISSIBLE
         for beyond in (False, True):
-            # Upwards from the first-order arm; what passes a dead point is too long, as what has the stroke is.
+            # Upwards from the first-order arm, until an arm has the stroke or passes a dead point: either is too long.
             low, high = 0.0, lever * (0.5 * stroke / end) / math.sin(half)
             for _ in range(_MOST_STEPS):
                 if _too_long(high, lever, frame, end, half, stroke, beyond):

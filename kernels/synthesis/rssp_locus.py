@@ -19,7 +19,7 @@ from kernels.types import EPS, TWO_PI, Array, Status
 
 
 class Given(NamedTuple):
-    """What is prescribed of a slider-crank, or chosen beforehand."""
+    """Numbers of a slider-crank that are prescribed or chosen beforehand."""
 
     stroke: Any  # [length] signed from extended to folded
     e: Any
@@ -74,7 +74,7 @@ def _valid(stroke: float, place: float, f: float, alpha: float) -> bool:
 def rssp_on_locus(requirements: Array, status: Status, failed: Status, designs: Array, s1: Array | None) -> None:
     """Compute slider-cranks at given crank angles of the extended position.
 
-    Equations (9)-(12) of docs/synthesis.md.  A central mechanism, phi0 = pi, has its own: :func:`rssp_at_place`.
+    Equations (9)-(12) of docs/synthesis.md.  A central mechanism, phi0 = pi, needs :func:`rssp_at_place`.
 
     Parameters
     ----------
@@ -111,7 +111,7 @@ def _between(
     g: Given, s1: float, s2: float, middle: float, side: float, point: bool,
     i: int, status: Status, failed: Status, designs: Array,
 ) -> float:  # fmt: skip
-    """Finish a slider-crank from its two limits; returns the crank angle phi1.  ``side`` is negative if phi0 is met."""
+    """Compute a slider-crank from its two limits; return the crank angle phi1.  ``side`` < 0 if phi0 is met."""
     e, ca = g.e, g.ca
     y1, y2 = s1 * ca, s2 * ca
     rho1, rho2 = math.sqrt(e * e + y1 * y1), math.sqrt(e * e + y2 * y2)
@@ -169,7 +169,7 @@ def rssp_at_offset(
 def rssp_at_place(
     requirements: Array, status: Status, failed: Status, designs: Array, phi0: Array | None, phi1: Array | None
 ) -> None:
-    """Compute slider-cranks whose stroke begins at a given place; phi0 comes out. The way to central ones: e = 0.
+    """Compute slider-cranks whose stroke begins at a given place; phi0 is a result.  Those with e = 0 are central.
 
     Equations (11), (12) and (14) of docs/synthesis.md.
 

@@ -115,7 +115,7 @@ def _finish(
 
 @kernel
 def rssr_on_locus(requirements: Array, status: Status, failed: Status, designs: Array, psi1: Array | None) -> None:
-    """Find the crank-rockers whose extended position is at given crank angles: on this way the locus is linear.
+    """Find the crank-rockers whose extended position is at given crank angles, from linear equations.
 
     Equations (1)-(7) of docs/synthesis.md.
 
@@ -146,7 +146,7 @@ def rssr_on_locus(requirements: Array, status: Status, failed: Status, designs: 
 def rssr_of_size(requirements: Array, status: Status, failed: Status, designs: Array, psi1: Array | None) -> None:
     """Find the crank-rockers of given rocker length; e and g are computed from their ratio.
 
-    That is possible because the rocker's length grows in proportion to both, and f does not enter it.
+    The rocker's length is proportional to both at a given ratio, and does not depend on f.
 
     Equations (1)-(7) of docs/synthesis.md at e = cos(direction), g = sin(direction), then scaled.
 
@@ -243,7 +243,7 @@ def rssr_at_direction(
         rho1, rho2 = math.sqrt(qx1 * qx1 + qy1 * qy1), math.sqrt(qx2 * qx2 + qy2 * qy2)
         u1, v1 = qx1 / rho1, qy1 / rho1
         if rho1 < 0.5 * (abs(r.e) + abs(r.h)):
-            # Near the crank axis the ball's direction has few digits. There (8a) gives phi1 but for half a turn,
+            # Near the crank axis the ball's direction has few digits. There (8a) gives phi1 up to half a turn,
             # and the ball decides about that.
             apart = -root[i] * far
             twice = math.atan2(big_a * apart - big_b * big_d, big_a * big_d + big_b * apart)
