@@ -95,7 +95,7 @@ def fourier(designs: Numbers, i: int, first: int, phi: Any) -> Motion:
 
 @inline
 def law_is_valid(designs: Numbers, i: int, first: int) -> bool:
-    """Whether the columns of the law mean something: a whole law, phases within a turn, numbers."""
+    """Whether the columns of the law are valid: a known law, phases within a turn, finite coefficients."""
     law, rise, dwell, fall = (
         designs[i, LAW].real, designs[i, RISE].real, designs[i, DWELL].real, designs[i, FALL].real,
     )  # fmt: skip
@@ -123,13 +123,13 @@ def motion(designs: Numbers, i: int, first: int, phi: Any) -> Motion:
     if back.real < 0.0:
         return Motion(1.0 + 0.0 * t, 0.0 * t, 0.0 * t, 0.0 * t)
     if back.real < fall.real:
-        # backwards from the end, where the way left to go is small
+        # counted back from the end, near which the remaining lift is small
         m = normalised(law, (fall - back) / fall)
         return Motion(m.y, -m.d1 / fall, m.d2 / (fall * fall), -m.d3 / (fall * fall * fall))
     return Motion(0.0 * t, 0.0 * t, 0.0 * t, 0.0 * t)
 
 
-# Pose outputs, each (n, m), or None: what is None is not computed.
+# Pose outputs, each (n, m), or None, which is not computed.
 Outputs = namedtuple("Outputs", "s ds d2s d3s pressure_angle x_p y_p")
 
 
@@ -142,7 +142,7 @@ def poses(designs: Numbers, phi: Numbers, status: Status, out: Outputs) -> None:
     designs : (n, 20) columns lift, rise, dwell, fall, start, law, r0, e, then the Fourier coefficients
     phi : (n, m), or (1, m) shared by all designs
     status : (n, m) out; OK, SINGULAR (the roller's centre reaches the cam's axis) or INVALID_INPUT
-    s ... y_p : (n, m) out, or None: what is None is neither computed nor compiled
+    s ... y_p : (n, m) out, or None: then it is neither computed nor compiled
     """
     for i in range(designs.shape[0]):
         # lengths divided by a power of two near the prime circle's radius: no square leaves float64
@@ -172,7 +172,7 @@ def poses(designs: Numbers, phi: Numbers, status: Status, out: Outputs) -> None:
             write(out.y_p, i, j, -(reach * np.sin(angle) + e * np.cos(angle)) * unit)
 
 
-# Pose outputs, each (n, m), or None: what is None is not computed.
+# Pose outputs, each (n, m), or None, which is not computed.
 LeverOutputs = namedtuple("LeverOutputs", "psi dpsi d2psi d3psi pressure_angle x_p y_p")
 
 
@@ -185,7 +185,7 @@ def lever_poses(designs: Numbers, phi: Numbers, status: Status, out: LeverOutput
     designs : (n, 22) columns lift [rad], rise, dwell, fall, start, law, r0, c, e, branch, then the Fourier coefficients
     phi : (n, m), or (1, m) shared by all designs
     status : (n, m) out; OK, NOT_ASSEMBLED (the lever does not reach the prime circle) or INVALID_INPUT
-    psi ... y_p : (n, m) out, or None: what is None is neither computed nor compiled
+    psi ... y_p : (n, m) out, or None: then it is neither computed nor compiled
     """
     for i in range(designs.shape[0]):
         # lengths divided by a power of two near the lever's: no square leaves float64

@@ -34,7 +34,7 @@ def power(u: Any, v: Any, times: int) -> tuple[Any, Any]:
     return c, s
 
 
-# Pose outputs, each (n, m), or None: what is None is not computed.
+# Pose outputs, each (n, m), or None, which is not computed.
 Outputs = namedtuple("Outputs", "psi dpsi d2psi d3psi sin_psi cos_psi x_b y_b")
 
 
@@ -47,7 +47,7 @@ def poses(designs: Numbers, cos_phi: Numbers, sin_phi: Numbers, status: Status, 
     designs : (n, 4) columns as `EPICYCLIC_PARAMETERS` of sweep/families/geared_dwell.py
     cos_phi, sin_phi : (n, m), or (1, m) shared by all designs
     status : (n, m) out; OK, SINGULAR (the pin is on the output axis within its rounding) or INVALID_INPUT
-    psi ... y_b : (n, m) out, or None: what is None is neither computed nor compiled
+    psi ... y_b : (n, m) out, or None: then it is neither computed nor compiled
 
     Notes
     -----
@@ -124,13 +124,13 @@ def _put_derivatives(
             write(out.d3psi, i, j, t3 - 3.0 * (r2 * t1 + t2 * r1) + 2.0 * (3.0 * r1 * r1 - t1 * t1) * t1)
 
 
-HALVINGS = 90  # k next to 1 dwells over some 1e-8, whose last digits they reach too
-STEPS = 64  # per turn of the pin while the end of the band is looked for
+HALVINGS = 90  # enough for the last digits of a dwell over 1e-8 rad, as for k next to 1
+STEPS = 64  # per turn of the pin in the search for the end of the band
 
 
 @inline
 def _output(k: float, front: float, arm: float, mesh: float, phi: float) -> tuple[float, float, float]:
-    """Output angle, its velocity analogue times the squared distance of the pin from the output axis, the pin's y.
+    """Output angle, its velocity analogue times the pin's squared distance from the output axis, and the pin's y.
 
     ``front`` is the pin's x at phi = 0.  No terms cancel for k next to 1 and small angles: L - sin(L phi)/sin(phi) is a
     sum of squares.
@@ -148,7 +148,7 @@ def _output(k: float, front: float, arm: float, mesh: float, phi: float) -> tupl
 
 @kernel
 def dwell_measures(designs: Array, status: Status, dwell_angle: Array, deviation: Array, band: Array) -> None:
-    """Dwell, largest deviation from mid-dwell and band dwell around phi = 0.
+    """Compute the dwell, the largest deviation from mid-dwell and the band dwell around phi = 0.
 
     Parameters
     ----------

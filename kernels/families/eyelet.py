@@ -38,7 +38,7 @@ class Reduced(NamedTuple):
 
 @inline
 def reduce_design(designs: Array, i: int) -> Reduced:
-    """Constants of one design; ``valid`` is false for a radius that is not positive and for what is not finite."""
+    """Constants of one design; ``valid`` is false for a radius of 0 or less and for numbers that are not finite."""
     size = abs(designs[i, 0].real) + abs(designs[i, 1].real) + abs(designs[i, 2].real)
     size += abs(designs[i, 4].real) + abs(designs[i, 5].real) + abs(designs[i, 7].real)
     offsets = abs(designs[i, 8].real) + abs(designs[i, 9].real) + abs(designs[i, 10].real) + abs(designs[i, 11].real)
@@ -71,7 +71,7 @@ def eyelet(r: Reduced, u: float, v: float) -> tuple[Vector, Vector, Vector]:
     return place, on_circle(r, -s, c), (-x, -y, -z)
 
 
-# Pose outputs, each (n, m), or None: what is None is not computed.
+# Pose outputs, each (n, m), or None, which is not computed.
 Outputs = namedtuple("Outputs", "P dP d2P L wrap X_E Y_E Z_E")
 
 

@@ -32,7 +32,7 @@ def _free(d: Array, i: int, v0: float, t: float) -> float:
 
 @inline
 def _gap(d: Array, i: int, x0: float, v0: float, t: float) -> float:
-    """Foot above the rack, or above the plate where the rack is below it."""
+    """Height of the foot above the rack, or above the plate where the rack is below the plate."""
     rack = d[i, 4] * math.sin(x0 + d[i, 3] * t) - d[i, 5]
     gap: float = _free(d, i, v0, t) - max(rack, 0.0)
     return gap
@@ -40,13 +40,13 @@ def _gap(d: Array, i: int, x0: float, v0: float, t: float) -> float:
 
 @inline
 def _first_contact(d: Array, i: int, x0: float, v0: float, longest: float) -> float:
-    """First time after the launch at which the foot meets rack or plate; the plate is met after ``longest``."""
+    """Find the first time after the launch when the foot meets rack or plate; it meets the plate after ``longest``."""
     low = 0.0
     for j in range(1, _CELLS + 1):
         high = longest * (j / _CELLS)
         if j == _CELLS or _gap(d, i, x0, v0, high) < 0.0:
             if low == 0.0:
-                # The first cell begins at the launch itself, where the gap is zero: halve towards it to find one.
+                # The first cell begins at the launch itself, where the gap is zero: halve towards it to find a gap.
                 low = high
                 for _ in range(60):
                     low *= 0.5
@@ -69,7 +69,7 @@ def _first_contact(d: Array, i: int, x0: float, v0: float, longest: float) -> fl
 
 @kernel
 def closed_forms(designs: Array, status: Status, outputs: Array) -> None:
-    """Entry, jump, limits of spring and preload, contact forces and first contact again; (1)-(3), (6) of docs/foot.md.
+    """Compute entry, jump, limits of spring and preload, contact forces, next contact; (1)-(3), (6) of docs/foot.md.
 
     Parameters
     ----------

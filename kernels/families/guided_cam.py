@@ -31,7 +31,7 @@ def displacement(thread: float, across_z: float, across_x: float) -> float:
 
 @inline
 def reaches(square: float, thread: float) -> int:
-    """Status of a squared displacement: within the rounding of L^2/4 it is zero, the thread just as long as its way."""
+    """Status of a squared displacement: within the rounding of L^2/4 it counts as zero, which is a dead point."""
     code = pose_status(math.isfinite(square), square, EPS * thread * thread, None)
     return st.NOT_ASSEMBLED if code != st.INVALID_INPUT and not thread > 0.0 else code
 
@@ -103,8 +103,8 @@ def jam_angles(friction: Array, angle: Array, tan_half: Array) -> None:
 HARMONICS = 6
 FIRST = 7
 COLUMNS = FIRST + 2 * HARMONICS
-LOOKS = 64  # over the turn: ten for each period of the highest harmonic
-STEPS = 60  # halvings of two looks' distance, which is 2^-2.3: the angle is then as exact as float64 has it
+LOOKS = 64  # samples over the turn: ten for each period of the highest harmonic
+STEPS = 60  # halvings of two samples' distance, which is 2^-2.3: the angle is then as exact as float64 has it
 
 
 class Reduced(NamedTuple):
@@ -139,7 +139,7 @@ def lowest(designs: Array, i: int) -> tuple[float, float]:
     """Find cosine and sine of the cam angle where P is least: the best of LOOKS samples, then its slope's zero."""
     best, where, step = math.inf, 0.0, 2.0 * math.pi / LOOKS
     for j in range(LOOKS):
-        # real part only: where P is least its slope is zero, so a complex step of the place moves the value by nothing
+        # real part only: where P is least its slope is zero, so a complex step of the place does not change the value
         value = law(designs, i, math.cos(step * j), math.sin(step * j))[0].real
         if value < best:
             best, where = value, step * j
@@ -176,7 +176,7 @@ def reduce_design(designs: Array, i: int) -> Reduced:
     )  # fmt: skip
 
 
-# Pose outputs, each (n, m), and profile (2, n, m); what is None is not computed.
+# Pose outputs, each (n, m), and profile (2, n, m); outputs of None are not computed.
 Outputs = namedtuple("Outputs", "P dP d2P L S dS d2S pressure_angle curvature profile")
 
 
@@ -233,8 +233,8 @@ def poses(designs: Array, cos_phi: Array, sin_phi: Array, status: Status, out: O
                     write(out.curvature, i, j, (way + ds * ds - reach * d2s) / (way * np.sqrt(way)) / r.unit)
 
 
-ROOT_LOOKS = 512  # over the turn; where S is small its root has far shorter waves than the series P
-ROOT_STEPS = 60  # halvings of two looks' distance, which is 2^-5: the place is then as exact as float64 has it
+ROOT_LOOKS = 512  # samples over the turn; where S is small its root has far shorter waves than the series P
+ROOT_STEPS = 60  # halvings of two samples' distance, which is 2^-5: the place is then as exact as float64 has it
 
 
 @kernel
@@ -247,7 +247,7 @@ def least_radius(designs: Array, status: Status, radius: Array, place: Array, an
     status : (n,) out; NOT_ASSEMBLED where the thread does not reach all through the turn, JAMMED where the follower
         jams at every pressure angle (mu1 mu2 >= 1), INVALID_INPUT
     radius : (n,) out [length]; cam radius at the least displacement, not below 0
-    place : (n,) out [rad]; cam angle that asks for it, -pi to pi
+    place : (n,) out [rad]; cam angle that requires it, -pi to pi
     angle : (n,) out [rad]; jamming angle;  displaced : (n,) out [length]; least displacement S over the turn
     """
     for i in range(designs.shape[0]):
@@ -276,7 +276,7 @@ def least_radius(designs: Array, status: Status, radius: Array, place: Array, an
 
 @inline
 def _need(designs: Array, i: int, r: Reduced, cotangent: float, phi: float) -> tuple[float, float]:
-    """Evaluate S' cot - S, which is the radius needed at a cam angle but for a constant, and its derivative."""
+    """Evaluate S' cot - S, the radius needed at a cam angle less a constant, and its derivative."""
     value, first, second = law(designs, i, math.cos(phi), math.sin(phi))
     thread = r.store + value / r.unit
     s = math.sqrt(displacement(thread, r.across_z, r.across_x))

@@ -70,7 +70,7 @@ def four_bar(a: Any, b: Any, c: Any, e: Any, side: float) -> FourBar:
 
 @inline
 def reduce_design(designs: Array, i: int) -> Reduced:
-    """Constants of one design; ``valid`` is false for zero or negative lengths and for what is not finite."""
+    """Constants of one design; ``valid`` is false for zero or negative lengths and for numbers that are not finite."""
     unit, per_unit = unit_near(designs[i, 1])
     a, b, c, e = designs[i, 0] * per_unit, designs[i, 1] * per_unit, designs[i, 2] * per_unit, designs[i, 3] * per_unit
     arm, chi_mid = designs[i, 4] * per_unit, designs[i, 5]
@@ -91,7 +91,7 @@ def reduce_design(designs: Array, i: int) -> Reduced:
     valid = valid and first.w_size < 1e140 and second.w_size < 1e140
     valid = valid and (parallel or (d.real > 0.0 and f.real > 0.0 and o.real > 0.0 and link.real > 0.0))
     valid = valid and abs(chi_mid.real) < 1e5 and side_f * side_f == 1.0 and side_c * side_c == 1.0
-    # 0 * x is nan exactly for what is not finite
+    # 0 * x is nan exactly for numbers that are not finite
     valid = valid and (0.0 * (arm + heddle + slide)).real == 0.0 and heddle.real >= 0.0
     return Reduced(
         first, second, parallel, divisor(b), np.sin(chi_mid), np.cos(chi_mid),
@@ -151,7 +151,7 @@ def _shaft_lever(r: Reduced, cos_turn: Any, sin_turn: Any, rates: bool) -> tuple
 
 @inline
 def _chained(outer: tuple[Any, Any, Any], inner: tuple[Any, Any, Any]) -> tuple[Any, Any, Any]:
-    """Three derivatives of a function of a function."""
+    """First three derivatives of a composed function, from those of the outer and the inner one."""
     f1, f2, f3 = outer
     g1, g2, g3 = inner
     return f1 * g1, f2 * g1 * g1 + f1 * g2, f3 * g1 * g1 * g1 + 3.0 * f2 * g1 * g2 + f1 * g3
@@ -181,7 +181,7 @@ def _lift(r: Reduced, cos: Any, sin: Any, rates: tuple[Any, Any, Any]) -> tuple[
     return y + h, y1 + h1, y2 + h2, y3 + h3, True
 
 
-# Pose outputs, each (n, m), and places (7, n, m); what is None is not computed.
+# Pose outputs, each (n, m), and places (7, n, m); outputs of None are not computed.
 Outputs = namedtuple("Outputs", "chi dchi d2chi d3chi y dy d2y d3y discriminant places")
 
 
@@ -196,7 +196,7 @@ def poses(designs: Array, cos_phi: Array, sin_phi: Array, status: Status, out: O
     designs : (n, 14) columns as `PARAMETERS` of sweep/families/heddle.py
     cos_phi, sin_phi : (n, m), or (1, m) shared by all designs; of the cam lever's angle theta
     status : (n, m) out; OK, NOT_ASSEMBLED, DEAD_POINT (rod and bell crank in line), SINGULAR or INVALID_INPUT
-    chi ... d3chi : (n, m) out [rad], or None: what is None is neither computed nor compiled
+    chi ... d3chi : (n, m) out [rad], or None: then it is neither computed nor compiled
     y ... d3y : (n, m) out [length], or None
     discriminant : (n, m) out [length^2], or None; positive where the rod reaches
     places : (7, n, m) out, or None; sine of the transmission angle, pressure angle between rod and bell crank, angle of
@@ -221,7 +221,7 @@ def poses(designs: Array, cos_phi: Array, sin_phi: Array, status: Status, out: O
             cos_turn, sin_turn = cos * r.cos_mid + sin * r.sin_mid, sin * r.cos_mid - cos * r.sin_mid
             lever_cos, lever_sin, slopes, lever_code = _shaft_lever(r, cos_turn, sin_turn, rates_wanted)
             lift, lift1, lift2, lift3, reached = _lift(r, lever_cos, lever_sin, _chained(slopes, turns))
-            # the first loop that fails names the status: without it what follows has no input
+            # the first loop that fails sets the status: the later ones have no input then
             if assembled and lever_code != st.OK:
                 code = lever_code
             elif assembled and not reached:
@@ -235,7 +235,7 @@ def poses(designs: Array, cos_phi: Array, sin_phi: Array, status: Status, out: O
             write(out.d3y, i, j, lift3 * r.unit)
             # one factor after the other: the square of the unit leaves float64 before the discriminant does
             write(out.discriminant, i, j, (delta * r.unit) * r.unit if r.valid else math.nan)
-            if out.places is not None:  # its arctangents are not dropped where nobody wants them
+            if out.places is not None:  # the compiler does not drop its arctangents where they are not wanted
                 places = _places(r, (u, v), (cos, sin, t), (lever_cos, lever_sin))
                 put_block(out.places, i, j, places, 1.0)
 

@@ -18,7 +18,7 @@ from kernels.linkage.outputs import put_block, write
 from kernels.linkage.verdict import follower_status
 from kernels.types import EPS, Numbers, Status
 
-# Pose outputs, each (n, m), and joints (2, n, m); what is None is not computed.
+# Pose outputs, each (n, m), and joints (2, n, m); outputs of None are not computed.
 Outputs = namedtuple("Outputs", "psi dpsi d2psi d3psi s ds d2s discriminant pressure_angle joints")
 
 
@@ -31,7 +31,7 @@ def poses(designs: Numbers, cos_phi: Numbers, sin_phi: Numbers, status: Status, 
     designs : (n, 4) columns as `PLANAR_PARAMETERS` of sweep/families/slotted.py
     cos_phi, sin_phi : (n, m), or (1, m) shared by all designs
     status : (n, m) out; OK, NOT_ASSEMBLED, DEAD_POINT, SINGULAR (the crank pin is on the rocker axis) or INVALID_INPUT
-    psi ... pressure_angle : (n, m) out, or None: what is None is neither computed nor compiled
+    psi ... pressure_angle : (n, m) out, or None: then it is neither computed nor compiled
     joints : (2, n, m) out, crank pin x y, or None
 
     Notes
@@ -50,7 +50,7 @@ def poses(designs: Numbers, cos_phi: Numbers, sin_phi: Numbers, status: Status, 
             x, y = a * u - e, a * v
             square = x * x + y * y
             delta = square - h * h
-            # What rounding makes of X^2 + Y^2 - h^2: 8 x 2^-53 of what it is made of.
+            # Rounding error of X^2 + Y^2 - h^2: 8 x 2^-53 times the magnitudes of its terms.
             x_size = a.real + abs(e.real)
             tolerance = 8.0 * EPS * (abs(x.real) * x_size + a.real * abs(y.real) + h.real * h.real)
             tolerance += 64.0 * EPS * EPS * x_size * x_size

@@ -101,7 +101,7 @@ def _closure(r: Reduced, u: Any, v: Any, is_bar: bool) -> Ball:
     x, y, z = r.a * u - r.e, r.y0 + r.ka * v, r.z0 - r.na * v
     error = 8.0 * EPS
     code = st.OK if r.valid else st.INVALID_INPUT
-    # the bar: how far the ball stands off the plane of the axis and the bar
+    # the bar: distance of the ball from the plane of the axis and the bar
     arm, arm_size = 0.0 * x, 0.0
     if is_bar:
         square = (r.k - z) * (r.k + z)
@@ -116,7 +116,7 @@ def _closure(r: Reduced, u: Any, v: Any, is_bar: bool) -> Ball:
     rr = x * x + y * y
     delta = rr - q * q
     q_size = abs(r.s.real) + arm_size
-    # what rounding makes of delta: of the products to first order, and of the squares of the errors where both vanish
+    # rounding error of delta: of the products to first order, and the squares of the errors where both vanish
     tolerance = error * (abs(x.real) * r.x_size + abs(y.real) * r.y_size + abs(q.real) * q_size)
     tolerance += error * error * (r.x_size * r.x_size + r.y_size * r.y_size + q_size * q_size)
     if code == st.OK:
@@ -124,7 +124,7 @@ def _closure(r: Reduced, u: Any, v: Any, is_bar: bool) -> Ball:
     return Ball(code, x, y, z, arm, q, rr, delta)
 
 
-# Pose outputs, each (n, m), and joints (6, n, m); what is None is not computed.
+# Pose outputs, each (n, m), and joints (6, n, m); outputs of None are not computed.
 Outputs = namedtuple(
     "Outputs", "psi dpsi d2psi d3psi sin_psi cos_psi rho drho d2rho d3rho discriminant pressure_angle joints"
 )
@@ -170,7 +170,7 @@ def poses(designs: Numbers, cos_phi: Numbers, sin_phi: Numbers, status: Status, 
             write(out.sin_psi, i, j, s)
             write(out.psi, i, j, arctan2(s, c))
             write(out.rho, i, j, p * r.unit if has_angle else math.nan)
-            if out.pressure_angle is not None:  # LLVM does not drop a hypotenuse that nobody wants
+            if out.pressure_angle is not None:  # LLVM does not drop a hypotenuse that is not wanted
                 write(out.pressure_angle, i, j, _pressure_angle(r, ball, p, is_bar) if has_angle else math.nan)
             at_joints = _joints(r, designs[i, 3] / r.unit, ball, v, p, c, s)
             put_block(out.joints, i, j, at_joints, r.unit if has_angle else math.nan)

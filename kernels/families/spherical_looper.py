@@ -25,7 +25,7 @@ from kernels.types import Array, Numbers, Status
 class Reduced(NamedTuple):
     """Per-design numbers in units of ``unit``."""
 
-    swings: Crank  # what swings the carrier
+    swings: Crank  # drive that swings the carrier
     o: float
     radial: Vector  # triad of the looper's axis at psi = 0: towards its ball, across, along the axis
     across: Vector
@@ -48,7 +48,7 @@ class Reduced(NamedTuple):
 
 @inline
 def reduce_design(designs: Numbers, i: int) -> Reduced:
-    """Constants of one design; ``valid`` is false for links of no length and for what is not finite."""
+    """Constants of one design; ``valid`` is false for links of no length and for numbers that are not finite."""
     d = designs[i]
     unit, per = unit_near(d[0])
     swings = reduce_crank(d, per)
@@ -124,7 +124,7 @@ def _carried(r: Reduced, carrier: Swung, looper: Swung, fixed: Vector) -> Path:
     return rotated(carrier.cos, carrier.sin, carrier.first, carrier.second, carrier.third, path)
 
 
-# Blocks (k, n, m) of outputs, or None: what is None is not computed.
+# Blocks (k, n, m) of outputs, or None, which is not computed.
 Outputs = namedtuple(
     "Outputs", "carrier carrier_loop looper looper_loop point velocity acceleration jerk magnitudes joints"
 )
@@ -151,8 +151,8 @@ def poses(designs: Numbers, cos_phi: Numbers, sin_phi: Numbers, status: Status, 
 
     Notes
     -----
-    What is None is neither computed nor compiled.  Where a loop is not OK its angle is nan (but at a dead point only
-    its derivatives are), and so is what follows from it.
+    Outputs of None are neither computed nor compiled.  Where a loop is not OK its angle is nan (but at a dead point
+    only its derivatives are), and so are the outputs that depend on it.
     """
     for i in range(designs.shape[0]):
         r = reduce_design(designs, i)
@@ -181,7 +181,7 @@ def poses(designs: Numbers, cos_phi: Numbers, sin_phi: Numbers, status: Status, 
 
 @inline
 def _joints(r: Reduced, first: Path, second: Path, one: Swung, two: Swung, v: float) -> tuple[Any, ...]:
-    """Give x y z of crank pin 1, carrier's ball, crank pin 2 and looper's ball."""
+    """Coordinates x y z of crank pin 1, carrier's ball, crank pin 2 and looper's ball."""
     drive = r.swings
     centre = (drive.e, 0.0 * drive.e, r.o)
     ball, _, _, _ = _carried(r, one, two, (r.c2, 0.0 * r.c2, r.along))

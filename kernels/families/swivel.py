@@ -47,7 +47,7 @@ class Reduced(NamedTuple):
 
 @inline
 def reduce_design(designs: Numbers, i: int) -> Reduced:
-    """Constants of one design; ``valid`` is false for a crank of no length and for what is not finite."""
+    """Constants of one design; ``valid`` is false for a crank of no length and for numbers that are not finite."""
     unit, per_unit = unit_near(designs[i, 0])
     a, e, f, g = designs[i, 0] * per_unit, designs[i, 1] * per_unit, designs[i, 2] * per_unit, designs[i, 3] * per_unit
     alpha, length = designs[i, 4], designs[i, 5] * per_unit
@@ -65,7 +65,7 @@ def reduce_design(designs: Numbers, i: int) -> Reduced:
 
 @inline
 def _along(r: Reduced, u: Any, v: Any) -> Any:
-    """Distance e - a u from crank pin to block along x; near the block's centre u has rounded it away."""
+    """Distance e - a u from crank pin to block along x, in a form that keeps its digits near the block's centre."""
     if u.real > 0.0:
         return (r.e - r.a) + r.a * v * v / (1.0 + u)
     return (r.e + r.a) - r.a * v * v / (1.0 - u)
@@ -77,7 +77,7 @@ def _turning(
 ) -> tuple[tuple[Any, Any, Any, Any], Any, Vector, Vector, Vector]:
     """Length of the rod with its derivatives, w.w, and the angular velocity w of the rod with its derivatives; (5)-(7).
 
-    No difference of large terms is left in them but those that the design itself has.
+    No terms cancel but those that cancel in the design itself.
     """
     square, ahead = per * per, r.e * u + r.side * v
     m, lean, pull = h1 * per, r.a * square * r.rise, r.power * square
@@ -103,7 +103,7 @@ def _turning(
     return (length, h1, length * bend, -h1 * (1.0 + 3.0 * bend)), fast, w, w1, w2
 
 
-# Blocks (k, n, m) of outputs, or None: what is None is not computed.
+# Blocks (k, n, m) of outputs, or None, which is not computed.
 Outputs = namedtuple("Outputs", "rod point velocity acceleration jerk joints")
 
 
@@ -125,7 +125,7 @@ def poses(designs: Numbers, cos_phi: Numbers, sin_phi: Numbers, status: Status, 
 
     Notes
     -----
-    What is None is neither computed nor compiled.  Where the status is not OK the values are nan.
+    Outputs of None are neither computed nor compiled.  Where the status is not OK the values are nan.
     """
     for i in range(designs.shape[0]):
         r = reduce_design(designs, i)

@@ -1,6 +1,6 @@
 """Warp beam, moving back-rest on sprung brackets with a guide, warp stop motion; planar statics over the beam radius.
 
-``closure`` holds geometry and statics at one bracket angle, ``roots`` finds bracket angles, ``motion`` evaluates poses.
+``closure`` holds geometry and statics at one bracket angle, ``motion`` finds bracket angles and evaluates poses.
 """
 
 from kernels.families.backrest.closure import Design as Design

@@ -19,7 +19,7 @@ from kernels.types import Array
 
 
 class Mode(IntEnum):
-    """What fixes the bracket angle."""
+    """Condition that fixes the bracket angle."""
 
     LAW = 0  # the let-off regulator: phi is given over rho
     TENSION = 1  # the tension K0 is held, slider reaction at the axis of the back-rest
@@ -61,12 +61,12 @@ Forces = namedtuple("Forces", "K N1 N2 K_couple N1_couple N2_couple")
 
 @inline
 def scaled(designs: Array, i: int, row: Array) -> tuple[float, bool]:
-    """Write the columns of one design in units of a power of two near r into ``row``; the unit, and whether valid."""
+    """Write a design to ``row`` in units of a power of two near r; return the unit, and whether it is valid."""
     unit, per_unit = unit_near(designs[i, 5])
     good = True
     for k in range(designs.shape[1]):
         row[k] = designs[i, k]
-        # 0 * x is nan exactly for what is not finite
+        # 0 * x is nan exactly for numbers that are not finite
         good = good and (0.0 * designs[i, k]).real == 0.0
     for k in LENGTHS:
         row[k] = designs[i, k] * per_unit
@@ -120,7 +120,7 @@ def spring(d: Array, phi: Any) -> tuple[Any, Any, Any]:
 def directions(d: Array, phi: Any, at: BracketPose, s1: Any, s2: Any) -> tuple[Any, Any, Any, Any, Any, Any, Any, Any]:
     """Projections of both reactions on the yarn's resultant and across it; (8).
 
-    A, S, Q2, k1, k2, sin v, cos v and twice the sine of half the wrap angle, in the words of the page.
+    A, S, Q2, k1, k2, sin v, cos v and twice the sine of half the wrap angle, in the symbols of the page.
     """
     f1, f2 = s1 * d[10], s2 * d[10]
     v = 0.5 * (0.5 * math.pi - at.theta - at.gamma)

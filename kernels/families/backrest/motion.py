@@ -50,7 +50,7 @@ def _bracketed(d: Array, a: float, fa: float, b: float, fb: float, rho: float, m
             c, b, fc, fb = b, a, fb, fa
         a, fa = x, fx
         best = a if abs(fa) < abs(fb) else b
-        # the small constant: at the root phi = 0 a share of it would never be reached
+        # the small constant: at the root phi = 0 a relative tolerance would never be reached
         room = 2.0 * EPS * abs(best) + 1e-300
         if fa == 0.0 or abs(b - a) <= 2.0 * room:
             return best
@@ -68,7 +68,7 @@ def _bracketed(d: Array, a: float, fa: float, b: float, fb: float, rho: float, m
 
 @inline
 def _dip(d: Array, low: float, high: float, sign: float, rho: float, mode: int) -> tuple[float, float]:
-    """Find by golden sections where sign * residual is least between two angles; stop once it is below zero."""
+    """Find the angle where sign * residual is least between two angles by golden sections; stop once it is negative."""
     share = 0.3819660112501051  # (3 - sqrt(5))/2: one new value per step serves the next one too
     x, y = low + share * (high - low), high - share * (high - low)
     fx, fy = sign * residual(d, x, rho, mode)[0], sign * residual(d, y, rho, mode)[0]
@@ -97,7 +97,7 @@ def _kept(roots: Any, count: int, root: float) -> int:
 
 @inline
 def all_roots(d: Array, rho: float, mode: int, roots: Array) -> int:
-    """Write the roots between phi_lo and phi_hi ascending into ``roots``, which is at least MOST long; their number.
+    """Write the roots between phi_lo and phi_hi, ascending, into ``roots`` (at least MOST); return their number.
 
     The interval is cut into CELLS cells.  A cell with one undefined end is cut at the edge; a cell pair whose middle is
     a dip towards zero is searched for a pair of roots, so that two close roots are not stepped over.
@@ -150,7 +150,7 @@ def _by_law(d: Array, rho: Any) -> tuple[Any, bool]:
 
 @inline
 def _by_root(d: Array, plain: Array, rho: Any, mode: int, roots: Array) -> tuple[Any, int, int]:
-    """Bracket angle from the equation of the mode, how many there are, and the status.
+    """Solve the equation of the mode: the chosen bracket angle, the number of roots, and the status.
 
     The last Newton step carries the imaginary parts of a complex design or radius: it differentiates the root exactly.
     """
@@ -189,7 +189,7 @@ def poses(
     ----------
     designs : (n, 32) columns of ``Design``
     rho : (n, m), or (1, m) shared by all designs; radius of the yarn on the beam [length], complex where designs are
-    modes : (n,) numbers of :class:`Mode`: what fixes the bracket angle
+    modes : (n,) numbers of :class:`Mode`
     status : (n, m) out; OK, NO_ROOT (fewer roots than ``root``), NOT_ASSEMBLED (a yarn branch has no length), SINGULAR
         (bracket parallel to the guide) or INVALID_INPUT; where it is not OK all values are nan, but the count of roots
     geometry : (13, n, m) out, or None: phi, R1, h, theta, gamma, L1, L2, Lc, wrap, x and y of the axis, clearance of

@@ -1,4 +1,4 @@
-"""One design of the cylindrical looper brought to its constants, and all angles of the shaft at which both loops close.
+"""Constants of one design of the cylindrical looper, and all angles of the shaft at which both loops close.
 
 The equation numbers are of docs/cylindrical_looper.md.
 
@@ -7,7 +7,7 @@ bit.  Designs may be complex128 (exact gradients by the complex step); decisions
 
 For a given angle psi of the shaft the second coupler gives its place s in closed form, so the first coupler's closure
 is a function H(psi) of one variable, on the whole circle or on the arc where the second coupler reaches.  All its roots
-are found by a scan; branches name the one that is meant.  Equation numbers are of docs/cylindrical_looper.md.
+are found by a scan; branches select one of them.
 """
 
 from __future__ import annotations
@@ -32,7 +32,7 @@ from kernels.types import Numbers
 
 
 class Reduced(NamedTuple):
-    """Per-design numbers in units of ``unit``: of the drive that swings the shaft, and of the one that slides it."""
+    """Per-design numbers in units of ``unit``: the drive that swings the shaft, and the drive that slides it."""
 
     swings: Crank
     moves: Slider
@@ -47,7 +47,7 @@ class Reduced(NamedTuple):
 
 @inline
 def reduce_design(designs: Numbers, i: int) -> Reduced:
-    """Constants of one design; ``valid`` is false for links of no length and for what is not finite."""
+    """Constants of one design; ``valid`` is false for links of no length and for numbers that are not finite."""
     d = designs[i]
     unit, per = unit_near(d[0])
     swings = reduce_crank(d, per)
@@ -62,11 +62,11 @@ def reduce_design(designs: Numbers, i: int) -> Reduced:
     return Reduced(swings, moves, size1, np.cos(d[13]), np.sin(d[13]), slides, point, unit, valid)
 
 
-# Both driving balls from the foot of the rocker at s = 0, real numbers: what H is made of at one crank angle.
+# Terms of H at one crank angle: both driving balls from the foot of the rocker at s = 0, lengths and directions.
 Loops = namedtuple("Loops", "x1 y1 z1 x2 y2 z2 b1 c1 b2 d cos_beta sin_beta branch2 slides")
 
 
-# H(psi), its derivative, the shaft's place s there, and what is left of the second coupler's square.
+# H(psi), its derivative, the shaft's place s there, and the square of the second coupler's part along the shaft.
 ShaftClosure = namedtuple("ShaftClosure", "value slope s q")
 
 
@@ -95,8 +95,8 @@ def _h(k: Loops, psi: float) -> float:
     return float(place(k, math.cos(psi), math.sin(psi)).value)
 
 
-# H is a trigonometric polynomial of degree 1 and one root of another: 48 cells part its waves.  30 halvings of a cell
-# leave 1e-10 rad, of which the caller's Newton steps leave rounding.
+# H is a trigonometric polynomial of degree 1 and one root of another: 48 cells separate its waves.  30 halvings of a
+# cell leave 1e-10 rad, which the caller's Newton steps reduce to rounding.
 _SCAN, _ = arc_search("shaft_angle", _h, 48, 30)
 
 
@@ -117,11 +117,9 @@ def _arc(k: Loops) -> tuple[float, float]:
 
 @inline
 def shaft_angles(k: Loops, noise: float, at: NDArray[np.float64]) -> tuple[int, float, float]:
-    """Write the shaft angles of all solutions into ``at`` (MOST numbers).
+    """Write the shaft angles of all solutions into ``at`` (MOST numbers); return their number, least and largest H.
 
-    Returns their number, the least and the largest H met.
-
-    A place where |H| comes as near to zero as ``noise`` without crossing it counts as one.
+    A place where |H| comes as near to zero as ``noise`` without crossing it counts as a solution.
     """
     centre, half = _arc(k)
     if half == 0.0:
@@ -133,7 +131,7 @@ def shaft_angles(k: Loops, noise: float, at: NDArray[np.float64]) -> tuple[int, 
 def chosen(
     k: Loops, branch1: float, mode: int, noise: float, at: NDArray[np.float64]
 ) -> tuple[int, float, float, float]:
-    """Status, cosine and sine of the solution that branches and mode name; -|least H largest H| where there is none."""
+    """Select a solution by branches and mode: status, cosine, sine; -|least H largest H| where there is none."""
     count, least, most = shaft_angles(k, noise, at)
     best, second, found, other = -math.inf, -math.inf, math.nan, math.nan
     for n in range(count):

@@ -1,4 +1,4 @@
-"""The looper on a cylinder whose second ball stands off the shaft's axis: both loops ask for angle and place at once.
+"""Looper on a cylinder whose second ball stands off the shaft's axis: both loops together fix angle and place.
 
 The angles at which both loops close are those of :mod:`kernels.families.cylindrical_looper.closure`.  Equation
 numbers are of docs/cylindrical_looper.md.
@@ -24,7 +24,7 @@ from kernels.types import EPS, Numbers, Status
 
 
 class Fixed(NamedTuple):
-    """What the offset adds to the constants of a design, in units of the first crank's."""
+    """Constants of the second ball's offset, with lengths in units of ``Reduced.unit``."""
 
     d: Any
     cos_beta: Any
@@ -51,7 +51,7 @@ def _fixed(designs: Numbers, i: int, r: Reduced) -> Fixed:
 
 @inline
 def _solve2(j11: Any, j12: Any, j21: Any, j22: Any, per: Any, p: Any, q: Any) -> tuple[Any, Any]:
-    """Solution of the two linear equations, ``per`` one over the determinant."""
+    """Solve two linear equations; ``per`` is one over the determinant."""
     return (p * j22 - q * j12) * per, (q * j11 - p * j21) * per
 
 
@@ -73,7 +73,7 @@ def _along(t: Vector, d: Vector) -> Any:
 
 @inline
 def _together(k: Loops, cos: Any, sin: Any, s: Any) -> tuple[Any, Any, Any]:
-    """One step of Newton's method for angle and place at once.
+    """Make one step of Newton's method for angle and place together.
 
     The place that belongs to a rounded angle is off by more than a rounding where the second coupler stands across the
     shaft; the place that solves both equations is not.
@@ -94,7 +94,7 @@ def _together(k: Loops, cos: Any, sin: Any, s: Any) -> tuple[Any, Any, Any]:
 
 @inline
 def _derived(k: Loops, first: Path, second: Path, cos: Any, sin: Any, s: Any, code: int) -> tuple[Swung, Slide]:
-    """Return the derivatives of angle and place from d . d = b^2 of both couplers, to the third; (8), (9)."""
+    """Three derivatives of angle and place, from d . d = b^2 of both couplers; (8), (9)."""
     r1: Vector = (k.c1 * cos, k.c1 * sin, 0.0 * cos)
     r2: Vector = (
         k.d * (cos * k.cos_beta - sin * k.sin_beta), k.d * (sin * k.cos_beta + cos * k.sin_beta), 0.0 * cos,
@@ -117,10 +117,10 @@ def _derived(k: Loops, first: Path, second: Path, cos: Any, sin: Any, s: Any, co
     q1 = dot(d1, first[3]) + 3.0 * p1 * p2 * dot(d1, r1) + p1 * p1 * p1 * j11 - 3.0 * dot(e1, f1)
     q2 = dot(d2, second[3]) + 3.0 * p1 * p2 * dot(d2, r2) + p1 * p1 * p1 * j21 - 3.0 * dot(e2, f2)
     p3, s3 = _solve2(j11, j12, j21, j22, per, q1, q2)
-    # the way each ball can go while the other coupler stays
+    # direction in which each ball can move while the other coupler keeps its length
     way1 = (t1[0] * j22, t1[1] * j22, -k.slides * j21)
     way2 = (-t2[0] * j12, -t2[1] * j12, j11)
-    if k.d == 0.0:  # the second coupler does not see the shaft turn
+    if k.d == 0.0:  # turning the shaft does not move the second ball
         way2 = (0.0 * j11, 0.0 * j11, 1.0 + 0.0 * j11)
     along1, along2 = _along(way1, d1), _along(way2, d2)
     one = Swung(code, cos, sin, magnitude(along1), _square(way1, d1), along1 * along1, p1, p2, p3)
@@ -164,7 +164,7 @@ def _about(o: Fixed, x: Any, z: Any, y: Any) -> Vector:
 
 @inline
 def _solved(r: Reduced, o: Fixed, first: Path, second: Path, at: NDArray[np.float64]) -> tuple[Swung, Slide]:
-    """Both loops at one crank angle; ``at`` is room for the scan."""
+    """Solve both loops at one crank angle; ``at`` is scratch for the scan."""
     p1, p2 = first[0], second[0]
     b1, c1, b2, branch = r.swings.b, r.swings.c, r.moves.b, r.moves.branch
     k = Loops(p1[0], p1[1], p1[2], p2[0], p2[1], p2[2], b1, c1, b2, o.d, o.cos_beta, o.sin_beta, branch, r.slides)
@@ -178,14 +178,14 @@ def _solved(r: Reduced, o: Fixed, first: Path, second: Path, at: NDArray[np.floa
         code, c, s, short = chosen(real, r.swings.branch, o.mode, noise, at)
     cos, sin = c + 0.0 * k.x1, s + 0.0 * k.x1
     if code == st.OK:
-        # Two rounds with everything the numbers carry: rounding is all that is left, and complex parts are exact.
+        # Two Newton steps on the complex numbers: only rounding is left, and the imaginary parts are exact.
         for _ in range(2):
             here = place(k, cos, sin)
             turn = -here.value / here.slope if here.slope.real != 0.0 else 0.0 * cos
             cos, sin = cos - turn * sin, sin + turn * cos
             per = 1.0 / np.sqrt(cos * cos + sin * sin)
             cos, sin = cos * per, sin * per
-        # the slope of H over one rounding of it is no larger than the noise: a dead point of both loops together
+        # a slope of H within the noise is a dead point of both loops together
         here = place(real, cos.real, sin.real)
         away = here.q > 32.0 * EPS * real.b2 * real.b2
         if not away or not here.slope * here.slope > 4.0 * noise * (abs(here.slope) + o.size):
@@ -213,8 +213,8 @@ def coupled_poses(designs: Numbers, cos_phi: Numbers, sin_phi: Numbers, status: 
     cos_phi, sin_phi : (n, m), or (1, m) shared by all designs
     status : (n, m) out; OK, NOT_ASSEMBLED (no solution on these branches), DEAD_POINT (the determinant of both loops
         vanishes), INVALID_INPUT
-    shaft ... joints : as of ``poses``; a discriminant is the square of the coupler's part along the way its ball can go
-        while the other coupler stays, and negative where there is no solution
+    shaft ... joints : as of ``poses``; a discriminant is the square of the coupler's part along the direction in which
+        its ball can move while the other coupler keeps its length, and negative where there is no solution
     """
     at = np.empty(MOST)
     for i in range(designs.shape[0]):

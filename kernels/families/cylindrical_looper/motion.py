@@ -40,7 +40,7 @@ class Slide(NamedTuple):
 
 @inline
 def _slide(r: Slider, u: float, v: float) -> Slide:
-    """Return the slider-crank that moves the shaft along, (1)."""
+    """Place of the shaft along its axis, and derivatives, from the slider-crank that moves it, (1)."""
     y = r.k0 + r.ka * v
     at = place(r, u, v)
     code = pose_status(True, at.q.real, tolerance(r, at), None)
@@ -63,7 +63,7 @@ def _first_crank(r: Reduced, slide: Slide, u: float, v: float) -> Path:
     return m, m1, m2, m3
 
 
-# Blocks (k, n, m) of outputs, or None: what is None is not computed.
+# Blocks (k, n, m) of outputs, or None, which is not computed.
 Outputs = namedtuple("Outputs", "shaft shaft_loop slide slide_loop point velocity acceleration jerk magnitudes joints")
 
 
@@ -88,8 +88,8 @@ def poses(designs: Numbers, cos_phi: Numbers, sin_phi: Numbers, status: Status, 
 
     Notes
     -----
-    What is None is neither computed nor compiled.  Where a loop is not OK its coordinate is nan (but at a dead point
-    only its derivatives are), and so is what follows from it.
+    Outputs of None are neither computed nor compiled.  Where a loop is not OK its coordinate is nan (but at a dead
+    point only its derivatives are), and so are the outputs that depend on it.
     """
     for i in range(designs.shape[0]):
         r = reduce_design(designs, i)
@@ -147,7 +147,7 @@ def carried(r: Reduced, one: Swung, two: Slide) -> Path:
 
 @inline
 def _joints(r: Reduced, first: Path, one: Swung, two: Slide, v: float) -> tuple[Any, ...]:
-    """Give x y z of crank pin 1 and of the rocker's ball."""
+    """Coordinates x y z of crank pin 1 and of the rocker's ball."""
     # not from the path's own z, which the slide has been taken off
     drive = r.swings
     pin = (first[0][0] + drive.e, first[0][1], drive.lift - drive.a * (drive.sa * v))

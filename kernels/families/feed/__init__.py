@@ -1,7 +1,7 @@
 """Rack of a feed mechanism on two chains: rocker of a four-bar for the length, eccentric for the lift; planar rack.
 
-``closure`` brings a design to its constants and closes both chains, ``motion`` evaluates poses, ``events`` finds entry
-and leaving, ``triad`` is the rack on three leads.
+``closure`` reduces a design to its constants and closes both chains, ``motion`` evaluates poses and finds entry and
+leaving, ``triad`` is the rack on three leads.
 """
 
 from kernels.families.feed.motion import differences as differences

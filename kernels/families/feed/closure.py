@@ -30,7 +30,7 @@ class Rocker(NamedTuple):
     ca: Any
     sa: Any
     links: Any  # (c - b)(c + b)
-    reach: float  # |e| + a and its fellows: sums of the magnitudes whose rounding errors make up X, Y, Z
+    reach: float  # |e| + a and so on: sums of the magnitudes whose rounding errors make up X, Y, Z
     y_reach: float
     z_reach: float
     sigma: float
@@ -66,7 +66,7 @@ Driven = namedtuple("Driven", "x y x1 y1 x2 y2")
 
 @inline
 def reduce_design(designs: Array, i: int) -> Reduced:
-    """Constants of one design; ``valid`` is false for zero or negative lengths and for what is not finite."""
+    """Constants of one design; ``valid`` is false for zero or negative lengths and for numbers that are not finite."""
     unit, per_unit = unit_near(designs[i, 13])
     a, b, c, e = designs[i, 0] * per_unit, designs[i, 1] * per_unit, designs[i, 2] * per_unit, designs[i, 3] * per_unit
     f, g, alpha = designs[i, 4] * per_unit, designs[i, 5] * per_unit, designs[i, 6]

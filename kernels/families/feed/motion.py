@@ -22,7 +22,7 @@ from kernels.families.feed.closure import (
 from kernels.jit import inline, kernel
 from kernels.types import TWO_PI, Array, Status
 
-# What poses writes, in order: angles, their derivatives, points of the rack, derivatives of the tooth.
+# Outputs of :func:`poses`, in order: angles, their derivatives, points of the rack, derivatives of the tooth.
 OUTPUTS = (
     "psi_plus_dh", "dpsi", "d2psi", "chi", "dchi", "d2chi", "x_h", "y_h", "x_e", "y_e", "x_f", "y_f",
     "x_t", "y_t", "dx_t", "dy_t", "d2x_t", "d2y_t",
@@ -111,7 +111,7 @@ def differences(designs: Array, cos_phi: Array, sin_phi: Array, chi: Array, stat
             e = eccentric(r.x_ecc, r.y_ecc, r.r_ecc, r.cos_ecc, r.sin_ecc, u, v)
             x, y = math.cos(chi[i, j]), math.sin(chi[i, j])
             dx, dy = h.x + x * r.fx - y * r.fy - e.x, h.y + y * r.fx + x * r.fy - e.y
-            # product of difference and sum: the squares nearly cancel for a good coupler, that is where it matters
+            # product of difference and sum: for a good coupler, where digits matter, the squares nearly cancel
             length = math.sqrt(dx * dx + dy * dy)
             value = (length - r.q) * (length + r.q)
             assembled = status[i, j] == st.OK or status[i, j] == st.DEAD_POINT
@@ -153,7 +153,7 @@ def lift_rows(designs: Array, cos_phi: Array, sin_phi: Array, chi: Array, status
 SAMPLES = 256
 _MOST_STEPS = 100  # a bound, so that the loop always ends
 _PANELS, _MOST_PANELS = 16, 4096
-_AREA_SETTLED = 1e-10  # of the area when the panels are halved: what 8 points a panel leave then is rounding
+_AREA_SETTLED = 1e-10  # relative change by halved panels, below which the error of 8 points per panel is rounding
 # Gauss-Legendre, 8 points: abscissae and weights of the positive half
 _NODES = (0.1834346424956498, 0.5255324099163290, 0.7966664774136267, 0.9602898564975363)
 _WEIGHTS = (0.3626837833783620, 0.3137066458778873, 0.2223810344533745, 0.1012285362903763)
@@ -174,7 +174,7 @@ def _height(r: Reduced, phi: float, order: int) -> float:
 
 @inline
 def _passage(r: Reduced, low: float, high: float, f_low: float, f_high: float, order: int) -> float:
-    """Find by false position where the height, or its derivative, passes zero between angles of opposite signs.
+    """Find the zero of the height, or of its derivative, between angles of opposite signs by false position.
 
     The end that stays is given half its value (Illinois), so that both ends close in.
     """
@@ -201,7 +201,7 @@ def _passage(r: Reduced, low: float, high: float, f_low: float, f_high: float, o
 
 @inline
 def _area(r: Reduced, entry: float, leave: float, panels: int) -> float:
-    """Area under the path between two crank angles, by Gauss's rule on so many panels."""
+    """Area under the path between two crank angles, by Gauss's rule on ``panels`` panels."""
     area, width = 0.0, (leave - entry) / panels
     for k in range(panels):
         middle = entry + (k + 0.5) * width
@@ -215,7 +215,7 @@ def _area(r: Reduced, entry: float, leave: float, panels: int) -> float:
 
 @inline
 def _between(r: Reduced, entry: float, leave: float) -> tuple[float, float, float]:
-    """Greatest height between two crank angles, the area under the path there, and its last change."""
+    """Greatest height between two crank angles, area under the path, and the area's change by the last refinement."""
     rise, panels, area, change = 0.0, _PANELS, _area(r, entry, leave, _PANELS), math.inf
     while change > _AREA_SETTLED * abs(area) and panels < _MOST_PANELS:
         panels *= 2
@@ -239,14 +239,14 @@ def _between(r: Reduced, entry: float, leave: float) -> tuple[float, float, floa
 def feeding(designs: Array, status: Status, outputs: Array) -> None:
     """Compute the entry and leaving of the tooth, its speed there, stitch length, rise and flatness of every design.
 
-    Equations (11)-(14) of docs/feed.md.  Of several times above the plate the longest counts.
+    Equations (11)-(14) of docs/feed.md.  If the tooth is above the plate several times, the longest counts.
 
     Parameters
     ----------
     designs : (n, 23) columns as `PARAMETERS` of sweep/families/feed.py
-    status : (n,) out; OK, NO_EVENT (the tooth never passes the plate), that of the first pose that is not assembled
-    outputs : (10, n) out in the order of :data:`EVENTS` [rad, length, length per rad], the error of the area in that
-        of the flatness; nan where the status is not OK
+    status : (n,) out; OK, NO_EVENT (the tooth never passes the plate), or the status of the first pose that is not OK
+    outputs : (10, n) out in the order of :data:`EVENTS` [rad, length, length per rad], ``area_error`` in units of the
+        flatness; nan where the status is not OK
 
     Notes
     -----

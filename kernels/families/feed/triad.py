@@ -4,9 +4,9 @@ The three closures are solved by Newton's method for the tooth and the rack's an
 guess at phi = 0 and goes round in NODES steps; a pose starts from the node before it.  So every pose of a design lies
 on the assembly that the guess chooses, whatever other poses are asked for.
 
-The guess chooses the assembly that is reached when links as long as it needs them take on their own lengths, without
-passing a position in which the leads lock.  Newton's method alone may wander about before it happens on some assembly:
-on which depends on the rounding of the lengths.
+The guess chooses the assembly as follows: links of the lengths that fit the guess are changed to their own lengths,
+without passing a position in which the leads lock.  Newton's method alone may wander before it converges to some
+assembly, and the rounding of the lengths would decide to which.
 """
 
 from __future__ import annotations
@@ -78,7 +78,7 @@ def _leads(d: Array, u: Any, v: Any) -> tuple[Driven, Driven, Driven, int]:
 
 @inline
 def _solved(m: Any, a: Any, b: Any, c: Any) -> tuple[Any, Any, Any, Any]:
-    """Solution of a 3 x 3 system by Cramer's rule, and its determinant; m holds the rows."""
+    """Solve a 3 x 3 system by Cramer's rule; also its determinant.  ``m`` holds the rows."""
     m0, m1, m2, m3, m4, m5, m6, m7, m8 = m
     c0, c1, c2 = m4 * m8 - m5 * m7, m5 * m6 - m3 * m8, m3 * m7 - m4 * m6
     det = m0 * c0 + m1 * c1 + m2 * c2
@@ -111,7 +111,7 @@ def _links(d: Array, leads: tuple[Driven, Driven, Driven], x: Any, y: Any, chi: 
 
 @inline
 def _newton(d: Array, u: float, v: float, x: float, y: float, chi: float) -> tuple[float, float, float, float, int]:
-    """Tooth, rack angle and determinant at one crank angle, from a start nearby."""
+    """Find tooth and rack angle at one crank angle from a start nearby; also the determinant and the status."""
     one, two, three, code = _leads(d, u, v)
     det = math.nan
     if code != st.OK:
@@ -125,7 +125,7 @@ def _newton(d: Array, u: float, v: float, x: float, y: float, chi: float) -> tup
         if not size < math.inf:
             return x, y, chi, det, st.SINGULAR
         x, y, chi = x - dx, y - dy, chi - dchi
-        # Steps of a few roundings that no longer shrink: as near as the closures can be told
+        # Steps of a few roundings that no longer shrink: rounding of the closures allows no better
         if size <= 4.0 * EPS or (size <= _SMALL and size >= 0.5 * before):
             return x, y, chi, det, st.OK
         before = size
@@ -134,10 +134,10 @@ def _newton(d: Array, u: float, v: float, x: float, y: float, chi: float) -> tup
 
 @inline
 def _begun(d: Array, x: float, y: float, chi: float) -> tuple[float, float, float, int]:
-    """Tooth and rack angle near the assembly at phi = 0 that a guess chooses.
+    """Find tooth and rack angle at phi = 0 on the assembly that a guess chooses.
 
-    Half the squares of the links' lengths go from those of the guess to their own in stages as long as Newton's steps
-    keep halving; a good guess takes one.  NOT_CONVERGED where the leads lock on the way.
+    Half the squares of the links' lengths go from those of the guess to their own in stages, so short that Newton's
+    steps keep halving; a good guess takes one stage.  NOT_CONVERGED where the leads lock on the way.
     """
     one, two, three, code = _leads(d, 1.0, 0.0)
     if code != st.OK:
@@ -192,7 +192,10 @@ def _rates(d: Array, leads: tuple[Driven, Driven, Driven], x: Any, y: Any, chi: 
 
 @inline
 def _round(d: Array, nodes: Array) -> int:
-    """Go once round from the given start; nodes (NODES, 4) get x, y, chi and the status.  Sign of the determinant."""
+    """Solve the nodes round the turn from the given start; return the determinant's sign.
+
+    ``nodes`` (NODES, 4) get x, y, chi and the status.
+    """
     x, y, chi, code = _begun(d, d[26].real, d[27].real, d[28].real)
     sign = 0
     for k in range(NODES):

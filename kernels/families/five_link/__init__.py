@@ -1,7 +1,7 @@
 """Five-link: crank, two perpendicular revolutes in place of the driving ball, coupler, ball and rocker.
 
-``closure`` reduces a design to its constants, ``solve`` finds the rocker angle (``roots`` all of them), ``motion``
-evaluates poses, ``synthesis`` keeps the limit positions of a crank-rocker.
+``closure`` reduces a design to its constants, finds all its rocker angles and designs with the limit positions of a
+crank-rocker; ``solve`` finds the rocker angle of one branch and mode, ``motion`` evaluates poses.
 With h = s2 = 0 it is the spatial crank-rocker, bit for bit.
 """
 

@@ -1,6 +1,4 @@
-"""One design of the five-link brought to its constants, its closure, and designs with the limits of a crank-rocker.
-
-The equation numbers are of docs/five_link.md.
+"""Constants of one design of the five-link, its closure, and designs with the limits of a crank-rocker.
 
 Polukhin 1971, section 5.5, in the forms of docs/five_link.md; the equation numbers are of that page.  Lengths are in
 units of the crank and mirrored to the assembly mode +1, as in :mod:`kernels.linkage.crank_closure`, whose numbers it
@@ -40,7 +38,7 @@ from kernels.types import EPS, Array, Numbers, Status
 
 
 class Joint(NamedTuple):
-    """What the two revolutes in place of the driving ball add to the closure, in units of the crank.
+    """Terms in the closure of the two revolutes in place of the driving ball, in units of the crank.
 
     G5 = X C - Y S + W - shift - share rho(psi) with rho^2 = b^2 - z^2 and z = sweep S + axial, (1).
     """
@@ -64,7 +62,7 @@ Slope = namedtuple("Slope", "value first second rho rho1 rho2 z")
 
 @inline
 def reduce_design(designs: Numbers, i: int) -> tuple[Reduced, Joint]:
-    """Constants of one design; ``valid`` is false for zero or negative lengths and for what is not finite."""
+    """Constants of one design; ``valid`` is false for zero or negative lengths and for numbers that are not finite."""
     unit = unit_scale(designs[i, 2].real)
     a, b, c = designs[i, 0] * unit, designs[i, 1] * unit, designs[i, 2] * unit
     e, f, g = designs[i, 3] * unit, designs[i, 4] * unit, designs[i, 5] * unit
@@ -111,7 +109,7 @@ def slope(joint: Joint, x: Any, y: Any, w: Any, c: Any, s: Any) -> Slope:
 
 @inline
 def residual_size(r: Reduced, joint: Joint, x: Any, y: Any) -> float:
-    """Return the rounding error of G5: what its terms are made of, times 8 x 2^-53."""
+    """Estimate the rounding error of G5: 8 x 2^-53 times the magnitudes that its terms are made of."""
     terms = abs(x.real) + abs(y.real) + abs(r.e.real) + 2.0 + abs(r.y0.real) + r.w_size + joint.size
     return float(8.0 * EPS * terms)
 
@@ -120,7 +118,7 @@ def residual_size(r: Reduced, joint: Joint, x: Any, y: Any) -> float:
 def with_limits_of(
     designs: Array, psi_ext: Array, psi_fold: Array, h: Array, status: Status, a: Array, b: Array
 ) -> None:
-    """Crank and coupler of the five-links with s2 = 0 that have the limit positions of given crank-rockers.
+    """Compute crank and coupler of five-links with s2 = 0 that have the limit positions of given crank-rockers.
 
     Parameters
     ----------
@@ -150,7 +148,7 @@ def with_limits_of(
         across = rho1 - found - h[i]
         admissible = found > 0.0 and across > 0.0 and rho2 + found > h[i]
         status[i] = st.OK if admissible else st.NOT_ADMISSIBLE
-        if found - found != 0.0:  # infinite or no number
+        if found - found != 0.0:  # infinite or nan
             status[i] = st.INVALID_INPUT
         a[i] = found if status[i] == st.OK else math.nan
         b[i] = np.hypot(across, y1 * sa + g * ca - f) if status[i] == st.OK else math.nan
@@ -159,7 +157,7 @@ def with_limits_of(
 SAMPLES = 32  # cells per arc
 # A rocker angle and G5 there.
 ClosureValue = namedtuple("ClosureValue", "psi value")
-# What G5 is made of at one crank angle: the joint, and X, Y, W of a crank-rocker.
+# Terms of G5 at one crank angle: the joint, and X, Y, W of a crank-rocker.
 Terms = namedtuple("Terms", "joint x y w")
 
 
@@ -171,13 +169,13 @@ def _closure(k: Terms, psi: float) -> float:
     return float(k.x * c - k.y * s + (k.w - k.joint.shift) - k.joint.share * math.sqrt(max(square, 0.0)))
 
 
-# 52 halvings of a cell come to its last bits; what they leave the caller's Newton steps take away
+# 52 halvings of a cell reach its last bits; the caller's Newton steps remove the rest
 _SCAN, _DIP = arc_search("five_link", _closure, SAMPLES, 52)
 
 
 @kernel
 def _extremes_of_arc(k: Terms, centre: float, half: float) -> tuple[ClosureValue, ClosureValue]:
-    """Find the places of the smallest and the largest G5 on one arc."""
+    """Find the smallest and the largest G5 on one arc, and their places."""
     begin, width = way_of(half)
     step = width / SAMPLES
     least, most, at_least, at_most = math.inf, -math.inf, 0, 0
@@ -202,7 +200,7 @@ def _extremes_of_arc(k: Terms, centre: float, half: float) -> tuple[ClosureValue
 
 @inline
 def arcs(joint: Joint) -> tuple[int, float, float, float, float]:
-    """Count the arcs on which rho^2 >= 0, and give centre and half width of both; half width pi is the whole circle."""
+    """Find the arcs where rho^2 >= 0: number, centre and half width of both; half width pi is the whole circle."""
     if joint.sweep == 0.0:
         reaches = abs(joint.axial) < joint.coupler
         return (1 if reaches else 0), 0.0, math.pi, 0.0, 0.0
@@ -224,9 +222,9 @@ def arcs(joint: Joint) -> tuple[int, float, float, float, float]:
 
 @kernel
 def all_roots(joint: Joint, x: float, y: float, w: float, noise: float, at: Array) -> int:
-    """Write the mirrored rocker angles [rad] of all solutions into ``at``, at least MOST numbers; their number.
+    """Write the mirrored rocker angles [rad] of all solutions into ``at`` (at least MOST); return their number.
 
-    A place where |G5| comes as near to zero as ``noise`` without crossing it counts as one.
+    A place where |G5| comes as near to zero as ``noise`` without crossing it counts as a solution.
     """
     number, centre, half, centre2, half2 = arcs(joint)
     k, count = Terms(joint, x, y, w), 0
@@ -253,7 +251,7 @@ def extremes(joint: Joint, x: float, y: float, w: float) -> tuple[ClosureValue, 
 
 
 ROUNDS = 5
-GUARD = 1e-9  # every bound is widened by this part of what it is made of, far above its rounding
+GUARD = 1e-9  # relative widening of every bound, far above its rounding
 ONE, UNKNOWN, NONE = 1, 0, -1
 
 
@@ -270,9 +268,9 @@ def _reach_between(joint: Joint, s0: float, s1: float) -> tuple[float, float, fl
 
 @kernel
 def solutions(joint: Joint, x: float, y: float, w: float) -> int:
-    """Tell how many solutions there can be for each sign of dG5/dpsi.
+    """Bound the number of solutions for each sign of dG5/dpsi.
 
-    ONE is one at most, NONE no solution; UNKNOWN where neither was proved.
+    ONE: at most one; NONE: no solution; UNKNOWN: neither was proved.
     """
     r = math.sqrt(x * x + y * y)
     if not r > 0.0:

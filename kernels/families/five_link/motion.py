@@ -22,7 +22,7 @@ from kernels.linkage.crank_closure import Reduced
 from kernels.linkage.outputs import put_block, write
 from kernels.types import Array, Numbers, Status
 
-# What the swivelling joint adds to the second and third derivative of the closure, and rho; zero where plain.
+# Terms of the swivelling joint in the second and third derivative of the closure, and rho; zero where plain.
 # ``second``: share rho''; ``third``: share (rho' + rho''').
 Bends = namedtuple("Bends", "rho second third")
 
@@ -64,7 +64,7 @@ def transfer(r: Reduced, joint: Joint, u: Any, v: Any, c: Any, s: Any, t: Any) -
 
 @inline
 def _extreme(joint: Joint, x: Any, y: Any, w: Any, c: float, s: float) -> Any:
-    """Return G5 at the place of an extreme; errors and changes of the place count only at the end of an arc."""
+    """G5 at an extremum; at the end of an arc the place moves with the design and is computed from it."""
     if reaches(real_joint(joint), s):
         return slope(joint, x, y, w, c, s).value
     z, _ = axial_reach(real_joint(joint), s)
@@ -75,7 +75,7 @@ def _extreme(joint: Joint, x: Any, y: Any, w: Any, c: float, s: float) -> Any:
 
 @inline
 def _shortfall(r: Reduced, joint: Joint, u: Any, v: Any) -> Any:
-    """Negative number that says how far the links are from reaching; Delta of a crank-rocker; (7)."""
+    """Negative measure of the gap by which the links do not reach; Delta of a crank-rocker; (7)."""
     x, y, w = pose_terms(r, u, v)
     real = real_joint(joint)
     if joint.plain:
@@ -121,7 +121,7 @@ def discriminant_of(r: Reduced, joint: Joint, code: int, u: Any, v: Any, w: Any,
     return _shortfall(r, joint, u, v)
 
 
-# Pose outputs, each (n, m), and places (11, n, m); what is None is not computed.
+# Pose outputs, each (n, m), and places (11, n, m); outputs of None are not computed.
 Outputs = namedtuple("Outputs", "psi dpsi d2psi d3psi sin_psi cos_psi discriminant pressure_angle places")
 
 
@@ -138,7 +138,7 @@ def poses(designs: Numbers, cos_phi: Numbers, sin_phi: Numbers, status: Status, 
     cos_phi, sin_phi : (n, m), or (1, m) shared by all designs; complex128 where they depend on the designs
     status : (n, m) out; OK, NOT_ASSEMBLED, DEAD_POINT, SINGULAR (the coupler is parallel to the crank axis) or
         INVALID_INPUT
-    psi ... pressure_angle : (n, m) out, or None: what is None is neither computed nor compiled; complex128 if an
+    psi ... pressure_angle : (n, m) out, or None: then it is neither computed nor compiled; complex128 if an
         input is
     places : (11, n, m) out, theta, beta, and x y z of crank pin, axis 2 nearest to it, and rocker ball, or None
 
@@ -182,7 +182,7 @@ def poses(designs: Numbers, cos_phi: Numbers, sin_phi: Numbers, status: Status, 
 def _places(d: Numbers, r: Reduced, joint: Joint, u: Any, v: Any, c: Any, s: Any) -> tuple[Any, ...]:
     """Angles theta and beta, crank pin B, the point of axis 2 nearest to axis 1 moved by s2 along it, rocker ball C."""
     z, square = axial_reach(joint, -s)
-    # the root of what rounding made negative is no number; the status has dealt with what is truly out of reach
+    # a square that rounding made negative counts as zero; poses truly out of reach have their status already
     rho = np.sqrt(square) if square.real > 0.0 else 0.0 * square
     # d from the crank pin to the ball, along e1 and e2 of the crank's frame
     d1 = r.e - u - r.rocker * c
@@ -240,7 +240,7 @@ def links(designs: Array, cos_phi: Array, sin_phi: Array, motion: Array, out: tr
             spin = (dot(seen, t)) / reach
             omega1 = scale(spin, u)
             seen2 = sub(tree.acceleration_at(rocker, ball), tree.acceleration_at(crank, pin))
-            # What the ball does at constant rates: about axis 1, of Coriolis, about axis 2.
+            # Accelerations of the ball at constant rates: about axis 1, of Coriolis, about axis 2.
             known = add(spun(omega1, (0.0, 0.0, 0.0), sub(ball, pin)), scale(2.0 * rate * d[1], cross(omega1, swept)))
             left = sub(seen2, sub(known, scale(rate * rate * d[1], arm)))
             rate2, spin2 = dot(left, u) / (d[1] * cb), dot(left, t) / reach

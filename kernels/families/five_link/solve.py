@@ -1,4 +1,4 @@
-"""The rocker angle of the five-link at one crank angle, by Newton's method from the crank-rocker's or by a scan."""
+"""Rocker angle of the five-link at one crank angle, by Newton's method from that of a crank-rocker, or by a scan."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ from kernels.linkage.crank_closure import Reduced, discriminant_tolerance
 from kernels.linkage.verdict import pose_status
 from kernels.types import EPS, Array
 
-ROUNDS = 10  # of Newton's method; 3 to 5 are usual, and what needs more is left to the scan
+ROUNDS = 10  # of Newton's method; 3 to 5 are usual, and a pose that needs more is left to the scan
 NEAR = 1e-5  # a step below this leaves 1e-10, and the two rounds that follow leave rounding only
 
 
@@ -38,10 +38,10 @@ def pose_terms(r: Reduced, u: Any, v: Any) -> tuple[Any, Any, Any]:
 
 @kernel
 def _newton(joint: Joint, x: float, y: float, w: float) -> tuple[bool, float, float]:
-    """Whether Newton's method settled on a root with dG5/dpsi > 0, its cosine and sine; (3)."""
+    """Find a root with dG5/dpsi > 0 by Newton's method: whether it converged, cosine and sine of the root; (3)."""
     square = x * x + y * y
     c, s = 0.0, 0.0
-    # Crank-rockers with the coupler that the last angle gives, from a quarter turn off the crank pin's direction on.
+    # Start from crank-rockers whose coupler follows from the last angle, first a quarter turn off the crank pin.
     _, reach = axial_reach(joint, -x / math.sqrt(square))
     for _ in range(2):
         close = w - joint.shift - joint.share * math.sqrt(max(reach, 0.0))
@@ -70,7 +70,7 @@ def reaches(joint: Joint, s: float) -> bool:
 
 @kernel
 def _scanned(joint: Joint, x: float, y: float, w: float, noise: float, at: Array) -> tuple[int, float, float]:
-    """Status, cosine and sine of the root that branch and mode name; section "Assembly modes" of the page.
+    """Find the root of a branch and mode by a scan: status, cosine, sine; section "Assembly modes" of the page.
 
     Of the roots with dG5/dpsi > 0 it is the one with the mode-th largest (C - B) . k'.  ``at`` has 2 MOST numbers.
     """
@@ -79,7 +79,7 @@ def _scanned(joint: Joint, x: float, y: float, w: float, noise: float, at: Array
     for k in range(count):
         c, s = math.cos(at[k]), math.sin(at[k])
         here = slope(joint, x, y, w, c, s)
-        # a double root is where the slope is no larger than what the noise of G5 makes of it
+        # at a double root the slope is no larger than the noise of G5 alone makes it
         if here.first * here.first <= 4.0 * noise * abs(here.second):
             touching = at[k]
         if here.first > 0.0:
@@ -127,7 +127,7 @@ def solve_general(r: Reduced, joint: Joint, x: Any, y: Any, w: Any, at: Array) -
         code, c0, s0 = _scanned(real, xr, yr, wr, noise, at)
     c, s = c0 + 0.0 * x, s0 + 0.0 * x
     if code == st.OK:
-        # Two rounds with everything the numbers carry: rounding is all that is left, and complex parts are exact.
+        # Two Newton steps on the complex numbers: only rounding is left, and the imaginary parts are exact.
         for _ in range(2):
             here = slope(joint, x, y, w, c, s)
             c, s = rotate(c, s, -here.value / divisor(here.first))
@@ -143,7 +143,7 @@ def solve_general(r: Reduced, joint: Joint, x: Any, y: Any, w: Any, at: Array) -
 
 @inline
 def real_joint(joint: Joint) -> Joint:
-    """Return the same constants without their imaginary parts."""
+    """Constants of the joint without their imaginary parts."""
     return Joint(
         joint.coupler.real, joint.sweep.real, joint.axial.real, joint.shift.real, joint.share.real, joint.h.real,
         joint.s2.real, joint.plain, joint.size, joint.mode, joint.valid,
@@ -152,11 +152,9 @@ def real_joint(joint: Joint) -> Joint:
 
 @inline
 def solve(r: Reduced, joint: Joint, u: Any, v: Any, at: Array) -> tuple[int, Any, Any, Any, Any]:
-    """Solve the closure: status, minus cosine and minus sine of the mirrored rocker angle, and what they come from.
+    """Solve the closure: status, minus cosine and minus sine of the mirrored rocker angle, dG5/dpsi and W there.
 
-    The last two are dG5/dpsi and the W of a crank-rocker there.
-
-    ``at`` is room for the scan.
+    W is that of a crank-rocker.  ``at`` is scratch for the scan.
     """
     x, y, w = pose_terms(r, u, v)
     code = st.INVALID_INPUT

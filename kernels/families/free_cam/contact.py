@@ -1,4 +1,4 @@
-"""The thread over the edge x = a y^2 of the cam: its length over one point, the shortest of all ways.
+"""The thread over the edge x = a y^2 of the cam: its length over one point of the edge, and its shortest path.
 
 The thread is shortest where L'(y) = 0 rises.  The search walks along the edge in steps that no zero of L' can be
 skipped by, |L'| / max|L''|, so that every minimum is found but for pairs nearer than a share FINEST of the way.
@@ -32,7 +32,7 @@ Cam = namedtuple("Cam", "a x1 y1 z1 x2 y2 z2 unit code")
 
 
 class Line(NamedTuple):
-    """Where the straight line between the guides passes the plane of the cam."""
+    """Point where the straight line between the guides passes the plane of the cam, and the line's length."""
 
     x: float
     y: float
@@ -63,7 +63,7 @@ def turned_cam(designs: Array, i: int, u: float, v: float) -> Cam:
 
 @inline
 def straight(cam: Cam) -> Line:
-    """Line between the guides at the plane of the cam."""
+    """Straight line between the guides and its point in the plane of the cam."""
     share = cam.z1 / divisor(cam.z1 - cam.z2)
     x, y = cam.x1 + share * (cam.x2 - cam.x1), cam.y1 + share * (cam.y2 - cam.y1)
     dx, dy, dz = cam.x2 - cam.x1, cam.y2 - cam.y1, cam.z2 - cam.z1
@@ -91,7 +91,7 @@ def along_edge(cam: Cam, at: float) -> tuple[float, float, float]:
 
 @inline
 def reach(cam: Cam) -> float:
-    """Return a |y| beyond which the thread only grows longer; no extremum lies outside."""
+    """Bound of |y| beyond which the thread only grows longer; no extremum lies outside."""
     return max(_reach(cam.a.real, cam.x1.real, cam.y1.real), _reach(cam.a.real, cam.x2.real, cam.y2.real))
 
 
@@ -160,7 +160,7 @@ def shortest(cam: Cam) -> Contact:
 
 @inline
 def root_of_slope(cam: Cam, low: float, high: float) -> float:
-    """Find where L' rises through zero between low and high, by Newton's method kept in the bracket."""
+    """Find the point between low and high where L' rises through zero, by Newton's method kept in the bracket."""
     y = 0.5 * (low + high)
     for _ in range(HALVINGS):
         _, slope, bend = along_edge(cam, y)
@@ -181,7 +181,7 @@ def root_of_slope(cam: Cam, low: float, high: float) -> float:
 
 @inline
 def by_angle(a: float, x: float, y: float, z: float, at: float) -> tuple[float, float, float]:
-    """Distance of a guide: first and second derivative by phi at a fixed y, and the mixed one; (21)."""
+    """First and second derivative by phi of the distance of a guide at a fixed y, and the mixed derivative; (21)."""
     cx, cy, tx = a * at * at, at, 2.0 * a * at
     dx, dy = cx - x, cy - y
     distance = divisor(np.sqrt(dx * dx + dy * dy + z * z))
@@ -203,7 +203,7 @@ def over_edge(cam: Cam, at: float) -> tuple[float, float]:
     return one[0] + two[0], one[1] + two[1] - mixed * mixed / divisor(along_edge(cam, at)[2])
 
 
-# Pose outputs, each (n, m), or None: what is None is not computed.
+# Pose outputs, each (n, m), or None, which is not computed.
 Outputs = namedtuple("Outputs", "P dP d2P L wrap y_contact X Y contact minima")
 
 
@@ -238,7 +238,7 @@ def poses(designs: Array, cos_phi: Array, sin_phi: Array, status: Status, out: O
             line = straight(cam)
             touching = line.inside and cam.code == st.OK
             at, count = line.y, 0
-            # the search along the edge is the dear part: not without contact, unless its count is wanted
+            # the search along the edge is costly: without contact it is made only if the number of minima is wanted
             if cam.code == st.OK and (touching or out.minima is not None):
                 found = shortest(cam)
                 count = found.minima

@@ -1,4 +1,4 @@
-"""Thread over the bare edge with friction: where it begins to slide along the edge, and the way it takes.
+"""Thread over the bare edge with friction: the points where it begins to slide along the edge, and its path.
 
 The resultant of both tensions on the edge's point, T12 = T1 e1 + T2 e2, may lean by the angle of friction before the
 thread slides along the edge.  Between two limit points it sticks, so where it lies depends on where it lay before: a
@@ -26,7 +26,7 @@ from kernels.linkage.outputs import write
 from kernels.linkage.thread_path import wrap_angle
 from kernels.types import Array, Status
 
-# How far beyond the last extremum of the length limit points are looked for, in units of that reach.
+# Distance within which limit points are searched, in units of the distance within which all extrema lie.
 FAR = 64.0
 
 
@@ -36,13 +36,13 @@ Pull = namedtuple("Pull", "ratio along sine")
 
 @inline
 def pull_of(ratio: float, along: float, across: float) -> Pull:
-    """Return numbers of one design: tension ratio, friction coefficients along and across the thread."""
+    """Friction numbers of one design, from tension ratio and coefficients along and across the thread."""
     return Pull(ratio, along, across / math.sqrt(1.0 + across * across))
 
 
 @inline
 def _usable(friction: Array) -> bool:
-    """Say whether tension ratio and coefficients of friction are numbers that a thread can have."""
+    """Whether tension ratio and coefficients of friction are in the range of a thread."""
     return bool(1e-6 < friction[0] < 1e6 and 0.0 <= friction[1] < 100.0 and 0.0 <= friction[2] < 1e6)
 
 
@@ -87,7 +87,7 @@ def steepest_excess(cam: Cam, pull: Pull, low: float, high: float) -> float:
 
 @inline
 def next_limit(cam: Cam, pull: Pull, side: float, start: float, sense: float, most: float) -> float:
-    """First limit point of one side from ``start`` along the edge, within ``most``; nan if there is none."""
+    """Find the first limit point of one side from ``start`` along the edge, within ``most``; nan if there is none."""
     end = reach(cam) + 1e-3
     at, value = start, excess(cam, pull, side, start)
     # A start on a limit point is one: the walk looks for a change of sign and would step over it.
@@ -107,7 +107,7 @@ def next_limit(cam: Cam, pull: Pull, side: float, start: float, sense: float, mo
 
 @inline
 def _bisected(cam: Cam, pull: Pull, side: float, low: float, high: float, at_low: float) -> float:
-    """Zero of :func:`excess` between low and high by the Illinois method, at most HALVINGS steps."""
+    """Find the zero of :func:`excess` between low and high by at most HALVINGS steps of the Illinois method."""
     f_low, f_high = at_low, excess(cam, pull, side, high)
     for _ in range(HALVINGS):
         middle = high - f_high * (high - low) / (f_high - f_low)
@@ -127,10 +127,10 @@ def _bisected(cam: Cam, pull: Pull, side: float, low: float, high: float, at_low
 
 @inline
 def nearest_limit(cam: Cam, pull: Pull, side: float, centre: float) -> float:
-    """Limit point of one side nearest to ``centre``; nan if there is none within FAR."""
+    """Find the limit point of one side nearest to ``centre``; nan if there is none within FAR."""
     most = FAR * (reach(cam) + 1e-3)
     up = next_limit(cam, pull, side, centre, 1.0, most)
-    # Downwards no farther than what was found upwards: beyond it nothing is nearer.
+    # Downwards no farther than the point found upwards: a point beyond is not nearer.
     down = next_limit(cam, pull, side, centre, -1.0, abs(up - centre) if up == up else most)
     if math.isnan(down):
         return up
@@ -141,7 +141,7 @@ def nearest_limit(cam: Cam, pull: Pull, side: float, centre: float) -> float:
 def limit_points(
     designs: Array, friction: Array, cos_phi: Array, sin_phi: Array, status: Status, plus: Array, minus: Array
 ) -> None:
-    """Points of the edge where the thread begins to slide along it, nearest to the frictionless contact; (25).
+    """Compute the points of the edge where the thread begins to slide, nearest to the frictionless contact; (25).
 
     Parameters
     ----------
@@ -169,9 +169,9 @@ def limit_points(
 
 @inline
 def slid(cam: Cam, pull: Pull, before: float) -> float:
-    """Give the place where a thread that lay at ``before`` rests now.
+    """Place where a thread that lay at ``before`` rests now.
 
-    It stays there, or it slides to the next limit point that holds it.
+    It stays there, or slides to the next limit point that holds it.
     """
     along, whole = lean(cam, pull, before)
     most = FAR * (reach(cam) + 1e-3)
@@ -184,9 +184,9 @@ def slid(cam: Cam, pull: Pull, before: float) -> float:
 
 @inline
 def landed(designs: Array, i: int, u0: float, v0: float, u1: float, v1: float) -> float:
-    """Find by bisection between two angles where the thread first touches the edge.
+    """Find the place where the thread first touches the edge, by bisection between two cam angles.
 
-    Taken at the pose before instead, the place would change with the steps of the march.
+    The place at the pose before would depend on the steps of the march.
     """
     low, high, y = 0.0, 1.0, 0.0
     for _ in range(HALVINGS):
@@ -203,7 +203,7 @@ def landed(designs: Array, i: int, u0: float, v0: float, u1: float, v1: float) -
     return y
 
 
-# Pose outputs, each (n, m), or None: what is None is not computed.
+# Pose outputs, each (n, m), or None, which is not computed.
 MarchOutputs = namedtuple("MarchOutputs", "L wrap y_contact contact sticking")
 
 
@@ -213,17 +213,16 @@ def march(
 ) -> None:
     """Follow the thread over an edge with friction, in the order of the given angles; docs/takeup.md, section 5.
 
-    The thread starts where it lies without friction and is led through the angles ``turns`` times; what is given is
-    the last time.
+    The thread starts where it lies without friction and is led through the angles ``turns`` times; the outputs are of
+    the last turn.
 
     Parameters
     ----------
     friction : (n, 3), tension ratio T2/T1; coefficients of friction along the thread and across it (along the edge)
-    turns : how often the angles are gone through
+    turns : number of turns
     designs : (n, 8) columns as `PARAMETERS` of sweep/families/free_cam.py
     cos_phi, sin_phi : (n, m) or (1, m), angles of one turn in their order
-    status : (n, m) out; OK, INVALID_INPUT, or NOT_CONVERGED where the thread slides off far outside; that and all that
-        follows of the design
+    status : (n, m) out; OK, INVALID_INPUT, or NOT_CONVERGED from the pose on where the thread slides off far outside
     L, wrap, y_contact : (n, m) out or None; thread length, wrap angle [rad], place along the edge's axis y [length]
     contact, sticking : (n, m) out or None; 1 or 0: whether the thread lies on the edge, and whether it sticks there
     """

@@ -1,4 +1,4 @@
-"""True maxima of the geared dwell drive over the turn, from all stationary points, and the measures of its dwell."""
+"""True maxima of the geared dwell drive over the turn, from all stationary points, and measures of its dwell."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from kernels.types import Array, Status
 def stretch(
     r: Reduced, k: float, a: float, number: int, s2: Array, q: Array, d: Array, lean: Array
 ) -> tuple[float, float]:
-    """Quadratics of a stretch of the half turn in its own variable tau >= 0, its length and |dtau/dcos(phi)|.
+    """Write the quadratics of a stretch of the half turn in its variable tau >= 0; return length, |dtau/dcos(phi)|.
 
     ``s2`` is sin^2(phi), ``q`` and ``d`` are Q and D.  The turn is cut at phi = pi/2 with tau = t (number 0) and
     tau = 1 + cos(phi) (number 1).  Where the pin passes nearest to the axis at cos(phi) = 1/k, near a = -k, it is cut
@@ -173,7 +173,7 @@ def turn_maxima(
 
 @inline
 def rising_angle(r: Reduced, psi: float, extreme: float) -> float:
-    """Find where psi, rising from its extreme to pi at phi = pi, takes a value; nan if the search does not settle."""
+    """Find the phi at which psi, rising from its extreme to pi at phi = pi, takes a value; nan without convergence."""
     low, high = extreme, math.pi
     phi, before = min(2.0 * extreme, 0.5 * (low + high)), math.inf  # twice the extreme is the root for k -> 1
     for _ in range(100):

@@ -17,7 +17,7 @@ from kernels.types import EPS, TWO_PI, Array, Numbers, Status
 
 TOO_NEAR = 1e-50  # a pin that passes the axis nearer than this has derivatives outside float64
 Most: TypeAlias = tuple[float, float, float, float]
-FLOOR = 1e-150  # of a squared distance on a grid; its square is no less than what float64 holds
+FLOOR = 1e-150  # least squared distance on a grid, whose square float64 still holds
 
 
 class Half(NamedTuple):
@@ -68,7 +68,7 @@ def reduce_half(sign: float, k: float, a: float, ak4: float) -> Half:
 
 @inline
 def reduce_design(designs: Numbers, i: int) -> Reduced:
-    """Constants of one design; ``valid`` is false for k <= 0 and for what is not finite or above 1e30."""
+    """Constants of one design; ``valid`` is false for k <= 0 and for numbers that are not finite or above 1e30."""
     k, a = designs[i, 0], designs[i, 1]
     ak4 = 4.0 * (a * k)
     front, back = reduce_half(1.0, k, a, ak4), reduce_half(-1.0, -k, -a, ak4)
@@ -116,7 +116,7 @@ def velocity(h: Half, ak4: float, t: float, square: float) -> float:
     return (h.v0 + t * (h.v1 - ak4 * t)) / square
 
 
-# Pose outputs, each (n, m), or None: what is None is not computed.
+# Pose outputs, each (n, m), or None, which is not computed.
 Outputs = namedtuple("Outputs", "psi dpsi d2psi d3psi sin_psi cos_psi x_b y_b")
 
 
@@ -130,7 +130,7 @@ def poses(designs: Numbers, phi: Numbers, cos_phi: Numbers, sin_phi: Numbers, st
         the complex step
     phi, cos_phi, sin_phi : (n, m), or (1, m) shared by all designs; phi only tells the turn, so that psi is continuous
     status : (n, m) out; OK, SINGULAR (on the output axis within the rounding of phi) or INVALID_INPUT
-    psi ... y_b : (n, m) out, or None: what is None is neither computed nor compiled
+    psi ... y_b : (n, m) out, or None: then it is neither computed nor compiled
 
     Notes
     -----
@@ -184,14 +184,14 @@ def poses(designs: Numbers, phi: Numbers, cos_phi: Numbers, sin_phi: Numbers, st
 def _reduced(
     h: Half, ak4: float, polynomial: bool, grid: Array, j: int, wanted: tuple[Array | None, ...], most: Most
 ) -> Most:
-    """Take a place of the grid into the least D and the largest derivatives, of those that are wanted."""
+    """Update the least D and the wanted largest derivatives by one place of the grid."""
     dpsi, d2psi, d3psi = wanted
     least, m1, m2, m3 = most
     t, s, ss = grid[0, j], grid[1, j], grid[2, j]
     if polynomial:
         square = (h.e * h.e + FLOOR) + t * (h.d1 - ak4 * t)
     else:
-        # As in `pin` near phi = 0, without that one's branch.
+        # As in `pin` near phi = 0, without the branch.
         twice = 2.0 * h.k
         x, y = h.e - (t + t) + twice * ss, s * (2.0 * h.below + twice * t)
         square = (x * x + FLOOR) + y * y

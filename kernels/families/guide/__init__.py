@@ -1,7 +1,7 @@
 """Planar four-bar with a guided coupler point.
 
-``closure`` reduces a design to its constants, ``motion`` evaluates poses, also in twice the working precision, and
-``stage`` is what chains are fused by.
+``closure`` reduces a design to its constants and holds the closures for fused chains, ``motion`` evaluates poses, also
+in twice the working precision.
 """
 
 from kernels.families.guide.closure import FORM as FORM

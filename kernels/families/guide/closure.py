@@ -1,4 +1,4 @@
-"""One design of the guided four-bar brought to its smallest set of numbers, its closure, and derivatives of psi; (5).
+"""Constants of one design of the guided four-bar, its closure, and derivatives of psi; (5).
 
 Polukhin 1971, section 4.4, as worked out in docs/guide.md; the equation numbers are of that page.  Everything is
 computed in lengths divided by a power of two near the rocker length.  Designs may be complex128 (exact gradients by the
@@ -7,7 +7,7 @@ complex step); decisions look at the real part.
 The one set of formulas behind the motion at given angles and behind the fused kernels of chains.  Derivatives of the
 closure F = X cos psi - Y sin psi + W are F_phi = ``g_ph``, F_phi psi = -``g_near``, F_phi phi psi = ``g_turn``.
 
-Behind them stands the guided four-bar as the last stage of a fused chain (:mod:`kernels.chains`).
+At the end is the guided four-bar as the last stage of a fused chain (:mod:`kernels.chains`).
 """
 
 from __future__ import annotations
@@ -53,7 +53,7 @@ class Reduced(NamedTuple):
 
 @inline
 def reduce_design(designs: Array, i: int) -> Reduced:
-    """Constants of one design; ``valid`` is false for zero or negative lengths and for what is not finite."""
+    """Constants of one design; ``valid`` is false for zero or negative lengths and for numbers that are not finite."""
     d = designs[i]
     return reduce_along((d[0], d[1], d[2], d[3], d[4], d[5], d[6], d[7], d[8]), np.cos(d[6]), np.sin(d[6]))
 
@@ -74,7 +74,7 @@ def reduce_along(d: tuple[Any, ...], cl: Any, sl: Any) -> Reduced:
     k2 = a * e / c
     w_size = 0.5 * (abs(((c - b) * (c + b)).real) + (a * a + e * e).real) / c.real + abs(k2.real)
     valid = (a.real > 0.0) & (b.real > 0.0) & (c.real > 0.0) & (w_size < 1e140) & (branch.real * branch.real == 1.0)
-    # 0 * x is nan exactly for what is not finite
+    # 0 * x is nan exactly for numbers that are not finite
     valid = valid & (abs(lam.real) < 1e5) & ((0.0 * (xi + eta + h)).real == 0.0)
     return Reduced(
         a, b, c, e, k0, k2, abs(e.real) + a.real, w_size,
@@ -111,7 +111,7 @@ First = namedtuple("First", "g_turn g_near g_ph p")
 
 @inline
 def velocity(r: Any, at: ClosurePose, cos_psi: Any, sin_psi: Any, per_t: Any) -> First:
-    """psi'; ``r`` has the fields a and k2 of :class:`kernels.families.guide.closure.Reduced`, ``per_t`` is 1/T."""
+    """Compute derivatives of the closure, and psi'; ``r`` has a and k2 of :class:`Reduced`, ``per_t`` is 1/T."""
     u, v = at.u, at.v
     g_turn, g_near = r.a * (v * cos_psi - u * sin_psi), r.a * (u * cos_psi + v * sin_psi)
     g_ph = g_turn + r.k2 * v
@@ -120,14 +120,14 @@ def velocity(r: Any, at: ClosurePose, cos_psi: Any, sin_psi: Any, per_t: Any) ->
 
 @inline
 def acceleration(r: Any, at: ClosurePose, first: First, per_t: Any) -> Any:
-    """Psi''."""
+    """Second derivative of psi from psi' and the derivatives of the closure."""
     p = first.p
     return -(first.g_near + r.k2 * at.u + p * (at.w * p - 2.0 * first.g_near)) * per_t
 
 
 @inline
 def jerk(at: ClosurePose, first: First, q: Any, t: Any, per_t: Any) -> Any:
-    """Psi''' from psi'' = ``q`` and T."""
+    """Third derivative of psi from psi'' = ``q`` and T."""
     p, g_turn = first.p, first.g_turn
     linear = first.g_ph - p * (3.0 * g_turn - p * (3.0 * g_turn + t * p))
     return (linear - 3.0 * q * (at.w * p - first.g_near)) * per_t
@@ -227,7 +227,7 @@ def _dip(c: Constants, u: Any, v: Any) -> tuple[Any, Any, Any]:
 
 @inline
 def _travel_blur(c: Constants, u: Any, v: Any, x1: Any, x2: Any, x3: Any) -> tuple[Any, ...]:
-    """Errors of psi and its derivatives as of the crank-rocker's, times the arm by which they move the point."""
+    """Estimate rounding errors of the point: those of psi and its derivatives (`_turn_blur` of rssr) times its arm."""
     at = place(c, u, v)
     t = c.branch * math.sqrt(largest(at.delta, 1e-300))
     per_t, per_rr = 1.0 / t, 1.0 / at.rr

@@ -39,7 +39,7 @@ from kernels.types import EPS, Array, Status
 Point = namedtuple("Point", "b_along b_across c_along c_across cos_psi sin_psi t")
 
 
-# Pose outputs, each (n, m), and joints (6, n, m); what is None is not computed.
+# Pose outputs, each (n, m), and joints (6, n, m); outputs of None are not computed.
 Outputs = namedtuple("Outputs", "s ds d2s d3s dev ddev d2dev discriminant pressure_angle joints")
 
 
@@ -54,7 +54,7 @@ def poses(designs: Array, cos_phi: Array, sin_phi: Array, status: Status, out: O
     designs : (n, 9) columns as `PARAMETERS` of sweep/families/guide.py
     cos_phi, sin_phi : (n, m), or (1, m) shared by all designs
     status : (n, m) out; OK, NOT_ASSEMBLED, DEAD_POINT, SINGULAR or INVALID_INPUT
-    s ... pressure_angle : (n, m) out [length; rad], or None: what is None is neither computed nor compiled
+    s ... pressure_angle : (n, m) out [length; rad], or None: then it is neither computed nor compiled
     joints : (6, n, m) out, crank pin x y, rocker pin x y, coupler point x y, or None
 
     Notes
@@ -89,7 +89,7 @@ def poses(designs: Array, cos_phi: Array, sin_phi: Array, status: Status, out: O
             c_across = r.q_along * sin_psi + r.q_across * cos_psi
             write(out.s, i, j, (b_along + c_along + r.along0) * r.unit)
             write(out.dev, i, j, (b_across + c_across + r.across0) * r.unit)
-            # without a branch: what nobody wants of it is arithmetic alone, which the compiler drops
+            # without a branch: arithmetic whose results are not wanted is dropped by the compiler
             point = Point(b_along, b_across, c_along, c_across, cos_psi, sin_psi, t)
             _put_derivatives(out, i, j, r, at, point, code == st.OK)
 
@@ -136,7 +136,7 @@ def point_shares(designs: Array, shares: Array) -> None:
         shares[i, 7] = 10.0 * EPS * reach * abs(r.e) * r.unit + 2.0 * EPS * abs(designs[i, 7])
 
 
-BAND = 4.0 * EPS  # what rounding the given numbers does to Delta: a dead point made in float64 is still one
+BAND = 4.0 * EPS  # effect of rounding the given numbers on Delta: a dead point rounded to float64 is still one
 
 
 @inline

@@ -1,7 +1,7 @@
 """Spatial slider-crank: revolute crank, two ball joints, prismatic slider (RSSP); planar for alpha = 0.
 
-``motion`` evaluates poses, also in twice the working precision, and what effects work from; ``margin`` decides
-rotatability and the largest pressure angle and finds the limit positions; ``stage`` is what chains are fused by.
+``motion`` evaluates poses, also in twice the working precision, and the records for effects; ``margin`` decides
+rotatability and the largest pressure angle and finds the limit positions; ``stage`` has the closures for fused chains.
 """
 
 from kernels.families.rssp.margin import limits as limits

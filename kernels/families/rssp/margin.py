@@ -1,4 +1,4 @@
-"""Whether the slider-crank turns fully, by what margin, and its limit positions.
+"""Rotatability of the slider-crank, its margin, and its limit positions.
 
 Margin and largest pressure angle come from one exact minimum.  In a limit position crank and coupler are in line,
 stretched (extended) or overlapping (folded).
@@ -29,18 +29,18 @@ from kernels.jit import inline, kernel
 from kernels.linkage.verdict import turning_status
 from kernels.types import TWO_PI, Array, Status
 
-# Smallest Q of the turn in squared units of the reduced design, where it is, and how well it is known.
+# Smallest Q of the turn in squared units of the reduced design, its place, and the bound of its rounding error.
 # ``across``: distance of the coupler's ends across the slide line.
 LeastQ = namedtuple("LeastQ", "q cos sin across tolerance")
 
 
 @inline
 def least_q(r: Reduced) -> LeastQ:
-    """Smallest Q over the turn; ``tolerance`` bounds its rounding error (docs/rssp.md, section on rotatability)."""
+    """Find the smallest Q of the turn; ``tolerance`` bounds its rounding error (docs/rssp.md, on rotatability)."""
     lowest = minimum(2.0 * r.a * r.e, 2.0 * r.n0 * r.na, -0.5 * r.ka * r.ka, 0.0)
     u, v = lowest.cos, lowest.sin
-    # The coefficients only place the minimum; its value comes from m and n, and its slope there takes off what the
-    # rounding of the place displaced it by.
+    # The coefficients only place the minimum; its value comes from m and n, and the slope there corrects for the
+    # rounding of the place.
     m, n, q = place(r, u, v)
     half_slope = -(m * (r.a * v) - n * (r.na * u))
     moved = 2.0 * half_slope * half_slope / lowest.curvature
@@ -73,7 +73,7 @@ def margin(
 
     Notes
     -----
-    What is None is neither computed nor compiled.
+    Outputs of None are neither computed nor compiled.
     """
     for i in range(designs.shape[0]):
         r = reduce_design(designs, i)
@@ -97,7 +97,7 @@ _MOST_STEPS = 200
 
 @inline
 def _excess(r: Reduced, crank: float, ca: float, sa: float, f: float, s: float) -> tuple[float, float, float]:
-    """Return e(s), dE/ds and rho for a crank pointing away from the ball (``crank`` = -a) or towards it (+a)."""
+    """Evaluate E(s), dE/ds and rho for a crank pointing away from the ball (``crank`` = -a) or towards it (+a)."""
     x, z = s * ca, s * sa - f
     rho = math.sqrt(r.e * r.e + x * x)
     reach = rho - crank
@@ -108,7 +108,7 @@ def _excess(r: Reduced, crank: float, ca: float, sa: float, f: float, s: float) 
 
 @inline
 def _folded(r: Reduced, ca: float, sa: float, f: float) -> tuple[float, bool]:
-    """Outer root of the convex E_fold on the side of the branch, by Newton's method from outside."""
+    """Find the outer root of the convex E_fold on the side of the branch, by Newton's method from outside."""
     # A product instead of b^2 - (f cos alpha)^2, which would cancel where the two are nearly equal.
     far = (r.b - f * ca) * (r.b + f * ca)
     s = f * sa + r.branch * math.sqrt(max(far, 0.0))
@@ -126,7 +126,7 @@ def _folded(r: Reduced, ca: float, sa: float, f: float) -> tuple[float, bool]:
 
 @inline
 def _extended(r: Reduced, ca: float, sa: float, f: float, folded: float) -> tuple[float, bool]:
-    """Root of E_ext between the folded position and the reach of crank and coupler: Newton kept in the bracket."""
+    """Find the root of E_ext between the folded position and the reach a + b, by Newton's method in the bracket."""
     inner, reach = folded, r.a + r.b
     outer = f * sa + r.branch * math.sqrt(max((reach - f * ca) * (reach + f * ca) - r.e * r.e, 0.0))
     s = outer
@@ -155,7 +155,7 @@ def _extended(r: Reduced, ca: float, sa: float, f: float, folded: float) -> tupl
 
 @inline
 def _turn(angle: float) -> float:
-    """Angle in [0, 2 pi)."""
+    """Angle of an arctangent in [0, 2 pi)."""
     return angle + TWO_PI if angle < 0.0 else angle
 
 

@@ -34,7 +34,7 @@ from kernels.types import Array, Status
 
 @inline
 def reduce_design(designs: Array, i: int) -> Reduced:
-    """Constants of one design; ``valid`` is false for zero or negative lengths and for what is not finite."""
+    """Constants of one design; ``valid`` is false for zero or negative lengths and for numbers that are not finite."""
     unit, per_unit = unit_near(designs[i, 1])
     a, b, e, f = designs[i, 0] * per_unit, designs[i, 1] * per_unit, designs[i, 2] * per_unit, designs[i, 3] * per_unit
     return reduce_scaled(a, b, e, f, designs[i, 4], designs[i, 5], unit)
@@ -94,7 +94,7 @@ def joints(designs: Array, cos_phi: Array, sin_phi: Array, motion: Array, per_po
             r[21], r[22], r[23] = root / b, ds, d2s
 
 
-# Pose outputs, each (n, m), and joints (6, n, m); what is None is not computed.
+# Pose outputs, each (n, m), and joints (6, n, m); outputs of None are not computed.
 Outputs = namedtuple("Outputs", "s ds d2s d3s discriminant pressure_angle joints")
 
 
@@ -110,7 +110,7 @@ def poses(designs: Array, cos_phi: Array, sin_phi: Array, status: Status, out: O
     designs : (n, 6) columns as `PARAMETERS` of sweep/families/rssp.py
     cos_phi, sin_phi : (n, m), or (1, m) shared by all designs
     status : (n, m) out; OK, NOT_ASSEMBLED, DEAD_POINT or INVALID_INPUT
-    s ... pressure_angle : (n, m) out [length; rad], or None: what is None is neither computed nor compiled
+    s ... pressure_angle : (n, m) out [length; rad], or None: then it is neither computed nor compiled
     joints : (6, n, m) out, crank pin x y z and slider ball x y z, or None
 
     Notes
@@ -146,7 +146,7 @@ def poses(designs: Array, cos_phi: Array, sin_phi: Array, status: Status, out: O
                 write(out.d3s, i, j, three * r.unit)
 
 
-BAND = 4.0 * EPS  # what rounding the given numbers does to Q: a dead point made in float64 is still one
+BAND = 4.0 * EPS  # effect of rounding the given numbers on Q: a dead point rounded to float64 is still one
 
 
 @kernel

@@ -104,7 +104,7 @@ def _dip(c: Constants, u: Any, v: Any) -> tuple[Any, Any, Any]:
 
 @inline
 def _travel_blur(c: Constants, u: Any, v: Any, x1: Any, x2: Any, x3: Any) -> tuple[Any, ...]:
-    """Errors of Q and of its derivatives, handed on through w w' = Q'/2 and its derivatives."""
+    """Estimate rounding errors of s and its derivatives, from those of Q by w w' = Q'/2 and its derivatives."""
     m, n, q = place(c, u, v)
     root = math.sqrt(largest(q, 1e-300))
     per_w = 1.0 / root
@@ -146,7 +146,7 @@ PLANAR_FORM = Form(
 
 @kernel
 def opening(designs: Array, status: Status, distance: Array) -> None:
-    """Tell whether the crank of a slider-crank by itself turns, and how near its motion's nearest singularity is.
+    """Decide whether the crank of a single slider-crank turns, and find the distance of the nearest singularity.
 
     Parameters
     ----------

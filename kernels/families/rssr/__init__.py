@@ -1,10 +1,10 @@
 """Spatial crank-rocker with two revolute and two ball joints (RSSR); planar four-bar for alpha = 0, f = g.
 
 ``closure`` reduces a design to its constants and has its transfer functions, ``motion`` evaluates poses (``precise`` in
-twice the working precision),
-``dense`` sweeps a grid of crank angles, ``margin`` decides rotatability, ``limits`` finds the limit positions,
-``maxima`` the true maxima over the turn, and ``certify`` proves them, and those of a guided point that crank-rockers in
-series drive, on the enclosures of ``driven``.
+twice the working precision) and sweeps a grid of crank angles, ``block`` decides rotatability, ``limits`` finds the
+limit positions, ``maxima`` the true maxima over the turn, and ``certify`` proves them, and those of a guided point that
+crank-rockers in series drive, on the enclosures of ``driven``.  ``stage`` holds the closures for fused chains.
+``proof`` searches boxes of designs (``box_*``).
 """
 
 from kernels.families.rssr.block import margin as margin

@@ -30,8 +30,8 @@ from kernels.jit import inline, kernel
 from kernels.linkage.verdict import turning_status
 
 BLOCK = 64
-# From nearer than _NEAR one step of Newton's method reaches the minimum as well as float64 shows.  Farther are flat
-# ones, after two steps from the lowest of 16 points.  They, and what is not _SURE to be the global one, are done again.
+# Within _NEAR of a minimum one step of Newton's method reaches it to the precision of float64.  Two steps from the
+# lowest of 16 points end farther from flat minima.  These, and minima not _SURE to be global, are searched again.
 _NEAR, _SURE = 1e-5, 1e-4
 # Rows: the fields of Reduced, the polynomial of Delta, its minimum.  During loading they hold the design itself.
 E, Y0, CA, K0, K1, K2, W_SIZE, COUPLER, ROCKER, Z0, SA, BRANCH, VALID = (k * BLOCK for k in range(13))
@@ -41,13 +41,13 @@ ROWS = 24
 
 @inline
 def new_block() -> Array:
-    """Memory for one block."""
+    """Allocate one block."""
     return np.empty(ROWS * BLOCK)
 
 
 @inline
 def load_block(designs: Array, start: int, count: int, at: Array) -> None:
-    """Reduce the designs start ... start + count - 1."""
+    """Reduce the designs start ... start + count - 1 into a block."""
     scaled = False
     for k in range(count):
         i = start + k
@@ -55,7 +55,7 @@ def load_block(designs: Array, start: int, count: int, at: Array) -> None:
         at[k + K0], at[k + K1], at[k + K2] = designs[i, 3], designs[i, 4], designs[i, 5]
         at[k + W_SIZE], at[k + COUPLER] = designs[i, 6], designs[i, 7]
         scaled |= not within_unit_range(designs[i, 2])
-    if scaled:  # apart, because next to none are
+    if scaled:  # apart, because it is rarely needed
         for k in range(count):
             unit = unit_scale(at[k + CA])
             for row in (E, Y0, CA, K0, K1, K2):
@@ -77,7 +77,7 @@ def load_block(designs: Array, start: int, count: int, at: Array) -> None:
 
 @inline
 def least_delta(count: int, at: Array) -> None:
-    """Compute the smallest Delta of the turn in squared crank units, where it is, and how well it is known.
+    """Compute the smallest Delta of the turn in squared crank units, its place, and the bound of its rounding error.
 
     The bound of the rounding error is from standard error analysis (docs/rssr.md, section 4.2): the numbers of the
     closure carry errors of at most 5 (X), 7 (Y) and 18 (W) units of 2^-53 of their terms, the unit length of (cos, sin)
@@ -102,11 +102,11 @@ def least_delta(count: int, at: Array) -> None:
 
 @inline
 def _evaluate(at: Array, k: int) -> None:
-    """Compute the Delta at the minimum next to the place given, and whether that was too far from it."""
+    """Compute Delta at the minimum next to the given place, and mark designs whose place is too far from it."""
     u, v, e, y0, ca = at[k + COS], at[k + SIN], at[k + E], at[k + Y0], at[k + CA]
     k0, k1, k2 = at[k + K0], at[k + K1], at[k + K2]
-    # The expanded coefficients only place the minimum; its value comes from X, Y, W themselves, and its slope there
-    # takes off what is left of the way to it.
+    # The expanded coefficients only place the minimum; its value comes from X, Y, W themselves, and the slope there
+    # corrects for the remaining distance.
     x, y, w = closure_terms(e, y0, ca, k0, k1, k2, u, v)
     slope = x * v + y * ca * u - w * (k1 * u + k2 * v)
     curvature = -(at[k + C1] * u + at[k + S1] * v) - 4.0 * (
@@ -129,12 +129,12 @@ def _evaluate(at: Array, k: int) -> None:
 
 @inline
 def singularity_distance(count: int, at: Array) -> None:
-    """Write into ACROSS, to leading order, how far [rad] the motion's nearest singularity is from the real axis.
+    """Write the distance [rad] of the motion's nearest singularity from the real axis to ACROSS, to leading order.
 
-    It sets how finely the motion must be sampled.  Singular are the complex zeros of Delta (its second minimum, where
-    there is one, counts too) and those of R = X^2 + Y^2, where the crank pin would lie on the rocker axis: X + i Y = 0
-    puts the point (e, y0) on an ellipse confocal with that of the crank pin, and the difference of their elliptic
-    coordinates is the distance.
+    It sets the spacing of samples.  Singularities are the complex zeros of Delta (its second minimum, where there is
+    one, counts too) and those of R = X^2 + Y^2, where the crank pin would lie on the rocker axis: X + i Y = 0 puts the
+    point (e, y0) on an ellipse confocal with that of the crank pin, and the difference of their elliptic coordinates is
+    the distance.
     """
     for k in range(count):
         c1, s1, c2, s2 = at[k + C1], at[k + S1], at[k + C2], at[k + S2]
@@ -182,19 +182,19 @@ def margin(
     max_pressure_angle : (n,) out [rad]; nan unless rotatable
     phi_min : (n,) out [rad], crank angle in (-pi, pi] of the least Delta
     error : (n,) out, bound of the rounding error of ``margin``
-    angle_error : (n,) out [rad], what ``error``, which it needs, does to ``max_pressure_angle``; nan as that is
+    angle_error : (n,) out [rad], error of ``max_pressure_angle`` due to ``error``, which it needs; nan where that is
 
     Notes
     -----
-    What is None is neither computed nor compiled.  Where the least Delta is farther from zero than the error bound of
-    :func:`least_delta`, the verdict is that of exact arithmetic on the given doubles.
+    Outputs of None are neither computed nor compiled.  Where the least Delta is farther from zero than the error bound
+    of :func:`least_delta`, the verdict is that of exact arithmetic on the given doubles.
     """
     at = new_block()
     for start in range(0, designs.shape[0], BLOCK):
         count = min(BLOCK, designs.shape[0] - start)
         load_block(designs, start, count, at)
         least_delta(count, at)
-        # Parts of the outputs, of which the index is that of the loop alone: else each number is written by itself.
+        # Slices of the outputs, so that the index is the loop variable alone: else numbers are written one by one.
         codes = status[start : start + count]
         for k in range(count):
             codes[k] = turning_status(at[k + DELTA], at[k + TOLERANCE], at[k + VALID] != 0.0)

@@ -1,7 +1,7 @@
 """Boxes of crank-rockers on the locus whose axes are given, by e, f, g, alpha and phi_ext.
 
-docs/synthesis.md, (1)-(7).  What vanishes where a design ceases to exist stands in numerators, so a box across such a
-place can still be told to hold no mechanism: rho1 = n1/det, X1 = nx/det, Y1 = ny/det, a = crank/total.
+docs/synthesis.md, (1)-(7).  Factors that vanish where a design ceases to exist stand in numerators, so a box across
+such a place can still be proven to hold no mechanism: rho1 = n1/det, X1 = nx/det, Y1 = ny/det, a = crank/total.
 """
 
 from __future__ import annotations
@@ -46,7 +46,7 @@ def recorded() -> bt.Formulas:
     start = bt.LimitPositions(total, crank, n1, nx, ny, e, fs, ca, u1, v1)
     found = {bt.PASSED: bt.arrival(tape, start)}
     tape.end()
-    tape.end()  # FREE: by the axes no crank has a length of its own
+    tape.end()  # FREE: empty, as with given axes the crank's length is never a variable
     sign = tape.new()
     rocker, per_det = rocker2.root(), det.inverse()
     per_rocker = rocker.inverse()

@@ -29,7 +29,7 @@ STEP = 2.0 * math.pi / POSES
 
 @kernel
 def _centre_curve(p: BoxQuestion, f: Formulas, at: Array, height: Array, neck: Array) -> None:
-    """Objective with its sign, and Delta/b^2, of the centre design at POSES crank angles; for the choice of rows."""
+    """Compute objective with sign and Delta/b^2 of the centre design at POSES crank angles, to choose the rows."""
     place = f.slots[bt.CENTRES :]
     a, e, fs, aca = middle(at, place[0]), middle(at, place[1]), middle(at, place[2]), middle(at, place[3])
     k0, k1, k2, b2 = middle(at, place[4]), middle(at, place[5]), middle(at, place[6]), middle(at, place[7])
@@ -54,14 +54,14 @@ def _centre_curve(p: BoxQuestion, f: Formulas, at: Array, height: Array, neck: A
 
 @inline
 def _summit(below: float, here: float, above: float) -> float:
-    """Where a parabola through three values one apart has its summit, counted from the middle one."""
+    """Place of the summit of a parabola through three values one apart, counted from the middle one."""
     bend = below - 2.0 * here + above
     return 0.5 * (below - above) / bend if bend < 0.0 else 0.0
 
 
 @inline
 def _next_peak(height: Array, sign: float, used: Flags) -> int:
-    """Highest local maximum of sign * height that was not used; -1 where there is none."""
+    """Find the highest local maximum of sign * height not used yet; -1 where there is none."""
     found = -1
     for i in range(POSES):
         here = sign * height[i]
@@ -90,7 +90,7 @@ def _at_angle(f: Formulas, rows: BoxScratch, theta: float) -> None:
 def peak_rows(
     p: BoxQuestion, f: Formulas, rows: BoxScratch, count: int, height: Array, neck: Array, used: Flags
 ) -> int:
-    """Return the number of rows with those of pressure angle and objective, at the peaks of the centre design."""
+    """Add rows of pressure angle and objective at the peaks of the centre design; return the number of rows."""
     _centre_curve(p, f, rows.at, height, neck)
     used[:] = 0
     for _ in range(NECKS):

@@ -1,4 +1,4 @@
-"""What is asked of boxes of crank-rockers on the locus, the kinds of their rows, and the room to judge a box in."""
+"""Question about boxes of crank-rockers on the locus, the kinds of their rows, and the scratch to judge a box."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ LARGE = 1e30
 
 
 class BoxQuestion(NamedTuple):
-    """What is asked of a design on the locus."""
+    """Objective, limits and target for designs on the locus."""
 
     branch: float
     order: int  # 2: |psi''|, 1: |psi'|, 0: sin^2 of the pressure angle
@@ -52,7 +52,7 @@ class BoxScratch(NamedTuple):
 
 @kernel
 def room(forms: int, n: int) -> BoxScratch:
-    """Return the room for boxes of ``n`` variables."""
+    """Allocate the scratch for boxes of ``n`` variables."""
     return BoxScratch(
         np.zeros((forms, width(n))), np.zeros((MOST_ROWS, width(n))), np.zeros(MOST_ROWS, np.int64),
         np.zeros(MOST_ROWS), np.zeros(MOST_ROWS, np.uint8), np.zeros(MOST_ROWS),
@@ -62,7 +62,7 @@ def room(forms: int, n: int) -> BoxScratch:
 
 @kernel
 def inputs(p: BoxQuestion, centre: Array, half: Array, varied: Array, given: Array, at: Array) -> None:
-    """Compute the inputs of the formulas: coordinates number ``varied[k]`` vary, the others are given."""
+    """Write the inputs of the formulas: the coordinates of number ``varied`` span the box, the others are given."""
     for j in range(bt.COORDINATES):
         constant(at, j, given[j], given[j])
     for k in range(varied.shape[0]):
@@ -76,19 +76,19 @@ def inputs(p: BoxQuestion, centre: Array, half: Array, varied: Array, given: Arr
 
 @kernel
 def take(rows: BoxScratch, count: int, form: int, kind: int, theta: float, sign: float) -> int:
-    """Return the number of rows after a form, or its negative, was copied to them."""
+    """Copy a form, or its negative, to the rows; return the number of rows."""
     last = rows.at.shape[1] - 1
     for j in range(last):
         rows.forms[count, j] = sign * rows.at[form, j]
     rows.forms[count, last] = rows.at[form, last]
     rows.kinds[count], rows.theta[count], rows.objective[count] = kind, theta, kind in (ABOVE, BELOW)
-    # a form without a bound says nothing, and would spoil the linear program
+    # a form without a bound proves nothing, and would spoil the linear program
     return count + 1 if rows.at[form, last] < LARGE else count
 
 
 @kernel
 def angle_inputs(at: Array, cosine: int, angle: float) -> None:
-    """Compute the cosine and sine of a given angle as two inputs.
+    """Write the cosine and sine of a given angle as two inputs.
 
     :func:`sincos` errs by less than a unit of its last place, so the intervals hold the exact sine and cosine.
     """
@@ -99,13 +99,13 @@ def angle_inputs(at: Array, cosine: int, angle: float) -> None:
 
 @inline
 def middle(at: Array, form: int) -> float:
-    """Return a number of the design at the centre of the box."""
+    """Value of a form for the design at the centre of the box."""
     return float(at[form, VALUE])
 
 
 @kernel
 def acceptance_rows(p: BoxQuestion, f: Formulas, rows: BoxScratch) -> int:
-    """Return the number of the first rows: acceptance tests, and limits that are known without a division."""
+    """Write the first rows, acceptance tests and limits that are known without a division; return their number."""
     count = 0
     for kind in range(LIMITED):
         count = take(rows, count, f.slots[bt.ACCEPTANCE + kind], kind, 0.0, 1.0)
@@ -114,7 +114,7 @@ def acceptance_rows(p: BoxQuestion, f: Formulas, rows: BoxScratch) -> int:
 
 @kernel
 def limit_rows(p: BoxQuestion, f: Formulas, rows: BoxScratch, count: int, first: int, last: int) -> int:
-    """Return the number of rows with the limits number ``first`` to ``last`` - 1, where there are such."""
+    """Add the rows of the limits number ``first`` to ``last`` - 1 that are finite; return the number of rows."""
     for k in range(2 * first, min(2 * last, p.limits.shape[0])):
         if abs(p.limits[k]) < math.inf:
             count = take(rows, count, f.slots[LIMITED + k], LIMITED + k, 0.0, 1.0)

@@ -1,14 +1,14 @@
-"""The rows of a box of crank-rockers on the locus, and what they say of it together.
+"""The rows of a box of crank-rockers on the locus, and the verdict that they prove together.
 
 Rows of the objective are +-psi'' (or +-psi', or sin^2 of the pressure angle) at crank angles counted from the extended
 position; rows of limits are those of the acceptance tests of docs/synthesis.md, of the pressure angle and of the links,
-multiplied by what keeps them finite, and those of the arrival.  What costs little is tried first: most boxes fall by
-limits and arrival alone.
+multiplied by factors that keep them finite, and those of the arrival.  Cheap rows are tried first: most boxes are
+decided by limits and arrival alone.
 
-The rows of the arrival hold for designs whose acceleration reaches the target: the rocker is where it can be in time.
-Between its limits it goes from rest to rest, so its angle stays in a tube (:mod:`kernels.boxes.tube`).  Whether it does
-is told by the sign of F(phi, psi) on the tube's sides, without solving for psi: a polynomial, where psi'' is a quotient
-of roots.  So these rows decide boxes far larger than rows of psi'' do.  Where rho1 + rho2 may vanish the crank's length
+The rows of the arrival hold for designs whose acceleration reaches the target.  Between its limits the rocker goes from
+rest to rest, so its angle stays in a tube (:mod:`kernels.boxes.tube`).  The sign of F(phi, psi) on the tube's sides
+tells whether it does, without solving for psi: F is a polynomial, where psi'' is a quotient of roots.  So these rows
+decide boxes far larger than rows of psi'' do.  Where rho1 + rho2 may vanish the crank's length
 is not known from the limit positions.  There it is a further variable between its own limits: F is linear in it, and
 a (rho1 + rho2) = crank of the locus gives two more rows.
 """
@@ -44,7 +44,7 @@ from kernels.types import Array
 
 @kernel
 def _passed(start: Array, pose: Array, side: int, total: float, crank: float) -> float:
-    """Return F at a pose of the tube for the design at the centre, times ``total``; for the choice of rows."""
+    """Evaluate F at a pose of the tube for the design at the centre, times ``total``, to choose the rows."""
     n1, x1, y1, e, fs, ca, u1, v1 = start[0], start[1], start[2], start[3], start[4], start[5], start[6], start[7]
     c, s, turn_c, turn_s = pose[COSINES], pose[COSINES + 1], pose[COSINES + 2 * side], pose[COSINES + 2 * side + 1]
     u, v = u1 * c - v1 * s, v1 * c + u1 * s
@@ -54,7 +54,7 @@ def _passed(start: Array, pose: Array, side: int, total: float, crank: float) ->
 
 @kernel
 def _worst(p: BoxQuestion, start: Array, group: int, total: float, crank: float) -> int:
-    """Pose at which the centre design is farthest out of one side of the tube on one stroke; -1 for none."""
+    """Find the pose where the centre design is farthest out of one side of the tube on one stroke; -1 for none."""
     stroke, side = p.tube.shape[0] // 2, LOW + group % 2
     sign = p.branch if side == HIGH else -p.branch
     found, lowest = -1, math.inf
@@ -70,7 +70,7 @@ def _worst(p: BoxQuestion, start: Array, group: int, total: float, crank: float)
 def _put(
     p: BoxQuestion, f: Formulas, rows: BoxScratch, count: int, i: int, side: int, part: int, slot: int, kind: int
 ) -> int:
-    """Return the number of rows after one was added; ``kind`` is that of the side ahead, the next one that behind."""
+    """Add the row of a pose; return the number of rows.  ``kind`` is for the side ahead, the next kind for behind."""
     angle_inputs(rows.at, bt.COS_THETA, p.tube[i, THETA])
     angle_inputs(rows.at, bt.COS_TURN, p.tube[i, side])
     run(f.operations, f.factors, f.ends, part, rows.at, rows.ones.shape[0])
@@ -80,14 +80,14 @@ def _put(
 
 @kernel
 def _centre(f: Formulas, rows: BoxScratch, start: Array) -> None:
-    """Compute n1, X1, Y1, e, f sa, ca, u1, v1 of the design at the centre."""
+    """Write n1, X1, Y1, e, f sa, ca, u1, v1 of the design at the centre."""
     for k in range(8):
         start[k] = middle(rows.at, f.slots[bt.STARTS + 2 + k])
 
 
 @kernel
 def arrival_rows(p: BoxQuestion, f: Formulas, rows: BoxScratch, count: int, start: Array) -> int:
-    """Return the number of rows with those that a design with the target keeps, one per stroke and side of the tube."""
+    """Add the rows that a design with the target keeps, one per stroke and side; return the number of rows."""
     _centre(f, rows, start)
     total, crank = middle(rows.at, f.slots[bt.STARTS]), middle(rows.at, f.slots[bt.STARTS + 1])
     for group in range(4):
@@ -99,7 +99,7 @@ def arrival_rows(p: BoxQuestion, f: Formulas, rows: BoxScratch, count: int, star
 
 @kernel
 def free_crank_rows(p: BoxQuestion, f: Formulas, rows: BoxScratch, count: int, start: Array) -> int:
-    """Return the number of rows with those of the tube and of the locus for a crank whose length is a variable.
+    """Add the rows of tube and locus for a crank whose length is a variable; return the number of rows.
 
     The poses are the worst of the centre design with its shortest, middle and longest crank.
     """
@@ -118,7 +118,7 @@ def free_crank_rows(p: BoxQuestion, f: Formulas, rows: BoxScratch, count: int, s
 
 @inline
 def _single(rows: BoxScratch, start: int, count: int) -> int:
-    """Return a row of limits from ``start`` on that is negative on the whole box; -1 where there is none."""
+    """Find a row of limits from ``start`` on that is negative on the whole box; -1 where there is none."""
     found = -1
     for j in range(start, count):
         if not rows.objective[j] and surely_negative(rows.forms, j, rows.ones.shape[0], rows.total):
@@ -128,7 +128,7 @@ def _single(rows: BoxScratch, start: int, count: int) -> int:
 
 @inline
 def _doubtful(rows: BoxScratch, count: int, n: int) -> int:
-    """Row of limits that is nearest to being negative on the whole box, in units of its spread."""
+    """Find the row of limits that is nearest to being negative on the whole box, in units of its spread."""
     found, lowest = -1, math.inf
     for j in range(count):
         if not rows.objective[j]:
@@ -141,10 +141,10 @@ def _doubtful(rows: BoxScratch, count: int, n: int) -> int:
 
 @inline
 def _lengths(f: Formulas, rows: BoxScratch) -> bool:
-    """Lengths of the designs; false where a divisor may vanish, or the crank."""
+    """Compute the lengths of the designs; false where a divisor, or the crank's length, may vanish."""
     at, n = rows.at, rows.ones.shape[0]
     if f.slots[bt.SIGN] >= 0:
-        sign = 1.0 if at[f.slots[bt.SIGNED], VALUE] > 0.0 else -1.0  # where it is not known, this part ends anyway
+        sign = 1.0 if at[f.slots[bt.SIGNED], VALUE] > 0.0 else -1.0  # where it is not known, the run of this part fails
         constant(at, f.slots[bt.SIGN], sign, sign)
     if not run(f.operations, f.factors, f.ends, bt.LENGTHS, at, n):
         return False
@@ -153,7 +153,7 @@ def _lengths(f: Formulas, rows: BoxScratch) -> bool:
 
 @inline
 def _by_target(rows: BoxScratch, count: int) -> bool:
-    """Whether the multipliers use rows that only designs with the target keep."""
+    """Whether the multipliers use rows that hold only for designs with the target."""
     found = False
     for j in range(count):
         found = found or (rows.kinds[j] >= AHEAD and rows.factors[j] != 0.0)
@@ -162,7 +162,7 @@ def _by_target(rows: BoxScratch, count: int) -> bool:
 
 @inline
 def _emptied(p: BoxQuestion, rows: BoxScratch, count: int) -> tuple[int, int, float]:
-    """Return what contradicting limits prove: no feasible design, or none with the target."""
+    """Verdict by contradicting limits: no feasible design, or none with the target."""
     if _by_target(rows, count):
         return BOUND, count, p.target
     return EMPTY, count, math.inf
@@ -176,7 +176,7 @@ def crank_known(f: Formulas, rows: BoxScratch) -> bool:
 
 @kernel
 def _limits_alone(p: BoxQuestion, rows: BoxScratch, count: int) -> bool:
-    """Whether the rows of limits contradict each other on the box; ``rows.factors`` tell how."""
+    """Whether the rows of limits contradict each other on the box; ``rows.factors`` combine them to the proof."""
     single = _single(rows, 0, count)
     if single >= 0:
         rows.factors[:] = 0.0
@@ -193,7 +193,7 @@ def _best(rows: BoxScratch, count: int) -> tuple[float, bool]:
 
 @inline
 def _undecided(rows: BoxScratch, count: int) -> None:
-    """Compute what each variable's width costs the row of limits that is nearest to a decision."""
+    """Compute how much each variable's width loosens the row of limits that is nearest to a decision."""
     rows.factors[:] = 0.0
     rows.factors[_doubtful(rows, count, rows.ones.shape[0])] = 1.0
     looseness(rows.forms, rows.factors, count, rows.ones.shape[0], rows.total, rows.loose)
@@ -204,9 +204,9 @@ def judge(
     p: BoxQuestion, f: Formulas, low: Array, high: Array, varied: Array, given: Array, rows: BoxScratch, scratch: Array,
     used: Flags,
 ) -> tuple[int, int, float]:  # fmt: skip
-    """Return what can be said of one box: outcome, number of rows, and the bound of the objective.
+    """Judge one box: outcome, number of rows, and the bound of the objective.
 
-    The outcome is BOUND, EMPTY or OPEN; ``rows.factors`` combine the rows to what it says.
+    The outcome is BOUND, EMPTY or OPEN; ``rows.factors`` combine the rows to its proof.
     """
     n = low.shape[0]
     centre, half, height, neck = scratch[0, :n], scratch[1, :n], scratch[2], scratch[3]
@@ -259,9 +259,9 @@ def judge(
 def judge_any_crank(
     p: BoxQuestion, f: Formulas, low: Array, high: Array, varied: Array, given: Array, rows: BoxScratch, scratch: Array
 ) -> tuple[int, int, float]:
-    """Return what can be said of a box where the crank's length does not follow from the place, as :func:`judge`.
+    """Judge a box as :func:`judge` does, where the crank's length does not follow from the place.
 
-    ``rows`` is room for one variable more than the box has: the crank's length between its limits.
+    ``rows`` is scratch for one variable more than the box has: the crank's length between its limits.
     """
     n = low.shape[0]
     centre, half, start = scratch[0, : n + 1], scratch[1, : n + 1], scratch[2]

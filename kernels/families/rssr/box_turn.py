@@ -1,4 +1,4 @@
-"""What the formulas of a box of crank-rockers have in common: inputs, rows, and the motion over the turn.
+"""Common parts of the formulas for boxes of crank-rockers: inputs, rows, and the motion over the turn.
 
 A box is a set of designs on the locus of limit positions, where swing and phi0 hold exactly (docs/synthesis.md).  The
 motion is that of docs/rssr.md, (1)-(4), in the given unit of length, at crank angles counted from the extended
@@ -26,7 +26,7 @@ INPUTS = LIMITS + 2 * MOST_LIMITED
 # Parts of the tape, in the order in which they run.
 PLACE, ARRIVAL, FREE, LENGTHS, CLOSURE, ANGLE, MOTION = range(7)
 
-# Where the forms stand that the rows of a box are made of.
+# Slots of the forms from which the rows of a box are made.
 ACCEPTANCE = 0  # five: both distances from the crank axis, order of the limits, crank, branch at both limits
 LIMITED = 5  # two per length: above its least, below its most
 PRESSURE, SIN2, PSI1, PSI2, SIGNED, SIGN, CRANK, PASSED, FREE_PASSED, FREE_CRANK = range(15, 25)
@@ -35,18 +35,18 @@ SLOTS = STARTS + 10
 
 
 class Formulas(NamedTuple):
-    """A recorded tape, and where its results stand: the numbers of forms, -1 where there is none."""
+    """Recorded tape, and the forms of its results in ``slots``, -1 where there is none."""
 
     operations: Operations
     factors: Array
     ends: Operations
     slots: Operations
     forms: int
-    early: int  # so many lengths have limits that are known without a division
+    early: int  # number of lengths whose limits are known without a division
 
 
 class LimitPositions(NamedTuple):
-    """The numbers that fix the motion in the limit positions: rho1, X1, Y1 and the crank are ratios.
+    """Numbers that fix the motion in the limit positions: rho1, X1, Y1 and the crank are ratios of them.
 
     ``total`` is rho1 + rho2 and ``crank`` a times it; ``total``, ``n1``, ``x1``, ``y1`` share a further factor.
     """
@@ -64,7 +64,7 @@ class LimitPositions(NamedTuple):
 
 
 class Linkage(NamedTuple):
-    """The numbers of a design that its motion needs; ``k0, k1, k2`` are those of W = k0 + k1 v - k2 u."""
+    """Numbers of a design that its motion needs; ``k0, k1, k2`` are those of W = k0 + k1 v - k2 u."""
 
     one: Number
     a: Number
@@ -80,7 +80,7 @@ class Linkage(NamedTuple):
 
 
 def arrival(tape: Tape, at: LimitPositions) -> Number:
-    """Record what tells whether the rocker has passed a given angle at a crank angle.
+    """Record the number whose sign tells whether the rocker has passed a given angle at a crank angle.
 
     It is F(phi, psi) of docs/rssr.md, (1), times ``branch`` and times numbers that are positive in a mechanism, from
     the equation of displacements, (15) of docs/synthesis.md.  There xi - rho1, the way of the ball along the crank, is
@@ -123,14 +123,14 @@ def turn(tape: Tape, at: Linkage) -> dict[int, Number]:
 
 
 def constant_of_closure(at: Linkage, cos1: Number, sin1: Number) -> Number:
-    """Return k0, from X C - Y S + W = 0 at the extended position; the linkage's own k0 is not used."""
+    """Record k0, from X C - Y S + W = 0 at the extended position; the linkage's own k0 is not used."""
     w1 = (at.fs + at.ac * at.v1) * sin1 - (at.e - at.a * at.u1) * cos1
     return w1 - (at.k1 * at.v1 - at.k2 * at.u1)
 
 
 def sense(tape: Tape, total: Number, crank: Number, e: Number, fs: Number, ca: Number, u: Number, v: Number,
           x: Number, y: Number) -> Number:  # fmt: skip
-    """Return T of a limit position with the sign of the branch, times ``total``, for a crank of length crank/total.
+    """Record T of a limit position with the sign of the branch, times ``total``, for a crank of length crank/total.
 
     It is positive where the limit lies on the branch; x, y are the ball's coordinates about the rocker axis.
     """
@@ -138,7 +138,7 @@ def sense(tape: Tape, total: Number, crank: Number, e: Number, fs: Number, ca: N
 
 
 def within(tape: Tape, number: int, value: Number, unit: Number, power: int = 1) -> tuple[Number, Number]:
-    """Rows value - least^power unit >= 0 and most^power unit - value >= 0 of a limited length."""
+    """Record the rows value - least^power unit >= 0 and most^power unit - value >= 0 of a limited length."""
     least, most = tape.input(LIMITS + 2 * number), tape.input(LIMITS + 2 * number + 1)
     if power == 2:
         least, most = least.square(), most.square()
@@ -150,7 +150,7 @@ def formulas(
     limits: Sequence[tuple[Number, Number]], early: int, start: LimitPositions,
     signs: tuple[Number, Number] | None = None,
 ) -> Formulas:  # fmt: skip
-    """Return the recorded tape with its table of forms.
+    """Collect the recorded tape and the table of its forms.
 
     Parameters
     ----------

@@ -69,13 +69,13 @@ def _gap(phi: float, centre: float) -> float:
 def careful_maximum(
     order: int, of: Loop, phi1: float, rho1: float, phi2: float, rho2: float, target: float
 ) -> tuple[float, float, float, float, bool]:
-    """Largest |d^order psi / dphi^order|, its crank angle, errors of both, and whether two marches agreed.
+    """Find the largest |d^order psi / dphi^order|, its crank angle, errors of both, and whether two marches agreed.
 
     Parameters
     ----------
     order : 1, 2 or 3
     of : the design
-    phi1, rho1, phi2, rho2 : where Delta is smallest and how far its complex zeros are there, twice [rad]
+    phi1, rho1, phi2, rho2 : crank angle of each minimum of Delta and distance of the complex zero there [rad]
     target : relative error wanted
     """
     before = -1.0

@@ -39,7 +39,7 @@ def certify_maxima(
     designs: InSeries, curves: NDArray[np.int64], target: float, most: int, status: Status, maximum: Array,
     phi: Array, error: Array, cells: Array,
 ) -> None:  # fmt: skip
-    """Prove maxima of derivatives of a rocker's angle, or of the way of a point that crank-rockers in series guide.
+    """Prove maxima of derivatives of a rocker's angle, or of the path of a point that crank-rockers in series guide.
 
     A maximum that the proof contradicts is corrected.
 
@@ -48,14 +48,14 @@ def certify_maxima(
     Parameters
     ----------
     designs : n of them
-    curves : (m, 2); of each curve whether it is the way along the line (0) or across it (1), or the velocity of the
-        first rocker (2), and the order of its derivative by phi: 1 to 3 along, 0 to 3 across, 0 to 2 of the velocity
+    curves : (m, 2); kind of each curve, travel along the line (0), deviation across it (1) or velocity of the first
+        rocker (2), and the order of its derivative by phi: 1 to 3 along, 0 to 3 across, 0 to 2 of the velocity
     target : relative error within which no other peak may be higher
     most : enclosures per design after which a curve is given up
     status : (m, n) in and out; only designs whose first one is OK are looked at; NOT_CONVERGED where nothing is proven
-    maximum, phi : (m, n) in and out [length; rad], what a search found and where; replaced where the proof contradicts
+    maximum, phi : (m, n) in and out [length; rad], maxima found by a search; replaced where the proof contradicts
     error : (m, n) out [length], proven bound of the absolute error of ``maximum``; nan where nothing is proven
-    cells : (n,) out, how many enclosures it took; 0 for what is not looked at
+    cells : (n,) out, number of enclosures; 0 for designs that are not looked at
     """
     n, count = cells.size, designs.stages.shape[0]
     rows = count * STAGE + SHARES * LANES
@@ -80,7 +80,7 @@ def certify_maxima(
         for lane in range(lanes):
             if walk[cells_of.ALONE + lane] != 0.0:
                 covering.decide(lane, good[lane] != 0.0, walk, of, target, most)
-        # Lanes that are done make room. From last to first: what moves into a free one is not done.
+        # Lanes that are done are freed, from last to first: the lane that moves into a free one is not done.
         for lane in range(lanes - 1, -1, -1):
             if walk[cells_of.MODE + lane] != cells_of.DONE:
                 continue

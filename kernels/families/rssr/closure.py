@@ -1,4 +1,4 @@
-"""One design of the spatial crank-rocker brought to its numbers, and its transfer functions at one pose.
+"""Constants of one design of the spatial crank-rocker, and its transfer functions at one pose.
 
 The numbers are those of :mod:`kernels.linkage.crank_closure`.  The transfer functions are equations (3)-(5), (5a) of
 docs/rssr.md: the one set of formulas behind the motion at given angles, the dense grid and the search for true maxima.
@@ -30,7 +30,7 @@ from kernels.types import Status as Status
 
 @inline
 def reduce_design(designs: Numbers, i: int) -> Reduced:
-    """Constants of one design; ``valid`` is false for zero or negative lengths and for what is not finite."""
+    """Constants of one design; ``valid`` is false for zero or negative lengths and for numbers that are not finite."""
     d = designs[i]
     return reduce_one((d[0], d[1], d[2], d[3], d[4], d[5], d[6], d[7]))
 
@@ -95,7 +95,7 @@ def rocker(at: ClosurePose, t: Any, per: Any) -> Rocker:
 
 @inline
 def velocity(k1: Any, k2: Any, to: Rocker, at: ClosurePose) -> First:
-    """Equation (3)."""
+    """Compute derivatives of the closure by phi, and minus psi'; equation (3)."""
     w_ph = k1 * at.u + k2 * at.v
     g_ph = w_ph - (at.v * to.c - at.hu * to.s)
     return First(w_ph, g_ph, g_ph * to.per_t)
@@ -103,7 +103,7 @@ def velocity(k1: Any, k2: Any, to: Rocker, at: ClosurePose) -> First:
 
 @inline
 def acceleration(to: Rocker, at: ClosurePose, first: First) -> Second:
-    """Equation (4)."""
+    """Second derivatives of the closure, and minus psi''; equation (4)."""
     g_phps = at.v * to.s + at.hu * to.c
     g_phph = at.w1 - (at.u * to.c + at.hv * to.s)
     # A sum instead of a product with 2: it leaves float32 what it is.
@@ -113,7 +113,7 @@ def acceleration(to: Rocker, at: ClosurePose, first: First) -> Second:
 
 @inline
 def jerk(to: Rocker, at: ClosurePose, first: First, second: Second) -> Any:
-    """Equation (5): psi''' with its own sign."""
+    """Third transfer function psi''', with its own sign; equation (5)."""
     p, q = first.p, second.q
     g_phphps, g_phpsps = at.u * to.s - at.hv * to.c, first.w_ph - first.g_ph
     by_p = p * (3.0 * g_phphps - p * (3.0 * g_phpsps + to.t * p))

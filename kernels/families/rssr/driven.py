@@ -1,6 +1,6 @@
-"""Enclosure of a crank-rocker's velocity, and of what crank-rockers in series drive: docs/rssr.md, docs/guide.md.
+"""Enclosure of a crank-rocker's velocity, and of a point driven by crank-rockers: docs/rssr.md, docs/guide.md.
 
-What they drive is a guided point, along its line and across it.
+Crank-rockers in series drive a guided point, which has a travel along its line and a deviation across it.
 
 The planar four-bar of a guide is the crank-rocker with parallel axes and all links in one plane, so each stage of the
 chain is one, its crank driven by the enclosure of the rocker before it.  The closure of the first stage is a known
@@ -49,8 +49,8 @@ from kernels.types import EPS
 
 # X, Y, W, R and Delta about one crank angle as series in s = sin z and m = 1 - cos z.
 # ``x0 + x1 s + x2 m`` is X, and Y and W alike; r0 ... r4 are the coefficients of 1, s, m, s m, m^2 in R, d0 ... d4
-# those in Delta. ``x``, ``y``, ``w``, ``square`` bound sizes, ``ex``, ``ey``, ``ew``, ``e_square``, ``e_delta`` what
-# the functions are off by.
+# those in Delta. ``x``, ``y``, ``w``, ``square`` bound sizes, ``ex``, ``ey``, ``ew``, ``e_square``, ``e_delta`` the
+# errors of the functions.
 Spread = namedtuple(
     "Spread", "x0 x1 x2 y0 y1 y2 w0 w1 w2 x y w ex ey ew square e_square e_delta r0 r1 r2 r3 r4 d0 d1 d2 d3 d4"
 )
@@ -95,7 +95,7 @@ def velocity_terms(z: Spread, ca: Any, k1: Any, k2: Any, reach: Any) -> tuple[Je
     x0, x1, x2, y0, y1, y2, w0, w1, w2 = z.x0, z.x1, z.x2, z.y0, z.y1, z.y2, z.w0, z.w1, z.w2
     x, y, w, ex, ey, ew, square, e_square = z.x, z.y, z.w, z.ex, z.ey, z.ew, z.square, z.e_square
     r0, r1, r2, r3, r4 = z.r0, z.r1, z.r2, z.r3, z.r4
-    # Sizes of the derivatives of X, Y, W, and what they are off by.
+    # Sizes of the derivatives of X, Y, W, and their errors.
     s, aca, turn = 1.18 * reach, abs(ca), abs(k1) + abs(k2)
     dx, dy, dw = 1.55 * abs(x1) + s * abs(x2), 1.55 * abs(y1) + s * abs(y2), 1.55 * abs(w1) + s * abs(w2)
     edx, edy, edw = 6.0 * EPS, 14.0 * EPS * aca, 26.0 * EPS * turn
@@ -121,12 +121,12 @@ def velocity_terms(z: Spread, ca: Any, k1: Any, k2: Any, reach: Any) -> tuple[Je
 
 
 Stages = NDArray[np.float64]
-# Rows of the numbers of a design: of each stage those of its closure; then a, b and a', b' of what it hands on,
-# a cos psi + b sin psi and a' cos psi + b' sin psi of its rocker angle, the b with the sign of the branch, and what
-# all four are off by.  That is cosine and sine of the next crank angle, at last the rocker's part of the point.
+# Rows of the numbers of a design: of each stage those of its closure; then a, b and a', b' of its outputs
+# a cos psi + b sin psi and a' cos psi + b' sin psi, the b with the sign of the branch, and the error of all four.  The
+# outputs are cosine and sine of the next crank angle, of the last stage the rocker's part of the point.
 E, Y0, CA, K0, K1, K2, W_SIZE, A1, B1, A2, B2, OFF = (k * LANES for k in range(12))
 STAGE = 12 * LANES
-# Behind the stages: the crank's part of the point, what its factors are off by, the constant across the line.
+# Behind the stages: the crank's part of the point, the error of its factors, the constant across the line, its error.
 P1, P2, P_OFF, CONSTANT, CONSTANT_OFF = (k * LANES for k in range(5))
 SHARES = 5
 # Places of jets: the crank; the closure; 1/R, which stands where the discriminant was; the point along and across the
@@ -179,7 +179,7 @@ def _first(lanes: int, r: Array, walk: Array, jets: Array) -> None:
 
 @kernel
 def _driven(lanes: int, r: Array, jets: Array) -> None:
-    """Enclose the same of a later stage from cosine and sine of its crank; the errors of the constants are of 4.2."""
+    """Enclose X, Y, W, R and the discriminant of a later stage from cosine and sine of its crank; errors as in 4.2."""
     for i in range(lanes):
         u, v = get(jets, COS + i, LANES), get(jets, SIN + i, LANES)
         e, y0, ca, k1, k2 = r[E + i], r[Y0 + i], r[CA + i], r[K1 + i], r[K2 + i]

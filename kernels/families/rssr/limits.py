@@ -46,8 +46,8 @@ FEWEST, MOST = 32, 8192  # samples of the sign of eta
 ROUNDS = 5  # steps of Newton's method, side by side
 SETTLED = 1e-7  # a last step below this share of T leaves an error of the crank angle below 2^-46 T
 Counts = NDArray[np.int64]
-# Of a root: its bracket, where it is so far, the length of the last step, the sign of eta's slope; then what the steps
-# side by side need: cosine and sine there, and the closure of its design.
+# Rows of a root: its bracket, its present place, the length of the last step, the sign of eta's slope; then, for steps
+# side by side, cosine and sine of the place, and the closure of its design.
 _LO, _HI, _PHI, _BEFORE, _RISING, _U, _V, _E, _Y0, _CA, _K0, _K1, _K2, _C = (k * 2 * BLOCK for k in range(14))
 _ROOT_ROWS = 14
 _TINY_SWING = 0.25  # below, the half-swing identity is more accurate than the difference of two angles
@@ -108,7 +108,7 @@ def _approach(count: int, roots: Array) -> None:
 
 @inline
 def _unsettled(at: Array, who: Counts, active: Counts, count: int, roots: Array) -> int:
-    """List the roots that :func:`_approach` has not settled, at the middles of their brackets; returns how many."""
+    """List the roots without convergence in :func:`_approach`, reset to mid-bracket; return their number."""
     left = 0
     for i in range(count):
         if math.isnan(roots[i + _BEFORE]):
@@ -123,7 +123,7 @@ def _unsettled(at: Array, who: Counts, active: Counts, count: int, roots: Array)
 
 @inline
 def _solve(at: Array, who: Counts, active: Counts, count: int, roots: Array) -> None:
-    """Find the zeros of eta in their brackets: Newton, bisection where it would leave the bracket or does not gain.
+    """Find the zeros of eta in their brackets by Newton steps, bisecting where a step leaves or does not gain.
 
     Every round takes one step of all roots that are left, numbers ``active[:count]``; root i is of design
     ``who[i // 2]``.  The steps of different roots do not wait for each other, so a round costs far less than its steps
@@ -161,7 +161,7 @@ def _rocker_turns(at: Array, k: int) -> bool:
 
 @inline
 def _turning_points(at: Array, k: int, n: int, begin: Array) -> int:
-    """Sample numbers after which psi' changes sign, into ``begin``; returns how many there are (at most 3 are told)."""
+    """Write the numbers of the samples after which psi' changes sign to ``begin``; return how many, 3 at most."""
     found, first, before = 0, False, False
     for i in range(n + 1):
         phi = (i % n) * (TWO_PI / n)
@@ -194,7 +194,7 @@ def _mark_turning_points(count: int, at: Array, cos: Array, sin: Array, marks: A
 
 @inline
 def _unmark(marks: float, begin: Array) -> int:
-    """Return what :func:`_turning_points` does, from the signs of :func:`_mark_turning_points`."""
+    """Find the turning points as :func:`_turning_points`, from the signs of :func:`_mark_turning_points`."""
     signs = int(marks)
     changes = signs ^ ((signs >> 1) | ((signs & 1) << (FEWEST - 1)))  # bit i: between sample i and i + 1
     begin[0] = lowest_bit(changes)
@@ -312,11 +312,11 @@ def _fill(at: Array, k: int, phi1: float, phi2: float, out: Array, error: Array 
     if abs(swing) < _TINY_SWING:
         half = math.tan(0.5 * swing)
         dc, ds = -half * (s1 + s2), half * (c1 + c2)
-    # The ball from the crank axis, and how it moves from one limit to the other: phi0 - pi without cancellation.
+    # The ball from the crank axis, and its displacement between the limits: phi0 - pi without cancellation.
     x, y, dx, dy = at[k + E] + rocker * c1, rocker * (ca * s1 - at[k + K1]), rocker * dc, rocker * ca * ds
     beyond = math.atan2(x * dy - y * dx, x * (x + dx) + y * (y + dy))
     out[0], out[1] = math.atan2(0.0 + branch * s1, c1), math.atan2(0.0 + branch * s2, c2)  # pi, never -pi
-    # psi stands still where phi is searched, so it is the better known; (8) gives phi from it.
+    # At a limit psi is stationary in phi, so psi is known better; (8) gives phi from it.
     out[2], out[3] = _wrapped(math.atan2(y, x)), _wrapped(math.atan2(-y - dy, -x - dx))
     out[4], out[5], out[6] = branch * swing, math.pi + beyond, (math.pi + beyond) / (math.pi - beyond)
     if error is not None:

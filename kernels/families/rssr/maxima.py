@@ -78,14 +78,14 @@ from kernels.types import CosSin
 
 Counts = NDArray[np.int64]
 PER_RHO, PER_RHO_JERK = 11.0, 18.0  # samples per distance of the nearest singularity, at least
-# A helper is compiled once more for a plain number that is written into its call, a type of its own: this is none.
+# A literal number in a call is a type of its own, for which a helper is compiled once more: this is no literal.
 _ZERO: Any = np.int64(0)
 _NONE = (math.nan, math.nan, math.nan, math.nan)
-_NEEDED = (E, Y0, CA, K0, K1, K2, W_SIZE, SA, C1, S1, C2, S2, COS, SIN, DELTA)  # what the search needs of a design
+_NEEDED = (E, Y0, CA, K0, K1, K2, W_SIZE, SA, C1, S1, C2, S2, COS, SIN, DELTA)  # rows that the search needs
 
 
 class Search(NamedTuple):
-    """Memory of the search of one order: samples of a block and of one design, the list of maxima, where each begins.
+    """Memory of the search of one order: samples of a block and of one design, the list of maxima, its index.
 
     The maxima of design i of a block are those from first[i] to first[i + 1] of the list.
     """
@@ -97,7 +97,7 @@ class Search(NamedTuple):
 
 
 class Places(NamedTuple):
-    """Where maxima stand, and the errors of both, (3, n) each; None for what is not wanted."""
+    """Crank angles of the maxima, errors of maxima and of angles, (3, n) each; None where not wanted."""
 
     phi: Array | None
     error: Array | None
@@ -105,7 +105,7 @@ class Places(NamedTuple):
 
 
 class Heights(NamedTuple):
-    """Maxima of the first, second and third derivative, (n,); None for what is not wanted."""
+    """Maxima of the first, second and third derivative, (n,); None where not wanted."""
 
     dpsi: Array | None
     d2psi: Array | None
@@ -119,7 +119,7 @@ def _new_search() -> Search:
 
 @inline
 def _careful(at: Array, k: int, order: int, target: float) -> tuple[tuple[float, float, float, float], bool]:
-    """Find the maximum by marching; return whether it was found, and nan if not."""
+    """Find the maximum by marching: height, place, errors of both (nan if not found), and whether it was found."""
     u, v = at[k + COS], at[k + SIN]
     c1, s1, c2, s2 = at[k + C1], at[k + S1], at[k + C2], at[k + S2] + 1e-300
     here = point(c1, s1, c2, s2, u, v)
@@ -137,9 +137,9 @@ def _careful(at: Array, k: int, order: int, target: float) -> tuple[tuple[float,
 
 @inline
 def _put(i: int, order: int, result: tuple[float, float, float, float], places: Places, heights: Heights) -> None:
-    """Write height, place and the errors of both of design i, of one order, to the heights that are given."""
+    """Write height, place and the errors of both for one order of design i, where they are wanted."""
     best, place, bound, reach = result
-    _put_in(places.phi, order, i, place - TURN * np.floor(place / TURN))  # math.floor makes an integer; nan is none
+    _put_in(places.phi, order, i, place - TURN * np.floor(place / TURN))  # math.floor makes an integer; nan has none
     _put_in(places.error, order, i, bound)
     _put_in(places.phi_error, order, i, reach)
     _put_height(heights.dpsi, i, best)
@@ -161,9 +161,9 @@ def _put_height(out: Array | None, i: int, value: float) -> None:
 
 @inline
 def _keep_what_turns(start: int, count: int, at: Array, who: Counts, status: Status) -> int:
-    """Decide which designs of the block turn and move them together; returns how many, ``who`` says which.
+    """Move the designs of a block that turn to its front; return their number.  ``who`` gets their old places.
 
-    What does not turn costs its verdict only.
+    A design that does not turn costs its verdict only.
     """
     block = 0
     for k in range(count):
@@ -181,7 +181,7 @@ def _keep_what_turns(start: int, count: int, at: Array, who: Counts, status: Sta
 @inline
 def _highest(begin: int, end: int, m: Array) -> tuple[float, float, float, float]:
     """Height, place and the errors of both of the highest refined maximum of a design."""
-    # The first and the last without a loop: few designs have more, and the processor guesses that rightly.
+    # The first and the last without a loop: few designs have more, which the processor predicts well.
     best, winner = max(m[begin + HEIGHT], 0.0), begin
     for peak in range(begin + 1, end - 1):
         winner = peak if m[peak + HEIGHT] > best else winner
@@ -196,7 +196,7 @@ def _highest(begin: int, end: int, m: Array) -> tuple[float, float, float, float
 def _list_maxima(
     block: int, at: Array, table: CosSin, of: Search, per_rho: float, first: Array | None, second: Array | None
 ) -> None:
-    """List the local maxima of a block among its samples, or more where they are needed; those of one order."""
+    """List the local maxima of one order among the samples of a block, or among more samples where needed."""
     count, (grid, size, m, first_peak) = _ZERO, of
     for i in range(block):
         first_peak[i] = count
@@ -244,9 +244,9 @@ def _maxima_of(
     """Refine the listed maxima of one transfer function of a block; exactly one height is given."""
     m, first_peak, first, second = of.m, of.first, heights.dpsi, heights.d2psi
     order = 1 if first is not None else (2 if second is not None else 3)
-    # The parabola at the end is one more; the one maximum in hundreds that is not settled then gets another three.
+    # The parabola at the end is one more step; a maximum not settled then, one in hundreds, gets another three.
     rounds = (2 if order == 1 else 3) - (1 if target > 1e-4 else 0)
-    padded = (first_peak[block] + 7) & ~7  # whole vectors; what stands in the surplus is never read
+    padded = (first_peak[block] + 7) & ~7  # whole vectors; the surplus is never read
     begin_at_vertex(padded, m)
     refine(_ZERO, padded, m, rounds, first, second)
     finish(_ZERO, padded, m, order, target, first, second, places.error, places.phi_error)
@@ -279,7 +279,7 @@ def true_maxima(
     max_abs_d2psi: Array | None,
     max_abs_d3psi: Array | None,
 ) -> None:
-    """Largest magnitudes of transfer functions over the whole turn, where they are, and estimates of their errors.
+    """Find the largest magnitudes of transfer functions over the turn, their places, and estimates of their errors.
 
     Parameters
     ----------

@@ -43,7 +43,7 @@ from kernels.jit import inline, kernel, kernel_fused
 from kernels.linkage.outputs import write
 from kernels.linkage.verdict import pose_status
 
-# Pose outputs, each (n, m), and coordinates of the crank pin B and the rocker ball C; what is None is not computed.
+# Pose outputs, each (n, m), and coordinates of the crank pin B and the rocker ball C; outputs of None are not computed.
 Outputs = namedtuple(
     "Outputs", "psi dpsi d2psi d3psi sin_psi cos_psi discriminant pressure_angle x_b y_b z_b x_c y_c z_c"
 )
@@ -60,7 +60,7 @@ def poses(designs: Numbers, cos_phi: Numbers, sin_phi: Numbers, status: Status, 
     designs : (n, 8) columns as `PARAMETERS` of sweep/families/rssr.py; complex128 for gradients by the complex step
     cos_phi, sin_phi : (n, m), or (1, m) shared by all designs; complex128 where they depend on the designs
     status : (n, m) out; OK, NOT_ASSEMBLED, DEAD_POINT, SINGULAR or INVALID_INPUT
-    psi ... z_c : (n, m) out, or None: what is None is neither computed nor compiled; complex128 if an input is
+    psi ... z_c : (n, m) out, or None: then it is neither computed nor compiled; complex128 if an input is
 
     Notes
     -----
@@ -89,7 +89,7 @@ def poses(designs: Numbers, cos_phi: Numbers, sin_phi: Numbers, status: Status, 
             sine = 0.0 - r.branch * s  # never -0.0, which would turn the angle pi into -pi
             write(out.sin_psi, i, j, sine)
             write(out.psi, i, j, arctan2(sine, -c))
-            if out.pressure_angle is not None:  # LLVM does not drop a hypotenuse that nobody wants
+            if out.pressure_angle is not None:  # LLVM does not drop a hypotenuse that is not wanted
                 # arctangent, not acos: acos loses half the digits near zero.
                 across = hypotenuse(r.rocker - at.w, r.z0 - r.sa * at.v)
                 write(out.pressure_angle, i, j, arctan2(across, t) if has_angle else math.nan)

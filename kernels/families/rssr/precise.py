@@ -1,7 +1,7 @@
 """Motion of the spatial crank-rocker for exactly the given doubles: the closure in twice the working precision.
 
 In plain arithmetic (:mod:`kernels.families.rssr.motion`) the discriminant of a short coupler, and the constant of a
-long one, are small differences of large numbers: their rounding exceeds what rounding the inputs once would do.  Here
+long one, are small differences of large numbers: their rounding error exceeds that of rounding the inputs once.  Here
 everything between the given numbers and the results is a pair of numbers (:mod:`kernels.arithmetic.double_double`).
 """
 
@@ -25,7 +25,7 @@ from kernels.linkage.verdict import pose_status
 E, Y0, CA, K0, K1, K2, RHO, Z0, SA = range(0, 18, 2)
 MX, MY, MW, VALID, BRANCH = range(18, 23)
 PRECISE_COLUMNS = 23
-BAND = 4.0 * EPS  # what rounding the given numbers does to Delta: a dead point made in float64 is still one
+BAND = 4.0 * EPS  # effect of rounding the given numbers on Delta: a dead point rounded to float64 is still one
 _ROW = 64  # designs side by side; the constant stride lets the loop over them become vector code
 
 

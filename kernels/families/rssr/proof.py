@@ -1,4 +1,4 @@
-"""Which crank-rockers on the locus cannot be better than a target: the search over boxes of them.
+"""Proof that crank-rockers on the locus are no better than a target: the search over boxes of designs.
 
 A box is halved until its rows (:mod:`kernels.families.rssr.box_rows`) prove that it holds no feasible design, or none
 that reaches the target.
@@ -24,7 +24,7 @@ NARROWEST = 1.0 / 64.0  # of the widest side
 
 
 class Leaves(NamedTuple):
-    """Boxes that were not halved: where they are and what was proven of them."""
+    """Boxes that were not halved: their ends, and what was proven of them."""
 
     low: Array  # (m, n)
     high: Array
@@ -39,7 +39,7 @@ class Leaves(NamedTuple):
 def _record(
     leaves: Leaves, count: int, low: Array, high: Array, outcome: int, bound: float, rows: BoxScratch, used: int
 ) -> int:
-    """One more leaf, with the rows that prove it."""
+    """Append a leaf with the rows that prove it; return the number of leaves."""
     leaves.low[count], leaves.high[count] = low, high
     leaves.outcome[count], leaves.bound[count] = outcome, bound
     leaves.kinds[count], leaves.theta[count], leaves.factors[count] = -1, 0.0, 0.0
@@ -54,11 +54,11 @@ def _record(
 
 @inline
 def _to_halve(low: Array, high: Array, whole: Array, smallest: float, loose: Array) -> int:
-    """Variable whose width costs the bound most, of those that are not too narrow; -1 where all are.
+    """Choose the variable to halve: the one that loosens the bound most, or -1 where all are too narrow.
 
-    One that is far narrower than the widest is not halved, so that no row that stays undecided is followed for ever.
+    A variable far narrower than the widest is not halved, so that a row that stays undecided is not pursued for ever.
 
-    Where nothing is known of the costs it is the one of the widest share.
+    Where no looseness is known, it is the variable of the widest share of the space.
     """
     best, most, widest = -1, 0.0, 0.0
     known = loose.max() > 0.0
@@ -79,22 +79,22 @@ def explore(
     p: BoxQuestion, f: Formulas, starts: tuple[Array, Array, Array], whole: Array, varied: Array, given: Array,
     smallest: float, most: int, leaves: Leaves,
 ) -> tuple[int, int]:  # fmt: skip
-    """Halve boxes until every part is proven not to reach the target, or so many parts were judged; worst parts first.
+    """Halve boxes until every part is proven not to reach the target, or ``most`` parts were judged; worst first.
 
     Parameters
     ----------
-    p, f : what is asked, and the formulas of the locus (``recorded()`` of ``box_by_axes`` or ``box_by_rocker``)
+    p, f : the question, and the formulas of the locus (``recorded()`` of ``box_by_axes`` or ``box_by_rocker``)
     starts : low and high ends of the boxes, (m, n) with n <= 4, and the bounds (m,) known of them; 0 for nothing
     whole : (n,) width of the whole space, by which widths are compared
     varied, given : (n,) which of the seven coordinates vary, and all seven
     smallest : share of ``whole`` below which a side is not halved again
-    most : parts to judge
+    most : largest number of parts to judge
     leaves : out, of at least m + most rows
 
     Returns
     -------
-    Leaves that were filled, and parts that were judged.  Leaves of outcome OPEN or TOO_SMALL are not proven; their
-    bound is what is known of them.
+    Number of leaves filled, and of parts judged.  Leaves of outcome OPEN or TOO_SMALL are not proven; their bound is
+    the best one known.
     """
     boxes, n = starts[0].shape
     rows, more = room(f.forms, n), room(f.forms, n + 1)

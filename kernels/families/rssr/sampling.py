@@ -2,10 +2,10 @@
 
 Most designs need no more than 16 samples.  Those of a block of designs are computed side by side, and their local
 maxima are marked side by side; a design that needs more samples is taken by itself.  Sets of samples are bits of one
-integer, so that what is listed costs no loop over the samples.
+integer, so that listing maxima takes no loop over the samples.
 
 All local maxima of a block of designs are refined side by side in one list: Newton steps on the next derivative, and
-what a refined maximum must keep to be trusted.
+conditions under which a refined maximum is trusted.
 """
 
 from __future__ import annotations
@@ -36,13 +36,13 @@ _ROWS = 21
 _TURNED = 4e-12  # error of an angle that is the sum of a few turns by :func:`rotate`
 # From a maximum to the samples beside it the function falls about as far as the parabola that touches it at the top.
 # If it falls by less than this share of the parabola, there may be a second maximum between the samples.
-_NEAREST, _NEXT = 0.6, 0.2  # for the sample it was found by and the two beside that
+_NEAREST, _NEXT = 0.6, 0.2  # for the sample at which it was found, and for that sample's neighbours
 _LEVEL = 1e-10  # a fall by less than this share of the height counts as none
 
 
 @inline
 def new_list() -> Array:
-    """Return room for the maxima of a block."""
+    """Allocate the list of maxima of a block."""
     return np.empty(_ROWS * CAPACITY)
 
 
@@ -107,9 +107,9 @@ def finish(
     begin: int, end: int, m: Array, order: int, target: float, first: Array | None, second: Array | None,
     error: Array | None, phi_error: Array | None,
 ) -> None:  # fmt: skip
-    """Compute the peak of the parabola through the last point, and what it adds as an error estimate.
+    """Compute the peak of the parabola through the last point, and its rise above the point as an error estimate.
 
-    Where an estimate is wanted, also the rounding error and that of the place.
+    If error estimates are wanted, also the rounding error and the error of the place.
     """
     for i in range(begin, end):
         y, dy, d2y = _jet(m, i, first, second)
@@ -134,8 +134,8 @@ def _estimate(m: Array, i: int, order: int, peak: float, step: float, across: fl
     """Write the relative rounding error of a peak and the error of its place; ``across`` is its width."""
     of = Loop(m[i + _E], m[i + _Y0], m[i + _CA], m[i + _K0], m[i + _K1], m[i + _K2], m[i + _SIZE])
     relative, slope = rounding(order, of, m[i + _U], m[i + _V], peak)
-    # What a step of Newton's method leaves is quadratic, the step before shows how much; that of the jerk has a slope
-    # good to a thousandth.
+    # The error after a step of Newton's method is quadratic in the step, with a factor estimated from the step before;
+    # for the jerk the slope is good to a thousandth.
     last = m[i + LAST]
     left = 4.0 * largest(abs(step) / m[i + _WIDTH], step * step / (last * last + 1e-300))
     left += 1e-3 if order == 3 else 0.0
@@ -143,7 +143,7 @@ def _estimate(m: Array, i: int, order: int, peak: float, step: float, across: fl
     m[i + REACH] = left * abs(step) + 4.0 * across * (relative + across * slope) + _TURNED
 
 
-_AGAIN: Any = np.int64(3)  # more steps; a plain number in the call would have `refine` compiled once more
+_AGAIN: Any = np.int64(3)  # more steps; for a literal number in the call `refine` would be compiled once more
 
 
 @kernel
@@ -151,9 +151,9 @@ def settle(
     begin: int, end: int, m: Array, order: int, target: float, first: Array | None, second: Array | None,
     error: Array | None, phi_error: Array | None,
 ) -> float:  # fmt: skip
-    """Take more steps for the maxima not trusted yet.
+    """Take more steps for the maxima not trusted yet; return the largest error estimate of all.
 
-    Returns the largest error estimate of all, infinite if one is still not trusted.
+    It is infinite if a maximum is still not trusted.
     """
     worst = 0.0
     for i in range(begin, end):
@@ -167,13 +167,13 @@ def settle(
 FEWEST, MOST = 16, 1024
 _FLOOR, MARKS = FEWEST + 2, (FEWEST + 3) * BLOCK  # two more rows under the samples of a block
 GRID_SIZE = (FEWEST + 4) * BLOCK
-# Numbers below 2048 and "and" this are themselves, and the compiler sees that they are not negative.  Otherwise it
-# would handle indices that count from the end, and gather samples one by one: twice the time.
+# Bitwise "and" with this leaves numbers below 2048 unchanged and shows the compiler that they are not negative.
+# Otherwise it would handle indices that count from the end, and gather samples one by one: twice the time.
 _NEVER_NEGATIVE = 2047
 
 
 class Samples(NamedTuple):
-    """Where samples of one design stand: ``stride`` apart, behind one at ``first``, numbers ``begin``, ... of n."""
+    """Layout of the samples of one design: ``stride`` apart, behind one at ``first``, numbers ``begin``, ... of n."""
 
     first: int
     stride: int
@@ -213,7 +213,7 @@ def sample_both(at: Array, k: int, table: CosSin, n: int, of_p: Array, of_q: Arr
 def _row(size: Array, i: int) -> Array:
     """Row i of the samples of a block.
 
-    An index into a row is seen not to be negative; one that is a sum is not, and would be written to one by one.
+    The compiler sees that an index into a row is not negative; with a sum as index it would write numbers one by one.
     """
     return size[i * BLOCK : (i + 1) * BLOCK]
 
@@ -267,7 +267,7 @@ def mark_peaks(count: int, size: Array) -> None:
 def _append_lowest(
     marks: int, at: Array, k: int, table: CosSin, size: Array, of: Samples, m: Array, count: int
 ) -> None:
-    """Append the lowest bit of ``marks``, as of :func:`list_marked`; something meaningless where there is none."""
+    """Append the maximum of the lowest bit of ``marks`` (:func:`list_marked`); a meaningless one if no bit is set."""
     i = lowest_bit(marks) & 63
     angle = (of.n - FEWEST + of.begin + i) & _NEVER_NEGATIVE
     before = (of.first + i * of.stride) & _NEVER_NEGATIVE
@@ -282,7 +282,7 @@ def list_marked(marks: int, at: Array, k: int, table: CosSin, size: Array, of: S
     Bit i stands for sample ``begin`` + i.
     """
     # Nearly all designs have one such maximum or two.  Two are written in any case, without a branch that the
-    # processor could guess wrong; what is too many the next design writes over.
+    # processor could mispredict; the next design overwrites the surplus.
     for _ in range(2):
         _append_lowest(marks, at, k, table, size, of, m, count)
         count += 1 if marks != 0 else 0

@@ -99,7 +99,7 @@ def _dip(c: Constants, u: Any, v: Any) -> tuple[Any, Any, Any]:
 
 @inline
 def _turn_blur(c: Constants, u: Any, v: Any, d1: Any, d2: Any, d3: Any) -> tuple[Any, Any, Any, Any]:
-    """As :func:`kernels.families.rssr.careful.rounding` has it, of the angle itself too."""
+    """Estimate rounding errors of the angle and its derivatives as :func:`kernels.families.rssr.careful.rounding`."""
     share, angle, terms, per_t, _ = _roundings(c, u, v)
     more = 1.0 + per_t
     first = abs(d1) * (1.5 * share + 8.0 * EPS) + terms
@@ -110,7 +110,7 @@ def _turn_blur(c: Constants, u: Any, v: Any, d1: Any, d2: Any, d3: Any) -> tuple
 
 @inline
 def _roundings(c: Constants, u: Any, v: Any) -> tuple[Any, Any, Any, Any, Any]:
-    """Relative error of Delta, error of the angle, of the terms of psi', 1/T, and absolute error of Delta."""
+    """Relative error of Delta, errors of the angle and of the terms of psi', then 1/T and absolute error of Delta."""
     x, y, w = closure_terms(c.e, c.y0, c.ca, c.k0, c.k1, c.k2, u, v)
     mx, my = abs(c.e) + 1.0, abs(c.y0) + abs(c.ca)
     tolerance = 4.0 * EPS * (abs(x) * mx + abs(y) * my + abs(w) * c.w_size)
@@ -132,7 +132,7 @@ FORM = Form("rssr", 8, None, 10, _constants, _put, _get, _turn, _travel, _dip, _
 
 @kernel
 def opening(designs: Array, status: Status, distance: Array) -> None:
-    """Tell whether the first stage of a chain turns, and how near its motion's nearest singularity is.
+    """Decide whether the first stage of a chain turns, and find the distance of its motion's nearest singularity.
 
     Parameters
     ----------
