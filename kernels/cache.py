@@ -1,7 +1,7 @@
 """numba's disk cache of machine code, kept in the folder of :mod:`kernels.cache_folder` and checked as it is read.
 
-This is the one file that derives from classes of ``numba.core``.  Where a version of numba has others, `kernels.jit`
-leaves it aside and kernels use numba's own cache inside that folder.
+This is the one file that derives from classes of ``numba.core``.  Where a version of numba has different classes,
+`kernels.jit` does without this file and kernels use numba's own cache inside that folder.
 """
 
 # mypy: disable-error-code="no-untyped-call"
@@ -21,14 +21,14 @@ from numba.core.caching import CompileResultCacheImpl, FunctionCache, IndexDataC
 
 from kernels.cache_folder import CACHE_DIR, SOURCES, locked, resolved, writable
 
-# What reading a file that is not whole raises (numba does not wait for its files to reach the disk), and one that names
-# what this process does not know: an argument's type of a module that only the writer had.
+# Exceptions of an incomplete file (numba does not wait for its files to reach the disk), and of one that names an
+# argument's type from a module which this process does not have.
 DAMAGED = (EOFError, ImportError, AttributeError)
 HASH_BYTES = hashlib.sha256().digest_size
 
 
 class _Locator:
-    """The folder of a kernel's machine code, with the methods that numba asks of such an object."""
+    """Folder of a kernel's machine code, with the methods that numba expects of a locator."""
 
     def __init__(self, function: Callable[..., Any], file: str) -> None:
         self._folder = CACHE_DIR / resolved(file).relative_to(SOURCES).with_suffix("")
@@ -36,12 +36,12 @@ class _Locator:
 
     @classmethod
     def from_function(cls, function: Callable[..., Any], file: str) -> _Locator | None:
-        """Make the folder if need be; None where it cannot be written."""
+        """Return the locator of a function, its folder made if need be; None where the folder cannot be written."""
         place = cls(function, file)
         return place if writable(place._folder) else None
 
     def get_cache_path(self) -> str:
-        """Name the folder."""
+        """Path of the folder."""
         return str(self._folder)
 
     def ensure_cache_path(self) -> None:
@@ -49,11 +49,11 @@ class _Locator:
         self._folder.mkdir(parents=True, exist_ok=True)
 
     def get_source_stamp(self) -> str:
-        """Give numba nothing to compare: the folder's name is a hash of the sources already."""
+        """Name of the cache folder, which is a hash of the sources already."""
         return CACHE_DIR.name
 
     def get_disambiguator(self) -> str:
-        """Tell functions of one name and file apart."""
+        """Line of the function, which tells functions of one name and file apart."""
         return str(self._line)
 
 
@@ -64,7 +64,7 @@ class _Implementation(CompileResultCacheImpl):
 class _CheckedFile(IndexDataCacheFile):
     """numba's index and machine code in files that begin with a hash of their name and of the rest.
 
-    What is read is run, so a changed bit and a file with the contents of another one must not be.
+    The machine code that is read is run, so a file with a changed bit or with the contents of another one is refused.
     """
 
     def _load_index(self) -> dict[Any, str]:
@@ -88,13 +88,13 @@ class _CheckedFile(IndexDataCacheFile):
 
 
 def _hash(path: Path, data: bytes) -> bytes:
-    """Hash a file's place inside the cache with its content, so that it is worth nothing under another name."""
+    """Hash of a file's path inside the cache and its content, so that the file is refused under another name."""
     place = path.relative_to(CACHE_DIR).as_posix()
     return hashlib.sha256(place.encode() + b"\0" + data).digest()
 
 
 def _checked(path: Path) -> bytes:
-    """Read what stands behind the hash at the beginning of a file; EOFError if it is not what was hashed."""
+    """Read the content behind the hash at the beginning of a file; EOFError if the two do not match."""
     content = path.read_bytes()
     data = content[HASH_BYTES:]
     if _hash(path, data) != content[:HASH_BYTES]:
@@ -104,12 +104,12 @@ def _checked(path: Path) -> bytes:
 
 @cache
 def _processor(codegen: Any) -> Any:
-    """Name what machine code depends on besides its source."""
+    """Processor and features for which machine code is made, as numba names them."""
     return codegen.magic_tuple()
 
 
 class KernelCache(FunctionCache):
-    """numba's cache of one function, in our folder."""
+    """numba's cache of one function, in the folder of :mod:`kernels.cache_folder`."""
 
     _impl_class = _Implementation
 
@@ -119,16 +119,16 @@ class KernelCache(FunctionCache):
         self._cache_file = _CheckedFile(self._cache_path, base, stamp)
 
     def _index_key(self, sig: Any, codegen: Any) -> Any:
-        """Tell machine code apart by signature, processor and byte code.
+        """Key of a function's machine code: signature, processor and byte code.
 
-        numba adds a hash of what a function closes over.  Other kernels in there carry a random number, so no process
-        would find the code of another.  A generated kernel says by its name what it closes over (`kernels.jit`).
+        numba adds a hash of the closure.  Kernels inside a closure carry a random number, so no process would find the
+        code of another one.  A generated kernel has a name that stands for its closure (`kernels.jit`).
         """
         code: bytes = self._py_func.__code__.co_code
         return sig, _processor(codegen), hashlib.sha256(code).hexdigest()
 
     def load_overload(self, sig: Any, target_context: Any) -> Any:
-        """Load the machine code of one signature, or None; files that cannot be read are emptied."""
+        """Load the machine code of one signature, or None; the index of damaged files is emptied."""
         try:
             return super().load_overload(sig, target_context)
         except DAMAGED:
@@ -137,12 +137,12 @@ class KernelCache(FunctionCache):
             return None
 
     def save_overload(self, sig: Any, data: Any) -> None:
-        """Keep the machine code of one signature; one process at a time."""
-        # A disk that is full takes no code; what was compiled serves this process all the same.
+        """Save the machine code of one signature; one process at a time."""
+        # A full disk saves nothing; the compiled code serves this process all the same.
         with suppress(OSError, *DAMAGED), locked():
             super().save_overload(sig, data)
 
 
 def keep(dispatcher: Any) -> None:
-    """Let a compiled function load its machine code from our folder and keep it there."""
+    """Let a compiled function load its machine code from the cache folder and save it there."""
     dispatcher._cache = KernelCache(dispatcher.py_func)

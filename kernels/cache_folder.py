@@ -1,11 +1,11 @@
-"""Where compiled kernels are kept between runs, and what makes sure that they are those of the sources at hand.
+"""Folder of the compiled kernels between runs, and the checks that they were made from the present sources.
 
 numba compares only the file of the function it loads, not the files of the helpers inlined into it, so its own folders
 would serve stale machine code after an edit of a helper.  Here the folder's name is a hash of all kernel sources, taken
 before the first kernel is imported, and three things keep foreign code out of it:
 
-* Sources may change while a process imports them.  Every module is compared with what was hashed as soon as its first
-  function is decorated; from the first difference on nothing is loaded or kept, the process compiles for itself.
+* Sources may change while a process imports them.  Every module is compared with its hash as soon as its first
+  function is decorated; from the first difference on nothing is loaded or saved, the process compiles for itself.
 * Python trusts a .pyc that names the second and the size of its source.  A .pyc that is not clearly younger than its
   source is compared with it.
 * Two processes that compile different signatures of one function at the same moment would take the same number for
@@ -13,8 +13,8 @@ before the first kernel is imported, and three things keep foreign code out of i
 
 The place inside the folder is that of the source inside the package, so copies of the same sources share it.
 
-What lies in such a folder is run.  A folder that belongs to somebody else, or that others may write to, is not used;
-ours is closed to others.
+The files of such a folder are run.  A folder that belongs to another user, or that others may write to, is not used;
+folders made here are closed to others.
 """
 
 from __future__ import annotations
@@ -40,13 +40,13 @@ from filelock import FileLock
 SOURCES = Path(__file__).resolve().parent
 PACKAGE = __name__.partition(".")[0]
 
-# What a .pyc says before the code: magic number, flags, seconds and size of the source.
+# Bytes of a .pyc before the code: magic number, flags, seconds and size of the source.
 PYC_HEADER = 16
-# A .pyc is younger than its source if it was written so much later [ns].
+# A .pyc counts as younger than its source if it was written later by more than this [ns].
 YOUNGER = 2_000_000_000
-# What a file system answers that has no locks.
+# Errors of a file system without locks.
 UNLOCKABLE = (errno.ENOSYS, errno.EOPNOTSUPP, errno.ENOTSUP, errno.ENOLCK)
-# The folder of the cache and its parent are made by this package.
+# Levels of folders that this package makes: the folder of the cache and its parent.
 OWN_LEVELS = 2
 
 
@@ -69,8 +69,8 @@ def source_hash() -> str:
 def cache_root() -> Path:
     """Folder that holds the compiled kernels of every version (what ``sweep cache clear`` removes).
 
-    It is the user's cache folder.  Where somebody else could have put something there, it is a private folder under the
-    system's one for temporary files, and that is said in a line on the standard error.
+    It is in the user's cache folder.  Where another user could have written there, it is a private folder under the
+    system's folder for temporary files, and a line on the standard error says so.
     """
     usual = Path(platformdirs.user_cache_dir("linksweep")) / "kernels"
     reason = distrust(usual)
@@ -84,7 +84,7 @@ def cache_root() -> Path:
 
 
 def distrust(folder: Path) -> str | None:
-    """Why what lies in a folder could be somebody else's, in words; None if only this user can have put it there.
+    """Reason why another user may have written to a folder, in words; None if no other user can have.
 
     The folder and its parent must be this user's and nobody else may write to them; a folder further up may be the
     system's, and others may write to it if they cannot rename there what is not theirs.
@@ -106,7 +106,7 @@ def distrust(folder: Path) -> str | None:
 
 
 def _made(folder: Path) -> None:
-    """Make a folder, and those above it that are missing, for this user alone."""
+    """Make a folder and its missing parents, for this user alone."""
     for place in (*reversed(folder.parents), folder):
         if not place.is_dir():
             with suppress(FileExistsError):  # another process was faster
@@ -124,7 +124,7 @@ CACHE_DIR = cache_root() / source_hash()
 
 
 class _Imported:
-    """The modules of this package that were imported so far, compared with what was hashed."""
+    """Modules of this package that were imported so far, compared with their hashes."""
 
     def __init__(self) -> None:
         self.known: set[str] = set()
@@ -132,7 +132,7 @@ class _Imported:
         self.unchanged = True
 
     def as_hashed(self) -> bool:
-        """Whether every module imported so far is the one that was hashed."""
+        """Whether every module imported so far matches its hash."""
         now = len(sys.modules), next(reversed(sys.modules))
         if now == self.seen:  # nothing was imported since; each of several hundred functions asks
             return self.unchanged
@@ -162,13 +162,13 @@ def _is_as_hashed(module: ModuleType) -> bool:
 
 @cache
 def resolved(file: str) -> Path:
-    """Resolve the path of a source, once for each."""
+    """Resolve the path of a source; the result is cached."""
     return Path(file).resolve()
 
 
 @cache
 def writable(folder: Path) -> bool:
-    """Whether a folder of the cache, made if need be, takes files."""
+    """Whether files can be written to a folder of the cache, which is made if need be."""
     try:
         _made(CACHE_DIR)
         folder.mkdir(parents=True, exist_ok=True)
@@ -192,5 +192,5 @@ def locked() -> Iterator[None]:
 
 
 def may_keep(file: str) -> bool:
-    """Whether machine code of functions in this file may be loaded and kept: a source of this package, as hashed."""
+    """Whether machine code of a file may be loaded and saved: only of sources of this package that match their hash."""
     return resolved(file).is_relative_to(SOURCES) and _IMPORTED.as_hashed()

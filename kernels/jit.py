@@ -12,7 +12,7 @@ Every kernel of the house is made by one of the decorators below, which are ``nu
 * ``no_cfunc_wrapper``: nothing calls kernels from C.  ``no_cpython_wrapper`` of helpers: see :class:`Helper`.
 * Machine code is kept on disk by :mod:`kernels.cache`.
 
-``NUMBA_DISABLE_JIT=1`` leaves every function as Python wrote it.
+``NUMBA_DISABLE_JIT=1`` leaves every function in plain Python.
 """
 
 from __future__ import annotations
@@ -38,19 +38,19 @@ OPTIONS: dict[str, Any] = {"nogil": True, "error_model": "numpy", "fastmath": Fa
 
 
 def _kept(dispatcher: Any) -> Any:
-    """Let a compiled function load its machine code from disk and keep it there, where that is safe and there is room.
+    """Let a compiled function load its machine code from disk and save it there, where that is safe and possible.
 
-    A function from outside of the package, as a bench or a study may have, is in no hash: every process compiles it.
+    A function from outside the package, as in a bench or a study, is in no hash: every process compiles it.
     """
     if config.DISABLE_JIT:
-        return dispatcher  # it is the Python function itself
+        return dispatcher  # which is the Python function itself
     if not may_keep(dispatcher.py_func.__code__.co_filename) or not writable(CACHE_DIR):
         return dispatcher
     try:
-        from kernels.cache import keep  # here, as its import may be what fails
+        from kernels.cache import keep  # imported here, as the import may fail
 
         keep(dispatcher)
-    except (ImportError, AttributeError, TypeError, RuntimeError) as error:  # what a changed class of numba answers
+    except (ImportError, AttributeError, TypeError, RuntimeError) as error:  # errors of changed classes of numba
         config.CACHE_DIR = str(CACHE_DIR)
         dispatcher.enable_caching()
         say(f"numba {numba.__version__} keeps its machine code in another way ({error}); its own cache is used")
@@ -62,10 +62,11 @@ def _compiled(function: F, **options: Any) -> F:
 
 
 class Helper:
-    """A function that kernels call: it has machine code for its callers alone, which takes a third less time to make.
+    """Function that kernels call: compiled without a wrapper for Python, which takes a third less time.
 
     Python may call it all the same, as tests do; for that it is compiled once more at the first call.  A kernel that is
-    loaded from disk asks none of its helpers, and hundreds of them would take a tenth of a second to be made.
+    loaded from disk needs none of its helpers, so their dispatchers, hundreds of them, are made on demand only: all
+    together would take a tenth of a second.
     """
 
     def __init__(self, function: Callable[..., Any], **options: Any) -> None:
@@ -75,7 +76,7 @@ class Helper:
 
     @cached_property
     def for_kernels(self) -> Any:
-        """The dispatcher that a kernel names."""
+        """Dispatcher of the helper for kernels."""
         return _compiled(self.py_func, no_cpython_wrapper=True, **self.targetoptions)
 
     @cached_property
@@ -89,7 +90,7 @@ class Helper:
 
 @typeof_impl.register(Helper)
 def _type_of_helper(helper: Helper, context: Any) -> Any:
-    """Let numba see the function for kernels wherever one of them names the helper."""
+    """Type of a helper that a kernel names: that of its dispatcher for kernels."""
     return typeof_impl(helper.for_kernels, context)
 
 
@@ -124,7 +125,7 @@ def part(function: F) -> F:
 def folded(function: F) -> F:
     """Fold a function with one caller into it before it is compiled, so that it costs no machine code of its own.
 
-    A caller is optimised with everything that it calls, whose optimisation by itself would be wasted.
+    A caller is optimised together with all that it calls, so optimising the function by itself would be wasted.
     """
     return _helper(function, inline="always")
 
@@ -163,7 +164,7 @@ def generated_part(name: str, function: F) -> F:
 
 
 def source_of(function: Any) -> Any:
-    """Give the Python function behind a compiled one."""
+    """Python function behind a compiled one."""
     return getattr(function, "py_func", function)
 
 
@@ -173,10 +174,10 @@ def _named(name: str, function: F) -> F:
 
 
 class _PausedCollector(Listener):
-    """Keeps Python from looking for garbage while numba compiles.
+    """Pause of Python's garbage collector while numba compiles.
 
-    A compiler makes a million objects that refer to each other, and nearly all live until the process ends: looking
-    through them after each kernel took a tenth of a first use.
+    A compiler makes a million objects that refer to each other, and nearly all live until the process ends: collecting
+    after each kernel took a tenth of the time of a first use.
     """
 
     def __init__(self) -> None:
@@ -188,7 +189,7 @@ class _PausedCollector(Listener):
         gc.disable()
 
     def on_end(self, event: Any) -> None:
-        """Go on as before."""
+        """Restore the collector to its state before the compilation."""
         if self._was_on.pop():
             gc.enable()
 

@@ -1,4 +1,4 @@
-"""What a status says.  Every kernel returns one; a nan never stands without a status that explains it.
+"""Numbers of the statuses and their meaning.  Every kernel returns a status; it explains every nan among the results.
 
 The numbers are part of the public contract: they are stored in every dataset.  Of several causes the one that made
 the result unusable first is reported.
