@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property, partial
 from typing import Any
@@ -13,7 +13,7 @@ from kernels.chains.links import chain_rule, input_angle
 from kernels.status import OK
 from kernels.types import Array
 from sweep.errors import InputError
-from sweep.families.base import Angles, Columns, Family, Output, Parameter, Stage, Turn
+from sweep.families.base import Angles, Columns, Family, Output, Parameter, Stage, Step, Turn
 from sweep.families.capabilities import Assembly, GuidedPoint, LimitLocus, OutputLink
 from sweep.families.curve_features import of_stages, on_part
 from sweep.families.frames import Frame, can_be_placed, stage_frames
@@ -80,6 +80,14 @@ def driven_guide(family: Family) -> tuple[Stage, Stage] | None:
     if first.family.find(LimitLocus) is None or last.family.find(GuidedPoint) is None:
         return None
     return first, last
+
+
+def own_outputs(family: Family, steps: Sequence[Step]) -> Iterator[tuple[Step, Output, Stage]]:
+    """Yield the outputs of a family's own steps; of a chain also those of its first stage, which turns as if alone."""
+    yield from ((step, o, family.whole) for step in steps for o in step.provides)
+    if isinstance(family, Chain):
+        first = family.stages[0]
+        yield from ((step, o.of_stage(first.number), first) for step in first.family.steps for o in step.provides)
 
 
 def chain(families: tuple[Family, ...]) -> Chain:

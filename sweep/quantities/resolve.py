@@ -8,10 +8,10 @@ from sweep.effects import elsewhere, extended, offered
 from sweep.errors import InputError, listed, nearest
 from sweep.families.base import Event, Family, Interval, Output, Turn
 from sweep.families.capabilities import Assembly
-from sweep.families.chain import Chain
+from sweep.families.chain import Chain, own_outputs
 from sweep.families.machines.machine import Machine
 from sweep.families.machines.relations import EventValue, Timing
-from sweep.families.names import at_stage, parts, without_minus
+from sweep.families.names import parts, without_minus
 from sweep.families.parts import Member
 from sweep.families.reduction import prefixes, reduction_of, split
 from sweep.quantities.box import NAMES as BOXES
@@ -90,17 +90,8 @@ def find(family: Family, name: str) -> Quantity | None:
 
 def _own(family: Family, name: str) -> OwnOutput | None:
     """Find the output among the family's own steps, or those of a chain's first stage, which turns alone."""
-    for step in family.steps:
-        for o in step.provides:
-            if o.name == name:
-                return OwnOutput(o)
-    if isinstance(family, Chain) and (own := at_stage(name, "1")):
-        stage = family.stages[0]
-        for step in stage.family.steps:
-            for o in step.provides:
-                if o.name == own:
-                    return OwnOutput(o.of_stage(stage.number), of_part=True)
-    return None
+    found = ((o, stage) for _, o, stage in own_outputs(family, family.steps) if o.name == name)
+    return next((OwnOutput(o, of_part=bool(stage.number)) for o, stage in found), None)
 
 
 def _from_dimensions(family: Family, name: str) -> Quantity | None:

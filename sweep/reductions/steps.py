@@ -13,9 +13,8 @@ from sweep.costs import nanoseconds
 from sweep.errors import InputError
 from sweep.families.base import Accuracy, Array, Columns, Family, Output, Stage, Step, Work, of_family
 from sweep.families.capabilities import Assembly, CrankRockerLoop, GuidedPoint
-from sweep.families.chain import Chain
+from sweep.families.chain import own_outputs
 from sweep.families.machines.machine import Machine
-from sweep.families.names import at_stage
 from sweep.families.reduction import REDUCTIONS, reduction_of
 from sweep.families.rssr import proven_columns
 from sweep.quantities.dimensions import dimension_step, size_step
@@ -115,13 +114,14 @@ def steps_of(family: Family) -> tuple[Step, ...]:
     return (*family.steps, *(step for step in made if step is not None))
 
 
+@of_family
+def _own_outputs(family: Family) -> tuple[tuple[Step, Output, Stage], ...]:
+    return tuple(own_outputs(family, steps_of(family)))
+
+
 def own_steps(family: Family, name: str) -> list[tuple[Step, Output, Stage]]:
     """List the steps to an output, including those of a chain's first stage, which turns as if it were alone."""
-    found = [(step, o, family.whole) for step in steps_of(family) for o in step.provides if o.name == name]
-    if isinstance(family, Chain) and (own := at_stage(name, "1")):
-        stage = family.stages[0]
-        found += [(step, o, stage) for step in stage.family.steps for o in step.provides if o.name == own]
-    return found
+    return [found for found in _own_outputs(family) if found[1].name == name]
 
 
 def applying_step(family: Family, name: str, accuracy: Accuracy) -> tuple[Step, Stage] | None:
@@ -140,10 +140,7 @@ def step_ns(family: Family, step: Step, accuracy: Accuracy) -> float:
 
 def certified_names(family: Family) -> tuple[str, ...]:
     """List the outputs whose maxima can be proven, including those of a chain's first stage."""
-    names = [o.name for step in steps_of(family) if step.certifies for o in step.provides]
-    if isinstance(family, Chain):
-        names += [f"{o.name}1" for step in family.stages[0].family.steps if step.certifies for o in step.provides]
-    return tuple(names)
+    return tuple(o.name for step, o, _ in _own_outputs(family) if step.certifies)
 
 
 def place_names(family: Family) -> set[str]:

@@ -260,26 +260,16 @@ def _needle(name: str, table: Mapping[str, Any], members: dict[str, Member], whe
         raise InputError("line", table["line"], f"an axis or line of it: {choices(str(table['line']), lines)}", where)
     sense = sign("sense", table.get("sense", 1), where, "the needle points along the line or against it")
     diameter = length("diameter", table["diameter"], where)
-    top, end, eye, point = (number(key, table.get(key, 0.0), where) for key in ("top", "scarf_end", "eye", "point"))
+    places = {key: number(key, table.get(key, 0.0), where) for key in ("top", "scarf_end", "eye", "point")}
+    top, end, eye, point = places.values()
     if not top <= end < eye < point:
         raise InputError("eye", eye, "top <= scarf_end < eye < point", where)
     floor = length("floor", table["floor"], where) if "floor" in table else 0.5 * diameter
     scarf = vector(table["scarf"], f"{where}.scarf")
     if not any(scarf):
         raise InputError("scarf", scarf, "a direction", where)
-    return Needle(
-        name,
-        str(table["on"]),
-        f"{owner.name}.{table['line']}_axis",
-        sense,
-        scarf,
-        diameter,
-        floor,
-        top,
-        end,
-        eye,
-        point,
-    )
+    line = f"{owner.name}.{table['line']}_axis"
+    return Needle(name, str(table["on"]), line, sense, scarf, diameter, floor, **places)
 
 
 def _blade(name: str, table: Mapping[str, Any], members: dict[str, Member], where: str) -> Tool:
