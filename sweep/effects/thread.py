@@ -11,17 +11,7 @@ from sweep.effects.loads import CHANGE
 from sweep.effects.scene import Scene
 from sweep.families.base import Array, Columns, Output, Parameter, floats
 from sweep.families.capabilities import ThreadPath
-from sweep.families.machines.thread_balance import (
-    ALPHA,
-    BENDING,
-    BETA,
-    COUNT,
-    DENSITY,
-    EXPONENT,
-    MM_PER_M,
-    REFERENCE_SPEED,
-    SHARE,
-)
+from sweep.families.machines import thread_balance as balance
 from sweep.families.poses import chosen, filled_each
 
 # Inputs have names of their own: a take-up uses symbols such as alpha for its geometry.
@@ -29,19 +19,19 @@ BEFORE = Parameter("thread_tension", "none", "tension in front of the eyelet, gf
 CONTOUR_INPUTS = (
     BEFORE,
     Parameter("eyelet_radius", "none", "radius of the eyelet's contour, mm; measured 0.125 to 7.5", not_negative=True),
-    Parameter("thread_adhesion", "none", ALPHA.text, not_negative=True, default=ALPHA.default),
-    Parameter("thread_friction", "none", BETA.text, not_negative=True, default=BETA.default),
-    Parameter("thread_bending", "none", BENDING.text, not_negative=True, default=BENDING.default),
-    Parameter("thread_count", "none", COUNT.text, positive=True, default=COUNT.default),
-    Parameter("thread_density", "none", DENSITY.text, positive=True, default=DENSITY.default),
+    Parameter("thread_adhesion", "none", balance.ALPHA.text, not_negative=True, default=balance.ALPHA.default),
+    Parameter("thread_friction", "none", balance.BETA.text, not_negative=True, default=balance.BETA.default),
+    Parameter("thread_bending", "none", balance.BENDING.text, not_negative=True, default=balance.BENDING.default),
+    Parameter("thread_count", "none", balance.COUNT.text, positive=True, default=balance.COUNT.default),
+    Parameter("thread_density", "none", balance.DENSITY.text, positive=True, default=balance.DENSITY.default),
 )  # fmt: skip
 SPEED_INPUTS = (
     Parameter("speed", "speed", "speed of the crank"),
     CHANGE,
     Parameter("thread_speed_ref", "none", "speed at which the tension is known, mm/s; reported 1230", positive=True,
-              default=MM_PER_M * float(REFERENCE_SPEED.default or 0.0)),
-    Parameter("thread_speed_share", "none", SHARE.text, default=SHARE.default),
-    Parameter("thread_speed_exponent", "none", EXPONENT.text, positive=True, default=EXPONENT.default),
+              default=balance.MM_PER_M * float(balance.REFERENCE_SPEED.default or 0.0)),
+    Parameter("thread_speed_share", "none", balance.SHARE.text, default=balance.SHARE.default),
+    Parameter("thread_speed_exponent", "none", balance.EXPONENT.text, positive=True, default=balance.EXPONENT.default),
 )  # fmt: skip
 CAPSTAN_INPUTS = (BEFORE, Parameter("mu_eyelet", "ratio", "coefficient of friction of the eyelet", not_negative=True))
 

@@ -16,20 +16,8 @@ from sweep.families.base import Family, Turn
 from sweep.families.capabilities import Assembly
 from sweep.families.machines.relations import EventValue, Timing
 from sweep.families.names import parts, stem, without_minus
+from sweep.quantities import kinds
 from sweep.quantities.dimensions import Piece
-from sweep.quantities.kinds import (
-    Dimension,
-    EventPlace,
-    Extent,
-    LargestLength,
-    LimitPosition,
-    Margin,
-    Negative,
-    OwnOutput,
-    Quantity,
-    Reduced,
-    TimingOf,
-)  # fmt: skip
 from sweep.quantities.resolve import find, resolve
 
 # Least Delta/b^2 at the worst pose of a crank that turns: cos^2 of 89.94 degrees.
@@ -187,37 +175,37 @@ def measure(family: Family, name: str, window: tuple[float, float] | None = None
     return _measure(family, name, resolve(family, name), window)
 
 
-def _measure(family: Family, name: str, asked: Quantity, window: tuple[float, float] | None) -> Measure:
+def _measure(family: Family, name: str, asked: kinds.Quantity, window: tuple[float, float] | None) -> Measure:
     match asked:
-        case Negative(inner=of):
+        case kinds.Negative(inner=of):
             inner = measure(family, of.output.name, window)
             return Measure(name, "minus", inner.series, inner.inner, 1.0, inner.numbers, (inner,), inner.pieces)
-        case TimingOf(timing=timing):
+        case kinds.TimingOf(timing=timing):
             return _of_timing(family, timing, window)
-        case EventPlace(event=event) if isinstance(family.domain, Turn) and not family.pose_output[asked.of].wraps:
-            return Measure(name, "phi_event", (Series(event.of, passes=(event.level, 1.0 if event.rising else -1.0)),))
-        case Margin(kind=kind):
+        case kinds.EventPlace(event=e) if isinstance(family.domain, Turn) and not family.pose_output[asked.of].wraps:
+            return Measure(name, "phi_event", (Series(e.of, passes=(e.level, 1.0 if e.rising else -1.0)),))
+        case kinds.Margin(kind=kind):
             return _of_margin(name, kind, margins(family, asked.stage))
-        case LimitPosition(kind=kind):
+        case kinds.LimitPosition(kind=kind):
             ratio: Inner = "ratio" if kind == "stroke_ratio" else "same"
             return Measure(name, LIMIT_KINDS[kind], (curve(family, asked.of),), ratio)
-        case Reduced(reduction=reduction, extreme=True):
+        case kinds.Reduced(reduction=reduction, extreme=True):
             inside = window if family.pose_output[asked.of].windowed else None
             # A vector's length has no slope at zero: its largest value is bounded by both signs, like a magnitude.
             of_vector = {f"{asked.of}_{axis}" for axis in "xyz"} <= family.pose_output.keys()
             kind = "max_abs" if of_vector and reduction.kind == "max" else reduction.kind
             return Measure(name, cast(Kind, kind), (curve(family, asked.of, inside),))
-        case Extent(box=box):
+        case kinds.Extent(box=box):
             numbers = tuple(f"{name}, still {k}" for k in range(len(box.still)))
             curves = tuple(curve(family, of) for of in box.curves)
             return Measure(name, "box", curves, numbers=numbers, pieces=box.still)
-        case Dimension(size=size):
+        case kinds.Dimension(size=size):
             numbers = tuple(f"{name}, piece {k}" for k in range(len(size.pieces)))
             side: Kind = "least" if size.least else "most"
             return Measure(name, side, (), "square" if size.squared else "same", numbers=numbers, pieces=size.pieces)
-        case LargestLength(lengths=lengths):
+        case kinds.LargestLength(lengths=lengths):
             return Measure(name, "lengths", (), numbers=lengths)
-        case OwnOutput(of_part=True):
+        case kinds.OwnOutput(of_part=True):
             raise InputError("output", name, "an output that changes steadily", f"design outputs of {family.name}")
         case _:
             # Means, counts, dwells, own outputs; passages of wrapped angles, and passages over an interval, are

@@ -14,25 +14,10 @@ from sweep.families.machines.relations import EventValue, Timing
 from sweep.families.names import parts, without_minus
 from sweep.families.parts import Member
 from sweep.families.reduction import prefixes, reduction_of, split
+from sweep.quantities import kinds
 from sweep.quantities.box import NAMES as BOXES
 from sweep.quantities.box import boxes
 from sweep.quantities.dimensions import SIZE, lengths, sizes
-from sweep.quantities.kinds import (
-    PLACES,
-    Dimension,
-    EventCount,
-    EventPlace,
-    Extent,
-    LargestLength,
-    LimitPosition,
-    Margin,
-    Negative,
-    OwnOutput,
-    Quantity,
-    Reduced,
-    TimingOf,
-    WindowAngle,
-)  # fmt: skip
 
 MARGIN_TEXTS = {
     "rotatable": ("1", "whether the links reach over the whole turn"),
@@ -44,7 +29,7 @@ MARGIN_TEXTS = {
 STAY = Output("window_angle", "rad", "crank angle over which the position lies in the window of the stroke: its dwell")
 
 
-def resolve(family: Family, name: str) -> Quantity:
+def resolve(family: Family, name: str) -> kinds.Quantity:
     """Resolve the name of a design output of a family, a chain or a machine to a typed quantity.
 
     Raises
@@ -52,7 +37,7 @@ def resolve(family: Family, name: str) -> Quantity:
     InputError
         if there is no such output; the message gives the nearest name.
     """
-    known: dict[str, Quantity] = family.derived.setdefault(resolve, {})  # a sweep asks the same for every chunk
+    known: dict[str, kinds.Quantity] = family.derived.setdefault(resolve, {})  # a sweep asks the same for every chunk
     if name not in known:
         found = find(family, name)
         if found is None:
@@ -66,7 +51,7 @@ def output(family: Family, name: str) -> Output:
     return resolve(family, name).output
 
 
-def find(family: Family, name: str) -> Quantity | None:
+def find(family: Family, name: str) -> kinds.Quantity | None:
     """Resolve a name as `resolve` does; None for an unknown name."""
     of = without_minus(name)
     if of:
@@ -74,12 +59,12 @@ def find(family: Family, name: str) -> Quantity | None:
         if inner is None:
             return None
         text = f"negative of {of}: {inner.output.text}"
-        return Negative(replace(inner.output, name=name, text=text), inner)
+        return kinds.Negative(replace(inner.output, name=name, text=text), inner)
     if isinstance(family, Machine):
         found = _of_machine(family, name)
     else:
         stays = name == STAY.name and isinstance(family.domain, Turn)
-        found = WindowAngle(STAY, of=family.position) if stays else _margin(family, name)
+        found = kinds.WindowAngle(STAY, of=family.position) if stays else _margin(family, name)
         found = found or _limit(family, name) or _event(family, name) or _reduction(family, name)
         found = found or _from_dimensions(family, name)
     own = _own(family, name)
@@ -88,25 +73,25 @@ def find(family: Family, name: str) -> Quantity | None:
     return replace(found, output=own.output)  # the family's own definition takes precedence
 
 
-def _own(family: Family, name: str) -> OwnOutput | None:
+def _own(family: Family, name: str) -> kinds.OwnOutput | None:
     """Find the output among the family's own steps, or those of a chain's first stage, which turns alone."""
     found = ((o, stage) for _, o, stage in own_outputs(family, family.steps) if o.name == name)
-    return next((OwnOutput(o, of_part=bool(stage.number)) for o, stage in found), None)
+    return next((kinds.OwnOutput(o, of_part=bool(stage.number)) for o, stage in found), None)
 
 
-def _from_dimensions(family: Family, name: str) -> Quantity | None:
+def _from_dimensions(family: Family, name: str) -> kinds.Quantity | None:
     box = boxes(family).get(name)
     if box is not None:
-        return Extent(box.output, box)
+        return kinds.Extent(box.output, box)
     size = sizes(family).get(name)
     if size is not None:
-        return Dimension(size.output, size)
+        return kinds.Dimension(size.output, size)
     if name == SIZE.name and lengths(family):
-        return LargestLength(SIZE, lengths(family))
+        return kinds.LargestLength(SIZE, lengths(family))
     return None
 
 
-def _of_machine(machine: Machine, name: str) -> Quantity | None:
+def _of_machine(machine: Machine, name: str) -> kinds.Quantity | None:
     member = machine.split(name)
     if member is not None:
         return _of_member(machine, name, *member)
@@ -115,7 +100,7 @@ def _of_machine(machine: Machine, name: str) -> Quantity | None:
         return _timing(machine, timing)
     # A machine has no limit positions of its own, only its members have.
     found = _margin(machine, name) or _event(machine, name) or _reduction(machine, name)
-    if isinstance(found, Reduced) and machine.split(found.of) is not None:
+    if isinstance(found, kinds.Reduced) and machine.split(found.of) is not None:
         part, _, pose = found.of.partition(".")
         right = f"{part}.{name.removesuffix(found.of)}{pose}"
         raise InputError(
@@ -124,7 +109,7 @@ def _of_machine(machine: Machine, name: str) -> Quantity | None:
     return found or _from_dimensions(machine, name)
 
 
-def _timing(machine: Machine, timing: Timing | EventValue) -> TimingOf:
+def _timing(machine: Machine, timing: Timing | EventValue) -> kinds.TimingOf:
     """Resolve a timing; raise unless its places are crank angles of extrema or events."""
     begins = f"{machine.domain.name}_"
     others = [t.name for t in machine.timings]
@@ -135,7 +120,7 @@ def _timing(machine: Machine, timing: Timing | EventValue) -> TimingOf:
             kind = "value" if isinstance(timing, EventValue) else "timing"
             allowed = f"a crank angle that is a design output, {begins}...{nearest(place, known)}"
             raise InputError(kind, place, allowed, f"machine.relations.{timing.name}")
-    return TimingOf(timing.output, timing)
+    return kinds.TimingOf(timing.output, timing)
 
 
 def check_timings(machine: Family) -> None:
@@ -144,33 +129,33 @@ def check_timings(machine: Family) -> None:
         resolve(extended(machine, [timing.name]), timing.name)
 
 
-def _of_member(machine: Machine, name: str, member: Member, own: str) -> Quantity | None:
+def _of_member(machine: Machine, name: str, member: Member, own: str) -> kinds.Quantity | None:
     """Resolve a dotted name in the machine's terms."""
     point, found = _of_point(machine, member, own), find(member.family, own)
     if found is None:
         return point
     named = replace(found.output, name=name, text=f"{member.name}: {found.output.text}")
     named = point.output if point else named
+    if kinds.group_of(member.family, found) is not None:
+        of = found.of and f"{member.name}.{found.of}"
+        return replace(found, output=named, of=of, stage=f"{member.name}.{found.stage}")
     match found:
-        case Margin() | LimitPosition() | WindowAngle() | Reduced() | EventPlace() | EventCount():
-            of = found.of and f"{member.name}.{found.of}"
-            return replace(found, output=named, of=of, stage=f"{member.name}.{found.stage}")
-        case Extent() | Dimension():
+        case kinds.Extent() | kinds.Dimension():
             whole = _from_dimensions(machine, name)
-            return replace(whole, output=named) if whole is not None else OwnOutput(named, of_part=True)
-        case LargestLength(lengths=longest):
-            return LargestLength(named, tuple(f"{member.name}.{length}" for length in longest))
+            return replace(whole, output=named) if whole is not None else kinds.OwnOutput(named, of_part=True)
+        case kinds.LargestLength(lengths=longest):
+            return kinds.LargestLength(named, tuple(f"{member.name}.{length}" for length in longest))
         case _:
-            return point or OwnOutput(named, of_part=True)
+            return point or kinds.OwnOutput(named, of_part=True)
 
 
-def _of_point(machine: Machine, member: Member, own: str) -> Reduced | None:
+def _of_point(machine: Machine, member: Member, own: str) -> kinds.Reduced | None:
     """Resolve a reduction of a machine's pose output, such as a coordinate in its frame, under a member's name."""
     for reduction, rest in split(own, machine.domain):
         pose = machine.pose_output.get(f"{member.name}.{rest}")
         if pose is not None:
             named = replace(reduction.output(pose, machine.domain), name=f"{member.name}.{own}")
-            return Reduced(named, reduction, of=pose.name)
+            return kinds.Reduced(named, reduction, of=pose.name)
     return None
 
 
@@ -179,16 +164,16 @@ def event_names(family: Family, event: Event) -> tuple[str, str]:
     return f"{family.domain.name}_{event.name}", f"count_{event.name}"
 
 
-def _event(family: Family, name: str) -> EventPlace | EventCount | None:
+def _event(family: Family, name: str) -> kinds.EventPlace | kinds.EventCount | None:
     for event in family.events:
         place, count = event_names(family, event)
         of = family.pose_output[event.of]
         if name == place:
             text = f"{family.domain.text} at which {event.text}"
-            return EventPlace(Output(name, family.domain.unit, text, of.equation), event, of=event.of)
+            return kinds.EventPlace(Output(name, family.domain.unit, text, of.equation), event, of=event.of)
         if name == count:
             text = f"how often {event.text}"
-            return EventCount(Output(name, "1", text, of.equation, jumps=True), event, of=event.of)
+            return kinds.EventCount(Output(name, "1", text, of.equation, jumps=True), event, of=event.of)
     return None
 
 
@@ -198,13 +183,13 @@ def limit_names(family: Family, position: str, stage: str) -> dict[str, str]:
     if pose is None:
         return {}
     amplitude = "swing" if pose.wraps else "stroke"
-    kinds: tuple[str, ...] = ("ext", "fold", amplitude, *PLACES)
+    names: tuple[str, ...] = ("ext", "fold", amplitude, *kinds.PLACES)
     if not isinstance(family.domain, Turn):
-        kinds = (amplitude,)  # an interval has no extended position, and no angle between the limits
-    return {f"{pose.base}_{kind}{stage}" if kind in ("ext", "fold") else f"{kind}{stage}": kind for kind in kinds}
+        names = (amplitude,)  # an interval has no extended position, and no angle between the limits
+    return {f"{pose.base}_{kind}{stage}" if kind in ("ext", "fold") else f"{kind}{stage}": kind for kind in names}
 
 
-def _margin(family: Family, name: str) -> Margin | None:
+def _margin(family: Family, name: str) -> kinds.Margin | None:
     _, base, stage = parts(name)
     loops = family.every(Assembly)
     if base not in MARGIN_TEXTS or not loops or (stage and stage not in [loop.stage for loop in loops]):
@@ -214,10 +199,10 @@ def _margin(family: Family, name: str) -> Margin | None:
         text = f"stage {stage}: {text}"
     elif len(loops) > 1:
         text = f"{text}; of the stage where it is worst"
-    return Margin(Output(name, unit, text), base, stage=stage)
+    return kinds.Margin(Output(name, unit, text), base, stage=stage)
 
 
-def _limit(family: Family, name: str) -> LimitPosition | None:
+def _limit(family: Family, name: str) -> kinds.LimitPosition | None:
     # At constant speed the times of both strokes have the ratio of the angles: two names for one ratio.
     plain = name.replace("time_ratio", "stroke_ratio")
     for position, stage in family.positions.items():
@@ -239,7 +224,7 @@ def _limit(family: Family, name: str) -> LimitPosition | None:
             "stroke": f"largest minus smallest {position} over {over}",
         }
         found = Output(name, units.get(kind, unit), texts[kind])
-        return LimitPosition(found, kind, of=position, stage=stage)
+        return kinds.LimitPosition(found, kind, of=position, stage=stage)
     return None
 
 
@@ -251,7 +236,7 @@ def limit_order(family: Family, position: str) -> tuple[str, str]:
     return "largest", "smallest"
 
 
-def _reduction(family: Family, name: str) -> Reduced | None:
+def _reduction(family: Family, name: str) -> kinds.Reduced | None:
     found = reduction_of(family, name)
     if found is None:
         return None
@@ -261,7 +246,7 @@ def _reduction(family: Family, name: str) -> Reduced | None:
             "output", name, f"no {reduction.name} over an {family.domain.kind} of the {family.domain.text}",
             f"design outputs of {family.name}",
         )  # fmt: skip
-    return Reduced(reduction.output(pose, family.domain), reduction, of=pose.name, stage=pose.stage)
+    return kinds.Reduced(reduction.output(pose, family.domain), reduction, of=pose.name, stage=pose.stage)
 
 
 def output_names(family: Family) -> tuple[str, ...]:

@@ -13,20 +13,9 @@ from sweep.families.base import Array, Family
 from sweep.families.curve_features import singular, switches
 from sweep.numerics.singularities import Singularities
 from sweep.quantities.kinds import Request
+from sweep.reductions import refine
 from sweep.reductions.hidden_tops import Sampled, apart, closer_looks, dips, doubtful, tops_of
-from sweep.reductions.refine import (
-    SHRINK,
-    VARIES,
-    Candidates,
-    Peaks,
-    Sampler,
-    attained,
-    confirmed,
-    first_of_equals,
-    first_peaks,
-    polished,
-    sharpen,
-)
+from sweep.reductions.refine import Candidates, Peaks, Sampler
 from sweep.reductions.resolution import MATTERS, broken, denser, nearest
 from sweep.reductions.rounding import (
     measure_constants,
@@ -201,7 +190,7 @@ class Search:
         """Refine the candidates, and add the peaks that closer looks find beside them and beside switches."""
         spacing = np.full(candidates.row.size, TWO_PI / turn.samples)
         around = candidates.sign[:, None] * turn.around(self.requests, candidates, np.arange(-3, 4))
-        first = first_peaks(np.multiply(candidates.column, spacing, dtype=np.float64), spacing, around)
+        first = refine.first_peaks(np.multiply(candidates.column, spacing, dtype=np.float64), spacing, around)
         peaks = self._sharpened(turn, candidates, first, size)
         # The place depends on which of several peaks is the highest, at every target.
         enough = np.where(self.places(candidates.request), min(TIE, self.target), SEARCHED * self.target)
@@ -225,7 +214,7 @@ class Search:
         if self.family.precise_poses is None:
             # A quartic may fall below zero where a curve touches zero; a value at a pose is attained.
             sample = self._sampler(self.family, turn, candidates)
-            return candidates, attained(sample, peaks, np.arange(len(peaks.phi)))
+            return candidates, refine.attained(sample, peaks, np.arange(len(peaks.phi)))
         self._confirm(turn, candidates, peaks, size[candidates[:2]], share)
         return candidates, peaks
 
@@ -233,7 +222,7 @@ class Search:
         """Refine peaks; ``size`` (r, n) are the sizes of the curves."""
         place = np.where(self.places(candidates.request), self.target, np.inf)
         tolerance = SEARCHED * self.target * size[candidates[:2]]
-        return sharpen(self._sampler(self.family, turn, candidates), first, tolerance, place)
+        return refine.sharpen(self._sampler(self.family, turn, candidates), first, tolerance, place)
 
     def _confirm(self, turn: Sampled, candidates: Candidates, peaks: Peaks, size: Array, share: Array) -> None:
         """Replace the peaks that may be the highest by those of the family's precise poses.
@@ -258,8 +247,8 @@ class Search:
         bare = np.array([request.pose not in self.family.derivative_of for request in self.requests])[mine.request]
         bare &= located
         locate[bare] = self.target
-        peak.err_phi[bare] = np.maximum(peak.step, SHRINK**3 * peak.spacing)[bare]
-        peak = confirmed(sample, peak, tolerance, locate, share[rivals] * np.abs(peak.height))
+        peak.err_phi[bare] = np.maximum(peak.step, refine.SHRINK**3 * peak.spacing)[bare]
+        peak = refine.confirmed(sample, peak, tolerance, locate, share[rivals] * np.abs(peak.height))
         # The first stage of a chain gets its exact input angle, later stages a rounded one.
         rounding = self._rounding(turn, mine, self.guards[1:]) * np.abs(peak.height)
         put(peaks, rivals, peak._replace(err_height=peak.err_height + rounding))
@@ -332,16 +321,16 @@ class Search:
             off = shaken(self.family, self.designs[rows[has]], peaks.phi[chosen], request.pose)
             err = np.maximum(err, off)
             if self.near is not None:
-                err += np.where(self.near.only(rows[has]).distance(peaks.phi[chosen]) < CLOSE, VARIES * off, 0.0)
+                err += np.where(self.near.only(rows[has]).distance(peaks.phi[chosen]) < CLOSE, refine.VARIES * off, 0.0)
         found.err[rows[has]] = err
         moved = np.zeros(rows.size)
         moved[has] = np.abs(peaks.height[chosen] - peaks.guess[chosen])
         if self.locate or request.place:
-            chosen = first_of_equals(row, peaks, chosen)
+            chosen = refine.first_of_equals(row, peaks, chosen)
         phi, err_phi = peaks.phi[chosen], peaks.err_phi[chosen]
         slope = self.family.derivative_of.get(request.pose)
         if (self.locate or request.place) and slope is not None and not request.windowed:
-            phi, err_phi = polished(self.family, self.designs[rows[has]], slope, phi, err_phi)
+            phi, err_phi = refine.polished(self.family, self.designs[rows[has]], slope, phi, err_phi)
         found.phi[rows[has]] = np.mod(phi, TWO_PI)
         found.err_phi[rows[has]] = err_phi
         return moved

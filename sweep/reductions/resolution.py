@@ -16,19 +16,9 @@ from kernels import status as st
 from kernels.curves import samples as scan
 from kernels.curves.periodic import climb
 from kernels.types import EPS, TWO_PI, Status
+from sweep.families import curve_features as features
 from sweep.families.base import Angles, Array, Family
-from sweep.families.curve_features import (
-    Bends,
-    SingularCurve,
-    Smooth,
-    bends,
-    crossings,
-    singular,
-    singular_curves,
-    switches,
-    switching,
-    waves,
-)
+from sweep.families.curve_features import Bends, SingularCurve
 from sweep.numerics.events import near_zeros, sign_changes, with_events
 from sweep.numerics.singularities import FAR, SAMPLES, SHORTEST, Curve, Singularities, crowded, singularities
 from sweep.quantities.kinds import Request
@@ -51,14 +41,14 @@ def denser(family: Family, designs: Array, outputs: Collection[str], near: Singu
     The samples resolve the distance between two switches, the waves of a curve, and with 12 samples the distance of a
     singularity that even samples would not see.
     """
-    factor = np.maximum(waves(family, designs, outputs) / PER_WAVE, 1.0)
-    angles = np.sort(switches(family, designs, outputs), axis=1)
+    factor = np.maximum(features.waves(family, designs, outputs) / PER_WAVE, 1.0)
+    angles = np.sort(features.switches(family, designs, outputs), axis=1)
     if angles.shape[1] > 1:
         gaps = np.concatenate([np.diff(angles, axis=1), angles[:, :1] + TWO_PI - angles[:, -1:]], axis=1)
         # Coinciding switches count as one.
         shortest = np.where(gaps > 1e-9, gaps, TWO_PI).min(axis=1)
         factor = np.maximum(factor, TWO_PI / (SHARES * shortest))
-    if singular(family, outputs):
+    if features.singular(family, outputs):
         near = nearest(family, designs, outputs, MATTERS) if near is None else near
         rho = near.rho.min(axis=1)
         factor = np.where(rho < FAR, np.maximum(factor, PER_SINGULARITY / (FEWEST * rho)), factor)
@@ -71,7 +61,7 @@ def nearest(family: Family, designs: Array, outputs: Collection[str], within: fl
 
     Singularities farther away than ``within`` [rad] are not refined beyond even samples.
     """
-    curves = singular_curves(family.precise(), outputs)
+    curves = features.singular_curves(family.precise(), outputs)
 
     def of_rows(some: Index, curve: SingularCurve) -> Curve:
         return lambda rows, phi: curve(designs[some[rows]], Angles.of(phi))
@@ -113,9 +103,9 @@ def ends(family: Family, designs: Array, even: int, looks: int, output: str) -> 
     """
     n = len(designs)
     edges = np.tile(np.linspace(0.0, TWO_PI, even + 1), (n, 1))
-    known = switches(family, designs, (output,))
+    known = features.switches(family, designs, (output,))
     edges = with_events(edges, np.repeat(np.arange(n), known.shape[1]), known.ravel())
-    fast = np.ceil(waves(family, designs, (output,)) / PER_PANEL).astype(np.int64)  # even panels for waves
+    fast = np.ceil(features.waves(family, designs, (output,)) / PER_PANEL).astype(np.int64)  # even panels for waves
     more = np.repeat(np.arange(n), np.where(fast > even, fast, 0))
     place = np.arange(more.size) - np.searchsorted(more, more)
     edges = with_events(edges, more, TWO_PI * place / fast[more])
@@ -125,7 +115,7 @@ def ends(family: Family, designs: Array, even: int, looks: int, output: str) -> 
     edges = with_events(edges, np.repeat(close, about.shape[1]), about.ravel())
     angles = crowded(near.only(close), LOOK)
     edges = with_events(edges, *_passed(family, designs, (output,), _looked(n, looks, close, angles)))
-    for bent in bends(family, output):
+    for bent in features.bends(family, output):
         edges = with_events(edges, *_bent(bent, designs, _looked(n, BENDING, close, angles)))
     return edges
 
@@ -138,7 +128,7 @@ def events(family: Family, designs: Array, looks: int, outputs: Collection[str])
     looked = np.tile(np.arange(looks) * (TWO_PI / looks), (len(designs), 1))
     found = [_passed(family, designs, outputs, looked)]
     # Near the minimum of a squared function a curve is steep, but has no kink.
-    known = dict.fromkeys(bent for output in outputs for bent in bends(family, output) if not bent.squares)
+    known = dict.fromkeys(bent for output in outputs for bent in features.bends(family, output) if not bent.squares)
     found += [_bent(bent, designs, looked) for bent in known]
     rows, phi = (np.concatenate(parts) for parts in zip(*found, strict=True))
     return rows, phi
@@ -147,7 +137,7 @@ def events(family: Family, designs: Array, looks: int, outputs: Collection[str])
 def zeros(family: Family, designs: Array, output: str) -> tuple[Index, Array]:
     """Find designs (k,) and angles (k,) where a non-negative pose output is known to vanish, or jumps."""
     looked = _looked(len(designs), BENDING, np.zeros(0, np.intp), np.zeros((0, 0)))
-    found = [_bent(bent, designs, looked) for bent in bends(family, output) if bent.zero]
+    found = [_bent(bent, designs, looked) for bent in features.bends(family, output) if bent.zero]
     return found[0] if found else (np.zeros(0, np.intp), np.zeros(0))
 
 
@@ -162,7 +152,7 @@ def _bent(bent: Bends, designs: Array, looked: Array) -> tuple[Index, Array]:
 
 def _passed(family: Family, designs: Array, outputs: Collection[str], looked: Array) -> tuple[Index, Array]:
     """Find designs and angles where an output passes its level or a speed passes zero, bracketed by ``looked``."""
-    passed_levels = crossings(family, outputs)
+    passed_levels = features.crossings(family, outputs)
     # Reversals affect friction and loads, which belong to effects; a family knows its own kinks.
     speeds = () if family.dear.keys().isdisjoint(outputs) else reversing(family)
     if not speeds and not passed_levels:
@@ -340,7 +330,7 @@ def _beyond_mean(coefficients: Array) -> Array:
 
 def series_of(family: Family, request: Request) -> Series | None:
     """Fourier series of a request; None unless the curve is known to be smooth and expensive."""
-    known = next((smooth for smooth in family.every(Smooth) if smooth.of == request.pose), None)
-    if known is None or request.place or request.windowed or switching(family, known.parts):
+    known = next((smooth for smooth in family.every(features.Smooth) if smooth.of == request.pose), None)
+    if known is None or request.place or request.windowed or features.switching(family, known.parts):
         return None
     return Series(family, request, known.parts) if len(known.parts) == 1 or request.mode >= 0 else None

@@ -19,16 +19,7 @@ from sweep.errors import InputError
 from sweep.evaluation.tables import numbers
 from sweep.evaluation.thread.rows import Sheet, columns_of, computed, frame, side_by_side, warn_outside
 from sweep.families.base import Parameter
-from sweep.families.machines.thread_balance import (
-    ALPHA,
-    BENDING,
-    BETA,
-    CONTOUR_CONSTANTS,
-    MEASURED_RADIUS,
-    MEASURED_SPEED,
-    RADIUS,
-    SPEED_CONSTANTS,
-)  # fmt: skip
+from sweep.families.machines import thread_balance
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -38,13 +29,13 @@ if TYPE_CHECKING:
 
 TENSION = Parameter("T1", "none", "tension in front of the contour, gf", not_negative=True)
 ANGLE = Parameter("theta_deg", "none", "wrap angle, degrees", not_negative=True)
-FITTED = (ALPHA, BETA, BENDING)
+FITTED = (thread_balance.ALPHA, thread_balance.BETA, thread_balance.BENDING)
 
-_CONTOUR = Sheet("contour", (TENSION, RADIUS, ANGLE, *CONTOUR_CONSTANTS))
-_CONTOURS = Sheet("contours", (RADIUS, *CONTOUR_CONSTANTS))
-_CONTOURS_WITH_ANGLES = Sheet("contours", (RADIUS, ANGLE, *CONTOUR_CONSTANTS))
-_CONSTANTS = Sheet("constants", CONTOUR_CONSTANTS)
-_SPEED = Sheet("speed", (Parameter("v", "none", "speed of the thread, m/s"), *SPEED_CONSTANTS))
+_CONTOUR = Sheet("contour", (TENSION, thread_balance.RADIUS, ANGLE, *thread_balance.CONTOUR_CONSTANTS))
+_CONTOURS = Sheet("contours", (thread_balance.RADIUS, *thread_balance.CONTOUR_CONSTANTS))
+_CONTOURS_WITH_ANGLES = Sheet("contours", (thread_balance.RADIUS, ANGLE, *thread_balance.CONTOUR_CONSTANTS))
+_CONSTANTS = Sheet("constants", thread_balance.CONTOUR_CONSTANTS)
+_SPEED = Sheet("speed", (Parameter("v", "none", "speed of the thread, m/s"), *thread_balance.SPEED_CONSTANTS))
 _CAPSTAN = Sheet(
     "capstan",
     (
@@ -86,7 +77,7 @@ def contour(table: Table) -> pd.DataFrame:
     0  15.667   13.701    1.008     0.959      0.11       0
     """
     given = columns_of(_CONTOUR, table)
-    warn_outside(given["R"], MEASURED_RADIUS, FITTED, table)
+    warn_outside(given["R"], thread_balance.MEASURED_RADIUS, FITTED, table)
     data = side_by_side(given, CONTOUR_COLUMNS)
     units = {"gf": "T2 capstan bending adhesion", "mm": "r_thread"}
     return computed(table, units, thread_contour, given["T1"][:, None], given["theta_deg"][:, None], data)
@@ -126,7 +117,7 @@ def path(T1: ArrayLike, contours: Table, theta_deg: ArrayLike | None = None) -> 
     0  5.0  15.667  27.37       0
     """
     given = columns_of(_CONTOURS if theta_deg is not None else _CONTOURS_WITH_ANGLES, contours)
-    warn_outside(given["R"], MEASURED_RADIUS, FITTED, contours)
+    warn_outside(given["R"], thread_balance.MEASURED_RADIUS, FITTED, contours)
     count = len(given["R"])
     angles = given["theta_deg"][:, None] if theta_deg is None else numbers(theta_deg, "theta_deg", "theta_deg")
     start = numbers(T1, "T1", "T1").reshape(-1)
@@ -210,7 +201,7 @@ def speed(table: Table) -> pd.DataFrame:
     1        1.0989       0
     """
     given = columns_of(_SPEED, table)
-    warn_outside(np.abs(given["v"]), MEASURED_SPEED, SPEED_CONSTANTS, table)
+    warn_outside(np.abs(given["v"]), thread_balance.MEASURED_SPEED, thread_balance.SPEED_CONSTANTS, table)
     data = side_by_side(given, SPEED_COLUMNS)
     return computed(table, {"1": "ratio_to_ref"}, thread_speed, given["v"][:, None], data)
 

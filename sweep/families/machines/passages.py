@@ -11,20 +11,7 @@ from numpy.typing import NDArray
 from kernels import status as st
 from kernels.types import TWO_PI, Array
 from sweep.families.base import Columns, Output, Step
-from sweep.families.machines.crossings import (
-    TANGENT,
-    CrankAngles,
-    Places,
-    Poses,
-    largest,
-    moved,
-    outputs_at,
-    scattered,
-    steepness,
-    step_of,
-    verdict,
-    where_largest,
-)
+from sweep.families.machines import crossings
 from sweep.families.machines.moments import Taking
 from sweep.families.machines.thread_way import turned as turned_back
 
@@ -62,15 +49,15 @@ def taking_step(taking: Taking, machine: Machine) -> Step:
     count = Output(f"count_{name}", "1", "passages in the stated sense beside the needle", "5.2", jumps=True)
     texts = TEXTS | (WINDOW | {"room": ("length", taking.window.words)} if taking.window else {})
     provides = (place, count, *(Output(f"{name}_{key}", unit, text, "5.2") for key, (unit, text) in texts.items()))
-    return step_of(name, provides, machine, partial(_found, taking), partial(_read, taking))
+    return crossings.step_of(name, provides, machine, partial(_found, taking), partial(_read, taking))
 
 
-def passages(taking: Taking, machine: Machine, poses: Poses, samples: int) -> Columns:
+def passages(taking: Taking, machine: Machine, poses: crossings.Poses, samples: int) -> Columns:
     """Compute outputs of the passage that need no further search, each (n,), and status."""
     return _read(taking, machine, poses.designs, _found(taking, poses, samples, frozenset()), frozenset())
 
 
-def _found(taking: Taking, poses: Poses, samples: int, wanted: frozenset[str]) -> Places:
+def _found(taking: Taking, poses: crossings.Poses, samples: int, wanted: frozenset[str]) -> crossings.Places:
     """Find the passage of the tip, the next one, and the places of the other outputs.
 
     Extrema of the tip's coordinate across the needle are found first, on a grid and then as roots of its derivative;
@@ -88,26 +75,26 @@ def _found(taking: Taking, poses: Poses, samples: int, wanted: frozenset[str]) -
     height, turned = at(roots, "height", "dacross")
     beside, right = taking.beside(height), sense * turned > 0.0
     count, ways = (np.bincount(roots.row, beside & one, n) for one in (right, ~right))
-    found = verdict(status, at.touches(extremes, across), count, ways)
+    found = crossings.verdict(status, at.touches(extremes, across), count, ways)
     taken = np.flatnonzero(beside & right & (found[roots.row] == st.OK))
     row, phi = roots.row[taken], roots.phi[taken]
-    passage = scattered(n, row, phi)
-    after = scattered(n, row, roots.phi[_following(roots, taken)])
+    passage = crossings.scattered(n, row, phi)
+    after = crossings.scattered(n, row, roots.phi[_following(roots, taken)])
     size = np.abs(poses.designs).max(axis=1)
     low = _last(stops, depths, size, passage)
     top = _last(stops, -depths, size, low)
-    places: Places = {"at": passage, "after": after, "low": low, "top": low - np.mod(low - top, TWO_PI)}
-    places["far"] = where_largest(extremes, -sense * across, n)
+    places: crossings.Places = {"at": passage, "after": after, "low": low, "top": low - np.mod(low - top, TWO_PI)}
+    places["far"] = crossings.where_largest(extremes, -sense * across, n)
     lag = np.mod(extremes.phi - passage[extremes.row], TWO_PI)
     between = (lag <= np.mod(after - passage, TWO_PI)[extremes.row]) & (sense * across > 0.0)
-    places["beyond"] = where_largest(extremes.take(between), sense * across[between], n)
+    places["beyond"] = crossings.where_largest(extremes.take(between), sense * across[between], n)
     if f"{name}_free" in wanted:
         rows = np.flatnonzero(status == st.OK)
-        places["near"] = scattered(n, rows, poses.least(rows, places["top"][rows], low[rows], f"{name}_gap"))
+        places["near"] = crossings.scattered(n, rows, poses.least(rows, places["top"][rows], low[rows], f"{name}_gap"))
     return places | {"count": np.where(status == st.OK, count, np.nan), "status": found}
 
 
-def _read(taking: Taking, machine: Machine, designs: Any, places: Places, wanted: frozenset[str]) -> Columns:
+def _read(taking: Taking, machine: Machine, designs: Any, places: crossings.Places, wanted: frozenset[str]) -> Columns:
     """Evaluate all outputs of the passage, each (n,), and status; with complex designs the places move too."""
     name, sense = taking.name, float(taking.sense)
     status = np.array(places["status"])
@@ -115,14 +102,14 @@ def _read(taking: Taking, machine: Machine, designs: Any, places: Places, wanted
     if np.iscomplexobj(designs):
         roots = {"at": "across", "after": "across", "low": "ddepth", "top": "ddepth"}
         before = np.stack([angles[key] for key in roots], axis=1)
-        after = moved(machine, designs, before, [f"{name}_{what}" for what in roots.values()])
+        after = crossings.moved(machine, designs, before, [f"{name}_{what}" for what in roots.values()])
         now = dict(zip(roots, after.T, strict=True))
         for end in ("low", "top") if "near" in angles else ():  # a least gap at an end of the stroke moves with it
             now["near"] = np.where(places["near"] == places[end], now[end], now.get("near", places["near"]))
         angles |= now  # an extremum's value does not depend on the motion of its place
     del angles["top"]
     names = ["across", "side", "height", "dacross", "depth", "speed", *(["gap"] if "near" in angles else [])]
-    found = outputs_at(machine, designs, angles, [f"{name}_{what}" for what in names])
+    found = crossings.outputs_at(machine, designs, angles, [f"{name}_{what}" for what in names])
     across, side, height, turned, depth, speed, *gap = (found[f"{name}_{what}"] for what in names)
     rise = depth["low"] - depth["at"]
     values = {
@@ -149,44 +136,45 @@ def _read(taking: Taking, machine: Machine, designs: Any, places: Places, wanted
         values["free"] = np.where(np.real(free) + radii > MEET * np.real(speed["near"]), free, np.real(free))
     status[np.real(side["at"]) <= 0.0] = st.WRONG_SIDE
     columns: Columns = {f"phi_{name}": angles["at"], f"count_{name}": places["count"], "status": status}
-    columns["steep"] = steepness(np.fmax(np.real(speed["at"]), np.real(speed["after"])), turned["at"], turned["after"])
+    fast = np.fmax(np.real(speed["at"]), np.real(speed["after"]))
+    columns["steep"] = crossings.steepness(fast, turned["at"], turned["after"])
     return columns | {f"{name}_{key}": value for key, value in values.items()}
 
 
 class _Tip:
     """Coordinates of the tip in the needle's frame, at given crank angles of several designs."""
 
-    def __init__(self, taking: Taking, poses: Poses) -> None:
+    def __init__(self, taking: Taking, poses: crossings.Poses) -> None:
         self.taking, self.poses = taking, poses
 
-    def __call__(self, where: CrankAngles, *what: str) -> list[Array]:
+    def __call__(self, where: crossings.CrankAngles, *what: str) -> list[Array]:
         """Evaluate outputs by their own names."""
         return self.poses.at(where.row, where.phi, *(f"{self.taking.name}_{one}" for one in what))
 
-    def touches(self, extremes: CrankAngles, across: Array) -> NDArray[np.bool_]:
+    def touches(self, extremes: crossings.CrankAngles, across: Array) -> NDArray[np.bool_]:
         """Whether an extremum beside the needle is 0 within rounding of its coordinates, per design (n,)."""
         side, height = self(extremes, "side", "height")
         designs = self.poses.designs
         size = np.abs(designs[extremes.row]).max(axis=1) + np.abs(side) + np.abs(height)
-        near = self.taking.beside(height) & (np.abs(across) <= TANGENT * size)
+        near = self.taking.beside(height) & (np.abs(across) <= crossings.TANGENT * size)
         return np.bincount(extremes.row, near, len(designs)) > 0
 
 
-def _last(stops: CrankAngles, depth: Array, size: Array, phi: Array) -> Array:
+def _last(stops: crossings.CrankAngles, depth: Array, size: Array, phi: Array) -> Array:
     """Find where the needle is lowest; of several places equal to rounding, the last one before ``phi``.
 
     A guide whose own dead point is passed on the way down and up is lowest twice, and so is one that turns twice.
     Depths are differences of coordinates of that ``size``, (n,).
     """
     lag = np.mod(np.where(np.isnan(phi), TWO_PI, phi)[stops.row] - stops.phi, TWO_PI)
-    deepest = largest(stops.row, depth, size.size)
-    lag[depth < (deepest - TANGENT * (np.abs(deepest) + size))[stops.row]] = np.inf
+    deepest = crossings.largest(stops.row, depth, size.size)
+    lag[depth < (deepest - crossings.TANGENT * (np.abs(deepest) + size))[stops.row]] = np.inf
     found, order = np.full(deepest.size, np.nan), np.argsort(-lag, kind="stable")
     found[stops.row[order]] = stops.phi[order]
     return found
 
 
-def _following(roots: CrankAngles, taken: NDArray[np.intp]) -> NDArray[np.intp]:
+def _following(roots: crossings.CrankAngles, taken: NDArray[np.intp]) -> NDArray[np.intp]:
     """Index of the next passage of the same design, around the turn."""
     after = taken + 1
     same = np.append(roots.row, -1)[after] == roots.row[taken]

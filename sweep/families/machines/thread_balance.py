@@ -27,23 +27,8 @@ import numpy as np
 
 from kernels.types import TWO_PI
 from sweep.families.base import PER_RADIAN, Output, Parameter
+from sweep.families.machines import thread_way
 from sweep.families.machines.relations import Relation
-from sweep.families.machines.thread_way import (
-    PHI,
-    Edge,
-    Piece,
-    Run,
-    TakeUp,
-    Waypoint,
-    beside,
-    length_and_bends,
-    masked,
-    nearest_way,
-    outside,
-    placed_points,
-    spots,
-    turned,
-)
 from sweep.numerics.curves import TableCurve
 
 GF = 9.80665e-3  # N
@@ -96,7 +81,7 @@ class ThreadBalance(Relation):
     moves : whether the velocities of all its points are known
     """
 
-    path: Run
+    path: thread_way.Run
     stock: float = 0.0
     tension: float = 0.0
     stiffness: float = 0.0
@@ -127,7 +112,7 @@ class ThreadBalance(Relation):
         if self.allowed is not None:
             found.append(("excess", "length", f"surplus of thread {who} beyond what is allowed"))
         kinks = set(self.bent)
-        if any(isinstance(place.on, TakeUp) and place.on.kinks for place in self.path):
+        if any(isinstance(place.on, thread_way.TakeUp) and place.on.kinks for place in self.path):
             kinks |= {"given", "surplus", "excess", "wrap", "tension"}
         if self.happens:
             kinks = {key for key, *_ in found}
@@ -136,7 +121,7 @@ class ThreadBalance(Relation):
     @property
     def bent(self) -> frozenset[str]:
         """Outputs with a kink where one of the curves of :meth:`bending` passes zero."""
-        if any(isinstance(place.on, Edge) for place in self.path):  # its ends bound the range of sliding
+        if any(isinstance(place.on, thread_way.Edge) for place in self.path):  # its ends bound the range of sliding
             return frozenset(("wrap", "tension", "rate", "velocity"))
         return frozenset(("tension",) if self.moves or self.stiffness else ())
 
@@ -167,8 +152,8 @@ class ThreadBalance(Relation):
     def needs(self, wanted: frozenset[str]) -> frozenset[str]:
         """Return names of the coordinates of points and take-up curves, with bends and velocities if wanted."""
         moving, bent = self._asked(wanted)
-        names = {name for place in self.path for spot in spots(place) for name in spot.needs(moving)}
-        ups = [place.on for place in self.path if isinstance(place.on, TakeUp)]
+        names = {name for place in self.path for spot in thread_way.spots(place) for name in spot.needs(moving)}
+        ups = [place.on for place in self.path if isinstance(place.on, thread_way.TakeUp)]
         names.update(f"phi_{event}" for event in self.happens)
         return frozenset(names.union((up.taken for up in ups), (up.wrap for up in ups if bent)))
 
@@ -180,21 +165,21 @@ class ThreadBalance(Relation):
 
     def compute(self, found: Mapping[str, Any], wanted: frozenset[str]) -> dict[str, Any]:
         """Return the outputs, (n, m); ``found`` holds "phi" of the main shaft, events as "phi_...", parameters."""
-        phi, (moving, bent) = found[PHI], self._asked(wanted)
+        phi, (moving, bent) = found[thread_way.PHI], self._asked(wanted)
         needed, rate, taken = 0.0 * phi, 0.0 * phi, 0.0 * phi
-        wraps: list[tuple[Waypoint, Any, Piece]] = []
+        wraps: list[tuple[thread_way.Waypoint, Any, thread_way.Piece]] = []
         for up, places in groupby(self.path, _is_take_up):
             run = list(places)
             if not up:
-                pieces = placed_points(run, found, moving)
-                length, change, bends = length_and_bends(pieces, moving, bent)
+                pieces = thread_way.placed_points(run, found, moving)
+                length, change, bends = thread_way.length_and_bends(pieces, moving, bent)
                 needed, rate = needed + length, rate + change
                 wraps += zip(run[1:-1], bends, pieces[1:-1], strict=True) if bent else ()
                 continue
             for place in run:
-                assert isinstance(place.on, TakeUp)
+                assert isinstance(place.on, thread_way.TakeUp)
                 taken = taken + found[place.on.taken]
-                wraps += [(place, found[place.on.wrap], Piece((), (), None))] if bent else []
+                wraps += [(place, found[place.on.wrap], thread_way.Piece((), (), None))] if bent else []
         sewn, sewing = self._passed("feeding", found)
         drawn, drawing = self._passed("drawing", found)
         given, demand = found[f"{self.name}_stock"] - taken, needed + sewn - drawn
@@ -205,9 +190,9 @@ class ThreadBalance(Relation):
         if moving:
             columns |= {"rate": rate, "velocity": rate * found[f"{self.name}_speed"]}
         if bent:
-            angles = [(p, masked(piece.on, angle + p.wrap)) for p, angle, piece in wraps]
+            angles = [(p, thread_way.masked(piece.on, angle + p.wrap)) for p, angle, piece in wraps]
             columns["wrap"] = sum((angle for _, angle in angles), 0.0 * needed)
-            sliding = [masked(outside(p.fixed, found), angle) for p, angle in angles]
+            sliding = [thread_way.masked(thread_way.outside(p.fixed, found), angle) for p, angle in angles]
             pull = self.tension - self.stiffness * columns["surplus"]
             columns["tension"] = self._tension(pull * self._hurried(columns, found), sliding)
         return {f"{self.name}_{key}": values for key, values in columns.items()}
@@ -233,8 +218,8 @@ class ThreadBalance(Relation):
         if not ends:
             return 0.0, 0.0
         first, last = (found[f"phi_{end}"] for end in ends)
-        since, lasts = found[PHI] - first, turned(last - first)
-        share = turned(since) / lasts
+        since, lasts = found[thread_way.PHI] - first, thread_way.turned(last - first)
+        share = thread_way.turned(since) / lasts
         share = np.where(np.real(share) < 1.0, share, 1.0)
         # a cycloid: thread begins to pass and ends without a jump of its speed
         passed = share - np.sin(TWO_PI * share) / TWO_PI + np.floor(np.real(since) / TWO_PI)
@@ -263,17 +248,18 @@ class ThreadBalance(Relation):
         return GF * pull
 
 
-def _is_take_up(place: Waypoint) -> bool:
-    return isinstance(place.on, TakeUp)
+def _is_take_up(place: thread_way.Waypoint) -> bool:
+    return isinstance(place.on, thread_way.TakeUp)
 
 
-def _past_ends(run: Run, found: Mapping[str, Any]) -> list[Any]:
+def _past_ends(run: thread_way.Run, found: Mapping[str, Any]) -> list[Any]:
     """Return the place of the shortest way along each blade of a run, measured from either end."""
-    pieces, past = placed_points(run, found, False), []
+    pieces, past = thread_way.placed_points(run, found, False), []
     for k, place in enumerate(run):
-        if isinstance(place.on, Edge):
-            ends = (spot.position(found) for spot in spots(place))
-            along = nearest_way(beside(pieces, k, -1).at, beside(pieces, k, 1).at, *ends)
+        if isinstance(place.on, thread_way.Edge):
+            ends = (spot.position(found) for spot in thread_way.spots(place))
+            before, after = (thread_way.beside(pieces, k, step).at for step in (-1, 1))
+            along = thread_way.nearest_way(before, after, *ends)
             past += [along, along - 1.0]
     return past
 

@@ -16,17 +16,7 @@ import numpy as np
 from kernels import status as st
 from kernels.types import TWO_PI
 from sweep.families.base import PER_RADIAN, Columns, Output, Step
-from sweep.families.machines.crossings import (
-    TANGENT,
-    Places,
-    Poses,
-    moved,
-    outputs_at,
-    scattered,
-    steepness,
-    step_of,
-    verdict,
-)
+from sweep.families.machines import crossings
 from sweep.families.machines.relations import Relation
 from sweep.families.machines.segments import cross, dot, minus
 from sweep.families.machines.tools import Spot
@@ -116,15 +106,15 @@ def entering_step(entering: Entering, machine: Machine) -> Step:
     units = {"pace": PER_RADIAN}
     read = (Output(f"{name}_{key}", units.get(key, "length"), text, "(13)") for key, text in TEXTS.items())
     provides = (place, count, *read)
-    return step_of(name, provides, machine, partial(_found, entering), partial(_read, entering))
+    return crossings.step_of(name, provides, machine, partial(_found, entering), partial(_read, entering))
 
 
-def entries(entering: Entering, machine: Machine, poses: Poses, samples: int) -> Columns:
+def entries(entering: Entering, machine: Machine, poses: crossings.Poses, samples: int) -> Columns:
     """Return all outputs of the entry, each (n,), and status."""
     return _read(entering, machine, poses.designs, _found(entering, poses, samples, frozenset()), frozenset())
 
 
-def _found(entering: Entering, poses: Poses, samples: int, wanted: frozenset[str]) -> Places:
+def _found(entering: Entering, poses: crossings.Poses, samples: int, wanted: frozenset[str]) -> crossings.Places:
     """Find the crank angle at which the tip enters, by the method for the passage of a needle."""
     name, sense, n = entering.name, float(entering.sense), len(poses.designs)
     above, dabove = f"{name}_above", f"{name}_dabove"
@@ -138,26 +128,29 @@ def _found(entering: Entering, poses: Poses, samples: int, wanted: frozenset[str
     inside, right = _within(entering, roots.phi), sense * turned > 0.0
     count, ways = (np.bincount(roots.row, inside & one, n) for one in (right, ~right))
     size = np.abs(poses.designs[extremes.row]).max(axis=1, initial=0.0)
-    near = _within(entering, extremes.phi) & (np.abs(heights) <= TANGENT * size)
-    found = verdict(status, np.bincount(extremes.row, near, n) > 0, count, ways)
+    near = _within(entering, extremes.phi) & (np.abs(heights) <= crossings.TANGENT * size)
+    found = crossings.verdict(status, np.bincount(extremes.row, near, n) > 0, count, ways)
     taken = np.flatnonzero(inside & right & (found[roots.row] == st.OK))
-    place = scattered(n, roots.row[taken], roots.phi[taken])
+    place = crossings.scattered(n, roots.row[taken], roots.phi[taken])
     places = {"at": place, "count": np.where(status == st.OK, count, np.nan), "status": found}
     return places | {"fastest": np.abs(slope).max(axis=1)}
 
 
-def _read(entering: Entering, machine: Machine, designs: Any, places: Places, wanted: frozenset[str]) -> Columns:
+def _read(
+    entering: Entering, machine: Machine, designs: Any, places: crossings.Places, wanted: frozenset[str]
+) -> Columns:
     """Return all outputs of the entry, each (n,), and status; complex designs move the crank angle to first order."""
     name, status, at = entering.name, np.array(places["status"]), places["at"]
     if np.iscomplexobj(designs):
-        at = moved(machine, designs, at[:, None], [f"{name}_above"])[:, 0]
+        at = crossings.moved(machine, designs, at[:, None], [f"{name}_above"])[:, 0]
     reads = [f"{name}_dabove", *(f"{name}_to_{side}" for side in SIDES)]
-    found = outputs_at(machine, designs, {"at": at}, reads)
+    found = crossings.outputs_at(machine, designs, {"at": at}, reads)
     turned, *distances = (found[one]["at"] for one in reads)
     least = np.minimum.reduce(distances) - entering.radius
     columns: Columns = {f"phi_{name}": at, f"count_{name}": places["count"], f"{name}_margin": least}
     columns |= {f"{name}_from_{side}": one for side, one in zip(SIDES, distances, strict=True)}
-    columns[f"{name}_pace"], columns["steep"] = float(entering.sense) * turned, steepness(places["fastest"], turned)
+    columns["steep"] = crossings.steepness(places["fastest"], turned)
+    columns[f"{name}_pace"] = float(entering.sense) * turned
     status[np.real(least) <= -entering.radius] = st.WRONG_SIDE
     status[np.isfinite(places["at"]) & np.isnan(least)] = st.NO_TRIANGLE
     return columns | {"status": status}
