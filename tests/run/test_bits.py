@@ -221,7 +221,7 @@ def test_a_machine_has_the_bits_it_has_alone_where_all_designs_share_a_member(ac
     machine = family({"shared": "rssr", "other": "rssr"})
     designs = np.tile(design_matrix(machine, _pair_of(machine))[0], (7, 1))
     designs[:, machine.parameter_names.index("other.b")] *= np.linspace(0.99, 1.01, 7)
-    wanted = ["rms_shared.dpsi", "rms_shared.d2psi", "rms_shared.discriminant"]
+    wanted = ["shared.rms_dpsi", "shared.rms_d2psi", "shared.rms_discriminant"]
     together = design_outputs(machine, designs, wanted, accuracy)
     alone = [design_outputs(machine, designs[[k]], wanted, accuracy) for k in range(7)]
     for name in wanted:

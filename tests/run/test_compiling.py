@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from contextlib import nullcontext
-from types import SimpleNamespace
 
 import pytest
 
@@ -40,11 +39,12 @@ def test_what_is_missing_is_compiled_side_by_side(
             elsewhere.extend(numbers)
             return iter(elsewhere)
 
-    def recorder(event: str) -> nullcontext[SimpleNamespace]:
-        return nullcontext(SimpleNamespace(buffer=["an event"] if len(here) == compiled_at else []))
+    def listening(event: str, compiled: engine.Compiled) -> nullcontext[None]:
+        compiled.functions = int(len(here) == compiled_at)
+        return nullcontext()
 
     monkeypatch.setattr(engine.KernelStep, "__call__", lambda step, number: here.append(number))
-    monkeypatch.setattr(engine, "install_recorder", recorder)
+    monkeypatch.setattr(engine, "install_listener", listening)
     monkeypatch.setattr(engine, "executor", lambda name, jobs: Processes())
     monkeypatch.setattr(engine.os, "cpu_count", lambda: 2)
     with Phases(False) as phases:

@@ -71,7 +71,7 @@ def stage_bodies(prefix, scene, frame, given, number):
             for w, kind in zip(own, kinds, strict=True)
         )
         driven += [f"{names[k]} {i}" for i, kind in enumerate(kinds) if kind == DRIVEN]
-        parent = names[tree.parents[k]] if tree.parents[k] >= 0 else ""
+        parent = names[body.parent] if body.parent >= 0 else ""
         joint = turn @ links.bodies[0, 0, k, 24:27] + at
         found.append(
             Body(names[k], parent, *placed[k], joint, freedoms, mass_of(given, body.name, number, body.slender))
