@@ -107,7 +107,9 @@ def shaken(family: Family, designs: Array, phi: Array, name: str) -> Array:
 
 def shaken_anywhere(family: Family, designs: Array, phi: Array, name: str) -> Array:
     """Return the largest of these changes at PLACES poses of a turn: of a few roundings any one pose may keep all."""
-    found: Array = np.max([shaken(family, designs, phi + k * (TWO_PI / PLACES), name) for k in range(PLACES)], axis=0)
+    places = phi[:, None] + np.arange(PLACES) * (TWO_PI / PLACES)
+    changes = shaken(family, np.repeat(designs, PLACES, axis=0), places.ravel(), name)
+    found: Array = changes.reshape(places.shape).max(axis=1)
     return found
 
 
