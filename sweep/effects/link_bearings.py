@@ -25,9 +25,9 @@ from sweep.families.link_tree import LinkJoint, LinkTree
 from sweep.families.poses import filled_all
 from sweep.families.sites import AXES
 
-EQUATION = "docs/links.md (10)-(13)"
+EQUATION = "docs/links.md (13)-(16)"
 SLIDING_FORMULAS = (
-    "(10) journals p_k = F_k/(d l_k) with the loads F_k of the supports, friction included; a collar carries the force",
+    "(13) journals p_k = F_k/(d l_k) with the loads F_k of the supports, friction included; a collar carries the force",
     "    along the axis: p_3 = 4 |F_axial|/(pi (d0^2 - d^2)); utilisation = largest p over its permissible value",
 )
 ROLLING_FORMULAS = (
