@@ -58,7 +58,7 @@ def test_passage_stays_on_its_level_while_the_design_changes() -> None:
     start = model(Limit("stay", 0.1, None))
     state = start.state(np.array([0.5, 0.5]))
     points, _ = start.moved(np.array([0.7, 0.35]), state.form, state.form.points)
-    own = points.how == PASSING
+    own = points.kind == PASSING
     assert own.sum() >= 2
     there = start.curves.values(start.design(np.array([0.7, 0.35]))[None, :], points)[0]
     # one Newton step beyond 3e-6 rad leaves 1e-11 of the slope, which is some 30 mm/rad here

@@ -46,7 +46,7 @@ def test_gradient_of_a_pose_output_equals_mpmath(output, order):
     curves = Curves(problem, (Series(output),))
     phi = np.array([0.3, 2.0, 4.4])
     points = curves.follow(DESIGN, Points.of([(0, x, 1.0, STATIC, math.nan, 0.0) for x in phi]))
-    found, _ = gradients(curves, stepped(problem, DESIGN, problem.scaled(DESIGN[None, :])[0]), points, places=False)
+    found, _ = gradients(curves, stepped(problem, DESIGN, problem.scaled(DESIGN[None, :])[0]), points, False)
     with mp.workdps(40):
         exact = [mp.mpf(float(x)) for x in DESIGN[:7]]
         for k, x in enumerate(phi):
@@ -123,7 +123,7 @@ def test_gradient_at_a_window_edge_follows_the_edge():
     rows = state.form.rows(state.atoms, 0.0)
     own = [k for k, label in enumerate(state.form.labels) if label.name == "max_abs_dev"]
     worst = min(own, key=lambda k: rows[k])
-    assert int(state.form.points.how[np.flatnonzero(state.form.matrix[worst])[0]]) == 1, "the edge should be the worst"
+    assert int(state.form.points.kind[np.flatnonzero(state.form.matrix[worst])[0]]) == 1, "the edge should be the worst"
     step = 1e-4
     for j in range(8):
         values = []

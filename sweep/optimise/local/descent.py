@@ -211,7 +211,7 @@ class Descent:
         # Windows and passages move with the design: a fixed angle may leave them, where the limit does not apply.
         held = [s.window is None and s.passes is None for s in self.model.curves.series]
         new &= np.array(held, dtype=np.bool_)[found.series]
-        return replace(found, how=np.full(len(found), STATIC)).take(new)
+        return replace(found, kind=np.full(len(found), STATIC)).take(new)
 
     def _verified(self) -> bool:
         """Tell whether four times as many poses give the same extrema; if not, they become the search's extrema."""

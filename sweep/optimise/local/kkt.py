@@ -138,7 +138,7 @@ def in_words(labels: tuple[Label, ...], found: Multipliers, variables: tuple[str
     for label, weight in zip(labels, found.weights, strict=True):
         if label.side != "objective" and abs(weight) > 1e-9:
             text = f"{label.name} {WORDS[label.side]}"
-            words[text] = words.get(text, 0.0) + float(weight) * label.per
+            words[text] = words.get(text, 0.0) + float(weight) * label.bound_ratio
     for name, weight in zip(variables, found.bounds, strict=True):
         if abs(weight) > 1e-9:
             words[f"{name} at its {'lower' if weight > 0 else 'upper'} bound"] = abs(float(weight))

@@ -60,7 +60,7 @@ class State:
     @property
     def known(self) -> float:
         """Largest scaled violation of the limits that exist for this design."""
-        return self.form.known_violation(self.atoms)
+        return self.form.defined_violation(self.atoms)
 
     @property
     def short(self) -> float:
@@ -84,7 +84,7 @@ class Model:
     ) -> None:
         self.looks, self.allowed = 0, allowed
         self.problem, self.program, self.stop, self.base = problem, program, stop, start
-        self.curves = Curves(problem, program.series, program.places)
+        self.curves = Curves(problem, program.series, program.with_angles)
         self.samples = problem.accuracy.samples or SAMPLES
         self.scale, self.price = 1.0, PRICE
         if program.objective.inner == "same":
@@ -138,7 +138,7 @@ class Model:
     def jacobian(self, fractions: Array, form: Form, points: Points) -> Array:
         """Return gradients (R, n) of the form's rows by the scaled variables, at tracked points."""
         designs = stepped(self.problem, self.base, fractions)
-        values, moves = gradients(self.curves, designs, points, self.program.places)
+        values, moves = gradients(self.curves, designs, points, self.program.with_angles)
         scalars = self._scalar_gradients(form.scalars, fractions, designs, points, moves)
         jacobian = np.concatenate([values, moves, *(scalars[name][None, :] for name in form.scalars)])
         # A quantity without derivative, as the angle of a vanishing extremum, gives nan only in the rows that use it.
@@ -180,7 +180,8 @@ class Model:
             if name in self.problem.family.parameter_names or name in self.program.pieces:
                 found[name] = np.asarray(self._scalars((name,), designs)[name].imag / STEP, np.float64)
             elif name in self.program.readings:
-                k, of = self.program.place(name, self.curves, designs[0].real, points), self.program.readings[name].of
+                k = self.program.reading_point(name, self.curves, designs[0].real, points)
+                of = self.program.readings[name].of
                 none = np.full(len(fractions), math.nan)
                 found[name] = none if k < 0 else reading_gradient(self.curves, designs, of, points.phi[k], moves[k])
         rest = [name for name in names if name not in found]

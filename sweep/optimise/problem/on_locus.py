@@ -56,7 +56,7 @@ class LocusCoordinates:
         return (f"phi_ext{self.stage.number}",)
 
     @cached_property
-    def _asked(self) -> tuple[str, ...]:
+    def _inputs(self) -> tuple[str, ...]:
         return tuple(self.stage.outside(name) for name in self.stage.way.parameter_names)
 
     @property
@@ -65,7 +65,7 @@ class LocusCoordinates:
 
     def make(self, columns: Mapping[str, Any]) -> Mapping[str, Any]:
         """Return the links that give the prescribed outputs; nan if the locus has no mechanism there."""
-        matrix = np.column_stack([columns[name] for name in self._asked])
+        matrix = np.column_stack([columns[name] for name in self._inputs])
         matrix[:, 0] *= -columns[self._branch].real
         links = self.stage.links_of(self.stage.way.solve(matrix))
         return {name: links[name] for name in self.made}
@@ -73,14 +73,14 @@ class LocusCoordinates:
     def read(self, family: Family, designs: Array) -> Mapping[str, Array]:
         """Return the limit positions of designs; nan if they do not exist."""
         number, direction = self.stage.number, f"direction{self.stage.number}"
-        asked = [name for name in self.given if name != direction]
-        columns = design_outputs(family, designs, asked, EXACT)
-        found = {name: np.asarray(columns[name], np.float64) for name in asked}
-        found[asked[0]] = np.abs(found[asked[0]])
+        names = [name for name in self.given if name != direction]
+        outputs = design_outputs(family, designs, names, EXACT)
+        coordinates = {name: np.asarray(outputs[name], np.float64) for name in names}
+        coordinates[names[0]] = np.abs(coordinates[names[0]])
         if direction in self.given:
             e, g = (designs[:, family.parameter_names.index(f"{name}{number}")] for name in ("e", "g"))
-            found[direction] = np.arctan2(g, e)
-        return found
+            coordinates[direction] = np.arctan2(g, e)
+        return coordinates
 
 
 def on_locus(problem: Problem) -> Problem:
@@ -97,31 +97,31 @@ def on_locus(problem: Problem) -> Problem:
     problem : problem in the parameters themselves
     """
     family = problem.family
-    first, number = family.stages[0].family, family.stages[0].tail
-    locus = first.find(LimitLocus)
+    stage, number = family.stages[0].family, family.stages[0].tail
+    locus = stage.find(LimitLocus)
     if problem.coordinates is not None or locus is None:
         return problem
-    wanted = (f"{locus.travel}{number}", f"phi0{number}")
+    eliminated = (f"{locus.travel}{number}", f"phi0{number}")
     equations = {x.output: x.minimum for x in problem.limits if x.minimum is not None and x.minimum == x.maximum}
-    if not all(name in equations for name in wanted):
+    if not all(name in equations for name in eliminated):
         return problem
     bounds = {n: (float(x), float(y)) for n, x, y in zip(problem.variables, problem.lower, problem.upper, strict=True)}
-    ends = _directions(problem, bounds, tuple(f"{name}{number}" for name in locus.sized))
-    coordinates = LocusCoordinates(OnLocus(first.name, number, "phi1" if ends is None else "direction"))
-    places = {f"phi_ext{number}": PLACE_BOUNDS}
-    if ends is not None:
-        places[f"direction{number}"] = ends
-    held = {name: (float(x), float(x)) for name, x in problem.fixed.items()}
-    links = [Limit(name, *(bounds | held)[name]) for name in coordinates.made]
-    varied = {name: ends for name, ends in bounds.items() if name not in coordinates.made} | places
+    directions = _direction_bounds(problem, bounds, tuple(f"{name}{number}" for name in locus.sized))
+    coordinates = LocusCoordinates(OnLocus(stage.name, number, "phi1" if directions is None else "direction"))
+    locus_bounds = {f"phi_ext{number}": PLACE_BOUNDS}
+    if directions is not None:
+        locus_bounds[f"direction{number}"] = directions
+    fixed_bounds = {name: (float(x), float(x)) for name, x in problem.fixed.items()}
+    link_limits = [Limit(name, *(bounds | fixed_bounds)[name]) for name in coordinates.made]
+    varied = {name: interval for name, interval in bounds.items() if name not in coordinates.made} | locus_bounds
     fixed = {name: float(x) for name, x in problem.fixed.items() if name not in coordinates.made}
     return replace(
         problem,
         variables=tuple(varied),
         lower=np.array([low for low, _ in varied.values()]),
         upper=np.array([high for _, high in varied.values()]),
-        fixed=fixed | {name: abs(float(equations[name] or 0.0)) for name in wanted},
-        limits=(*(limit for limit in problem.limits if limit.output not in wanted), *links),
+        fixed=fixed | {name: abs(float(equations[name] or 0.0)) for name in eliminated},
+        limits=(*(limit for limit in problem.limits if limit.output not in eliminated), *link_limits),
         coordinates=coordinates,
     )
 
@@ -131,7 +131,6 @@ def in_parameters(problem: Problem, design: Array) -> Problem | None:
 
     The coordinates become limits, equations if they are fixed, and the links that follow become variables.  None if the
     problem is already in the parameters, if the place on the locus is not free, or if limits leave a link no interval.
-    leave a link no room.
 
     Parameters
     ----------
@@ -141,42 +140,43 @@ def in_parameters(problem: Problem, design: Array) -> Problem | None:
     coordinates = problem.coordinates
     if not isinstance(coordinates, LocusCoordinates):
         return None
-    held, places = coordinates.given[:2], coordinates.given[2:]  # swing or stroke and phi0; place on the locus
+    # Swing or stroke and phi0; place on the locus.
+    eliminated, places = coordinates.given[:2], coordinates.given[2:]
     bounds = {n: (float(x), float(y)) for n, x, y in zip(problem.variables, problem.lower, problem.upper, strict=True)}
     if any(n not in bounds or (n in coordinates.periodic and np.ptp(bounds[n]) < WHOLE_TURN) for n in places):
         return None
-    ends = {name: bounds[name] for name in problem.variables if name not in coordinates.given}
-    ends |= {name: _around(problem, design, coordinates.made, name) for name in coordinates.made}
-    if any(low > high for low, high in ends.values()):
+    intervals = {name: bounds[name] for name in problem.variables if name not in coordinates.given}
+    intervals |= {name: _link_interval(problem, design, coordinates.made, name) for name in coordinates.made}
+    if any(low > high for low, high in intervals.values()):
         return None
-    varied = {name: (low, high) for name, (low, high) in ends.items() if low < high}
-    known = {name: (float(x), float(x)) for name, x in problem.fixed.items()} | bounds
-    fixed = {name: x for name, x in problem.fixed.items() if name not in held}
+    varied = {name: (low, high) for name, (low, high) in intervals.items() if low < high}
+    given_bounds = {name: (float(x), float(x)) for name, x in problem.fixed.items()} | bounds
+    fixed = {name: x for name, x in problem.fixed.items() if name not in eliminated}
     return replace(
         problem,
         variables=tuple(varied),
         lower=np.array([low for low, _ in varied.values()]),
         upper=np.array([high for _, high in varied.values()]),
-        fixed=fixed | {name: low for name, (low, high) in ends.items() if low == high},
+        fixed=fixed | {name: low for name, (low, high) in intervals.items() if low == high},
         limits=(
             *(limit for limit in problem.limits if limit.output not in coordinates.made),
-            *(Limit(name, *known[name]) for name in held),
+            *(Limit(name, *given_bounds[name]) for name in eliminated),
         ),
         coordinates=None,
     )
 
 
-def _around(problem: Problem, design: Array, links: tuple[str, ...], name: str) -> tuple[float, float]:
+def _link_interval(problem: Problem, design: Array, links: tuple[str, ...], name: str) -> tuple[float, float]:
     """Return the bounds of a link that follows: its limits, otherwise an interval around its present length."""
     names = problem.family.parameter_names
-    reach = float(np.abs([design[names.index(link)] for link in links]).max())
-    here, parameter = float(design[names.index(name)]), problem.family.parameters[names.index(name)]
+    longest = float(np.abs([design[names.index(link)] for link in links]).max())
+    length, parameter = float(design[names.index(name)]), problem.family.parameters[names.index(name)]
     low, high = tightest(problem.limits, name)
-    least = SHORTEST * here if parameter.positive else here - reach
-    return least if math.isinf(low) else low, here + reach if math.isinf(high) else high
+    shortest = SHORTEST * length if parameter.positive else length - longest
+    return shortest if math.isinf(low) else low, length + longest if math.isinf(high) else high
 
 
-def _directions(
+def _direction_bounds(
     problem: Problem, bounds: Mapping[str, tuple[float, float]], sized: tuple[str, ...]
 ) -> tuple[float, float] | None:
     """Return the least and greatest direction of the offsets (e, g).
@@ -188,5 +188,5 @@ def _directions(
     c, e, g = sized
     if c not in problem.fixed or e not in bounds or g not in bounds or bounds[e][0] < 0.0:
         return None
-    ends = [math.atan2(y, x) for x in bounds[e] for y in bounds[g]]
-    return min(ends), max(ends)
+    angles = [math.atan2(y, x) for x in bounds[e] for y in bounds[g]]
+    return min(angles), max(angles)

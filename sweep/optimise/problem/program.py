@@ -14,7 +14,7 @@ from sweep.families.base import Array
 from sweep.families.machines.machine import Machine
 from sweep.optimise.extrema.points import Curves, Points
 from sweep.optimise.extrema.scanned import first_passage
-from sweep.optimise.problem.rows import Form, Label, Term, box, numbers
+from sweep.optimise.problem.rows import Form, Label, Term, box_sums, number_sums
 from sweep.optimise.problem.statement import PLACE, Problem
 from sweep.quantities.measures import Measure, Series, margins, measure
 from sweep.quantities.resolve import output
@@ -25,25 +25,25 @@ if TYPE_CHECKING:
 SMALLEST = 1e-100  # a smaller limit counts as a limit at zero
 
 
-Moving: TypeAlias = tuple[Mapping[str, float], float]
-NOT_MOVING: Moving = ({}, 0.0)
+BoundShift: TypeAlias = tuple[Mapping[str, float], float]
+NO_SHIFT: BoundShift = ({}, 0.0)
 DIFFERENCE = 1e-6  # relative step for the derivative of an inner value by its output
-ALIKE = 1e-10  # relative difference of extrema of equal height, of which summaries report the place of the first
+TIE = 1e-10  # relative difference of extrema of equal height, of which summaries report the place of the first
 
 
 @dataclass(frozen=True)
 class Requirement:
     """One limit in the optimiser's inner values (`Measure`); it is an equation if ``minimum == maximum``.
 
-    ``raised`` and ``lowered`` are the changes of its lower and upper bound with parameters: derivatives by name, and
-    the sum of these times the values at which the bounds hold as given.
+    ``lower_shift`` and ``upper_shift`` are the changes of its bounds with parameters: derivatives by name, and the sum
+    of these times the values at which the bounds hold as given.
     """
 
     measure: Measure
     minimum: float | None
     maximum: float | None
-    raised: Moving = NOT_MOVING
-    lowered: Moving = NOT_MOVING
+    lower_shift: BoundShift = NO_SHIFT
+    upper_shift: BoundShift = NO_SHIFT
 
     @property
     def equal(self) -> bool:
@@ -51,9 +51,9 @@ class Requirement:
         return self.minimum is not None and self.minimum == self.maximum
 
 
-def measured_in(size: float) -> float:
+def violation_scale(magnitude: float) -> float:
     """Return the divisor of violations of a limit of the given size; 1 if the quotient would overflow."""
-    return size if size > SMALLEST else 1.0
+    return magnitude if magnitude > SMALLEST else 1.0
 
 
 class Program:
@@ -69,26 +69,27 @@ class Program:
             if name not in problem.family.parameter_names and output(problem.family, name).jumps:
                 raise InputError(name, "constant in pieces", "a quantity that changes steadily", PLACE)
         self.turning = Measure("rotatable", "min", margins(problem.family), "rotatable")
-        turns = Requirement(self.turning, self.turning.to_inner(1.0), None)
-        self.requirements = [turns] if self.turning.series else []
+        rotatability = Requirement(self.turning, self.turning.to_inner(1.0), None)
+        self.requirements = [rotatability] if self.turning.series else []
         for limit in problem.limits:
-            found = measure(problem.family, limit.output, problem.window)
-            if found.inner == "rotatable":
+            quantity = measure(problem.family, limit.output, problem.window)
+            if quantity.inner == "rotatable":
                 if limit.maximum is not None or limit.minimum not in (1, 1.0, True):
                     raise InputError(limit.output, (limit.minimum, limit.maximum), "at least 1 (it turns)", PLACE)
                 continue  # required of every design anyway
-            if allowed := found.refused(limit.minimum, limit.maximum):
+            if allowed := quantity.refused(limit.minimum, limit.maximum):
                 raise InputError(limit.output, (limit.minimum, limit.maximum), allowed, PLACE)
-            sides = [None if side is None else found.to_inner(float(side)) for side in (limit.minimum, limit.maximum)]
-            given = problem.allowances.get(limit.output)
-            raised, lowered = (_moving(found, b, given, s) for b, s in ((limit.minimum, 1.0), (limit.maximum, -1.0)))
-            self.requirements.append(Requirement(found, sides[0], sides[1], raised, lowered))
+            bounds = [None if b is None else quantity.to_inner(float(b)) for b in (limit.minimum, limit.maximum)]
+            allowance = problem.allowances.get(limit.output)
+            lower = _bound_shift(quantity, limit.minimum, allowance, 1.0)
+            upper = _bound_shift(quantity, limit.maximum, allowance, -1.0)
+            self.requirements.append(Requirement(quantity, bounds[0], bounds[1], lower, upper))
         measures = [self.objective, *(r.measure for r in self.requirements)]
         self.series = tuple(dict.fromkeys(s for m in measures for s in m.series))
-        moving = [name for r in self.requirements for side in (r.raised, r.lowered) for name in side[0]]
-        self.scalars = tuple(dict.fromkeys([*(name for m in measures for name in m.numbers), *moving]))
+        names = [name for r in self.requirements for side in (r.lower_shift, r.upper_shift) for name in side[0]]
+        self.scalars = tuple(dict.fromkeys([*(name for m in measures for name in m.numbers), *names]))
         self.pieces = {name: piece for m in measures for name, piece in zip(m.numbers, m.pieces, strict=False)}
-        self.places = any(m.follows_angles for m in measures)
+        self.with_angles = any(m.follows_angles for m in measures)
         readings = (m.parts[0] if m.kind == "minus" else m for m in measures)
         self.readings = {m.name: m for m in readings if m.kind == "scalar" and m.parts}
 
@@ -103,33 +104,33 @@ class Program:
         reaches = all(curves.series.index(s) in points.series for s in self.turning.series)
         return layout.form(complete and layout.has_objective, reaches)
 
-    def place(self, name: str, curves: Curves, design: Array, points: Points) -> int:
+    def reading_point(self, name: str, curves: Curves, design: Array, points: Points) -> int:
         """Return the number of the point at which one of the ``readings`` is taken; -1 if the design has none."""
-        found = _Layout(curves, points, design, self.scalars).upper(self.readings[name].parts[0])
-        return next(iter(found[0][0])) - len(points) if found else -1
+        terms = _Layout(curves, points, design, self.scalars).upper(self.readings[name].parts[0])
+        return next(iter(terms[0][0])) - len(points) if terms else -1
 
-    def value(self, found: Measure, form: Form, curves: Curves, design: Array, atoms: Array) -> float:
+    def value(self, quantity: Measure, form: Form, curves: Curves, design: Array, atoms: Array) -> float:
         """Return the value of a measure in its own unit; nan if it does not exist."""
         layout = _Layout(curves, form.points, design, self.scalars)
-        inner = [sum(w * atoms[k] for k, w in term.items()) + shift for term, shift in layout.upper(found)]
-        return found.from_inner(float(max(inner))) if inner else math.nan
+        inner = [sum(w * atoms[k] for k, w in term.items()) + shift for term, shift in layout.upper(quantity)]
+        return quantity.from_inner(float(max(inner))) if inner else math.nan
 
 
-def _moving(found: Measure, bound: float | None, given: Allowance | None, sense: float) -> Moving:
+def _bound_shift(quantity: Measure, bound: float | None, allowance: Allowance | None, sense: float) -> BoundShift:
     """Return the change of a bound, in inner values, with its allowance; ``sense`` is +1 for a lower bound."""
-    if bound is None or given is None:
-        return NOT_MOVING
+    if bound is None or allowance is None:
+        return NO_SHIFT
     step = DIFFERENCE * max(abs(bound), DIFFERENCE)
-    per = sense * (found.to_inner(bound + step) - found.to_inner(bound - step)) / (2.0 * step)
-    slopes = {name: per * float(slope) for name, slope in zip(given.names, given.slopes, strict=True) if slope != 0.0}
-    at = dict(zip(given.names, given.place.tolist(), strict=True))
-    return slopes, sum(slope * at[name] for name, slope in slopes.items())
+    rate = sense * (quantity.to_inner(bound + step) - quantity.to_inner(bound - step)) / (2.0 * step)
+    slopes = {name: rate * float(s) for name, s in zip(allowance.names, allowance.slopes, strict=True) if s != 0.0}
+    reference = dict(zip(allowance.names, allowance.place.tolist(), strict=True))
+    return slopes, sum(slope * reference[name] for name, slope in slopes.items())
 
 
 def _label(r: Requirement, side: str, bound: float, size: float) -> Label:
     """Return the label of a limit's row; violations of pressure angles and margins are not divided by the bound."""
-    own = r.measure.inner == "pressure" or any(s.pressure for s in r.measure.series)
-    return Label(r.measure.name, side, 1.0 if own else abs(bound) / size)
+    unscaled = r.measure.inner == "pressure" or any(s.pressure for s in r.measure.series)
+    return Label(r.measure.name, side, 1.0 if unscaled else abs(bound) / size)
 
 
 class _Layout:
@@ -137,168 +138,168 @@ class _Layout:
         self.curves, self.points, self.scalars = curves, points, scalars
         self.design = design
         self.terms: list[Term] = []
-        self.rest: list[tuple[float, float, bool, Label]] = []
+        self.rows: list[tuple[float, float, bool, Label]] = []
 
     @property
     def has_objective(self) -> bool:
-        return any(label.side == "objective" for *_, label in self.rest)
+        return any(label.side == "objective" for *_, label in self.rows)
 
     def add(
         self, term: Term, shift: float, weight: float, bound: float, slack: float, equal: bool, label: Label
     ) -> None:
         self.terms.append({k: weight * w for k, w in term.items()})
-        self.rest.append((weight * shift + bound, slack, equal, label))
+        self.rows.append((weight * shift + bound, slack, equal, label))
 
     def require(self, r: Requirement) -> bool:
         """Add the rows of one limit; return False if the design has no extremum of the limited output."""
-        found = True
-        self._keep_first(r, "minimum" if r.maximum is None else "maximum")
+        exists = True
+        self._exclude_earlier_passages(r, "minimum" if r.maximum is None else "maximum")
         if r.equal and r.minimum is not None:
             for term, shift in self.lower(r.measure)[:1]:
-                size = self._size(r, r.minimum)
+                size = self._violation_scale(r, r.minimum)
                 label = _label(r, "equal", r.minimum, size)
                 self.add(term, shift, 1.0 / size, -r.minimum / size, 0.0, True, label)
             return bool(self.lower(r.measure))
         if r.minimum is not None:
-            terms, size = self.lower(r.measure), self._size(r, r.minimum)
-            found = found and bool(terms)
-            for term, shift in self._moved(terms, r.raised):
+            terms, size = self.lower(r.measure), self._violation_scale(r, r.minimum)
+            exists = exists and bool(terms)
+            for term, shift in self._shifted(terms, r.lower_shift):
                 label = _label(r, "minimum", r.minimum, size)
                 self.add(term, shift, 1.0 / size, -r.minimum / size, 0.0, False, label)
         if r.maximum is not None:
-            terms, size = self.upper(r.measure), self._size(r, r.maximum)
-            found = found and bool(terms)
-            for term, shift in self._moved(terms, r.lowered):
+            terms, size = self.upper(r.measure), self._violation_scale(r, r.maximum)
+            exists = exists and bool(terms)
+            for term, shift in self._shifted(terms, r.upper_shift):
                 label = _label(r, "maximum", r.maximum, size)
                 self.add(term, shift, -1.0 / size, r.maximum / size, 0.0, False, label)
-        return found
+        return exists
 
-    def _moved(self, terms: list[tuple[Term, float]], moving: Moving) -> list[tuple[Term, float]]:
+    def _shifted(self, terms: list[tuple[Term, float]], change: BoundShift) -> list[tuple[Term, float]]:
         """Return the sums minus the shift of their bound."""
-        first = 2 * len(self.points)
-        more = {first + self.scalars.index(name): -slope for name, slope in moving[0].items()}
+        offset = 2 * len(self.points)
+        more = {offset + self.scalars.index(name): -slope for name, slope in change[0].items()}
         return [
-            ({k: term.get(k, 0.0) + more.get(k, 0.0) for k in term | more}, shift + moving[1]) for term, shift in terms
+            ({k: term.get(k, 0.0) + more.get(k, 0.0) for k in term | more}, shift + change[1]) for term, shift in terms
         ]
 
     def upper(self, m: Measure) -> list[tuple[Term, float]]:
         """Return sums of atoms such that the inner value is below a bound if and only if all sums are."""
-        return self._bounded(m, above=m.sign > 0.0)
+        return self._sums(m, above=m.sign > 0.0)
 
     def lower(self, m: Measure) -> list[tuple[Term, float]]:
         """Return sums of atoms such that the inner value is above a bound if and only if all sums are."""
-        return self._bounded(m, above=m.sign < 0.0)
+        return self._sums(m, above=m.sign < 0.0)
 
-    def _bounded(self, m: Measure, above: bool) -> list[tuple[Term, float]]:
+    def _sums(self, m: Measure, above: bool) -> list[tuple[Term, float]]:
         if m.kind == "minus":
-            of = m.parts[0]
-            return [({k: -w for k, w in t.items()}, -shift) for t, shift in (self.lower if above else self.upper)(of)]
+            part = m.parts[0]
+            return [({k: -w for k, w in t.items()}, -shift) for t, shift in (self.lower if above else self.upper)(part)]
         if m.numbers:
             return self._numbers(m, above)
         if m.kind == "difference":
             return self._difference(m, above)
         if m.kind == "phi_event":
             first, _ = self._passage(m.series[0])
-            return [] if first is None else [({len(self.points) + first: 1.0}, self._turns(first))]
-        maxima, minima = self._ends(m.series)
+            return [] if first is None else [({len(self.points) + first: 1.0}, self._turn_shift(first))]
+        maxima, minima = self._extrema(m.series)
         if m.kind in ("max", "min"):
-            many = above == (m.kind == "max")
-            ends = maxima if m.kind == "max" else minima
-            return [({k: m.sign}, 0.0) for k in (ends if many else ends[:1])]
+            every = above == (m.kind == "max")
+            extrema = maxima if m.kind == "max" else minima
+            return [({k: m.sign}, 0.0) for k in (extrema if every else extrema[:1])]
         if m.kind in ("phi_max", "phi_min"):
-            ends = maxima if m.kind == "phi_max" else minima
-            return [({len(self.points) + k: 1.0}, self._turns(k)) for k in self._first(ends)]
+            extrema = maxima if m.kind == "phi_max" else minima
+            return [({len(self.points) + k: 1.0}, self._turn_shift(k)) for k in self._first_tie(extrema)]
         if m.kind in ("max_abs", "phi_max_abs"):
             value = self.points.value
-            ends = sorted([*maxima, *minima], key=lambda k: -self.points.sense[k] * value[k])
+            extrema = sorted([*maxima, *minima], key=lambda k: -self.points.sense[k] * value[k])
             if m.kind == "phi_max_abs":
-                return [({len(self.points) + k: 1.0}, self._turns(k)) for k in self._first(ends)]
-            return [({k: float(self.points.sense[k])}, 0.0) for k in (ends if above else ends[:1])]
+                return [({len(self.points) + k: 1.0}, self._turn_shift(k)) for k in self._first_tie(extrema)]
+            return [({k: float(self.points.sense[k])}, 0.0) for k in (extrema if above else extrema[:1])]
         if not maxima or not minima:
             return []
         if m.kind == "range":
             pairs = [(i, j) for i in maxima[:4] for j in minima[:4]]
             return [({i: 1.0, j: -1.0}, 0.0) for i, j in (pairs if above else pairs[:1])]
-        outward = self._outward(m.series[0].output)
-        highest, lowest = self._first(maxima)[0], self._first(minima)[0]
-        ext, fold = (highest, lowest) if outward > 0.0 else (lowest, highest)
-        k, other = len(self.points), {"ext": ext, "fold": fold}
+        sign = self._extension_sign(m.series[0].output)
+        highest, lowest = self._first_tie(maxima)[0], self._first_tie(minima)[0]
+        ext, fold = (highest, lowest) if sign > 0.0 else (lowest, highest)
+        count, limit_points = len(self.points), {"ext": ext, "fold": fold}
         if m.kind in ("ext", "fold"):
-            return [({other[m.kind]: 1.0}, 0.0)]
+            return [({limit_points[m.kind]: 1.0}, 0.0)]
         if m.kind in ("phi_ext", "phi_fold"):
-            end = other[m.kind.removeprefix("phi_")]
-            return [({k + end: 1.0}, self._turns(end))]
-        apart = self.points.phi[fold] - self.points.phi[ext]
-        return [({k + fold: 1.0, k + ext: -1.0}, -2.0 * math.pi * math.floor(apart / (2.0 * math.pi)))]
+            end = limit_points[m.kind.removeprefix("phi_")]
+            return [({count + end: 1.0}, self._turn_shift(end))]
+        difference = self.points.phi[fold] - self.points.phi[ext]
+        return [({count + fold: 1.0, count + ext: -1.0}, -2.0 * math.pi * math.floor(difference / (2.0 * math.pi)))]
 
-    def _first(self, ends: list[int]) -> list[int]:
+    def _first_tie(self, extrema: list[int]) -> list[int]:
         """Return, as a list of one, the first of the equally high ends in the turn, which defines the place."""
-        size = np.abs(self.points.value)
-        alike = [k for k in ends if abs(size[k] - size[ends[0]]) <= ALIKE * size[ends[0]]]
-        begin = self._begin(self.curves.series[self.points.series[ends[0]]].output) if ends else 0.0
-        return sorted(alike, key=lambda k: float(self.points.phi[k] - begin) % (2.0 * math.pi))[:1]
+        heights = np.abs(self.points.value)
+        ties = [k for k in extrema if abs(heights[k] - heights[extrema[0]]) <= TIE * heights[extrema[0]]]
+        start = self._turn_start(self.curves.series[self.points.series[extrema[0]]].output) if extrema else 0.0
+        return sorted(ties, key=lambda k: float(self.points.phi[k] - start) % (2.0 * math.pi))[:1]
 
-    def _begin(self, output: str) -> float:
+    def _turn_start(self, output: str) -> float:
         """Return the crank angle at which the turn of an output begins; a member on the shaft has its own phase."""
         family = self.curves.family
-        found = family.split(output) if isinstance(family, Machine) else None
-        if found is None or not found[0].alone or found[1] not in found[0].family.pose_output:
+        member = family.split(output) if isinstance(family, Machine) else None
+        if member is None or not member[0].alone or member[1] not in member[0].family.pose_output:
             return 0.0
-        return -float(found[0].phase(self.design[None, :])[0])
+        return -float(member[0].phase(self.design[None, :])[0])
 
     def _numbers(self, m: Measure, above: bool) -> list[tuple[Term, float]]:
         """Return sums of plain numbers, combined for a box with the ends of curves."""
-        first = 2 * len(self.points)
+        offset = 2 * len(self.points)
         if m.kind == "box":
-            tops, bottoms = ([(float(self.points.value[k]), k) for k in side] for side in self._ends(m.series))
-            return box(m, tops, bottoms, self.design, self.scalars, first, above)
-        return numbers(m, self.design, self.curves.family.parameter_names, self.scalars, first, above)
+            maxima, minima = ([(float(self.points.value[k]), k) for k in side] for side in self._extrema(m.series))
+            return box_sums(m, maxima, minima, self.design, self.scalars, offset, above)
+        return number_sums(m, self.design, self.curves.family.parameter_names, self.scalars, offset, above)
 
     def _difference(self, m: Measure, above: bool) -> list[tuple[Term, float]]:
         """Return the second angle minus the first, with whole turns that put it in (-pi, pi] at the present points."""
-        ends = [self._bounded(part, above)[:1] for part in m.parts]
-        if not all(ends):
+        angles = [self._sums(part, above)[:1] for part in m.parts]
+        if not all(angles):
             return []
-        (first, shift), (second, other) = (end[0] for end in ends)
+        (first, first_shift), (second, second_shift) = (end[0] for end in angles)
         count = len(self.points)
-        apart = sum(w * self.points.phi[k - count] for k, w in second.items()) + other
-        apart -= sum(w * self.points.phi[k - count] for k, w in first.items()) + shift
-        turns = 2.0 * math.pi * math.ceil((apart - math.pi) / (2.0 * math.pi))
-        return [(second | {k: -w for k, w in first.items()}, other - shift - turns)]
+        difference = sum(w * self.points.phi[k - count] for k, w in second.items()) + second_shift
+        difference -= sum(w * self.points.phi[k - count] for k, w in first.items()) + first_shift
+        turns = 2.0 * math.pi * math.ceil((difference - math.pi) / (2.0 * math.pi))
+        return [(second | {k: -w for k, w in first.items()}, second_shift - first_shift - turns)]
 
     def _passage(self, series: Series) -> tuple[int | None, list[int]]:
-        own = np.flatnonzero(self.points.series == self.curves.series.index(series)).tolist()
-        return first_passage(self.points.phi, self.points.how, own)
+        indices = np.flatnonzero(self.points.series == self.curves.series.index(series)).tolist()
+        return first_passage(self.points.phi, self.points.kind, indices)
 
-    def _keep_first(self, r: Requirement, side: str) -> None:
+    def _exclude_earlier_passages(self, r: Requirement, side: str) -> None:
         """Add rows that prevent earlier passages where an event is limited, since the event would jump to them."""
         for series in r.measure.series:
             if series.passes is None:
                 continue
             level, sense = series.passes
             for k in self._passage(series)[1]:
-                size = measured_in(max(abs(level), 1e-3 * abs(self.points.value[k])))
+                size = violation_scale(max(abs(level), 1e-3 * abs(self.points.value[k])))
                 self.add({k: -sense}, 0.0, 1.0 / size, sense * level / size, 0.0, False, Label(r.measure.name, side))
 
-    def _outward(self, position: str) -> float:
+    def _extension_sign(self, position: str) -> float:
         """Return +1 if the extended position of the follower is the largest, -1 if it is the smallest."""
         family = self.curves.family
         sign = family.outward_sign(position)
         return float(self.design[family.parameter_names.index(sign)]) if sign else 1.0
 
-    def _turns(self, k: int) -> float:
+    def _turn_shift(self, k: int) -> float:
         return -2.0 * math.pi * math.floor(float(self.points.phi[k]) / (2.0 * math.pi))
 
-    def _ends(self, series: Sequence[Series]) -> tuple[list[int], list[int]]:
+    def _extrema(self, series: Sequence[Series]) -> tuple[list[int], list[int]]:
         """Return the maxima of some series, highest first, and their minima, lowest first, as numbers of points."""
-        numbers = [self.curves.series.index(s) for s in series]
-        own = np.isin(self.points.series, numbers)
+        series_numbers = [self.curves.series.index(s) for s in series]
+        mask = np.isin(self.points.series, series_numbers)
         value, sense = self.points.value, self.points.sense
-        maxima = sorted(np.flatnonzero(own & (sense > 0)).tolist(), key=lambda k: -value[k])
-        minima = sorted(np.flatnonzero(own & (sense < 0)).tolist(), key=lambda k: value[k])
+        maxima = sorted(np.flatnonzero(mask & (sense > 0)).tolist(), key=lambda k: -value[k])
+        minima = sorted(np.flatnonzero(mask & (sense < 0)).tolist(), key=lambda k: value[k])
         return maxima, minima
 
-    def _size(self, r: Requirement, bound: float) -> float:
+    def _violation_scale(self, r: Requirement, bound: float) -> float:
         """Return the divisor of a limit's violations: its bound, unless that is tiny against the curve; 1 for margins.
 
         For a plain number, which has no curve, it is the larger of both bounds.
@@ -308,17 +309,17 @@ class _Layout:
         if any(s.pressure for s in r.measure.series):
             return 1.0
         if r.measure.numbers:
-            return measured_in(max(abs(r.minimum or 0.0), abs(r.maximum or 0.0)))
-        ends = [k for side in self._ends(r.measure.series) for k in side]
-        amplitude = 1.0 if r.measure.is_angle else max((abs(self.points.value[k]) for k in ends), default=0.0)
-        return measured_in(max(abs(bound), 1e-3 * amplitude))
+            return violation_scale(max(abs(r.minimum or 0.0), abs(r.maximum or 0.0)))
+        extrema = [k for side in self._extrema(r.measure.series) for k in side]
+        amplitude = 1.0 if r.measure.is_angle else max((abs(self.points.value[k]) for k in extrema), default=0.0)
+        return violation_scale(max(abs(bound), 1e-3 * amplitude))
 
     def form(self, complete: bool, reaches: bool) -> Form:
         matrix = np.zeros((len(self.terms), 2 * len(self.points) + len(self.scalars)))
         for row, term in enumerate(self.terms):
             for k, weight in term.items():
                 matrix[row, k] += weight
-        constant, slack, equal, labels = (list(c) for c in zip(*self.rest, strict=True)) if self.rest else ([],) * 4
+        constant, slack, equal, labels = (list(c) for c in zip(*self.rows, strict=True)) if self.rows else ([],) * 4
         return Form(
             self.points, self.scalars, matrix, np.array(constant, np.float64), np.array(slack, np.float64),
             np.array(equal, np.bool_), tuple(labels), complete, reaches,

@@ -15,7 +15,7 @@ from sweep.families.base import Array
 from sweep.optimise.extrema.points import Points
 from sweep.quantities.measures import Measure
 
-AT_HAND = 0.6  # scaled distance from its bound beyond which a row is left out at first
+NEAR_BOUND = 0.6  # scaled distance from its bound beyond which a row is left out at first
 FAR = 1e3  # value of a row that cannot be computed at a trial design: far outside, but finite
 
 
@@ -23,19 +23,19 @@ FAR = 1e3  # value of a row that cannot be computed at a trial design: far outsi
 class Label:
     """Meaning of a row: an output and its side, "objective", "minimum", "maximum" or "equal".
 
-    ``per`` converts the row's multiplier to one per relative change of the bound: the bound over the row's scale.
+    ``bound_ratio``, bound over the row's scale, makes the row's multiplier one per relative change of the bound.
     """
 
     name: str
     side: str
-    per: float = 1.0
+    bound_ratio: float = 1.0
 
 
 @dataclass(frozen=True)
 class Form:
     """Rows of the program and the points whose curves they use.
 
-    ``complete`` says that the design turns and every limit exists for it, ``reaches`` that every stage assembles
+    ``complete`` says that the design turns and every limit exists for it, ``assembles`` that every stage assembles
     somewhere, so that its margin measures the distance from turning.
     """
 
@@ -47,73 +47,73 @@ class Form:
     equal: NDArray[np.bool_]
     labels: tuple[Label, ...]
     complete: bool
-    reaches: bool
+    assembles: bool
 
     def rows(self, atoms: Array, t: float) -> Array:
         """Return the rows' values; a row that is nan counts as far outside."""
         if np.isfinite(atoms).all():
             return np.asarray(self.constant + self.matrix @ atoms + self.slack * t)
-        far = self.matrix @ np.nan_to_num(atoms, nan=1e30)
-        return np.nan_to_num(self.constant + far + self.slack * t, nan=-FAR)
+        base = self.matrix @ np.nan_to_num(atoms, nan=1e30)
+        return np.nan_to_num(self.constant + base + self.slack * t, nan=-FAR)
 
     def objective(self, atoms: Array) -> float:
         """Return the largest of the objective's rows: the smallest t they allow."""
-        own = np.array([label.side == "objective" for label in self.labels], dtype=np.bool_)
-        if not own.any():
+        mask = np.array([label.side == "objective" for label in self.labels], dtype=np.bool_)
+        if not mask.any():
             return math.inf
-        return float(-(self.constant + self.matrix @ atoms)[own].min())
+        return float(-(self.constant + self.matrix @ atoms)[mask].min())
 
     def violation(self, atoms: Array) -> float:
         """Return the largest scaled violation of the limits; infinite if a limit does not exist for the design."""
         if not self.complete:
             return math.inf
-        return self.known_violation(atoms)
+        return self.defined_violation(atoms)
 
-    def known_violation(self, atoms: Array) -> float:
+    def defined_violation(self, atoms: Array) -> float:
         """Return the largest scaled violation of the limits that exist for this design.
 
         It is infinite if some stage of the design assembles nowhere.
         """
-        if not self.reaches:
+        if not self.assembles:
             return math.inf
-        c = self.constant + self.matrix @ atoms
-        own = np.array([label.side != "objective" for label in self.labels], dtype=np.bool_)
-        if np.isnan(c[own]).any():
+        values = self.constant + self.matrix @ atoms
+        limits = np.array([label.side != "objective" for label in self.labels], dtype=np.bool_)
+        if np.isnan(values[limits]).any():
             return math.inf
-        return float(np.maximum(np.where(self.equal, np.abs(c), -c)[own], 0.0).max(initial=0.0))
+        return float(np.maximum(np.where(self.equal, np.abs(values), -values)[limits], 0.0).max(initial=0.0))
 
     def near(self, atoms: Array, t: float) -> Form:
         """Return the form without the rows far from their bounds, which no short step reaches."""
-        keep = (self.rows(atoms, t) < AT_HAND) | self.equal
-        labels = tuple(label for label, kept in zip(self.labels, keep, strict=True) if kept)
+        close = (self.rows(atoms, t) < NEAR_BOUND) | self.equal
+        labels = tuple(label for label, chosen in zip(self.labels, close, strict=True) if chosen)
         return replace(
-            self, matrix=self.matrix[keep], constant=self.constant[keep], slack=self.slack[keep],
-            equal=self.equal[keep], labels=labels,
+            self, matrix=self.matrix[close], constant=self.constant[close], slack=self.slack[close],
+            equal=self.equal[close], labels=labels,
         )  # fmt: skip
 
     def relaxed(self, hard: set[str]) -> Form:
         """Return the elastic program: t is the smallest relaxation of all limits but the ``hard`` ones."""
-        keep = np.array([label.side != "objective" for label in self.labels], dtype=np.bool_)
-        soft = np.array([label.name not in hard for label in self.labels], dtype=np.float64)[keep]
-        both = self.equal[keep]
-        matrix, constant = self.matrix[keep], self.constant[keep]
-        labels = tuple(label for label, kept in zip(self.labels, keep, strict=True) if kept)
+        limits = np.array([label.side != "objective" for label in self.labels], dtype=np.bool_)
+        relaxation = np.array([label.name not in hard for label in self.labels], dtype=np.float64)[limits]
+        equations = self.equal[limits]
+        matrix, constant = self.matrix[limits], self.constant[limits]
+        labels = tuple(label for label, chosen in zip(self.labels, limits, strict=True) if chosen)
         return replace(
             self,
-            matrix=np.concatenate([matrix, -matrix[both]]),
-            constant=np.concatenate([constant, -constant[both]]),
-            slack=np.concatenate([soft, soft[both]]),
-            equal=np.zeros(len(labels) + int(both.sum()), dtype=np.bool_),
-            labels=labels + tuple(label for label, twice in zip(labels, both, strict=True) if twice),
+            matrix=np.concatenate([matrix, -matrix[equations]]),
+            constant=np.concatenate([constant, -constant[equations]]),
+            slack=np.concatenate([relaxation, relaxation[equations]]),
+            equal=np.zeros(len(labels) + int(equations.sum()), dtype=np.bool_),
+            labels=labels + tuple(label for label, is_equation in zip(labels, equations, strict=True) if is_equation),
         )
 
 
 Term = dict[int, float]
-ENDS = 4  # foremost and rearmost joints that are tracked: a step rarely makes another one the end
+JOINTS = 4  # foremost and rearmost joints that are tracked: a step rarely makes another one the end
 
 
-def numbers(
-    m: Measure, design: Array, parameters: tuple[str, ...], scalars: tuple[str, ...], first: int, above: bool
+def number_sums(
+    m: Measure, design: Array, parameters: tuple[str, ...], scalars: tuple[str, ...], offset: int, above: bool
 ) -> list[tuple[Term, float]]:
     """Return sums of atoms for a plain number, for every piece of a size, or for every length with both signs.
 
@@ -122,30 +122,30 @@ def numbers(
     Parameters
     ----------
     m : the measure;  design : (P,);  parameters : names of its columns
-    scalars : names of all plain numbers; ``first`` is the place of the first among the atoms
+    scalars : names of all plain numbers; ``offset`` is the place of the first among the atoms
     above : whether all sums must be below a bound for the inner value to be below it
     """
     if m.kind == "scalar":
-        return [({first + scalars.index(m.name): m.sign}, 0.0)]
+        return [({offset + scalars.index(m.name): m.sign}, 0.0)]
     if m.kind in ("least", "most"):
-        each = [float(piece(design[None, :])[0]) for piece in m.pieces]
-        order = sorted(range(len(each)), key=each.__getitem__, reverse=m.kind == "most")
-        asked = order if above == (m.kind == "most") else order[:1]
-        return [({first + scalars.index(m.numbers[k]): 1.0}, 0.0) for k in asked]
-    sizes = {name: float(design[parameters.index(name)]) for name in m.numbers}
+        values = [float(piece(design[None, :])[0]) for piece in m.pieces]
+        order = sorted(range(len(values)), key=values.__getitem__, reverse=m.kind == "most")
+        selected = order if above == (m.kind == "most") else order[:1]
+        return [({offset + scalars.index(m.numbers[k]): 1.0}, 0.0) for k in selected]
+    lengths = {name: float(design[parameters.index(name)]) for name in m.numbers}
     if above:
-        return [({first + scalars.index(name): sign}, 0.0) for name in sizes for sign in (1.0, -1.0)]
-    name = max(sizes, key=lambda name: abs(sizes[name]))
-    return [({first + scalars.index(name): math.copysign(1.0, sizes[name])}, 0.0)]
+        return [({offset + scalars.index(name): sign}, 0.0) for name in lengths for sign in (1.0, -1.0)]
+    name = max(lengths, key=lambda name: abs(lengths[name]))
+    return [({offset + scalars.index(name): math.copysign(1.0, lengths[name])}, 0.0)]
 
 
-def box(
+def box_sums(
     m: Measure,
     maxima: list[tuple[float, int]],
     minima: list[tuple[float, int]],
     design: Array,
     scalars: tuple[str, ...],
-    first: int,
+    offset: int,
     above: bool,
 ) -> list[tuple[Term, float]]:
     """Return the largest coordinates of the joints minus the smallest ones, fixed joints included.
@@ -155,10 +155,10 @@ def box(
     """
     if not maxima or not minima:
         return []
-    still = [
-        (float(piece(design[None, :])[0]), first + scalars.index(name))
+    fixed = [
+        (float(piece(design[None, :])[0]), offset + scalars.index(name))
         for name, piece in zip(m.numbers, m.pieces, strict=True)
     ]
-    tops, ends = sorted([*maxima, *still], reverse=True)[:ENDS], sorted([*minima, *still])[:ENDS]
-    pairs = [(i, j) for _, i in tops for _, j in ends if i != j]
+    foremost, rearmost = sorted([*maxima, *fixed], reverse=True)[:JOINTS], sorted([*minima, *fixed])[:JOINTS]
+    pairs = [(i, j) for _, i in foremost for _, j in rearmost if i != j]
     return [({i: 1.0, j: -1.0}, 0.0) for i, j in (pairs if above else pairs[:1])]

@@ -162,8 +162,8 @@ class Problem:
     def _filled(self, base: Array, values: Array) -> Array:
         designs = np.empty((len(values), len(base)), values.dtype)
         designs[:] = base
-        own, columns = self._direct
-        designs[:, columns] = values[:, own]
+        indices, columns = self._direct
+        designs[:, columns] = values[:, indices]
         if self.coordinates is not None:
             names = self.family.parameter_names
             given = dict(zip(self.variables, values.T, strict=True))
@@ -176,5 +176,5 @@ class Problem:
     def _direct(self) -> tuple[list[int], list[int]]:
         """Indices of the variables that are parameters, and their columns of the design matrix."""
         names = self.family.parameter_names
-        own = [k for k, name in enumerate(self.variables) if name in names]
-        return own, [names.index(self.variables[k]) for k in own]
+        indices = [k for k, name in enumerate(self.variables) if name in names]
+        return indices, [names.index(self.variables[k]) for k in indices]

@@ -15,7 +15,7 @@ from sweep.evaluation.summaries import design_outputs
 from sweep.families.base import Accuracy, Array
 from sweep.families.names import is_flag, stem
 from sweep.optimise.multistart.survey import TOGETHER, Group
-from sweep.optimise.problem.program import measured_in
+from sweep.optimise.problem.program import violation_scale
 from sweep.optimise.problem.statement import Problem
 from sweep.quantities.limits import compared
 from sweep.quantities.measures import ROTATABLE_MARGIN, margins
@@ -263,7 +263,7 @@ def _missed(limit: Any, value: Array) -> Array:
     out = np.zeros(len(value))
     for bound, sense in ((limit.minimum, 1.0), (limit.maximum, -1.0)):
         if bound is not None:
-            size = measured_in(max(abs(limit.minimum or 0.0), abs(limit.maximum or 0.0)))
+            size = violation_scale(max(abs(limit.minimum or 0.0), abs(limit.maximum or 0.0)))
             out = np.maximum(out, sense * (bound - value) / size)
     return np.nan_to_num(out, nan=ABSENT)
 
