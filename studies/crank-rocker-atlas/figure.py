@@ -1,8 +1,8 @@
-"""The chart of the atlas: least acceleration and least pressure angle over swing and phi0, for both angles of the axes.
+"""Draw the chart of the atlas: least acceleration and least pressure angle over swing and phi0.
 
-``python studies/crank-rocker-atlas/figure.py FOLDER`` reads FOLDER/designs and writes FOLDER/figures/atlas.svg and
-FOLDER/atlas.parquet: per angle of the axes, swing and phi0 the design of least acceleration whose pressure angle is at
-most 45 degrees, and the least pressure angle of all.
+``python studies/crank-rocker-atlas/figure.py FOLDER`` reads FOLDER/designs.  It writes FOLDER/figures/atlas.svg and
+FOLDER/atlas.parquet.  For both angles of the axes and each swing and phi0 they give the design of least acceleration
+whose pressure angle is at most 45 degrees, and the least pressure angle of all designs.
 """
 
 from __future__ import annotations

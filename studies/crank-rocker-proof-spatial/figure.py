@@ -1,4 +1,4 @@
-"""The space of the spatial study: what excludes it, over every free coordinate."""
+"""Draw the space of the spatial study over every free coordinate, coloured by the reason that excludes it."""
 
 import sys
 from pathlib import Path

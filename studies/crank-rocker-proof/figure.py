@@ -1,4 +1,4 @@
-"""The space of the planar study: every box of the certificate, coloured by what excludes it."""
+"""Draw the space of the planar study: each box of the certificate has the colour of the reason that excludes it."""
 
 import sys
 from pathlib import Path

@@ -1,4 +1,4 @@
-"""Where the presser foot leaves the rack, and what that takes from the stitch.
+"""Draw the speeds at which the presser foot leaves the rack, and the loss of stitch over the speed.
 
 ``python studies/feed208/figure.py FOLDER`` writes FOLDER/contact.parquet and FOLDER/figures/contact.svg.
 """

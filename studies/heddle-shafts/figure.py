@@ -1,4 +1,4 @@
-"""The shafts of one loom: what changes from shaft to shaft, symmetry of the shed, acceleration of each shaft.
+"""Compare the shafts of one loom: changed dimensions, symmetry of the shed and acceleration of each shaft.
 
 ``python studies/heddle-shafts/figure.py FOLDER`` writes FOLDER/shafts.parquet and FOLDER/figures/shafts.svg.
 """

@@ -1,7 +1,8 @@
-"""Which effect matters at which speed, and which pressure angle the bearings permit.
+"""Show which effects matter at which speed, and which pressure angle the bearings permit.
 
-``python studies/joint-loads/figure.py FOLDER`` reads FOLDER/designs and writes FOLDER/effects.parquet (per speed and
-effect the median, the 5 % and 95 % quantiles and the threshold of the effect's rule) and FOLDER/figures/effects.svg.
+``python studies/joint-loads/figure.py FOLDER`` reads FOLDER/designs.  It writes FOLDER/figures/effects.svg and
+FOLDER/effects.parquet.  Each row of the table has a speed and an effect, with the median, the 5 % and 95 % quantiles
+and the threshold of the effect's rule.
 """
 
 from __future__ import annotations

@@ -1,7 +1,7 @@
-"""Slotted links beside crank-rockers: least acceleration for the same swing and the same times forward and back.
+"""Compare slotted links with crank-rockers: least acceleration for the same swing and the same times.
 
-``python studies/looper-slotted/figure.py FOLDER`` reads the front of the slotted links from FOLDER, searches
-the best crank-rocker for each of its stroke ratios and writes FOLDER/drives.parquet and FOLDER/figures/drives.svg.
+``python studies/looper-slotted/figure.py FOLDER`` reads the front of the slotted links from FOLDER and searches the
+best crank-rocker for each of its stroke ratios.  It writes FOLDER/drives.parquet and FOLDER/figures/drives.svg.
 """
 
 from __future__ import annotations

@@ -1,7 +1,7 @@
-"""What the distance h of the two revolutes buys: least acceleration of the five-links of the study for given h.
+"""Find the least acceleration of the study's five-links for given distances h of the two revolutes.
 
-``python studies/looper1097/figure.py FOLDER`` starts from the optimum in FOLDER, follows it to other h and
-writes FOLDER/joint.parquet and FOLDER/figures/joint.svg.
+``python studies/looper1097/figure.py FOLDER`` starts from the optimum in FOLDER and follows it to other values of h.
+It writes FOLDER/joint.parquet and FOLDER/figures/joint.svg.
 """
 
 from __future__ import annotations

@@ -1,7 +1,7 @@
-"""What needle bar, piercing and friction add, load by load, to the drive to be built and to the design of least torque.
+"""Add needle bar, piercing and friction, load by load, to the drive to be built and to the design of least torque.
 
-``python studies/needle208-loads/figure.py FOLDER`` reads the optimum in FOLDER and writes FOLDER/loads.parquet (one row
-per design and case) and FOLDER/figures/loads.svg.
+``python studies/needle208-loads/figure.py FOLDER`` reads the optimum in FOLDER.  It writes FOLDER/loads.parquet (one
+row per design and case) and FOLDER/figures/loads.svg.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""What it costs to build the needle drive: record on paper, best drawing, drive to be built and reference side by side.
+"""Compare the needle drive to be built with the record on paper, the best drawing and the reference.
 
 ``python studies/needle208/figure.py FOLDER`` reads study and optimum in FOLDER and writes FOLDER/price.csv and
 FOLDER/figures/price.svg.

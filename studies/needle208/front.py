@@ -1,7 +1,7 @@
-"""What a looser deviation buys in the needle drive as it is made: a front, whose searches take minutes.
+"""Search the least acceleration of the needle drive for other limits of its deviation; this takes minutes.
 
-``python studies/needle208/front.py FOLDER`` begins with the optimum and the price.csv in FOLDER and writes
-FOLDER/front.csv (least acceleration for other deviations of what is made) and FOLDER/figures/front.svg.
+``python studies/needle208/front.py FOLDER`` starts from the optimum and the price.csv in FOLDER.  It writes
+FOLDER/front.csv (deviation that 95 % of the drives made keep, and least acceleration) and FOLDER/figures/front.svg.
 """
 
 from __future__ import annotations
