@@ -1,9 +1,7 @@
 """Draw the space of the right-angle study over every free coordinate, coloured by the reason that excludes it."""
 
-import sys
-from pathlib import Path
-
+from studies.figure import folder_asked
 from studies.proof_space import main
 
 if __name__ == "__main__":
-    main(Path(sys.argv[1]))
+    main(folder_asked(__doc__))

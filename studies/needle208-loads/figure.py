@@ -1,4 +1,4 @@
-"""Add needle bar, piercing and friction, load by load, to the drive to be built and to the design of least torque.
+"""Add needle bar, piercing and friction, load by load, to the drive of needle208 and to the design of least torque.
 
 ``python studies/needle208-loads/figure.py FOLDER`` reads the optimum in FOLDER.  It writes FOLDER/loads.parquet (one
 row per design and case) and FOLDER/figures/loads.svg.
@@ -81,7 +81,7 @@ def chart(table: pd.DataFrame, torques: dict[str, Array]) -> Figure:
     above.set_xlabel("crank [°]")
     above.set_ylabel("driving torque [N m]")
     above.set_xticks(np.arange(0, 361, 60))
-    above.set_title("drive to be built at 7000 per minute")
+    above.set_title("drive of needle208 at 7000 per minute")
     above.legend(fontsize="small")
     designs, width = list(table["design"].unique()), 0.38
     for d, (design, colour) in enumerate(zip(designs, (REFERENCE, OPTIMUM), strict=False)):
@@ -107,7 +107,7 @@ def main() -> None:
     best = pd.read_parquet(folder / "_optimum.parquet").iloc[0]
     own = study.bare.parameter_names
     designs = {
-        "drive to be built": {name: study.reference[name] for name in own},
+        "drive of needle208": {name: study.reference[name] for name in own},
         "least torque": {name: float(best[name]) for name in own},
     }
     table, torques = cases(study, designs)

@@ -1,4 +1,4 @@
-"""Constants of a thread from measured tensions: least squares with confidence intervals; docs/thread.md, section 4."""
+"""Constants of a thread from measured tensions: least squares with confidence intervals; docs/thread.md, section 5."""
 
 from __future__ import annotations
 

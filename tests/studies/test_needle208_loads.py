@@ -55,7 +55,7 @@ def test_less_torque_costs_acceleration_and_bearings(accepted):
     assert found["max_abs_d2s"] / built["max_abs_d2s"] == pytest.approx(1.50, abs=0.01)
     assert found["max_force_d2"] / built["max_force_d2"] == pytest.approx(1.70, abs=0.01)
     table = pd.DataFrame(expected["loads"]).set_index(["design", "case"])
-    rubbing, smooth = (table.loc[("drive to be built", case)] for case in ("and friction", "and piercing 6 N"))
+    rubbing, smooth = (table.loc[("drive of needle208", case)] for case in ("and friction", "and piercing 6 N"))
     assert rubbing.mean_torque == pytest.approx(232.0, abs=1.0)
     # A turn of the motor against piercing alone is the work of 6 N over 11 mm.
     assert smooth.mean_torque * 2.0 * np.pi == pytest.approx(66.0, rel=5e-3)  # 720 poses, the force jumps
