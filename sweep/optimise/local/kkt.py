@@ -40,7 +40,7 @@ class Multipliers:
     residual: float
 
 
-def multipliers(form: Form, rows: Array, jacobian: Array, fractions: Array, within: float = ACTIVE) -> Multipliers:
+def multipliers(form: Form, rows: Array, jacobian: Array, fractions: Array, tolerance: float = ACTIVE) -> Multipliers:
     """Return multipliers of the active rows and bounds by non-negative least squares (any sign for equations).
 
     Parameters
@@ -49,32 +49,32 @@ def multipliers(form: Form, rows: Array, jacobian: Array, fractions: Array, with
     rows : (R,) its rows there
     jacobian : (R, n) their gradients by the scaled variables
     fractions : (n,) scaled variables
-    within : largest scaled distance from the bound of a row with a multiplier
+    tolerance : largest scaled distance from the bound of a row with a multiplier
     """
     n = len(fractions)
-    active = np.flatnonzero((rows <= within) | form.equal)
+    active = np.flatnonzero((rows <= tolerance) | form.equal)
     lower, upper = np.flatnonzero(fractions <= EDGE), np.flatnonzero(fractions >= 1.0 - EDGE)
     if not np.isfinite(jacobian[active]).all():
         return Multipliers(np.zeros(len(rows)), np.zeros(n), np.zeros(n, np.bool_), math.nan)
-    full = np.column_stack([jacobian[active], form.slack[active]]).T
-    equations = full[:, form.equal[active]]
-    edges = np.zeros((n + 1, len(lower) + len(upper)))
-    edges[lower, np.arange(len(lower))] = 1.0
-    edges[upper, len(lower) + np.arange(len(upper))] = -1.0
-    matrix = np.concatenate([full, -equations, edges], axis=1)
+    gradients = np.column_stack([jacobian[active], form.slack[active]]).T
+    equations = gradients[:, form.equal[active]]
+    bound_gradients = np.zeros((n + 1, len(lower) + len(upper)))
+    bound_gradients[lower, np.arange(len(lower))] = 1.0
+    bound_gradients[upper, len(lower) + np.arange(len(upper))] = -1.0
+    matrix = np.concatenate([gradients, -equations, bound_gradients], axis=1)
     target = np.concatenate([np.zeros(n), [1.0]])
     # Small columns beside very large ones would be missed by the choice of the active set.
-    size = np.sqrt((matrix * matrix).sum(axis=0))
-    size[size == 0.0] = 1.0
-    solution = non_negative(matrix / size, target) / size
+    norms = np.sqrt((matrix * matrix).sum(axis=0))
+    norms[norms == 0.0] = 1.0
+    solution = non_negative(matrix / norms, target) / norms
     residual = np.abs(matrix @ solution - target).max()
     weights = np.zeros(len(rows))
     weights[active] = solution[: len(active)]
     weights[active[form.equal[active]]] -= solution[len(active) : len(active) + equations.shape[1]]
-    edge = solution[len(active) + equations.shape[1] :]
+    bound_weights = solution[len(active) + equations.shape[1] :]
     bounds = np.zeros(n)
-    bounds[lower] += edge[: len(lower)]
-    bounds[upper] -= edge[len(lower) :]
+    bounds[lower] += bound_weights[: len(lower)]
+    bounds[upper] -= bound_weights[len(lower) :]
     at_bound = bounds != 0.0
     complementarity = np.abs(weights * rows)[~form.equal].max(initial=0.0)
     return Multipliers(weights, bounds, at_bound, float(max(residual, complementarity)))
@@ -132,14 +132,14 @@ class Result:
         )
 
 
-def in_words(labels: tuple[Label, ...], found: Multipliers, variables: tuple[str, ...]) -> dict[str, float]:
+def in_words(labels: tuple[Label, ...], duals: Multipliers, variables: tuple[str, ...]) -> dict[str, float]:
     """Return active limits and bounds with their multipliers, by name; multipliers of one limit's points are added."""
     words: dict[str, float] = {}
-    for label, weight in zip(labels, found.weights, strict=True):
+    for label, weight in zip(labels, duals.weights, strict=True):
         if label.side != "objective" and abs(weight) > 1e-9:
             text = f"{label.name} {WORDS[label.side]}"
             words[text] = words.get(text, 0.0) + float(weight) * label.bound_ratio
-    for name, weight in zip(variables, found.bounds, strict=True):
+    for name, weight in zip(variables, duals.bounds, strict=True):
         if abs(weight) > 1e-9:
             words[f"{name} at its {'lower' if weight > 0 else 'upper'} bound"] = abs(float(weight))
     return words

@@ -11,15 +11,15 @@ from sweep.optimise.local.model import Model, State
 from sweep.optimise.problem.rows import Form
 
 ITERATIONS, PER_VARIABLE = 30, 3  # largest number of iterations; with few variables Newton steps finish faster
-SETTLED = 1e-13  # change of t at which SLSQP ends
+PRECISION = 1e-13  # change of t at which SLSQP ends
 
 
-def propose(model: Model, at: State, form: Form, t: float, radius: float, floor: float | None) -> tuple[Array, float]:
+def propose(model: Model, base: State, form: Form, t: float, radius: float, floor: float | None) -> tuple[Array, float]:
     """Minimise t under the rows of a form, at most ``radius`` away in every scaled variable.
 
     Parameters
     ----------
-    model, at : the start and its present design
+    model, base : model of the start, and its present design
     form : rows; their points are tracked as the design moves
     t : initial value
     radius : half width of the box around the present design, in scaled variables
@@ -31,42 +31,42 @@ def propose(model: Model, at: State, form: Form, t: float, radius: float, floor:
     """
     from scipy.optimize import minimize
 
-    trail = _Trail(model, form)
-    low, high = np.maximum(at.fractions - radius, 0.0), np.minimum(at.fractions + radius, 1.0)
-    begin = np.append(np.clip(at.fractions, low, high), t)
-    of_t = np.append(np.zeros(len(low)), 1.0)
-    kinds = [(kind, own) for kind, own in (("ineq", ~form.equal), ("eq", form.equal)) if own.any()]
+    tracked = _TrackedRows(model, form)
+    low, high = np.maximum(base.fractions - radius, 0.0), np.minimum(base.fractions + radius, 1.0)
+    start = np.append(np.clip(base.fractions, low, high), t)
+    gradient = np.append(np.zeros(len(low)), 1.0)
+    kinds = [(kind, mask) for kind, mask in (("ineq", ~form.equal), ("eq", form.equal)) if mask.any()]
     constraints = [
         {
             "type": kind,
-            "fun": lambda z, own=own: trail.rows(z)[own],
-            "jac": lambda z, own=own: trail.jacobian(z)[own],
+            "fun": lambda z, mask=mask: tracked.rows(z)[mask],
+            "jac": lambda z, mask=mask: tracked.jacobian(z)[mask],
         }
-        for kind, own in kinds
+        for kind, mask in kinds
     ]
     run: Any = minimize
-    found = run(
-        lambda z: (z[-1], of_t), begin, jac=True, method="SLSQP", constraints=constraints,
+    result = run(
+        lambda z: (z[-1], gradient), start, jac=True, method="SLSQP", constraints=constraints,
         bounds=[*zip(low, high, strict=True), (floor, None)],
-        options={"maxiter": min(ITERATIONS, PER_VARIABLE * len(low)), "ftol": SETTLED},
+        options={"maxiter": min(ITERATIONS, PER_VARIABLE * len(low)), "ftol": PRECISION},
     )  # fmt: skip
-    z = found.x if np.isfinite(found.x).all() else begin
+    z = result.x if np.isfinite(result.x).all() else start
     return np.clip(z[:-1], low, high), float(z[-1])
 
 
-class _Trail:
+class _TrackedRows:
     """Rows and gradients along one run; points are tracked from the last design whose gradient was computed."""
 
     def __init__(self, model: Model, form: Form) -> None:
         self.model, self.form = model, form
         self.origin = self.points = form.points
-        self.seen = self.atoms = np.empty(0)
-        self.slopes: Array | None = None
+        self.last = self.atoms = np.empty(0)
+        self.gradients: Array | None = None
 
     def _move(self, x: Array) -> None:
-        if not np.array_equal(self.seen, x):
-            self.points, self.atoms = self.model.moved(x, self.form, self.origin)
-            self.seen, self.slopes = x.copy(), None
+        if not np.array_equal(self.last, x):
+            self.points, self.atoms = self.model.tracked(x, self.form, self.origin)
+            self.last, self.gradients = x.copy(), None
 
     def rows(self, z: Array) -> Array:
         """Return the rows (R,) at the scaled variables and t."""
@@ -76,8 +76,8 @@ class _Trail:
     def jacobian(self, z: Array) -> Array:
         """Return the gradients (R, n + 1) of the rows by the scaled variables and by t."""
         self._move(z[:-1])
-        if self.slopes is None:
-            self.slopes = self.model.jacobian(z[:-1], self.form, self.points)
+        if self.gradients is None:
+            self.gradients = self.model.jacobian(z[:-1], self.form, self.points)
             if np.isfinite(self.points.value).all():
                 self.origin = self.points
-        return np.column_stack([np.nan_to_num(self.slopes, posinf=0.0, neginf=0.0), self.form.slack])
+        return np.column_stack([np.nan_to_num(self.gradients, posinf=0.0, neginf=0.0), self.form.slack])
