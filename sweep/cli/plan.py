@@ -101,7 +101,7 @@ def _optimiser(study: Study) -> list[str]:
     """Describe the largest number of starts and the stopping rule of the optimiser."""
     if study.optimise is None:
         return []
-    from sweep.optimise.multistart.survey import MET, wanted
+    from sweep.optimise.multistart.survey import CONFIRMATIONS, wanted
 
     settings = study.optimise
     share = 100.0 * wanted(settings)
@@ -111,7 +111,7 @@ def _optimiser(study: Study) -> list[str]:
         most = f"{how_many(settings.populations, 'population')} (evolutionary searches of their own), {each}"
         source = "population"
     unlikely = f" and another {source} finds a new one with a chance under {share:g} %" if share < 100.0 else ""
-    enough = f"fewer once the best local optimum was found from {MET} {source}s{unlikely}"
+    enough = f"fewer once the best local optimum was found from {CONFIRMATIONS} {source}s{unlikely}"
     return [f"optimiser: at most {most}; {enough}{_brake(settings.time_budget)}"]
 
 

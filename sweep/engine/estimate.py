@@ -127,7 +127,7 @@ def searches(study: Study, jobs: int, known: Pilot) -> tuple[tuple[str, float, f
     # scipy's minimisers take as long as numpy to import; a study without a search does not wait for them
     from sweep.optimise.front import pareto
     from sweep.optimise.local.start import search
-    from sweep.optimise.multistart.survey import MET, TOGETHER
+    from sweep.optimise.multistart.survey import CONFIRMATIONS, GROUP_SIZE
     from sweep.optimise.starts.dataset import SAMPLES, drawn, sample_seconds
     from sweep.optimise.starts.global_starts import MADE, SWEPT
     from sweep.optimise.starts.posing import problem_of
@@ -146,12 +146,12 @@ def searches(study: Study, jobs: int, known: Pilot) -> tuple[tuple[str, float, f
     population = POPULATION_LOOKS * look if settings.by_populations else 0.0
     if settings.by_populations:
         every = settings.populations * (population + 2.0 * most) + settings.starts // SWEPT * most
-        found = [("search", MET * (population + 2.0 * typical), every)]
+        found = [("search", CONFIRMATIONS * (population + 2.0 * typical), every)]
     else:
         sampled = study.fit is None and settings.starts > 1
         sample = sample_seconds(problem, designs[0], settings.starts) if sampled else 0.0
         some = 0.0 if len(known.kept) else sample
-        all_of_them = -(-SAMPLES * settings.starts // TOGETHER) * sample
+        all_of_them = -(-SAMPLES * settings.starts // GROUP_SIZE) * sample
         found = [("search", some + settings.starts * typical, all_of_them + settings.starts * most)]
     if study.tolerance is not None and share is not None:
         some, every = (n * look + MADE * population for n in _robust_looks(settings, settled))

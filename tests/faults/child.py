@@ -77,7 +77,7 @@ if __name__ == "__main__":
     marked(sweep.optimise.study, "robust", "tolerance", place)
     marked(sweep.report.page, "write_report", "report", place)
     vars(sweep.chunks.plan).update(SMALL_CHUNKS)
-    sweep.optimise.multistart.multistart.SERIAL_LOOKS = 0  # every start goes to a process
+    sweep.optimise.multistart.multistart.SERIAL_EVALUATIONS = 0  # every start goes to a process
     FAULTS[sys.argv[2]]()
     del sys.argv[1:3]
     main()

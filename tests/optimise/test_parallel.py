@@ -39,7 +39,7 @@ def problem() -> Problem:
 def test_processes_find_the_bits_of_one_process(problem: Problem, monkeypatch: pytest.MonkeyPatch) -> None:
     starts = problem.rows(STARTS[:3] + np.array([[0.0], [0.0], [0.05]]))
     alone = minimise(problem, starts, ONCE)
-    monkeypatch.setattr(sweep.optimise.multistart.multistart, "SERIAL_LOOKS", 0)
+    monkeypatch.setattr(sweep.optimise.multistart.multistart, "SERIAL_EVALUATIONS", 0)
     together = minimise(problem, starts, ONCE, jobs=2)
     assert [r.start for r in together] == [r.start for r in alone]
     for ours, theirs in zip(together, alone, strict=True):
@@ -52,7 +52,7 @@ def test_processes_find_the_bits_of_one_process(problem: Problem, monkeypatch: p
 
 
 def test_stop_at_once_keeps_an_answer(problem: Problem, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(sweep.optimise.multistart.multistart, "SERIAL_LOOKS", 0)
+    monkeypatch.setattr(sweep.optimise.multistart.multistart, "SERIAL_EVALUATIONS", 0)
     results = minimise(problem, problem.rows(np.repeat(STARTS, 50, axis=0)), ONCE, stop=lambda: True, jobs=2)
     assert len(results) == 1 and results[0].ended == "time" and np.isfinite(results[0].design).all()
 
@@ -66,7 +66,7 @@ def test_start_that_is_to_stop_at_once_still_has_its_first_design(problem: Probl
 
 def test_work_left_to_the_processes_may_be_left_at_any_time(problem: Problem, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(
-        sweep.optimise.multistart.multistart, "SERIAL_LOOKS", 150
+        sweep.optimise.multistart.multistart, "SERIAL_EVALUATIONS", 150
     )  # in the middle of the first or second start
     alone = minimise(problem, problem.rows(STARTS), ONCE)
     assert [r.looks for r in alone if r.looks > 150]
@@ -93,7 +93,7 @@ def test_looks_are_a_budget_that_no_clock_changes(problem: Problem, allowed: int
 
 
 def test_deadline_ends_workers_within_a_second(problem: Problem, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(sweep.optimise.multistart.multistart, "SERIAL_LOOKS", 0)
+    monkeypatch.setattr(sweep.optimise.multistart.multistart, "SERIAL_EVALUATIONS", 0)
     starts = problem.rows(np.repeat(STARTS, 500, axis=0))
     minimise(problem, starts[:4], ONCE, jobs=2)  # the workers are up and have read their kernels
     begin = time.monotonic()

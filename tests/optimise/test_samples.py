@@ -13,7 +13,7 @@ import pytest
 from sweep.engine.run import run
 from sweep.families import family
 from sweep.optimise import Problem, on_locus, optimum
-from sweep.optimise.multistart.survey import TOGETHER
+from sweep.optimise.multistart.survey import GROUP_SIZE
 from sweep.optimise.starts import samples as sampling
 from sweep.optimise.starts.dataset import sample_seconds
 from sweep.optimise.starts.posing import problem_and_starts
@@ -82,7 +82,7 @@ def test_nearly_every_sample_reaches_a_basin_at_several_bounds(monkeypatch: pyte
     problem = on_locus(CORNER)
 
     def samples(seeds: range) -> list[int]:
-        found = [gathered(sampling.samples(problem, BRANCHES, 4 * TOGETHER, seed)) for seed in seeds]
+        found = [gathered(sampling.samples(problem, BRANCHES, 4 * GROUP_SIZE, seed)) for seed in seeds]
         return [len({numbers[k] for k in np.flatnonzero(met(problem, starts))}) for starts, numbers in found]
 
     assert sum(samples(range(2))) >= 6  # of eight
@@ -130,8 +130,8 @@ def test_price_of_a_sample_is_that_of_few_designs_where_they_are_dear(monkeypatc
     for step, number in ((0.1, 64), (0.001, 8192)):
         ticks = itertools.count(step=step)
         monkeypatch.setattr("sweep.optimise.starts.dataset.time.process_time", lambda ticks=ticks: next(ticks))
-        of_sample = (2**15 + 16 * 24 * 12) * TOGETHER  # designs drawn, and those of the rounds about the best of them
-        assert sample_seconds(CORNER, base, TOGETHER) == pytest.approx(step / number * of_sample)
+        of_sample = (2**15 + 16 * 24 * 12) * GROUP_SIZE  # designs drawn, and those of the rounds about the best of them
+        assert sample_seconds(CORNER, base, GROUP_SIZE) == pytest.approx(step / number * of_sample)
 
 
 def test_two_coordinates_in_five_of_half_a_sample_are_at_bounds_but_no_angle_of_a_whole_turn() -> None:

@@ -11,7 +11,7 @@ import pytest
 
 from kernels import status as st
 from sweep.optimise import Survey, explore
-from sweep.optimise.multistart.survey import TOGETHER, Group, in_groups, survey, wanted, with_basins
+from sweep.optimise.multistart.survey import GROUP_SIZE, Group, in_groups, survey, wanted, with_basins
 from sweep.study import OptimiseSettings, load_study
 from tests.optimise.test_study import STUDY
 from tests.support.starts import bowl, populations_ended_at, result
@@ -127,7 +127,7 @@ def test_search_ends_when_enough_is_known() -> None:
     many = starts(50)
     results, found, _ = explore(bowl(), in_groups(many), replace(ASKED, starts=50))
     # One basin, met by 12 starts: 2 / (12 * 11) is below 2 %, 2 / (6 * 5) is not.
-    assert found.ended == "enough" and len(results) == found.starts == 12 == 2 * TOGETHER
+    assert found.ended == "enough" and len(results) == found.starts == 12 == 2 * GROUP_SIZE
     assert found.warnings == ()
     _, more, _ = explore(bowl(), in_groups(many), replace(ASKED, starts=50, unseen=1e-3))
     assert more.starts == 48 and more.unseen == pytest.approx(2 / (48 * 47))

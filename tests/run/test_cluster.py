@@ -147,7 +147,7 @@ def test_a_worker_with_other_sources_computes_nothing(study: Study, tmp_path: Pa
 def test_optimum_and_front_have_the_bytes_of_one_process(
     address: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(sweep.optimise.multistart.multistart, "SERIAL_LOOKS", 0)  # every start is worth a process
+    monkeypatch.setattr(sweep.optimise.multistart.multistart, "SERIAL_EVALUATIONS", 0)  # every start is worth a process
     study = written(tmp_path / "study", TABLE)
     here = sweep.run(study, tmp_path / "here" / "designs", jobs=1)
     taken: list[int] = []

@@ -30,10 +30,10 @@ from sweep.optimise.starts.samples import samples
 if TYPE_CHECKING:
     from sweep.study import OptimiseSettings, Study
 
-LOOKED_AT = 3  # number of starts at which equations are checked for dependency
-SERIAL_LOOKS = 800  # evaluations, about a second, after which a search is worth several processes
+CHECKED_STARTS = 3  # number of starts at which equations are checked for dependency
+SERIAL_EVALUATIONS = 800  # evaluations, about a second, after which a search is worth several processes
 ROUNDS = 12  # steps between catalogue values, each of at most two searches per parameter
-GAIN = 1e-9  # smallest relative gain of such a step
+LEAST_GAIN = 1e-9  # smallest relative gain of such a step
 Tell = Callable[[int, int, float], None]
 
 
@@ -108,56 +108,56 @@ def explore(
         if a worker process was killed.
     """
     deadline = Deadline(settings.time_budget, stop)
-    begun, results, ended = list[Group](), list[Result](), "starts"
-    seen: list[Result] = []
+    searched, results, ending = list[Group](), list[Result](), "starts"
+    finished: list[Result] = []
 
-    def told(*found: Result) -> None:
-        seen.extend(found)
+    def report(*found: Result) -> None:
+        finished.extend(found)
         if tell is not None:
-            best = min((r.objective for r in seen if r.feasible), default=math.inf)
-            tell(_done(begun, seen), most_counted(settings), best)
+            best = min((r.objective for r in finished if r.feasible), default=math.inf)
+            tell(_count_finished(searched, finished), most_counted(settings), best)
 
-    told()
-    with _signals() as own:
+    report()
+    with _interruptible() as interrupt:
 
-        def asked() -> bool:
-            return bool(own) or deadline()
+        def should_stop() -> bool:
+            return bool(interrupt) or deadline()
 
         for group in groups:
             first = len(results)
-            begun.append(group)
+            searched.append(group)
             problem = group.problem or problem
             if not first:  # unknown names and dependent equations are refused here, not in a worker
-                refuse_dependent(problem, Program(problem), group.designs[:LOOKED_AT])
-            numbers = list(range(first, first + len(group.designs)))
+                refuse_dependent(problem, Program(problem), group.designs[:CHECKED_STARTS])
+            indices = list(range(first, first + len(group.designs)))
             task = SearchTask(problem, group.designs, settings.looks, first)
-            results += _batch(task, numbers, results, asked, jobs, told)
-            if len(results) <= numbers[-1] or any(r.ended in CUT for r in results):
-                ended = "time"
+            results += _search_group(task, indices, results, should_stop, jobs, report)
+            if len(results) <= indices[-1] or any(r.ended in CUT for r in results):
+                ending = "time"
                 break
-            if survey(problem, begun, results, settings, "").enough:
-                ended = "enough"
+            if survey(problem, searched, results, settings, "").enough:
+                ending = "enough"
                 break
         else:
-            if asked() and _done(begun, seen) < most_counted(settings):
-                ended = "time"
-    if own.signal_number is not None:
+            if should_stop() and _count_finished(searched, finished) < most_counted(settings):
+                ending = "time"
+    if interrupt.signal_number is not None:
         results = [replace(r, ended="interrupted") if r.ended == "time" else r for r in results]
-        if own.signal_number == signal.SIGTERM:
+        if interrupt.signal_number == signal.SIGTERM:
             signal.raise_signal(signal.SIGTERM)
-    if ended == "time" and (own.signal_number is not None or any(r.ended == "interrupted" for r in results)):
-        ended = "interrupted"
-    return Search(ranked(results), survey(problem, begun, results, settings, ended), problem)
+    if ending == "time" and (interrupt.signal_number is not None or any(r.ended == "interrupted" for r in results)):
+        ending = "interrupted"
+    return Search(ranked(results), survey(problem, searched, results, settings, ending), problem)
 
 
-def _done(begun: Sequence[Group], results: Sequence[Result]) -> int:
+def _count_finished(searched: Sequence[Group], results: Sequence[Result]) -> int:
     """Return the number of finished starts that count."""
-    counts = counted(begun)
+    counts = counted(searched)
     return sum(counts[r.start] for r in results)
 
 
 @contextmanager
-def _signals() -> Iterator[Stop]:
+def _interruptible() -> Iterator[Stop]:
     """Let Ctrl-C set a flag, so that every process ends with its best design; leave a caller's own handler alone."""
     if signal.getsignal(signal.SIGINT) is not signal.default_int_handler:
         yield Stop()
@@ -166,23 +166,23 @@ def _signals() -> Iterator[Stop]:
         yield stop
 
 
-def _batch(
-    task: SearchTask, numbers: list[int], before: Sequence[Result], asked: Callable[[], bool], jobs: int,
-    told: Callable[[Result], None],
+def _search_group(
+    task: SearchTask, numbers: list[int], earlier: Sequence[Result], should_stop: Callable[[], bool], jobs: int,
+    report: Callable[[Result], None],
 ) -> list[Result]:  # fmt: skip
     """Search from some starts, in this process until many evaluations were needed, then in several processes."""
     results: list[Result] = []
     while len(results) < len(numbers):
-        spent = sum(r.looks for r in (*before, *results))
+        evaluations = sum(r.looks for r in (*earlier, *results))
         # The very first start always has a result, even if the search is to stop.
-        if (results or before) and (asked() or (jobs > 1 and spent >= SERIAL_LOOKS)):
+        if (results or earlier) and (should_stop() or (jobs > 1 and evaluations >= SERIAL_EVALUATIONS)):
             break
-        results.append(task(numbers[len(results)], asked))
-        told(results[-1])
-    rest = numbers[len(results) :]
-    if not rest or asked():
+        results.append(task(numbers[len(results)], should_stop))
+        report(results[-1])
+    remaining = numbers[len(results) :]
+    if not remaining or should_stop():
         return results
-    return results + spread_over(task, rest, asked, jobs, lambda _, found: told(found))
+    return results + spread_over(task, remaining, should_stop, jobs, lambda _, found: report(found))
 
 
 def ranked(results: list[Result]) -> list[Result]:
@@ -222,13 +222,13 @@ def optimum(
     InputError
         if there is no start, or a name of the problem is unknown.
     """
-    along = on_locus(problem)
-    results = _sampled(along, signs, settings, stop, jobs)
-    if along is not problem and not any(result.feasible for result in results):
+    on_locus_problem = on_locus(problem)
+    results = _sampled(on_locus_problem, signs, settings, stop, jobs)
+    if on_locus_problem is not problem and not any(result.feasible for result in results):
         # Relaxing the equations competes with relaxing the bounds of the links: the smaller relaxation is the answer.
-        others = _sampled(problem, signs, settings, stop, jobs, [result.design for result in results[:1]])
+        relaxed = _sampled(problem, signs, settings, stop, jobs, [result.design for result in results[:1]])
         first = 1 + max((result.start for result in results), default=-1)
-        results = ranked([*results, *(replace(result, start=first + result.start) for result in others)])
+        results = ranked([*results, *(replace(result, start=first + result.start) for result in relaxed)])
     if not results:
         raise InputError("starts", 0, "bounds between which there is a design", PLACE)
     return results
@@ -243,8 +243,8 @@ def _sampled(
     near: Sequence[Array] = (),
 ) -> list[Result]:
     """Search from the designs ``near``, then from samples."""
-    own = samples(problem, signs, settings.starts, settings.seed, stop or (lambda: False))
-    return explore(problem, chain(in_groups(np.array(near)), own), settings, stop, jobs).results
+    sampled = samples(problem, signs, settings.starts, settings.seed, stop or (lambda: False))
+    return explore(problem, chain(in_groups(np.array(near)), sampled), settings, stop, jobs).results
 
 
 def listed(study: Study) -> dict[str, Array]:
@@ -256,15 +256,15 @@ def listed(study: Study) -> dict[str, Array]:
     raw = study.written
     names = study.family.parameter_names
     signs = {p.name for p in study.family.parameters if p.choices is not None}
-    found = {}
+    catalogue = {}
     for axis in study.space.axes:
         entry = raw.get(axis.name)
-        own = axis.name in names and axis.name not in (*signs, *study.made, *study.rescaled)
-        if own and axis.values is not None and isinstance(entry, dict) and "values" in entry:
+        is_listed = axis.name in names and axis.name not in (*signs, *study.made, *study.rescaled)
+        if is_listed and axis.values is not None and isinstance(entry, dict) and "values" in entry:
             values = np.unique(axis.values)
             if len(values) > 1:
-                found[axis.name] = values
-    return found
+                catalogue[axis.name] = values
+    return catalogue
 
 
 def with_neighbours(
@@ -290,37 +290,37 @@ def with_neighbours(
     """
     names = problem.family.parameter_names
     tried: set[tuple[float, ...]] = set()
-    found = list(results)
+    ordered = list(results)
     for _ in range(ROUNDS):
-        best = found[0]
+        best = ordered[0]
         if best.ended in CUT:
             break
-        tried.add(_chosen(best.design, names, catalogue))
+        tried.add(_listed_values(best.design, names, catalogue))
         starts = []
         for name, values in catalogue.items():
-            at = int(np.argmin(np.abs(values - best.design[names.index(name)])))
-            for other in (at - 1, at + 1):
-                if 0 <= other < len(values):
+            index = int(np.argmin(np.abs(values - best.design[names.index(name)])))
+            for neighbour in (index - 1, index + 1):
+                if 0 <= neighbour < len(values):
                     design = best.design.copy()
-                    design[names.index(name)] = values[other]
-                    if _chosen(design, names, catalogue) not in tried:
-                        tried.add(_chosen(design, names, catalogue))
+                    design[names.index(name)] = values[neighbour]
+                    if _listed_values(design, names, catalogue) not in tried:
+                        tried.add(_listed_values(design, names, catalogue))
                         starts.append(design)
         if not starts:
             break
-        more = minimise(problem, np.array(starts), replace(settings, unseen=0.0), stop, jobs)
-        first = 1 + max(result.start for result in found)
-        found = ranked([*found, *(replace(result, start=first + result.start) for result in more)])
-        if not _better(found[0], best):
+        new_results = minimise(problem, np.array(starts), replace(settings, unseen=0.0), stop, jobs)
+        first = 1 + max(result.start for result in ordered)
+        ordered = ranked([*ordered, *(replace(result, start=first + result.start) for result in new_results)])
+        if not _better(ordered[0], best):
             break
-    return found
+    return ordered
 
 
-def _chosen(design: Array, names: tuple[str, ...], catalogue: Mapping[str, Array]) -> tuple[float, ...]:
+def _listed_values(design: Array, names: tuple[str, ...], catalogue: Mapping[str, Array]) -> tuple[float, ...]:
     return tuple(float(design[names.index(name)]) for name in catalogue)
 
 
 def _better(new: Result, old: Result) -> bool:
     if new.feasible != old.feasible:
         return new.feasible
-    return new.rank[1] < old.rank[1] - GAIN * abs(old.rank[1])
+    return new.rank[1] < old.rank[1] - LEAST_GAIN * abs(old.rank[1])

@@ -18,21 +18,21 @@ from sweep.optimise.problem.statement import Problem
 T = TypeVar("T")
 
 
-class _Asked(Stop):
+class _PolledStop(Stop):
     """A stop flag that is set when a reader finds that ``asked`` returns true."""
 
-    def __init__(self, asked: Callable[[], bool]) -> None:
-        self._asked = asked
+    def __init__(self, should_stop: Callable[[], bool]) -> None:
+        self._should_stop = should_stop
         super().__init__()
 
     def __bool__(self) -> bool:
-        if not super().__bool__() and self._asked():
+        if not super().__bool__() and self._should_stop():
             self.set()
         return super().__bool__()
 
 
 @dataclass(frozen=True)
-class _Checked(Generic[T]):
+class _SameSources(Generic[T]):
     """A task for workers, refused by a worker with sources other than those of the calling process."""
 
     task: Task[T]
@@ -40,10 +40,10 @@ class _Checked(Generic[T]):
 
     def __call__(self, number: int, should_stop: Callable[[], bool]) -> tuple[int, T] | None:
         """Return the number with the result of the task, or None if the search is to stop."""
-        own = optimiser_hash()
-        if own != self.code:
+        sources = optimiser_hash()
+        if sources != self.code:
             allowed = f"{self.code}, the sources and libraries of the process that searches"
-            raise InputError("code", own, allowed, "worker")
+            raise InputError("code", sources, allowed, "worker")
         return None if should_stop() else (number, self.task(number, should_stop))
 
 
@@ -53,22 +53,22 @@ class SearchTask:
 
     problem: Problem
     starts: Array
-    allowed: float
+    budget: float
     first: int = 0
 
     def __call__(self, number: int, should_stop: Callable[[], bool]) -> Result:
         """Return the result of the start with this number."""
-        return search(number, self.problem, self.starts[number - self.first], should_stop, self.allowed)
+        return search(number, self.problem, self.starts[number - self.first], should_stop, self.budget)
 
 
 def spread_over(
     task: Task[T],
     numbers: list[int],
-    asked: Callable[[], bool],
+    should_stop: Callable[[], bool],
     jobs: int,
     tell: Callable[[int, T], None] = lambda _, __: None,
 ) -> list[T]:
-    """Return the results of a task for the numbers begun before ``asked`` became true, in their order.
+    """Return the results of a task for the numbers begun before ``should_stop`` became true, in their order.
 
     A single number, or the work of a single worker, runs in this process; otherwise processes or the cluster of the run
     are used.  Each result is the same as in this process, to the bit.
@@ -77,7 +77,7 @@ def spread_over(
     ----------
     task : task that can be pickled
     numbers : arguments of its calls
-    asked : called in this process; workers are told to stop, and one that does not answer soon is abandoned
+    should_stop : called in this process; workers are told to stop, and one that does not answer soon is abandoned
     jobs : number of workers
     tell : called with each number and its result
 
@@ -86,15 +86,15 @@ def spread_over(
     WorkerDied
         if a worker process was killed.
     """
-    stop, checked = _Asked(asked), _Checked(task, optimiser_hash())
-    place: Executor = Here() if jobs == 1 or len(numbers) == 1 else place_of_searches()
-    found: dict[int, T] = {}
+    stop, checked_task = _PolledStop(should_stop), _SameSources(task, optimiser_hash())
+    executor: Executor = Here() if jobs == 1 or len(numbers) == 1 else place_of_searches()
+    results: dict[int, T] = {}
     try:
-        for outcome in place.outcomes(checked, iter(numbers), min(jobs, len(numbers)), stop):
+        for outcome in executor.outcomes(checked_task, iter(numbers), min(jobs, len(numbers)), stop):
             if outcome is not None:
-                found[outcome[0]] = outcome[1]
+                results[outcome[0]] = outcome[1]
                 tell(*outcome)
     except WorkerDied as error:
         if not stop:  # the signal that stops this process may have reached the workers too
             raise WorkerDied(f"optimiser: {error}; run again") from error
-    return [found[number] for number in numbers if number in found]
+    return [results[number] for number in numbers if number in results]

@@ -18,8 +18,8 @@ from sweep.optimise.problem.statement import Problem
 if TYPE_CHECKING:
     from sweep.study import OptimiseSettings
 
-TOGETHER = 6  # starts searched between two checks of the stopping rule
-MET = 3  # distinct starts that have to end in the best basin
+GROUP_SIZE = 6  # starts searched between two checks of the stopping rule
+CONFIRMATIONS = 3  # distinct starts that have to end in the best basin
 UNSEEN = 0.02  # default of the estimated share of unseen basins below which a search ends; populations need no estimate
 DISTINCT = 0.05  # share of the average distance of two random designs below which starts are not distinct
 CUT = ("time", "interrupted")  # endings of a start whose search was cut short
@@ -46,8 +46,8 @@ class Group(NamedTuple):
 
 def in_groups(starts: Array) -> Iterator[Group]:
     """Yield starts (k, P) in groups of at most six, independent of the number of jobs."""
-    for first in range(0, len(starts), TOGETHER):
-        yield Group(starts[first : first + TOGETHER])
+    for first in range(0, len(starts), GROUP_SIZE):
+        yield Group(starts[first : first + GROUP_SIZE])
 
 
 def counted(groups: Sequence[Group]) -> list[bool]:
@@ -87,7 +87,7 @@ class Survey:
     @property
     def enough(self) -> bool:
         """Whether the best basin was met often enough and the estimated share of unseen basins is small enough."""
-        return self.best >= MET and self.unseen <= self.wanted
+        return self.best >= CONFIRMATIONS and self.unseen <= self.wanted
 
     @property
     def words(self) -> str:
@@ -113,31 +113,31 @@ class Survey:
     @property
     def shortcomings(self) -> tuple[str, ...]:
         """Parts of the search that were requested and not done."""
-        found = []
+        messages = []
         if self.ended in CUT:
             why = "time ran out" if self.ended == "time" else "interrupted"
-            asked = how_many(self.asked, "start")
-            of = how_many(self.starts, "start") if self.populations else f"{self.starts} of {asked}"
+            limit = how_many(self.asked, "start")
+            of = how_many(self.starts, "start") if self.populations else f"{self.starts} of {limit}"
             after = "; not all that follows them, neighbouring values and robust designs, was" if self.late else ""
-            found.append(f"{why}: {of}{after}")
+            messages.append(f"{why}: {of}{after}")
         elif not self.populations and self.starts < self.asked and not self.enough:
-            some = how_many(self.starts, "start")
-            found.append(f"only {some} of the {self.asked} asked: no more were found in the design space")
-        return tuple(found)
+            starts = how_many(self.starts, "start")
+            messages.append(f"only {starts} of the {self.asked} asked: no more were found in the design space")
+        return tuple(messages)
 
     @property
     def doubts(self) -> tuple[str, ...]:
         """Reasons why a better result than that of the search may exist."""
-        found = []
+        messages = []
         if self.ended == "starts" and self.basins and not self.enough:
             of = "populations" if self.populations else "distinct starts"
-            rare = f"the best local optimum was found from {self.best} of the {MET} {of} wanted"
-            parts = [rare] if self.best < MET else []
+            confirmed = f"the best local optimum was found from {self.best} of the {CONFIRMATIONS} {of} wanted"
+            parts = [confirmed] if self.best < CONFIRMATIONS else []
             if self.unseen > self.wanted:
                 parts.append(f"{self._chance}, not the {_percent(self.wanted)} asked")
             more = "populations" if self.populations else "starts"
-            found.append(f"{' and '.join(parts)}: more {more} may find a better one")
-        return tuple(found)
+            messages.append(f"{' and '.join(parts)}: more {more} may find a better one")
+        return tuple(messages)
 
 
 def survey(
@@ -160,17 +160,17 @@ def survey(
     these are the best of samples, so the estimate refers to further starts of the same kind.  Populations are random:
     they differ by their seeds alone.
     """
-    whole = [r for r in results if r.ended not in CUT]
-    none = np.empty((0, len(problem.family.parameters)))
-    numbered, starts = with_basins(whole), np.concatenate([none, *(group.designs for group in groups)])
+    finished = [r for r in results if r.ended not in CUT]
+    empty = np.empty((0, len(problem.family.parameters)))
+    numbered, starts = with_basins(finished), np.concatenate([empty, *(group.designs for group in groups)])
     source = [group.source for group in groups for _ in group.designs]
     counts = counted(groups)
-    known = [r for r in numbered if r.basin and counts[r.start]]
-    met = Counter(r.basin for r in known)
-    best = _distinct(problem, starts, [r.start for r in known if r.basin == 1], source)
-    populations = met.total() if settings.by_populations else 0
+    counted_results = [r for r in numbered if r.basin and counts[r.start]]
+    hits = Counter(r.basin for r in counted_results)
+    best = _distinct(problem, starts, [r.start for r in counted_results if r.basin == 1], source)
+    populations = hits.total() if settings.by_populations else 0
     return Survey(
-        len(whole), most_counted(settings), len(met), best, _unseen(met), wanted(settings), ended,
+        len(finished), most_counted(settings), len(hits), best, _unseen(hits), wanted(settings), ended,
         _kinds(problem, starts, numbered), populations=populations,
     )  # fmt: skip
 
@@ -202,33 +202,33 @@ def basins(values: Sequence[float]) -> list[int]:
     return numbers
 
 
-def later(found: Survey) -> Survey:
+def cut_afterwards(finished: Survey) -> Survey:
     """Return the survey of a search whose time ran out after all starts had been searched."""
-    return replace(found, ended="time", late=True)
+    return replace(finished, ended="time", late=True)
 
 
 def with_basins(results: Sequence[Result]) -> list[Result]:
     """Return results with their basin, ordered by rank: 1 for the best; infeasible ones have 0 and come last."""
     numbers = basins([r.objective if r.feasible else math.inf for r in results])
-    found = [replace(r, basin=number) for r, number in zip(results, numbers, strict=True)]
-    return sorted(found, key=lambda r: (*r.rank, r.start))
+    numbered = [replace(r, basin=number) for r, number in zip(results, numbers, strict=True)]
+    return sorted(numbered, key=lambda r: (*r.rank, r.start))
 
 
-def _unseen(met: Counter[int]) -> float:
+def _unseen(hits: Counter[int]) -> float:
     """Return the larger of both estimates of the share of unseen basins; 1 for fewer than two starts."""
-    n, w = met.total(), len(met)
-    once = sum(1 for count in met.values() if count == 1)
-    return min(1.0, max(once / n, w * (w + 1) / (n * (n - 1)))) if n > 1 else 1.0
+    n, w = hits.total(), len(hits)
+    singletons = sum(1 for count in hits.values() if count == 1)
+    return min(1.0, max(singletons / n, w * (w + 1) / (n * (n - 1)))) if n > 1 else 1.0
 
 
 def _distinct(problem: Problem, starts: Array, numbers: list[int], source: Sequence[int]) -> int:
     """Return the number of starts that are far apart or come from different sources."""
-    place = problem.scaled(starts)
-    least = DISTINCT * math.sqrt(place.shape[1] / 6.0)
+    fractions = problem.scaled(starts)
+    distance = DISTINCT * math.sqrt(fractions.shape[1] / 6.0)
     taken: list[int] = []
     for k in sorted(numbers):
         near = (
-            np.linalg.norm(place[k] - place[j]) < least
+            np.linalg.norm(fractions[k] - fractions[j]) < distance
             and source[k] == source[j]
             and np.array_equal(starts[k, problem.others], starts[j, problem.others])
             for j in taken
@@ -240,15 +240,15 @@ def _distinct(problem: Problem, starts: Array, numbers: list[int], source: Seque
 
 def _kinds(problem: Problem, starts: Array, results: Sequence[Result]) -> tuple[tuple[str, int, int], ...]:
     """Return numbers of starts and basins for each combination of the parameters that are not varied."""
-    differ = [c for c in problem.others if len(np.unique(starts[:, c])) > 1]
+    columns = [c for c in problem.others if len(np.unique(starts[:, c])) > 1]
     names = problem.family.parameter_names
     count: Counter[str] = Counter()
     basins: dict[str, set[int]] = {}
     for r in results:
-        words = ", ".join(f"{names[c]} = {starts[r.start, c]:.6g}" for c in differ)
+        words = ", ".join(f"{names[c]} = {starts[r.start, c]:.6g}" for c in columns)
         count[words] += 1
         basins.setdefault(words, set()).update({r.basin} - {0})
-    return tuple((words, count[words], len(basins[words])) for words in sorted(count)) if differ else ()
+    return tuple((words, count[words], len(basins[words])) for words in sorted(count)) if columns else ()
 
 
 def _percent(share: float) -> str:

@@ -15,7 +15,7 @@ from kernels import status as st
 from sweep.chunks.parameters import runs_matrix
 from sweep.dataset.chunk_files import batches, parts
 from sweep.families.base import Array, Family
-from sweep.optimise.multistart.survey import TOGETHER, Group, in_groups
+from sweep.optimise.multistart.survey import GROUP_SIZE, Group, in_groups
 from sweep.optimise.problem.statement import Problem
 from sweep.optimise.starts.samples import ALIKE, RANKED, diverse, ranking, samples
 from sweep.quantities.limits import compared
@@ -195,7 +195,7 @@ def sample_seconds(problem: Problem, base: Array, count: int) -> float:
         seconds = time.process_time() - begin
         if seconds > ENOUGH:
             break
-    return seconds / number * RANKED * min(count, TOGETHER)
+    return seconds / number * RANKED * min(count, GROUP_SIZE)
 
 
 def apart(problem: Problem, starts: Array, more: Array, count: int) -> Array:

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from sweep.evaluation.summaries import design_outputs
 from sweep.families.base import Accuracy, Array
 from sweep.families.names import is_flag, stem
-from sweep.optimise.multistart.survey import TOGETHER, Group
+from sweep.optimise.multistart.survey import GROUP_SIZE, Group
 from sweep.optimise.problem.program import violation_scale
 from sweep.optimise.problem.statement import Problem
 from sweep.quantities.limits import compared
@@ -51,7 +51,7 @@ def samples(
     seed : seed of the samples
     stop : true ends the present sample with the best designs so far, and the iteration
     """
-    number = -(-count // TOGETHER)
+    number = -(-count // GROUP_SIZE)
     size = -(-count // number)
     for k in range(number):
         if k and stop():
