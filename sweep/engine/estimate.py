@@ -173,9 +173,9 @@ def _robust_looks(settings: OptimiseSettings, settled: int | None) -> tuple[int,
     """
     from sweep.optimise.manufacture import robust
 
-    begun = robust.TRIED if settings.by_populations else min(robust.TRIED, settings.starts)
-    rounds, heat = begun * robust.ROUNDS, min(robust.HEAT, settings.looks)
-    ended, corrected = min(robust.ENDED, begun), robust.CORRECTIONS * robust.ROUNDS
+    begun = robust.MOST_BASINS if settings.by_populations else min(robust.MOST_BASINS, settings.starts)
+    rounds, heat = begun * robust.ROUNDS, min(robust.FIRST_BUDGET, settings.looks)
+    ended, corrected = min(robust.CONTINUED, begun), robust.CORRECTIONS * robust.ROUNDS
     most = rounds * heat + ended * settings.looks
     if settled is None:
         return most, most

@@ -24,7 +24,7 @@ from sweep.jobs.progress import AT_MOST, Say, best_words, unsaid
 from sweep.jobs.signals import Deadline
 from sweep.optimise.local.kkt import CAVEAT, Result
 from sweep.optimise.local.model import Model
-from sweep.optimise.manufacture.robust import better_made, robust, yields
+from sweep.optimise.manufacture.robust import best_yield_first, robust, yields
 from sweep.optimise.manufacture.tolerance import manufactured, sensitivities, tolerance_rows
 from sweep.optimise.multistart.kept import Kept, noted, result_of, survey_of
 from sweep.optimise.multistart.multistart import explore, listed, with_neighbours
@@ -247,7 +247,7 @@ def _drawing(
         say("search in the catalogue", 0, 0, "steps")
         results = with_neighbours(problem, results, catalogue, settings, deadline, jobs)
     if study.tolerance is not None and found.ended not in CUT:
-        results = better_made(problem, results, study.tolerance, settings.seed)
+        results = best_yield_first(problem, results, study.tolerance, settings.seed)
     if not deadline.pulled and found.ended not in CUT:
         bounds = {"lower": problem.lower.tolist(), "upper": problem.upper.tolist()}
         kept.note("drawing", bounds | {"results": [noted(r) for r in results], "survey": asdict(found)})

@@ -15,7 +15,7 @@ from sweep.errors import InputError
 from sweep.exchange.dxf import add_tables
 from sweep.exchange.export import export
 from sweep.exchange.scene import exists, finite, frames_of, is_spatial, over, pose, shown_name
-from sweep.optimise.manufacture.tolerance import touched
+from sweep.optimise.manufacture.tolerance import tolerances_of
 from sweep.plot.drawing import draw, spread
 from sweep.report.dataset import Dataset, as_result, chosen, cyclogram_of, read_dataset, row_of
 from sweep.report.figures import house_style, new_figure
@@ -84,7 +84,7 @@ def tables_of(data: Dataset, parts: Sequence[Part]) -> list[Table]:
     study, tolerance = data.study, data.study.tolerance
     names = study.family.parameter_names
     design = np.array([value_of(data.result, name) for name in names])
-    wide = np.zeros(len(names)) if tolerance is None else touched(study.family, design, tolerance)
+    wide = np.zeros(len(names)) if tolerance is None else tolerances_of(study.family, design, tolerance)
     spread = dict(zip(names, wide.tolist(), strict=True))
     units = {p.name: p.unit for p in study.family.parameters}
     own = study.bare.parameter_names

@@ -15,12 +15,12 @@ from sweep.evaluation.cyclogram import event_angles
 from sweep.evaluation.summaries import design_outputs
 from sweep.families.names import is_flag, without_minus
 from sweep.optimise.manufacture.tolerance import (
-    TELLING,
+    TELLING_GAIN,
     Cost,
     Manufactured,
-    deviating,
     limits_of_made,
     manufactured,
+    sampled_designs,
 )
 from sweep.quantities import resolve
 from sweep.quantities.limits import compared, meets
@@ -81,7 +81,7 @@ def many(data: Dataset, row: Mapping[str, Any] | None, samples: int = 0) -> tupl
         return None
     design = _design(data, row)
     samples = samples or study.tolerance.samples
-    return design, deviating(study.family, design, study.tolerance, study.optimise.seed, samples)
+    return design, sampled_designs(study.family, design, study.tolerance, study.optimise.seed, samples)
 
 
 def made(data: Dataset) -> Made | None:
@@ -117,7 +117,7 @@ def made_sentence(found: Made | None, tolerance: str) -> str:
     most = next(iter(found.costs), None)
     if most is None or found.share == 1.0:
         return f"{text}."
-    if most.gain >= TELLING:
+    if most.gain >= TELLING_GAIN:
         gain = number(100.0 * most.gain, 2)
         return f"{text}; the dimension that costs most is {most.name}: were it exact, {gain} points more would."
     share, words = number(100.0 * most.spread, 2), found.histogram.shown.words

@@ -14,7 +14,7 @@ from sweep.dataset.files import OF_OPTIMUM, PARETO, beside, located, replacing, 
 from sweep.errors import InputError
 from sweep.evaluation.statuses import meaning
 from sweep.jobs.progress import Say, unsaid
-from sweep.optimise.manufacture.tolerance import SINGLE, TELLING
+from sweep.optimise.manufacture.tolerance import COST_SAMPLE, TELLING_GAIN
 from sweep.pages import rendered
 from sweep.report import answer, maps, tables
 from sweep.report.dataset import Dataset, Row, as_result, chosen, cyclogram_of, gather, read_dataset, row_of
@@ -134,8 +134,8 @@ def _as_made(data: Dataset) -> dict[str, Any]:
     told, within = made(data), tolerance_words(data)
     return {
         "made": told, "made_words": made_sentence(told, within), "tolerance": within, "spreads": spreads(data),
-        "costs": [x for x in told.costs if max(x.spread, x.gain) >= TELLING] if told else [],
-        "share_made": share_made(data), "slopes": slopes(data), "single": SINGLE,
+        "costs": [x for x in told.costs if max(x.spread, x.gain) >= TELLING_GAIN] if told else [],
+        "share_made": share_made(data), "slopes": slopes(data), "single": COST_SAMPLE,
     }  # fmt: skip
 
 

@@ -14,7 +14,7 @@ from sweep.evaluation.summaries import design_outputs
 from sweep.evaluation.tables import design_matrix
 from sweep.families import family
 from sweep.families.base import Accuracy
-from sweep.optimise.manufacture.tolerance import deviating
+from sweep.optimise.manufacture.tolerance import sampled_designs
 from sweep.quantities.limits import Limit, meets
 from sweep.study.study import Tolerance
 from tests.families.machines.test_stitch_reference import ROWS, machine_of
@@ -120,7 +120,7 @@ def test_shares_and_scatter_of_relations_are_those_of_an_independent_sample(row)
     own = {name: TILTS for name in whole.parameter_names if name.endswith("_tilt")} | {"looper.offset": PHASE}
     own |= {name: 0.0 for name in whole.parameter_names if name.startswith("upper.") or name.endswith("_tip")}
     tolerance = Tolerance(LENGTHS, ANGLES, own=tuple(own.items()))
-    designs = deviating(whole, design_matrix(whole, design)[0][0], tolerance, 7, MADE)
+    designs = sampled_designs(whole, design_matrix(whole, design)[0][0], tolerance, 7, MADE)
     ours = design_outputs(whole, designs, list(NAMES), Accuracy(target=1e-8))
     theirs = outputs(*made(given, np.random.default_rng(8), MADE), sense)
     both, spread = np.ones((2, MADE), np.bool_), {}

@@ -165,14 +165,14 @@ def test_a_search_that_runs_out_of_looks_is_corrected_until_that_brings_nothing(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     """What its limits cost is not known there; what is asked for is kept all the same."""
-    approached, ended = robust_search._approached, []
+    approached, ended = robust_search._margin_rounds, []
 
     def unsettled(*given: Any) -> Any:
         result, radius, step = approached(*given)
         ended.append(result.ended)
         return replace(result, ended="looks"), radius, step
 
-    monkeypatch.setattr(robust_search, "_approached", unsettled)
+    monkeypatch.setattr(robust_search, "_margin_rounds", unsettled)
     _, share = room()
     assert share == pytest.approx(SHARE, abs=0.002)
     assert len(ended) < robust_search.CORRECTIONS

@@ -23,7 +23,7 @@ from sweep.families import family
 from sweep.families.base import Accuracy
 from sweep.optimise import Problem
 from sweep.optimise.manufacture.robust import yields
-from sweep.optimise.manufacture.tolerance import deviating, sensitivities, tolerance_rows
+from sweep.optimise.manufacture.tolerance import sampled_designs, sensitivities, tolerance_rows
 from sweep.report.dataset import read_dataset
 from sweep.report.made import made
 from sweep.study import Limit, Tolerance, load_study
@@ -147,13 +147,13 @@ def test_design_without_links_has_no_slopes_and_ends_no_study(tmp_path: Path) ->
 
 
 def test_deviating_designs_have_the_tolerance_as_three_standard_deviations() -> None:
-    designs = deviating(RSSR, DESIGN, Tolerance(0.03, 0.0), seed=1)
+    designs = sampled_designs(RSSR, DESIGN, Tolerance(0.03, 0.0), seed=1)
     assert designs.shape == (2048, 8) and (designs[:, 6:] == DESIGN[6:]).all()
     off = (designs - DESIGN)[:, :6] / 0.01
     for column in off.T:
         assert stats.kstest(column, "norm").pvalue > 1e-3
     assert np.abs(np.corrcoef(off.T) - np.eye(6)).max() < 0.05
-    np.testing.assert_array_equal(designs, deviating(RSSR, DESIGN, Tolerance(0.03, 0.0), seed=1))
+    np.testing.assert_array_equal(designs, sampled_designs(RSSR, DESIGN, Tolerance(0.03, 0.0), seed=1))
 
 
 def test_small_tolerances_give_the_band_of_the_sensitivities() -> None:

@@ -17,7 +17,7 @@ import sweep
 from kernels import status as codes
 from sweep.evaluation.summaries import design_outputs
 from sweep.families.names import negative
-from sweep.optimise.manufacture.tolerance import deviating
+from sweep.optimise.manufacture.tolerance import sampled_designs
 from sweep.pages import rendered
 from sweep.plot.datasets import draw_histogram
 from sweep.report.answer import not_achieved
@@ -138,7 +138,7 @@ def test_dimensions_are_tried_although_the_limit_that_is_shown_is_far_and_anothe
     far = {"swing": {"max": 3.0, "unit": "rad"}}
     data = data_of(row("optimum", 0.5), limits=far)
     study, design = data.study, np.array([data.optimum[name] for name in data.study.family.parameter_names], float)
-    about = deviating(study.family, design, study.tolerance, study.optimise.seed, study.tolerance.samples)
+    about = sampled_designs(study.family, design, study.tolerance, study.optimise.seed, study.tolerance.samples)
     values = design_outputs(study.family, about, ["max_abs_d2psi"], study.accuracy)["max_abs_d2psi"]
     near = {"max_abs_d2psi": {"max": float(values.max() + 0.05 * values.std()), "unit": "1"}}
     found = made(data_of(row("optimum", 0.5), limits=far | near))

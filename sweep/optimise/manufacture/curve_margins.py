@@ -23,11 +23,11 @@ MOVED = 1e-4  # share of a variable's bounds: step of the difference of exact de
 class CurveMargin:
     """Trigonometric sum with (M,) coefficients ``constant + slopes @ (values of the columns - place)``.
 
-    ``columns`` (V,) of the design matrix, ``place`` (V,) their values at which the sum is exact, ``slopes`` (M, V).
+    ``columns`` (V,) of the design matrix, ``reference`` (V,) their values at which the sum is exact, ``slopes`` (M, V).
     """
 
     columns: tuple[int, ...]
-    place: Array
+    reference: Array
     constant: Array
     slopes: Array
 
@@ -37,24 +37,24 @@ class CurveMargin:
 
     def at(self, designs: Any, phi: Array) -> Any:
         """Return the margin (n, m) of designs (n, P), which may have imaginary parts, at crank angles (m,)."""
-        moved = designs[:, list(self.columns)] - self.place
-        return trigonometric_sum(self.constant + moved @ self.slopes.T, phi)
+        offset = designs[:, list(self.columns)] - self.reference
+        return trigonometric_sum(self.constant + offset @ self.slopes.T, phi)
 
     def slope(self, design: Array, phi: Array) -> Array:
         """Return the derivative (m,) of the margin of one design (P,) by the crank angle."""
-        moved = design[list(self.columns)] - self.place
-        return np.asarray(trigonometric_sum((self.constant + self.slopes @ moved)[None, :], phi, True)[0], np.float64)
+        offset = design[list(self.columns)] - self.reference
+        return np.asarray(trigonometric_sum((self.constant + self.slopes @ offset)[None, :], phi, True)[0], np.float64)
 
 
 @dataclass(frozen=True)
 class Allowance:
     """Margin of a limit beyond a fixed amount: ``slopes`` (V,) times the changes of the parameters ``names``.
 
-    ``place`` (V,) are the values of these parameters at which the fixed amount is exact.
+    ``reference`` (V,) are the values of these parameters at which the fixed amount is exact.
     """
 
     names: tuple[str, ...]
-    place: Array
+    reference: Array
     slopes: Array
 
     def times(self, level: float) -> Allowance:
@@ -71,19 +71,19 @@ def allowances(problem: Problem, design: Array, spread: Callable[[Array], dict[s
     design : (P,)
     spread : returns the margin of every output of a design
     """
-    around, moved = _around(problem, design)
-    found = [spread(row) for row in around[1:]]
-    n, columns = len(moved), list(problem.columns)
+    designs, moves = _neighbours(problem, design)
+    margins = [spread(row) for row in designs[1:]]
+    n, columns = len(moves), list(problem.columns)
     names = tuple(problem.family.parameter_names[k] for k in columns)
-    change = {name: np.array([found[k][name] - found[n + k][name] for k in range(n)]) for name in found[0]}
+    change = {name: np.array([margins[k][name] - margins[n + k][name] for k in range(n)]) for name in margins[0]}
     return {
-        name: Allowance(names, design[columns], _shortest(moved, own))
-        for name, own in change.items()
-        if np.isfinite(own).all()
+        name: Allowance(names, design[columns], _shortest_slopes(moves, values))
+        for name, values in change.items()
+        if np.isfinite(values).all()
     }
 
 
-def _around(problem: Problem, design: Array) -> tuple[Array, Array]:
+def _neighbours(problem: Problem, design: Array) -> tuple[Array, Array]:
     """Return a design with its neighbours one step up and down in every variable, and the differences of columns."""
     n = len(problem.variables)
     steps = np.concatenate([np.zeros((1, n)), MOVED * np.eye(n), -MOVED * np.eye(n)])
@@ -102,10 +102,10 @@ def trigonometric_sum(coefficients: Any, phi: Array, derivative: bool = False) -
     """
     k = np.arange(1, coefficients.shape[1] // 2 + 1)
     powers = np.exp(1j * phi)[None, :].repeat(len(k), axis=0).cumprod(axis=0)  # faster than computing cosines and sines
-    along, aside = coefficients[:, 1::2], coefficients[:, 2::2]
+    cosines, sines = coefficients[:, 1::2], coefficients[:, 2::2]
     if derivative:
-        return (k * aside) @ powers.real - (k * along) @ powers.imag
-    return coefficients[:, :1] + along @ powers.real + aside @ powers.imag
+        return (k * sines) @ powers.real - (k * cosines) @ powers.imag
+    return coefficients[:, :1] + cosines @ powers.real + sines @ powers.imag
 
 
 def curves_with_margin(problem: Problem) -> dict[str, str]:
@@ -116,19 +116,19 @@ def curves_with_margin(problem: Problem) -> dict[str, str]:
     program = Program(problem)
     measures = [program.objective, *(r.measure for r in program.requirements)]
     # The margin raises maxima and lowers minima: a largest value with a lower limit needs the opposite sign.
-    inward = {
+    opposite = {
         r.measure.name
         for r in program.requirements
         if (r.maximum if r.measure.kind == "min" else r.minimum) is not None
     }
     kinds = ("max_abs", "max", "min")
-    plain = {m.name for m in measures if m.kind in kinds and len(m.series) == 1 and m.name not in inward}
-    others = {s.output for m in measures if m.name not in plain for s in m.series}
-    limits = {r.measure.name: r.measure.series[0] for r in program.requirements if r.measure.name in plain}
+    one_curve = {m.name for m in measures if m.kind in kinds and len(m.series) == 1 and m.name not in opposite}
+    other_curves = {s.output for m in measures if m.name not in one_curve for s in m.series}
+    limits = {r.measure.name: r.measure.series[0] for r in program.requirements if r.measure.name in one_curve}
     return {
         name: s.output
         for name, s in limits.items()
-        if s.output not in others and not s.pressure and not s.wrapped and name != problem.objective
+        if s.output not in other_curves and not s.pressure and not s.wrapped and name != problem.objective
     }
 
 
@@ -144,29 +144,29 @@ def curve_margins(problem: Problem, design: Array, sigma: Array, levels: Mapping
     """
     n = len(problem.variables)
     # Parameters that follow from coordinates move together: take the shortest slopes that reproduce their changes.
-    designs, moved = _around(problem, design)
+    designs, moves = _neighbours(problem, design)
     turn: Array = np.arange(POSES, dtype=np.float64) * (2.0 * math.pi / POSES)
-    found = curve_derivatives(problem.family, designs, sigma, tuple(levels), turn)
+    derivatives = curve_derivatives(problem.family, designs, sigma, tuple(levels), turn)
     columns = tuple(problem.columns)
-    waves = np.array([trigonometric_sum(row[None, :], turn)[0] for row in np.eye(2 * HARMONICS + 1)])
-    weights = waves * (np.where(np.arange(len(waves)) == 0, 1.0, 2.0) / POSES)[:, None]
-    out = {}
+    basis = np.array([trigonometric_sum(row[None, :], turn)[0] for row in np.eye(2 * HARMONICS + 1)])
+    weights = basis * (np.where(np.arange(len(basis)) == 0, 1.0, 2.0) / POSES)[:, None]
+    margins = {}
     for name, level in levels.items():
-        spread = level * np.sqrt((found[name] ** 2).sum(axis=1))
+        spread = level * np.sqrt((derivatives[name] ** 2).sum(axis=1))
         if not np.isfinite(spread).all():
             continue
         coefficients = spread @ weights.T
         change = coefficients[1 : n + 1] - coefficients[n + 1 :]
-        slopes = np.array([_shortest(moved, change[:, k]) for k in range(change.shape[1])])
-        out[name] = CurveMargin(columns, design[list(columns)], coefficients[0], slopes)
-    return out
+        slopes = np.array([_shortest_slopes(moves, change[:, k]) for k in range(change.shape[1])])
+        margins[name] = CurveMargin(columns, design[list(columns)], coefficients[0], slopes)
+    return margins
 
 
-def _shortest(moved: Array, change: Array) -> Array:
+def _shortest_slopes(moves: Array, change: Array) -> Array:
     """Return the shortest slopes (V,) that explain the changes (n,) by the moves (n, V) of the columns."""
-    size = np.abs(moved).max(axis=0)
-    size[size == 0.0] = 1.0
-    return np.asarray(least_squares(moved / size, change, 1e-10) / size, np.float64)
+    scale = np.abs(moves).max(axis=0)
+    scale[scale == 0.0] = 1.0
+    return np.asarray(least_squares(moves / scale, change, 1e-10) / scale, np.float64)
 
 
 def curve_derivatives(
@@ -187,15 +187,15 @@ def curve_derivatives(
     For each output (n, q, m), one row per inexact dimension.  The root of the sum of their squares is the standard
     deviation of the curve there, to first order and for independent dimensions; nan for designs with a nan.
     """
-    own = np.flatnonzero(sigma)
+    varied = np.flatnonzero(sigma)
     # Complex kernels raise on a division by zero: designs with nan are left out.
-    known = np.flatnonzero(np.isfinite(designs).all(axis=1))
-    stepped = np.repeat(designs[known].astype(np.complex128), len(own), axis=0)
-    stepped[np.arange(len(stepped)), np.tile(own, len(known))] += 1j * STEP * np.tile(sigma[own], len(known))
+    finite = np.flatnonzero(np.isfinite(designs).all(axis=1))
+    stepped = np.repeat(designs[finite].astype(np.complex128), len(varied), axis=0)
+    stepped[np.arange(len(stepped)), np.tile(varied, len(finite))] += 1j * STEP * np.tile(sigma[varied], len(finite))
     angles = Angles.of(phi[None, :].astype(np.complex128))
     with np.errstate(all="ignore"):  # a design may not reach every pose; the caller handles its nan
-        found = family.poses(np.ascontiguousarray(stepped), angles, frozenset(outputs))
-    out = {name: np.full((len(designs), len(own), len(phi)), np.nan) for name in outputs}
+        columns = family.poses(np.ascontiguousarray(stepped), angles, frozenset(outputs))
+    out = {name: np.full((len(designs), len(varied), len(phi)), np.nan) for name in outputs}
     for name, values in out.items():
-        values[known] = (found[name].imag / STEP).reshape(len(known), len(own), len(phi))
+        values[finite] = (columns[name].imag / STEP).reshape(len(finite), len(varied), len(phi))
     return out

@@ -19,7 +19,7 @@ from sweep.optimise.manufacture.curve_margins import (
     curve_margins,
     curves_with_margin,
 )
-from sweep.optimise.manufacture.tolerance import SIGMAS, sensitivities, touched
+from sweep.optimise.manufacture.tolerance import SIGMAS, sensitivities, tolerances_of
 from sweep.optimise.problem.program import Program
 from sweep.optimise.problem.statement import Problem
 from sweep.quantities.limits import meets
@@ -27,29 +27,29 @@ from sweep.quantities.limits import meets
 if TYPE_CHECKING:
     from sweep.study import Limit, Tolerance
 
-STEPS = (0.2, 0.1, 0.05)  # steps of the compass search [standard deviations]; finer ones follow the sample's noise
-TURNS = 100  # largest number of rounds of each step
+SHIFTS = (0.2, 0.1, 0.05)  # steps of the compass search [standard deviations]; finer ones follow the sample's noise
+MAX_ROUNDS = 100  # largest number of rounds of each step
 CLOSE = 3.0  # distance from a limit, in margins, within which the slopes of its margin are computed
-MOVED = 1e-3  # shift of bounds by which the change of their rows is found [standard deviations]
+BOUND_STEP = 1e-3  # shift of bounds by which the change of their rows is found [standard deviations]
 TURN: Array = np.arange(POSES, dtype=np.float64) * (2.0 * math.pi / POSES)
 
 Levels = Mapping[str, float]
 """Numbers of standard deviations in the margins of limits, by the keys of :func:`keyed`."""
 
 
-def bounded(problem: Problem) -> list[Limit]:
+def inequalities(problem: Problem) -> list[Limit]:
     """Return the inequality limits on outputs, which get a margin; limits on parameters apply to the nominal design."""
-    own = [x for x in problem.limits if x.output not in problem.family.parameter_names]
-    return [x for x in own if not x.is_equation]
+    on_outputs = [x for x in problem.limits if x.output not in problem.family.parameter_names]
+    return [x for x in on_outputs if not x.is_equation]
 
 
-def keyed(problem: Problem) -> dict[str, str]:
+def margin_keys(problem: Problem) -> dict[str, str]:
     """Return the limited outputs that get a margin, each with the key of its number of standard deviations.
 
     Limits on one curve share its margin, so their key is the pose output.  The key of any other limit is its own name.
     """
     along = curves_with_margin(problem)
-    names = dict.fromkeys(x.output for x in bounded(problem))
+    names = dict.fromkeys(x.output for x in inequalities(problem))
     return {name: along.get(name, name) for name in names if not name.startswith("rotatable")}
 
 
@@ -65,21 +65,21 @@ class Scatter:
     """
 
     def __init__(self, problem: Problem, tolerance: Tolerance) -> None:
-        self.problem, self.tolerance, self.keys = problem, tolerance, keyed(problem)
+        self.problem, self.tolerance, self.keys = problem, tolerance, margin_keys(problem)
         self._design: Array = np.empty(0)
         self.curves: dict[str, CurveMargin] = {}
         self.single: dict[str, tuple[float, float]] = {}
         self._changes: dict[str, Allowance] = {}
 
-    def look(self, design: Array) -> None:
+    def update(self, design: Array) -> None:
         """Compute the deviations ``curves`` of curves, and those of ``single`` outputs with their values."""
         if np.array_equal(design, self._design):
             return
-        sigma = touched(self.problem.family, design, self.tolerance) / SIGMAS
+        sigma = tolerances_of(self.problem.family, design, self.tolerance) / SIGMAS
         along = {key: 1.0 for name, key in self.keys.items() if key != name}
         self.curves = curve_margins(self.problem, design, sigma, along)
-        others = [name for name, key in self.keys.items() if key not in self.curves]
-        self.single = _spreads(self.problem, design, sigma, others)
+        single = [name for name, key in self.keys.items() if key not in self.curves]
+        self.single = _deviations(self.problem, design, sigma, single)
         self._design, self._sigma, self._changes = design.copy(), sigma, {}
 
     def changes(self, names: Sequence[str]) -> dict[str, Allowance]:
@@ -88,7 +88,7 @@ class Scatter:
         if new:
 
             def spread(row: Array) -> dict[str, float]:
-                return {name: one for name, (one, _) in _spreads(self.problem, row, self._sigma, new).items()}
+                return {name: sigma for name, (sigma, _) in _deviations(self.problem, row, self._sigma, new).items()}
 
             self._changes |= allowances(self.problem, self._design, spread)
         return {name: self._changes[name] for name in names if name in self._changes}
@@ -105,19 +105,19 @@ def with_margins(scatter: Scatter, design: Array, levels: Levels, radius: float 
     radius : half width of the box in scaled variables; None for the bounds of the problem
     """
     problem, keys = scatter.problem, scatter.keys
-    scatter.look(design)
+    scatter.update(design)
     curves = {key: curve.times(levels[key]) for key, curve in scatter.curves.items()}
     fixed = {name: (levels[keys[name]] * spread, value) for name, (spread, value) in scatter.single.items()}
     # A band narrower than both margins becomes infeasible until a design needs smaller ones.
     limits = tuple(x.drawn_in(fixed[x.output][0]) if x.output in fixed else x for x in problem.limits)
-    close = [x.output for x in problem.limits if x.output in fixed and _close(x, *fixed[x.output])]
-    given = {name: change.times(levels[keys[name]]) for name, change in scatter.changes(close).items()}
+    close = [x.output for x in problem.limits if x.output in fixed and _is_close(x, *fixed[x.output])]
+    allowances = {name: change.times(levels[keys[name]]) for name, change in scatter.changes(close).items()}
     lower, upper = problem.lower, problem.upper
     if radius is not None:
-        place = np.clip(problem.scaled(design[None, :])[0], 0.0, 1.0)
-        lower = problem.lower + np.maximum(place - radius, 0.0) * problem.span
-        upper = problem.lower + np.minimum(place + radius, 1.0) * problem.span
-    return replace(problem, limits=limits, curve_margins=curves, allowances=given, lower=lower, upper=upper)
+        centre = np.clip(problem.scaled(design[None, :])[0], 0.0, 1.0)
+        lower = problem.lower + np.maximum(centre - radius, 0.0) * problem.span
+        upper = problem.lower + np.minimum(centre + radius, 1.0) * problem.span
+    return replace(problem, limits=limits, curve_margins=curves, allowances=allowances, lower=lower, upper=upper)
 
 
 @dataclass(frozen=True)
@@ -138,33 +138,33 @@ def prices(scatter: Scatter, design: Array, levels: Levels) -> dict[str, Price]:
     It follows from the multipliers of the active rows: a bound shifted by a standard deviation shifts its rows, and the
     objective changes by their multipliers times that.
     """
-    whole = with_margins(scatter, design, levels, None)
+    tight = with_margins(scatter, design, levels, None)
     keys, units, spreads = scatter.keys, scatter.curves, scatter.single
-    model = Model(whole, Program(whole), design, lambda: False)
-    state = model.state(whole.scaled(design[None, :])[0])
-    found, form, points = model.certificate(state), state.form, state.form.points
-    moved = tuple(x.drawn_in(MOVED * spreads[x.output][0]) if x.output in spreads else x for x in whole.limits)
-    other = Program(replace(whole, limits=moved)).lay_out(model.curves, design, points, form.complete, model.scale)
-    change = (form.rows(state.atoms, 0.0) - other.rows(state.atoms, 0.0)) / MOVED
+    model = Model(tight, Program(tight), design, lambda: False)
+    state = model.state(tight.scaled(design[None, :])[0])
+    duals, form, points = model.certificate(state), state.form, state.form.points
+    limits = tuple(x.drawn_in(BOUND_STEP * spreads[x.output][0]) if x.output in spreads else x for x in tight.limits)
+    shifted = Program(replace(tight, limits=limits)).lay_out(model.curves, design, points, form.complete, model.scale)
+    change = (form.rows(state.atoms, 0.0) - shifted.rows(state.atoms, 0.0)) / BOUND_STEP
     price, weight = dict.fromkeys(keys.values(), 0.0), dict.fromkeys(units, 0.0)
     for row, label in enumerate(form.labels):
         key = keys.get(label.name)
         if key is None:
             continue
         if key in units:
-            size = found.weights[row] * np.abs(form.matrix[row, : len(points)])
-            price[key] += float((size * units[key].at(design[None, :], points.phi)[0]).sum())
-            weight[key] += float(size.sum())
+            active = duals.weights[row] * np.abs(form.matrix[row, : len(points)])
+            price[key] += float((active * units[key].at(design[None, :], points.phi)[0]).sum())
+            weight[key] += float(active.sum())
         else:
-            price[key] += float(found.weights[row] * change[row])
+            price[key] += float(duals.weights[row] * change[row])
     out = {key: Price(max(price[key], 0.0), spreads[key][0]) for key in keys.values() if key not in units}
     for key, unit in units.items():
-        own = price[key] / weight[key] if weight[key] > 0.0 else float(unit.at(design[None, :], TURN)[0].max())
-        out[key] = Price(max(price[key], 0.0), own)
+        spread = price[key] / weight[key] if weight[key] > 0.0 else float(unit.at(design[None, :], TURN)[0].max())
+        out[key] = Price(max(price[key], 0.0), spread)
     return out
 
 
-def excesses(problem: Problem, found: Mapping[str, Array], known: Mapping[str, Price]) -> dict[str, Array]:
+def excesses(problem: Problem, outputs: Mapping[str, Array], units: Mapping[str, Price]) -> dict[str, Array]:
     """Return the excess of outputs over their limits in standard deviations, by the keys of the limits.
 
     It is infinite for a mechanism without the output, and for one that does not turn: no margin helps there.
@@ -172,41 +172,41 @@ def excesses(problem: Problem, found: Mapping[str, Array], known: Mapping[str, P
     Parameters
     ----------
     problem : problem with the limits as given
-    found : limited outputs of n mechanisms, as compared with limits
-    known : standard deviation of every limit
+    outputs : limited outputs of n mechanisms, as compared with limits
+    units : standard deviation of every limit
     """
-    keys, out = keyed(problem), dict[str, Array]()
-    lost = np.zeros(len(found[problem.objective]), np.bool_)
-    for limit in bounded(problem):
-        key, values = keys.get(limit.output), found[limit.output]
+    keys, out = margin_keys(problem), dict[str, Array]()
+    failing = np.zeros(len(outputs[problem.objective]), np.bool_)
+    for limit in inequalities(problem):
+        key, values = keys.get(limit.output), outputs[limit.output]
         if key is None:
-            lost |= ~meets(limit, values)
+            failing |= ~meets(limit, values)
             continue
         low, high = limit.ends
-        beyond, unit = np.maximum(low - values, values - high), known[key].spread
-        own = beyond / unit if unit > 0.0 else np.where(beyond > 0.0, math.inf, -math.inf)
-        own = np.where(np.isnan(own), math.inf, own)
-        out[key] = np.maximum(out[key], own) if key in out else own
-    return {key: np.where(lost, math.inf, own) for key, own in out.items()}
+        violation, unit = np.maximum(low - values, values - high), units[key].spread
+        excess = violation / unit if unit > 0.0 else np.where(violation > 0.0, math.inf, -math.inf)
+        excess = np.where(np.isnan(excess), math.inf, excess)
+        out[key] = np.maximum(out[key], excess) if key in out else excess
+    return {key: np.where(failing, math.inf, excess) for key, excess in out.items()}
 
 
-def _close(limit: Limit, room: float, value: float) -> bool:
+def _is_close(limit: Limit, margin: float, value: float) -> bool:
     """Tell whether a limit is so close that the change of its margin may matter."""
     low, high = limit.ends
-    return value - CLOSE * room < low or value + CLOSE * room > high
+    return value - CLOSE * margin < low or value + CLOSE * margin > high
 
 
-def _spreads(problem: Problem, design: Array, sigma: Array, names: Sequence[str]) -> dict[str, tuple[float, float]]:
+def _deviations(problem: Problem, design: Array, sigma: Array, names: Sequence[str]) -> dict[str, tuple[float, float]]:
     """Return standard deviations of outputs, from exact derivatives by all toleranced dimensions, with their values."""
     if not names:
         return {}
     rows = sensitivities(problem.family, design, names, problem.window)
-    spread = dict(zip(problem.family.parameter_names, sigma, strict=True))
+    sigmas = dict(zip(problem.family.parameter_names, sigma, strict=True))
     variance, values = dict.fromkeys(names, 0.0), dict.fromkeys(names, math.nan)
     kinds = ("parameter", "output", "value", "growing", "shrinking")
     for name, output, value, up, down in zip(*(rows[k] for k in kinds), strict=True):
-        steep = max(abs(up), abs(down)) * spread[name]
-        variance[output] += steep * steep if math.isfinite(steep) else 0.0
+        change = max(abs(up), abs(down)) * sigmas[name]
+        variance[output] += change * change if math.isfinite(change) else 0.0
         values[output] = value
     return {name: (math.sqrt(v), values[name]) for name, v in variance.items()}
 
@@ -235,22 +235,22 @@ def risk_allocation(excess: Array, prices: Array, share: float, reach: float = m
     For normally distributed excesses the share is log-concave in the shifts (Prekopa 1971), so the minimum of the
     price is unique, and a compass search finds it.  Its last step leaves some 0.1 % of the saving.
     """
-    number = min(max(math.ceil(share * len(excess)), 1), len(excess))
-    around = [number - 1, min(number, len(excess) - 1)]  # the last mechanism that keeps all limits, and the next
+    rank = min(max(math.ceil(share * len(excess)), 1), len(excess))
+    ranks = [rank - 1, min(rank, len(excess) - 1)]  # the last mechanism that keeps all limits, and the next
     weights = prices if prices.any() else np.ones(len(prices))
     total, dearest = float(weights.sum()), int(np.argmax(weights))
 
     def common(offsets: Array) -> float:
-        ends = np.partition((excess - offsets).max(axis=1), around)[around]
+        ends = np.partition((excess - offsets).max(axis=1), ranks)[ranks]
         return float(ends.mean() if np.isfinite(ends[1]) else ends[0])
 
     offsets = np.zeros(len(weights))
-    together = best = total * common(offsets)
+    equal_cost = best = total * common(offsets)
     if not math.isfinite(best):
         return np.full(len(weights), math.inf), 0.0
-    for step in STEPS:
-        for _ in range(TURNS):
-            before = best
+    for step in SHIFTS:
+        for _ in range(MAX_ROUNDS):
+            previous = best
             for k in range(len(weights)):
                 for move in (step, -step):
                     trial = offsets.copy()
@@ -260,6 +260,6 @@ def risk_allocation(excess: Array, prices: Array, share: float, reach: float = m
                     value = float((weights * trial).sum()) + total * common(trial)
                     if value < best:
                         offsets, best = trial, value
-            if best >= before:
+            if best >= previous:
                 break
-    return offsets + common(offsets), together - best
+    return offsets + common(offsets), equal_cost - best

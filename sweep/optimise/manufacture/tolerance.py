@@ -52,26 +52,26 @@ def sensitivities(
     rad or 1), nan if the output does not exist.  Derivatives are exact to rounding (docs/internals/optimiser.md,
     Gradients).  A piecewise constant output, such as a count, has no rows, and a design with a nan has none.
     """
-    there = ~_absent(family, design)
-    varied = [k for k, p in enumerate(family.parameters) if p.unit in DIMENSIONS and there[k]]
-    sizes = {
+    present = ~_absent(family, design)
+    varied = [k for k, p in enumerate(family.parameters) if p.unit in DIMENSIONS and present[k]]
+    scales = {
         unit: max((abs(design[k]) for k in varied if family.parameters[k].unit == unit), default=1.0) or 1.0
         for unit in ("length", "ratio")
     }
-    span = np.array([REACH * sizes.get(family.parameters[k].unit, 1.0) for k in varied])
+    span = np.array([REACH * scales.get(family.parameters[k].unit, 1.0) for k in varied])
     names = tuple(family.parameters[k].name for k in varied)
     fixed = {n: float(x) for n, x in zip(family.parameter_names, design, strict=True) if n not in names}
     rows: dict[str, list[Any]] = {name: [] for name in ("parameter", "output", "value", "growing", "shrinking")}
-    asked = [name for name in outputs if not is_flag(name) and not described(family, name).jumps]
-    place, accuracy = design[varied], Accuracy(target=1e-9)
+    differentiable = [name for name in outputs if not is_flag(name) and not described(family, name).jumps]
+    centre, accuracy = design[varied], Accuracy(target=1e-9)
 
     def problem(output: str) -> Problem:
-        return Problem(family, names, place - 0.5 * span, place + 0.5 * span, fixed, output, (), window, accuracy)
+        return Problem(family, names, centre - 0.5 * span, centre + 0.5 * span, fixed, output, (), window, accuracy)
 
-    asked = asked if np.isfinite(design).all() else []  # [locus] may have no links for the design
-    found = _plain_ends(problem, design, [name for name in asked if _is_plain(family, name, window)])
-    for output in asked:
-        value, low, high = found[output] if output in found else _ends(problem(output), design)
+    differentiable = differentiable if np.isfinite(design).all() else []  # [locus] may have no links for the design
+    plain = _plain_gradients(problem, design, [name for name in differentiable if _is_plain(family, name, window)])
+    for output in differentiable:
+        value, low, high = plain[output] if output in plain else _side_gradients(problem(output), design)
         rows["parameter"] += names
         rows["output"] += [output] * len(names)
         rows["value"] += [value] * len(names)
@@ -82,60 +82,60 @@ def sensitivities(
 
 def _is_plain(family: Family, output: str, window: tuple[float, float] | None) -> bool:
     """Tell whether an output is a plain number, without extrema to be tracked, and no parameter."""
-    found = measure(family, output, window)
-    return found.kind == "scalar" and not found.parts and output not in family.parameter_names
+    quantity = measure(family, output, window)
+    return quantity.kind == "scalar" and not quantity.parts and output not in family.parameter_names
 
 
-def _plain_ends(
+def _plain_gradients(
     problem: Callable[[str], Problem], design: Array, outputs: Sequence[str]
 ) -> dict[str, tuple[float, Array, Array]]:
     """Return the results of :func:`_ends` for plain numbers, computed together since they share poses and steps."""
     if not outputs:
         return {}
-    asked = problem(outputs[0])
-    at = asked.scaled(design[None, :])[0]
+    base = problem(outputs[0])
+    fractions = base.scaled(design[None, :])[0]
 
     def values(designs: Array, names: Sequence[str]) -> Array:
-        columns = design_outputs(asked.family, designs, names, asked.accuracy, asked.window)
+        columns = design_outputs(base.family, designs, names, base.accuracy, base.window)
         return np.stack(floats(columns, *names), axis=1)
 
-    moves = design + 1j * stepped(asked, design, at).imag  # exactly at the design whose values are computed
-    slopes = step_gradients(asked.family, moves, outputs, asked.accuracy)
+    steps = design + 1j * stepped(base, design, fractions).imag  # exactly at the design whose values are computed
+    slopes = step_gradients(base.family, steps, outputs, base.accuracy)
     rest = [name for name in outputs if name not in slopes]
     if rest:
-        found = scalar_gradient(lambda moved: values(asked.placed(design, moved), rest), at)
-        slopes |= dict(zip(rest, found.T, strict=True))
+        gradients = scalar_gradient(lambda rows: values(base.placed(design, rows), rest), fractions)
+        slopes |= dict(zip(rest, gradients.T, strict=True))
     numbers = values(design[None, :], outputs)[0]
     return {name: (float(x), slopes[name], slopes[name]) for name, x in zip(outputs, numbers, strict=True)}
 
 
-def _ends(problem: Problem, design: Array) -> tuple[float, Array, Array]:
+def _side_gradients(problem: Problem, design: Array) -> tuple[float, Array, Array]:
     """Return the objective and its gradients by the scaled variables, for shrinking and for growing variables."""
     program = Program(problem)
     if program.objective.is_least:  # its extrema bound its negative from above
         opposite = without_minus(problem.objective) or f"{MINUS}{problem.objective}"
-        value, low, high = _ends(replace(problem, objective=opposite), design)
+        value, low, high = _side_gradients(replace(problem, objective=opposite), design)
         return -value, -low, -high
     model = Model(problem, program, design, lambda: False)
     state = model.state(problem.scaled(design[None, :])[0])
     value = program.value(program.objective, state.form, model.curves, state.design, state.atoms)
-    own = np.array([label.side == "objective" for label in state.form.labels], dtype=np.bool_)
-    nothing = np.full(len(problem.variables), math.nan)
-    if not own.any() or not math.isfinite(value):
-        return math.nan, nothing, nothing
+    objective_rows = np.array([label.side == "objective" for label in state.form.labels], dtype=np.bool_)
+    nan = np.full(len(problem.variables), math.nan)
+    if not objective_rows.any() or not math.isfinite(value):
+        return math.nan, nan, nan
     points = state.form.points
-    inner = -(state.form.constant + state.form.matrix @ state.atoms)[own] * model.scale
-    jacobian = -model.jacobian(state.fractions, state.form, points)[own] * model.scale
-    shared = jacobian[inner >= inner.max() - TIE * abs(inner.max())]
-    level = level_gradients(model.curves, stepped(problem, design, state.fractions), points, program.objective, shared)
-    shared = np.concatenate([shared, level]) * _outward(program.objective, float(inner.max()))
-    return value, shared.min(axis=0), shared.max(axis=0)
+    inner = -(state.form.constant + state.form.matrix @ state.atoms)[objective_rows] * model.scale
+    jacobian = -model.jacobian(state.fractions, state.form, points)[objective_rows] * model.scale
+    tied = jacobian[inner >= inner.max() - TIE * abs(inner.max())]
+    level = level_gradients(model.curves, stepped(problem, design, state.fractions), points, program.objective, tied)
+    tied = np.concatenate([tied, level]) * _output_slope(program.objective, float(inner.max()))
+    return value, tied.min(axis=0), tied.max(axis=0)
 
 
-def _outward(measure: Measure, inner: float) -> float:
+def _output_slope(measure: Measure, inner: float) -> float:
     """Return the derivative of the output by its inner value."""
     if measure.kind == "minus":
-        return _outward(measure.parts[0], -inner)
+        return _output_slope(measure.parts[0], -inner)
     if measure.inner == "pressure":  # inner = -cos^2 of the angle
         return 1.0 / (2.0 * math.sqrt(max(-inner * (1.0 + inner), 1e-300)))
     if measure.inner == "transmission":  # inner = sin^2 of the angle
@@ -152,23 +152,23 @@ SIGMAS = 3.0  # a tolerance of +-t is three standard deviations
 BAND = (2.5, 97.5)  # percent
 
 
-def touched(family: Family, design: Array, tolerance: Tolerance) -> Array:
+def tolerances_of(family: Family, design: Array, tolerance: Tolerance) -> Array:
     """Return the tolerance (P,) of every parameter: its own, otherwise that of lengths or angles, zero for all others.
 
     A parameter that cannot be negative and is 0 in the design (P,), as the arm of a fork slot, is a missing part.
     """
-    widths, own = {"length": tolerance.lengths, "angle": tolerance.angles}, dict(tolerance.own)
-    wide = [own.get(p.name, widths.get(p.unit, 0.0)) for p in family.parameters]
-    return np.where(_absent(family, design), 0.0, wide)
+    defaults, individual = {"length": tolerance.lengths, "angle": tolerance.angles}, dict(tolerance.own)
+    widths = [individual.get(p.name, defaults.get(p.unit, 0.0)) for p in family.parameters]
+    return np.where(_absent(family, design), 0.0, widths)
 
 
 def _absent(family: Family, design: Array) -> NDArray[np.bool_]:
     """Tell which parameters (P,) of a design are choices or missing parts."""
-    given = zip(family.parameters, design, strict=True)
-    return np.array([p.choices is not None or (p.not_negative and x == 0.0) for p, x in given])
+    pairs = zip(family.parameters, design, strict=True)
+    return np.array([p.choices is not None or (p.not_negative and x == 0.0) for p, x in pairs])
 
 
-def deviating(family: Family, design: Array, tolerance: Tolerance, seed: int, samples: int = SAMPLES) -> Array:
+def sampled_designs(family: Family, design: Array, tolerance: Tolerance, seed: int, samples: int = SAMPLES) -> Array:
     """Return designs (samples, P) around a design, with independent normally distributed lengths and angles.
 
     Parameters
@@ -182,7 +182,7 @@ def deviating(family: Family, design: Array, tolerance: Tolerance, seed: int, sa
     from scipy.special import ndtri
     from scipy.stats import qmc
 
-    sigma = touched(family, design, tolerance) / SIGMAS
+    sigma = tolerances_of(family, design, tolerance) / SIGMAS
     varied = np.flatnonzero(sigma)
     uniform = qmc.Sobol(len(varied), seed=seed).random(samples)
     designs = np.repeat(design[None, :], samples, axis=0)
@@ -221,30 +221,30 @@ def tolerance_rows(
     """
     limits = [limit for limit in limits if not limit.is_equation]
     designs = np.concatenate(
-        [design[None, :], deviating(family, design, tolerance, seed, min(SAMPLES, tolerance.samples))]
+        [design[None, :], sampled_designs(family, design, tolerance, seed, min(SAMPLES, tolerance.samples))]
     )
     columns: dict[str, Any] = design_outputs(family, designs, list(outputs), accuracy, window)
     rows: list[tuple[Any, ...]] = []
-    everything = np.ones(len(designs) - 1, dtype=np.bool_)
+    all_kept = np.ones(len(designs) - 1, dtype=np.bool_)
     for output in outputs:
         values = np.asarray(columns[output], np.float64)
-        known = values[1:][np.isfinite(values[1:])]
-        low, high = np.percentile(known, BAND) if len(known) else (math.nan, math.nan)
-        own = [meets(limit, values[1:]) for limit in limits if limit.output == output]
-        for kept in own:
-            everything &= kept
-        within = float(np.logical_and.reduce(own).mean()) if own else math.nan
-        mean = float(known.mean()) if len(known) else math.nan
-        missing = 1.0 - len(known) / len(everything)
+        finite = values[1:][np.isfinite(values[1:])]
+        low, high = np.percentile(finite, BAND) if len(finite) else (math.nan, math.nan)
+        kept = [meets(limit, values[1:]) for limit in limits if limit.output == output]
+        for mask in kept:
+            all_kept &= mask
+        within = float(np.logical_and.reduce(kept).mean()) if kept else math.nan
+        mean = float(finite.mean()) if len(finite) else math.nan
+        missing = 1.0 - len(finite) / len(all_kept)
         rows.append((output, float(values[0]), mean, float(low), float(high), missing, within))
-    rows.append(("all limits", *[math.nan] * 5, float(everything.mean()) if limits else math.nan))
+    rows.append(("all limits", *[math.nan] * 5, float(all_kept.mean()) if limits else math.nan))
     names = ("output", "nominal", "mean", "low", "high", "missing", "within")
     return {name: list(column) for name, column in zip(names, zip(*rows, strict=True), strict=True)}
 
 
-SINGLE = 512  # mechanisms of the sample used for the cost of each dimension
+COST_SAMPLE = 512  # mechanisms of the sample used for the cost of each dimension
 COSTS = 8  # number of dimensions made exact, one at a time
-TELLING = 0.004  # share of mechanisms below which 512 of them show no cost of a dimension
+TELLING_GAIN = 0.004  # share of mechanisms below which 512 of them show no cost of a dimension
 
 
 class Cost(NamedTuple):
@@ -283,11 +283,11 @@ def manufactured(study: Study, design: Array) -> Manufactured | None:
     limits = limits_of_made(study)
     if study.tolerance is None or study.optimise is None or not limits or not np.isfinite(design).all():
         return None
-    designs = deviating(study.family, design, study.tolerance, study.optimise.seed, study.tolerance.samples)
+    designs = sampled_designs(study.family, design, study.tolerance, study.optimise.seed, study.tolerance.samples)
     columns, kept = within_limits(study, limits, designs)
     worst = min(limits, key=lambda limit: float(meets(limit, columns[limit.output]).mean()))
-    few = {name: values[:SINGLE] for name, values in columns.items()}
-    costs = _costs(study, limits, worst, design, designs[:SINGLE], few, float(kept[:SINGLE].mean()))
+    subset = {name: values[:COST_SAMPLE] for name, values in columns.items()}
+    costs = _costs(study, limits, worst, design, designs[:COST_SAMPLE], subset, float(kept[:COST_SAMPLE].mean()))
     return Manufactured(worst.output, columns[worst.output], kept, tuple(costs))
 
 
@@ -297,42 +297,42 @@ def within_limits(
     """Return limited outputs and outputs ``more`` of designs (n, P), and which designs keep all limits, (n,)."""
     names = list(dict.fromkeys([*(limit.output for limit in limits), *more]))
     columns = design_outputs(of.family, designs, names, of.accuracy, of.window)
-    met = [np.ones(len(designs), np.bool_), *(meets(limit, columns[limit.output]) for limit in limits)]
-    return {name: columns[name] for name in names}, np.logical_and.reduce(met)
+    masks = [np.ones(len(designs), np.bool_), *(meets(limit, columns[limit.output]) for limit in limits)]
+    return {name: columns[name] for name in names}, np.logical_and.reduce(masks)
 
 
 def _costs(
     study: Study, limits: list[Limit], worst: Limit, design: Array, designs: Array,
-    columns: dict[str, NDArray[np.generic]], before: float,
+    columns: dict[str, NDArray[np.generic]], baseline: float,
 ) -> list[Cost]:  # fmt: skip
     """Return the dimensions by the cost of their tolerances, the most expensive first.
 
-    For the mechanisms ``designs`` the output ``columns`` are known, and the share ``before`` that keeps all limits.
+    For the mechanisms ``designs`` the output ``columns`` are known, and the share ``baseline`` that keeps all limits.
     The dimensions with the largest share in the variance of an output, times the share that violates its limit, are
     made exact one at a time.  A limit that all these mechanisms keep by a standard deviation is kept then, too.
     """
     assert study.tolerance is not None
     limits = [x for x in limits if x is worst or _near(x, columns[x.output])]
-    scatter = _variance(columns, worst)
-    found = []
-    own = np.flatnonzero(touched(study.family, design, study.tolerance))
-    matters = np.zeros(len(own))
+    variance = _variance(columns, worst)
+    costs = []
+    varied = np.flatnonzero(tolerances_of(study.family, design, study.tolerance))
+    importance = np.zeros(len(varied))
     for limit in limits:
         values = compared(limit.output, np.asarray(columns[limit.output], np.float64))
-        known = np.isfinite(values)
-        if not known.any():
+        finite = np.isfinite(values)
+        if not finite.any():
             continue  # no mechanism has this output, and no single dimension changes that
-        off, away = designs[known][:, own] - design[own], values[known] - values[known].mean()
-        along = (away @ off) ** 2 / (off**2).sum(axis=0)
-        matters += along / max(along.sum(), 1e-300) * (1.0 - float(meets(limit, columns[limit.output]).mean()))
-    for k in own[np.argsort(-matters, kind="stable")[:COSTS]]:
+        dp, dx = designs[finite][:, varied] - design[varied], values[finite] - values[finite].mean()
+        shares = (dx @ dp) ** 2 / (dp**2).sum(axis=0)
+        importance += shares / max(shares.sum(), 1e-300) * (1.0 - float(meets(limit, columns[limit.output]).mean()))
+    for k in varied[np.argsort(-importance, kind="stable")[:COSTS]]:
         exact = designs.copy()
         exact[:, k] = design[k]
         parameter = study.family.parameters[k]
         columns, kept = within_limits(study, limits, exact)
-        spread = 1.0 - _variance(columns, worst) / scatter if scatter > 0.0 else 0.0
-        found.append(Cost(parameter.name, parameter.text, max(spread, 0.0), float(kept.mean()) - before))
-    return sorted(found, key=lambda cost: (-cost.gain if cost.gain >= TELLING else 0.0, -cost.spread))
+        spread = 1.0 - _variance(columns, worst) / variance if variance > 0.0 else 0.0
+        costs.append(Cost(parameter.name, parameter.text, max(spread, 0.0), float(kept.mean()) - baseline))
+    return sorted(costs, key=lambda cost: (-cost.gain if cost.gain >= TELLING_GAIN else 0.0, -cost.spread))
 
 
 def _near(limit: Limit, column: NDArray[np.generic]) -> bool:
@@ -342,5 +342,5 @@ def _near(limit: Limit, column: NDArray[np.generic]) -> bool:
 
 def _variance(columns: dict[str, NDArray[np.generic]], limit: Limit) -> float:
     values = compared(limit.output, np.asarray(columns[limit.output], np.float64))
-    known = values[np.isfinite(values)]
-    return float(known.var()) if known.size else 0.0
+    finite = values[np.isfinite(values)]
+    return float(finite.var()) if finite.size else 0.0

@@ -123,7 +123,7 @@ def _bound_shift(quantity: Measure, bound: float | None, allowance: Allowance | 
     step = DIFFERENCE * max(abs(bound), DIFFERENCE)
     rate = sense * (quantity.to_inner(bound + step) - quantity.to_inner(bound - step)) / (2.0 * step)
     slopes = {name: rate * float(s) for name, s in zip(allowance.names, allowance.slopes, strict=True) if s != 0.0}
-    reference = dict(zip(allowance.names, allowance.place.tolist(), strict=True))
+    reference = dict(zip(allowance.names, allowance.reference.tolist(), strict=True))
     return slopes, sum(slope * reference[name] for name, slope in slopes.items())
 
 

@@ -23,7 +23,7 @@ import numpy as np
 from sweep.families.base import Array
 from sweep.families.capabilities import GuidedPoint
 from sweep.families.chain import driven_guide
-from sweep.optimise.manufacture.tolerance import SIGMAS, touched
+from sweep.optimise.manufacture.tolerance import SIGMAS, tolerances_of
 from sweep.optimise.problem.statement import Problem
 
 if TYPE_CHECKING:
@@ -130,7 +130,7 @@ def elimination(problem: Problem, tolerance: Tolerance | None = None) -> Elimina
     sigma, level = None, 0.0
     if tolerance is not None and share is not None:
         design = np.array([problem.fixed.get(name, math.nan) for name in problem.family.parameter_names])
-        sigma = touched(problem.family, design, tolerance) / SIGMAS
+        sigma = tolerances_of(problem.family, design, tolerance) / SIGMAS
         level = NormalDist().inv_cdf(1.0 - (1.0 - share) / BOTH)
     driver = f"{before.family.position}{before.number}"
     return Elimination(
