@@ -57,7 +57,7 @@ def model(limit: Limit) -> Model:
 def test_passage_stays_on_its_level_while_the_design_changes() -> None:
     start = model(Limit("stay", 0.1, None))
     state = start.state(np.array([0.5, 0.5]))
-    points, _ = start.moved(np.array([0.7, 0.35]), state.form, state.form.points)
+    points, _ = start.tracked(np.array([0.7, 0.35]), state.form, state.form.points)
     own = points.kind == PASSING
     assert own.sum() >= 2
     there = start.curves.values(start.design(np.array([0.7, 0.35]))[None, :], points)[0]

@@ -84,7 +84,7 @@ def test_gradients_along_the_locus_equal_differences(name):
         for n in (-1, 1):
             moved = at.copy()
             moved[j] += n * step
-            rows.append(state.form.rows(model.moved(moved, state.form, state.form.points)[1], 0.0))
+            rows.append(state.form.rows(model.tracked(moved, state.form, state.form.points)[1], 0.0))
         np.testing.assert_allclose(jacobian[:, j], (rows[1] - rows[0]) / (2.0 * step), rtol=1e-5, atol=1e-5)
 
 

@@ -23,7 +23,7 @@ from sweep.plot.datasets import draw_histogram
 from sweep.report.answer import not_achieved
 from sweep.report.dataset import without_rows
 from sweep.report.figures import LIMIT
-from sweep.report.made import TELLING, histogram, made, made_sentence
+from sweep.report.made import TELLING_GAIN, histogram, made, made_sentence
 from sweep.report.optima import groups, optima, optima_sentence, shown_designs
 from sweep.study import study_from_data
 
@@ -128,7 +128,7 @@ def test_dimension_that_costs_most_is_the_one_that_the_limit_is_about() -> None:
     found = made(data)
     first, *others = found.costs
     assert first.name == "c" and first.spread == pytest.approx(1.0, abs=1e-9)
-    assert first.gain == pytest.approx(1.0 - found.share, abs=0.02) and first.gain > TELLING
+    assert first.gain == pytest.approx(1.0 - found.share, abs=0.02) and first.gain > TELLING_GAIN
     assert all(cost.spread < 1e-9 and abs(cost.gain) < 1e-9 for cost in others)
     assert "the dimension that costs most is c: were it exact, 28" in made_sentence(found, "x")
 
