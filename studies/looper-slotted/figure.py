@@ -19,7 +19,7 @@ from sweep.families import family
 from sweep.families.base import Accuracy
 from sweep.jobs.progress import Phases, Say, unsaid
 from sweep.optimise.multistart.multistart import optimum
-from sweep.optimise.starts.dataset import drawn
+from sweep.optimise.starts.dataset import random_designs
 from sweep.optimise.starts.posing import problem_of
 from sweep.report.figures import OPTIMUM, REFERENCE, WIDTH, new_figure
 from sweep.study import OptimiseSettings, study_from_data
@@ -63,7 +63,7 @@ def crank_rocker(ratio: float, starts: int) -> Result:
     """Return the crank-rocker of least acceleration for a stroke ratio, or the least infeasible one."""
     locus = CRANK_ROCKER["locus"] | {"phi0": f"{360.0 * ratio / (1.0 + ratio)!r} deg"}
     study = study_from_data(CRANK_ROCKER | {"locus": locus}, Path("crank-rocker"))
-    problem = problem_of(study, drawn(study, KNOWN, SEED), on_locus=False)
+    problem = problem_of(study, random_designs(study, KNOWN, SEED), on_locus=False)
     return optimum(problem, SIGNS, OptimiseSettings(starts=starts, seed=SEED, looks=LOOKS), jobs=JOBS)[0]
 
 

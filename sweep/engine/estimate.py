@@ -128,39 +128,39 @@ def searches(study: Study, jobs: int, known: Pilot) -> tuple[tuple[str, float, f
     from sweep.optimise.front import pareto
     from sweep.optimise.local.start import search
     from sweep.optimise.multistart.survey import CONFIRMATIONS, GROUP_SIZE
-    from sweep.optimise.starts.dataset import SAMPLES, drawn, sample_seconds
-    from sweep.optimise.starts.global_starts import MADE, SWEPT
+    from sweep.optimise.starts.dataset import SAMPLES, random_designs, sample_seconds
+    from sweep.optimise.starts.global_starts import POPULATIONS, SWEPT
     from sweep.optimise.starts.posing import problem_of
 
-    designs = known.kept if len(known.kept) else drawn(study, 1, settings.seed)
+    designs = known.kept if len(known.kept) else random_designs(study, 1, settings.seed)
     if not len(designs):
         return ()
     problem = problem_of(study, designs)
     search(0, problem, designs[0], lambda: False, TRIED_LOOKS)  # compiles
     begin = time.process_time()
-    tried = search(0, problem, designs[0], lambda: time.process_time() - begin > TRIED_SECONDS, TYPICAL_LOOKS)
-    look = (time.process_time() - begin) / max(tried.looks, 1) / jobs
-    settled = tried.looks if tried.ended == "converged" else None
-    typical, most = min(settings.looks, settled or TYPICAL_LOOKS) * look, settings.looks * look
+    trial = search(0, problem, designs[0], lambda: time.process_time() - begin > TRIED_SECONDS, TYPICAL_LOOKS)
+    seconds = (time.process_time() - begin) / max(trial.looks, 1) / jobs
+    settled = trial.looks if trial.ended == "converged" else None
+    typical, most = min(settings.looks, settled or TYPICAL_LOOKS) * seconds, settings.looks * seconds
     share = None if study.tolerance is None else study.tolerance.robust
-    population = POPULATION_LOOKS * look if settings.by_populations else 0.0
+    population = POPULATION_LOOKS * seconds if settings.by_populations else 0.0
     if settings.by_populations:
-        every = settings.populations * (population + 2.0 * most) + settings.starts // SWEPT * most
-        found = [("search", CONFIRMATIONS * (population + 2.0 * typical), every)]
+        longest = settings.populations * (population + 2.0 * most) + settings.starts // SWEPT * most
+        rows = [("search", CONFIRMATIONS * (population + 2.0 * typical), longest)]
     else:
         sampled = study.fit is None and settings.starts > 1
         sample = sample_seconds(problem, designs[0], settings.starts) if sampled else 0.0
-        some = 0.0 if len(known.kept) else sample
-        all_of_them = -(-SAMPLES * settings.starts // GROUP_SIZE) * sample
-        found = [("search", some + settings.starts * typical, all_of_them + settings.starts * most)]
+        expected = 0.0 if len(known.kept) else sample
+        all_samples = -(-SAMPLES * settings.starts // GROUP_SIZE) * sample
+        rows = [("search", expected + settings.starts * typical, all_samples + settings.starts * most)]
     if study.tolerance is not None and share is not None:
-        some, every = (n * look + MADE * population for n in _robust_looks(settings, settled))
-        found.append(("tolerances", some, 2.0 * every))
+        expected, longest = (n * seconds + POPULATIONS * population for n in _robust_looks(settings, settled))
+        rows.append(("tolerances", expected, 2.0 * longest))
     if study.pareto is not None:
         count = pareto.searches(study.pareto)
-        allowed = min(study.pareto.looks, settings.looks) * look
-        found.append(("front", count * min(NEAR_LOOKS * look, allowed), count * allowed))
-    return (*found, ("tables and report", REPORT_SECONDS, 4.0 * REPORT_SECONDS))
+        limit = min(study.pareto.looks, settings.looks) * seconds
+        rows.append(("front", count * min(NEAR_LOOKS * seconds, limit), count * limit))
+    return (*rows, ("tables and report", REPORT_SECONDS, 4.0 * REPORT_SECONDS))
 
 
 def _robust_looks(settings: OptimiseSettings, settled: int | None) -> tuple[int, int]:
@@ -173,13 +173,13 @@ def _robust_looks(settings: OptimiseSettings, settled: int | None) -> tuple[int,
     """
     from sweep.optimise.manufacture import robust
 
-    begun = robust.MOST_BASINS if settings.by_populations else min(robust.MOST_BASINS, settings.starts)
-    rounds, heat = begun * robust.ROUNDS, min(robust.FIRST_BUDGET, settings.looks)
-    ended, corrected = min(robust.CONTINUED, begun), robust.CORRECTIONS * robust.ROUNDS
-    most = rounds * heat + ended * settings.looks
+    starts = robust.MOST_BASINS if settings.by_populations else min(robust.MOST_BASINS, settings.starts)
+    rounds, first_budget = starts * robust.ROUNDS, min(robust.FIRST_BUDGET, settings.looks)
+    continued, corrections = min(robust.CONTINUED, starts), robust.CORRECTIONS * robust.ROUNDS
+    most = rounds * first_budget + continued * settings.looks
     if settled is None:
         return most, most
-    return rounds * min(heat, settled) + ended * min(settings.looks, corrected * settled), most
+    return rounds * min(first_budget, settled) + continued * min(settings.looks, corrections * settled), most
 
 
 def other_accuracies(

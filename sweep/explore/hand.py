@@ -15,7 +15,7 @@ from sweep.errors import InputError, nearest
 from sweep.evaluation.tables import design_matrix
 from sweep.families.base import Array, Family, Parameter
 from sweep.families.names import is_flag
-from sweep.optimise.starts.dataset import drawn
+from sweep.optimise.starts.dataset import random_designs
 from sweep.report.dataset import Dataset, Row, chosen, read_dataset, reference_of, row_of, without_rows
 from sweep.report.page import judged
 from sweep.report.quantities import quantity
@@ -200,7 +200,7 @@ def of_study(study: Study) -> Hand:
     if pins := _reference(study):
         return Hand(without_rows(study), None, pins["reference"], pins)
     if study.made:
-        found = drawn(study, 1, 0)
+        found = random_designs(study, 1, 0)
         if not len(found):
             allowed = "one with a design that [locus] and [fit] can make"
             raise InputError("design space", space.count, allowed, "explore")

@@ -13,8 +13,8 @@ from pathlib import Path
 from studies.accuracy.machine import description
 from sweep.optimise.local.kkt import AGREE
 from sweep.optimise.local.start import search
-from sweep.optimise.starts.dataset import drawn, kinds
-from sweep.optimise.starts.global_starts import holding
+from sweep.optimise.starts.dataset import kinds, random_designs
+from sweep.optimise.starts.global_starts import enclosing
 from sweep.optimise.starts.linear import elimination
 from sweep.optimise.starts.populations import breed
 from sweep.optimise.starts.posing import problem_of
@@ -84,7 +84,7 @@ def populations(problem: str, seed: int, rows: Sequence[Row]) -> Iterator[Row]:
     """
     study = record(LEAST[problem], seed=seed)
     assert study.optimise is not None
-    known = drawn(study, study.optimise.starts, study.optimise.seed)
+    known = random_designs(study, study.optimise.starts, study.optimise.seed)
     own = problem_of(study, known)
     linear = elimination(own)
     assert linear is not None
@@ -94,12 +94,12 @@ def populations(problem: str, seed: int, rows: Sequence[Row]) -> Iterator[Row]:
         times = [time.process_time()]
         bred = breed(linear, signs, (seed, len(found)))
         times.append(time.process_time())
-        end = search(0, holding(study, own, bred.designs[:1]), bred.designs[0], lambda: False, study.optimise.looks)
+        end = search(0, enclosing(study, own, bred.designs[:1]), bred.designs[0], lambda: False, study.optimise.looks)
         times.append(time.process_time())
         found.append(
             Row(
                 problem, seed, len(found), end.objective if end.feasible else float("nan"), end.kkt_residual,
-                float(bred.worth[0]), bred.looks, times[1] - times[0], times[2] - times[1],
+                float(bred.merit[0]), bred.evaluations, times[1] - times[0], times[2] - times[1],
             )
         )  # fmt: skip
         yield found[-1]

@@ -19,7 +19,7 @@ from sweep.families import family
 from sweep.optimise import Problem, optimum
 from sweep.optimise.starts import populations
 from sweep.optimise.starts.linear import elimination
-from sweep.optimise.starts.dataset import drawn
+from sweep.optimise.starts.dataset import random_designs
 from sweep.optimise.starts.posing import problem_of
 from sweep.study import Limit, OptimiseSettings, load_study
 
@@ -33,7 +33,7 @@ study = load_study(Path("studies/needle208"))
 signs = [{"branch1": 1.0, "branch2": 1.0, "kappa2": 1.0}]
 size = populations.Size(sampled=1 << 13, first=6, later=4, generations=1)
 for tolerance in (None, study.tolerance):
-    linear = elimination(problem_of(study, drawn(study, 1, 208)), tolerance)
+    linear = elimination(problem_of(study, random_designs(study, 1, 208)), tolerance)
     print(populations.breed(linear, signs, (7, 0), size=size).designs.tobytes().hex())
 """
 # What numpy and OpenBLAS would choose on other processors: sums in another order, so other last bits on the way.

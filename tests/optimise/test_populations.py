@@ -23,7 +23,7 @@ from sweep.optimise.manufacture.curve_margins import curve_derivatives
 from sweep.optimise.multistart import parallel
 from sweep.optimise.multistart.multistart import explore
 from sweep.optimise.starts import global_starts, populations
-from sweep.optimise.starts.dataset import drawn, kinds
+from sweep.optimise.starts.dataset import kinds, random_designs
 from sweep.optimise.starts.global_starts import from_populations
 from sweep.optimise.starts.linear import POSES, TURN, Elimination, elimination
 from sweep.optimise.starts.populations import Population, Size
@@ -43,7 +43,7 @@ def eliminated(least: float | None = None, robust: bool = False) -> Elimination:
     study = record(least)
     if robust:
         study = study_from_data(study.data | {"tolerance": study.data["tolerance"] | {"robust": "95 %"}}, study.path)
-    found = elimination(problem_of(study, drawn(study, 1, 208)), study.tolerance)
+    found = elimination(problem_of(study, random_designs(study, 1, 208)), study.tolerance)
     assert found is not None
     return found
 
@@ -58,7 +58,7 @@ def place_of_record(rows: PoseRows) -> np.ndarray:
     free = rows.linear.free
     values = np.array([design[name] / (design["a2"] if name in rows.linear.links else 1.0) for name in free])
     place = (values - own.low) / (own.high - own.low)
-    log = own.wide != 0.0
+    log = own.log_width != 0.0
     place[log] = np.log(values[log] / own.low[log]) / np.log(own.high[log] / own.low[log])
     return np.asarray(rows.wrapped(place[None, :]))
 
@@ -68,7 +68,7 @@ def test_record_is_worth_its_acceleration_and_its_rows_hold(rows: PoseRows) -> N
     one = Descents(rows, place_of_record(rows), FIRST[:1])
     one.advance(4)
     # The record keeps its limits to the last digit, and what 64 poses see beyond them is priced.
-    assert one.worth[0] == pytest.approx(RECORD, rel=3.0 * SEEN)
+    assert one.merit[0] == pytest.approx(RECORD, rel=3.0 * SEEN)
     names = rows.family.parameter_names
     design = rows.finished(one.places, FIRST[:1], one.x)[0]
     for name in ("a2", "xi2", "eta2", "h2"):  # a line the other way round is the same line
@@ -79,7 +79,7 @@ def around_record(rows: PoseRows, count: int) -> tuple[np.ndarray, np.ndarray]:
     """Places about the record and their unknowns."""
     rng = np.random.default_rng(1)
     places = np.clip(place_of_record(rows) + 0.003 * rng.standard_normal((count, len(rows.columns))), 0.01, 0.99)
-    return places, rows.begun(places, FIRST[:count])[0]
+    return places, rows.initial(places, FIRST[:count])[0]
 
 
 def rows_of(rows: PoseRows, place: np.ndarray, x: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -150,13 +150,13 @@ def test_descents_from_around_the_record_end_at_it(rows: PoseRows) -> None:
     rng = np.random.default_rng(4)
     begin = place_of_record(rows)[0] + 0.004 * rng.standard_normal((8, len(rows.columns)))
     many = Descents(rows, np.clip(begin, 0.0, 1.0), FIRST[:8])
-    before = many.worth.copy()
+    before = many.merit.copy()
     many.advance(40)
-    reached = many.worth[np.isfinite(before)]
+    reached = many.merit[np.isfinite(before)]
     # Some begin where the links do not reach, and stay there.
     assert (before > 1.1 * RECORD).sum() >= 3
     assert (np.abs(reached / RECORD - 1.0) < SEEN).sum() >= 3
-    assert (many.worth <= before).all()
+    assert (many.merit <= before).all()
 
 
 def test_descents_beside_change_nothing_and_descents_can_be_given_up(rows: PoseRows) -> None:
@@ -169,13 +169,13 @@ def test_descents_beside_change_nothing_and_descents_can_be_given_up(rows: PoseR
     for many in (together, alone):
         many.advance(4)
     np.testing.assert_array_equal(together.places[0], alone.places[0])
-    assert together.worth[0] == alone.worth[0]
+    assert together.merit[0] == alone.merit[0]
 
 
 def test_places_that_do_not_turn_are_worth_nothing(rows: PoseRows) -> None:
     places = np.random.default_rng(3).random((400, len(rows.columns)))
     places[:20] = np.clip(place_of_record(rows) + 0.002 * np.random.default_rng(4).standard_normal((20, 11)), 0.0, 1.0)
-    _, worth = rows.begun(places, FIRST)
+    _, worth = rows.initial(places, FIRST)
     ratios = rows.placed(places, FIRST)
     table = {name: ratios[:, k] for k, name in enumerate(rows.family.parameter_names)}
     margins = sweep.summarise(["rssr", "guide"], table, ["margin1", "margin2"], accuracy=1e-3)
@@ -198,10 +198,10 @@ def test_every_class_of_swings_has_parents_however_good_the_others_are() -> None
     swings = [x.swing for x in found]
     assert sum(x < 0.6 for x in swings) == 2 and len(found) <= 5 * 3
     # Negative control: the twelve best are all of large swings.
-    assert all(x.swing > 0.9 for x in sorted(many + few, key=lambda e: e.worth)[:12])
+    assert all(x.swing > 0.9 for x in sorted(many + few, key=lambda e: e.merit)[:12])
     # No two are alike, useless ones and a third of the same class beside better ones are left out.
     again = populations._parents([*many, end(10.6, 0.95, many[0].place), end(99.0, 0.55, rng.random(4))], 12, guide)
-    assert len({x.worth for x in again}) == len(again) and all(x.worth < 99.0 for x in again)
+    assert len({x.merit for x in again}) == len(again) and all(x.merit < 99.0 for x in again)
 
 
 def test_children_are_the_best_of_many_tries(rows: PoseRows, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -212,21 +212,21 @@ def test_children_are_the_best_of_many_tries(rows: PoseRows, monkeypatch: pytest
     monkeypatch.setattr(populations, "DRIVERS", 1)
     for tries in (1, 64):
         monkeypatch.setattr(populations, "TRIES", tries)
-        monkeypatch.setattr(populations, "STRANGERS", 4 * tries)
+        monkeypatch.setattr(populations, "RANDOM_TRIES", 4 * tries)
         places, kinds = populations._children(rows, parents, np.random.default_rng(7), 24, 1)
         assert places.shape == (24, 11) and not kinds.any() and (places >= 0.0).all() and (places <= 1.0).all()
-        worth[tries] = populations._tried(rows, places, kinds, 1)
+        worth[tries] = populations._initial_merits(rows, places, kinds, 1)
     # Of one try most do not turn; of 64 nearly all children do, and their middle is far better.
     assert np.isfinite(worth[64]).mean() > 0.9 and np.median(worth[64]) < 0.5 * np.median(worth[1])
 
 
-SMALL = Size(sampled=1 << 13, first=12, later=6, generations=1, heat=4, steps=8)
+SMALL = Size(sampled=1 << 13, first=12, later=6, generations=1, first_steps=4, steps=8)
 
 
 def same(one: Population, other: Population) -> None:
     np.testing.assert_array_equal(one.designs, other.designs)
-    np.testing.assert_array_equal(one.worth, other.worth)
-    assert one.looks == other.looks
+    np.testing.assert_array_equal(one.merit, other.merit)
+    assert one.evaluations == other.evaluations
 
 
 def test_populations_are_those_of_their_seed_and_number() -> None:
@@ -234,13 +234,13 @@ def test_populations_are_those_of_their_seed_and_number() -> None:
     first, second = populations.populations(linear, SIGNS, 2, 5, size=SMALL)
     same(next(populations.populations(linear, SIGNS, 1, 5, size=SMALL)), first)
     assert not np.array_equal(first.designs, second.designs)
-    assert (np.diff(first.worth) > 0.0).all() and len(first.worth) >= 4
+    assert (np.diff(first.merit) > 0.0).all() and len(first.merit) >= 4
     names = linear.problem.family.parameter_names
     table = {name: first.designs[:, k] for k, name in enumerate(names)}
     found = sweep.summarise(["rssr", "guide"], table, ["max_abs_d2s", "max_abs_dev", "stroke"], accuracy=1e-6)
-    good = first.worth < 13.0  # the better ones keep their limits, and are worth what they do
+    good = first.merit < 13.0  # the better ones keep their limits, and are worth what they do
     assert good.any()
-    np.testing.assert_allclose(found["max_abs_d2s"][good], first.worth[good], rtol=0.05)
+    np.testing.assert_allclose(found["max_abs_d2s"][good], first.merit[good], rtol=0.05)
     np.testing.assert_allclose(found["stroke"].abs()[good], 24.5, rtol=0.02)
     assert (first.designs[:, names.index("a2")][good] >= 8.0 * 0.98).all()
     assert not list(populations.populations(linear, SIGNS, 2, 5, stop=lambda: True))
@@ -263,7 +263,7 @@ def test_populations_are_made_until_they_tell_enough(monkeypatch: pytest.MonkeyP
     monkeypatch.setattr(populations, "breed", numbered)
     monkeypatch.setattr(parallel, "search", led)
     study = record(8.0, starts=4, populations=9, seed=3)
-    known = drawn(study, 1, 3)
+    known = random_designs(study, 1, 3)
     problem = problem_of(study, known)
 
     def searched(study: Study, jobs: int) -> list[int]:
@@ -289,7 +289,7 @@ def test_populations_in_threads_are_those_of_one_thread() -> None:
 def test_starts_are_the_best_end_of_every_population_and_another(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(global_starts, "populations", partial(populations.populations, size=SMALL))
     study = record(8.0, starts=6, populations=2, seed=3, looks=100)
-    known = drawn(study, 4, 3)
+    known = random_designs(study, 4, 3)
     problem = problem_of(study, known)
     merit = 1e3 + np.arange(len(known))  # worse than every end: searched from where populations do not settle
     *groups, own = from_populations(study, problem, known, merit, lambda: False, 1)
@@ -300,7 +300,7 @@ def test_starts_are_the_best_end_of_every_population_and_another(monkeypatch: py
     linear = elimination(problem)
     assert linear is not None
     found = list(populations.populations(linear, kinds(study, problem, known[:1]), 2, 3, size=SMALL))
-    worth = {one.designs[k].tobytes(): one.worth[k] for one in found for k in range(len(one.worth))}
+    worth = {one.designs[k].tobytes(): one.merit[k] for one in found for k in range(len(one.merit))}
     for number, (group, one) in enumerate(zip(groups, found, strict=True)):
         assert (group.source, group.counted, len(group.designs)) == (number, 1, 2)
         np.testing.assert_array_equal(group.designs[0], one.designs[0])
@@ -321,7 +321,7 @@ def test_three_populations_of_any_seed_find_the_record(seed: int) -> None:
     """
     study = record(seed=seed, starts=3, populations=3, looks=2000)
     assert study.optimise is not None
-    known = drawn(study, 24, seed)
+    known = random_designs(study, 24, seed)
     problem = problem_of(study, known)
     groups = from_populations(study, problem, known[:0], np.empty(0), lambda: False, 2)
     results, found, _ = explore(problem, groups, study.optimise, jobs=2)

@@ -50,15 +50,15 @@ def place_of(rows: PoseRows, design: np.ndarray) -> np.ndarray:
     guide = [own.columns.index(rows.linear.column(name)) for name in "bce"]
     values[guide] /= design[rows.linear.column("a")]
     place = (values - own.low) / (own.high - own.low)
-    log = own.wide != 0.0
-    place[log] = np.log(values[log] / own.low[log]) / own.wide[log]
+    log = own.log_width != 0.0
+    place[log] = np.log(values[log] / own.low[log]) / own.log_width[log]
     return np.asarray(rows.wrapped(place[None, :]))
 
 
 def test_unknowns_are_those_of_the_least_acceleration_with_stroke_and_straightness(rows: PoseRows) -> None:
     names = rows.family.parameter_names
     place = place_of(rows, accepted()[1])  # the record: the proportions of the optimum cannot keep its straightness
-    x, worth = rows.begun(place, NONE)
+    x, worth = rows.initial(place, NONE)
     table = dict(zip(names, rows.finished(place, NONE, x).T, strict=True))
     found = sweep.summarise(["rssr", "guide"], table, ["max_abs_d2s", "max_abs_dev", "stroke"], accuracy=1e-9)
     # 64 poses see the peaks of acceleration and stroke to 1e-3, those of the deviation, which has more of them, to 3 %.
@@ -72,7 +72,7 @@ def test_missed_limits_and_designs_that_do_not_turn_rank_behind(rows: PoseRows) 
     good, steep, stuck = (accepted()[1].copy() for _ in range(3))
     steep[0] *= 1.05
     stuck[1] = 3.0
-    worth = [float(rows.begun(place_of(rows, design), NONE)[1][0]) for design in (good, steep, stuck)]
+    worth = [float(rows.initial(place_of(rows, design), NONE)[1][0]) for design in (good, steep, stuck)]
     assert worth[0] < worth[1] < LOCKED < worth[2]
 
 
@@ -87,7 +87,7 @@ def test_room_for_tolerances_costs_acceleration(rows: PoseRows) -> None:
     drawn, built = Descents(rows, place, NONE), Descents(made, place, NONE)
     for many in (drawn, built):
         many.advance(3)
-    assert drawn.worth[0] < built.worth[0] < LOCKED
+    assert drawn.merit[0] < built.merit[0] < LOCKED
 
 
 def test_bounds_are_widened_until_designs_lie_within(rows: PoseRows) -> None:

@@ -87,7 +87,7 @@ def test_nearly_every_sample_reaches_a_basin_at_several_bounds(monkeypatch: pyte
 
     assert sum(samples(range(2))) >= 6  # of eight
     # Between the bounds alone, and from what keeps the limits alone, hardly any does.
-    monkeypatch.setattr(sampling, "BEYOND", 0.0)
+    monkeypatch.setattr(sampling, "WIDENING", 0.0)
     assert sum(samples(range(2))) <= 2
 
 
@@ -136,7 +136,7 @@ def test_price_of_a_sample_is_that_of_few_designs_where_they_are_dear(monkeypatc
 
 def test_two_coordinates_in_five_of_half_a_sample_are_at_bounds_but_no_angle_of_a_whole_turn() -> None:
     problem = on_locus(CORNER)
-    drawn = sampling._brought_in(problem, np.random.default_rng(1).random((20_000, 5)))
+    drawn = sampling._drawn_within(problem, np.random.default_rng(1).random((20_000, 5)))
     ends = ((drawn == 0.0) | (drawn == 1.0)).mean(axis=0)
     # 0.7 of a width of 1.7, in half of the sample
     np.testing.assert_allclose(ends[:4], 0.35 / 1.7, atol=0.01)

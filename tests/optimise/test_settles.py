@@ -22,7 +22,7 @@ from sweep.optimise.local import descent
 from sweep.optimise.local.kkt import Result
 from sweep.optimise.local.start import search
 from sweep.optimise.problem.on_locus import in_parameters
-from sweep.optimise.starts.dataset import drawn
+from sweep.optimise.starts.dataset import random_designs
 from sweep.optimise.starts.posing import problem_of
 from sweep.study import Limit, OptimiseSettings
 from tests.optimise.test_locus import PROBLEMS
@@ -96,7 +96,7 @@ def test_search_that_rests_outside_of_its_limits_comes_back() -> None:
 
 def test_search_far_outside_of_narrow_limits_comes_within_them() -> None:
     study = record(8.0)
-    problem = problem_of(study, drawn(study, 10, 5))
+    problem = problem_of(study, random_designs(study, 10, 5))
     assert search(0, problem, np.array(BENT), lambda: False, 900).violation < 1e-9
 
 

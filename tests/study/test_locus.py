@@ -22,7 +22,7 @@ from sweep.chunks.chunk import compute_chunk
 from sweep.dataset.files import beside
 from sweep.engine.run import run
 from sweep.errors import StudyError
-from sweep.optimise.starts.dataset import drawn
+from sweep.optimise.starts.dataset import random_designs
 from sweep.optimise.starts.posing import problem_of
 from sweep.study import Study, load_study
 from sweep.study.study import Limit
@@ -272,7 +272,7 @@ minimise = "max_abs_d2psi"
 """
     (tmp_path / "study.toml").write_text(text.replace("LIMIT", limit))
     study = load_study(tmp_path)
-    problem = problem_of(study, drawn(study, 4, 0), on_locus=False)
+    problem = problem_of(study, random_designs(study, 4, 0), on_locus=False)
     k = problem.variables.index("b")
     low, high = float(problem.lower[k]), float(problem.upper[k])
     assert 0.0 < low < high and all(given in (None, end) for given, end in zip(ends, (low, high), strict=True))

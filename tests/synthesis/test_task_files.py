@@ -157,13 +157,13 @@ def study(tmp_path: Path, text: str = STUDY) -> Path:
 
 def test_search_of_a_study_begins_at_the_mechanisms_that_do_its_task(tmp_path: Path) -> None:
     import sweep
-    from sweep.optimise.starts.dataset import of_task
+    from sweep.optimise.starts.dataset import task_designs
     from sweep.study import load_study
 
     place = study(tmp_path)
     loaded = load_study(place)
     names = loaded.family.parameter_names
-    starts = of_task(loaded, 2, 0)
+    starts = task_designs(loaded, 2, 0)
     best = solve(load_task(place), starts=2, samples=4, seed=0)[0]
     assert best.feasible and 1 <= len(starts) <= 2
     for name, value in zip(names, starts[0], strict=True):

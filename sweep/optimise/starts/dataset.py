@@ -38,17 +38,17 @@ def best_rows(family: Family, objective: str, folder: Path) -> tuple[Array, Arra
     names = family.parameter_names
     designs, merit = np.empty((0, len(names))), np.empty(0)
     for batch in batches((part.path for part in parts(folder)), [*names, objective, "status"]):
-        good = np.asarray(batch["status"]) == st.OK
-        more = np.column_stack([np.asarray(batch[name], np.float64) for name in names])[good]
-        designs = np.concatenate([designs, more])
-        merit = np.concatenate([merit, compared(objective, np.asarray(batch[objective], np.float64)[good])])
+        feasible = np.asarray(batch["status"]) == st.OK
+        new = np.column_stack([np.asarray(batch[name], np.float64) for name in names])[feasible]
+        designs = np.concatenate([designs, new])
+        merit = np.concatenate([merit, compared(objective, np.asarray(batch[objective], np.float64)[feasible])])
         if len(merit) > KEPT:
             best = np.sort(np.argsort(merit, kind="stable")[:KEPT])
             designs, merit = designs[best], merit[best]
     return designs, merit
 
 
-def of_task(study: Study, count: int, seed: int) -> Array:
+def task_designs(study: Study, count: int, seed: int) -> Array:
     """Return the study's designs that solve its [task], the best first, (k, P).
 
     There are at most ``count``, and none without a task.  A parameter that the study fixes keeps its value.
@@ -57,14 +57,14 @@ def of_task(study: Study, count: int, seed: int) -> Array:
     if study.task is None:
         return np.empty((0, len(names)))
 
-    found = solve(study.task, starts=count, samples=TASK_SAMPLES, seed=seed)
+    solutions = solve(study.task, starts=count, samples=TASK_SAMPLES, seed=seed)
     default = {p.name: p.default for p in study.family.parameters}
-    rows = [default | {n: x for n, x in s.mechanism.items() if n in names} | dict(study.space.fixed) for s in found]
+    rows = [default | {n: x for n, x in s.mechanism.items() if n in names} | dict(study.space.fixed) for s in solutions]
     rows = [row for row in rows if None not in (row[name] for name in names)]
     return np.array([[row[name] for name in names] for row in rows], np.float64).reshape(-1, len(names))[:count]
 
 
-def drawn(study: Study, count: int, seed: int) -> Array:
+def random_designs(study: Study, count: int, seed: int) -> Array:
     """Return random designs of a study's space, completed by its [locus] and [fit].
 
     They replace the rows of a dataset without feasible ones.
@@ -80,8 +80,8 @@ def drawn(study: Study, count: int, seed: int) -> Array:
     return np.asarray(fitted[status == st.OK], np.float64)
 
 
-LOOKED_AT = 4  # blocks of 256 designs of a space that show its combinations of signs
-SOME, ENOUGH = (64, 256, 8192), 0.05  # designs timed for the price of a sample, until they take ENOUGH [s]
+BLOCKS_SEEN = 4  # blocks of 256 designs of a space that show its combinations of signs
+TIMED, TIMED_SECONDS = (64, 256, 8192), 0.05  # designs timed for the price of a sample, until they take TIMED_SECONDS
 SAMPLES = 2  # factor on the samples, since starts near another one are dropped
 MOST_KINDS = 64  # combinations of signs among which a sample is divided
 
@@ -95,7 +95,7 @@ def kinds(study: Study, problem: Problem, known: Array) -> list[dict[str, float]
     known : (k, P) designs whose combinations come first
     """
     names = problem.family.parameter_names
-    designs = np.concatenate([known, drawn(study, LOOKED_AT, study.optimise.seed if study.optimise else 0)])
+    designs = np.concatenate([known, random_designs(study, BLOCKS_SEEN, study.optimise.seed if study.optimise else 0)])
     _, first = np.unique(designs[:, problem.others], axis=0, return_index=True)
     chosen = designs[np.sort(first)][:MOST_KINDS]
     return [{names[c]: float(design[c]) for c in problem.others} for design in chosen]
@@ -110,19 +110,19 @@ class Catalogued(Problem):
     @classmethod
     def of(cls, problem: Problem, values: Mapping[str, Array]) -> Catalogued:
         """Return the problem with the listed parameters, and their values in order, as further variables."""
-        own = {part.name: getattr(problem, part.name) for part in fields(problem)}
-        own["variables"] = (*problem.variables, *values)
-        own["lower"] = np.append(problem.lower, [listed[0] for listed in values.values()])
-        own["upper"] = np.append(problem.upper, [listed[-1] for listed in values.values()])
-        return cls(**own, values=values)
+        values_of = {item.name: getattr(problem, item.name) for item in fields(problem)}
+        values_of["variables"] = (*problem.variables, *values)
+        values_of["lower"] = np.append(problem.lower, [listed[0] for listed in values.values()])
+        values_of["upper"] = np.append(problem.upper, [listed[-1] for listed in values.values()])
+        return cls(**values_of, values=values)
 
     def placed(self, base: Array, fractions: Array) -> Array:
         """Return designs as in :class:`Problem`, each listed parameter at the nearest of its values."""
         designs = super().placed(base, fractions)
         for name, listed in self.values.items():
             column = self.family.parameter_names.index(name)
-            away = np.abs(designs[..., column, None] - listed)
-            designs[..., column] = listed[away.argmin(axis=-1)]
+            distance = np.abs(designs[..., column, None] - listed)
+            designs[..., column] = listed[distance.argmin(axis=-1)]
         return designs
 
 
@@ -151,21 +151,21 @@ def swept_and_sampled(
     assert study.optimise is not None
     count, seed = study.optimise.starts, study.optimise.seed
     sampled = not len(merit) or (study.fit is None and (problem.coordinates is not None or len(catalogue) > 0))
-    worth = merit if len(merit) else ranking(problem, designs)
-    own = diverse(problem, designs, worth, count - count // 2 if sampled else count, ALIKE)
-    begun = np.concatenate([of_task(study, count, seed), own])[:count]
-    yield from in_groups(begun)
-    choosing = Catalogued.of(problem, catalogue) if catalogue else problem
-    offered = _offered(study, choosing, designs, worth, begun, stop)
-    while len(begun) < count and not stop() and (more := next(offered, None)) is not None:
-        taken = apart(problem, begun, more.designs, count)
-        if len(taken) > len(begun):
-            yield more._replace(designs=taken[len(begun) :])
-        begun = taken
+    ranks = merit if len(merit) else ranking(problem, designs)
+    swept = diverse(problem, designs, ranks, count - count // 2 if sampled else count, ALIKE)
+    starts = np.concatenate([task_designs(study, count, seed), swept])[:count]
+    yield from in_groups(starts)
+    sampled_problem = Catalogued.of(problem, catalogue) if catalogue else problem
+    further = _further_groups(study, sampled_problem, designs, ranks, starts, stop)
+    while len(starts) < count and not stop() and (group := next(further, None)) is not None:
+        extended = with_distinct(problem, starts, group.designs, count)
+        if len(extended) > len(starts):
+            yield group._replace(designs=extended[len(starts) :])
+        starts = extended
 
 
-def _offered(
-    study: Study, problem: Problem, designs: Array, worth: Array, begun: Array, stop: Callable[[], bool]
+def _further_groups(
+    study: Study, problem: Problem, designs: Array, ranks: Array, starts: Array, stop: Callable[[], bool]
 ) -> Iterator[Group]:
     """Yield further groups of starts.
 
@@ -175,11 +175,11 @@ def _offered(
     assert study.optimise is not None
     count, seed = study.optimise.starts, study.optimise.seed
     if study.fit is None:
-        yield from samples(problem, kinds(study, problem, begun), SAMPLES * count, seed, stop)
+        yield from samples(problem, kinds(study, problem, starts), SAMPLES * count, seed, stop)
     else:
-        more = drawn(study, count, seed)
-        yield Group(diverse(problem, more, ranking(problem, more), count) if len(more) else more)
-    yield Group(diverse(problem, designs, worth, count, ALIKE))
+        drawn = random_designs(study, count, seed)
+        yield Group(diverse(problem, drawn, ranking(problem, drawn), count) if len(drawn) else drawn)
+    yield Group(diverse(problem, designs, ranks, count, ALIKE))
 
 
 def sample_seconds(problem: Problem, base: Array, count: int) -> float:
@@ -188,26 +188,26 @@ def sample_seconds(problem: Problem, base: Array, count: int) -> float:
     The designs have the signs of ``base`` (P,); fewer are measured if they are slow.
     """
     rng, number, seconds = np.random.default_rng(0), 0, 0.0
-    for number in SOME:
+    for number in TIMED:
         designs = problem.placed(base, rng.random((number, len(problem.variables))))
         begin = time.process_time()
         ranking(problem, designs)
         seconds = time.process_time() - begin
-        if seconds > ENOUGH:
+        if seconds > TIMED_SECONDS:
             break
     return seconds / number * RANKED * min(count, GROUP_SIZE)
 
 
-def apart(problem: Problem, starts: Array, more: Array, count: int) -> Array:
+def with_distinct(problem: Problem, starts: Array, more: Array, count: int) -> Array:
     """Return the starts and those of ``more`` designs that are not near any of them, at most ``count`` in all."""
-    both = np.concatenate([starts, more])
-    place = problem.scaled(both)
+    designs = np.concatenate([starts, more])
+    x = problem.scaled(designs)
     others = problem.others
-    least = ALIKE * math.sqrt(place.shape[1] / 6.0)
+    distance = ALIKE * math.sqrt(x.shape[1] / 6.0)
     taken = list(range(len(starts)))
-    for k in range(len(starts), len(both)):
-        away = np.linalg.norm(place[taken] - place[k], axis=1) >= least
-        other = (both[taken][:, others] != both[k, others]).any(axis=1)
-        if len(taken) < count and bool((away | other).all()):
+    for k in range(len(starts), len(designs)):
+        far = np.linalg.norm(x[taken] - x[k], axis=1) >= distance
+        other_signs = (designs[taken][:, others] != designs[k, others]).any(axis=1)
+        if len(taken) < count and bool((far | other_signs).all()):
             taken.append(k)
-    return np.asarray(both[taken], np.float64)
+    return np.asarray(designs[taken], np.float64)

@@ -83,17 +83,17 @@ class Elimination:
         """Return designs (n, P) with the point, line and scale given by the unknowns (n, 5)."""
         scale: Array = np.sqrt(x[:, 0] ** 2 + x[:, 1] ** 2)
         scale[scale < SMALLEST] = np.nan  # a guide of size zero is no solution, and its poses are undefined
-        along, aside, line, offset = (
+        along, across, line, offset = (
             self.column(n) for n in (*self.guide.arms, self.guide.direction, self.guide.offset)
         )
-        grown = designs[:, self.column(self.guide.links[1])] / scale
+        ratio = designs[:, self.column(self.guide.links[1])] / scale
         out = designs.copy()
         for name in self.guide.links:
             out[:, self.column(name)] *= scale
         # numpy's arctan2 depends on the processor, the C library's does not
         lam = np.array([math.atan2(-y, x) for x, y in x[:, :2].tolist()])
-        out[:, along] = (x[:, 2] * x[:, 0] + x[:, 3] * x[:, 1]) * grown
-        out[:, aside] = (x[:, 3] * x[:, 0] - x[:, 2] * x[:, 1]) * grown
+        out[:, along] = (x[:, 2] * x[:, 0] + x[:, 3] * x[:, 1]) * ratio
+        out[:, across] = (x[:, 3] * x[:, 0] - x[:, 2] * x[:, 1]) * ratio
         out[:, offset], out[:, line] = x[:, 4], self.turned(lam)
         return out
 
@@ -115,15 +115,15 @@ def elimination(problem: Problem, tolerance: Tolerance | None = None) -> Elimina
     stages = driven_guide(problem.family)
     if stages is None or problem.window is not None or problem.coordinates is not None:
         return None
-    before, last = stages[0], str(stages[1].number)
+    first, last = stages[0], str(stages[1].number)
     guide = stages[1].family.find(GuidedPoint)
     if guide is None or not {f"{name}{last}" for name in (*guide.fitted, guide.links[0])} <= set(problem.variables):
         return None
-    off = next(iter(guide.across.values()))
-    small = {f"max_abs_{name}": name for name in list(guide.across)[1:]} | {f"max_abs_{off}": next(iter(guide.across))}
+    dev = next(iter(guide.across.values()))
+    goals = {f"max_abs_{name}": name for name in list(guide.across)[1:]} | {f"max_abs_{dev}": next(iter(guide.across))}
     limits = {limit.output: limit for limit in problem.limits}
-    stroke, deviation = limits.get("stroke"), limits.get(f"max_abs_{off}")
-    if problem.objective not in small or stroke is None or not stroke.minimum:
+    stroke, deviation = limits.get("stroke"), limits.get(f"max_abs_{dev}")
+    if problem.objective not in goals or stroke is None or not stroke.minimum:
         return None
     bound = None if deviation is None else deviation.maximum
     share = None if tolerance is None else tolerance.robust
@@ -132,14 +132,14 @@ def elimination(problem: Problem, tolerance: Tolerance | None = None) -> Elimina
         design = np.array([problem.fixed.get(name, math.nan) for name in problem.family.parameter_names])
         sigma = tolerances_of(problem.family, design, tolerance) / SIGMAS
         level = NormalDist().inv_cdf(1.0 - (1.0 - share) / BOTH)
-    driver = f"{before.family.position}{before.number}"
+    driver = f"{first.family.position}{first.number}"
     return Elimination(
-        problem, guide, last, driver, small[problem.objective], problem.objective == f"max_abs_{off}", bound,
+        problem, guide, last, driver, goals[problem.objective], problem.objective == f"max_abs_{dev}", bound,
         float(stroke.minimum), sigma, level,
     )  # fmt: skip
 
 
-def turned_into(problem: Problem, designs: Array) -> Array:
+def within_turn(problem: Problem, designs: Array) -> Array:
     """Return the designs with whole turns added to angles that put them within their bounds."""
     out = designs.copy()
     for k, name in enumerate(problem.variables):
@@ -156,7 +156,7 @@ def widened(problem: Problem, designs: Array, names: Sequence[str]) -> Problem:
     for k, name in enumerate(problem.variables):
         if name in names and len(designs):
             values = designs[:, problem.family.parameter_names.index(name)]
-            reach = 0.5 * np.abs(values)
-            lower[k] = min(lower[k], float((values - reach).min()))
-            upper[k] = max(upper[k], float((values + reach).max()))
+            half_size = 0.5 * np.abs(values)
+            lower[k] = min(lower[k], float((values - half_size).min()))
+            upper[k] = max(upper[k], float((values + half_size).max()))
     return replace(problem, lower=lower, upper=upper)

@@ -17,33 +17,33 @@ from numpy.typing import NDArray
 from kernels.descent.descents import LOCKED
 from sweep.families.base import Array
 from sweep.optimise.local.kkt import AGREE
-from sweep.optimise.starts.linear import Elimination, turned_into
+from sweep.optimise.starts.linear import Elimination, within_turn
 from sweep.optimise.starts.pose_rows import Descents, Index, PoseRows
 from sweep.optimise.starts.samples import spread
 
 PARENTS = 40  # best ends, all distinct, from which a generation is made; divided among the signs
-TRIES, STRANGERS = 64, 256  # tries of every child, the best of which descends; tries with one random stage
+TRIES, RANDOM_TRIES = 64, 256  # tries of every child, the best of which descends; tries with one random stage
 DRIVERS = 4  # drivers among the tries of a child
 MUTATIONS = (0.0, 0.03, 0.1)  # standard deviations of the variation of a child, chosen at random
 NICHE = 0.15  # share of the average distance of two random guides below which guides are alike
 CLASSES = 5  # classes of swings, each with its own parents
 SMALLEST = 1e-3  # swing below which a swing counts as zero [rad]
-USELESS = 1.3  # multiple of the best value above which ends are no parents
+USEFUL = 1.3  # multiple of the best value above which ends are no parents
 
 
 class Size(NamedTuple):
     """Size of a population.
 
     ``sampled`` proportions for each combination of signs, two to eight per cent of which turn; ``first`` descents in
-    the first generation, ``later`` in each of the other ``generations``; ``heat`` steps for all descents, ``steps`` for
-    the better half of them.
+    the first generation, ``later`` in each of the other ``generations``; ``first_steps`` for all descents, ``steps`` in
+    all for the better half of them.
     """
 
     sampled: int = 1 << 14
     first: int = 120
     later: int = 60
     generations: int = 10
-    heat: int = 14
+    first_steps: int = 14
     steps: int = 60
 
 
@@ -55,12 +55,12 @@ class Population(NamedTuple):
     """Ends of a population, all distinct and the best first: designs (k, P), their values (k,), and evaluations."""
 
     designs: Array
-    worth: Array
-    looks: int
+    merit: Array
+    evaluations: int
 
 
 class _End(NamedTuple):
-    worth: float
+    merit: float
     kind: int
     place: Array
     design: Array
@@ -77,7 +77,7 @@ def breed(
 ) -> Population:
     """Return the ends of generations of descents from one seed, run in ``jobs`` threads."""
     rows, rng = PoseRows(linear, signs), np.random.default_rng(seed)
-    ends, looks = list[_End](), 0
+    ends, evaluations = list[_End](), 0
     for generation in range(1 + size.generations):
         parents = _parents(ends, -(-PARENTS // len(signs)), ~rows.driving)
         if stop() or (generation and not parents):
@@ -87,11 +87,11 @@ def breed(
         else:
             places, kinds = _children(rows, parents, rng, -(-size.later // len(signs)), jobs)
             swings = np.array([p.swing for p in parents])
-        found, spent = _descended(rows, places, kinds, swings, size, stop, jobs)
-        ends, looks = ends + found, looks + spent
+        new_ends, steps = _descend(rows, places, kinds, swings, size, stop, jobs)
+        ends, evaluations = ends + new_ends, evaluations + steps
     best = _parents(ends, PARENTS, ~rows.driving)[:PARENTS]
     designs = np.array([end.design for end in best]).reshape(-1, len(rows.family.parameters))
-    return Population(turned_into(linear.problem, designs), np.array([end.worth for end in best]), looks)
+    return Population(within_turn(linear.problem, designs), np.array([end.merit for end in best]), evaluations)
 
 
 def populations(
@@ -128,26 +128,26 @@ def _sampled(rows: PoseRows, rng: np.random.Generator, size: Size, jobs: int) ->
     """
     from scipy.stats import qmc
 
-    number = len(rows.bases)
-    place = np.concatenate([qmc.Sobol(len(rows.columns), seed=rng).random(size.sampled) for _ in range(number)])
-    kinds = np.repeat(np.arange(number), size.sampled)
-    worth = _tried(rows, place, kinds, jobs)
-    order = np.argsort(worth, kind="stable")
-    order = order[worth[order] < LOCKED]
+    sign_count = len(rows.bases)
+    place = np.concatenate([qmc.Sobol(len(rows.columns), seed=rng).random(size.sampled) for _ in range(sign_count)])
+    kinds = np.repeat(np.arange(sign_count), size.sampled)
+    merit = _initial_merits(rows, place, kinds, jobs)
+    order = np.argsort(merit, kind="stable")
+    order = order[merit[order] < LOCKED]
     place, kinds = place[order], kinds[order]
-    swings = rows.driven(place, kinds)[1]
-    better = swings[: len(swings) // 4]
-    numbers, found = kinds * CLASSES + _classes(swings, better), list[int]()
-    for k in range(number * CLASSES):
-        own = np.flatnonzero(numbers == k)
-        found += own[spread(place[own], kinds[own], -(-size.first // (number * CLASSES)))].tolist()
-    chosen = sorted(found)
-    return place[chosen], kinds[chosen], better
+    swings = rows.input_range(place, kinds)[1]
+    best_swings = swings[: len(swings) // 4]
+    groups, selected = kinds * CLASSES + _classes(swings, best_swings), list[int]()
+    for k in range(sign_count * CLASSES):
+        members = np.flatnonzero(groups == k)
+        selected += members[spread(place[members], kinds[members], -(-size.first // (sign_count * CLASSES)))].tolist()
+    chosen = sorted(selected)
+    return place[chosen], kinds[chosen], best_swings
 
 
-def _tried(rows: PoseRows, places: Array, kinds: Index, jobs: int) -> Array:
+def _initial_merits(rows: PoseRows, places: Array, kinds: Index, jobs: int) -> Array:
     """Return the values (k,), before any descent, of places with the middle of the guide's input angles."""
-    return rows.begun(rows.without_middle(places, kinds), kinds, jobs)[1]
+    return rows.initial(rows.without_middle(places, kinds), kinds, jobs)[1]
 
 
 def _children(
@@ -158,76 +158,78 @@ def _children(
     Most of them combine stage 1 of one parent with the guide of another, slightly varied; a sixth combine stage 1 of a
     parent with a random guide, a sixth the guide of a parent with a random stage 1.
     """
-    few, places, kinds = count // 6, list[Array](), list[int]()
+    random_count, places, kinds = count // 6, list[Array](), list[int]()
     for kind in sorted({p.kind for p in parents}):
-        own = [p for p in parents if p.kind == kind]
-        drivers = np.array([p.place for p in parents])[rng.integers(0, len(parents), few)]
-        guides = np.array([p.place for p in own])[rng.integers(0, len(own), few)]
-        places.append(_best(rows, _mixed(rows, own, parents, rng, count - 2 * few), kind, jobs))
-        for kept, part in ((drivers, ~rows.driving), (guides, rows.driving)):
-            tries = np.repeat(kept[:, None], STRANGERS, axis=1)
-            tries[:, :, part] = rng.random((few, STRANGERS, int(part.sum())))
-            places.append(_best(rows, tries, kind, jobs))
+        pool = [p for p in parents if p.kind == kind]
+        drivers = np.array([p.place for p in parents])[rng.integers(0, len(parents), random_count)]
+        guides = np.array([p.place for p in pool])[rng.integers(0, len(pool), random_count)]
+        places.append(_best_tries(rows, _mixed(rows, pool, parents, rng, count - 2 * random_count), kind, jobs))
+        for inherited, redrawn in ((drivers, ~rows.driving), (guides, rows.driving)):
+            tries = np.repeat(inherited[:, None], RANDOM_TRIES, axis=1)
+            tries[:, :, redrawn] = rng.random((random_count, RANDOM_TRIES, int(redrawn.sum())))
+            places.append(_best_tries(rows, tries, kind, jobs))
         kinds += [kind] * count
     return np.concatenate(places), np.array(kinds, np.intp)
 
 
-def _mixed(rows: PoseRows, own: Sequence[_End], parents: Sequence[_End], rng: np.random.Generator, count: int) -> Array:
+def _mixed(
+    rows: PoseRows, pool: Sequence[_End], parents: Sequence[_End], rng: np.random.Generator, count: int
+) -> Array:
     """Combine stage 1 of one parent with the guide of another, slightly varied, in many tries of each child.
 
     Offsets with bounds symmetric to zero change their sign in every second try, since a crank-rocker and its mirror
     image have the same motion.
     """
-    guide = rng.integers(0, len(own), count)
+    guide = rng.integers(0, len(pool), count)
     # With all drivers at once the best try would nearly always lie in the same basin.
     driver = np.repeat(rng.integers(0, len(parents), (count, DRIVERS)), TRIES // DRIVERS, axis=1)
-    places = np.repeat(np.array([p.place for p in own])[guide][:, None], TRIES, axis=1)
+    places = np.repeat(np.array([p.place for p in pool])[guide][:, None], TRIES, axis=1)
     places[:, :, rows.driving] = np.array([p.place for p in parents])[driver][:, :, rows.driving]
-    other = (rng.random((count, TRIES)) < 0.5)[:, :, None] & rows.mirrored
-    places = np.where(other, 1.0 - places, places)
+    mirror = (rng.random((count, TRIES)) < 0.5)[:, :, None] & rows.mirrored
+    places = np.where(mirror, 1.0 - places, places)
     # A child equal to its parent would only end at the parent's end.
-    numbers = np.array([next(k for k, p in enumerate(parents) if p is end) for end in own])
-    same = driver == numbers[guide][:, None]
-    spread_by = np.where(same, MUTATIONS[-1], np.array(MUTATIONS)[rng.integers(0, len(MUTATIONS), count)][:, None])
-    return places + spread_by[:, :, None] * rng.standard_normal(places.shape)
+    parent_numbers = np.array([next(k for k, p in enumerate(parents) if p is end) for end in pool])
+    same_parent = driver == parent_numbers[guide][:, None]
+    sigma = np.where(same_parent, MUTATIONS[-1], np.array(MUTATIONS)[rng.integers(0, len(MUTATIONS), count)][:, None])
+    return places + sigma[:, :, None] * rng.standard_normal(places.shape)
 
 
-def _best(rows: PoseRows, tries: Array, kind: int, jobs: int) -> Array:
+def _best_tries(rows: PoseRows, tries: Array, kind: int, jobs: int) -> Array:
     """Return the best try of each child: places (count, n) of (count, tries, n)."""
     places = rows.wrapped(tries.reshape(-1, tries.shape[2]))
-    worth = _tried(rows, places, np.full(len(places), kind), jobs).reshape(tries.shape[:2])
-    return np.asarray(places.reshape(tries.shape)[np.arange(len(tries)), np.argmin(worth, axis=1)], np.float64)
+    merit = _initial_merits(rows, places, np.full(len(places), kind), jobs).reshape(tries.shape[:2])
+    return np.asarray(places.reshape(tries.shape)[np.arange(len(tries)), np.argmin(merit, axis=1)], np.float64)
 
 
-def _descended(
+def _descend(
     rows: PoseRows, places: Array, kinds: Index, swings: Array, size: Size, stop: Callable[[], bool], jobs: int
 ) -> tuple[list[_End], int]:
     """Return the ends of descents from some places, and their evaluations; the worse half stops after the first heat.
 
     The halves are formed in each class, among ``swings``, of each kind.
     """
-    many = Descents(rows, rows.without_middle(places, kinds), kinds, jobs)
-    many.advance(size.heat, stop)
-    own = kinds * CLASSES + _classes(rows.driven(many.places, kinds)[1], swings)
-    order = np.argsort(many.worth, kind="stable")
-    better = [some[: -(-len(some) // 2)] for some in (order[own[order] == number] for number in np.unique(own))]
-    many.keep(np.sort(np.concatenate(better)))
-    many.advance(size.steps - size.heat, stop)
-    there = rows.with_middle(many.places, many.kinds)
-    designs = rows.finished(many.places, many.kinds, many.x)
-    reached = rows.driven(many.places, many.kinds)[1]
-    known = np.flatnonzero(many.worth < LOCKED).tolist()
-    ends = [_End(float(many.worth[k]), int(many.kinds[k]), there[k], designs[k], float(reached[k])) for k in known]
-    return ends, many.looks
+    runs = Descents(rows, rows.without_middle(places, kinds), kinds, jobs)
+    runs.advance(size.first_steps, stop)
+    groups = kinds * CLASSES + _classes(rows.input_range(runs.places, kinds)[1], swings)
+    order = np.argsort(runs.merit, kind="stable")
+    kept = [group[: -(-len(group) // 2)] for group in (order[groups[order] == number] for number in np.unique(groups))]
+    runs.keep(np.sort(np.concatenate(kept)))
+    runs.advance(size.steps - size.first_steps, stop)
+    final = rows.with_middle(runs.places, runs.kinds)
+    designs = rows.finished(runs.places, runs.kinds, runs.x)
+    swing = rows.input_range(runs.places, runs.kinds)[1]
+    turning = np.flatnonzero(runs.merit < LOCKED).tolist()
+    ends = [_End(float(runs.merit[k]), int(runs.kinds[k]), final[k], designs[k], float(swing[k])) for k in turning]
+    return ends, runs.evaluations
 
 
-def _classes(swings: Array, among: Array) -> Index:
+def _classes(swings: Array, reference: Array) -> Index:
     """Return the class (k,) of each swing, of equal width on a log scale between the extremes of useful swings."""
-    known = among[among > SMALLEST]
-    if not len(known) or not known.min() < known.max():
+    useful = reference[reference > SMALLEST]
+    if not len(useful) or not useful.min() < useful.max():
         return np.zeros(len(swings), np.intp)
-    place = np.log(np.maximum(swings, SMALLEST) / known.min()) * (CLASSES / math.log(known.max() / known.min()))
-    return np.asarray(np.clip(place, 0.0, CLASSES - 1.0), np.intp)
+    position = np.log(np.maximum(swings, SMALLEST) / useful.min()) * (CLASSES / math.log(useful.max() / useful.min()))
+    return np.asarray(np.clip(position, 0.0, CLASSES - 1.0), np.intp)
 
 
 def _parents(ends: Sequence[_End], most: int, guide: NDArray[np.bool_]) -> list[_End]:
@@ -239,23 +241,23 @@ def _parents(ends: Sequence[_End], most: int, guide: NDArray[np.bool_]) -> list[
     Without these rules the many descents that ran out of steps in one basin would displace those in all others, and
     guides for large swings would displace guides for small ones.
     """
-    found: list[_End] = []
-    beside: Counter[tuple[int, int]] = Counter()
-    first: Counter[int] = Counter()
-    least = NICHE * math.sqrt(int(guide.sum()) / 6.0)
-    useful = sorted(ends, key=lambda end: end.worth)
-    useful = [end for end in useful if end.worth < USELESS * useful[0].worth]
+    parents: list[_End] = []
+    in_class: Counter[tuple[int, int]] = Counter()
+    of_signs: Counter[int] = Counter()
+    distance = NICHE * math.sqrt(int(guide.sum()) / 6.0)
+    useful = sorted(ends, key=lambda end: end.merit)
+    useful = [end for end in useful if end.merit < USEFUL * useful[0].merit]
     swings = np.array([end.swing for end in useful])
     for end, number in zip(useful, _classes(swings, swings).tolist(), strict=True):
-        own = [p for p in found if p.kind == end.kind]
-        alike = any(
-            abs(end.worth - p.worth) <= 2.0 * AGREE * abs(p.worth)
-            or math.sqrt(float(((end.place - p.place)[guide] ** 2).sum())) < least
-            for p in own
+        same_signs = [p for p in parents if p.kind == end.kind]
+        duplicate = any(
+            abs(end.merit - p.merit) <= 2.0 * AGREE * abs(p.merit)
+            or math.sqrt(float(((end.place - p.place)[guide] ** 2).sum())) < distance
+            for p in same_signs
         )
-        place = (end.kind, number)
-        if not alike and (first[end.kind] < most // 2 or beside[place] < -(-most // (2 * CLASSES))):
-            first[end.kind] += 1
-            beside[place] += 1
-            found.append(end)
-    return found
+        key = (end.kind, number)
+        if not duplicate and (of_signs[end.kind] < most // 2 or in_class[key] < -(-most // (2 * CLASSES))):
+            of_signs[end.kind] += 1
+            in_class[key] += 1
+            parents.append(end)
+    return parents

@@ -80,20 +80,20 @@ class PoseRows:
         self.driving = np.array([c < len(self.driver.parameters) for c in self.columns])
         self.mirrored = self.driving & (self.low == -self.high)
         offset = f"offset{linear.last}"
-        self.turning = linear.free.index(offset) if offset in linear.free else -1
+        self.offset = linear.free.index(offset) if offset in linear.free else -1
         self.limits = self._limits()
         self.task = self._task(self.limits)
 
     def _bounds(self) -> None:
-        """Set ``low`` and ``high`` (n,), the ends of places, and ``wide``, the logarithmic width of lengths.
+        """Set ``low`` and ``high`` (n,), the ends of places, and ``log_width``, the logarithmic width of lengths.
 
         Lengths of the guide are relative to its crank, which is the unit.  They and positive lengths of stage 1 are on
         a logarithmic scale.
         """
         problem, links = self.linear.problem, self.linear.links
-        at = [problem.variables.index(name) for name in self.linear.free]
-        self.low, self.high = problem.lower[at].astype(np.float64), problem.upper[at].astype(np.float64)
-        self.wide = np.zeros(len(at))
+        indices = [problem.variables.index(name) for name in self.linear.free]
+        self.low, self.high = problem.lower[indices].astype(np.float64), problem.upper[indices].astype(np.float64)
+        self.log_width = np.zeros(len(indices))
         units, unit = {p.name: p.unit for p in self.family.parameters}, problem.variables.index(links[0])
         for k, name in enumerate(self.linear.free):
             if units[name] == "angle" and self.high[k] - self.low[k] >= 2.0 * math.pi:
@@ -104,25 +104,25 @@ class PoseRows:
                 self.low[k] = shortest / problem.upper[unit]
                 self.high[k] /= max(problem.lower[unit], problem.upper[unit] * SHORT)
             if name in links or (units[name] == "length" and self.low[k] > 0.0):
-                self.wide[k] = math.log(self.high[k] / self.low[k])
+                self.log_width[k] = math.log(self.high[k] / self.low[k])
 
     def placed(self, places: Array, kinds: Index) -> Array:
         """Return designs (k, P) at places (k, n), of kinds (k,), without the point, line and scale of the guide."""
         values: Array = self.low + places * (self.high - self.low)
-        log = self.wide != 0.0
+        logarithmic = self.log_width != 0.0
         # numpy's exponential depends on the processor, the C library's does not
-        grown = [math.exp(x) for x in (places[:, log] * self.wide[log]).ravel().tolist()]
-        values[:, log] = self.low[log] * np.reshape(grown, (len(places), int(log.sum())))
+        scales = [math.exp(x) for x in (places[:, logarithmic] * self.log_width[logarithmic]).ravel().tolist()]
+        values[:, logarithmic] = self.low[logarithmic] * np.reshape(scales, (len(places), int(logarithmic.sum())))
         designs = self.bases[kinds]
         designs[:, self.columns] = values
         return designs
 
-    def driven(self, places: Array, kinds: Index) -> tuple[Array, Array]:
+    def input_range(self, places: Array, kinds: Index) -> tuple[Array, Array]:
         """Return middle and range (k,) of the guide's input angles without offset; 0 if stage 1 does not turn."""
         upstream = np.ascontiguousarray(self.placed(places, kinds)[:, : len(self.driver.parameters)])
-        found = design_outputs(self.driver, upstream, ("psi_ext", "swing"), MIDDLE)
-        swing = np.asarray(found["swing"], np.float64)
-        middle = np.asarray(found["psi_ext"], np.float64) + 0.5 * swing
+        outputs = design_outputs(self.driver, upstream, ("psi_ext", "swing"), MIDDLE)
+        swing = np.asarray(outputs["swing"], np.float64)
+        middle = np.asarray(outputs["psi_ext"], np.float64) + 0.5 * swing
         return np.nan_to_num(middle), np.nan_to_num(np.abs(swing))
 
     def _codes(self) -> dict[str, int]:
@@ -138,50 +138,50 @@ class PoseRows:
     def _limits(self) -> list[_Curve]:
         """Return the rows: the objective with both signs, rotatability, then the limits that these curves give."""
         linear, codes = self.linear, self._codes()
-        objective = linear.guide.across[linear.wanted] if linear.straight else linear.wanted
-        off = linear.guide.across[linear.position]
-        curves = [_Curve(objective, sign, 0.0, 1.0) for sign in (1.0, -1.0)]
+        wanted = linear.guide.across[linear.wanted] if linear.straight else linear.wanted
+        deviation = linear.guide.across[linear.position]
+        curves = [_Curve(wanted, sign, 0.0, 1.0) for sign in (1.0, -1.0)]
         curves += [_Curve(name, -1.0, -ROTATABLE_MARGIN, 1.0) for name, code in codes.items() if code < ANGLE]
         for limit in linear.problem.limits:
             if not limit.output.startswith("rotatable"):
-                found = measure(self.family, limit.output, linear.problem.window)
+                quantity = measure(self.family, limit.output, linear.problem.window)
                 for bound, upper in ((limit.minimum, False), (limit.maximum, True)):
                     if bound is not None:
-                        curves += _rows_of(found, found.to_inner(float(bound)), upper, off)
+                        curves += _rows_of(quantity, quantity.to_inner(float(bound)), upper, deviation)
         if linear.sigma is not None:
             curves = [c._replace(size=NARROW * c.size) if c.output == linear.position else c for c in curves]
         return [curve for curve in curves if curve.output in codes]
 
     def _task(self, curves: Sequence[_Curve]) -> Task:
         linear, problem, codes = self.linear, self.linear.problem, self._codes()
-        known = [codes[curve.output] for curve in curves]
+        curve_codes = [codes[curve.output] for curve in curves]
         if linear.sigma is not None:
             # Margins for tolerances widen the deviation on either side.
             for k in range(2, len(curves)):
-                if known[k] == ACROSS and curves[k].at == EVERY:
-                    known[k] = HIGH if curves[k].sign > 0.0 else LOW
-        used = list(dict.fromkeys(known))
+                if curve_codes[k] == ACROSS and curves[k].at == EVERY:
+                    curve_codes[k] = HIGH if curves[k].sign > 0.0 else LOW
+        used = list(dict.fromkeys(curve_codes))
         ends = np.cumsum([POSES if curve.at == EVERY else 1 for curve in curves])
         firsts = ends - np.array([POSES if curve.at == EVERY else 1 for curve in curves])
         names = problem.family.parameter_names
-        at = [problem.variables.index(name) for name in linear.links if name in problem.variables]
-        lengths = [names.index(problem.variables[k]) for k in at]
+        own = [problem.variables.index(name) for name in linear.links if name in problem.variables]
+        lengths = [names.index(problem.variables[k]) for k in own]
         kinds = np.full(ends[-1] + 2 * len(lengths), SOFT, np.int64)
         for k, curve in enumerate(curves):
             rows, least = slice(firsts[k], ends[k]), curve.at == RANGE and curve.sign < 0.0
-            straight = known[k] > ANGLE and curve.at in (EVERY, RANGE)
+            straight = curve_codes[k] > ANGLE and curve.at in (EVERY, RANGE)
             kinds[rows] = WANTED if k < 2 else LEFT_OUT if not straight else NEEDED if least else SOFT
-        strokes = [k for k in range(2, len(curves)) if known[k] == ALONG and curves[k].at == RANGE]
+        strokes = [k for k in range(2, len(curves)) if curve_codes[k] == ALONG and curves[k].at == RANGE]
         unit = UNIT * linear.stroke
         return Task(
-            np.ascontiguousarray(self.bases), np.array(self.columns), self.low, self.high, self.wide,
+            np.ascontiguousarray(self.bases), np.array(self.columns), self.low, self.high, self.log_width,
             np.cos(TURN), np.sin(TURN), np.array(used),
             Limits(
-                np.array([used.index(code) for code in known]), np.array([curve.at for curve in curves]),
+                np.array([used.index(code) for code in curve_codes]), np.array([curve.at for curve in curves]),
                 np.array([curve.sign for curve in curves]), np.array([curve.bound for curve in curves]),
                 np.array([curve.size for curve in curves]),
             ),
-            np.array(lengths, np.int64), problem.lower[at].astype(np.float64), problem.upper[at].astype(np.float64),
+            np.array(lengths, np.int64), problem.lower[own].astype(np.float64), problem.upper[own].astype(np.float64),
             np.array([np.arange(e - POSES, e) for e, curve in zip(ends, curves, strict=True) if curve.at == EVERY]),
             kinds, firsts[strokes], np.array([curves[k].size for k in strokes]),
             FREE * linear.stroke if linear.bound is None else linear.bound, linear.stroke, unit, PRICE * unit,
@@ -191,17 +191,17 @@ class PoseRows:
     def without_middle(self, places: Array, kinds: Index, sign: float = -1.0) -> Array:
         """Return places with the offset between the stages in place of the middle of the guide's input angles."""
         out = places.copy()
-        if self.turning >= 0:
-            wide = self.high[self.turning] - self.low[self.turning]
-            out[:, self.turning] += sign * self.driven(places, kinds)[0] / wide
-            out[:, self.turning] = self.wrapped(out)[:, self.turning]
+        if self.offset >= 0:
+            width = self.high[self.offset] - self.low[self.offset]
+            out[:, self.offset] += sign * self.input_range(places, kinds)[0] / width
+            out[:, self.offset] = self.wrapped(out)[:, self.offset]
         return out
 
     def wrapped(self, places: Array) -> Array:
         """Return places (k, n) between 0 and 1: an angle with a whole turn is wrapped, other variables are clipped."""
         out = np.clip(places, 0.0, 1.0)
-        if self.turning >= 0 and self.high[self.turning] - self.low[self.turning] >= 2.0 * math.pi - 1e-9:
-            out[:, self.turning] = places[:, self.turning] % 1.0
+        if self.offset >= 0 and self.high[self.offset] - self.low[self.offset] >= 2.0 * math.pi - 1e-9:
+            out[:, self.offset] = places[:, self.offset] % 1.0
         return out
 
     def with_middle(self, places: Array, kinds: Index) -> Array:
@@ -212,19 +212,19 @@ class PoseRows:
         """Return designs (k, P) at places (k, n) with the linear unknowns (k, 5)."""
         return self.linear.finished(self.placed(places, kinds), x)
 
-    def begun(self, places: Array, kinds: Index, jobs: int = 1) -> tuple[Array, Array]:
+    def initial(self, places: Array, kinds: Index, jobs: int = 1) -> tuple[Array, Array]:
         """Return the best linear unknowns (k, 5) of some places, and the values of the designs (k,)."""
-        x, worth = np.empty((len(places), UNKNOWNS)), np.empty(len(places))
+        x, merit = np.empty((len(places), UNKNOWNS)), np.empty(len(places))
 
-        def some(part: slice) -> None:
-            begun(self.task, kinds[part], places[part], x[part], worth[part])
+        def evaluate(part: slice) -> None:
+            begun(self.task, kinds[part], places[part], x[part], merit[part])
 
-        in_threads(some, [slice(k, k + BLOCK) for k in range(0, len(places), BLOCK)], jobs)
-        return x, worth
+        in_threads(evaluate, [slice(k, k + BLOCK) for k in range(0, len(places), BLOCK)], jobs)
+        return x, merit
 
 
 class Descents:
-    """Descents from many places; ``worth`` (k,) are their present values, ``looks`` counts evaluations with gradients.
+    """Descents from many places; ``merit`` (k,) are their present values, ``evaluations`` count those with gradients.
 
     Parameters
     ----------
@@ -236,39 +236,39 @@ class Descents:
 
     def __init__(self, rows: PoseRows, places: Array, kinds: Index, jobs: int = 1) -> None:
         self.rows, self.places, self.kinds, self.jobs = rows, places.copy(), kinds, jobs
-        self.x, worth = rows.begun(self.places, kinds, jobs)
+        self.x, merit = rows.initial(self.places, kinds, jobs)
         k, n = places.shape
-        self.states = np.stack([worth, np.where(worth < LOCKED, RADIUS, 0.0), np.full(k, np.inf), np.zeros(k)], axis=1)
+        self.states = np.stack([merit, np.where(merit < LOCKED, RADIUS, 0.0), np.full(k, np.inf), np.zeros(k)], axis=1)
         self.curvature = np.empty((k, n + UNKNOWNS, n + UNKNOWNS))
-        for one in self.curvature:
-            begin(one)
-        self.spent = 0.0
+        for matrix in self.curvature:
+            begin(matrix)
+        self.abandoned = 0.0
 
     @property
-    def worth(self) -> Array:
+    def merit(self) -> Array:
         """Present value of each descent."""
         return self.states[:, 0]
 
     @property
-    def looks(self) -> int:
+    def evaluations(self) -> int:
         """Number of evaluations with gradients, including those of abandoned descents."""
-        return int(self.spent + self.states[:, 3].sum())
+        return int(self.abandoned + self.states[:, 3].sum())
 
     def keep(self, numbers: NDArray[np.intp]) -> None:
         """Continue only the descents with these numbers."""
-        self.spent += float(self.states[:, 3].sum() - self.states[numbers, 3].sum())
+        self.abandoned += float(self.states[:, 3].sum() - self.states[numbers, 3].sum())
         for name in ("places", "kinds", "x", "states", "curvature"):
             setattr(self, name, getattr(self, name)[numbers])
 
     def advance(self, steps: int, stop: Callable[[], bool] = lambda: False) -> None:
         """Take ``steps`` steps of all descents that have not converged."""
 
-        def one(k: int) -> None:
+        def descend_one(k: int) -> None:
             if not stop():
-                own = self.places[k], self.x[k], self.states[k], self.curvature[k]
-                descend(self.rows.task, self.kinds[k], *own, steps)
+                arrays = self.places[k], self.x[k], self.states[k], self.curvature[k]
+                descend(self.rows.task, self.kinds[k], *arrays, steps)
 
-        in_threads(one, np.flatnonzero(self.states[:, BOX] > LEAST).tolist(), self.jobs)
+        in_threads(descend_one, np.flatnonzero(self.states[:, BOX] > LEAST).tolist(), self.jobs)
 
 
 def in_threads(task: Callable[[T], None], parts: Iterable[T], jobs: int) -> None:
@@ -278,21 +278,21 @@ def in_threads(task: Callable[[T], None], parts: Iterable[T], jobs: int) -> None
             pass
 
 
-def _rows_of(found: Measure, bound: float, upper: bool, deviation: str) -> list[_Curve]:
+def _rows_of(quantity: Measure, bound: float, upper: bool, deviation: str) -> list[_Curve]:
     """Return the rows for one side of a limit, in inner values; none if poses do not give them."""
-    if found.kind not in ("max", "min", "max_abs", "range"):
+    if quantity.kind not in ("max", "min", "max_abs", "range"):
         return []
     side = 1.0 if upper else -1.0
-    size = 1.0 + bound if found.inner == "pressure" else max(abs(bound), ROTATABLE_MARGIN)
+    size = 1.0 + bound if quantity.inner == "pressure" else max(abs(bound), ROTATABLE_MARGIN)
     curves = []
-    for series in found.series:
-        own = size / DEVIATION if series.output == deviation else size
-        if found.kind == "range":
-            curves.append(_Curve(series.output, side, side * bound, own, RANGE))
-        elif found.kind == "max_abs":
-            curves += [_Curve(series.output, sign, bound, own) for sign in (1.0, -1.0)] if upper else []
+    for series in quantity.series:
+        curve_size = size / DEVIATION if series.output == deviation else size
+        if quantity.kind == "range":
+            curves.append(_Curve(series.output, side, side * bound, curve_size, RANGE))
+        elif quantity.kind == "max_abs":
+            curves += [_Curve(series.output, sign, bound, curve_size) for sign in (1.0, -1.0)] if upper else []
         else:
-            every = (side * found.sign > 0.0) == (found.kind == "max")
-            at = EVERY if every else HIGHEST if found.kind == "max" else LOWEST
-            curves.append(_Curve(series.output, side * found.sign, side * bound, own, at))
+            everywhere = (side * quantity.sign > 0.0) == (quantity.kind == "max")
+            at = EVERY if everywhere else HIGHEST if quantity.kind == "max" else LOWEST
+            curves.append(_Curve(series.output, side * quantity.sign, side * bound, curve_size, at))
     return curves

@@ -15,8 +15,8 @@ from sweep.optimise.multistart.multistart import listed
 from sweep.optimise.multistart.survey import Group
 from sweep.optimise.problem.on_locus import LocusCoordinates
 from sweep.optimise.problem.statement import Problem
-from sweep.optimise.starts.dataset import best_rows, drawn, swept_and_sampled
-from sweep.optimise.starts.global_starts import descend_once, from_populations, holding
+from sweep.optimise.starts.dataset import best_rows, random_designs, swept_and_sampled
+from sweep.optimise.starts.global_starts import descend_once, enclosing, from_populations
 from sweep.quantities.limits import Limit, tightest
 
 if TYPE_CHECKING:
@@ -50,32 +50,31 @@ def problem_of(study: Study, designs: Array, on_locus: bool | None = None) -> Pr
     """
     if study.objective is None:
         raise MissingInput("objective", "[objective] minimise = an output", str(study.path))
-    coordinates = (
-        LocusCoordinates(study.locus) if study.locus and (_wanted(study) if on_locus is None else on_locus) else None
-    )
+    use_locus = _uses_locus(study) if on_locus is None else on_locus
+    coordinates = LocusCoordinates(study.locus) if study.locus and use_locus else None
     follows, given = ((), ()) if coordinates is None else (coordinates.made, coordinates.given)
-    chosen = listed(study)
+    catalogue = listed(study)
     bounds = {
-        name: None if name in chosen else _bounds(study, name, designs)
+        name: None if name in catalogue else _bounds(study, name, designs)
         for name in (*study.family.parameter_names, *given)
     }
     varied = {name: ends for name, ends in bounds.items() if ends is not None and name not in follows}
-    held = {name: ends[0] for name, ends in varied.items() if ends[0] == ends[1]}
-    names = tuple(name for name in varied if name not in held)
-    own = [name for name in (*study.family.parameter_names, *given) if name not in follows]
-    fixed = {name: abs(x) if name in given else x for name, x in study.space.fixed.items() if name in own}
+    constant = {name: ends[0] for name, ends in varied.items() if ends[0] == ends[1]}
+    names = tuple(name for name in varied if name not in constant)
+    parameters = [name for name in (*study.family.parameter_names, *given) if name not in follows]
+    fixed = {name: abs(x) if name in given else x for name, x in study.space.fixed.items() if name in parameters}
     limits = [limit for limit in study.output_limits if limit.output not in given or limit in study.bands]
-    limits += [limit for limit in study.parameter_limits if limit.output in (*follows, *chosen)]
+    limits += [limit for limit in study.parameter_limits if limit.output in (*follows, *catalogue)]
     if not names:
         allowed = "a parameter that changes steadily beside the listed ones; the sweep has tried them all"
-        raise InputError("optimise", ", ".join(chosen), allowed, str(study.path))
+        raise InputError("optimise", ", ".join(catalogue), allowed, str(study.path))
     return Problem(
         study.family, names, np.array([varied[n][0] for n in names]), np.array([varied[n][1] for n in names]),
-        fixed | held, study.objective.output, tuple(limits), study.window, study.accuracy, coordinates,
+        fixed | constant, study.objective.output, tuple(limits), study.window, study.accuracy, coordinates,
     )  # fmt: skip
 
 
-def _wanted(study: Study) -> bool:
+def _uses_locus(study: Study) -> bool:
     """Tell whether the search uses the locus: as the study says, by default if that eliminates an equation."""
     if study.optimise is not None and study.optimise.variables is not None:
         return study.optimise.variables == "locus"
@@ -89,13 +88,13 @@ def _bounds(study: Study, name: str, designs: Array) -> tuple[float, float] | No
     parameter = next(p for p in (*study.family.parameters, *prescribed) if p.name == name)
     if parameter.choices is not None:
         return None
-    ends = _limited(study, name)
+    ends = _length_bounds(study, name)
     if name in study.rescaled and ends is not None:
         return ends
     if name in (*study.made, *study.rescaled):
         low, high = (float(end) for end in np.percentile(designs[:, names.index(name)], TAILS))
-        reach = 0.5 * max(abs(low), abs(high)) if parameter.unit == "length" else 0.5
-        low, high = (0.2 * low if parameter.positive else low - reach), high + reach
+        widening = 0.5 * max(abs(low), abs(high)) if parameter.unit == "length" else 0.5
+        low, high = (0.2 * low if parameter.positive else low - widening), high + widening
     elif name in study.space.bounds:
         low, high = study.space.bounds[name]
         if name not in names and not name.startswith("phi"):
@@ -104,17 +103,17 @@ def _bounds(study: Study, name: str, designs: Array) -> tuple[float, float] | No
             low, high = low - np.pi, high + np.pi
     else:
         return None
-    least, most, width = low, high, high - low
+    swept_low, swept_high, width = low, high, high - low
     low, high = tightest([Limit(name, low, high), *study.parameter_limits], name)
     if name in (*study.made, *study.rescaled):  # perhaps no design of [locus] or [fit] comes near the limits
-        if high <= least:
+        if high <= swept_low:
             low = max(high - width, SHORTEST * high) if parameter.positive else high - width
-        elif low >= most:
+        elif low >= swept_high:
             high = low + width
     return low, high
 
 
-def _limited(study: Study, name: str) -> tuple[float, float] | None:
+def _length_bounds(study: Study, name: str) -> tuple[float, float] | None:
     """Return the limits of a guide's length, which are its bounds in a global search over proportions."""
     low, high = tightest(study.parameter_limits, name)
     if study.optimise is None or not study.optimise.by_populations or math.isinf(high):
@@ -132,7 +131,7 @@ def problem_and_starts(
     """
     if study.optimise is None:
         raise MissingInput("optimise", "an [optimise] section", str(study.path))
-    designs, merit, problem = _known(study, folder)
+    designs, merit, problem = _designs_and_problem(study, folder)
     if study.optimise.by_populations:
         return problem, from_populations(study, problem, designs, merit, stop, jobs)
     return problem, swept_and_sampled(study, problem, designs, merit, listed(study), stop)
@@ -140,7 +139,7 @@ def problem_and_starts(
 
 def compile_descents(study: Study) -> None:
     """Compile or load the kernels of a study's search over proportions, with a few designs of its space."""
-    designs = drawn(study, 1, 0)
+    designs = random_designs(study, 1, 0)
     if len(designs):  # otherwise the search reports the fault
         descend_once(study, problem_of(study, designs))
 
@@ -159,12 +158,12 @@ def problem_of_dataset(study: Study, folder: Path, found: Array) -> Problem:
     InputError
         if nothing can change, or neither rows nor a sample give a design.
     """
-    problem = _known(study, folder)[2]
+    problem = _designs_and_problem(study, folder)[2]
     by_populations = study.optimise is not None and study.optimise.by_populations
-    return holding(study, problem, found) if by_populations else problem
+    return enclosing(study, problem, found) if by_populations else problem
 
 
-def _known(study: Study, folder: Path) -> tuple[Array, Array, Problem]:
+def _designs_and_problem(study: Study, folder: Path) -> tuple[Array, Array, Problem]:
     """Return the best designs of a dataset, their objectives, and the problem.
 
     Without a feasible row the designs are random ones without an objective.
@@ -173,7 +172,7 @@ def _known(study: Study, folder: Path) -> tuple[Array, Array, Problem]:
         raise MissingInput("objective", "[objective] minimise = an output", str(study.path))
     designs, merit = best_rows(study.family, study.objective.output, folder)
     if not len(designs) and study.optimise is not None:
-        designs = drawn(study, study.optimise.starts, study.optimise.seed)
+        designs = random_designs(study, study.optimise.starts, study.optimise.seed)
     if not len(designs):
         allowed = "at least one design that [locus] and [fit] can make"
         raise InputError("design space", study.space.count, allowed, str(study.path))

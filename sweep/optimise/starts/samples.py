@@ -21,8 +21,8 @@ from sweep.quantities.limits import compared
 from sweep.quantities.measures import ROTATABLE_MARGIN, margins
 
 SAMPLED = 1 << 15  # designs per start; on a locus they cost a third of a microsecond each
-BLOCK, LEAST = 1 << 15, 1 << 12  # designs ranked together; smallest such number, with many signs
-BEYOND = 0.35  # share of the bounds' width added on either side: two coordinates in five are clipped to a bound
+BLOCK, LEAST_BLOCK = 1 << 15, 1 << 12  # designs ranked together; smallest such number, with many signs
+WIDENING = 0.35  # share of the bounds' width added on either side: two coordinates in five are clipped to a bound
 KEPT = 512  # best designs of the sample per start, and as many of the infeasible ones
 PARENTS, CHILDREN, ROUNDS = 16, 24, 12  # designs improved per start; samples around each design per round; rounds
 RANKED = SAMPLED + PARENTS * CHILDREN * ROUNDS  # designs per start in all
@@ -35,7 +35,7 @@ NEARLY = 0.03  # violation that a search corrects in passing, so that the object
 PRICE = 3.0  # price of such a violation, in objectives
 ABSENT = 100.0  # violation of a limit on an output that a design does not have, as the swing of a rocker that turns
 ALIKE = 0.02  # share of the average distance of two random designs: nearer designs of a sweep give one start
-OUTSIDE, STUCK = 1e100, 1e200  # above every objective: violates its limits, does not turn
+OUTSIDE, NOT_TURNING = 1e100, 1e200  # above every objective: violates its limits, does not turn
 
 
 def samples(
@@ -51,9 +51,9 @@ def samples(
     seed : seed of the samples
     stop : true ends the present sample with the best designs so far, and the iteration
     """
-    number = -(-count // GROUP_SIZE)
-    size = -(-count // number)
-    for k in range(number):
+    sample_count = -(-count // GROUP_SIZE)
+    size = -(-count // sample_count)
+    for k in range(sample_count):
         if k and stop():
             return
         designs = sample(problem, signs, size, seed, k, stop)[: count - k * size]
@@ -82,7 +82,7 @@ def sample(
     centre = problem.lower + 0.5 * problem.span
     bases = [problem.rows(centre, **choice)[0] for choice in signs]
     block = BLOCK
-    while block > LEAST and block * len(bases) > SAMPLED * count:
+    while block > LEAST_BLOCK and block * len(bases) > SAMPLED * count:
         block //= 2
     blocks = max(-(-SAMPLED * count // block), len(bases))
     rng = np.random.default_rng((seed, number))
@@ -91,38 +91,38 @@ def sample(
     for k in range(blocks):
         if k and stop():
             break
-        fractions, own = _brought_in(problem, points.random(block)), k % len(bases)
-        found = ranking(problem, problem.placed(bases[own], fractions))
+        fractions, index = _drawn_within(problem, points.random(block)), k % len(bases)
+        ranks = ranking(problem, problem.placed(bases[index], fractions))
         place = np.concatenate([place, fractions])
-        kind = np.concatenate([kind, np.full(block, own)])
-        merit = np.concatenate([merit, found])
+        kind = np.concatenate([kind, np.full(block, index)])
+        merit = np.concatenate([merit, ranks])
         order = np.argsort(merit, kind="stable")
-        good = merit[order] < OUTSIDE
-        best = np.sort(np.concatenate([order[good][: KEPT * count], order[~good][: KEPT * count]]))
+        feasible = merit[order] < OUTSIDE
+        best = np.sort(np.concatenate([order[feasible][: KEPT * count], order[~feasible][: KEPT * count]]))
         place, kind, merit = place[best], kind[best], merit[best]
     merit = _verified(problem, bases, place, kind, merit)
-    chosen, near = _parents(place, kind, merit, PARENTS * count)
+    chosen, feasible_count = _parents(place, kind, merit, PARENTS * count)
     place, merit = _improved(problem, bases, place[chosen], kind[chosen], merit[chosen], rng, stop)
     ranked = np.argsort(merit, kind="stable")
-    if near >= count:  # designs moved within the limits have to be as good as those that were there
-        ranked = ranked[merit[ranked] <= merit[:near].max()]
+    if feasible_count >= count:  # designs moved within the limits have to be as good as those that were there
+        ranked = ranked[merit[ranked] <= merit[:feasible_count].max()]
     place, kind = place[ranked], kind[chosen][ranked]
     designs = [problem.placed(bases[kind[k]], place[k]) for k in spread(place, kind, count)]
     return np.array(designs).reshape(-1, len(problem.family.parameters))
 
 
-def _brought_in(problem: Problem, fractions: Array) -> Array:
+def _drawn_within(problem: Problem, fractions: Array) -> Array:
     """Return points of a block of a sample within the bounds, half of them drawn from a wider range and clipped.
 
     Optima lie on bounds, often on several at once, and the feasible designs near them may fill less than a millionth of
     the space between the bounds.
     """
-    low, high = _one_turn(problem)
+    low, high = _drawing_range(problem)
     bounded = high - low == 1.0  # an angle of a whole turn has no ends
     half = len(fractions) // 2
     out = fractions.copy()
-    wide = np.clip((1.0 + 2.0 * BEYOND) * fractions[:half] - BEYOND, 0.0, 1.0)
-    out[:half] = np.where(bounded, wide, fractions[:half])
+    widened = np.clip((1.0 + 2.0 * WIDENING) * fractions[:half] - WIDENING, 0.0, 1.0)
+    out[:half] = np.where(bounded, widened, fractions[:half])
     return np.asarray(low + out * (high - low), np.float64)
 
 
@@ -136,16 +136,16 @@ def _parents(place: Array, kind: NDArray[np.intp], merit: Array, count: int) -> 
     """
     order = np.argsort(merit, kind="stable")
     order = order[np.isfinite(merit[order])]
-    near, turning = merit[order] < OUTSIDE, merit[order] < STUCK
-    taken = order[near][spread(place[order[near]], kind[order[near]], count // 2)]
-    first = len(taken)
-    for others in (order[turning & ~near], order):
-        rows = np.concatenate([taken, others[~np.isin(others, taken)]])
+    feasible, turning = merit[order] < OUTSIDE, merit[order] < NOT_TURNING
+    taken = order[feasible][spread(place[order[feasible]], kind[order[feasible]], count // 2)]
+    feasible_count = len(taken)
+    for candidates in (order[turning & ~feasible], order):
+        rows = np.concatenate([taken, candidates[~np.isin(candidates, taken)]])
         taken = rows[spread(place[rows], kind[rows], count, first=len(taken))]
-    return np.asarray(taken, np.intp), first
+    return np.asarray(taken, np.intp), feasible_count
 
 
-def _one_turn(problem: Problem) -> tuple[Array, Array]:
+def _drawing_range(problem: Problem) -> tuple[Array, Array]:
     """Return the bounds in which samples are drawn, as fractions.
 
     A variable with the period of a turn is drawn from the middle turn of its bounds only.
@@ -163,11 +163,11 @@ def _one_turn(problem: Problem) -> tuple[Array, Array]:
 def _verified(problem: Problem, bases: list[Array], place: Array, kind: NDArray[np.intp], merit: Array) -> Array:
     """Return the ranks of designs, from true extrema if the poses hid most of a peak."""
     out = merit.copy()
-    for own, base in enumerate(bases):
-        rows = np.flatnonzero((kind == own) & (merit < OUTSIDE))
-        found = ranking(problem, problem.placed(base, place[rows]), VERIFIED)
-        hidden = found > HIDDEN * merit[rows]
-        out[rows[hidden]] = found[hidden]
+    for index, base in enumerate(bases):
+        rows = np.flatnonzero((kind == index) & (merit < OUTSIDE))
+        ranks = ranking(problem, problem.placed(base, place[rows]), VERIFIED)
+        hidden = ranks > HIDDEN * merit[rows]
+        out[rows[hidden]] = ranks[hidden]
     return out
 
 
@@ -184,15 +184,15 @@ def _improved(
         steps = radius[:, None, None] * rng.standard_normal((len(place), CHILDREN, place.shape[1]))
         children = np.clip(place[:, None, :] + steps, 0.0, 1.0)
         values = np.empty((len(place), CHILDREN))
-        for own, base in enumerate(bases):
-            rows = np.flatnonzero(kind == own)
+        for index, base in enumerate(bases):
+            rows = np.flatnonzero(kind == index)
             designs = problem.placed(base, children[rows].reshape(-1, place.shape[1]))
             values[rows] = ranking(problem, designs).reshape(-1, CHILDREN)
         chosen = np.arange(len(place)), np.argmin(values, axis=1)
         best = children[chosen]
-        found = _verified(problem, bases, best, kind, values[chosen])
-        better = found < merit
-        place[better], merit[better] = best[better], found[better]
+        ranks = _verified(problem, bases, best, kind, values[chosen])
+        better = ranks < merit
+        place[better], merit[better] = best[better], ranks[better]
         radius[~better] *= 0.5
     return place, merit
 
@@ -223,21 +223,21 @@ def ranking(problem: Problem, designs: Array, accuracy: Accuracy = ACCURACY) -> 
     merit = np.full(len(designs), np.inf)
     alive = np.flatnonzero(np.isfinite(designs).all(axis=1))
     violation = np.zeros(len(designs))
-    for left, group in zip((3.0, 2.0, 1.0), groups, strict=True):
-        wanted = list(dict.fromkeys(limit.output for limit in group)) + (turning if left == 2.0 else [])
-        at = TURNING if left == 2.0 and accuracy.samples else accuracy
-        columns = _values(problem, designs[alive], wanted, at)
+    for level, group in zip((3.0, 2.0, 1.0), groups, strict=True):
+        wanted = list(dict.fromkeys(limit.output for limit in group)) + (turning if level == 2.0 else [])
+        used = TURNING if level == 2.0 and accuracy.samples else accuracy
+        columns = _values(problem, designs[alive], wanted, used)
         for limit in group:
-            violation[alive] = np.maximum(violation[alive], _missed(limit, columns[limit.output]))
-        bad = violation[alive] > NEARLY
-        merit[alive[bad]] = OUTSIDE * (left + violation[alive[bad]])
-        if left == 2.0 and turning:
+            violation[alive] = np.maximum(violation[alive], _relative_violation(limit, columns[limit.output]))
+        rejected = violation[alive] > NEARLY
+        merit[alive[rejected]] = OUTSIDE * (level + violation[alive[rejected]])
+        if level == 2.0 and turning:
             stuck = ~(columns["margin"] >= ROTATABLE_MARGIN)
             # The distance of a crank from turning is a rank only; larger numbers count as equal, and would overflow.
             margin = np.maximum(np.nan_to_num(columns["margin"][stuck]), -FARTHEST)
-            merit[alive[stuck]] = STUCK * (1.0 - margin)
-            bad |= stuck
-        alive = alive[~bad]
+            merit[alive[stuck]] = NOT_TURNING * (1.0 - margin)
+            rejected |= stuck
+        alive = alive[~rejected]
     values = _values(problem, designs[alive], [problem.objective], accuracy)[problem.objective]
     objective = compared(problem.objective, values)
     merit[alive] = np.nan_to_num(objective + PRICE * np.abs(objective) * violation[alive], nan=np.inf, posinf=np.inf)
@@ -254,7 +254,7 @@ def _values(problem: Problem, designs: Array, wanted: list[str], accuracy: Accur
     return {name: np.asarray(columns.get(name, np.empty(0)), np.float64) for name in wanted}
 
 
-def _missed(limit: Any, value: Array) -> Array:
+def _relative_violation(limit: Any, value: Array) -> Array:
     """Return the violation of a limit relative to its bound, (n,).
 
     A missing output has a large violation.
@@ -288,27 +288,27 @@ def diverse(problem: Problem, designs: Array, merit: Array, count: int, least: f
     return ranked[spread(problem.scaled(ranked), kind.reshape(-1), count, least)]
 
 
-def spread(place: Array, kind: NDArray[np.intp], count: int, least: float = 0.0, first: int = 0) -> list[int]:
+def spread(place: Array, kind: NDArray[np.intp], count: int, least_share: float = 0.0, first: int = 0) -> list[int]:
     """Return the numbers of the best rows that keep a distance from each other.
 
     At most ``count`` rows of ``place`` (k, n), which is ranked with the best first, are taken.
 
-    ``kind`` (k,): rows of different kinds are never neighbours.  The distance is never less than ``least``, a share of
-    the average distance of two random designs.  The ``first`` rows are taken in any case.
+    ``kind`` (k,): rows of different kinds are never neighbours.  The distance is at least ``least_share`` of the
+    average distance of two random designs.  The ``first`` rows are taken in any case.
     """
     distance = 0.5 * np.sqrt(place.shape[1] / 6.0)  # half of the average distance of two random designs
     taken: list[int] = []
     for _ in range(12):
-        taken, free = list(range(first)), np.ones(len(place), dtype=np.bool_)
-        for row in taken:
-            free &= ~((np.linalg.norm(place - place[row], axis=1) < distance) & (kind == kind[row]))
-        free[:first] = False
-        while len(taken) < count and free.any():
-            best = int(np.argmax(free))
-            taken.append(best)
-            free &= ~((np.linalg.norm(place - place[best], axis=1) < distance) & (kind == kind[best]))
-            free[best] = False
-        if len(taken) == count or 0.5 * distance < least * np.sqrt(place.shape[1] / 6.0):
+        taken, available = list(range(first)), np.ones(len(place), dtype=np.bool_)
+        for near in taken:
+            available &= ~((np.linalg.norm(place - place[near], axis=1) < distance) & (kind == kind[near]))
+        available[:first] = False
+        while len(taken) < count and available.any():
+            row = int(np.argmax(available))
+            taken.append(row)
+            available &= ~((np.linalg.norm(place - place[row], axis=1) < distance) & (kind == kind[row]))
+            available[row] = False
+        if len(taken) == count or 0.5 * distance < least_share * np.sqrt(place.shape[1] / 6.0):
             break
         distance *= 0.5
     return taken
