@@ -27,7 +27,7 @@ ROUNDING = {"float64": 1e-12, "float32": 1e-6}
 # Relative changes within which a search repeats: of the objective, and of dimensions in a flat valley.
 OBJECTIVE_RTOL, DIMENSION_RTOL = 1e-6, 1e-4
 # Bounds that a front places depend on the designs and repeat like dimensions, here relative to the range of bounds; a
-# gap that gets one is 1/256 wide (`sweep.optimise.front.pareto.NARROWEST`), so bounds cannot be confused.  A study is
+# gap that gets one is 1/256 wide (`sweep.optimise.front.pareto.LEAST_WIDTH`), so bounds cannot be confused.  A study is
 # slower if it takes this multiple of the median of earlier nights, twice in a row, with enough nights.
 SLOWER_FACTOR, LEAST_NIGHTS, MOST_NIGHTS = 1.5, 3, 7
 

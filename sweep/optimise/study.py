@@ -124,7 +124,7 @@ def write(
             wanted = output(family, plain)
             text = f"{error_words(study, plain)} of {wanted.text}" if is_error(name) else wanted.text
             texts[name] = (wanted.unit.replace("length", "mm"), text)
-    arrays = {name: pa.array(_plain(values)) for name, values in columns.items()}
+    arrays = {name: pa.array(_for_arrow(values)) for name, values in columns.items()}
     fields = [
         pa.field(name, array.type, metadata={"unit": texts[name][0], "definition": texts[name][1]})
         for name, array in arrays.items()
@@ -137,7 +137,7 @@ def write(
     files.write_atomically(path, bytes(sink.getvalue()))
 
 
-def _plain(values: Any) -> Any:
+def _for_arrow(values: Any) -> Any:
     array = np.asarray(values)
     return array.tolist() if array.dtype.kind == "U" else array
 
@@ -180,78 +180,78 @@ def optimise_study(
     KeyboardInterrupt
         if the search was stopped, after the best result so far was written.
     """
-    place = Path(folder)
-    side = files.beside(place)
-    kept = Kept(side / files.SEARCH if key else None, key)
+    dataset = Path(folder)
+    results_folder = files.beside(dataset)
+    kept = Kept(results_folder / files.SEARCH if key else None, key)
     deadline = Deadline(None if study.optimise is None else study.optimise.time_budget, stop)
-    problem, results, found = _drawing(study, place, deadline, jobs, say, kept)
+    problem, results, survey = _nominal_search(study, dataset, deadline, jobs, say, kept)
     nominal, settings, share = results[0], study.optimise, math.nan
-    if study.tolerance is not None and study.tolerance.robust is not None and settings and found.ended not in CUT:
-        unlimited = replace(settings, time_budget=None)  # one deadline for all following steps
-        part = kept.parts.get("insensitive")
-        known = None if part is None else np.array(part).reshape(-1, len(problem.family.parameters))
-        whole, more = insensitive(study, unlimited, problem, deadline, jobs, say, known)
+    if study.tolerance is not None and study.tolerance.robust is not None and settings and survey.ended not in CUT:
+        unhurried = replace(settings, time_budget=None)  # one deadline for all following steps
+        stored = kept.parts.get("insensitive")
+        stored_designs = None if stored is None else np.array(stored).reshape(-1, len(problem.family.parameters))
+        robust_problem, robust_starts = insensitive(study, unhurried, problem, deadline, jobs, say, stored_designs)
         if not deadline():
-            kept.note("insensitive", more.tolist())
-        made = robust(
-            whole, results, study.tolerance, unlimited, deadline, jobs, more,
+            kept.note("insensitive", robust_starts.tolist())
+        robust_result = robust(
+            robust_problem, results, study.tolerance, unhurried, deadline, jobs, robust_starts,
             lambda done, total, best: say("robust design", done, total, f"searches {AT_MOST}{best}"), kept,
         )  # fmt: skip
-        if made is not None:
-            results, share = [made.result, *results], made.share
-    if deadline.pulled and found.ended not in CUT:
-        found = cut_afterwards(found)
-    parts = 3 if study.tolerance is None else 5
-    say("tables", 0, parts, "tables")
+        if robust_result is not None:
+            results, share = [robust_result.result, *results], robust_result.share
+    if deadline.pulled and survey.ended not in CUT:
+        survey = cut_afterwards(survey)
+    tables = 3 if study.tolerance is None else 5
+    say("tables", 0, tables, "tables")
     frame = _table(study, problem, results, nominal, share)
-    about = {"search": json.dumps(asdict(found)), "summary": "; ".join([found.words, *found.warnings])}
-    write(side / files.OPTIMUM, frame, study, about=about)
-    say("tables", 1, parts, "tables")
-    write(side / files.CURVES, _curves(study, frame), study)
-    say("tables", 2, parts, "tables")
-    write(side / files.SENSITIVITY, _by_role(study, frame, sensitivity), study)
-    say("tables", 3, parts, "tables")
+    about = {"search": json.dumps(asdict(survey)), "summary": "; ".join([survey.words, *survey.warnings])}
+    write(results_folder / files.OPTIMUM, frame, study, about=about)
+    say("tables", 1, tables, "tables")
+    write(results_folder / files.CURVES, _curves(study, frame), study)
+    say("tables", 2, tables, "tables")
+    write(results_folder / files.SENSITIVITY, _by_role(study, frame, sensitivity), study)
+    say("tables", 3, tables, "tables")
     if study.tolerance is None:
-        (side / files.TOLERANCE).unlink(missing_ok=True)
+        (results_folder / files.TOLERANCE).unlink(missing_ok=True)
     else:
-        write(side / files.TOLERANCE, _by_role(study, frame, _tolerance), study)
-        say("tables", 4, parts, "tables")
-    stopped = found.ended == "interrupted" or (stop is not None and stop())
-    _write_made(side / files.MADE, study, None if stopped else results[0].design)
+        write(results_folder / files.TOLERANCE, _by_role(study, frame, _tolerance), study)
+        say("tables", 4, tables, "tables")
+    stopped = survey.ended == "interrupted" or (stop is not None and stop())
+    _write_made(results_folder / files.MADE, study, None if stopped else results[0].design)
     if stopped or (stop is not None and stop()):
         raise KeyboardInterrupt
     if not deadline.pulled:
         kept.forget()
-    return side / files.OPTIMUM
+    return results_folder / files.OPTIMUM
 
 
-def _drawing(
-    study: Study, place: Path, deadline: Deadline, jobs: int, say: Say, kept: Kept
+def _nominal_search(
+    study: Study, dataset: Path, deadline: Deadline, jobs: int, say: Say, kept: Kept
 ) -> tuple[Problem, list[Result], Survey]:
     """Return the problem, the results of the nominal search, best first, and its survey, or those kept by `Kept`."""
-    part = kept.parts.get("drawing")
-    if part is not None:
-        problem = problem_of_dataset(study, place, np.empty((0, len(study.family.parameters))))
-        problem = replace(problem, lower=np.array(part["lower"]), upper=np.array(part["upper"]))
-        return problem, [result_of(r) for r in part["results"]], survey_of(part["survey"])
-    problem, groups = problem_and_starts(study, place, deadline, jobs)
+    stored = kept.parts.get("drawing")
+    if stored is not None:
+        problem = problem_of_dataset(study, dataset, np.empty((0, len(study.family.parameters))))
+        problem = replace(problem, lower=np.array(stored["lower"]), upper=np.array(stored["upper"]))
+        return problem, [result_of(r) for r in stored["results"]], survey_of(stored["survey"])
+    problem, groups = problem_and_starts(study, dataset, deadline, jobs)
     assert study.optimise is not None
     settings = replace(study.optimise, time_budget=None)
     unit = "populations" if settings.by_populations else "starts"
-    results, found, problem = explore(
+    results, survey, problem = explore(
         problem, groups, settings, deadline, jobs,
-        lambda done, most, best: say("search", done, most, f"{unit} {AT_MOST}{best_words(best)}"),
+        lambda done, limit, best: say("search", done, limit, f"{unit} {AT_MOST}{best_words(best)}"),
     )  # fmt: skip
     catalogue = listed(study)
-    if catalogue and found.ended not in CUT:
+    if catalogue and survey.ended not in CUT:
         say("search in the catalogue", 0, 0, "steps")
         results = with_neighbours(problem, results, catalogue, settings, deadline, jobs)
-    if study.tolerance is not None and found.ended not in CUT:
+    if study.tolerance is not None and survey.ended not in CUT:
         results = best_yield_first(problem, results, study.tolerance, settings.seed)
-    if not deadline.pulled and found.ended not in CUT:
+    if not deadline.pulled and survey.ended not in CUT:
         bounds = {"lower": problem.lower.tolist(), "upper": problem.upper.tolist()}
-        kept.note("drawing", bounds | {"results": [noted(r) for r in results], "survey": asdict(found)})
-    return problem, results, found
+        kept.note("drawing", bounds | {"results": [noted(r) for r in results], "survey": asdict(survey)})
+    return problem, results, survey
 
 
 def _table(study: Study, problem: Problem, results: list[Result], nominal: Result, share: float) -> dict[str, Any]:
@@ -267,16 +267,16 @@ def _table(study: Study, problem: Problem, results: list[Result], nominal: Resul
         reference, violation = _reference(study, problem)
         designs = np.concatenate([designs, reference])
         status = st.OK if violation <= 1e-9 else st.LIMIT_EXCEEDED
-        last: tuple[Any, ...] = ("reference", -1, violation, np.nan, np.nan, "", "", 1, 0, "", 0, status)
-        for name, value in zip(rows, last, strict=True):
+        reference_row: tuple[Any, ...] = ("reference", -1, violation, np.nan, np.nan, "", "", 1, 0, "", 0, status)
+        for name, value in zip(rows, reference_row, strict=True):
             rows[name].append(value)
     if study.tolerance is not None:
         rows["yield"] = [share] + [math.nan] * (len(designs) - 1)
-        shown = [k for k, role in enumerate(rows["role"]) if role != "start" and math.isnan(rows["yield"][k])]
+        without_yield = [k for k, role in enumerate(rows["role"]) if role != "start" and math.isnan(rows["yield"][k])]
         assert study.optimise is not None
-        shares = yields(problem, designs[shown], study.tolerance, study.optimise.seed)
-        for k, found in zip(shown, shares, strict=True):
-            rows["yield"][k] = found
+        shares = yields(problem, designs[without_yield], study.tolerance, study.optimise.seed)
+        for k, yield_share in zip(without_yield, shares, strict=True):
+            rows["yield"][k] = yield_share
     columns: dict[str, Any] = {name: designs[:, k] for k, name in enumerate(study.family.parameter_names)}
     return {"role": rows.pop("role"), "start": rows.pop("start")} | columns | outputs(study, designs) | rows
 
@@ -295,11 +295,11 @@ def _reference(study: Study, problem: Problem) -> tuple[Array, float]:
 
 def _curves(study: Study, table: dict[str, Any]) -> dict[str, Any]:
     """Return pose curves of optimum and reference over one turn; no rows if the study wants none."""
-    shown = [k for k, role in enumerate(table["role"]) if role in ("optimum", "reference")]
-    designs = np.array([[table[name][k] for name in study.family.parameter_names] for k in shown])
-    columns = curves(study, designs.reshape(len(shown), len(study.family.parameters)))
+    selected = [k for k, role in enumerate(table["role"]) if role in ("optimum", "reference")]
+    designs = np.array([[table[name][k] for name in study.family.parameter_names] for k in selected])
+    columns = curves(study, designs.reshape(len(selected), len(study.family.parameters)))
     count = len(columns["status"]) // POSES
-    return {"role": np.repeat([table["role"][k] for k in shown[:count]], POSES)} | columns
+    return {"role": np.repeat([table["role"][k] for k in selected[:count]], POSES)} | columns
 
 
 def curves(study: Study, designs: Array) -> Columns:
@@ -318,21 +318,21 @@ def _by_role(study: Study, table: dict[str, Any], rows_of: Callable[[Study, Arra
     rows: dict[str, list[Any]] = {"role": []}
     for k, role in enumerate(table["role"]):
         if role in ("optimum", "reference"):
-            own = rows_of(study, np.array([table[name][k] for name in study.family.parameter_names], np.float64))
-            rows["role"] += [role] * len(own["output"])
-            for name, values in own.items():
+            part = rows_of(study, np.array([table[name][k] for name in study.family.parameter_names], np.float64))
+            rows["role"] += [role] * len(part["output"])
+            for name, values in part.items():
                 rows.setdefault(name, []).extend(values)
     return rows
 
 
 def _write_made(path: Path, study: Study, design: Array | None) -> None:
     """Write the sample of manufactured mechanisms of the optimum (P,), slow for many limits; None removes the table."""
-    made = None if design is None else manufactured(study, design)
-    if made is None:
+    sample = None if design is None else manufactured(study, design)
+    if sample is None:
         path.unlink(missing_ok=True)
     else:
-        about = {"costs": json.dumps(made.costs)}
-        write(path, {made.output: made.values, "kept": made.kept}, study, about=about)
+        about = {"costs": json.dumps(sample.costs)}
+        write(path, {sample.output: sample.values, "kept": sample.kept}, study, about=about)
 
 
 def sensitivity(study: Study, design: Array) -> dict[str, list[Any]]:

@@ -21,7 +21,7 @@ from sweep.dataset.store import is_complete
 from sweep.engine.run import run
 from sweep.errors import Interrupted, StudyError
 from sweep.optimise import front_study
-from sweep.optimise.front.study import saved, within
+from sweep.optimise.front.study import best_within, saved
 from sweep.report.dataset import read_dataset
 from sweep.report.front import Front
 from sweep.report.page import write_report
@@ -167,10 +167,10 @@ def test_starts_lie_within_their_bound(whole: tuple[Study, Path]) -> None:
     rows = pd.concat(pd.read_parquet(path) for path in sorted(folder.glob("part-*")))
     assert study.pareto is not None
     for bound in (0.6, 0.8):
-        ((designs, merit),) = within(study, study.pareto, (bound,), folder)
+        ((designs, merit),) = best_within(study, study.pareto, (bound,), folder)
         inside = rows[rows["max_pressure_angle"] <= bound]
         assert len(designs) == len(inside) and merit.min() == inside["max_abs_d2psi"].min()
-    ((designs, _),) = within(study, replace(study.pareto, at_least=True), (0.8,), folder)
+    ((designs, _),) = best_within(study, replace(study.pareto, at_least=True), (0.8,), folder)
     assert len(designs) == (rows["max_pressure_angle"] >= 0.8).sum()
 
 

@@ -24,8 +24,8 @@ if TYPE_CHECKING:
     from sweep.study import ParetoSettings
 
 
-NARROWEST = 1.0 / 256.0  # share of the range of bounds: a narrower gap is a jump of the front, which no point fills
-LEAST = 1e-4  # share of the square around the front: a smaller triangle is no gap
+LEAST_WIDTH = 1.0 / 256.0  # share of the range of bounds: a narrower gap is a jump of the front, which no point fills
+LEAST_AREA = 1e-4  # share of the square around the front: a smaller triangle is no gap
 SHOWN = 0.02  # share of that square above which a gap is reported
 
 
@@ -83,10 +83,10 @@ def steps(count: int) -> tuple[Step, ...]:
 
     Each search starts from its neighbour's result, so a good design reaches every bound that it satisfies.
     """
-    there = [Step(k, k - 1, first=True) for k in range(count)]
-    back = [Step(k, k + 1, first=False) for k in range(count - 2, -1, -1)]
-    again = [Step(k, k - 1, first=False) for k in range(1, count)]
-    return (*there, *back, *again)
+    tighten = [Step(k, k - 1, first=True) for k in range(count)]
+    loosen = [Step(k, k + 1, first=False) for k in range(count - 2, -1, -1)]
+    tighten_again = [Step(k, k - 1, first=False) for k in range(1, count)]
+    return (*tighten, *loosen, *tighten_again)
 
 
 def searches(settings: ParetoSettings) -> int:
@@ -95,7 +95,6 @@ def searches(settings: ParetoSettings) -> int:
     placed = max((settings.points or count) - count, 0)
     # Each bound adds the optimum as a start, from the second bound on also the previous result.  A placed bound starts
     # from both neighbours as well, and its result is tried for them.
-    # with both neighbours besides, and is lent to them.
     return count * (settings.starts + 1) + max(0, 3 * (count - 1)) + placed * (settings.starts + 5)
 
 
@@ -103,11 +102,11 @@ def bounded(problem: Problem, settings: ParetoSettings, bound: float) -> Problem
     """Return the problem with the bound replacing its own limit on that side of the second output."""
     name = settings.output
     others = tuple(limit for limit in problem.limits if limit.output != name)
-    own = [limit for limit in problem.limits if limit.output == name]
+    same_output = [limit for limit in problem.limits if limit.output == name]
     if settings.at_least:
-        highest = min((x.maximum for x in own if x.maximum is not None), default=None)
+        highest = min((x.maximum for x in same_output if x.maximum is not None), default=None)
         return replace(problem, limits=(*others, Limit(name, float(bound), highest)))
-    lowest = max((x.minimum for x in own if x.minimum is not None), default=None)
+    lowest = max((x.minimum for x in same_output if x.minimum is not None), default=None)
     return replace(problem, limits=(*others, Limit(name, lowest, float(bound))))
 
 
@@ -164,32 +163,32 @@ def advance(
     """
     if settings.output == problem.objective:
         raise InputError("second output", settings.output, "another output than the objective", PLACE)
-    own = [np.atleast_2d(s) for s in ([starts] * len(front.bounds) if isinstance(starts, np.ndarray) else starts)]
-    asked, plan = Deadline(settings.time_budget, stop), steps(front.given)
+    starts_of = [np.atleast_2d(s) for s in ([starts] * len(front.bounds) if isinstance(starts, np.ndarray) else starts)]
+    should_stop, plan = Deadline(settings.time_budget, stop), steps(front.given)
     for number in range(front.taken, len(plan)):
         step = plan[number]
-        begin = _begin(front, step, number, own[step.target])
-        if begin is not None:
-            result = _search(problem, settings, front.bounds[step.target], begin, asked, jobs)
-            front = _with(front, step, number, result)
-            if result.ended in CUT or asked():
+        designs = _step_starts(front, step, number, starts_of[step.target])
+        if designs is not None:
+            result = _search(problem, settings, front.bounds[step.target], designs, should_stop, jobs)
+            front = _with_result(front, step, number, result)
+            if result.ended in CUT or should_stop():
                 yield front
                 return
         front = replace(front, taken=number + 1)
         yield front
     while not front.complete:
-        front, cut = _placed(problem, settings, front, own, asked, jobs)
+        front, cut = _with_new_point(problem, settings, front, starts_of, should_stop, jobs)
         yield front
         if cut:
             return
 
 
-def _placed(
+def _with_new_point(
     problem: Problem,
     settings: ParetoSettings,
     front: Front,
     starts: Sequence[Array],
-    asked: Callable[[], bool],
+    should_stop: Callable[[], bool],
     jobs: int,
 ) -> tuple[Front, bool]:
     """Return the front with one more bound, in the middle of its largest gap, and whether the search was cut short.
@@ -197,45 +196,45 @@ def _placed(
     The bound is searched from the results of both neighbours and from the starts of the next tighter given bound.  Its
     result is then a start for the tighter neighbour, and for looser bounds as long as it is better there.
     """
-    found = gaps(np.array(front.bounds), *places(problem, settings, front))
-    if not found:
+    open_gaps = gaps(np.array(front.bounds), *front_points(problem, settings, front))
+    if not open_gaps:
         return replace(front, filled=True), False
-    at, bound, number = found[0].number + 1, found[0].middle, front.taken
+    index, bound, number = open_gaps[0].number + 1, open_gaps[0].middle, front.taken
     given = Front.of(settings).bounds
     tighter = next(k for k, b in enumerate(given) if (b >= bound if settings.at_least else b <= bound))
-    beside = [r.design[None, :] for r in (front.results[at - 1], front.results[at]) if r is not None]
-    designs = np.concatenate([*beside, starts[tighter]])
+    neighbours = [r.design[None, :] for r in (front.results[index - 1], front.results[index]) if r is not None]
+    designs = np.concatenate([*neighbours, starts[tighter]])
     _, first = np.unique(designs, axis=0, return_index=True)
     front = replace(
         front,
-        bounds=(*front.bounds[:at], bound, *front.bounds[at:]),
-        results=(*front.results[:at], None, *front.results[at:]),
-        found=(*front.found[:at], -1, *front.found[at:]),
+        bounds=(*front.bounds[:index], bound, *front.bounds[index:]),
+        results=(*front.results[:index], None, *front.results[index:]),
+        found=(*front.found[:index], -1, *front.found[index:]),
     )
-    result = _search(problem, settings, bound, designs[np.sort(first)], asked, jobs)
-    front = _with(front, Step(at, at - 1, first=True), number, result)
-    for step in (Step(at + 1, at, first=False), *(Step(k, k + 1, first=False) for k in range(at, -1, -1))):
-        near, held = front.results[step.neighbour], front.results[step.target]
-        if near is None or held is None or not near.feasible or asked():
+    result = _search(problem, settings, bound, designs[np.sort(first)], should_stop, jobs)
+    front = _with_result(front, Step(index, index - 1, first=True), number, result)
+    for step in (Step(index + 1, index, first=False), *(Step(k, k + 1, first=False) for k in range(index, -1, -1))):
+        neighbour, present = front.results[step.neighbour], front.results[step.target]
+        if neighbour is None or present is None or not neighbour.feasible or should_stop():
             continue
-        if step.target < step.neighbour and not near.rank < held.rank:
+        if step.target < step.neighbour and not neighbour.rank < present.rank:
             continue
-        better = _search(problem, settings, front.bounds[step.target], near.design[None, :], asked, jobs)
-        front = _with(front, step, number, better)
-    cut = asked()
+        improved = _search(problem, settings, front.bounds[step.target], neighbour.design[None, :], should_stop, jobs)
+        front = _with_result(front, step, number, improved)
+    cut = should_stop()
     return replace(front, taken=number + (not cut)), cut
 
 
-def places(problem: Problem, settings: ParetoSettings, front: Front) -> tuple[Array, Array]:
+def front_points(problem: Problem, settings: ParetoSettings, front: Front) -> tuple[Array, Array]:
     """Return second output and objective of each result; the bound and nan for a bound without a feasible one."""
     reached, values = np.array(front.bounds, np.float64), np.full(len(front.bounds), np.nan)
-    good = {k: r for k, r in enumerate(front.results) if r is not None and r.feasible}
-    if good:
-        rows, designs = list(good), np.array([r.design for r in good.values()])
+    feasible = {k: r for k, r in enumerate(front.results) if r is not None and r.feasible}
+    if feasible:
+        numbers, designs = list(feasible), np.array([r.design for r in feasible.values()])
         outputs = design_outputs(problem.family, designs, [settings.output], problem.accuracy, problem.window)
-        size = compared(settings.output, np.asarray(outputs[settings.output], np.float64))
-        reached[rows] = np.where(np.isfinite(size), size, reached[rows])
-        values[rows] = [r.objective for r in good.values()]
+        measured = compared(settings.output, np.asarray(outputs[settings.output], np.float64))
+        reached[numbers] = np.where(np.isfinite(measured), measured, reached[numbers])
+        values[numbers] = [r.objective for r in feasible.values()]
     return reached, values
 
 
@@ -265,63 +264,63 @@ def gaps(bounds: Array, reached: Array, values: Array) -> list[Gap]:
     reached : second output of the points; the bound if nothing was found
     values : minimised objective, nan if no design keeps the bound: the front ends before it, at unknown height
     """
-    known = np.isfinite(values)
-    if bounds.size < 2 or not known.any():
+    solved = np.isfinite(values)
+    if bounds.size < 2 or not solved.any():
         return []
     sense = np.sign(bounds[-1] - bounds[0])
-    wide = float(sense * (bounds[-1] - reached[0]))
-    high = float(np.ptp(values[known]))
-    found = []
+    width = float(sense * (bounds[-1] - reached[0]))
+    height = float(np.ptp(values[solved]))
+    fillable = []
     for k in range(bounds.size - 1):
-        step = float(sense * (bounds[k + 1] - reached[k])) / wide if wide > 0.0 else 0.0
+        step = float(sense * (bounds[k + 1] - reached[k])) / width if width > 0.0 else 0.0
         rise = 0.0
-        if known[k] and known[k + 1]:
-            rise = abs(values[k + 1] - values[k]) / high if high > 0.0 else 0.0
-        elif known[k] or known[k + 1]:
+        if solved[k] and solved[k + 1]:
+            rise = abs(values[k + 1] - values[k]) / height if height > 0.0 else 0.0
+        elif solved[k] or solved[k + 1]:
             rise = 1.0
-        if step >= NARROWEST and 0.5 * step * rise >= LEAST:
-            found.append(Gap(k, 0.5 * step * rise, 0.5 * float(reached[k] + bounds[k + 1])))
-    return sorted(found, key=lambda gap: (-gap.area, gap.number))
+        if step >= LEAST_WIDTH and 0.5 * step * rise >= LEAST_AREA:
+            fillable.append(Gap(k, 0.5 * step * rise, 0.5 * float(reached[k] + bounds[k + 1])))
+    return sorted(fillable, key=lambda gap: (-gap.area, gap.number))
 
 
-def _begin(front: Front, step: Step, number: int, starts: Array) -> Array | None:
+def _step_starts(front: Front, step: Step, number: int, starts: Array) -> Array | None:
     """Return the starting designs of a step, or None if the neighbour offers nothing new."""
-    near = front.results[step.neighbour] if 0 <= step.neighbour < len(front.bounds) else None
+    neighbour = front.results[step.neighbour] if 0 <= step.neighbour < len(front.bounds) else None
     if step.first:
-        designs = starts if near is None else np.concatenate([near.design[None, :], starts])
-        _, places = np.unique(designs, axis=0, return_index=True)
-        return np.asarray(designs[np.sort(places)], np.float64)
-    held = front.results[step.target]
-    if near is None or held is None:
+        designs = starts if neighbour is None else np.concatenate([neighbour.design[None, :], starts])
+        _, first_rows = np.unique(designs, axis=0, return_index=True)
+        return np.asarray(designs[np.sort(first_rows)], np.float64)
+    present = front.results[step.target]
+    if neighbour is None or present is None:
         return None
     seen = step.neighbour < step.target and front.found[step.neighbour] < front.given
-    worse = held.feasible and not near.feasible
-    offers = not (seen or worse or np.array_equal(near.design, held.design))
+    infeasible = present.feasible and not neighbour.feasible
+    offers = not (seen or infeasible or np.array_equal(neighbour.design, present.design))
     # A search that has not converged is continued from its end.
-    unfinished = held.status == st.NOT_CONVERGED
-    begin = [near.design] * offers + [held.design] * unfinished
-    return np.array(begin) if begin else None
+    unfinished = present.status == st.NOT_CONVERGED
+    chosen = [neighbour.design] * offers + [present.design] * unfinished
+    return np.array(chosen) if chosen else None
 
 
 def _search(
     problem: Problem,
     settings: ParetoSettings,
     bound: float,
-    begin: Array,
-    asked: Callable[[], bool],
+    starts: Array,
+    should_stop: Callable[[], bool],
     jobs: int,
 ) -> Result:
     # All starts of a bound are searched: the stopping rule of the survey is switched off.
-    search = OptimiseSettings(len(begin), unseen=0.0, looks=settings.looks)
-    results = minimise(bounded(problem, settings, bound), begin, search, asked, jobs)
-    cut = any(r.ended in CUT for r in results) or len(results) < len(begin)
+    search = OptimiseSettings(len(starts), unseen=0.0, looks=settings.looks)
+    results = minimise(bounded(problem, settings, bound), starts, search, should_stop, jobs)
+    cut = any(r.ended in CUT for r in results) or len(results) < len(starts)
     return replace(results[0], ended="time") if cut and results[0].ended not in CUT else results[0]
 
 
-def _with(front: Front, step: Step, number: int, result: Result) -> Front:
+def _with_result(front: Front, step: Step, number: int, result: Result) -> Front:
     """Return the front with this result if it is better than the known one."""
-    held = front.results[step.target]
-    if held is not None and not result.rank < held.rank:
+    present = front.results[step.target]
+    if present is not None and not result.rank < present.rank:
         return front
     results, found = list(front.results), list(front.found)
     results[step.target], found[step.target] = result, number

@@ -72,28 +72,28 @@ def front_study(
     """
     if study.pareto is None:
         raise MissingInput("pareto", "a [pareto] section", str(study.path))
-    place = Path(folder)
-    settings, path = study.pareto, files.beside(place) / files.PARETO
+    dataset = Path(folder)
+    settings, path = study.pareto, files.beside(dataset) / files.PARETO
     front = saved(path, key) or Front.of(settings)
     if front.complete and path.exists():
         return path
-    many = front.steps
-    say("front", front.taken, many, "steps")
-    ends, optimum = _searched(study, place)
-    problem = problem_of_dataset(study, place, ends)
-    starts = _starts(study, settings, problem, place, optimum)
-    kept, begin = front, time.monotonic()
+    total = front.steps
+    say("front", front.taken, total, "steps")
+    ends, optimum = _search_ends(study, dataset)
+    problem = problem_of_dataset(study, dataset, ends)
+    starts = _starts(study, settings, problem, dataset, optimum)
+    last_whole, started = front, time.monotonic()
     for best in advance(problem, settings, front, starts, stop, jobs):
-        kept = best if best.complete or best.taken > kept.taken else kept
-        say("front", kept.taken, many, "steps")
-        _write(path, study, settings, best, key, kept)
-    late = settings.time_budget is not None and time.monotonic() - begin >= settings.time_budget
-    if not kept.complete and (not late or (stop is not None and stop())):
+        last_whole = best if best.complete or best.taken > last_whole.taken else last_whole
+        say("front", last_whole.taken, total, "steps")
+        _write(path, study, settings, best, key, last_whole)
+    timed_out = settings.time_budget is not None and time.monotonic() - started >= settings.time_budget
+    if not last_whole.complete and (not timed_out or (stop is not None and stop())):
         raise KeyboardInterrupt
-    if not kept.complete:
-        _write(path, study, settings, best, key, kept, "time")
-        done = f"{kept.taken} of {kept.steps} steps of the front"
-        raise SearchCutShort(place, f"{path}: time ran out: {done}; run again to continue the front")
+    if not last_whole.complete:
+        _write(path, study, settings, best, key, last_whole, "time")
+        done = f"{last_whole.taken} of {last_whole.steps} steps of the front"
+        raise SearchCutShort(dataset, f"{path}: time ran out: {done}; run again to continue the front")
     return path
 
 
@@ -113,9 +113,9 @@ def saved(path: Path, key: str) -> Front | None:
 
 
 def _write(
-    path: Path, study: Study, settings: ParetoSettings, best: Front, key: str, kept: Front, ended: str = ""
+    path: Path, study: Study, settings: ParetoSettings, best: Front, key: str, last_whole: Front, ended: str = ""
 ) -> None:
-    """Write ``best`` as rows; the search resumes from ``kept``, the front after its last finished step."""
+    """Write ``best`` as rows; the search resumes from ``last_whole``, the front after its last finished step."""
     bounds, results = (list(column) for column in zip(*best.known(), strict=True))
     designs = np.array([r.design for r in results])
     columns: dict[str, Any] = {"bound": bounds}
@@ -124,15 +124,15 @@ def _write(
     side = "lower" if settings.at_least else "upper"
     unit = internal_unit(output(study.family, settings.output).unit)
     texts = {"bound": (unit, f"{side} bound on {settings.output}")}
-    state = asdict(replace(kept, results=())) | {"results": [r and noted(r) for r in kept.results]}
+    state = asdict(replace(last_whole, results=())) | {"results": [r and noted(r) for r in last_whole.results]}
     about = {"output": settings.output, "side": "at least" if settings.at_least else "at most"}
-    about |= {"complete": str(best.complete).lower(), "steps": f"{kept.taken} of {kept.steps}"}
+    about |= {"complete": str(best.complete).lower(), "steps": f"{last_whole.taken} of {last_whole.steps}"}
     about |= {"ended": ended} if ended else {}
     about |= {KEY.decode(): key, STATE.decode(): json.dumps(state)}
     write(path, columns, study, texts, about)
 
 
-def _searched(study: Study, folder: Path) -> tuple[Array, Array]:
+def _search_ends(study: Study, folder: Path) -> tuple[Array, Array]:
     """Return the designs at which the search for the optimum ended, (k, P), and the optimum (1, P)."""
     names = list(study.family.parameter_names)
     rows = _columns(files.beside(folder) / files.OPTIMUM, [*names, "role"])
@@ -140,40 +140,40 @@ def _searched(study: Study, folder: Path) -> tuple[Array, Array]:
     return designs[rows["role"] != "reference"], designs[rows["role"] == "optimum"]
 
 
-def _starts(study: Study, settings: ParetoSettings, problem: Problem, folder: Path, own: Array) -> list[Array]:
+def _starts(study: Study, settings: ParetoSettings, problem: Problem, folder: Path, optimum: Array) -> list[Array]:
     """Return the starts for each bound, the loosest bound first.
 
-    These are the optimum ``own`` and diverse good designs of the dataset within the bound.
+    These are the optimum ``optimum`` and diverse good designs of the dataset within the bound.
     """
     chosen = []
-    for designs, merit in within(study, settings, Front.of(settings).bounds, folder):
-        found = diverse(problem, designs, merit, settings.starts) if settings.starts else designs[:0]
-        chosen.append(np.concatenate([own, found]))
+    for designs, merit in best_within(study, settings, Front.of(settings).bounds, folder):
+        good = diverse(problem, designs, merit, settings.starts) if settings.starts else designs[:0]
+        chosen.append(np.concatenate([optimum, good]))
     return chosen
 
 
-def within(
+def best_within(
     study: Study, settings: ParetoSettings, bounds: tuple[float, ...], folder: Path
 ) -> list[tuple[Array, Array]]:
     """Return the best feasible designs (k, P) of a dataset within each bound, k up to 2048, with their objectives."""
     assert study.objective is not None
     names = study.family.parameter_names
-    kept = [(np.empty((0, len(names))), np.empty(0)) for _ in bounds]
+    best = [(np.empty((0, len(names))), np.empty(0)) for _ in bounds]
     for part in chunk_files.parts(folder):
         columns = _columns(part.path, [*names, study.objective.output, settings.output, "status"])
         designs = np.column_stack([columns[name] for name in names]).astype(np.float64)
-        merit = columns[study.objective.output].astype(np.float64)
-        second = columns[settings.output].astype(np.float64)
-        size = np.abs(second) if by_magnitude(settings.output) else second
-        good = (columns["status"] == st.OK) & np.isfinite(merit)
+        objective = columns[study.objective.output].astype(np.float64)
+        output = columns[settings.output].astype(np.float64)
+        magnitude = np.abs(output) if by_magnitude(settings.output) else output
+        feasible = (columns["status"] == st.OK) & np.isfinite(objective)
         for k, bound in enumerate(bounds):
-            inside = good & (size >= bound if settings.at_least else size <= bound)
-            more, values = (
-                np.concatenate(pair) for pair in zip(kept[k], (designs[inside], merit[inside]), strict=True)
+            inside = feasible & (magnitude >= bound if settings.at_least else magnitude <= bound)
+            joined, values = (
+                np.concatenate(pair) for pair in zip(best[k], (designs[inside], objective[inside]), strict=True)
             )
-            best = np.sort(np.argsort(values, kind="stable")[:KEPT])
-            kept[k] = more[best], values[best]
-    return kept
+            order = np.sort(np.argsort(values, kind="stable")[:KEPT])
+            best[k] = joined[order], values[order]
+    return best
 
 
 def _columns(path: Path, names: list[str]) -> dict[str, Any]:
