@@ -120,9 +120,11 @@ def _refined(scene: Scene, rubs: bool, run: Callable[[Scene, tuple[int, ...]], C
         return run(scene, RUBBING)
     bent = _bent(scene)
     found = run(scene, FINEST if bent.all() else GRIDS)
+    if bent.all():  # so are none at all
+        return found
     unresolved = (found["status"] == st.NOT_CONVERGED).reshape(len(bent), -1).any(axis=1)
     again = np.flatnonzero(bent | unresolved)
-    if bent.all() or not again.size:
+    if not again.size:
         return found
     finer = run(scene.only(again), FINEST)
     # An output that the coarse grids resolve keeps its bits, whatever else is wanted.

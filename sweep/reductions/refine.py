@@ -238,8 +238,8 @@ def hill(row: Index, phi: Array, err_phi: Array, height: Array, err: Array, chos
     number = np.zeros(row.size, np.int64)
     number[rival[1:]] = np.cumsum(apart)
     # Peaks on both sides of the angle 0 belong to one hill: the last one of a row precedes its first one.
-    begin = np.flatnonzero(np.diff(row[rival], prepend=-1))
-    head, tail = rival[begin], rival[np.append(begin[1:], rival.size) - 1]
+    head = rival[np.flatnonzero(np.diff(row[rival], prepend=-1))]
+    tail = rival[np.flatnonzero(np.diff(row[rival], append=-1))]
     around = (phi[head] + TWO_PI - phi[tail] <= NEIGHBOURS) & (number[head] != number[tail])
     same = np.arange(row.size)
     same[number[tail[around]]] = number[head[around]]

@@ -19,10 +19,10 @@ def test_many_hostile_tables_have_an_answer_a_status_or_an_error_of_ours() -> No
     assert not wrong
 
 
-@pytest.mark.parametrize("seed", [609, 1845])
-def test_dynamic_elasticity_of_a_table_without_a_turning_design_is_missing_with_a_status(seed: int) -> None:
-    """Both once ended in a KeyError: nothing was left to solve, and its result was looked up."""
-    assert not faults(seed)
+@pytest.mark.parametrize(("seed", "requests"), [(609, None), (1845, None), (1561, None), (114, 150)])
+def test_outputs_of_a_table_without_a_turning_design_are_missing_with_a_status(seed: int, requests: int | None) -> None:
+    """Each of these tables once ended in a KeyError, IndexError or ValueError: no design was left to solve."""
+    assert not faults(seed, requests)
 
 
 def test_the_tables_are_hostile_and_of_every_family() -> None:
