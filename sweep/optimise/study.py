@@ -28,7 +28,7 @@ from sweep.optimise.manufacture.robust import best_yield_first, robust, yields
 from sweep.optimise.manufacture.tolerance import manufactured, sensitivities, tolerance_rows
 from sweep.optimise.multistart.kept import Kept, noted, result_of, survey_of
 from sweep.optimise.multistart.multistart import explore, listed, with_neighbours
-from sweep.optimise.multistart.survey import CUT, Survey, cut_afterwards
+from sweep.optimise.multistart.survey import CUT, Survey
 from sweep.optimise.problem.program import Program
 from sweep.optimise.problem.statement import Problem
 from sweep.optimise.starts.global_starts import insensitive
@@ -200,7 +200,7 @@ def optimise_study(
         if robust_result is not None:
             results, share = [robust_result.result, *results], robust_result.share
     if deadline.pulled and survey.ended not in CUT:
-        survey = cut_afterwards(survey)
+        survey = replace(survey, ended="time", late=True)
     tables = 3 if study.tolerance is None else 5
     say("tables", 0, tables, "tables")
     frame = _table(study, problem, results, nominal, share)

@@ -216,7 +216,7 @@ class Curves:
         if at_edge.any():
             given = design[None, :], phi[at_edge], points.level[at_edge]
             phi[at_edge] = moved_edges(self.problem.family, *given, self.plain)[0]
-        by_series = self._by_series(points)
+        by_series = [(s, k) for n, s in enumerate(self.series) if len(k := np.flatnonzero(points.series == n))]
         longest, previous = np.full(len(phi), stride), np.zeros(len(phi))
         for _ in range(12):
             slope, curvature, position_slope, position, value = self._derivatives(design, phi, points, by_series)
@@ -272,11 +272,6 @@ class Curves:
         if any(s.pressure for s in self.series):
             return np.concatenate([points.phi, np.arange(16) * (math.pi / 8.0)])
         return points.phi
-
-    def _by_series(self, points: Points) -> list[tuple[Series, Index]]:
-        """Return the series that have points, with the indices of these points."""
-        pairs = ((s, np.flatnonzero(points.series == n)) for n, s in enumerate(self.series))
-        return [(s, indices) for s, indices in pairs if len(indices)]
 
     def _derivatives(
         self, design: Array, phi: Array, points: Points, by_series: list[tuple[Series, Index]]

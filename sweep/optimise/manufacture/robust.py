@@ -124,7 +124,7 @@ def robust(
     designs, numbers = _starting_designs(results, more)
     if not designs:
         return None
-    should_stop, stored = stop or _never, stored or Kept()
+    should_stop, stored = stop or (lambda: False), stored or Kept()
     level = NormalDist().inv_cdf(1.0 - (1.0 - (tolerance.robust or 0.0)) / VIOLATION_WAYS)
     total = len(designs) + min(CONTINUED, len(designs))
 
@@ -165,10 +165,6 @@ def robust(
     best = replace(best, result=replace(best.result, agree=max(1, agree)))
     unfinished = any(x.cut for x in runs) or len(runs) < len(ends) or len(reached) < len(designs)
     return replace(best, cut=best.cut or unfinished)
-
-
-def _never() -> bool:
-    return False
 
 
 def _same_design(problem: Problem, first: Result, second: Result) -> bool:
@@ -247,7 +243,7 @@ class _Calibrate:
             if wanted <= share <= wanted + excess and step < STEP_SETTLED and min(saving, gain) < SAVING_SETTLED:
                 break
             reach *= REACH_FACTOR
-        nominal = Model(self.problem, Program(self.problem), best.result.design, _never)
+        nominal = Model(self.problem, Program(self.problem), best.result.design, lambda: False)
         state = nominal.state(self.problem.scaled(best.result.design[None, :])[0])
         return replace(best, result=replace(best.result, violation=state.violation, relaxation={}))
 

@@ -202,11 +202,6 @@ def basins(values: Sequence[float]) -> list[int]:
     return numbers
 
 
-def cut_afterwards(finished: Survey) -> Survey:
-    """Return the survey of a search whose time ran out after all starts had been searched."""
-    return replace(finished, ended="time", late=True)
-
-
 def with_basins(results: Sequence[Result]) -> list[Result]:
     """Return results with their basin, ordered by rank: 1 for the best; infeasible ones have 0 and come last."""
     numbers = basins([r.objective if r.feasible else math.inf for r in results])

@@ -99,10 +99,11 @@ class Program:
         complete = turns
         for requirement in self.requirements:
             complete = layout.require(requirement) and complete
-        for term, shift in layout.upper(self.objective):
+        sums = layout.upper(self.objective)
+        for term, shift in sums:
             layout.add(term, shift, -1.0 / scale, 0.0, 1.0, False, Label(self.objective.name, "objective"))
-        reaches = all(curves.series.index(s) in points.series for s in self.turning.series)
-        return layout.form(complete and layout.has_objective, reaches)
+        assembles = all(curves.series.index(s) in points.series for s in self.turning.series)
+        return layout.form(complete and bool(sums), assembles)
 
     def reading_point(self, name: str, curves: Curves, design: Array, points: Points) -> int:
         """Return the number of the point at which one of the ``readings`` is taken; -1 if the design has none."""
@@ -140,10 +141,6 @@ class _Layout:
         self.terms: list[Term] = []
         self.rows: list[tuple[float, float, bool, Label]] = []
 
-    @property
-    def has_objective(self) -> bool:
-        return any(label.side == "objective" for *_, label in self.rows)
-
     def add(
         self, term: Term, shift: float, weight: float, bound: float, slack: float, equal: bool, label: Label
     ) -> None:
@@ -154,24 +151,15 @@ class _Layout:
         """Add the rows of one limit; return False if the design has no extremum of the limited output."""
         exists = True
         self._exclude_earlier_passages(r, "minimum" if r.maximum is None else "maximum")
-        if r.equal and r.minimum is not None:
-            for term, shift in self.lower(r.measure)[:1]:
-                size = self._violation_scale(r, r.minimum)
-                label = _label(r, "equal", r.minimum, size)
-                self.add(term, shift, 1.0 / size, -r.minimum / size, 0.0, True, label)
-            return bool(self.lower(r.measure))
-        if r.minimum is not None:
-            terms, size = self.lower(r.measure), self._violation_scale(r, r.minimum)
-            exists = exists and bool(terms)
-            for term, shift in self._shifted(terms, r.lower_shift):
-                label = _label(r, "minimum", r.minimum, size)
-                self.add(term, shift, 1.0 / size, -r.minimum / size, 0.0, False, label)
-        if r.maximum is not None:
-            terms, size = self.upper(r.measure), self._violation_scale(r, r.maximum)
-            exists = exists and bool(terms)
-            for term, shift in self._shifted(terms, r.upper_shift):
-                label = _label(r, "maximum", r.maximum, size)
-                self.add(term, shift, -1.0 / size, r.maximum / size, 0.0, False, label)
+        sides = [("minimum", r.minimum, 1.0, r.lower_shift), ("maximum", r.maximum, -1.0, r.upper_shift)]
+        for side, bound, sense, change in [("equal", r.minimum, 1.0, NO_SHIFT)] if r.equal else sides:
+            if bound is None:
+                continue
+            sums, size = (self.lower if sense > 0.0 else self.upper)(r.measure), self._violation_scale(r, bound)
+            exists = exists and bool(sums)
+            for term, shift in sums[:1] if r.equal else self._shifted(sums, change):
+                label = _label(r, side, bound, size)
+                self.add(term, shift, sense / size, -sense * bound / size, 0.0, r.equal, label)
         return exists
 
     def _shifted(self, terms: list[tuple[Term, float]], change: BoundShift) -> list[tuple[Term, float]]:
@@ -314,7 +302,7 @@ class _Layout:
         amplitude = 1.0 if r.measure.is_angle else max((abs(self.points.value[k]) for k in extrema), default=0.0)
         return violation_scale(max(abs(bound), 1e-3 * amplitude))
 
-    def form(self, complete: bool, reaches: bool) -> Form:
+    def form(self, complete: bool, assembles: bool) -> Form:
         matrix = np.zeros((len(self.terms), 2 * len(self.points) + len(self.scalars)))
         for row, term in enumerate(self.terms):
             for k, weight in term.items():
@@ -322,5 +310,5 @@ class _Layout:
         constant, slack, equal, labels = (list(c) for c in zip(*self.rows, strict=True)) if self.rows else ([],) * 4
         return Form(
             self.points, self.scalars, matrix, np.array(constant, np.float64), np.array(slack, np.float64),
-            np.array(equal, np.bool_), tuple(labels), complete, reaches,
+            np.array(equal, np.bool_), tuple(labels), complete, assembles,
         )  # fmt: skip
