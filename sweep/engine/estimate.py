@@ -41,7 +41,7 @@ THREAD_EFFICIENCY = 0.97
 
 
 # Evaluations of a local search in the median, evaluations to compile and time one, and evaluations equivalent to a
-# population of needle drives: 27 and 29 s at 9 ms each were measured, without and with room for tolerances.  If a
+# population of needle drives: 27 and 29 s at 9 ms each were measured, without and with margins for tolerances.  If a
 # trial search converges within TRIED_SECONDS, its own number of evaluations is used.
 TYPICAL_LOOKS, TRIED_LOOKS, POPULATION_LOOKS = 300, 40, 3000
 TRIED_SECONDS = 0.5
@@ -164,7 +164,7 @@ def searches(study: Study, jobs: int, known: Pilot) -> tuple[tuple[str, float, f
 
 
 def _robust_looks(settings: OptimiseSettings, settled: int | None) -> tuple[int, int]:
-    """Estimate the evaluations of the searches with room for tolerances: typical, and if none converges.
+    """Estimate the evaluations of the searches with margins for tolerances: typical, and if none converges.
 
     Searches of needle drives use all evaluations they are allowed: 9 to 14 s per start and 33 to 41 s per end were
     measured, samples included, where 1600 and 4000 evaluations take 14 and 36 s.  Where a trial search has ``settled``
