@@ -136,22 +136,34 @@ def law(designs: Array, i: int, u: float, v: float) -> tuple[float, float, float
 
 @inline
 def lowest(designs: Array, i: int) -> tuple[float, float]:
-    """Find cosine and sine of the cam angle where P is least: the best of LOOKS samples, then its slope's zero."""
-    best, where, step = math.inf, 0.0, 2.0 * math.pi / LOOKS
+    """Find cosine and sine of the cam angle where P is least: of all valleys of LOOKS samples, by the slope's zero.
+
+    The lowest sample may stand in a valley that is not the lowest: each whose parabola may reach as deep is followed.
+    """
+    step = 2.0 * math.pi / LOOKS
+    # real parts only: where P is least its slope is zero, so a complex step of the place does not change the value
+    least = math.inf
     for j in range(LOOKS):
-        # real part only: where P is least its slope is zero, so a complex step of the place does not change the value
-        value = law(designs, i, math.cos(step * j), math.sin(step * j))[0].real
-        if value < best:
-            best, where = value, step * j
-    low, high = where - step, where + step
-    for _ in range(STEPS):
-        middle = 0.5 * (low + high)
-        if law(designs, i, math.cos(middle), math.sin(middle))[1].real < 0.0:
-            low = middle
-        else:
-            high = middle
-    middle = 0.5 * (low + high)
-    return math.cos(middle), math.sin(middle)
+        least = min(least, law(designs, i, math.cos(step * j), math.sin(step * j))[0].real)
+    best, u, v = math.inf, 1.0, 0.0
+    before = law(designs, i, math.cos(step), -math.sin(step))[0].real
+    here = law(designs, i, 1.0, 0.0)[0].real
+    for j in range(LOOKS):
+        after = law(designs, i, math.cos(step * (j + 1)), math.sin(step * (j + 1)))[0].real
+        if here <= min(before, after) and here - (max(before, after) - here) <= least:
+            low, high = step * (j - 1), step * (j + 1)
+            for _ in range(STEPS):
+                middle = 0.5 * (low + high)
+                if law(designs, i, math.cos(middle), math.sin(middle))[1].real < 0.0:
+                    low = middle
+                else:
+                    high = middle
+            c, s = math.cos(low), math.sin(low)
+            value = law(designs, i, c, s)[0].real
+            if value < best:
+                best, u, v = value, c, s
+        before, here = here, after
+    return u, v
 
 
 @inline
@@ -286,19 +298,25 @@ def _need(designs: Array, i: int, r: Reduced, cotangent: float, phi: float) -> t
 
 @inline
 def _largest(designs: Array, i: int, r: Reduced, cotangent: float) -> tuple[float, float]:
-    """Find the largest radius needed over the turn and its place: the best sample, then its slope's zero."""
-    best, where, step = -math.inf, 0.0, 2.0 * math.pi / ROOT_LOOKS
+    """Find the largest radius needed over the turn and its place: of all tops of the samples, by the slope's zero."""
+    step, largest = 2.0 * math.pi / ROOT_LOOKS, -math.inf
     for j in range(ROOT_LOOKS):
-        value = _need(designs, i, r, cotangent, step * j)[0]
-        if value > best:
-            best, where = value, step * j
-    low, high = where - step, where + step
-    for _ in range(ROOT_STEPS):
-        middle = 0.5 * (low + high)
-        if _need(designs, i, r, cotangent, middle)[1] > 0.0:
-            low = middle
-        else:
-            high = middle
-    middle = 0.5 * (low + high)
-    # the larger of both: where two maxima share the bracket the bisection may have come to the lower one
-    return max(_need(designs, i, r, cotangent, middle)[0], best), middle
+        largest = max(largest, _need(designs, i, r, cotangent, step * j)[0])
+    best, where = -math.inf, 0.0
+    before, here = _need(designs, i, r, cotangent, -step)[0], _need(designs, i, r, cotangent, 0.0)[0]
+    for j in range(ROOT_LOOKS):
+        after = _need(designs, i, r, cotangent, step * (j + 1))[0]
+        if here >= max(before, after) and here + (here - min(before, after)) >= largest:
+            low, high = step * (j - 1), step * (j + 1)
+            for _ in range(ROOT_STEPS):
+                middle = 0.5 * (low + high)
+                if _need(designs, i, r, cotangent, middle)[1] > 0.0:
+                    low = middle
+                else:
+                    high = middle
+            # the larger of both: where two maxima share the bracket the bisection may have come to the lower one
+            value = max(_need(designs, i, r, cotangent, low)[0], here)
+            if value > best:
+                best, where = value, low
+        before, here = here, after
+    return best, where

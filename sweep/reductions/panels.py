@@ -37,6 +37,7 @@ VANISHED = 1e-6  # share of the size below which a root counts as a zero
 EDGE = 2.0**17  # times EPS of the size: change over NARROWEST/4 of a curve with a slope of six sizes per radian
 CROWD = 48  # number of small panels of one curve beyond which only rounding is being halved
 ALLOWED = 1.0 / 32.0  # share of the target by which two successive polynomials may differ
+LEVEL = 16.0  # times EPS of a value: most by which the poses of a level curve miss the polynomial through them, 10.7
 AGAIN = 8.0  # factor from that difference to the claimed error: poses may see only 1/8 of a kink between them
 STEADY = 10.0 * AGAIN  # times EPS of a value: largest error claimed for a curve that is constant but for rounding
 SLOPE = 2.0 * (NODES - 1) ** 2  # bound of the slope of a polynomial bounded by 1 on a panel of width 1 (Markov)
@@ -195,7 +196,7 @@ def _climbed(
         top = _tops(halves, request.mode, AGAIN * miss)
         settled, at_end = miss <= tolerance, (top.phi <= halves.low) | (top.phi >= halves.high)
         if locate:
-            settled &= (top.err_phi <= target) | at_end | (miss <= 4.0 * EPS * np.abs(top.value))
+            settled &= (top.err_phi <= target) | at_end | (miss <= LEVEL * EPS * np.abs(top.value))
         off = _off(family, designs, halves, top, request, np.flatnonzero(settled & ~narrow))
         settled &= off <= tolerance
         top.err[:] += AGAIN * off + np.where(at_end, EDGE * EPS * size[halves.row], 0.0)

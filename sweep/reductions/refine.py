@@ -234,13 +234,15 @@ def hill(row: Index, phi: Array, err_phi: Array, height: Array, err: Array, chos
     first = _first(row, phi, err_phi, height, err, chosen)
     rival = np.flatnonzero(height + 2.0 * err >= height[_of_row(row, chosen)])
     rival = rival[np.lexsort((phi[rival], row[rival]))]
-    apart = (np.diff(row[rival]) != 0) | (np.diff(phi[rival]) > NEIGHBOURS)
+    gap = np.diff(phi[rival]) - err_phi[rival[:-1]] - err_phi[rival[1:]]  # a level piece is as high at its other end
+    apart = (np.diff(row[rival]) != 0) | (gap > NEIGHBOURS)
     number = np.zeros(row.size, np.int64)
     number[rival[1:]] = np.cumsum(apart)
     # Peaks on both sides of the angle 0 belong to one hill: the last one of a row precedes its first one.
     head = rival[np.flatnonzero(np.diff(row[rival], prepend=-1))]
     tail = rival[np.flatnonzero(np.diff(row[rival], append=-1))]
-    around = (phi[head] + TWO_PI - phi[tail] <= NEIGHBOURS) & (number[head] != number[tail])
+    seam = phi[head] - err_phi[head] + TWO_PI - phi[tail] - err_phi[tail]
+    around = (seam <= NEIGHBOURS) & (number[head] != number[tail])
     same = np.arange(row.size)
     same[number[tail[around]]] = number[head[around]]
     phi, number = phi - TWO_PI * (same[number] != number), same[number]

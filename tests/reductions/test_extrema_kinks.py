@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+import sweep
 from kernels import status as st
 from sweep.effects import extended
 from sweep.evaluation.summaries import design_outputs
@@ -172,6 +173,18 @@ def test_the_place_of_a_dwell_errs_by_as_much_as_the_dwell_is_long():
     assert (away >= 2.0 - 1e-3).all() and (away <= 3.5 + 1e-3).all()
     assert (np.maximum(away - 2.0, 3.5 - away) <= err_phi + 0.1).all()
     assert (err_phi <= 1.5 + 0.1).all()
+
+
+@pytest.mark.parametrize(("start", "output", "end"), [(1.0, "x_r", 1.0), (-0.7, "s", 5.583185307179586)])
+def test_a_rest_cut_into_panels_is_one_hill_wherever_the_cam_begins(start, output, end):
+    """The rest begins at start + 2.5: tops of its level panels stand as far apart as the panels are wide."""
+    cam = {"lift": 1.0, "r0": 3.0, "e": 0.4, "law": 2.0, "rise": 1.0, "dwell": 0.5, "fall": 1.0, "start": start}
+    found = sweep.summarise("cam", cam, f"phi_min_{output}", accuracy=1e-8).iloc[0]
+    place, error = found[f"phi_min_{output}"], found[f"err_phi_min_{output}"]
+    assert found.status == st.OK
+    for edge in (start + 2.5, end):  # both are as low as what is between
+        away = abs(np.remainder(edge - place + np.pi, 2.0 * np.pi) - np.pi)
+        assert away <= error + 1e-3
 
 
 def test_a_curve_that_is_all_noise_is_not_converged_and_its_error_says_so():

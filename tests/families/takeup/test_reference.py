@@ -234,6 +234,17 @@ def test_least_radius_of_the_guided_cam_brings_the_pressure_angle_to_the_jamming
     assert there.pressure_angle[0] == pytest.approx(size.jam_angle[0], rel=1e-12)
 
 
+def test_the_profile_of_the_guided_cam_counts_from_the_deepest_of_several_valleys():
+    """Of six valleys one stands on a sample of the search, the two deepest between samples."""
+    row = GUIDED | {"A1": 0.02, "B2": 0.0, "A6": 2.0, "mu1": 0.6, "mu2": 0.7}
+    found = sweep.summarise("guided_cam", row, ["least_displacement", "least_radius"], accuracy=1e-8).iloc[0]
+    turn = sweep.evaluate("guided_cam", row, ["S", "dS"], phi=np.linspace(0.0, 2.0 * np.pi, 200_001))
+    least, jams = turn.S.min(), math.tan(math.atan2(1.0 - 0.42, 1.3))
+    # poses 3e-5 rad apart miss the top of a wave of order 6 by 36 x (1.6e-5)^2/2 = 5e-9 of its height, here 2.5
+    assert abs(found.least_displacement - least) <= 2e-8
+    assert abs(found.least_radius - (np.abs(turn.dS) / jams - (turn.S - least)).max()) <= 1e-7
+
+
 @settings(deadline=None, max_examples=50)
 @given(mu1=some.floats(0.0, 0.9), mu2=some.floats(0.0, 0.9))
 def test_jamming_angle_solves_the_equilibrium_of_the_follower_and_the_printed_root_its_complement(mu1, mu2):
