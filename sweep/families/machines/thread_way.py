@@ -80,8 +80,9 @@ def outside(ends: tuple[str, ...], found: Mapping[str, Any], inside: bool = Fals
     """Return the mask of the poses outside two events, or between them for ``inside``; None for the whole turn."""
     if not ends:
         return None
-    start, end = (np.real(found[f"phi_{name}"]) for name in ends)
-    return (turned(np.real(found[PHI]) - start) < turned(end - start)) == inside
+    # Compared as they are: at an event where several places begin or end, all masks change at the same pose.
+    phi, start, end = (turned(np.real(found[name])) for name in (PHI, *(f"phi_{name}" for name in ends)))
+    return np.where(start <= end, (phi >= start) & (phi < end), (phi >= start) | (phi < end)) == inside
 
 
 def masked(where: Any, values: Any) -> Any:

@@ -126,6 +126,31 @@ def test_extremes_of_the_surplus_are_found_at_the_jumps():
     np.testing.assert_array_equal(grid["demand"], grid["upper_demand"])
 
 
+def test_places_that_end_at_one_event_end_at_the_same_pose():
+    # At neighbouring doubles the hole was still held and the blade no longer: a piece of no length, and nan.
+    path = [*PATH[:2], {"on": HOLE.tolist(), "held": ["late", "cast"]}, *PATH[2:]]
+    made = machine_of(RELATIONS | {"late": {"event": "a_across", "level": 1.0}, "upper": {"thread": path}})
+    event = sweep.summarise(made, DESIGN, ["phi_cast"])["phi_cast"][0]
+    near = event + np.spacing(event) * np.arange(-20.0, 21.0)
+    wrap, length = poses(made, ["wrap", "needed"], near)
+    assert np.isfinite(wrap).all() and (np.abs(np.diff(length)) > 1e-9).sum() == 1
+
+
+@pytest.mark.parametrize("name", ["tension", "rate", "wrap"])
+def test_root_mean_squares_are_those_of_gauss_between_the_events(name):
+    made = machine(tension=20.0 * GF)
+    found = sweep.summarise(made, DESIGN, [f"rms_upper_{name}"], accuracy=1e-8).iloc[0]
+    # 400 panels between events: a kink at the end of the blade is off by (1/400)^2 of one panel's share, 1e-8.
+    x, weights = np.polynomial.legendre.leggauss(12)
+    square = 0.0
+    for start, end in pairwise([PHI, casting(), PHI + TURN]):
+        left = start + (end - start) * np.arange(400.0)[:, None] / 400.0
+        values = poses(made, [name], ((left + (end - start) * (x + 1.0) / 800.0) % TURN).ravel())[0]
+        square += (end - start) / 800.0 * (np.tile(weights, 400) @ values**2)
+    assert found["status"] == 0
+    assert found[f"rms_upper_{name}"] == pytest.approx(math.sqrt(square / TURN), rel=1e-7)
+
+
 @pytest.mark.parametrize("name", ["min_upper_rate", "max_upper_rate"])
 def test_the_rate_over_a_blade_keeps_the_accuracy_where_the_thread_comes_to_its_end(name):
     made = machine(thread=[[-73.8, 11.0, -1.6], "blade", [-56.5, 11.9, 6.7]])
