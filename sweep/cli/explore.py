@@ -20,7 +20,7 @@ from sweep.study.load import study_from_data
 
 @click.command()
 @click.argument("source")
-@click.option("--port", type=click.IntRange(0, 65535), default=0, help="Of the address; default: any that is free.")
+@click.option("--port", type=click.IntRange(0, 65535), default=0, help="Port of the page; default: a free one.")
 @click.option("--open/--no-open", "opened", default=False, help="Show the page in the browser of this machine.")
 def explore(source: str, port: int, opened: bool) -> None:
     """Take a design in hand: sliders for its dimensions; mechanism, curves, outputs and limits follow.

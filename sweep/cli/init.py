@@ -33,19 +33,19 @@ NAME = re.compile(r"[a-z0-9][a-z0-9-]{0,63}")
     "--member",
     "members",
     multiple=True,
-    help="Of a machine, once for each: NAME=FAMILY, such as needle=rssr+guide.",
+    help="A member of a machine, NAME=FAMILY, such as needle=rssr+guide; once for each member.",
 )
 @click.option(
     "--points",
     type=IS_FILE,
-    help="Of --family: the points of a drawing, as of `sweep points`; the study is about that design.",
+    help="Points of a drawing, as for `sweep points`, from which the design of --family is taken.",
 )
-@click.option("--unit", default="mm", show_default=True, help="Of the coordinates in --points.")
+@click.option("--unit", default="mm", show_default=True, help="Unit of the coordinates in --points.")
 @click.option(
     "--from-cyclogram",
     "cyclogram",
     type=IS_THERE,
-    help="A study of a machine with [cyclogram]: studies NAME-MEMBER of its members, in the order of design.",
+    help="A study of a machine with [cyclogram]; its members get studies NAME-MEMBER, in the order of design.",
 )
 @click.option("--into", type=A_FOLDER, default=Path(), help="Where the folder NAME is made; default: here.")
 def init(

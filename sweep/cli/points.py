@@ -29,19 +29,20 @@ FILE = click.argument("file", type=IS_FILE)
 @click.command()
 @click.argument("family", shell_complete=complete_families)
 @FILE
-@click.option("--part", default="", help="Of a file with several: `stage 1`, the member's name, or both.")
-@click.option("--unit", default="mm", show_default=True, help="Of a file that says none, as a heading `x [inch]` does.")
-@click.option("--tolerance", type=float, help="Largest residual as a part of the drawing's size; default 1e-4.")
-@click.option("--out", type=A_FILE, help="A table for `sweep eval`: one design.")
+@click.option("--part", default="", help="Part of a file that has several: `stage 1`, the member's name, or both.")
+@click.option("--unit", default="mm", show_default=True, help="Unit, if no heading such as `x [inch]` names it.")
+@click.option("--tolerance", type=float, help="Largest residual as a fraction of the drawing's size; default 1e-4.")
+@click.option("--out", type=A_FILE, help="Write the design as a table for `sweep eval`.")
 def points(family: str, file: Path, part: str, unit: str, tolerance: float | None, out: Path | None) -> None:
     """Find the dimensions of FAMILY from the points of a drawing: FILE.csv with the columns name, x, y, z.
 
-    FILE may also be a .csv, .dxf or .glb that `sweep export` wrote; of several stages or members --part names one.
+    FILE may also be a .csv, .dxf or .glb that `sweep export` wrote; if it holds several stages or members, --part names
+    one of them.
 
-    Names are A (centre of the crank circle), axis_A (crank axis), B (crank pin), C, D, axis_D and so on: see
-    docs/frames.md.  Printed is TOML: the table [design] of a study file, and [drawing]: the crank angle of the drawn
-    position, where the family's frame stands in the drawing [mm], and the residual: how far a point lies from its joint
-    at most.  --out writes the parameters and phi as a table [mm, rad].
+    The points are named A (centre of the crank circle), axis_A (crank axis), B (crank pin), C, D, axis_D and so on; see
+    docs/frames.md.  The answer is TOML: the table [design] of a study file, and [drawing] with the crank angle of the
+    drawn position, the place of the family's frame in the drawing [mm], and the residual, which is the largest distance
+    of a point from its joint.  --out also writes the parameters and phi as a table [mm, rad].
     """
     out = checked_format(out)
     found = drawn(family, file, part, unit, TOLERANCE if tolerance is None else tolerance)
@@ -112,10 +113,10 @@ NOTHING = 4  # same exit code as `sweep run`: no design within the limits
     help="Points of each sample tried first.",
 )
 @click.option(
-    "--starts", default=6, show_default=True, type=click.IntRange(min=1), help="Of them, how many are refined."
+    "--starts", default=6, show_default=True, type=click.IntRange(min=1), help="How many of them are refined."
 )
-@click.option("--samples", default=12, show_default=True, type=click.IntRange(min=1), help="How many at most.")
-@click.option("--seed", default=0, show_default=True, type=click.IntRange(min=0), help="Of the samples.")
+@click.option("--samples", default=12, show_default=True, type=click.IntRange(min=1), help="Most samples drawn.")
+@click.option("--seed", default=0, show_default=True, type=click.IntRange(min=0), help="Seed of the samples.")
 @click.option("--out", type=click.Path(path_type=Path), help="The mechanisms as a table: .csv or .parquet.")
 def task(file: Path, candidates: int, starts: int, samples: int, seed: int, out: Path | None) -> None:
     """Answer the [task] table of FILE (docs/tasks.md): mechanisms, the best first, lengths in mm, angles in rad."""

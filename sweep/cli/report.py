@@ -91,15 +91,15 @@ class Options(TypedDict):
 @click.option("--out", required=True, type=A_FILE, help="A .svg, .png or .pdf file; of cyclogram also a .csv table.")
 @click.option(
     "--design",
-    help="Of a dataset: optimum, reference, best, or a number of the column design; of motion several, as a,b.",
+    help="Design of a dataset: optimum, reference, best, or a number of the column design; for motion several, as a,b.",
 )
-@click.option("--row", type=click.IntRange(min=0), default=0, show_default=True, help="Of TABLE.")
-@click.option("--want", help="Of motion: outputs, separated by commas.")
-@click.option("--phi", type=float, default=0.0, show_default=True, help="Of mechanism: crank angle [rad].")
+@click.option("--row", type=click.IntRange(min=0), default=0, show_default=True, help="Row of TABLE to draw.")
+@click.option("--want", help="For motion: outputs, separated by commas.")
+@click.option("--phi", type=float, default=0.0, show_default=True, help="For mechanism: crank angle [rad].")
 @ANGLES
-@click.option("--view", help="Of mechanism: space, xy, zy or xz.")
-@click.option("--positions", type=click.IntRange(min=1), default=1, show_default=True, help="Of mechanism, in a turn.")
-@click.option("--output", help="Of tolerance: the output whose histogram is drawn; all in percent if left out.")
+@click.option("--view", help="For mechanism: space, xy, zy or xz.")
+@click.option("--positions", type=click.IntRange(min=1), default=1, show_default=True, help="For mechanism: how many.")
+@click.option("--output", help="For tolerance: output whose histogram is drawn; without it, all outputs in percent.")
 def draw(what: str, source: str, table: Path | None, out: Path, **options: Unpack[Options]) -> None:
     """Draw one picture.
 
