@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from kernels import status as st
 from kernels.boxes.taylor import LINEAR, ROUNDING, TINY, VALUE, least, up
 from kernels.jit import inline, kernel
-from kernels.linear.nearest import nearest_with, nothing_held
+from kernels.linear.nearest import nearest_with, no_active_rows
 from kernels.types import Array
 
 Indices = NDArray[np.int64]
@@ -67,7 +67,7 @@ def multipliers(rows: Array, count: int, objective: NDArray[np.uint8], half: Arr
     """
     n, scale = half.shape[0], 0.0
     sides, needs = np.zeros((n + 1, count + 2 * n + 1)), np.zeros(count + 2 * n + 1)
-    centre, y, held = np.zeros(n + 1), np.empty(n + 1), nothing_held(n + 1, count + 2 * n + 1)
+    centre, y, held = np.zeros(n + 1), np.empty(n + 1), no_active_rows(n + 1, count + 2 * n + 1)
     for j in range(count):
         sign = -1.0 if objective[j] else 1.0
         needs[j], scale = -sign * rows[j, 0], max(scale, abs(rows[j, 0]))
@@ -82,7 +82,7 @@ def multipliers(rows: Array, count: int, objective: NDArray[np.uint8], half: Arr
     out[:] = 0.0
     for k in range(found):
         if held.numbers[k] < count:
-            out[held.numbers[k]] = max(-held.share[k] if status == st.LIMIT_EXCEEDED else held.weights[k], 0.0)
+            out[held.numbers[k]] = max(-held.shares[k] if status == st.LIMIT_EXCEEDED else held.weights[k], 0.0)
     if status == st.LIMIT_EXCEEDED and held.numbers[found] < count:
         out[held.numbers[found]] = 1.0
     return int(status)

@@ -36,47 +36,47 @@ class Limits(NamedTuple):
 
 
 @inline
-def _parabola(before: float, here: float, after: float) -> tuple[float, float, float]:
+def _parabola(before: float, middle: float, after: float) -> tuple[float, float, float]:
     """Weights of three neighbouring samples, the middle one the lowest, in the minimum of the parabola through them."""
-    bend = before - 2.0 * here + after
-    place = 0.5 * (before - after) / bend if bend > 0.0 else 0.0
-    half = 0.5 * place * place
-    return half - 0.5 * place, 1.0 - 2.0 * half, half + 0.5 * place
+    second_difference = before - 2.0 * middle + after
+    vertex = 0.5 * (before - after) / second_difference if second_difference > 0.0 else 0.0
+    half = 0.5 * vertex * vertex
+    return half - 0.5 * vertex, 1.0 - 2.0 * half, half + 0.5 * vertex
 
 
 @inline
-def _end(y: Array, sign: float) -> tuple[int, int, int, float, float, float]:
+def _peak_weights(y: Array, sign: float) -> tuple[int, int, int, float, float, float]:
     """Three poses and their weights in the largest value of ``sign * y``, interpolated between the poses."""
-    last, at, best = len(y) - 1, 0, -math.inf
+    last, peak, highest = len(y) - 1, 0, -math.inf
     for p in range(last + 1):
-        if sign * y[p] > best:
-            at, best = p, sign * y[p]
-    before, after = at - 1 if at > 0 else last, at + 1 if at < last else 0
-    first, middle, third = _parabola(-sign * y[before], -sign * y[at], -sign * y[after])
-    return before, at, after, first, middle, third
+        if sign * y[p] > highest:
+            peak, highest = p, sign * y[p]
+    before, after = peak - 1 if peak > 0 else last, peak + 1 if peak < last else 0
+    first, middle, third = _parabola(-sign * y[before], -sign * y[peak], -sign * y[after])
+    return before, peak, after, first, middle, third
 
 
 @inline
-def _every(y: Array, of: Array, level: float, factor: float, values: Array, slopes: Array) -> None:
-    """Write the rows at every pose, ``level + factor y``, and their gradients where ``of`` has any."""
+def _rows_at_every_pose(y: Array, dy: Array, level: float, factor: float, values: Array, slopes: Array) -> None:
+    """Write the rows at every pose, ``level + factor y``, and their gradients where ``dy`` has any."""
     m = len(y)
     for p in range(m):
         values[p] = level + factor * y[p]
-    for q in range(of.shape[0]):
+    for q in range(dy.shape[0]):
         for p in range(m):
-            slopes[q, p] = factor * of[q, p]
+            slopes[q, p] = factor * dy[q, p]
     for p in range(m):
         before, after = p - 1 if p > 0 else m - 1, p + 1 if p < m - 1 else 0
         low, here, high = factor * y[before], factor * y[p], factor * y[after]
         if here <= low and here <= high and low - 2.0 * here + high > 0.0:
             first, middle, third = _parabola(low, here, high)
             values[p] = level + first * low + middle * here + third * high
-            for q in range(of.shape[0]):
-                slopes[q, p] = factor * (first * of[q, before] + middle * of[q, p] + third * of[q, after])
+            for q in range(dy.shape[0]):
+                slopes[q, p] = factor * (first * dy[q, before] + middle * dy[q, p] + third * dy[q, after])
 
 
 @kernel
-def sampled_rows(curves: Array, moved: Array, limits: Limits, values: Array, slopes: Array) -> None:
+def sampled_rows(curves: Array, dcurves: Array, limits: Limits, values: Array, slopes: Array) -> None:
     """Write the rows ``(bound - sign * curve) / size`` of limits on sampled curves of one design, and their gradients.
 
     A value that is lowest among its neighbours is replaced by the minimum of the parabola there.  The place of the
@@ -85,17 +85,17 @@ def sampled_rows(curves: Array, moved: Array, limits: Limits, values: Array, slo
     Parameters
     ----------
     curves : (c, m) at m poses of a turn
-    moved : (c, n, m) derivatives of the curves; n is 0 where no gradients are wanted
+    dcurves : (c, n, m) derivatives of the curves; n is 0 where no gradients are wanted
     limits : in the order of their rows
     values : (r,) out, of which the first rows are written
     slopes : (n, r) out, gradients of the rows
     """
     m, r = curves.shape[1], 0
     for j in range(len(limits.which)):
-        y, of, factor = curves[limits.which[j]], moved[limits.which[j]], -limits.signs[j] / limits.sizes[j]
+        y, dy, factor = curves[limits.which[j]], dcurves[limits.which[j]], -limits.signs[j] / limits.sizes[j]
         level = limits.bounds[j] / limits.sizes[j]
         if limits.at[j] == EVERY:
-            _every(y, of, level, factor, values[r : r + m], slopes[:, r : r + m])
+            _rows_at_every_pose(y, dy, level, factor, values[r : r + m], slopes[:, r : r + m])
             r += m
             continue
         values[r] = level
@@ -104,10 +104,10 @@ def sampled_rows(curves: Array, moved: Array, limits: Limits, values: Array, slo
         for sign in (1.0, -1.0):
             if limits.at[j] == (LOWEST if sign > 0.0 else HIGHEST):
                 continue
-            before, here_at, after, first, middle, third = _end(y, sign)
-            share = -factor if limits.at[j] == RANGE and sign < 0.0 else factor
-            values[r] += share * (first * y[before] + middle * y[here_at] + third * y[after])
-            for q in range(of.shape[0]):
-                along = first * of[q, before] + middle * of[q, here_at] + third * of[q, after]
-                slopes[q, r] += share * along
+            before, peak, after, first, middle, third = _peak_weights(y, sign)
+            weight = -factor if limits.at[j] == RANGE and sign < 0.0 else factor
+            values[r] += weight * (first * y[before] + middle * y[peak] + third * y[after])
+            for q in range(dy.shape[0]):
+                slope = first * dy[q, before] + middle * dy[q, peak] + third * dy[q, after]
+                slopes[q, r] += weight * slope
         r += 1

@@ -7,39 +7,39 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from kernels.descent.motion import Index, Motion, gradients, moving, no_motion, nothing_moved
-from kernels.descent.program import Program, begin, box, learn, no_program, prepare, solve, units
-from kernels.descent.room import rooms
-from kernels.descent.rows import UNKNOWNS, Task, columns_of, slopes_of, values_of, worth_of
-from kernels.descent.unknowns import solved, unknowns_of
+from kernels.descent.motion import Index, Motion, empty_motion, gradients, motion_of, zero_slopes
+from kernels.descent.program import Program, bfgs, no_program, prepare, reset_curvature, set_box, solve, units
+from kernels.descent.room import margins_and_slopes
+from kernels.descent.rows import UNKNOWNS, Task, columns_of, merit_of, rows_and_slopes, rows_of
+from kernels.descent.unknowns import improved_unknowns, unknowns_of
 from kernels.jit import folded, inline, kernel, part
 from kernels.types import Array
 
 LOCKED = 1e6  # above the merit of any design that turns
 RADIUS, LARGEST, LEAST = 0.1, 0.3, 1e-6  # half widths of the box: at the start, at most, and where a descent is at rest
-SPENT = 1e-6  # promised gain, as a share of the objective, at which a descent has come to rest
-RENEWED = 1e-5  # gain since the last rest, as a share of the objective, above which a descent is started again
+REST_GAIN = 1e-6  # promised gain, as a share of the objective, at which a descent has come to rest
+RESTART_GAIN = 1e-5  # gain since the last rest, as a share of the objective, above which a descent is started again
 CORRECTIONS = 3  # second-order ones of a step: without them a valley of 0.015 mm is crossed in steps of 1e-3
-TRUSTED, GOOD = 0.1, 0.6  # share of the promised gain below which the box shrinks, and above which it grows
-WORTH, BOX, RESTED, LOOKS = 0, 1, 2, 3  # elements of ``state``
+SHRINK_BELOW, GROW_ABOVE = 0.1, 0.6  # share of the promised gain below which the box shrinks, and above which it grows
+MERIT, BOX, REST_MERIT, EVALUATIONS = 0, 1, 2, 3  # elements of ``state``
 
 
 class Design(NamedTuple):
-    """Design at a place: its columns, motion, linear unknowns, room and rows."""
+    """Design at a place: its columns, motion, linear unknowns, tolerance margins and rows."""
 
     place: Array
     row: Array
-    at: Motion
+    motion: Motion
     x: Array
-    room: Array
+    margin: Array
     values: Array
 
 
 @part
-def _no_design(task: Task) -> Design:
+def _empty_design(task: Task) -> Design:
     m = len(task.cos)
     return Design(
-        np.empty(len(task.columns)), np.empty(task.bases.shape[1]), no_motion(m), np.ones(UNKNOWNS), np.zeros(m + 1),
+        np.empty(len(task.columns)), np.empty(task.bases.shape[1]), empty_motion(m), np.ones(UNKNOWNS), np.zeros(m + 1),
         np.empty(len(task.kinds)),
     )  # fmt: skip
 
@@ -51,54 +51,54 @@ def _copy(x: Any, out: Any) -> None:
 
 
 @part
-def _with_room(task: Task, kind: int, d: Design, moved: Array) -> None:
+def _update_margin(task: Task, kind: int, d: Design, dmargin: Array) -> None:
     if len(task.sigma):
-        rooms(task, kind, d.place, d.x, d.room, moved)
+        margins_and_slopes(task, kind, d.place, d.x, d.margin, dmargin)
 
 
 @folded
-def _begun(task: Task, kind: int, d: Design) -> float:
+def _initial_merit(task: Task, kind: int, d: Design) -> float:
     """Find the linear unknowns of a design at its place; return its merit, infinite where it does not turn."""
-    none = np.empty((0, len(d.room)))
+    no_slopes = np.empty((0, len(d.margin)))
     columns_of(task, kind, d.place, d.row)
-    if not moving(d.row, task.cos, task.sin, d.at) > 0.0:
+    if not motion_of(d.row, task.cos, task.sin, d.motion) > 0.0:
         return math.inf
-    for p in range(len(d.room)):
-        d.room[p] = 0.0
-    if not unknowns_of(task, d.row, d.at, d.room, d.x):
+    for p in range(len(d.margin)):
+        d.margin[p] = 0.0
+    if not unknowns_of(task, d.row, d.motion, d.margin, d.x):
         return math.inf
     if len(task.sigma):
-        _with_room(task, kind, d, none)
-        if not unknowns_of(task, d.row, d.at, d.room, d.x):
+        _update_margin(task, kind, d, no_slopes)
+        if not unknowns_of(task, d.row, d.motion, d.margin, d.x):
             return math.inf
-        _with_room(task, kind, d, none)
-    values_of(task, d.row, d.at, d.x, d.room, d.values)
-    return _known(worth_of(task, d.values))
+        _update_margin(task, kind, d, no_slopes)
+    rows_of(task, d.row, d.motion, d.x, d.margin, d.values)
+    return _finite_merit(merit_of(task, d.values))
 
 
 @inline
-def _known(worth: float) -> float:
-    return worth if worth == worth else math.inf
+def _finite_merit(merit: float) -> float:
+    return merit if merit == merit else math.inf
 
 
 @kernel
-def begun(task: Task, kinds: Index, places: Array, x: Array, worth: Array) -> None:
+def initial_merits(task: Task, kinds: Index, places: Array, x: Array, merit: Array) -> None:
     """Compute the best linear unknowns (k, 5) at places (k, n), and merits (k,), infinite where nothing turns."""
-    d = _no_design(task)
+    d = _empty_design(task)
     for i in range(len(places)):
         _copy(places[i], d.place)
-        worth[i] = _begun(task, kinds[i], d)
+        merit[i] = _initial_merit(task, kinds[i], d)
         _copy(d.x, x[i])
 
 
 @part
-def _look(task: Task, kind: int, d: Design, slopes: Array) -> bool:
+def _evaluate(task: Task, kind: int, d: Design, slopes: Array) -> bool:
     """Compute the rows and gradients of a design; return whether the gradients are finite."""
     n, m = len(task.columns), len(task.cos)
-    by, moved = nothing_moved(n, m), np.zeros((n + UNKNOWNS, m + 1))
-    gradients(d.row, d.at, task.columns, task.cos, task.sin, by)
-    _with_room(task, kind, d, moved)
-    slopes_of(task, d.row, d.at, by, d.x, d.room, moved, d.values, slopes)
+    dmotion, dmargin = zero_slopes(n, m), np.zeros((n + UNKNOWNS, m + 1))
+    gradients(d.row, d.motion, task.columns, task.cos, task.sin, dmotion)
+    _update_margin(task, kind, d, dmargin)
+    rows_and_slopes(task, d.row, d.motion, dmotion, d.x, d.margin, dmargin, d.values, slopes)
     for k in range(len(slopes)):
         for j in range(slopes.shape[1]):
             if not math.isfinite(slopes[k, j]):
@@ -107,48 +107,48 @@ def _look(task: Task, kind: int, d: Design, slopes: Array) -> bool:
 
 
 @folded
-def _try(task: Task, kind: int, d: Design, step: Array, out: Design, spare: Design) -> float:
+def _evaluate_step(task: Task, kind: int, d: Design, step: Array, out: Design, spare: Design) -> float:
     """Evaluate a step with its own linear unknowns and with the best ones there; keep the better; return its merit."""
-    n, none = len(d.place), np.empty((0, len(d.room)))
+    n, no_slopes = len(d.place), np.empty((0, len(d.margin)))
     for k in range(n):
         out.place[k] = min(max(d.place[k] + step[k], 0.0), 1.0)
     for k in range(UNKNOWNS):
         out.x[k] = d.x[k] + step[n + k]
     columns_of(task, kind, out.place, out.row)
-    if not moving(out.row, task.cos, task.sin, out.at) > 0.0:
+    if not motion_of(out.row, task.cos, task.sin, out.motion) > 0.0:
         return math.inf
-    _with_room(task, kind, out, none)
-    values_of(task, out.row, out.at, out.x, out.room, out.values)
-    own = _known(worth_of(task, out.values))
+    _update_margin(task, kind, out, no_slopes)
+    rows_of(task, out.row, out.motion, out.x, out.margin, out.values)
+    stepped_merit = _finite_merit(merit_of(task, out.values))
     _copy(out.place, spare.place)
-    solved(task, out.row, out.at, out.x, out.room, spare.x)
-    _with_room(task, kind, spare, none)
-    values_of(task, out.row, out.at, spare.x, spare.room, spare.values)
-    other = _known(worth_of(task, spare.values))
-    if other <= own:
+    improved_unknowns(task, out.row, out.motion, out.x, out.margin, spare.x)
+    _update_margin(task, kind, spare, no_slopes)
+    rows_of(task, out.row, out.motion, spare.x, spare.margin, spare.values)
+    solved_merit = _finite_merit(merit_of(task, spare.values))
+    if solved_merit <= stepped_merit:
         _copy(spare.x, out.x)
-        _copy(spare.room, out.room)
+        _copy(spare.margin, out.margin)
         _copy(spare.values, out.values)
-    return float(min(own, other))
+    return float(min(stepped_merit, solved_merit))
 
 
 @part
-def _copied(d: Design, out: Design) -> None:
+def _copy_design(d: Design, out: Design) -> None:
     """Copy a design, row by row: assignments to slices take ten times as long to compile."""
     _copy(d.place, out.place)
     _copy(d.row, out.row)
     _copy(d.x, out.x)
-    _copy(d.room, out.room)
+    _copy(d.margin, out.margin)
     _copy(d.values, out.values)
-    for k in range(len(d.at.driver)):
-        _copy(d.at.driver[k], out.at.driver[k])
-    for k in range(len(d.at.driven)):
-        _copy(d.at.driven[k], out.at.driven[k])
-    for k in range(len(d.at.pin)):
-        _copy(d.at.pin[k], out.at.pin[k])
-    for k in range(len(d.at.b)):
-        _copy(d.at.b[k], out.at.b[k])
-        _copy(d.at.w[k], out.at.w[k])
+    for k in range(len(d.motion.driver)):
+        _copy(d.motion.driver[k], out.motion.driver[k])
+    for k in range(len(d.motion.driven)):
+        _copy(d.motion.driven[k], out.motion.driven[k])
+    for k in range(len(d.motion.pin)):
+        _copy(d.motion.pin[k], out.motion.pin[k])
+    for k in range(len(d.motion.b)):
+        _copy(d.motion.b[k], out.motion.b[k])
+        _copy(d.motion.w[k], out.motion.w[k])
 
 
 @part
@@ -161,7 +161,7 @@ def _lagrangian(slopes: Array, weights: Array, sign: float, out: Array) -> None:
 
 
 @inline
-def _largest(values: Array, count: int) -> float:
+def _objective(values: Array, count: int) -> float:
     """Magnitude of the objective, from its ``count`` rows."""
     t = -math.inf
     for j in range(count):
@@ -170,33 +170,33 @@ def _largest(values: Array, count: int) -> float:
 
 
 @folded
-def _tried(
-    task: Task, kind: int, here: Design, worth: float, slopes: Array, q: Program, weights: Array, best: Design
+def _best_step(
+    task: Task, kind: int, current: Design, merit: float, slopes: Array, q: Program, weights: Array, best: Design
 ) -> tuple[float, float]:
     """Solve for a step, correct it while rows are curved, keep the best design; return merit and promised gain."""
     n, r = len(q.size), len(weights)
-    there, spare, step, ignored = _no_design(task), _no_design(task), np.empty(n), np.empty(r)
-    t = _largest(here.values, 2 * len(task.cos))
-    _copy(here.values, q.right)
-    promised = solve(task, t, worth, q, step, weights)
-    found = math.inf
+    trial, spare, step, unused = _empty_design(task), _empty_design(task), np.empty(n), np.empty(r)
+    t = _objective(current.values, 2 * len(task.cos))
+    _copy(current.values, q.rhs)
+    promised = solve(task, t, merit, q, step, weights)
+    trial_merit = math.inf
     for correction in range(CORRECTIONS + 1):
-        value = _try(task, kind, here, step, there, spare)
-        if correction > 0 and not value < found:
+        value = _evaluate_step(task, kind, current, step, trial, spare)
+        if correction > 0 and not value < trial_merit:
             break
-        found = value
-        if not found < LOCKED:
+        trial_merit = value
+        if not trial_merit < LOCKED:
             break
-        _copied(there, best)
-        if not worth - found < GOOD * promised or correction == CORRECTIONS:
+        _copy_design(trial, best)
+        if not merit - trial_merit < GROW_ABOVE * promised or correction == CORRECTIONS:
             break
-        _copy(there.values, q.right)
+        _copy(trial.values, q.rhs)
         for k in range(n):
-            move = there.place[k] - here.place[k] if k < len(here.place) else there.x[k - n] - here.x[k - n]
+            move = trial.place[k] - current.place[k] if k < len(current.place) else trial.x[k - n] - current.x[k - n]
             for j in range(r):
-                q.right[j] -= move * slopes[k, j]
-        solve(task, t, worth, q, step, ignored)
-    return found, promised
+                q.rhs[j] -= move * slopes[k, j]
+        solve(task, t, merit, q, step, unused)
+    return trial_merit, promised
 
 
 @kernel
@@ -213,70 +213,70 @@ def descend(task: Task, kind: int, place: Array, x: Array, state: Array, curvatu
     curvature : (n + 5, n + 5), in and out; see :func:`begin`
     steps : largest number of steps
     """
-    here, best, q = _no_design(task), _no_design(task), no_program(task)
+    current, best, q = _empty_design(task), _empty_design(task), no_program(task)
     n = len(q.size)
-    slopes, weights, change = np.empty((n, len(here.values))), np.empty(len(here.values)), np.empty(n)
-    before = np.empty(n)
-    _copy(place, here.place)
-    _copy(x, here.x)
-    columns_of(task, kind, here.place, here.row)
-    new = True
+    slopes, weights, change = np.empty((n, len(current.values))), np.empty(len(current.values)), np.empty(n)
+    step_taken = np.empty(n)
+    _copy(place, current.place)
+    _copy(x, current.x)
+    columns_of(task, kind, current.place, current.row)
+    accepted = True
     for step in range(steps):
         if not state[BOX] > LEAST:
             break
         if step == 0:
-            moving(here.row, task.cos, task.sin, here.at)
-            state[LOOKS] += 1.0
-            if not _look(task, kind, here, slopes):
+            motion_of(current.row, task.cos, task.sin, current.motion)
+            state[EVALUATIONS] += 1.0
+            if not _evaluate(task, kind, current, slopes):
                 state[BOX] = 0.0
                 break
-        if new:
-            units(here.x, q.size)
+        if accepted:
+            units(current.x, q.size)
             prepare(task, slopes, curvature, q)
-        box(here.place, _largest(here.values, 2 * len(task.cos)), task.unit, state[BOX], q)
-        found, promised = _tried(task, kind, here, state[WORTH], slopes, q, weights, best)
-        gain, length = state[WORTH] - found, 0.0
+        set_box(current.place, _objective(current.values, 2 * len(task.cos)), task.unit, state[BOX], q)
+        new_merit, promised = _best_step(task, kind, current, state[MERIT], slopes, q, weights, best)
+        gain, length = state[MERIT] - new_merit, 0.0
         for k in range(n - UNKNOWNS):
-            length = max(length, abs(best.place[k] - here.place[k]))
-        new = gain > 0.0
-        if new:
+            length = max(length, abs(best.place[k] - current.place[k]))
+        accepted = gain > 0.0
+        if accepted:
             for k in range(n):
                 change[k] = 0.0
-                before[k] = here.place[k] if k < n - UNKNOWNS else here.x[k - n]
+                step_taken[k] = current.place[k] if k < n - UNKNOWNS else current.x[k - n]
             _lagrangian(slopes, weights, 1.0, change)
-            _copied(best, here)
-            state[WORTH] = found
-            state[LOOKS] += 1.0
-            if not _look(task, kind, here, slopes):
+            _copy_design(best, current)
+            state[MERIT] = new_merit
+            state[EVALUATIONS] += 1.0
+            if not _evaluate(task, kind, current, slopes):
                 state[BOX] = 0.0
                 break
             _lagrangian(slopes, weights, -1.0, change)
             for k in range(n):
-                at = here.place[k] if k < n - UNKNOWNS else here.x[k - n]
-                before[k] = (at - before[k]) / q.size[k]
+                coordinate = current.place[k] if k < n - UNKNOWNS else current.x[k - n]
+                step_taken[k] = (coordinate - step_taken[k]) / q.size[k]
                 change[k] *= q.size[k]
-            learn(curvature, before, change)
-        if gain < TRUSTED * promised:
+            bfgs(curvature, step_taken, change)
+        if gain < SHRINK_BELOW * promised:
             state[BOX] = 0.5 * (state[BOX] if gain > 0.0 else min(state[BOX], length))
-        elif gain > GOOD * promised:
+        elif gain > GROW_ABOVE * promised:
             state[BOX] = min(2.0 * state[BOX], LARGEST)
-        if promised <= SPENT * abs(state[WORTH]):
+        if promised <= REST_GAIN * abs(state[MERIT]):
             state[BOX] = 0.0
-        if state[BOX] <= LEAST and state[RESTED] - state[WORTH] > RENEWED * abs(state[WORTH]):
+        if state[BOX] <= LEAST and state[REST_MERIT] - state[MERIT] > RESTART_GAIN * abs(state[MERIT]):
             # The learnt curvature may promise less gain than there is.
-            state[RESTED], state[BOX], new = state[WORTH], RADIUS, True
-            begin(curvature)
-    _copy(here.place, place)
-    _copy(here.x, x)
+            state[REST_MERIT], state[BOX], accepted = state[MERIT], RADIUS, True
+            reset_curvature(curvature)
+    _copy(current.place, place)
+    _copy(current.x, x)
 
 
 @kernel
 def rows_at(task: Task, kind: int, place: Array, x: Array, values: Array, slopes: Array) -> None:
     """Compute the rows (r,) of one design that turns, and their gradients (n + 5, r) by places and unknowns."""
-    d = _no_design(task)
+    d = _empty_design(task)
     _copy(place, d.place)
     _copy(x, d.x)
     columns_of(task, kind, d.place, d.row)
-    moving(d.row, task.cos, task.sin, d.at)
-    _look(task, kind, d, slopes)
+    motion_of(d.row, task.cos, task.sin, d.motion)
+    _evaluate(task, kind, d, slopes)
     _copy(d.values, values)

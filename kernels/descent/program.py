@@ -13,32 +13,32 @@ from kernels.jit import kernel, part
 from kernels.linear.nearest_of_many import CurveRows, Nearest, nearest_of_many
 from kernels.types import Array
 
-EXACT = 1e-11  # distance by which the point nearest to the centre may violate a row
+TOLERANCE = 1e-11  # distance by which the point nearest to the centre may violate a row
 NEAR = 0.15  # rows further from their bound join the quadratic program only where its step would violate them
-JOINED, MISSED = 6, 1e-6  # most rounds in which rows join, and the largest violation that is none
-SOFT, LINEAR = 1.0, 1e-2  # initial curvature, of the places and of the linear unknowns
+MAX_ROUNDS, VIOLATED = 6, 1e-6  # most rounds in which rows join, and the largest violation that is none
+PLACE_CURVATURE, UNKNOWN_CURVATURE = 1.0, 1e-2  # initial curvature, of the places and of the linear unknowns
 REACH = 10.0  # largest step of the linear unknowns, in units of their size and of the radius
-DAMPED = 0.2  # least curvature along a step, as a share of the estimate before it (Powell 1978)
-FLAT = 1e-6  # smallest curvature: the objective is about 1, the places run from 0 to 1
-LENT = 1e-4  # curvature added in t and in the violation, which have none
+DAMPING = 0.2  # least curvature along a step, as a share of the estimate before it (Powell 1978)
+LEAST_CURVATURE = 1e-6  # smallest curvature: the objective is about 1, the places run from 0 to 1
+ADDED_CURVATURE = 1e-4  # curvature added in t and in the violation, which have none
 
 
 class Program(NamedTuple):
-    """Quadratic program in the step, in t and in the violation; ``held`` are the active rows, for the next program.
+    """Quadratic program in the step, in t and in the violation; ``active`` are the active rows, for the next program.
 
-    ``rows`` (n, r) are the gradients of its rows.  ``back`` leads to the step from coordinates in which the objective
-    is the distance from ``centre``.  ``size`` are the units of the step.
+    ``rows`` (n, r) are the gradients of its rows.  ``transform`` leads to the step from coordinates in which the
+    objective is the distance from ``centre``.  ``size`` are the units of the step.
     """
 
     rows: Array
-    back: Array
+    transform: Array
     centre: Array
     low: Array
     high: Array
     size: Array
-    right: Array
-    there: Array
-    held: Index
+    rhs: Array
+    predicted: Array
+    active: Index
 
 
 @part
@@ -78,43 +78,42 @@ def prepare(task: Task, slopes: Array, curvature: Array, q: Program) -> None:
             value = curvature[i, k]
             for j in range(k):
                 value -= lower[i, j] * lower[k, j]
-            lower[i, k] = math.sqrt(max(value, FLAT)) if i == k else value / lower[k, k]
+            lower[i, k] = math.sqrt(max(value, LEAST_CURVATURE)) if i == k else value / lower[k, k]
     for k in range(n):
         for i in range(k, -1, -1):
             value = 1.0 if i == k else 0.0
             for j in range(i + 1, k + 1):
-                value -= lower[j, i] * q.back[j, k]
-            q.back[i, k] = value / lower[i, i]
-    q.back[n, n] = q.back[n + 1, n + 1] = 1.0 / math.sqrt(LENT)
+                value -= lower[j, i] * q.transform[j, k]
+            q.transform[i, k] = value / lower[i, i]
+    q.transform[n, n] = q.transform[n + 1, n + 1] = 1.0 / math.sqrt(ADDED_CURVATURE)
     for k in range(n):
         q.centre[k] = 0.0
-    q.centre[n], q.centre[n + 1] = -q.back[n, n], -q.back[n, n] * task.price / task.unit
+    q.centre[n], q.centre[n + 1] = -q.transform[n, n], -q.transform[n, n] * task.price / task.unit
 
 
 @part
-def solve(task: Task, t: float, worth: float, q: Program, step: Array, weights: Array) -> float:
+def solve(task: Task, t: float, merit: float, q: Program, step: Array, weights: Array) -> float:
     """Compute step (n + 5,) and multipliers (r,) for the rows ``q.right`` at t = 0; return the promised gain."""
     n, objective = len(q.size), 2 * len(task.cos)
     for j in range(objective):
-        q.right[j] = (q.right[j] + t) / task.unit
-    whole = np.empty(n + 2)
-    found = Nearest(whole, q.there, weights, q.held)
-    nearest_of_many(
-        CurveRows(q.right, q.rows, task.turns), q.back, q.centre, q.low, q.high, (NEAR, MISSED), JOINED, EXACT, found
-    )
-    missed = 0.0
+        q.rhs[j] = (q.rhs[j] + t) / task.unit
+    solution = np.empty(n + 2)
+    nearest = Nearest(solution, q.predicted, weights, q.active)
+    rows = CurveRows(q.rhs, q.rows, task.turn_rows)
+    nearest_of_many(rows, q.transform, q.centre, q.low, q.high, (NEAR, VIOLATED), MAX_ROUNDS, TOLERANCE, nearest)
+    violation = 0.0
     for j in range(objective, len(weights)):
-        missed = max(missed, whole[n + 1] - q.there[j])
+        violation = max(violation, solution[n + 1] - q.predicted[j])
     for j in range(objective):
         weights[j] /= task.unit
     for k in range(n):
-        step[k] = whole[k] * q.size[k]
-    promised: float = worth - (t + task.unit * whole[n] + task.price * missed)
+        step[k] = solution[k] * q.size[k]
+    promised: float = merit - (t + task.unit * solution[n] + task.price * violation)
     return promised
 
 
 @part
-def box(place: Array, t: float, unit: float, radius: float, q: Program) -> None:
+def set_box(place: Array, t: float, unit: float, radius: float, q: Program) -> None:
     """Write the bounds of a step: the box around a design, and the range of the places."""
     n = len(place)
     for k in range(len(q.size)):
@@ -125,31 +124,31 @@ def box(place: Array, t: float, unit: float, radius: float, q: Program) -> None:
 
 
 @part
-def learn(curvature: Array, moved: Array, change: Array) -> None:
+def bfgs(curvature: Array, s: Array, y: Array) -> None:
     """Update the curvature by BFGS, damped so that it stays positive definite."""
-    along = np.zeros(len(moved))
-    for i in range(len(moved)):
-        for j in range(len(moved)):
-            along[i] += curvature[i, j] * moved[j]
-    known, seen = 0.0, 0.0
-    for i in range(len(moved)):
-        known += moved[i] * along[i]
-        seen += moved[i] * change[i]
-    if not known > 1e-300:
+    bs = np.zeros(len(s))
+    for i in range(len(s)):
+        for j in range(len(s)):
+            bs[i] += curvature[i, j] * s[j]
+    s_bs, s_y = 0.0, 0.0
+    for i in range(len(s)):
+        s_bs += s[i] * bs[i]
+        s_y += s[i] * y[i]
+    if not s_bs > 1e-300:
         return
-    share = (1.0 - DAMPED) * known / (known - seen) if seen < DAMPED * known else 1.0
-    seen = max(seen, DAMPED * known)
-    for i in range(len(moved)):
-        change[i] = share * change[i] + (1.0 - share) * along[i]
-    for i in range(len(moved)):
-        for j in range(len(moved)):
-            curvature[i, j] += change[i] * change[j] / seen - along[i] * along[j] / known
+    theta = (1.0 - DAMPING) * s_bs / (s_bs - s_y) if s_y < DAMPING * s_bs else 1.0
+    s_y = max(s_y, DAMPING * s_bs)
+    for i in range(len(s)):
+        y[i] = theta * y[i] + (1.0 - theta) * bs[i]
+    for i in range(len(s)):
+        for j in range(len(s)):
+            curvature[i, j] += y[i] * y[j] / s_y - bs[i] * bs[j] / s_bs
 
 
 @kernel
-def begin(curvature: Array) -> None:
+def reset_curvature(curvature: Array) -> None:
     """Write the initial curvature."""
     for k in range(len(curvature)):
         for i in range(len(curvature)):
             curvature[k, i] = 0.0
-        curvature[k, k] = SOFT if k < len(curvature) - UNKNOWNS else LINEAR
+        curvature[k, k] = PLACE_CURVATURE if k < len(curvature) - UNKNOWNS else UNKNOWN_CURVATURE

@@ -13,19 +13,19 @@ import math
 import numpy as np
 
 from kernels import status as st
-from kernels.descent.motion import Index, Motion, nothing_moved
-from kernels.descent.program import EXACT, LENT, units
-from kernels.descent.rows import ACROSS, ALONG, ANGLE, UNKNOWNS, Task, by_unknowns, curve, slopes_of
+from kernels.descent.motion import Index, Motion, zero_slopes
+from kernels.descent.program import ADDED_CURVATURE, TOLERANCE, units
+from kernels.descent.rows import ACROSS, ALONG, ANGLE, UNKNOWNS, Task, by_unknowns, curve, rows_and_slopes
 from kernels.jit import kernel, part
 from kernels.linear.nearest import nearest
 from kernels.types import Array
 
-LEFT_OUT, WANTED, SOFT, NEEDED = 0, 1, 2, 3  # kinds of rows: left out, with t, with v, and rows that must be kept
-FLAT = 1e-8  # curvature added in the unknowns, in units of their size and of the objective
+OMITTED, OBJECTIVE, SOFT, REQUIRED = 0, 1, 2, 3  # kinds of rows: left out, with t, with v, and rows that must be kept
+ADDED = 1e-8  # curvature added in the unknowns, in units of their size and of the objective
 EXCESS = 0.5  # price of a deviation twice as large as allowed, in strokes
 SMALLEST = 1e-9  # scale below which there is no guide
 DIRECTIONS = 3  # most directions along which the least scale of a guide is imposed
-FAR = 0.3  # distance from its bound, in shares of the bound or of the objective, from which on a row is left out
+DISTANT = 0.3  # distance from its bound, in shares of the bound or of the objective, from which on a row is left out
 
 
 @kernel
@@ -46,83 +46,83 @@ def best_unknowns(values: Array, slopes: Array, kinds: Index, size: Array, unit:
     """
     count, n = 1, UNKNOWNS + 2
     for kind in kinds:
-        count += 1 if kind != LEFT_OUT else 0
-    rows, needs, centre, y, weights = np.zeros((n, count)), np.zeros(count), np.zeros(n), np.empty(n), np.empty(count)
-    lent, joined, total = 1.0 / math.sqrt(LENT), 1, 0.0
-    rows[UNKNOWNS + 1, 0] = lent
+        count += 1 if kind != OMITTED else 0
+    rows, rhs, centre, y, weights = np.zeros((n, count)), np.zeros(count), np.zeros(n), np.empty(n), np.empty(count)
+    unit_slack, column, check = 1.0 / math.sqrt(ADDED_CURVATURE), 1, 0.0
+    rows[UNKNOWNS + 1, 0] = unit_slack
     for j in range(len(kinds)):
-        if kinds[j] != LEFT_OUT:
-            per = 1.0 / unit if kinds[j] == WANTED else 1.0
-            needs[joined] = -values[j] * per
+        if kinds[j] != OMITTED:
+            scale = 1.0 / unit if kinds[j] == OBJECTIVE else 1.0
+            rhs[column] = -values[j] * scale
             for k in range(UNKNOWNS):
-                rows[k, joined] = slopes[k, j] * per * size[k] / math.sqrt(FLAT)
-                total += rows[k, joined] + needs[joined]
-            if kinds[j] != NEEDED:
-                rows[UNKNOWNS if kinds[j] == WANTED else UNKNOWNS + 1, joined] = lent
-            joined += 1
-    centre[UNKNOWNS], centre[UNKNOWNS + 1] = -lent, -lent * price / unit
-    if not math.isfinite(total) or nearest(rows, needs, centre, EXACT, y, weights) != st.OK:
+                rows[k, column] = slopes[k, j] * scale * size[k] / math.sqrt(ADDED)
+                check += rows[k, column] + rhs[column]
+            if kinds[j] != REQUIRED:
+                rows[UNKNOWNS if kinds[j] == OBJECTIVE else UNKNOWNS + 1, column] = unit_slack
+            column += 1
+    centre[UNKNOWNS], centre[UNKNOWNS + 1] = -unit_slack, -unit_slack * price / unit
+    if not math.isfinite(check) or nearest(rows, rhs, centre, TOLERANCE, y, weights) != st.OK:
         return False
     for k in range(UNKNOWNS):
-        x[k] += y[k] * size[k] / math.sqrt(FLAT)
+        x[k] += y[k] * size[k] / math.sqrt(ADDED)
     return True
 
 
 @part
-def solved(task: Task, row: Array, at: Motion, x: Array, room: Array, out: Array) -> None:
+def improved_unknowns(task: Task, row: Array, motion: Motion, x: Array, margin: Array, out: Array) -> None:
     """Compute the best linear unknowns (5,) of a design, its rows linearised at ``x``; x itself without a solution."""
     m, r = len(task.cos), len(task.kinds)
     values, slopes, size, kinds = np.empty(r), np.empty((UNKNOWNS, r)), np.empty(UNKNOWNS), task.kinds.copy()
-    slopes_of(task, row, at, nothing_moved(0, m), x, room, np.zeros((UNKNOWNS, m + 1)), values, slopes)
+    rows_and_slopes(task, row, motion, zero_slopes(0, m), x, margin, np.zeros((UNKNOWNS, m + 1)), values, slopes)
     units(x, size)
     t = task.unit
     for j in range(2 * m):
         t = max(t, -values[j])
     for j in range(r):
-        if (kinds[j] == SOFT and values[j] > FAR) or (kinds[j] == WANTED and values[j] + t > FAR * t):
-            kinds[j] = LEFT_OUT
+        if (kinds[j] == SOFT and values[j] > DISTANT) or (kinds[j] == OBJECTIVE and values[j] + t > DISTANT * t):
+            kinds[j] = OMITTED
     for k in range(UNKNOWNS):
         out[k] = x[k]
     best_unknowns(values, slopes, kinds, size, task.unit, task.price, out)
 
 
 @part
-def unknowns_of(task: Task, row: Array, at: Motion, room: Array, x: Array) -> bool:
+def unknowns_of(task: Task, row: Array, motion: Motion, margin: Array, x: Array) -> bool:
     """Compute the best linear unknowns (5,) of a design under the least lengths of stage 2; whether there are any.
 
     Least lengths bound the modulus of z1 from below, which is not linear.  The bound is imposed on the component of z1
     along its direction without the bound, then along its direction with it.
     """
-    m, none, angle = len(task.cos), np.zeros(UNKNOWNS), np.empty(len(task.cos))
-    values, slopes, by = np.zeros(4 * m + 2), np.zeros((UNKNOWNS, 4 * m + 2)), np.empty((UNKNOWNS, m))
-    size, kinds = np.full(UNKNOWNS, task.stroke), np.zeros(4 * m + 2, np.int64)
-    kinds[4 * m] = NEEDED
-    for which in range(2):
-        by_unknowns(task.codes[0] if which == 0 else ACROSS, at, none, by)
+    m, zeros, angle = len(task.cos), np.zeros(UNKNOWNS), np.empty(len(task.cos))
+    values, slopes, curve_slopes = np.zeros(4 * m + 2), np.zeros((UNKNOWNS, 4 * m + 2)), np.empty((UNKNOWNS, m))
+    size, kinds = np.full(UNKNOWNS, task.min_stroke), np.zeros(4 * m + 2, np.int64)
+    kinds[4 * m] = REQUIRED
+    for block in range(2):
+        by_unknowns(task.codes[0] if block == 0 else ACROSS, motion, zeros, curve_slopes)
         for p in range(m):
-            for j, sign in ((2 * m * which + p, 1.0), (2 * m * which + m + p, -1.0)):
-                kinds[j] = WANTED if which == 0 else SOFT
-                values[j] = 0.0 if which == 0 else 1.0 - room[p] / task.bound
+            for j, sign in ((2 * m * block + p, 1.0), (2 * m * block + m + p, -1.0)):
+                kinds[j] = OBJECTIVE if block == 0 else SOFT
+                values[j] = 0.0 if block == 0 else 1.0 - margin[p] / task.max_deviation
                 for k in range(UNKNOWNS):
-                    slopes[k, j] = sign * by[k, p] / (1.0 if which == 0 else task.bound)
-    by_unknowns(ALONG, at, none, by)
-    curve(ANGLE, at, none, room, angle)
+                    slopes[k, j] = sign * curve_slopes[k, p] / (1.0 if block == 0 else task.max_deviation)
+    by_unknowns(ALONG, motion, zeros, curve_slopes)
+    curve(ANGLE, motion, zeros, margin, angle)
     high, low, least = 0, 0, 0.0
     for p in range(m):
         high, low = p if angle[p] > angle[high] else high, p if angle[p] < angle[low] else low
     for k in range(UNKNOWNS):
-        slopes[k, 4 * m] = (by[k, high] - by[k, low]) / task.stroke
-    values[4 * m] = -1.0 - room[m] / task.stroke
+        slopes[k, 4 * m] = (curve_slopes[k, high] - curve_slopes[k, low]) / task.min_stroke
+    values[4 * m] = -1.0 - margin[m] / task.min_stroke
     for j in range(len(task.lengths)):
-        least = max(least, task.least[j] / row[task.lengths[j]])
+        least = max(least, task.shortest[j] / row[task.lengths[j]])
     for _ in range(DIRECTIONS):
         for k in range(UNKNOWNS):
             x[k] = 0.0
-        if not best_unknowns(values, slopes, kinds, size, task.unit, EXCESS * task.stroke, x):
+        if not best_unknowns(values, slopes, kinds, size, task.unit, EXCESS * task.min_stroke, x):
             return False
         scale = math.sqrt(x[0] * x[0] + x[1] * x[1])
         if not 0.0 < scale < (1.0 - 1e-6) * least:
             break
-        kinds[4 * m + 1], values[4 * m + 1] = NEEDED, -1.0
+        kinds[4 * m + 1], values[4 * m + 1] = REQUIRED, -1.0
         slopes[0, 4 * m + 1], slopes[1, 4 * m + 1] = x[0] / (scale * least), x[1] / (scale * least)
     return bool(x[0] * x[0] + x[1] * x[1] > SMALLEST * SMALLEST)

@@ -19,25 +19,25 @@ def eliminate(rows: Array, least: float) -> bool:
         size = 0.0
         for j in range(n):
             size = max(size, abs(rows[i, j]))
-        per = 1.0 / size if size > 0.0 else math.nan
+        scale = 1.0 / size if size > 0.0 else math.nan
         for j in range(width):
-            rows[i, j] *= per
+            rows[i, j] *= scale
     for j in range(n):
-        best, most = j, abs(rows[j, j])
+        pivot, largest = j, abs(rows[j, j])
         for i in range(j + 1, n):
             size = abs(rows[i, j])
-            best, most = (i, size) if size > most else (best, most)
-        solvable = solvable and most >= least
-        if best != j:
+            pivot, largest = (i, size) if size > largest else (pivot, largest)
+        solvable = solvable and largest >= least
+        if pivot != j:
             for column in range(j, width):
-                rows[j, column], rows[best, column] = rows[best, column], rows[j, column]
-        per = 1.0 / rows[j, j]
+                rows[j, column], rows[pivot, column] = rows[pivot, column], rows[j, column]
+        scale = 1.0 / rows[j, j]
         for i in range(j + 1, n):
-            factor = rows[i, j] * per
+            factor = rows[i, j] * scale
             if factor != 0.0:
                 for column in range(j + 1, width):
                     rows[i, column] -= factor * rows[j, column]
-        rows[j, j] = per
+        rows[j, j] = scale
     for j in range(n - 1, -1, -1):
         for column in range(n, width):
             value = rows[j, column]

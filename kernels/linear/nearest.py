@@ -23,53 +23,53 @@ STEPS = 20  # per unknown, after which the search is given up
 DEPENDENT = 1e-20  # square of a row's remainder across the active rows, relative to the row's, that is rounding
 
 
-class Held(NamedTuple):
+class ActiveSet(NamedTuple):
     """Active rows in an orthogonal factorisation, ``q`` (n, n) and ``r`` (n, n); their numbers and multipliers.
 
     Where no point satisfies all rows, the number of the contradicting row stands behind those of the active rows, and
-    ``share`` combines the active rows into it.  ``inside`` (m,) is 1 for active rows; ``d``, ``z`` and ``share`` (n,)
-    and ``room`` (m,) are scratch.
+    ``shares`` combines the active rows into it.  ``active`` (m,) is 1 for active rows; ``d``, ``z`` and ``shares`` (n,)
+    and ``slack`` (m,) are scratch.
     """
 
     q: Array
     r: Array
     numbers: Index
     weights: Array
-    inside: Index
+    active: Index
     d: Array
     z: Array
-    share: Array
-    room: Array
+    shares: Array
+    slack: Array
 
 
 @inline
-def nothing_held(n: int, m: int) -> Held:
+def no_active_rows(n: int, m: int) -> ActiveSet:
     """Allocate the state without active rows."""
-    return Held(
+    return ActiveSet(
         np.eye(n), np.zeros((n, n)), np.empty(n + 1, np.int64), np.zeros(n + 1), np.zeros(m, np.int64), np.empty(n),
         np.empty(n), np.empty(n), np.empty(m),
     )  # fmt: skip
 
 
 @inline
-def _most_missed(rows: Array, needs: Array, size: Array, m: int, y: Array, h: Held, tolerance: float) -> int:
+def _most_violated(rows: Array, rhs: Array, size: Array, m: int, y: Array, h: ActiveSet, tolerance: float) -> int:
     """Find the row that a point violates most, relative to the row's size; -1 where it satisfies the first m rows."""
     for j in range(m):
-        h.room[j] = -needs[j]
+        h.slack[j] = -rhs[j]
     for i in range(len(y)):
         factor = y[i]
         for j in range(m):
-            h.room[j] += rows[i, j] * factor
-    found, worst = -1, -tolerance
+            h.slack[j] += rows[i, j] * factor
+    index, worst = -1, -tolerance
     for j in range(m):
-        if h.inside[j] == 0 and h.room[j] < worst * size[j]:
-            found, worst = j, h.room[j] / size[j]
-    return found
+        if h.active[j] == 0 and h.slack[j] < worst * size[j]:
+            index, worst = j, h.slack[j] / size[j]
+    return index
 
 
 @inline
-def shares(rows: Array, p: int, count: int, h: Held) -> float:
-    """Split row p into a remainder z across the active rows and a ``share`` of each of them; return the square of z."""
+def split_row(rows: Array, p: int, count: int, h: ActiveSet) -> float:
+    """Split row p into a remainder z across the active rows and the ``shares`` of each; return the square of z."""
     n = rows.shape[0]
     square = 0.0
     for k in range(n):
@@ -88,37 +88,37 @@ def shares(rows: Array, p: int, count: int, h: Held) -> float:
     for k in range(count - 1, -1, -1):
         value = h.d[k]
         for j in range(k + 1, count):
-            value -= h.r[k, j] * h.share[j]
-        h.share[k] = value / h.r[k, k]
+            value -= h.r[k, j] * h.shares[j]
+        h.shares[k] = value / h.r[k, k]
     return square
 
 
 @inline
-def taken_in(p: int, count: int, square: float, h: Held) -> None:
+def activate(p: int, count: int, square: float, h: ActiveSet) -> None:
     """Add row p to the active rows: a reflection turns its remainder, of that square, into one column."""
     n = len(h.d)
-    first = h.d[count]
-    length = -math.sqrt(square) if first > 0.0 else math.sqrt(square)
-    half = square - first * length
-    h.d[count] = first - length
+    leading = h.d[count]
+    norm = -math.sqrt(square) if leading > 0.0 else math.sqrt(square)
+    scale = square - leading * norm
+    h.d[count] = leading - norm
     for i in range(n):
         value = 0.0
         for k in range(count, n):
             value += h.q[i, k] * h.d[k]
-        value /= half
+        value /= scale
         for k in range(count, n):
             h.q[i, k] -= value * h.d[k]
-    h.d[count] = length
+    h.d[count] = norm
     for k in range(count + 1):
         h.r[k, count] = h.d[k]
-    h.numbers[count], h.inside[p] = p, 1
+    h.numbers[count], h.active[p] = p, 1
 
 
 @inline
-def dropped(place: int, count: int, h: Held) -> None:
+def deactivate(place: int, count: int, h: ActiveSet) -> None:
     """Remove the active row at ``place``; rotations make the rest a triangle again."""
     n = len(h.d)
-    h.inside[h.numbers[place]] = 0
+    h.active[h.numbers[place]] = 0
     for k in range(place, count - 1):
         h.numbers[k] = h.numbers[k + 1]
         for j in range(n):
@@ -128,8 +128,8 @@ def dropped(place: int, count: int, h: Held) -> None:
     for k in range(place, count - 1):
         first, second = h.r[k, k], h.r[k + 1, k]
         if second != 0.0:
-            length = math.hypot(first, second)
-            c, s = first / length, second / length
+            norm = math.hypot(first, second)
+            c, s = first / norm, second / norm
             for i in range(n):
                 x, y = h.q[i, k], h.q[i, k + 1]
                 h.q[i, k], h.q[i, k + 1] = c * x + s * y, c * y - s * x
@@ -139,49 +139,49 @@ def dropped(place: int, count: int, h: Held) -> None:
 
 
 @kernel
-def pursued(
-    rows: Array, needs: Array, size: Array, m: int, tolerance: float, y: Array, h: Held, count: int
+def continued(
+    rows: Array, rhs: Array, size: Array, m: int, tolerance: float, y: Array, h: ActiveSet, count: int
 ) -> tuple[int, int]:
     """Continue from the nearest point with ``count`` active rows to the nearest that satisfies the first m rows."""
     n = rows.shape[0]
-    left, status = STEPS * n, int(st.OK)
+    remaining, status = STEPS * n, int(st.OK)
     while status == st.OK:
-        p = _most_missed(rows, needs, size, m, y, h, tolerance)
+        p = _most_violated(rows, rhs, size, m, y, h, tolerance)
         if p < 0:
             break
-        short = -h.room[p]
+        violation = -h.slack[p]
         h.weights[count] = 0.0
         while True:
-            square = shares(rows, p, count, h)
-            full = short / square if count < n and square > DEPENDENT * size[p] * size[p] else math.inf
-            part, place = math.inf, -1
+            square = split_row(rows, p, count, h)
+            full = violation / square if count < n and square > DEPENDENT * size[p] * size[p] else math.inf
+            partial, blocking = math.inf, -1
             for k in range(count):
-                if h.share[k] > 0.0 and h.weights[k] / h.share[k] < part:
-                    part, place = h.weights[k] / h.share[k], k
-            step = min(part, full)
-            left -= 1
-            if step == math.inf or left < 0:
+                if h.shares[k] > 0.0 and h.weights[k] / h.shares[k] < partial:
+                    partial, blocking = h.weights[k] / h.shares[k], k
+            step = min(partial, full)
+            remaining -= 1
+            if step == math.inf or remaining < 0:
                 h.numbers[count] = p
                 status = int(st.LIMIT_EXCEEDED) if step == math.inf else int(st.NOT_CONVERGED)
                 break
             if full < math.inf:
                 for i in range(n):
                     y[i] += step * h.z[i]
-                short -= step * square
+                violation -= step * square
             for k in range(count):
-                h.weights[k] -= step * h.share[k]
+                h.weights[k] -= step * h.shares[k]
             h.weights[count] += step
-            if full <= part:
-                taken_in(p, count, square, h)
+            if full <= partial:
+                activate(p, count, square, h)
                 count += 1
                 break
-            dropped(place, count, h)
+            deactivate(blocking, count, h)
             count -= 1
     return count, status
 
 
 @kernel
-def nearest_with(rows: Array, needs: Array, centre: Array, tolerance: float, y: Array, h: Held) -> tuple[int, int]:
+def nearest_with(rows: Array, rhs: Array, centre: Array, tolerance: float, y: Array, h: ActiveSet) -> tuple[int, int]:
     """Find the point of :func:`nearest`; return number of active rows and status.  ``h`` is that of `nothing_held`."""
     n, m = rows.shape
     size = np.zeros(m)
@@ -191,17 +191,17 @@ def nearest_with(rows: Array, needs: Array, centre: Array, tolerance: float, y: 
             size[j] += rows[i, j] * rows[i, j]
     for j in range(m):
         size[j] = math.sqrt(size[j])
-    return pursued(rows, needs, size, m, tolerance, y, h, 0)
+    return continued(rows, rhs, size, m, tolerance, y, h, 0)
 
 
 @kernel
-def nearest(rows: Array, needs: Array, centre: Array, tolerance: float, y: Array, weights: Array) -> int:
+def nearest(rows: Array, rhs: Array, centre: Array, tolerance: float, y: Array, weights: Array) -> int:
     """Find the point nearest to a centre that satisfies ``rows.T y >= needs``.
 
     Parameters
     ----------
     rows : (n, m), one column for each row
-    needs : (m,)
+    rhs : (m,)
     centre : (n,)
     tolerance : distance by which a row may be violated
     y : (n,) out
@@ -217,8 +217,8 @@ def nearest(rows: Array, needs: Array, centre: Array, tolerance: float, y: Array
     Goldfarb and Idnani 1983, with an orthogonal factorisation of the active rows.  Against scipy's least-distance
     programs: 1e-12.
     """
-    h = nothing_held(*rows.shape)
-    count, status = nearest_with(rows, needs, centre, tolerance, y, h)
+    h = no_active_rows(*rows.shape)
+    count, status = nearest_with(rows, rhs, centre, tolerance, y, h)
     for j in range(len(weights)):
         weights[j] = 0.0
     for k in range(count):

@@ -128,7 +128,7 @@ def test_rows_are_the_pose_outputs_of_the_design(robust: bool) -> None:
             )
             first += POSES
         lengths = design[0, [rows.family.parameter_names.index(f"{name}2") for name in "abce"]]
-        np.testing.assert_allclose((values[first::2] + 1.0) * rows.task.least, lengths, rtol=1e-12)
+        np.testing.assert_allclose((values[first::2] + 1.0) * rows.task.shortest, lengths, rtol=1e-12)
 
 
 @pytest.mark.parametrize("robust", [False, True])

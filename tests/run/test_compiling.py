@@ -7,7 +7,7 @@ from contextlib import nullcontext
 
 import pytest
 
-from kernels.descent.descents import begun, descend
+from kernels.descent.descents import descend, initial_merits
 from sweep.chunks.chunk import asked_outputs
 from sweep.engine import run as engine
 from sweep.jobs.progress import Phases
@@ -58,4 +58,4 @@ def test_what_the_search_for_starts_needs_is_compiled_too() -> None:
     step = engine.KernelStep(study)
     assert step.count == len(asked_outputs(study)) + 1
     step(step.count - 1)
-    assert descend.nopython_signatures and begun.nopython_signatures
+    assert descend.nopython_signatures and initial_merits.nopython_signatures

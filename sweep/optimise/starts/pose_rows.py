@@ -15,8 +15,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from kernels.curves.sampled_rows import EVERY, HIGHEST, LOWEST, RANGE, Limits
-from kernels.descent.descents import BOX, LEAST, LOCKED, RADIUS, begun, descend
-from kernels.descent.program import begin
+from kernels.descent.descents import BOX, LEAST, LOCKED, RADIUS, descend, initial_merits
+from kernels.descent.program import reset_curvature
 from kernels.descent.rows import (
     ACROSS,
     ALONG,
@@ -29,7 +29,7 @@ from kernels.descent.rows import (
     UNKNOWNS,
     Task,
 )
-from kernels.descent.unknowns import LEFT_OUT, NEEDED, SOFT, WANTED
+from kernels.descent.unknowns import OBJECTIVE, OMITTED, REQUIRED, SOFT
 from sweep.evaluation.summaries import design_outputs
 from sweep.families.base import Accuracy, Array
 from sweep.families.capabilities import Assembly
@@ -170,7 +170,7 @@ class PoseRows:
         for k, curve in enumerate(curves):
             rows, least = slice(firsts[k], ends[k]), curve.at == RANGE and curve.sign < 0.0
             straight = curve_codes[k] > ANGLE and curve.at in (EVERY, RANGE)
-            kinds[rows] = WANTED if k < 2 else LEFT_OUT if not straight else NEEDED if least else SOFT
+            kinds[rows] = OBJECTIVE if k < 2 else OMITTED if not straight else REQUIRED if least else SOFT
         strokes = [k for k in range(2, len(curves)) if curve_codes[k] == ALONG and curves[k].at == RANGE]
         unit = UNIT * linear.stroke
         return Task(
@@ -217,7 +217,7 @@ class PoseRows:
         x, merit = np.empty((len(places), UNKNOWNS)), np.empty(len(places))
 
         def evaluate(part: slice) -> None:
-            begun(self.task, kinds[part], places[part], x[part], merit[part])
+            initial_merits(self.task, kinds[part], places[part], x[part], merit[part])
 
         in_threads(evaluate, [slice(k, k + BLOCK) for k in range(0, len(places), BLOCK)], jobs)
         return x, merit
@@ -241,7 +241,7 @@ class Descents:
         self.states = np.stack([merit, np.where(merit < LOCKED, RADIUS, 0.0), np.full(k, np.inf), np.zeros(k)], axis=1)
         self.curvature = np.empty((k, n + UNKNOWNS, n + UNKNOWNS))
         for matrix in self.curvature:
-            begin(matrix)
+            reset_curvature(matrix)
         self.abandoned = 0.0
 
     @property

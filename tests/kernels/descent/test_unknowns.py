@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from scipy.optimize import linprog
 
-from kernels.descent.unknowns import LEFT_OUT, NEEDED, SOFT, WANTED, best_unknowns
+from kernels.descent.unknowns import OBJECTIVE, OMITTED, REQUIRED, SOFT, best_unknowns
 
 BOUND, NEED, PRICE = 0.015, np.array([24.5, 3.0]), 100.0
 
@@ -34,8 +34,8 @@ def solved(
 ) -> tuple[np.ndarray, float]:
     values = np.concatenate([np.zeros(2 * g.shape[1]), bound[1], bound[0], -NEED])
     slopes = np.concatenate([-g, g, -d, d, e], axis=1)
-    kinds = np.repeat([WANTED, SOFT, NEEDED], [2 * g.shape[1], 2 * d.shape[1], 2])
-    kinds[~np.isfinite(values)], values[~np.isfinite(values)] = LEFT_OUT, 0.0
+    kinds = np.repeat([OBJECTIVE, SOFT, REQUIRED], [2 * g.shape[1], 2 * d.shape[1], 2])
+    kinds[~np.isfinite(values)], values[~np.isfinite(values)] = OMITTED, 0.0
     x = np.zeros(5)
     assert best_unknowns(values, np.ascontiguousarray(slopes), kinds, np.full(5, size), 3.0, PRICE, x)
     missed = max(0.0, (d.T @ x - bound[1]).max(), (-d.T @ x - bound[0]).max())
@@ -77,7 +77,7 @@ def test_least_largest_magnitude_equals_scipys(bound: float | np.ndarray) -> Non
 
 def test_missing_numbers_and_impossible_needs_are_told_and_leave_the_unknowns() -> None:
     (g, _, e), x = problems(1)[0], np.ones(5)
-    kinds, size = np.array([WANTED, WANTED, NEEDED, NEEDED]), np.ones(5)
+    kinds, size = np.array([OBJECTIVE, OBJECTIVE, REQUIRED, REQUIRED]), np.ones(5)
     for row, value in ((e[:, :1], np.nan), (np.zeros((5, 1)), -1.0), (np.full((5, 1), np.nan), -1.0)):
         slopes = np.concatenate([g[:, :1], -g[:, :1], row, e[:, 1:]], axis=1)
         assert not best_unknowns(np.array([0.0, 0.0, value, -1.0]), slopes, kinds, size, 1.0, PRICE, x)
