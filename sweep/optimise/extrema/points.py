@@ -214,8 +214,8 @@ class Curves:
         stationary, passing, at_edge = points.kind == STATIONARY, points.kind == PASSING, points.kind == EDGE
         phi = points.phi.copy()
         if at_edge.any():
-            given = design[None, :], phi[at_edge], points.level[at_edge]
-            phi[at_edge] = moved_edges(self.problem.family, *given, self.plain)[0]
+            edge_data = design[None, :], phi[at_edge], points.level[at_edge]
+            phi[at_edge] = moved_edges(self.problem.family, *edge_data, self.plain)[0]
         by_series = [(s, k) for n, s in enumerate(self.series) if len(k := np.flatnonzero(points.series == n))]
         longest, previous = np.full(len(phi), stride), np.zeros(len(phi))
         for _ in range(12):

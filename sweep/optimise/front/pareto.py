@@ -293,9 +293,9 @@ def _step_starts(front: Front, step: Step, number: int, starts: Array) -> Array 
     present = front.results[step.target]
     if neighbour is None or present is None:
         return None
-    seen = step.neighbour < step.target and front.found[step.neighbour] < front.given
+    passed_before = step.neighbour < step.target and front.found[step.neighbour] < front.given
     infeasible = present.feasible and not neighbour.feasible
-    offers = not (seen or infeasible or np.array_equal(neighbour.design, present.design))
+    offers = not (passed_before or infeasible or np.array_equal(neighbour.design, present.design))
     # A search that has not converged is continued from its end.
     unfinished = present.status == st.NOT_CONVERGED
     chosen = [neighbour.design] * offers + [present.design] * unfinished

@@ -143,7 +143,7 @@ def _search_ends(study: Study, folder: Path) -> tuple[Array, Array]:
 def _starts(study: Study, settings: ParetoSettings, problem: Problem, folder: Path, optimum: Array) -> list[Array]:
     """Return the starts for each bound, the loosest bound first.
 
-    These are the optimum ``optimum`` and diverse good designs of the dataset within the bound.
+    These are ``optimum`` and diverse good designs of the dataset within the bound.
     """
     chosen = []
     for designs, merit in best_within(study, settings, Front.of(settings).bounds, folder):

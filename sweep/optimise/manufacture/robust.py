@@ -137,8 +137,8 @@ def robust(
             done[number] = item
             if not item.cut:
                 stored.note(f"{name} {number}", {"result": noted(item.result), "share": item.share})
-            good = [x.result.objective for x in done.values() if x.share >= (tolerance.robust or 0.0)]
-            say(offset + len(done), total, best_words(min(good, default=math.inf)))
+            sufficient = [x.result.objective for x in done.values() if x.share >= (tolerance.robust or 0.0)]
+            say(offset + len(done), total, best_words(min(sufficient, default=math.inf)))
 
         say(offset + len(done), total, "")
         if rest := [number for number in range(count) if number not in done]:
@@ -157,8 +157,8 @@ def robust(
     runs = run_tasks("calibrated", calibrate, len(ends), len(designs)) or [
         Robust(r, _yield_share(problem, r.design, tolerance, settings.seed), True) for r in ends[:1]
     ]
-    good = [x for x in runs if x.share >= (tolerance.robust or 0.0)]
-    best = min(good, key=lambda x: x.result.objective) if good else max(runs, key=lambda x: x.share)
+    sufficient = [x for x in runs if x.share >= (tolerance.robust or 0.0)]
+    best = min(sufficient, key=lambda x: x.result.objective) if sufficient else max(runs, key=lambda x: x.share)
     value = best.result.objective
     equal = [end for end, x in zip(ends, runs, strict=False) if abs(x.result.objective - value) <= AGREE * abs(value)]
     agree = sum(any(_same_design(problem, r, end) for end in equal) for r in reached)

@@ -292,11 +292,11 @@ def manufactured(study: Study, design: Array) -> Manufactured | None:
 
 
 def within_limits(
-    of: Study | Problem, limits: Sequence[Limit], designs: Array, *more: str
+    source: Study | Problem, limits: Sequence[Limit], designs: Array, *more: str
 ) -> tuple[dict[str, NDArray[np.generic]], NDArray[np.bool_]]:
     """Return limited outputs and outputs ``more`` of designs (n, P), and which designs keep all limits, (n,)."""
     names = list(dict.fromkeys([*(limit.output for limit in limits), *more]))
-    columns = design_outputs(of.family, designs, names, of.accuracy, of.window)
+    columns = design_outputs(source.family, designs, names, source.accuracy, source.window)
     masks = [np.ones(len(designs), np.bool_), *(meets(limit, columns[limit.output]) for limit in limits)]
     return {name: columns[name] for name in names}, np.logical_and.reduce(masks)
 

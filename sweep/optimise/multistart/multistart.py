@@ -240,11 +240,11 @@ def _sampled(
     settings: OptimiseSettings,
     stop: Callable[[], bool] | None,
     jobs: int,
-    near: Sequence[Array] = (),
+    designs: Sequence[Array] = (),
 ) -> list[Result]:
-    """Search from the designs ``near``, then from samples."""
+    """Search from ``designs``, then from samples."""
     sampled = samples(problem, signs, settings.starts, settings.seed, stop or (lambda: False))
-    return explore(problem, chain(in_groups(np.array(near)), sampled), settings, stop, jobs).results
+    return explore(problem, chain(in_groups(np.array(designs)), sampled), settings, stop, jobs).results
 
 
 def listed(study: Study) -> dict[str, Array]:

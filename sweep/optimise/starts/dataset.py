@@ -71,8 +71,8 @@ def random_designs(study: Study, count: int, seed: int) -> Array:
     """
     length = min(64, study.space.count)
     blocks = max(1, SCREENED * count // length)
-    begins = np.random.default_rng(seed).integers(0, study.space.count - length + 1, blocks)
-    matrix, made = runs_matrix(study, [(int(k), int(k) + length) for k in begins])
+    firsts = np.random.default_rng(seed).integers(0, study.space.count - length + 1, blocks)
+    matrix, made = runs_matrix(study, [(int(k), int(k) + length) for k in firsts])
     designs: Array = matrix[made == st.OK]
     if study.fit is None or not len(designs):
         return designs
@@ -190,9 +190,9 @@ def sample_seconds(problem: Problem, base: Array, count: int) -> float:
     rng, number, seconds = np.random.default_rng(0), 0, 0.0
     for number in TIMED:
         designs = problem.placed(base, rng.random((number, len(problem.variables))))
-        begin = time.process_time()
+        start = time.process_time()
         ranking(problem, designs)
-        seconds = time.process_time() - begin
+        seconds = time.process_time() - start
         if seconds > TIMED_SECONDS:
             break
     return seconds / number * RANKED * min(count, GROUP_SIZE)

@@ -127,6 +127,6 @@ def _elimination(study: Study, problem: Problem, tolerance: Tolerance | None = N
     return linear
 
 
-def enclosing(study: Study, problem: Problem, found: Array) -> Problem:
+def enclosing(study: Study, problem: Problem, designs: Array) -> Problem:
     """Return the problem with bounds of the variables that [fit] sets, widened to contain designs (k, P)."""
-    return widened(problem, found, [n for n in problem.variables if n in study.made])
+    return widened(problem, designs, [n for n in problem.variables if n in study.made])

@@ -144,14 +144,14 @@ def compile_descents(study: Study) -> None:
         descend_once(study, problem_of(study, designs))
 
 
-def problem_of_dataset(study: Study, folder: Path, found: Array) -> Problem:
+def problem_of_dataset(study: Study, folder: Path, ends: Array) -> Problem:
     """Return the problem of a study whose search is finished, without searching for starts again.
 
     Parameters
     ----------
     study : study with an objective
     folder : folder of its dataset
-    found : designs (k, P) of the search, which the bounds must contain if they depend on such designs
+    ends : designs (k, P) of the search, which the bounds must contain if they depend on such designs
 
     Raises
     ------
@@ -160,7 +160,7 @@ def problem_of_dataset(study: Study, folder: Path, found: Array) -> Problem:
     """
     problem = _designs_and_problem(study, folder)[2]
     by_populations = study.optimise is not None and study.optimise.by_populations
-    return enclosing(study, problem, found) if by_populations else problem
+    return enclosing(study, problem, ends) if by_populations else problem
 
 
 def _designs_and_problem(study: Study, folder: Path) -> tuple[Array, Array, Problem]:

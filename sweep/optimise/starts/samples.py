@@ -86,28 +86,28 @@ def sample(
         block //= 2
     blocks = max(-(-SAMPLED * count // block), len(bases))
     rng = np.random.default_rng((seed, number))
-    points = qmc.Sobol(len(problem.variables), seed=rng)
-    place, kind, merit = np.empty((0, len(problem.variables))), np.empty(0, np.intp), np.empty(0)
+    sobol = qmc.Sobol(len(problem.variables), seed=rng)
+    points, kind, merit = np.empty((0, len(problem.variables))), np.empty(0, np.intp), np.empty(0)
     for k in range(blocks):
         if k and stop():
             break
-        fractions, index = _drawn_within(problem, points.random(block)), k % len(bases)
+        fractions, index = _drawn_within(problem, sobol.random(block)), k % len(bases)
         ranks = ranking(problem, problem.placed(bases[index], fractions))
-        place = np.concatenate([place, fractions])
+        points = np.concatenate([points, fractions])
         kind = np.concatenate([kind, np.full(block, index)])
         merit = np.concatenate([merit, ranks])
         order = np.argsort(merit, kind="stable")
         feasible = merit[order] < OUTSIDE
         best = np.sort(np.concatenate([order[feasible][: KEPT * count], order[~feasible][: KEPT * count]]))
-        place, kind, merit = place[best], kind[best], merit[best]
-    merit = _verified(problem, bases, place, kind, merit)
-    chosen, feasible_count = _parents(place, kind, merit, PARENTS * count)
-    place, merit = _improved(problem, bases, place[chosen], kind[chosen], merit[chosen], rng, stop)
+        points, kind, merit = points[best], kind[best], merit[best]
+    merit = _verified(problem, bases, points, kind, merit)
+    chosen, feasible_count = _parents(points, kind, merit, PARENTS * count)
+    points, merit = _improved(problem, bases, points[chosen], kind[chosen], merit[chosen], rng, stop)
     ranked = np.argsort(merit, kind="stable")
     if feasible_count >= count:  # designs moved within the limits have to be as good as those that were there
         ranked = ranked[merit[ranked] <= merit[:feasible_count].max()]
-    place, kind = place[ranked], kind[chosen][ranked]
-    designs = [problem.placed(bases[kind[k]], place[k]) for k in spread(place, kind, count)]
+    points, kind = points[ranked], kind[chosen][ranked]
+    designs = [problem.placed(bases[kind[k]], points[k]) for k in spread(points, kind, count)]
     return np.array(designs).reshape(-1, len(problem.family.parameters))
 
 
@@ -126,7 +126,7 @@ def _drawn_within(problem: Problem, fractions: Array) -> Array:
     return np.asarray(low + out * (high - low), np.float64)
 
 
-def _parents(place: Array, kind: NDArray[np.intp], merit: Array, count: int) -> tuple[NDArray[np.intp], int]:
+def _parents(points: Array, kind: NDArray[np.intp], merit: Array, count: int) -> tuple[NDArray[np.intp], int]:
     """Return the row numbers of diverse designs to be improved, feasible ones first, and how many are feasible.
 
     Feasible ones are up to half; the others violate the limits and keep a distance from them.
@@ -137,11 +137,11 @@ def _parents(place: Array, kind: NDArray[np.intp], merit: Array, count: int) -> 
     order = np.argsort(merit, kind="stable")
     order = order[np.isfinite(merit[order])]
     feasible, turning = merit[order] < OUTSIDE, merit[order] < NOT_TURNING
-    taken = order[feasible][spread(place[order[feasible]], kind[order[feasible]], count // 2)]
+    taken = order[feasible][spread(points[order[feasible]], kind[order[feasible]], count // 2)]
     feasible_count = len(taken)
     for candidates in (order[turning & ~feasible], order):
         rows = np.concatenate([taken, candidates[~np.isin(candidates, taken)]])
-        taken = rows[spread(place[rows], kind[rows], count, first=len(taken))]
+        taken = rows[spread(points[rows], kind[rows], count, first=len(taken))]
     return np.asarray(taken, np.intp), feasible_count
 
 
@@ -160,41 +160,41 @@ def _drawing_range(problem: Problem) -> tuple[Array, Array]:
     return 0.5 - 0.5 * share, 0.5 + 0.5 * share
 
 
-def _verified(problem: Problem, bases: list[Array], place: Array, kind: NDArray[np.intp], merit: Array) -> Array:
+def _verified(problem: Problem, bases: list[Array], points: Array, kind: NDArray[np.intp], merit: Array) -> Array:
     """Return the ranks of designs, from true extrema if the poses hid most of a peak."""
     out = merit.copy()
     for index, base in enumerate(bases):
         rows = np.flatnonzero((kind == index) & (merit < OUTSIDE))
-        ranks = ranking(problem, problem.placed(base, place[rows]), VERIFIED)
+        ranks = ranking(problem, problem.placed(base, points[rows]), VERIFIED)
         hidden = ranks > HIDDEN * merit[rows]
         out[rows[hidden]] = ranks[hidden]
     return out
 
 
 def _improved(
-    problem: Problem, bases: list[Array], place: Array, kind: NDArray[np.intp], merit: Array, rng: np.random.Generator,
+    problem: Problem, bases: list[Array], points: Array, kind: NDArray[np.intp], merit: Array, rng: np.random.Generator,
     stop: Callable[[], bool],
 ) -> tuple[Array, Array]:  # fmt: skip
     """Replace each design repeatedly by the best of a sample around it; without a better one the radius is halved."""
-    place, merit = place.copy(), merit.copy()
-    radius = np.full(len(place), RADIUS)
+    points, merit = points.copy(), merit.copy()
+    radius = np.full(len(points), RADIUS)
     for _ in range(ROUNDS):
         if stop():
             break
-        steps = radius[:, None, None] * rng.standard_normal((len(place), CHILDREN, place.shape[1]))
-        children = np.clip(place[:, None, :] + steps, 0.0, 1.0)
-        values = np.empty((len(place), CHILDREN))
+        steps = radius[:, None, None] * rng.standard_normal((len(points), CHILDREN, points.shape[1]))
+        children = np.clip(points[:, None, :] + steps, 0.0, 1.0)
+        values = np.empty((len(points), CHILDREN))
         for index, base in enumerate(bases):
             rows = np.flatnonzero(kind == index)
-            designs = problem.placed(base, children[rows].reshape(-1, place.shape[1]))
+            designs = problem.placed(base, children[rows].reshape(-1, points.shape[1]))
             values[rows] = ranking(problem, designs).reshape(-1, CHILDREN)
-        chosen = np.arange(len(place)), np.argmin(values, axis=1)
+        chosen = np.arange(len(points)), np.argmin(values, axis=1)
         best = children[chosen]
         ranks = _verified(problem, bases, best, kind, values[chosen])
         better = ranks < merit
-        place[better], merit[better] = best[better], ranks[better]
+        points[better], merit[better] = best[better], ranks[better]
         radius[~better] *= 0.5
-    return place, merit
+    return points, merit
 
 
 def ranking(problem: Problem, designs: Array, accuracy: Accuracy = ACCURACY) -> Array:
@@ -288,27 +288,27 @@ def diverse(problem: Problem, designs: Array, merit: Array, count: int, least: f
     return ranked[spread(problem.scaled(ranked), kind.reshape(-1), count, least)]
 
 
-def spread(place: Array, kind: NDArray[np.intp], count: int, least_share: float = 0.0, first: int = 0) -> list[int]:
+def spread(points: Array, kind: NDArray[np.intp], count: int, least_share: float = 0.0, first: int = 0) -> list[int]:
     """Return the numbers of the best rows that keep a distance from each other.
 
-    At most ``count`` rows of ``place`` (k, n), which is ranked with the best first, are taken.
+    At most ``count`` rows of ``points`` (k, n), which is ranked with the best first, are taken.
 
     ``kind`` (k,): rows of different kinds are never neighbours.  The distance is at least ``least_share`` of the
     average distance of two random designs.  The ``first`` rows are taken in any case.
     """
-    distance = 0.5 * np.sqrt(place.shape[1] / 6.0)  # half of the average distance of two random designs
+    distance = 0.5 * np.sqrt(points.shape[1] / 6.0)  # half of the average distance of two random designs
     taken: list[int] = []
     for _ in range(12):
-        taken, available = list(range(first)), np.ones(len(place), dtype=np.bool_)
+        taken, available = list(range(first)), np.ones(len(points), dtype=np.bool_)
         for near in taken:
-            available &= ~((np.linalg.norm(place - place[near], axis=1) < distance) & (kind == kind[near]))
+            available &= ~((np.linalg.norm(points - points[near], axis=1) < distance) & (kind == kind[near]))
         available[:first] = False
         while len(taken) < count and available.any():
             row = int(np.argmax(available))
             taken.append(row)
-            available &= ~((np.linalg.norm(place - place[row], axis=1) < distance) & (kind == kind[row]))
+            available &= ~((np.linalg.norm(points - points[row], axis=1) < distance) & (kind == kind[row]))
             available[row] = False
-        if len(taken) == count or 0.5 * distance < least_share * np.sqrt(place.shape[1] / 6.0):
+        if len(taken) == count or 0.5 * distance < least_share * np.sqrt(points.shape[1] / 6.0):
             break
         distance *= 0.5
     return taken
