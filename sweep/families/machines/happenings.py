@@ -96,11 +96,13 @@ def bends_of_threads(machine: Machine) -> list[Bends]:
 
 
 def _bending(machine: Machine, thread: ThreadBalance, designs: Array, angles: Angles) -> Array:
-    own = {output.name for output in thread.outputs} & {f"{thread.name}_{name}" for name in ("surplus", "velocity")}
-    places = {name for name in thread.needs(frozenset(own)) if not name.startswith("phi_")}
-    found = {PHI: angles.phi} | machine.poses(designs, angles, frozenset(own | places))
+    names = frozenset(f"{thread.name}_{name}" for name in ("surplus", "velocity"))
+    own = names.intersection(output.name for output in thread.outputs)
+    places = frozenset(name for name in thread.needs(own) if not name.startswith("phi_"))
+    found = {PHI: angles.phi} | machine.poses(designs, angles, places)  # the machine of the events has no threads
     found |= event_angles(machine, designs)[0] if thread.happens else {}
-    curves: Array = thread.bending(found)
+    found |= {p.name: designs[:, [machine.parameter_names.index(p.name)]] for p in thread.parameters}
+    curves: Array = thread.bending(found | thread.compute(found, own))
     return curves
 
 

@@ -135,11 +135,10 @@ def _built(machine: Machine, members: tuple[Member, ...]) -> Machine:
         members=tuple(placed),
     )
     found = replace(found, poses=partial(_poses, found))  # events of a thread are searched on poses of the others
-    found = replace(found, poses=partial(_poses, found))  # bends of a thread are searched on its own
     precise = partial(_precise_poses, found) if any(m.family.precise_poses for m in placed) else None
     smooth = (one for r in sums for one in r.smooth)
     known = (*found.capabilities, *switches_of_threads(found), *bends_of_threads(found), *smooth)
-    found = replace(found, precise_poses=precise, capabilities=known)
+    found = replace(found, poses=partial(_poses, found), precise_poses=precise, capabilities=known)
     steps = [taking_step(r, found) for r in machine.relations if isinstance(r, Taking)]
     steps += [entering_step(r, found) for r in machine.relations if isinstance(r, Entering)]
     steps += [sewing_step(r, found) for r in machine.relations if isinstance(r, Sewing)]
