@@ -74,7 +74,7 @@ def _proof(table: pd.DataFrame) -> str:
     took, alone = (float(rows["ns_per_design"].mean()) for rows in (proven, searched))
     return (
         f"add `certify = true`. {duration(took)} a design on average at `accuracy = {power(PROVEN)}`,"
-        f" {sig(took / alone)} times as long as the search alone: for survivors and optima."
+        f" {sig(took / alone)} times as long as the search alone. Use it for survivors and optima."
         f" {proven['unanswered'].sum()} of {proven['designs'].sum()} proofs failed."
     )
 
@@ -98,7 +98,7 @@ def _spread(table: pd.DataFrame) -> list[str]:
     """Describe the spread of the timings of one call, over all rows of the table."""
     width = (table["ns_per_design_upper"] - table["ns_per_design_lower"]) / table["ns_per_design"]
     return prose(
-        f"Every time is the median of five; between its quartiles lie {sig(100.0 * width.median())} % of it in the",
-        f"middle of the table, {sig(100.0 * width.quantile(0.95))} % in the worst twentieth. The quartiles",
-        "stand in `results/accuracy/families.parquet`.",
+        f"Every time is the median of five runs. The quartiles differ by {sig(100.0 * width.median())} % of it in the",
+        f"middle of the table, by {sig(100.0 * width.quantile(0.95))} % in the worst twentieth; they are in",
+        "`results/accuracy/families.parquet`.",
     )

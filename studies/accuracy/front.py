@@ -23,8 +23,8 @@ USUAL = 360.0  # samples of a turn in common use
 
 def front_parts(m: Measured) -> Parts:
     """Return the parts of the first page: five sentences, one whole study, the conditions of the times."""
-    rough = "Smoke version: few designs, rough figures." if m.smoke else "Every figure here is measured, none is typed."
-    told = f"{rough} Machine: {m.machine}. Ratios travel between machines, nanoseconds do not."
+    rough = "Smoke version: few designs, rough figures." if m.smoke else "Every figure here is measured."
+    told = f"{rough} Machine: {m.machine}. Ratios hold on other machines, nanoseconds do not."
     return {"five": [f"* {line}" for line in five(m)], "study": _study(m.whole), "measured": prose(told)}
 
 
@@ -84,7 +84,7 @@ def _edge(table: pd.DataFrame) -> str:
         f"**Near a change point only `accuracy=` can be trusted.** There a grid of {USUAL:.0f} is off by up to {off} %"
         f" ({both['largest_error_grid'].idxmax()}), `accuracy={power(FINE)}` by {sig(both['largest_error'][worst])} at"
         f" most ({worst}, where the reference is sure to {sig(both['reference_error'][worst])}), for {slower} times the"
-        " time of an ordinary design (median). Where it cannot, its status says so."
+        " time of an ordinary design (median). If it cannot reach the accuracy, its status says so."
     )
 
 
@@ -111,7 +111,7 @@ def _in_a_study(whole: pd.DataFrame) -> str:
         f"**In a whole study the digits {cost}.** {int(last['designs'])} designs and their optimum take"
         f" {sig(grid['processor_seconds'])} s of one core with a grid of {_setting(grid)},"
         f" {sig(first['processor_seconds'])} s and {sig(last['processor_seconds'])} s with `accuracy` {_setting(first)}"
-        f" and {_setting(last)}; the largest error of what is kept is {sig(grid['largest_error'])},"
+        f" and {_setting(last)}; the largest errors of the kept designs are {sig(grid['largest_error'])},"
         f" {sig(first['largest_error'])} and {sig(last['largest_error'])}."
     )
 
@@ -133,13 +133,13 @@ def _study(whole: pd.DataFrame) -> list[str]:
         for row in whole.itertuples()
     ]
     head = ["accuracy", "seconds, quartiles", "processor seconds", "largest error kept", "error of optimum",
-            "optimum off the finest"]  # fmt: skip
+            "difference from the finest optimum"]  # fmt: skip
     first = whole.iloc[0]
     return [
         *prose(
-            f"A Sobol sample of {int(first['designs'])} crank-rockers, limits on swing and pressure angle,"
-            f" {int(first['kept'])} kept, least of the largest acceleration searched from four starts; one worker.",
-            "Errors are relative, against the reference of [every family](accuracy/families.md).",
+            f"The study has a Sobol sample of {int(first['designs'])} crank-rockers and limits on swing and pressure",
+            f"angle; {int(first['kept'])} designs are kept. It minimises the largest acceleration from four starts",
+            "with one worker. Errors are relative, against the reference of [every family](accuracy/families.md).",
         ),
         "",
         *pipe_table(head, rows),

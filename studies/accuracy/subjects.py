@@ -19,8 +19,8 @@ NEAR, WIDE, FAR = 0.02, 0.3, 0.9  # largest share by which a parameter differs f
 ORDINARY, VARIED, EDGE = "ordinary", "wide", "near a change point"
 TEXTS = {
     ORDINARY: "every parameter within 2 % of the family's ordinary design",
-    VARIED: "every parameter within 30 % of it, as far as they move all the way",
-    EDGE: "1e-6 to 1e-2 of the way back from a design that does not move all the way, to one that does",
+    VARIED: "every parameter within 30 % of the ordinary design's; only designs that move all the way",
+    EDGE: "1e-6 to 1e-2 of the way from the end of the range of full motion back to an ordinary design",
 }
 MOVES = (st.OK, st.NOT_OSCILLATING)  # a follower that turns fully moves all the way
 COARSE, CLOSE = Accuracy(samples=90), Accuracy(samples=3600)

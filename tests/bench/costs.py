@@ -42,25 +42,25 @@ PROVEN = Accuracy(target=1e-8, certify=True)
 
 PAGE_HEAD = """# What a pose of each family takes
 
-Written by `make bench`, on one core: position and all derivatives that the family gives, on designs within 2 % of its
-ordinary one; of an interval there and back, of a march on its grid. The reason is said where a pose takes more than
-three times what the crank-rocker's does. The same figures, and those of steps, effects and searches, lie in
-`sweep/costs.toml`, from which `sweep check` estimates; no value depends on them. What accuracy costs in time is in
-[accuracy.md](accuracy.md).
+This page has the time of one pose of each family, measured by `make bench` on one core. A pose has the position and all
+derivatives that the family gives. The designs are within 2 % of the family's ordinary one. An interval is passed there
+and back, a march on its grid. A reason is given if a pose takes more than three times as long as the crank-rocker's.
+`sweep/costs.toml` has the same figures and those of steps, effects and searches; `sweep check` estimates from them, and
+no value depends on them. [accuracy.md](accuracy.md) says what accuracy costs in time.
 """
 
 # Why a pose takes more than three times what the crank-rocker's does.
 REASONS = {
-    "five_link": "the root of the closing equation is iterated and proved to be the only one of its branch",
-    "free_cam": "every minimum of the thread's length over the edge is found by iteration, so that the least is",
-    "free_cam_friction": "the thread's way is followed in order, with an iteration wherever it begins to slide",
+    "five_link": "the root of the closure equation is found by iteration and proved to be the only one of its branch",
+    "free_cam": "iteration finds every minimum of the thread's length over the edge, so that the least one is found",
+    "free_cam_friction": "the thread's path is followed in order, with an iteration wherever it begins to slide",
     "backrest": "forces of yarn, spring and guide at every radius, with a square root for each of four lengths",
-    "backrest_tension": "the bracket angle is sought on 400 cells, and every root of the equilibrium in them refined",
+    "backrest_tension": "the bracket angle is searched on 400 cells; every root of the equilibrium in them is refined",
     "backrest_closure": "as backrest_tension",
     "feed": "closures one after the other, an arctangent for each, and two derivatives of the tooth through all",
     "feed_triad": "Newton's method in three unknowns, over 180 nodes besides the poses, to stay on the chosen assembly",
     "foot": "the motion is marched over four turns of 720 nodes for every 360 poses that are kept",
-    "feed_foot": "the same march as of the foot, on the path of the rack",
+    "feed_foot": "as foot, on the path of the rack",
 }
 
 

@@ -40,14 +40,16 @@ def page(found: pd.DataFrame, worst: pd.DataFrame) -> list[str]:
         "# Largest known errors",
         "",
         *prose(
-            "Every row of the 25-digit tables, in units of 2^-53 max(cond, abs y); for the geared dwell drive,",
-            "whose table has no cond, of abs y, its lower derivatives and what one rounding of phi does; for the",
-            "largest pressure angle of a rounding of one radian; for joint loads of the tabulated sensitivity, with",
-            "friction of the largest force. Back to [what the next digit costs](../accuracy.md).",
+            "The tables show the largest errors over all rows of the 25-digit tables. The unit is 2^-53 times",
+            "max(cond, abs y). In some tables another size takes the place of this maximum: for the geared dwell",
+            "drive, whose table has no cond, the largest of abs y, its lower derivatives and the change by one",
+            "rounding of phi; for the largest pressure angle one radian; for other pressure angles and joint",
+            "loads the tabulated sensitivity; with friction the largest force. Back to [what the next digit",
+            "costs](../accuracy.md).",
         ),
         "",
-        f"Beyond the factor of their sheet: {beyond} of {len(found)} quantities and kinds, over {rows} rows;",
-        f"rows declared undecidable: {int(found['undecidable'].sum())}.",
+        f"{beyond} of {len(found)} quantities and kinds exceed the factor of their sheet, over {rows} rows;",
+        f"{int(found['undecidable'].sum())} rows are declared undecidable.",
         "",
     ]
     tables = found.groupby("table", sort=False)
@@ -69,8 +71,8 @@ def page(found: pd.DataFrame, worst: pd.DataFrame) -> list[str]:
         "### Largest found by search",
         "",
         *prose(
-            "Crank-rockers outside the tables: `make search-worse` looks for poses with larger factors than any",
-            "known; the tests replay them.",
+            "These are crank-rockers outside the tables. `make search-worse` looks for poses with larger factors than",
+            "any known; the tests replay them.",
         ),
         "",
         *pipe_table(["poses of", "region", *ORDERS], searched),

@@ -31,14 +31,17 @@ def page(peers: pd.DataFrame, loads: pd.DataFrame, one: pd.DataFrame) -> list[st
     return [
         "# Other programs on the same tasks",
         "",
-        "`make bench-peers` measures them. Back to [what the next digit costs](../accuracy.md).",
+        *prose(
+            "This page compares linksweep with other programs; `make bench-peers` measures it. Back to [what the next",
+            "digit costs](../accuracy.md).",
+        ),
         "",
         "## The planar case",
         "",
         *prose(
-            f"Largest acceleration of ordinary designs of `{peers['family'].iloc[0]}` on a grid, each program by its",
-            "fastest way. A cell is the largest relative error and the median time per design. All have the same",
-            "designs: equal errors mean equal accelerations.",
+            f"The table has the largest acceleration of ordinary designs of `{peers['family'].iloc[0]}` on a grid.",
+            "Each program computes it by its fastest method. A cell has the largest relative error and the median",
+            "time per design. All programs have the same designs, so equal errors mean equal accelerations.",
         ),
         "",
         *pipe_table(
@@ -52,9 +55,9 @@ def page(peers: pd.DataFrame, loads: pd.DataFrame, one: pd.DataFrame) -> list[st
         "## Joint loads",
         "",
         *prose(
-            "Inverse dynamics of the same bodies at the same poses: largest difference of a joint force or drive",
-            "torque, relative to the largest of the turn, and the time per pose; theirs from Python, with the loop",
-            "closed by Newton's method in the exported model, ours in a sweep.",
+            "The programs compute inverse dynamics of the same bodies at the same poses. The difference is the largest",
+            "of a joint force or drive torque, relative to the largest of the turn; times are per pose. The others run",
+            "from Python, with the loop closed by Newton's method in the exported model; linksweep runs in a sweep.",
         ),
         "",
         *pipe_table(
@@ -63,7 +66,7 @@ def page(peers: pd.DataFrame, loads: pd.DataFrame, one: pd.DataFrame) -> list[st
         ),
         "",
         *prose(
-            "One crank-rocker with heavy links, time per pose and how many times as fast as the first; the loads",
+            "The next table is for one crank-rocker with heavy links. The ratio compares with the first row; the loads",
             f"differ by at most {sig(one['largest_difference'].max())} of the largest.",
         ),
         "",

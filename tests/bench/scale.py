@@ -181,34 +181,34 @@ def main() -> None:
 
 PAGE = """# Scale
 
-`make bench-scale` writes this page; each line is a run in a process of its own, with two threads, on {cores} cores
-({machine}). Where other work goes on at the same time the wall clock says little; the processor's time counts. Start
-(imports, compiled kernels from the cache, the plan) is subtracted from the time per sample or design, not from the
-other columns.
+This page shows time, memory and disk of large sweeps (`make bench-scale`). Each row is a run in its own process with
+two threads, on {cores} cores ({machine}). Other work on the machine lengthens the wall time, so the processor time
+counts. The start (imports, compiled kernels from the cache, the plan) is subtracted from the time per sample or
+design, not from the other columns.
 
 ## Samples
 
-A crank-rocker with rotatability, swing, greatest pressure angle and greatest acceleration on {angles} crank angles;
-every design becomes a row.
+The study is a crank-rocker with rotatability, swing, largest pressure angle and largest acceleration on {angles} crank
+angles; every design becomes a row.
 
 {samples}
 
 ## Designs
 
-The same outputs with `accuracy = 1e-8`: true extrema instead of a grid.
+The outputs are the same with `accuracy = 1e-8`, so with true extrema instead of a grid.
 
 {designs}
 
 ## Memory
 
-Memory is that of the chunks at work, not of the sweep. A chunk takes two seconds of computing, 32 MB before it is
-encoded, or a sixteenth of all designs, whichever is least. So memory grows with a small sweep, and no more from about
-10^7 designs on: the cut of 10^8 or 10^12 of these designs has the chunks of 10^7. Each further job adds a chunk.
+Memory depends on the chunks in work, not on the sweep. A chunk takes two seconds of computing, 32 MB before it is
+encoded, or a sixteenth of all designs, whichever is least. So memory grows with a small sweep, but not beyond about
+10^7 designs: sweeps of 10^8 or 10^12 of these designs have chunks of the same size. Each further job adds a chunk.
 
 ## Reading 10^{power} rows
 
-In batches of 131072 rows, one file after the other (`sweep.dataset.reading`): first the columns that decide, of all
-rows within the limits, then all columns of the rows that are kept. pandas never sees more than one batch.
+The rows are read in batches of 131072, one file after the other (`sweep.dataset.reading`): first the columns that
+decide, of all rows within the limits, then all columns of the kept rows. pandas never holds more than one batch.
 
 {read}
 """
