@@ -23,6 +23,7 @@ from kernels.jit import inline, kernel
 from kernels.types import Array, Status
 
 EXCHANGES = 60
+REPEATS = 6
 ROUNDING = 2.0**-49  # of a residual, relative to its terms
 
 
@@ -260,8 +261,8 @@ def line_fit(
 
     Notes
     -----
-    Which positions belong to the working part depends on the point, so fit and window are repeated until they are the
-    same as before, three times at most.
+    Which positions belong to the working part depends on the point, so fit, best direction and window are repeated until
+    the window is the same as before, REPEATS times at most; the least deviation for its travel counts.
     """
     m, (xi, eta, h, deviation, travel, status) = b_x.shape[1], found
     bx, by, dx, dy = np.empty(m), np.empty(m), np.empty(m), np.empty(m)
@@ -275,14 +276,14 @@ def line_fit(
             xi[i], eta[i], h[i], deviation[i], travel[i] = math.nan, math.nan, math.nan, math.nan, math.nan
             status[i] = st.NOT_ASSEMBLED
             continue
-        code = st.NOT_CONVERGED
-        for repeat in range(3):
+        given, line, best = lam[i], lam[i], math.inf
+        for repeat in range(REPEATS):
             moments = _least_squares(bx, by, dx, dy, inside)
-            if free_direction and repeat == 0:
+            if free_direction:
                 free = _direction(bx, by, dx, dy, inside, moments)
-                lam[i] = free if math.cos(free - lam[i]) >= 0.0 else free - math.pi
+                line = free if math.cos(free - given) >= 0.0 else free - math.pi
             mbx, mby, mdx, mdy, cx_bx, cy_bx, cx_by, cy_by = moments
-            c, s = math.cos(lam[i]), math.sin(lam[i])
+            c, s = math.cos(line), math.sin(line)
             x[0], x[1] = _point(cx_bx, cy_bx, cx_by, cy_by, c, s)
             x[2] = c * mby - s * mbx + x[0] * mdy + x[1] * mdx
             for j in range(m):
@@ -304,7 +305,9 @@ def line_fit(
                 inside[j] = counts
                 if counts:
                     worst = max(worst, abs(target[j] + x[0] * dy[j] + x[1] * dx[j] - x[2]))
+            if repeat == 0 or (code == st.OK and (status[i] != st.OK or worst < best * (high - low))):
+                lam[i], best = line, worst / (high - low)
+                xi[i], eta[i] = c * x[0] - s * x[1], s * x[0] + c * x[1]
+                h[i], deviation[i], travel[i], status[i] = x[2], worst, high - low, code
             if settled:
                 break
-        xi[i], eta[i] = c * x[0] - s * x[1], s * x[0] + c * x[1]
-        h[i], deviation[i], travel[i], status[i] = x[2], worst, high - low, code
