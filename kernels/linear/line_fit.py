@@ -261,8 +261,8 @@ def line_fit(
 
     Notes
     -----
-    Which positions belong to the working part depends on the point, so fit, best direction and window are repeated until
-    the window is the same as before, REPEATS times at most; the least deviation for its travel counts.
+    Which positions belong to the working part depends on the point, so fit, best direction and window are repeated
+    until the window is the same as before, REPEATS times at most; the least deviation for its travel counts.
     """
     m, (xi, eta, h, deviation, travel, status) = b_x.shape[1], found
     bx, by, dx, dy = np.empty(m), np.empty(m), np.empty(m), np.empty(m)

@@ -32,6 +32,7 @@ PANELS_AT_ONCE = 1024
 LOOKS = 512  # samples on which kinks and jumps of a curve are searched
 EVEN = 16  # first panels of a curve with kinks, jumps or waves, in addition to cuts at its known kinks
 KNOWN = 4  # first panels of a curve all of whose kinks are known
+ROUGH = 1e-3  # error of the mean of SAMPLES poses, as a share of it, from which on the curve may be rounding alone
 PREFIX = "rms_"
 
 
@@ -88,7 +89,9 @@ def _refined(family: Family, designs: Array, pose: str, target: float) -> tuple[
     cut = crossed(family, designs, (pose,)) | (denser(family, designs, (pose,)) > 1.0) | output.kinks | output.jumps
     even = KNOWN if switching(family, (pose,)) and pose not in family.dear else EVEN
     alive = np.flatnonzero(status == st.OK)
-    for rows in np.split(alive, range(PANELS_AT_ONCE, alive.size, PANELS_AT_ONCE)):
+    noise = _alone(family, designs, alive[err[alive] > ROUGH * mean[alive]], pose, top, mean, err)
+    left = np.setdiff1d(alive, noise)
+    for rows in np.split(left, range(PANELS_AT_ONCE, left.size, PANELS_AT_ONCE)):
         near = nearest(family, designs[rows], (pose,), NEAR)
         open_ = cut[rows] | (near.rho.min(axis=1, initial=FAR) < NEAR) | ~(err[rows] <= target * mean[rows])
         edges, rows = turn_edges(near.only(np.flatnonzero(open_)), PANEL), rows[open_]
@@ -105,12 +108,16 @@ def _refined(family: Family, designs: Array, pose: str, target: float) -> tuple[
         # Badly scaled designs lose digits in every pose: the mean may lose as much as the largest value.
         err[alive] = np.maximum(err[alive], shaken(family, designs[alive], top[alive], pose))
     late = np.flatnonzero(status == st.NOT_CONVERGED)
-    if late.size:
-        off = shaken_anywhere(family, designs[late], top[late], pose)
-        alone = off >= ALONE * mean[late]  # the mean of rounding never settles, and its error is as large as itself
-        rows, off = late[alone], off[alone]
-        status[rows], err[rows] = st.OK, np.maximum(err[rows], np.maximum(off, mean[rows]))
+    status[_alone(family, designs, late, pose, top, mean, err)] = st.OK
     return mean, err, status
+
+
+def _alone(family: Family, designs: Array, rows: Index, pose: str, top: Array, mean: Array, err: Array) -> Index:
+    """Select rows whose curve is rounding alone: its mean never settles, and its error becomes as large as itself."""
+    off = shaken_anywhere(family, designs[rows], top[rows], pose)
+    found: Index = rows[off >= ALONE * mean[rows]]
+    err[found] = np.maximum(err[found], np.maximum(off[off >= ALONE * mean[rows]], mean[found]))
+    return found
 
 
 def _on_turn(family: Family, designs: Array, pose: str) -> tuple[Array, Array, Status, Array]:

@@ -17,7 +17,7 @@ from sweep.reductions.resolution import nearest
 from sweep.reductions.sampling import Index, Mask, blocks, only, pose_columns
 
 TRIES = 3
-PLACES = 8
+PLACES = 32  # a force along what bears none is exactly 0 at five of six poses
 ALONE = 0.1  # relative change of a curve's highest sample by rounded inputs from which on the curve is only rounding
 FAINT = 1e-10  # ratio of range to size below which the rounding of a signed curve is checked
 CONSTANT = 64.0 * EPS  # relative range below which a curve is constant but for rounding

@@ -31,7 +31,9 @@ def test_moments_that_are_rounding_alone_end_the_search_with_an_error_of_their_o
         assert (err >= 0.1 * size).all() if output in zero else (err <= 10.0 * TARGET * size).all(), output
 
 
-@pytest.mark.parametrize(("name", "output"), [("cam", "force_d_x"), ("geared_dwell", "moment_d_z")])
+@pytest.mark.parametrize(
+    ("name", "output"), [("cam", "force_d_x"), ("geared_dwell", "moment_d_z"), ("guided_cam", "force_d_y")]
+)
 def test_means_and_extremes_of_few_roundings_have_their_size_as_error(name, output):
     """Along what bears no load: all such means were NOT_CONVERGED, and extremes of 5 of 12 cams."""
     bare = family(name)

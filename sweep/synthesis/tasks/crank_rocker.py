@@ -56,10 +56,11 @@ def acceleration(designs: Array) -> Array:
 
 
 def with_tops(curve: Array) -> Array:
-    """Raise samples of a turn, (n, m), next to an extreme to that of the parabola through three of them.
+    """Replace samples of a turn, (n, m), next to an extreme by the extreme of the parabola through three samples.
 
-    So the largest magnitude has no corner where another sample becomes the highest.  Farther away than half a sample
-    what is added dies out: it stays continuous.
+    ``away`` is the distance of the parabola's extreme from the middle sample, in samples.  Up to a half the extreme is
+    taken in full; from there to one and a half what it adds falls to nothing.  So the largest magnitude changes
+    continuously with the dimensions, without a corner where the next sample becomes the highest.
     """
     before, after = np.roll(curve, 1, axis=1), np.roll(curve, -1, axis=1)
     slope, bend = 0.5 * (after - before), after - 2.0 * curve + before
