@@ -37,9 +37,9 @@ class Limit:
         """Both bounds, infinite if there is none."""
         return -math.inf if self.minimum is None else self.minimum, math.inf if self.maximum is None else self.maximum
 
-    def drawn_in(self, room: float) -> Limit:
+    def drawn_in(self, margin: float) -> Limit:
         """Return the limit tightened by a margin; a band narrower than both margins becomes infeasible."""
-        low, high = (None if x is None else x + d for x, d in ((self.minimum, room), (self.maximum, -room)))
+        low, high = (None if x is None else x + d for x, d in ((self.minimum, margin), (self.maximum, -margin)))
         return replace(self, minimum=low, maximum=high)
 
 

@@ -149,8 +149,8 @@ def margins(family: Family, stage: str = "") -> tuple[Series, ...]:
     """
     of_member = stage.endswith(".")
     loops = [o for o in family.every(Assembly) if o.stage == stage or (of_member and o.stage.startswith(stage))]
-    found = loops if stage else family.every(Assembly)
-    return tuple(Series(o.discriminant, pressure=o.pressure_angle) for o in found)
+    selected = loops if stage else family.every(Assembly)
+    return tuple(Series(o.discriminant, pressure=o.pressure_angle) for o in selected)
 
 
 def measure(family: Family, name: str, window: tuple[float, float] | None = None) -> Measure:
@@ -175,29 +175,29 @@ def measure(family: Family, name: str, window: tuple[float, float] | None = None
     return _measure(family, name, resolve(family, name), window)
 
 
-def _measure(family: Family, name: str, asked: kinds.Quantity, window: tuple[float, float] | None) -> Measure:
-    match asked:
-        case kinds.Negative(inner=of):
-            inner = measure(family, of.output.name, window)
+def _measure(family: Family, name: str, quantity: kinds.Quantity, window: tuple[float, float] | None) -> Measure:
+    match quantity:
+        case kinds.Negative(inner=negated):
+            inner = measure(family, negated.output.name, window)
             return Measure(name, "minus", inner.series, inner.inner, 1.0, inner.numbers, (inner,), inner.pieces)
         case kinds.TimingOf(timing=timing):
             return _of_timing(family, timing, window)
-        case kinds.EventPlace(event=e) if isinstance(family.domain, Turn) and not family.pose_output[asked.of].wraps:
+        case kinds.EventPlace(event=e) if isinstance(family.domain, Turn) and not family.pose_output[quantity.of].wraps:
             return Measure(name, "phi_event", (Series(e.of, passes=(e.level, 1.0 if e.rising else -1.0)),))
         case kinds.Margin(kind=kind):
-            return _of_margin(name, kind, margins(family, asked.stage))
+            return _of_margin(name, kind, margins(family, quantity.stage))
         case kinds.LimitPosition(kind=kind):
             ratio: Inner = "ratio" if kind == "stroke_ratio" else "same"
-            return Measure(name, LIMIT_KINDS[kind], (curve(family, asked.of),), ratio)
+            return Measure(name, LIMIT_KINDS[kind], (curve(family, quantity.of),), ratio)
         case kinds.Reduced(reduction=reduction, extreme=True):
-            inside = window if family.pose_output[asked.of].windowed else None
+            inside = window if family.pose_output[quantity.of].windowed else None
             # A vector's length has no slope at zero: its largest value is bounded by both signs, like a magnitude.
-            of_vector = {f"{asked.of}_{axis}" for axis in "xyz"} <= family.pose_output.keys()
+            of_vector = {f"{quantity.of}_{axis}" for axis in "xyz"} <= family.pose_output.keys()
             kind = "max_abs" if of_vector and reduction.kind == "max" else reduction.kind
-            return Measure(name, cast(Kind, kind), (curve(family, asked.of, inside),))
+            return Measure(name, cast(Kind, kind), (curve(family, quantity.of, inside),))
         case kinds.Extent(box=box):
             numbers = tuple(f"{name}, still {k}" for k in range(len(box.still)))
-            curves = tuple(curve(family, of) for of in box.curves)
+            curves = tuple(curve(family, output) for output in box.curves)
             return Measure(name, "box", curves, numbers=numbers, pieces=box.still)
         case kinds.Dimension(size=size):
             numbers = tuple(f"{name}, piece {k}" for k in range(len(size.pieces)))
@@ -214,15 +214,15 @@ def _measure(family: Family, name: str, asked: kinds.Quantity, window: tuple[flo
 
 
 def _of_timing(family: Family, timing: Timing | EventValue, window: tuple[float, float] | None) -> Measure:
-    ends = tuple(measure(family, place, window) for place in timing.places)
+    places = tuple(measure(family, name, window) for name in timing.places)
     if isinstance(timing, EventValue):
         # The angle of a passage has an exact gradient; that of an extremum only finite differences.
-        at = ends if ends[0].kind == "phi_event" else ()
-        series = ends[0].series if at else ()
-        return Measure(timing.name, "scalar", series, numbers=(timing.name,), parts=at, of=timing.of.name)
-    if not all(end.is_angle for end in ends):
+        passages = places if places[0].kind == "phi_event" else ()
+        series = places[0].series if passages else ()
+        return Measure(timing.name, "scalar", series, numbers=(timing.name,), parts=passages, of=timing.of.name)
+    if not all(end.is_angle for end in places):
         return Measure(timing.name, "scalar", (), numbers=(timing.name,))
-    return Measure(timing.name, "difference", tuple(s for end in ends for s in end.series), parts=ends)
+    return Measure(timing.name, "difference", tuple(s for end in places for s in end.series), parts=places)
 
 
 def _of_margin(name: str, kind: str, series: tuple[Series, ...]) -> Measure:
