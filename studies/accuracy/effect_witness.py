@@ -277,9 +277,9 @@ WITNESSES: Mapping[str, tuple[Witness, int, str]] = {
     "pressure_extrema": (pressure, 0, "the angle on ever narrower grids"),
     "bearing_life": (bearing_life, MANY, f"even sums over {MANY} poses"),
     "rolling_bearings": (bearings_of_shafts, MANY, f"even sums over {MANY} poses"),
-    "speed_fluctuation": (speed, SAMPLES, f"energy summed over {SAMPLES} poses, level by halving"),
+    "speed_fluctuation": (speed, SAMPLES, f"energy summed over {SAMPLES} poses, speed level by halving"),
     "speed_fluctuation_friction": (
-        speed_with_friction, SAMPLES, f"energy summed over {SAMPLES} poses, friction at the speed it makes",
+        speed_with_friction, SAMPLES, f"energy summed over {SAMPLES} poses, friction at the resulting speed",
     ),
     "dynamic_elasticity": (
         elastic, SAMPLES, f"differences of eighth order over {SAMPLES} poses; Liouville's formula",
