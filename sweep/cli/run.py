@@ -16,7 +16,10 @@ from sweep.jobs.progress import stages
 @OUT
 @JOBS
 @BACKEND
-@click.option("--accuracy", type=float, help="Relative error of the extrema, instead of the study's own target.")
+@click.option(
+    "--accuracy", type=click.FloatRange(1e-14, 0.1),
+    help="Relative error of the extrema, instead of the study's own target.",
+)  # fmt: skip
 @click.option("--certify", is_flag=True, help="Prove that no peak of the wanted maxima is missed.")
 @SMOKE
 @click.option(

@@ -250,6 +250,12 @@ def test_run_passes_its_options_on(study: Path, monkeypatch: pytest.MonkeyPatch)
     assert {given["accuracy"], given["smoke"], given["force"]} == {1e-5, True}
 
 
+def test_an_accuracy_out_of_range_is_a_fault_of_the_option_not_of_the_study_file(study: Path) -> None:
+    result = call("run", study, "--accuracy", 1.0)
+    assert result.exit_code == 2
+    assert "--accuracy" in result.output and "study.toml" not in result.output
+
+
 def test_warm_compiles_levels_in_processes_and_the_rest_by_the_tiny_version(study: Path) -> None:
     first, then = rounds([str(study), "geared_dwell"])
     assert [part.of for part in first].count("geared_dwell") > 1 and Part("geared_dwell") in first
