@@ -71,6 +71,23 @@ def on_grid(cosines: Array, sines: Array, turn: Array, values: Array) -> None:
 
 
 @inline
+def series_at(cosines: Array, sines: Array, phi: Array, turn: Array, values: Array, slopes: Array) -> None:
+    """Evaluate a Fourier series and its derivative at M crank angles [rad]; ``turn`` as for :func:`on_grid`.
+
+    The sums are those of :func:`series`; with all angles side by side the loop vectorises.
+    """
+    for j in range(values.size):
+        turn[2, j], turn[3, j] = math.cos(phi[j]), math.sin(phi[j])
+        turn[0, j], turn[1, j], values[j], slopes[j] = turn[2, j], turn[3, j], cosines[0], 0.0
+    for k in range(1, cosines.size):
+        for j in range(values.size):
+            c, s = turn[0, j], turn[1, j]
+            values[j] += cosines[k] * c + sines[k] * s
+            slopes[j] += k * (sines[k] * c - cosines[k] * s)
+            turn[0, j], turn[1, j] = c * turn[2, j] - s * turn[3, j], s * turn[2, j] + c * turn[3, j]
+
+
+@inline
 def series(cosines: Array, sines: Array, phi: float) -> tuple[float, float]:
     """Evaluate a Fourier series and its derivative at any angle phi [rad]."""
     value, slope = cosines[0], 0.0

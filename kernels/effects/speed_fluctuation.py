@@ -14,7 +14,7 @@ from typing import NamedTuple
 import numpy as np
 
 from kernels import status as st
-from kernels.curves.periodic import coefficients, on_grid, series, significant, tail
+from kernels.curves.periodic import coefficients, on_grid, series, series_at, significant, tail
 from kernels.effects.motor_line import steady_energy
 from kernels.jit import inline, kernel
 from kernels.types import Array, Status
@@ -78,6 +78,7 @@ def speed_fluctuation(
     all_xc, all_xs = (np.empty(half), np.empty(half)) if slope is not None else (all_wc, all_ws)
     work, turn = np.empty(n), np.empty((4, half))
     fine_j, fine_w, looks = np.empty(FINER * n), np.empty(FINER * n), np.empty((4, FINER * n))
+    turning, at = np.empty((4, phi.shape[1])), np.empty((4, phi.shape[1]))
     for i in range(inertia.shape[0]):
         row = i if phi.shape[0] > 1 else 0
         coefficients(inertia[i], turn, all_jc, all_js)
@@ -116,10 +117,9 @@ def speed_fluctuation(
         high = _extreme(jc, js, wc, ws, e, 1.0, fine_j, fine_w) if code == st.OK else math.nan
         low = _extreme(jc, js, wc, ws, e, -1.0, fine_j, fine_w) if code == st.OK else math.nan
         found.fastest[i], found.slowest[i], found.delta[i] = high, low, (high - low) / mean_speed[i]
-        for j in range(phi.shape[1]):
-            omega, change = _speed_at(phi[row, j], jc, js, wc, ws, e)
-            found.speed[i, j] = omega if code == st.OK else math.nan
-            found.acceleration[i, j] = change if code == st.OK else math.nan
+        found.speed[i], found.acceleration[i] = math.nan, math.nan
+        if code == st.OK:
+            _speeds(phi[row], jc, js, wc, ws, e, turning, at, found.speed[i], found.acceleration[i])
 
 
 @inline
@@ -140,12 +140,17 @@ def _integrate(c: Array, s: Array) -> None:
 
 
 @inline
-def _speed_at(phi: float, jc: Array, js: Array, wc: Array, ws: Array, e: float) -> tuple[float, float]:
-    """Compute the speed and d omega/d t at a crank angle."""
-    j_red, dj = series(jc, js, phi)
-    w, dw = series(wc, ws, phi)
-    square = 2.0 * (e + w) / j_red
-    return math.sqrt(square), (dw - 0.5 * square * dj) / j_red
+def _speeds(
+    phi: Array, jc: Array, js: Array, wc: Array, ws: Array, e: float, turn: Array, at: Array, speed: Array,
+    acceleration: Array,
+) -> None:  # fmt: skip
+    """Compute the speed and d omega/d t at crank angles; ``turn`` and ``at`` are (4, m) scratch."""
+    series_at(jc, js, phi, turn, at[0], at[1])
+    series_at(wc, ws, phi, turn, at[2], at[3])
+    for j in range(phi.size):
+        square = 2.0 * (e + at[2, j]) / at[0, j]
+        speed[j] = math.sqrt(square)
+        acceleration[j] = (at[3, j] - 0.5 * square * at[1, j]) / at[0, j]
 
 
 @inline
