@@ -107,9 +107,11 @@ def shaken(family: Family, designs: Array, phi: Array, name: str) -> Array:
 
 def shaken_anywhere(family: Family, designs: Array, phi: Array, name: str) -> Array:
     """Return the largest of these changes at PLACES poses of a turn: of a few roundings any one pose may keep all."""
-    places = phi[:, None] + np.arange(PLACES) * (TWO_PI / PLACES)
-    changes = shaken(family, np.repeat(designs, PLACES, axis=0), places.ravel(), name)
-    found: Array = changes.reshape(places.shape).max(axis=1)
+    found = np.empty(len(designs))
+    for rows in blocks(np.arange(len(designs)), PLACES * (TRIES + 1)):
+        places = phi[rows, None] + np.arange(PLACES) * (TWO_PI / PLACES)
+        changes = shaken(family, np.repeat(designs[rows], PLACES, axis=0), places.ravel(), name)
+        found[rows] = changes.reshape(places.shape).max(axis=1)
     return found
 
 
