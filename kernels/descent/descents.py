@@ -210,7 +210,7 @@ def descend(task: Task, kind: int, place: Array, x: Array, state: Array, curvatu
     place, x : (n,) and (5,) present place and linear unknowns, in and out
     state : (4,) merit, half width of the box (0 at rest), merit at the last rest, number of gradient evaluations; in
         and out.  A descent begins with (merit, RADIUS, inf, 0), at rest where the merit is LOCKED or more.
-    curvature : (n + 5, n + 5), in and out; see :func:`begin`
+    curvature : (n + 5, n + 5), in and out; see :func:`kernels.descent.program.reset_curvature`
     steps : largest number of steps
     """
     current, best, q = _empty_design(task), _empty_design(task), no_program(task)

@@ -188,7 +188,9 @@ def link_friction(
     lost: Array | None,
     on_supports: Array | None,
 ) -> None:
-    """Compute joint reactions and driving torque with friction; further arguments as in :mod:`.link_loads`.
+    """Compute joint reactions and driving torque with friction.
+
+    Further arguments are those of :mod:`kernels.effects.link_loads`.
 
     Parameters
     ----------

@@ -111,7 +111,7 @@ def rack_path(designs: Array, path: Array) -> None:
     Parameters
     ----------
     designs : (n, 8) columns as `PARAMETERS` of sweep/families/foot.py, without its fabric
-    path : (n, 6, N) out, for :func:`kernels.effects.foot.march`
+    path : (n, 6, N) out, for :func:`kernels.effects.foot_fabric.march`
     """
     step = TWO_PI / path.shape[2]
     for i in range(designs.shape[0]):

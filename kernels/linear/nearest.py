@@ -182,7 +182,7 @@ def continued(
 
 @kernel
 def nearest_with(rows: Array, rhs: Array, centre: Array, tolerance: float, y: Array, h: ActiveSet) -> tuple[int, int]:
-    """Find the point of :func:`nearest`; return number of active rows and status.  ``h`` is that of `nothing_held`."""
+    """Find the point of :func:`nearest`; return number of active rows and status.  ``h`` is :func:`no_active_rows`."""
     n, m = rows.shape
     size = np.zeros(m)
     for i in range(n):
@@ -196,7 +196,7 @@ def nearest_with(rows: Array, rhs: Array, centre: Array, tolerance: float, y: Ar
 
 @kernel
 def nearest(rows: Array, rhs: Array, centre: Array, tolerance: float, y: Array, weights: Array) -> int:
-    """Find the point nearest to a centre that satisfies ``rows.T y >= needs``.
+    """Find the point nearest to a centre that satisfies ``rows.T y >= rhs``.
 
     Parameters
     ----------

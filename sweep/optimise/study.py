@@ -167,9 +167,10 @@ def optimise_study(
 
     Returns
     -------
-    Path of ``_optimum.parquet``, whose metadata hold the survey of the starts (:func:`read_survey`);
-    ``_curves.parquet``, ``_sensitivity.parquet`` and, for a study with tolerances, ``_tolerance.parquet`` and
-    ``_made.parquet`` are written beside it.  Each file is written as a whole or not at all.
+    Path of ``_optimum.parquet``, whose metadata hold the survey of the starts, which
+    :func:`sweep.optimise.multistart.kept.read_survey` reads.  ``_curves.parquet``, ``_sensitivity.parquet`` and, for a
+    study with tolerances, ``_tolerance.parquet`` and ``_made.parquet`` are written beside it.  Each file is written as
+    a whole or not at all.
 
     Raises
     ------

@@ -8,6 +8,7 @@ import os
 import re
 from importlib import import_module
 from pathlib import Path
+from pkgutil import resolve_name
 
 import matplotlib.pyplot as plt
 import pytest
@@ -54,6 +55,19 @@ def test_examples_give_what_they_show(module, press):
     found = doctest.testmod(import_module(module), extraglobs={"sweep": sweep}, optionflags=doctest.FAIL_FAST)
     plt.close("all")
     assert found.failed == 0 and found.attempted > 0
+
+
+@pytest.mark.parametrize("folder", ["kernels", "sweep"])
+def test_docstrings_refer_to_what_exists(folder):
+    missing = []
+    for file in sorted((ROOT / folder).rglob("*.py")):
+        module = ".".join(file.relative_to(ROOT).with_suffix("").parts).removesuffix(".__init__")
+        for name in re.findall(r":(?:func|class|meth|mod|data|attr):`([\w.]+)`", file.read_text(encoding="utf-8")):
+            try:
+                resolve_name(name if name.split(".")[0] in ("kernels", "sweep") else f"{module}.{name}")
+            except (AttributeError, ImportError, ValueError):
+                missing.append(f"{module}: {name}")
+    assert not missing
 
 
 def test_a_wrong_example_is_noticed():

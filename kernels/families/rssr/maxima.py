@@ -284,7 +284,7 @@ def true_maxima(
     Parameters
     ----------
     designs : (n, 8) columns as `PARAMETERS` of sweep/families/rssr.py
-    table : :func:`sampling_tables`
+    table : :func:`kernels.families.rssr.sampling.sampling_tables`
     target : relative error wanted, 1e-3 ... 1e-12
     status : (n,) out; OK, NOT_ROTATABLE, UNDECIDABLE, NOT_CONVERGED or INVALID_INPUT
     phi : (3, n) out, or None [rad], crank angles in [0, 2 pi) of the maxima, of order 1, 2 and 3

@@ -67,7 +67,7 @@ def _reduce(at: Array, k: int) -> None:
 
 @kernel
 def precise_constants(designs: Array, out: Array) -> None:
-    """Compute the numbers of :class:`Reduced` in twice the working precision.
+    """Compute the numbers of :class:`kernels.linkage.crank_closure.Reduced` in twice the working precision.
 
     Parameters
     ----------

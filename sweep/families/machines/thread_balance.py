@@ -120,7 +120,7 @@ class ThreadBalance(Relation):
 
     @property
     def bent(self) -> frozenset[str]:
-        """Outputs with a kink where one of the curves of :meth:`bending` passes zero."""
+        """Outputs with a kink where one of the curves of :meth:`ThreadBalance.bending` passes zero."""
         if any(isinstance(place.on, thread_way.Edge) for place in self.path):  # its ends bound the range of sliding
             return frozenset(("wrap", "tension", "rate", "velocity"))
         return frozenset(("tension",) if self.moves or self.stiffness else ())
@@ -198,9 +198,10 @@ class ThreadBalance(Relation):
         return {f"{self.name}_{key}": values for key, values in columns.items()}
 
     def bending(self, found: Mapping[str, Any]) -> Any:
-        """Return the curves whose zeros are kinks of tension or rate, (n, m, q); ``found`` as in :meth:`compute`.
+        """Return the curves whose zeros are kinks of tension or rate, (n, m, q).
 
-        At these the thread becomes slack, its speed leaves the measured range, or it comes to the end of a blade.
+        ``found`` is that of :meth:`ThreadBalance.compute`.  At these zeros the thread becomes slack, its
+        speed leaves the measured range, or it comes to the end of a blade.
         """
         curves: list[Any] = []
         if self.stiffness:

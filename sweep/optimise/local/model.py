@@ -109,7 +109,7 @@ class Model:
         return self.uncounted(fractions, samples)
 
     def uncounted(self, fractions: Array, samples: int | None = None) -> State:
-        """Return the same as :meth:`state` without counting the evaluation and without stopping."""
+        """Return the same as :meth:`Model.state` without counting the evaluation and without stopping."""
         design = self.design(fractions)
         points, turns = self.curves.scan(design, samples or self.samples)
         form = self.program.lay_out(self.curves, design, points, turns, self.scale)

@@ -34,7 +34,7 @@ BOUND_STEP = 1e-3  # shift of bounds by which the change of their rows is found 
 TURN: Array = np.arange(POSES, dtype=np.float64) * (2.0 * math.pi / POSES)
 
 Levels = Mapping[str, float]
-"""Numbers of standard deviations in the margins of limits, by the keys of :func:`keyed`."""
+"""Numbers of standard deviations in the margins of limits, by the keys of :func:`margin_keys`."""
 
 
 def inequalities(problem: Problem) -> list[Limit]:

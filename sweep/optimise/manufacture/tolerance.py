@@ -89,7 +89,7 @@ def _is_plain(family: Family, output: str, window: tuple[float, float] | None) -
 def _plain_gradients(
     problem: Callable[[str], Problem], design: Array, outputs: Sequence[str]
 ) -> dict[str, tuple[float, Array, Array]]:
-    """Return the results of :func:`_ends` for plain numbers, computed together since they share poses and steps."""
+    """Return the results of :func:`_side_gradients` for plain numbers; they share poses and steps."""
     if not outputs:
         return {}
     base = problem(outputs[0])
@@ -210,7 +210,7 @@ def tolerance_rows(
     family, design : (P,) nominal design
     outputs : names of design outputs
     limits : limits counted in ``within``, without equations, which no toleranced mechanism keeps
-    tolerance, seed : see :func:`deviating`
+    tolerance, seed : see :func:`sampled_designs`
     accuracy, window : as for ``summarise``
 
     Returns
