@@ -15,7 +15,7 @@ from sweep.effects import NAMES, effect
 from sweep.effects.base import Effect
 from sweep.effects.link_loads import rods_of
 from sweep.effects.load_passing import LOADS
-from sweep.effects.loads import FRICTION_SUFFIX
+from sweep.effects.loads import FRICTION_SUFFIX, FRICTION_TEXT
 from sweep.errors import InputError, choices
 from sweep.families.base import Output, Parameter
 from sweep.families.link_tree import LinkTree
@@ -23,10 +23,15 @@ from sweep.pages import rendered
 from sweep.quantities.units import internal_unit
 
 Rows: TypeAlias = list[tuple[str, str, str]]  # names, unit, definition
-COMPONENT = re.compile(r"_[xyz]{1,2}$")  # of a vector or a tensor
-OF_COMPONENT = re.compile(r"^(?:magnitude|[xyz]): |: entry of the tensor, - integral [xyz] [xyz] dm")
-ALONG = re.compile(r" along [xyz](?= of the fixed axes)")
+COMPONENT = re.compile(r"_[xyz]{1,2}$|[xyz](?=_p$)")  # of a vector or a tensor, or of the point of a coupler
+OF_COMPONENT = re.compile(r"^(magnitude: |[xyz]: |[xyz] of (the )?)|: entry of the tensor, - integral [xyz] [xyz] dm")
+ALONG = re.compile(r" along [xyz](?= of the fixed axes| per unit|$)")
 OF_PLACE = rf"(?:[123]?(?:{FRICTION_SUFFIX})?|_[xyz]{{1,2}})"  # suffix of a name behind that of a link or joint
+CONTACT = "C1"  # key of the effects about contacts
+OF_JOINT = re.compile(r": joint J\b(.*?)(?:; [a-z, ]+)?$")
+NUMBER = re.compile(r"( [a-d]?|^)(1|2|first|second)\b")
+BOTH = {"1": "1, 2", "2": "1, 2", "first": "first, second", "second": "first, second"}
+AS_WITHOUT = "as without `_friction`, friction included"
 REDUCED = re.compile(r"(?:(?:phi_)?(?:max_abs|max|min)|range|rms)_(?P<pose>.+)")
 
 
@@ -59,7 +64,8 @@ def cost_words(entry: Effect) -> str:
     """Return the measured cost in words."""
     words = [f"{entry.ns_per_pose:.0f} ns per pose"] if entry.ns_per_pose else []
     if entry.design_result:
-        words.append(f"{entry.ns_per_design / 1000.0:.3g} us per design")
+        us = entry.ns_per_design / 1000.0
+        words.append(f"{us:.3g} us per design" if us < 1000.0 else f"{us / 1000.0:.3g} ms per design")
     return ", ".join(words)
 
 
@@ -136,7 +142,7 @@ def joined(rows: Iterable[tuple[str, str, str, str]]) -> Rows:
 def input_notes(p: Parameter) -> str:
     """Describe the range of an input, and its default."""
     notes = [p.sign] if p.sign else []
-    return ", ".join([*notes, f"{p.default:g} if left out" if p.default is not None else "required"])
+    return ", ".join([*notes, f"default {p.default:g}" if p.default is not None else "required"])
 
 
 def every_input(entry: Effect) -> tuple[Parameter, ...]:
@@ -156,11 +162,70 @@ def heading(group: Sequence[Effect]) -> str:
     """Return the common last words of the names of a group, or all its names."""
     names = [entry.name.split("_")[::-1] for entry in group]
     alike = takewhile(lambda words: len(set(words)) == 1, zip(*names, strict=False))
-    return "_".join([words[0] for words in alike][::-1]) or ", ".join(entry.name for entry in group)
+    words = "_".join([words[0] for words in alike][::-1]) or ", ".join(entry.name for entry in group)
+    return f"{words} of many links" if len(group) > 2 and all(entry.tree for entry in group) else words
+
+
+def needed(group: Iterable[Effect]) -> list[str]:
+    """Return what the effects of a group need, without the family in front of the names."""
+    return list(dict.fromkeys(n.removeprefix(f"{e.families[0]}_") for e in group for n in e.needs))
+
+
+def link_lists(group: Sequence[Effect]) -> dict[tuple[Place, ...], list[Effect]]:
+    """Return the links and joints of the effects of a group, with the effects that share them."""
+    alike: dict[tuple[Place, ...], list[Effect]] = {}
+    for entry in group:
+        alike.setdefault(tuple(places_of(entry)), []).append(entry)
+    return alike
+
+
+def without_repeats(groups: Sequence[Sequence[Effect]]) -> list[tuple[list[str], list[str]]]:
+    """Return equations of each group that stand neither on another page nor before, and the headings of the latter."""
+    place: dict[str, str] = {}
+    out = []
+    for group in groups:
+        formulas = () if group[0].equation.startswith("docs/") else group[0].formulas
+        new = [f for f in formulas if f not in place]
+        out.append((new, list(dict.fromkeys(place[f] for f in formulas if f in place))))
+        place |= dict.fromkeys(new, heading(group))
+    return out
+
+
+def with_friction(rows: Rows) -> Rows:
+    """Say of outputs that differ from others by their friction alone what they are."""
+    return [(n, unit, AS_WITHOUT if FRICTION_SUFFIX in n and FRICTION_TEXT in t else t) for n, unit, t in rows]
+
+
+def alike(rows: Rows) -> Rows:
+    """Merge the rows of outputs with friction into one, and rows that differ by the number 1 or 2 alone."""
+    merged: dict[tuple[str, str, str], Rows] = {}
+    for row in rows:
+        name, unit, text = row
+        both = NUMBER.sub(lambda found: found[1] + BOTH[found[2]], text) if name[-1] in "12" else text
+        key = ("", "", text) if text == AS_WITHOUT else (name[:-1], unit, both) if both != text else row
+        merged.setdefault(key, []).append(row)
+    return [
+        ("; ".join(name for name, *_ in own), ", ".join(dict.fromkeys(unit for _, unit, _ in own)), key[2])
+        if len(own) > 1
+        else own[0]
+        for key, own in merged.items()
+    ]
+
+
+def without_joint(row: tuple[str, str, str]) -> tuple[str, str, str]:
+    """Return the row of an input of every joint J as that of one joint."""
+    return row[0].replace("_J", ""), row[1], OF_JOINT.sub(r"\1", row[2])
+
+
+def shared_inputs(groups: Iterable[Sequence[Effect]]) -> Rows:
+    """Return the rows of inputs that effects of several groups take."""
+    tables = ([row for columns, _, rows in parts(g) if columns == "input" for row in alike(rows)] for g in groups)
+    count = Counter(row for table in tables for row in dict.fromkeys(map(without_joint, table)))
+    return [row for row, n in count.items() if n > 1]
 
 
 class Place(NamedTuple):
-    """A link, ``B``, or a joint, ``J``, of a link tree: its kind, name and words, and patterns for any such place."""
+    """A link, ``B``, or a joint, ``J``: kind, name, axes or what acts on what, and patterns for any such place."""
 
     sign: str
     kind: str
@@ -169,23 +234,37 @@ class Place(NamedTuple):
     general: tuple[tuple[str, str], ...]
 
 
-def places(tree: LinkTree) -> list[Place]:
-    """Return the links and the joints of a link tree."""
+def places(tree: LinkTree, touching: bool = False) -> list[Place]:
+    """Return the links and the joints of a link tree, or the joints with a contact only."""
     rods, found = rods_of(tree), list[Place]()
     for k, b in enumerate(tree.bodies):
-        kind = "slender" if b.slender else "rod" if k in rods else "compact"
-        named = (rf"_{b.name}\b", "_B"), (rf"\bof (?:the )?{b.name}\b", "of link B")
-        found.append(Place("B", kind, b.name, b.axes, ((re.escape(f"({b.axes})"), "along its axes"), *named)))
+        found.append(link("slender" if b.slender else "rod" if k in rods else "compact", b.name, b.axes))
     for j in tree.joints:
         acting = re.escape(f"of the {j.acts}"), "of its first link on the second"
         general = (f"(?<!of the ){re.escape(j.text)}", "joint J"), acting
-        found.append(Place("J", j.kind, j.name, f"{j.text}: {j.acts}", general))
-    return found
+        found.append(Place("J", j.touch if touching else j.kind, j.name, j.acts, general))
+    return [place for place in found if place.sign == "J" and place.kind] if touching else found
 
 
-def _generalised(tree: LinkTree, row: tuple[str, str, str]) -> tuple[str, str, tuple[str, str, str]] | None:
+def places_of(entry: Effect) -> list[Place]:
+    """Return the links and joints that rows of an effect are about; of a stage of one kind its links alone."""
+    if entry.tree is not None:
+        return places(entry.tree, entry.key == CONTACT)
+    of = {p.name: p.text for p in entry.inputs}
+    bodies = [name.removeprefix("m_") for name in of if f"com_{name.removeprefix('m_')}_x" in of]
+    axes = {body: of[f"com_{body}_x"].partition(" (")[2][:-1] for body in bodies}
+    return [link("rod" if f"rod_{body}" in of else "compact", body, axes[body]) for body in bodies]
+
+
+def link(kind: str, name: str, axes: str) -> Place:
+    """Return a link with the patterns of rows about it."""
+    named = (rf"_{name}\b", "_B"), (rf"\bof (?:the )?{name}\b", "of link B")
+    return Place("B", kind, name, axes, ((re.escape(f"({axes})"), "along its axes"), *named))
+
+
+def _generalised(found: Sequence[Place], row: tuple[str, str, str]) -> tuple[str, str, tuple[str, str, str]] | None:
     """Return sign and kind of a row's link or joint, and the row for any of them; None for a row about none."""
-    for place in places(tree):
+    for place in found:
         name = re.sub(rf"_{place.name}(?={OF_PLACE}(?:,|$))", f"_{place.sign}", row[0], count=1)
         text = row[2]
         for words, general in place.general:
@@ -195,10 +274,10 @@ def _generalised(tree: LinkTree, row: tuple[str, str, str]) -> tuple[str, str, t
     return None
 
 
-def of_any_place(trees: Sequence[LinkTree], tables: Sequence[Rows]) -> tuple[Rows, list[Rows]]:
-    """Return the rows that all links or joints of some kinds share, in general form, and each tree's other rows."""
-    every = Counter((place.sign, place.kind) for tree in trees for place in places(tree))
-    found = [[_generalised(tree, row) for row in table] for tree, table in zip(trees, tables, strict=True)]
+def of_any_place(known: Sequence[Sequence[Place]], tables: Sequence[Rows]) -> tuple[Rows, list[Rows]]:
+    """Return the rows that all links or joints of some kinds share, in general form, and each effect's other rows."""
+    every = Counter((place.sign, place.kind) for own in known for place in own)
+    found = [[_generalised(own, row) for row in table] for own, table in zip(known, tables, strict=True)]
     kinds: dict[tuple[str, tuple[str, str, str]], Counter[str]] = {}
     for sign, kind, row in (one for ones in found for one in ones if one is not None):
         kinds.setdefault((sign, row), Counter())[kind] += 1
@@ -226,24 +305,20 @@ def parts(group: Sequence[Effect]) -> list[tuple[str, list[str], Rows]]:
     """
     known = [{p for name in entry.needs for p in every_input(effect(name))} for entry in group]
     kinds = {
-        "output | unit | definition": [_output_rows(entry.outputs) for entry in group],
-        "output per design | unit | definition": [_design_rows(entry) for entry in group],
-        "input | unit | definition": [
+        "output": [_output_rows(entry.outputs) for entry in group],
+        "output per design": [_design_rows(entry) for entry in group],
+        "input": [
             _input_rows(p for p in every_input(entry) if p not in old) for entry, old in zip(group, known, strict=True)
         ],
     }
-    trees = [entry.tree for entry in group if entry.tree is not None]
-    together = len(trees) == len(group) > 1
+    found = [places_of(entry) for entry in group]
+    together = len(group) > 1 and all(found)
     out: list[tuple[str, list[str], Rows]] = []
-    if together and group[0].key == LOADS:
-        alike: dict[tuple[tuple[str, str, str], ...], list[str]] = {}
-        for entry, tree in zip(group, trees, strict=True):
-            alike.setdefault(tuple((p.name, p.kind, p.text) for p in places(tree)), []).append(entry.name)
-        out += [("link B or joint J | kind | axes; what it is", names, list(table)) for table, names in alike.items()]
     for columns, tables in kinds.items():
-        common = [row for row in tables[0] if all(row in table for table in tables)]
-        own = [[row for row in table if row not in common] for table in tables]
-        general, own = of_any_place(trees, own) if together else ([], own)
+        general, own = of_any_place(found, tables) if together else ([], tables)
+        general, *own = map(with_friction, (general, *own))
+        common = [row for row in own[0] if all(row in table for table in own)]
+        own = [[row for row in table if row not in common] for table in own]
         of_several: dict[tuple[str, ...], Rows] = {}
         for row in dict.fromkeys(row for table in own for row in table):
             names = tuple(entry.name for entry, table in zip(group, own, strict=True) if row in table)
@@ -254,14 +329,21 @@ def parts(group: Sequence[Effect]) -> list[tuple[str, list[str], Rows]]:
 
 def page() -> str:
     """Return docs/effects.md, generated from the register."""
-    entries = [effect(name) for name in NAMES]
+    groups = grouped(effect(name) for name in NAMES)
     return str(
         rendered(
             "effects.md.j2",
-            entries=entries,
-            groups=grouped(entries),
+            groups=groups,
+            equations=without_repeats(groups),
+            shared=shared_inputs(groups),
+            without_joint=without_joint,
             heading=heading,
-            parts=parts,
+            families=lambda group: dict.fromkeys(name for entry in group for name in entry.families),
+            needed=needed,
+            link_lists=link_lists,
+            listed=(LOADS, CONTACT),
+            tables=lambda group: groupby(parts(group), key=lambda part: part[0]),
+            alike=alike,
             cost=cost_words,
             in_chain=chain_words,
         )

@@ -12,7 +12,7 @@ from click.testing import CliRunner
 import sweep
 from studies.accuracy.ordinary import designs
 from sweep.cli import main
-from sweep.cli.effects import every_input, grouped, of_any_place, page, parts, places
+from sweep.cli.effects import every_input, grouped, of_any_place, page, parts, places_of
 from sweep.effects import NAMES, applicable, effect, extended, offered
 from sweep.effects.advice import closure, findings, left_out, tree
 from sweep.effects.base import Placed
@@ -36,16 +36,16 @@ def test_rows_of_the_page_for_any_link_or_joint_hold_for_those_of_their_kinds():
     for group in grouped(map(effect, NAMES)):
         if len(group) == 1 or any(entry.tree is None for entry in group):
             continue
-        trees = [entry.tree for entry in group]
-        for columns in ("output | ", "output per design | ", "input | "):
-            alone = [[row for part, _, rows in parts([e]) if part.startswith(columns) for row in rows] for e in group]
-            general, own = of_any_place(trees, alone)
-            kinds = {place.kind for one in trees for place in places(one)}
-            for own_tree, table, left in zip(trees, alone, own, strict=True):
+        for columns in ("output", "output per design", "input"):
+            alone = [[row for part, _, rows in parts([e]) if part == columns for row in rows] for e in group]
+            found = [places_of(entry) for entry in group]
+            general, own = of_any_place(found, alone)
+            kinds = {place.kind for one in found for place in one}
+            for own_places, table, left in zip(found, alone, own, strict=True):
                 named = [row[0] for row in left]
                 for name, _, text in general:
                     only = text.rpartition("; ")[2].split(", ")
-                    for place in places(own_tree):
+                    for place in own_places:
                         if f"_{place.sign}" in name and (place.kind in only or not set(only) <= kinds):
                             named.append(name.replace(f"_{place.sign}", f"_{place.name}", 1))
                             seen += 1
@@ -167,10 +167,11 @@ def test_the_command_lists_and_explains():
 def test_the_page_names_every_output_and_input_once_for_all_effects_that_share_it():
     """Names in one row share their stem; reductions of outputs per pose are not listed."""
     named = set()
-    any_place = {(place.sign, place.name) for entry in map(effect, NAMES) if entry.tree for place in places(entry.tree)}
-    for cell in re.findall(r"^\| `([^`]+)` \| [^|]+ \| [^|]+ \|$", page(), re.MULTILINE):
+    any_place = {(place.sign, place.name) for entry in map(effect, NAMES) for place in places_of(entry)}
+    rows = re.findall(r"^(?:\| (?=`)|Common inputs: )([^|]+)(?: \| [^|]+ \| [^|]+ \||\.)$", page(), re.MULTILINE)
+    for cell in re.findall(r"`([^`]+)`", "\n".join(rows)):
         first, *others = cell.split(", ")
-        names = {first, *(re.sub(r"_[xyz]{1,2}$", "", first) + other for other in others)}
+        names = {first, *others, *(re.sub(r"_[xyz]{1,2}$", "", first) + other for other in others)}
         named |= names | {x.replace(f"_{sign}", f"_{own}", 1) for x in names for sign, own in any_place}
     for entry in map(effect, NAMES):
         reductions = {o.name for o in entry.design_result.outputs} if entry.design_result else set()
