@@ -46,13 +46,14 @@ def write_hardpoints(mechanism: Mechanism, design: Table, path: Path, phi: float
                 rows.writerow([*head, f"axis_{shown_name(joint)}", *map(repr, axis.tolist()), "1"])
 
 
-def _per_angle(family: Family, name: str) -> str:
-    """Return the suffix of a derivative's unit by the shaft's angle, as /rad^2 for the second derivative."""
+def _unit(family: Family, name: str, of: str) -> str:
+    """Return an output's unit, of a derivative by the shaft's angle with its own, as mm/rad^2 and rad/rad^2."""
     if family.domain.unit != "rad":
-        return ""  # a derivative by another variable has its own unit
+        return of  # a derivative by another variable has its own unit
     found = family.split(name) if isinstance(family, Machine) else None
     order = len(family.orders(name) if found is None else found[0].family.orders(found[1]))
-    return "" if order == 0 else "/rad" if order == 1 else f"/rad^{order}"
+    of = "rad" if order and of == "1" else of  # pure numbers are derivatives of angles
+    return of + ("" if order == 0 else "/rad" if order == 1 else f"/rad^{order}")
 
 
 def write_law(
@@ -76,7 +77,7 @@ def write_law(
         angles, text = equal_steps(domain, matrix, poses), domain.text
     found = evaluate(mechanism, design, names, phi=angles, angles="rad")
     units = {o.name: o.unit for o in family.pose_outputs} | {domain.name: domain.unit}
-    units = {name: of.replace("length", unit) + _per_angle(family, name) for name, of in units.items()}
+    units = {name: _unit(family, name, of.replace("length", unit)) for name, of in units.items()}
     texts = {o.name: o.text for o in family.pose_outputs} | {domain.name: text}
     columns = {domain.name: angles}
     if speed is not None and not isinstance(domain, Interval):

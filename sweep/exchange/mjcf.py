@@ -40,7 +40,6 @@ class Loop:
     A, B, C, D : joints; D is C on a slider
     crank, coupler, driven : axes of the bodies, (3, 3); x along the link, z along its axis
     finger : DRIVING or not
-    turn : from the frame in which the family's forces and gravity are, into that of its joints
     turn : rotation from the frame of the family's forces and gravity to that of its joints
     """
 
@@ -230,7 +229,6 @@ def inertial(design: Mapping[str, float], name: str, stage: str, unit: str) -> X
     Raises
     ------
     InputError
-        for a mass without the inertia that counts, or with one that no body has.
     for a mass without the inertia that matters, or with an unphysical one.
     """
     kilograms, metres = KILOGRAMS[unit], METRES[unit]

@@ -124,15 +124,15 @@ def pose(mechanism: Mechanism, design: Table, phi: float) -> list[Part]:
 
 
 def side_by_side(found: Sequence[Part]) -> list[Placed]:
-    """Place the parts of one frame together, and each further frame beside those before it, along x."""
-    placed, right = [], math.nan
-    for same in frames_of(found).values():
+    """Place the parts of one frame together, and each further frame beside those before it, along x; same order."""
+    shifts, right = {}, math.nan
+    for frame, same in frames_of(found).items():
         points = np.vstack([path for part in same for path in part.joints.values()])
         low, high = float(np.nanmin(points[:, 0])), float(np.nanmax(points[:, 0]))
         along = 0.0 if math.isnan(right) else right + GAP * extent(same) - low
-        placed += [Placed(part, np.array([along, 0.0, 0.0])) for part in same]
+        shifts[frame] = np.array([along, 0.0, 0.0])
         right = high + along
-    return placed
+    return [Placed(part, shifts[part.frame]) for part in found]
 
 
 def extent(found: Sequence[Part]) -> float:

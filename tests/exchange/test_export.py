@@ -290,6 +290,8 @@ def test_law_has_units_in_its_headings_and_its_metadata(tmp_path):
     assert schema.field("s").metadata[b"unit"] == b"mm"
     assert schema.field("s").metadata[b"definition"].startswith(b"slider displacement")
     np.testing.assert_array_equal(pd.read_parquet(file)["d2s"], poses["d2s"])
+    head = sweep.export("rssr", scaled("rssr"), tmp_path / "angle.csv", "law").read_text().splitlines()[0]
+    assert head.startswith("phi [rad],psi [rad],dpsi [rad/rad],d2psi [rad/rad^2],d3psi [rad/rad^3],")
 
 
 def test_time_of_a_march_is_from_0_wherever_a_turn_begins(tmp_path):

@@ -155,3 +155,10 @@ def test_members_on_shafts_are_limited_and_differentiated_like_placed_ones():
     assert found["y.max_tip_x"][0] == pytest.approx(dense["y.tip_x"].max(), rel=1e-6)
     alone = sweep.evaluate("rssr", rssr, ["psi"], phi=-(-2.0 * dense["phi"].to_numpy()[:5] + 0.4 + 0.3 - 0.8))
     np.testing.assert_allclose(np.sin(dense["y.psi"][:5]), np.sin(alone["psi"]), atol=1e-12)
+
+
+def test_first_stage_is_placed_only_where_the_last_one_stands_in_its_frame():
+    chain = {"chain": ["kim_dison", "five_link"]}
+    sweep.machine({"x": chain | {"place": {}}})
+    with pytest.raises(sweep.InputError, match="place: stage = 1"):  # it was a RecursionError
+        sweep.machine({"x": chain | {"place": {"stage": 1}}})

@@ -187,6 +187,9 @@ def _member(
     driver = _driver(table.get("driver"), earlier, where)
     drives = {} if driver is None else dict(earlier[driver[0]].family.derivative_of)
     spot = placement(name, None if table.get("place") is None else dict(table["place"]))
+    if spot.stage and len(family.stages) > 1 and not family.stages[-1].is_placed:
+        allowed = "a chain whose stages have places; left out, the frame is that of the last stage"
+        raise InputError("stage", spot.stage, allowed, f"{where}.place")
     member = Member(name, family, ratio, offset, driver, drives, spot, tip, mount=mount)
     return member if table.get("eye") is None else replace(member, eye=_eye(member, table["eye"], f"{where}.eye"))
 
