@@ -26,7 +26,7 @@ from kernels.types import EPS, TWO_PI, Array, CosSin, Status
 
 PER_TARGET, PER_POWER = 1.2, 1.4  # samples times distance, per logarithm of the target: mostly enough at first
 SLOWEST = 0.3  # ratio of amplitudes n/8 apart above which the samples do not resolve the curve
-SURE = 8.0  # factor of the amplitude of the harmonic, which counts twice
+SURE = 40.0  # factor of the amplitude of the harmonic, which counts twice; 8 was 4.7 times too small near two dips
 ARCS = 8  # sums of samples, by their number modulo 8
 _HALF = math.sqrt(0.5)
 THIN, FEW = 4, MOST // 4  # every fourth sample is used to estimate the rounding; their largest number

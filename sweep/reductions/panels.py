@@ -183,7 +183,8 @@ def _climbed(
     size = best if request.mode == 0 else best - least
     tops: list[Top] = []
     while panels.row.size:
-        panels = only(panels, _upper(panels, request.mode) >= best[panels.row])
+        # Of tops as high as each other none is dropped by rounding.
+        panels = only(panels, _upper(panels, request.mode) >= best[panels.row] - LEVEL * EPS * np.abs(best[panels.row]))
         # The even first panels may all be within the target: a constant, or a dwell.
         crowded = panels.high - panels.low < 0.25 * TWO_PI / PANELS
         crowded &= np.bincount(panels.row[crowded], minlength=n)[panels.row] > CROWD
@@ -291,9 +292,10 @@ def _highest(tops: list[Top], n: int) -> Top:
 
 def _upper(panels: Panels, mode: int) -> Array:
     """Estimate an upper bound of a curve on each panel from its coefficients."""
-    dense = product(panels.series, rising(np.linspace(-1.0, 1.0, DENSE)))
+    dense = _measured(product(panels.series, rising(np.linspace(-1.0, 1.0, DENSE))), mode)
     doubt = CAREFUL * np.abs(panels.series[:, -TAIL:]).sum(axis=1) + LATELY * panels.missed
-    upper: Array = np.maximum(_measured(dense, mode).max(axis=1), panels.peak) + doubt
+    between = np.maximum(-np.diff(dense, 2, axis=1).min(axis=1), 0.0) / 8.0  # a parabola rises so far between points
+    upper: Array = np.maximum(dense.max(axis=1) + between, panels.peak) + doubt
     return upper
 
 

@@ -206,6 +206,11 @@ class Search:
             more, first = only(more, new), only(first, new)
             peaks = joined(peaks, self._sharpened(turn, more, first, size))
             candidates = joined(candidates, more)
+        if self.family.precise_poses is None:
+            rivals, tolerance, tied = self._rivals(turn, candidates, peaks, size[candidates[:2]])
+            rivals, tolerance = rivals[tied], tolerance[tied]
+            sample = self._sampler(self.family, turn, only(candidates, rivals))
+            put(peaks, rivals, refine.sharpen(sample, only(peaks, rivals), tolerance, np.full(rivals.size, np.inf)))
         share = self._rounding(turn, candidates, self.guards)
         if self.near is not None:
             near = self.near.only(turn.rows[candidates.row])
@@ -229,19 +234,10 @@ class Search:
 
         ``share`` of a height is the possible effect of rounding.
         """
-        number, row, _, sign = candidates
-        windowed = np.array([request.windowed for request in self.requests])[number]  # those outside are dropped later
-        group, doubt = number * turn.rows.size + row, peaks.err_height + RIVALS * size
-        lowest = np.full(len(self.requests) * turn.rows.size, -np.inf)
-        np.maximum.at(lowest, group, peaks.height - doubt)
-        rivals = np.flatnonzero((peaks.height + doubt >= lowest[group]) | windowed)
-        group, tolerance = group[rivals], self.target * size[rivals]
-        # The place depends on which of several peaks is the highest.
-        located = self.places(number[rivals])
-        tied = (np.bincount(group, minlength=lowest.size)[group] > 1) & located
-        tolerance = np.where(tied, np.minimum(tolerance, TIE * size[rivals]), tolerance)
+        rivals, tolerance, _ = self._rivals(turn, candidates, peaks, size)
         mine, peak = only(candidates, rivals), only(peaks, rivals)
-        sample = self._sampler(self.family.precise(), turn, mine, sign[rivals] * peak.height)
+        located = self.places(mine.request)
+        sample = self._sampler(self.family.precise(), turn, mine, mine.sign * peak.height)
         locate = np.full(rivals.size, np.inf)
         # Without a derivative to polish it, a place is limited by the rounding of the heights: precise poses locate it.
         bare = np.array([request.pose not in self.family.derivative_of for request in self.requests])[mine.request]
@@ -252,6 +248,18 @@ class Search:
         # The first stage of a chain gets its exact input angle, later stages a rounded one.
         rounding = self._rounding(turn, mine, self.guards[1:]) * np.abs(peak.height)
         put(peaks, rivals, peak._replace(err_height=peak.err_height + rounding))
+
+    def _rivals(self, turn: Sampled, candidates: Candidates, peaks: Peaks, size: Array) -> tuple[Index, Array, Mask]:
+        """Select the peaks that may be the highest; their tolerances, and whether a place depends on which one is."""
+        number = candidates.request
+        windowed = np.array([request.windowed for request in self.requests])[number]  # those outside are dropped later
+        group, doubt = number * turn.rows.size + candidates.row, peaks.err_height + RIVALS * size
+        lowest = np.full(len(self.requests) * turn.rows.size, -np.inf)
+        np.maximum.at(lowest, group, peaks.height - doubt)
+        rivals = np.flatnonzero((peaks.height + doubt >= lowest[group]) | windowed)
+        group = group[rivals]
+        tied = (np.bincount(group, minlength=lowest.size)[group] > 1) & self.places(number[rivals])
+        return rivals, np.where(tied, min(self.target, TIE), self.target) * size[rivals], tied
 
     def _sampler(self, family: Family, turn: Sampled, candidates: Candidates, middle: Array | None = None) -> Sampler:
         """Make a function that evaluates candidates by the poses of ``family``.
@@ -316,20 +324,26 @@ class Search:
         np.maximum.at(ceiling, row, peaks.height + peaks.err_height)
         # A less accurate maximum may be higher.
         err = np.maximum(peaks.err_height[chosen], ceiling[has] - peaks.height[chosen])
-        if self.family.precise_poses is None and chosen.size:
+        located, rounded, off = self.locate or request.place, self.family.precise_poses is None, np.zeros(rows.size)
+        if (located or rounded) and chosen.size:
+            off[has] = shaken(self.family, self.designs[rows[has]], peaks.phi[chosen], request.pose)
+        if rounded and chosen.size:
             # Badly scaled designs lose digits before any discriminant is computed.
-            off = shaken(self.family, self.designs[rows[has]], peaks.phi[chosen], request.pose)
-            err = np.maximum(err, off)
+            err = np.maximum(err, off[has])
             if self.near is not None:
-                err += np.where(self.near.only(rows[has]).distance(peaks.phi[chosen]) < CLOSE, refine.VARIES * off, 0.0)
+                err += np.where(
+                    self.near.only(rows[has]).distance(peaks.phi[chosen]) < CLOSE, refine.VARIES * off[has], 0.0
+                )
         found.err[rows[has]] = err
         moved = np.zeros(rows.size)
         moved[has] = np.abs(peaks.height[chosen] - peaks.guess[chosen])
-        if self.locate or request.place:
-            chosen = refine.first_of_equals(row, peaks, chosen)
+        if located:
+            alike = refine.VARIES * (off[row] + 4.0 * EPS * np.abs(peaks.height))
+            known = peaks._replace(err_height=np.maximum(peaks.err_height, alike))
+            chosen = refine.first_of_equals(row, known, chosen)
         phi, err_phi = peaks.phi[chosen], peaks.err_phi[chosen]
         slope = self.family.derivative_of.get(request.pose)
-        if (self.locate or request.place) and slope is not None and not request.windowed:
+        if located and slope is not None and not request.windowed:
             phi, err_phi = refine.polished(self.family, self.designs[rows[has]], slope, phi, err_phi)
         found.phi[rows[has]] = np.mod(phi, TWO_PI)
         found.err_phi[rows[has]] = err_phi

@@ -119,7 +119,8 @@ def sharpen(sample: Sampler, peaks: Peaks, tolerance: Array, locate: Array) -> P
         # Samples that deviate from a quartic are noise, which does not shrink with the window.
         error = claim * np.abs(top - height[active]) + RIPPLE * ripple + 4.0 * EPS * np.abs(top) + kink
         # Too small a window shows only noise: it may refine the height, but must not change the place.
-        err_place = u * (claim * np.abs(place) + blur) + 4.0 * EPS * np.pi
+        misplaced = np.where(kink > 0.0, SHRINK_KINKED, 0.0)
+        err_place = u * (claim * np.abs(place) + blur + misplaced) + 4.0 * EPS * np.pi
         # At a kink the error shrinks with the window.  Noise looks bent too, but its error stays, and it is ignored.
         noisy = inside & (kink > 0.0) & (error >= LEARNT * err_height[active]) & (u < looked[active])
         looked[active] = np.where(inside, u, looked[active])

@@ -89,19 +89,20 @@ def shaken(family: Family, designs: Array, phi: Array, name: str) -> Array:
     """Measure the change of a pose output under rounding of the inputs of a design, (n,).
 
     A kernel as exact as its inputs has an error of this size.  It is the largest change of TRIES poses, at one crank
-    angle of each design; poses that fail are ignored.
+    angle of each design, (n,), or at several, (n, k); poses that fail are ignored.
     """
     free = np.array([p.choices is None and p.unit != "count" for p in family.parameters])
     # Signs depend on the name of each input, so that further inputs of other outputs do not change them.
     bits = np.array([crc32(p.name.encode()) for p in family.parameters]) >> np.arange(TRIES)[:, None]
     signs = np.where(free, 1.0 - 2.0 * (bits & 1), 0.0)
     every = np.concatenate([designs, *(designs * (1.0 + 2.0 * EPS * sign) for sign in signs)])
-    columns, status = pose_columns(family, every, np.tile(phi, TRIES + 1)[:, None], [name])
-    values, known = (x.reshape(TRIES + 1, len(designs)) for x in (columns[name], status == st.OK))
+    angles = np.atleast_2d(phi.T).T
+    columns, status = pose_columns(family, every, np.tile(angles, (TRIES + 1, 1)), [name])
+    values, known = (x.reshape(TRIES + 1, *angles.shape) for x in (columns[name], status == st.OK))
     off = values[1:] - values[0]
     if family.pose_output[name].wraps:
         off -= TWO_PI * np.rint(off / TWO_PI)
-    found: Array = np.where(known[1:], np.abs(off), 0.0).max(axis=0)
+    found: Array = np.where(known[1:], np.abs(off), 0.0).max(axis=(0, 2))
     return found
 
 
@@ -110,8 +111,7 @@ def shaken_anywhere(family: Family, designs: Array, phi: Array, name: str) -> Ar
     found = np.empty(len(designs))
     for rows in blocks(np.arange(len(designs)), PLACES * (TRIES + 1)):
         places = phi[rows, None] + np.arange(PLACES) * (TWO_PI / PLACES)
-        changes = shaken(family, np.repeat(designs[rows], PLACES, axis=0), places.ravel(), name)
-        found[rows] = changes.reshape(places.shape).max(axis=1)
+        found[rows] = shaken(family, designs[rows], places, name)
     return found
 
 

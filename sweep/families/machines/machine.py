@@ -117,10 +117,15 @@ def _built(machine: Machine, members: tuple[Member, ...]) -> Machine:
     derivative_of = {
         f"{m.name}.{name}": f"{m.name}.{of}" for m in placed for name, of in m.family.derivative_of.items()
     }
-    outputs += [o for relation in machine.relations for o in relation.outputs]
+    sums = [r for r in machine.relations if isinstance(r, Shaking | ShaftTorque)]
+    kinked = {o.name for o in outputs if o.kinks}
+    outputs += [
+        replace(o, kinks=o.kinks or (r in sums and not kinked.isdisjoint(r.needs(frozenset((o.name,))))))
+        for r in machine.relations
+        for o in r.outputs
+    ]
     derivative_of |= {name: rate for r in machine.relations for name, rate in r.rates.items()}
     loops = tuple(_loop(m, loop) for m in placed for loop in m.family.every(Assembly))
-    sums = [r for r in machine.relations if isinstance(r, Shaking | ShaftTorque)]
     found = replace(
         machine,
         title=" and ".join(f"{m.name} ({m.family.title})" for m in placed),
