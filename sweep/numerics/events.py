@@ -8,17 +8,14 @@ from typing import TypeAlias
 import numpy as np
 
 from kernels.types import TWO_PI, Array
-from sweep.numerics.quadrature import Index, Mask
+from sweep.numerics.quadrature import Index
 
-GOLDEN = 0.5 * (np.sqrt(5.0) - 1.0)
-SECTIONS = 12
-PARABOLAS = 4
-NARROWER = 1.0 / 16.0
 WIDER = 8.0  # ratio of successive distances: a pole beside the nearer end leaves 2.1^-k in the k-th coefficient
 SHORTEST = 1e-11  # distance of a zero [rad] below which its effect falls between two crank angles
 BISECTIONS = 120  # at most; a smooth function takes some eight steps, a jump one for each bit of the angle
-GRID, GRIDS = 65, 11  # points of each grid about a minimum; grids that narrow a whole turn down to rounding
+GRID, GRIDS = 9, 26  # points of each grid about a minimum; grids that narrow a whole turn down to rounding
 LAST = 2.0**-48  # width of the last brackets [rad]: four times the rounding of an angle
+FLAT = 1e-9  # width of brackets [rad] in which a smooth function is at its minimum to rounding
 
 Functions: TypeAlias = Callable[[Index, Array], Array]
 """``f(rows, phi)``: values (k, m, q) of q functions of the designs ``rows`` (k,) at crank angles (k, m)."""
@@ -34,7 +31,7 @@ def sign_changes(functions: Functions, angles: Array) -> tuple[Index, Array]:
 
     Notes
     -----
-    Roots are found by bracketing.  Two roots between samples appear as a dip: its bottom is found by golden sections.
+    Roots are found by bracketing.  Two roots between samples appear as a dip, whose bottom is found first.
     """
     before, after, values, left, right = _with_neighbours(functions, angles)
     row, column, which = np.nonzero((values < 0.0) != (right < 0.0))
@@ -44,17 +41,19 @@ def sign_changes(functions: Functions, angles: Array) -> tuple[Index, Array]:
     dip &= ((values < 0.0) == (left < 0.0)) & ((values < 0.0) == (right < 0.0))
     dip &= (left != 0.0) | (right != 0.0)  # a dwell at zero does not change its sign
     row, column, which = np.nonzero(dip)
-    near = _reaches(values, left, right, row, column, which)
+    # A parabola falls below its lowest sample by an eighth of the bend at most: other dips stay above zero.
+    a, b, c = (np.abs(y[row, column, which]) for y in (left, values, right))
+    near = b <= a + c - 2.0 * b
     row, column, which = row[near], column[near], which[near]
     low, high = before[row, column], after[row, column]
-    sign = np.where(values[row, column, which] < 0.0, -1.0, 1.0)
-    bottom, lowest = _bottom(functions, row, which, sign, low, high, whole=False)
-    through = lowest < 0.0
+    sign = np.where(values[row, column, which] < 0.0, -1.0, 1.0)[:, None]
+    bottom = bottoms(lambda phi: sign * _one(functions, row, which, phi), low, high, FLAT)
+    through = (sign * _one(functions, row, which, bottom[:, None]))[:, 0] < 0.0
     row, which, low, high, bottom = row[through], which[through], low[through], high[through], bottom[through]
     brackets += [(row, which, low, bottom), (row, which, bottom, high)]
 
     rows, numbers, lows, highs = (np.concatenate(parts) for parts in zip(*brackets, strict=True))
-    found = zeros(lambda k, phi: _one(functions, rows[k], numbers[k], phi), lows, highs)
+    found = zeros(lambda k, phi: _one(functions, rows[k], numbers[k], phi[:, None])[:, 0], lows, highs)
     return rows, np.mod(found, TWO_PI)
 
 
@@ -94,10 +93,10 @@ def zeros(function: Callable[[Index, Array], Array], low: Array, high: Array) ->
     return found
 
 
-def bottoms(function: Callable[[Array], Array], low: Array, high: Array) -> Array:
-    """Find the minima of functions with one minimum in each bracket, to the rounding of the angle.
+def bottoms(function: Callable[[Array], Array], low: Array, high: Array, width: float = LAST) -> Array:
+    """Find the minima of functions with one minimum in each bracket, by default to the rounding of the angle.
 
-    Successively finer grids work for a wedge as for a smooth function: many points at once take hardly longer than one.
+    Successively finer grids work for a wedge as for a smooth function, until the brackets have the given width.
 
     Parameters
     ----------
@@ -106,7 +105,7 @@ def bottoms(function: Callable[[Array], Array], low: Array, high: Array) -> Arra
     """
     every, share = np.arange(low.size), np.linspace(0.0, 1.0, GRID)
     for _ in range(GRIDS):
-        if (high - low).max(initial=0.0) <= LAST:
+        if (high - low).max(initial=0.0) <= width:
             break
         places = low[:, None] + share * (high - low)[:, None]
         least = np.argmin(function(places), axis=1)
@@ -142,7 +141,7 @@ def near_zeros(functions: Functions, angles: Array, reach: float) -> tuple[Index
     A dip D + D''/2 x^2 has a complex zero at the distance sqrt(2 D/D'').  The angles returned are the bottom, both
     angles at that distance from it, and angles at eight times the previous distance up to ``reach``.  Quantities that
     turn quickly there decay like the inverse of the distance: a panel that begins close by and ends far away would
-    not resolve that.  The bottom is found by golden sections.
+    not resolve that.
     """
     before, after, values, left, right = _with_neighbours(functions, angles)
     row, column, which = np.nonzero((values <= left) & (values < right))
@@ -150,10 +149,10 @@ def near_zeros(functions: Functions, angles: Array, reach: float) -> tuple[Index
     # A parabola falls below its lowest sample by an eighth of the bend at most: dips that stay above have no near zero.
     near = sides[0] <= sides[1] + sides[2] - 2.0 * sides[0]
     row, which, low, high = row[near], which[near], before[row, column][near], after[row, column][near]
-    bottom, lowest = _bottom(functions, row, which, np.ones(row.size), low, high, whole=True)
+    bottom = bottoms(lambda phi: _one(functions, row, which, phi), low, high, SHORTEST)
     step = 0.125 * (high - low)
-    beside = 0.5 * (_one(functions, row, which, bottom - step) + _one(functions, row, which, bottom + step))
-    rise = np.maximum(beside - lowest, np.finfo(float).tiny)
+    left, lowest, right = _one(functions, row, which, bottom[:, None] + step[:, None] * np.arange(-1.0, 2.0)).T
+    rise = np.maximum(0.5 * (left + right) - lowest, np.finfo(float).tiny)
     away = step * np.sqrt(np.maximum(lowest, 0.0) / rise)
     close = away < reach
     row, bottom, away = row[close], bottom[close], away[close]
@@ -173,64 +172,8 @@ def _with_neighbours(functions: Functions, angles: Array) -> tuple[Array, Array,
 
 
 def _one(functions: Functions, row: Index, which: Index, phi: Array) -> Array:
-    if not row.size:
-        return np.zeros(0)
-    found: Array = functions(row, phi[:, None])[np.arange(row.size), 0, which]
-    return found
-
-
-def _reaches(values: Array, left: Array, right: Array, row: Index, column: Index, which: Index) -> Mask:
-    """Whether a dip may cross zero: a parabola falls below its lowest sample by an eighth of the bend at most."""
-    a, b, c = (np.abs(y[row, column, which]) for y in (left, values, right))
-    return np.asarray(b <= a + c - 2.0 * b)
-
-
-def _bottom(
-    functions: Functions, row: Index, which: Index, sign: Array, low: Array, high: Array, whole: bool
-) -> tuple[Array, Array]:
-    """Find places and values of the bottoms of dips by golden sections, then parabolas on shrinking steps.
-
-    Unless ``whole``, the search of a dip ends once it is known whether the dip crosses zero.
-    """
-    place, lowest = 0.5 * (low + high), np.full(low.size, np.inf)
-    left = np.arange(low.size)
-
-    def at(x: Array) -> Array:
-        return sign[left] * _one(functions, row[left], which[left], x)
-
-    def keep(x: Array, value: Array) -> None:
-        better = value < lowest[left]
-        place[left[better]], lowest[left[better]] = x[better], value[better]
-
-    # Both ends, both inner points, and the values at all four.
-    four = np.stack([low, high - GOLDEN * (high - low), low + GOLDEN * (high - low), high])
-    values = np.stack([at(x) for x in four])
-    for _ in range(SECTIONS):
-        first = values[1] < values[2]
-        keep(np.where(first, four[1], four[2]), np.minimum(values[1], values[2]))
-        if not whole:
-            best = lowest[left]
-            open_ = (best >= 0.0) & (best <= values[0] + values[3] - 2.0 * best)
-            left, first, four, values = left[open_], first[open_], four[:, open_], values[:, open_]
-        if not left.size:
-            return place, lowest
-        four, values = (np.where(first, x[[0, 0, 1, 2]], x[[1, 2, 3, 3]]) for x in (four, values))
-        x = np.where(first, four[3] - GOLDEN * (four[3] - four[0]), four[0] + GOLDEN * (four[3] - four[0]))
-        four[1], four[2] = np.where(first, x, four[1]), np.where(first, four[2], x)
-        value = at(x)
-        values[1], values[2] = np.where(first, value, values[1]), np.where(first, values[2], value)
-    step = 0.5 * (four[3] - four[0])
-    for _ in range(PARABOLAS):
-        around = [np.clip(place[left] + k * step, low[left], high[left]) for k in (-1.0, 0.0, 1.0)]
-        before, here, after = (at(x) for x in around)
-        for x, value in zip(around, (before, here, after), strict=True):
-            keep(x, value)
-        bend = before + after - 2.0 * here
-        share = np.divide(0.5 * (before - after), bend, out=np.zeros(left.size), where=bend > 0.0)
-        x = np.clip(around[1] + step * np.clip(share, -1.0, 1.0), low[left], high[left])
-        keep(x, at(x))
-        step = NARROWER * step
-    return place, lowest
+    """Values (k, m) of the functions ``which`` (k,) of the designs ``row`` at crank angles (k, m)."""
+    return functions(row, phi)[np.arange(row.size), :, which] if row.size else np.zeros(phi.shape)
 
 
 def with_events(edges: Array, rows: Index, phi: Array) -> Array:
