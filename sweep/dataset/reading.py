@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from itertools import pairwise
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -84,19 +84,14 @@ def best(folder: str | Path, output: str, count: int = 10) -> pd.DataFrame:
     InputError, StoreError
         as :func:`scan`; also for an unknown output or a count out of range.
     """
-    import pandas as pd
-
     if isinstance(count, bool) or not isinstance(count, int) or not 1 <= count <= MOST_BEST:
         raise InputError("count", count, f"a whole number from 1 to {MOST_BEST}", "best")
-    source = scan(folder)
-    _known(source, [output], "best")
-    kept = pd.DataFrame({name: [] for name in ("design", output)})
-    for batch in _feasible(source, list(kept.columns)):
-        here = batch[np.isfinite(batch[output].to_numpy())]
-        merged = here if kept.empty else pd.concat([kept, here], ignore_index=True)
-        order = np.argsort(compared(output, merged[output].to_numpy()), kind="stable")[:count]
-        kept = merged.iloc[order]
-    return _whole(source, kept["design"].to_numpy(np.int64))
+
+    def first(rows: pd.DataFrame) -> NDArray[np.intp]:
+        order: NDArray[np.intp] = np.argsort(compared(output, rows[output].to_numpy()), kind="stable")
+        return order[:count]
+
+    return _chosen(folder, [output], "best", first)
 
 
 def of_number(folder: str | Path, number: int) -> pd.DataFrame:
@@ -141,19 +136,30 @@ def pareto(folder: str | Path, first: str, second: str) -> pd.DataFrame:
     InputError, StoreError
         as :func:`scan`; also for an unknown output.
     """
+
+    def unbeaten(rows: pd.DataFrame) -> NDArray[np.intp]:
+        x, y = (compared(name, rows[name].to_numpy()) for name in (first, second))
+        order: NDArray[np.intp] = np.lexsort((rows["design"].to_numpy(), y, x))
+        least = np.minimum.accumulate(y[order])
+        front: NDArray[np.intp] = order[np.concatenate([[True], least[1:] < least[:-1]])[: len(order)]]
+        return front
+
+    return _chosen(folder, [first, second], "pareto", unbeaten)
+
+
+def _chosen(
+    folder: str | Path, names: list[str], place: str, choose: Callable[[pd.DataFrame], NDArray[np.intp]]
+) -> pd.DataFrame:
+    """Read the designs that ``choose`` selects by their outputs, from a batch and those selected before, in order."""
     import pandas as pd
 
     source = scan(folder)
-    _known(source, [first, second], "pareto")
-    kept = pd.DataFrame({name: [] for name in dict.fromkeys(["design", first, second])})
+    _known(source, names, place)
+    kept = pd.DataFrame({name: [] for name in dict.fromkeys(["design", *names])})
     for batch in _feasible(source, list(kept.columns)):
-        here = batch[np.isfinite(batch[first].to_numpy()) & np.isfinite(batch[second].to_numpy())]
+        here = batch[np.isfinite(batch[names].to_numpy()).all(axis=1)]
         merged = here if kept.empty else pd.concat([kept, here], ignore_index=True)
-        x, y = (compared(name, merged[name].to_numpy()) for name in (first, second))
-        order = np.lexsort((merged["design"].to_numpy(), y, x))
-        least = np.minimum.accumulate(y[order])
-        unbeaten = np.concatenate([[True], least[1:] < least[:-1]])[: len(order)]
-        kept = merged.iloc[order[unbeaten]]
+        kept = merged.iloc[choose(merged)]
     return _whole(source, kept["design"].to_numpy(np.int64))
 
 

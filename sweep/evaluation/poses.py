@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Container, Mapping, Sequence
-from typing import TYPE_CHECKING, NamedTuple
+from collections.abc import Callable, Container, Mapping, Sequence
+from typing import TYPE_CHECKING, Literal, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -109,7 +109,7 @@ def evaluate(
         made["status_text"] = np.array(meanings(made["status"]), dtype=object)
     own = pd.DataFrame(made, index=index, copy=False)  # the arrays are not shared
     result = _beside(kept_columns(given, keep, made, len(matrix)), own, len(matrix), repeats)
-    result.attrs["units"] = dict(units)
+    result.attrs["units"] = {variable: mechanism.domain.unit, **units}
     return result
 
 
@@ -121,21 +121,28 @@ class Question(NamedTuple):
     units: Mapping[str, str]
 
 
-def asked_of_poses(family: Family, want: str | Sequence[str], loads: Loads | None = None) -> Question:
-    """Make the request for pose outputs of a family with precise poses."""
-    given = wanted_names(want, f"pose outputs of {family.name}")
+def asked(
+    family: Family, want: str | Sequence[str], loads: Loads | None, kind: Literal["pose", "design"],
+    read: Callable[[Family, list[str]], Mapping[str, str]],
+) -> Question:  # fmt: skip
+    """Make the request for pose or design outputs of a family; ``read`` returns the units of the names."""
+    given = wanted_names(want, f"{kind} outputs of {family.name}")
     # Requests without loads are looked at once.
-    known: dict[tuple[str, ...], Question] = family.derived.setdefault(asked_of_poses, {})
-    if (key := tuple(given)) in known and not loads:
+    known: dict[tuple[str, ...], Question] = family.derived.setdefault(asked, {})
+    if (key := (kind, *given)) in known and not loads:
         return known[key]
-    names = expanded(family, given, poses=True)
+    names = expanded(family, given, poses=kind == "pose")
     mechanism = extended(family, names, curves_of(family, loads))
-    wanted = tuple(pose_wants(mechanism, names))
-    units = {name: mechanism.pose_output[name].unit for name in wanted}
-    found = Question(mechanism, wanted, {mechanism.domain.name: mechanism.domain.unit} | units)
+    units = read(mechanism, names)
+    found = Question(mechanism, tuple(units), units)
     if not loads:
         known[key] = found
     return found
+
+
+def asked_of_poses(family: Family, want: str | Sequence[str], loads: Loads | None = None) -> Question:
+    """Make the request for pose outputs of a family with precise poses."""
+    return asked(family, want, loads, "pose", lambda m, names: {n: m.pose_output[n].unit for n in pose_wants(m, names)})
 
 
 def _beside(kept: Columns, result: pd.DataFrame, designs: int, repeats: int) -> pd.DataFrame:

@@ -30,7 +30,6 @@ from sweep.reductions.turn import limits_and_reductions, margin_group
 
 Part: TypeAlias = tuple[float, float] | None
 """A window of the stroke as two fractions, or None."""
-RunFunction: TypeAlias = Callable[[Array, Accuracy, Part], Columns]
 
 
 @dataclass(frozen=True)
@@ -51,7 +50,7 @@ class Route:
     name: str
     outputs: tuple[str, ...]
     ns_per_design: float
-    run: RunFunction | None = None
+    run: Callable[[Array, Accuracy, Part], Columns] | None = None
     general: Group | Literal[""] = ""
     order: tuple[Work, int] = (Work.SEARCH, 0)
     columns: int | None = None

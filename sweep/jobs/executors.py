@@ -93,7 +93,7 @@ class Processes:
         _begin_tracker()
         with tempfile.TemporaryDirectory(prefix="linksweep-", ignore_cleanup_errors=True) as folder:
             flag = Path(folder, "stop")
-            calls = (delayed(_until_flag)(task, number, flag) for number in _until(stop, numbers))
+            calls = (delayed(task)(number, flag.exists) for number in _until(stop, numbers))
             killed = threading.Event()
             pool = _pool(jobs, backend="loky", initializer=depend_on_parent, initargs=(os.getpid(),))
 
@@ -175,10 +175,6 @@ def _kill_workers() -> None:
     from joblib.externals.loky import get_reusable_executor
 
     get_reusable_executor(reuse=True).shutdown(wait=False, kill_workers=True)
-
-
-def _until_flag(task: Task[T], number: int, flag: Path) -> T:
-    return task(number, flag.exists)
 
 
 EXECUTORS: dict[str, Callable[..., Executor]] = {"threading": Threads, "loky": Processes, "dask": Dask}

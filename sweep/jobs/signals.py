@@ -91,12 +91,19 @@ def stop_on_signal() -> Iterator[Stop]:
     if threading.current_thread() is not threading.main_thread():
         yield stop
         return
-    before = {number: signal.signal(number, stop.handle) for number in SIGNALS}
-    try:
+    with _handled(stop.handle):
         yield stop
+
+
+@contextmanager
+def _handled(handler: Callable[[int, FrameType | None], None] | signal.Handlers) -> Iterator[None]:
+    """Let ``handler`` receive the signals within this context, then those that received them before."""
+    before = {number: signal.signal(number, handler) for number in SIGNALS}
+    try:
+        yield
     finally:
-        for number, handler in before.items():
-            signal.signal(number, handler)
+        for number, earlier in before.items():
+            signal.signal(number, earlier)
 
 
 @contextmanager
@@ -111,12 +118,10 @@ def unheard() -> Iterator[None]:
         return
     # A new process inherits ignored signals; blocked signals wait in this process until they are unblocked.
     mask = signal.pthread_sigmask(signal.SIG_BLOCK, SIGNALS)
-    before = {number: signal.signal(number, signal.SIG_IGN) for number in SIGNALS}
     try:
-        yield
+        with _handled(signal.SIG_IGN):
+            yield
     finally:
-        for number, handler in before.items():
-            signal.signal(number, handler)
         signal.pthread_sigmask(signal.SIG_SETMASK, mask)
 
 
@@ -149,10 +154,11 @@ def leaving_within(seconds: float, words: str) -> Iterator[None]:
     if threading.current_thread() is not threading.main_thread():
         yield
         return
-    before, hook = {number: signal.signal(number, leave) for number in SIGNALS}, sys.unraisablehook
+    hook = sys.unraisablehook
     _promised.append((seconds, words))
     try:
-        yield
+        with _handled(leave):
+            yield
     except Exception as error:
         if heard and not isinstance(error, LinksweepError):  # a compiler swallowed the interruption and failed over it
             raise _interruption(heard[-1]) from None
@@ -160,8 +166,6 @@ def leaving_within(seconds: float, words: str) -> Iterator[None]:
     finally:
         _promised.pop()
         sys.unraisablehook = hook
-        for number, handler in before.items():
-            signal.signal(number, handler)
 
 
 def _interruption(number: int) -> KeyboardInterrupt:

@@ -153,7 +153,9 @@ def _draw(data: Dataset, parts: Sequence[Part], tables: Sequence[Table], target:
         speed = f", {rpm(data.study.speed)}" if data.study.speed is not None else ""
         figure.suptitle(f"{data.study.title or data.study.name}{speed}. Lengths in mm, angles in degrees.")
         spread(figure)
-        figure.savefig(target, format=target.suffix[1:].lower(), metadata=_no_date(target))
+        form = target.suffix[1:].lower()
+        # Without the date files of the same data are equal.
+        figure.savefig(target, format=form, metadata={"CreationDate" if form == "pdf" else "Date": None})
 
 
 def _rows(tables: Sequence[Table]) -> list[list[Table]]:
@@ -166,11 +168,6 @@ def _rows(tables: Sequence[Table]) -> list[list[Table]]:
     first = [next(x for x in blocks if x.title == table.title) for table in tables[: len(WIDTHS[0])]]
     rest, wide = [x for x in blocks if x not in first], len(WIDTHS[1])
     return [first, *(rest[k : k + wide] for k in range(0, len(rest), wide))]
-
-
-def _no_date(target: Path) -> dict[str, None]:
-    """Return the metadata that omit the date, so that files of the same data are equal."""
-    return {"CreationDate": None} if target.suffix.lower() == ".pdf" else {"Date": None}
 
 
 def _set(axes: Axes, table: Table | None) -> None:

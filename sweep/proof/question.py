@@ -67,18 +67,13 @@ class Question:
         motion = self._motion()
         if motion is None or not self.floor < target < HUGE:
             return np.zeros((0, 9))
-        least, longest = self.least_coupler, self._longest_rocker()
+        least, longest = max(float(self.links[-2]), 0.0), self._longest_rocker()  # of the coupler, and of the rocker
         found = tube(*motion, target)
         # a tube of half a turn or more contains the other mode in any case
         wide = np.tan(0.5 * np.minimum(found[:, HIGH] - found[:, LOW], np.pi))
         blurred = ~(wide * (least + longest) < least * np.sqrt(self.cos2) * WEAKER)
         found[blurred, LOW], found[blurred, HIGH] = -np.inf, np.inf
         return found
-
-    @property
-    def least_coupler(self) -> float:
-        """Lower limit of the coupler's length, the last of the links."""
-        return max(float(self.links[-2]), 0.0)
 
     def _longest_rocker(self) -> float:
         names = self.provable.links

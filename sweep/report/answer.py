@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 from kernels import status as codes
 from sweep.dataset import files
 from sweep.errors import how_many
+from sweep.evaluation.statuses import meaning
 from sweep.optimise.local.descent import KKT
 from sweep.optimise.local.start import DIFFERS
 from sweep.optimise.multistart.survey import optima_words
@@ -75,7 +76,7 @@ def _headline(data: Dataset, who: str, shown: Quantity) -> str:
     if data.reference is None:
         return f"{text}."
     if math.isnan(old):
-        return f"{text}. The reference design has none: {data.reference_status}."
+        return f"{text}. The reference design has none: {meaning(int(data.reference.get('status', 0)))}."
     difference = change(shown, value, old)
     than = "the same as" if difference == "the same" else f"{difference} than"
     return f"{text}, {than} the reference design with {_with_speed(data, shown, old)}."

@@ -15,7 +15,6 @@ from sweep.dataset.files import check_tables
 from sweep.dataset.reading import of_number
 from sweep.errors import InputError
 from sweep.evaluation.cyclogram import cyclogram, table_in_degrees
-from sweep.evaluation.statuses import meaning
 from sweep.evaluation.summaries import design_outputs, output
 from sweep.evaluation.tables import design_matrix
 from sweep.families.base import Family
@@ -125,12 +124,6 @@ class Dataset:
         words = "" if self.optimum is None else str(self.optimum.get("active") or "")
         limits = [word.strip() for word in words.split(";") if word.strip() and not word.strip().endswith(" bound")]
         return [word.split()[0].rstrip(":,") for word in limits]
-
-    @property
-    def reference_status(self) -> str:
-        """Reason why the reference has no values."""
-        code = 0 if self.reference is None else int(self.reference.get("status", 0))
-        return meaning(code)
 
     @cached_property
     def second(self) -> str | None:

@@ -85,7 +85,8 @@ def fit_line(
     fitted = designs.copy()
     guide = family.stages[-1].family
     start, swing, status = _driven(family, designs) if driven is None else (*driven, np.zeros(len(designs), np.uint8))
-    share = _shares(TURN_SAMPLES if guide is family else SWING_SAMPLES)
+    samples = TURN_SAMPLES if guide is family else SWING_SAMPLES
+    share = 0.5 - 0.5 * np.cos(np.linspace(0.0, np.pi, samples))  # Chebyshev points from 0 to 1
     alive = np.flatnonzero(status == codes.OK)
     own = np.array([column[f"{name}{suffix}"] for name in guide.parameter_names])
     set_here = np.array([column[f"{name}{suffix}"] for name in guided.fitted])
@@ -172,8 +173,3 @@ def _input_angles(family: Family, designs: Array, driving: Array) -> Array:
     last = family.stages[-1]
     assert last.kappa is not None and last.offset is not None
     return designs[:, last.kappa, None] * driving + designs[:, last.offset, None]
-
-
-def _shares(samples: int) -> Array:
-    """Return Chebyshev points from 0 to 1."""
-    return 0.5 - 0.5 * np.cos(np.linspace(0.0, np.pi, samples))

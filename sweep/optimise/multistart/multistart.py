@@ -7,8 +7,8 @@ from __future__ import annotations
 
 import math
 import signal
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from contextlib import AbstractContextManager, nullcontext
 from dataclasses import replace
 from itertools import chain
 from typing import TYPE_CHECKING, NamedTuple
@@ -156,14 +156,10 @@ def _count_finished(searched: Sequence[Group], results: Sequence[Result]) -> int
     return sum(counts[r.start] for r in results)
 
 
-@contextmanager
-def _interruptible() -> Iterator[Stop]:
+def _interruptible() -> AbstractContextManager[Stop]:
     """Let Ctrl-C set a flag, so that every process ends with its best design; leave a caller's own handler alone."""
-    if signal.getsignal(signal.SIGINT) is not signal.default_int_handler:
-        yield Stop()
-        return
-    with stop_on_signal() as stop:
-        yield stop
+    own = signal.getsignal(signal.SIGINT) is not signal.default_int_handler
+    return nullcontext(Stop()) if own else stop_on_signal()
 
 
 def _search_group(

@@ -299,12 +299,9 @@ def spread(points: Array, kind: NDArray[np.intp], count: int, least_share: float
     distance = 0.5 * np.sqrt(points.shape[1] / 6.0)  # half of the average distance of two random designs
     taken: list[int] = []
     for _ in range(12):
-        taken, available = list(range(first)), np.ones(len(points), dtype=np.bool_)
-        for near in taken:
-            available &= ~((np.linalg.norm(points - points[near], axis=1) < distance) & (kind == kind[near]))
-        available[:first] = False
-        while len(taken) < count and available.any():
-            row = int(np.argmax(available))
+        taken, available = [], np.ones(len(points), dtype=np.bool_)
+        while len(taken) < first or (len(taken) < count and available.any()):
+            row = len(taken) if len(taken) < first else int(np.argmax(available))
             taken.append(row)
             available &= ~((np.linalg.norm(points - points[row], axis=1) < distance) & (kind == kind[row]))
             available[row] = False
