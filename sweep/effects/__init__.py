@@ -91,18 +91,13 @@ _FIRST_ONLY = ("speed", "speed_change")
 
 NO_CURVES: Mapping[str, Curve] = MappingProxyType({})
 
-_INPUTS: dict[tuple[tuple[str, str], ...], Mapping[str, Parameter]] = {}
-
 
 @lru_cache
 def effect(name: str) -> Effect:
     """Look up an effect's entry in the register."""
-    if name in _MADE:
-        tree, module, function = _MADE[name]
-        made: Effect = getattr(import_module(f"sweep.effects.{module}"), function)(tree)
-        return made
-    module, constant = _ENTRIES[name]
-    entry: Effect = getattr(import_module(f"sweep.effects.{module}"), constant)
+    tree, module, attribute = _MADE.get(name) or ("", *_ENTRIES[name])
+    found = getattr(import_module(f"sweep.effects.{module}"), attribute)
+    entry: Effect = found(tree) if tree else found
     return entry
 
 
@@ -172,15 +167,12 @@ def _handing(family: Family, placed: Placed) -> list[Placed]:
     return found if len(found) == len(family.stages) - 1 - placed.stage else []
 
 
+@of_family
 def all_inputs(family: Family) -> Mapping[str, Parameter]:
     """Collect the inputs of all effects of a family, by name with the number of a stage or the name of a member."""
     if isinstance(family, Machine):
         return {f"{m.name}.{name}": p for m in family.members for name, p in all_inputs(m.family).items()}
-    # Called by every reduction; it depends only on the names of the stages.
-    stages = tuple((stage.family.name, stage.tail) for stage in family.stages)
-    if stages not in _INPUTS:
-        _INPUTS[stages] = {p.name: p for p in inputs(family, applicable(family))}
-    return _INPUTS[stages]
+    return {p.name: p for p in inputs(family, applicable(family))}
 
 
 def input_names(family: Family) -> frozenset[str]:

@@ -34,7 +34,6 @@ STUDY_LOADS = (
 )
 
 ComputeFunction: TypeAlias = Callable[[Scene, frozenset[str]], Columns]
-DesignFunction: TypeAlias = Callable[[Scene, frozenset[str], Accuracy], Columns]
 
 
 @dataclass(frozen=True)
@@ -47,7 +46,7 @@ class DesignResult:
     """
 
     outputs: tuple[Output, ...]
-    run: DesignFunction
+    run: Callable[[Scene, frozenset[str], Accuracy], Columns]
     block: int = 32
 
 

@@ -121,10 +121,7 @@ def compute(scene: Scene, wanted: frozenset[str]) -> Columns:
 @lru_cache
 def contact_of(name: str) -> Effect:
     """Make the entry of the contacts of a family with a tree of links."""
-    bare = loads_of(name)
-    tree = bare.tree
-    assert tree is not None
-    joints = touching(tree)
+    bare, joints = loads_of(name), touching(family(name).the(LinkTree))
     return replace(
         bare,
         key="C1",

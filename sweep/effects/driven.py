@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import replace
 from typing import NamedTuple
 
@@ -12,8 +11,8 @@ from numpy.typing import NDArray
 from sweep.effects import loads
 from sweep.effects.base import ON_TIP, tool_place
 from sweep.effects.load_passing import INERTIAS, LOADS, behind, compute_loads, inputs_of_loads
-from sweep.effects.scene import Driven, Scene
-from sweep.families.base import Array, Parameter
+from sweep.effects.scene import Scene
+from sweep.families.base import Array
 
 # Units of the inputs by which a stage needs a torque.
 WEIGHING = frozenset({"mass", "line_mass", "inertia", "force", "torque"})
@@ -38,17 +37,10 @@ def _behind_weighs(scene: Scene) -> NDArray[np.bool_]:
     """Whether any later stage has a mass or a load in each design, (n,)."""
     found = np.zeros(len(scene.designs), np.bool_)
     for stage in scene.after:
-        found |= _weighs(stage, stage.inputs, inputs_of_loads(stage.family))
-    return found
-
-
-def _weighs(stage: Scene | Driven, given: dict[str, Array], inputs: Sequence[Parameter]) -> NDArray[np.bool_]:
-    """Whether any of the inputs that are a mass, an inertia or a load is not zero, (n,)."""
-    found = np.zeros(len(stage.designs), np.bool_)
-    for p in inputs:
-        if p.unit in WEIGHING:
-            found |= (given[p.name] != 0.0) if p.name in given else False
-            found |= p.name in stage.curves
+        for p in inputs_of_loads(stage.family):
+            if p.unit in WEIGHING:
+                found |= (stage.inputs[p.name] != 0.0) if p.name in stage.inputs else False
+                found |= p.name in stage.curves
     return found
 
 

@@ -114,9 +114,8 @@ def compute_static(scene: Scene, wanted: frozenset[str]) -> Columns:
     status = scene.status()
     p, d2psi, c, reach, data = _arguments(scene)
     driven = driven_side(scene, False)
-    if driven is not None:
-        missing = ~np.isfinite(driven.torque)
-        take_over(status, np.where(missing, _status_behind(scene), st.OK))
+    if driven is not None and (handed_back := behind(scene, LOADS)) is not None:
+        take_over(status, np.where(np.isfinite(driven.torque), st.OK, np.asarray(handed_back["status"], np.uint8)))
     quasi_static(p, d2psi, c, reach, data, status, lag, displacement, ratio, _varying(scene, driven))
     if driven is not None and ratio is not None:
         ratio *= np.sqrt(data[:, :1] / (data[:, :1] + driven.inertia))
@@ -124,11 +123,6 @@ def compute_static(scene: Scene, wanted: frozenset[str]) -> Columns:
         np.abs(ratio, out=ratio)  # also where the crank turns backwards
     columns: Columns = {name: out for name, out in zip(_KERNEL_NAMES, outputs, strict=True) if out is not None}
     return columns | {"status": status}
-
-
-def _status_behind(scene: Scene) -> Status:
-    handed_back = behind(scene, LOADS)
-    return scene.status() if handed_back is None else np.asarray(handed_back["status"], np.uint8)
 
 
 def compute_dynamic(scene: Scene, wanted: frozenset[str]) -> Columns:

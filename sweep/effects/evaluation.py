@@ -67,8 +67,7 @@ def effect_poses(
         of_effects = wanted & frozenset(o.name for placed in effects for o in placed.pose_outputs)
         turned = differenced(partial(effect_poses, added, effects), designs, angles, of_effects) if of_effects else {}
         return turned | family.poses(added.own(designs), angles, own)
-    asked = [(placed, [name for name in placed.own if name in wanted]) for placed in effects]
-    asked = [(placed, names) for placed, names in asked if names]
+    asked = [(placed, names) for placed in effects if (names := [name for name in placed.own if name in wanted])]
     last, shape = len(family.stages) - 1, (len(designs), angles.cos.shape[1])
     # Without a wanted output of the family its motion is computed by the scenes only.
     bare = not own and bool(asked) and not any(placed.entry.whole_turn for placed, _ in asked)
@@ -105,12 +104,8 @@ def run_design(added: Added, placed: Placed, designs: Array, wanted: frozenset[s
         scene = added.scene(designs[start : start + whole_turn.block], at_rest)
         parts.append(whole_turn.run(scene, names, accuracy))
     whole = {name: np.concatenate([part[name] for part in parts]) for name in parts[0]}
-    columns: Columns = {"status": whole["status"]}
-    for name in wanted:
-        columns |= {
-            f"{e}{name}": whole[f"{e}{placed.own[name]}"] for e in ("", "err_") if f"{e}{placed.own[name]}" in whole
-        }
-    return columns
+    pairs = [(f"{e}{name}", f"{e}{placed.own[name]}") for name in wanted for e in ("", "err_")]
+    return {"status": whole["status"]} | {name: whole[own] for name, own in pairs if own in whole}
 
 
 def bend_curves(added: Added, placed: Placed, bend: Bend, designs: Array, angles: Angles) -> Array:

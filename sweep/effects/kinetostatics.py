@@ -177,19 +177,13 @@ def with_friction(scene: Scene, load: Array, wanted: frozenset[str], status: Sta
     given = Loading(_bodies(scene), drive, tool.coupler, tool.follower)
     friction_loads(*scene.records, scene.inputs["finger"], given, data, status, forces, couples, lossy, contraction)
     columns = _vector_columns(forces, wanted, FRICTION_SUFFIX)
-    columns |= _frame(scene, given, status, wanted, FRICTION_SUFFIX)
+    on_frame = loads.frame_room(scene.shape, wanted, FRICTION_SUFFIX)
+    if any(part is not None for part in on_frame):  # friction does not change them
+        kinetostatics(*scene.records, scene.inputs["finger"], given, status, None, None, None, *on_frame)
+    columns |= loads.frame_columns(on_frame, wanted, FRICTION_SUFFIX)
     for names, values in ((tuple(COUPLES_WITH_FRICTION), couples), (lost, lossy)):
         columns |= loads.scalar_columns(names, values, wanted)
     return columns if contraction is None else columns | {CONTRACTION: contraction}
-
-
-def _frame(scene: Scene, given: Loading, status: Status, wanted: frozenset[str], suffix: str = "") -> Columns:
-    """Compute the wanted force and moment on the frame, which friction does not change; nan if not OK."""
-    on_frame = loads.frame_room(scene.shape, wanted, suffix)
-    if all(part is None for part in on_frame):
-        return {}
-    kinetostatics(*scene.records, scene.inputs["finger"], given, status, None, None, None, *on_frame)
-    return loads.frame_columns(on_frame, wanted, suffix)
 
 
 def _vector_columns(forces: Array | None, wanted: frozenset[str], suffix: str = "") -> Columns:

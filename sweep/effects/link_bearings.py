@@ -8,7 +8,7 @@ from functools import partial
 import numpy as np
 
 from kernels.effects.bearings import journal_pressures
-from sweep.effects.base import Bend, DesignResult, Effect
+from sweep.effects.base import DesignResult, Effect
 from sweep.effects.bearing_life import BLOCK, Shaft, load_outputs, turn_outputs
 from sweep.effects.bearing_life import FORMULAS as LIFE_FORMULAS
 from sweep.effects.bearing_life import bends as bends_of_shaft
@@ -116,13 +116,11 @@ def sliding(scene: Scene, wanted: frozenset[str]) -> Columns:
 
 
 def _rolling_inputs(joint: LinkJoint) -> tuple[Parameter, ...]:
+    """Places of the supports, data of the catalogue, and the required life."""
     supports = [p for p in friction_inputs(joint) if p.name.startswith("support_")]
-    catalogue = [replace(p, name=f"{p.name}_{joint.name}", text=f"{p.text}: {joint.text}") for p in CATALOGUE]
-    return (*supports, *catalogue)
-
-
-def _life(joint: LinkJoint) -> Parameter:
-    return replace(REQUIRED_LIFE, name=f"required_life_{joint.name}", text=f"{REQUIRED_LIFE.text}: {joint.text}")
+    of_bearings = (*CATALOGUE, REQUIRED_LIFE)
+    named = [replace(p, name=f"{p.name}_{joint.name}", text=f"{p.text}: {joint.text}") for p in of_bearings]
+    return (*supports, *named)
 
 
 def _rolling_outputs(joint: LinkJoint) -> tuple[Output, ...]:
@@ -187,9 +185,7 @@ def rolling_turn(scene: Scene, wanted: frozenset[str], accuracy: Accuracy) -> Co
 
 def sliding_of(name: str) -> Effect:
     """Make the entry of the sliding bearings of a family with a tree of links."""
-    rubbing = friction_of(name)
-    tree = rubbing.tree
-    assert tree is not None
+    rubbing, tree = friction_of(name), family(name).the(LinkTree)
     found = {j: (_sliding_inputs(j), _pressure_limits(j), _sliding_outputs(j)) for j in journals(tree)}
     only = {p.name: tuple(o.name for o in out) for own, _, out in found.values() for p in own}
     only |= {p.name: (out[-1].name,) for _, limits, out in found.values() for p in limits}
@@ -215,22 +211,10 @@ def sliding_of(name: str) -> Effect:
 
 def rolling_of(name: str) -> Effect:
     """Make the entry of the rolling bearings of a family with a tree of links."""
-    bare = loads_of(name)
-    tree = bare.tree
-    assert tree is not None
-    poses: list[Output] = []
-    lives: list[Output] = []
-    inputs: list[Parameter] = []
-    only: dict[str, tuple[str, ...]] = {}
-    bends: list[Bend] = []
-    for joint in shafts(tree):
-        own, life = _rolling_inputs(joint), _life(joint)
-        out, turn = _rolling_outputs(joint), turn_outputs(joint.name, joint.text, EQUATION)
-        inputs += [*own, life]
-        poses += out
-        lives += turn
-        only |= {p.name: tuple(o.name for o in (*out, *turn)) for p in own} | {life.name: (out[-1].name,)}
-        bends += bends_of_shaft(_shaft(tree, joint), out[-1].name)
+    bare, tree = loads_of(name), family(name).the(LinkTree)
+    found = {j: (_rolling_inputs(j), _rolling_outputs(j), turn_outputs(j.name, j.text, EQUATION)) for j in shafts(tree)}
+    only = {p.name: tuple(o.name for o in (*out, *turn)) for (*own, _), out, turn in found.values() for p in own}
+    only |= {life.name: (out[-1].name,) for (*_, life), out, _ in found.values()}
     return replace(
         bare,
         key="B2",
@@ -239,14 +223,14 @@ def rolling_of(name: str) -> Effect:
         equation=EQUATION,
         formulas=ROLLING_FORMULAS,
         needs=(bare.name,),
-        inputs=(*bare.inputs, *inputs),
+        inputs=(*bare.inputs, *(p for own, _, _ in found.values() for p in own)),
         only_for=only,
-        outputs=tuple(poses),
+        outputs=tuple(o for _, out, _ in found.values() for o in out),
         compute=rolling,
         called_for="choice and life of rolling bearings",
         negligible="sliding bearings; elsewhere never, the life is what is asked for",
         even_crank=True,
         advise=None,
-        bends=tuple(bends),
-        design_result=DesignResult(tuple(lives), rolling_turn, BLOCK),
+        bends=tuple(b for j, (_, out, _) in found.items() for b in bends_of_shaft(_shaft(tree, j), out[-1].name)),
+        design_result=DesignResult(tuple(o for _, _, turn in found.values() for o in turn), rolling_turn, BLOCK),
     )

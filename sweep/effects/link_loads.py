@@ -40,9 +40,7 @@ SUPPORTED = ("shaft", "sleeve")
 
 def tree_of(scene: Scene) -> LinkTree:
     """Tree of links of a scene's family."""
-    tree = scene.family.find(LinkTree)
-    assert tree is not None
-    return tree
+    return scene.family.the(LinkTree)
 
 
 @lru_cache

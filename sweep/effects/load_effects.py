@@ -44,7 +44,7 @@ def tree_bends(tree: LinkTree, outputs: tuple[str, ...]) -> tuple[Bend, ...]:
 
 def reversals(scene: Scene) -> Array:
     """Angular velocity of each shaft in its bearings, (n, m, q)."""
-    shafts = _shafts(tree_of(scene))
+    shafts = [j for j in tree_of(scene).joints if j.kind == "shaft"]
     return np.stack([(relative(scene, joint)[0] * axis_of(scene, joint)).sum(axis=2) for joint in shafts], axis=2)
 
 
@@ -67,10 +67,6 @@ def slowness(scene: Scene) -> Array:
 def axis_of(scene: Scene, joint: LinkJoint) -> Array:
     """Axis of a shaft or a sleeve, (n, m, 3)."""
     return scene.links.axes[:, :, tree_of(scene).freedom(joint)]
-
-
-def _shafts(tree: LinkTree) -> list[LinkJoint]:
-    return [j for j in tree.joints if j.kind == "shaft"]
 
 
 def _others(tree: LinkTree) -> list[LinkJoint]:
@@ -235,8 +231,7 @@ def _closed_friction(kind: loads.Follower) -> Effect:
 def loads_of(name: str) -> Effect:
     """Make the entry of the loads of a family with a tree of links."""
     found = family(name)
-    tree = found.find(LinkTree)
-    assert tree is not None
+    tree = found.the(LinkTree)
     return Effect(
         key=LOADS,
         name=f"{name}_loads",
@@ -261,9 +256,7 @@ def loads_of(name: str) -> Effect:
 @lru_cache
 def friction_of(name: str) -> Effect:
     """Make the entry of the friction of a family with a tree of links."""
-    bare = loads_of(name)
-    tree = bare.tree
-    assert tree is not None
+    bare, tree = loads_of(name), family(name).the(LinkTree)
     torque = {link_loads.TORQUE_WITH_FRICTION: ("torque", f"torque that drives the cranks{FRICTION_TEXT}")}
     supports = {at: ("force", words) for at, (_, _, words) in link_loads.support_loads(tree).items()}
     scalars = torque | link_loads.losses(tree) | supports

@@ -50,8 +50,7 @@ def _inputs_by_records(family: Family) -> tuple[Parameter, ...]:
 
 
 def _inputs_by_links(family: Family) -> tuple[Parameter, ...]:
-    tree = family.find(LinkTree)
-    return () if tree is None else link_loads.inputs(tree)
+    return link_loads.inputs(family.the(LinkTree))
 
 
 _ROUTES = {

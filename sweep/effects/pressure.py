@@ -91,10 +91,7 @@ EXTREMA_ERROR = 1e-14
 
 def extrema(scene: Scene, wanted: frozenset[str], accuracy: Accuracy) -> Columns:
     """Compute the wanted extrema and the status, each (n,)."""
-    ellipse = scene.family.find(PressureEllipse)
-    if ellipse is None:
-        raise TypeError(f"{scene.family.name} has no ellipse of the coupler direction")
-    n = len(scene.designs)
+    ellipse, n = scene.family.the(PressureEllipse), len(scene.designs)
     status, count = np.empty(n, np.uint8), np.empty(n)
     phi, theta, highest, lowest = (np.empty((n, 4)) for _ in range(4))
     pressure_extrema(ellipse.curve(scene.designs), status, count, phi, theta, highest, lowest)

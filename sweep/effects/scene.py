@@ -120,9 +120,7 @@ class Scene:
             yield rows, self._links(rows, self.angles.part(rows), motion)
 
     def _links(self, rows: slice, angles: Angles, motion: Columns) -> Links:
-        tree = self.family.find(LinkTree)
-        if tree is None:
-            raise TypeError(f"{self.family.name} has no tree of links")
+        tree = self.family.the(LinkTree)
         shape, every = motion["status"].shape, (len(tree.bodies), len(tree.freedoms), len(tree.ends))
         bodies, axes, lines = (np.empty((*shape, k, per)) for k, per in zip(every, _PER_LINK, strict=True))
         parents = np.array([body.parent for body in tree.bodies], np.int64)
@@ -140,10 +138,7 @@ class Scene:
 
     @cached_property
     def _joints(self) -> JointRecords:
-        joints = self.family.find(JointRecords)
-        if joints is None:
-            raise TypeError(f"{self.family.name} has no joint records")
-        return joints
+        return self.family.the(JointRecords)
 
     @cached_property
     def driven(self) -> Scene | None:

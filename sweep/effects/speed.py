@@ -309,17 +309,15 @@ def _effect(name: str, title: str, loaded: Effect, rubbing: Effect | None = None
     )
 
 
-def of_tree(name: str) -> Effect:
+def of_tree(name: str, rubbing: Effect | None = None) -> Effect:
     """Make the entry of a family with a tree of links."""
-    return _effect(f"{name}_speed_fluctuation", f"{TITLE}: {family(name).title}", load_effects.loads_of(name))
+    title, loaded = f"{TITLE}: {family(name).title}", load_effects.loads_of(name)
+    return _effect(f"{name}_speed_fluctuation", title, loaded, rubbing)
 
 
 def rubbing_tree(name: str) -> Effect:
     """Make the entry of a family with a tree of links, friction included."""
-    return _effect(
-        f"{name}_speed_fluctuation", f"{TITLE}: {family(name).title}", load_effects.loads_of(name),
-        load_effects.friction_of(name),
-    )  # fmt: skip
+    return of_tree(name, load_effects.friction_of(name))
 
 
 _SLIDER_NAME = f"{loads.SLIDER.prefix}speed_fluctuation"

@@ -57,15 +57,9 @@ CAPSTAN_OUTPUTS = (
 )
 
 
-def _path(scene: Scene) -> ThreadPath:
-    path = scene.family.find(ThreadPath)
-    assert path is not None
-    return path
-
-
 def _wrap(scene: Scene) -> tuple[Array, Status]:
     """Wrap angle [rad] and the poses' status."""
-    name = _path(scene).wrap
+    name = scene.family.the(ThreadPath).wrap
     found = scene.family.poses(scene.designs, scene.angles, frozenset({name}))
     return np.ascontiguousarray(found[name], dtype=np.float64), np.array(found["status"], np.uint8)
 
@@ -93,7 +87,7 @@ def euler(scene: Scene, wanted: frozenset[str]) -> Columns:
 
 def speed(scene: Scene, wanted: frozenset[str]) -> Columns:
     """Compute speed and acceleration of the thread, and the ratio of tensions due to the speed."""
-    path = _path(scene)
+    path = scene.family.the(ThreadPath)
     found = scene.family.poses(scene.designs, scene.angles, frozenset({path.rate, path.rate2}))
     first, second = floats(found, path.rate, path.rate2)
     turning, change = scene.crank()

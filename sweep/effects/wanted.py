@@ -47,15 +47,11 @@ def names_of_effects(family: Family, poses: bool = False) -> dict[str, tuple[str
     effects = applicable(family)
     taken = {o.name for placed in effects for o in (placed.pose_outputs if poses else placed.design_outputs)}
     for placed in effects:
-        outputs = _pose_names(placed) if poses else _design_names(placed, prefixes(family.domain))
-        found[placed.name] = outputs
+        numbered = tuple(f"{o.name}{placed.number}" for o in placed.entry.outputs)
+        outputs = found[placed.name] = numbered if poses else _design_names(placed, prefixes(family.domain))
         if placed.number:
             found[placed.entry.name] = (*found.get(placed.entry.name, ()), *outputs)
     return {name: outputs for name, outputs in found.items() if name not in taken}
-
-
-def _pose_names(placed: Placed) -> tuple[str, ...]:
-    return tuple(f"{o.name}{placed.number}" for o in placed.entry.outputs)
 
 
 def _design_names(placed: Placed, reductions: tuple[str, ...]) -> tuple[str, ...]:

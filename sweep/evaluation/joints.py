@@ -232,8 +232,7 @@ def _part(
     fixed = {name: np.tile(point.at(matrix)[0], (phi.size, 1)) for name, point in skeleton.fixed.items()}
     axes = {name: point.axis(matrix)[0] for name, point in skeleton.fixed.items() if point.axis is not None}
     if where.tip is not None:
-        link = family.find(OutputLink)
-        assert link is not None
+        link = family.the(OutputLink)
         moving[TIP] = np.stack(link.carried(matrix, found[family.position], where.tip), axis=-1)[0]
     rotation, at = where.placed.rotation[0], where.placed.at[0]
     turned = {name: path @ rotation.T + at for name, path in (fixed | moving).items()}

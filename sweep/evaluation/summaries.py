@@ -8,16 +8,15 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from sweep.effects import extended, inputs_beside
-from sweep.effects.wanted import expanded
+from sweep.effects import inputs_beside
 from sweep.errors import InputError
 from sweep.evaluation.angles import AngleUnit, in_radians, plain_names
-from sweep.evaluation.loads import Loads, curves_of
-from sweep.evaluation.poses import Question
+from sweep.evaluation.loads import Loads
+from sweep.evaluation.poses import Question, asked
 from sweep.evaluation.route import Route
 from sweep.evaluation.routes import design_outputs, routes, with_errors
 from sweep.evaluation.statuses import meanings
-from sweep.evaluation.tables import design_matrix, kept_columns, plain_columns, wanted_names
+from sweep.evaluation.tables import design_matrix, kept_columns, plain_columns
 from sweep.families import Mechanism
 from sweep.families import family as find_family
 from sweep.families.base import DEFAULT_TARGET, Accuracy, Domain, Family, March
@@ -129,18 +128,11 @@ def summarise(
 
 def asked_of_designs(family: Family, want: str | Sequence[str], loads: Loads | None = None) -> Question:
     """Make the request for design outputs of a family."""
-    given = wanted_names(want, f"design outputs of {family.name}")
-    # Requests without loads are looked at once.
-    known: dict[tuple[str, ...], Question] = family.derived.setdefault(asked_of_designs, {})
-    if (key := tuple(given)) in known and not loads:
-        return known[key]
-    names = expanded(family, given)
-    mechanism = extended(family, names, curves_of(family, loads))
-    wanted = tuple(name for name in names if name != "status")
-    found = Question(mechanism, wanted, {name: output(mechanism, name).unit for name in wanted})
-    if not loads:
-        known[key] = found
-    return found
+
+    def read(mechanism: Family, names: list[str]) -> dict[str, str]:
+        return {name: output(mechanism, name).unit for name in names if name != "status"}
+
+    return asked(family, want, loads, "design", read)
 
 
 def chosen_accuracy(

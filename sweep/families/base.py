@@ -18,8 +18,6 @@ from sweep.families.parameter import Output as Output
 from sweep.families.parameter import Parameter as Parameter
 from sweep.families.parameter import Unit as Unit
 
-EndsFunction: TypeAlias = Callable[[Array], tuple[Array, Array]]
-
 
 @dataclass(frozen=True)
 class Turn:
@@ -43,7 +41,7 @@ class Interval:
     name: str
     unit: str
     text: str
-    ends: EndsFunction
+    ends: Callable[[Array], tuple[Array, Array]]
 
 
 @dataclass(frozen=True)
@@ -137,7 +135,6 @@ class Accuracy:
 
 DEFAULT_TARGET = 1e-8  # relative error where no accuracy is given
 PoseFunction: TypeAlias = Callable[[Array, Angles, frozenset[str]], Columns]
-StepFunction: TypeAlias = Callable[[Array, frozenset[str], Accuracy], Columns]
 Capability = TypeVar("Capability")
 
 
@@ -169,7 +166,7 @@ class Step:
 
     name: str
     provides: tuple[Output, ...]
-    run: StepFunction
+    run: Callable[[Array, frozenset[str], Accuracy], Columns]
     applies: Callable[[Accuracy], bool] = field(default=lambda accuracy: True)
     work: Work = Work.QUICK
     certifies: bool = False
@@ -228,7 +225,7 @@ class Family:
 
     def precise(self) -> Family:
         """Family with the most accurate poses it has: for single poses, not for sweeps."""
-        return self if self.precise_poses is None else self._precise
+        return self._precise
 
     def values(self, designs: Array, angles: Angles, *names: str) -> list[Array]:
         """Compute some pose outputs, (n, m) each, without their status."""
@@ -236,13 +233,16 @@ class Family:
 
     @cached_property
     def _precise(self) -> Family:
-        """The family with precise poses, made once, so that results cached with it are reused."""
-        assert self.precise_poses is not None
-        return replace(self, poses=self.precise_poses)
+        """The same, made once, so that results cached with it are reused."""
+        return self if self.precise_poses is None else replace(self, poses=self.precise_poses)
 
     def find(self, kind: type[Capability]) -> Capability | None:
         """First capability of a type, None if the family has none."""
         return next(iter(self.every(kind)), None)
+
+    def the(self, kind: type[Capability]) -> Capability:
+        """First capability of a type that the family has."""
+        return self.every(kind)[0]
 
     def every(self, kind: type[Capability]) -> tuple[Capability, ...]:
         """All capabilities of a type: a chain has one per stage."""

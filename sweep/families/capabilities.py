@@ -20,7 +20,6 @@ if TYPE_CHECKING:  # families without fused kernels do not wait for the import
     from kernels.chains.form import Form
 
 DesignMap: TypeAlias = Callable[[Array], Array]
-FillFunction: TypeAlias = Callable[[Array, Angles, Columns, Array, Array], None]
 
 
 @dataclass(frozen=True)
@@ -53,7 +52,7 @@ class JointRecords:
     ones.
     """
 
-    fill: FillFunction
+    fill: Callable[[Array, Angles, Columns, Array, Array], None]
     needs: tuple[str, ...]
     follower: Literal["rocker", "slider"]
     moved: tuple[PoseFunction, PoseFunction] | None = None

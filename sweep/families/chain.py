@@ -49,13 +49,12 @@ class Chain(Family):
         own = self.stages[int(stage) - 1].family.outward if stage else ""
         return own and f"{own}{stage}" if stage else self.outward
 
-    def precise(self) -> Chain:
-        """Return the chain with the most accurate poses its stages have."""
-        return (
-            self
-            if self.precise_poses is None
-            else replace(self, poses=self.precise_poses, stages=_precise(self.stages))
-        )
+    @cached_property
+    def _precise(self) -> Family:
+        """The chain with the most accurate poses its stages have."""
+        if self.precise_poses is None:
+            return self
+        return replace(self, poses=self.precise_poses, stages=_precise(self.stages))
 
 
 @dataclass
@@ -135,7 +134,11 @@ def chain(families: tuple[Family, ...]) -> Chain:
         uses_phi=families[0].uses_phi,
         analytic=all(f.analytic for f in families),
         points={name: at for name, at in last.points.items() if not ends_in_digit(name)},
-        capabilities=(*(loop for stage in stages for loop in _loops(stage)), *_of_last(stages[-1]), *of_stages(stages)),
+        capabilities=(
+            *(loop for stage in stages for loop in _loops(stage)),
+            *(OutputLink(partial(on_part, stages[-1].designs, link.origin)) for link in last.every(OutputLink)),
+            *of_stages(stages),
+        ),
         dear={
             f"{name}{s.number}": (f"{what}{s.number}", ns) for s in stages for name, (what, ns) in s.family.dear.items()
         }
@@ -161,11 +164,6 @@ def _loops(stage: Stage) -> list[Assembly]:
         )
         for loop in stage.family.every(Assembly)
     ]
-
-
-def _of_last(stage: Stage) -> list[object]:
-    """Transfer the output link of the last stage to the chain."""
-    return [OutputLink(partial(on_part, stage.designs, link.origin)) for link in stage.family.every(OutputLink)]
 
 
 def _numbered(families: tuple[Family, ...]) -> tuple[tuple[Stage, ...], tuple[Parameter, ...]]:

@@ -30,7 +30,8 @@ def check_family(family: Family) -> Family:
     FamilyError
         naming the family, the faults and their remedies.
     """
-    faults = [*_names(family), *output_faults(family), *_drawing(family), *_capabilities(family), *_example(family)]
+    rules = (_names, _definitions, _position, _derivatives, _events, _steps, _drawing, _capabilities, _example)
+    faults = [fault for rule in rules for fault in rule(family)]
     if faults:
         raise FamilyError("\n".join([f"family {family.name}: {len(faults)} faults", *(f"  {x}" for x in faults)]))
     return family
@@ -143,11 +144,6 @@ def _capabilities(family: Family) -> list[str]:
             if isinstance(found, Assembly | JointRecords | LinkTree | OutputLink)
         ]
     return faults
-
-
-def output_faults(family: Family) -> list[str]:
-    """List the faults of an entry's outputs, each with its remedy."""
-    return [*_definitions(family), *_position(family), *_derivatives(family), *_events(family), *_steps(family)]
 
 
 def _definitions(family: Family) -> list[str]:

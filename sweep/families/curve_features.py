@@ -7,7 +7,7 @@ searches for extrema, means and events start with sufficiently dense samples, an
 from __future__ import annotations
 
 from collections.abc import Callable, Collection, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 from typing import TypeAlias, TypeVar
 
@@ -122,7 +122,7 @@ class Smooth:
     parts: tuple[str, ...]
 
 
-def _about(family: Family, kind: type[Feature], outputs: Collection[str]) -> list[Feature]:
+def about(family: Family, kind: type[Feature], outputs: Collection[str]) -> list[Feature]:
     """List the features of a kind that concern one of the given pose outputs, or all outputs."""
     return [known for known in family.every(kind) if known.of is None or not known.of.isdisjoint(outputs)]
 
@@ -130,20 +130,15 @@ def _about(family: Family, kind: type[Feature], outputs: Collection[str]) -> lis
 def waves(family: Family, designs: Array, outputs: Collection[str]) -> Array:
     """Return the number of waves per turn of the given pose outputs, at least 1, (n,)."""
     most = np.ones(len(designs))
-    for fast in _about(family, Waves, outputs):
+    for fast in about(family, Waves, outputs):
         count = np.abs(fast.count(designs))
         most = np.fmax(most, np.where(np.isfinite(count), count, 1.0))
     return most
 
 
-def switching(family: Family, outputs: Collection[str]) -> list[Switches]:
-    """List the switches of the given pose outputs."""
-    return _about(family, Switches, outputs)
-
-
 def switches(family: Family, designs: Array, outputs: Collection[str]) -> Array:
     """Angles at which one of the given pose outputs switches, in [0, 2 pi), (n, k); 0 for invalid ones."""
-    every = [np.zeros((len(designs), 0)), *(known.angles(designs) for known in switching(family, outputs))]
+    every = [np.zeros((len(designs), 0)), *(known.angles(designs) for known in about(family, Switches, outputs))]
     angles = np.mod(np.concatenate(every, axis=1), TWO_PI)
     return np.where(np.isfinite(angles), angles, 0.0)
 
@@ -186,14 +181,9 @@ def bends(family: Family, output: str) -> tuple[Bends, ...]:
     return tuple(known for known in family.every(Bends) if output in known.of)
 
 
-def singular(family: Family, outputs: Collection[str]) -> list[Singular]:
-    """List the functions near whose zeros the given pose outputs have narrow peaks, without discriminants."""
-    return _about(family, Singular, outputs)
-
-
 def singular_curves(family: Family, outputs: Collection[str]) -> Sequence[SingularCurve]:
     """List functions of designs (n, P) and angles whose complex zeros are the singularities of the pose outputs."""
-    found = [partial(_measured, family, known) for known in singular(family, outputs)]
+    found = [partial(_measured, family, known) for known in about(family, Singular, outputs)]
     discriminants = [loop.discriminant for loop in family.every(Assembly)]
     if set(outputs) <= set(discriminants):
         # Discriminants are smooth where they vanish, and defined where the links do not reach.
@@ -263,7 +253,13 @@ def of_members(members: Sequence[Member], sums: frozenset[str]) -> list[object]:
                 if known.of is not None
             ]
         found += [_of_part(m, known, sums) for known in m.family.every(Crossing)]
-        found += [_of_shaft(m, known) for known in m.family.every(Bends) if m.driver is None]
+        found += [
+            replace(
+                known, of=frozenset(f"{m.name}.{name}" for name in known.of), curves=partial(_turned, m, known.curves)
+            )
+            for known in m.family.every(Bends)
+            if m.driver is None
+        ]
         for known in m.family.every(Singular):
             if known.needs:
                 names = {name: f"{m.name}.{name}" for name in known.needs}
@@ -286,11 +282,6 @@ def _named(member: Member, names: frozenset[str] | None, sums: frozenset[str]) -
 def _geared(member: Member, count: DesignMap, designs: Array) -> Array:
     found: Array = abs(member.ratio) * count(member.designs(designs))
     return found
-
-
-def _of_shaft(member: Member, known: Bends) -> Bends:
-    names = frozenset(f"{member.name}.{name}" for name in known.of)
-    return Bends(names, partial(_turned, member, known.curves), known.squares, known.zero)
 
 
 def _turned(member: Member, curves: Callable[..., Array], designs: Array, angles: Angles, *found: Columns) -> Array:

@@ -91,19 +91,14 @@ def _of_both(designs: Array, angles: Angles, wanted: frozenset[str], beside: np.
     return found
 
 
-def rocker_foot(designs: Array, angles: Angles, motion: Columns) -> Array:
-    """Return the point of the shaft at the height of the rocker's ball, (n, m, 3)."""
-    return _on_shaft(designs, np.asarray(motion["z_c1"], np.float64))
+def foot(height: str) -> Made:
+    """Make the point of the shaft at the height of a pose output: of the rocker's ball, or of the working point."""
 
+    def at(designs: Array, angles: Angles, motion: Columns) -> Array:
+        z = np.asarray(motion[height], np.float64)
+        return np.stack([parameter(PARAMETERS, "e1", designs)[:, None] + 0.0 * z, 0.0 * z, z], axis=-1)
 
-def looper_foot(designs: Array, angles: Angles, motion: Columns) -> Array:
-    """Return the point of the shaft at the height of the working point, (n, m, 3)."""
-    return _on_shaft(designs, np.asarray(motion["z_p"], np.float64))
-
-
-def _on_shaft(designs: Array, height: Array) -> Array:
-    e = parameter(PARAMETERS, "e1", designs)[:, None] + 0.0 * height
-    return np.stack([e, np.zeros_like(height), height], axis=-1)
+    return Made((height,), at)
 
 
 _ON_AXIS = "from the axis at the height of the rocker's ball"
@@ -164,7 +159,7 @@ FAMILY = Family(
                 Link("crank 1", ("a1", "b1")), Link("coupler 1", ("b1", "c1")),
                 Link("rocker", ("q1", "c1")), Link("looper", ("q", "p")),
             ),
-            {"q1": Made(("z_c1",), rocker_foot), "q": Made(("z_p",), looper_foot)},
+            {"q1": foot("z_c1"), "q": foot("z_p")},
         ),
     ),
 )  # fmt: skip

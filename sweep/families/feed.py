@@ -127,17 +127,13 @@ poses = partial(_poses, feed.poses, _POSES, ("cos", "sin"))
 
 def _of_chain(parameters: tuple[Parameter, ...], designs: Array, angles: Angles, *names: str) -> list[Array]:
     """Compute outputs of the crank-rocker of the horizontal chain, (n, m) each."""
-    return CRANK_ROCKER.values(horizontal_chain(designs, parameters), angles, *names)
+    own = np.column_stack([designs[:, [0, 1, 2, 3, 4, 5, 6]], parameter(parameters, SIGMA.name, designs)])
+    return CRANK_ROCKER.values(own, angles, *names)
 
 
 def rocker_loop(parameters: tuple[Parameter, ...], designs: Array, angles: Angles, found: Columns) -> Array:
     """Discriminant of the horizontal chain, (n, m)."""
     return _of_chain(parameters, designs, angles, "discriminant")[0]
-
-
-def horizontal_chain(designs: Array, parameters: tuple[Parameter, ...] = PARAMETERS) -> Array:
-    """Extract the crank-rocker of the horizontal chain from the designs of a rack, as its design matrix (n, 8)."""
-    return np.column_stack([designs[:, [0, 1, 2, 3, 4, 5, 6]], parameter(parameters, SIGMA.name, designs)])
 
 
 def chain_joints(parameters: tuple[Parameter, ...]) -> dict[str, Made]:

@@ -106,12 +106,6 @@ def marched(path: Array, feet: Array) -> tuple[Columns, Array, Array]:
     return columns | {"changes": changes, "status": status}, heights, forces
 
 
-def nodes_for(poses: int) -> tuple[int, int]:
-    """Return the number of nodes marched for ``poses`` poses of a turn, and that from pose to pose."""
-    apart = -(-NODES // poses)
-    return poses * apart, apart
-
-
 def happening(columns: Columns, wanted: frozenset[str]) -> Columns:
     """Select the wanted columns; status NO_EVENT where one of them belongs to an event that does not occur."""
     status = np.array(columns["status"], np.uint8)
@@ -154,10 +148,11 @@ def _poses(
     run: Callable[[Array, int], Marched], feet: list[int], designs: Array, angles: Angles, wanted: frozenset[str]
 ) -> Columns:
     """Compute the wanted pose outputs and status of every design over one turn in equal steps from 0, each (n, m)."""
-    nodes, apart = nodes_for(angles.phi.shape[1])
-    columns, path, heights, forces = run(designs, nodes)
+    poses = angles.phi.shape[1]
+    apart = -(-NODES // poses)  # nodes from pose to pose
+    columns, path, heights, forces = run(designs, poses * apart)
     found = pose_columns(designs[:, feet], path, heights, forces, apart)
-    status = np.repeat(np.asarray(columns["status"], np.uint8)[:, None], angles.phi.shape[1], axis=1)
+    status = np.repeat(np.asarray(columns["status"], np.uint8)[:, None], poses, axis=1)
     return chosen(found, wanted, status)
 
 

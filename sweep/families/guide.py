@@ -116,22 +116,11 @@ def tool_direction(designs: Array) -> Array:
     return np.column_stack([np.cos(designs[:, 6]), np.sin(designs[:, 6]), 0.0 * designs[:, 6]])
 
 
-def _in_frame(designs: Array, along: Array, across: Array) -> Array:
+def _of_point(axis: str, designs: Array) -> Array:
     """Coefficients of s, dev and 1 in a coordinate of the coupler point, (n, 3)."""
-    h = parameter(PARAMETERS, "h", designs)
+    lam, h = parameter(PARAMETERS, "lam", designs), parameter(PARAMETERS, "h", designs)
+    along, across = (np.cos(lam), -np.sin(lam)) if axis == "x" else (np.sin(lam), np.cos(lam))
     return np.column_stack([along, across, across * h])
-
-
-def x_of_point(designs: Array) -> Array:
-    """Coefficients of s, dev and 1 in x_m, (n, 3)."""
-    lam = parameter(PARAMETERS, "lam", designs)
-    return _in_frame(designs, np.cos(lam), -np.sin(lam))
-
-
-def y_of_point(designs: Array) -> Array:
-    """Coefficients of s, dev and 1 in y_m, (n, 3)."""
-    lam = parameter(PARAMETERS, "lam", designs)
-    return _in_frame(designs, np.sin(lam), np.cos(lam))
 
 
 _ALONG, _ACROSS = can.constant(1.0, 0.0, 0.0), can.constant(0.0, 1.0, 0.0)
@@ -150,7 +139,7 @@ IN_SERIES = can.InSeries(
     {
         "s": can.Curve(0, _ALONG), "ds": can.Curve(1, _ALONG), "d2s": can.Curve(2, _ALONG), "d3s": can.Curve(3, _ALONG),
         "dev": can.Curve(0, _ACROSS), "ddev": can.Curve(1, _ACROSS), "d2dev": can.Curve(2, _ACROSS),
-        "x_m": can.Curve(0, x_of_point), "y_m": can.Curve(0, y_of_point),
+        "x_m": can.Curve(0, partial(_of_point, "x")), "y_m": can.Curve(0, partial(_of_point, "y")),
     },
     {"ds": "x1", "d2s": "x2", "d3s": "x3", "dev": "y0", "ddev": "y1", "d2dev": "y2"},
     opening,

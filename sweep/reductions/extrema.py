@@ -14,7 +14,7 @@ import numpy as np
 from kernels import status as st
 from kernels.types import Status
 from sweep.families.base import Array, Family
-from sweep.families.curve_features import crossed, singular
+from sweep.families.curve_features import Singular, about, crossed
 from sweep.quantities.kinds import Request
 from sweep.reductions import fused, panels, peak_search
 from sweep.reductions.peak_search import LIMIT
@@ -66,7 +66,7 @@ def true_extrema(
     alike: dict[tuple[object, ...], list[Request]] = {}
     for request in requests:
         jumps = crossed(family, designs, () if anywhere else (request.pose,))
-        alike.setdefault((jumps.tobytes(), *singular(family, (request.pose,))), []).append(request)
+        alike.setdefault((jumps.tobytes(), *about(family, Singular, (request.pose,))), []).append(request)
     if len(alike) > 1:
         for some in alike.values():
             part, now = true_extrema(family, designs, some, target, locate=locate, anywhere=anywhere, window=window)

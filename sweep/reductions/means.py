@@ -15,7 +15,7 @@ from kernels import status as st
 from kernels.curves import samples as scan
 from kernels.types import EPS, TWO_PI, Status
 from sweep.families.base import Accuracy, Array, Columns, Family
-from sweep.families.curve_features import crossed, switching
+from sweep.families.curve_features import Switches, about, crossed
 from sweep.numerics.events import with_events
 from sweep.numerics.quadrature import integrate
 from sweep.numerics.singularities import FAR, turn_edges
@@ -87,7 +87,7 @@ def _refined(family: Family, designs: Array, pose: str, target: float) -> tuple[
     output = family.pose_output[pose]
     # Curves with jumps, kinks or waves are cut into panels.
     cut = crossed(family, designs, (pose,)) | (denser(family, designs, (pose,)) > 1.0) | output.kinks | output.jumps
-    even = KNOWN if switching(family, (pose,)) and pose not in family.dear else EVEN
+    even = KNOWN if about(family, Switches, (pose,)) and pose not in family.dear else EVEN
     alive = np.flatnonzero(status == st.OK)
     noise = _alone(family, designs, alive[err[alive] > ROUGH * mean[alive]], pose, top, mean, err)
     left = np.setdiff1d(alive, noise)

@@ -19,7 +19,7 @@ from kernels import status as st
 from kernels.curves import samples as scan
 from kernels.types import EPS, TWO_PI, Status
 from sweep.families.base import Array, Family
-from sweep.families.curve_features import Bends, bends, singular
+from sweep.families.curve_features import Bends, Singular, about, bends
 from sweep.numerics.chebyshev import DENSE, NODES, at_nodes, basis, product, rising, summits
 from sweep.quantities.kinds import Request
 from sweep.reductions.refine import hill
@@ -130,7 +130,7 @@ def _block(
         top, size = _climbed(family, designs[rows], panels, request, target, locate or request.place)
         rounding = _rounding(guards, poses, good, row, top, family.precise_poses is not None)
         lost = np.zeros(top.row.size, np.bool_)  # no correct digit next to a singularity
-        if singular(family, (request.pose,)):
+        if about(family, Singular, (request.pose,)):
             near = nearest(family, designs[rows[top.row]], (request.pose,), MATTERS)
             order = np.full(top.row.size, order_of(family, request.pose))
             share = singular_share(near, top.phi, order)

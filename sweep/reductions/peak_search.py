@@ -10,7 +10,7 @@ from kernels import status as st
 from kernels.curves import samples as scan
 from kernels.types import EPS, TWO_PI, Status
 from sweep.families.base import Array, Family
-from sweep.families.curve_features import singular, switches
+from sweep.families.curve_features import Singular, about, switches
 from sweep.numerics.singularities import Singularities
 from sweep.quantities.kinds import Request
 from sweep.reductions import refine
@@ -85,7 +85,7 @@ class Search:
         self.names = list(dict.fromkeys([*(r.pose for r in self.requests), *position, *self.guards]))
         # Samples that each request still needs for each design; 0 once its extremum is found.
         curves = [request.pose for request in self.requests]
-        sharp = bool(singular(self.family, curves))
+        sharp = bool(about(self.family, Singular, curves))
         self.near = nearest(self.family, self.designs, curves, MATTERS) if sharp else None
         fewest = (START * denser(self.family, self.designs, self.names, self.near)).astype(np.int64)
         self.undone = np.tile(fewest, (len(self.requests), 1))

@@ -48,7 +48,7 @@ def denser(family: Family, designs: Array, outputs: Collection[str], near: Singu
         # Coinciding switches count as one.
         shortest = np.where(gaps > 1e-9, gaps, TWO_PI).min(axis=1)
         factor = np.maximum(factor, TWO_PI / (SHARES * shortest))
-    if features.singular(family, outputs):
+    if features.about(family, features.Singular, outputs):
         near = nearest(family, designs, outputs, MATTERS) if near is None else near
         rho = near.rho.min(axis=1)
         factor = np.where(rho < FAR, np.maximum(factor, PER_SINGULARITY / (FEWEST * rho)), factor)
@@ -331,6 +331,6 @@ def _beyond_mean(coefficients: Array) -> Array:
 def series_of(family: Family, request: Request) -> Series | None:
     """Fourier series of a request; None unless the curve is known to be smooth and expensive."""
     known = next((smooth for smooth in family.every(features.Smooth) if smooth.of == request.pose), None)
-    if known is None or request.place or request.windowed or features.switching(family, known.parts):
+    if known is None or request.place or request.windowed or features.about(family, features.Switches, known.parts):
         return None
     return Series(family, request, known.parts) if len(known.parts) == 1 or request.mode >= 0 else None

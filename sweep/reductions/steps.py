@@ -102,9 +102,7 @@ def _proven(
 
 def _loop(stage: Stage, designs: Array) -> Array:
     """Return a stage as a crank-rocker, (n, 8)."""
-    found = stage.family.find(CrankRockerLoop)
-    assert found is not None
-    return found.matrix(stage.designs(designs))
+    return stage.family.the(CrankRockerLoop).matrix(stage.designs(designs))
 
 
 @of_family

@@ -68,12 +68,9 @@ class Machine(Family):
         own = found[0].family.outward_sign(found[1])
         return own and f"{found[0].name}.{own}"
 
-    def precise(self) -> Machine:
-        """Return the machine with the most accurate poses its members have."""
-        return self._exact
-
     @cached_property
-    def _exact(self) -> Machine:
+    def _precise(self) -> Machine:
+        """The machine with the most accurate poses its members have."""
         return _built(self, tuple(replace(m, family=m.family.precise()) for m in self.members))
 
     def with_families(self, families: Mapping[str, Family]) -> Machine:

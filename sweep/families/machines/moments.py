@@ -125,11 +125,15 @@ class Taking(Relation):
         """Parameters of the rise window."""
         return self.window.parameters if self.window else ()
 
+    @property
+    def _moving(self) -> frozenset[str]:
+        """Names of the outputs that need velocities."""
+        return frozenset((*self.rates.values(), f"{self.name}_speed"))
+
     def needs(self, wanted: frozenset[str]) -> frozenset[str]:
         """Names of coordinates of both points and the line, and of velocities if they are wanted."""
         names = [self.needle.on, self.blade.tip, self.needle.line]
-        moving = {*self.rates.values(), f"{self.name}_speed"}
-        if not moving.isdisjoint(wanted):
+        if not wanted.isdisjoint(self._moving):
             names += [rate_of(self.needle.on), rate_of(self.blade.tip)]
         if self.gap.name in wanted:
             names.append(self.blade.back)
@@ -146,24 +150,15 @@ class Taking(Relation):
         size = np.where(np.real(size) > PARALLEL * np.linalg.norm(scarf), size, np.nan)
         w = [x / size for x in w]
         u = cross(n, w)
-        own = {name for name in wanted if name.startswith(f"{self.name}_")}
         columns = self.gap.compute(found, frozenset()) if self.gap.name in wanted else {}
-        for moving, d in ((False, ""), (True, "d")):
-            names = {what: f"{self.name}_{d}{what}" for what in ("across", "side", "height", "depth", "speed")}
-            if own.isdisjoint(names.values()) and not (moving and f"{self.name}_speed" in own):
-                continue
-            if moving:
-                point, tip = _vector(found, rate_of(self.needle.on)), _vector(found, rate_of(self.blade.tip))
+        orders = [("", point, tip)]
+        if not wanted.isdisjoint(self._moving):
+            orders.append(("d", _vector(found, rate_of(self.needle.on)), _vector(found, rate_of(self.blade.tip))))
+        for d, point, tip in orders:
             r = minus(tip, point)
-            for what, value in (
-                ("across", dot(r, u)),
-                ("side", dot(r, w)),
-                ("height", dot(r, n)),
-                ("depth", dot(point, n)),
-            ):
-                columns[names[what]] = value
-            if moving:
-                columns[f"{self.name}_speed"] = np.sqrt(dot(r, r))
+            parts = {"across": dot(r, u), "side": dot(r, w), "height": dot(r, n), "depth": dot(point, n)}
+            columns |= {f"{self.name}_{d}{what}": part for what, part in parts.items()}
+            columns |= {f"{self.name}_speed": np.sqrt(dot(r, r))} if d else {}
         return columns
 
 

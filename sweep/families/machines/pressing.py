@@ -109,10 +109,8 @@ def read_pressing(
     if m.ratio not in (1, -1):
         raise InputError("press", given, f"a rack with ratio 1 or -1: {given} rises {abs(m.ratio)} times a turn", where)
     alone, lifted = find(ON_RACK), len(m.family.parameters)
-    foot = alone.find(PresserFoot)
-    assert foot is not None
     parameters = tuple(
         replace(p, name=f"{name}_{SPEED.get(p.name, p.name)}", text=f"{name}: {p.text}")
         for p in alone.parameters[lifted:]
     )
-    return Pressing(name, given, lifted, foot, parameters)
+    return Pressing(name, given, lifted, alone.the(PresserFoot), parameters)
