@@ -229,7 +229,7 @@ def inertial(design: Mapping[str, float], name: str, stage: str, unit: str) -> X
     Raises
     ------
     InputError
-    for a mass without the inertia that matters, or with an unphysical one.
+        for a mass without the inertia that matters, or with an unphysical one.
     """
     kilograms, metres = KILOGRAMS[unit], METRES[unit]
     mass = float(design[f"m_{name}{stage}"])
