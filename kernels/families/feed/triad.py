@@ -124,6 +124,9 @@ def _newton(d: Array, u: float, v: float, x: float, y: float, chi: float) -> tup
         # written so that a nan counts too: the determinant was zero
         if not size < math.inf:
             return x, y, chi, det, st.SINGULAR
+        # Steps that grow go across a locking position onto another assembly.
+        if size > before and size > _SMALL:
+            return x, y, chi, det, st.SINGULAR
         x, y, chi = x - dx, y - dy, chi - dchi
         # Steps of a few roundings that no longer shrink: rounding of the closures allows no better
         if size <= 4.0 * EPS or (size <= _SMALL and size >= 0.5 * before):

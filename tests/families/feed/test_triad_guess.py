@@ -63,3 +63,30 @@ def test_triad_of_which_two_leads_cannot_reach_each_other_is_not_assembled():
     assert set(status[~closes]) == {st.NOT_ASSEMBLED, st.NOT_CONVERGED}
     assert set(status[closes]) == {st.OK, st.NOT_CONVERGED}
     assert np.mean(status[~closes] == st.NOT_ASSEMBLED) > 0.75
+
+
+def test_triad_whose_leads_lock_on_the_way_does_not_go_on_in_another_assembly():
+    """All poses of the first design had status 0, though its turn did not close.
+
+    The reference is the motion itself: one that turns comes back to where it began.
+    """
+    lengths = {
+        "h_a": 0.481, "h_b": 3.202, "h_c": 1.561, "h_e": 3.676, "h_f": -0.261, "h_g": -0.281, "rh": 1.182,
+        "xE2": 2.17, "yE2": -2.234, "rE2": 0.141, "xE3": 5.849, "yE3": -2.375, "rE3": 0.161, "f1x": -0.899,
+        "f1y": -0.508, "f2x": -0.783, "f2y": -0.542, "f3x": 1.182, "f3y": -0.607, "q1": 1.497, "q2": 2.336,
+        "q3": 2.609, "x0": 4.0, "y0": 1.0,
+    }  # fmt: skip
+    angles = {"h_alpha": -0.32, "dh": -0.127, "dE2": 0.281, "dE3": 0.53, "chi0": 0.0}
+    locks = lengths | angles | {"h_sigma": -1.0}
+    phi = np.linspace(0.0, 2.0 * math.pi * (1.0 - 1e-9), 181)
+    one = sweep.evaluate("feed_triad", locks, ["x_t"], phi=phi)["status"].to_numpy()
+    assert one[0] == st.OK
+    assert (one[80:] == st.SINGULAR).all()
+    random = np.random.default_rng(77)
+    rows = {name: np.full(200, value) * np.exp(random.uniform(-0.12, 0.12, 200)) for name, value in locks.items()}
+    rows |= {"h_sigma": np.full(200, -1.0)}
+    found = sweep.evaluate("feed_triad", rows, ["x_t"], phi=[0.0, phi[-1]])
+    both = (found["status"].to_numpy().reshape(200, 2) == st.OK).all(axis=1)
+    path = found["x_t"].to_numpy().reshape(200, 2)[both]
+    assert both.sum() > 30
+    np.testing.assert_allclose(path[:, 1], path[:, 0], rtol=0.0, atol=1e-6)  # the angles differ by 6e-9 rad
