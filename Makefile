@@ -131,7 +131,7 @@ dist-test:  ## wheel and sdist, built and installed in an environment of their o
 notebooks: $(VENV)/dev  ## run the notebooks of docs/notebooks in place
 	$(BIN)/python docs/site/notebooks.py
 
-frames: $(VENV)/dev  ## draw the frames of all families for docs/frames.md
+frames: $(VENV)/dev  ## draw the frames of all families for their pages
 	$(BIN)/python docs/frames.py
 
 bench-estimates: $(VENV)/dev  ## what sweep check expects of every study against what a slice of it takes
