@@ -2,40 +2,50 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import TYPE_CHECKING
 
-from studies.accuracy.effect_prices import GRID, REFINED, SAMPLES, TARGETS
+from studies.accuracy.effect_prices import REFINED
 from studies.accuracy.measured import Measured
-from studies.accuracy.tables import Parts, cells, duration, pipe_table, power, prose
+from studies.accuracy.tables import USUAL, USUAL_HEAD, Parts, cells, pipe_table, power, prose
 from studies.accuracy.tables import significant as sig
-from sweep.effects import NAMES, effect
 
 if TYPE_CHECKING:
     import pandas as pd
 
-WAYS = (*((GRID, float(n)) for n in SAMPLES), *((REFINED, target) for target in TARGETS))
-HEAD = ("effect", "on", "designs", *(f"grid {n}" for n in SAMPLES), *(f"`{power(t)}`" for t in TARGETS), "least sure",
-        "reference sure to", "per pose")  # fmt: skip
+HEAD = ("effect", "on", "designs", *USUAL_HEAD, "reference sure to", "judged")
 
 
 def effects_parts(m: Measured) -> Parts:
-    """Return the table of all effects, a statement on their error estimates, and the table of their references."""
-    groups = [(f"`{name}`", part) for name, part in m.effects.groupby("effect", sort=False)]
-    firsts = [(name, part.iloc[0]) for name, part in groups]
-    words = [[name, f"{first['judged']} of {first['outputs']}", first["reference"]] for name, first in firsts]
+    """Return the table of all effects, a statement on their error estimates, and the list of their references."""
+    rows = [_row(f"`{name}`", part) for name, part in m.effects.groupby("effect", sort=False)]
     return {
-        "prices": pipe_table(HEAD, [_row(name, part) for name, part in groups]),
+        "prices": pipe_table(HEAD, rows),
         "honest": _honest(m.effects),
-        "references": pipe_table(("effect", "judged", "reference"), words),
+        "references": references(dict(zip(m.effects["effect"], m.effects["reference"], strict=True))),
     }
+
+
+def references(of: Mapping[str, str]) -> list[str]:
+    """Return a line for every reference with its effects; the most frequent one has all others."""
+    names: dict[str, list[str]] = {}
+    for name, words in of.items():
+        names.setdefault(words, []).append(f"`{name}`")
+    most, *others = sorted(names, key=lambda words: -len(names[words]))
+    return [*(f"* {words}: {', '.join(names[words])};" for words in others), f"* {most}: all other effects."]
 
 
 def _row(name: str, rows: pd.DataFrame) -> list[str]:
     first, last = rows.iloc[0], rows.iloc[-1]
-    entry = effect(first["effect"]) if first["effect"] in NAMES else None
-    pose = duration(entry.ns_per_pose) if entry is not None and entry.ns_per_pose else "-"
-    tail = [f"`{last['worst_output']}`", sig(last["reference_error"]), pose]
-    return [name, f"`{first['family']}`", str(first["designs"]), *cells(rows, WAYS), *tail]
+    judged = f"{first['judged']} of {first['outputs']}"
+    return [
+        name,
+        f"`{first['family']}`",
+        str(first["designs"]),
+        *cells(rows, USUAL),
+        sig(last["reference_error"]),
+        judged,
+    ]
 
 
 def _honest(table: pd.DataFrame) -> list[str]:

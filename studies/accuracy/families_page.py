@@ -6,17 +6,16 @@ from collections.abc import Hashable
 from typing import TYPE_CHECKING
 
 from studies.accuracy.measured import Measured
-from studies.accuracy.prices import CERTIFIED, GRID, PROVEN, REFINED, SAMPLES, TARGETS
+from studies.accuracy.prices import CERTIFIED, GRID, PROVEN, REFINED
 from studies.accuracy.subjects import TEXTS
-from studies.accuracy.tables import Parts, cells, duration, pipe_table, power, prose
+from studies.accuracy.tables import USUAL, USUAL_HEAD, Parts, cells, duration, pipe_table, power, prose
 from studies.accuracy.tables import significant as sig
 
 if TYPE_CHECKING:
     import pandas as pd
 
-WAYS = (*((GRID, float(n)) for n in SAMPLES), *((REFINED, target) for target in TARGETS), (CERTIFIED, PROVEN))
-HEAD = ("number", "designs", *(f"grid {n}" for n in SAMPLES), *(f"`{power(t)}`" for t in TARGETS),
-        f"proven, `{power(PROVEN)}`", "reference sure to", "no answer")  # fmt: skip
+WAYS = (*USUAL, (CERTIFIED, PROVEN))
+HEAD = ("number", "designs", *USUAL_HEAD, f"proven, `{power(PROVEN)}`", "reference sure to", "no answer")
 PURPOSES = {"For a nightly map": 1e-3, "For a drawing, an optimum, a comparison with a measurement": 1e-9}
 
 

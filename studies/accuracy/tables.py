@@ -16,6 +16,9 @@ Ways = Iterable[tuple[str, float]]
 """Names of methods, each with a setting."""
 Parts = Mapping[str, Sequence[str]]
 """Lines of a page by the name of their placeholder in its template."""
+USUAL = (("grid", 360.0), ("accuracy=", 1e-3), ("accuracy=", 1e-9))
+USUAL_HEAD = ("grid 360", "`1e-3`", "`1e-9`")
+"""Methods and settings that the pages show of all that are measured, and the heads of their columns."""
 
 
 def significant(value: Any) -> str:

@@ -1,4 +1,4 @@
-"""Largest known errors of the oracle tables, by table, quantity and kind of row: ``python -m tests.bench.factors``.
+"""Largest known errors of the oracle tables: ``python -m tests.bench.factors``.
 
 Writes docs/accuracy/factors.md; tests/families/test_hard_oracle.py holds every figure to what its sheet allows.
 """
@@ -9,7 +9,6 @@ import argparse
 import json
 from pathlib import Path
 
-import numpy as np
 import pandas as pd
 
 from studies.accuracy.tables import pipe_table, prose
@@ -33,34 +32,30 @@ def main() -> None:
 
 
 def page(found: pd.DataFrame, worst: pd.DataFrame) -> list[str]:
-    """One line per table, then by quantity and kind of row, then what the search found."""
+    """One line per table, then what the search found."""
     beyond = int((~(found["factor"] <= found["allowed"])).sum())
     rows = int(found.groupby(["table", "kind"])["rows"].max().sum())
     lines = [
         "# Largest known errors",
         "",
         *prose(
-            "The tables show the largest errors over all rows of the 25-digit tables. The unit is 2^-53 times",
-            "max(cond, abs y). In some tables another size takes the place of this maximum: for the geared dwell",
-            "drive, whose table has no cond, the largest of abs y, its lower derivatives and the change by one",
-            "rounding of phi; for the largest pressure angle one radian; for other pressure angles and joint",
-            "loads the tabulated sensitivity; with friction the largest force. Back to [what the next digit",
-            "costs](../accuracy.md).",
+            "The largest errors over all rows of the 25-digit tables, with their quantity and kind of rows. Hard",
+            "rows, where a table tells them apart, have dead points, change points, extreme proportions and",
+            "scales. The unit is 2^-53 times max(cond, abs y). In some tables another size takes the place of",
+            "this maximum: for the geared dwell drive, whose table has no cond, the largest of abs y, its lower",
+            "derivatives and the change by one rounding of phi; for the largest pressure angle one radian; for",
+            "other pressure angles and joint loads the tabulated sensitivity; with friction the largest force.",
+            "Back to [what the next digit costs](../accuracy.md).",
         ),
         "",
         f"{beyond} of {len(found)} quantities and kinds exceed the factor of their sheet, over {rows} rows;",
         f"{int(found['undecidable'].sum())} rows are declared undecidable.",
         "",
     ]
-    tables = found.groupby("table", sort=False)
     lines += pipe_table(
-        ["table", "rows", "allowed", "largest known", "of", "among"], [_summary(*one) for one in tables]
+        ["table", "rows", "allowed", "largest of other rows", "largest of hard rows"],
+        [_summary(*one) for one in found.groupby("table", sort=False)],
     )
-    for table, part in tables:
-        quantities = list(dict.fromkeys(part["quantity"]))
-        lines += ["", f"### {table}, allowed {part['allowed'].iloc[0]:g}", ""]
-        kinds = [_kind(str(kind), cells, quantities) for kind, cells in part.groupby("kind", sort=False)]
-        lines += pipe_table(["kind of rows", "rows", *quantities], kinds)
     searched = [
         [str(poses), str(region), *(sig(part.loc[part["output"] == name, "factor"].max()) for name in ORDERS)]
         for (poses, region), part in worst.groupby(["poses", "region"])
@@ -80,16 +75,16 @@ def page(found: pd.DataFrame, worst: pd.DataFrame) -> list[str]:
 
 
 def _summary(table: object, part: pd.DataFrame) -> list[str]:
+    rows = part.groupby("quantity")["rows"].sum().max()
+    hard = part["kind"].str.startswith("hard")
+    return [str(table), str(rows), f"{part['allowed'].iloc[0]:g}", _largest(part[~hard]), _largest(part[hard])]
+
+
+def _largest(part: pd.DataFrame) -> str:
+    if part.empty:
+        return "-"
     top = part.sort_values("factor").iloc[-1]
-    count = f"{part.groupby('quantity')['rows'].sum().max()}"
-    kind = str(top["kind"]).replace("_", " ")
-    return [str(table), count, f"{top['allowed']:g}", sig(top["factor"]), top["quantity"], kind]
-
-
-def _kind(kind: str, cells: pd.DataFrame, quantities: list[str]) -> list[str]:
-    known = dict(zip(cells["quantity"], cells["factor"], strict=True))
-    count = str(int(cells["rows"].max()))
-    return [kind.replace("_", " "), count, *(sig(known.get(quantity, np.nan)) for quantity in quantities)]
+    return f"{sig(top['factor'])} ({top['quantity']}, {str(top['kind']).replace('_', ' ')})"
 
 
 if __name__ == "__main__":
