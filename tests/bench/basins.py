@@ -5,7 +5,6 @@ from __future__ import annotations
 import argparse
 import json
 import time
-from collections import Counter
 from collections.abc import Iterator, Sequence
 from dataclasses import asdict, dataclass
 from pathlib import Path
@@ -121,8 +120,8 @@ def page(rows: Sequence[Row]) -> str:
         f"{fewest(record())} populations of every seed, whatever they end at, and at most {most(record())}; "
         "what one of the first of them finds is found.", "",
         "| requirement | best known [mm/rad^2] | seed | populations made | first that ends at the best "
-        "| of these end at it | found by the study | values [mm/rad^2] | processor time of a population [s] |",
-        "|---|---|---|---|---|---|---|---|---|",
+        "| found by the study | processor time of a population [s] |",
+        "|---|---|---|---|---|---|---|",
     ]  # fmt: skip
     for problem in LEAST:
         for seed in sorted({row.seed for row in rows if row.problem == problem}):
@@ -131,12 +130,10 @@ def page(rows: Sequence[Row]) -> str:
             study = record(LEAST[problem], seed=seed)
             over = told(study, own)
             found = "yes" if hits and (hits[0] <= fewest(study) or over) else "**no**" if over else "not yet"
-            values = Counter(f"{row.value:.4f}" for row in own)
-            each = ", ".join(f"{value} ({count})" for value, count in sorted(values.items()))
             cpu = sum(row.cpu + row.searched for row in own) / len(own)
             first = str(hits[0]) if hits else "none"
             best = f"{best_known(problem):.6f}"
-            cells = (WORDS[problem], best, seed, len(own), first, len(hits), found, each, f"{cpu:.0f}")
+            cells = (WORDS[problem], best, seed, len(own), first, found, f"{cpu:.0f}")
             lines.append(f"| {' | '.join(map(str, cells))} |")
     return "\n".join(lines) + "\n"
 

@@ -18,7 +18,6 @@ from sweep.chunks.plan import spread_designs
 from sweep.costs import TABLE, table
 from sweep.evaluation.summaries import design_outputs
 from sweep.evaluation.tables import design_matrix
-from sweep.families import family
 from sweep.families.base import Accuracy, Array, Family
 from sweep.families.capabilities import InSeries
 from sweep.families.chain import Chain
@@ -28,7 +27,7 @@ from sweep.study import Study, load_study
 from sweep.study.space import Axis, DesignSpace
 from sweep.synthesis.fit import fit_line
 from tests.bench import effect_costs as effects
-from tests.bench.families import ROUNDS, Run, ladder, least, margin_runs, pose_runs, sized, step_costs
+from tests.bench.families import ROUNDS, Run, least, margin_runs, pose_runs, sized, step_costs
 from tests.support.own_code import own_code
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -42,11 +41,10 @@ PROVEN = Accuracy(target=1e-8, certify=True)
 
 PAGE_HEAD = """# What a pose of each family takes
 
-This page has the time of one pose of each family, measured by `make bench` on one core. A pose has the position and all
-derivatives that the family gives. The designs are within 2 % of the family's ordinary one. An interval is passed there
-and back, a march on its grid. A reason is given if a pose takes more than three times as long as the crank-rocker's.
-`sweep/costs.toml` has the same figures and those of steps, effects and searches; `sweep check` estimates from them, and
-no value depends on them. [accuracy.md](accuracy.md) says what accuracy costs in time.
+Times of one pose, with the position and all derivatives that the family gives, on one core (`make bench`). An interval
+is passed there and back, a march on its grid. A reason is given if a pose takes more than three times as long as the
+crank-rocker's. `sweep check` estimates from `sweep/costs.toml`, which has the same figures and those of steps, effects
+and searches; no value depends on them. [accuracy.md](accuracy.md) says what accuracy costs in time.
 """
 
 # Why a pose takes more than three times what the crank-rocker's does.
@@ -175,10 +173,10 @@ def written(sections: Sections) -> str:
 
 def page(poses: Mapping[str, float]) -> str:
     """docs/costs.md: what a pose of every family takes next to the crank-rocker's, and why where it is much more."""
-    lines = [PAGE_HEAD, "| family | outputs | ns per pose | times `rssr` | reason |", "|---|---|---|---|---|"]
+    lines = [PAGE_HEAD, "| family | ns per pose | times `rssr` | reason |", "|---|---|---|---|"]
     for name, ns in poses.items():
-        outputs, times = ", ".join(f"`{one}`" for one in ladder(family(name))), ns / poses["rssr"]
-        lines.append(f"| `{name}` | {outputs} | {ns:g} | {float(f'{times:.2g}'):g} | {REASONS.get(name, '')} |")
+        times = ns / poses["rssr"]
+        lines.append(f"| `{name}` | {ns:g} | {float(f'{times:.2g}'):g} | {REASONS.get(name, '')} |")
     return "\n".join(lines) + "\n"
 
 

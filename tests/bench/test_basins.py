@@ -37,9 +37,9 @@ def test_page_says_which_seeds_find_the_best_known() -> None:
     late = [row(k, 1.01 * BEST, seed=3) for k in range(2)]  # not at its end yet
     text = page([*found, *missed, *late])
     lines = [line for line in text.splitlines() if line.startswith("| links of stage 2")]
-    assert [line.split(" | ")[6] for line in lines] == ["yes", "**no**", "not yet"]
+    assert [line.split(" | ")[5] for line in lines] == ["yes", "**no**", "not yet"]
     assert [line.split(" | ")[4] for line in lines] == ["5", "none", "none"]
-    assert f"{BEST:.4f} (1), {1.01 * BEST:.4f} (11)" in lines[0] and "at least 3 populations" in text
+    assert "at least 3 populations" in text
 
 
 def test_value_a_ten_thousandth_above_is_the_same_basin_and_more_is_not() -> None:
