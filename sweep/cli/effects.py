@@ -61,22 +61,13 @@ def effects(name: str | None, markdown: bool) -> None:
         click.echo(line)
 
 
-def cost_words(*group: Effect) -> str:
-    """Return the measured costs of effects, the least and the largest, in words."""
-    of = {
-        "pose": [entry.ns_per_pose for entry in group if entry.ns_per_pose],
-        "design": [entry.ns_per_design for entry in group if entry.design_result],
-    }
-    ends = {name: dict.fromkeys(duration(ns) for ns in (min(costs), max(costs))) for name, costs in of.items() if costs}
-    return ", ".join(f"{' to '.join(words)} per {name}" for name, words in ends.items())
-
-
-def duration(ns: float) -> str:
-    """Return a time in the unit that suits it."""
-    unit, size = next(
-        (unit, size) for unit, size in (("ms", 1e6), ("us", 1e3), ("ns", 1.0)) if ns >= size or size == 1.0
-    )
-    return f"{ns / size:.3g} {unit}"
+def cost_words(entry: Effect) -> str:
+    """Return the measured cost in words."""
+    words = [f"{entry.ns_per_pose:.0f} ns per pose"] if entry.ns_per_pose else []
+    if entry.design_result:
+        us = entry.ns_per_design / 1000.0
+        words.append(f"{us:.3g} us per design" if us < 1000.0 else f"{us / 1000.0:.3g} ms per design")
+    return ", ".join(words)
 
 
 def chain_words(entry: Effect) -> str:
@@ -354,7 +345,7 @@ def page() -> str:
             listed=(LOADS, CONTACT),
             tables=lambda group: groupby(parts(group), key=lambda part: part[0]),
             alike=alike,
-            costs=lambda group: cost_words(*group),
+            cost=cost_words,
             tool=TOOL,
         )
     )
