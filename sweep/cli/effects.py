@@ -32,7 +32,6 @@ OF_JOINT = re.compile(r": joint J\b(.*?)(?:; [a-z, ]+)?$")
 NUMBER = re.compile(r"( [a-d]?|^)(1|2|first|second)\b")
 BOTH = {"1": "1, 2", "2": "1, 2", "first": "first, second", "second": "first, second"}
 AS_WITHOUT = "as without `_friction`, friction included"
-TOOL = ("m_tool", "tool_", "pierce_")  # names of the inputs of a tool begin so
 REDUCED = re.compile(r"(?:(?:phi_)?(?:max_abs|max|min)|range|rms)_(?P<pose>.+)")
 
 
@@ -346,6 +345,5 @@ def page() -> str:
             tables=lambda group: groupby(parts(group), key=lambda part: part[0]),
             alike=alike,
             cost=cost_words,
-            tool=TOOL,
         )
     )
