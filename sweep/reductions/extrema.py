@@ -156,9 +156,9 @@ def _searched(
         rows = np.flatnonzero(torn)
         if rows.size:
             cut, now = panels.extrema(family, designs[rows], [request], target, locate)
-            if family.pose_output[request.pose].wraps:  # panels do not unwrap an angle across its branch cut
+            if family.pose_output[request.pose].wraps:  # it may jump across its branch cut either way
                 over = np.abs(cut[request].value) + 2.0 * cut[request].err > np.pi - OVER
-                now = np.where((now == st.OK) & over, st.NOT_CONVERGED, now)
+                now = np.where((now == st.OK) & over | (now == st.NOT_OSCILLATING), st.NOT_CONVERGED, now)
             search.status[rows] = np.where(search.status[rows] == st.OK, now, search.status[rows])
             put(search.found[request], rows, cut[request])
     return search.found, search.status

@@ -16,16 +16,25 @@ import numpy as np
 from numpy.polynomial import chebyshev
 
 from kernels import status as st
-from kernels.curves import samples as scan
 from kernels.types import EPS, TWO_PI, Status
 from sweep.families.base import Array, Family
-from sweep.families.curve_features import Bends, Singular, about, bends
+from sweep.families.curve_features import Bends, Singular, Switches, about, bends
 from sweep.numerics.chebyshev import DENSE, NODES, at_nodes, basis, product, rising, summits
 from sweep.quantities.kinds import Request
 from sweep.reductions.refine import hill
 from sweep.reductions.resolution import MATTERS, ends, nearest, zeros
-from sweep.reductions.rounding import order_of, singular_share
-from sweep.reductions.sampling import DESIGN_STATUS, Extremum, Index, Mask, blocks, discriminants, only, pose_columns
+from sweep.reductions.rounding import order_of, rounding_by_pieces, singular_share
+from sweep.reductions.sampling import (
+    Extremum,
+    Index,
+    blocks,
+    continued,
+    discriminants,
+    only,
+    pose_columns,
+    unwrapped,
+    worst_of_pieces,
+)
 
 PANELS = 64  # first even panels of a turn, besides cuts where a follower reverses
 TAIL = 4  # last coefficients that bound a polynomial's error; for a tent in the middle three of them nearly vanish ...
@@ -72,7 +81,11 @@ class Top(NamedTuple):
 def has_kinks(family: Family, request: Request, jumps: bool = False) -> bool:
     """Whether an extremum is searched on panels; with ``jumps`` all curves of these designs may jump."""
     output = family.pose_output[request.pose]
-    return (output.kinks or output.jumps or jumps) and not output.wraps and not request.windowed
+    if output.wraps:  # samples find the heights of an angle, but not how long it dwells
+        kinked = request.place and bool(about(family, Switches, (request.pose,)))
+    else:
+        kinked = output.kinks or output.jumps or jumps
+    return kinked and not request.windowed
 
 
 def extrema(
@@ -119,16 +132,20 @@ def _block(
     names = list(dict.fromkeys([*(request.pose for request in found), *guards]))
     row, low, high = _cut(family, designs[rows], names[0])
     poses, each = pose_columns(family, designs[rows[row]], _places(low, high), names)
-    status = _worst(row, each, rows.size)
+    status = worst_of_pieces(row, each, rows.size)
     good = status[row] == st.OK
     if not good.any():
         return status
     row, low, high = row[good], low[good], high[good]
     for request, answer in found.items():
         values = poses[request.pose][good]
+        if family.pose_output[request.pose].wraps:
+            values, winds = unwrapped(row, values)
+            status[row[winds]] = st.NOT_OSCILLATING
         panels = _fitted(row, low, high, values, request.mode)
         top, size = _climbed(family, designs[rows], panels, request, target, locate or request.place)
-        rounding = _rounding(guards, poses, good, row, top, family.precise_poses is not None)
+        dead = {name: poses[name][good] for name in (guards[1:] if family.precise_poses else guards)}
+        rounding = rounding_by_pieces(dead, row, top.row) * np.abs(top.value)
         lost = np.zeros(top.row.size, np.bool_)  # no correct digit next to a singularity
         if about(family, Singular, (request.pose,)):
             near = nearest(family, designs[rows[top.row]], (request.pose,), MATTERS)
@@ -217,7 +234,8 @@ def _halved(family: Family, designs: Array, panels: Panels, request: Request) ->
     values = np.empty((row.size, NODES))
     for some in blocks(np.arange(row.size), NODES):
         poses, _ = pose_columns(family, designs[row[some]], _places(low[some], high[some]), [request.pose])
-        values[some] = poses[request.pose]
+        middle = np.repeat(panels.series[:, :1], 2, axis=0)[some]
+        values[some] = continued(family, request.pose, poses[request.pose], middle)
     nodes, _ = basis()
     inner = np.concatenate([0.5 * (nodes - 1.0), 0.5 * (nodes + 1.0)])
     before = product(panels.series, rising(inner))
@@ -235,7 +253,8 @@ def _off(family: Family, designs: Array, panels: Panels, top: Top, request: Requ
     off, place = np.zeros(top.row.size), _inside(top.phi, panels.low, panels.high)
     for some in blocks(which, 1):
         poses, _ = pose_columns(family, designs[top.row[some]], place[some, None], [request.pose])
-        off[some] = np.abs(_measured(poses[request.pose][:, 0], request.mode) - top.value[some])
+        here = continued(family, request.pose, poses[request.pose][:, 0], panels.series[some, 0])
+        off[some] = np.abs(_measured(here, request.mode) - top.value[some])
     return off
 
 
@@ -269,7 +288,8 @@ def _beside(family: Family, designs: Array, panels: Panels, request: Request) ->
     for some in blocks(np.arange(panels.row.size), 2):
         both = panels.at[some, None] + NARROWEST * np.array([-1.0, 1.0])
         poses, _ = pose_columns(family, designs[panels.row[some]], both, [request.pose])
-        heights = _measured(poses[request.pose], request.mode)
+        values = continued(family, request.pose, poses[request.pose], panels.series[some, :1])
+        heights = _measured(values, request.mode)
         off[some] = np.abs(heights - panels.peak[some, None]).min(axis=1)
     return off
 
@@ -299,18 +319,6 @@ def _upper(panels: Panels, mode: int) -> Array:
     return upper
 
 
-def _rounding(guards: Sequence[str], poses: dict[str, Array], good: Mask, row: Index, top: Top, precise: bool) -> Array:
-    """Bound the effect of rounding near a dead point on each height (as in `sweep.reductions.peak_search`)."""
-    amplified = np.zeros(top.row.size)
-    for name in guards[1:] if precise else guards:
-        values = poses[name][good]
-        largest, least = np.full(row.max(initial=0) + 1, -np.inf), np.full(row.max(initial=0) + 1, np.inf)
-        np.maximum.at(largest, row, values.max(axis=1))
-        np.minimum.at(least, row, values.min(axis=1))
-        amplified += np.divide(largest[top.row], least[top.row], out=np.zeros(top.row.size), where=least[top.row] > 0.0)
-    return 4.0 * EPS * (1.0 + amplified) * np.abs(top.value)
-
-
 def _measured(values: Array, mode: int) -> Array:
     measured: Array = np.abs(values) if mode == 0 else mode * values
     return measured
@@ -333,14 +341,3 @@ def _fitted(row: Index, low: Array, high: Array, values: Array, mode: int) -> Pa
     top = measured.argmax(axis=1)
     series: Array = product(values, basis()[1].T)
     return Panels(row, low, high, series, measured[every, top], _places(low, high)[every, top], np.zeros(row.size))
-
-
-def _worst(row: Index, each: Status, n: int) -> Status:
-    """Worst status of each design's poses."""
-    first = np.searchsorted(row, np.arange(n))
-    count = np.bincount(row, minlength=n)
-    turn = np.zeros((n, int(count.max(initial=0)), NODES), np.uint8)
-    turn[row, np.arange(row.size) - first[row]] = each
-    worst: Status = np.empty(n, np.uint8)
-    scan.worst_status(turn.reshape(n, -1), worst)
-    return DESIGN_STATUS[worst]

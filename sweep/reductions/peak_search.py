@@ -31,6 +31,7 @@ from sweep.reductions.sampling import (
     Extremum,
     Index,
     Mask,
+    continued,
     discriminants,
     joined,
     jumps,
@@ -280,9 +281,7 @@ class Search:
             out = np.empty(phi.shape)
             for k, request in enumerate(self.requests):
                 mine = number[active] == k
-                values = poses[request.pose][mine]
-                if self.family.pose_output[request.pose].wraps:
-                    values = values + TWO_PI * np.rint((middle[active][mine, None] - values) / TWO_PI)
+                values = continued(self.family, request.pose, poses[request.pose][mine], middle[active][mine, None])
                 out[mine] = sign[active][mine, None] * values
             return out
 

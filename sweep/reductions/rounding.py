@@ -66,6 +66,23 @@ def rounding_share(
     return _of_order(order, amplified)
 
 
+def rounding_by_pieces(guards: dict[str, Array], row: Index, of: Index) -> Array:
+    """Bound the share of values that rounding near a dead point may have changed.
+
+    Parameters
+    ----------
+    guards : the discriminants, (k, m) each, on pieces of turns
+    row : (k,) design of each piece;  of : (q,) design of each value
+    """
+    amplified = np.zeros(of.size)
+    for values in guards.values():
+        largest, least = np.full(row.max(initial=0) + 1, -np.inf), np.full(row.max(initial=0) + 1, np.inf)
+        np.maximum.at(largest, row, values.max(axis=1))
+        np.minimum.at(least, row, values.min(axis=1))
+        amplified += np.divide(largest[of], least[of], out=np.zeros(of.size), where=least[of] > 0.0)
+    return 4.0 * EPS * (1.0 + amplified)
+
+
 def singular_share(near: Singularities, phi: Array, order: Index) -> Array:
     """Estimate the rounding near singularities that no discriminant of an assembly shows.
 

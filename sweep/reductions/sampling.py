@@ -72,6 +72,29 @@ def pose_columns(family: Family, designs: Array, phi: Array, names: Sequence[str
     return _evaluate(family, designs, Angles.of(phi), names)
 
 
+def continued(family: Family, name: str, values: Array, middle: Array) -> Array:
+    """Add full turns to poses of an output that wraps, so that they are near ``middle``; others stay as they are."""
+    if not family.pose_output[name].wraps:
+        return values
+    near: Array = values + TWO_PI * np.rint((middle - values) / TWO_PI)
+    return near
+
+
+def unwrapped(row: Index, values: Array) -> tuple[Array, Mask]:
+    """Make angles continuous over the turn, from poses (k, m) on pieces of it in rising order.
+
+    Returns
+    -------
+    values : continuous from the first piece of each ``row`` (k,) on
+    winds : (k,) whether the row's angle makes full turns
+    """
+    flat, first = values.ravel(), np.searchsorted(row, row)
+    turns = np.cumsum(np.rint(np.diff(flat, prepend=flat[:1]) / TWO_PI)).reshape(values.shape)
+    whole = values - TWO_PI * (turns - turns[first, :1])
+    last = np.searchsorted(row, row, side="right") - 1
+    return whole, np.abs(whole[last, -1] - whole[first, 0]) > np.pi
+
+
 def _evaluate(family: Family, designs: Array, angles: Angles, names: Sequence[str]) -> tuple[dict[str, Array], Status]:
     columns = family.poses(designs, angles, frozenset(names))
     # Designs and angles are float64 here, so the pose outputs are too.
@@ -151,6 +174,17 @@ class Extremum(NamedTuple):
 DESIGN_STATUS = np.arange(256, dtype=np.uint8)
 DESIGN_STATUS[st.NOT_ASSEMBLED] = st.NOT_ROTATABLE
 DESIGN_STATUS[st.DEAD_POINT] = st.UNDECIDABLE
+
+
+def worst_of_pieces(row: Index, each: Status, n: int) -> Status:
+    """Worst status of the turn of each of n designs, from poses (k, m) on pieces of the turns of ``row`` (k,)."""
+    first = np.searchsorted(row, np.arange(n))
+    count = np.bincount(row, minlength=n)
+    turn = np.zeros((n, int(count.max(initial=0)), each.shape[1]), np.uint8)
+    turn[row, np.arange(row.size) - first[row]] = each
+    worst: Status = np.empty(n, np.uint8)
+    scan.worst_status(turn.reshape(n, -1), worst)
+    return DESIGN_STATUS[worst]
 
 
 JUMPS = 32  # of a turn; a curve with more is not resolved

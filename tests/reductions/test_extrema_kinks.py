@@ -187,6 +187,35 @@ def test_a_rest_cut_into_panels_is_one_hill_wherever_the_cam_begins(start, outpu
         assert away <= error + 1e-3
 
 
+LEVER = {"lift": 0.4, "r0": 3.0, "c": 5.0, "e": 6.0, "law": 2.0, "rise": 1.0, "dwell": 0.7, "fall": 1.3}
+# The rocker behind the lever swings from 3.00 to 3.38 rad, over the cut of its angle.
+BEHIND = {"a2": 1.0, "b2": 2.3, "c2": 1.9, "e2": 4.0, "f2": 0.2, "g2": 0.1, "alpha2": 0.3, "offset2": -1.0}
+
+
+@pytest.mark.parametrize("start", [0.0, 0.37, -2.0, 4.5])
+@pytest.mark.parametrize("branch", [1.0, -1.0])
+@pytest.mark.parametrize("chain", [False, True])
+def test_the_place_of_a_levers_dwell_errs_by_its_whole_length(start, branch, chain):
+    """Any angle of a dwell would do; a shifted start moved phi0 by 0.18 rad, and its error was that of rounding."""
+    design = LEVER | {"start": start, "branch": branch}
+    if chain:
+        design = {f"{name}1": value for name, value in design.items()} | BEHIND | {"kappa2": branch}
+    psi = "psi2" if chain else "psi"
+    names = [f"phi_max_{psi}", f"phi_min_{psi}", "phi_ext", "phi_fold", "phi0"]
+    found = sweep.summarise(["cam_lever", "rssr"] if chain else "cam_lever", design, names, accuracy=1e-8).iloc[0]
+    assert found.status == st.OK
+    dwells = [(start + 1.0, 0.7), (start + 3.0, 2.0 * np.pi - 3.0)]
+    spans = []
+    for name in names[:4]:
+        away = [np.mod(found[name] - begins + 0.1, 2.0 * np.pi) - 0.1 for begins, _ in dwells]
+        which = int(-1e-3 <= away[1] <= dwells[1][1] + 1e-3)  # beyond its end the angle rises by less than its rounding
+        assert -1e-3 <= away[which] <= dwells[which][1] + 1e-3
+        assert max(away[which], dwells[which][1] - away[which]) <= found[f"err_{name}"] + 1e-3
+        spans.append(which)
+    assert {spans[0], spans[1]} == {spans[2], spans[3]} == {0, 1}
+    assert found.err_phi0 == pytest.approx(found.err_phi_ext + found.err_phi_fold)
+
+
 def test_a_curve_that_is_all_noise_is_not_converged_and_its_error_says_so():
     """Noise of 1e-6 of the size: no halving makes it agree to 1e-9."""
     value, err, _, status = searched(lambda x: np.cos(x) + 1e-6 * np.sin(1e9 * x), 0)
