@@ -23,7 +23,7 @@ from sweep.numerics.chebyshev import DENSE, NODES, at_nodes, basis, product, ris
 from sweep.quantities.kinds import Request
 from sweep.reductions.refine import hill
 from sweep.reductions.resolution import MATTERS, ends, nearest, zeros
-from sweep.reductions.rounding import order_of, rounding_by_pieces, singular_share
+from sweep.reductions.rounding import ALONE, order_of, rounding_by_pieces, shaken_anywhere, singular_share
 from sweep.reductions.sampling import (
     Extremum,
     Index,
@@ -162,7 +162,11 @@ def _block(
             heights = _measured(near_by[request.pose], request.mode)
             side = np.abs(heights - top.value[:, None]).argmin(axis=1)
             top = top._replace(value=np.take_along_axis(heights, side[:, None], axis=1)[:, 0])
-        late = lost | ((top.err > allowed) & (top.err > rounding))
+        late = np.flatnonzero(lost | ((top.err > allowed) & (top.err > rounding)))
+        off = shaken_anywhere(family, designs[rows[top.row[late]]], top.phi[late], request.pose)
+        noise = off >= ALONE * size[top.row[late]]
+        top.err[late[noise]] = np.maximum(top.err[late], off)[noise]
+        late = late[~noise]
         status[top.row[late]] = np.where(status[top.row[late]] == st.OK, st.NOT_CONVERGED, status[top.row[late]])
         at = rows[top.row]
         answer.value[at] = -top.value if request.mode == -1 else top.value

@@ -45,3 +45,15 @@ def test_means_and_extremes_of_few_roundings_have_their_size_as_error(name, outp
     assert (found["status"] == st.OK).all()
     for one in wanted:
         assert (found[one] < NOTHING).all() and (found[f"err_{one}"] >= 0.1 * found[one]).all()
+
+
+def test_extremes_of_rounding_on_panels_have_its_size_as_error():
+    """A tool that pierces cuts the turn into panels, whose halving never ends: all these were NOT_CONVERGED."""
+    full = extended(family("guide"), wanted := [f"{k}_moment_d_z" for k in ("min", "max", "max_abs")])
+    matrix = ordinary(full, 4)
+    matrix[:, full.parameter_names.index("pierce_force")] = 20.0
+    found = design_outputs(full, matrix, wanted, Accuracy(target=TARGET))
+    assert (found["status"] == st.OK).all()
+    for one in wanted:
+        size = np.abs(found[one])
+        assert (size < NOTHING).all() and (found[f"err_{one}"] >= 0.1 * size).all()
