@@ -23,7 +23,7 @@ from sweep.numerics.chebyshev import DENSE, NODES, at_nodes, basis, product, ris
 from sweep.quantities.kinds import Request
 from sweep.reductions.refine import hill
 from sweep.reductions.resolution import MATTERS, ends, nearest, zeros
-from sweep.reductions.rounding import ALONE, order_of, rounding_by_pieces, shaken_anywhere, singular_share
+from sweep.reductions.rounding import ALONE, PLACES, order_of, rounding_by_pieces, shaken_anywhere, singular_share
 from sweep.reductions.sampling import (
     Extremum,
     Index,
@@ -163,7 +163,8 @@ def _block(
             side = np.abs(heights - top.value[:, None]).argmin(axis=1)
             top = top._replace(value=np.take_along_axis(heights, side[:, None], axis=1)[:, 0])
         late = np.flatnonzero(lost | ((top.err > allowed) & (top.err > rounding)))
-        off = shaken_anywhere(family, designs[rows[top.row[late]]], top.phi[late], request.pose)
+        # Not at the place itself: at a pole rounding moves the height by as much as itself.
+        off = shaken_anywhere(family, designs[rows[top.row[late]]], top.phi[late] + np.pi / PLACES, request.pose)
         noise = off >= ALONE * size[top.row[late]]
         top.err[late[noise]] = np.maximum(top.err[late], off)[noise]
         late = late[~noise]
