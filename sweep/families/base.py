@@ -119,8 +119,7 @@ class Event:
 class Accuracy:
     """Accuracy of extrema over the turn: a dense grid of ``samples``, or refinement to relative error ``target``.
 
-    With ``certify`` it is also proven that no peak of a maximum was missed (docs/extrema.md, section 5): of all wanted
-    maxima, or of those that ``proven`` names.
+    With ``certify`` all wanted maxima, or those that ``proven`` names, are proven too (docs/extrema.md, section 5).
     """
 
     samples: int | None = None
@@ -141,8 +140,7 @@ Capability = TypeVar("Capability")
 class Work(IntEnum):
     """Kind of work of a route; routes are run in this order.
 
-    The order decides which limit a design meets first, and which outputs are then not computed.  So it is part of the
-    sources, like all that determines values, and does not depend on measured times.
+    It decides which limit a design meets first and which outputs are then not computed, so no measured time changes it.
     """
 
     PARAMETERS = 0  # reads parameters only
@@ -241,8 +239,10 @@ class Family:
         return next(iter(self.every(kind)), None)
 
     def the(self, kind: type[Capability]) -> Capability:
-        """First capability of a type that the family has."""
-        return self.every(kind)[0]
+        """First capability of a type that the family has to have."""
+        if not (found := self.every(kind)):
+            raise TypeError(f"{self.name} has no {kind.__name__}")
+        return found[0]
 
     def every(self, kind: type[Capability]) -> tuple[Capability, ...]:
         """All capabilities of a type: a chain has one per stage."""

@@ -11,7 +11,16 @@ import pytest
 import sweep
 from sweep.families import NAMES, family
 from sweep.families.base import Event, Family, Interval, March, Output, Parameter, Step
-from sweep.families.capabilities import Assembly, Dimensions, JointRecords, Link, Made, OutputLink, Skeleton
+from sweep.families.capabilities import (
+    Assembly,
+    Dimensions,
+    JointRecords,
+    Link,
+    Made,
+    OutputLink,
+    PresserFoot,
+    Skeleton,
+)
 from sweep.families.check import FamilyError, check_family
 from sweep.families.skeletons import ORIGIN
 from sweep.quantities.units import factor, internal_unit
@@ -186,3 +195,8 @@ def test_units_of_all_outputs_are_converted_in_studies_and_named_in_results(name
         unit = internal_unit(o.unit)
         assert factor(unit, unit) == 1.0
         assert (unit == "1") == (o.unit == "1"), o.name
+
+
+def test_a_capability_that_a_family_lacks_is_named():
+    with pytest.raises(TypeError, match="guide has no PresserFoot"):
+        family("guide").the(PresserFoot)
