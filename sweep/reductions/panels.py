@@ -279,7 +279,7 @@ def _tops(panels: Panels, mode: int, err: Array) -> Top:
 
 def _held(panels: Panels, before: Array, size: Array) -> Top:
     """Highest poses of panels at the limit of resolvable crank angles; ``before`` are those before halving."""
-    err = np.abs(panels.peak - before) + EDGE * EPS * np.maximum(size[panels.row], np.abs(panels.peak))
+    err = np.abs(panels.peak - before) + EDGE * EPS * size[panels.row] + 4.0 * EPS * np.abs(panels.peak)
     return Top(panels.row, panels.at, panels.peak, err, panels.high - panels.low + 8.0 * EPS * np.pi)
 
 

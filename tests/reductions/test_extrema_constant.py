@@ -86,3 +86,13 @@ def test_mean_shaking_force_of_a_balanced_four_bar_is_rounding_with_an_error_as_
     assert (found.status == st.OK).all()
     for name in names:
         assert found[name][0] <= found[f"err_{name}"][0] <= 1e-12 * 540.0
+
+
+@pytest.mark.parametrize("start", [1.0000001e-11, 1.2e-11, 2e-11, 1.2e-11 - 1.7])
+def test_a_constant_beside_a_phase_that_ends_just_after_the_angle_0_is_found(start):
+    """The follower's line stands still; the panel between the angle 0 and the end of a phase is 1e-11 rad wide."""
+    cam = {"lift": 1.0, "r0": 3.0, "e": 0.4, "law": 2.0, "rise": 1.0, "dwell": 0.7, "fall": 1.3, "start": start}
+    found = sweep.summarise("cam", cam, ["max_y_r", "min_y_r"], accuracy=TARGET).iloc[0]
+    assert found.status == st.OK
+    assert found.max_y_r == found.min_y_r == -0.4
+    assert max(found.err_max_y_r, found.err_min_y_r) <= 1e-14
