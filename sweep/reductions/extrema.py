@@ -156,9 +156,9 @@ def _searched(
         rows = np.flatnonzero(torn)
         if rows.size:
             cut, now = panels.extrema(family, designs[rows], [request], target, locate)
-            if family.pose_output[request.pose].wraps:  # it may jump across its branch cut either way
-                over = np.abs(cut[request].value) + 2.0 * cut[request].err > np.pi - OVER
-                now = np.where((now == st.OK) & over | (now == st.NOT_OSCILLATING), st.NOT_CONVERGED, now)
+            if family.pose_output[request.pose].wraps:  # where it all but jumps to its cut it may have passed it
+                cut_off = np.abs(np.abs(cut[request].value) - np.pi) < 2.0 * cut[request].err + OVER
+                now = np.where((now == st.OK) & cut_off, st.NOT_CONVERGED, now)
             search.status[rows] = np.where(search.status[rows] == st.OK, now, search.status[rows])
             put(search.found[request], rows, cut[request])
     return search.found, search.status

@@ -95,8 +95,7 @@ class Search:
             broken(self.family, self.designs, self.near, self.status)
             self.undone[:, self.status != st.OK] = 0
             steep = (self.near.rho.min(axis=1) < NARROWEST) & (self.status == st.OK)
-            apart = [not (r.windowed or self.family.pose_output[r.pose].wraps) for r in self.requests]
-            self.torn[np.ix_(apart, steep)] = True
+            self.torn[np.ix_([not request.windowed for request in self.requests], steep)] = True
             self.undone[self.torn] = 0
 
     def needed(self, rows: Index) -> Index:

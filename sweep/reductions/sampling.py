@@ -20,6 +20,7 @@ Index: TypeAlias = NDArray[np.int64]
 Mask: TypeAlias = NDArray[np.bool_]
 
 BLOCK = 2**17  # samples handled at once: a few columns of this length stay in the cache
+UNCLEAR = 0.25  # step of an angle between two poses [turns] from which on it may have gone the other way round
 FEW = 4  # number of columns above which blocks have fewer samples
 
 
@@ -85,14 +86,18 @@ def unwrapped(row: Index, values: Array) -> tuple[Array, Mask]:
 
     Returns
     -------
-    values : continuous from the first piece of each ``row`` (k,) on
+    values : continuous from the first piece of each ``row`` (k,) on; as they are where a step may go either way
     winds : (k,) whether the row's angle makes full turns
     """
-    flat, first = values.ravel(), np.searchsorted(row, row)
-    turns = np.cumsum(np.rint(np.diff(flat, prepend=flat[:1]) / TWO_PI)).reshape(values.shape)
+    first, last = np.searchsorted(row, row), np.searchsorted(row, row, side="right") - 1
+    step = np.diff(values.ravel(), prepend=values[:1, 0]).reshape(values.shape) / TWO_PI
+    step[first, 0] = 0.0
+    turns = np.cumsum(np.rint(step)).reshape(values.shape)
     whole = values - TWO_PI * (turns - turns[first, :1])
-    last = np.searchsorted(row, row, side="right") - 1
-    return whole, np.abs(whole[last, -1] - whole[first, 0]) > np.pi
+    clear = np.ones(row.size, np.bool_)
+    np.logical_and.at(clear, first, (np.abs(step - np.rint(step)) < UNCLEAR).all(axis=1))
+    clear = clear[first]
+    return np.where(clear[:, None], whole, values), clear & (np.abs(whole[last, -1] - whole[first, 0]) > np.pi)
 
 
 def _evaluate(family: Family, designs: Array, angles: Angles, names: Sequence[str]) -> tuple[dict[str, Array], Status]:

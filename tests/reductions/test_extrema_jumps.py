@@ -142,3 +142,30 @@ def test_an_angle_that_all_but_jumps_over_its_cut_is_not_called_a_turn():
         assert abs(got.swing[i]) == pytest.approx(np.ptp(psi), abs=1e-4)
         swinging += 1
     assert swinging > 80
+
+
+def test_an_angle_beside_a_jump_over_its_cut_converges_as_its_mirror_image_does():
+    """Forks whose ball passes 1e-9 to 0.1 cranks from the driven axis: up to half was NOT_CONVERGED, by the branch."""
+    rng, n = np.random.default_rng(3), 100
+    alpha, at, gap = rng.uniform(-1.2, 1.2, n), rng.uniform(0.0, 2.0 * np.pi, n), 10.0 ** rng.uniform(-9.0, -1.0, n)
+    e, f = np.cos(at) + gap * rng.choice([-1, 1], n), -np.sin(at) / np.tan(alpha)
+    around = e**2 + (f * np.tan(alpha)) ** 2 < 1.0
+    names, fork = ["max_psi", "min_psi"], {"a": np.ones(n), "e": e, "f": f, "alpha": alpha}
+    ends = []
+    for design in (fork, fork | {"branch": -np.ones(n)}, fork | {"alpha": -alpha}):
+        got = sweep.summarise("slotted", design, names, accuracy=1e-8)
+        assert (got.status == np.where(around, st.NOT_OSCILLATING, st.OK)).all()
+        ends.append(got[~around])
+    own, turned, mirrored = ends
+    for off in (
+        turned.max_psi - own.max_psi + np.pi,
+        turned.min_psi - own.min_psi + np.pi,
+        mirrored.max_psi + own.min_psi,
+    ):
+        assert np.abs(np.remainder(off + 1.0, 2.0 * np.pi) - 1.0).max() <= 1e-8
+    for i in range(0, len(own), 7):
+        k = np.flatnonzero(~around)[i]
+        close = np.sinh(np.linspace(-24.0, 24.0, 4000)) * 1e-11
+        phi = np.sort(np.concatenate([np.linspace(0.0, 2.0 * np.pi, 4001), at[k] + close]))
+        psi = np.unwrap(np.arctan2(f[k] * np.sin(alpha[k]) + np.cos(alpha[k]) * np.sin(phi), np.cos(phi) - e[k]))
+        assert own.max_psi.iloc[i] - own.min_psi.iloc[i] == pytest.approx(np.ptp(psi), abs=1e-4)
