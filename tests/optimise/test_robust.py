@@ -11,6 +11,7 @@ import pandas as pd
 import pytest
 
 import sweep
+import sweep.optimise.manufacture.robust
 import sweep.optimise.study
 from sweep.errors import SearchCutShort, StudyError
 from sweep.families import family
@@ -165,6 +166,22 @@ def test_robust_search_refuses_equations_and_shares_that_cannot_be() -> None:
     for share in ("100 %", "0 %", "95"):
         with pytest.raises(StudyError, match=r"tolerance\.robust"):
             study_from_data(study.data | {"tolerance": table | {"robust": share}}, study.path)
+
+
+def test_no_search_of_a_robust_design_takes_more_evaluations_than_a_start_may(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    budgets: list[float] = []
+
+    def counted(number: int, problem: Problem, start: np.ndarray, stop: Any, budget: float) -> Any:
+        budgets.append(budget)
+        return search(number, problem, start, stop, budget)
+
+    search = sweep.optimise.manufacture.robust.search
+    monkeypatch.setattr(sweep.optimise.manufacture.robust, "search", counted)
+    (tmp_path / "study.toml").write_text(ROBUST.replace("[optimise]\n", "[optimise]\nlooks = 100\n"))
+    sweep.run(tmp_path, tmp_path / "designs", jobs=1)
+    assert max(budgets) == 100
 
 
 def test_brake_that_is_pulled_after_the_starts_is_told(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

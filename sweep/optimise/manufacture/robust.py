@@ -226,7 +226,7 @@ class _Calibrate:
             if correction or initial.ended != "converged":  # otherwise these margins have led to this design already
                 # Rounds that do not settle must not delay the other searches: all corrections share the evaluations of
                 # one search.
-                budget = max(FIRST_BUDGET, (self.budget - spent) // ROUNDS)
+                budget = max(min(FIRST_BUDGET, self.budget), (self.budget - spent) // ROUNDS)
                 result, radius, step = _margin_rounds(
                     scatter, initial.start, design, levels, should_stop, ROUNDS, budget, radius
                 )
