@@ -87,6 +87,7 @@ class Model:
         self.curves = Curves(problem, program.series, program.with_angles)
         self.samples = problem.accuracy.samples or SAMPLES
         self.scale, self.price = 1.0, FIRST_PRICE
+        self._scan: tuple[tuple[bytes, int], tuple[Points, bool]] | None = None  # the last one, by design and poses
         if program.objective.inner == "same":
             size = abs(self.state(problem.scaled(start[None, :])[0]).objective)
             self.scale = size if 1e-12 < size < math.inf else 1.0
@@ -110,8 +111,11 @@ class Model:
 
     def uncounted(self, fractions: Array, samples: int | None = None) -> State:
         """Return the same as :meth:`Model.state` without counting the evaluation and without stopping."""
-        design = self.design(fractions)
-        points, turns = self.curves.scan(design, samples or self.samples)
+        design, samples = self.design(fractions), samples or self.samples
+        key = design.tobytes(), samples
+        if self._scan is None or self._scan[0] != key:  # the scale of the objective and the first state need the same
+            self._scan = key, self.curves.scan(design, samples)
+        points, turns = self._scan[1]
         form = self.program.lay_out(self.curves, design, points, turns, self.scale)
         atoms = self.atoms(design, form, points)
         return State(fractions, design, form, atoms, form.objective(atoms), form.violation(atoms))
