@@ -14,6 +14,7 @@ from xml.etree import ElementTree as Xml
 
 import numpy as np
 
+from sweep.effects.loads import body_inputs, put_rod
 from sweep.effects.scene import Scene
 from sweep.errors import InputError
 from sweep.evaluation.joints import Part
@@ -196,7 +197,7 @@ def _stage(
     lengths = {"crank": a, "coupler": b, follower: c if follower == "rocker" else 4.0 * thick}
     for body, name in ((crank, "crank"), (coupler, "coupler"), (driven, follower)):
         if f"m_{name}{part.stage}" in design:
-            body.append(inertial(design, name, part.stage, unit))
+            body.append(inertial(design, name, part.stage, unit, lengths[name]))
         Xml.SubElement(
             body, "geom", name=f"{name}{tag}", type="capsule", size=repr(thick), density="7850", contype="0",
             conaffinity="0", fromto=words(np.array([0.0, 0.0, 0.0, lengths[name], 0.0, 0.0])),
@@ -215,13 +216,28 @@ def words(values: Array) -> str:
     return " ".join(repr(float(x)) for x in values)
 
 
-MOMENTS = ("xx", "yy", "zz", "xy", "xz", "yz")
 KILOGRAMS = {"mm": 1e3, "m": 1.0}  # masses of designs in mm are tonnes, as N and s want
 SPARE = 2.0  # factor on the least possible value of moments that do not matter
+THIN = 1e-6  # moment of a slender coupler along itself, relative to that across: MuJoCo takes no zero
 
 
-def inertial(design: Mapping[str, float], name: str, stage: str, unit: str) -> Xml.Element:
-    """Return mass, centre and inertia of a body.
+def _own(design: Mapping[str, float], name: str, stage: str, length: float) -> tuple[float, Array, Array]:
+    """Return mass, centre and moments of a body in the design's units; a rod's follow from its length, as in loads."""
+    mass, *others = (p.name for p in body_inputs(name, ""))
+    columns = np.array([[float(design.get(f"{key}{stage}", 0.0)) for key in (mass, *others)]])
+    is_rod = design.get(f"rod_{name}{stage}", not any(f"{key}{stage}" in design for key in others))
+    if name != "slider" and is_rod:
+        switch, line_mass, gyration = (
+            np.array([x])
+            for x in (1.0, *(float(design.get(f"{key}_{name}{stage}", 0.0)) for key in ("line_mass", "gyration")))
+        )
+        put_rod(columns, switch, line_mass, gyration, np.zeros((1, 3)), np.array([[length, 0.0, 0.0]]))
+        columns[0, 4] = max(columns[0, 4], THIN * columns[0, 7])
+    return float(columns[0, 0]), columns[0, 1:4], columns[0, 4:]
+
+
+def inertial(design: Mapping[str, float], name: str, stage: str, unit: str, length: float) -> Xml.Element:
+    """Return mass, centre and inertia of a body; ``length`` [m] is that between its joints.
 
     A body about a fixed axis rotates by its moment about that axis and its products with it alone, a slider does not
     rotate: entries that do not matter are chosen such that the tensor is physical.
@@ -232,9 +248,7 @@ def inertial(design: Mapping[str, float], name: str, stage: str, unit: str) -> X
         for a mass without the inertia that matters, or with an unphysical one.
     """
     kilograms, metres = KILOGRAMS[unit], METRES[unit]
-    mass = float(design[f"m_{name}{stage}"])
-    centre = np.array([float(design.get(f"com_{name}_{axis}{stage}", 0.0)) for axis in "xyz"])
-    xx, yy, zz, xy, xz, yz = (float(design.get(f"j_{name}_{entry}{stage}", 0.0)) for entry in MOMENTS)
+    mass, centre, (xx, xy, xz, yy, yz, zz) = _own(design, name, stage, length / metres)
     if not mass > 0.0:
         raise InputError(f"m_{name}{stage}", mass, "a positive mass: MuJoCo moves none", "export")
     if name == "slider":

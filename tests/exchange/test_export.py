@@ -171,13 +171,27 @@ def test_mujoco_closes_the_loop_where_we_do(name, tmp_path):
         assert abs(gap) < 1e-9
 
 
-def test_mujoco_has_the_reduced_inertia_of_the_masses(tmp_path):
+def _shaped():
     bodies = {"crank": (1e-4, 0.03), "coupler": (2e-4, 0.2), "rocker": (1.5e-4, 0.15)}  # t, t mm^2
-    design = scaled("rssr") | {"speed": 100.0}
+    found = {}
     for body, (mass, inertia) in bodies.items():
-        design |= {f"m_{body}": mass, f"com_{body}_x": 9.0}
-        design |= {f"j_{body}_xx": 0.6 * inertia, f"j_{body}_yy": inertia, f"j_{body}_zz": inertia}
-    design |= {"com_crank_y": 2.0, "com_rocker_z": -3.0, "j_rocker_xz": 0.02}
+        found |= {f"m_{body}": mass, f"com_{body}_x": 9.0}
+        found |= {f"j_{body}_xx": 0.6 * inertia, f"j_{body}_yy": inertia, f"j_{body}_zz": inertia}
+    return found | {"com_crank_y": 2.0, "com_rocker_z": -3.0, "j_rocker_xz": 0.02}
+
+
+RODS = {"m_crank": 1e-4, "m_coupler": 2e-4, "m_rocker": 1.5e-4}  # the inputs of a study have every column:
+EVERY = RODS | {f"rod_{body}": 1.0 for body in ("crank", "coupler", "rocker")} | {"com_crank_x": 0.0, "j_crank_zz": 0.0}
+THICK = RODS | {"m_crank": 0.0, "line_mass_crank": 2e-6, "gyration_coupler": 1.5}
+
+
+@pytest.mark.parametrize(
+    ("masses", "rel"),
+    [(_shaped(), 1e-13), (RODS, 1e-6), (EVERY, 1e-6), (THICK, 1e-13)],
+    ids=["shaped", "rods", "rods of a study", "thick rods"],
+)
+def test_mujoco_has_the_reduced_inertia_of_the_masses(masses, rel, tmp_path):
+    design = scaled("rssr") | {"speed": 100.0} | masses
     plain = {key: value for key, value in design.items() if key != "speed"}
     model = mujoco.MjModel.from_xml_path(str(sweep.export("rssr", plain, tmp_path / "m.xml")))
     model.opt.jacobian = mujoco.mjtJacobian.mjJAC_DENSE
@@ -194,7 +208,7 @@ def test_mujoco_has_the_reduced_inertia_of_the_masses(tmp_path):
         momentum = np.zeros(model.nv)
         mujoco.mj_mulM(model, data, momentum, rates)
         # t mm^2 are 1e-3 kg m^2
-        assert rates @ momentum == pytest.approx(1e-3 * expected, rel=1e-13)
+        assert rates @ momentum == pytest.approx(1e-3 * expected, rel=rel)
 
 
 def test_mujoco_couples_the_stages_of_a_chain(tmp_path):
@@ -264,7 +278,7 @@ def test_mujoco_is_refused_where_there_is_no_such_linkage_and_for_a_mass_without
     with pytest.raises(sweep.InputError, match="crank, coupler and rocker"):
         sweep.export("slotted", scaled("slotted"), tmp_path / "m.xml")
     with pytest.raises(sweep.InputError, match="no mass without"):
-        sweep.export("rssr", scaled("rssr") | {"m_crank": 1e-4}, tmp_path / "m.xml")
+        sweep.export("rssr", scaled("rssr") | {"m_crank": 1e-4, "com_crank_x": 5.0}, tmp_path / "m.xml")
     with pytest.raises(sweep.InputError, match="a positive mass"):
         sweep.export("rssr", scaled("rssr") | {"m_crank": 0.0}, tmp_path / "m.xml")
     plate = {"m_coupler": 1e-4, "j_coupler_xx": 0.1, "j_coupler_yy": 0.01, "j_coupler_zz": 0.01}
