@@ -256,6 +256,8 @@ def _converted(values: object) -> Array | None:
         # Dates, time spans and complex numbers are rejected, although numpy would convert them.
         if array.dtype.kind in "mMc" or (array.dtype.kind == "O" and not all(map(_is_number, array.flat))):
             return None
+        if isinstance(values, np.ma.MaskedArray):  # otherwise numpy takes what is under the mask
+            return np.asarray(np.ma.filled(values.astype(np.float64), np.nan))
         return np.asarray(values, dtype=np.float64)
     except (TypeError, ValueError, OverflowError):  # ragged lists among them
         return None

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 import sweep
@@ -71,3 +72,6 @@ def test_what_is_missing_is_said_to_be_missing() -> None:
         sweep.summarise("rssr", {"a": 1.0}, "swing")
     with pytest.raises(InputError, match="allowed: a finite number; an empty cell is read as nan"):
         sweep.summarise("geared_dwell", {"k": [1.0, float("nan")], "a": 1.0}, "dwell_angle")
+    masked = np.ma.array([1.0, 2.0], mask=[False, True])  # numpy would take the 2
+    with pytest.raises(InputError, match="column k, row 1: k = nan"):
+        sweep.summarise("geared_dwell", {"k": masked, "a": 1.0}, "dwell_angle")
