@@ -26,7 +26,8 @@ AngleUnit: TypeAlias = Literal["rad", "deg"]
 
 FACTORS = {"rad": 1.0, "deg": math.pi / 180.0}
 REMEDY = (
-    'for degrees say angles="deg" (--angles deg) or "{name} [deg]" as the column\'s name, for rad "rad" in the same way'
+    'for degrees say angles="deg" (--angles deg), or "{name} [deg]" as the column\'s name, or a text such as "90 deg"; '
+    'for rad "rad" in the same way'
 )
 
 # Most angles lie between two directions and are at most one turn, with slack for rounding.  Crank angles, the offset of
