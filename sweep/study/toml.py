@@ -17,6 +17,7 @@ from sweep.quantities.units import factor, internal_unit
 DEEPEST = 16  # levels of nested tables; a study needs four
 _DIGITS = re.compile(r"\d[\d_]{4000,}")
 _PLACE = re.compile(r"\(at line (\d+), column \d+[^)]*\)")
+_LINE = re.compile(r"\bline (\d+)")
 _KEY = re.compile(r"""\s*([\w."'-]+)\s*=""")
 _TABLE = re.compile(r"\s*\[+([^\[\]]+)\]+\s*(?:#.*)?")
 _LONG, _SHORT = r'"""(?:\\.|[^\\])*?"{3,5}|\'\'\'.*?\'{3,5}', r'"(?:\\.|[^"\\\n])*"|\'[^\'\n]*\''
@@ -78,7 +79,9 @@ def toml_text(file: Path) -> str:
 
 
 def _fault(file: Path, text: str) -> StudyError:
-    return StudyError(str(file), [f"{file.name}: {text}"])
+    line = _LINE.search(text)
+    place = f"{file.name}:{line[1]}" if line else file.name
+    return StudyError(str(file), [f"{place}: {re.sub('^line [0-9]+: ', '', text)}"])
 
 
 def _said(text: str, message: str) -> str:

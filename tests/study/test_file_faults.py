@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from pathlib import Path
 
 import pytest
@@ -24,7 +25,7 @@ from tests.study.test_faults import RIGHT, faults_of
 )
 def test_toml_faults_name_line_and_column(text: str, place: str, tmp_path: Path) -> None:
     (message,) = faults_of(text, tmp_path)
-    assert message.startswith("study.toml: ")
+    assert re.match(r"study\.toml:\d: ", message)
     assert place in message
 
 
@@ -34,7 +35,7 @@ def test_toml_faults_name_line_and_column(text: str, place: str, tmp_path: Path)
 def test_a_quote_that_is_not_closed_is_told_with_its_line(title: str, line: int, tmp_path: Path) -> None:
     text = f'[study]  # "quoted\nname = ""\ntitle = {title}\n[scene]\nwant = 1\n'
     (message,) = faults_of(text, tmp_path)
-    assert message.startswith(f"study.toml: line {line}: a text without its closing quote; allowed: ")
+    assert message.startswith(f"study.toml:{line}: a text without its closing quote; allowed: ")
 
 
 @pytest.mark.parametrize(
