@@ -17,9 +17,10 @@ from kernels.status import OK
 from sweep.chunks.cascade import BLOCK, CALL_SECONDS, Cascade, levels
 from sweep.chunks.chunk import output_columns
 from sweep.chunks.parameters import parameter_ns, runs_matrix
-from sweep.evaluation.summaries import output
 from sweep.families.base import Array, Unit, Work
 from sweep.families.names import is_error, without_error
+from sweep.quantities.kinds import requests
+from sweep.quantities.resolve import resolve
 from sweep.quantities.units import internal_unit
 from sweep.reductions.steps import is_proven
 from sweep.sources import DIGESTS
@@ -300,8 +301,11 @@ def error_words(study: Study, name: str) -> str:
 
 def _output_column(study: Study, name: str, dtype: str) -> Column:
     plain = without_error(name)
-    definition = output(study.family, plain)
+    asked = resolve(study.family, plain)
+    definition = asked.output
     text = f"{error_words(study, plain)} of {definition.name}" if is_error(name) else definition.text
+    if study.window is not None and not is_error(name) and any(r.windowed for r in requests(study.family, asked, True)):
+        text += ", in the window from {:g} to {:g} of the stroke".format(*study.window)
     return Column(name, dtype, internal_unit(definition.unit), text, "output")
 
 

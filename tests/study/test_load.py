@@ -9,6 +9,7 @@ import pickle
 import re
 import subprocess
 import sys
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -17,6 +18,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from sweep.chunks.plan import _output_column as output_column
 from sweep.errors import StudyError
 from sweep.families.base import Accuracy
 from sweep.quantities import units
@@ -90,6 +92,13 @@ def test_quantities_are_in_mm_rad_and_rad_per_second(needle: Study) -> None:
         Limit("stroke", minimum=pytest.approx(24.4, rel=1e-15), maximum=pytest.approx(24.6, rel=1e-15)),
         Limit("margin2", minimum=0.1),
     )
+
+
+def test_a_column_of_the_window_says_so(needle: Study) -> None:
+    deviation = output_column(needle, "max_abs_dev", "float64").text
+    assert deviation.endswith("to its left, in the window from 0 to 0.6 of the stroke")
+    assert "window" not in output_column(replace(needle, window=None), "max_abs_dev", "float64").text
+    assert "window" not in output_column(needle, "max_abs_d2s", "float64").text
 
 
 def test_axes_run_in_the_order_of_the_file_and_columns_in_that_of_the_family(needle: Study) -> None:
