@@ -297,7 +297,7 @@ def run_rows(runs: tuple[dict[str, Any], ...]) -> list[tuple[str, str]]:
     ]
     rows.append(("versions", ", ".join(f"{name} {release}" for name, release in last.get("versions", {}).items())))
     seconds = sum(run.get("seconds", 0.0) for run in runs)
-    rows.append(("time taken", f"{number(seconds, 3)} s in {how_many(len(starts), 'run')}"))
+    rows.append(("time taken", f"{number(seconds, 3)} s in {how_many(len(starts), 'run')} into this folder"))
     return rows
 
 

@@ -70,7 +70,7 @@ def ending(folder: Path) -> Ending:
         if found is not None:
             lines.append(f"search: {how_many(found.starts, 'start')}, {search_words(data, found)}")
             kinds = [f"{words}: {how_many(n, 'start')}, {optima_words(b)}" for words, n, b in found.kinds]
-            lines += [f"signs: {'; '.join(kinds)}"] if kinds else []
+            lines += [f"by listed values: {'; '.join(kinds)}"] if kinds else []
             lines += [f"warning: {text}" for text in survey_warnings(data, found)]
         lines += [sentence] if (sentence := proof_sentence(data)) else []
     else:

@@ -173,3 +173,14 @@ def test_every_key_of_the_search_arrives(tmp_path: Path) -> None:
     keys = 'starts = 7\nseed = 3\nunseen = "5 %"\nlooks = 900\ntime_budget = "2 s"\nglobal = "none"\npopulations = 9\n'
     (tmp_path / "study.toml").write_text(STUDY.format(swing=40).replace("starts = 3\nseed = 1\n", keys))
     assert load_study(tmp_path).optimise == OptimiseSettings(7, 3, 2.0, None, 0.05, 900, "none", 9)
+
+
+def test_listed_angles_are_in_degrees() -> None:
+    both = np.tile([1.0, 2.0, 0.0, 1.0], (4, 1))
+    both[2:, 2] = math.pi / 3.0
+    problem = bowl()
+    p, q, r, branch = problem.family.parameters
+    family = replace(problem.family, parameters=(p, q, replace(r, unit="angle"), branch))
+    ends = [result(k, 1.0) for k in range(4)]
+    found = survey(replace(problem, family=family), [Group(both)], ends, ASKED, "starts")
+    assert [words for words, *_ in found.kinds] == ["r = 0 deg", "r = 60 deg"]

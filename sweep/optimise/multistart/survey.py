@@ -236,14 +236,18 @@ def _distinct(problem: Problem, starts: Array, numbers: list[int], source: Seque
 def _kinds(problem: Problem, starts: Array, results: Sequence[Result]) -> tuple[tuple[str, int, int], ...]:
     """Return numbers of starts and basins for each combination of the parameters that are not varied."""
     columns = [c for c in problem.others if len(np.unique(starts[:, c])) > 1]
-    names = problem.family.parameter_names
+    own = problem.family.parameters
     count: Counter[str] = Counter()
     basins: dict[str, set[int]] = {}
     for r in results:
-        words = ", ".join(f"{names[c]} = {starts[r.start, c]:.6g}" for c in columns)
+        words = ", ".join(f"{own[c].name} = {_written(starts[r.start, c], own[c].unit)}" for c in columns)
         count[words] += 1
         basins.setdefault(words, set()).update({r.basin} - {0})
     return tuple((words, count[words], len(basins[words])) for words in sorted(count)) if columns else ()
+
+
+def _written(value: float, unit: str) -> str:
+    return f"{math.degrees(value):.6g} deg" if unit == "angle" else f"{value:.6g}"
 
 
 def _percent(share: float) -> str:
