@@ -136,6 +136,7 @@ class Search:
             if self.window is not None and request.windowed:
                 row, found = self._within_window(rows, columns, request, row, found, resolved[number])
             moved = self._keep_best(rows, request, row, found) > DISAGREEMENT * scales[number]
+            self.found[request].err_phi[rows[alone[number]]] = np.pi  # any angle would do
             again = moved & resolved[number] & ~alone[number]
             needed[number, again] = np.maximum(needed[number, again], 2 * samples)
         # Every design is sampled LIMIT times before it is given up.
@@ -146,7 +147,7 @@ class Search:
     def _candidates(
         self, rows: Index, columns: dict[str, Array], samples: int
     ) -> tuple[Candidates, Array, Index, Mask]:
-        """Return candidates, sizes of the curves, samples needed, and a mask of noise and jumps, which need no more."""
+        """Return candidates, sizes of the curves, samples needed, and which curves are constants, noise or jump."""
         needed, pieces = np.full((len(self.requests), rows.size), START), []
         scales, alone = np.empty(needed.shape), np.zeros(needed.shape, np.bool_)
         for number, request in enumerate(self.requests):
@@ -160,11 +161,12 @@ class Search:
             row, column = (np.empty(rows.size * (samples // 2 + 1), np.int64) for _ in range(2))
             count = scan.peaks(values, request.mode, share, allowed, scale, rough, row, column)
             row, column = row[:count], column[:count]
-            if request.mode != 0:
-                measure_constants(values, scale, rough)
+            if request.mode != 0 or self.locate or request.place:
+                heights = np.abs(values) if request.mode == 0 else values
+                alone[number] = measure_constants(heights, scale, rough)
             if samples >= BREAKING:
                 given = self.family.precise(), self.designs[rows], request.pose
-                alone[number] = rounding_alone(*given, values, scale, rough > ROUGH)
+                alone[number] |= rounding_alone(*given, values, scale, rough > ROUGH)
                 rough[alone[number]] = 0.0
             if samples >= BREAKING and allowed is None and (rough > ROUGH).any():
                 torn = jumps(values, scale, ROUGH)

@@ -23,19 +23,20 @@ FAINT = 1e-10  # ratio of range to size below which the rounding of a signed cur
 CONSTANT = 64.0 * EPS  # relative range below which a curve is constant but for rounding
 
 
-def measure_constants(values: Array, scale: Array, rough: Array) -> None:
-    """Use the size of a curve that is constant but for rounding as the scale of its signed extrema, in place.
+def measure_constants(values: Array, scale: Array, rough: Array) -> Mask:
+    """Use the size of a curve that is constant but for rounding as the scale of its signed extrema; say which are.
 
     The range of such a curve is noise: no relative target can be met by it, and no denser samples resolve it.
 
     Parameters
     ----------
     values : (n, m) samples of one turn
-    scale, rough : (n,) range of each curve, and the share of it that the samples do not resolve
+    scale, rough : (n,) range of each curve, and the share of it that the samples do not resolve; changed in place
     """
     size = np.abs(values).max(axis=1)
-    constant = np.ptp(values, axis=1) <= CONSTANT * size
+    constant: Mask = np.ptp(values, axis=1) <= CONSTANT * size
     scale[constant], rough[constant] = size[constant], 0.0
+    return constant
 
 
 def rounding_share(

@@ -96,3 +96,13 @@ def test_a_constant_beside_a_phase_that_ends_just_after_the_angle_0_is_found(sta
     assert found.status == st.OK
     assert found.max_y_r == found.min_y_r == -0.4
     assert max(found.err_max_y_r, found.err_min_y_r) <= 1e-14
+
+
+@pytest.mark.parametrize("accuracy", [1e-3, 1e-9])
+def test_the_place_on_a_constant_may_be_any_angle(accuracy):
+    """A slot through the driven axis has no pressure angle; `phi_min_discriminant` erred by 1e-3 rad or less."""
+    names = ["phi_max_discriminant", "phi_min_discriminant", "phi_max_abs_discriminant"]
+    slots = {"a": [1.0, 0.7, 1.3], "e": [2.2, 0.4, 1.0], "h": [0.0, 0.0, 0.0], "branch": [1.0, -1.0, -1.0]}
+    found = sweep.summarise("inverted_slider_crank", slots, names, accuracy=accuracy)
+    assert (found.status == st.OK).all()
+    assert (found[[f"err_{name}" for name in names]] == np.pi).all(axis=None)
