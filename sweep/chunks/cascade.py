@@ -148,19 +148,22 @@ class Cascade:
         """
         for number in range(len(self.levels)):
             self._work(number, whole=True)
-        left, width = self._left, len(self.study.family.parameters)
-        index = np.concatenate([np.empty(0, np.int64), *(batch.index for batch in left)])
+        batches, width = self._left, len(self.study.family.parameters)
+        index = np.concatenate([np.empty(0, np.int64), *(batch.index for batch in batches)])
         order = np.argsort(index, kind="stable")
         # Column by column, each released once it is joined: a chunk is in memory once, not three times.
         outputs: dict[str, Array] = {}
         for name in names:
-            taken = [batch.outputs.pop(name, None) for batch in left]
-            missing = [np.full(batch.index.size, np.nan) for batch in left]
-            columns = [gap if values is None else values for values, gap in zip(taken, missing, strict=True)]
+            taken = [batch.outputs.pop(name, None) for batch in batches]
+            missing = [np.full(batch.index.size, np.nan) for batch in batches]
+            columns = [
+                missing_values if values is None else values
+                for values, missing_values in zip(taken, missing, strict=True)
+            ]
             outputs[name] = np.concatenate([np.empty(0), *columns])[order]
-        designs = np.concatenate([np.empty((0, width)), *(batch.designs for batch in left)])[order]
-        status = np.concatenate([np.empty(0, np.uint8), *(batch.status for batch in left)])[order]
-        left.clear()
+        designs = np.concatenate([np.empty((0, width)), *(batch.designs for batch in batches)])[order]
+        status = np.concatenate([np.empty(0, np.uint8), *(batch.status for batch in batches)])[order]
+        batches.clear()
         return Batch(index[order], designs, outputs, status)
 
     def _work(self, number: int, whole: bool) -> None:
@@ -193,13 +196,13 @@ class Cascade:
     def _computed(self, level: Level, batch: Batch) -> tuple[Batch, NDArray[np.bool_]]:
         """Add the outputs of a level to a batch; return the batch and a mask of the designs that go on."""
         study = self.study
-        found = self._found(level, batch)
-        status = np.where(batch.status == codes.OK, found["status"], batch.status)
+        outputs = self._found(level, batch)
+        status = np.where(batch.status == codes.OK, outputs["status"], batch.status)
         for limit in study.tested_limits:
-            if limit.output in found:
-                self._leave(limit, status, (status == codes.OK) & ~meets(limit, found[limit.output]))
-        more = {name: np.asarray(values, np.float64) for name, values in found.items() if name != "status"}
-        return Batch(batch.index, batch.designs, batch.outputs | more, status), self._go_on[status]
+            if limit.output in outputs:
+                self._leave(limit, status, (status == codes.OK) & ~meets(limit, outputs[limit.output]))
+        added = {name: np.asarray(values, np.float64) for name, values in outputs.items() if name != "status"}
+        return Batch(batch.index, batch.designs, batch.outputs | added, status), self._go_on[status]
 
     def _found(self, level: Level, batch: Batch) -> Mapping[str, NDArray[Any]]:
         """Compute the outputs of a level with their error estimates, and ``status``."""
@@ -211,11 +214,11 @@ class Cascade:
         study, designs, status = self.study, batch.designs, batch.status.copy()
         goes_on = np.ones(status.size, np.bool_)
         if study.fit is not None:
-            swing = [batch.outputs[name] for name in driving_outputs(study.family) if name in batch.outputs]
-            known = (swing[0], swing[1]) if len(swing) == 2 and bool(np.all(status == codes.OK)) else None
-            designs, fate = fit_line(study.family, designs, study.fit, study.window, known)
-            status[:] = fate
-            goes_on = fate == codes.OK
+            driving = [batch.outputs[name] for name in driving_outputs(study.family) if name in batch.outputs]
+            known = (driving[0], driving[1]) if len(driving) == 2 and bool(np.all(status == codes.OK)) else None
+            designs, fit_status = fit_line(study.family, designs, study.fit, study.window, known)
+            status[:] = fit_status
+            goes_on = fit_status == codes.OK
         for limit in study.parameter_limits:
             exceeds = goes_on & ~meets(limit, designs[:, study.family.parameter_names.index(limit.output)])
             self._leave(limit, status, exceeds)
@@ -261,11 +264,11 @@ class Recalled(Cascade):
 
 def levels(study: Study) -> tuple[Level, ...]:
     """Levels of a study: its routes in the order of `Work`, the fit before routes that need fitted parameters."""
-    found = [_level(study, route) for route in ordered_routes(study)]
+    ordered = [_level(study, route) for route in ordered_routes(study)]
     if study.fit is not None or study.parameter_limits:
-        before = sum(_before_fit(study, level.route) for level in found if level.route is not None)
-        found.insert(before, Level(None, nanoseconds("work", "fit") if study.fit is not None else 0.0))
-    return tuple(found)
+        position = sum(_before_fit(study, level.route) for level in ordered if level.route is not None)
+        ordered.insert(position, Level(None, nanoseconds("work", "fit") if study.fit is not None else 0.0))
+    return tuple(ordered)
 
 
 def _level(study: Study, route: Route) -> Level:
@@ -281,14 +284,14 @@ def ordered_routes(study: Study) -> tuple[Route, ...]:
     Where only feasible designs are kept, effects and other long routes follow all limits, unless they have limits
     themselves.
     """
-    found = routes(study.family, study.want, study.accuracy, study.window is not None)
+    selected = routes(study.family, study.want, study.accuracy, study.window is not None)
     limited = {limit.output for limit in study.tested_limits}
 
     def place(route: Route) -> tuple[bool, bool]:
         waits = study.output.keep != "all" and route.order[0] >= Work.EFFECT and limited.isdisjoint(route.outputs)
         return not _before_fit(study, route), waits
 
-    return tuple(sorted(found, key=place))
+    return tuple(sorted(selected, key=place))
 
 
 def _before_fit(study: Study, route: Route) -> bool:

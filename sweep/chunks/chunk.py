@@ -115,9 +115,9 @@ def compute_chunk(
     parameters = Parameters.of(study, cascades[0].levels[0].columns)
     designs_known = np.empty(0, np.int64)
     if known is not None:
-        within = known["status"] == OK
-        designs_known = known["design"][within]
-        recalled = {name: values[within] for name, values in known.items()}
+        feasible = known["status"] == OK
+        designs_known = known["design"][feasible]
+        recalled = {name: values[feasible] for name, values in known.items()}
         cascades.append(Recalled(study, keep, should_stop, recalled))
     for low in range(start, stop, BLOCK):
         index = np.arange(low, min(low + BLOCK, stop))
@@ -125,21 +125,21 @@ def compute_chunk(
         if known is None:
             cascades[0].feed(index, matrix, status)
             continue
-        old = np.isin(index, designs_known)
-        for cascade, mine in zip(cascades, (~old, old), strict=True):
-            if mine.any():
-                cascade.feed(index[mine], matrix[mine], status[mine])
+        is_known = np.isin(index, designs_known)
+        for cascade, mask in zip(cascades, (~is_known, is_known), strict=True):
+            if mask.any():
+                cascade.feed(index[mask], matrix[mask], status[mask])
     return _result(study, cascades)
 
 
 def _result(study: Study, cascades: Sequence[Cascade]) -> ChunkResult:
     """Join rows and counts of cascades that have been fed all designs of a chunk."""
     types = output_columns(study)
-    found = Batch.joined([cascade.end(tuple(types)) for cascade in cascades]).ordered()
-    columns: Columns = {"design": found.index}
-    columns |= {name: found.designs[:, k] for k, name in enumerate(study.family.parameter_names)}
-    columns |= {name: found.outputs[name].astype(dtype, copy=False) for name, dtype in types.items()}
-    columns |= {"status": found.status}
+    batch = Batch.joined([cascade.end(tuple(types)) for cascade in cascades]).ordered()
+    columns: Columns = {"design": batch.index}
+    columns |= {name: batch.designs[:, k] for k, name in enumerate(study.family.parameter_names)}
+    columns |= {name: batch.outputs[name].astype(dtype, copy=False) for name, dtype in types.items()}
+    columns |= {"status": batch.status}
     total = np.sum([cascade.counts for cascade in cascades], axis=0)
     counts = {code: int(total[code]) for code in np.flatnonzero(total).tolist()}
     missed = sum((cascade.missed for cascade in cascades), Counter[str]())

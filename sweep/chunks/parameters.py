@@ -36,28 +36,28 @@ def runs_matrix(study: Study, runs: Iterable[tuple[int, int]]) -> tuple[Array, N
 
     Checking all ranges at once takes no longer than checking one.
     """
-    found = [study.space.columns(start, stop) for start, stop in runs]
-    columns = {name: np.concatenate([run[name] for run in found]) for name in found[0]}
+    pieces = [study.space.columns(start, stop) for start, stop in runs]
+    columns = {name: np.concatenate([piece[name] for piece in pieces]) for name in pieces[0]}
     if study.locus is None:
         matrix, _ = design_matrix(study.family, columns)
         return matrix, np.zeros(len(matrix), np.uint8)
-    made, status = study.locus.links(columns)
+    links, status = study.locus.links(columns)
     # A design without a mechanism gets a status; it raises no error.
     given = {name: values for name, values in columns.items() if name in study.family.parameter_names}
-    matrix, _ = design_matrix(study.family, given | {name: np.ones(status.size) for name in made})
-    for name, values in made.items():
+    matrix, _ = design_matrix(study.family, given | {name: np.ones(status.size) for name in links})
+    for name, values in links.items():
         matrix[:, study.family.parameter_names.index(name)] = values
     return matrix, status
 
 
 def parameter_ns(study: Study) -> float:
     """Estimate the time for the parameters of a design [ns]."""
-    own = nanoseconds("work", "parameter") * len(study.family.parameters)
-    own += nanoseconds("work", "locus") if study.locus is not None else 0.0
+    cost = nanoseconds("work", "parameter") * len(study.family.parameters)
+    cost += nanoseconds("work", "locus") if study.locus is not None else 0.0
     if study.space.kind == "product":
-        return own + nanoseconds("work", "axis of a lattice") * len(study.space.axes)
+        return cost + nanoseconds("work", "axis of a lattice") * len(study.space.axes)
     plain, log = nanoseconds("work", "axis of a sample"), nanoseconds("work", "axis of a sample, log")
-    return own + sum(log if axis.scale == "log" else plain for axis in study.space.axes)
+    return cost + sum(log if axis.scale == "log" else plain for axis in study.space.axes)
 
 
 @dataclass(frozen=True)
@@ -80,9 +80,9 @@ class Parameters:
         All are generated at first where rows are kept anyway, where [locus] computes some from others, and where a
         value may be invalid, so that the error names its place.
         """
-        whole = len(study.family.parameters)
-        early = needed is not None and study.output.keep != "all" and study.locus is None and _is_valid(study)
-        return cls(study, needed if needed is not None and early else whole)
+        count = len(study.family.parameters)
+        deferrable = needed is not None and study.output.keep != "all" and study.locus is None and _is_valid(study)
+        return cls(study, needed if needed is not None and deferrable else count)
 
     def first(self, start: int, stop: int) -> tuple[Array, NDArray[np.uint8]]:
         """Return the leading columns of the designs start, ..., stop - 1, (n, leading), and their status (n,)."""

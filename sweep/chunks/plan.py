@@ -141,8 +141,8 @@ def make_plan(study: Study, chunk_size: int | None = None) -> Plan:
 def _repetitive(study: Study) -> tuple[str, ...]:
     """List the parameters whose values repeat among the designs; they are written dictionary-encoded."""
     names = study.space.fixed if study.space.kind == "sobol" else study.space.names
-    own = study.family.parameter_names
-    return tuple(name for name in names if name in own and name not in (*study.made, *study.rescaled))
+    parameters = study.family.parameter_names
+    return tuple(name for name in names if name in parameters and name not in (*study.made, *study.rescaled))
 
 
 def designs_fingerprint(study: Study) -> str:
@@ -179,20 +179,20 @@ def pilot(study: Study, tell: Callable[[int, int], None] = lambda _, __: None) -
     number = min(PILOT_MOST, max(count // PILOT_SHARE, min(PILOT_LEAST, count)))
     length = -(-number // PILOT_RUNS)
     starts = _spread(number // length, count - length + 1)
-    many = -(-len(starts) // PILOT_PARTS)
-    parts = [starts[k : k + many] for k in range(0, len(starts), many)]
-    asked = _telling(study)
+    runs_per_part = -(-len(starts) // PILOT_PARTS)
+    parts = [starts[k : k + runs_per_part] for k in range(0, len(starts), runs_per_part)]
+    computed = _pilot_levels(study)
     reached, feasible, total, kept = np.zeros(len(levels(study))), 0, 0, []
     for k, part in enumerate(parts):
         tell(k, len(parts))
         designs, status = runs_matrix(study, [(start, start + length) for start in part])
         cascade = Cascade(study, keep=False)
-        cascade.levels = cascade.levels[:asked]
+        cascade.levels = cascade.levels[:computed]
         cascade.feed(np.arange(len(designs)), designs, status)
         kept.append(cascade.end(()).designs)
-        through = int(cascade.counts[OK])
-        reached += [*cascade.reached[:asked], *[through] * (len(reached) - asked)]
-        feasible += through
+        passed = int(cascade.counts[OK])
+        reached += [*cascade.reached[:computed], *[passed] * (len(reached) - computed)]
+        feasible += passed
         total += len(designs)
     shares = [float(share) for share in reached / total]
     outputs = tuple(level.outputs for level in levels(study))
@@ -200,7 +200,7 @@ def pilot(study: Study, tell: Callable[[int, int], None] = lambda _, __: None) -
     return Pilot(seconds, feasible / total, sent, np.concatenate(kept), total)
 
 
-def _telling(study: Study) -> int:
+def _pilot_levels(study: Study) -> int:
     """Return the number of levels that a pilot computes; effects without a limit at the end are skipped."""
     limited = {limit.output for limit in study.tested_limits}
     count = len(levels(study))
@@ -243,8 +243,8 @@ def spread_designs(study: Study, number: int) -> Array:
     """Choose about ``number`` designs (n, P) spread over the space; fewer where [locus] finds no mechanism."""
     starts = _spread(number, study.space.count)
     matrix, status = runs_matrix(study, [(start, start + 1) for start in starts])
-    found: Array = matrix[status == OK]
-    return found
+    designs: Array = matrix[status == OK]
+    return designs
 
 
 def feasible_designs(study: Study, number: int) -> tuple[Array, int]:
@@ -255,9 +255,9 @@ def feasible_designs(study: Study, number: int) -> tuple[Array, int]:
     """
     count, tried = study.space.count, 0
     kept = np.empty((0, len(study.family.parameters)))
-    for many in TRIED:
+    for most in TRIED:
         runs = -(-count // RUN)
-        chosen = range(runs) if count <= many else _spread(many // RUN, runs)
+        chosen = range(runs) if count <= most else _spread(most // RUN, runs)
         designs, status = runs_matrix(study, [(k * RUN, min((k + 1) * RUN, count)) for k in chosen])
         cascade = Cascade(study, keep=False)
         cascade.feed(np.arange(len(designs)), designs, status)
@@ -269,8 +269,8 @@ def feasible_designs(study: Study, number: int) -> tuple[Array, int]:
 
 def spread_rows(designs: Array, number: int) -> Array:
     """Select ``number`` of the designs, evenly spread, or all if they are fewer."""
-    some = np.unique(np.linspace(0, len(designs) - 1, min(number, len(designs))).astype(int))
-    chosen: Array = designs[some]
+    rows = np.unique(np.linspace(0, len(designs) - 1, min(number, len(designs))).astype(int))
+    chosen: Array = designs[rows]
     return chosen
 
 

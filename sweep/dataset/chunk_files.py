@@ -71,8 +71,8 @@ class Part:
 
     def rows(self) -> pd.DataFrame:
         """Return all rows, after the checks of `read`."""
-        found: pd.DataFrame = self.read()[0].read().to_pandas()
-        return found
+        rows: pd.DataFrame = self.read()[0].read().to_pandas()
+        return rows
 
     def check_file(self) -> None:
         """Check that the path is a file of plausible size before it is opened: reading a pipe would never end.
@@ -107,19 +107,19 @@ def _opened(part: Part, source: Path | pa.BufferReader) -> tuple[pq.ParquetFile,
     try:
         with store_errors(part.path):
             file = pq.ParquetFile(source)
-        found = json.loads(file.metadata.metadata[METADATA])
-        own = found["chunk"], found["identity"]
+        metadata = json.loads(file.metadata.metadata[METADATA])
+        stated = metadata["chunk"], metadata["identity"]
         for key, kind in ABOUT_TYPES.items():
-            if not isinstance(found[key], kind):
+            if not isinstance(metadata[key], kind):
                 raise TypeError(key)
-        if not all(isinstance(found.get(key, 0), int) for key in ("chunks", "designs")):
+        if not all(isinstance(metadata.get(key, 0), int) for key in ("chunks", "designs")):
             raise TypeError("chunks")
     except (pa.ArrowException, ValueError, KeyError, TypeError) as error:
         raise StoreError(f"{part.path}: damaged chunk; {REMEDY}") from error
-    if own != (part.index, part.identity):
-        names = f"chunk {own[0]} of {own[1]} under the name of chunk {part.index} of {part.identity}"
+    if stated != (part.index, part.identity):
+        names = f"chunk {stated[0]} of {stated[1]} under the name of chunk {part.index} of {part.identity}"
         raise StoreError(f"{part.path}: {names}; {REMEDY}")
-    return file, found
+    return file, metadata
 
 
 def content_hash(data: bytes) -> str:
@@ -187,15 +187,15 @@ def check_columns(chunks: Sequence[Part], schemas: Iterable[pa.Schema] = ()) -> 
     StoreError
         for the first chunk with other columns; the message names those that differ.
     """
-    names: list[str] = []
+    expected: list[str] = []
     for part, schema in zip(chunks, schemas or map(_schema, chunks), strict=True):
-        found = schema.names
-        names = names or found
-        if found != names:
+        columns = schema.names
+        expected = expected or columns
+        if columns != expected:
             part.read()  # a damaged file is reported as such
-            apart = ", ".join(sorted({*names} ^ {*found})) or "their order"
+            differing = ", ".join(sorted({*expected} ^ {*columns})) or "their order"
             raise StoreError(
-                f"{part.path}: other columns than {chunks[0].path.name} ({apart}); move it away, then run again"
+                f"{part.path}: other columns than {chunks[0].path.name} ({differing}); move it away, then run again"
             )
 
 
@@ -229,7 +229,7 @@ def encode(plan: Plan, index: int, result: ChunkResult) -> bytes:
     import pyarrow.parquet as pq
 
     start, stop = plan.bounds(index)
-    own = {
+    metadata = {
         "format": plan.format, "name": plan.name, "study": plan.study, "code": plan.code, "identity": plan.identity,
         "chunk": index, "chunks": plan.chunks, "start": start, "stop": stop, "designs": plan.designs,
         "counts": named_counts(result.counts_by_status), "missed": result.missed_by_limit, "data": plan.chunk_data,
@@ -238,7 +238,7 @@ def encode(plan: Plan, index: int, result: ChunkResult) -> bytes:
         pa.field(c.name, pa.from_numpy_dtype(c.dtype), metadata={"unit": c.unit, "definition": c.text})
         for c in plan.columns
     ]
-    schema = pa.schema(fields, metadata={METADATA: json.dumps(own, sort_keys=True).encode()})
+    schema = pa.schema(fields, metadata={METADATA: json.dumps(metadata, sort_keys=True).encode()})
     table = pa.Table.from_arrays([pa.array(result.columns[c.name]) for c in plan.columns], schema=schema)
     dictionary = [*plan.repetitive, "status"]
     split = {c.name: "BYTE_STREAM_SPLIT" for c in plan.columns if c.name not in dictionary}

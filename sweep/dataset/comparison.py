@@ -50,15 +50,15 @@ class Moved:
         with np.errstate(invalid="ignore"):
             absolute = np.where(a == b, 0.0, np.abs(a - b))
             # nan against a number is counted as missing above; an infinite difference always counts as a change
-            far = (absolute > rtol * size) | np.isinf(absolute)
-        self.changed += int(far.sum())
-        self.places += [str(place) for place in places[far][: NAMED - len(self.places)]]
-        if far.any():
-            relative = np.where(far, absolute / np.where((size > 0.0) & np.isfinite(size), size, 1.0), 0.0)
+            exceeds = (absolute > rtol * size) | np.isinf(absolute)
+        self.changed += int(exceeds.sum())
+        self.places += [str(place) for place in places[exceeds][: NAMED - len(self.places)]]
+        if exceeds.any():
+            relative = np.where(exceeds, absolute / np.where((size > 0.0) & np.isfinite(size), size, 1.0), 0.0)
             worst = int(relative.argmax())
             if relative[worst] >= self.relative:
                 self.relative, self.where = float(relative[worst]), f"{self.kind} {places[worst]}".strip()
-            self.absolute = max(self.absolute, float(absolute[far].max()))
+            self.absolute = max(self.absolute, float(absolute[exceeds].max()))
 
 
 @dataclass
@@ -104,9 +104,9 @@ class Comparison:
 
     def lines(self) -> list[str]:
         """Describe the differences in words."""
-        found = [*self.notes, f"{how_many(self.rows, 'row')} in both"]
+        lines = [*self.notes, f"{how_many(self.rows, 'row')} in both"]
         old, new = ", ".join(self.columns_only_old), ", ".join(self.columns_only_new)
-        told = {
+        differences = {
             f"{how_many(self.only_old, 'row')} only in the old dataset": self.only_old,
             f"{how_many(self.only_new, 'row')} only in the new dataset": self.only_new,
             f"columns only in the old dataset: {old}": old,
@@ -114,22 +114,22 @@ class Comparison:
             f"{how_many(self.status_changed, 'row')} with another status": self.status_changed,
             f"the first of these rows: designs {', '.join(map(str, self.designs))}": self.designs,
         }
-        found += [words for words, there in told.items() if there]
+        lines += [words for words, present in differences.items() if present]
         for column in self.moved.values():
             if column.changed:
-                found.append(
+                lines.append(
                     f"{column.name}: {how_many(column.changed, 'value')} changed, at most by {column.absolute:.3g}, "
                     f"relative {column.relative:.3g} (worst: {column.where}{_first(column)})"
                 )
             if column.missing:
-                found.append(f"{column.name}: {how_many(column.missing, 'value')} appeared or went missing")
+                lines.append(f"{column.name}: {how_many(column.missing, 'value')} appeared or went missing")
         if not (self.values_changed or self.rows_changed):
-            found.append("no value changed")
+            lines.append("no value changed")
         if self.seconds is not None:
             before, now = self.seconds
             verdict = f", more than {self.slower:g} times as long" if self.is_slower else ""
-            found.append(f"time {before:.3g} s before, {now:.3g} s now{verdict}")
-        return found
+            lines.append(f"time {before:.3g} s before, {now:.3g} s now{verdict}")
+        return lines
 
 
 def _first(column: Moved) -> str:
@@ -175,25 +175,25 @@ def compare(old: str | Path, new: str | Path, rtol: float = 0.0, slower: float =
         raise InputError("slower", slower, "a factor from 1", "compare")
     folders = files.located(old), files.located(new)
     chunks = [_chunks(folder) for folder in folders]
-    names = [_columns(own) for own in chunks]
+    names = [_columns(parts) for parts in chunks]
     result = Comparison(slower=slower, notes=_notes(*folders), seconds=_seconds(*folders))
     result.columns_only_old = tuple(name for name in names[0] if name not in names[1])
     result.columns_only_new = tuple(name for name in names[1] if name not in names[0])
     shared = [name for name in names[0] if name in names[1] and name not in ("design", "status")]
     result.moved = {name: Moved(name) for name in shared}
     stops = [*(chunk_files.about(part)["stop"] for part in chunks[0]), math.inf]
-    sides = [_pieces(own, columns, stops) for own, columns in zip(chunks, names, strict=True)]
-    for before, after in zip(*sides, strict=True):
+    streams = [_pieces(parts, columns, stops) for parts, columns in zip(chunks, names, strict=True)]
+    for before, after in zip(*streams, strict=True):
         _look(result, before, after, rtol)
     _compare_optima(result, *folders, rtol)
     return result
 
 
 def _chunks(folder: Path) -> list[chunk_files.Part]:
-    found = chunk_files.parts(folder) if folder.is_dir() else []
-    if not found:
+    parts = chunk_files.parts(folder) if folder.is_dir() else []
+    if not parts:
         raise InputError("folder", str(folder), "a folder with part-*.parquet written by sweep run", "compare")
-    return found
+    return parts
 
 
 def _columns(chunks: Sequence[chunk_files.Part]) -> list[str]:
@@ -207,12 +207,12 @@ def _pieces(chunks: Iterable[chunk_files.Part], columns: list[str], stops: Itera
     """Yield the rows of a dataset in design order, split at the stops; one chunk at a time is in memory."""
     import pandas as pd
 
-    rows, reached, following = pd.DataFrame({name: [] for name in columns}), 0, iter(chunks)
+    rows, reached, remaining = pd.DataFrame({name: [] for name in columns}), 0, iter(chunks)
     for stop in stops:
-        while reached < stop and (part := next(following, None)) is not None:
-            file, own = part.read()
-            reached, more = own["stop"], file.read(columns).to_pandas()
-            rows = pd.concat([rows, more], ignore_index=True) if len(rows) else more
+        while reached < stop and (part := next(remaining, None)) is not None:
+            file, metadata = part.read()
+            reached, read = metadata["stop"], file.read(columns).to_pandas()
+            rows = pd.concat([rows, read], ignore_index=True) if len(rows) else read
         if np.any(np.diff(rows["design"].to_numpy()) <= 0):
             where = next(iter(chunks)).path.parent
             raise StoreError(f"{where}: designs are not in their order, or there twice; see sweep verify")
@@ -229,8 +229,8 @@ def _look(result: Comparison, old: pd.DataFrame, new: pd.DataFrame, rtol: float)
     before, after = old["status"].to_numpy()[in_old], new["status"].to_numpy()[in_new]
     result.status_changed += int((before != after).sum())
     if len(result.designs) < NAMED:
-        apart = np.setxor1d(old["design"], new["design"], assume_unique=True)
-        named = np.union1d(apart, designs[before != after]).astype(np.int64)
+        unmatched = np.setxor1d(old["design"], new["design"], assume_unique=True)
+        named = np.union1d(unmatched, designs[before != after]).astype(np.int64)
         result.designs += named[: NAMED - len(result.designs)].tolist()
     for name, moved in result.moved.items():
         moved.look(old[name].to_numpy()[in_old], new[name].to_numpy()[in_new], designs, rtol)
@@ -283,7 +283,7 @@ def _seconds(old: Path, new: Path) -> tuple[float, float] | None:
         if not ends or ends[-1].get("outcome") != "complete":
             return None
         seconds = [line.get("seconds", 0.0) for line in ends]
-        if not all(isinstance(one, (int, float)) for one in seconds):
+        if not all(isinstance(value, (int, float)) for value in seconds):
             return None
         times.append(float(sum(seconds)))
     return times[0], times[1]

@@ -146,11 +146,13 @@ def set_aside(folder: Path, paths: list[Path], where: str) -> None:
     with store_errors(folder):
         target.mkdir(parents=True, exist_ok=True)
         for path in paths:
-            to, count = target / path.name, 0
-            while to.is_dir() and not to.is_symlink():  # a folder of this name has been set aside before
+            destination, count = target / path.name, 0
+            while (
+                destination.is_dir() and not destination.is_symlink()
+            ):  # a folder of this name has been set aside before
                 count += 1
-                to = target / f"{path.name}.{count}"
-            path.replace(to)
+                destination = target / f"{path.name}.{count}"
+            path.replace(destination)
 
 
 def link_or_copy(source: Path, target: Path) -> None:
@@ -184,8 +186,8 @@ def read_plan(folder: Path) -> dict[str, Any] | None:
         return None
     if not isinstance(data, dict) or data.pop(OWN_HASH, None) not in (None, _own_hash(data)):
         return None
-    whole = all(isinstance(data.get(key), kind) for key, kind in PLAN_TYPES.items())
-    return data if whole and data["chunk_size"] > 0 else None
+    is_valid = all(isinstance(data.get(key), kind) for key, kind in PLAN_TYPES.items())
+    return data if is_valid and data["chunk_size"] > 0 else None
 
 
 def trusted_plan(folder: Path) -> dict[str, Any] | None:
@@ -275,8 +277,8 @@ def altered(place: Path, note: Mapping[str, Any], names: Iterable[str]) -> list[
     note : content of ``_plan.json``
     names : names of the tables
     """
-    known, found = note.get(TABLES) or {}, digests(place, names)
-    return [name for name in names if name not in found or known.get(name, found[name]) != found[name]]
+    known, current = note.get(TABLES) or {}, digests(place, names)
+    return [name for name in names if name not in current or known.get(name, current[name]) != current[name]]
 
 
 def check_tables(folder: Path, names: Iterable[str]) -> None:

@@ -112,8 +112,8 @@ def of_number(folder: str | Path, number: int) -> pd.DataFrame:
     source = scan(folder)
     row: pd.DataFrame = source.to_table(filter=pc.field("design") == number).to_pandas()
     if row.empty:
-        there = pc.min_max(source.to_table(columns=["design"]).column("design")).as_py()
-        allowed = f"a number of the column design; the designs kept are some of {there['min']} to {there['max']}"
+        ends = pc.min_max(source.to_table(columns=["design"]).column("design")).as_py()
+        allowed = f"a number of the column design; the designs kept are some of {ends['min']} to {ends['max']}"
         raise InputError("design", number, allowed, str(folder))
     return _with_units(row, source)
 
@@ -154,13 +154,13 @@ def _chosen(
     import pandas as pd
 
     source = scan(folder)
-    _known(source, names, place)
-    kept = pd.DataFrame({name: [] for name in dict.fromkeys(["design", *names])})
-    for batch in _feasible(source, list(kept.columns)):
-        here = batch[np.isfinite(batch[names].to_numpy()).all(axis=1)]
-        merged = here if kept.empty else pd.concat([kept, here], ignore_index=True)
-        kept = merged.iloc[choose(merged)]
-    return _whole(source, kept["design"].to_numpy(np.int64))
+    _check_outputs(source, names, place)
+    best = pd.DataFrame({name: [] for name in dict.fromkeys(["design", *names])})
+    for batch in _feasible(source, list(best.columns)):
+        finite = batch[np.isfinite(batch[names].to_numpy()).all(axis=1)]
+        merged = finite if best.empty else pd.concat([best, finite], ignore_index=True)
+        best = merged.iloc[choose(merged)]
+    return _all_columns(source, best["design"].to_numpy(np.int64))
 
 
 def _with_units(rows: pd.DataFrame, source: Any) -> pd.DataFrame:
@@ -193,7 +193,7 @@ def histogram(
     if isinstance(bins, bool) or not isinstance(bins, int) or not 1 <= bins <= MOST_BINS:
         raise InputError("bins", bins, f"a whole number from 1 to {MOST_BINS}", "histogram")
     source = scan(folder)
-    _known(source, [output], "histogram")
+    _check_outputs(source, [output], "histogram")
     low, high = _ends(source, output) if ends is None else ends
     if not (math.isfinite(low) and math.isfinite(high) and low <= high):
         raise InputError("ends", (low, high), "two finite numbers, the smaller one first", "histogram")
@@ -232,7 +232,7 @@ def _feasible(source: Any, names: Sequence[str]) -> Iterator[pd.DataFrame]:
             yield batch.to_pandas()
 
 
-def _whole(source: Any, designs: NDArray[np.int64]) -> pd.DataFrame:
+def _all_columns(source: Any, designs: NDArray[np.int64]) -> pd.DataFrame:
     """Read all columns of the given designs, in the given order.
 
     Of files without any of these designs only the statistics are read.
@@ -246,7 +246,7 @@ def _whole(source: Any, designs: NDArray[np.int64]) -> pd.DataFrame:
     return _with_units(rows.iloc[order].reset_index(drop=True), source)
 
 
-def _known(source: Any, names: Sequence[str], place: str) -> Sequence[str]:
+def _check_outputs(source: Any, names: Sequence[str], place: str) -> Sequence[str]:
     for name in names:
         if name not in source.schema.names:
             columns = ", ".join(source.schema.names)

@@ -32,9 +32,9 @@ def finished_chunks(
         if a chunk belongs to another study or another version of the code.
     """
     finished: dict[int, chunk_files.Part] = {}
-    there = chunk_files.parts(folder)
-    for k, part in enumerate(there):
-        tell(k, len(there))
+    present = chunk_files.parts(folder)
+    for k, part in enumerate(present):
+        tell(k, len(present))
         if part.identity != plan.identity or part.index >= plan.chunks:
             raise foreign(folder, f"the chunk {part.path.name}", plan)
         if not chunk_files.is_whole(part):
@@ -51,13 +51,13 @@ def _twice(folder: Path, one: chunk_files.Part, other: chunk_files.Part) -> Stor
     return StoreError(f"{folder}: two different chunks {one.index}, {names}; remove the one you do not trust")
 
 
-def foreign(folder: Path, found: str, plan: Plan) -> InputError:
+def foreign(folder: Path, what: str, plan: Plan) -> InputError:
     """Make the error for data of another study or code, which are never mixed."""
     allowed = (
         f"data of this study, as its file is now, and of this version of the program (identity {plan.identity}); "
         "take another folder with --out, or set what is there aside with sweep run --force"
     )
-    return InputError("dataset", found, allowed, str(folder))
+    return InputError("dataset", what, allowed, str(folder))
 
 
 def totals(folder: Path) -> tuple[dict[str, int], dict[str, int]]:
@@ -65,9 +65,9 @@ def totals(folder: Path) -> tuple[dict[str, int], dict[str, int]]:
     counts: Counter[str] = Counter()
     missed: Counter[str] = Counter()
     for part in chunk_files.parts(folder):
-        found = chunk_files.about(part)
-        counts.update(found["counts"])
-        missed.update(found["missed"])
+        metadata = chunk_files.about(part)
+        counts.update(metadata["counts"])
+        missed.update(metadata["missed"])
     return {name: counts[name] for name in chunk_files.STATUS_NAMES.values() if name in counts}, dict(missed)
 
 
@@ -93,23 +93,23 @@ def is_complete(folder: str | Path) -> bool:
     plan = read_plan(place)
     if plan is None:
         return False
-    own = [part for part in chunk_files.parts(place) if part.identity == plan["identity"]]
-    whole = {part.index for part in own if chunk_files.is_whole(part)}
+    parts = [part for part in chunk_files.parts(place) if part.identity == plan["identity"]]
+    sound = {part.index for part in parts if chunk_files.is_whole(part)}
     optimum = plan.get("optimised") is not None and (beside(place) / OPTIMUM).is_file()
     front = not plan.get("pareto") or front_is_complete(beside(place) / PARETO)
-    return whole == set(range(plan["chunks"])) and ((optimum and front) or not plan["optimise"])
+    return sound == set(range(plan["chunks"])) and ((optimum and front) or not plan["optimise"])
 
 
 def front_is_complete(path: Path) -> bool:
     """Whether the search of the front in this file has ended."""
-    about = metadata(path)
-    return about.get(b"complete") == b"true" or about.get(b"ended") == b"time"
+    fields = metadata(path)
+    return fields.get(b"complete") == b"true" or fields.get(b"ended") == b"time"
 
 
 def front_cut_short(path: Path) -> str | None:
     """Return how much of a front was left out by its time limit, as ``5 of 28``; None if nothing was."""
-    about = metadata(path)
-    return None if about.get(b"complete") != b"false" else about.get(b"steps", b"").decode() or None
+    fields = metadata(path)
+    return None if fields.get(b"complete") != b"false" else fields.get(b"steps", b"").decode() or None
 
 
 def load(folder: str | Path, units: bool = False) -> pd.DataFrame:
@@ -168,11 +168,11 @@ def load(folder: str | Path, units: bool = False) -> pd.DataFrame:
         text = f"{place}: incomplete, {len(missing)} of {len(missing) + len(chunks)} chunks are missing"
         text += f" (the first is {missing[0]}); run the study again to have them computed"
         warnings.warn(text, IncompleteWarning, stacklevel=2)
-    found: pd.DataFrame = pa.concat_tables(tables).to_pandas()
-    named = chunk_files.units_of(tables[0].schema)
+    rows: pd.DataFrame = pa.concat_tables(tables).to_pandas()
+    unit_of = chunk_files.units_of(tables[0].schema)
     if units:
-        found = found.rename(
-            columns={name: f"{name} [{unit}]" for name, unit in named.items() if unit not in ("", "1")}
+        rows = rows.rename(
+            columns={name: f"{name} [{unit}]" for name, unit in unit_of.items() if unit not in ("", "1")}
         )
-    found.attrs["units"] = named
-    return found
+    rows.attrs["units"] = unit_of
+    return rows

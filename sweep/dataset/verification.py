@@ -129,98 +129,98 @@ def verify(folder: str | Path, designs: int = DEFAULT_DESIGNS) -> Verification:
     chunks, strangers = chunk_files.listing(place)
     if plan is None and not chunks:
         raise InputError("folder", str(folder), "a dataset that sweep run wrote", "verify")
-    found = Verification(place)
+    result = Verification(place)
     for path in strangers:
         words = "no chunk, but every reader of the folder takes it for one"
-        found.add(path, words, "the next run refuses it; move it away")
+        result.add(path, words, "the next run refuses it; move it away")
     about = plan or {}
     for part in chunks if plan is None else ():  # then the first readable chunk describes the study
         with suppress(StoreError):
             about = about or chunk_files.about(part)
-    study = None if plan is None else _study(found, plan)
+    study = None if plan is None else _study(result, plan)
     if plan is None:
         # Chunks keep the study's tables, but not the order of the axes in them.
-        found.notes.append("without the plan, parameters are not checked and no design is computed again")
-        found.add(
+        result.notes.append("without the plan, parameters are not checked and no design is computed again")
+        result.add(
             files.beside(place) / files.PLAN, "not there, or damaged", "the next run writes it and keeps the chunks"
         )
-    whole = _whole_chunks(found, chunks, about, study)
-    _missing(found, plan or {}, about.get("chunks", 0), whole)
-    _side_files(found, plan or {})
-    if study is not None and designs and whole:
-        _recompute(found, study, about, whole, designs)
-    return found
+    sound = _sound_chunks(result, chunks, about, study)
+    _missing(result, plan or {}, about.get("chunks", 0), sound)
+    _side_files(result, plan or {})
+    if study is not None and designs and sound:
+        _recompute(result, study, about, sound, designs)
+    return result
 
 
-def _study(found: Verification, plan: dict[str, Any]) -> Study | None:
+def _study(result: Verification, plan: dict[str, Any]) -> Study | None:
     """Study of the dataset; None, with a note, if this version cannot read it."""
     try:
-        return study_of(plan, files.beside(found.folder) / files.PLAN)
+        return study_of(plan, files.beside(result.folder) / files.PLAN)
     except LinksweepError as error:
-        found.notes.append(f"the study cannot be read by this version, so parameters are not checked: {error}")
+        result.notes.append(f"the study cannot be read by this version, so parameters are not checked: {error}")
         return None
 
 
-def _whole_chunks(
-    found: Verification, chunks: list[chunk_files.Part], about: dict[str, Any], study: Study | None
+def _sound_chunks(
+    result: Verification, chunks: list[chunk_files.Part], about: dict[str, Any], study: Study | None
 ) -> dict[int, chunk_files.Part]:
     """Return the undamaged chunks; faults of the others and of the rows are added to the findings."""
-    whole: dict[int, chunk_files.Part] = {}
+    sound: dict[int, chunk_files.Part] = {}
     for part in chunks:
         if part.identity != about.get("identity", part.identity):
             words = f"belongs to other data ({part.identity}, not {about['identity']})"
-            found.add(part.path, words, "the next run refuses; --force sets it aside")
+            result.add(part.path, words, "the next run refuses; --force sets it aside")
             continue
         try:
-            file, own = part.read()
+            file, metadata = part.read()
         except StoreError as error:
             if isinstance(error.__cause__, OSError):
                 raise
             words = str(error).removeprefix(f"{part.path}: ").removesuffix(f"; {chunk_files.REMEDY}")
-            found.add(part.path, words, ANEW)
+            result.add(part.path, words, ANEW)
             continue
-        if part.index in whole:
-            words = f"a second chunk {part.index}, besides {whole[part.index].path.name}"
-            found.add(part.path, words, "the next run refuses; remove the one you do not trust")
+        if part.index in sound:
+            words = f"a second chunk {part.index}, besides {sound[part.index].path.name}"
+            result.add(part.path, words, "the next run refuses; remove the one you do not trust")
             continue
-        whole[part.index] = part
+        sound[part.index] = part
         rows = file.read().to_pandas()
-        found.chunks, found.rows = found.chunks + 1, found.rows + len(rows)
-        found.size += part.path.stat().st_size
-        for words in row_faults(rows, own, about, study):
-            found.add(part.path, words, UNSEEN)
-    return whole
+        result.chunks, result.rows = result.chunks + 1, result.rows + len(rows)
+        result.size += part.path.stat().st_size
+        for words in row_faults(rows, metadata, about, study):
+            result.add(part.path, words, UNSEEN)
+    return sound
 
 
-def _missing(found: Verification, plan: dict[str, Any], number: int, whole: dict[int, chunk_files.Part]) -> None:
+def _missing(result: Verification, plan: dict[str, Any], number: int, sound: dict[int, chunk_files.Part]) -> None:
     """Report missing chunks and searches that the plan asks for, and counts that differ from the chunks'."""
-    named = {finding.path.name[: len("part-000000-")] for finding in found.findings}
-    lost = [k for k in range(number) if k not in whole and f"part-{k:06d}-" not in named]
+    named = {finding.path.name[: len("part-000000-")] for finding in result.findings}
+    missing = [k for k in range(number) if k not in sound and f"part-{k:06d}-" not in named]
     complete = bool(plan.get("complete"))
-    if lost:
-        words = f"{len(lost)} of {number} chunks are missing, the first is {lost[0]}"
+    if missing:
+        words = f"{len(missing)} of {number} chunks are missing, the first is {missing[0]}"
         words += ", although a run had finished them all" if complete else ""
-        found.add(found.folder, words, "the next run computes them", damage=complete)
-    place = files.beside(found.folder)
+        result.add(result.folder, words, "the next run computes them", damage=complete)
+    place = files.beside(result.folder)
     optimum, front = place / files.OPTIMUM, place / files.PARETO
     if plan.get("optimise") and (plan.get("optimised") is None or not optimum.is_file()):
-        found.add(optimum, "the search has not ended", "the next run searches it", damage=False)
+        result.add(optimum, "the search has not ended", "the next run searches it", damage=False)
     if plan.get("optimise") and plan.get("pareto") and not store.front_is_complete(front):
-        found.add(front, "the front is not complete", "the next run goes on", damage=False)
-    if complete and set(whole) == set(range(number)):
-        counts = sum((Counter(chunk_files.about(part)["counts"]) for part in whole.values()), Counter[str]())
+        result.add(front, "the front is not complete", "the next run goes on", damage=False)
+    if complete and set(sound) == set(range(number)):
+        counts = sum((Counter(chunk_files.about(part)["counts"]) for part in sound.values()), Counter[str]())
         if counts != Counter(plan.get("counts") or {}):
             words = f"counts {plan.get('counts')}, but the chunks hold {dict(counts)}"
-            found.add(place / files.PLAN, words, "the next run writes the right ones")
+            result.add(place / files.PLAN, words, "the next run writes the right ones")
 
 
-def _side_files(found: Verification, plan: dict[str, Any]) -> None:
+def _side_files(result: Verification, plan: dict[str, Any]) -> None:
     """Check the tables beside the chunks: page checksums, and the hashes in the plan."""
-    place, told = files.beside(found.folder), {finding.path for finding in found.findings}
+    place, reported = files.beside(result.folder), {finding.path for finding in result.findings}
     for path in [place / name for name in files.SIDE_FILES]:
         if not path.is_file():
-            if path.name in (plan.get(TABLES) or {}) and path not in told:
-                found.add(path, "not there any more", "the next run searches it anew")
+            if path.name in (plan.get(TABLES) or {}) and path not in reported:
+                result.add(path, "not there any more", "the next run searches it anew")
             continue
         try:
             files.read_table(path)
@@ -228,94 +228,99 @@ def _side_files(found: Verification, plan: dict[str, Any]) -> None:
                 raise StoreError(f"{path}: not as its search has written it")
         except StoreError as error:
             words = str(error).removeprefix(f"{path}: ").split("; delete it")[0]
-            found.add(path, words, "the next run searches it anew")
+            result.add(path, words, "the next run searches it anew")
 
 
 def _recompute(
-    found: Verification, study: Study, about: dict[str, Any], whole: dict[int, chunk_files.Part], number: int
+    result: Verification, study: Study, about: dict[str, Any], sound: dict[int, chunk_files.Part], number: int
 ) -> None:
     """Recompute some designs, each by itself, since a design's row does not depend on other designs."""
     if about.get("code") != plans.code_hash():
-        found.notes.append("computed by other sources or libraries than these: no design was computed again")
+        result.notes.append("computed by other sources or libraries than these: no design was computed again")
         return
-    abouts = ((index, chunk_files.about(part)) for index, part in whole.items())
-    bounds = {index: (own["start"], own["stop"]) for index, own in abouts}
+    abouts = ((index, chunk_files.about(part)) for index, part in sound.items())
+    bounds = {index: (metadata["start"], metadata["stop"]) for index, metadata in abouts}
     fresh = replace(study)
     for index, chosen in spread(bounds, number).items():
-        rows = whole[index].rows()
+        rows = sound[index].rows()
         for design in chosen:
-            again = compute_chunk(fresh, design, design + 1).columns
-            found.recomputed += 1
-            if words := unequal(rows[rows["design"] == design], again):
-                found.add(whole[index].path, f"design {design}: {words}", UNSEEN)
+            recomputed = compute_chunk(fresh, design, design + 1).columns
+            result.recomputed += 1
+            if words := unequal(rows[rows["design"] == design], recomputed):
+                result.add(sound[index].path, f"design {design}: {words}", UNSEEN)
 
 
-def row_faults(rows: pd.DataFrame, own: Mapping[str, Any], about: Mapping[str, Any], study: Study | None) -> list[str]:
+def row_faults(
+    rows: pd.DataFrame, metadata: Mapping[str, Any], about: Mapping[str, Any], study: Study | None
+) -> list[str]:
     """Describe the faults in the rows of one chunk.
 
     Parameters
     ----------
     rows : all rows and columns of the chunk
-    own : metadata of the chunk
+    metadata : metadata of the chunk
     about : the plan, or the metadata of a chunk where there is no plan
     study : gives the parameters of the design space; None if it is not known
     """
     faults = []
     if "chunk_size" in about:
-        start = own["chunk"] * about["chunk_size"]
+        start = metadata["chunk"] * about["chunk_size"]
         stop = min(start + about["chunk_size"], about["designs"])
-        if (own["start"], own["stop"]) != (start, stop):
-            faults.append(f"designs {own['start']}:{own['stop']}, the plan says {start}:{stop}")
-    wanted = [(column["name"], column["dtype"]) for column in about.get("columns", [])]
-    there = [(str(name), str(dtype)) for name, dtype in rows.dtypes.items()]
-    if wanted and wanted != there:
-        return [*faults, f"columns {there}, the plan says {wanted}"]
+        if (metadata["start"], metadata["stop"]) != (start, stop):
+            faults.append(f"designs {metadata['start']}:{metadata['stop']}, the plan says {start}:{stop}")
+    expected = [(column["name"], column["dtype"]) for column in about.get("columns", [])]
+    actual = [(str(name), str(dtype)) for name, dtype in rows.dtypes.items()]
+    if expected and expected != actual:
+        return [*faults, f"columns {actual}, the plan says {expected}"]
     if lacking := [name for name in ("design", "status") if name not in rows.columns]:
         return [*faults, f"no column {', '.join(lacking)}"]
-    apart = [key for key in SHARED if key in about and own.get(key) != about[key]]
-    apart += ["data"] if own.get("data") != about.get("chunk_data", own.get("data")) else []
-    faults += [f"its metadata say another {', '.join(apart)} than the plan"] if apart else []
+    differing = [key for key in SHARED if key in about and metadata.get(key) != about[key]]
+    differing += ["data"] if metadata.get("data") != about.get("chunk_data", metadata.get("data")) else []
+    faults += [f"its metadata say another {', '.join(differing)} than the plan"] if differing else []
     designs, status = rows["design"].to_numpy(), rows["status"].to_numpy()
-    if np.any(np.diff(designs) <= 0) or np.any((designs < own["start"]) | (designs >= own["stop"])):
-        return [*faults, f"design numbers not growing inside {own['start']}:{own['stop']}"]
-    faults += _count_faults(status, own)
-    if study is not None and study.output.keep == "all" and len(rows) != own["stop"] - own["start"]:
+    if np.any(np.diff(designs) <= 0) or np.any((designs < metadata["start"]) | (designs >= metadata["stop"])):
+        return [*faults, f"design numbers not growing inside {metadata['start']}:{metadata['stop']}"]
+    faults += _count_faults(status, metadata)
+    if study is not None and study.output.keep == "all" and len(rows) != metadata["stop"] - metadata["start"]:
         faults.append(
-            f"{how_many(len(rows), 'row')}, although every one of {own['stop'] - own['start']} designs is kept"
+            f"{how_many(len(rows), 'row')}, although every one of {metadata['stop'] - metadata['start']} designs is kept"
         )
     outputs = [column["name"] for column in about.get("columns", []) if column["role"] == "output"]
     missing = rows.loc[status == 0, [name for name in outputs if not is_error(name)]].isna().any()
     faults += [f"{name}: missing values in rows whose status is ok" for name in missing.index[missing]]
     if study is not None and len(rows):
-        faults += _parameter_faults(rows, own, study)
+        faults += _parameter_faults(rows, metadata, study)
     return faults
 
 
-def _count_faults(status: np.ndarray[Any, Any], own: Mapping[str, Any]) -> list[str]:
+def _count_faults(status: np.ndarray[Any, Any], metadata: Mapping[str, Any]) -> list[str]:
     faults = []
-    noted, number = own["counts"], own["stop"] - own["start"]
-    if sum(noted.values()) != number:
-        faults.append(f"{how_many(sum(noted.values()), 'design')} counted, {number} in the chunk")
-    codes, found = np.unique(status, return_counts=True)
+    counted, number = metadata["counts"], metadata["stop"] - metadata["start"]
+    if sum(counted.values()) != number:
+        faults.append(f"{how_many(sum(counted.values()), 'design')} counted, {number} in the chunk")
+    codes, numbers = np.unique(status, return_counts=True)
     rows = {
-        chunk_files.STATUS_NAMES.get(int(code), str(code)): int(count) for code, count in zip(codes, found, strict=True)
+        chunk_files.STATUS_NAMES.get(int(code), str(code)): int(count)
+        for code, count in zip(codes, numbers, strict=True)
     }
     # Rows that were not kept are counted too; of a status either all rows are kept or none.
-    if any(noted.get(name, 0) != count for name, count in rows.items()) or (noted.get("OK", 0) and "OK" not in rows):
-        faults.append(f"rows by status {rows}, counted {noted}")
+    if any(counted.get(name, 0) != count for name, count in rows.items()) or (
+        counted.get("OK", 0) and "OK" not in rows
+    ):
+        faults.append(f"rows by status {rows}, counted {counted}")
     return faults
 
 
-def _parameter_faults(rows: pd.DataFrame, own: Mapping[str, Any], study: Study) -> list[str]:
+def _parameter_faults(rows: pd.DataFrame, metadata: Mapping[str, Any], study: Study) -> list[str]:
     """Parameters that differ from the design space; those that [fit] sets or scales are not compared."""
-    matrix, _ = parameter_matrix(study, own["start"], own["stop"])
-    at = rows["design"].to_numpy() - own["start"]
+    matrix, _ = parameter_matrix(study, metadata["start"], metadata["stop"])
+    index = rows["design"].to_numpy() - metadata["start"]
     fitted = () if study.fit is None else (*study.fit.parameters(study.family), *study.rescaled)
     faults = []
     for k, name in enumerate(study.family.parameter_names):
         if name in fitted or name not in rows.columns:
             continue
-        wrong = ~np.isclose(rows[name].to_numpy(), matrix[at, k], rtol=0.0, atol=0.0, equal_nan=True)
+        wrong = ~np.isclose(rows[name].to_numpy(), matrix[index, k], rtol=0.0, atol=0.0, equal_nan=True)
         if wrong.any():
             first = int(rows["design"].to_numpy()[wrong][0])
             faults.append(f"{name}: {int(wrong.sum())} values are not those of the design space (design {first})")

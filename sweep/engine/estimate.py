@@ -87,10 +87,10 @@ def estimate(
         assumed.  ``disk_bytes`` assumes that every result of a row is computed and does not repeat, which is too much
         where rows of infeasible designs are kept or symmetries make values repeat.
     """
-    found = pilot(study, tell) if known is None else known
-    chunk_size = choose_chunk_size(study, found)
+    sample = pilot(study, tell) if known is None else known
+    chunk_size = choose_chunk_size(study, sample)
     designs = study.space.count
-    kept = 1.0 if study.output.keep == "all" else max(found.feasible, LEAST_KEPT)
+    kept = 1.0 if study.output.keep == "all" else max(sample.feasible, LEAST_KEPT)
     columns = describe_columns(study)
     results = sum(
         np.dtype(column.dtype).itemsize * (PACKED_ERROR if is_error(column.name) else PACKED_RESULT)
@@ -99,7 +99,7 @@ def estimate(
     )
     sampled = len(study.space.axes) * SAMPLED_VALUE_BYTES if study.space.kind == "sobol" else 0.0
     chunks = -(-designs // chunk_size)
-    work = designs * (found.seconds_per_design + kept * WRITE_SECONDS_PER_ROW)
+    work = designs * (sample.seconds_per_design + kept * WRITE_SECONDS_PER_ROW)
     # At the end of a chunk every level computes the designs that still wait there, even a few.
     work += chunks * (WRITE_SECONDS_PER_CHUNK + CALL_SECONDS * len(levels(study)))
     return Estimate(
@@ -189,12 +189,12 @@ def other_accuracies(
 
     ``tell`` is called with the number of finished estimates and of all estimates.  ``known`` is the pilot of the study.
     """
-    sent = pilot(study) if known is None else known
-    found, others = [], neighbours(study)
+    sample = pilot(study) if known is None else known
+    estimates, others = [], neighbours(study)
     for k, (words, other) in enumerate(others):
         tell(k, len(others))
-        found.append((words, estimate(other, jobs, known=pilot_at(other, sent)).seconds))
-    return tuple(found)
+        estimates.append((words, estimate(other, jobs, known=pilot_at(other, sample)).seconds))
+    return tuple(estimates)
 
 
 def neighbours(study: Study) -> tuple[tuple[str, Study], ...]:
@@ -206,17 +206,17 @@ def neighbours(study: Study) -> tuple[tuple[str, Study], ...]:
     target, samples = study.accuracy.target, study.accuracy.samples
     if target is not None:
         digits = (("one digit less", 10.0 * target), ("one digit more", 0.1 * target))
-        found = [(words, with_accuracy(study, t)) for words, t in digits if FINEST_TARGET <= t <= COARSEST_TARGET]
+        variants = [(words, with_accuracy(study, t)) for words, t in digits if FINEST_TARGET <= t <= COARSEST_TARGET]
         provable = [
             name
             for name in certified_names(study.family)
             if name in study.want and not (study.window and is_windowed(study.family, name))
         ]
         if study.accuracy.certify:
-            found.append(("without the proof", with_accuracy(study, certify=False)))
+            variants.append(("without the proof", with_accuracy(study, certify=False)))
         elif provable:
-            found.append(("with the proof that no peak is missed", with_accuracy(study, certify=provable)))
-        return tuple(found)
+            variants.append(("with the proof that no peak is missed", with_accuracy(study, certify=provable)))
+        return tuple(variants)
     assert samples is not None
     counts = (("half the samples", samples // 2), ("twice the samples", 2 * samples))
     return tuple(

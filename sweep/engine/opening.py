@@ -47,22 +47,26 @@ def open_plan(study: Study, folder: Path, force: bool, chunk_size: int | None = 
 
 def _differs_in_limits_only(study: Study, noted: dict[str, Any], plan: Plan) -> bool:
     """Whether stored designs can be sorted by new limits: all rows were kept in float64, only limits changed."""
-    apart = ("limits", *NOT_IN_CHUNKS)
-    before, now = ({k: v for k, v in data.items() if k not in apart} for data in (noted.get("data") or {}, study.data))
-    kept = study.output.keep == "all" and study.output.dtype == "float64"
+    ignored = ("limits", *NOT_IN_CHUNKS)
+    before, now = (
+        {k: v for k, v in data.items() if k not in ignored} for data in (noted.get("data") or {}, study.data)
+    )
+    complete = study.output.keep == "all" and study.output.dtype == "float64"
     columns = [column.name for column in plan.columns]
     same = before == now and [column["name"] for column in noted.get("columns", [])] == columns
-    return kept and same and noted.get("code") == plan.code
+    return complete and same and noted.get("code") == plan.code
 
 
 def _with_other_limits(study: Study, folder: Path, plan: Plan) -> Plan:
     """Set the chunks aside and note their folder in the plan: their designs are sorted by the new limits."""
-    where = old_name()
-    own = [files.beside(folder) / name for name in OWN_FILES]
+    old_folder = old_name()
+    side_files = [files.beside(folder) / name for name in OWN_FILES]
     files.set_aside(
-        folder, [*(part.path for part in chunk_files.parts(folder)), *(path for path in own if path.is_file())], where
+        folder,
+        [*(part.path for part in chunk_files.parts(folder)), *(path for path in side_files if path.is_file())],
+        old_folder,
     )
-    files.write_plan(folder, plan_note(study, folder, plan) | {"known": where})
+    files.write_plan(folder, plan_note(study, folder, plan) | {"known": old_folder})
     return plan
 
 
@@ -89,11 +93,11 @@ def _conflict(study: Study, noted: dict[str, Any], plan: Plan) -> str:
         {key: value for key, value in data.items() if key not in NOT_IN_CHUNKS}
         for data in (noted.get("data") or noted["chunk_data"], study.data)
     )
-    found = [] if noted.get("study") == plan.study else differences(before, now)
+    reasons = [] if noted.get("study") == plan.study else differences(before, now)
     if noted.get("code") != plan.code:
-        found.append("other sources or libraries")
+        reasons.append("other sources or libraries")
     name = noted["name"] if noted["name"] == study.name else f"{noted['name']}, not {study.name}"
-    return f"{name}: {'; '.join(found) or 'cut in another way'}"
+    return f"{name}: {'; '.join(reasons) or 'cut in another way'}"
 
 
 def _set_foreign_aside(folder: Path, plan: Plan, others: tuple[str, ...]) -> None:
@@ -133,13 +137,13 @@ def plan_note(study: Study, folder: Path, plan: Plan) -> dict[str, Any]:
 
 def differences(old: Mapping[str, Any], new: Mapping[str, Any]) -> list[str]:
     """Describe keys whose values differ, such as ``limits.swing.min 170 -> 50 deg``; at most six of them."""
-    found = list(_lines(old, new, ""))
-    more = [f"and {len(found) - MOST} more"] if len(found) > MOST else []
-    return found[:MOST] + more
+    lines = list(_lines(old, new, ""))
+    rest = [f"and {len(lines) - MOST} more"] if len(lines) > MOST else []
+    return lines[:MOST] + rest
 
 
 def _lines(old: Mapping[str, Any], new: Mapping[str, Any], place: str) -> list[str]:
-    found: list[str] = []
+    lines: list[str] = []
     units = old.get("unit"), new.get("unit")
     for key in [*new, *(key for key in old if key not in new)]:
         before, now = old.get(key), new.get(key)
@@ -147,13 +151,13 @@ def _lines(old: Mapping[str, Any], new: Mapping[str, Any], place: str) -> list[s
         if before == now or (key == "unit" and len(old) > 1):
             continue
         if isinstance(before, Mapping) and isinstance(now, Mapping):
-            found += _lines(before, now, f"{name}.")
+            lines += _lines(before, now, f"{name}.")
         else:
-            own = units[0] if units[0] != units[1] else None
-            found.append(f"{name} {_said(before, own)} -> {_said(now, units[1])}")
-    if not found and units[0] != units[1]:
-        found.append(f"{place}unit {_said(units[0])} -> {_said(units[1])}")
-    return found
+            unit_before = units[0] if units[0] != units[1] else None
+            lines.append(f"{name} {_said(before, unit_before)} -> {_said(now, units[1])}")
+    if not lines and units[0] != units[1]:
+        lines.append(f"{place}unit {_said(units[0])} -> {_said(units[1])}")
+    return lines
 
 
 def _said(value: Any, unit: Any = None) -> str:

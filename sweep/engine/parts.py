@@ -51,15 +51,15 @@ def split(study: str | Path, out: str | Path, parts: int, *, smoke: bool = False
     count = min(parts, plan.chunks)
     folders = [files.beside(folder) / PARTS / f"{k:04d}" / files.DESIGNS for k in range(count)]
     for k, place in enumerate(folders):
-        own = [plan.chunks * k // count, plan.chunks * (k + 1) // count]
-        there = files.read_plan(place)
-        if there is not None and (there["identity"], there.get("part")) != (plan.identity, own):
+        chunk_range = [plan.chunks * k // count, plan.chunks * (k + 1) // count]
+        existing = files.read_plan(place)
+        if existing is not None and (existing["identity"], existing.get("part")) != (plan.identity, chunk_range):
             allowed = "parts of this study cut in this way; remove the old ones first"
             raise InputError("part", str(place), allowed, "split")
         with files.store_errors(place):
             place.mkdir(parents=True, exist_ok=True)
-        if there is None:
-            files.write_plan(place, note | {"part": own, "optimised": None, "complete": False})
+        if existing is None:
+            files.write_plan(place, note | {"part": chunk_range, "optimised": None, "complete": False})
     return folders
 
 
@@ -102,18 +102,18 @@ def merge(study: str | Path, out: str | Path, *, smoke: bool = False) -> Merged:
     plan = make_plan(model, noted["chunk_size"])
     taken, damaged = 0, []
     with locked(folder):
-        there = store.finished_chunks(folder, plan)
+        present = store.finished_chunks(folder, plan)
         for part in [part for place in places for part in chunk_files.parts(place)]:
             if part.identity != plan.identity:
                 raise store.foreign(part.path.parent, f"the chunk {part.path.name}", plan)
-            if part.index in there:
+            if part.index in present:
                 continue
             if not chunk_files.is_whole(part):
                 damaged.append(part.path)
                 continue
             with files.store_errors(folder):
                 link_or_copy(part.path, folder / part.path.name)
-            there[part.index] = part
+            present[part.index] = part
             taken += 1
-    missing = tuple(index for index in range(plan.chunks) if index not in there)
+    missing = tuple(index for index in range(plan.chunks) if index not in present)
     return Merged(folder, taken, missing, tuple(damaged))

@@ -77,17 +77,17 @@ def _commit() -> str | None:
 @contextmanager
 def logged(folder: Path, said: str, jobs: int, backend: str) -> Iterator[list[str]]:
     """Log the start and the end of a run: the error that ended it, or the words that the caller appends to the list."""
-    head = {"run": uuid.uuid4().hex[:12]}
+    identity = {"run": uuid.uuid4().hex[:12]}
     begin = time.monotonic()
-    files.append_run(folder, head | {"event": "start", "command": said} | circumstances(jobs, backend))
+    files.append_run(folder, identity | {"event": "start", "command": said} | circumstances(jobs, backend))
     words: list[str] = []
     try:
         yield words
     except Exception as error:
         if not isinstance(error, StoreError):  # the log is on the disk that has just failed
-            files.append_run(folder, head | _end(begin, type(error).__name__, str(error)))
+            files.append_run(folder, identity | _end(begin, type(error).__name__, str(error)))
         raise
-    files.append_run(folder, head | _end(begin, "complete", "; ".join(words)))
+    files.append_run(folder, identity | _end(begin, "complete", "; ".join(words)))
 
 
 def _end(begin: float, outcome: str, text: str) -> dict[str, Any]:
@@ -324,9 +324,9 @@ def _results(
     with stop.raising():
         warm(task.study)  # one process compiles, the others load the machine code
     deadline = time.monotonic() + allowed  # compiling does not count, so that every run makes progress
-    todo = (index for index in missing if not stop and time.monotonic() < deadline)
+    pending = (index for index in missing if not stop and time.monotonic() < deadline)
     try:
-        yield from for_tasks(place, len(missing)).outcomes(task, todo, jobs, stop)
+        yield from for_tasks(place, len(missing)).outcomes(task, pending, jobs, stop)
     except WorkerDied as error:
         stop.raise_if_signalled(task.folder, "finished chunks are")
         raise WorkerDied(f"{task.folder}: {error}; finished chunks are kept, run again to continue") from error

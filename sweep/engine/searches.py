@@ -36,13 +36,13 @@ def search(study: Study, folder: Path, jobs: int, backend: str, progress: bool) 
 
 def stages_of(study: Study) -> tuple[str, ...]:
     """List the stages of a run in order, by the labels of its progress."""
-    found, settings = ["compiling", "planning", study.name], study.optimise
+    labels, settings = ["compiling", "planning", study.name], study.optimise
     if settings is not None:
         robust = study.tolerance is not None and study.tolerance.robust is not None
-        asked = {"search": True, "tolerances": settings.by_populations and robust, "robust design": robust}
-        asked |= {"tables": True, "proof": settings.prove is not None, "front": study.pareto is not None}
-        found += [name for name, wanted in asked.items() if wanted]
-    return tuple(found)
+        optional = {"search": True, "tolerances": settings.by_populations and robust, "robust design": robust}
+        optional |= {"tables": True, "proof": settings.prove is not None, "front": study.pareto is not None}
+        labels += [name for name, wanted in optional.items() if wanted]
+    return tuple(labels)
 
 
 def optimum_key(study: Study, note: Mapping[str, Any]) -> str:
@@ -66,10 +66,10 @@ def _optimise(study: Study, folder: Path, jobs: int, progress: bool) -> None:
     note = files.read_plan(folder) or {}
     key = optimum_key(study, note)
     place = files.beside(folder)
-    found = optimise.read_survey(place / files.OPTIMUM)
+    survey = optimise.read_survey(place / files.OPTIMUM)
     noted = [name for name in files.OF_OPTIMUM if name in (note.get(TABLES) or {})]
-    whole = not altered(place, note, {files.OPTIMUM, *noted})
-    if note.get("optimised") == key and whole and (found is None or found.ended != "time"):
+    intact = not altered(place, note, {files.OPTIMUM, *noted})
+    if note.get("optimised") == key and intact and (survey is None or survey.ended != "time"):
         return
     assert study.optimise is not None
     files.write_plan(folder, note | {"optimised": None})
@@ -80,9 +80,9 @@ def _optimise(study: Study, folder: Path, jobs: int, progress: bool) -> None:
 
 def _raise_if_cut_short(folder: Path) -> None:
     """Raise if the optimum is written but its time limit left some starts unsearched."""
-    found = optimise.read_survey(files.beside(folder) / files.OPTIMUM)
-    if found is not None and found.ended == "time":
-        text = f"{folder}: {found.warnings[0]} searched; run again with a greater optimise.time_budget for all of them"
+    survey = optimise.read_survey(files.beside(folder) / files.OPTIMUM)
+    if survey is not None and survey.ended == "time":
+        text = f"{folder}: {survey.warnings[0]} searched; run again with a greater optimise.time_budget for all of them"
         raise SearchCutShort(folder, text)
 
 
@@ -94,17 +94,17 @@ def _front(study: Study, folder: Path, jobs: int, progress: bool) -> None:
 
     note = files.read_plan(folder) or {}
     key = optimum_key(study, note)
-    place, known = files.beside(folder), dict(note.get(TABLES) or {})
+    place, noted = files.beside(folder), dict(note.get(TABLES) or {})
     damaged = altered(place, note, [files.PARETO])
     if damaged:
         (place / files.PARETO).unlink(missing_ok=True)
-    if files.PARETO in known and (damaged or metadata(place / files.PARETO).get(b"key") != key.encode()):
-        del known[files.PARETO]  # the hash of an earlier front: the new one grows step by step
-        files.write_plan(folder, note | {TABLES: known})
+    if files.PARETO in noted and (damaged or metadata(place / files.PARETO).get(b"key") != key.encode()):
+        del noted[files.PARETO]  # the hash of an earlier front: the new one grows step by step
+        files.write_plan(folder, note | {TABLES: noted})
     with _stoppable(folder, "searching the front; run again to continue") as stop, Phases(progress) as phases:
         optimise.front_study(study, folder, key, lambda: bool(stop), jobs, phases.say)
-    if digests(place, [files.PARETO]).items() - known.items():
-        files.write_plan(folder, note | {TABLES: known | digests(place, [files.PARETO])})
+    if digests(place, [files.PARETO]).items() - noted.items():
+        files.write_plan(folder, note | {TABLES: noted | digests(place, [files.PARETO])})
 
 
 def refuse_unprovable(study: Study) -> None:
@@ -141,11 +141,11 @@ def prove(study: Study, folder: Path, jobs: int, backend: str, progress: bool) -
     note = files.read_plan(folder) or {}
     if altered(place, note, [files.PROOF]):
         (place / files.PROOF).unlink(missing_ok=True)
-    found = known_proof(study, folder) or _proven(study, folder, jobs, backend, progress)
-    known, now = dict(note.get(TABLES) or {}), digests(place, [files.PROOF])
-    if now.items() - known.items():
-        files.write_plan(folder, note | {TABLES: known | now})
-    return found.cut_short
+    proof = known_proof(study, folder) or _proven(study, folder, jobs, backend, progress)
+    noted, current = dict(note.get(TABLES) or {}), digests(place, [files.PROOF])
+    if current.items() - noted.items():
+        files.write_plan(folder, note | {TABLES: noted | current})
+    return proof.cut_short
 
 
 def _proven(study: Study, folder: Path, jobs: int, backend: str, progress: bool) -> Proof:

@@ -55,8 +55,8 @@ class ChunkTask:
         try:
             self._check_sources()
             known = self._known(number)
-            what = (self.study, start, end, should_stop)
-            result = compute_chunk(*what) if known is None else compute_chunk(*what, known)
+            arguments = (self.study, start, end, should_stop)
+            result = compute_chunk(*arguments) if known is None else compute_chunk(*arguments, known)
             write_chunk(self.folder, self.plan, number, result)
         except Dropped:
             return Done(number, dropped=True)
@@ -85,7 +85,7 @@ class ChunkTask:
         return {str(name): rows[0][name].to_numpy() for name in rows[0].columns} if len(rows) == 1 else None
 
     def _check_sources(self) -> None:
-        own = plans.code_hash()
-        if own != self.plan.code:
+        code = plans.code_hash()
+        if code != self.plan.code:
             allowed = f"{self.plan.code}, the sources and libraries of the process that plans"
-            raise InputError("code", own, allowed, "worker")
+            raise InputError("code", code, allowed, "worker")

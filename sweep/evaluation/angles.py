@@ -76,8 +76,8 @@ def in_radians(
     renamed, changed = {}, {}
     columns: Any = table
     for key in columns:
-        found = _HEADER.fullmatch(str(key))
-        name, unit = (found[1], found[2]) if found is not None and found[1] in known else (str(key), None)
+        match = _HEADER.fullmatch(str(key))
+        name, unit = (match[1], match[2]) if match is not None and match[1] in known else (str(key), None)
         values = columns[key]
         if unit is not None:
             if name in map(str, table):
@@ -91,9 +91,9 @@ def in_radians(
         if name not in known:
             continue
         if not isinstance(values, np.ndarray | float | int) or getattr(values, "dtype", "") == np.object_:
-            said = plain(values, _internal(name, family, others, domain), name, f"column {name}")
-            if said is not values:
-                changed[name] = said
+            converted = plain(values, _internal(name, family, others, domain), name, f"column {name}")
+            if converted is not values:
+                changed[name] = converted
                 continue
         if not known[name]:
             continue
@@ -124,9 +124,9 @@ def plain_names(table: Iterable[Any]) -> tuple[str, ...]:
 def grid_in_radians(name: str, unit: str, phi: ArrayLike, angles: AngleUnit | None) -> ArrayLike:
     """Convert the argument ``phi=`` to rad if the variable is an angle; otherwise it is returned as it is."""
     _check_unit(angles)
-    said: ArrayLike = plain(phi, internal_unit(unit), name)
-    if said is not phi:
-        return np.asarray(said, np.float64)
+    converted: ArrayLike = plain(phi, internal_unit(unit), name)
+    if converted is not phi:
+        return np.asarray(converted, np.float64)
     if unit != "rad":
         return phi
     if angles == "deg":
@@ -143,14 +143,14 @@ def _check_unit(angles: object) -> None:
 
 def _check_plausible(name: str, values: Any, turns_on: bool) -> None:
     try:
-        found = np.abs(numbers(values, name, "column"))
+        sizes = np.abs(numbers(values, name, "column"))
     except InputError:
         return  # the reader of the column raises, with the right row
-    if found.size == 0 or np.maximum.reduce(found, axis=None) <= MOST:
+    if sizes.size == 0 or np.maximum.reduce(sizes, axis=None) <= MOST:
         return  # the usual case, in one pass
-    if is_plausible(float(np.max(found, initial=0.0, where=np.isfinite(found))), turns_on):
+    if is_plausible(float(np.max(sizes, initial=0.0, where=np.isfinite(sizes))), turns_on):
         return
-    row = int(np.argmax(np.where(np.isfinite(found), found, 0.0)))
+    row = int(np.argmax(np.where(np.isfinite(sizes), sizes, 0.0)))
     raise InputError(
         name,
         float(np.atleast_1d(numbers(values, "angle", "column")).flat[row]),

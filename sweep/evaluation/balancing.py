@@ -61,9 +61,9 @@ class Balanced(NamedTuple):
 def orders(values: Array, most: int) -> Orders:
     """Return the Fourier coefficients of samples (m, ...) at equal steps of a turn from 0; exact up to aliasing."""
     m = len(values)
-    found = np.fft.rfft(values, axis=0) / m
-    found[1 : (m + 1) // 2] *= 2.0  # order m/2 has one cosine and no pair
-    return Orders(found[0].real, found[1 : most + 1].real, -found[1 : most + 1].imag)
+    coefficients = np.fft.rfft(values, axis=0) / m
+    coefficients[1 : (m + 1) // 2] *= 2.0  # order m/2 has one cosine and no pair
+    return Orders(coefficients[0].real, coefficients[1 : most + 1].real, -coefficients[1 : most + 1].imag)
 
 
 def rms(values: Array) -> float:

@@ -71,12 +71,12 @@ def cyclogram(
         raise InputError("dwell", dwell, "a share of the stroke between 0 and 0.5", "cyclogram")
     poses = Poses(family, family.precise(), designs)
     rows = [row for member, name in _positions(family) for row in _strokes(poses, family, member, name, dwell)]
-    rows += [row for foot in _feet(family, designs) for row in _pieces(*foot)]
+    rows += [row for foot in _feet(family, designs) for row in _foot_rows(*foot)]
     rows += _events(family, designs)
-    found = pd.DataFrame(rows, columns=list(COLUMNS))
-    found = found.sort_values(["start", "kind"], kind="stable", ignore_index=True)
-    found.attrs["units"] = dict(UNITS)
-    return found
+    table = pd.DataFrame(rows, columns=list(COLUMNS))
+    table = table.sort_values(["start", "kind"], kind="stable", ignore_index=True)
+    table.attrs["units"] = dict(UNITS)
+    return table
 
 
 def table_in_degrees(rows: pd.DataFrame) -> pd.DataFrame:
@@ -100,44 +100,46 @@ def _strokes(poses: Poses, family: Family, member: str, name: str, dwell: float)
     rate = family.derivative_of[name]
     status, (slope, values) = poses.samples([rate, name], SAMPLES)
     wraps = family.pose_output[name].wraps
-    whole = np.unwrap(values[0]) if wraps else values[0]
-    if status[0] or (wraps and abs(whole[-1] - whole[0]) > np.pi):
+    unwrapped = np.unwrap(values[0]) if wraps else values[0]
+    if status[0] or (wraps and abs(unwrapped[-1] - unwrapped[0]) > np.pi):
         return
-    ends = np.sort(poses.turning(rate, slope).phi % TWO_PI)
-    if ends.size < 2:
+    extrema = np.sort(poses.turning(rate, slope).phi % TWO_PI)
+    if extrema.size < 2:
         return
-    exact = poses.at(np.zeros(ends.size, np.intp), ends, name)[0]
+    exact = poses.at(np.zeros(extrema.size, np.intp), extrema, name)[0]
     if wraps:  # shifted by full turns to the unwrapped samples
         grid = np.arange(SAMPLES + 1) * TWO_PI / SAMPLES
-        exact = exact + TWO_PI * np.round((np.interp(ends, grid, np.append(whole, whole[0])) - exact) / TWO_PI)
+        exact = exact + TWO_PI * np.round(
+            (np.interp(extrema, grid, np.append(unwrapped, unwrapped[0])) - exact) / TWO_PI
+        )
     for k, size in enumerate(np.roll(exact, -1) - exact):
-        yield member, "stroke", "rises" if size > 0.0 else "falls", ends[k], ends[(k + 1) % ends.size], size
+        yield member, "stroke", "rises" if size > 0.0 else "falls", extrema[k], extrema[(k + 1) % extrema.size], size
     band = dwell * float(np.ptp(exact))
     for word, k in (("low", int(exact.argmin())), ("high", int(exact.argmax()))):
 
-        def off(phi: float, level: float = exact[k]) -> float:
-            away = poses.at(np.zeros(1, np.intp), np.array([phi]), name)[0][0] - level
-            return float(abs(away - TWO_PI * round(away / TWO_PI) if wraps else away)) - band
+        def beyond_band(phi: float, level: float = exact[k]) -> float:
+            offset = poses.at(np.zeros(1, np.intp), np.array([phi]), name)[0][0] - level
+            return float(abs(offset - TWO_PI * round(offset / TWO_PI) if wraps else offset)) - band
 
-        start, end = (_left(off, float(ends[k]), way) for way in (-1.0, 1.0))
+        start, end = (_band_end(beyond_band, float(extrema[k]), way) for way in (-1.0, 1.0))
         yield member, "dwell", word, start % TWO_PI, end % TWO_PI, band
 
 
-def _left(off: Callable[[float], float], phi: float, way: float) -> float:
+def _band_end(beyond_band: Callable[[float], float], phi: float, direction: float) -> float:
     """Find where the band about an extremum is left, searching in one direction."""
     from scipy.optimize import brentq
 
-    step = way * TWO_PI / SAMPLES
+    step = direction * TWO_PI / SAMPLES
     inside = phi
-    while off(inside + step) < 0.0 and abs(inside - phi) < TWO_PI:
+    while beyond_band(inside + step) < 0.0 and abs(inside - phi) < TWO_PI:
         inside += step
-    return float(brentq(off, inside, inside + step)) if abs(inside - phi) < TWO_PI else inside
+    return float(brentq(beyond_band, inside, inside + step)) if abs(inside - phi) < TWO_PI else inside
 
 
 def _feet(family: Family, designs: Array) -> Iterator[tuple[str, Columns, Array, float]]:
     """Yield each presser foot: name, outputs of its march, path of its rack, its angle at crank angle 0."""
-    for alone in family.every(PresserFoot):
-        columns, path, _, _ = alone.march(designs, alone.nodes)
+    for presser in family.every(PresserFoot):
+        columns, path, _, _ = presser.march(designs, presser.nodes)
         yield "", columns, path[0], 0.0
     for foot in _pressings(family):
         assert isinstance(family, Machine)
@@ -149,7 +151,7 @@ def _pressings(family: Family) -> list[Pressing]:
     return [r for r in getattr(family, "relations", ()) if isinstance(r, Pressing)]
 
 
-def _pieces(member: str, columns: Columns, path: Array, ahead: float) -> Iterator[Row]:
+def _foot_rows(member: str, columns: Columns, path: Array, ahead: float) -> Iterator[Row]:
     """Yield strokes, dwell and flights of a foot whose turns are alike; on the rack strokes end at extrema.
 
     On fabric its path is not known as exactly: only its flights are listed.
@@ -160,12 +162,12 @@ def _pieces(member: str, columns: Columns, path: Array, ahead: float) -> Iterato
     begins, modes = changes[1 : 1 + 2 * int(changes[0])].reshape(-1, 2).T
     slope, step = path[1], TWO_PI / path.shape[1]
     k = np.flatnonzero((slope > 0.0) & (np.roll(slope, -1) <= 0.0) | (slope < 0.0) & (np.roll(slope, -1) >= 0.0))
-    turns = zeros(lambda _, phi: _rack(path, phi)[1], k * step, (k + 1) * step)
+    extrema = zeros(lambda _, phi: _rack(path, phi)[1], k * step, (k + 1) * step)
     for begin, end, mode in zip(begins, np.roll(begins, -1), modes, strict=True):
-        lasts, tops = (end - begin) % TWO_PI, np.sort((turns - begin) % TWO_PI)
-        cuts = begin + np.array([0.0, *tops[(mode == RACK) & (tops > 0.0) & (tops < lasts)], lasts])
-        for start, stop, way in zip(cuts, cuts[1:], np.diff(_rack(path, cuts)[0]), strict=False):
-            stroke = ("stroke", "rises" if way > 0.0 else "falls", float(way))
+        duration, offsets = (end - begin) % TWO_PI, np.sort((extrema - begin) % TWO_PI)
+        cuts = begin + np.array([0.0, *offsets[(mode == RACK) & (offsets > 0.0) & (offsets < duration)], duration])
+        for start, stop, rise in zip(cuts, cuts[1:], np.diff(_rack(path, cuts)[0]), strict=False):
+            stroke = ("stroke", "rises" if rise > 0.0 else "falls", float(rise))
             if mode in AWAY or mode == RACK:
                 kind, name, size = AWAY.get(int(mode), stroke)
                 yield member, kind, name, (start - ahead) % TWO_PI, (stop - ahead) % TWO_PI, size
@@ -191,8 +193,8 @@ def event_angles(family: Family) -> dict[str, str]:
 def _events(family: Family, designs: Array) -> Iterator[Row]:
     """Yield the events and moments of the machine that occur."""
     accuracy = Accuracy(samples=SAMPLES) if isinstance(family.domain, March) else Accuracy(target=1e-9)
-    for name, place in event_angles(family).items():
-        found = design_outputs(family, designs, [place], accuracy)
-        phi = float(np.asarray(found[place], np.float64)[0])
+    for name, angle in event_angles(family).items():
+        outputs = design_outputs(family, designs, [angle], accuracy)
+        phi = float(np.asarray(outputs[angle], np.float64)[0])
         if np.isfinite(phi):
             yield "", "event", name, phi, phi, float("nan")

@@ -77,7 +77,7 @@ class Part:
 
 
 @dataclass(frozen=True)
-class _Where:
+class _Location:
     """Names of a stage, and its frame relative to the frame of the coordinates."""
 
     member: str = ""
@@ -146,9 +146,9 @@ def joints(mechanism: Mechanism, design: Table, phi: ArrayLike, *, angles: Angle
             for column, values in (("phi", part.phi), *zip("xyz", path.T, strict=True)):
                 columns[column] += values.tolist()
             columns["status"] += ([OK] * m) if fixed else part.status.tolist()
-    found = pd.DataFrame(columns)
-    found.attrs["units"] = dict(UNITS)
-    return found
+    table = pd.DataFrame(columns)
+    table.attrs["units"] = dict(UNITS)
+    return table
 
 
 def parts(mechanism: Mechanism, design: Table, phi: ArrayLike) -> list[Part]:
@@ -164,19 +164,19 @@ def parts(mechanism: Mechanism, design: Table, phi: ArrayLike) -> list[Part]:
         return [part for member in family.members for part in _of_member(family, member, matrix, given)]
     if not any(skeleton_of(stage.family).links or stage.family.points for stage in family.stages):
         raise InputError("mechanism", family.name, "a mechanism that has joints", "joints")
-    return list(_of_stages(family, matrix, given, angles, _wheres(family, matrix)))
+    return list(_of_stages(family, matrix, given, angles, _locations(family, matrix)))
 
 
-def _wheres(family: Family, matrix: Array) -> list[_Where]:
+def _locations(family: Family, matrix: Array) -> list[_Location]:
     """List names and frames of the stages of a mechanism: in the frame of the first stage, if a chain defines it."""
     stages = family.stages
     if not isinstance(family, Chain):
-        return [_Where(frame=family.name)]
+        return [_Location(frame=family.name)]
     names = [f"stage {stage.number} ({stage.family.name})" for stage in stages]
     if not family.is_placed:
-        return [_Where("", str(stage.number), name) for stage, name in zip(stages, names, strict=True)]
+        return [_Location("", str(stage.number), name) for stage, name in zip(stages, names, strict=True)]
     placed = zip(stages, family.frames(matrix), strict=True)
-    return [_Where("", str(stage.number), names[0], frame) for stage, frame in placed]
+    return [_Location("", str(stage.number), names[0], frame) for stage, frame in placed]
 
 
 def _of_member(machine: Machine, member: Member, matrix: Array, angles: Angles) -> Iterator[Part]:
@@ -184,31 +184,37 @@ def _of_member(machine: Machine, member: Member, matrix: Array, angles: Angles) 
     if member.driver is not None:
         name = ".".join(member.driver)
         (driving,) = machine.values(matrix, angles, name)
-    own = Angles.of(np.ascontiguousarray(member.ratio * driving + member.phase(matrix)))
-    wheres = []
+    crank = Angles.of(np.ascontiguousarray(member.ratio * driving + member.phase(matrix)))
+    locations = []
     for stage, frame in zip(member.family.stages, member.frames(matrix), strict=True):
-        alone = f"{member.name} stage {stage.tail} ({stage.family.name})"
-        wheres.append(_Where(member.name, stage.tail, *(("machine", frame) if frame else (alone,))))
+        label = f"{member.name} stage {stage.tail} ({stage.family.name})"
+        locations.append(_Location(member.name, stage.tail, *(("machine", frame) if frame else (label,))))
     if member.tip is not None:
         tip = np.array([member.column(matrix, f"{axis}_tip")[0] for axis in AXES])
-        wheres[-1] = replace(wheres[-1], tip=tip)
-    return _of_stages(member.family, member.designs(matrix), own, angles.phi[0], wheres)
+        locations[-1] = replace(locations[-1], tip=tip)
+    return _of_stages(member.family, member.designs(matrix), crank, angles.phi[0], locations)
 
 
-def _of_stages(family: Family, matrix: Array, angles: Angles, phi: Array, wheres: Sequence[_Where]) -> Iterator[Part]:
+def _of_stages(
+    family: Family, matrix: Array, angles: Angles, phi: Array, locations: Sequence[_Location]
+) -> Iterator[Part]:
     """Yield every stage in its frame; each stage drives the next one."""
     stages = family.stages
     status = np.zeros(phi.size, np.uint8)
     for k, stage in enumerate(stages):
-        own = stage.family
-        more = driving_names(own, stages[k + 1].family) | {own.position} if k + 1 < len(stages) else {own.position}
-        found = own.poses(stage.designs(matrix), angles, frozenset(_needed(own) | more))
-        np.copyto(status, np.asarray(found["status"], np.uint8)[0], where=status == OK)
-        yield _part(own, stage.designs(matrix), angles, phi, dict(found), wheres[k], status.copy())
+        stage_family = stage.family
+        further = (
+            driving_names(stage_family, stages[k + 1].family) | {stage_family.position}
+            if k + 1 < len(stages)
+            else {stage_family.position}
+        )
+        poses = stage_family.poses(stage.designs(matrix), angles, frozenset(_needed(stage_family) | further))
+        np.copyto(status, np.asarray(poses["status"], np.uint8)[0], where=status == OK)
+        yield _part(stage_family, stage.designs(matrix), angles, phi, dict(poses), locations[k], status.copy())
         if k + 1 < len(stages):
-            after = stages[k + 1]
-            kappa, offset = (np.ascontiguousarray(matrix[:, column]) for column in (after.kappa, after.offset))
-            angles = drive(dict(found), own.position, kappa, offset)
+            following = stages[k + 1]
+            kappa, offset = (np.ascontiguousarray(matrix[:, column]) for column in (following.kappa, following.offset))
+            angles = drive(dict(poses), stage_family.position, kappa, offset)
 
 
 def _needed(family: Family) -> set[str]:
@@ -217,28 +223,28 @@ def _needed(family: Family) -> set[str]:
 
 
 def _part(
-    family: Family, matrix: Array, angles: Angles, phi: Array, found: dict[str, Any], where: _Where, status: Any
+    family: Family, matrix: Array, angles: Angles, phi: Array, poses: dict[str, Any], location: _Location, status: Any
 ) -> Part:
-    """Compute the joints of one stage, transformed into the frame of ``where``."""
+    """Compute the joints of one stage, transformed into the frame of ``location``."""
     skeleton = skeleton_of(family)
     moving = {
-        name: np.stack([found[x][0] if x else np.zeros(phi.size) for x in at], axis=-1)
+        name: np.stack([poses[x][0] if x else np.zeros(phi.size) for x in at], axis=-1)
         for name, at in family.points.items()
     }
-    moving |= {name: made.at(matrix, angles, found)[0] for name, made in skeleton.made.items()}
+    moving |= {name: made.at(matrix, angles, poses)[0] for name, made in skeleton.made.items()}
     if linked := {joint for link in skeleton.links for joint in link.joints}:
         # A point that no link carries is not a joint: the pitch curve is given in the frame of the cam.
         moving = {name: path for name, path in moving.items() if name in linked}
     fixed = {name: np.tile(point.at(matrix)[0], (phi.size, 1)) for name, point in skeleton.fixed.items()}
     axes = {name: point.axis(matrix)[0] for name, point in skeleton.fixed.items() if point.axis is not None}
-    if where.tip is not None:
+    if location.tip is not None:
         link = family.the(OutputLink)
-        moving[TIP] = np.stack(link.carried(matrix, found[family.position], where.tip), axis=-1)[0]
-    rotation, at = where.placed.rotation[0], where.placed.at[0]
+        moving[TIP] = np.stack(link.carried(matrix, poses[family.position], location.tip), axis=-1)[0]
+    rotation, at = location.placed.rotation[0], location.placed.at[0]
     turned = {name: path @ rotation.T + at for name, path in (fixed | moving).items()}
-    crank, position = (np.asarray(values[0], np.float64) for values in (angles.phi, found[family.position]))
+    crank, position = (np.asarray(values[0], np.float64) for values in (angles.phi, poses[family.position]))
     return Part(
-        where.member, where.stage, where.frame, family, matrix[0], phi, crank, position, turned,
+        location.member, location.stage, location.frame, family, matrix[0], phi, crank, position, turned,
         {name: rotation @ axis for name, axis in axes.items()},
         {name: point.kind for name, point in skeleton.fixed.items()}, skeleton.links, status,
     )  # fmt: skip

@@ -30,7 +30,7 @@ def curves_of(family: Family, loads: Loads | None) -> dict[str, Curve]:
     InputError
         for a name that is no load of this mechanism, or a value that is no curve.
     """
-    found: dict[str, Curve] = {}
+    curves: dict[str, Curve] = {}
     known = curved_inputs(family) if loads else ()
     for name, given in (loads or {}).items():
         if name not in known:
@@ -40,8 +40,8 @@ def curves_of(family: Family, loads: Loads | None) -> dict[str, Curve]:
                 f"{', '.join(known) or 'no load: no effect takes one'}{nearest(name, known)}",
                 family.name,
             )
-        found[name] = _curve(name, given)
-    return found
+        curves[name] = _curve(name, given)
+    return curves
 
 
 def _curve(name: str, given: Any) -> Curve:
@@ -141,16 +141,16 @@ def rod(body: str, material: str, section: str, inertia: str = "slender") -> dic
         match = _SECTION.fullmatch(section.strip())
         assert match is not None
         sizes = [factor(match[3], "mm") * float(size) for size in match.groups()[:2] if size is not None]
-        area, across = _AREAS[match[4]](*sizes), _GYRATIONS.get(match[4])
-        square = math.nan if across is None else across(*sizes)
+        area, squared_radius = _AREAS[match[4]](*sizes), _GYRATIONS.get(match[4])
+        squared = math.nan if squared_radius is None else squared_radius(*sizes)
     except (AssertionError, TypeError, ValueError):
         raise InputError("section", section, f"a section, as {SECTIONS}", body) from None
     if not area > 0.0:
         raise InputError("section", section, "positive sizes, a wall of at most half the diameter", body)
-    if inertia not in INERTIAS or (inertia == "exact" and math.isnan(square)):
+    if inertia not in INERTIAS or (inertia == "exact" and math.isnan(squared)):
         allowed = f"{' or '.join(INERTIAS)}; how a rectangular section lies is not known, so it is slender"
         raise InputError("inertia", inertia, allowed, body)
-    member, dot, own = body.rpartition(".")
-    thick = math.sqrt(square) if inertia == "exact" else 0.0
-    values = 0.0, 1e-12 * DENSITIES[material] * area, thick
-    return {f"{member}{dot}{name}_{own}": x for name, x in zip(("m", "line_mass", "gyration"), values, strict=True)}
+    member, dot, plain = body.rpartition(".")
+    gyration = math.sqrt(squared) if inertia == "exact" else 0.0
+    values = 0.0, 1e-12 * DENSITIES[material] * area, gyration
+    return {f"{member}{dot}{name}_{plain}": x for name, x in zip(("m", "line_mass", "gyration"), values, strict=True)}

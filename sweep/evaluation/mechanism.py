@@ -66,15 +66,15 @@ class BoundDesign:
             an array like ``phi`` for each wanted name and ``status``, or a number each for one angle; ``pd.DataFrame``
             accepts it
         """
-        asked = asked_of_poses(self._precise, want)
-        angles, is_one = _angles(self.family.domain, phi)
+        request = asked_of_poses(self._precise, want)
+        angles, is_scalar = _angles(self.family.domain, phi)
         with np.errstate(all="ignore"):  # values beyond float64 get a status below
-            found = explained(
-                asked.family.poses(self._row(asked.family), angles, frozenset(asked.wanted)), asked.wanted
+            outputs = explained(
+                request.family.poses(self._row(request.family), angles, frozenset(request.wanted)), request.wanted
             )
-        if is_one:
-            return {name: found[name].item() for name in (*asked.wanted, "status")}
-        return {name: found[name][0] for name in (*asked.wanted, "status")}
+        if is_scalar:
+            return {name: outputs[name].item() for name in (*request.wanted, "status")}
+        return {name: outputs[name][0] for name in (*request.wanted, "status")}
 
     def outputs(
         self,
@@ -91,10 +91,10 @@ class BoundDesign:
         dict
             a number for each wanted name, with ``accuracy`` also ``err_<name>``, and ``status``
         """
-        asked = asked_of_designs(self.family, want)
+        request = asked_of_designs(self.family, want)
         chosen = chosen_accuracy(self.family.domain, samples, accuracy)
-        found = design_outputs(asked.family, self._row(asked.family), asked.wanted, chosen, window)
-        return {name: values.item() for name, values in found.items()}
+        outputs = design_outputs(request.family, self._row(request.family), request.wanted, chosen, window)
+        return {name: values.item() for name, values in outputs.items()}
 
     def with_(self, **dimensions: Number) -> BoundDesign:
         """Bind the same mechanism with some dimensions changed."""
@@ -178,11 +178,11 @@ def _is_number(given: object) -> TypeGuard[float]:
 def _value(name: str, p: Parameter, given: object, place: str) -> float:
     """Convert one dimension to its internal unit, with the checks of a table's column."""
     internal = internal_unit(p.unit)
-    said: Any = (
+    converted: Any = (
         one_value(given, internal, name, place) if isinstance(given, str) else plain(given, internal, name, place)
     )
-    if said is not given and _is_number(said):
-        value = float(said)
+    if converted is not given and _is_number(converted):
+        value = float(converted)
     elif _is_number(given):
         value = float(given)
         if p.unit == "angle" and not is_plausible(abs(value), stem(name) in TURNING):

@@ -107,10 +107,10 @@ def evaluate(
     made = head | {name: columns[name].ravel() for name in [*wanted, "status"]}
     if status_text:
         made["status_text"] = np.array(meanings(made["status"]), dtype=object)
-    own = pd.DataFrame(made, index=index, copy=False)  # the arrays are not shared
-    result = _beside(kept_columns(given, keep, made, len(matrix)), own, len(matrix), repeats)
-    result.attrs["units"] = {variable: mechanism.domain.unit, **units}
-    return result
+    result = pd.DataFrame(made, index=index, copy=False)  # the arrays are not shared
+    whole = _beside(kept_columns(given, keep, made, len(matrix)), result, len(matrix), repeats)
+    whole.attrs["units"] = {variable: mechanism.domain.unit, **units}
+    return whole
 
 
 class Question(NamedTuple):
@@ -128,16 +128,16 @@ def asked(
     """Make the request for pose or design outputs of a family; ``read`` returns the units of the names."""
     given = wanted_names(want, f"{kind} outputs of {family.name}")
     # Requests without loads are looked at once.
-    known: dict[tuple[str, ...], Question] = family.derived.setdefault(asked, {})
-    if (key := (kind, *given)) in known and not loads:
-        return known[key]
+    cache: dict[tuple[str, ...], Question] = family.derived.setdefault(asked, {})
+    if (key := (kind, *given)) in cache and not loads:
+        return cache[key]
     names = expanded(family, given, poses=kind == "pose")
     mechanism = extended(family, names, curves_of(family, loads))
     units = read(mechanism, names)
-    found = Question(mechanism, tuple(units), units)
+    request = Question(mechanism, tuple(units), units)
     if not loads:
-        known[key] = found
-    return found
+        cache[key] = request
+    return request
 
 
 def asked_of_poses(family: Family, want: str | Sequence[str], loads: Loads | None = None) -> Question:

@@ -67,12 +67,12 @@ def check_window(window: tuple[float, float] | None) -> None:
 
 def own_route(step: Step, stage: Stage, outputs: tuple[str, ...], accuracy: Accuracy) -> Route:
     """Make the route of a family's own step, or of a step of a chain's first stage."""
-    place = [own.name for own in steps_of(stage.family)].index(step.name)
+    position = [other.name for other in steps_of(stage.family)].index(step.name)
     run, cost = (
-        partial(_run_step, step, stage, _own_outputs(step, stage, outputs)),
+        partial(_run_step, step, stage, _step_outputs(step, stage, outputs)),
         step_ns(stage.family, step, accuracy),
     )
-    route = Route(step.name, outputs, cost, run, order=(step.work, place))
+    route = Route(step.name, outputs, cost, run, order=(step.work, position))
     if not stage.tail:
         return route
     return replace(route, name=f"stage {stage.tail}: {step.name}", columns=stage.columns.stop)
@@ -102,7 +102,7 @@ def _run_general(
             return limits_and_reductions(family, designs, outputs, accuracy, window)
 
 
-class _Own(NamedTuple):
+class _StepOutput(NamedTuple):
     """Output of a step: outer name, name in the stage, and the pose output whose precise maximum may replace it."""
 
     name: str
@@ -110,9 +110,12 @@ class _Own(NamedTuple):
     pose: str
 
 
-def _own_outputs(step: Step, stage: Stage, outputs: Sequence[str]) -> tuple[_Own, ...]:
+def _step_outputs(step: Step, stage: Stage, outputs: Sequence[str]) -> tuple[_StepOutput, ...]:
     plain = [at_stage(name, stage.tail) for name in outputs]
-    return tuple(_Own(name, own, _sharpened(stage.family, step, own)) for name, own in zip(outputs, plain, strict=True))
+    return tuple(
+        _StepOutput(name, inner, _sharpened(stage.family, step, inner))
+        for name, inner in zip(outputs, plain, strict=True)
+    )
 
 
 def _sharpened(family: Family, step: Step, name: str) -> str:
@@ -125,27 +128,27 @@ def _sharpened(family: Family, step: Step, name: str) -> str:
     place = f"{family.domain.name}_{name}"
     if not any(o.name == place for o in step.provides):
         return ""
-    asked = find(family, name)
-    return asked.of if isinstance(asked, Reduced) and asked.reduction.modes == (0,) else ""
+    quantity = find(family, name)
+    return quantity.of if isinstance(quantity, Reduced) and quantity.reduction.modes == (0,) else ""
 
 
 def _run_step(
-    step: Step, stage: Stage, outputs: tuple[_Own, ...], designs: Array, accuracy: Accuracy, window: Part
+    step: Step, stage: Stage, outputs: tuple[_StepOutput, ...], designs: Array, accuracy: Accuracy, window: Part
 ) -> Columns:
     part = stage.designs(designs)
-    found = step.run(part, frozenset(own.plain for own in outputs), accuracy)
+    results = step.run(part, frozenset(output.plain for output in outputs), accuracy)
     if accuracy.target is not None:
         for _, plain, pose in outputs:
-            if error_of(plain) not in found:  # a step either meets the target, or gives its own error
-                found[error_of(plain)] = accuracy.target * np.abs(np.asarray(found[plain], np.float64))
+            if error_of(plain) not in results:  # a step either meets the target, or gives its own error
+                results[error_of(plain)] = accuracy.target * np.abs(np.asarray(results[plain], np.float64))
             # Rounding may have left a maximum less accurate than the target.
             if pose and not accuracy.certify:
-                sharpen_maxima(stage.family, step, part, pose, plain, found, accuracy.target)
-    columns: Columns = {"status": found["status"]}
+                sharpen_maxima(stage.family, step, part, pose, plain, results, accuracy.target)
+    columns: Columns = {"status": results["status"]}
     for name, plain, _ in outputs:
-        columns[name] = found[plain]
-        if error_of(plain) in found:
-            columns[error_of(name)] = found[error_of(plain)]
+        columns[name] = results[plain]
+        if error_of(plain) in results:
+            columns[error_of(name)] = results[error_of(plain)]
     return columns
 
 
@@ -172,10 +175,10 @@ def extent(box: Box, designs: Array, found: Columns) -> Composed:
     still = [np.asarray(piece(designs), np.float64) for piece in box.still]
     ends = []
     errors: Array = np.zeros(len(designs))
-    for which, take in ((0, np.maximum), (1, np.minimum)):
+    for which, extremum in ((0, np.maximum), (1, np.minimum)):
         names = [pair[which] for pair in box.reductions]
         values = floats(found, *names)
-        ends.append(take.reduce([*values, *still]))  # nan where a joint's extremum is nan: its status says why
+        ends.append(extremum.reduce([*values, *still]))  # nan where a joint's extremum is nan: its status says why
         errors = errors + np.maximum.reduce([_error(found, name) for name in names])
     errors = errors + 4.0 * ROUNDING * np.maximum(np.abs(ends[0]), np.abs(ends[1]))
     return ends[0] - ends[1], errors, found["status"]
@@ -193,11 +196,11 @@ def value_at(machine: Machine, reading: EventValue, designs: Array, found: Colum
     """Compute a pose output at a crank angle of each design; the angle's error times the slope adds to its error."""
     place = reading.places[0]
     phi = np.asarray(found[place], np.float64)
-    known = np.isfinite(phi)
-    near = np.where(known, phi, 0.0)[:, None] + SLOPE * np.array([0.0, -1.0, 1.0])
-    poses, at = pose_columns(machine, designs, near, [reading.of.name])
-    values = np.where(known[:, None], poses[reading.of.name], np.nan)
-    status = np.where(found["status"] == st.OK, at[:, 0], found["status"]).astype(np.uint8)
+    finite = np.isfinite(phi)
+    near = np.where(finite, phi, 0.0)[:, None] + SLOPE * np.array([0.0, -1.0, 1.0])
+    poses, pose_status = pose_columns(machine, designs, near, [reading.of.name])
+    values = np.where(finite[:, None], poses[reading.of.name], np.nan)
+    status = np.where(found["status"] == st.OK, pose_status[:, 0], found["status"]).astype(np.uint8)
     slope = np.abs(values[:, 2] - values[:, 1]) / (2.0 * SLOPE)
-    rounded = shaken(machine, designs, near[:, 0], reading.of.name) + 4.0 * ROUNDING * np.abs(values[:, 0])
-    return np.where(status == st.OK, values[:, 0], np.nan), slope * _error(found, place) + rounded, status
+    rounding = shaken(machine, designs, near[:, 0], reading.of.name) + 4.0 * ROUNDING * np.abs(values[:, 0])
+    return np.where(status == st.OK, values[:, 0], np.nan), slope * _error(found, place) + rounding, status

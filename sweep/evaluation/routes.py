@@ -78,49 +78,51 @@ def design_outputs(
     status = np.zeros(n, np.uint8)
     columns: Columns = {}
     turns = not isinstance(family.domain, Interval)
-    ways = routes(family, wanted, accuracy)
+    selected = routes(family, wanted, accuracy)
     # Refinement detects a dead point between samples, a plain grid does not.
-    known = accuracy.samples is None or any(route.general == "margin" for route in ways) or not margin_suffixes(family)
+    rotation_known = (
+        accuracy.samples is None or any(step.general == "margin" for step in selected) or not margin_suffixes(family)
+    )
     with np.errstate(all="ignore"):  # values beyond float64 get a status below
-        for route in ways:
-            assert route.run is not None
-            if route.general and not known:  # quicker outputs such as the margin are computed by now
-                status, known = np.where(status == st.OK, _turning(family, designs, accuracy), status), True
+        for step in selected:
+            assert step.run is not None
+            if step.general and not rotation_known:  # quicker outputs such as the margin are computed by now
+                status, rotation_known = np.where(status == st.OK, _turning(family, designs, accuracy), status), True
             # A follower that turns fully lacks limit positions or a dwell, but has extrema; one that jams still moves.
             alive = np.flatnonzero(GOES_ON[status]) if status.any() else None  # None means all
-            of_these = designs if alive is None or alive.size == n else designs[alive]
-            found = route.run(of_these, accuracy, window)
-            for name in with_errors(route.outputs, accuracy):
-                columns[name] = _spread(found[name], alive, n)
+            rows = designs if alive is None or alive.size == n else designs[alive]
+            results = step.run(rows, accuracy, window)
+            for name in with_errors(step.outputs, accuracy):
+                columns[name] = _spread(results[name], alive, n)
                 if turns and is_place(name):  # np.mod returns 2 pi for a tiny negative angle
                     columns[name] = np.where(columns[name] == TWO_PI, 0.0, columns[name])
-            now = found["status"].astype(np.uint8)
+            step_status = results["status"].astype(np.uint8)
             if alive is None:
-                status = now
+                status = step_status
             else:
-                status[alive] = np.where(status[alive] == st.OK, now, status[alive])
+                status[alive] = np.where(status[alive] == st.OK, step_status, status[alive])
         if not turns:
             status[status == st.NOT_ROTATABLE] = st.NOT_ASSEMBLED  # an interval has no turning crank
-        chosen = {name: columns[name] for name in with_errors(wanted, accuracy)}
-        return explained(chosen | {"status": status}, dict.fromkeys(wanted))
+        asked_for = {name: columns[name] for name in with_errors(wanted, accuracy)}
+        return explained(asked_for | {"status": status}, dict.fromkeys(wanted))
 
 
 def _turning(family: Family, designs: Array, accuracy: Accuracy) -> Status:
     """Status of the margin; that of a machine comes from its members' own steps."""
     if isinstance(family, Machine):
-        found = _margins(family, designs, accuracy, None)
+        results = _margins(family, designs, accuracy, None)
     else:
-        found = margin_group(family, designs, (), accuracy)
-    return found["status"].astype(np.uint8)
+        results = margin_group(family, designs, (), accuracy)
+    return results["status"].astype(np.uint8)
 
 
 def _spread(values: NDArray[np.generic], rows: Index | None, n: int) -> NDArray[np.generic]:
     """Expand values of some rows, or of all, to a whole column; False or nan in the other rows."""
     if rows is None or rows.size == n:
         return values
-    whole: NDArray[np.generic] = np.zeros(n, np.bool_) if values.dtype == np.bool_ else np.full(n, np.nan)
-    whole[rows] = values
-    return whole
+    column: NDArray[np.generic] = np.zeros(n, np.bool_) if values.dtype == np.bool_ else np.full(n, np.nan)
+    column[rows] = values
+    return column
 
 
 def with_errors(wanted: Sequence[str], accuracy: Accuracy) -> list[str]:
@@ -154,30 +156,33 @@ def _routes(family: Family, wanted: Sequence[str], accuracy: Accuracy, windowed:
     if isinstance(family.domain, March) and accuracy.target is not None:
         allowed = "samples=: a pose depends on those before it, so values exist on the grid that is marched only"
         raise InputError("accuracy", accuracy.target, allowed, f"design outputs of {family.name}")
-    asked = {name: resolve(family, name) for name in dict.fromkeys(wanted)}
-    found: list[Route] = []
+    quantities = {name: resolve(family, name) for name in dict.fromkeys(wanted)}
+    selected: list[Route] = []
     if isinstance(family, Machine):
-        found, asked = _of_members(family, asked, accuracy, windowed)
-    own = {name: applying_step(family, name, accuracy) for name in asked}
+        selected, quantities = _of_members(family, quantities, accuracy, windowed)
+    own_steps = {name: applying_step(family, name, accuracy) for name in quantities}
     # The margin of a whole chain needs all stages: the first stage alone would reject designs before the others.
-    together = any(own[name] is None and isinstance(one, Margin) and not one.stage for name, one in asked.items())
+    chain_margin = any(
+        own_steps[name] is None and isinstance(quantity, Margin) and not quantity.stage
+        for name, quantity in quantities.items()
+    )
     steps: dict[tuple[str, int], tuple[Step, Stage, list[str]]] = {}
     groups: dict[tuple[Group, str], list[str]] = {}
-    for name, one in asked.items():
-        step, group = own[name], group_of(family, one)
-        if isinstance(one, Negative | Extent | TimingOf):
-            found.append(_composed(family, one, accuracy, windowed))
-        elif step is not None and not (together and group == "margin"):
+    for name, quantity in quantities.items():
+        step, group = own_steps[name], group_of(family, quantity)
+        if isinstance(quantity, Negative | Extent | TimingOf):
+            selected.append(_composed(family, quantity, accuracy, windowed))
+        elif step is not None and not (chain_margin and group == "margin"):
             steps.setdefault((step[0].name, step[1].number), (*step, []))[2].append(name)
         elif group is not None:
             # Each effect by itself: one that jams or leaves its range does not affect the others.
-            effect = beyond_motion(family, one.of).name
+            effect = beyond_motion(family, quantity.of).name
             groups.setdefault((group, effect), []).append(name)
         else:
             raise _unserved(family, name, accuracy)
-    found += [own_route(step, stage, tuple(names), accuracy) for step, stage, names in steps.values()]
-    found += [general_route(family, *key, tuple(names), accuracy, windowed) for key, names in groups.items()]
-    return tuple(sorted(found, key=lambda route: (*route.order, route.name)))
+    selected += [own_route(step, stage, tuple(names), accuracy) for step, stage, names in steps.values()]
+    selected += [general_route(family, *key, tuple(names), accuracy, windowed) for key, names in groups.items()]
+    return tuple(sorted(selected, key=lambda chosen: (*chosen.order, chosen.name)))
 
 
 def _unserved(family: Family, name: str, accuracy: Accuracy) -> InputError:
@@ -190,96 +195,96 @@ def _unserved(family: Family, name: str, accuracy: Accuracy) -> InputError:
     return InputError("output", name, allowed, f"design outputs of {family.name}")
 
 
-def _composed(family: Family, asked: Negative | Extent | TimingOf, accuracy: Accuracy, windowed: bool) -> Route:
+def _composed(family: Family, quantity: Negative | Extent | TimingOf, accuracy: Accuracy, windowed: bool) -> Route:
     """Make the route of a composed output; its time is that of the outputs it is composed of."""
-    name, least = asked.output.name, (Work.SEARCH, 0)
-    of: Sequence[str]
+    name, lowest = quantity.output.name, (Work.SEARCH, 0)
+    operands: Sequence[str]
     compose: Compose
-    match asked:
+    match quantity:
         case Negative(inner=inner):
-            of = (inner.output.name,)
-            title, compose = f"negative of {of[0]}", partial(route.negative, of[0])
+            operands = (inner.output.name,)
+            title, compose = f"negative of {operands[0]}", partial(route.negative, operands[0])
         case Extent(box=box):
-            of, title, compose = box.asked, f"box {name}", partial(route.extent, box)
+            operands, title, compose = box.asked, f"box {name}", partial(route.extent, box)
         case TimingOf(timing=timing):
             # each place of a timing is a search of its own
-            of, least = timing.places, (Work.LONG, 0)
+            operands, lowest = timing.places, (Work.LONG, 0)
             if isinstance(timing, EventValue):
                 assert isinstance(family, Machine)
                 title, compose = f"value {name}", partial(route.value_at, family, timing)
             else:
                 title, compose = f"timing {name}", partial(route.difference, timing)
-    parts = routes(family, of, accuracy, windowed)
-    cost = sum(route.ns_per_design for route in parts)
+    components = routes(family, operands, accuracy, windowed)
+    cost = sum(component.ns_per_design for component in components)
     # Not before the outputs it is composed of: the margin of non-rotatable designs would be left out.
-    order = max([least, *(route.order for route in parts)])
-    whole = isinstance(asked, Extent)  # an extent is about the whole motion; the window is for deviations only
-    return Route(title, (name,), cost, partial(_run_composed, family, name, of, compose, whole), order=order)
+    order = max([lowest, *(component.order for component in components)])
+    whole_turn = isinstance(quantity, Extent)  # an extent is about the whole motion; the window is for deviations only
+    return Route(title, (name,), cost, partial(_run_composed, family, name, operands, compose, whole_turn), order=order)
 
 
 def _run_composed(
-    family: Family, name: str, of: Sequence[str], compose: Compose, whole: bool,
+    family: Family, name: str, operands: Sequence[str], compose: Compose, whole_turn: bool,
     designs: Array, accuracy: Accuracy, window: Part,
 ) -> Columns:  # fmt: skip
-    found = design_outputs(family, designs, of, accuracy, None if whole else window)
-    value, error, status = compose(designs, found)
+    columns = design_outputs(family, designs, operands, accuracy, None if whole_turn else window)
+    value, error, status = compose(designs, columns)
     return {name: value, error_of(name): error, "status": status}
 
 
 def _of_members(
-    machine: Machine, asked: dict[str, Quantity], accuracy: Accuracy, windowed: bool
+    machine: Machine, quantities: dict[str, Quantity], accuracy: Accuracy, windowed: bool
 ) -> tuple[list[Route], dict[str, Quantity]]:
     """Make the routes of single members and of the machine's margins; also return the remaining quantities.
 
     A member that the main shaft drives turn by turn is computed alone, by its own exact routes; only quantities that
     depend on several members, or on a gear between them, are searched for on the poses of the whole machine.
     """
-    left: dict[str, Quantity] = {}
-    own: dict[str, list[str]] = {m.name: [] for m in machine.members}
+    remaining: dict[str, Quantity] = {}
+    outputs_of: dict[str, list[str]] = {m.name: [] for m in machine.members}
     margin: list[str] = []
-    for name, one in asked.items():
+    for name, quantity in quantities.items():
         member = machine.split(name)
-        free = isinstance(one, LargestLength)  # independent of the member's drive
-        if member is not None and (free or (member[0].alone and not _is_of_point(member[0], one))):
-            own[member[0].name].append(member[1])
-        elif isinstance(one, Margin) and member is None:
+        independent = isinstance(quantity, LargestLength)  # independent of the member's drive
+        if member is not None and (independent or (member[0].alone and not _is_of_point(member[0], quantity))):
+            outputs_of[member[0].name].append(member[1])
+        elif isinstance(quantity, Margin) and member is None:
             margin.append(name)
         else:
-            left[name] = one
-    found: list[Route] = []
+            remaining[name] = quantity
+    selected: list[Route] = []
     for m in machine.members:
-        for inner in routes(m.family, own[m.name], accuracy, windowed):
+        for inner in routes(m.family, outputs_of[m.name], accuracy, windowed):
             names = tuple(f"{m.name}.{name}" for name in inner.outputs)
             run = partial(_of_member, m, inner)
-            found.append(Route(f"{m.name}: {inner.name}", names, inner.ns_per_design, run, order=inner.order))
+            selected.append(Route(f"{m.name}: {inner.name}", names, inner.ns_per_design, run, order=inner.order))
     if margin:
         cost = sum(group_ns(m.family, "margin", (), accuracy) for m in machine.members)
-        found.append(Route("margins", tuple(margin), cost, partial(_margins, machine), order=(Work.QUICK, 0)))
-    return found, left
+        selected.append(Route("margins", tuple(margin), cost, partial(_margins, machine), order=(Work.QUICK, 0)))
+    return selected, remaining
 
 
-def _is_of_point(member: Member, asked: Quantity) -> bool:
+def _is_of_point(member: Member, quantity: Quantity) -> bool:
     """Whether a quantity belongs to a point in the machine's frame, which the member alone does not know."""
-    return bool(asked.of) and member.own(asked.of) not in member.family.pose_output
+    return bool(quantity.of) and member.own(quantity.of) not in member.family.pose_output
 
 
 def _by_itself(m: Member, outputs: Sequence[str], designs: Array, accuracy: Accuracy, window: Part) -> Columns:
     """Compute outputs of a member's family; only once where the member is the same in all designs."""
-    own = m.designs(designs)
-    once = len(own) > 1 and bool((own[1:] == own[0]).all())
-    found = design_outputs(m.family, own[:1] if once else own, outputs, accuracy, window)
-    return {name: np.repeat(values, len(own)) for name, values in found.items()} if once else found
+    member_designs = m.designs(designs)
+    identical = len(member_designs) > 1 and bool((member_designs[1:] == member_designs[0]).all())
+    columns = design_outputs(m.family, member_designs[:1] if identical else member_designs, outputs, accuracy, window)
+    return {name: np.repeat(values, len(member_designs)) for name, values in columns.items()} if identical else columns
 
 
 def _of_member(m: Member, inner: Route, designs: Array, accuracy: Accuracy, window: Part) -> Columns:
     """Run a member's own route, and rename its outputs for the machine."""
-    found, phase = _by_itself(m, inner.outputs, designs, accuracy, window), m.phase(designs)
-    columns: Columns = {"status": found["status"]}
+    results, phase = _by_itself(m, inner.outputs, designs, accuracy, window), m.phase(designs)
+    columns: Columns = {"status": results["status"]}
     for name in inner.outputs:
         dotted = f"{m.name}.{name}"
-        columns[dotted] = found[name]
+        columns[dotted] = results[name]
         if accuracy.target is not None:
-            columns[error_of(dotted)] = found[error_of(name)]
+            columns[error_of(dotted)] = results[error_of(name)]
     for name in filter(is_place, inner.outputs):  # from the member's crank to the main shaft
         at_crank = np.asarray(columns[f"{m.name}.{name}"], np.float64)
         columns[f"{m.name}.{name}"] = np.mod(at_crank - phase, TWO_PI)
@@ -296,16 +301,16 @@ def _margins(machine: Machine, designs: Array, accuracy: Accuracy, window: Part)
         if not loops:
             continue
         if m.driver is None:  # its crank turns fully with any gear ratio
-            found = _by_itself(m, MARGINS, designs, accuracy, None)
-            now, none = found["status"], np.zeros(len(designs))
+            results = _by_itself(m, MARGINS, designs, accuracy, None)
+            member_status, zeros = results["status"], np.zeros(len(designs))
             for name in MARGINS:
-                columns[f"{name}{m.name}"] = found[name]
-                columns[f"{error_of(name)}{m.name}"] = found.get(error_of(name), none)
+                columns[f"{name}{m.name}"] = results[name]
+                columns[f"{error_of(name)}{m.name}"] = results.get(error_of(name), zeros)
             suffixes.append(m.name)
         else:
-            found = margins(machine, designs, loops, accuracy)
-            now = found.pop("status")
-            columns |= found
+            results = margins(machine, designs, loops, accuracy)
+            member_status = results.pop("status")
+            columns |= results
             suffixes += loops
-        status = np.where(status == st.OK, now, status).astype(np.uint8)
+        status = np.where(status == st.OK, member_status, status).astype(np.uint8)
     return with_transmission(combined(columns, tuple(suffixes)), ("",)) | {"status": status}

@@ -116,14 +116,17 @@ def summarise(
     table = in_radians(mechanism, table, angles, others)
     matrix, _ = design_matrix(mechanism, table, unused=others)
     columns = design_outputs(mechanism, matrix, wanted, chosen, window)
-    made: dict[str, Any] = {name: columns[name] for name in (*with_errors(wanted, chosen), "status")}
+    computed: dict[str, Any] = {name: columns[name] for name in (*with_errors(wanted, chosen), "status")}
     if status_text:
-        made["status_text"] = np.array(meanings(columns["status"]), dtype=object)
+        computed["status_text"] = np.array(meanings(columns["status"]), dtype=object)
     index = given.index if isinstance(given, pd.DataFrame) else None
-    kept = kept_columns(given, keep, made, len(matrix))
-    found = pd.DataFrame(kept | made, index=index, copy=bool(kept))  # the arrays made here are not shared
-    found.attrs["units"] = {**units, **{error_of(name): unit for name, unit in units.items() if error_of(name) in made}}
-    return found
+    repeated = kept_columns(given, keep, computed, len(matrix))
+    result = pd.DataFrame(repeated | computed, index=index, copy=bool(repeated))  # the arrays made here are not shared
+    result.attrs["units"] = {
+        **units,
+        **{error_of(name): unit for name, unit in units.items() if error_of(name) in computed},
+    }
+    return result
 
 
 def asked_of_designs(family: Family, want: str | Sequence[str], loads: Loads | None = None) -> Question:

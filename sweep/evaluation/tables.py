@@ -73,8 +73,8 @@ def design_matrix(
             if guess:
                 raise InputError("column", name, f"the columns {', '.join(known)}{guess}", "table")
     columns = {name: numbers(table[key], name, f"column {name}, row") for name, key in keys.items() if name in known}
-    beside = {name: np.asarray(table[key]) for name, key in keys.items() if name in unused and name not in columns}
-    rows = _row_count(columns | beside)
+    unread = {name: np.asarray(table[key]) for name, key in keys.items() if name in unused and name not in columns}
+    rows = _row_count(columns | unread)
     matrix = np.empty((rows, len(family.parameters)))
     for k, parameter in enumerate(family.parameters):
         matrix[:, k] = _checked_column(family, parameter, columns, keys)
@@ -106,8 +106,8 @@ def plain_columns(table: Table) -> Table:
     if not isinstance(table, pd.DataFrame) or not table.columns.is_unique:
         return table
     columns: dict[Any, Any] = {}
-    if len(table) <= FEW and (whole := table.to_numpy()).dtype.kind in "fiu":
-        return dict(zip(table.columns, whole.T, strict=True))
+    if len(table) <= FEW and (block := table.to_numpy()).dtype.kind in "fiu":
+        return dict(zip(table.columns, block.T, strict=True))
     for name, values in table.items():
         plain = isinstance(values.dtype, np.dtype) and values.dtype.kind in "fiu"
         columns[name] = values.to_numpy() if plain else values
@@ -240,9 +240,9 @@ def numbers(values: object, name: str, place: str) -> Array:
     InputError
         for the first value that is not a number, with its place
     """
-    found = _converted(values)
-    if found is not None:
-        return found
+    array = _converted(values)
+    if array is not None:
+        return array
     rows = _entries(values)
     kind = getattr(getattr(values, "dtype", None), "kind", "")
     row = next((k for k, value in enumerate(rows) if kind in ("m", "M", "c") or not _is_number(value)), 0)

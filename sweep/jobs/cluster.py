@@ -51,10 +51,10 @@ class Dask:
 
     def __exit__(self, *_: object) -> None:
         client, cluster, self._client, self._cluster = self._client, self._cluster, None, None
-        for one in (client, cluster):
-            if one is not None:
+        for resource in (client, cluster):
+            if resource is not None:
                 with suppress(TimeoutError):  # workers of this machine end with this process at the latest
-                    one.close(timeout=CLOSE_SECONDS)
+                    resource.close(timeout=CLOSE_SECONDS)
 
     def outcomes(self, task: Task[T], numbers: Iterator[int], jobs: int, stop: Stop) -> Iterator[T]:
         """Yield results as `Executor.outcomes` does; a cluster at an address gets a task per thread, and one more."""
@@ -115,16 +115,16 @@ def _at_worker(task: Task[T], number: int, name: str) -> T:
     worker = get_worker()
     key = worker.get_current_task()
     flag = Event(name, worker.client)
-    asked, told = -math.inf, False
+    queried, stopped = -math.inf, False
 
     def should_stop() -> bool:
-        nonlocal asked, told
-        if not told and time.monotonic() - asked > ASK_SECONDS:
-            own = worker.state.tasks.get(key)
-            lost = own is None or own.state == "cancelled"  # nobody waits for the result any more
-            told = lost or flag.is_set()
-            asked = time.monotonic()
-        return told
+        nonlocal queried, stopped
+        if not stopped and time.monotonic() - queried > ASK_SECONDS:
+            state = worker.state.tasks.get(key)
+            lost = state is None or state.state == "cancelled"  # nobody waits for the result any more
+            stopped = lost or flag.is_set()
+            queried = time.monotonic()
+        return stopped
 
     return task(number, should_stop)
 
@@ -144,14 +144,14 @@ def _flow(
     jobs : returns the present number of workers
     """
     waiting: set[Future[T]] = set()
-    late = math.inf
+    deadline = math.inf
     while True:
         while not stop and len(waiting) <= jobs() and (number := next(numbers, None)) is not None:
             waiting.add(submit(number))
-        if not waiting or time.monotonic() > late:
+        if not waiting or time.monotonic() > deadline:
             return
         done, waiting = wait(waiting, timeout=POLL, return_when=FIRST_COMPLETED)
         for future in done:
             yield future.result()
-        if stop and late == math.inf:
-            late = time.monotonic() + GRACE
+        if stop and deadline == math.inf:
+            deadline = time.monotonic() + GRACE

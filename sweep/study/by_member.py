@@ -37,16 +37,16 @@ def studies_of_members(study: Study, name: str) -> dict[str, dict[str, Any]]:
         raise InputError(
             "--from-cyclogram", study.name, "a study of a machine with a table [cyclogram]", "command line"
         )
-    found: dict[str, dict[str, Any]] = {}
-    kept: list[str] = []
-    before: Family | None = None
+    studies: dict[str, dict[str, Any]] = {}
+    members: list[str] = []
+    previous: Family | None = None
     for member in order_of_design(spec, machine):
-        last = f"{name}-{kept[-1]}" if kept else None
-        kept.append(member)
-        part, known = _within(spec, kept)
-        found[f"{name}-{member}"] = _tables(study, known, part, before, f"{name}-{member}", last)
-        before = part
-    return found
+        last = f"{name}-{members[-1]}" if members else None
+        members.append(member)
+        part, known = _within(spec, members)
+        studies[f"{name}-{member}"] = _tables(study, known, part, previous, f"{name}-{member}", last)
+        previous = part
+    return studies
 
 
 def order_of_design(spec: Specification, machine: Machine) -> list[str]:
@@ -56,9 +56,9 @@ def order_of_design(spec: Specification, machine: Machine) -> list[str]:
     taking = {tool for _, table in spec.relations for tool in dict(table).get("take", ())}
 
     def rank(member: str) -> int:
-        own = [name for name, carrier in carriers.items() if carrier == member]
-        if own:
-            return 0 if any("line" in tools[one] for one in own) else 1 if taking.intersection(own) else 2
+        carried = [name for name, carrier in carriers.items() if carrier == member]
+        if carried:
+            return 0 if any("line" in tools[one] for one in carried) else 1 if taking.intersection(carried) else 2
         return 3 if machine.member(member).family.find(ThreadPath) is None else 4
 
     return sorted((m.name for m in machine.members), key=rank)
@@ -68,77 +68,83 @@ def _within(spec: Specification, kept: list[str]) -> tuple[Family, set[str]]:
     """Return the machine of the ``kept`` members, with every relation it can hold, and the names of all its parts."""
     members = tuple((name, table) for name, table in spec.members if name in kept)
     tools = tuple((n, t) for n, t in spec.tools if str(dict(t).get("on", kept[0])).partition(".")[0] in kept)
-    part = replace(spec, members=members, tools=tools, relations=())
-    machine = find_family(part)
+    built = replace(spec, members=members, tools=tools, relations=())
+    machine = find_family(built)
     # An event may refer to a relation and a thread to events: repeat until no further relation fits.
-    left = list(spec.relations)
+    remaining = list(spec.relations)
     while True:
-        now = [one for one in left if (more := _fits(part, one)) is not None and (part := more)]
-        if not now:
+        fitting = [
+            relation
+            for relation in remaining
+            if (extended := _fits(built, relation)) is not None and (built := extended)
+        ]
+        if not fitting:
             break
-        left = [one for one in left if one not in now]
-        machine = find_family(part)
-    return machine, {name for names in (members, tools, part.relations) for name, _ in names}
+        remaining = [relation for relation in remaining if relation not in fitting]
+        machine = find_family(built)
+    return machine, {name for names in (members, tools, built.relations) for name, _ in names}
 
 
 def _fits(part: Specification, relation: tuple[str, Any]) -> Specification | None:
-    more = replace(part, relations=(*part.relations, relation))
+    extended = replace(part, relations=(*part.relations, relation))
     try:
-        machine = find_family(more)
+        machine = find_family(extended)
     except InputError:
         return None
     places = [place for timing in getattr(machine, "timings", ()) for place in timing.places]
-    return more if all(_has(machine, place) for place in places) else None
+    return extended if all(_has(machine, place) for place in places) else None
 
 
 def _tables(
-    study: Study, known: set[str], part: Family, before: Family | None, name: str, last: str | None
+    study: Study, known: set[str], part: Family, previous: Family | None, name: str, last: str | None
 ) -> dict[str, Any]:
     """Return the study of the last member in ``known``: its dimensions, and the limits that involve it."""
     data, member = study.data, name.rpartition("-")[2]
 
     def new(output_name: str) -> bool:
-        return _has(part, output_name) and not (before is not None and _has(before, output_name))
+        return _has(part, output_name) and not (previous is not None and _has(previous, output_name))
 
-    found: dict[str, Any] = {"study": {"name": name, "title": f"{study.title}: {member}"}}
+    tables: dict[str, Any] = {"study": {"name": name, "title": f"{study.title}: {member}"}}
     for table in BY_NAME:
         entries = {key: entry for key, entry in data.get(table, {}).items() if key in known}
         if table == "relations":  # already limits of an earlier member
-            old = {r.name for r in getattr(before, "relations", ())}
-            entries = {k: {x: y for x, y in e.items() if x != "settings" or k not in old} for k, e in entries.items()}
+            earlier = {r.name for r in getattr(previous, "relations", ())}
+            entries = {
+                k: {x: y for x, y in e.items() if x != "settings" or k not in earlier} for k, e in entries.items()
+            }
         if table == "cyclogram":
             entries = {k: entry for k, entry in entries.items() if k == member or new(f"phi_{k}")}
-        found |= {table: entries} if entries else {}
-    own = {key: x for key, x in data["design"].items() if key == "sample" or key in part.parameter_names}
-    if before is not None:
-        own = {"from": last} | {key: x for key, x in own.items() if key not in before.parameter_names}
+        tables |= {table: entries} if entries else {}
+    design = {key: x for key, x in data["design"].items() if key == "sample" or key in part.parameter_names}
+    if previous is not None:
+        design = {"from": last} | {key: x for key, x in design.items() if key not in previous.parameter_names}
     goal = study.objective.output if study.objective is not None else ""
     if not new(goal) and isinstance(part, Machine):
         position = f"{member}.{part.member(member).family.position}"
         goal = f"{member}.max_abs_{part.derivative_of[part.derivative_of[position]].partition('.')[2]}"
-    varied = any(isinstance(x, dict) and "value" not in x for key, x in own.items() if key != "sample")
+    varied = any(isinstance(x, dict) and "value" not in x for key, x in design.items() if key != "sample")
     if not varied:  # All its dimensions are fixed: compute the goal as a wanted output.
-        own.pop("sample", None)
+        design.pop("sample", None)
     wanted = [x for x in data.get("scene", {}).get("want", ()) if new(x)]
-    found["scene"] = data.get("scene", {}) | {"want": wanted if varied else [*wanted, goal]}
-    found["design"] = _by_member(own, member)
+    tables["scene"] = data.get("scene", {}) | {"want": wanted if varied else [*wanted, goal]}
+    tables["design"] = _by_member(design, member)
     limits = {key: x for key, x in data.get("limits", {}).items() if new(key)}
-    found |= {"limits": _by_member(limits, member)} if limits else {}
-    found |= {"objective": {"minimise": goal}} if varied else {}
+    tables |= {"limits": _by_member(limits, member)} if limits else {}
+    tables |= {"objective": {"minimise": goal}} if varied else {}
     if isinstance(part, Machine) and any(isinstance(r, Shaking | ShaftTorque) for r in part.relations):
         bodies = data.get("bodies", {})
         for m in part.members:
             bodies = _by_member(bodies, m.name)
-        found["bodies"] = {name: entries for name, entries in bodies.items() if name in known}
-    kept = ("accuracy", "optimise") if varied else ("accuracy",)
-    return found | {key: data[key] for key in kept if key in data}
+        tables["bodies"] = {name: entries for name, entries in bodies.items() if name in known}
+    copied = ("accuracy", "optimise") if varied else ("accuracy",)
+    return tables | {key: data[key] for key in copied if key in data}
 
 
 def _by_member(entries: dict[str, Any], member: str) -> dict[str, Any]:
     """Move the dotted names of a member into a table of its own."""
-    own = {key.removeprefix(f"{member}."): x for key, x in entries.items() if key.startswith(f"{member}.")}
+    of_member = {key.removeprefix(f"{member}."): x for key, x in entries.items() if key.startswith(f"{member}.")}
     others = {key: x for key, x in entries.items() if not key.startswith(f"{member}.")}
-    return others | ({member: own} if own else {})
+    return others | ({member: of_member} if of_member else {})
 
 
 def _has(family: Family, name: str) -> bool:

@@ -26,17 +26,17 @@ class StrokeSection(Section):
 
 def limits_of_cyclogram(file: StudyFile, family: Family) -> list[Limit]:
     """Return the limits that the windows of events and strokes stand for, in internal units."""
-    found, members = [], {name.partition(".")[0] for name in family.parameter_names if "." in name}
+    limits, members = [], {name.partition(".")[0] for name in family.parameter_names if "." in name}
     for name, entry in (file.free_table("cyclogram") or {}).items():
         key: Key = ("cyclogram", name)
         if name not in members:
-            found += _window(file.faults, family, f"phi_{name}", entry, key)
+            limits += _window(file.faults, family, f"phi_{name}", entry, key)
             continue
         section = read_section(StrokeSection, entry, key, file.faults)
-        for what, asked in section.model_dump(exclude_none=True).items():
+        for what, window in section.model_dump(exclude_none=True).items():
             output = f"{name}.{ENDS[what]}" if what in ENDS else _size(family, name)
-            found += _window(file.faults, family, output, asked, (*key, what))
-    return found
+            limits += _window(file.faults, family, output, window, (*key, what))
+    return limits
 
 
 def _size(family: Family, member: str) -> str:

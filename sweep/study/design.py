@@ -72,26 +72,26 @@ def read_space(file: StudyFile, family: Family, other: Elsewhere) -> DesignSpace
     sample = read_section(SampleTable, raw["sample"], ("design", "sample"), faults) if "sample" in raw else None
     _check_names(family, raw, ("design",), faults, (*other.fitted, *other.given, *other.made), other.tables)
     _check_needless(raw, other, faults)
-    found: dict[str, Entry] = dict(other.prescribed)
+    entries: dict[str, Entry] = dict(other.prescribed)
     for name in [name for name in raw if name in family.parameter_names]:
         parameter = next(p for p in family.parameters if p.name == name)
         key = (other.tables.get(name, "design"), name)
         entry = read_entry(parameter, raw[name], key, faults, sampled=sample is not None)
         if entry is not None:
-            found[name] = entry
-    axes = tuple(entry for entry in found.values() if isinstance(entry, Axis))
-    own = [p for p in family.parameters if p.name not in other.made]
-    left_out = {p.name: p.left_out(found) for p in own if p.name not in found}
+            entries[name] = entry
+    axes = tuple(entry for entry in entries.values() if isinstance(entry, Axis))
+    parameters = [p for p in family.parameters if p.name not in other.made]
+    left_out = {p.name: p.left_out(entries) for p in parameters if p.name not in entries}
     fixed = {name: value for name, value in left_out.items() if value is not None}
-    fixed |= {name: 0.0 for name in other.fitted if name not in found} | dict(other.given)
-    fixed |= {name: entry for name, entry in found.items() if not isinstance(entry, Axis)}
+    fixed |= {name: 0.0 for name in other.fitted if name not in entries} | dict(other.given)
+    fixed |= {name: entry for name, entry in entries.items() if not isinstance(entry, Axis)}
     if sample is None and (count := math.prod(axis.count for axis in axes)) > MOST_DESIGNS:
         faults.value(("design",), count, f"at most {MOST_DESIGNS:.0e} designs; take fewer values or design.sample")
     if sample is not None and len(faults.lines) == before and not 1 <= len(axes) <= DIMENSIONS:
         faults.value(("design", "sample"), f"{len(axes)} swept parameters", f"1 to {DIMENSIONS} with from and to")
     if len(faults.lines) > before:
         return None
-    names = (*other.prescribed, *(p.name for p in own))
+    names = (*other.prescribed, *(p.name for p in parameters))
     if sample is None:
         return DesignSpace(names, axes, fixed)
     return DesignSpace(names, axes, fixed, "sobol", sample.n or 0, sample.seed)
@@ -123,22 +123,24 @@ def read_reference(
     if raw is None:
         return None
     key: Key = ("reference", "design")
-    own = (*bare.parameter_names, *other.prescribed)
+    mechanism_names = (*bare.parameter_names, *other.prescribed)
     fixed = {} if space is None else space.fixed
-    given = {**other.given, **{name: value for name, value in fixed.items() if name not in own}}
+    given = {**other.given, **{name: value for name, value in fixed.items() if name not in mechanism_names}}
     # If the space has faults, the inputs that it fixes are unknown.
-    scene = tuple(name for name in family.parameter_names if name not in own) if space is None else tuple(given)
+    scene = (
+        tuple(name for name in family.parameter_names if name not in mechanism_names) if space is None else tuple(given)
+    )
     _check_names(family, raw, key, faults, scene)
     defaults = {p.name: p.left_out(raw) for p in family.parameters}
     values = {name: value for name, value in defaults.items() if value is not None} | given
     for parameter in family.parameters:
         if parameter.name in raw:
-            place = (*key, parameter.name)
+            entry_key = (*key, parameter.name)
             entry = raw[parameter.name]
             if isinstance(entry, dict) and "value" not in entry:
-                faults.value(place, entry, f"one value: {forms(parameter)}")
+                faults.value(entry_key, entry, f"one value: {forms(parameter)}")
                 continue
-            value = read_entry(parameter, entry, place, faults, sampled=False)
+            value = read_entry(parameter, entry, entry_key, faults, sampled=False)
             if isinstance(value, float):
                 values[parameter.name] = value
     return {name: values[name] for name in family.parameter_names if name in values}
@@ -204,16 +206,18 @@ def take(file: StudyFile, family: Family, elsewhere: Collection[str]) -> None:
                 for missing in (p.name for p in family.parameters if p.name.startswith(member)):
                     file.faults.excuse((*key, missing))
                 continue
-            own = fingerprint(design)
-            if pinned is not None and pinned != own:
-                file.faults.value((*key, f"{member}{HASH}"), pinned, f'"{own}", the hash of what {source} accepts now')
+            digest = fingerprint(design)
+            if pinned is not None and pinned != digest:
+                file.faults.value(
+                    (*key, f"{member}{HASH}"), pinned, f'"{digest}", the hash of what {source} accepts now'
+                )
             # A fitted lam may be given in [design], where it defines "up".
             left_out = {x for x in elsewhere if not x.startswith("lam")} if key == ("design",) else set()
             _fill(file, table, (*key, name), member, design, family, left_out)
-            notes.append(f"{'.'.join((*key, member.rstrip('.'))).rstrip('.')}: {source} {own}")
-    about = own_table(file.data, ("study",))
-    if notes and about is not None:
-        about["taken"] = notes
+            notes.append(f"{'.'.join((*key, member.rstrip('.'))).rstrip('.')}: {source} {digest}")
+    study_table = own_table(file.data, ("study",))
+    if notes and study_table is not None:
+        study_table["taken"] = notes
 
 
 def taken_reference(file: StudyFile, section: ReferenceSection) -> ReferenceSection:

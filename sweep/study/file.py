@@ -146,13 +146,13 @@ class StudyFile:
 
 def own_table(data: Mapping[str, Any], key: tuple[str, ...]) -> dict[str, Any] | None:
     """Replace a table of the file by a copy that may be changed, and return the copy; None if it does not exist."""
-    found: Any = data
+    table: Any = data
     for part in key:
-        if not isinstance(found, dict) or not isinstance(found.get(part), dict):
+        if not isinstance(table, dict) or not isinstance(table.get(part), dict):
             return None
-        found[part] = dict(found[part])
-        found = found[part]
-    return found if isinstance(found, dict) else None
+        table[part] = dict(table[part])
+        table = table[part]
+    return table if isinstance(table, dict) else None
 
 
 def spelled(key: Key) -> str:
@@ -276,9 +276,9 @@ def _missing_keys(model: type[Section], raw: Mapping[str, Any], key: Key, faults
             faults.missing((*key, name), _reached(model, (name,))[1])
     for name, value in raw.items():
         inner = _reached(model, (name,))[0]
-        for k, one in enumerate(value) if isinstance(value, list) else [(None, value)]:
-            if isinstance(one, dict):
-                _missing_keys(inner, one, (*key, name) if k is None else (*key, name, k), faults)
+        for k, table in enumerate(value) if isinstance(value, list) else [(None, value)]:
+            if isinstance(table, dict):
+                _missing_keys(inner, table, (*key, name) if k is None else (*key, name, k), faults)
 
 
 def _validated(model: type[S], raw: Mapping[str, Any], key: Key, faults: Faults) -> S:
@@ -292,8 +292,8 @@ def _validated(model: type[S], raw: Mapping[str, Any], key: Key, faults: Faults)
             if item["type"] == "extra_forbidden":
                 faults.unknown((*key, *place), _keys(_reached(model, place[:-1])[0]))
             else:
-                own = item.get("ctx", {}) if item["type"] == QUANTITY else {}
-                faults.value((*key, *place), item["input"], own.get("words") or _reached(model, place)[1])
+                context = item.get("ctx", {}) if item["type"] == QUANTITY else {}
+                faults.value((*key, *place), item["input"], context.get("words") or _reached(model, place)[1])
         return model.model_validate({name: value for name, value in raw.items() if name not in bad})
 
 

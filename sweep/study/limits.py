@@ -50,7 +50,7 @@ SETTINGS = {
 
 def limits_of_settings(file: StudyFile) -> list[Limit]:
     """Return the limits of every relation that names a machine's settings, and report unknown names."""
-    found = []
+    limits = []
     relations = file.data.get("relations")
     for relation, table in relations.items() if isinstance(relations, dict) else ():
         if not isinstance(table, dict) or "settings" not in table:
@@ -65,8 +65,8 @@ def limits_of_settings(file: StudyFile) -> list[Limit]:
             file.faults.value(key, name, choices(str(name), SETTINGS))
             continue
         bounds = {what: ends for what, ends in setting._asdict().items() if what != "source" and ends is not None}
-        found += [Limit(f"{relation}_{what}", *ends) for what, ends in bounds.items()]
-    return found
+        limits += [Limit(f"{relation}_{what}", *ends) for what, ends in bounds.items()]
+    return limits
 
 
 UPPER, LOWER = ("<=", "\u2264"), (">=", "\u2265")
@@ -100,31 +100,31 @@ def read_limits(file: StudyFile, family: Family, prescribed: Mapping[str, Entry]
     A bound in [limits] replaces the setting of the same output.
     """
     raw, faults = file.free_table("limits") or {}, file.faults
-    found = list(prescribed_limits(prescribed))
-    found += [limit for limit in limits_of_settings(file) if limit.output not in raw]
-    found += limits_of_cyclogram(file, family)
-    held = {limit.output: limit for limit in found}
+    limits = list(prescribed_limits(prescribed))
+    limits += [limit for limit in limits_of_settings(file) if limit.output not in raw]
+    limits += limits_of_cyclogram(file, family)
+    held = {limit.output: limit for limit in limits}
     for name, entry in raw.items():
         key: Key = ("limits", name)
         output = _parameter(family, name) or read_output_name(family, name, key, faults)
         if output is None:
             continue
-        before = len(found)
+        before = len(limits)
         if is_flag(name):
             if entry is not True:
                 faults.value(key, entry, "true")
-            found.append(Limit(name, minimum=1.0))
+            limits.append(Limit(name, minimum=1.0))
         elif isinstance(entry, str) and ("+-" in entry or entry.lstrip()[:1] in _SIDES):
-            found += _read_text(output, entry, key, faults)
+            limits += _read_text(output, entry, key, faults)
         elif isinstance(entry, dict):
-            found += _read_bounds(output, entry, key, faults)
+            limits += _read_bounds(output, entry, key, faults)
         else:
             faults.value(key, entry, _form(output))
-        counts = "tolerance" in file and all(_around(held.get(name), band) for band in found[before:])
+        counts = "tolerance" in file and all(_around(held.get(name), band) for band in limits[before:])
         if name in prescribed and not counts:
             allowed = "nothing here: [locus] prescribes it; with [tolerance] a band around that, as"
             faults.value(key, entry, f"{allowed} {_band(units.internal_unit(output.unit))}")
-    return tuple(found)
+    return tuple(limits)
 
 
 def _around(held: Limit | None, band: Limit) -> bool:
@@ -136,8 +136,8 @@ def _around(held: Limit | None, band: Limit) -> bool:
 
 def _parameter(family: Family, name: str) -> Output | None:
     """Return a parameter as an output that can be bounded ([fit] may set or scale it), or None."""
-    found = next((p for p in family.parameters if p.name == name and p.choices is None), None)
-    return None if found is None else Output(name, found.unit, found.text)
+    parameter = next((p for p in family.parameters if p.name == name and p.choices is None), None)
+    return None if parameter is None else Output(name, parameter.unit, parameter.text)
 
 
 def _read_bounds(output: Output, raw: Mapping[str, Any], key: Key, faults: Faults) -> list[Limit]:

@@ -112,8 +112,13 @@ def merged(base: Mapping[str, Any], over: Mapping[str, Any], key: tuple[str, ...
     result = copy.deepcopy(dict(base))
     for name, new in over.items():
         old = result.get(name)
-        one = (*key, name) in (("accuracy",), ("objective",))
-        if isinstance(old, dict) and isinstance(new, dict) and not one and {"value", "values"}.isdisjoint({*old, *new}):
+        is_whole = (*key, name) in (("accuracy",), ("objective",))
+        if (
+            isinstance(old, dict)
+            and isinstance(new, dict)
+            and not is_whole
+            and {"value", "values"}.isdisjoint({*old, *new})
+        ):
             result[name] = merged(old, new, (*key, name))
         else:
             result[name] = copy.deepcopy(new)
@@ -134,15 +139,15 @@ def _build(
     check_goal(sections.objective, file)
     if not (sections.scene.want or file.free_table("limits") or sections.objective.goal):
         faults.missing(("scene", "want"), "design outputs to compute, here or in [limits] or [objective]")
-    found = read_mechanism(sections.mechanism, file, read_threads(file))
+    mechanism = read_mechanism(sections.mechanism, file, read_threads(file))
     task = None
     if "task" in file:
         from sweep.study.task import read_study_task  # imports every task, which few studies need
 
-        task = read_study_task(file, found and found[0])
-    if found is None:  # the remaining checks need the mechanism
+        task = read_study_task(file, mechanism and mechanism[0])
+    if mechanism is None:  # the remaining checks need the mechanism
         raise StudyError(str(path), faults.lines)
-    return _study(file, sections, window, accuracy, task, *found)
+    return _study(file, sections, window, accuracy, task, *mechanism)
 
 
 def _study(
@@ -174,8 +179,8 @@ def _study(
     check_tolerance(tolerance, family, limits, faults)
     reference = read_reference(taken_reference(file, sections.reference), bare, family, faults, other, space)
     check_report(sections.report, file, family, prescribed)
-    asked = [*prescribed, *(name for name in file.free_table("locus") or () if name.startswith(RATIOS))]
-    want = _computed(family, [*expanded(bare, sections.scene.want), *asked], limits, goal, front)
+    prescribed_names = [*prescribed, *(name for name in file.free_table("locus") or () if name.startswith(RATIOS))]
+    want = _computed(family, [*expanded(bare, sections.scene.want), *prescribed_names], limits, goal, front)
     check_proofs(accuracy, family, want, window=window is not None, faults=faults)
     file.raise_faults()
     assert space is not None  # a faulty space was raised above
@@ -221,8 +226,8 @@ def _computed(
 ) -> tuple[str, ...]:
     """Return the names of all computed design outputs: wanted, limited, objective and second output of the front."""
     wanted = [*names, *(limit.output for limit in limits), goal, None if front is None else front.output]
-    own = family.parameter_names
-    return tuple(name for name in dict.fromkeys(wanted) if name and name not in own)
+    parameters = family.parameter_names
+    return tuple(name for name in dict.fromkeys(wanted) if name and name not in parameters)
 
 
 def _completed(file: StudyFile, sections: Sections, accuracy: Accuracy, inputs: Inputs) -> dict[str, Any]:

@@ -70,32 +70,32 @@ class Inputs:
 
 def read_inputs(file: StudyFile, bare: Family) -> Inputs:
     """Read [bodies] and [loads]; report names that are no inputs of effects or stand in the wrong table."""
-    found = Inputs()
+    inputs = Inputs()
     given = {table: entries for table in ("bodies", "loads") if (entries := file.free_table(table)) is not None}
-    homes = {name: home(bare, name) for name in (input_names(bare) if given else ())}
+    tables = {name: home(bare, name) for name in (input_names(bare) if given else ())}
     design = file.free_table("design") or {}
     for table, entries in given.items():
         for name, entry in _with_rods(entries, file.faults).items() if table == "bodies" else entries.items():
             key: Key = (table, name)
-            if homes.get(name) != table:
-                _misplaced(bare, key, entry, homes, file.faults)
+            if tables.get(name) != table:
+                _misplaced(bare, key, entry, tables, file.faults)
             elif name in design:
                 file.faults.value(key, entry, "either here or in [design]")
             elif table == "loads" and is_curve(entry):
-                _read_load(file, bare, found, name, entry)
+                _read_load(file, bare, inputs, name, entry)
             else:
-                found.raw[name], found.tables[name] = entry, table
+                inputs.raw[name], inputs.tables[name] = entry, table
     if given.get("loads"):
-        found.inlined = {**given["loads"], **found.inlined}
-    return found
+        inputs.inlined = {**given["loads"], **inputs.inlined}
+    return inputs
 
 
 def _with_rods(entries: Mapping[str, Any], faults: Faults) -> dict[str, Any]:
     """Replace bodies of a material and a section by their columns of :func:`sweep.evaluation.loads.rod`."""
-    found: dict[str, Any] = {}
+    replaced: dict[str, Any] = {}
     for name, entry in entries.items():
         if not isinstance(entry, dict) or {"material", "section"}.isdisjoint(entry):
-            found[name] = entry
+            replaced[name] = entry
             continue
         texts = {key: str(value) for key, value in entry.items()}
         try:
@@ -106,8 +106,8 @@ def _with_rods(entries: Mapping[str, Any], faults: Faults) -> dict[str, Any]:
             continue
         for column in columns.keys() & entries.keys():
             faults.value(("bodies", column), entries[column], f"nothing beside the material and section of {name}")
-        found |= {column: f"{value!r} {unit}" for (column, value), unit in zip(columns.items(), UNITS, strict=True)}
-    return found
+        replaced |= {column: f"{value!r} {unit}" for (column, value), unit in zip(columns.items(), UNITS, strict=True)}
+    return replaced
 
 
 def tables_of_inputs(file: StudyFile, bare: Family, family: Family, inputs: Inputs) -> dict[str, str]:
@@ -138,8 +138,8 @@ def home(family: Family, name: str) -> str:
 def plain_name(family: Family, name: str) -> str:
     """Remove member and stage from the name of an effect's input."""
     if isinstance(family, Machine):
-        member, own = family.split(name) or (None, name)
-        return plain_name(member.family, own) if member is not None else name
+        member, name_in_member = family.split(name) or (None, name)
+        return plain_name(member.family, name_in_member) if member is not None else name
     return next((plain for stage in family.stages if (plain := at_stage(name, stage.tail))), name)
 
 
@@ -148,23 +148,23 @@ def _misplaced(bare: Family, key: Key, entry: object, homes: dict[str, str], fau
     if name in bare.parameter_names:
         faults.value(key, entry, "nothing here: it is a parameter of the mechanism and stands in [design]")
     elif name in homes:
-        place = {"design": "[scene] or [design]"}.get(homes[name], f"[{homes[name]}]")
-        faults.value(key, entry, f"nothing here: it stands in {place}")
+        home = {"design": "[scene] or [design]"}.get(homes[name], f"[{homes[name]}]")
+        faults.value(key, entry, f"nothing here: it stands in {home}")
     else:
-        names = sorted(name for name, place in homes.items() if place == table)
+        names = sorted(name for name, home in homes.items() if home == table)
         guess = closest(name, names)  # the inputs of a chain are hundreds
         names = names if guess is None else [guess]
         faults.unknown(key, names, f"input of the effects of {bare.name}")
 
 
-def _read_load(file: StudyFile, bare: Family, found: Inputs, name: str, entry: dict[str, Any]) -> None:
+def _read_load(file: StudyFile, bare: Family, inputs: Inputs, name: str, entry: dict[str, Any]) -> None:
     if name not in curved_inputs(bare):
         file.faults.value(("loads", name), entry, "one value: it does not change over the turn")
         return
     internal = "N*mm" if "torque" in name.rpartition(".")[2] else "N"
-    made = read_curve(entry, internal, file.path.parent, ("loads", name), file.faults)
-    if made is not None:
-        found.curves[name], found.inlined[name] = made
+    curve = read_curve(entry, internal, file.path.parent, ("loads", name), file.faults)
+    if curve is not None:
+        inputs.curves[name], inputs.inlined[name] = curve
 
 
 def is_curve(entry: object) -> bool:
@@ -193,7 +193,7 @@ def read_curve(
     if len(faults.lines) > before:
         return None
     if kinds == {SERIES}:
-        cos, sin = (tuple(factor * x for x in some or ()) for some in (section.cos, section.sin))
+        cos, sin = (tuple(factor * x for x in coefficients or ()) for coefficients in (section.cos, section.sin))
         return SeriesCurve(factor * (section.mean or 0.0), cos, sin), raw
     columns = (section.phi, section.values) if section.file is None else _file(section, folder, key, faults)
     if columns is None:
@@ -205,12 +205,12 @@ def read_curve(
     if phi is None or values is None:
         return None
     try:
-        made = table_curve(angle * np.array(phi, np.float64), factor * np.array(values, np.float64))
+        curve = table_curve(angle * np.array(phi, np.float64), factor * np.array(values, np.float64))
     except ValueError as error:
         faults.value((*key, "phi" if section.file is None else "file"), section.file or phi, str(error))
         return None
     inline = {"phi": list(phi), "values": list(values), "angle": section.angle, "unit": section.unit}
-    return made, raw if section.file is None else inline
+    return curve, raw if section.file is None else inline
 
 
 def _factor(section: CurveSection, name: str, internal: str, key: Key, faults: Faults) -> float:
@@ -289,10 +289,10 @@ def with_effects(file: StudyFile, bare: Family, others: Iterable[str], curves: M
     others : names of outputs requested by other tables
     curves : the loads over the turn
     """
-    asked = file.texts("scene", "want")
-    family = extended(bare, expanded(bare, [*(name for _, name in asked), *others]), dict(curves))
+    wanted = file.texts("scene", "want")
+    family = extended(bare, expanded(bare, [*(name for _, name in wanted), *others]), dict(curves))
     effects = names_of_effects(bare)
-    for k, name in asked:
+    for k, name in wanted:
         if name not in effects:
             read_output_name(family, name, ("scene", "want", k), file.faults)
     return family

@@ -50,13 +50,13 @@ def _prescribed(locus: OnLocus, raw: Mapping[str, Any], faults: Faults, sampled:
     known.insert(known.index(phi0) + 1, ratio)
     for name in raw:
         if name not in known:
-            told = {phi0, ratio} if {phi0, ratio} & set(raw) else set()  # either of both gives phi0
-            faults.unknown(("locus", name), [k for k in known if k not in raw and k not in told] or known)
-    found: dict[str, Entry] = {}
+            redundant = {phi0, ratio} if {phi0, ratio} & set(raw) else set()  # either of both gives phi0
+            faults.unknown(("locus", name), [k for k in known if k not in raw and k not in redundant] or known)
+    entries: dict[str, Entry] = {}
     for p in locus.prescribed:
         if p.name == phi0 and ratio in raw:
             angle = _angle_of_ratio(phi0, raw, ratio, faults, sampled)
-            found |= {} if angle is None else {phi0: angle}
+            entries |= {} if angle is None else {phi0: angle}
             continue
         if p.name not in raw:
             instead = ratio if p.name == phi0 else ""
@@ -66,11 +66,11 @@ def _prescribed(locus: OnLocus, raw: Mapping[str, Any], faults: Faults, sampled:
         entry = read_entry(p, raw[p.name], ("locus", p.name), faults, sampled)
         if entry is None:
             continue
-        wrong = locus.allowed(p.name, _values(entry))
-        if wrong is not None:
-            faults.value(("locus", p.name), raw[p.name], wrong)
-        found[p.name] = entry
-    return found
+        allowed = locus.allowed(p.name, _values(entry))
+        if allowed is not None:
+            faults.value(("locus", p.name), raw[p.name], allowed)
+        entries[p.name] = entry
+    return entries
 
 
 def _angle_of_ratio(phi0: str, raw: Mapping[str, Any], ratio: str, faults: Faults, sampled: bool) -> Entry | None:
@@ -97,14 +97,14 @@ def prescribed_limits(entries: Mapping[str, Entry]) -> tuple[Limit, ...]:
 
     An output swept over a whole turn has no limit.
     """
-    found = []
+    limits = []
     for name, entry in entries.items():
         ends = _values(entry)
         if isinstance(entry, Axis) and float(np.ptp(ends)) >= WHOLE_TURN:
             continue
         sizes = np.abs(ends)
-        found.append(Limit(name, float(sizes.min()), float(sizes.max())))
-    return tuple(found)
+        limits.append(Limit(name, float(sizes.min()), float(sizes.max())))
+    return tuple(limits)
 
 
 def _values(entry: Entry) -> np.ndarray[tuple[int], np.dtype[np.float64]]:

@@ -158,7 +158,7 @@ def flattened(data: Mapping[str, Any], members: object) -> dict[str, Any]:
         table, flat = own_table(result, key) or {}, dict[str, Any]()
         for name, entry in table.items():
             nested = name in members and isinstance(entry, dict)
-            flat |= {f"{name}.{own}": value for own, value in entry.items()} if nested else {name: entry}
+            flat |= {f"{name}.{inner}": value for inner, value in entry.items()} if nested else {name: entry}
         table.clear()
         table |= flat
     return result
@@ -247,13 +247,15 @@ def _machine(
     if threads is None or len(faults.lines) > before:
         return None
     try:
-        plain = {name: table for name, table in relations.items() if not _hangs_on_events(table)}
+        steady = {name: table for name, table in relations.items() if not _hangs_on_events(table)}
         outputs = (
-            find_family(specification(members, plain, shafts, tools)).pose_output if len(plain) < len(relations) else {}
+            find_family(specification(members, steady, shafts, tools)).pose_output
+            if len(steady) < len(relations)
+            else {}
         )
         for name, table in relations.items():
-            if "level" in table and (of := outputs.get(table.get("event", ""))) is not None:
-                table["level"] = _level(table["level"], units.internal_unit(of.unit), name, faults)
+            if "level" in table and (output := outputs.get(table.get("event", ""))) is not None:
+                table["level"] = _level(table["level"], units.internal_unit(output.unit), name, faults)
         if len(faults.lines) > before:
             return None
         given = specification(members, relations, shafts, tools)
@@ -269,8 +271,12 @@ def _machine(
             return None
         name = "" if place[-1:] == (error.name,) else error.name
         if place[:1] == ("relations",):
-            own = relations.get(str(place[-1]), {})
-            name = name if name in own else next((kind for kind in RELATION_KINDS if kind in own), "")
+            relation_table = relations.get(str(place[-1]), {})
+            name = (
+                name
+                if name in relation_table
+                else next((kind for kind in RELATION_KINDS if kind in relation_table), "")
+            )
         key = place if place[:1] in (("relations",), ("shafts",), ("tools",)) else ("machine", *place)
         key = (*key, name) if name else key
         if isinstance(error, MissingInput):
@@ -310,5 +316,5 @@ def _read_each(model: type[Section], data: Mapping[str, Any], table: str, faults
     if not isinstance(raw, dict):
         faults.value((table,), raw, f"tables [{table}.NAME]")
         return {}
-    sections = {name: read_section(model, own, (table, name), faults) for name, own in raw.items()}
+    sections = {name: read_section(model, entry, (table, name), faults) for name, entry in raw.items()}
     return {name: section.model_dump(exclude_none=True) for name, section in sections.items()}

@@ -65,20 +65,20 @@ def check_steady(file: StudyFile, family: Family, objective: ObjectiveSection, l
     if "optimise" not in file:
         return
     written = file.free_table("limits") or {}
-    asked = [(("objective", key), name, name) for key, name in objective.named]
-    asked += [(("limits", limit.output), limit.output, written.get(limit.output, limit.output)) for limit in limits]
-    for key, name, shown in asked:
+    checked = [(("objective", key), name, name) for key, name in objective.named]
+    checked += [(("limits", limit.output), limit.output, written.get(limit.output, limit.output)) for limit in limits]
+    for key, name, given in checked:
         if name not in family.parameter_names and _jumps(family, name):
             allowed = (
                 f"a quantity that changes steadily; {name} is constant in pieces, so no slope leads to it: ask for it "
                 "in scene.want, or leave out [optimise] and let the sweep alone decide"
             )
-            file.faults.value(key, shown, allowed)
+            file.faults.value(key, given, allowed)
     for limit in limits:
         allowed = _followed(family, limit)
         if allowed:
-            shown = written.get(limit.output, limit.output)
-            file.faults.value(("limits", limit.output), shown, f"{allowed}, as [optimise] is given")
+            given = written.get(limit.output, limit.output)
+            file.faults.value(("limits", limit.output), given, f"{allowed}, as [optimise] is given")
 
 
 def _followed(family: Family, limit: Limit) -> str:
@@ -153,17 +153,19 @@ def read_pareto(
     bounds = _bounds(output, raw[given[0]], key, faults)
     if bounds is None or not _searchable(family, output, bounds, given[0], faults):
         return None
-    low = given[0] == "at_least"
-    ends = [limit.maximum if low else limit.minimum for limit in limits if limit.output == output.name]
-    if any(bound > end if low else bound < end for end in ends if end is not None for bound in bounds):
-        side = "maximum" if low else "minimum"
+    at_least = given[0] == "at_least"
+    ends = [limit.maximum if at_least else limit.minimum for limit in limits if limit.output == output.name]
+    if any(bound > end if at_least else bound < end for end in ends if end is not None for bound in bounds):
+        side = "maximum" if at_least else "minimum"
         faults.value(key, raw[given[0]], f"bounds that leave room to the {side} of {output.name} in [limits]")
         return None
     if section.points is not None and not 2 <= len(set(bounds)) < section.points:
-        some = f"more than the {len(set(bounds))} bounds given, of which there must be two or more"
-        faults.value(("pareto", "points"), section.points, some)
+        allowed = f"more than the {len(set(bounds))} bounds given, of which there must be two or more"
+        faults.value(("pareto", "points"), section.points, allowed)
         return None
-    return ParetoSettings(output.name, bounds, low, section.starts, section.time_budget, section.points, search.looks)
+    return ParetoSettings(
+        output.name, bounds, at_least, section.starts, section.time_budget, section.points, search.looks
+    )
 
 
 def _bounds(output: Output, raw: object, key: Key, faults: Faults) -> tuple[float, ...] | None:
@@ -182,15 +184,15 @@ def _bounds(output: Output, raw: object, key: Key, faults: Faults) -> tuple[floa
 def _searchable(family: Family, output: Output, bounds: tuple[float, ...], side: str, faults: Faults) -> bool:
     """Tell whether the optimiser can keep these bounds on the second output."""
     try:
-        found = measure(family, output.name)
+        measured = measure(family, output.name)
     except InputError as error:
         faults.value(("pareto", "output"), output.name, error.allowed)
         return False
-    if found.inner == "rotatable" or output.jumps:
+    if measured.inner == "rotatable" or output.jumps:
         faults.value(("pareto", "output"), output.name, "a quantity that changes steadily")
         return False
     ends = [(bound, None) if side == "at_least" else (None, bound) for bound in bounds]
-    allowed = next((words for low, high in ends if (words := found.refused(low, high))), "")
+    allowed = next((words for low, high in ends if (words := measured.refused(low, high))), "")
     if allowed:
         faults.value(("pareto", side), list(bounds), allowed)
     return not allowed

@@ -75,12 +75,12 @@ def _entry() -> Schema:
 
 def _of_family(entry: Family) -> Schema:
     """Return the schema of [design] for mechanisms of one family."""
-    own = {p.name: {"description": _described(p), "allOf": [ENTRY]} for p in entry.parameters}
-    known = [*own, *sorted(input_names(entry) - own.keys()), "sample", FROM, HASH]
-    design = {"properties": own, "propertyNames": {"enum": known}}
-    this = {"properties": {"family": {"const": entry.name}}, "required": ["family"]}
+    parameters = {p.name: {"description": _described(p), "allOf": [ENTRY]} for p in entry.parameters}
+    known = [*parameters, *sorted(input_names(entry) - parameters.keys()), "sample", FROM, HASH]
+    design = {"properties": parameters, "propertyNames": {"enum": known}}
+    mechanism = {"properties": {"family": {"const": entry.name}}, "required": ["family"]}
     return {
-        "if": {"properties": {"mechanism": this}, "required": ["mechanism"]},
+        "if": {"properties": {"mechanism": mechanism}, "required": ["mechanism"]},
         "then": {"properties": {"design": design}},
     }
 
@@ -95,9 +95,9 @@ def _described(p: Parameter) -> str:
 def _model(model: type[Section], definitions: Schema) -> Schema:
     """Return the schema of one table by the names that a file uses."""
     template = "#/definitions/{model}"
-    found: Schema = model.model_json_schema(by_alias=True, ref_template=template, schema_generator=_WithoutNull)
-    definitions |= found.pop("$defs", {})
-    return found
+    schema: Schema = model.model_json_schema(by_alias=True, ref_template=template, schema_generator=_WithoutNull)
+    definitions |= schema.pop("$defs", {})
+    return schema
 
 
 class _WithoutNull(GenerateJsonSchema):

@@ -123,8 +123,8 @@ class DesignSpace:
             raise IndexError(f"designs {start} to {stop}; the space has {self.count}")
         matrix, wanted = np.empty((stop - start, len(names))), tuple(names)
         if self.kind == "product":
-            found = self.columns_at(np.arange(start, stop, dtype=np.int64), wanted)
-            for column, values in enumerate(found.values()):
+            values_by_name = self.columns_at(np.arange(start, stop, dtype=np.int64), wanted)
+            for column, values in enumerate(values_by_name.values()):
                 matrix[:, column] = values
             return matrix
         swept = self._swept(wanted)
@@ -147,9 +147,9 @@ class DesignSpace:
             values = self._lattice(index, swept)
         else:
             values = [self.axes[k].at(place) for k, place in zip(swept, self._sequence.at(index, swept), strict=True)]
-        found = {self.axes[k].name: own for k, own in zip(swept, values, strict=True)}
+        by_name = {self.axes[k].name: column for k, column in zip(swept, values, strict=True)}
         wanted = self.names if names is None else names
-        return {name: found[name] if name in found else np.full(index.size, self.fixed[name]) for name in wanted}
+        return {name: by_name[name] if name in by_name else np.full(index.size, self.fixed[name]) for name in wanted}
 
     def _swept(self, names: Sequence[str] | None) -> list[int]:
         """Return the indices of the wanted axes."""

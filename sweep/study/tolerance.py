@@ -39,27 +39,29 @@ def read_tolerance(section: ToleranceSection, file: StudyFile, family: Family) -
     if not 2 <= samples <= MOST_SAMPLES or samples & (samples - 1):
         allowed = f"a power of two, 2 to {MOST_SAMPLES}: a Sobol sample keeps its balance only so"
         file.faults.value(("tolerance", "samples"), samples, allowed)
-    own = tuple(_own(section.own, file, family).items())
-    return Tolerance(section.lengths or 0.0, section.angles or 0.0, section.robust, own, samples)
+    single = tuple(_own(section.own, file, family).items())
+    return Tolerance(section.lengths or 0.0, section.angles or 0.0, section.robust, single, samples)
 
 
 def _own(given: Mapping[str, str], file: StudyFile, family: Family) -> dict[str, float]:
     """Return the tolerances of single parameters; of several matching patterns the last holds."""
-    found: dict[str, float] = {}
+    tolerances: dict[str, float] = {}
     for pattern, text in given.items():
-        named = [p for p in family.parameters if fnmatchcase(p.name, pattern) and p.unit in UNITS and p.choices is None]
+        matching = [
+            p for p in family.parameters if fnmatchcase(p.name, pattern) and p.unit in UNITS and p.choices is None
+        ]
         key = ("tolerance", "own", pattern)
-        if not named or len({p.unit for p in named}) > 1:
+        if not matching or len({p.unit for p in matching}) > 1:
             words = "a pattern of names of lengths, or one of angles, as *.key" + nearest(
                 pattern, family.parameter_names
             )
             file.faults.value(key, text, words)
             continue
-        width = file.faults.number(text, UNITS[named[0].unit], key)
+        width = file.faults.number(text, UNITS[matching[0].unit], key)
         if width is not None and not width >= 0.0:
             file.faults.value(key, text, "a tolerance, 0 for what is exact")
-        found |= dict.fromkeys((p.name for p in named), width or 0.0)
-    return found
+        tolerances |= dict.fromkeys((p.name for p in matching), width or 0.0)
+    return tolerances
 
 
 def check_tolerance(tolerance: Tolerance | None, family: Family, limits: tuple[Limit, ...], faults: Faults) -> None:
@@ -73,8 +75,8 @@ def check_tolerance(tolerance: Tolerance | None, family: Family, limits: tuple[L
                 f"{size:.6g} {UNITS[unit]}",
                 f"nothing: {family.name} has no {key} that could deviate",
             )
-    roomy = [x.output for x in limits if x.minimum != x.maximum]
-    equal = [x.output for x in limits if x.is_equation and x.output not in roomy]
-    if tolerance.robust is not None and equal:
+    with_room = [x.output for x in limits if x.minimum != x.maximum]
+    equations = [x.output for x in limits if x.is_equation and x.output not in with_room]
+    if tolerance.robust is not None and equations:
         words = 'limits with room, as swing = "40 +- 0.2 deg": no mechanism that is made keeps an equation'
-        faults.value(("tolerance", "robust"), ", ".join(equal), words)
+        faults.value(("tolerance", "robust"), ", ".join(equations), words)

@@ -48,8 +48,8 @@ def read_toml(file: Path) -> dict[str, Any]:
     except tomllib.TOMLDecodeError as error:
         raise _fault(file, _said(text, str(error))) from None
     except ValueError:  # Python refuses to read an integer of thousands of digits
-        found = _DIGITS.search(text)
-        line = text.count("\n", 0, found.start() if found else 0) + 1
+        match = _DIGITS.search(text)
+        line = text.count("\n", 0, match.start() if match else 0) + 1
         raise _fault(file, f"line {line}: a number of thousands of digits; allowed: numbers up to 1e100") from None
     except RecursionError:
         raise _fault(file, f"tables or lists within each other too often; allowed: {DEEPEST} levels") from None
@@ -90,7 +90,7 @@ def _said(text: str, message: str) -> str:
     message = message.replace("at end of document", f"at line {line}, column {column}, the end of the file")
     place = _PLACE.search(message)
     if place is not None and message.startswith(_NO_END):
-        opened = next((found.start() for found in _OPENED.finditer(text) if found.lastgroup), None)
+        opened = next((match.start() for match in _OPENED.finditer(text) if match.lastgroup), None)
         line = int(place[1]) if opened is None else text.count("\n", 0, opened) + 1
         return f"line {line}: a text without its closing quote; allowed: {_QUOTED}"
     if place is not None and message.startswith(_BARE_WORDS):
@@ -118,14 +118,14 @@ def _earlier(lines: list[str], is_it: Any) -> str:
 
 
 def _name(line: str) -> str | None:
-    found = _KEY.match(line)
-    return None if found is None else found[1].strip("\"'")
+    match = _KEY.match(line)
+    return None if match is None else match[1].strip("\"'")
 
 
 def _heading(lines: list[str]) -> str:
     """Return the heading of the table that holds the last line."""
-    found = [match[1].strip() for match in map(_TABLE.fullmatch, lines) if match is not None]
-    return found[-1] if found else ""
+    headings = [match[1].strip() for match in map(_TABLE.fullmatch, lines) if match is not None]
+    return headings[-1] if headings else ""
 
 
 def _too_deep(data: dict[str, Any]) -> str | None:
@@ -248,10 +248,10 @@ def toml(data: Mapping[str, Any]) -> str:
 
 
 def _table(path: tuple[str, ...], entries: Mapping[str, Any]) -> str:
-    own = {name: entry for name, entry in entries.items() if not (isinstance(entry, dict) and len(entry) > SHORT)}
-    head = [f"[{'.'.join(map(_key, path))}]"] if own or not entries else []
-    lines = [*head, *(f"{_key(name)} = {_value(entry)}" for name, entry in own.items())]
-    inner = [_table((*path, name), entry) for name, entry in entries.items() if name not in own]
+    inline = {name: entry for name, entry in entries.items() if not (isinstance(entry, dict) and len(entry) > SHORT)}
+    head = [f"[{'.'.join(map(_key, path))}]"] if inline or not entries else []
+    lines = [*head, *(f"{_key(name)} = {_value(entry)}" for name, entry in inline.items())]
+    inner = [_table((*path, name), entry) for name, entry in entries.items() if name not in inline]
     return "\n".join([*(["\n".join(lines) + "\n"] if lines else []), *inner])
 
 
@@ -282,5 +282,5 @@ def written(p: Parameter, value: float) -> str | float:
     unit = "deg" if internal == "rad" else internal
     scale = factor(unit, internal)
     texts = (f"{value / scale:.{digits}g}" for digits in range(6, EXACT + 1))
-    found = next((text for text in texts if float(text) * scale == value), None)
-    return f"{value!r} {internal}" if found is None else f"{found} {unit}"
+    shortest = next((text for text in texts if float(text) * scale == value), None)
+    return f"{value!r} {internal}" if shortest is None else f"{shortest} {unit}"

@@ -101,10 +101,10 @@ def lift_chain(
         dimensions, or a result without a real coupler.
     """
     matrix, grid, angles = _given(table, phi, chi, "chi")
-    share = np.ones_like(grid) if weights is None else numbers(weights, "weights", "weights, position")
-    if grid.size < 3 or share.shape != grid.shape:
+    weight = np.ones_like(grid) if weights is None else numbers(weights, "weights", "weights, position")
+    if grid.size < 3 or weight.shape != grid.shape:
         raise InputError("poses", grid.size, "at least 3, with as many weights", "lift_chain")
-    refuse_rows(~(np.isfinite(share) & (share >= 0.0)), share, "weights", "finite numbers that are not negative")
+    refuse_rows(~(np.isfinite(weight) & (weight >= 0.0)), weight, "weights", "finite numbers that are not negative")
     if norm not in ("squares", "largest"):
         raise InputError("norm", norm, "squares or largest", "lift_chain")
     status, rows = _rows(matrix, grid, angles)
@@ -113,7 +113,7 @@ def lift_chain(
         raise InputError("phi", float(grid[bad]), st.MEANING[int(status[bad])], f"phi, position {bad}")
     system = np.column_stack([rows[0], rows[1], -np.ones_like(grid)])
     size = float(np.abs(rows[:2]).max())
-    solution = (_least if norm == "squares" else _minimax)(system / [size, size, 1.0], -rows[2], share)
+    solution = (_least if norm == "squares" else _minimax)(system / [size, size, 1.0], -rows[2], weight)
     fx, fy, p0 = solution[0] / size, solution[1] / size, solution[2]
     square = p0 + fx * fx + fy * fy
     if not square > 0.0:
@@ -130,8 +130,8 @@ def _given(table: Table, phi: object, other: object, name: str) -> tuple[Array, 
     matrix = one_design(family("feed"), table, unused=("phi",))
     grid = np.atleast_1d(numbers(phi, "phi", "phi, position"))
     values = np.atleast_1d(numbers(other, name, f"{name}, position"))
-    for column, found in (("phi", grid), (name, values)):
-        refuse_rows(~np.isfinite(found), found, column, "a finite number")
+    for column, array in (("phi", grid), (name, values)):
+        refuse_rows(~np.isfinite(array), array, column, "a finite number")
     if values.shape != grid.shape or grid.ndim != 1:
         raise InputError(name, f"{values.size} values", f"one for each crank angle, {grid.size}", name)
     return matrix, grid, values
@@ -159,8 +159,8 @@ def _minimax(system: Array, right: Array, weights: Array) -> Array:
     rows, rest = system * weights[:, None], (right - system @ start) * weights / scale
     bound = -np.ones((len(rows), 1))
     above, below = np.hstack([rows, bound]), np.hstack([-rows, bound])
-    found = linprog([0.0, 0.0, 0.0, 1.0], A_ub=np.vstack([above, below]), b_ub=np.concatenate([rest, -rest]),
+    solution = linprog([0.0, 0.0, 0.0, 1.0], A_ub=np.vstack([above, below]), b_ub=np.concatenate([rest, -rest]),
                     bounds=[(None, None)] * 3 + [(0.0, None)])  # fmt: skip
-    if found.status != 0 or found.x is None:
-        raise InputError("poses", found.message, "a linear programme with a solution", "lift_chain")
-    return start + scale * found.x[:3]
+    if solution.status != 0 or solution.x is None:
+        raise InputError("poses", solution.message, "a linear programme with a solution", "lift_chain")
+    return start + scale * solution.x[:3]

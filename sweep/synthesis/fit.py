@@ -86,46 +86,48 @@ def fit_line(
     guide = family.stages[-1].family
     start, swing, status = _driven(family, designs) if driven is None else (*driven, np.zeros(len(designs), np.uint8))
     samples = TURN_SAMPLES if guide is family else SWING_SAMPLES
-    share = 0.5 - 0.5 * np.cos(np.linspace(0.0, np.pi, samples))  # Chebyshev points from 0 to 1
+    chebyshev = 0.5 - 0.5 * np.cos(np.linspace(0.0, np.pi, samples))  # Chebyshev points from 0 to 1
     alive = np.flatnonzero(status == codes.OK)
-    own = np.array([column[f"{name}{suffix}"] for name in guide.parameter_names])
-    set_here = np.array([column[f"{name}{suffix}"] for name in guided.fitted])
+    link_columns = np.array([column[f"{name}{suffix}"] for name in guide.parameter_names])
+    fitted_columns = np.array([column[f"{name}{suffix}"] for name in guided.fitted])
     scaled = np.array([column[f"{name}{suffix}"] for name in guided.scaled])
     limits = np.array(window or (0.0, 1.0), dtype=np.float64)
     links, values, travel = (
-        designs[np.ix_(alive, own)],
+        designs[np.ix_(alive, link_columns)],
         np.empty((len(guided.fitted), alive.size)),
         np.empty(alive.size),
     )
-    rows = max(1, BLOCK // share.size)
+    rows = max(1, BLOCK // chebyshev.size)
     for begin in range(0, alive.size, rows):
         part = slice(begin, begin + rows)
-        some = alive[part]
-        angles = _input_angles(family, designs[some], start[some, None] + swing[some, None] * share)
-        values[:, part], travel[part], status[some] = _fitted(guide, guided, links[part], angles, fit, limits)
-    fitted[np.ix_(alive, set_here)] = values.T
+        indices = alive[part]
+        angles = _input_angles(family, designs[indices], start[indices, None] + swing[indices, None] * chebyshev)
+        values[:, part], travel[part], status[indices] = _fitted(guide, guided, links[part], angles, fit, limits)
+    fitted[np.ix_(alive, fitted_columns)] = values.T
     if fit.stroke is not None:
         fitted[np.ix_(alive, scaled)] *= (fit.stroke / travel)[:, None]
     return fitted, status
 
 
 def _fitted(
-    guide: Family, guided: GuidedPoint, own: Array, angles: Array, fit: LineFit, limits: Array
+    guide: Family, guided: GuidedPoint, links: Array, angles: Array, fit: LineFit, limits: Array
 ) -> tuple[Array, Array, NDArray[np.uint8]]:
     """Return the fitted parameters (4, n), the travel (n,) and the status of guides at their input angles (n, m)."""
     names = ("x_b", "y_b", "x_c", "y_c")
-    pins = guide.poses(own, Angles.of(angles), frozenset(names))
-    parts = floats(pins, *names)
+    pins = guide.poses(links, Angles.of(angles), frozenset(names))
+    coordinates = floats(pins, *names)
     missing = pins["status"] != codes.OK
     if missing.any():
-        for part in parts:
-            part[missing] = np.nan
-    values = np.array([own[:, guide.parameter_names.index(name)] for name in guided.fitted])
+        for coordinate in coordinates:
+            coordinate[missing] = np.nan
+    values = np.array([links[:, guide.parameter_names.index(name)] for name in guided.fitted])
     along, across, direction, offset = values
-    deviation, travel = np.empty(len(own)), np.empty(len(own))
-    found = Straightest(along, across, offset, deviation, travel, np.empty(len(own), np.uint8))
-    line_fit(parts[0], parts[1], parts[2], parts[3], limits, direction, fit.free_direction, found)
-    return values, travel, found.status
+    deviation, travel = np.empty(len(links)), np.empty(len(links))
+    line = Straightest(along, across, offset, deviation, travel, np.empty(len(links), np.uint8))
+    line_fit(
+        coordinates[0], coordinates[1], coordinates[2], coordinates[3], limits, direction, fit.free_direction, line
+    )
+    return values, travel, line.status
 
 
 def driving_outputs(family: Family) -> tuple[str, ...]:
@@ -134,15 +136,15 @@ def driving_outputs(family: Family) -> tuple[str, ...]:
     They must equal those that `fit_line` computes, to the last bit: so there are none unless a single step of the first
     of two stages gives both at any accuracy.
     """
-    both = driven_guide(family)
-    if both is None:
+    stages = driven_guide(family)
+    if stages is None:
         return ()
-    step = applying_step(both[0].family, SWING[0], SWING_ACCURACY)
+    step = applying_step(stages[0].family, SWING[0], SWING_ACCURACY)
     if step is None or not {o.name for o in step[0].provides} >= set(SWING):
         return ()
     # A step that also serves a grid ignores the accuracy.
     exact = step[0].applies(Accuracy(samples=SWING_SAMPLES))
-    return tuple(f"{name}{both[0].number}" for name in SWING) if exact else ()
+    return tuple(f"{name}{stages[0].number}" for name in SWING) if exact else ()
 
 
 def _guided(family: Family) -> tuple[GuidedPoint, str]:
@@ -161,9 +163,9 @@ def _driven(family: Family, designs: Array) -> tuple[Array, Array, NDArray[np.ui
         return np.zeros(n), np.full(n, 2.0 * np.pi), np.zeros(n, np.uint8)
     upstream = find_family([stage.family.name for stage in family.stages[:-1]])
     driving = np.ascontiguousarray(designs[:, : len(upstream.parameters)])
-    found = design_outputs(upstream, driving, SWING, SWING_ACCURACY)
-    start, swing = found["psi_ext"].astype(np.float64), found["swing"].astype(np.float64)
-    return start, swing, found["status"].astype(np.uint8)
+    outputs = design_outputs(upstream, driving, SWING, SWING_ACCURACY)
+    start, swing = outputs["psi_ext"].astype(np.float64), outputs["swing"].astype(np.float64)
+    return start, swing, outputs["status"].astype(np.uint8)
 
 
 def _input_angles(family: Family, designs: Array, driving: Array) -> Array:

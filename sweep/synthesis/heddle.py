@@ -99,13 +99,13 @@ def extremes(table: Table, mode: Mode = "exact") -> pd.DataFrame:
     """
     with_rod = "BC" in table or "O2B" in table
     matrix = design_matrix(_LEVER if with_rod else _EXTREMES, table)[0]
-    found, status = _positions(matrix, mode)
+    positions, status = _positions(matrix, mode)
     turn = 2.0 * np.pi
-    xi = [np.abs(found[:, k] - turn * np.rint(found[:, k] / turn)) for k in (1, 2)]
-    columns: dict[str, Array] = {"mu": found[:, 0], "xi_1": xi[0], "xi_2": xi[1]}
-    columns |= {"O2C_1": found[:, 3], "O2C_2": found[:, 4], "vertical_travel": found[:, 5]}
+    xi = [np.abs(positions[:, k] - turn * np.rint(positions[:, k] / turn)) for k in (1, 2)]
+    columns: dict[str, Array] = {"mu": positions[:, 0], "xi_1": xi[0], "xi_2": xi[1]}
+    columns |= {"O2C_1": positions[:, 3], "O2C_2": positions[:, 4], "vertical_travel": positions[:, 5]}
     if with_rod:
-        angles, closed = _lever_angles(_closure(matrix, found, matrix[:, 6:9]))
+        angles, closed = _lever_angles(_closure(matrix, positions, matrix[:, 6:9]))
         columns |= angles
         status = np.where(status == st.OK, closed, status)
     return _frame(columns | {"status": status}, index_of(table, len(matrix)))
@@ -132,20 +132,20 @@ def rods(table: Table, mode: Mode = "exact") -> pd.DataFrame:
     """
     matrix = design_matrix(_RODS, table)[0]
     refuse_rows(matrix[:, 7] >= np.pi, matrix[:, 7], "swing", "an angle below pi")
-    found, status = _positions(matrix, mode)
+    positions, status = _positions(matrix, mode)
     lengths, count = np.empty((len(matrix), 4)), np.empty(len(matrix), np.uint8)
     code = np.empty(len(matrix), np.uint8)
-    kernels.heddle_rods(_closure(matrix, found, matrix[:, 6:9]), lengths, count, code)
+    kernels.heddle_rods(_closure(matrix, positions, matrix[:, 6:9]), lengths, count, code)
     code = np.where(status == st.OK, code, status)
     shown = np.maximum(count, 1).astype(np.int64)
-    which = np.repeat(np.arange(len(matrix)), shown)
-    number = np.arange(len(which)) - (np.cumsum(shown) - shown)[which]
-    rod = lengths[which, number]
-    lever = np.column_stack([matrix[which, 6], np.where(np.isnan(rod), 1.0, rod), matrix[which, 8]])
-    angles, _ = _lever_angles(_closure(matrix[which], found[which], lever))
+    source = np.repeat(np.arange(len(matrix)), shown)
+    number = np.arange(len(source)) - (np.cumsum(shown) - shown)[source]
+    rod = lengths[source, number]
+    lever = np.column_stack([matrix[source, 6], np.where(np.isnan(rod), 1.0, rod), matrix[source, 8]])
+    angles, _ = _lever_angles(_closure(matrix[source], positions[source], lever))
     angles = {name: np.where(np.isnan(rod), np.nan, angle) for name, angle in angles.items()}
     columns = {"rod": number + 1, "BC": rod} | angles
-    return _frame(columns | {"status": code[which]}, index_of(table, len(matrix))[which])
+    return _frame(columns | {"status": code[source]}, index_of(table, len(matrix))[source])
 
 
 def shed(table: Table) -> pd.DataFrame:
@@ -191,10 +191,10 @@ def arms(table: Table) -> pd.DataFrame:
     """
     matrix = design_matrix(_ARMS, table)[0]
     refuse_rows(matrix[:, 4] >= 0.5 * np.pi, matrix[:, 4], "mu_3", "an angle below pi/2")
-    found, status = np.empty((len(matrix), 4)), np.empty(len(matrix), np.uint8)
-    kernels.heddle_shaft_arms(matrix, found, status)
-    columns = dict(zip(("O3D", "DF", "y_high", "y_low"), found.T, strict=True))
-    columns |= {"asymmetry": found[:, 2] + found[:, 3]}
+    results, status = np.empty((len(matrix), 4)), np.empty(len(matrix), np.uint8)
+    kernels.heddle_shaft_arms(matrix, results, status)
+    columns = dict(zip(("O3D", "DF", "y_high", "y_low"), results.T, strict=True))
+    columns |= {"asymmetry": results[:, 2] + results[:, 3]}
     return _frame(columns | {"status": status}, index_of(table, len(matrix)))
 
 
@@ -202,10 +202,10 @@ def _frame(columns: Mapping[str, np.ndarray], index: pd.Index) -> pd.DataFrame:
     """Return columns with units: angles by their names, all others but number and status are lengths."""
     import pandas as pd
 
-    found = pd.DataFrame(columns, index=index)
-    kinds = {name: "rad" if name in ANGLES else "length" for name in columns if name != "status"}
-    found.attrs["units"] = kinds | ({"rod": "1"} if "rod" in columns else {})
-    return found
+    frame = pd.DataFrame(columns, index=index)
+    units = {name: "rad" if name in ANGLES else "length" for name in columns if name != "status"}
+    frame.attrs["units"] = units | ({"rod": "1"} if "rod" in columns else {})
+    return frame
 
 
 def _positions(matrix: Array, mode: Mode) -> tuple[Array, np.ndarray]:
@@ -227,6 +227,6 @@ def _lever_angles(closure: Array) -> tuple[dict[str, Array], np.ndarray]:
     return dict(zip(("lever_angle_1", "lever_angle_2", "lever_swing"), angles.T, strict=True)), status
 
 
-def _closure(matrix: Array, found: Array, lever: Array) -> Array:
+def _closure(matrix: Array, positions: Array, lever: Array) -> Array:
     """Return rows for the kernels: O2O3, O3C, both angles xi, and the given lengths of the cam lever."""
-    return np.column_stack([matrix[:, 3] - matrix[:, 2], matrix[:, 4], found[:, 1], found[:, 2], lever])
+    return np.column_stack([matrix[:, 3] - matrix[:, 2], matrix[:, 4], positions[:, 1], positions[:, 2], lever])

@@ -97,10 +97,10 @@ class Locus:
         columns = dict(zip(names, matrix.T, strict=True))
         status, failed = np.empty(n, np.uint8), np.empty(n, np.uint8)
         designs = np.empty((n, len(find_family(self.family).parameters)), matrix.dtype)
-        found = {name: np.empty(n, matrix.dtype) for name in self.gives}
+        results = {name: np.empty(n, matrix.dtype) for name in self.gives}
         roots = [np.ascontiguousarray(columns["root"])] if self.has_roots else []
-        self.kernel(matrix, *roots, status, failed, designs, *found.values())
-        known = columns | found
+        self.kernel(matrix, *roots, status, failed, designs, *results.values())
+        known = columns | results
         return Found(designs, status, failed, known["phi1"], known["start"], known["phi0"])
 
     def _ranges(self, matrix: Array) -> list[tuple[str, str, NDArray[np.bool_]]]:
@@ -151,17 +151,21 @@ def locus(family: str, names: tuple[str, ...]) -> Locus:
     InputError
         if the family has no locus or the columns select no form.
     """
-    of_family = [way for way in LOCI if way.family == family]
+    of_family = [form for form in LOCI if form.family == family]
     if not of_family:
-        known = tuple(dict.fromkeys(way.family for way in LOCI))
+        known = tuple(dict.fromkeys(form.family for form in LOCI))
         raise InputError("family", family, f"{' or '.join(known)}{nearest(str(family), known)}", "synthesis")
-    told = [way for way in of_family if way.chosen_by in names]
+    selected = [form for form in of_family if form.chosen_by in names]
     # A column shared with another selected form selects nothing.
-    told = [way for way in told if not any(way.chosen_by in other.parameter_names for other in told if other != way)]
-    if not told or len({way.chosen_by for way in told} - {"e"}) > 1:
-        ways = "; or ".join(", ".join(way.parameter_names) for way in of_family)
-        raise InputError("columns", ", ".join(names), ways, "requirement")
-    return told[0]
+    selected = [
+        form
+        for form in selected
+        if not any(form.chosen_by in other.parameter_names for other in selected if other != form)
+    ]
+    if not selected or len({form.chosen_by for form in selected} - {"e"}) > 1:
+        forms = "; or ".join(", ".join(form.parameter_names) for form in of_family)
+        raise InputError("columns", ", ".join(names), forms, "requirement")
+    return selected[0]
 
 
 def locus_designs(family: str, columns: Table) -> tuple[Columns, Status]:
@@ -187,10 +191,10 @@ def locus_designs(family: str, columns: Table) -> tuple[Columns, Status]:
     -----
     Measured: 0.13 us per candidate for ``rssr`` on its locus.
     """
-    way = locus(family, tuple(str(name) for name in columns))
-    found = way.solve(way.read(columns))
+    form = locus(family, tuple(str(name) for name in columns))
+    solved = form.solve(form.read(columns))
     names = find_family(family).parameter_names
-    return dict(zip(names, found.designs.T, strict=True)), found.status
+    return dict(zip(names, solved.designs.T, strict=True)), solved.status
 
 
 def admissible_arcs(family: str, requirement: Mapping[str, float]) -> list[tuple[float, float]]:
@@ -213,22 +217,22 @@ def admissible_arcs(family: str, requirement: Mapping[str, float]) -> list[tuple
     """
     if "phi1" in requirement:
         raise InputError("phi1", requirement["phi1"], "no phi1: its arcs are what is asked for", "requirement")
-    way = locus(family, (*requirement, "phi1"))
-    row = way.read({**requirement, "phi1": 0.0})
-    if way.arc_ends is None:
-        known = [other for other in LOCI if other.family == way.family and other.arc_ends is not None]
+    form = locus(family, (*requirement, "phi1"))
+    row = form.read({**requirement, "phi1": 0.0})
+    if form.arc_ends is None:
+        known = [other for other in LOCI if other.family == form.family and other.arc_ends is not None]
         allowed = "; or ".join(", ".join(n for n in other.parameter_names if n != "phi1") for other in known)
         raise InputError("columns", ", ".join(requirement), allowed, "requirement")
     ends = np.full((1, ARC_ENDS), np.nan)
-    way.arc_ends(row, ends)
-    marks = np.unique(ends[np.isfinite(ends)])
-    following = np.append(marks[1:], marks[0] + TWO_PI)
-    middles = np.repeat(row, marks.size, axis=0)
-    middles[:, way.parameter_names.index("phi1")] = 0.5 * (marks + following)
-    failed = way.solve(middles).failed
+    form.arc_ends(row, ends)
+    boundaries = np.unique(ends[np.isfinite(ends)])
+    following = np.append(boundaries[1:], boundaries[0] + TWO_PI)
+    middles = np.repeat(row, boundaries.size, axis=0)
+    middles[:, form.parameter_names.index("phi1")] = 0.5 * (boundaries + following)
+    failed = form.solve(middles).failed
     inside = (failed != acceptance.SIDE) & (failed != acceptance.NO_POINT)
     arcs: list[tuple[float, float]] = []
-    for start, end, good in zip(marks.tolist(), following.tolist(), inside.tolist(), strict=True):
+    for start, end, good in zip(boundaries.tolist(), following.tolist(), inside.tolist(), strict=True):
         if good and arcs and arcs[-1][1] == start:
             arcs[-1] = (arcs[-1][0], end)
         elif good:
@@ -262,9 +266,9 @@ class OnLocus:
     @cached_property
     def prescribed(self) -> tuple[Parameter, ...]:
         """Prescribed design outputs, as columns of a design space."""
-        own = find_family(self.family).parameter_names
-        asked = [p for p in self.way.parameters if p.name not in own]
-        return tuple(Parameter(self.outside(p.name), p.unit, p.text) for p in asked)
+        parameters = find_family(self.family).parameter_names
+        outputs = [p for p in self.way.parameters if p.name not in parameters]
+        return tuple(Parameter(self.outside(p.name), p.unit, p.text) for p in outputs)
 
     @cached_property
     def made(self) -> tuple[str, ...]:
@@ -300,14 +304,14 @@ class OnLocus:
         columns : nan if the status is not OK
         status : OK, or NOT_ADMISSIBLE if the place on the locus gives no mechanism with the prescribed outputs
         """
-        way = self.way
-        found = way.solve(way.read({name: columns[self.outside(name)] for name in way.parameter_names}))
-        return self.links_of(found), found.status
+        form = self.way
+        solved = form.solve(form.read({name: columns[self.outside(name)] for name in form.parameter_names}))
+        return self.links_of(solved), solved.status
 
-    def links_of(self, found: Found) -> dict[str, Array]:
+    def links_of(self, solved: Found) -> dict[str, Array]:
         """Return the parameters in ``made`` from mechanisms of this stage alone."""
-        own = find_family(self.family).parameter_names
-        return {name: found.designs[:, own.index(name.removesuffix(self.number))] for name in self.made}
+        parameters = find_family(self.family).parameter_names
+        return {name: solved.designs[:, parameters.index(name.removesuffix(self.number))] for name in self.made}
 
     def outside(self, name: str) -> str:
         """Return the name of a column of the requirement in a study."""

@@ -138,58 +138,58 @@ def synthesise(
         raise InputError("max_pressure_angle", max_pressure_angle, "an angle between 0 and pi/2", "synthesise")
     if family == CENTRAL_SLOT.name:  # its mechanisms lie on no locus
         return central_slots(in_radians(CENTRAL_SLOT, table, angles))
-    way = locus(family, plain_names(table))
-    table = in_radians(way, table, angles)
-    matrix = way.read(table)
+    form = locus(family, plain_names(table))
+    table = in_radians(form, table, angles)
+    matrix = form.read(table)
     index = index_of(table, len(matrix))
-    if way.has_roots and "root" not in table:
+    if form.has_roots and "root" not in table:
         matrix = np.repeat(matrix, 2, axis=0)
         matrix[:, -1] = np.tile([1.0, -1.0], len(matrix) // 2)
         index = index.repeat(2)
-    found = way.solve(matrix)
+    solved = form.solve(matrix)
     amplitude = matrix[:, 0]
-    columns: dict[str, object] = dict(zip(find_family(family).parameter_names, found.designs.T, strict=True))
-    if way.has_roots:
+    columns: dict[str, object] = dict(zip(find_family(family).parameter_names, solved.designs.T, strict=True))
+    if form.has_roots:
         columns["root"] = matrix[:, -1]
-    columns |= _limits(way, found, amplitude)
-    columns |= _verdict(family, found, max_pressure_angle)
-    solutions = pd.DataFrame(columns, index=index)
-    solutions.attrs["units"] = _units(way)
-    return solutions
+    columns |= _limits(form, solved, amplitude)
+    columns |= _verdict(family, solved, max_pressure_angle)
+    frame = pd.DataFrame(columns, index=index)
+    frame.attrs["units"] = _units(form)
+    return frame
 
 
-def _units(way: Locus) -> dict[str, str]:
+def _units(form: Locus) -> dict[str, str]:
     """Return the units of the columns that have one, by the letter of the output: an angle psi, a displacement s."""
-    mechanism, amplitude = find_family(way.family), way.parameter_names[0]
+    mechanism, amplitude = find_family(form.family), form.parameter_names[0]
     letter, unit = mechanism.position, mechanism.pose_output[mechanism.position].unit
     angles = dict.fromkeys(("phi_ext", "phi_fold", "phi0", "max_pressure_angle"), "rad")
-    own = dict.fromkeys((f"{letter}_ext", f"{letter}_fold", amplitude), unit)
-    root = {"root": "1"} if way.has_roots else {}
-    return parameter_units(mechanism.parameters) | root | own | angles | {"margin": "1"}
+    limits = dict.fromkeys((f"{letter}_ext", f"{letter}_fold", amplitude), unit)
+    root = {"root": "1"} if form.has_roots else {}
+    return parameter_units(mechanism.parameters) | root | limits | angles | {"margin": "1"}
 
 
-def _limits(way: Locus, found: Found, amplitude: Array) -> dict[str, object]:
-    letter, name = find_family(way.family).position, way.parameter_names[0]
-    good = found.status == st.OK
-    phi1, start = (np.where(good, x, np.nan) for x in (found.phi1, found.start))
+def _limits(form: Locus, solved: Found, amplitude: Array) -> dict[str, object]:
+    letter, name = find_family(form.family).position, form.parameter_names[0]
+    exists = solved.status == st.OK
+    phi1, start = (np.where(exists, x, np.nan) for x in (solved.phi1, solved.start))
     return {
         "phi_ext": phi1 % TWO_PI,
-        "phi_fold": (phi1 + found.phi0) % TWO_PI,
+        "phi_fold": (phi1 + solved.phi0) % TWO_PI,
         f"{letter}_ext": start,
         f"{letter}_fold": start + amplitude,
         name: amplitude,
-        "phi0": found.phi0,
+        "phi0": solved.phi0,
     }
 
 
-def _verdict(family: str, found: Found, limit: float | None) -> dict[str, object]:
+def _verdict(family: str, solved: Found, limit: float | None) -> dict[str, object]:
     """Return tests (iv) and (v) of the mechanisms that passed the first three."""
     import pandas as pd
 
-    status, failed = found.status.copy(), found.failed.copy()
+    status, failed = solved.status.copy(), solved.failed.copy()
     alive = np.flatnonzero(status == st.OK)
     margin, angle = np.full(len(status), np.nan), np.full(len(status), np.nan)
-    turn = design_outputs(find_family(family), found.designs[alive], ["margin", "max_pressure_angle"], _EXACT)
+    turn = design_outputs(find_family(family), solved.designs[alive], ["margin", "max_pressure_angle"], _EXACT)
     turning = turn["status"].astype(np.uint8)
     margin[alive], angle[alive], status[alive] = turn["margin"], turn["max_pressure_angle"], turning
     failed[alive[turning != st.OK]] = acceptance.ROTATION
@@ -227,22 +227,22 @@ def five_links_with_limits(table: Table, h: float) -> pd.DataFrame:
 
     designs, _ = design_matrix(find_family("rssr"), table)
     n = len(designs)
-    state, limits = np.empty(n, np.uint8), np.empty((n, len(rssr.LIMIT_NAMES)))
-    rssr.limits(designs, state, limits, None)
+    rssr_status, limits = np.empty(n, np.uint8), np.empty((n, len(rssr.LIMIT_NAMES)))
+    rssr.limits(designs, rssr_status, limits, None)
     ext, fold = (np.ascontiguousarray(limits[:, rssr.LIMIT_NAMES.index(name)]) for name in ("psi_ext", "psi_fold"))
-    found, a, b = np.empty(n, np.uint8), np.empty(n), np.empty(n)
-    five_link.with_limits_of(designs, ext, fold, np.full(n, float(h)), found, a, b)
-    status = np.where(state == st.OK, found, state)
+    five_link_status, a, b = np.empty(n, np.uint8), np.empty(n), np.empty(n)
+    five_link.with_limits_of(designs, ext, fold, np.full(n, float(h)), five_link_status, a, b)
+    status = np.where(rssr_status == st.OK, five_link_status, rssr_status)
     matrix = np.column_stack(
         [a, b, designs[:, 2:7], np.full(n, float(h)), np.zeros(n), designs[:, 7], np.ones(n)]
     )  # fmt: skip
-    there = np.flatnonzero(status == st.OK)
-    turning = design_outputs(find_family("five_link"), matrix[there], ["psi_ext", "psi_fold"], Accuracy(target=1e-9))
-    status[there] = turning["status"]
+    alive = np.flatnonzero(status == st.OK)
+    turning = design_outputs(find_family("five_link"), matrix[alive], ["psi_ext", "psi_fold"], Accuracy(target=1e-9))
+    status[alive] = turning["status"]
     # the stroke may end elsewhere than at the two places found, if they belong to different assembly modes
     places: Array = np.column_stack([turning["psi_ext"], turning["psi_fold"]])
-    apart = places - np.column_stack([ext, fold])[there]
-    defect = there[(np.abs(np.sin(0.5 * apart)) > LIMITS_APART).any(axis=1)]
+    offsets = places - np.column_stack([ext, fold])[alive]
+    defect = alive[(np.abs(np.sin(0.5 * offsets)) > LIMITS_APART).any(axis=1)]
     status[defect], matrix[defect, :2] = st.NOT_ADMISSIBLE, np.nan
     frame = pd.DataFrame(matrix, index_of(table, n), list(find_family("five_link").parameter_names))
     frame["status"] = status

@@ -81,10 +81,10 @@ def fit_eyelet(
     import pandas as pd
 
     angles, wanted = numbers(phi, "phi", "phi").ravel(), numbers(P, "P", "P").ravel()
-    share = np.ones(angles.size) if weights is None else numbers(weights, "weights", "weights").ravel()
-    if not angles.size == wanted.size == share.size:
+    weight = np.ones(angles.size) if weights is None else numbers(weights, "weights", "weights").ravel()
+    if not angles.size == wanted.size == weight.size:
         allowed = f"as many values as phi, {angles.size}"
-        raise InputError("P", f"{wanted.size} and {share.size} weights", allowed, "wanted points")
+        raise InputError("P", f"{wanted.size} and {weight.size} weights", allowed, "wanted points")
     for name, values in (("phi", angles), ("P", wanted)):
         refuse_rows(~np.isfinite(values), values, name, "a finite number")
     for name in fixed:
@@ -95,10 +95,10 @@ def fit_eyelet(
         raise InputError("fixed", ", ".join(fixed), f"not all of {', '.join(SOUGHT)}", "fit_eyelet")
     if angles.size <= len(sought):
         raise InputError("phi", f"{angles.size} points", f"more than the {len(sought)} unknowns", "wanted points")
-    if not (np.isfinite(share).all() and (share >= 0.0).all() and share.sum() > 0.0):
-        raise InputError("weights", share.min(), "numbers that are not negative, one of them positive", "weights")
+    if not (np.isfinite(weight).all() and (weight >= 0.0).all() and weight.sum() > 0.0):
+        raise InputError("weights", weight.min(), "numbers that are not negative, one of them positive", "weights")
     matrix, _ = design_matrix(family("eyelet"), starts)
-    problem = _Problem(np.cos(angles)[None], np.sin(angles)[None], wanted, share / share.sum(), sought)
+    problem = _Problem(np.cos(angles)[None], np.sin(angles)[None], wanted, weight / weight.sum(), sought)
     rows = [problem.solved(start) for start in matrix]
     frame = pd.DataFrame(rows).sort_values("rms", kind="stable", ignore_index=True)
     frame.attrs["units"] = parameter_units(family("eyelet").parameters) | {"rms": "length", "largest": "length"}
@@ -121,20 +121,20 @@ class _Problem:
         scale = np.array([unit if SOUGHT[k] in LENGTHS else 1.0 for k in self.sought])
         low = np.array([1e-9 * unit if SOUGHT[k] == "a" else -np.inf for k in self.sought])
 
-        found = least_squares(
+        fit = least_squares(
             partial(self.errors, start), start[self.sought], partial(self.slopes, start), x_scale=scale,
             bounds=(low, np.inf), xtol=1e-15, ftol=1e-15, gtol=1e-15, max_nfev=500,
         )  # fmt: skip
-        design = self.design(start, found.x)
-        left = self.lengths(design) - self.wanted
-        design[0, STORE] = self.weights @ left
-        left = left - design[0, STORE]
-        _, size, right = np.linalg.svd(self.slopes(start, found.x) * scale, full_matrices=False)
-        weak = right[size <= LEAST_RANK * size[0]]
+        design = self.design(start, fit.x)
+        residuals = self.lengths(design) - self.wanted
+        design[0, STORE] = self.weights @ residuals
+        residuals = residuals - design[0, STORE]
+        _, singular_values, directions = np.linalg.svd(self.slopes(start, fit.x) * scale, full_matrices=False)
+        weak = directions[singular_values <= LEAST_RANK * singular_values[0]]
         names = [SOUGHT[k] for i, k in enumerate(self.sought) if (np.abs(weak[:, i]) > SHARE).any()]
         values: dict[str, float | str] = dict(zip(family("eyelet").parameter_names, design[0], strict=True))
-        rms = float(np.sqrt(self.weights @ left**2))
-        return values | {"rms": rms, "largest": float(np.abs(left).max()), "undetermined": ",".join(names)}
+        rms = float(np.sqrt(self.weights @ residuals**2))
+        return values | {"rms": rms, "largest": float(np.abs(residuals).max()), "undetermined": ",".join(names)}
 
     def design(self, start: Array, x: Array) -> Array:
         design = start[None].copy()
@@ -143,15 +143,15 @@ class _Problem:
 
     def lengths(self, design: Array) -> Array:
         status, length = np.empty(self.cos.shape, np.uint8), np.empty(self.cos.shape)
-        wanted = eyelet.Outputs(None, None, None, length, None, None, None, None)
-        eyelet.poses(design, self.cos, self.sin, status, wanted)
-        whole: Array = length[0]
-        return whole
+        outputs = eyelet.Outputs(None, None, None, length, None, None, None, None)
+        eyelet.poses(design, self.cos, self.sin, status, outputs)
+        lengths: Array = length[0]
+        return lengths
 
     def errors(self, start: Array, x: Array) -> Array:
         """Return the weighted errors of P, with the best P_h."""
-        left = self.lengths(self.design(start, x)) - self.wanted
-        return np.sqrt(self.weights) * (left - self.weights @ left)
+        residuals = self.lengths(self.design(start, x)) - self.wanted
+        return np.sqrt(self.weights) * (residuals - self.weights @ residuals)
 
     def slopes(self, start: Array, x: Array) -> Array:
         jacobian = np.empty((len(SOUGHT), *self.cos.shape))

@@ -89,16 +89,18 @@ def fit_contour(table: Table, confidence: float = 0.95) -> ConstantsFit:
 
     def law(x: Array) -> Array:
         alpha, beta, b = x
-        way = beta * theta
-        model: Array = t1 * np.exp(way) + b * pressed * np.expm1(way) + alpha * radius * theta * _growth(way)
+        exponent = beta * theta
+        model: Array = (
+            t1 * np.exp(exponent) + b * pressed * np.expm1(exponent) + alpha * radius * theta * _growth(exponent)
+        )
         return model / t2 - 1.0
 
     def slopes(x: Array) -> Array:
         alpha, beta, b = x
-        way = beta * theta
-        rise = theta * np.exp(way)
-        by_beta = t1 * rise + b * pressed * rise + alpha * radius * theta * theta * _growth_slope(way)
-        columns = (radius * theta * _growth(way), by_beta, pressed * np.expm1(way))
+        exponent = beta * theta
+        rise = theta * np.exp(exponent)
+        by_beta = t1 * rise + b * pressed * rise + alpha * radius * theta * theta * _growth_slope(exponent)
+        columns = (radius * theta * _growth(exponent), by_beta, pressed * np.expm1(exponent))
         return np.column_stack([column / t2 for column in columns])
 
     start = np.array([float(p.default or 0.0) for p in (ALPHA, BETA, BENDING)])
@@ -127,8 +129,8 @@ def fit_speed(table: Table, confidence: float = 0.95) -> ConstantsFit:
     relative, measured = np.log(given["v"] / given["v_ref"]), given["ratio_to_ref"]
 
     def law(x: Array) -> Array:
-        found: Array = (1.0 + x[0] * np.expm1(x[1] * relative)) / measured - 1.0
-        return found
+        residual: Array = (1.0 + x[0] * np.expm1(x[1] * relative)) / measured - 1.0
+        return residual
 
     def slopes(x: Array) -> Array:
         power = np.exp(x[1] * relative)
@@ -162,22 +164,22 @@ def _fitted(
         raise InputError("table", f"{count} rows", f"at least {len(names)}, one per constant", "measurements")
     if not 0.0 < confidence < 1.0:
         raise InputError("confidence", confidence, "a number between 0 and 1", "measurements")
-    found = least_squares(law, start, slopes, bounds=(0.0, most), x_scale=start, xtol=1e-15, ftol=1e-15, gtol=1e-15)
-    values, free = found.x, count - len(names)
+    result = least_squares(law, start, slopes, bounds=(0.0, most), x_scale=start, xtol=1e-15, ftol=1e-15, gtol=1e-15)
+    values, free = result.x, count - len(names)
     scaled = slopes(values) * start
-    _, size, right = np.linalg.svd(scaled, full_matrices=False)
-    weak = size <= LEAST_RANK * size[0]
+    _, singular_values, directions = np.linalg.svd(scaled, full_matrices=False)
+    weak = singular_values <= LEAST_RANK * singular_values[0]
     # A constant with a component in a weak direction is not determined.
-    lost = (np.abs(right[weak]) > 1e-3).any(axis=0) if weak.any() else np.zeros(len(names), np.bool_)
-    square = float(found.fun @ found.fun)
+    undetermined = (np.abs(directions[weak]) > 1e-3).any(axis=0) if weak.any() else np.zeros(len(names), np.bool_)
+    square = float(result.fun @ result.fun)
     variance = square / free if free > 0 else np.nan
-    spread = np.sqrt(variance * ((right[~weak].T / size[~weak]) ** 2).sum(axis=1)) * start
-    spread = np.where(lost, np.inf, spread)
+    spread = np.sqrt(variance * ((directions[~weak].T / singular_values[~weak]) ** 2).sum(axis=1)) * start
+    spread = np.where(undetermined, np.inf, spread)
     half = float(student.ppf(0.5 + 0.5 * confidence, free)) * spread if free > 0 else np.full(len(names), np.inf)
     columns = {"value": values, "standard_error": spread, "low": values - half, "high": values + half}
     return ConstantsFit(
         pd.DataFrame(columns, index=pd.Index(names, name="constant")),
         float(np.sqrt(square / count)),
         confidence,
-        tuple(name for name, gone in zip(names, lost, strict=True) if gone),
+        tuple(name for name, gone in zip(names, undetermined, strict=True) if gone),
     )

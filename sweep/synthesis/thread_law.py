@@ -39,8 +39,8 @@ class ThreadLaw:
 
     def __call__(self, phi: ArrayLike, order: int = 0) -> Array:
         """Return P or its derivative of the given order."""
-        found: Array = _waves(np.asarray(phi, np.float64), len(self.cos), order) @ np.concatenate([self.cos, self.sin])
-        return found
+        values: Array = _waves(np.asarray(phi, np.float64), len(self.cos), order) @ np.concatenate([self.cos, self.sin])
+        return values
 
     @property
     def coefficients(self) -> dict[str, float]:
@@ -71,11 +71,11 @@ def smoothest_law(phi: ArrayLike, demand: ArrayLike, allowed: ArrayLike, harmoni
     """
     from scipy.optimize import linprog
 
-    at, need = numbers(phi, "phi", "phi").ravel(), numbers(demand, "demand", "demand").ravel()
+    angles, need = numbers(phi, "phi", "phi").ravel(), numbers(demand, "demand", "demand").ravel()
     slack = numbers(allowed, "allowed", "allowed").ravel()
-    for name, values in (("phi", at), ("demand", need), ("allowed", slack)):
-        if values.size != at.size and (name, values.size) != ("allowed", 1):
-            raise InputError(name, f"{values.size} values", f"as many as phi, {at.size}", "thread law")
+    for name, values in (("phi", angles), ("demand", need), ("allowed", slack)):
+        if values.size != angles.size and (name, values.size) != ("allowed", 1):
+            raise InputError(name, f"{values.size} values", f"as many as phi, {angles.size}", "thread law")
         if not np.isfinite(values).all() or not values.size:
             raise InputError(name, values.tolist()[:3], "finite numbers", "thread law")
     if harmonics < 1:
@@ -83,8 +83,8 @@ def smoothest_law(phi: ArrayLike, demand: ArrayLike, allowed: ArrayLike, harmoni
     # The tolerances of the linear program suit numbers of about 1.
     unit, least = max(float(np.abs(slack).max()), LEAST * float(np.ptp(need))) or 1.0, float(slack.min())
     need, slack = need / unit, np.broadcast_to(slack / unit, need.shape)
-    waves, curving = _waves(at, harmonics, 0), _waves(at, harmonics, 2)
-    one, none = np.ones((at.size, 1)), np.zeros((at.size, 1))
+    waves, curving = _waves(angles, harmonics, 0), _waves(angles, harmonics, 2)
+    one, none = np.ones((angles.size, 1)), np.zeros((angles.size, 1))
     # unknowns: the coefficients, the stock, the largest |P''|, and the excess over the slack
     rows = np.block(
         [
@@ -94,18 +94,18 @@ def smoothest_law(phi: ArrayLike, demand: ArrayLike, allowed: ArrayLike, harmoni
             [-curving, none, -one, none],
         ]
     )
-    right = np.concatenate([-need, need + slack, np.zeros(2 * at.size)])
+    right = np.concatenate([-need, need + slack, np.zeros(2 * angles.size)])
     free = 2 * harmonics + 1
     for goal, most in ((free + 1, None), (free, 0.0)):
         cost = np.zeros(free + 2)
         cost[goal] = 1.0
-        found: Any = linprog(cost, rows, right, bounds=[(None, None)] * free + [(0.0, None), (0.0, most)])
-        if most is None and found.x[-1] > TIGHT:
-            words = f"{unit * found.x[-1]:.4g} more, or more than {harmonics} harmonics"
+        program: Any = linprog(cost, rows, right, bounds=[(None, None)] * free + [(0.0, None), (0.0, most)])
+        if most is None and program.x[-1] > TIGHT:
+            words = f"{unit * program.x[-1]:.4g} more, or more than {harmonics} harmonics"
             raise InputError("allowed", least, words, "thread law")
-    surplus = found.x[free - 1] - waves @ found.x[: free - 1] - need
+    surplus = program.x[free - 1] - waves @ program.x[: free - 1] - need
     spare = unit * float(np.minimum(surplus, slack - surplus).min())
-    x = unit * found.x
+    x = unit * program.x
     return ThreadLaw(x[:harmonics], x[harmonics : 2 * harmonics], float(x[free - 1]), float(x[free]), spare)
 
 
@@ -160,11 +160,11 @@ def cam_edge(law: ThreadLaw, guides: ArrayLike, P_h: float, count: int = 360) ->
     apart = np.abs((np.arange(count) - np.arange(count)[:, None] + count // 2) % count - count // 2)
     clear = np.where(apart * 100 >= count, longer, np.inf).min(axis=1)
     _refuse(clear < 0.0, phi, "an edge that touches the thread at one place alone")
-    found = pd.DataFrame({"phi": phi, "x": x, "y": y, "nx": nx, "ny": ny, "curvature": turning / along, "clear": clear})
-    found.attrs["units"] = {"phi": "rad", "nx": "1", "ny": "1", "curvature": "1/length"} | dict.fromkeys(
+    edge = pd.DataFrame({"phi": phi, "x": x, "y": y, "nx": nx, "ny": ny, "curvature": turning / along, "clear": clear})
+    edge.attrs["units"] = {"phi": "rad", "nx": "1", "ny": "1", "curvature": "1/length"} | dict.fromkeys(
         ("x", "y", "clear"), "length"
     )
-    return found
+    return edge
 
 
 def _waves(phi: Array, harmonics: int, order: int) -> Array:
@@ -211,14 +211,14 @@ def _touched(ends: Array, length: Array, rate: Array, phi: Array) -> Array:
     changes = left * np.roll(left, -1, axis=1) <= 0.0
     _refuse(~changes.any(axis=1), phi, "a law that an edge can give: P changes too fast for these guides")
     far = np.where(changes, np.hypot(q[..., 0], q[..., 1]), -np.inf).argmax(axis=1)
-    found: Array = q[np.arange(len(q)), far]
+    point: Array = q[np.arange(len(q)), far]
     for _ in range(ROUNDS):
-        total, g, h = _way(ends, found)
-        swept = np.stack([-found[:, 1], found[:, 0]], axis=1)
+        total, g, h = _way(ends, point)
+        swept = np.stack([-point[:, 1], point[:, 0]], axis=1)
         across = np.einsum("nij,nj->ni", h, swept) + np.stack([g[:, 1], -g[:, 0]], axis=1)
         errors = np.stack([total - length, (g * swept).sum(axis=1) - rate], axis=1)
-        found = found - np.linalg.solve(np.stack([g, across], axis=1), errors[..., None])[..., 0]
-    return found
+        point = point - np.linalg.solve(np.stack([g, across], axis=1), errors[..., None])[..., 0]
+    return point
 
 
 def _refuse(where: NDArray[np.bool_], phi: Array, allowed: str) -> None:

@@ -78,12 +78,12 @@ def diagram(
     events = switches(family, one_design(family, given), wanted)[0]
     turn = np.arange(samples) * (TWO_PI / samples)
     phi = np.unique(np.mod(np.concatenate([turn, events - BESIDE, events + BESIDE]), TWO_PI))
-    found = evaluate(family, given, wanted, phi=phi).drop(columns="design")
-    found["demand"] = sum(found[f"{t.name}_demand"] for t in threads)
-    found.attrs["units"]["demand"] = found.attrs["units"][f"{threads[0].name}_demand"]
+    result = evaluate(family, given, wanted, phi=phi).drop(columns="design")
+    result["demand"] = sum(result[f"{t.name}_demand"] for t in threads)
+    result.attrs["units"]["demand"] = result.attrs["units"][f"{threads[0].name}_demand"]
     for name in (name for name in wanted if name.endswith("_velocity")):
-        speeds = np.abs(found[name].to_numpy(np.float64)) / MM_PER_M
+        speeds = np.abs(result[name].to_numpy(np.float64)) / MM_PER_M
         warn_outside(
             speeds, MEASURED_SPEED._replace(low=0.0, name=f"speed of {name.removesuffix('_velocity')}"), (), {}
         )
-    return found
+    return result

@@ -42,9 +42,9 @@ def frame(
     import pandas as pd
 
     index = table.index if isinstance(table, pd.DataFrame) else None
-    found = pd.DataFrame({name: np.asarray(x).reshape(len(x)) for name, x in columns.items()}, index=index)
-    found.attrs["units"] = {name: unit for unit, names in units.items() for name in names.split()}
-    return found
+    result = pd.DataFrame({name: np.asarray(x).reshape(len(x)) for name, x in columns.items()}, index=index)
+    result.attrs["units"] = {name: unit for unit, names in units.items() for name in names.split()}
+    return result
 
 
 def warn_outside(values: Array, measured: Range, constants: tuple[Parameter, ...], table: Table) -> None:

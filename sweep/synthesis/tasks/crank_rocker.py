@@ -72,11 +72,11 @@ def with_tops(curve: Array) -> Array:
 def outputs_of(designs: Array, names: Iterable[str], accuracy: Accuracy) -> dict[str, Array]:
     """Return design outputs of crank-rockers, (n,) each; nan if there is no mechanism."""
     alive = np.isfinite(designs).all(axis=1)
-    found = design_outputs(RSSR, designs[alive], list(names), accuracy)
-    whole = {name: np.full(len(designs), np.nan) for name in names}
-    for name, column in whole.items():
-        column[alive] = found[name]
-    return whole
+    outputs = design_outputs(RSSR, designs[alive], list(names), accuracy)
+    columns = {name: np.full(len(designs), np.nan) for name in names}
+    for name, column in columns.items():
+        column[alive] = outputs[name]
+    return columns
 
 
 def least_cos2(designs: Array) -> Array:
@@ -98,10 +98,10 @@ def bearing_reserve(designs: Array, bearings: Mapping[str, float]) -> Array:
     """
     rolling = "theta1_reserve_rolling"
     name = rolling if "dynamic_capacity" in bearings else "theta1_reserve"
-    whole, least = extended(RSSR, [f"min_{name}"]), np.full(len(designs), np.nan)
+    with_bearings, least = extended(RSSR, [f"min_{name}"]), np.full(len(designs), np.nan)
     alive = np.isfinite(designs).all(axis=1)
-    matrix = design_matrix(whole, {**named(designs[alive]), **bearings})[0]
-    least[alive] = whole.values(matrix, turn(), name)[0].min(axis=1)
+    matrix = design_matrix(with_bearings, {**named(designs[alive]), **bearings})[0]
+    least[alive] = with_bearings.values(matrix, turn(), name)[0].min(axis=1)
     return least
 
 
@@ -170,8 +170,10 @@ class EngineeringMethod(OnLocus):
         """
         f: Array = np.linspace(*self.f_range, offsets, dtype=np.float64)
         phi1: Array = np.arange(places, dtype=np.float64) * (2.0 * np.pi / places)
-        kept = np.array([(self.evaluate(side_by_side(phi1, one)).limits >= 0.0).all(axis=1).any() for one in f])
-        edges = np.flatnonzero(np.diff(np.concatenate([[False], kept, [False]]).astype(np.int8)))
+        feasible = np.array(
+            [(self.evaluate(side_by_side(phi1, offset)).limits >= 0.0).all(axis=1).any() for offset in f]
+        )
+        edges = np.flatnonzero(np.diff(np.concatenate([[False], feasible, [False]]).astype(np.int8)))
         return [(float(f[a]), float(f[b - 1])) for a, b in edges.reshape(-1, 2)]
 
 

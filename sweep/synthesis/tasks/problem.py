@@ -207,23 +207,23 @@ class Task(ABC):
 
     def evaluate(self, x: Array) -> Candidates:
         """Return equations, limits, objective curve and mechanisms of candidates x (n, number of unknowns)."""
-        n, found = len(x), self._bounded(x)
-        columns = {name: np.broadcast_to(np.asarray(values, np.float64), n) for name, values in found.results.items()}
-        return Candidates(_stacked(n, found.equations), _stacked(n, found.limits), found.curve, columns)
+        n, named = len(x), self._bounded(x)
+        columns = {name: np.broadcast_to(np.asarray(values, np.float64), n) for name, values in named.results.items()}
+        return Candidates(_stacked(n, named.equations), _stacked(n, named.limits), named.curve, columns)
 
     def _bounded(self, x: Array) -> Found:
         """Return the values of candidates x (n, unknowns), with slacks of the bounds in units of their range."""
-        found = self.found(dict(zip((u.name for u in self.unknowns), x.T, strict=True)))
-        limits = dict(found.limits)
+        named = self.found(dict(zip((u.name for u in self.unknowns), x.T, strict=True)))
+        limits = dict(named.limits)
         for name, (low, high) in self.bounds.items():
-            if name not in found.results:
-                raise InputError("bounds", name, choices(name, found.results), "task")
-            value = found.results[name]
+            if name not in named.results:
+                raise InputError("bounds", name, choices(name, named.results), "task")
+            value = named.results[name]
             limits[f"{name} not below"], limits[f"{name} not above"] = (
                 (value - low) / (high - low),
                 (high - value) / (high - low),
             )
-        return found._replace(limits=limits)
+        return named._replace(limits=limits)
 
 
 def _stacked(count: int, columns: Mapping[str, Array]) -> Array:
@@ -238,5 +238,5 @@ def turning(name: str) -> Unknown:
 
 def ranges(task: object, *names: str) -> list[Unknown]:
     """Return the unknowns with these names for which a task gives a range, ``name_range``."""
-    found = ((name, getattr(task, f"{name}_range")) for name in names)
-    return [Unknown(name, *ends) for name, ends in found if ends is not None]
+    given = ((name, getattr(task, f"{name}_range")) for name in names)
+    return [Unknown(name, *ends) for name, ends in given if ends is not None]

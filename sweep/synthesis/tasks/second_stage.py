@@ -45,10 +45,10 @@ class Drive(NamedTuple):
         """
         matrix, _ = design_matrix(RSSR, design)
         names = ("psi_ext", "swing", "phi_ext", "phi_fold")
-        found = design_outputs(RSSR, matrix, names, Accuracy(target=1e-12))
-        if len(matrix) != 1 or found["status"][0] != 0:
+        limits = design_outputs(RSSR, matrix, names, Accuracy(target=1e-12))
+        if len(matrix) != 1 or limits["status"][0] != 0:
             raise InputError("drive", dict(design), "one crank-rocker that turns fully and oscillates", place)
-        return cls(matrix[0], *(float(found[name][0]) for name in names))
+        return cls(matrix[0], *(float(limits[name][0]) for name in names))
 
     def columns(self, count: int) -> dict[str, Array]:
         """Return the parameters of the crank-rocker as columns of stage 1."""
@@ -117,8 +117,8 @@ class RockerSlider(FourBar):
 
     def path(self, shape: Mapping[str, Array], angles: Angles, branch: int) -> tuple[Points, Points]:
         """Return the working point and its derivative by the crank angle, (n, m), for a crank of 1."""
-        own = {name: shape[name] for name in ("coupler", "offset")}
-        s, ds = self.poses(own, angles, branch, ("s", "ds"))
+        proportions = {name: shape[name] for name in ("coupler", "offset")}
+        s, ds = self.poses(proportions, angles, branch, ("s", "ds"))
         share = ((shape["along"] + 1j * shape["across"]) / shape["coupler"])[:, None]
         pin, slide = angles.cos + 1j * angles.sin, s + 1j * shape["offset"][:, None]
         point, moving = (1.0 - share) * pin + share * slide, (1.0 - share) * 1j * pin + share * ds

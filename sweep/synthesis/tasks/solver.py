@@ -50,9 +50,9 @@ class _Scaled:
 
         def slope(values: Array) -> Array:
             centre, ahead, behind = values[0], values[1 : k + 1], values[k + 1 :]
-            found = (ahead - behind) / (2.0 * STEP)
-            found = np.where(np.isnan(found), (ahead - centre) / STEP, found)
-            return np.nan_to_num(np.where(np.isnan(found), (centre - behind) / STEP, found))
+            difference = (ahead - behind) / (2.0 * STEP)
+            difference = np.where(np.isnan(difference), (ahead - centre) / STEP, difference)
+            return np.nan_to_num(np.where(np.isnan(difference), (centre - behind) / STEP, difference))
 
         at, limits, curve, _ = self.rows(np.vstack([z[None, :], z + steps, z - steps]))
         return Candidates(at[0], limits[0], curve[0], {}), Candidates(slope(at), slope(limits), slope(curve), {})
@@ -86,9 +86,9 @@ def solve(
     best: list[float] = []
     while len(best) < samples and not _met(best):
         ends = [_refined(scaled, z) for z in _starts(scaled, candidates, starts, (seed, len(best)))]
-        found = [_solution(problem, scaled.real(z)) for z in ends]
-        best.append(min((s.objective for s in found if s.feasible), default=np.inf))
-        solutions += found
+        refined = [_solution(problem, scaled.real(z)) for z in ends]
+        best.append(min((s.objective for s in refined if s.feasible), default=np.inf))
+        solutions += refined
     solutions.sort(key=lambda s: (not s.feasible, s.objective if s.feasible else _miss(s)))
     places = [(np.array([*s.unknowns.values()]) - scaled.low) / scaled.span for s in solutions]
     return [solutions[n] for n in _apart(scaled, places, APART, starts)]
@@ -129,11 +129,11 @@ def _starts(scaled: _Scaled, candidates: int, starts: int, seed: tuple[int, int]
 
 def _apart(scaled: _Scaled, places: Sequence[Array] | Array, least: float, most: int) -> list[int]:
     """Return the indices of the first places that are farther than ``least`` from those before them."""
-    kept: list[int] = []
+    chosen: list[int] = []
     for n, z in enumerate(places):
-        if len(kept) < most and all(_distance(scaled, z, places[other]) > least for other in kept):
-            kept.append(n)
-    return kept
+        if len(chosen) < most and all(_distance(scaled, z, places[other]) > least for other in chosen):
+            chosen.append(n)
+    return chosen
 
 
 def _distance(scaled: _Scaled, one: Array, other: Array) -> float:
@@ -191,8 +191,8 @@ def _restored(scaled: _Scaled, z: Array) -> Array:
 
     def residuals(point: Array) -> Array:
         value = scaled.rows(point)
-        both = np.concatenate([value.equations[0], np.minimum(value.limits[0] - 1e-10, 0.0)])
-        return np.where(np.isfinite(both), both, 1e3)
+        residual = np.concatenate([value.equations[0], np.minimum(value.limits[0] - 1e-10, 0.0)])
+        return np.where(np.isfinite(residual), residual, 1e3)
 
     def jacobian(point: Array) -> Array:
         value, slope = scaled.with_gradient(point)
@@ -202,8 +202,8 @@ def _restored(scaled: _Scaled, z: Array) -> Array:
     run: Any = least_squares
     if not np.isfinite(scaled.rows(inside).equations).all():
         return z
-    found = run(residuals, inside, jac=jacobian, bounds=(low, high), xtol=1e-15, ftol=1e-15, gtol=1e-15, max_nfev=60)
-    point: Array = found.x
+    result = run(residuals, inside, jac=jacobian, bounds=(low, high), xtol=1e-15, ftol=1e-15, gtol=1e-15, max_nfev=60)
+    point: Array = result.x
     for _ in range(4):
         step = np.linalg.lstsq(jacobian(point), -residuals(point), rcond=1e-12)[0]
         following = np.clip(point + step, low, high)
@@ -219,23 +219,23 @@ def _descended(scaled: _Scaled, z: Array, top: float, used: NDArray[np.bool_], r
 
     if not top > 0.0:
         return z
-    memory: dict[bytes, tuple[Array, Array, Array, Array]] = {}
+    cache: dict[bytes, tuple[Array, Array, Array, Array]] = {}
 
     def parts(point: Array) -> tuple[Array, Array, Array, Array]:
         key = point.tobytes()
-        if key not in memory:
-            memory.clear()
+        if key not in cache:
+            cache.clear()
             value, slope = scaled.with_gradient(point[:-1])
             curve = value.curve[used] / top
             below = np.concatenate([point[-1] - curve, point[-1] + curve, value.limits])
             rows = np.concatenate([-slope.curve[:, used] / top, slope.curve[:, used] / top, slope.limits], axis=1).T
             last = np.concatenate([np.ones(2 * curve.size), np.zeros(value.limits.size)])
             # Where no mechanism exists: a value that makes the line search step back.
-            kept = np.where(np.isfinite(below), below, -1e3)
+            inequalities = np.where(np.isfinite(below), below, -1e3)
             equal = np.where(np.isfinite(value.equations), value.equations, 1e3)
-            memory[key] = (kept, np.column_stack([rows, last]), equal,
+            cache[key] = (inequalities, np.column_stack([rows, last]), equal,
                            np.column_stack([slope.equations.T, np.zeros(equal.size)]))  # fmt: skip
-        return memory[key]
+        return cache[key]
 
     gradient = np.append(np.zeros(z.size), 1.0)
     constraints = [{"type": "ineq", "fun": lambda p: parts(p)[0], "jac": lambda p: parts(p)[1]}]
@@ -244,23 +244,23 @@ def _descended(scaled: _Scaled, z: Array, top: float, used: NDArray[np.bool_], r
     low, high = _bounds(scaled, z)
     bounds = [*zip(np.maximum(low, z - radius), np.minimum(high, z + radius), strict=True), (0.0, None)]
     run: Any = minimize
-    found = run(
+    result = run(
         lambda p: p[-1], np.append(z, 1.0), jac=lambda p: gradient, method="SLSQP", bounds=bounds,
         constraints=constraints, options={"maxiter": 60, "ftol": 1e-12},
     )  # fmt: skip
-    point: Array = np.clip(found.x[:-1], low, high)
+    point: Array = np.clip(result.x[:-1], low, high)
     return point if np.isfinite(point).all() else z
 
 
 def _solution(problem: SynthesisTask, x: Array) -> Solution:
-    found = problem.evaluate(x[None, :])
+    candidate = problem.evaluate(x[None, :])
     return Solution(
-        _feasible(found),
-        float(np.abs(found.curve).max()),
+        _feasible(candidate),
+        float(np.abs(candidate.curve).max()),
         _named([u.name for u in problem.unknowns], x),
-        {name: float(column[0]) for name, column in found.results.items()},
-        _named(problem.equations, found.equations[0]),
-        _named(problem.limits, found.limits[0]),
+        {name: float(column[0]) for name, column in candidate.results.items()},
+        _named(problem.equations, candidate.equations[0]),
+        _named(problem.limits, candidate.limits[0]),
     )
 
 

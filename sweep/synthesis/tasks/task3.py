@@ -91,8 +91,8 @@ class Task3(Task):
 
     def found(self, x: Mapping[str, Array]) -> Found:
         """Compute equations, limits, curve and mechanisms of candidates from their unknowns, (n,) each."""
-        own = (x["phi1"], self.e, x["f"], x.get("g", self.g), x.get("alpha", self.alpha))
-        first, _ = designs_on_locus(self.swing, self.phi0, *own)
+        place = (x["phi1"], self.e, x["f"], x.get("g", self.g), x.get("alpha", self.alpha))
+        first, _ = designs_on_locus(self.swing, self.phi0, *place)
         results, equations, designs = dict(named(first)), dict[str, Array](), [first]
         for k, setting in enumerate(self.settings, 2):
             design = first.copy()
@@ -140,7 +140,7 @@ def adjustments(design: Mapping[str, float]) -> pd.DataFrame:
     psi_ext, phi_ext, psi_fold, phi_fold = rates[0].T
     swing, phi0 = psi_fold - psi_ext, phi_fold - phi_ext
     units = np.where(np.array(PARAMETERS) == "alpha", 1.0, matrix[0, 2])  # lengths relative to the rocker
-    found = pd.DataFrame(
+    frame = pd.DataFrame(
         {
             "dswing": swing,
             "dphi0": phi0,
@@ -150,8 +150,8 @@ def adjustments(design: Mapping[str, float]) -> pd.DataFrame:
         },
         index=pd.Index(PARAMETERS, name="dimension"),
     )
-    found.attrs["units"] = dict.fromkeys(("dswing", "dphi0", "dpsi_ext", "dpsi_fold"), "rad per unit of the dimension")
-    return found
+    frame.attrs["units"] = dict.fromkeys(("dswing", "dphi0", "dpsi_ext", "dpsi_fold"), "rad per unit of the dimension")
+    return frame
 
 
 def _adjusts(swing: float, phi0: float) -> str:
