@@ -32,10 +32,10 @@ def verify(folder: Path, designs: int) -> None:
     Nothing is written.  Each finding says what the next `sweep run` will do about it.  Ends with 74 if something is
     damaged or wrong, else with 11 if chunks or the optimum are missing, with 0 if all is well.
     """
-    found = verify_dataset(folder, designs)
-    for line in found.lines():
+    result = verify_dataset(folder, designs)
+    for line in result.lines():
         click.echo(line)
-    click.get_current_context().exit(found.exit_code)
+    click.get_current_context().exit(result.exit_code)
 
 
 @click.command()
@@ -51,10 +51,10 @@ def compare(old: Path, new: Path, rtol: float, slower: float) -> None:
     Ends with 11 if rows, a status or the pattern of missing values changed, else with 10 if values changed, else with
     12 if the new run was slower; with 0 if nothing moved.
     """
-    found = compare_datasets(old, new, rtol, slower)
-    for line in found.lines():
+    comparison = compare_datasets(old, new, rtol, slower)
+    for line in comparison.lines():
         click.echo(line)
-    click.get_current_context().exit(found.exit_code)
+    click.get_current_context().exit(comparison.exit_code)
 
 
 INCOMPLETE = 11
@@ -85,15 +85,15 @@ def merge(study: Path, out: Path | None, smoke: bool) -> None:
 
     Ends with 11 while chunks are missing; `sweep run` computes those, and the optimum.
     """
-    found = merge_parts(study, _folder(study, out, smoke), smoke=smoke)
-    for path in found.damaged:
+    merged = merge_parts(study, _folder(study, out, smoke), smoke=smoke)
+    for path in merged.damaged:
         click.echo(f"{path}: damaged, left out; the run of this part computes it anew")
-    if found.missing:
-        missing = f"{how_many(len(found.missing), 'chunk')} missing (the first is {found.missing[0]})"
+    if merged.missing:
+        missing = f"{how_many(len(merged.missing), 'chunk')} missing (the first is {merged.missing[0]})"
     else:
         missing = "all are there; sweep run notes the totals and searches the optimum"
-    click.echo(f"{found.folder}: {how_many(found.taken, 'chunk')} taken over, {missing}")
-    click.get_current_context().exit(INCOMPLETE if found.missing else 0)
+    click.echo(f"{merged.folder}: {how_many(merged.taken, 'chunk')} taken over, {missing}")
+    click.get_current_context().exit(INCOMPLETE if merged.missing else 0)
 
 
 def _folder(study: Path, out: Path | None, smoke: bool) -> Path:

@@ -134,8 +134,8 @@ def joined(rows: Iterable[tuple[str, str, str, str]]) -> Rows:
         if len(notes) == 1:
             out.append((names, unit, (text if others else first[2]) + first[3]))
         else:  # the entries of a tensor: those off its diagonal may have either sign
-            said = "; ".join(", ".join(own) + note for note, own in notes.items())
-            out.append((names, unit, f"{text}, off its diagonal - integral x y dm; {said}"))
+            signs = "; ".join(", ".join(components) + note for note, components in notes.items())
+            out.append((names, unit, f"{text}, off its diagonal - integral x y dm; {signs}"))
     return out
 
 
@@ -201,14 +201,14 @@ def alike(rows: Rows) -> Rows:
     merged: dict[tuple[str, str, str], Rows] = {}
     for row in rows:
         name, unit, text = row
-        both = NUMBER.sub(lambda found: found[1] + BOTH[found[2]], text) if name[-1] in "12" else text
-        key = ("", "", text) if text == AS_WITHOUT else (name[:-1], unit, both) if both != text else row
+        general = NUMBER.sub(lambda match: match[1] + BOTH[match[2]], text) if name[-1] in "12" else text
+        key = ("", "", text) if text == AS_WITHOUT else (name[:-1], unit, general) if general != text else row
         merged.setdefault(key, []).append(row)
     return [
-        ("; ".join(name for name, *_ in own), ", ".join(dict.fromkeys(unit for _, unit, _ in own)), key[2])
-        if len(own) > 1
-        else own[0]
-        for key, own in merged.items()
+        ("; ".join(name for name, *_ in same), ", ".join(dict.fromkeys(unit for _, unit, _ in same)), key[2])
+        if len(same) > 1
+        else same[0]
+        for key, same in merged.items()
     ]
 
 
@@ -236,24 +236,24 @@ class Place(NamedTuple):
 
 def places(tree: LinkTree, touching: bool = False) -> list[Place]:
     """Return the links and the joints of a link tree, or the joints with a contact only."""
-    rods, found = rods_of(tree), list[Place]()
+    rods, listed = rods_of(tree), list[Place]()
     for k, b in enumerate(tree.bodies):
-        found.append(link("slender" if b.slender else "rod" if k in rods else "compact", b.name, b.axes))
+        listed.append(link("slender" if b.slender else "rod" if k in rods else "compact", b.name, b.axes))
     for j in tree.joints:
         acting = re.escape(f"of the {j.acts}"), "of its first link on the second"
         general = (f"(?<!of the ){re.escape(j.text)}", "joint J"), acting
-        found.append(Place("J", j.touch if touching else j.kind, j.name, j.acts, general))
-    return [place for place in found if place.sign == "J" and place.kind] if touching else found
+        listed.append(Place("J", j.touch if touching else j.kind, j.name, j.acts, general))
+    return [place for place in listed if place.sign == "J" and place.kind] if touching else listed
 
 
 def places_of(entry: Effect) -> list[Place]:
     """Return the links and joints that rows of an effect are about; of a stage of one kind its links alone."""
     if entry.tree is not None:
         return places(entry.tree, entry.key == CONTACT)
-    of = {p.name: p.text for p in entry.inputs}
-    bodies = [name.removeprefix("m_") for name in of if f"com_{name.removeprefix('m_')}_x" in of]
-    axes = {body: of[f"com_{body}_x"].partition(" (")[2][:-1] for body in bodies}
-    return [link("rod" if f"rod_{body}" in of else "compact", body, axes[body]) for body in bodies]
+    texts = {p.name: p.text for p in entry.inputs}
+    bodies = [name.removeprefix("m_") for name in texts if f"com_{name.removeprefix('m_')}_x" in texts]
+    axes = {body: texts[f"com_{body}_x"].partition(" (")[2][:-1] for body in bodies}
+    return [link("rod" if f"rod_{body}" in texts else "compact", body, axes[body]) for body in bodies]
 
 
 def link(kind: str, name: str, axes: str) -> Place:
@@ -262,9 +262,9 @@ def link(kind: str, name: str, axes: str) -> Place:
     return Place("B", kind, name, axes, ((re.escape(f"({axes})"), "along its axes"), *named))
 
 
-def _generalised(found: Sequence[Place], row: tuple[str, str, str]) -> tuple[str, str, tuple[str, str, str]] | None:
+def _generalised(known: Sequence[Place], row: tuple[str, str, str]) -> tuple[str, str, tuple[str, str, str]] | None:
     """Return sign and kind of a row's link or joint, and the row for any of them; None for a row about none."""
-    for place in found:
+    for place in known:
         name = re.sub(rf"_{place.name}(?={OF_PLACE}(?:,|$))", f"_{place.sign}", row[0], count=1)
         text = row[2]
         for words, general in place.general:
@@ -276,23 +276,23 @@ def _generalised(found: Sequence[Place], row: tuple[str, str, str]) -> tuple[str
 
 def of_any_place(known: Sequence[Sequence[Place]], tables: Sequence[Rows]) -> tuple[Rows, list[Rows]]:
     """Return the rows that all links or joints of some kinds share, in general form, and each effect's other rows."""
-    every = Counter((place.sign, place.kind) for own in known for place in own)
-    found = [[_generalised(own, row) for row in table] for own, table in zip(known, tables, strict=True)]
+    every = Counter((place.sign, place.kind) for places in known for place in places)
+    generalised = [[_generalised(places, row) for row in table] for places, table in zip(known, tables, strict=True)]
     kinds: dict[tuple[str, tuple[str, str, str]], Counter[str]] = {}
-    for sign, kind, row in (one for ones in found for one in ones if one is not None):
+    for sign, kind, row in (entry for entries in generalised for entry in entries if entry is not None):
         kinds.setdefault((sign, row), Counter())[kind] += 1
-    whole = {
-        key: of
-        for key, of in kinds.items()
-        if of.total() > 1 and all(every[key[0], kind] == n for kind, n in of.items())
+    shared = {
+        key: count
+        for key, count in kinds.items()
+        if count.total() > 1 and all(every[key[0], kind] == n for kind, n in count.items())
     }
     rows = []
-    for (sign, (name, unit, text)), of in whole.items():
-        all_kinds = len(of) == sum(one == sign for one, _ in every)
-        rows.append((name, unit, text if all_kinds else f"{text}; {', '.join(of)}"))
+    for (sign, (name, unit, text)), count in shared.items():
+        all_kinds = len(count) == sum(entry == sign for entry, _ in every)
+        rows.append((name, unit, text if all_kinds else f"{text}; {', '.join(count)}"))
     left = [
-        [row for row, one in zip(table, ones, strict=True) if one is None or (one[0], one[2]) not in whole]
-        for table, ones in zip(tables, found, strict=True)
+        [row for row, entry in zip(table, entries, strict=True) if entry is None or (entry[0], entry[2]) not in shared]
+        for table, entries in zip(tables, generalised, strict=True)
     ]
     return rows, left
 
@@ -311,20 +311,23 @@ def parts(group: Sequence[Effect]) -> list[tuple[str, list[str], Rows]]:
             _input_rows(p for p in every_input(entry) if p not in old) for entry, old in zip(group, known, strict=True)
         ],
     }
-    found = [places_of(entry) for entry in group]
-    together = len(group) > 1 and all(found)
-    out: list[tuple[str, list[str], Rows]] = []
+    listed = [places_of(entry) for entry in group]
+    together = len(group) > 1 and all(listed)
+    tables_of_group: list[tuple[str, list[str], Rows]] = []
     for columns, tables in kinds.items():
-        general, own = of_any_place(found, tables) if together else ([], tables)
-        general, *own = map(with_friction, (general, *own))
-        common = [row for row in own[0] if all(row in table for table in own)]
-        own = [[row for row in table if row not in common] for table in own]
+        general, remaining = of_any_place(listed, tables) if together else ([], tables)
+        general, *remaining = map(with_friction, (general, *remaining))
+        common = [row for row in remaining[0] if all(row in table for table in remaining)]
+        remaining = [[row for row in table if row not in common] for table in remaining]
         of_several: dict[tuple[str, ...], Rows] = {}
-        for row in dict.fromkeys(row for table in own for row in table):
-            names = tuple(entry.name for entry, table in zip(group, own, strict=True) if row in table)
+        for row in dict.fromkeys(row for table in remaining for row in table):
+            names = tuple(entry.name for entry, table in zip(group, remaining, strict=True) if row in table)
             of_several.setdefault(names, []).append(row)
-        out += [(columns, [], common + general), *((columns, list(names), rows) for names, rows in of_several.items())]
-    return [part for part in out if part[2]]
+        tables_of_group += [
+            (columns, [], common + general),
+            *((columns, list(names), rows) for names, rows in of_several.items()),
+        ]
+    return [part for part in tables_of_group if part[2]]
 
 
 def page() -> str:

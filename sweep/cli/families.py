@@ -70,8 +70,8 @@ def complete_outputs(context: click.Context, parameter: click.Parameter, incompl
 def families(name: str | None) -> None:
     """List the mechanism families, or the parameters and outputs of one (or of a chain: rssr+guide)."""
     if name is None:
-        found = [family(known) for known in NAMES]
-        rows = [(entry.name, over(entry), entry.title, ", ".join(capability_words(entry))) for entry in found]
+        entries = [family(known) for known in NAMES]
+        rows = [(entry.name, over(entry), entry.title, ", ".join(capability_words(entry))) for entry in entries]
         echo_columns([("family", "over", "", "can be asked for"), *rows])
         click.echo("\nchains: any of them in series, such as rssr+guide; `sweep families NAME` shows what one takes")
         return
@@ -110,8 +110,8 @@ def describe(family: Family) -> list[str]:
 def described(p: Parameter, default: str = "", left_out: str = "") -> str:
     """Describe a parameter and its range; a default is put between the texts ``default`` and ``left_out``."""
     notes = [p.sign, p.choice if p.choices else "", "" if p.default is None else f"{default}{p.default:g}{left_out}"]
-    told = ", ".join(filter(None, notes))
-    return f"{p.text} ({told})" if told else p.text
+    remarks = ", ".join(filter(None, notes))
+    return f"{p.text} ({remarks})" if remarks else p.text
 
 
 def main_outputs(family: Family) -> list[str]:

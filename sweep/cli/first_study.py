@@ -107,14 +107,14 @@ def _swept_of(machine: Machine, member: str) -> list[str]:
 
 def _relations(machine: Machine) -> list[tuple[str, str]]:
     """Return relations and their outputs: a distance between neighbours with points, and the timing of neighbours."""
-    found = []
-    for one, other in pairwise(machine.members):
-        points = [f"{m.name}.{m.points[-1]}" for m in (one, other) if m.points]
+    relations = []
+    for first, second in pairwise(machine.members):
+        points = [f"{m.name}.{m.points[-1]}" for m in (first, second) if m.points]
         if len(points) == 2:
-            found.append((f"gap_{other.name} = {{ distance = {json.dumps(points)} }}", f"min_gap_{other.name}"))
-        places = json.dumps([f"{m.name}.{_place(m.family)}" for m in (one, other)])
-        found.append((f"lag_{other.name} = {{ timing = {places} }}", f"lag_{other.name}"))
-    return found
+            relations.append((f"gap_{second.name} = {{ distance = {json.dumps(points)} }}", f"min_gap_{second.name}"))
+        places = json.dumps([f"{m.name}.{_place(m.family)}" for m in (first, second)])
+        relations.append((f"lag_{second.name} = {{ timing = {places} }}", f"lag_{second.name}"))
+    return relations
 
 
 def _place(family: Family) -> str:

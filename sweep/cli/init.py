@@ -74,9 +74,9 @@ def init(
         raise InputError("--points", str(points), "with --family: the points of one mechanism", "command line")
     if cyclogram is not None:
         tables = studies_of_members(load_study(cyclogram), name)
-        for one, data in tables.items():
-            _write(into / one, {"study.toml": toml(data)})
-        click.echo("\n".join(f"study: {into / one / 'study.toml'}" for one in tables))
+        for member_study, data in tables.items():
+            _write(into / member_study, {"study.toml": toml(data)})
+        click.echo("\n".join(f"study: {into / member_study / 'study.toml'}" for member_study in tables))
         click.echo(
             f"next: sweep run {into / next(iter(tables))}, then its optimum as expected.json for the study behind it"
         )
@@ -106,17 +106,17 @@ def _write(folder: Path, files: dict[str, str]) -> None:
 
 def _machine(members: tuple[str, ...]) -> Machine | None:
     """Return the machine of NAME=FAMILY texts, or None without any."""
-    found: dict[str, str | list[str]] = {}
+    mechanisms: dict[str, str | list[str]] = {}
     for text in members:
         name, _, family = text.partition("=")
-        if not family or name in found:
+        if not family or name in mechanisms:
             raise InputError(
                 "--member", text, "NAME=FAMILY, every name once, such as needle=rssr+guide", "command line"
             )
-        found[name] = family_names(family)
-    if len(found) == 1:
+        mechanisms[name] = family_names(family)
+    if len(mechanisms) == 1:
         raise InputError("--member", members[0], "two members or more; --family takes one mechanism", "command line")
-    machine = find_family(found) if found else None
+    machine = find_family(mechanisms) if mechanisms else None
     assert machine is None or isinstance(machine, Machine)
     return machine
 

@@ -98,8 +98,8 @@ def rounds(what: Sequence[str]) -> tuple[list[Part], list[Part]]:
     for name in what:
         if not Path(name).exists():
             family = find_family(name)
-            ways = routes(family, main_outputs(family), _accuracy(family))
-            first += [Part(name), *(Part(name, route.outputs) for route in ways)]
+            selected = routes(family, main_outputs(family), _accuracy(family))
+            first += [Part(name), *(Part(name, route.outputs) for route in selected)]
             continue
         for file in files_of(Path(name)):
             study = load_study(file)

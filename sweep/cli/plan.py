@@ -49,19 +49,19 @@ def check(study: Path, jobs: int, smoke: bool) -> None:
 
         question_of(model)  # raises if the proof is not supported
     with Phases(show=True) as phases:
-        sent = pilot(model, lambda done, of: phases.say("planning", done, of))
-        cost = estimate(model, jobs, known=sent)
-        others = other_accuracies(model, jobs, lambda done, of: phases.say("other accuracies", done, of), sent)
+        sample = pilot(model, lambda done, of: phases.say("planning", done, of))
+        cost = estimate(model, jobs, known=sample)
+        others = other_accuracies(model, jobs, lambda done, of: phases.say("other accuracies", done, of), sample)
         phases.say("what follows the sweep")
-        lines = _searches(cost, searches(model, jobs, sent))
+        lines = _searches(cost, searches(model, jobs, sample))
         phases.say("what matters")
-        lines = plan_lines(model, cost, others, sent) + lines
+        lines = plan_lines(model, cost, others, sample) + lines
     for line in lines:
         click.echo(line)
     check_budget(model, cost)
 
 
-def plan_lines(study: Study, cost: Estimate, others: Sequence[tuple[str, float]], sent: Pilot) -> list[str]:
+def plan_lines(study: Study, cost: Estimate, others: Sequence[tuple[str, float]], sample: Pilot) -> list[str]:
     """Return the plan of a study, line by line.
 
     Parameters
@@ -69,7 +69,7 @@ def plan_lines(study: Study, cost: Estimate, others: Sequence[tuple[str, float]]
     study : checked study
     cost : its estimate
     others : time with other accuracies [s], in words
-    sent : the pilot run of both estimates
+    sample : the pilot run of both estimates
     """
     kind = "every combination" if study.space.kind == "product" else "Sobol sample"
     large = without_minus(study.objective.output) if study.objective is not None else None
@@ -90,7 +90,7 @@ def plan_lines(study: Study, cost: Estimate, others: Sequence[tuple[str, float]]
     of = f"{kind} of" if study.space.axes else "nothing is swept"
     lines += ["", f"{how_many(study.space.count, 'design')}, {of}"]
     lines += aligned([(axis.name, _axis(axis)) for axis in study.space.axes])
-    lines += [*_computed(study), *_before_and_between(study), *_effects(study, sent), *_left_out(study)]
+    lines += [*_computed(study), *_before_and_between(study), *_effects(study, sample), *_left_out(study)]
     if study.objective is not None:
         lines += ["", f"to be made large: {large}" if large else f"to be made small: {study.objective.output}"]
     lines += [*_optimiser(study), *_proof(study), *_front(study)]
@@ -119,12 +119,12 @@ def _brake(seconds: float | None) -> str:
     return "" if seconds is None else f"; emergency brake after {duration(seconds)}"
 
 
-def _searches(cost: Estimate, found: Sequence[tuple[str, float, float]]) -> list[str]:
+def _searches(cost: Estimate, rows: Sequence[tuple[str, float, float]]) -> list[str]:
     """Describe the steps after the sweep with their time, then the whole run."""
-    if not found:
+    if not rows:
         return []
-    least, most = (cost.seconds + sum(times) for times in list(zip(*found, strict=True))[1:])
-    all_of_it = (*found, ("the whole run", least, most))
+    least, most = (cost.seconds + sum(times) for times in list(zip(*rows, strict=True))[1:])
+    all_of_it = (*rows, ("the whole run", least, most))
     words = [(name, f"about {duration(typical)}, at most {duration(end)}") for name, typical, end in all_of_it]
     return ["", "what follows the sweep, by timed evaluations of a design of this study", *aligned(words)]
 
@@ -137,11 +137,11 @@ def _mechanism(family: Family) -> list[str]:
 
 
 def _left_out(study: Study) -> list[str]:
-    left = [name for name in main_outputs(study.family) if name not in study.want]
-    if not left:
+    names = [name for name in main_outputs(study.family) if name not in study.want]
+    if not names:
         return []
-    more = len(left) - NAMED
-    text = ", ".join(left[:NAMED]) + (f" and {more} more, see sweep families" if more > 0 else "")
+    further = len(names) - NAMED
+    text = ", ".join(names[:NAMED]) + (f" and {further} more, see sweep families" if further > 0 else "")
     return ["", "will not be computed, because nothing asks for it", f"  {text}"]
 
 
@@ -151,9 +151,9 @@ def _computed(study: Study) -> list[str]:
         limit.output: bound_words(limit, quantity(limit.output, output(study.family, limit.output).unit))
         for limit in study.output_limits
     }
-    found, rows = ordered_routes(study), list[tuple[str, str, str]]()
+    selected, rows = ordered_routes(study), list[tuple[str, str, str]]()
     lines = ["", f"will be computed, {_accuracy(study)}; only designs within the limits so far go on to the next line"]
-    for k, route in enumerate(found, 1):
+    for k, route in enumerate(selected, 1):
         outputs = ", ".join(name + (f" ({limits[name]})" if name in limits else "") for name in route.outputs)
         rows.append((f"{k}. {route.name}", f"{duration(1e-9 * route.ns_per_design)} per design", outputs))
     return [*lines, *aligned(rows)]
@@ -208,58 +208,58 @@ def _proof(study: Study) -> list[str]:
         return []
     from sweep.proof.question import question_of
 
-    asked, question = study.optimise.prove, question_of(study)
+    settings, question = study.optimise.prove, question_of(study)
     unused = f"; no use is made of the limits on {', '.join(question.left_out)}" if question.left_out else ""
     return [
-        f"proof: that no design is better than the optimum by more than {100.0 * asked.gap:g} %, over "
-        f"{', '.join(question.names)}; at most {how_many(asked.boxes, 'box', 'es')}, "
-        f"{duration(asked.boxes * SECONDS_PER_BOX)} of processor time{_brake(asked.seconds)}{unused}"
+        f"proof: that no design is better than the optimum by more than {100.0 * settings.gap:g} %, over "
+        f"{', '.join(question.names)}; at most {how_many(settings.boxes, 'box', 'es')}, "
+        f"{duration(settings.boxes * SECONDS_PER_BOX)} of processor time{_brake(settings.seconds)}{unused}"
     ]
 
 
-def _effects(study: Study, sent: Pilot) -> list[str]:
+def _effects(study: Study, sample: Pilot) -> list[str]:
     """Describe the effects of the scene: computed ones, others, and the rules of negligibility that hold."""
     bare = study.bare
-    out = left_out(bare, study.want)
-    if not out and bare is study.family:
+    others = left_out(bare, study.want)
+    if not others and bare is study.family:
         return []
     lines = []
     if bare is not study.family:
         lines += ["", "effects, with their share of the cost at equal numbers of poses"]
         lines += aligned(tree(bare, study.want, POSES))
-    if out:
-        lines += ["", "effects not computed, because nothing asks for them", f"  {', '.join(out)}"]
-    looked_at, tried = spread_rows(sent.kept, ADVISED), sent.tried
-    if not len(looked_at):
-        looked_at, tried = feasible_designs(study, ADVISED)
-    which = f"by {how_many(len(looked_at), 'design')} within all limits, of {tried} tried"
-    if not len(looked_at):
-        looked_at = spread_designs(study, ADVISED)
-        which = f"by {how_many(len(looked_at), 'design')} spread over the space: none of {tried} tried keeps all limits"
+    if others:
+        lines += ["", "effects not computed, because nothing asks for them", f"  {', '.join(others)}"]
+    designs, tried = spread_rows(sample.kept, ADVISED), sample.tried
+    if not len(designs):
+        designs, tried = feasible_designs(study, ADVISED)
+    which = f"by {how_many(len(designs), 'design')} within all limits, of {tried} tried"
+    if not len(designs):
+        designs = spread_designs(study, ADVISED)
+        which = f"by {how_many(len(designs), 'design')} spread over the space: none of {tried} tried keeps all limits"
     rods = [p.name for p in study.family.parameters if p.unless and study.space.fixed.get(p.name) == 1.0]
     if rods:
         lines += ["", "bodies without centre and inertia are slender rods between their joints", f"  {', '.join(rods)}"]
     if points := _points(study):
         lines += ["", "masses in the joints of their bodies, as centre and inertia are 0", f"  {', '.join(points)}"]
-    found = findings(bare, study.family, looked_at, study.want)
-    told = ["", f"what matters here, {which}; the choice is yours", *(f"  {finding.words}" for finding in found)]
-    return lines + (told if found else [])
+    rules = findings(bare, study.family, designs, study.want)
+    advice = ["", f"what matters here, {which}; the choice is yours", *(f"  {finding.words}" for finding in rules)]
+    return lines + (advice if rules else [])
 
 
 def _points(study: Study) -> list[str]:
     """Name the point masses: without centre and inertia, on bodies without a second joint that would make them rods."""
     names, fixed = study.family.parameter_names, study.space.fixed
 
-    def of(mass: str) -> list[str]:
-        place, dot, own = mass.rpartition(".")
-        body = own.removeprefix("m_")
+    def entries(mass: str) -> list[str]:
+        place, dot, parameter = mass.rpartition(".")
+        body = parameter.removeprefix("m_")
         stage = "" if f"{place}{dot}com_{body}_x" in names else body[-1]
         heads = tuple(f"{place}{dot}{head}_{body.removesuffix(stage)}_" for head in ("com", "j"))
         return [name for name in names if name.startswith(heads) and name.endswith(stage)]
 
     return [
         p.name for p in study.family.parameters
-        if POINT in p.text and fixed.get(p.name) != 0.0 and all(fixed.get(name) == 0.0 for name in of(p.name))
+        if POINT in p.text and fixed.get(p.name) != 0.0 and all(fixed.get(name) == 0.0 for name in entries(p.name))
     ]  # fmt: skip
 
 

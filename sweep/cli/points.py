@@ -45,14 +45,14 @@ def points(family: str, file: Path, part: str, unit: str, tolerance: float | Non
     of a point from its joint.  --out also writes the parameters and phi as a table [mm, rad].
     """
     out = checked_format(out)
-    found = drawn(family, file, part, unit, TOLERANCE if tolerance is None else tolerance)
+    design = drawn(family, file, part, unit, TOLERANCE if tolerance is None else tolerance)
     if out is not None:
-        write_table(pd.DataFrame([found.parameters | {"phi": found.phi}]), out)
-    place = found.place
-    drawing = {"phi": f"{found.phi!r} rad", "at": list(place.at), "axis": list(place.axis), "zero": list(place.zero)}
+        write_table(pd.DataFrame([design.parameters | {"phi": design.phi}]), out)
+    place = design.place
+    drawing = {"phi": f"{design.phi!r} rad", "at": list(place.at), "axis": list(place.axis), "zero": list(place.zero)}
     tables = {
-        "design": design_entries(find_family(family), found.parameters),
-        "drawing": drawing | {"residual": found.residual},
+        "design": design_entries(find_family(family), design.parameters),
+        "drawing": drawing | {"residual": design.residual},
     }
     click.echo(toml(tables), nl=False)
 
@@ -79,8 +79,8 @@ def export(folder: Path, design: str | None, kind: str, out: Path | None, phi: f
     if kind == "xlsx":
         click.echo(f"xlsx: {write_workbook(folder, out or _place(folder, 'results.xlsx'))}")
         return
-    found = chosen(folder, design)
-    refuse_degrees(found.family.domain, phi)
+    selected = chosen(folder, design)
+    refuse_degrees(selected.family.domain, phi)
     if kind in OF_DATASETS:
         target = out or _place(folder, f"{design or 'result'}.{kind}")
         click.echo(f"{kind}: {write_sheet(folder, design, target, phi)}")
@@ -89,7 +89,7 @@ def export(folder: Path, design: str | None, kind: str, out: Path | None, phi: f
         name = f"{design or 'result'}{'-law' if kind == 'law' else ''}{FORMATS[kind][0]}"
         out = _place(folder, name)
     click.echo(
-        f"{kind}: {write(found.family, found.design, out, kind, phi=phi, poses=poses, speed=found.speed, angles='rad')}"
+        f"{kind}: {write(selected.family, selected.design, out, kind, phi=phi, poses=poses, speed=selected.speed, angles='rad')}"
     )
 
 

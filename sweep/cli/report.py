@@ -168,11 +168,11 @@ def _design(source: str, table: Path | None, design: str | None, row: int, sever
         if not Path(source).is_dir():
             raise InputError("SOURCE", source, "a dataset folder, or a family with a table of designs", "command line")
         if not several or design is None or "," not in design:
-            found = chosen(source, design)
-            return found.family, found.design
+            selected = chosen(source, design)
+            return selected.family, selected.design
         names = [int(name) if name.strip().isdigit() else name.strip() for name in design.split(",")]
-        every = [chosen(source, name) for name in names]
-        return every[0].family, pd.DataFrame([one.design for one in every], index=names)
+        selection = [chosen(source, name) for name in names]
+        return selection[0].family, pd.DataFrame([entry.design for entry in selection], index=names)
     designs = read_table(table)
     if row >= len(designs):
         raise InputError("--row", row, f"a row from 0 to {len(designs) - 1}", str(table))

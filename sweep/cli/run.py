@@ -70,11 +70,11 @@ def run(
         if is_part(folder):  # the answer is for the whole dataset, after the parts are merged
             click.echo(f"part: {folder}")
             return
-        found = ending(folder)
-        for line in (*found.lines, *([] if report else [found.next])):
+        answer = ending(folder)
+        for line in (*answer.lines, *([] if report else [answer.next])):
             click.echo(line)
         click.echo(f"dataset: {folder}")
         code = written(folder, None, figures) if report else 0
     if late is not None:
         raise late
-    click.get_current_context().exit(found.exit_code or code)
+    click.get_current_context().exit(answer.exit_code or code)

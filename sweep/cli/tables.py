@@ -71,8 +71,8 @@ def evaluate_table(
     turns = not isinstance(mechanism.domain, Interval)
     if poses is not None and not turns:
         raise InputError("--poses", poses, f"a column {variable}: the ends are those of each design", "command line")
-    whole = 2.0 * np.pi if angles != "deg" else 360.0
-    phi = None if poses is None else np.arange(poses) * (whole / poses)
+    full_turn = 2.0 * np.pi if angles != "deg" else 360.0
+    phi = None if poses is None else np.arange(poses) * (full_turn / poses)
     designs = read_table(table)
     names = [str(name).split("[")[0].strip() for name in designs.columns]
     if poses is None and variable not in names:
@@ -123,7 +123,7 @@ def summarise_table(
     """
     out = checked_format(out, table)
     designs = read_table(table)
-    found = summarise(
+    result = summarise(
         family_names(family),
         designs,
         wanted(want),
@@ -135,7 +135,7 @@ def summarise_table(
         status_text=status_text,
         angles=angles,
     )
-    write_table(found, out)
+    write_table(result, out)
 
 
 def refuse_degrees(domain: Domain, phi: float) -> None:

@@ -65,7 +65,7 @@ def write_dxf(placed: list[Placed], path: Path, unit: str) -> None:
         document.layers.add(layer, color=colour)
     space = document.modelspace()
     right, first = 0.0, True
-    for same in frames_of([one.part for one in placed]).values():
+    for same in frames_of([stage.part for stage in placed]).values():
         size = extent(same)
         points = np.vstack([path for part in same for path in part.joints.values()])
         spatial = float(np.ptp(points[:, 2])) > 1e-9 * size
@@ -88,14 +88,14 @@ def add_tables(path: Path, tables: Sequence[tuple[str, Sequence[str], Sequence[S
     ezdxf = ezdxf_or_refuse()
     document: Any = ezdxf.readfile(path)
     space = document.modelspace()
-    found = ezdxf.bbox.extents(space)
-    size = float(max(found.size.x, found.size.y))
-    height, down = 0.012 * size, float(found.extmin.y) - 0.05 * size
+    box = ezdxf.bbox.extents(space)
+    size = float(max(box.size.x, box.size.y))
+    height, down = 0.012 * size, float(box.extmin.y) - 0.05 * size
     for title, heads, lines in tables:
         rows = [(title,), tuple(heads), *lines]
         widths = [max(len(row[k]) for row in rows[1:]) for k in range(len(heads))]
         for row in rows:
-            right = float(found.extmin.x)
+            right = float(box.extmin.x)
             for words, width in zip(row, widths, strict=False):
                 if words:
                     _text(space, words, np.array([right, down]), height)

@@ -46,14 +46,14 @@ def write_hardpoints(mechanism: Mechanism, design: Table, path: Path, phi: float
                 rows.writerow([*head, f"axis_{shown_name(joint)}", *map(repr, axis.tolist()), "1"])
 
 
-def _unit(family: Family, name: str, of: str) -> str:
+def _unit(family: Family, name: str, unit: str) -> str:
     """Return an output's unit, of a derivative by the shaft's angle with its own, as mm/rad^2 and rad/rad^2."""
     if family.domain.unit != "rad":
-        return of  # a derivative by another variable has its own unit
-    found = family.split(name) if isinstance(family, Machine) else None
-    order = len(family.orders(name) if found is None else found[0].family.orders(found[1]))
-    of = "rad" if order and of == "1" else of  # pure numbers are derivatives of angles
-    return of + ("" if order == 0 else "/rad" if order == 1 else f"/rad^{order}")
+        return unit  # a derivative by another variable has its own unit
+    member = family.split(name) if isinstance(family, Machine) else None
+    order = len(family.orders(name) if member is None else member[0].family.orders(member[1]))
+    unit = "rad" if order and unit == "1" else unit  # pure numbers are derivatives of angles
+    return unit + ("" if order == 0 else "/rad" if order == 1 else f"/rad^{order}")
 
 
 def write_law(
@@ -198,13 +198,13 @@ def _writer(
 
 def _numbers(design: Table) -> dict[str, float]:
     """Return the columns of one design as numbers."""
-    found = {}
+    values = {}
     for key, value in design.items():
         try:
-            found[str(key)] = float(np.ravel(value)[0])
+            values[str(key)] = float(np.ravel(value)[0])
         except (TypeError, ValueError):
             continue  # a column of words does not belong to the model
-    return found
+    return values
 
 
 def _format(path: Path, given: str | None) -> str:

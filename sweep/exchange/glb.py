@@ -51,8 +51,8 @@ class Model:
 
     def accessor(self, values: NDArray[Any], kind: str, target: int | None = None) -> int:
         """Store an array and return the number of its accessor; integers are indices."""
-        whole = values.dtype.kind in "iu"
-        stored = np.ascontiguousarray(values, np.uint16 if whole else np.float32)
+        is_index = values.dtype.kind in "iu"
+        stored = np.ascontiguousarray(values, np.uint16 if is_index else np.float32)
         self.data += b"\0" * (-len(self.data) % 4)
         view: dict[str, Any] = {"buffer": 0, "byteOffset": len(self.data), "byteLength": stored.nbytes}
         self.views.append(view | ({"target": target} if target else {}))
@@ -61,7 +61,7 @@ class Model:
         self.accessors.append(
             {
                 "bufferView": len(self.views) - 1,
-                "componentType": UINT16 if whole else FLOAT,
+                "componentType": UINT16 if is_index else FLOAT,
                 "count": len(stored),
                 "type": kind,
                 "min": flat.min(axis=0).tolist(),
@@ -132,9 +132,9 @@ def _material(name: str, rgb: tuple[float, float, float]) -> dict[str, Any]:
     return {"name": name, "pbrMetallicRoughness": surface}
 
 
-def _group(model: Model, one: Placed, times: int, size: float) -> int:
+def _group(model: Model, placed: Placed, times: int, size: float) -> int:
     """Return the node of a part with those of its links, joints and axes."""
-    part, children, thick = one.part, [], 0.008 * size
+    part, children, thick = placed.part, [], 0.008 * size
     for k, link in enumerate(part.links):
         pairs = list(pairwise(link.joints))
         pairs += [(link.joints[-1], link.joints[0])] if len(link.joints) > 2 else []
@@ -168,7 +168,7 @@ def _group(model: Model, one: Placed, times: int, size: float) -> int:
             )
         )  # fmt: skip
     name = part.label if part.member or part.stage else "stage"
-    return model.node(name=name, translation=one.shift.tolist(), children=children)
+    return model.node(name=name, translation=placed.shift.tolist(), children=children)
 
 
 def _block(model: Model, part: Part, link: Link, colour: str, times: int, thick: float) -> int:

@@ -73,17 +73,17 @@ def write_mjcf(family: Family, placed: list[Placed], design: Mapping[str, float]
     Xml.SubElement(root, "compiler", angle="radian", inertiafromgeom="auto")
     option = Xml.SubElement(root, "option")
     world, equality = Xml.SubElement(root, "worldbody"), Xml.SubElement(root, "equality")
-    thick = THICK * extent([one.part for one in placed]) * METRES[unit]
-    for k, one in enumerate(placed):
-        part, before = one.part, placed[k - 1].part if k else None
-        own = _of_member(design, part.member)
-        loop = _loop(one, own.get(f"finger{part.stage}", 0.0), METRES[unit])
-        _stage(world, equality, loop, part, own, unit, thick)
+    thick = THICK * extent([stage.part for stage in placed]) * METRES[unit]
+    for k, stage in enumerate(placed):
+        part, before = stage.part, placed[k - 1].part if k else None
+        columns = _of_member(design, part.member)
+        loop = _loop(stage, columns.get(f"finger{part.stage}", 0.0), METRES[unit])
+        _stage(world, equality, loop, part, columns, unit, thick)
         if before is None:
-            gravity = np.array([own.get(f"gravity_{axis}{part.stage}", 0.0) for axis in "xyz"])
+            gravity = np.array([columns.get(f"gravity_{axis}{part.stage}", 0.0) for axis in "xyz"])
             option.set("gravity", words(loop.turn @ gravity * METRES[unit]))
         elif before.member == part.member:
-            _geared(equality, f"crank{loop.tag}", f"rocker{_tag(before)}", own.get(f"kappa{part.stage}", 1.0))
+            _geared(equality, f"crank{loop.tag}", f"rocker{_tag(before)}", columns.get(f"kappa{part.stage}", 1.0))
         elif isinstance(family, Machine):
             _geared(equality, f"crank{loop.tag}", *_driver(family, part.member, f"crank{_tag(placed[0].part)}"))
     actuators = Xml.SubElement(root, "actuator")
@@ -122,29 +122,29 @@ def _geared(equality: Xml.Element, joint: str, other: str, ratio: float) -> None
     )  # fmt: skip
 
 
-def _loop(one: Placed, finger: float, metres: float) -> Loop:
+def _loop(placed: Placed, finger: float, metres: float) -> Loop:
     """Return the stage's joints and directions, from its joint records."""
-    part = one.part
+    part = placed.part
     records = part.family.find(JointRecords)
     if records is None:
         allowed = "a family or chain of linkages with crank, coupler and rocker or slider"
         raise InputError("format", f"mjcf of {part.label}", allowed, "export")
     matrix, angles = part.design[None, :], Angles.of(part.crank[None, :1])
     poses, designs = Scene(part.family, matrix, angles, {}).records
-    pose, own = poses[0, 0], designs[0]
+    pose, record = poses[0, 0], designs[0]
     # as kernels/linkage/joints.py writes them: B C s rho_b tau_b rho tau per pose, u k A D per design
     s, rho_b, tau_b, rho, tau = (pose[k : k + 3] for k in (6, 9, 12, 15, 18))
-    u, k, center, d = (own[n : n + 3] for n in (0, 3, 6, 9))
-    found = evaluate(
+    u, k, center, d = (record[n : n + 3] for n in (0, 3, 6, 9))
+    finger_axes = evaluate(
         part.family, part.parameters | {"finger": finger}, ["n_x", "n_y", "n_z"], phi=part.crank[:1], angles="rad"
     )
-    n = found[["n_x", "n_y", "n_z"]].to_numpy(np.float64)[0]
+    n = finger_axes[["n_x", "n_y", "n_z"]].to_numpy(np.float64)[0]
     # The records start at the crank's axis, the joints in the frame of the family.
     crank = np.column_stack([rho_b, tau_b, u])
     turn = _triad(part.joints["b"][0] - part.joints["a"][0], part.axes["a"]) @ crank.T
     slider = records.follower == "slider"
     a, b, c, d = (
-        (turn @ (point - center) + part.joints["a"][0] + one.shift) * metres
+        (turn @ (point - center) + part.joints["a"][0] + placed.shift) * metres
         for point in (center, pose[0:3], pose[3:6], pose[3:6] if slider else d)
     )
     coupler, driven = np.column_stack([s, np.cross(n, s), n]), np.column_stack([rho, tau, k])

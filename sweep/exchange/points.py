@@ -90,21 +90,24 @@ def from_points(family: str, *, tolerance: float = TOLERANCE, **points: Sequence
     >>> round(found.parameters["b"], 6), found.branch
     (1219.631092, -1.0)
     """
-    found, reader = find_family(family), reader_of(family)
+    mechanism, reader = find_family(family), reader_of(family)
     given = _checked(reader, points)
     extent = size(given)
     if not extent > 0.0:
         raise InputError("points", "all one point", "points that are apart", "points")
     reading = reader.fit(given)
-    joints = _joints(found, reading, given)
-    off = {name: float(np.linalg.norm(given[name] - at)) for name, at in joints.items()}
-    for name, distance in off.items():  # the first deviating point is named, since it displaces those after it as well
+    joints = _joints(mechanism, reading, given)
+    distances = {name: float(np.linalg.norm(given[name] - at)) for name, at in joints.items()}
+    for (
+        name,
+        distance,
+    ) in distances.items():  # the first deviating point is named, since it displaces those after it as well
         if not distance <= tolerance * extent:
             allowed = f"a point at most {tolerance * extent:.3g} from {_words(joints[name])}"
             why = f", where the other points put it; it is {distance:.3g} off (tolerance = {tolerance:g})"
-            raise InputError(name, _words(given[name]), allowed + why, f"points of {found.name}")
+            raise InputError(name, _words(given[name]), allowed + why, f"points of {mechanism.name}")
     place = Placement(_triple(reading.at), _triple(reading.z), _triple(reading.x))
-    return PlacedDesign(found.name, reading.parameters, reading.phi, place, max(off.values()))
+    return PlacedDesign(mechanism.name, reading.parameters, reading.phi, place, max(distances.values()))
 
 
 def drawn(family: str, file: Path, part: str = "", unit: str = "mm", tolerance: float = TOLERANCE) -> PlacedDesign:
@@ -126,11 +129,11 @@ def reader_of(family: str) -> Hardpoints:
     InputError
         for a family whose dimensions cannot be read from points.
     """
-    found = find_family(family)
-    reader = found.find(Hardpoints)
+    mechanism = find_family(family)
+    reader = mechanism.find(Hardpoints)
     if reader is None:
         known = [name for name in NAMES if find_family(name).find(Hardpoints) is not None]
-        raise InputError("family", found.name, f"one of {', '.join(known)}", "points")
+        raise InputError("family", mechanism.name, f"one of {', '.join(known)}", "points")
     return reader
 
 
@@ -161,7 +164,7 @@ def _joints(family: Family, reading: FittedPose, given: Mapping[str, Array]) -> 
     (part,) = parts(family, reading.parameters, reading.phi)
     z, x = reading.z, reading.x
     turn = np.column_stack([x, np.cross(z, x), z])
-    found = {}
+    positions = {}
     for name, point in given.items():
         joint = name if name in part.joints else name.lower()
         if joint in part.joints:
@@ -169,8 +172,8 @@ def _joints(family: Family, reading: FittedPose, given: Mapping[str, Array]) -> 
             if part.kinds.get(joint) == "slide":  # any point of the line may be given
                 along = turn @ part.axes[joint]
                 at = at + float((point - at) @ along) * along
-            found[name] = at
-    return found
+            positions[name] = at
+    return positions
 
 
 def _triple(values: Array) -> tuple[float, float, float]:
@@ -214,10 +217,10 @@ def read_points(file: Path, reader: Hardpoints | None = None, *, part: str = "",
         raise MissingInput("part", f"one of {', '.join(groups)}: name it with --part", str(file))
     if part and part not in groups:
         raise InputError("part", part, f"one of {', '.join(groups)}", str(file))
-    found = groups[part] if part else next(iter(groups.values()))
+    points = groups[part] if part else next(iter(groups.values()))
     if not exported or reader is None:
-        return found
-    return {name: at for name, at in found.items() if name in (*reader.needs, *reader.may)}
+        return points
+    return {name: at for name, at in points.items() if name in (*reader.needs, *reader.may)}
 
 
 def _of_csv(file: Path, scale: float) -> tuple[Groups, bool]:
@@ -258,11 +261,11 @@ def _in_mm(table: pd.DataFrame, file: Path, scale: float) -> pd.DataFrame:
         factors = table["unit"].map({"m": 1e3}).fillna(1.0) if exported else scale
         table[axis] = factors * numbers(table[axis], axis, f"{file}, row")
     for heading in list(table.columns):
-        found = _HEADED.fullmatch(heading)
-        if found is None:
+        match = _HEADED.fullmatch(heading)
+        if match is None:
             continue
         try:
-            table[found[1]] = factor(found[2].strip(), "mm") * numbers(table.pop(heading), heading, f"{file}, row")
+            table[match[1]] = factor(match[2].strip(), "mm") * numbers(table.pop(heading), heading, f"{file}, row")
         except UnitFault as fault:
             raise InputError("column", heading, str(fault), str(file)) from None
     return table

@@ -41,9 +41,9 @@ def turn(mechanism: Mechanism, design: Table, phi: float, poses: int) -> list[Pl
     InputError
         if a pose does not exist.
     """
-    found = over(mechanism, design, phi, poses)
+    stages = over(mechanism, design, phi, poses)
     domain = find_family(mechanism).domain
-    for part in found:
+    for part in stages:
         if not part.links:
             raise InputError(
                 "mechanism", part.family.name, "a mechanism whose links are known: see docs/frames.md", "export"
@@ -52,9 +52,11 @@ def turn(mechanism: Mechanism, design: Table, phi: float, poses: int) -> list[Pl
         if bad.size:
             pose = int(np.argmax(part.status != 0))
             value = f"{meaning(int(part.status[pose]))} at {domain.name} = {part.phi[pose]:.6g}"
-            whole = "that exists over the whole interval" if isinstance(domain, Interval) else "whose crank turns fully"
-            raise InputError(part.label, value, f"a design {whole}", "export")
-    return side_by_side(found)
+            condition = (
+                "that exists over the whole interval" if isinstance(domain, Interval) else "whose crank turns fully"
+            )
+            raise InputError(part.label, value, f"a design {condition}", "export")
+    return side_by_side(stages)
 
 
 def over(mechanism: Mechanism, design: Table, phi: float, poses: int) -> list[Part]:
@@ -123,21 +125,21 @@ def pose(mechanism: Mechanism, design: Table, phi: float) -> list[Part]:
     return [_taken(part, [k], steps[[k]]) for part in parts(mechanism, design, steps)]
 
 
-def side_by_side(found: Sequence[Part]) -> list[Placed]:
+def side_by_side(stages: Sequence[Part]) -> list[Placed]:
     """Place the parts of one frame together, and each further frame beside those before it, along x; same order."""
     shifts, right = {}, math.nan
-    for frame, same in frames_of(found).items():
+    for frame, same in frames_of(stages).items():
         points = np.vstack([path for part in same for path in part.joints.values()])
         low, high = float(np.nanmin(points[:, 0])), float(np.nanmax(points[:, 0]))
         along = 0.0 if math.isnan(right) else right + GAP * extent(same) - low
         shifts[frame] = np.array([along, 0.0, 0.0])
         right = high + along
-    return [Placed(part, shifts[part.frame]) for part in found]
+    return [Placed(part, shifts[part.frame]) for part in stages]
 
 
-def extent(found: Sequence[Part]) -> float:
+def extent(stages: Sequence[Part]) -> float:
     """Return the largest extent of all joints over the turn."""
-    points = np.vstack([path for part in found for path in part.joints.values()])
+    points = np.vstack([path for part in stages for path in part.joints.values()])
     return float(np.nanmax(np.nanmax(points, axis=0) - np.nanmin(points, axis=0)))
 
 

@@ -67,16 +67,16 @@ def cells(
     number = design if rows.size == design.size else design[rows]
     places = {name: _places(hand.folder, merit, name, bins) for name in dict.fromkeys(chain.from_iterable(pairs))}
     if rows.size < design.size:
-        places = {name: found[rows] for name, found in places.items()}
+        places = {name: column_places[rows] for name, column_places in places.items()}
     return {
         "axes": {
             name: {
-                "title": of.title,
-                "symbol": of.symbol,
-                "ends": sorted([columns[name].low * of.factor, columns[name].high * of.factor]),
-                "turned": of.factor < 0.0,
+                "title": quantity.title,
+                "symbol": quantity.symbol,
+                "ends": sorted([columns[name].low * quantity.factor, columns[name].high * quantity.factor]),
+                "turned": quantity.factor < 0.0,
             }
-            for name, of in shown.items()
+            for name, quantity in shown.items()
         },
         "pairs": [_counted(places[x], places[y], bins, number) for x, y in pairs],
         "kept": int(rows.size),
@@ -118,8 +118,8 @@ def _read(folder: Path, name: str) -> Array:
     source = scan(folder)
     if name not in source.schema.names:
         raise InputError("column", name, ", ".join(source.schema.names), "explore")
-    found = source.to_table(columns=[name], filter=pc.field("status") == 0).column(name)
-    return np.asarray(found.to_numpy(), np.float64)
+    column = source.to_table(columns=[name], filter=pc.field("status") == 0).column(name)
+    return np.asarray(column.to_numpy(), np.float64)
 
 
 def design_of(hand: Hand, number: int) -> dict[str, float]:

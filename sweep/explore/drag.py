@@ -43,17 +43,17 @@ def dragged(
         return parts(hand.family, {**design, **dict(zip(free, x[:-1].tolist(), strict=True))}, float(x[-1]))
 
     x = np.array([*(design[name] for name in free), phi])
-    found = joints(x)
-    if is_spatial(found) or not isinstance(hand.family.domain, Turn):
+    stages = joints(x)
+    if is_spatial(stages) or not isinstance(hand.family.domain, Turn):
         raise InputError("mechanism", hand.family.name, "a plane one that turns: its joints can be dragged", "explore")
     names = [
         (part.label if part.member or part.stage else "", f"{shown_name(name)}{part.stage}")
-        for part in found
+        for part in stages
         for name in part.joints
     ]
     if place not in names:
         raise InputError("joint", place[1], ", ".join(name for _, name in names), "explore")
-    flat = _flat(found)
+    flat = _flat(stages)
     size = float(np.ptp(flat, axis=0).max())
     scale = np.array([*(size if r.unit == "mm" else 1.0 for r in ranges), 1.0])
     weight = np.full(len(names), STAY)
@@ -67,17 +67,17 @@ def dragged(
     steady = [bool(np.isfinite(_flat(joints(x + STEP * step))).all()) for step in steps]
     steps = steps[steady]
 
-    def off(changes: Array) -> Array:
+    def residuals(changes: Array) -> Array:
         apart = weight[:, None] * (_flat(joints(x + changes @ steps)) - goal) / size
         return np.append(np.nan_to_num(apart.ravel(), nan=1.0), LITTLE * changes)  # large if it falls apart
 
     low = np.where(positive, -(1.0 - LEAST) * x / scale, -np.inf)[steady]
     changes = least_squares(
-        off, np.zeros(len(steps)), bounds=(low, np.inf), diff_step=np.full(len(steps), STEP), max_nfev=ROUNDS
+        residuals, np.zeros(len(steps)), bounds=(low, np.inf), diff_step=np.full(len(steps), STEP), max_nfev=ROUNDS
     ).x
     x = x + changes @ steps
     return dict(zip(free, x[:-1].tolist(), strict=True)), float(x[-1])
 
 
-def _flat(found: Sequence[Part]) -> Array:
-    return np.array([path[0, :2] for part in found for path in part.joints.values()])
+def _flat(stages: Sequence[Part]) -> Array:
+    return np.array([path[0, :2] for part in stages for path in part.joints.values()])

@@ -157,17 +157,19 @@ class Hand:
             low, high = swept[p.name]
             entries[p.name] = {"from": low, "to": high, "unit": PARAMETER_UNITS[p.unit]}
             entries[p.name] |= {"count": COUNT} if len(axes) <= 2 else {}
-        old, own = self.study.data, self.own
+        old, mechanism_names = self.study.data, self.own
         if not axes and "optimise" in old:
             raise InputError("dimensions", "none", STEADY, "explore")
         data: dict[str, Any] = {name: table for name, table in old.items() if name not in TABLES}
         for table in ("bodies", "loads", "design"):
-            kept = {name: entry for name, entry in old.get(table, {}).items() if name != "sample"}
-            data |= {table: {name: self._entry(entries, name, entry) for name, entry in kept.items()}} if kept else {}
-        data["design"] = {name: entries[name] for name in own} | data["design"]
+            written = {name: entry for name, entry in old.get(table, {}).items() if name != "sample"}
+            data |= (
+                {table: {name: self._entry(entries, name, entry) for name, entry in written.items()}} if written else {}
+            )
+        data["design"] = {name: entries[name] for name in mechanism_names} | data["design"]
         if len(axes) > 2:
             data["design"]["sample"] = {"kind": "sobol", "n": SAMPLE}
-        data["limits"] = {name: limit for name, limit in old.get("limits", {}).items() if name not in own}
+        data["limits"] = {name: limit for name, limit in old.get("limits", {}).items() if name not in mechanism_names}
         data["study"] = {**old["study"], "name": f"{self.study.name}-in-hand"[:MOST_LETTERS]}
         data["reference"] = {"design": self._reference_entries(design, swept)}
         data |= {"optimise": {"starts": STARTS}} if "optimise" in old else {}
@@ -184,8 +186,8 @@ class Hand:
     def _reference_entries(self, design: Design, swept: Collection[str]) -> dict[str, str | float]:
         """Return the entries of a reference design: the mechanism, and inputs of effects that differ from the study."""
         fixed = self.study.space.fixed
-        own = {*self.own, *swept, *(r.name for r in self.ranges if design[r.name] != fixed.get(r.name))}
-        return design_entries(self.family, {name: value for name, value in design.items() if name in own})
+        names = {*self.own, *swept, *(r.name for r in self.ranges if design[r.name] != fixed.get(r.name))}
+        return design_entries(self.family, {name: value for name, value in design.items() if name in names})
 
 
 def of_study(study: Study) -> Hand:
@@ -200,11 +202,11 @@ def of_study(study: Study) -> Hand:
     if pins := _reference(study):
         return Hand(without_rows(study), None, pins["reference"], pins)
     if study.made:
-        found = random_designs(study, 1, 0)
-        if not len(found):
+        designs = random_designs(study, 1, 0)
+        if not len(designs):
             allowed = "one with a design that [locus] and [fit] can make"
             raise InputError("design space", space.count, allowed, "explore")
-        return Hand(without_rows(study), None, dict(zip(names, found[0].tolist(), strict=True)), {})
+        return Hand(without_rows(study), None, dict(zip(names, designs[0].tolist(), strict=True)), {})
     middle = {axis.name: _middle(axis.values, axis.low, axis.high) for axis in space.axes}
     return Hand(without_rows(study), None, {name: {**space.fixed, **middle}[name] for name in names}, {})
 

@@ -44,11 +44,11 @@ def problem_in_hand(hand: Hand, design: Mapping[str, float], free: Mapping[str, 
 def improve(problem: Problem, design: Mapping[str, float], asked: Callable[[], bool]) -> dict[str, Any]:
     """Search from a design until it converges or ``asked`` returns true, and return the best result in either case."""
     start = np.array([design[name] for name in problem.family.parameter_names])
-    found = search(0, problem, start, asked, LOOKS)
+    result = search(0, problem, start, asked, LOOKS)
     return {
-        "design": dict(zip(problem.family.parameter_names, found.design.tolist(), strict=True)),
-        "ended": found.ended,
-        "feasible": found.feasible,
-        "active": list(found.active),
-        "looks": found.looks,
+        "design": dict(zip(problem.family.parameter_names, result.design.tolist(), strict=True)),
+        "ended": result.ended,
+        "feasible": result.feasible,
+        "active": list(result.active),
+        "looks": result.looks,
     }

@@ -89,12 +89,12 @@ class Server:
             await (routed if ours else PlainTextResponse("not for you\n", 403))(scope, receive, sent)
 
         place = f"/{self.token}"
-        asked = {
+        endpoints = {
             "answer": self._answer, "cells": self._cells, "design": self._design, "drag": self._drag,
             "save": self._save,
         }  # fmt: skip
         routes = [Route(f"{place}/", page)]
-        routes += [Route(f"{place}/{name}", _json(what), methods=["POST"]) for name, what in asked.items()]
+        routes += [Route(f"{place}/{name}", _json(what), methods=["POST"]) for name, what in endpoints.items()]
         others = {"improve": self._improve, "export": self._export}
         routes += [Route(f"{place}/{name}", what, methods=["POST"]) for name, what in others.items()]
         wrong = dict.fromkeys((LinksweepError, KeyError, OverflowError, TypeError, ValueError), _refused)
@@ -111,34 +111,34 @@ class Server:
         host, origin = request.headers.get("host", ""), request.headers.get("origin")
         return known and f"http://{host}" == self.origin and origin in (None, self.origin)
 
-    def _answer(self, asked: dict[str, Any]) -> dict[str, Any]:
+    def _answer(self, body: dict[str, Any]) -> dict[str, Any]:
         begun = time.perf_counter()
-        found = self.hand.answer(asked["designs"], asked["names"])
-        return found | {"milliseconds": 1e3 * (time.perf_counter() - begun)}
+        answer = self.hand.answer(body["designs"], body["names"])
+        return answer | {"milliseconds": 1e3 * (time.perf_counter() - begun)}
 
-    def _cells(self, asked: dict[str, Any]) -> dict[str, Any]:
-        return cells(self.hand, asked["pairs"], asked.get("ranges", {}), int(asked["bins"]))
+    def _cells(self, body: dict[str, Any]) -> dict[str, Any]:
+        return cells(self.hand, body["pairs"], body.get("ranges", {}), int(body["bins"]))
 
-    def _drag(self, asked: dict[str, Any]) -> dict[str, Any]:
-        design, place = self.hand.design(asked["design"]), (str(asked["part"]), str(asked["joint"]))
-        moved, phi = dragged(self.hand, design, float(asked["phi"]), place, [float(x) for x in asked["to"]])
+    def _drag(self, body: dict[str, Any]) -> dict[str, Any]:
+        design, place = self.hand.design(body["design"]), (str(body["part"]), str(body["joint"]))
+        moved, phi = dragged(self.hand, design, float(body["phi"]), place, [float(x) for x in body["to"]])
         return {"design": moved, "phi": phi}
 
-    def _design(self, asked: dict[str, Any]) -> dict[str, Any]:
-        return {"design": design_of(self.hand, int(asked["number"]))}
+    def _design(self, body: dict[str, Any]) -> dict[str, Any]:
+        return {"design": design_of(self.hand, int(body["number"]))}
 
-    def _save(self, asked: dict[str, Any]) -> dict[str, Any]:
-        if asked["as"] == "reference":
-            return {"text": self.hand.reference(asked["design"])}
-        return {"text": self.hand.saved(asked["design"], asked["free"])}
+    def _save(self, body: dict[str, Any]) -> dict[str, Any]:
+        if body["as"] == "reference":
+            return {"text": self.hand.reference(body["design"])}
+        return {"text": self.hand.saved(body["design"], body["free"])}
 
     async def _improve(self, request: Request) -> Response:
         """Search while the page is connected; a page that disconnects stops its own search only."""
         from starlette.responses import StreamingResponse
 
-        asked = await _asked(request)
-        design = self.hand.design(asked["design"])
-        problem = problem_in_hand(self.hand, design, asked["free"])
+        body = await _asked(request)
+        design = self.hand.design(body["design"])
+        problem = problem_in_hand(self.hand, design, body["free"])
         stop, counted = threading.Event(), [0]
 
         def is_over() -> bool:
@@ -173,8 +173,8 @@ class Server:
         from starlette.concurrency import run_in_threadpool
         from starlette.responses import Response
 
-        asked = await _asked(request)
-        design, kind = self.hand.design(asked["design"]), str(asked["format"])
+        body = await _asked(request)
+        design, kind = self.hand.design(body["design"]), str(body["format"])
         content = await run_in_threadpool(self._file, design, kind)
         return Response(content, media_type="application/octet-stream")
 
@@ -199,12 +199,12 @@ def _needed() -> None:
 async def _asked(request: Request) -> dict[str, Any]:
     body = await request.body()
     try:
-        found = json.loads(body) if len(body) <= MOST_BYTES else None
+        content = json.loads(body) if len(body) <= MOST_BYTES else None
     except RecursionError:  # deeply nested brackets
-        found = None
-    if not isinstance(found, dict):
+        content = None
+    if not isinstance(content, dict):
         raise ValueError(f"a JSON object of at most {MOST_BYTES} bytes")
-    return found
+    return content
 
 
 def _json(answer: Callable[[dict[str, Any]], dict[str, Any]]) -> Callable[[Request], Any]:

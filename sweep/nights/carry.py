@@ -52,10 +52,10 @@ def carry(study: Study, earlier: Sequence[Path], target: Path) -> Carried | None
         if noted is None or make_plan(study, noted["chunk_size"]).identity != noted["identity"]:
             continue
         try:
-            found = verify(source, designs=0)
+            verification = verify(source, designs=0)
         except LinksweepError:  # a faulty earlier night is computed again
             continue
-        bad = {finding.path for finding in found.findings}
+        bad = {finding.path for finding in verification.findings}
         sound = [path for path in sorted(source.glob("part-*.parquet")) if path not in bad]
         if not sound:
             continue
@@ -72,8 +72,10 @@ def carry(study: Study, earlier: Sequence[Path], target: Path) -> Carried | None
             # This file is appended to, so it is copied.
             if (files.beside(source) / files.RUNS).is_file():
                 shutil.copyfile(files.beside(source) / files.RUNS, target / files.RUNS)
-            same = all(noted.get(key) == words for key, words in words_of(study).items())  # titles are in the report
-            whole = not found.findings and bool(noted.get("complete")) and same and searched(study, target)
+            same_words = all(
+                noted.get(key) == words for key, words in words_of(study).items()
+            )  # titles are in the report
+            whole = not verification.findings and bool(noted.get("complete")) and same_words and searched(study, target)
             if whole:
                 _link_report(files.beside(source), target)
         return Carried(night.name, len(sound), whole)
@@ -90,11 +92,11 @@ def searched(study: Study, folder: Path) -> bool:
     note = files.read_plan(folder / files.DESIGNS) or {}
     if study.optimise is not None and note.get("optimised") != optimum_key(replace(study, pareto=None), note):
         return False
-    found = read_survey(folder / files.OPTIMUM)
-    if found is not None and found.ended == "time":
+    survey = read_survey(folder / files.OPTIMUM)
+    if survey is not None and survey.ended == "time":
         return False
-    asked = study.optimise is not None and study.optimise.prove is not None
-    if asked and known_proof(study, folder / files.DESIGNS) is None:
+    wants_proof = study.optimise is not None and study.optimise.prove is not None
+    if wants_proof and known_proof(study, folder / files.DESIGNS) is None:
         return False
     if study.pareto is None:
         return True

@@ -51,10 +51,10 @@ def figures(study: Study, folder: Path) -> tuple[dict[str, float], dict[str, str
     plan = files.read_plan(folder) or {}
     counts = plan.get("counts") or {}
     number, within = sum(counts.values()), counts.get("OK", 0)
-    found: dict[str, float] = {DESIGNS: number, WITHIN: within, YIELD: within / number if number else 0.0}
+    values: dict[str, float] = {DESIGNS: number, WITHIN: within, YIELD: within / number if number else 0.0}
     units = {DESIGNS: "", WITHIN: "", YIELD: ""}
     if study.objective is None:
-        return found, units
+        return values, units
     name = study.objective.output
     optimum = _role(files.beside(folder) / files.OPTIMUM, "optimum")
     if optimum is not None:
@@ -63,9 +63,9 @@ def figures(study: Study, folder: Path) -> tuple[dict[str, float], dict[str, str
         rows = best(folder, name, 1)
         value = float(rows[name].iloc[0]) if len(rows) else math.nan
     if math.isfinite(value):
-        found[name] = value
+        values[name] = value
         units[name] = next((c["unit"] for c in plan.get("columns", []) if c["name"] == name), "")
-    return found, units
+    return values, units
 
 
 def changes(study: Study, old: Path, new: Path) -> Changes:
@@ -84,17 +84,17 @@ def changes(study: Study, old: Path, new: Path) -> Changes:
         words = differences(plans[0].get("data") or {}, plans[1].get("data") or {})
         return Changes(ROWS_CHANGED, (f"the study itself was edited: {'; '.join(words) or 'its fixed tables'}",))
     rtol = study.accuracy.target or ROUNDING[study.output.dtype]
-    found = compare(old, new, rtol)
+    comparison = compare(old, new, rtol)
     # The optimum and the reference have tolerances of their own.
-    found.moved = {name: moved for name, moved in found.moved.items() if moved.kind == "design"}
-    found.seconds = None
-    code = ROWS_CHANGED if found.rows_changed else VALUES_CHANGED if found.values_changed else 0
-    moved = [name for name, column in found.moved.items() if column.changed or column.missing]
-    lines = found.lines() if code else []
-    for more, names in (_yield(plans), _optimum(study, old, new), _front(study, old, new)):
-        lines += more
+    comparison.moved = {name: moved for name, moved in comparison.moved.items() if moved.kind == "design"}
+    comparison.seconds = None
+    code = ROWS_CHANGED if comparison.rows_changed else VALUES_CHANGED if comparison.values_changed else 0
+    moved = [name for name, column in comparison.moved.items() if column.changed or column.missing]
+    lines = comparison.lines() if code else []
+    for further, names in (_yield(plans), _optimum(study, old, new), _front(study, old, new)):
+        lines += further
         moved += names
-        code = code or (VALUES_CHANGED if more else 0)
+        code = code or (VALUES_CHANGED if further else 0)
     return Changes(code, tuple(lines), tuple(dict.fromkeys(moved)))
 
 
@@ -111,9 +111,9 @@ def _optimum(study: Study, old: Path, new: Path) -> tuple[list[str], list[str]]:
     before, after = (_role(files.beside(folder) / files.OPTIMUM, "optimum") for folder in (old, new))
     if before is None or after is None or study.objective is None:
         return [], []
-    name, found = study.objective.output, []
+    name, lines = study.objective.output, []
     if _far(before[name], after[name], OBJECTIVE_RTOL):
-        found.append(f"optimum moved: {name} {before[name]:.10g} -> {after[name]:.10g}")
+        lines.append(f"optimum moved: {name} {before[name]:.10g} -> {after[name]:.10g}")
     sizes = {p.name: max(abs(before[p.name]), abs(after[p.name])) for p in study.family.parameters}
     # A length near zero is compared relative to the longest one.
     largest = max((sizes[p.name] for p in study.family.parameters if p.unit == "length"), default=0.0)
@@ -123,8 +123,8 @@ def _optimum(study: Study, old: Path, new: Path) -> tuple[list[str], list[str]]:
         if not abs(before[p.name] - after[p.name]) <= DIMENSION_RTOL * scale:
             dimensions.append(f"{p.name} {before[p.name]:.8g} -> {after[p.name]:.8g}")
     if dimensions:
-        found.append(f"optimum moved in its dimensions: {', '.join(dimensions)}")
-    return found, [name] if found else []
+        lines.append(f"optimum moved in its dimensions: {', '.join(dimensions)}")
+    return lines, [name] if lines else []
 
 
 def _front(study: Study, old: Path, new: Path) -> tuple[list[str], list[str]]:
@@ -140,9 +140,9 @@ def _front(study: Study, old: Path, new: Path) -> tuple[list[str], list[str]]:
     near = np.abs(now - at[:, None]).argmin(axis=1)
     apart = np.abs(now[near] - at)
     pairs = apart <= DIMENSION_RTOL * np.ptp(at)
-    found = []
+    lines = []
     if not len(at) == len(now) == pairs.sum():
-        found.append(f"front: {len(at)} bounds before, {len(now)} now, {pairs.sum()} of them the same")
+        lines.append(f"front: {len(at)} bounds before, {len(now)} now, {pairs.sum()} of them the same")
     # Between neighbouring bounds a front is no steeper than to its neighbours; for equal bounds this allows nothing.
     slopes = np.nan_to_num(np.abs(np.diff(values) / np.diff(at)))
     steepest = np.maximum(np.append(slopes, 0.0), np.append(0.0, slopes))
@@ -151,11 +151,11 @@ def _front(study: Study, old: Path, new: Path) -> tuple[list[str], list[str]]:
     far = np.flatnonzero(pairs & ~(moved <= allowed) & ~(np.isnan(values) & np.isnan(then[near])))
     if far.size:
         worst = far[np.nan_to_num(moved[far], nan=np.inf).argmax()]
-        found.append(
+        lines.append(
             f"front moved at {far.size} of {pairs.sum()} bounds, most at {bound} = {at[worst]:g}: "
             f"{name} {values[worst]:.8g} -> {then[near[worst]]:.8g}"
         )
-    return found, []
+    return lines, []
 
 
 def slower(name: str, seconds: float, history: Sequence[NightRecord]) -> Changes:

@@ -173,21 +173,21 @@ class _Night:
         """Write the report of a complete dataset, compare it, and return the record."""
         message, cut = "", ended.message if ended.code == TimeUsedUp.exit_code else ""
         if not (target / REPORT).is_file():
-            told = call(["report", str(target)], target / RUN_LOG, max(self.left, 0.0))
-            message = told.message
-            if told.code == StoreError.exit_code:
+            report_run = call(["report", str(target)], target / RUN_LOG, max(self.left, 0.0))
+            message = report_run.message
+            if report_run.code == StoreError.exit_code:
                 raise StoreError(message.removeprefix("sweep: "))
         reported = (target / REPORT).is_file()
         designs = target / files.DESIGNS
         chunks = len(chunk_files.parts(designs))
         values, units = figures(study, designs)
         base = self.base(study.name)
-        found = Changes(0, ())
+        difference = Changes(0, ())
         if base is not None and not (carried.whole and carried.night == base.name):
-            found = changes(study, base / study.name / files.DESIGNS, designs)
+            difference = changes(study, base / study.name / files.DESIGNS, designs)
         if not carried.chunks:
             late = slower(study.name, ended.seconds, self.history)
-            found = Changes(found.code or late.code, (*found.lines, *late.lines), found.moved)
+            difference = Changes(difference.code or late.code, (*difference.lines, *late.lines), difference.moved)
         return StudyRecord(
             "complete",
             linked_from=carried.night,
@@ -197,9 +197,9 @@ class _Night:
             figures=values,
             units=units,
             compared_with=base.name if base else None,
-            changed=found.code,
-            changes=found.lines,
-            moved=found.moved,
+            changed=difference.code,
+            changes=difference.lines,
+            moved=difference.moved,
             report=reported,
             message="; ".join(filter(None, [cut, "" if reported else f"no report: {message}"])),
         )
@@ -244,9 +244,9 @@ def _words(name: str, record: StudyRecord) -> str:
 
 def _verdict(record: NightRecord) -> str:
     """Return the last line of a night's log."""
-    changed = [f"{name} ({own.changed})" for name, own in record.studies.items() if own.changed]
-    late = [name for name, own in record.studies.items() if own.state in ("cut", "waiting")]
-    failed = [name for name, own in record.studies.items() if own.state == "failed"]
+    changed = [f"{name} ({entry.changed})" for name, entry in record.studies.items() if entry.changed]
+    late = [name for name, entry in record.studies.items() if entry.state in ("cut", "waiting")]
+    failed = [name for name, entry in record.studies.items() if entry.state == "failed"]
     parts = [("changed", changed), ("not ready", late), ("failed", failed)]
     words = "; ".join(f"{word}: {', '.join(names)}" for word, names in parts if names)
     return f"{words or record.quiet} (exit code {record.exit_code}, {record.seconds:.3g} s)"

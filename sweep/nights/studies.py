@@ -48,28 +48,28 @@ def chosen(places: Iterable[Path], smoke: bool) -> list[Chosen]:
         if there is no study, or two have the same name: each has a folder of its name in the night.
     """
     places = list(places)
-    found: list[Chosen] = []
+    selected: list[Chosen] = []
     broken: list[tuple[int, Path, str]] = []
     for path in [path for place in places for path in files_of(place)]:
         try:
             study = load_study(path, smoke=smoke)
         except (LinksweepError, OSError) as error:
-            broken.append((len(found) + len(broken), path, str(error)))
+            broken.append((len(selected) + len(broken), path, str(error)))
             continue
-        twin = next((other for other in found if other.name == study.name), None)
+        twin = next((other for other in selected if other.name == study.name), None)
         if twin is not None:
             raise InputError("study", study.name, f"one study of a name, {twin.path} has it already", str(path))
-        found.append(Chosen(study.name, path, study))
+        selected.append(Chosen(study.name, path, study))
     for place, path, fault in broken:
         name = free = path.parent.name if path.name == FILE else path.stem
         count = 1
-        while free in [one.name for one in found]:
+        while free in [one.name for one in selected]:
             count += 1
             free = f"{name}-{count}"
-        found.insert(place, Chosen(free, path, None, fault))
-    if not found:
+        selected.insert(place, Chosen(free, path, None, fault))
+    if not selected:
         raise InputError("studies", ", ".join(map(str, places)), f"study files, or folders with a {FILE}", "nightly")
-    return found
+    return selected
 
 
 def files_of(place: Path) -> list[Path]:

@@ -46,18 +46,18 @@ def map(folder: str | Path, x: str | None = None, y: str | None = None) -> NDArr
     >>> best.get_xlabel(), best.get_ylabel()
     ('a [mm]', 'b [mm]')
     """
-    data, found, cells = gather(Path(folder))
+    data, scanned, cells = gather(Path(folder))
     pair = None
     if x is not None or y is not None:
         known = [c.name for c in cells]
         for name in (x, y):
             if name not in known:
                 raise InputError("axis", name, f"two of {', '.join(known)}", str(folder))
-        pair = next(((a, b) for a, b in ((x, y), (y, x)) if (a, b) in found.grids), None)
+        pair = next(((a, b) for a, b in ((x, y), (y, x)) if (a, b) in scanned.grids), None)
         if pair is None:
             raise InputError("axes", [x, y], "two different swept parameters", str(folder))
     with house_style():
-        figure = maps.design_map(data, found, cells, None if pair is None else (str(pair[0]), str(pair[1])))
+        figure = maps.design_map(data, scanned, cells, None if pair is None else (str(pair[0]), str(pair[1])))
     drawn = _drawn(figure, folder, "a study that sweeps a parameter and has feasible designs")
     return np.array(drawn.axes[: 1 if data.objective is None else 2], dtype=object)
 
@@ -85,9 +85,9 @@ def front(folder: str | Path) -> Axes:
     >>> sweep.plot.front("results/press/designs").get_xlabel()
     'largest acceleration max |s″| [mm/rad²]'
     """
-    data, found, _ = gather(Path(folder))
+    data, scanned, _ = gather(Path(folder))
     with house_style():
-        figure = maps.trade_off(data, found)
+        figure = maps.trade_off(data, scanned)
     return _drawn(figure, folder, "a study with an objective and a second criterion").axes[0]
 
 
@@ -119,15 +119,15 @@ def tolerance(folder: str | Path, output: str | None = None) -> Axes:
     'change from the nominal value [%]'
     """
     data = read_dataset(Path(folder))
-    found = histogram(data, output) if output is not None else None
-    changes = [(one.shown.symbol, one.changes) for one in spreads(data) if one.changes is not None]
-    if found is None and (output is not None or not changes):
+    distribution = histogram(data, output) if output is not None else None
+    changes = [(spread.shown.symbol, spread.changes) for spread in spreads(data) if spread.changes is not None]
+    if distribution is None and (output is not None or not changes):
         raise InputError("folder", str(folder), "a dataset with an optimum and [tolerance]", "plot")
     with house_style():
-        axes = new_figure(NARROW, 0.27 * len(changes) + 1.1 if found is None else 1.9).subplots()
+        axes = new_figure(NARROW, 0.27 * len(changes) + 1.1 if distribution is None else 1.9).subplots()
         axes.set_title(tolerance_words(data))
-        if found is not None:
-            return draw_histogram(axes, found)
+        if distribution is not None:
+            return draw_histogram(axes, distribution)
         for k, (_, (low, mean, high)) in enumerate(changes):
             axes.plot([low, high], [k, k], color=OPTIMUM, linewidth=5.0, solid_capstyle="butt", alpha=0.5)
             axes.plot(mean, k, "o", color=OPTIMUM, markersize=4.5)
@@ -138,16 +138,21 @@ def tolerance(folder: str | Path, output: str | None = None) -> Axes:
     return axes
 
 
-def draw_histogram(axes: Axes, found: Histogram) -> Axes:
+def draw_histogram(axes: Axes, distribution: Histogram) -> Axes:
     """Draw the histogram of an output, with bins that miss its limit in another colour, and lines at the limit."""
-    colours = np.where(found.missing, LIMIT, OPTIMUM)
+    colours = np.where(distribution.missing, LIMIT, OPTIMUM)
     axes.bar(
-        found.edges[:-1], 100.0 * found.shares, 0.92 * np.diff(found.edges), align="edge", color=colours, alpha=0.75
+        distribution.edges[:-1],
+        100.0 * distribution.shares,
+        0.92 * np.diff(distribution.edges),
+        align="edge",
+        color=colours,
+        alpha=0.75,
     )
-    for bound in (found.low, found.high):
+    for bound in (distribution.low, distribution.high):
         if bound is not None:
             axes.axvline(bound, color=LIMIT, linewidth=1.2)
-    axes.set_xlabel(found.shown.title)
+    axes.set_xlabel(distribution.shown.title)
     axes.set_ylabel("of what is made [%]")
     return axes
 

@@ -114,14 +114,14 @@ def spread(figure: Figure) -> None:
 
 def _joined(names: Sequence[tuple[Array, str]], near: float) -> list[tuple[Array, str]]:
     """Join the names of joints in the same place, instead of drawing them over each other."""
-    found: list[tuple[Array, list[str]]] = []
+    groups: list[tuple[Array, list[str]]] = []
     for at, name in names:
-        same = next((words for place, words in found if np.linalg.norm(at - place) <= near), None)
+        same = next((words for place, words in groups if np.linalg.norm(at - place) <= near), None)
         if same is None:
-            found.append((at, [name]))
+            groups.append((at, [name]))
         elif name not in same:
             same.append(name)
-    return [(at, ", ".join(words)) for at, words in found]
+    return [(at, ", ".join(words)) for at, words in groups]
 
 
 def draw_links(axes: Axes, part: Part, seen: Array, pose: int, *, faint: bool = False) -> None:

@@ -130,38 +130,40 @@ def motion(
     family = find_family(mechanism)
     if isinstance(family.domain, Interval):
         raise InputError("mechanism", family.name, "a mechanism that turns: this one runs over an interval", "plot")
-    asked = want.split(",") if isinstance(want, str) else want
+    wanted = want.split(",") if isinstance(want, str) else want
     names = (
-        list(dict.fromkeys(motion_curves(family))) if asked is None else pose_wants(family, [n.strip() for n in asked])
+        list(dict.fromkeys(motion_curves(family)))
+        if wanted is None
+        else pose_wants(family, [n.strip() for n in wanted])
     )
     phi = np.arange(POSES) * (2.0 * math.pi / POSES)
     design = in_radians(family, design, angles)
-    found = evaluate(mechanism, design, list(dict.fromkeys([*names, family.position])), phi=phi, angles="rad")
-    known = design.index if isinstance(design, pd.DataFrame) else range(int(found["design"].iloc[-1]) + 1)
-    if not 1 <= len(known) <= MOST_LINES:
-        raise InputError("design", f"{len(known)} rows", f"1 to {MOST_LINES} designs", f"table of {family.name}")
-    given = None if axes is None else list(np.atleast_1d(np.array(axes, dtype=object)).ravel())
-    if given is not None and len(given) != len(names):
-        raise InputError("axes", len(given), f"{len(names)}, one for each of {', '.join(names)}", "plot")
-    names_of = [str(name) if isinstance(name, str) else f"design {name}" for name in known]
+    poses = evaluate(mechanism, design, list(dict.fromkeys([*names, family.position])), phi=phi, angles="rad")
+    index = design.index if isinstance(design, pd.DataFrame) else range(int(poses["design"].iloc[-1]) + 1)
+    if not 1 <= len(index) <= MOST_LINES:
+        raise InputError("design", f"{len(index)} rows", f"1 to {MOST_LINES} designs", f"table of {family.name}")
+    panels = None if axes is None else list(np.atleast_1d(np.array(axes, dtype=object)).ravel())
+    if panels is not None and len(panels) != len(names):
+        raise InputError("axes", len(panels), f"{len(names)}, one for each of {', '.join(names)}", "plot")
+    labels = [str(name) if isinstance(name, str) else f"design {name}" for name in index]
     with house_style():
-        return _panels(family, names, dict(zip(names_of, (turn for _, turn in found.groupby("design")), strict=True)),
-                       unit, speed_given(speed), given)  # fmt: skip
+        return _panels(family, names, dict(zip(labels, (turn for _, turn in poses.groupby("design")), strict=True)),
+                       unit, speed_given(speed), panels)  # fmt: skip
 
 
 def _panels(
     family: Family, names: list[str], turns: Mapping[str, pd.DataFrame], unit: str, speed: float | None,
-    given: list[Any] | None,
+    panels: list[Any] | None,
 ) -> NDArray[Any]:  # fmt: skip
     """Draw curves over the crank angle from the lowest position, so that several designs can be compared."""
-    if given is None:
+    if panels is None:
         figure = new_figure(WIDTH, 2.1 * -(-len(names) // 2) + 0.5)
         every = np.atleast_1d(figure.subplots(-(-len(names) // 2), 2)).ravel().tolist()
         for axes in every[len(names) :]:
             axes.set_axis_off()
-        given = every[: len(names)]
+        panels = every[: len(names)]
     free = any(lowest(family.position, turn[family.position].to_numpy(float))[1] for turn in turns.values())
-    for axes, name in zip(given, names, strict=True):
+    for axes, name in zip(panels, names, strict=True):
         shown = quantity(name, family.pose_output[name].unit.replace("length", unit))
         for (design, turn), colour in zip(turns.items(), cycle(COLOURS)):
             angle, values = aligned_turn(turn, name, family.position)
@@ -175,8 +177,8 @@ def _panels(
             twin.set_ylabel(shown.speed_unit)
         crank_axis(axes, "crank angle [°]" if free else "crank angle from the lowest position [°]")
     if len(turns) > 1:
-        given[0].legend()
-    return np.array(given, dtype=object)
+        panels[0].legend()
+    return np.array(panels, dtype=object)
 
 
 def aligned_turn(turn: pd.DataFrame, name: str, position: str) -> tuple[Array, Array]:
@@ -263,11 +265,11 @@ def mechanism(
     family = find_family(mechanism)
     design = in_radians(family, design, angles)
     start = float(np.asarray(grid_in_radians(family.domain.name, family.domain.unit, phi, angles), np.float64))
-    found = over(mechanism, design, start, 180)
-    if not exists(found):
-        raise InputError("design", dict(found[0].parameters), "one with a pose in which all its joints exist", "plot")
+    stages = over(mechanism, design, start, 180)
+    if not exists(stages):
+        raise InputError("design", dict(stages[0].parameters), "one with a pose in which all its joints exist", "plot")
     with house_style():
-        figure = mechanism_figure(found, unit, view, positions)
+        figure = mechanism_figure(stages, unit, view, positions)
     return np.array(figure.axes, dtype=object)
 
 
@@ -310,16 +312,16 @@ def polar_load(
     'force at A [N], marks: crank angle'
     """
     design = in_radians(find_family(mechanism), design, angles)
-    found = [
+    selected = [
         part
         for part in parts(mechanism, _plain(mechanism, design), 0.0)
         if part.member == member and part.stage == stage
     ]
-    known = [name for part in found for name, kind in part.kinds.items() if kind == "axis"]
-    if joint not in known:
-        allowed = f"a joint with an axis: {', '.join(known) or 'none here; name member and stage'}"
+    axes_here = [name for part in selected for name, kind in part.kinds.items() if kind == "axis"]
+    if joint not in axes_here:
+        allowed = f"a joint with an axis: {', '.join(axes_here) or 'none here; name member and stage'}"
         raise InputError("joint", joint, allowed, "plot")
-    axis = found[0].axes[joint]
+    axis = selected[0].axes[joint]
     first = np.array([1.0, 0.0, 0.0]) if abs(axis[0]) < 0.9 else np.array([0.0, 1.0, 0.0])
     first = first - (first @ axis) * axis
     first /= np.linalg.norm(first)

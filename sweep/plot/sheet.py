@@ -65,14 +65,14 @@ def write_sheet(folder: str | Path, design: str | int | None, path: str | Path, 
     target = Path(path)
     if target.suffix.lower() not in ENDINGS:
         raise InputError("path", target.name, f"a file ending in {', '.join(ENDINGS)}", "export")
-    data, found = read_dataset(Path(folder)), chosen(folder, design)
-    parts = over(found.family, found.design, finite(phi), POSES)
+    data, drawn = read_dataset(Path(folder)), chosen(folder, design)
+    parts = over(drawn.family, drawn.design, finite(phi), POSES)
     if not exists(parts):
-        raise InputError("mechanism", found.family.name, "one whose joints are known, docs/frames.md", "export")
-    tables = tables_of(as_result(data, row_of(data.study, found.design)), pose(found.family, found.design, phi))
+        raise InputError("mechanism", drawn.family.name, "one whose joints are known, docs/frames.md", "export")
+    tables = tables_of(as_result(data, row_of(data.study, drawn.design)), pose(drawn.family, drawn.design, phi))
     with unwritable(target):
         if target.suffix.lower() == ".dxf":
-            export(found.family, found.design, target, "dxf", phi=phi, angles="rad")
+            export(drawn.family, drawn.design, target, "dxf", phi=phi, angles="rad")
             add_tables(target, tables)
         else:
             _draw(data, parts, tables, target)
@@ -84,19 +84,19 @@ def tables_of(data: Dataset, parts: Sequence[Part]) -> list[Table]:
     study, tolerance = data.study, data.study.tolerance
     names = study.family.parameter_names
     design = np.array([value_of(data.result, name) for name in names])
-    wide = np.zeros(len(names)) if tolerance is None else tolerances_of(study.family, design, tolerance)
-    spread = dict(zip(names, wide.tolist(), strict=True))
+    tolerances = np.zeros(len(names)) if tolerance is None else tolerances_of(study.family, design, tolerance)
+    tolerance_of = dict(zip(names, tolerances.tolist(), strict=True))
     units = {p.name: p.unit for p in study.family.parameters}
-    own = study.bare.parameter_names
+    mechanism_names = study.bare.parameter_names
     lines: list[tuple[str, ...]] = []
     others: list[tuple[str, ...]] = []
     for row in parameter_rows(data):
         shown = quantity(row.name, {"length": "mm", "angle": "rad"}.get(units[row.name], "1"))
-        give = spread[row.name]
+        give = tolerance_of[row.name]
         member = row.name.rpartition(".")[0]
         text = row.text.removeprefix(f"{member}: ")
         line = (row.name, row.value, f"± {shown.show(give, 3)}" if give else "", text)
-        (lines if row.name in own else others).append(line)
+        (lines if row.name in mechanism_names else others).append(line)
     heads = ("name", "value", "tolerance", "")
     joints = tuple(
         (_joint(part, name), *(number(_zero(x), DIGITS) for x in path[0].tolist()))
@@ -104,14 +104,14 @@ def tables_of(data: Dataset, parts: Sequence[Part]) -> list[Table]:
         for name, path in part.joints.items()
     )
     limits = tuple((x.shown.symbol, x.bound, x.value, x.state) for x in limit_states(data))
-    found = [
+    tables = [
         Table("Dimensions", heads, tuple(lines)),
         Table("Hardpoints [mm]", ("joint", "x", "y", "z"), joints),
         Table("Limits", ("limit", "required", "design", ""), limits),
         *_cyclogram(data),
         *([Table("Bodies, loads and scene", heads, tuple(others))] if others else []),
     ]
-    return [t._replace(lines=tuple(tuple(x.replace("\u00a0", " ") for x in line) for line in t.lines)) for t in found]
+    return [t._replace(lines=tuple(tuple(x.replace("\u00a0", " ") for x in line) for line in t.lines)) for t in tables]
 
 
 def _cyclogram(data: Dataset) -> list[Table]:
@@ -183,13 +183,13 @@ def _set(axes: Axes, table: Table | None) -> None:
         return
     high, wide = (len(table.lines) + 1) / (LINES + 1), axes.get_window_extent().width / axes.figure.dpi * LETTERS
     lines, widths = _fitted(table, wide)
-    found = axes.table(
+    drawn = axes.table(
         lines, colLabels=list(table.heads), cellLoc="left", colLoc="left", colWidths=widths,
         edges="horizontal", bbox=Bbox.from_bounds(0.0, 1.0 - high, 1.0, high),
     )  # fmt: skip
-    found.auto_set_font_size(False)
-    found.set_fontsize(7.5)
-    for cell in found.get_celld().values():
+    drawn.auto_set_font_size(False)
+    drawn.set_fontsize(7.5)
+    for cell in drawn.get_celld().values():
         cell.PAD = PAD / wide
         cell.set_linewidth(0.3)
 

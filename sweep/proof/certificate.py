@@ -60,9 +60,9 @@ class Proof:
         return self.open == 0
 
 
-def concluded(question: Question, found: Explored, best: float, wanted_gap: float) -> Proof:
+def concluded(question: Question, explored: Explored, best: float, wanted_gap: float) -> Proof:
     """Return the conclusion from the leaves of a search."""
-    leaves = found.leaves
+    leaves = explored.leaves
     outcome, bounds = leaves.outcome, np.where(leaves.outcome == EMPTY, np.inf, leaves.bound)
     volume = np.prod((leaves.high - leaves.low) / (question.high - question.low), axis=1)
     small = outcome == TOO_SMALL
@@ -75,7 +75,7 @@ def concluded(question: Question, found: Explored, best: float, wanted_gap: floa
         bound=question.outside(least) if np.isfinite(least) else least,
         best=best,
         wanted_gap=wanted_gap,
-        boxes=found.judged,
+        boxes=explored.judged,
         leaves=len(outcome),
         open=int((outcome == OPEN).sum()),
         exceptions=int(small.sum()),
@@ -84,7 +84,7 @@ def concluded(question: Question, found: Explored, best: float, wanted_gap: floa
         exception_high=tuple(float(x) for x in ends[1]),
         free=question.names,
         empty_share=float(volume[outcome == EMPTY].sum()),
-        cut_short=found.cut_short,
+        cut_short=explored.cut_short,
         reasons=_reasons(question, leaves),
         left_out=question.left_out,
         floor=question.outside(question.floor),
@@ -126,9 +126,9 @@ def write(path: Path, question: Question, leaves: Leaves, proof: Proof, target: 
         rows = getattr(leaves, name)
         offsets = np.concatenate([[0], np.cumsum(used.sum(axis=1))]).astype(np.int32)
         columns[name] = pa.ListArray.from_arrays(pa.array(offsets), pa.array(rows[used]))
-    asked = {**described(question), "target": target, "rows": list(question.provable.rows)}
+    content = {**described(question), "target": target, "rows": list(question.provable.rows)}
     table = pa.table(columns).replace_schema_metadata(
-        {"question": json.dumps(asked), "proof": json.dumps(asdict(proof)), "key": key}
+        {"question": json.dumps(content), "proof": json.dumps(asdict(proof)), "key": key}
     )
     sink = pa.BufferOutputStream()
     pq.write_table(table, sink, compression="zstd")

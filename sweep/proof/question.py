@@ -68,12 +68,12 @@ class Question:
         if motion is None or not self.floor < target < HUGE:
             return np.zeros((0, 9))
         least, longest = max(float(self.links[-2]), 0.0), self._longest_rocker()  # of the coupler, and of the rocker
-        found = tube(*motion, target)
+        bounds = tube(*motion, target)
         # a tube of half a turn or more contains the other mode in any case
-        wide = np.tan(0.5 * np.minimum(found[:, HIGH] - found[:, LOW], np.pi))
+        wide = np.tan(0.5 * np.minimum(bounds[:, HIGH] - bounds[:, LOW], np.pi))
         blurred = ~(wide * (least + longest) < least * np.sqrt(self.cos2) * WEAKER)
-        found[blurred, LOW], found[blurred, HIGH] = -np.inf, np.inf
-        return found
+        bounds[blurred, LOW], bounds[blurred, HIGH] = -np.inf, np.inf
+        return bounds
 
     def _longest_rocker(self) -> float:
         names = self.provable.links
@@ -149,7 +149,7 @@ def _known(study: Study) -> set[str]:
 
 def _entries(study: Study, coordinates: tuple[str, ...], place: str) -> dict[str, tuple[float, float]]:
     """Return the interval of every coordinate; its ends are equal if the coordinate is fixed."""
-    found: dict[str, tuple[float, float]] = {}
+    intervals: dict[str, tuple[float, float]] = {}
     chosen = listed(study)
     for name in coordinates:
         if name in chosen:
@@ -164,8 +164,8 @@ def _entries(study: Study, coordinates: tuple[str, ...], place: str) -> dict[str
             low = high = fixed
         else:  # an angle of the rocker, unrestricted
             low, high = -np.pi, np.pi
-        found[name] = _narrowed(study, name, float(low), float(high))
-    return found
+        intervals[name] = _narrowed(study, name, float(low), float(high))
+    return intervals
 
 
 def _narrowed(study: Study, name: str, low: float, high: float) -> tuple[float, float]:

@@ -47,8 +47,8 @@ class Leaves(NamedTuple):
     @property
     def open(self) -> NDArray[np.bool_]:
         """Mask of the boxes that the next round halves."""
-        found: NDArray[np.bool_] = self.outcome == OPEN
-        return found
+        mask: NDArray[np.bool_] = self.outcome == OPEN
+        return mask
 
     def taken(self, which: Numbers) -> Leaves:
         """Select rows of the table by index or mask."""
@@ -110,14 +110,20 @@ class Unit:
         mine = self.boxes.taken(np.arange(number, len(self.boxes.bound), UNITS))
         if should_stop() or not len(mine.bound):
             return number, 0
-        asked, provable = self.question, self.question.provable
+        question, provable = self.question, self.question.provable
         leaves = empty(len(mine.bound) + self.most, mine.low.shape[1])
-        about = (asked.branch, provable.objectives[asked.objective], asked.cos2, asked.links, self.target)
-        question, starts = (*about, asked.tube(self.target)), (mine.low, mine.high, mine.bound)
-        search = (starts, asked.high - asked.low, asked.free, asked.given, self.smallest)
-        provable.explore(question, (*search, 0), tuple(leaves))  # evaluates no box, but compiles the kernels
+        constants = (
+            question.branch,
+            provable.objectives[question.objective],
+            question.cos2,
+            question.links,
+            self.target,
+        )
+        for_kernel, starts = (*constants, question.tube(self.target)), (mine.low, mine.high, mine.bound)
+        search = (starts, question.high - question.low, question.free, question.given, self.smallest)
+        provable.explore(for_kernel, (*search, 0), tuple(leaves))  # evaluates no box, but compiles the kernels
         begin = time.thread_time()
-        filled, judged = provable.explore(question, (*search, self.most), tuple(leaves))
+        filled, judged = provable.explore(for_kernel, (*search, self.most), tuple(leaves))
         _write(self.path(number), leaves.taken(np.arange(filled)), judged, time.thread_time() - begin)
         return number, judged
 
@@ -137,7 +143,7 @@ def _read(path: Path) -> Explored:
 
 
 def explored(
-    question: Question, target: float, asked: ProveSettings, folder: Path, cores: Cores, tell: Tell
+    question: Question, target: float, settings: ProveSettings, folder: Path, cores: Cores, tell: Tell
 ) -> Explored:
     """Halve boxes until every box is proven or the allowed number of boxes was evaluated.
 
@@ -145,7 +151,7 @@ def explored(
     ----------
     question : the space, objective and limits
     target : in the unit of the proof's rows
-    asked : largest number of boxes to evaluate, and their smallest size
+    settings : largest number of boxes to evaluate, and their smallest size
     folder : folder of finished units; the same question must have the same folder
     cores : executor of the units, and its stop flag
     tell : called with the numbers of boxes evaluated so far and expected in all: a round ends early if units prove all
@@ -163,25 +169,25 @@ def explored(
     for number, share in enumerate(SHARES):
         if not len(todo.bound):
             break
-        if cores.stop or (asked.seconds is not None and time.monotonic() - begin > asked.seconds):
+        if cores.stop or (settings.seconds is not None and time.monotonic() - begin > settings.seconds):
             return Explored(joined([*done, todo]), judged, True, seconds)
-        most = max(int(asked.boxes * share) // UNITS, 1)
-        unit = Unit(question, target, _split(todo, question), most, asked.smallest, folder, number)
+        most = max(int(settings.boxes * share) // UNITS, 1)
+        unit = Unit(question, target, _split(todo, question), most, settings.smallest, folder, number)
         counts = [_read(path).judged for path in _finished(unit)]  # of a stopped run
         for _, count in _run(unit, cores):
             counts.append(count)
             here = sum(counts)
             # A unit that used its whole share has boxes left.
-            further = int(asked.boxes * sum(SHARES[number + 1 :])) if max(counts) == most else 0
+            further = int(settings.boxes * sum(SHARES[number + 1 :])) if max(counts) == most else 0
             tell(judged + here, judged + here * UNITS // len(counts) + further)
         if cores.stop:
             return Explored(joined([*done, todo]), judged, True, seconds)
         results = [_read(path) for path in _finished(unit)]
         judged += sum(result.judged for result in results)
         seconds += sum(result.seconds for result in results)
-        found = joined([result.leaves for result in results])
-        done.append(found.taken(~found.open))
-        todo = found.taken(found.open)
+        leaves = joined([result.leaves for result in results])
+        done.append(leaves.taken(~leaves.open))
+        todo = leaves.taken(leaves.open)
         todo = todo.taken(np.lexsort((*todo.low.T, todo.bound)))
     return Explored(joined([*done, todo]), judged, False, seconds)
 

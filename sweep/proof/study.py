@@ -53,14 +53,16 @@ def prove_study(study: Study, folder: str | Path, cores: Cores, tell: Tell = lam
     known = known_proof(study, folder)
     if known is not None:
         return known
-    asked, question, target, key = _asked(study, Path(folder))
+    settings, question, target, key = _asked(study, Path(folder))
     side = files.beside(Path(folder))
-    found = explored(question, target, asked, side / PARTS / key, cores, tell)
-    proof = concluded(question, found, _best(side / files.OPTIMUM, question), asked.gap)
-    write(side / files.PROOF, question, found.leaves, proof, target, key)
+    result = explored(question, target, settings, side / PARTS / key, cores, tell)
+    proof = concluded(question, result, _best(side / files.OPTIMUM, question), settings.gap)
+    write(side / files.PROOF, question, result.leaves, proof, target, key)
     if cores.stop:
         raise KeyboardInterrupt
-    files.append_run(Path(folder), {"event": EVENT, "boxes": proof.boxes, "processor_seconds": round(found.seconds, 3)})
+    files.append_run(
+        Path(folder), {"event": EVENT, "boxes": proof.boxes, "processor_seconds": round(result.seconds, 3)}
+    )
     if not proof.cut_short:
         shutil.rmtree(side / PARTS, ignore_errors=True)
     return proof
@@ -75,23 +77,32 @@ def known_proof(study: Study, folder: str | Path) -> Proof | None:
         if the study asks for a proof that is not supported.
     """
     path = files.beside(Path(folder)) / files.PROOF
-    found = read_proof(path)
-    if found is None or found.cut_short:
+    proof = read_proof(path)
+    if proof is None or proof.cut_short:
         return None
     *_, key = _asked(study, Path(folder))
-    return found if metadata(path).get(b"key") == key.encode() else None
+    return proof if metadata(path).get(b"key") == key.encode() else None
 
 
 def _asked(study: Study, folder: Path) -> tuple[ProveSettings, Question, float, str]:
     """Return the settings, the question, the target in the unit of the proof's rows, and the key of the certificate."""
     if study.optimise is None or study.optimise.prove is None:
         raise MissingInput("optimise.prove", '{ gap = "1 %", boxes = 1000000 }', str(study.path))
-    asked, question = study.optimise.prove, question_of(study)
+    settings, question = study.optimise.prove, question_of(study)
     best = _best(files.beside(folder) / files.OPTIMUM, question)
-    target = question.in_kernel(best / (1.0 + asked.gap)) if np.isfinite(best) else NEVER
-    what = [described(question), target, asked.gap, asked.boxes, asked.smallest, UNITS, SHARES, source_hash()]
-    key = hashlib.sha256(json.dumps(what, default=str, sort_keys=True).encode()).hexdigest()[:16]
-    return asked, question, target, key
+    target = question.in_kernel(best / (1.0 + settings.gap)) if np.isfinite(best) else NEVER
+    content = [
+        described(question),
+        target,
+        settings.gap,
+        settings.boxes,
+        settings.smallest,
+        UNITS,
+        SHARES,
+        source_hash(),
+    ]
+    key = hashlib.sha256(json.dumps(content, default=str, sort_keys=True).encode()).hexdigest()[:16]
+    return settings, question, target, key
 
 
 def _best(path: Path, question: Question) -> float:

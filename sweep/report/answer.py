@@ -32,11 +32,11 @@ BEHIND = 1e-6  # relative difference by which a known design must be better than
 NO_PROOF = "This is no proof of a global optimum"
 
 
-def answer(data: Dataset, found: Scan, further: Sequence[str] = ()) -> list[str]:
+def answer(data: Dataset, scanned: Scan, further: Sequence[str] = ()) -> list[str]:
     """Return the sentences that answer the study's question, most important first; ``further`` before the limits."""
     total = data.designs
     if data.result is None:
-        stops = max(fates(data, found)[:-1], key=lambda fate: fate.count, default=None)
+        stops = max(fates(data, scanned)[:-1], key=lambda fate: fate.count, default=None)
         most = [] if stops is None else [f"What stops most of them, {_count(stops.count)}: {stops.text}."]
         return [f"No design of the {_count(total)} in the sweep meets all limits.", *most]
     cut = data.front_steps is not None or (data.survey is not None and data.survey.ended == "time")
@@ -61,11 +61,11 @@ def answer(data: Dataset, found: Scan, further: Sequence[str] = ()) -> list[str]
         states, data.optimum is not None and tolerance is not None and tolerance.robust is not None
     )
     sentences += _edge_sentence(data)
-    sentences += _sweep_sentences(data, found)
+    sentences += _sweep_sentences(data, scanned)
     front = Front.of(data)
     sentences.append(front.sentence() if front else "")
     sentences += _against_reference(data)
-    sentences += not_achieved(data, found)
+    sentences += not_achieved(data, scanned)
     return [s for s in sentences if s]
 
 
@@ -121,7 +121,7 @@ def _edge_sentence(data: Dataset) -> list[str]:
     )
 
 
-def not_achieved(data: Dataset, found: Scan) -> list[str]:
+def not_achieved(data: Dataset, scanned: Scan) -> list[str]:
     """Return a sentence about missed limits, and about an optimiser that did not settle or lost a better design."""
     faults = [f"{s.shown.words}: {s.value} instead of {s.bound}" for s in limit_states(data) if s.state in MISSED]
     objective = data.objective
@@ -134,8 +134,8 @@ def not_achieved(data: Dataset, found: Scan) -> list[str]:
         made = value_of(data.optimum, "yield")
         if asked is not None and made < asked:
             faults.append(f"as it is made: {share_words(made, asked, str(data.optimum.get('ended')))}")
-        if objective is not None and found.best_row:
-            best, value = found.best_row[objective.name], value_of(data.optimum, objective.name)
+        if objective is not None and scanned.best_row:
+            best, value = scanned.best_row[objective.name], value_of(data.optimum, objective.name)
             if not compared(objective.name, value) <= compared(objective.name, best) + BEHIND * abs(best):
                 faults.append(f"the optimiser ended behind the best design of the sweep, {objective.show(best)}")
     return [f"Not achieved: {'; '.join(faults)}."] if faults else []
@@ -176,53 +176,53 @@ def _against_reference(data: Dataset) -> list[str]:
     ]
 
 
-def _sweep_sentences(data: Dataset, found: Scan) -> list[str]:
-    feasible = found.feasible
+def _sweep_sentences(data: Dataset, scanned: Scan) -> list[str]:
+    feasible = scanned.feasible
     share = number(100.0 * feasible / max(data.designs, 1), 3)
     text = f"Of {_count(data.designs)} designs in the sweep {_count(feasible)} ({share} %) meet all limits"
     shown = data.objective
-    if shown is None or data.optimum is None or not found.best_row:
+    if shown is None or data.optimum is None or not scanned.best_row:
         return [text + "."]
-    best = shown.show(found.best_row[shown.name])
-    on = "" if data.survey is not None and data.survey.populations else ", from where the optimiser went on"
-    return [f"{text}; the best of them has {shown.symbol} = {best}{on}."]
+    best = shown.show(scanned.best_row[shown.name])
+    source = "" if data.survey is not None and data.survey.populations else ", from where the optimiser went on"
+    return [f"{text}; the best of them has {shown.symbol} = {best}{source}."]
 
 
 def search_warnings(data: Dataset) -> list[str]:
     """Return warnings about the optimum; the optimiser's own statements are in `searched`."""
-    found, front = data.survey, data.front_steps
-    words = [] if found is None else [*_unconfirmed(data), *found.shortcomings]
-    if found is not None and found.doubts and not _is_proven(data):
-        of = "population" if found.populations else "start"
-        rare = {1: f"only one {of} reached this optimum", 2: f"only two {of}s reached this optimum"}.get(found.best)
+    survey, front = data.survey, data.front_steps
+    words = [] if survey is None else [*_unconfirmed(data), *survey.shortcomings]
+    if survey is not None and survey.doubts and not _is_proven(data):
+        of = "population" if survey.populations else "start"
+        rare = {1: f"only one {of} reached this optimum", 2: f"only two {of}s reached this optimum"}.get(survey.best)
         words.append(f"{rare}; run more" if rare else f"a better optimum may be left; run more {of}s")
     words += [] if front is None else [f"time ran out: {front} steps of the front"]
     return [f"{text[0].upper()}{text[1:]}." for text in words]
 
 
-def searched(data: Dataset, found: Scan) -> list[str]:
+def searched(data: Dataset, scanned: Scan) -> list[str]:
     """Return sentences about the search for the optimum, in the optimiser's own words, and about its uncertainty."""
     doubts = () if data.survey is None or _is_proven(data) else data.survey.doubts
-    return [text for text in (search_sentence(data, found), *(f"{x[0].upper()}{x[1:]}." for x in doubts)) if text]
+    return [text for text in (search_sentence(data, scanned), *(f"{x[0].upper()}{x[1:]}." for x in doubts)) if text]
 
 
 def _residual(value: float) -> str:
     return "its KKT residual does not exist" if math.isnan(value) else f"KKT residual {number(value, 3)}"
 
 
-def search_sentence(data: Dataset, found: Scan) -> str:
+def search_sentence(data: Dataset, scanned: Scan) -> str:
     """Describe the search for the optimum and, without a proof, state that it is none."""
     if data.result is None or data.study.objective is None:
         return ""
     if data.optimum is None:
         return f"{NO_PROOF}: no optimiser was run, and the best of the sweep is as fine as the spacing of its designs."
     starts = data.starts
-    kind = "" if found.feasible else "random "
+    kind = "" if scanned.feasible else "random "
     head = "The" if proof_sentence(data) else f"{NO_PROOF}: the"
     text = f"{head} optimiser started from {how_many(starts, f'{kind}design')}"
     populations = 0 if data.survey is None else data.survey.populations
-    some = "most of them " if starts > 2 * populations else ""  # at most two per population, others from the sweep
-    text += f", {some}ends of {how_many(populations, 'population')}" if populations else " of the sweep"
+    most = "most of them " if starts > 2 * populations else ""  # at most two per population, others from the sweep
+    text += f", {most}ends of {how_many(populations, 'population')}" if populations else " of the sweep"
     text += "" if data.survey is None else f"; {search_words(data, data.survey)}"
     residual, violation = value_of(data.optimum, "kkt_residual"), value_of(data.optimum, "violation")
     wanted = "" if residual <= KKT else f" where {number(KKT)} is wanted"
@@ -237,24 +237,24 @@ def _count(n: float) -> str:
 
 def proof_sentence(data: Dataset) -> str:
     """Return the statement of the proof; empty if the study asked for none."""
-    found = read_proof(files.beside(data.folder) / files.PROOF)
-    if found is None:
+    proof = read_proof(files.beside(data.folder) / files.PROOF)
+    if proof is None:
         return ""
-    shown = quantity(found.objective, data.units.get(found.objective, found.unit))
+    shown = quantity(proof.objective, data.units.get(proof.objective, proof.unit))
     took = [run["processor_seconds"] for run in data.runs if run.get("event") == EVENT]
-    return proof_words(found, shown.words, shown.show, took[-1] if took else None)
+    return proof_words(proof, shown.words, shown.show, took[-1] if took else None)
 
 
-def survey_warnings(data: Dataset, found: Survey) -> tuple[str, ...]:
+def survey_warnings(data: Dataset, survey: Survey) -> tuple[str, ...]:
     """Return warnings about a search; a proof of the whole space removes the doubts about better designs."""
-    return (*_unconfirmed(data), *(found.shortcomings if _is_proven(data) else found.warnings))
+    return (*_unconfirmed(data), *(survey.shortcomings if _is_proven(data) else survey.warnings))
 
 
-def search_words(data: Dataset, found: Survey) -> str:
+def search_words(data: Dataset, survey: Survey) -> str:
     """Describe the local optima found; with a proof of the whole space without the chance that one is left."""
-    if found.basins == 0 or not _is_proven(data):
-        return found.words
-    return f"{optima_words(found.basins)} found"
+    if survey.basins == 0 or not _is_proven(data):
+        return survey.words
+    return f"{optima_words(survey.basins)} found"
 
 
 def _is_proven(data: Dataset) -> bool:
@@ -280,9 +280,9 @@ def _behind_the_front(data: Dataset) -> tuple[str, ...]:
         return ()
     good = (front["status"] == codes.OK) & (front["kkt_residual"] <= KKT)
     for limit in study.limits:  # the front's bounds replace limits on its side
-        own = limit.minimum if study.pareto.at_least else limit.maximum
-        if limit.output == study.pareto.output and own is not None:
-            good &= front["bound"] >= own if study.pareto.at_least else front["bound"] <= own
+        bound = limit.minimum if study.pareto.at_least else limit.maximum
+        if limit.output == study.pareto.output and bound is not None:
+            good &= front["bound"] >= bound if study.pareto.at_least else front["bound"] <= bound
     least = float(compared(shown.name, front[shown.name][good].to_numpy()).min(initial=math.inf))
     missed = int(best.get("status", 0)) == codes.LIMIT_EXCEEDED
     value = math.inf if missed else compared(shown.name, value_of(best, shown.name))

@@ -308,8 +308,8 @@ def cyclogram_of(data: Dataset) -> pd.DataFrame | None:
 
 def marked(data: Dataset) -> dict[str, Any]:
     """Return the designs that are marked in the figures of the design space."""
-    found = {} if data.study.objective is None else {data.result_name: data.result}
-    return found | {"reference": data.reference}
+    rows = {} if data.study.objective is None else {data.result_name: data.result}
+    return rows | {"reference": data.reference}
 
 
 def gather(folder: Path) -> tuple[Dataset, Scan, list[Cells]]:
@@ -321,12 +321,12 @@ def gather(folder: Path) -> tuple[Dataset, Scan, list[Cells]]:
     larger = data.study.pareto is not None and data.study.pareto.at_least
     second = data.against if objective is not None else None
     total = sum(data.counts.values()) if data.study.output.keep == "all" else feasible
-    found = scan(data.parts, cells, objective, second, larger, total)
-    found.best_row |= _absent(data.study, found.best_row) if found.best_row else {}
-    data = replace(data, best=found.best_row or None)
+    scanned = scan(data.parts, cells, objective, second, larger, total)
+    scanned.best_row |= _absent(data.study, scanned.best_row) if scanned.best_row else {}
+    data = replace(data, best=scanned.best_row or None)
     if data.optima is None and data.study.reference is not None:
         data = replace(data, computed_reference=row_of(data.study, reference_of(data.study)))
-    return data, found, cells
+    return data, scanned, cells
 
 
 def reference_of(study: Study) -> dict[str, float]:
@@ -338,5 +338,5 @@ def reference_of(study: Study) -> dict[str, float]:
 def row_of(study: Study, design: Mapping[str, float]) -> Row:
     """Return a design with the outputs that a study wants, computed like those of its sweep."""
     matrix, _ = design_matrix(study.family, design)
-    found = design_outputs(study.family, matrix, study.want, study.accuracy, study.window)
-    return dict(design) | {name: float(values[0]) for name, values in found.items()}
+    outputs = design_outputs(study.family, matrix, study.want, study.accuracy, study.window)
+    return dict(design) | {name: float(values[0]) for name, values in outputs.items()}

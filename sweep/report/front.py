@@ -112,10 +112,12 @@ class Front:
         reached = [float(p["bound"]) if _missed(p) else compared(second.name, float(p[second.name])) for p in points]
         values = [math.nan if _missed(p) else float(p[objective]) for p in points]
         bounds = np.array([float(p["bound"]) for p in points])
-        found = gaps(bounds, np.array(reached), np.array(values))
-        if not found or found[0].area < SHOWN:
+        largest = gaps(bounds, np.array(reached), np.array(values))
+        if not largest or largest[0].area < SHOWN:
             return ""
-        ends = f"{second.show(reached[found[0].number], 4)} and {second.show(float(bounds[found[0].number + 1]), 4)}"
+        ends = (
+            f"{second.show(reached[largest[0].number], 4)} and {second.show(float(bounds[largest[0].number + 1]), 4)}"
+        )
         count = self.settings.points or len(points)
         return f" It is least known between {ends}: pareto.points, now {count}, places further bounds there."
 

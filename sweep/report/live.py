@@ -45,7 +45,7 @@ def live(data: Dataset, cells: Sequence[Cells], different: Sequence[Group]) -> d
     lines = parallel(data, cells, shown)
     return {
         "shown": shown,
-        "live_designs": [(one.name, one.role) for one in shown],
+        "live_designs": [(design.name, design.role) for design in shown],
         "motion_data": "" if motion is None else embedded(motion),
         "axis": "" if motion is None else motion["axis"],
         "sides": motion is not None and len({tuple(part["shift"]) for part in motion["designs"][0]["parts"]}) > 1,
@@ -86,9 +86,9 @@ FOLLOWERS = ("psi", "alpha")  # positions that are angles
 def whole(name: str, path: Array) -> Array:
     """Return a follower's angle without jumps of a turn; any other curve unchanged."""
     known = np.isfinite(path)
-    found = path.copy()
-    found[known] = np.unwrap(path[known]) if stem(name) in FOLLOWERS else path[known]
-    return found
+    unwrapped = path.copy()
+    unwrapped[known] = np.unwrap(path[known]) if stem(name) in FOLLOWERS else path[known]
+    return unwrapped
 
 
 def lowest(position: str, path: Array) -> tuple[Array, bool, int]:
@@ -106,15 +106,15 @@ def lowest(position: str, path: Array) -> tuple[Array, bool, int]:
 
 def limit_values(name: str, limits: tuple[Limit, ...]) -> list[float]:
     """Return the limits of a curve itself as ordinates in stored units, both signs for a limit on magnitude."""
-    found = []
+    values = []
     above, below = (reduced("max_abs", name), reduced("max", name)), (reduced("min", name),)
     for limit in limits:
         for value, outputs in ((limit.maximum, above), (limit.minimum, below)):
             if value is None or limit.output not in outputs:
                 continue
             both = is_largest(limit.output, magnitude=True) and stem(name) != "pressure_angle"
-            found += [value, -value] if both else [value]
-    return found
+            values += [value, -value] if both else [value]
+    return values
 
 
 POSES = 240
@@ -149,11 +149,11 @@ def moving(data: Dataset, shown: Sequence[Shown]) -> dict[str, Any] | None:
         return None
     family = data.study.family
     names = [x for x in dict.fromkeys(motion_curves(family)) if x == family.position or coordinate(x) is None]
-    motions = [_motion(data, one, names) for one in shown]
+    motions = [_motion(data, placed, names) for placed in shown]
     interval = isinstance(family.domain, Interval)
     phase = " from the lowest position" if all(motion.from_lowest for motion in motions) else ""
     variable = quantity(family.domain.name, family.domain.unit)
-    joints = [one.part for motion in motions for one in motion.placed]
+    joints = [placed.part for motion in motions for placed in motion.placed]
     designs = [_design(data, motion, variable.factor) for motion in motions]
     return {
         "closed": not interval,
@@ -172,18 +172,18 @@ def _motion(data: Dataset, shown: Shown, names: list[str]) -> Motion:
     design = data.design(shown.row)
     matrix = np.array([list(design.values())])
     phi = equal_steps(family.domain, matrix, POSES)
-    cut = next((family.follower(o.name) for o in family.pose_outputs if o.windowed), family.position)
-    found = family.poses(matrix, Angles.of(phi[None, :]), frozenset([*names, family.position, cut]))
-    path = np.asarray(found[family.position][0], np.float64)
+    windowed = next((family.follower(o.name) for o in family.pose_outputs if o.windowed), family.position)
+    poses = family.poses(matrix, Angles.of(phi[None, :]), frozenset([*names, family.position, windowed]))
+    path = np.asarray(poses[family.position][0], np.float64)
     closed, free, start = not isinstance(family.domain, Interval), False, 0
     if closed:
         path, free, start = lowest(family.position, path)
     order = np.roll(np.arange(POSES), -start)
-    curves = {name: whole(name, np.asarray(found[name][0], np.float64)[order]) for name in names}
+    curves = {name: whole(name, np.asarray(poses[name][0], np.float64)[order]) for name in names}
     from_lowest = closed and not free
     curves[family.position] = path[order] - (path[start] if from_lowest else 0.0)
     window = data.study.window
-    working = curves[cut] if cut in curves else np.asarray(found[cut][0], np.float64)[order]
+    working = curves[windowed] if windowed in curves else np.asarray(poses[windowed][0], np.float64)[order]
     inside = np.zeros(POSES, np.bool_) if window is None else in_window(working, window)
     return Motion(shown, phi[order], from_lowest, curves, inside, _placed(family, design, phi, order))
 
@@ -191,12 +191,12 @@ def _motion(data: Dataset, shown: Shown, names: list[str]) -> Motion:
 def _placed(family: Family, design: dict[str, float], phi: Array, order: NDArray[np.intp]) -> tuple[Placed, ...]:
     """Return stages and members with their joints in the order of the poses; a march is computed in its own order."""
     try:
-        found = parts(family, design, phi)
+        stages = parts(family, design, phi)
     except InputError:  # a mechanism without joints has curves only
         return ()
-    found = [replace(part, joints={name: path[order] for name, path in part.joints.items()}) for part in found]
-    known = [part for part in found if any(np.isfinite(path).all() for path in part.joints.values())]
-    return tuple(side_by_side(known)) if known else ()
+    stages = [replace(part, joints={name: path[order] for name, path in part.joints.items()}) for part in stages]
+    assembled = [part for part in stages if any(np.isfinite(path).all() for path in part.joints.values())]
+    return tuple(side_by_side(assembled)) if assembled else ()
 
 
 def _panel(data: Dataset, name: str, motions: list[Motion]) -> dict[str, Any]:
@@ -287,19 +287,20 @@ def parallel(data: Dataset, cells: Sequence[Cells], shown: Sequence[Shown]) -> d
     numbers, values = _lines(data.parts, names, best, of)
     if len(numbers) < 2:
         return None
-    told = np.ptp(values, axis=0) > CONSTANT * np.abs(values).max(axis=0)
-    axes, values = [axis for axis, varies in zip(axes, told, strict=True) if varies], values[:, told]
+    varying = np.ptp(values, axis=0) > CONSTANT * np.abs(values).max(axis=0)
+    axes, values = [axis for axis, varies in zip(axes, varying, strict=True) if varies], values[:, varying]
     if len(axes) < 2:
         return None
-    named = [one for one in shown if one.role != "front"]
-    marks = [[float(one.row.get(axis.name, np.nan)) * axis.factor for axis in axes] for one in named]
+    named = [design for design in shown if design.role != "front"]
+    marks = [[float(design.row.get(axis.name, np.nan)) * axis.factor for axis in axes] for design in named]
     return {
         "axes": [{"name": axis.name, "symbol": axis.symbol, "unit": axis.unit} for axis in axes],
         "objective": next((k for k, axis in enumerate(axes) if objective and axis.name == objective.name), -1),
         "numbers": numbers.tolist(),
         "values": packed(values * [axis.factor for axis in axes]),
         "designs": [
-            {"name": one.name, "role": one.role, "values": packed(mark)} for one, mark in zip(named, marks, strict=True)
+            {"name": design.name, "role": design.role, "values": packed(mark)}
+            for design, mark in zip(named, marks, strict=True)
         ],
         "of": of,
     }
@@ -314,8 +315,8 @@ def _axes(data: Dataset, cells: Sequence[Cells]) -> list[Quantity]:
     limits = [limit.output for limit in study.limits if limit.output in study.want and not is_flag(limit.output)]
     dimensions = [limited(data, cell.name) for cell in cells][:DIMENSIONS]
     there = {axis.name for axis in dimensions}  # a prescribed output of [locus] is a dimension
-    told = [name for name in dict.fromkeys([*objective, *second, *limits]) if name in stored and not is_flag(name)]
-    return [*dimensions, *[data.shown(name) for name in told if name not in there][:OUTPUTS]]
+    outputs = [name for name in dict.fromkeys([*objective, *second, *limits]) if name in stored and not is_flag(name)]
+    return [*dimensions, *[data.shown(name) for name in outputs if name not in there][:OUTPUTS]]
 
 
 def _lines(parts: Sequence[Path], names: list[str], objective: str | None, of: int) -> tuple[NDArray[np.int64], Array]:
@@ -324,12 +325,12 @@ def _lines(parts: Sequence[Path], names: list[str], objective: str | None, of: i
     seen = 0
     numbers, values = np.empty(0, np.int64), np.empty((0, len(names)))
     best_numbers, best_values = numbers, values
-    for found, table in _feasible(parts, names):
-        taken = slice(-seen % step, None, step)
-        numbers, values = np.concatenate([numbers, found[taken]]), np.vstack([values, table[taken]])
-        seen += found.size
+    for batch_numbers, table in _feasible(parts, names):
+        every = slice(-seen % step, None, step)
+        numbers, values = np.concatenate([numbers, batch_numbers[every]]), np.vstack([values, table[every]])
+        seen += batch_numbers.size
         if objective is not None:
-            best_numbers, best_values = np.concatenate([best_numbers, found]), np.vstack([best_values, table])
+            best_numbers, best_values = np.concatenate([best_numbers, batch_numbers]), np.vstack([best_values, table])
             order = np.argsort(compared(objective, best_values[:, names.index(objective)]), kind="stable")[:BEST]
             best_numbers, best_values = best_numbers[order], best_values[order]
     numbers, first = np.unique(np.concatenate([numbers, best_numbers]), return_index=True)

@@ -86,12 +86,12 @@ def many(data: Dataset, row: Mapping[str, Any] | None, samples: int = 0) -> tupl
 
 def made(data: Dataset) -> Made | None:
     """Return the yield of the optimum; None without tolerances, an optimum, or an inequality limit."""
-    found = _manufactured(data)
-    if found is None:
+    sample = _manufactured(data)
+    if sample is None:
         return None
-    limits = [limit for limit in limits_of_made(data.study) if limit.output == found.output]
-    worst = min(limits, key=lambda limit: float(meets(limit, found.values).mean()))
-    return Made(float(found.kept.mean()), _histogram(data, worst, found.values), found.costs)
+    limits = [limit for limit in limits_of_made(data.study) if limit.output == sample.output]
+    worst = min(limits, key=lambda limit: float(meets(limit, sample.values).mean()))
+    return Made(float(sample.kept.mean()), _histogram(data, worst, sample.values), sample.costs)
 
 
 def _manufactured(data: Dataset) -> Manufactured | None:
@@ -109,28 +109,28 @@ def _design(data: Dataset, row: Mapping[str, Any]) -> Array:
     return np.array([float(row[name]) for name in data.study.family.parameter_names])
 
 
-def made_sentence(found: Made | None, tolerance: str) -> str:
+def made_sentence(result: Made | None, tolerance: str) -> str:
     """Return a sentence about the yield and the most expensive tolerance, for the answer."""
-    if found is None:
+    if result is None:
         return ""
-    text = f"Of what is made within {tolerance}, {number(100.0 * found.share, 3)}\u00a0% keeps all limits"
-    most = next(iter(found.costs), None)
-    if most is None or found.share == 1.0:
+    text = f"Of what is made within {tolerance}, {number(100.0 * result.share, 3)}\u00a0% keeps all limits"
+    most = next(iter(result.costs), None)
+    if most is None or result.share == 1.0:
         return f"{text}."
     if most.gain >= TELLING_GAIN:
         gain = number(100.0 * most.gain, 2)
         return f"{text}; the dimension that costs most is {most.name}: were it exact, {gain} points more would."
-    share, words = number(100.0 * most.spread, 2), found.histogram.shown.words
+    share, words = number(100.0 * most.spread, 2), result.histogram.shown.words
     return f"{text}; the dimension that scatters the {words} most is {most.name}, with {share}\u00a0% of its variance."
 
 
 def histogram(data: Dataset, output: str) -> Histogram | None:
     """Return the histogram of one output over manufactured mechanisms; None without tolerances or an optimum."""
-    study, found = data.study, many(data, data.optimum)
-    if found is None:
+    study, sample = data.study, many(data, data.optimum)
+    if sample is None:
         return None
     resolve.output(study.family, output)  # raises for an unknown name
-    values = design_outputs(study.family, found[1], [output], study.accuracy, study.window)[output]
+    values = design_outputs(study.family, sample[1], [output], study.accuracy, study.window)[output]
     limits = [x for x in study.output_limits if x.output == output]
     # Of two limits the last one is the tolerance band around a prescribed output.
     return _histogram(data, limits[-1] if limits else Limit(output, None, None), values)
@@ -207,9 +207,9 @@ def with_bands(rows: pd.DataFrame, bands: Mapping[str, tuple[float, float]]) -> 
 
 def share_made(data: Dataset) -> float:
     """Return the share of mechanisms that keep all limits, from the largest sample known; nan without one."""
-    few = [float(row["within"]) for row in _optimum_rows(data, files.TOLERANCE) if row["output"] == "all limits"]
+    shares = [float(row["within"]) for row in _optimum_rows(data, files.TOLERANCE) if row["output"] == "all limits"]
     known = float((data.optimum or {}).get("yield", math.nan))
-    return known if math.isfinite(known) else next(iter(few), math.nan)
+    return known if math.isfinite(known) else next(iter(shares), math.nan)
 
 
 def tolerance_words(data: Dataset) -> str:

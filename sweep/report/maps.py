@@ -121,32 +121,32 @@ def line_figure(
     return figure
 
 
-def trade_off(data: Dataset, found: Scan) -> Figure | None:
+def trade_off(data: Dataset, scanned: Scan) -> Figure | None:
     """Draw feasible designs by objective and second criterion, with the non-dominated ones.
 
     The front of the optimiser is drawn if one was searched.
     """
     objective, against = data.objective, data.against
-    if objective is None or against is None or not (len(found.scatter) or data.front is not None):
+    if objective is None or against is None or not (len(scanned.scatter) or data.front is not None):
         return None
     second, front = data.shown(against), Front.of(data)
     figure = new_figure(WIDTH, 4.4, None)
     figure.subplots_adjust(left=0.08, right=0.98, bottom=0.2, top=0.97)
     axes = figure.subplots()
-    scatter = found.scatter * (objective.factor, second.factor)
-    beaten = found.front * (objective.factor, second.factor)
+    scatter = scanned.scatter * (objective.factor, second.factor)
+    best = scanned.front * (objective.factor, second.factor)
     if len(scatter):
         size = 3 if len(scatter) > 5000 else 9 if len(scatter) > 500 else 25
-        look: dict[str, Any] = {"color": QUIET, "alpha": 0.35, "linewidths": 0, "rasterized": True}
-        axes.scatter(scatter[:, 0], scatter[:, 1], s=size, label="feasible designs of the sweep", **look)
-        axes.step(*beaten.T, where="post", color="#2f8f5b", linewidth=1.2, zorder=3)
+        style: dict[str, Any] = {"color": QUIET, "alpha": 0.35, "linewidths": 0, "rasterized": True}
+        axes.scatter(scatter[:, 0], scatter[:, 1], s=size, label="feasible designs of the sweep", **style)
+        axes.step(*best.T, where="post", color="#2f8f5b", linewidth=1.2, zorder=3)
         axes.scatter(
-            beaten[:, 0],
-            beaten[:, 1],
+            best[:, 0],
+            best[:, 1],
             s=14,
             color="#2f8f5b",
             zorder=3,
-            label=f"of these, non-dominated ({len(beaten)})",
+            label=f"of these, non-dominated ({len(best)})",
         )
     if front is not None:
         front.draw(axes)
@@ -213,25 +213,27 @@ def _share_norm(values: Array) -> object:
     return Normalize(0.0, float(np.nanmax(values)) if np.isfinite(values).any() else 100.0)
 
 
-def design_map(data: Dataset, found: Scan, cells: list[Cells], pair: tuple[str, str] | None = None) -> Figure | None:
+def design_map(data: Dataset, scanned: Scan, cells: list[Cells], pair: tuple[str, str] | None = None) -> Figure | None:
     """Draw the best objective of each cell over one or two axes, by default the pair with the largest variation."""
     by_name = {c.name: c for c in cells}
     marks = {role: row for role, row in marked(data).items() if row is not None}
     shown = data.objective
     if pair is None:
-        if shown is None and found.feasible == data.designs:
+        if shown is None and scanned.feasible == data.designs:
             return None  # all of one colour
-        pair = most_telling(found)
+        pair = most_telling(scanned)
     if pair is not None:
         x, y = pair
-        at = {role: (by_name[x].placed(float(row[x])), by_name[y].placed(float(row[y]))) for role, row in marks.items()}
+        places = {
+            role: (by_name[x].placed(float(row[x])), by_name[y].placed(float(row[y]))) for role, row in marks.items()
+        }
         sides = (by_name[x], axis_quantity(data, x)), (by_name[y], axis_quantity(data, y))
-        return map_figure(found.grids[pair], *sides, data.designs, shown, at, overlays(data.study, x, y))
-    if len(cells) == 1 and found.feasible:
+        return map_figure(scanned.grids[pair], *sides, data.designs, shown, places, overlays(data.study, x, y))
+    if len(cells) == 1 and scanned.feasible:
         name = cells[0].name
         side = cells[0], axis_quantity(data, name)
         return line_figure(
-            found.lines[name], side, data.designs, shown, {r: float(row[name]) for r, row in marks.items()}
+            scanned.lines[name], side, data.designs, shown, {r: float(row[name]) for r, row in marks.items()}
         )
     return None
 
@@ -245,10 +247,10 @@ def axis_quantity(data: Dataset, name: str) -> Quantity:
 def overlays(study: Study, x: str, y: str) -> list[Overlay]:
     """Return the known lines of ``[report] curves`` that lie in the plane of the map, in stored units."""
     factors = {axis.name: axis.factor for axis in study.space.axes}
-    found = []
+    lines = []
     for curve in study.data.get("report", {}).get("curves", []):
         if {curve["x"], curve["y"]} == {x, y}:
             points = np.asarray(curve["points"], dtype=np.float64) * (factors[curve["x"]], factors[curve["y"]])
             along = points if curve["x"] == x else points[:, ::-1]
-            found.append(Overlay(curve["label"], along[:, 0], along[:, 1]))
-    return found
+            lines.append(Overlay(curve["label"], along[:, 0], along[:, 1]))
+    return lines

@@ -54,8 +54,8 @@ def groups(data: Dataset) -> list[Group]:
     """Return the different optima: the answer, the best nominal one, the others by objective; none without a search."""
     if data.optima is None or data.objective is None:
         return []
-    kept = data.optima[(data.optima["role"] != "reference") & (data.optima["status"] == codes.OK)]
-    rows, name, order = records(kept), data.objective.name, {"optimum": 0, "nominal": 1}
+    feasible = data.optima[(data.optima["role"] != "reference") & (data.optima["status"] == codes.OK)]
+    rows, name, order = records(feasible), data.objective.name, {"optimum": 0, "nominal": 1}
     rows.sort(key=lambda row: (order.get(row["role"], 2), float(compared(name, row[name]))))
     places = _places(data, rows)
     values = [float(row[name]) for row in rows]
@@ -64,11 +64,11 @@ def groups(data: Dataset) -> list[Group]:
     for k, row in enumerate(rows):
         near = next((j for j in leaders if _apart(places, j, k) <= ALIKE), None)
         twin = next((j for j in leaders if near is None and _mirrored(places, values, j, k)), None)
-        own = near if near is not None else twin
-        if own is None:
+        leader = near if near is not None else twin
+        if leader is None:
             leaders.append(k)
         started = row["role"] != "nominal"
-        count[k if own is None else own] += started
+        count[k if leader is None else leader] += started
         if twin is not None:
             mirrored[twin] += started
     return [Group(rows[k], count[k], mirrored[k]) for k in leaders]
@@ -76,16 +76,19 @@ def groups(data: Dataset) -> list[Group]:
 
 def _places(data: Dataset, rows: list[dict[str, Any]]) -> tuple[Array, Array, Array]:
     """Return lengths and ratios over the largest of them, angles, and signs, (k, number of each)."""
-    own = [p for p in data.study.bare.parameters if p.name in data.study.family.parameter_names]
-    of = {unit: [p.name for p in own if p.unit == unit and p.choices is None] for unit in ("length", "ratio", "angle")}
-    signs = [p.name for p in own if p.choices is not None]
+    parameters = [p for p in data.study.bare.parameters if p.name in data.study.family.parameter_names]
+    names_of = {
+        unit: [p.name for p in parameters if p.unit == unit and p.choices is None]
+        for unit in ("length", "ratio", "angle")
+    }
+    signs = [p.name for p in parameters if p.choices is not None]
 
     def matrix(names: list[str]) -> Array:
         return np.array([[float(row[name]) for name in names] for row in rows]).reshape(len(rows), len(names))
 
     sized = [x / np.maximum(np.abs(x).max(axis=1, initial=1e-300, keepdims=True), 1e-300)
-             for x in (matrix(of["length"]), matrix(of["ratio"]))]  # fmt: skip
-    return np.hstack(sized), matrix(of["angle"]), matrix(signs)
+             for x in (matrix(names_of["length"]), matrix(names_of["ratio"]))]  # fmt: skip
+    return np.hstack(sized), matrix(names_of["angle"]), matrix(signs)
 
 
 def _apart(places: tuple[Array, Array, Array], j: int, k: int) -> float:
@@ -122,13 +125,16 @@ def shown_designs(data: Dataset, different: Sequence[Group]) -> list[Shown]:
     """
     if data.result is None:
         return []
-    found = [Shown(data.result_name, "result", _objective(data, data.result), data.result)]
-    others = [one for one in different if one.row["role"] != "optimum"][:OFFERED]
-    found += [Shown(one.title(k), "alternative", _objective(data, one.row), one.row) for k, one in enumerate(others, 1)]
-    found += _of_front(data)
+    designs = [Shown(data.result_name, "result", _objective(data, data.result), data.result)]
+    others = [group for group in different if group.row["role"] != "optimum"][:OFFERED]
+    designs += [
+        Shown(group.title(k), "alternative", _objective(data, group.row), group.row)
+        for k, group in enumerate(others, 1)
+    ]
+    designs += _of_front(data)
     if data.reference is not None:
-        found.append(Shown("reference", "reference", _objective(data, data.reference), data.reference))
-    return found
+        designs.append(Shown("reference", "reference", _objective(data, data.reference), data.reference))
+    return designs
 
 
 def _of_front(data: Dataset) -> list[Shown]:
@@ -173,18 +179,18 @@ class Optimum:
     picture: Markup | None
 
 
-def optima(data: Dataset, found: list[Group]) -> list[Optimum]:
+def optima(data: Dataset, distinct: list[Group]) -> list[Optimum]:
     """Return the cards of the first optima, with pictures to one scale; empty if there is only one."""
-    shown, own = data.objective, data.study.bare.parameter_names
-    tilts = {name for name in own if name.endswith("_tilt")}  # tilts of nominal designs are zero
-    if len(found) < 2 or shown is None:
+    shown, names = data.objective, data.study.bare.parameter_names
+    tilts = {name for name in names if name.endswith("_tilt")}  # tilts of nominal designs are zero
+    if len(distinct) < 2 or shown is None:
         return []
-    found = found[:CARDS]
-    drawn = [drawn_parts(data.study.family, group.row) for group in found]
-    span = max((extent([one.part for one in placed]) for placed in drawn if placed), default=0.0)
-    best = float(found[0].row[shown.name])
+    distinct = distinct[:CARDS]
+    drawn = [drawn_parts(data.study.family, group.row) for group in distinct]
+    span = max((extent([stage.part for stage in placed]) for placed in drawn if placed), default=0.0)
+    best = float(distinct[0].row[shown.name])
     cards = []
-    for k, (group, placed) in enumerate(zip(found, drawn, strict=True)):
+    for k, (group, placed) in enumerate(zip(distinct, drawn, strict=True)):
         value = float(group.row[shown.name])
         lines = parameter_rows(data, group.row, 4)
         title = group.title(k)
@@ -196,7 +202,7 @@ def optima(data: Dataset, found: list[Group]) -> list[Optimum]:
                 group.starts,
                 group.mirrored,
                 _made(data, group.row),
-                [(x.name, x.value) for x in lines if x.name in own and (group.row[x.name] or x.name not in tilts)],
+                [(x.name, x.value) for x in lines if x.name in names and (group.row[x.name] or x.name not in tilts)],
                 _extras(data, group.row),
                 sketch(placed, f"{title}: positions over one turn", names=False, span=span) if placed else None,
             )
@@ -204,17 +210,17 @@ def optima(data: Dataset, found: list[Group]) -> list[Optimum]:
     return cards
 
 
-def optima_sentence(data: Dataset, found: list[Group]) -> str:
+def optima_sentence(data: Dataset, distinct: list[Group]) -> str:
     """Return a sentence about the number of different optima, for the answer."""
     shown = data.objective
-    if len(found) < 2 or shown is None:
+    if len(distinct) < 2 or shown is None:
         return ""
-    value, best = (float(group.row[shown.name]) for group in (found[1], found[0]))
+    value, best = (float(group.row[shown.name]) for group in (distinct[1], distinct[0]))
     difference = change(shown, value, best)
-    same = sum(abs(float(group.row[shown.name]) - best) <= AGREE * abs(best) for group in found)
-    text = f"The search ended in {len(found)} structurally different optima"
+    same = sum(abs(float(group.row[shown.name]) - best) <= AGREE * abs(best) for group in distinct)
+    text = f"The search ended in {len(distinct)} structurally different optima"
     text += f", {same} of them with the best value" if same > 1 else ""
-    row = found[1].row
+    row = distinct[1].row
     paper = row.get("role") == "nominal"
     text += f"; the {'best on paper' if paper else 'next'} has {shown.show(value)}"
     text += f" ({difference})" if difference else ""
@@ -229,10 +235,10 @@ def _made(data: Dataset, row: dict[str, Any]) -> str:
     if not limits:
         return ""
     if not math.isfinite(known):
-        found = many(data, row, SAMPLES)
-        if found is None:
+        sample = many(data, row, SAMPLES)
+        if sample is None:
             return ""
-        columns = design_outputs(study.family, found[1], [x.output for x in limits], study.accuracy, study.window)
+        columns = design_outputs(study.family, sample[1], [x.output for x in limits], study.accuracy, study.window)
         known = float(np.logical_and.reduce([meets(limit, columns[limit.output]) for limit in limits]).mean())
     return f"{number(100.0 * known, 3)}\u00a0% of what is made keeps all limits"
 
@@ -241,10 +247,10 @@ def _extras(data: Dataset, row: dict[str, Any]) -> list[tuple[str, str]]:
     """Return the design outputs that matter for building the mechanism."""
     family = data.study.bare
     design = np.array([[float(row[name]) for name in family.parameter_names]])
-    found = []
+    extras = []
     for name in EXTRAS:
-        one = sizes(family).get(name)
-        if one is not None:
-            shown = quantity(name, one.output.unit)
-            found.append((shown.words, shown.show(float(one.values(family, design)[0]), 4)))
-    return found
+        dimension = sizes(family).get(name)
+        if dimension is not None:
+            shown = quantity(name, dimension.output.unit)
+            extras.append((shown.words, shown.show(float(dimension.values(family, design)[0]), 4)))
+    return extras

@@ -77,12 +77,12 @@ def write_report(folder: str | Path, out: str | Path | None = None, say: Say = u
 def _write(folder: Path, out: Path, say: Say) -> Path:
     """Write all files of the report into ``out``."""
     say("report", 0, STEPS, "steps")
-    data, found, cells = gather(folder)
+    data, scanned, cells = gather(folder)
     several = groups(data)
     with unwritable(f"report {out}"):
         out.mkdir(parents=True, exist_ok=True)
         say("report", 1, STEPS, "steps")
-        figures = draw(data, found, cells, out / "figures")
+        figures = draw(data, scanned, cells, out / "figures")
         say("report", 2, STEPS, "steps")
         as_made = _as_made(data)
         events = event_bands(data)
@@ -101,14 +101,14 @@ def _write(folder: Path, out: Path, say: Say) -> Path:
             sketch=answer_sketch(data),
             figures=figures,
             own_figures=own_figures(data.study, out / "figures"),
-            sentences=answer.answer(data, found, further),
-            searched=answer.searched(data, found),
+            sentences=answer.answer(data, scanned, further),
+            searched=answer.searched(data, scanned),
             limits=tables.limit_states(data),
             outputs=tables.output_rows(data),
             parameters=tables.parameter_rows(data),
             bars=bars(data),
-            fates=tables.fates(data, found),
-            errors=tables.error_rows(data, found),
+            fates=tables.fates(data, scanned),
+            errors=tables.error_rows(data, scanned),
             provenance=tables.provenance(data),
             front=Front.of(data),
             optima=optima(data, several),
@@ -117,7 +117,7 @@ def _write(folder: Path, out: Path, say: Say) -> Path:
             cyclogram=strokes,
             events=events,
             number=number,
-            pair=most_telling(found) or (cells[0].name,) if cells else (),
+            pair=most_telling(scanned) or (cells[0].name,) if cells else (),
             axes=len(cells),
             speed=rpm(data.study.speed),
             today=date.today().isoformat(),
@@ -131,10 +131,10 @@ def _write(folder: Path, out: Path, say: Say) -> Path:
 
 def _as_made(data: Dataset) -> dict[str, Any]:
     """Return the template's variables about manufactured mechanisms of the optimum."""
-    told, within = made(data), tolerance_words(data)
+    result, within = made(data), tolerance_words(data)
     return {
-        "made": told, "made_words": made_sentence(told, within), "tolerance": within, "spreads": spreads(data),
-        "costs": [x for x in told.costs if max(x.spread, x.gain) >= TELLING_GAIN] if told else [],
+        "made": result, "made_words": made_sentence(result, within), "tolerance": within, "spreads": spreads(data),
+        "costs": [x for x in result.costs if max(x.spread, x.gain) >= TELLING_GAIN] if result else [],
         "share_made": share_made(data), "slopes": slopes(data), "single": COST_SAMPLE,
     }  # fmt: skip
 
@@ -149,15 +149,15 @@ def _threads(data: Dataset, out: Path) -> dict[str, str]:
         return {"threads": save(threads_figure(turn), out / "figures" / "threads.svg").uri}
 
 
-def draw(data: Dataset, found: Scan, cells: list[Cells], folder: Path) -> dict[str, str]:
+def draw(data: Dataset, scanned: Scan, cells: list[Cells], folder: Path) -> dict[str, str]:
     """Save the available figures of the design space and return them as data URIs, by names of the template."""
-    if not (len(cells) and found.feasible) and data.front is None:
+    if not (len(cells) and scanned.feasible) and data.front is None:
         return {}
     with house_style():
-        every = {"map": maps.design_map(data, found, cells), "trade-off": maps.trade_off(data, found)}
+        drawn = {"map": maps.design_map(data, scanned, cells), "trade-off": maps.trade_off(data, scanned)}
         return {
             name.replace("-", "_"): save(figure, folder / f"{name}.svg").uri
-            for name, figure in every.items()
+            for name, figure in drawn.items()
             if figure is not None
         }
 
@@ -168,11 +168,11 @@ def answer_sketch(data: Dataset) -> Markup | None:
     placed = [] if row is None or data.study.output.curves == "none" else drawn_parts(data.study.family, row)
     if row is None or not placed:
         return None
-    found = dimensioned(data.study.family, row, placed)
+    ends = dimensioned(data.study.family, row, placed)
     rows = tables.parameter_rows(data, digits=5)
     free = [r for r in rows if r.space != "fixed"] or rows
-    shown = {r.name: r.value for r in free if r.name in found}
-    words = {k if len(shown) > MOST_VALUES else f"{k} = {value}": found[k] for k, value in shown.items()}
+    shown = {r.name: r.value for r in free if r.name in ends}
+    words = {k if len(shown) > MOST_VALUES else f"{k} = {value}": ends[k] for k, value in shown.items()}
     return sketch(placed, f"{data.result_name} with its dimensions", words)
 
 
@@ -181,20 +181,20 @@ def _cyclogram(data: Dataset, events: Mapping[str, tuple[float, float]], out: Pa
 
     The file also has the intervals of the ``events`` of manufactured mechanisms.
     """
-    found = cyclogram_of(data)
-    if found is None:
+    rows = cyclogram_of(data)
+    if rows is None:
         return []
-    with_bands(found, events).to_csv(out / "cyclogram.csv", index=False, float_format="%.4f")
-    return list(found.itertuples(index=False, name=None))
+    with_bands(rows, events).to_csv(out / "cyclogram.csv", index=False, float_format="%.4f")
+    return list(rows.itertuples(index=False, name=None))
 
 
 def own_figures(study: Study, folder: Path) -> list[dict[str, Any]]:
     """Return the figures that ``[report] figures`` names; ``uri`` is None for one that has not been drawn."""
-    found = []
+    figures = []
     for entry in study.data.get("report", {}).get("figures", []):
         path = folder / entry["file"]
-        found.append({**entry, "uri": drawn_before(path).uri if path.exists() else None})
-    return found
+        figures.append({**entry, "uri": drawn_before(path).uri if path.exists() else None})
+    return figures
 
 
 def copy_tables(folder: Path, out: Path) -> None:
@@ -228,23 +228,26 @@ def write_survivors(parts: Sequence[Path], target: Path) -> None:
 
 def judged(data: Dataset, rows: Sequence[Row], names: Sequence[str]) -> dict[str, Any]:
     """Return the page's data of designs by name: the current one first, then those compared with it."""
-    seen = [as_result(data, row) for row in rows]
+    results = [as_result(data, row) for row in rows]
     roles = ["result", *(f"pin pin-{k}" for k in range(1, len(rows)))]
     shown = [Shown(name, role, status_words(row), row) for name, role, row in zip(names, roles, rows, strict=True)]
-    outputs, limits = [tables.output_rows(one) for one in seen], [tables.limit_states(one) for one in seen]
+    outputs, limits = (
+        [tables.output_rows(entry) for entry in results],
+        [tables.limit_states(entry) for entry in results],
+    )
     motion = moving(data, shown)
     return {
         "status": [status_words(row) for row in rows],
         "motion": motion and motion | {"ghosts": list(range(1, len(rows)))},
         "outputs": [
             {"name": same[0].name, "symbol": same[0].symbol, "text": same[0].text,
-             "values": [one.value for one in same], "fast": [one.fast for one in same]}
+             "values": [entry.value for entry in same], "fast": [entry.fast for entry in same]}
             for same in zip(*outputs, strict=True)
         ],
         "limits": [
             {"name": same[0].shown.name, "symbol": same[0].shown.symbol, "bound": same[0].bound,
-             "values": [one.value for one in same], "states": [one.state for one in same],
-             "slack": [one.slack for one in same]}
+             "values": [entry.value for entry in same], "states": [entry.state for entry in same],
+             "slack": [entry.slack for entry in same]}
             for same in zip(*limits, strict=True)
         ],
     }  # fmt: skip
@@ -268,14 +271,14 @@ def write_comparison(folders: Sequence[Path], out: Path) -> Path:
     """
     data = read_dataset(folders[0])
     names = _names([read_dataset(folder).study.name for folder in folders], folders)
-    found = [chosen(folder) for folder in folders]
-    own = data.study.bare.parameter_names
-    for folder, one in zip(folders, found, strict=True):
-        if not set(own) <= set(one.design):
-            allowed = f"a dataset of the mechanism of {folders[0]}: {', '.join(own)}"
+    designs = [chosen(folder) for folder in folders]
+    parameters = data.study.bare.parameter_names
+    for folder, entry in zip(folders, designs, strict=True):
+        if not set(parameters) <= set(entry.design):
+            allowed = f"a dataset of the mechanism of {folders[0]}: {', '.join(parameters)}"
             raise InputError("folder", str(folder), allowed, "report")
-    first = found[0].design
-    rows = [row_of(data.study, first | {name: one.design[name] for name in own}) for one in found]
+    first = designs[0].design
+    rows = [row_of(data.study, first | {name: entry.design[name] for name in parameters}) for entry in designs]
     compared = judged(data, rows, names)
     lines = [tables.parameter_rows(as_result(data, row)) for row in rows]
     text = rendered(

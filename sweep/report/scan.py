@@ -139,12 +139,12 @@ def scan(
     total : approximate number of rows, which sets the stride of the points in the figure
     """
     sense = -1.0 if larger else 1.0
-    found = Scan()
+    result = Scan()
     for c in cells:
-        found.lines[c.name] = Grid(np.full(c.weights.size, np.inf), np.zeros(c.weights.size))
+        result.lines[c.name] = Grid(np.full(c.weights.size, np.inf), np.zeros(c.weights.size))
     for x, y in combinations(cells, 2):
         shape = (y.weights.size, x.weights.size)
-        found.grids[x.name, y.name] = Grid(np.full(shape, np.inf), np.zeros(shape))
+        result.grids[x.name, y.name] = Grid(np.full(shape, np.inf), np.zeros(shape))
     stride = max(1, total // SCATTER_POINTS)
     best, samples = np.inf, []
     for rows in batches(parts):
@@ -152,53 +152,53 @@ def scan(
         batch = {name: np.asarray(rows[name], np.float64) for name in names}
         ok = batch["status"] == 0
         for code, count in zip(*np.unique(batch["status"], return_counts=True), strict=True):
-            found.counts[int(code)] = found.counts.get(int(code), 0) + int(count)
-        offset = -found.rows % stride
-        found.rows += ok.size
+            result.counts[int(code)] = result.counts.get(int(code), 0) + int(count)
+        offset = -result.rows % stride
+        result.rows += ok.size
         if objective is not None:
             ok &= np.isfinite(batch[objective])
-        found.feasible += int(ok.sum())
+        result.feasible += int(ok.sum())
         for name in names:
             if is_error(name) and ok.any():
-                _note_errors(found, name, np.abs(batch[name][ok]), np.abs(batch[name[4:]][ok]))
+                _note_errors(result, name, np.abs(batch[name][ok]), np.abs(batch[name[4:]][ok]))
         if not ok.any():
             continue
         score = compared(objective, batch[objective]) if objective is not None else np.zeros(ok.size)
-        _fill(found, cells, batch, ok, score)
+        _fill(result, cells, batch, ok, score)
         row = int(np.argmin(np.where(ok, score, np.inf)))
         if score[row] < best:
-            best, found.best_row = float(score[row]), {name: float(batch[name][row]) for name in names}
+            best, result.best_row = float(score[row]), {name: float(batch[name][row]) for name in names}
         if objective is not None and second is not None:
             other = sense * compared(second, batch[second])
             both = ok & np.isfinite(other)
             points = np.column_stack([score, other])
-            found.front = non_dominated(np.vstack([found.front, points[both]]))
-            taken = points[offset::stride]
-            samples.append(taken[both[offset::stride]])
+            result.front = non_dominated(np.vstack([result.front, points[both]]))
+            sampled = points[offset::stride]
+            samples.append(sampled[both[offset::stride]])
     if samples:
-        found.scatter = np.vstack(samples) * (1.0, sense)
-        found.front = found.front * (1.0, sense)
-    return found
+        result.scatter = np.vstack(samples) * (1.0, sense)
+        result.front = result.front * (1.0, sense)
+    return result
 
 
-def _fill(found: Scan, cells: Sequence[Cells], batch: dict[str, Array], ok: Array, score: Array) -> None:
+def _fill(result: Scan, cells: Sequence[Cells], batch: dict[str, Array], ok: Array, score: Array) -> None:
     index = {c.name: c.index(batch[c.name][ok]) for c in cells}
     good = score[ok]
-    for name, line in found.lines.items():
+    for name, line in result.lines.items():
         np.minimum.at(line.best, index[name], good)
         line.count += np.bincount(index[name], minlength=line.count.size)
-    for (x, y), grid in found.grids.items():
+    for (x, y), grid in result.grids.items():
         flat = index[y] * grid.best.shape[1] + index[x]
         np.minimum.at(grid.best.reshape(-1), flat, good)
         grid.count += np.bincount(flat, minlength=grid.count.size).reshape(grid.count.shape)
 
 
-def _note_errors(found: Scan, name: str, errors: Array, values: Array) -> None:
+def _note_errors(result: Scan, name: str, errors: Array, values: Array) -> None:
     finite = np.isfinite(errors) & np.isfinite(values) & (values > 0.0)
     if finite.any():
         relative = float(np.max(errors[finite] / values[finite]))
-        before = found.errors.get(name, (0.0, 0.0))
-        found.errors[name] = (max(before[0], float(errors[finite].max())), max(before[1], relative))
+        before = result.errors.get(name, (0.0, 0.0))
+        result.errors[name] = (max(before[0], float(errors[finite].max())), max(before[1], relative))
 
 
 def non_dominated(points: Array) -> Array:
@@ -210,14 +210,14 @@ def non_dominated(points: Array) -> Array:
     return ordered[ordered[:, 1] < least_before]
 
 
-def most_telling(found: Scan) -> tuple[str, str] | None:
+def most_telling(scanned: Scan) -> tuple[str, str] | None:
     """Return the pair of axes whose map varies most.
 
     That is the pair with the largest variation of the best objective over its cells; for equal pairs, the one with the
     largest variation of the share of feasible designs.
     """
     scores: dict[tuple[str, str], tuple[float, float]] = {}
-    for pair, grid in found.grids.items():
+    for pair, grid in scanned.grids.items():
         reached = np.isfinite(grid.best)
         if not reached.any():
             continue

@@ -47,10 +47,10 @@ TELLING = 1e-3  # relative change of dimensions that distinguishes equal ones
 def drawn_parts(family: Family, design: Mapping[str, float]) -> list[Placed]:
     """Return joints and links of a design over one turn, frames side by side; empty without joints or poses."""
     try:
-        found = over(family, {name: float(design[name]) for name in family.parameter_names}, 0.0, POSES)
+        parts = over(family, {name: float(design[name]) for name in family.parameter_names}, 0.0, POSES)
     except InputError:  # a mechanism without joints has curves only
         return []
-    return side_by_side(found) if exists(found) else []
+    return side_by_side(parts) if exists(parts) else []
 
 
 def dimensioned(family: Family, design: Mapping[str, float], placed: Sequence[Placed]) -> dict[str, Array]:
@@ -58,27 +58,27 @@ def dimensioned(family: Family, design: Mapping[str, float], placed: Sequence[Pl
 
     A length is identified by a distance that follows it, when all lengths are changed slightly by different shares.
     """
-    pose = first_pose([one.part for one in placed])
-    own = [p.name for p in family.parameters if p.unit == "length" and abs(float(design[p.name])) > 0.0]
-    changed = {name: float(design[name]) * (1.0 + TELLING * (k + 1) / len(own)) for k, name in enumerate(own)}
+    pose = first_pose([stage.part for stage in placed])
+    lengths = [p.name for p in family.parameters if p.unit == "length" and abs(float(design[p.name])) > 0.0]
+    changed = {name: float(design[name]) * (1.0 + TELLING * (k + 1) / len(lengths)) for k, name in enumerate(lengths)}
     other = drawn_parts(family, {**design, **changed})
     if len(other) != len(placed):
         return {}
-    near = NEAR * extent([one.part for one in placed])
-    found: dict[str, Array] = {}
-    for one, two in zip(placed, other, strict=True):
-        points, moved = _points(one.part, pose), _points(two.part, pose)
+    near = NEAR * extent([stage.part for stage in placed])
+    ends: dict[str, Array] = {}
+    for stage, changed_stage in zip(placed, other, strict=True):
+        points, moved = _points(stage.part, pose), _points(changed_stage.part, pose)
         # The links first: a length of the frame may equal that of a link in some position.
-        linked = [pair for link in one.part.links for pair in combinations(link.joints, 2)]
+        linked = [pair for link in stage.part.links for pair in combinations(link.joints, 2)]
         for p, q in [*linked, *combinations(points, 2)]:
             if p not in moved or q not in moved:
                 continue
             size, after = (float(np.linalg.norm(at[p] - at[q])) for at in (points, moved))
-            for name in own:
+            for name in lengths:
                 same = abs(size - abs(float(design[name]))) < near and abs(after - abs(changed[name])) < near
-                if same and name not in found:
-                    found[name] = np.array([points[p], points[q]]) + one.shift
-    return found
+                if same and name not in ends:
+                    ends[name] = np.array([points[p], points[q]]) + stage.shift
+    return ends
 
 
 def _points(part: Part, pose: int) -> dict[str, Array]:
@@ -106,20 +106,20 @@ def sketch(
         replace(one.part, joints={name: path + one.shift for name, path in one.part.joints.items()}) for one in placed
     ]
     flat = np.vstack([path for part in parts for path in part.joints.values()])
-    seen = projection("space" if is_spatial([one.part for one in placed]) else "xy")
-    flat = flat[np.isfinite(flat).all(axis=1)] @ seen.T
+    view = projection("space" if is_spatial([one.part for one in placed]) else "xy")
+    flat = flat[np.isfinite(flat).all(axis=1)] @ view.T
     low, wide = flat.min(axis=0), np.ptp(flat, axis=0)
     scale = (WIDE - 2.0 * ROOM) / max(float(wide[0]), float(wide[1]) / 0.8, span, 1e-300)
 
     def at(points: Array) -> Array:
-        x, y = ((points @ seen.T - low) * scale).T
+        x, y = ((points @ view.T - low) * scale).T
         return np.column_stack([x + ROOM, float(wide[1]) * scale + ROOM - y])
 
     pose, steps = first_pose(parts), parts[0].phi.size - 1
     turned = [(pose + round(k * steps / (FAINT + 1))) % steps for k in range(FAINT, -1, -1)]
     lines: list[tuple[str, str]] = []
     marks: list[tuple[str, float, float]] = []
-    taken: list[tuple[float, float, str, str]] = []
+    labels: list[tuple[float, float, str, str]] = []
     for part in parts:
         for name, path in part.joints.items():
             if name not in part.kinds:
@@ -137,20 +137,20 @@ def sketch(
     for words, ends in (dimensions or {}).items():
         first, second = at(ends).tolist()
         lines.append(("measure", _line(at(ends))))
-        _write(taken, 0.5 * (first[0] + second[0]), 0.5 * (first[1] + second[1]), words, "dimension")
+        _write(labels, 0.5 * (first[0] + second[0]), 0.5 * (first[1] + second[1]), words, "dimension")
     members = {part.member: part for part in reversed(parts)}
     if names and len(members) > FEW:  # letters of this many joints would overlap
         for member, part in members.items():
             ((x, y),) = at(next(iter(part.joints.values()))[[pose]]).tolist()
-            _write(taken, x, y, member, "name")
+            _write(labels, x, y, member, "name")
     for part in parts:
         for name, path in part.joints.items():
             ((x, y),) = at(path[[pose]]).tolist()
             marks.append(("pivot" if name in part.kinds else "joint", x, y))
             if names and len(members) <= FEW:
-                _write(taken, x, y, f"{shown_name(name)}{part.stage}", "name")
+                _write(labels, x, y, f"{shown_name(name)}{part.stage}", "name")
     size = (WIDE, float(wide[1]) * scale + 2.0 * ROOM)
-    return rendered("sketch.svg", title=title, size=size, lines=lines, marks=marks, labels=taken)
+    return rendered("sketch.svg", title=title, size=size, lines=lines, marks=marks, labels=labels)
 
 
 def _line(points: Array) -> str:
@@ -196,10 +196,10 @@ def bars(data: Dataset) -> list[Bar]:
         for link in (link for link in part.links if len(link.joints) > 1):
             first, second = (part.joints[name][pose] for name in link.joints[:2])
             lengths[(part.member, f"{link.name.replace(' ', '_')}{part.stage}")] = float(np.linalg.norm(second - first))
-    found = []
+    result = []
     for name in rods:
-        member, dot, own = name.rpartition(".")
-        body = own.removeprefix("rod_")
+        member, dot, parameter = name.rpartition(".")
+        body = parameter.removeprefix("rod_")
         given = {word: value_of(row, f"{member}{dot}{word}_{body}") for word in ("m", "line_mass", "gyration")}
         length = lengths.get((member, body), np.nan)
         mass, thick = given["m"] + given["line_mass"] * length, given["gyration"] ** 2
@@ -207,5 +207,5 @@ def bars(data: Dataset) -> list[Bar]:
             values = (("m", "t", mass), ("com", "mm", 0.5 * length), ("j", "t*mm^2", mass * (length**2 / 12.0 + thick)),
                       ("j", "t*mm^2", 2.0 * mass * thick))  # fmt: skip
             words = [quantity(word, unit).show(value) for word, unit, value in values]
-            found.append(Bar(f"{member}{dot}{body}", "exact" if thick else "slender", *words))
-    return found
+            result.append(Bar(f"{member}{dot}{body}", "exact" if thick else "slender", *words))
+    return result

@@ -181,11 +181,11 @@ def parameter_rows(data: Dataset, row: Row | None = None, digits: int = 6) -> li
     study, rows = data.study, []
     row = data.result if row is None else row
     links = () if study.locus is None else study.locus.made
-    own = study.bare.parameter_names
+    mechanism_names = study.bare.parameter_names
     size = max((abs(value_of(row, p.name)) for p in study.bare.parameters if p.unit == "length"), default=0.0)
     for p in study.family.parameters:
         left_out = 0.0 if p.unless else p.default
-        if p.name not in own and p.name in study.space.fixed and study.space.fixed[p.name] == left_out:
+        if p.name not in mechanism_names and p.name in study.space.fixed and study.space.fixed[p.name] == left_out:
             continue  # an input of an effect that the study does not use
         shown = quantity(p.name, data.units.get(p.name, {"length": "mm", "angle": "rad"}.get(p.unit, "1")))
         value, other = value_of(row, p.name), value_of(data.reference, p.name)
@@ -220,9 +220,9 @@ def _few_values(study: Study, name: str) -> list[float] | None:
     return None if axis is None or axis.values is None or not listed or axis.count > FEW else axis.values.tolist()
 
 
-def fates(data: Dataset, found: Scan) -> list[Fate]:
+def fates(data: Dataset, scanned: Scan) -> list[Fate]:
     """Return the number of designs per status in the order of the sweep's checks, feasible ones last."""
-    counts = data.counts or found.counts
+    counts = data.counts or scanned.counts
     total = max(sum(counts.values()), 1)
     order = [codes.INVALID_INPUT, codes.NOT_ADMISSIBLE, codes.NOT_ASSEMBLED, codes.NOT_ROTATABLE, codes.UNDECIDABLE]
     failed = sorted(
@@ -248,17 +248,17 @@ def _by_limit(data: Dataset) -> list[tuple[str, int]]:
     ]
 
 
-def error_rows(data: Dataset, found: Scan) -> list[tuple[str, str, str, str]]:
+def error_rows(data: Dataset, scanned: Scan) -> list[tuple[str, str, str, str]]:
     """Return symbol of every output, error at the result, largest error in the sweep, and largest relative error."""
     rows = []
     for name in data.study.want:
         error = f"err_{name}"
         if is_place(name) or is_flag(name):
             continue  # a relative error of an angle or of a flag is meaningless
-        if error not in found.errors and math.isnan(value_of(data.result, error)):
+        if error not in scanned.errors and math.isnan(value_of(data.result, error)):
             continue
         shown = quantity(error, data.units.get(error, data.units.get(name, "")))
-        largest, relative = found.errors.get(error, (math.nan, math.nan))
+        largest, relative = scanned.errors.get(error, (math.nan, math.nan))
         rows.append(
             (
                 quantity(name, "").symbol,

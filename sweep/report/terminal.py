@@ -62,16 +62,16 @@ def ending(folder: Path) -> Ending:
     feasible = data.counts.get(codes.OK, 0)
     swept = f"{data.study.name}: {how_many(data.designs, 'design')}"
     lines = [f"{swept}, {feasible} within all limits{_best_of_sweep(data, feasible)}"]
-    best = data.optimum
-    if best is not None:
-        missed = int(best.get("status", 0)) == codes.LIMIT_EXCEEDED
+    optimum = data.optimum
+    if optimum is not None:
+        missed = int(optimum.get("status", 0)) == codes.LIMIT_EXCEEDED
         lines += _nearest(data) if missed else _optimum(data)
-        found = read_survey(files.beside(folder) / files.OPTIMUM)
-        if found is not None:
-            lines.append(f"search: {how_many(found.starts, 'start')}, {search_words(data, found)}")
-            kinds = [f"{words}: {how_many(n, 'start')}, {optima_words(b)}" for words, n, b in found.kinds]
+        survey = read_survey(files.beside(folder) / files.OPTIMUM)
+        if survey is not None:
+            lines.append(f"search: {how_many(survey.starts, 'start')}, {search_words(data, survey)}")
+            kinds = [f"{words}: {how_many(n, 'start')}, {optima_words(b)}" for words, n, b in survey.kinds]
             lines += [f"by listed values: {'; '.join(kinds)}"] if kinds else []
-            lines += [f"warning: {text}" for text in survey_warnings(data, found)]
+            lines += [f"warning: {text}" for text in survey_warnings(data, survey)]
         lines += [sentence] if (sentence := proof_sentence(data)) else []
     else:
         missed = feasible == 0
@@ -144,7 +144,7 @@ def _cannot_meet(data: Dataset) -> list[str]:
         reach = [np.max(poses[x.discriminant] / np.reshape(x.scale(designs), (-1, 1)), axis=1) for x in loops]
     nearest = int(np.argmax(np.nanmin(np.nan_to_num(reach, nan=math.inf), axis=0)))
     lines = []
-    for loop, value in zip(loops, [float(own[nearest]) for own in reach], strict=True):
+    for loop, value in zip(loops, [float(values[nearest]) for values in reach], strict=True):
         if value < 0.0:
             member, _, stage = loop.stage.rpartition(".")
             links = [p.name for p in family.parameters if p.unit == "length" and p.name.startswith(member)]
