@@ -156,10 +156,7 @@ class Cascade:
         for name in names:
             taken = [batch.outputs.pop(name, None) for batch in batches]
             missing = [np.full(batch.index.size, np.nan) for batch in batches]
-            columns = [
-                missing_values if values is None else values
-                for values, missing_values in zip(taken, missing, strict=True)
-            ]
+            columns = [gap if values is None else values for values, gap in zip(taken, missing, strict=True)]
             outputs[name] = np.concatenate([np.empty(0), *columns])[order]
         designs = np.concatenate([np.empty((0, width)), *(batch.designs for batch in batches)])[order]
         status = np.concatenate([np.empty(0, np.uint8), *(batch.status for batch in batches)])[order]

@@ -313,7 +313,7 @@ def parts(group: Sequence[Effect]) -> list[tuple[str, list[str], Rows]]:
     }
     listed = [places_of(entry) for entry in group]
     together = len(group) > 1 and all(listed)
-    tables_of_group: list[tuple[str, list[str], Rows]] = []
+    out: list[tuple[str, list[str], Rows]] = []
     for columns, tables in kinds.items():
         general, remaining = of_any_place(listed, tables) if together else ([], tables)
         general, *remaining = map(with_friction, (general, *remaining))
@@ -323,11 +323,8 @@ def parts(group: Sequence[Effect]) -> list[tuple[str, list[str], Rows]]:
         for row in dict.fromkeys(row for table in remaining for row in table):
             names = tuple(entry.name for entry, table in zip(group, remaining, strict=True) if row in table)
             of_several.setdefault(names, []).append(row)
-        tables_of_group += [
-            (columns, [], common + general),
-            *((columns, list(names), rows) for names, rows in of_several.items()),
-        ]
-    return [part for part in tables_of_group if part[2]]
+        out += [(columns, [], common + general), *((columns, list(names), rows) for names, rows in of_several.items())]
+    return [part for part in out if part[2]]
 
 
 def page() -> str:

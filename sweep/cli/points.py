@@ -79,8 +79,8 @@ def export(folder: Path, design: str | None, kind: str, out: Path | None, phi: f
     if kind == "xlsx":
         click.echo(f"xlsx: {write_workbook(folder, out or _place(folder, 'results.xlsx'))}")
         return
-    selected = chosen(folder, design)
-    refuse_degrees(selected.family.domain, phi)
+    found = chosen(folder, design)
+    refuse_degrees(found.family.domain, phi)
     if kind in OF_DATASETS:
         target = out or _place(folder, f"{design or 'result'}.{kind}")
         click.echo(f"{kind}: {write_sheet(folder, design, target, phi)}")
@@ -89,7 +89,7 @@ def export(folder: Path, design: str | None, kind: str, out: Path | None, phi: f
         name = f"{design or 'result'}{'-law' if kind == 'law' else ''}{FORMATS[kind][0]}"
         out = _place(folder, name)
     click.echo(
-        f"{kind}: {write(selected.family, selected.design, out, kind, phi=phi, poses=poses, speed=selected.speed, angles='rad')}"
+        f"{kind}: {write(found.family, found.design, out, kind, phi=phi, poses=poses, speed=found.speed, angles='rad')}"
     )
 
 

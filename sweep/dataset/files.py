@@ -146,13 +146,11 @@ def set_aside(folder: Path, paths: list[Path], where: str) -> None:
     with store_errors(folder):
         target.mkdir(parents=True, exist_ok=True)
         for path in paths:
-            destination, count = target / path.name, 0
-            while (
-                destination.is_dir() and not destination.is_symlink()
-            ):  # a folder of this name has been set aside before
+            to, count = target / path.name, 0
+            while to.is_dir() and not to.is_symlink():  # a folder of this name has been set aside before
                 count += 1
-                destination = target / f"{path.name}.{count}"
-            path.replace(destination)
+                to = target / f"{path.name}.{count}"
+            path.replace(to)
 
 
 def link_or_copy(source: Path, target: Path) -> None:

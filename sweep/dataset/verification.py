@@ -251,70 +251,65 @@ def _recompute(
 
 
 def row_faults(
-    rows: pd.DataFrame, metadata: Mapping[str, Any], about: Mapping[str, Any], study: Study | None
+    rows: pd.DataFrame, chunk: Mapping[str, Any], about: Mapping[str, Any], study: Study | None
 ) -> list[str]:
     """Describe the faults in the rows of one chunk.
 
     Parameters
     ----------
     rows : all rows and columns of the chunk
-    metadata : metadata of the chunk
+    chunk : metadata of the chunk
     about : the plan, or the metadata of a chunk where there is no plan
     study : gives the parameters of the design space; None if it is not known
     """
     faults = []
     if "chunk_size" in about:
-        start = metadata["chunk"] * about["chunk_size"]
+        start = chunk["chunk"] * about["chunk_size"]
         stop = min(start + about["chunk_size"], about["designs"])
-        if (metadata["start"], metadata["stop"]) != (start, stop):
-            faults.append(f"designs {metadata['start']}:{metadata['stop']}, the plan says {start}:{stop}")
+        if (chunk["start"], chunk["stop"]) != (start, stop):
+            faults.append(f"designs {chunk['start']}:{chunk['stop']}, the plan says {start}:{stop}")
     expected = [(column["name"], column["dtype"]) for column in about.get("columns", [])]
     actual = [(str(name), str(dtype)) for name, dtype in rows.dtypes.items()]
     if expected and expected != actual:
         return [*faults, f"columns {actual}, the plan says {expected}"]
     if lacking := [name for name in ("design", "status") if name not in rows.columns]:
         return [*faults, f"no column {', '.join(lacking)}"]
-    differing = [key for key in SHARED if key in about and metadata.get(key) != about[key]]
-    differing += ["data"] if metadata.get("data") != about.get("chunk_data", metadata.get("data")) else []
+    differing = [key for key in SHARED if key in about and chunk.get(key) != about[key]]
+    differing += ["data"] if chunk.get("data") != about.get("chunk_data", chunk.get("data")) else []
     faults += [f"its metadata say another {', '.join(differing)} than the plan"] if differing else []
     designs, status = rows["design"].to_numpy(), rows["status"].to_numpy()
-    if np.any(np.diff(designs) <= 0) or np.any((designs < metadata["start"]) | (designs >= metadata["stop"])):
-        return [*faults, f"design numbers not growing inside {metadata['start']}:{metadata['stop']}"]
-    faults += _count_faults(status, metadata)
-    if study is not None and study.output.keep == "all" and len(rows) != metadata["stop"] - metadata["start"]:
+    if np.any(np.diff(designs) <= 0) or np.any((designs < chunk["start"]) | (designs >= chunk["stop"])):
+        return [*faults, f"design numbers not growing inside {chunk['start']}:{chunk['stop']}"]
+    faults += _count_faults(status, chunk)
+    if study is not None and study.output.keep == "all" and len(rows) != chunk["stop"] - chunk["start"]:
         faults.append(
-            f"{how_many(len(rows), 'row')}, although every one of {metadata['stop'] - metadata['start']} designs is kept"
+            f"{how_many(len(rows), 'row')}, although every one of {chunk['stop'] - chunk['start']} designs is kept"
         )
     outputs = [column["name"] for column in about.get("columns", []) if column["role"] == "output"]
     missing = rows.loc[status == 0, [name for name in outputs if not is_error(name)]].isna().any()
     faults += [f"{name}: missing values in rows whose status is ok" for name in missing.index[missing]]
     if study is not None and len(rows):
-        faults += _parameter_faults(rows, metadata, study)
+        faults += _parameter_faults(rows, chunk, study)
     return faults
 
 
-def _count_faults(status: np.ndarray[Any, Any], metadata: Mapping[str, Any]) -> list[str]:
+def _count_faults(status: np.ndarray[Any, Any], chunk: Mapping[str, Any]) -> list[str]:
     faults = []
-    counted, number = metadata["counts"], metadata["stop"] - metadata["start"]
-    if sum(counted.values()) != number:
-        faults.append(f"{how_many(sum(counted.values()), 'design')} counted, {number} in the chunk")
-    codes, numbers = np.unique(status, return_counts=True)
-    rows = {
-        chunk_files.STATUS_NAMES.get(int(code), str(code)): int(count)
-        for code, count in zip(codes, numbers, strict=True)
-    }
+    counts, total = chunk["counts"], chunk["stop"] - chunk["start"]
+    if sum(counts.values()) != total:
+        faults.append(f"{how_many(sum(counts.values()), 'design')} counted, {total} in the chunk")
+    codes, sizes = np.unique(status, return_counts=True)
+    rows = {chunk_files.STATUS_NAMES.get(int(code), str(code)): int(n) for code, n in zip(codes, sizes, strict=True)}
     # Rows that were not kept are counted too; of a status either all rows are kept or none.
-    if any(counted.get(name, 0) != count for name, count in rows.items()) or (
-        counted.get("OK", 0) and "OK" not in rows
-    ):
-        faults.append(f"rows by status {rows}, counted {counted}")
+    if any(counts.get(name, 0) != count for name, count in rows.items()) or (counts.get("OK", 0) and "OK" not in rows):
+        faults.append(f"rows by status {rows}, counted {counts}")
     return faults
 
 
-def _parameter_faults(rows: pd.DataFrame, metadata: Mapping[str, Any], study: Study) -> list[str]:
+def _parameter_faults(rows: pd.DataFrame, chunk: Mapping[str, Any], study: Study) -> list[str]:
     """Parameters that differ from the design space; those that [fit] sets or scales are not compared."""
-    matrix, _ = parameter_matrix(study, metadata["start"], metadata["stop"])
-    index = rows["design"].to_numpy() - metadata["start"]
+    matrix, _ = parameter_matrix(study, chunk["start"], chunk["stop"])
+    index = rows["design"].to_numpy() - chunk["start"]
     fitted = () if study.fit is None else (*study.fit.parameters(study.family), *study.rescaled)
     faults = []
     for k, name in enumerate(study.family.parameter_names):

@@ -33,8 +33,10 @@ def open_plan(study: Study, folder: Path, force: bool, chunk_size: int | None = 
             if force:
                 _set_foreign_aside(folder, plan, ())
             return plan
-        if _differs_in_limits_only(study, noted, plan):
-            return _with_other_limits(study, folder, plan)
+        if _differs_in_limits_only(study, noted, plan):  # the old designs are sorted by the new limits
+            old_folder = _set_foreign_aside(folder, plan, OWN_FILES)
+            files.write_plan(folder, plan_note(study, folder, plan) | {"known": old_folder})
+            return plan
         if not force:
             raise store.foreign(folder, _conflict(study, noted, plan), plan)
     plan = make_plan(study, chunk_size)
@@ -47,27 +49,12 @@ def open_plan(study: Study, folder: Path, force: bool, chunk_size: int | None = 
 
 def _differs_in_limits_only(study: Study, noted: dict[str, Any], plan: Plan) -> bool:
     """Whether stored designs can be sorted by new limits: all rows were kept in float64, only limits changed."""
-    ignored = ("limits", *NOT_IN_CHUNKS)
-    before, now = (
-        {k: v for k, v in data.items() if k not in ignored} for data in (noted.get("data") or {}, study.data)
-    )
+    other = ("limits", *NOT_IN_CHUNKS)
+    before, now = ({k: v for k, v in data.items() if k not in other} for data in (noted.get("data") or {}, study.data))
     complete = study.output.keep == "all" and study.output.dtype == "float64"
     columns = [column.name for column in plan.columns]
     same = before == now and [column["name"] for column in noted.get("columns", [])] == columns
     return complete and same and noted.get("code") == plan.code
-
-
-def _with_other_limits(study: Study, folder: Path, plan: Plan) -> Plan:
-    """Set the chunks aside and note their folder in the plan: their designs are sorted by the new limits."""
-    old_folder = old_name()
-    side_files = [files.beside(folder) / name for name in OWN_FILES]
-    files.set_aside(
-        folder,
-        [*(part.path for part in chunk_files.parts(folder)), *(path for path in side_files if path.is_file())],
-        old_folder,
-    )
-    files.write_plan(folder, plan_note(study, folder, plan) | {"known": old_folder})
-    return plan
 
 
 def known_folder(folder: Path) -> Path | None:
@@ -100,12 +87,14 @@ def _conflict(study: Study, noted: dict[str, Any], plan: Plan) -> str:
     return f"{name}: {'; '.join(reasons) or 'cut in another way'}"
 
 
-def _set_foreign_aside(folder: Path, plan: Plan, others: tuple[str, ...]) -> None:
-    place = files.beside(folder)
+def _set_foreign_aside(folder: Path, plan: Plan, others: tuple[str, ...]) -> str:
+    """Move chunks of other plans and some side files into a folder of old data; return its name."""
+    place, old_folder = files.beside(folder), old_name()
     old = [part.path for part in chunk_files.parts(folder) if part.identity != plan.identity]
     old += [place / name for name in others if (place / name).is_file()]
     if old:
-        files.set_aside(folder, old, old_name())
+        files.set_aside(folder, old, old_folder)
+    return old_folder
 
 
 def old_name() -> str:

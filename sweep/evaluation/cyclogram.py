@@ -100,8 +100,8 @@ def _strokes(poses: Poses, family: Family, member: str, name: str, dwell: float)
     rate = family.derivative_of[name]
     status, (slope, values) = poses.samples([rate, name], SAMPLES)
     wraps = family.pose_output[name].wraps
-    unwrapped = np.unwrap(values[0]) if wraps else values[0]
-    if status[0] or (wraps and abs(unwrapped[-1] - unwrapped[0]) > np.pi):
+    path = np.unwrap(values[0]) if wraps else values[0]
+    if status[0] or (wraps and abs(path[-1] - path[0]) > np.pi):
         return
     extrema = np.sort(poses.turning(rate, slope).phi % TWO_PI)
     if extrema.size < 2:
@@ -109,9 +109,7 @@ def _strokes(poses: Poses, family: Family, member: str, name: str, dwell: float)
     exact = poses.at(np.zeros(extrema.size, np.intp), extrema, name)[0]
     if wraps:  # shifted by full turns to the unwrapped samples
         grid = np.arange(SAMPLES + 1) * TWO_PI / SAMPLES
-        exact = exact + TWO_PI * np.round(
-            (np.interp(extrema, grid, np.append(unwrapped, unwrapped[0])) - exact) / TWO_PI
-        )
+        exact = exact + TWO_PI * np.round((np.interp(extrema, grid, np.append(path, path[0])) - exact) / TWO_PI)
     for k, size in enumerate(np.roll(exact, -1) - exact):
         yield member, "stroke", "rises" if size > 0.0 else "falls", extrema[k], extrema[(k + 1) % extrema.size], size
     band = dwell * float(np.ptp(exact))

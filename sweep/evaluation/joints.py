@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
@@ -77,7 +78,7 @@ class Part:
 
 
 @dataclass(frozen=True)
-class _Location:
+class _Place:
     """Names of a stage, and its frame relative to the frame of the coordinates."""
 
     member: str = ""
@@ -164,19 +165,19 @@ def parts(mechanism: Mechanism, design: Table, phi: ArrayLike) -> list[Part]:
         return [part for member in family.members for part in _of_member(family, member, matrix, given)]
     if not any(skeleton_of(stage.family).links or stage.family.points for stage in family.stages):
         raise InputError("mechanism", family.name, "a mechanism that has joints", "joints")
-    return list(_of_stages(family, matrix, given, angles, _locations(family, matrix)))
+    return list(_of_stages(family, matrix, given, angles, _places(family, matrix)))
 
 
-def _locations(family: Family, matrix: Array) -> list[_Location]:
+def _places(family: Family, matrix: Array) -> list[_Place]:
     """List names and frames of the stages of a mechanism: in the frame of the first stage, if a chain defines it."""
     stages = family.stages
     if not isinstance(family, Chain):
-        return [_Location(frame=family.name)]
+        return [_Place(frame=family.name)]
     names = [f"stage {stage.number} ({stage.family.name})" for stage in stages]
     if not family.is_placed:
-        return [_Location("", str(stage.number), name) for stage, name in zip(stages, names, strict=True)]
+        return [_Place("", str(stage.number), name) for stage, name in zip(stages, names, strict=True)]
     placed = zip(stages, family.frames(matrix), strict=True)
-    return [_Location("", str(stage.number), names[0], frame) for stage, frame in placed]
+    return [_Place("", str(stage.number), names[0], frame) for stage, frame in placed]
 
 
 def _of_member(machine: Machine, member: Member, matrix: Array, angles: Angles) -> Iterator[Part]:
@@ -185,36 +186,29 @@ def _of_member(machine: Machine, member: Member, matrix: Array, angles: Angles) 
         name = ".".join(member.driver)
         (driving,) = machine.values(matrix, angles, name)
     crank = Angles.of(np.ascontiguousarray(member.ratio * driving + member.phase(matrix)))
-    locations = []
+    places = []
     for stage, frame in zip(member.family.stages, member.frames(matrix), strict=True):
         label = f"{member.name} stage {stage.tail} ({stage.family.name})"
-        locations.append(_Location(member.name, stage.tail, *(("machine", frame) if frame else (label,))))
+        places.append(_Place(member.name, stage.tail, *(("machine", frame) if frame else (label,))))
     if member.tip is not None:
         tip = np.array([member.column(matrix, f"{axis}_tip")[0] for axis in AXES])
-        locations[-1] = replace(locations[-1], tip=tip)
-    return _of_stages(member.family, member.designs(matrix), crank, angles.phi[0], locations)
+        places[-1] = replace(places[-1], tip=tip)
+    return _of_stages(member.family, member.designs(matrix), crank, angles.phi[0], places)
 
 
-def _of_stages(
-    family: Family, matrix: Array, angles: Angles, phi: Array, locations: Sequence[_Location]
-) -> Iterator[Part]:
+def _of_stages(family: Family, matrix: Array, angles: Angles, phi: Array, places: Sequence[_Place]) -> Iterator[Part]:
     """Yield every stage in its frame; each stage drives the next one."""
-    stages = family.stages
     status = np.zeros(phi.size, np.uint8)
-    for k, stage in enumerate(stages):
-        stage_family = stage.family
-        further = (
-            driving_names(stage_family, stages[k + 1].family) | {stage_family.position}
-            if k + 1 < len(stages)
-            else {stage_family.position}
-        )
-        poses = stage_family.poses(stage.designs(matrix), angles, frozenset(_needed(stage_family) | further))
+    for stage, following, place in itertools.zip_longest(family.stages, family.stages[1:], places):
+        inner = stage.family
+        wanted = _needed(inner) | {inner.position}
+        wanted |= set() if following is None else driving_names(inner, following.family)
+        poses = inner.poses(stage.designs(matrix), angles, frozenset(wanted))
         np.copyto(status, np.asarray(poses["status"], np.uint8)[0], where=status == OK)
-        yield _part(stage_family, stage.designs(matrix), angles, phi, dict(poses), locations[k], status.copy())
-        if k + 1 < len(stages):
-            following = stages[k + 1]
+        yield _part(inner, stage.designs(matrix), angles, phi, dict(poses), place, status.copy())
+        if following is not None:
             kappa, offset = (np.ascontiguousarray(matrix[:, column]) for column in (following.kappa, following.offset))
-            angles = drive(dict(poses), stage_family.position, kappa, offset)
+            angles = drive(dict(poses), inner.position, kappa, offset)
 
 
 def _needed(family: Family) -> set[str]:
@@ -223,9 +217,9 @@ def _needed(family: Family) -> set[str]:
 
 
 def _part(
-    family: Family, matrix: Array, angles: Angles, phi: Array, poses: dict[str, Any], location: _Location, status: Any
+    family: Family, matrix: Array, angles: Angles, phi: Array, poses: dict[str, Any], place: _Place, status: Any
 ) -> Part:
-    """Compute the joints of one stage, transformed into the frame of ``location``."""
+    """Compute the joints of one stage, transformed into the frame of ``place``."""
     skeleton = skeleton_of(family)
     moving = {
         name: np.stack([poses[x][0] if x else np.zeros(phi.size) for x in at], axis=-1)
@@ -237,14 +231,14 @@ def _part(
         moving = {name: path for name, path in moving.items() if name in linked}
     fixed = {name: np.tile(point.at(matrix)[0], (phi.size, 1)) for name, point in skeleton.fixed.items()}
     axes = {name: point.axis(matrix)[0] for name, point in skeleton.fixed.items() if point.axis is not None}
-    if location.tip is not None:
+    if place.tip is not None:
         link = family.the(OutputLink)
-        moving[TIP] = np.stack(link.carried(matrix, poses[family.position], location.tip), axis=-1)[0]
-    rotation, at = location.placed.rotation[0], location.placed.at[0]
-    turned = {name: path @ rotation.T + at for name, path in (fixed | moving).items()}
+        moving[TIP] = np.stack(link.carried(matrix, poses[family.position], place.tip), axis=-1)[0]
+    rotation, origin = place.placed.rotation[0], place.placed.at[0]
+    turned = {name: path @ rotation.T + origin for name, path in (fixed | moving).items()}
     crank, position = (np.asarray(values[0], np.float64) for values in (angles.phi, poses[family.position]))
     return Part(
-        location.member, location.stage, location.frame, family, matrix[0], phi, crank, position, turned,
+        place.member, place.stage, place.frame, family, matrix[0], phi, crank, position, turned,
         {name: rotation @ axis for name, axis in axes.items()},
         {name: point.kind for name, point in skeleton.fixed.items()}, skeleton.links, status,
     )  # fmt: skip

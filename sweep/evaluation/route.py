@@ -113,8 +113,7 @@ class _StepOutput(NamedTuple):
 def _step_outputs(step: Step, stage: Stage, outputs: Sequence[str]) -> tuple[_StepOutput, ...]:
     plain = [at_stage(name, stage.tail) for name in outputs]
     return tuple(
-        _StepOutput(name, inner, _sharpened(stage.family, step, inner))
-        for name, inner in zip(outputs, plain, strict=True)
+        _StepOutput(name, n, _sharpened(stage.family, step, n)) for name, n in zip(outputs, plain, strict=True)
     )
 
 

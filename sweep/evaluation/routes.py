@@ -78,16 +78,14 @@ def design_outputs(
     status = np.zeros(n, np.uint8)
     columns: Columns = {}
     turns = not isinstance(family.domain, Interval)
-    selected = routes(family, wanted, accuracy)
+    steps = routes(family, wanted, accuracy)
     # Refinement detects a dead point between samples, a plain grid does not.
-    rotation_known = (
-        accuracy.samples is None or any(step.general == "margin" for step in selected) or not margin_suffixes(family)
-    )
+    decided = accuracy.samples is None or any(step.general == "margin" for step in steps) or not margin_suffixes(family)
     with np.errstate(all="ignore"):  # values beyond float64 get a status below
-        for step in selected:
+        for step in steps:
             assert step.run is not None
-            if step.general and not rotation_known:  # quicker outputs such as the margin are computed by now
-                status, rotation_known = np.where(status == st.OK, _turning(family, designs, accuracy), status), True
+            if step.general and not decided:  # quicker outputs such as the margin are computed by now
+                status, decided = np.where(status == st.OK, _turning(family, designs, accuracy), status), True
             # A follower that turns fully lacks limit positions or a dwell, but has extrema; one that jams still moves.
             alive = np.flatnonzero(GOES_ON[status]) if status.any() else None  # None means all
             rows = designs if alive is None or alive.size == n else designs[alive]
@@ -162,10 +160,7 @@ def _routes(family: Family, wanted: Sequence[str], accuracy: Accuracy, windowed:
         selected, quantities = _of_members(family, quantities, accuracy, windowed)
     own_steps = {name: applying_step(family, name, accuracy) for name in quantities}
     # The margin of a whole chain needs all stages: the first stage alone would reject designs before the others.
-    chain_margin = any(
-        own_steps[name] is None and isinstance(quantity, Margin) and not quantity.stage
-        for name, quantity in quantities.items()
-    )
+    chain_margin = any(own_steps[n] is None and isinstance(q, Margin) and not q.stage for n, q in quantities.items())
     steps: dict[tuple[str, int], tuple[Step, Stage, list[str]]] = {}
     groups: dict[tuple[Group, str], list[str]] = {}
     for name, quantity in quantities.items():

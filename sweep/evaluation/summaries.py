@@ -122,10 +122,8 @@ def summarise(
     index = given.index if isinstance(given, pd.DataFrame) else None
     repeated = kept_columns(given, keep, computed, len(matrix))
     result = pd.DataFrame(repeated | computed, index=index, copy=bool(repeated))  # the arrays made here are not shared
-    result.attrs["units"] = {
-        **units,
-        **{error_of(name): unit for name, unit in units.items() if error_of(name) in computed},
-    }
+    errors = {error_of(name): unit for name, unit in units.items() if error_of(name) in computed}
+    result.attrs["units"] = {**units, **errors}
     return result
 
 

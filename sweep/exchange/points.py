@@ -98,10 +98,8 @@ def from_points(family: str, *, tolerance: float = TOLERANCE, **points: Sequence
     reading = reader.fit(given)
     joints = _joints(mechanism, reading, given)
     distances = {name: float(np.linalg.norm(given[name] - at)) for name, at in joints.items()}
-    for (
-        name,
-        distance,
-    ) in distances.items():  # the first deviating point is named, since it displaces those after it as well
+    # The first deviating point is named, since it displaces those after it as well.
+    for name, distance in distances.items():
         if not distance <= tolerance * extent:
             allowed = f"a point at most {tolerance * extent:.3g} from {_words(joints[name])}"
             why = f", where the other points put it; it is {distance:.3g} off (tolerance = {tolerance:g})"

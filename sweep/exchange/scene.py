@@ -52,10 +52,8 @@ def turn(mechanism: Mechanism, design: Table, phi: float, poses: int) -> list[Pl
         if bad.size:
             pose = int(np.argmax(part.status != 0))
             value = f"{meaning(int(part.status[pose]))} at {domain.name} = {part.phi[pose]:.6g}"
-            condition = (
-                "that exists over the whole interval" if isinstance(domain, Interval) else "whose crank turns fully"
-            )
-            raise InputError(part.label, value, f"a design {condition}", "export")
+            kind = "that exists over the whole interval" if isinstance(domain, Interval) else "whose crank turns fully"
+            raise InputError(part.label, value, f"a design {kind}", "export")
     return side_by_side(stages)
 
 

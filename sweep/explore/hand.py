@@ -162,10 +162,8 @@ class Hand:
             raise InputError("dimensions", "none", STEADY, "explore")
         data: dict[str, Any] = {name: table for name, table in old.items() if name not in TABLES}
         for table in ("bodies", "loads", "design"):
-            written = {name: entry for name, entry in old.get(table, {}).items() if name != "sample"}
-            data |= (
-                {table: {name: self._entry(entries, name, entry) for name, entry in written.items()}} if written else {}
-            )
+            rest = {name: entry for name, entry in old.get(table, {}).items() if name != "sample"}
+            data |= {table: {name: self._entry(entries, name, entry) for name, entry in rest.items()}} if rest else {}
         data["design"] = {name: entries[name] for name in mechanism_names} | data["design"]
         if len(axes) > 2:
             data["design"]["sample"] = {"kind": "sobol", "n": SAMPLE}

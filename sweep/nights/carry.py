@@ -72,10 +72,8 @@ def carry(study: Study, earlier: Sequence[Path], target: Path) -> Carried | None
             # This file is appended to, so it is copied.
             if (files.beside(source) / files.RUNS).is_file():
                 shutil.copyfile(files.beside(source) / files.RUNS, target / files.RUNS)
-            same_words = all(
-                noted.get(key) == words for key, words in words_of(study).items()
-            )  # titles are in the report
-            whole = not verification.findings and bool(noted.get("complete")) and same_words and searched(study, target)
+            same = all(noted.get(key) == words for key, words in words_of(study).items())  # titles are in the report
+            whole = not verification.findings and bool(noted.get("complete")) and same and searched(study, target)
             if whole:
                 _link_report(files.beside(source), target)
         return Carried(night.name, len(sound), whole)

@@ -119,15 +119,15 @@ def tolerance(folder: str | Path, output: str | None = None) -> Axes:
     'change from the nominal value [%]'
     """
     data = read_dataset(Path(folder))
-    distribution = histogram(data, output) if output is not None else None
+    bins = histogram(data, output) if output is not None else None
     changes = [(spread.shown.symbol, spread.changes) for spread in spreads(data) if spread.changes is not None]
-    if distribution is None and (output is not None or not changes):
+    if bins is None and (output is not None or not changes):
         raise InputError("folder", str(folder), "a dataset with an optimum and [tolerance]", "plot")
     with house_style():
-        axes = new_figure(NARROW, 0.27 * len(changes) + 1.1 if distribution is None else 1.9).subplots()
+        axes = new_figure(NARROW, 0.27 * len(changes) + 1.1 if bins is None else 1.9).subplots()
         axes.set_title(tolerance_words(data))
-        if distribution is not None:
-            return draw_histogram(axes, distribution)
+        if bins is not None:
+            return draw_histogram(axes, bins)
         for k, (_, (low, mean, high)) in enumerate(changes):
             axes.plot([low, high], [k, k], color=OPTIMUM, linewidth=5.0, solid_capstyle="butt", alpha=0.5)
             axes.plot(mean, k, "o", color=OPTIMUM, markersize=4.5)
@@ -138,21 +138,14 @@ def tolerance(folder: str | Path, output: str | None = None) -> Axes:
     return axes
 
 
-def draw_histogram(axes: Axes, distribution: Histogram) -> Axes:
+def draw_histogram(axes: Axes, bins: Histogram) -> Axes:
     """Draw the histogram of an output, with bins that miss its limit in another colour, and lines at the limit."""
-    colours = np.where(distribution.missing, LIMIT, OPTIMUM)
-    axes.bar(
-        distribution.edges[:-1],
-        100.0 * distribution.shares,
-        0.92 * np.diff(distribution.edges),
-        align="edge",
-        color=colours,
-        alpha=0.75,
-    )
-    for bound in (distribution.low, distribution.high):
+    colours = np.where(bins.missing, LIMIT, OPTIMUM)
+    axes.bar(bins.edges[:-1], 100.0 * bins.shares, 0.92 * np.diff(bins.edges), align="edge", color=colours, alpha=0.75)
+    for bound in (bins.low, bins.high):
         if bound is not None:
             axes.axvline(bound, color=LIMIT, linewidth=1.2)
-    axes.set_xlabel(distribution.shown.title)
+    axes.set_xlabel(bins.shown.title)
     axes.set_ylabel("of what is made [%]")
     return axes
 

@@ -130,12 +130,7 @@ def motion(
     family = find_family(mechanism)
     if isinstance(family.domain, Interval):
         raise InputError("mechanism", family.name, "a mechanism that turns: this one runs over an interval", "plot")
-    wanted = want.split(",") if isinstance(want, str) else want
-    names = (
-        list(dict.fromkeys(motion_curves(family)))
-        if wanted is None
-        else pose_wants(family, [n.strip() for n in wanted])
-    )
+    names = list(dict.fromkeys(motion_curves(family))) if want is None else pose_wants(family, want)
     phi = np.arange(POSES) * (2.0 * math.pi / POSES)
     design = in_radians(family, design, angles)
     poses = evaluate(mechanism, design, list(dict.fromkeys([*names, family.position])), phi=phi, angles="rad")

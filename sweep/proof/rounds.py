@@ -110,17 +110,11 @@ class Unit:
         mine = self.boxes.taken(np.arange(number, len(self.boxes.bound), UNITS))
         if should_stop() or not len(mine.bound):
             return number, 0
-        question, provable = self.question, self.question.provable
+        space, provable = self.question, self.question.provable
         leaves = empty(len(mine.bound) + self.most, mine.low.shape[1])
-        constants = (
-            question.branch,
-            provable.objectives[question.objective],
-            question.cos2,
-            question.links,
-            self.target,
-        )
-        for_kernel, starts = (*constants, question.tube(self.target)), (mine.low, mine.high, mine.bound)
-        search = (starts, question.high - question.low, question.free, question.given, self.smallest)
+        fixed = (space.branch, provable.objectives[space.objective], space.cos2, space.links, self.target)
+        for_kernel, starts = (*fixed, space.tube(self.target)), (mine.low, mine.high, mine.bound)
+        search = (starts, space.high - space.low, space.free, space.given, self.smallest)
         provable.explore(for_kernel, (*search, 0), tuple(leaves))  # evaluates no box, but compiles the kernels
         begin = time.thread_time()
         filled, judged = provable.explore(for_kernel, (*search, self.most), tuple(leaves))

@@ -55,14 +55,12 @@ def prove_study(study: Study, folder: str | Path, cores: Cores, tell: Tell = lam
         return known
     settings, question, target, key = _asked(study, Path(folder))
     side = files.beside(Path(folder))
-    result = explored(question, target, settings, side / PARTS / key, cores, tell)
-    proof = concluded(question, result, _best(side / files.OPTIMUM, question), settings.gap)
-    write(side / files.PROOF, question, result.leaves, proof, target, key)
+    done = explored(question, target, settings, side / PARTS / key, cores, tell)
+    proof = concluded(question, done, _best(side / files.OPTIMUM, question), settings.gap)
+    write(side / files.PROOF, question, done.leaves, proof, target, key)
     if cores.stop:
         raise KeyboardInterrupt
-    files.append_run(
-        Path(folder), {"event": EVENT, "boxes": proof.boxes, "processor_seconds": round(result.seconds, 3)}
-    )
+    files.append_run(Path(folder), {"event": EVENT, "boxes": proof.boxes, "processor_seconds": round(done.seconds, 3)})
     if not proof.cut_short:
         shutil.rmtree(side / PARTS, ignore_errors=True)
     return proof
@@ -88,21 +86,12 @@ def _asked(study: Study, folder: Path) -> tuple[ProveSettings, Question, float, 
     """Return the settings, the question, the target in the unit of the proof's rows, and the key of the certificate."""
     if study.optimise is None or study.optimise.prove is None:
         raise MissingInput("optimise.prove", '{ gap = "1 %", boxes = 1000000 }', str(study.path))
-    settings, question = study.optimise.prove, question_of(study)
+    prove, question = study.optimise.prove, question_of(study)
     best = _best(files.beside(folder) / files.OPTIMUM, question)
-    target = question.in_kernel(best / (1.0 + settings.gap)) if np.isfinite(best) else NEVER
-    content = [
-        described(question),
-        target,
-        settings.gap,
-        settings.boxes,
-        settings.smallest,
-        UNITS,
-        SHARES,
-        source_hash(),
-    ]
-    key = hashlib.sha256(json.dumps(content, default=str, sort_keys=True).encode()).hexdigest()[:16]
-    return settings, question, target, key
+    target = question.in_kernel(best / (1.0 + prove.gap)) if np.isfinite(best) else NEVER
+    data = [described(question), target, prove.gap, prove.boxes, prove.smallest, UNITS, SHARES, source_hash()]
+    key = hashlib.sha256(json.dumps(data, default=str, sort_keys=True).encode()).hexdigest()[:16]
+    return prove, question, target, key
 
 
 def _best(path: Path, question: Question) -> float:

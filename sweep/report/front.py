@@ -115,9 +115,8 @@ class Front:
         largest = gaps(bounds, np.array(reached), np.array(values))
         if not largest or largest[0].area < SHOWN:
             return ""
-        ends = (
-            f"{second.show(reached[largest[0].number], 4)} and {second.show(float(bounds[largest[0].number + 1]), 4)}"
-        )
+        k = largest[0].number
+        ends = f"{second.show(reached[k], 4)} and {second.show(float(bounds[k + 1]), 4)}"
         count = self.settings.points or len(points)
         return f" It is least known between {ends}: pareto.points, now {count}, places further bounds there."
 

@@ -291,16 +291,15 @@ def parallel(data: Dataset, cells: Sequence[Cells], shown: Sequence[Shown]) -> d
     axes, values = [axis for axis, varies in zip(axes, varying, strict=True) if varies], values[:, varying]
     if len(axes) < 2:
         return None
-    named = [design for design in shown if design.role != "front"]
-    marks = [[float(design.row.get(axis.name, np.nan)) * axis.factor for axis in axes] for design in named]
+    named = [item for item in shown if item.role != "front"]
+    marks = [[float(item.row.get(axis.name, np.nan)) * axis.factor for axis in axes] for item in named]
     return {
         "axes": [{"name": axis.name, "symbol": axis.symbol, "unit": axis.unit} for axis in axes],
         "objective": next((k for k, axis in enumerate(axes) if objective and axis.name == objective.name), -1),
         "numbers": numbers.tolist(),
         "values": packed(values * [axis.factor for axis in axes]),
         "designs": [
-            {"name": design.name, "role": design.role, "values": packed(mark)}
-            for design, mark in zip(named, marks, strict=True)
+            {"name": x.name, "role": x.role, "values": packed(mark)} for x, mark in zip(named, marks, strict=True)
         ],
         "of": of,
     }

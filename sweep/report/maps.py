@@ -224,11 +224,9 @@ def design_map(data: Dataset, scanned: Scan, cells: list[Cells], pair: tuple[str
         pair = most_telling(scanned)
     if pair is not None:
         x, y = pair
-        places = {
-            role: (by_name[x].placed(float(row[x])), by_name[y].placed(float(row[y]))) for role, row in marks.items()
-        }
+        at = {role: (by_name[x].placed(float(row[x])), by_name[y].placed(float(row[y]))) for role, row in marks.items()}
         sides = (by_name[x], axis_quantity(data, x)), (by_name[y], axis_quantity(data, y))
-        return map_figure(scanned.grids[pair], *sides, data.designs, shown, places, overlays(data.study, x, y))
+        return map_figure(scanned.grids[pair], *sides, data.designs, shown, at, overlays(data.study, x, y))
     if len(cells) == 1 and scanned.feasible:
         name = cells[0].name
         side = cells[0], axis_quantity(data, name)

@@ -77,10 +77,8 @@ def groups(data: Dataset) -> list[Group]:
 def _places(data: Dataset, rows: list[dict[str, Any]]) -> tuple[Array, Array, Array]:
     """Return lengths and ratios over the largest of them, angles, and signs, (k, number of each)."""
     parameters = [p for p in data.study.bare.parameters if p.name in data.study.family.parameter_names]
-    names_of = {
-        unit: [p.name for p in parameters if p.unit == unit and p.choices is None]
-        for unit in ("length", "ratio", "angle")
-    }
+    free = [p for p in parameters if p.choices is None]
+    names_of = {unit: [p.name for p in free if p.unit == unit] for unit in ("length", "ratio", "angle")}
     signs = [p.name for p in parameters if p.choices is not None]
 
     def matrix(names: list[str]) -> Array:
@@ -126,10 +124,9 @@ def shown_designs(data: Dataset, different: Sequence[Group]) -> list[Shown]:
     if data.result is None:
         return []
     designs = [Shown(data.result_name, "result", _objective(data, data.result), data.result)]
-    others = [group for group in different if group.row["role"] != "optimum"][:OFFERED]
+    others = [one for one in different if one.row["role"] != "optimum"][:OFFERED]
     designs += [
-        Shown(group.title(k), "alternative", _objective(data, group.row), group.row)
-        for k, group in enumerate(others, 1)
+        Shown(one.title(k), "alternative", _objective(data, one.row), one.row) for k, one in enumerate(others, 1)
     ]
     designs += _of_front(data)
     if data.reference is not None:

@@ -231,23 +231,20 @@ def judged(data: Dataset, rows: Sequence[Row], names: Sequence[str]) -> dict[str
     results = [as_result(data, row) for row in rows]
     roles = ["result", *(f"pin pin-{k}" for k in range(1, len(rows)))]
     shown = [Shown(name, role, status_words(row), row) for name, role, row in zip(names, roles, rows, strict=True)]
-    outputs, limits = (
-        [tables.output_rows(entry) for entry in results],
-        [tables.limit_states(entry) for entry in results],
-    )
+    outputs, limits = [tables.output_rows(one) for one in results], [tables.limit_states(one) for one in results]
     motion = moving(data, shown)
     return {
         "status": [status_words(row) for row in rows],
         "motion": motion and motion | {"ghosts": list(range(1, len(rows)))},
         "outputs": [
             {"name": same[0].name, "symbol": same[0].symbol, "text": same[0].text,
-             "values": [entry.value for entry in same], "fast": [entry.fast for entry in same]}
+             "values": [one.value for one in same], "fast": [one.fast for one in same]}
             for same in zip(*outputs, strict=True)
         ],
         "limits": [
             {"name": same[0].shown.name, "symbol": same[0].shown.symbol, "bound": same[0].bound,
-             "values": [entry.value for entry in same], "states": [entry.state for entry in same],
-             "slack": [entry.slack for entry in same]}
+             "values": [one.value for one in same], "states": [one.state for one in same],
+             "slack": [one.slack for one in same]}
             for same in zip(*limits, strict=True)
         ],
     }  # fmt: skip

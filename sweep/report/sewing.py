@@ -78,10 +78,8 @@ def sewn(data: Dataset) -> Sewn | None:
     speeds = np.union1d(stated, np.linspace(stated[0], stated[-1], CURVE))
     ends = sewing.ends.values()
     optimum_rooms, _ = sewing.rooms(study.family, design[None], stated, study.accuracy)
-    rooms_of_optimum = {name: room[0] for name, room in optimum_rooms.items()}
-    sentence = sewing_sentence(
-        {name: room for name, room in rooms_of_optimum.items() if name not in ends}, stated / RPM
-    )
+    nominal = {name: room[0] for name, room in optimum_rooms.items()}
+    sentence = sewing_sentence({name: room for name, room in nominal.items() if name not in ends}, stated / RPM)
     sentence += f" {window_sentence(*sewing.binding(study.family, design))}"
     windows = np.stack(sewing.window(study.family, design[None], stated), axis=-1)[0]
     rooms, _ = sewing.rooms(study.family, designs, speeds, study.accuracy)
@@ -92,7 +90,7 @@ def sewn(data: Dataset) -> Sewn | None:
         Row(
             f"{stated[k] / RPM:.6g}",
             f"{number(float(windows[k, 0]))} to {number(float(windows[k, 1]))}",
-            _binds(sewing, {end: float(rooms_of_optimum[name][k]) for end, name in sewing.ends.items()}, k),
+            _binds(sewing, {end: float(nominal[name][k]) for end, name in sewing.ends.items()}, k),
             tuple(_percent(float(kept[name][:, at].mean())) for name in (*moments, *ends)),
             _percent(float(every[:, at].mean())),
             " to ".join(map(_percent, _interval(every[:, at]))),

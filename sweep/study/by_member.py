@@ -73,15 +73,10 @@ def _within(spec: Specification, kept: list[str]) -> tuple[Family, set[str]]:
     # An event may refer to a relation and a thread to events: repeat until no further relation fits.
     remaining = list(spec.relations)
     while True:
-        fitting = [
-            relation
-            for relation in remaining
-            if (extended := _fits(built, relation)) is not None and (built := extended)
-        ]
-        if not fitting:
+        left = [x for x in remaining if (more := _fits(built, x)) is None or not (built := more)]
+        if len(left) == len(remaining):
             break
-        remaining = [relation for relation in remaining if relation not in fitting]
-        machine = find_family(built)
+        remaining, machine = left, find_family(built)
     return machine, {name for names in (members, tools, built.relations) for name, _ in names}
 
 
@@ -108,10 +103,8 @@ def _tables(
     for table in BY_NAME:
         entries = {key: entry for key, entry in data.get(table, {}).items() if key in known}
         if table == "relations":  # already limits of an earlier member
-            earlier = {r.name for r in getattr(previous, "relations", ())}
-            entries = {
-                k: {x: y for x, y in e.items() if x != "settings" or k not in earlier} for k, e in entries.items()
-            }
+            old = {r.name for r in getattr(previous, "relations", ())}
+            entries = {k: {x: y for x, y in e.items() if x != "settings" or k not in old} for k, e in entries.items()}
         if table == "cyclogram":
             entries = {k: entry for k, entry in entries.items() if k == member or new(f"phi_{k}")}
         tables |= {table: entries} if entries else {}

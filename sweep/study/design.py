@@ -123,13 +123,11 @@ def read_reference(
     if raw is None:
         return None
     key: Key = ("reference", "design")
-    mechanism_names = (*bare.parameter_names, *other.prescribed)
+    names = (*bare.parameter_names, *other.prescribed)
     fixed = {} if space is None else space.fixed
-    given = {**other.given, **{name: value for name, value in fixed.items() if name not in mechanism_names}}
+    given = {**other.given, **{name: value for name, value in fixed.items() if name not in names}}
     # If the space has faults, the inputs that it fixes are unknown.
-    scene = (
-        tuple(name for name in family.parameter_names if name not in mechanism_names) if space is None else tuple(given)
-    )
+    scene = tuple(name for name in family.parameter_names if name not in names) if space is None else tuple(given)
     _check_names(family, raw, key, faults, scene)
     defaults = {p.name: p.left_out(raw) for p in family.parameters}
     values = {name: value for name, value in defaults.items() if value is not None} | given
@@ -206,15 +204,13 @@ def take(file: StudyFile, family: Family, elsewhere: Collection[str]) -> None:
                 for missing in (p.name for p in family.parameters if p.name.startswith(member)):
                     file.faults.excuse((*key, missing))
                 continue
-            digest = fingerprint(design)
-            if pinned is not None and pinned != digest:
-                file.faults.value(
-                    (*key, f"{member}{HASH}"), pinned, f'"{digest}", the hash of what {source} accepts now'
-                )
+            now = fingerprint(design)
+            if pinned is not None and pinned != now:
+                file.faults.value((*key, f"{member}{HASH}"), pinned, f'"{now}", the hash of what {source} accepts now')
             # A fitted lam may be given in [design], where it defines "up".
             left_out = {x for x in elsewhere if not x.startswith("lam")} if key == ("design",) else set()
             _fill(file, table, (*key, name), member, design, family, left_out)
-            notes.append(f"{'.'.join((*key, member.rstrip('.'))).rstrip('.')}: {source} {digest}")
+            notes.append(f"{'.'.join((*key, member.rstrip('.'))).rstrip('.')}: {source} {now}")
     study_table = own_table(file.data, ("study",))
     if notes and study_table is not None:
         study_table["taken"] = notes

@@ -103,6 +103,9 @@ def with_accuracy(study: Study, target: float | None = None, certify: bool | Seq
     return study_from_data(study.data | {"accuracy": setting}, study.path)
 
 
+WHOLE = (("accuracy",), ("objective",))  # tables that smoke.toml replaces as a whole
+
+
 def merged(base: Mapping[str, Any], over: Mapping[str, Any], key: tuple[str, ...] = ()) -> dict[str, Any]:
     """Merge the tables of one file into those of another, key by key.
 
@@ -112,13 +115,8 @@ def merged(base: Mapping[str, Any], over: Mapping[str, Any], key: tuple[str, ...
     result = copy.deepcopy(dict(base))
     for name, new in over.items():
         old = result.get(name)
-        is_whole = (*key, name) in (("accuracy",), ("objective",))
-        if (
-            isinstance(old, dict)
-            and isinstance(new, dict)
-            and not is_whole
-            and {"value", "values"}.isdisjoint({*old, *new})
-        ):
+        tables = isinstance(old, dict) and isinstance(new, dict)
+        if tables and (*key, name) not in WHOLE and {"value", "values"}.isdisjoint({*old, *new}):
             result[name] = merged(old, new, (*key, name))
         else:
             result[name] = copy.deepcopy(new)

@@ -247,11 +247,9 @@ def _machine(
     if threads is None or len(faults.lines) > before:
         return None
     try:
-        steady = {name: table for name, table in relations.items() if not _hangs_on_events(table)}
+        plain = {name: table for name, table in relations.items() if not _hangs_on_events(table)}
         outputs = (
-            find_family(specification(members, steady, shafts, tools)).pose_output
-            if len(steady) < len(relations)
-            else {}
+            find_family(specification(members, plain, shafts, tools)).pose_output if len(plain) < len(relations) else {}
         )
         for name, table in relations.items():
             if "level" in table and (output := outputs.get(table.get("event", ""))) is not None:
@@ -271,12 +269,8 @@ def _machine(
             return None
         name = "" if place[-1:] == (error.name,) else error.name
         if place[:1] == ("relations",):
-            relation_table = relations.get(str(place[-1]), {})
-            name = (
-                name
-                if name in relation_table
-                else next((kind for kind in RELATION_KINDS if kind in relation_table), "")
-            )
+            entry = relations.get(str(place[-1]), {})
+            name = name if name in entry else next((kind for kind in RELATION_KINDS if kind in entry), "")
         key = place if place[:1] in (("relations",), ("shafts",), ("tools",)) else ("machine", *place)
         key = (*key, name) if name else key
         if isinstance(error, MissingInput):

@@ -153,19 +153,17 @@ def read_pareto(
     bounds = _bounds(output, raw[given[0]], key, faults)
     if bounds is None or not _searchable(family, output, bounds, given[0], faults):
         return None
-    at_least = given[0] == "at_least"
-    ends = [limit.maximum if at_least else limit.minimum for limit in limits if limit.output == output.name]
-    if any(bound > end if at_least else bound < end for end in ends if end is not None for bound in bounds):
-        side = "maximum" if at_least else "minimum"
+    lower = given[0] == "at_least"
+    ends = [limit.maximum if lower else limit.minimum for limit in limits if limit.output == output.name]
+    if any(bound > end if lower else bound < end for end in ends if end is not None for bound in bounds):
+        side = "maximum" if lower else "minimum"
         faults.value(key, raw[given[0]], f"bounds that leave room to the {side} of {output.name} in [limits]")
         return None
     if section.points is not None and not 2 <= len(set(bounds)) < section.points:
         allowed = f"more than the {len(set(bounds))} bounds given, of which there must be two or more"
         faults.value(("pareto", "points"), section.points, allowed)
         return None
-    return ParetoSettings(
-        output.name, bounds, at_least, section.starts, section.time_budget, section.points, search.looks
-    )
+    return ParetoSettings(output.name, bounds, lower, section.starts, section.time_budget, section.points, search.looks)
 
 
 def _bounds(output: Output, raw: object, key: Key, faults: Faults) -> tuple[float, ...] | None:

@@ -195,10 +195,8 @@ class Study:
     @property
     def bands(self) -> tuple[Limit, ...]:
         """Tolerance bands around prescribed outputs: designs hold the value, manufactured mechanisms scatter."""
-        prescribed = [limit for limit in self.output_limits if limit.output in self.prescribed]
-        return tuple(
-            band for k, band in enumerate(prescribed) if band.output in [other.output for other in prescribed[:k]]
-        )
+        held = [limit for limit in self.output_limits if limit.output in self.prescribed]
+        return tuple(x for k, x in enumerate(held) if x.output in [other.output for other in held[:k]])
 
     @property
     def made(self) -> tuple[str, ...]:

@@ -113,9 +113,7 @@ def read_task(raw: object, faults: Faults) -> SynthesisTask | None:
         return None
     for name, value in given.items():
         if name in ("positions", "settings"):
-            given[name] = tuple(
-                RECORDS[kind](**{"swing": None} | record if kind == "task3" else record) for record in value
-            )
+            given[name] = tuple(RECORDS[kind](**{"swing": None} | row if kind == "task3" else row) for row in value)
         elif isinstance(value, list):
             given[name] = tuple(value)
     try:

@@ -47,20 +47,18 @@ def _own(given: Mapping[str, str], file: StudyFile, family: Family) -> dict[str,
     """Return the tolerances of single parameters; of several matching patterns the last holds."""
     tolerances: dict[str, float] = {}
     for pattern, text in given.items():
-        matching = [
-            p for p in family.parameters if fnmatchcase(p.name, pattern) and p.unit in UNITS and p.choices is None
-        ]
+        named = [p for p in family.parameters if fnmatchcase(p.name, pattern) and p.unit in UNITS and p.choices is None]
         key = ("tolerance", "own", pattern)
-        if not matching or len({p.unit for p in matching}) > 1:
+        if not named or len({p.unit for p in named}) > 1:
             words = "a pattern of names of lengths, or one of angles, as *.key" + nearest(
                 pattern, family.parameter_names
             )
             file.faults.value(key, text, words)
             continue
-        width = file.faults.number(text, UNITS[matching[0].unit], key)
+        width = file.faults.number(text, UNITS[named[0].unit], key)
         if width is not None and not width >= 0.0:
             file.faults.value(key, text, "a tolerance, 0 for what is exact")
-        tolerances |= dict.fromkeys((p.name for p in matching), width or 0.0)
+        tolerances |= dict.fromkeys((p.name for p in named), width or 0.0)
     return tolerances
 
 

@@ -124,9 +124,7 @@ def _fitted(
     along, across, direction, offset = values
     deviation, travel = np.empty(len(links)), np.empty(len(links))
     line = Straightest(along, across, offset, deviation, travel, np.empty(len(links), np.uint8))
-    line_fit(
-        coordinates[0], coordinates[1], coordinates[2], coordinates[3], limits, direction, fit.free_direction, line
-    )
+    line_fit(*coordinates, limits, direction, fit.free_direction, line)
     return values, travel, line.status
 
 

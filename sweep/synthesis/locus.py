@@ -157,11 +157,7 @@ def locus(family: str, names: tuple[str, ...]) -> Locus:
         raise InputError("family", family, f"{' or '.join(known)}{nearest(str(family), known)}", "synthesis")
     selected = [form for form in of_family if form.chosen_by in names]
     # A column shared with another selected form selects nothing.
-    selected = [
-        form
-        for form in selected
-        if not any(form.chosen_by in other.parameter_names for other in selected if other != form)
-    ]
+    selected = [x for x in selected if not any(x.chosen_by in y.parameter_names for y in selected if y != x)]
     if not selected or len({form.chosen_by for form in selected} - {"e"}) > 1:
         forms = "; or ".join(", ".join(form.parameter_names) for form in of_family)
         raise InputError("columns", ", ".join(names), forms, "requirement")

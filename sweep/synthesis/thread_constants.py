@@ -89,18 +89,16 @@ def fit_contour(table: Table, confidence: float = 0.95) -> ConstantsFit:
 
     def law(x: Array) -> Array:
         alpha, beta, b = x
-        exponent = beta * theta
-        model: Array = (
-            t1 * np.exp(exponent) + b * pressed * np.expm1(exponent) + alpha * radius * theta * _growth(exponent)
-        )
+        power = beta * theta
+        model: Array = t1 * np.exp(power) + b * pressed * np.expm1(power) + alpha * radius * theta * _growth(power)
         return model / t2 - 1.0
 
     def slopes(x: Array) -> Array:
         alpha, beta, b = x
-        exponent = beta * theta
-        rise = theta * np.exp(exponent)
-        by_beta = t1 * rise + b * pressed * rise + alpha * radius * theta * theta * _growth_slope(exponent)
-        columns = (radius * theta * _growth(exponent), by_beta, pressed * np.expm1(exponent))
+        power = beta * theta
+        rise = theta * np.exp(power)
+        by_beta = t1 * rise + b * pressed * rise + alpha * radius * theta * theta * _growth_slope(power)
+        columns = (radius * theta * _growth(power), by_beta, pressed * np.expm1(power))
         return np.column_stack([column / t2 for column in columns])
 
     start = np.array([float(p.default or 0.0) for p in (ALPHA, BETA, BENDING)])

@@ -170,9 +170,7 @@ class EngineeringMethod(OnLocus):
         """
         f: Array = np.linspace(*self.f_range, offsets, dtype=np.float64)
         phi1: Array = np.arange(places, dtype=np.float64) * (2.0 * np.pi / places)
-        feasible = np.array(
-            [(self.evaluate(side_by_side(phi1, offset)).limits >= 0.0).all(axis=1).any() for offset in f]
-        )
+        feasible = np.array([(self.evaluate(side_by_side(phi1, x)).limits >= 0.0).all(axis=1).any() for x in f])
         edges = np.flatnonzero(np.diff(np.concatenate([[False], feasible, [False]]).astype(np.int8)))
         return [(float(f[a]), float(f[b - 1])) for a, b in edges.reshape(-1, 2)]
 

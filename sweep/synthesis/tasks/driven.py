@@ -95,9 +95,8 @@ class Task5(OnLocus):
         curve = with_tops(self.kappa * d2psi * here.first + dpsi * dpsi * here.second)
         start = slot(a2, e2, t1[:, None]).rho[:, 0]
         equations = {
-            f"rho at position {k}": (rho_at(np.array([[position.dphi]]))[0].rho[:, 0] - start - position.drho)
-            / abs(self.rho0)
-            for k, position in enumerate(self.positions, 1)
+            f"rho at position {k}": (rho_at(np.array([[p.dphi]]))[0].rho[:, 0] - start - p.drho) / abs(self.rho0)
+            for k, p in enumerate(self.positions, 1)
         }
         sign = np.sign(np.sin(0.5 * (t1 + t2)))
         limits = {
