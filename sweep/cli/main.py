@@ -101,7 +101,7 @@ class Verbs(click.Group):
         """Run the verb."""
         try:
             with leaving_within(SECONDS_TO_LEAVE, WORDS), warnings.catch_warnings():
-                warnings.showwarning = _said
+                warnings.showwarning = _show_warning
                 return super().invoke(ctx)
         except LinksweepError as error:
             if isinstance(error, ProgramFault):
@@ -130,7 +130,7 @@ def _last_words(text: str) -> None:
     sys.stdout = Path(os.devnull).open("w", encoding="utf-8")  # noqa: SIM115
 
 
-def _said(
+def _show_warning(
     message: Warning | str,
     category: type[Warning],
     filename: str,

@@ -143,17 +143,20 @@ def _lines(old: Mapping[str, Any], new: Mapping[str, Any], place: str) -> list[s
             lines += _lines(before, now, f"{name}.")
         else:
             unit_before = units[0] if units[0] != units[1] else None
-            lines.append(f"{name} {_said(before, unit_before)} -> {_said(now, units[1])}")
+            lines.append(f"{name} {_written(before, unit_before)} -> {_written(now, units[1])}")
     if not lines and units[0] != units[1]:
-        lines.append(f"{place}unit {_said(units[0])} -> {_said(units[1])}")
+        lines.append(f"{place}unit {_written(units[0])} -> {_written(units[1])}")
     return lines
 
 
-def _said(value: Any, unit: Any = None) -> str:
+def _written(value: Any, unit: Any = None) -> str:
     if value is None:
         return "none"
     if isinstance(value, Mapping):
-        value, unit = ", ".join(f"{key} = {_said(v)}" for key, v in value.items() if key != "unit"), value.get("unit")
+        value, unit = (
+            ", ".join(f"{key} = {_written(v)}" for key, v in value.items() if key != "unit"),
+            value.get("unit"),
+        )
     if isinstance(value, list):
         value = f"{len(value)} values" if len(value) > MOST else ", ".join(map(str, value))
     text = str(value).lower() if isinstance(value, bool) else f"{value:g}" if isinstance(value, float) else str(value)

@@ -24,7 +24,7 @@ if TYPE_CHECKING:
 
 AngleUnit: TypeAlias = Literal["rad", "deg"]
 
-FACTORS = {"rad": 1.0, "deg": math.pi / 180.0}
+RADIANS = math.pi / 180.0  # of a degree
 REMEDY = (
     'for degrees say angles="deg" (--angles deg), or "{name} [deg]" as the column\'s name, or a text such as "90 deg"; '
     'for rad "rad" in the same way'
@@ -67,38 +67,38 @@ def in_radians(
         like degrees.
     """
     _check_unit(angles)
-    known = dict.fromkeys(others, False) | {p.name: p.unit == "angle" for p in family.parameters}
+    units: dict[str, str] = {name: p.unit for name, p in others.items()} | {p.name: p.unit for p in family.parameters}
     variable = "" if domain is None else domain.name
     if domain is not None:
-        known[variable] = domain.unit == "rad"
+        units[variable] = domain.unit
     if not (isinstance(table, Mapping) or hasattr(table, "columns")):
         return table  # not a table: the reader of the table raises
     renamed, changed = {}, {}
     columns: Any = table
     for key in columns:
         match = _HEADER.fullmatch(str(key))
-        name, unit = (match[1], match[2]) if match is not None and match[1] in known else (str(key), None)
+        name, unit = (match[1], match[2]) if match is not None and match[1] in units else (str(key), None)
         values = columns[key]
         if unit is not None:
             if name in map(str, table):
                 here = f"column {name} [{unit}]"
                 raise InputError("column", name, f"either {name} or {name} [{unit}], not both", here)
             renamed[key] = name
-            scale = heading_factor(name, unit, _internal(name, family, others, domain))
+            scale = heading_factor(name, unit, internal_unit(units[name]))
             if scale != 1.0:
                 changed[name] = numbers(values, name, f"column {key}, row") * scale
             continue
-        if name not in known:
+        if name not in units:
             continue
         if not isinstance(values, np.ndarray | float | int) or getattr(values, "dtype", "") == np.object_:
-            converted = plain(values, _internal(name, family, others, domain), name, f"column {name}")
+            converted = plain(values, internal_unit(units[name]), name, f"column {name}")
             if converted is not values:
                 changed[name] = converted
                 continue
-        if not known[name]:
+        if units[name] not in ("angle", "rad"):
             continue
         if angles == "deg":
-            changed[name] = numbers(values, name, f"column {key}, row") * FACTORS["deg"]
+            changed[name] = numbers(values, name, f"column {key}, row") * RADIANS
         elif angles is None:
             _check_plausible(name, values, name == variable or stem(name) in TURNING)
     if not renamed and not changed:
@@ -108,17 +108,9 @@ def in_radians(
     return table.rename(columns=renamed).assign(**changed)
 
 
-def _internal(name: str, family: Parametrised, others: Mapping[str, Parameter], domain: Domain | None) -> str:
-    """Return the internal unit of a column."""
-    if domain is not None and name == domain.name:
-        return internal_unit(domain.unit)
-    p = next((p for p in family.parameters if p.name == name), None) or others[name]
-    return internal_unit(p.unit)
-
-
 def plain_names(table: Iterable[Any]) -> tuple[str, ...]:
     """Return the column names without the units in their headers."""
-    return tuple(found[1] if (found := _HEADER.fullmatch(str(key))) else str(key) for key in table)
+    return tuple(match[1] if (match := _HEADER.fullmatch(str(key))) else str(key) for key in table)
 
 
 def grid_in_radians(name: str, unit: str, phi: ArrayLike, angles: AngleUnit | None) -> ArrayLike:
@@ -130,14 +122,14 @@ def grid_in_radians(name: str, unit: str, phi: ArrayLike, angles: AngleUnit | No
     if unit != "rad":
         return phi
     if angles == "deg":
-        return np.asarray(numbers(phi, name, f"{name}, position")) * FACTORS["deg"]
+        return np.asarray(numbers(phi, name, f"{name}, position")) * RADIANS
     if angles is None:
         _check_plausible(name, phi, True)
     return phi
 
 
 def _check_unit(angles: object) -> None:
-    if angles is not None and angles not in FACTORS:
+    if angles is not None and angles not in ("rad", "deg"):
         raise InputError("angles", angles, '"rad" or "deg"', "angles")
 
 

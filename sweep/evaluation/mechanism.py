@@ -13,10 +13,10 @@ from kernels.types import TWO_PI, Array
 from sweep.effects import inputs_beside
 from sweep.errors import InputError, MissingInput, nearest
 from sweep.evaluation.angles import TURNING, grid_in_radians, is_plausible
-from sweep.evaluation.poses import asked_of_poses, check_march, values_of_the_variable
+from sweep.evaluation.poses import check_march, requested, values_of_the_variable
 from sweep.evaluation.routes import design_outputs
 from sweep.evaluation.statuses import explained
-from sweep.evaluation.summaries import asked_of_designs, chosen_accuracy
+from sweep.evaluation.summaries import chosen_accuracy
 from sweep.families import Mechanism
 from sweep.families import family as find_family
 from sweep.families.base import Angles, Domain, Family, Parameter, Turn
@@ -66,7 +66,7 @@ class BoundDesign:
             an array like ``phi`` for each wanted name and ``status``, or a number each for one angle; ``pd.DataFrame``
             accepts it
         """
-        request = asked_of_poses(self._precise, want)
+        request = requested(self._precise, want, None, "pose")
         angles, is_scalar = _angles(self.family.domain, phi)
         with np.errstate(all="ignore"):  # values beyond float64 get a status below
             outputs = explained(
@@ -91,7 +91,7 @@ class BoundDesign:
         dict
             a number for each wanted name, with ``accuracy`` also ``err_<name>``, and ``status``
         """
-        request = asked_of_designs(self.family, want)
+        request = requested(self.family, want, None, "design")
         chosen = chosen_accuracy(self.family.domain, samples, accuracy)
         outputs = design_outputs(request.family, self._row(request.family), request.wanted, chosen, window)
         return {name: values.item() for name, values in outputs.items()}

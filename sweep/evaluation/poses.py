@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Container, Mapping, Sequence
+from collections.abc import Container, Mapping, Sequence
 from typing import TYPE_CHECKING, Literal, NamedTuple
 
 import numpy as np
@@ -19,7 +19,7 @@ from sweep.evaluation.tables import design_matrix, kept_columns, numbers, plain_
 from sweep.families import Mechanism
 from sweep.families import family as find_family
 from sweep.families.base import Angles, Columns, Domain, Family, March
-from sweep.quantities.resolve import output_names
+from sweep.quantities.resolve import output, output_names
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -84,7 +84,7 @@ def evaluate(
     import pandas as pd
 
     bare = find_family(family).precise()
-    mechanism, wanted, units = asked_of_poses(bare, want, loads)
+    mechanism, wanted, units = requested(bare, want, loads, "pose")
     given = table
     table = plain_columns(table)
     others = inputs_beside(bare, plain_names(table))
@@ -113,7 +113,7 @@ def evaluate(
     return whole
 
 
-class Question(NamedTuple):
+class Request(NamedTuple):
     """A request to a mechanism: its family with the effects that it needs, the names in order, their units."""
 
     family: Family
@@ -121,28 +121,25 @@ class Question(NamedTuple):
     units: Mapping[str, str]
 
 
-def asked(
-    family: Family, want: str | Sequence[str], loads: Loads | None, kind: Literal["pose", "design"],
-    read: Callable[[Family, list[str]], Mapping[str, str]],
-) -> Question:  # fmt: skip
-    """Make the request for pose or design outputs of a family; ``read`` returns the units of the names."""
+def requested(
+    family: Family, want: str | Sequence[str], loads: Loads | None, kind: Literal["pose", "design"]
+) -> Request:
+    """Make the request for pose outputs of a family with precise poses, or for design outputs of a family."""
     given = wanted_names(want, f"{kind} outputs of {family.name}")
     # Requests without loads are looked at once.
-    cache: dict[tuple[str, ...], Question] = family.derived.setdefault(asked, {})
+    cache: dict[tuple[str, ...], Request] = family.derived.setdefault(requested, {})
     if (key := (kind, *given)) in cache and not loads:
         return cache[key]
     names = expanded(family, given, poses=kind == "pose")
     mechanism = extended(family, names, curves_of(family, loads))
-    units = read(mechanism, names)
-    request = Question(mechanism, tuple(units), units)
+    if kind == "pose":
+        units = {name: mechanism.pose_output[name].unit for name in pose_wants(mechanism, names)}
+    else:
+        units = {name: output(mechanism, name).unit for name in names if name != "status"}
+    request = Request(mechanism, tuple(units), units)
     if not loads:
         cache[key] = request
     return request
-
-
-def asked_of_poses(family: Family, want: str | Sequence[str], loads: Loads | None = None) -> Question:
-    """Make the request for pose outputs of a family with precise poses."""
-    return asked(family, want, loads, "pose", lambda m, names: {n: m.pose_output[n].unit for n in pose_wants(m, names)})
 
 
 def _beside(kept: Columns, result: pd.DataFrame, designs: int, repeats: int) -> pd.DataFrame:

@@ -28,7 +28,7 @@ from sweep.reductions.sampling import pose_columns
 from sweep.reductions.steps import group_ns, group_order, step_ns, steps_of
 from sweep.reductions.turn import limits_and_reductions, margin_group
 
-Part: TypeAlias = tuple[float, float] | None
+Window: TypeAlias = tuple[float, float] | None
 """A window of the stroke as two fractions, or None."""
 
 
@@ -50,7 +50,7 @@ class Route:
     name: str
     outputs: tuple[str, ...]
     ns_per_design: float
-    run: Callable[[Array, Accuracy, Part], Columns] | None = None
+    run: Callable[[Array, Accuracy, Window], Columns] | None = None
     general: Group | Literal[""] = ""
     order: tuple[Work, int] = (Work.SEARCH, 0)
     columns: int | None = None
@@ -89,7 +89,7 @@ def general_route(
 
 
 def _run_general(
-    family: Family, general: Group, outputs: tuple[str, ...], designs: Array, accuracy: Accuracy, window: Part
+    family: Family, general: Group, outputs: tuple[str, ...], designs: Array, accuracy: Accuracy, window: Window
 ) -> Columns:
     match general:
         case "margin":
@@ -132,7 +132,7 @@ def _sharpened(family: Family, step: Step, name: str) -> str:
 
 
 def _run_step(
-    step: Step, stage: Stage, outputs: tuple[_StepOutput, ...], designs: Array, accuracy: Accuracy, window: Part
+    step: Step, stage: Stage, outputs: tuple[_StepOutput, ...], designs: Array, accuracy: Accuracy, window: Window
 ) -> Columns:
     part = stage.designs(designs)
     results = step.run(part, frozenset(output.plain for output in outputs), accuracy)

@@ -17,7 +17,7 @@ from kernels.types import TWO_PI, Status
 from sweep import costs
 from sweep.errors import InputError
 from sweep.evaluation import route
-from sweep.evaluation.route import Part, Route, check_window, general_route, own_route
+from sweep.evaluation.route import Window, Route, check_window, general_route, own_route
 from sweep.evaluation.statuses import explained
 from sweep.families.base import Accuracy, Array, Columns, Family, Interval, March, Stage, Step, Work, of_family
 from sweep.families.capabilities import Assembly
@@ -50,7 +50,7 @@ def design_outputs(
     designs: Array,
     wanted: Sequence[str],
     accuracy: Accuracy,
-    window: Part = None,
+    window: Window = None,
 ) -> Columns:
     """Compute design outputs of a design matrix, cheap routes first; non-rotatable designs skip the costly ones.
 
@@ -219,7 +219,7 @@ def _composed(family: Family, quantity: Negative | Extent | TimingOf, accuracy: 
 
 def _run_composed(
     family: Family, name: str, operands: Sequence[str], compose: Compose, whole_turn: bool,
-    designs: Array, accuracy: Accuracy, window: Part,
+    designs: Array, accuracy: Accuracy, window: Window,
 ) -> Columns:  # fmt: skip
     columns = design_outputs(family, designs, operands, accuracy, None if whole_turn else window)
     value, error, status = compose(designs, columns)
@@ -263,7 +263,7 @@ def _is_of_point(member: Member, quantity: Quantity) -> bool:
     return bool(quantity.of) and member.own(quantity.of) not in member.family.pose_output
 
 
-def _by_itself(m: Member, outputs: Sequence[str], designs: Array, accuracy: Accuracy, window: Part) -> Columns:
+def _by_itself(m: Member, outputs: Sequence[str], designs: Array, accuracy: Accuracy, window: Window) -> Columns:
     """Compute outputs of a member's family; only once where the member is the same in all designs."""
     member_designs = m.designs(designs)
     identical = len(member_designs) > 1 and bool((member_designs[1:] == member_designs[0]).all())
@@ -271,7 +271,7 @@ def _by_itself(m: Member, outputs: Sequence[str], designs: Array, accuracy: Accu
     return {name: np.repeat(values, len(member_designs)) for name, values in columns.items()} if identical else columns
 
 
-def _of_member(m: Member, inner: Route, designs: Array, accuracy: Accuracy, window: Part) -> Columns:
+def _of_member(m: Member, inner: Route, designs: Array, accuracy: Accuracy, window: Window) -> Columns:
     """Run a member's own route, and rename its outputs for the machine."""
     results, phase = _by_itself(m, inner.outputs, designs, accuracy, window), m.phase(designs)
     columns: Columns = {"status": results["status"]}
@@ -286,7 +286,7 @@ def _of_member(m: Member, inner: Route, designs: Array, accuracy: Accuracy, wind
     return columns
 
 
-def _margins(machine: Machine, designs: Array, accuracy: Accuracy, window: Part) -> Columns:
+def _margins(machine: Machine, designs: Array, accuracy: Accuracy, window: Window) -> Columns:
     """Compute the margin of the weakest member; a member driven by another is tested at the angles that it gets."""
     status = np.zeros(len(designs), np.uint8)
     columns: Columns = {}

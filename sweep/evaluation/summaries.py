@@ -12,14 +12,14 @@ from sweep.effects import inputs_beside
 from sweep.errors import InputError
 from sweep.evaluation.angles import AngleUnit, in_radians, plain_names
 from sweep.evaluation.loads import Loads
-from sweep.evaluation.poses import Question, asked
+from sweep.evaluation.poses import requested
 from sweep.evaluation.route import Route
 from sweep.evaluation.routes import design_outputs, routes, with_errors
 from sweep.evaluation.statuses import meanings
 from sweep.evaluation.tables import design_matrix, kept_columns, plain_columns
 from sweep.families import Mechanism
 from sweep.families import family as find_family
-from sweep.families.base import DEFAULT_TARGET, Accuracy, Domain, Family, March
+from sweep.families.base import DEFAULT_TARGET, Accuracy, Domain, March
 from sweep.families.names import error_of
 from sweep.quantities.resolve import output, output_names
 from sweep.reductions.steps import check_certifiable, proofs
@@ -106,7 +106,7 @@ def summarise(
     import pandas as pd
 
     bare = find_family(family)
-    mechanism, wanted, units = asked_of_designs(bare, want, loads)
+    mechanism, wanted, units = requested(bare, want, loads, "design")
     chosen = chosen_accuracy(mechanism.domain, samples, accuracy, certify)
     if certify:
         check_certifiable(mechanism, wanted, chosen, window is not None)
@@ -125,15 +125,6 @@ def summarise(
     errors = {error_of(name): unit for name, unit in units.items() if error_of(name) in computed}
     result.attrs["units"] = {**units, **errors}
     return result
-
-
-def asked_of_designs(family: Family, want: str | Sequence[str], loads: Loads | None = None) -> Question:
-    """Make the request for design outputs of a family."""
-
-    def read(mechanism: Family, names: list[str]) -> dict[str, str]:
-        return {name: output(mechanism, name).unit for name in names if name != "status"}
-
-    return asked(family, want, loads, "design", read)
 
 
 def chosen_accuracy(

@@ -152,15 +152,15 @@ ELEVATION, AZIMUTH = math.radians(24.0), math.radians(-55.0)
 
 def first_pose(parts: Sequence[Part]) -> int:
     """Return the first pose in which every joint exists; 0 if there is none."""
-    return int(np.argmax(_whole(parts)))
+    return int(np.argmax(_assembled(parts)))
 
 
 def exists(parts: Sequence[Part]) -> bool:
     """Tell whether there are joints, and a pose in which all of them exist."""
-    return any(part.joints for part in parts) and bool(_whole(parts).any())
+    return any(part.joints for part in parts) and bool(_assembled(parts).any())
 
 
-def _whole(parts: Sequence[Part]) -> NDArray[np.bool_]:
+def _assembled(parts: Sequence[Part]) -> NDArray[np.bool_]:
     """Return the mask of poses in which every joint exists."""
     there = [np.isfinite(path).all(axis=1) for part in parts for path in part.joints.values()]
     return np.asarray(np.logical_and.reduce(there))

@@ -136,7 +136,7 @@ class Server:
         """Search while the page is connected; a page that disconnects stops its own search only."""
         from starlette.responses import StreamingResponse
 
-        body = await _asked(request)
+        body = await _json_body(request)
         design = self.hand.design(body["design"])
         problem = problem_in_hand(self.hand, design, body["free"])
         stop, counted = threading.Event(), [0]
@@ -173,7 +173,7 @@ class Server:
         from starlette.concurrency import run_in_threadpool
         from starlette.responses import Response
 
-        body = await _asked(request)
+        body = await _json_body(request)
         design, kind = self.hand.design(body["design"]), str(body["format"])
         content = await run_in_threadpool(self._file, design, kind)
         return Response(content, media_type="application/octet-stream")
@@ -196,7 +196,7 @@ def _needed() -> None:
         raise InputError("explore", "a page", needed, "explore") from error
 
 
-async def _asked(request: Request) -> dict[str, Any]:
+async def _json_body(request: Request) -> dict[str, Any]:
     body = await request.body()
     try:
         content = json.loads(body) if len(body) <= MOST_BYTES else None
@@ -213,7 +213,7 @@ def _json(answer: Callable[[dict[str, Any]], dict[str, Any]]) -> Callable[[Reque
     from starlette.responses import JSONResponse
 
     async def endpoint(request: Request) -> Response:
-        return JSONResponse(await run_in_threadpool(answer, await _asked(request)))
+        return JSONResponse(await run_in_threadpool(answer, await _json_body(request)))
 
     return endpoint
 

@@ -23,7 +23,7 @@ from sweep.families.base import Array, Family, Interval
 from sweep.plot.drawing import COLOURS, mechanism_figure
 from sweep.quantities.units import speed_given
 from sweep.report.figures import LIMIT, OPTIMUM, QUIET, REFERENCE, WIDTH, crank_axis, house_style, new_figure
-from sweep.report.live import lowest, whole
+from sweep.report.live import lowest, without_jumps
 from sweep.report.quantities import quantity
 
 if TYPE_CHECKING:
@@ -186,7 +186,7 @@ def aligned_turn(turn: pd.DataFrame, name: str, position: str) -> tuple[Array, A
         full = np.copysign(2.0 * np.pi, path[-1] - path[0]) if name == position else 0.0
         return np.append(phi, 2.0 * np.pi), np.append(values, values[0] + full)
     order = np.r_[start : phi.size, 0:start]
-    values = whole(name, values[order]) - (values[start] if name == position else 0.0)
+    values = without_jumps(name, values[order]) - (values[start] if name == position else 0.0)
     return np.append(np.mod(phi[order] - phi[start], 2.0 * np.pi), 2.0 * np.pi), np.append(values, values[0])
 
 

@@ -53,7 +53,7 @@ def prove_study(study: Study, folder: str | Path, cores: Cores, tell: Tell = lam
     known = known_proof(study, folder)
     if known is not None:
         return known
-    settings, question, target, key = _asked(study, Path(folder))
+    settings, question, target, key = _statement(study, Path(folder))
     side = files.beside(Path(folder))
     done = explored(question, target, settings, side / PARTS / key, cores, tell)
     proof = concluded(question, done, _best(side / files.OPTIMUM, question), settings.gap)
@@ -78,11 +78,11 @@ def known_proof(study: Study, folder: str | Path) -> Proof | None:
     proof = read_proof(path)
     if proof is None or proof.cut_short:
         return None
-    *_, key = _asked(study, Path(folder))
+    *_, key = _statement(study, Path(folder))
     return proof if metadata(path).get(b"key") == key.encode() else None
 
 
-def _asked(study: Study, folder: Path) -> tuple[ProveSettings, Question, float, str]:
+def _statement(study: Study, folder: Path) -> tuple[ProveSettings, Question, float, str]:
     """Return the settings, the question, the target in the unit of the proof's rows, and the key of the certificate."""
     if study.optimise is None or study.optimise.prove is None:
         raise MissingInput("optimise.prove", '{ gap = "1 %", boxes = 1000000 }', str(study.path))

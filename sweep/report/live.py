@@ -83,7 +83,7 @@ def in_window(path: Array, window: tuple[float, float]) -> NDArray[np.bool_]:
 FOLLOWERS = ("psi", "alpha")  # positions that are angles
 
 
-def whole(name: str, path: Array) -> Array:
+def without_jumps(name: str, path: Array) -> Array:
     """Return a follower's angle without jumps of a turn; any other curve unchanged."""
     known = np.isfinite(path)
     unwrapped = path.copy()
@@ -99,7 +99,7 @@ def lowest(position: str, path: Array) -> tuple[Array, bool, int]:
     path, bool, int
         path without the jumps of an angle; whether the follower turns fully; number of the pose, 0 if it turns fully.
     """
-    path = whole(position, path)
+    path = without_jumps(position, path)
     free = stem(position) in FOLLOWERS and bool(abs(path[-1] - path[0]) > 0.9 * 2.0 * np.pi)
     return path, free, int(np.nanargmin(path)) if not free and np.isfinite(path).any() else 0
 
@@ -179,7 +179,7 @@ def _motion(data: Dataset, shown: Shown, names: list[str]) -> Motion:
     if closed:
         path, free, start = lowest(family.position, path)
     order = np.roll(np.arange(POSES), -start)
-    curves = {name: whole(name, np.asarray(poses[name][0], np.float64)[order]) for name in names}
+    curves = {name: without_jumps(name, np.asarray(poses[name][0], np.float64)[order]) for name in names}
     from_lowest = closed and not free
     curves[family.position] = path[order] - (path[start] if from_lowest else 0.0)
     window = data.study.window

@@ -71,7 +71,7 @@ class Made(NamedTuple):
     costs: tuple[Cost, ...]
 
 
-def many(data: Dataset, row: Mapping[str, Any] | None, samples: int = 0) -> tuple[Array, Array] | None:
+def toleranced(data: Dataset, row: Mapping[str, Any] | None, samples: int = 0) -> tuple[Array, Array] | None:
     """Return a design (P,) and its toleranced mechanisms (n, P), n from the tolerances unless ``samples`` is given.
 
     None without tolerances, an optimisation, or a design.
@@ -126,7 +126,7 @@ def made_sentence(result: Made | None, tolerance: str) -> str:
 
 def histogram(data: Dataset, output: str) -> Histogram | None:
     """Return the histogram of one output over manufactured mechanisms; None without tolerances or an optimum."""
-    study, sample = data.study, many(data, data.optimum)
+    study, sample = data.study, toleranced(data, data.optimum)
     if sample is None:
         return None
     resolve.output(study.family, output)  # raises for an unknown name

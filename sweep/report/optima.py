@@ -20,7 +20,7 @@ from sweep.optimise.local.kkt import AGREE
 from sweep.quantities.dimensions import sizes
 from sweep.quantities.limits import compared, meets
 from sweep.report.dataset import Dataset, Row, records
-from sweep.report.made import many
+from sweep.report.made import toleranced
 from sweep.report.quantities import change, number, quantity
 from sweep.report.sketch import drawn_parts, sketch
 from sweep.report.tables import parameter_rows
@@ -232,7 +232,7 @@ def _made(data: Dataset, row: dict[str, Any]) -> str:
     if not limits:
         return ""
     if not math.isfinite(known):
-        sample = many(data, row, SAMPLES)
+        sample = toleranced(data, row, SAMPLES)
         if sample is None:
             return ""
         columns = design_outputs(study.family, sample[1], [x.output for x in limits], study.accuracy, study.window)

@@ -17,7 +17,7 @@ from sweep.families.machines.sewing import RPM, Sewing
 from sweep.families.machines.thread_balance import MEASURED_SPEED, MM_PER_M, ThreadBalance
 from sweep.report.dataset import Dataset
 from sweep.report.figures import LIMIT, WIDTH, new_figure
-from sweep.report.made import many
+from sweep.report.made import toleranced
 from sweep.report.quantities import number
 
 if TYPE_CHECKING:
@@ -32,7 +32,7 @@ ON_LIMIT = 1e-9  # mm: an optimum ends on its limits, and exceeds them by the ro
 
 
 @dataclass(frozen=True)
-class Row:
+class SpeedRow:
     """One speed: the window of the rise, the end of it that binds the optimum, and shares of mechanisms.
 
     ``shares`` are those of manufactured mechanisms that keep each moment, then the least and the most rise;
@@ -57,7 +57,7 @@ class Sewn:
 
     sentence: str
     moments: tuple[str, ...]
-    rows: tuple[Row, ...]
+    rows: tuple[SpeedRow, ...]
     count: int
     speeds: Array
     shares: Array
@@ -70,7 +70,7 @@ def sewn(data: Dataset) -> Sewn | None:
     """Sample mechanisms of the optimum and test sewing at every speed; None without tolerances or a sewing relation."""
     study = data.study
     sewing = next((one for one in getattr(study.family, "relations", ()) if isinstance(one, Sewing)), None)
-    drawn = many(data, data.optimum) if sewing else None
+    drawn = toleranced(data, data.optimum) if sewing else None
     if sewing is None or drawn is None or not isinstance(study.family, Machine):
         return None
     design, designs = drawn
@@ -87,7 +87,7 @@ def sewn(data: Dataset) -> Sewn | None:
     moments = tuple(name for name in kept if name not in ends)
     every = np.logical_and.reduce(list(kept.values()))
     rows = tuple(
-        Row(
+        SpeedRow(
             f"{stated[k] / RPM:.6g}",
             f"{number(float(windows[k, 0]))} to {number(float(windows[k, 1]))}",
             _binds(sewing, {end: float(nominal[name][k]) for end, name in sewing.ends.items()}, k),

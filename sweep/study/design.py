@@ -16,7 +16,7 @@ from typing import Any, Literal
 from sweep.errors import choices
 from sweep.families.base import Family
 from sweep.quantities.units import internal_unit
-from sweep.study.file import Faults, Key, Section, Seed, StudyFile, holds, own_table, read_section
+from sweep.study.file import Faults, Key, Section, Seed, StudyFile, holds, copied_table, read_section
 from sweep.study.parameter import Entry, forms, missing_parameter, read_entry
 from sweep.study.sobol import DIMENSIONS
 from sweep.study.space import Axis, DesignSpace
@@ -44,7 +44,7 @@ class ReferenceSection(Section):
 
 
 @dataclass(frozen=True)
-class Elsewhere:
+class OtherTables:
     """Parameters and entries that other tables than [design] give.
 
     ``fitted`` parameters are set by [fit] and must not be given, except lam, which then defines "up".  ``given``
@@ -61,7 +61,7 @@ class Elsewhere:
     tables: Mapping[str, str] = field(default_factory=dict)
 
 
-def read_space(file: StudyFile, family: Family, other: Elsewhere) -> DesignSpace | None:
+def read_space(file: StudyFile, family: Family, other: OtherTables) -> DesignSpace | None:
     """Read the designs of a study, or None if a parameter is faulty (all faults are reported)."""
     raw, faults = file.free_table("design"), file.faults
     if raw is None:
@@ -113,7 +113,12 @@ def check_varied(file: StudyFile, family: Family, space: DesignSpace, entries: M
 
 
 def read_reference(
-    section: ReferenceSection, bare: Family, family: Family, faults: Faults, other: Elsewhere, space: DesignSpace | None
+    section: ReferenceSection,
+    bare: Family,
+    family: Family,
+    faults: Faults,
+    other: OtherTables,
+    space: DesignSpace | None,
 ) -> dict[str, float] | None:
     """Read the parameters of the reference design, in the order of the family.
 
@@ -144,7 +149,7 @@ def read_reference(
     return {name: values[name] for name in family.parameter_names if name in values}
 
 
-def _check_needless(raw: Mapping[str, Any], other: Elsewhere, faults: Faults) -> None:
+def _check_needless(raw: Mapping[str, Any], other: OtherTables, faults: Faults) -> None:
     """Report parameters in [design] that another table sets."""
     words = dict.fromkeys(other.given, "[scene] gives it")
     words |= {name: "[fit] finds it" for name in other.fitted if not name.startswith("lam")}
@@ -194,7 +199,7 @@ def take(file: StudyFile, family: Family, elsewhere: Collection[str]) -> None:
     """
     notes: list[str] = []
     for key in (("design",), ("reference", "design")):
-        table = own_table(file.data, key)
+        table = copied_table(file.data, key)
         for name in [name for name in table or () if name.rpartition(".")[2] == FROM]:
             assert table is not None
             member = name.removesuffix(FROM)
@@ -211,14 +216,14 @@ def take(file: StudyFile, family: Family, elsewhere: Collection[str]) -> None:
             left_out = {x for x in elsewhere if not x.startswith("lam")} if key == ("design",) else set()
             _fill(file, table, (*key, name), member, design, family, left_out)
             notes.append(f"{'.'.join((*key, member.rstrip('.'))).rstrip('.')}: {source} {now}")
-    study_table = own_table(file.data, ("study",))
+    study_table = copied_table(file.data, ("study",))
     if notes and study_table is not None:
         study_table["taken"] = notes
 
 
 def taken_reference(file: StudyFile, section: ReferenceSection) -> ReferenceSection:
     """Return the section with the design that `take` has filled in."""
-    table = own_table(file.data, ("reference", "design"))
+    table = copied_table(file.data, ("reference", "design"))
     return section if section.design is None else section.model_copy(update={"design": table})
 
 

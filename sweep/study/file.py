@@ -144,7 +144,7 @@ class StudyFile:
             raise StudyError(str(self.path), self.faults.lines)
 
 
-def own_table(data: Mapping[str, Any], key: tuple[str, ...]) -> dict[str, Any] | None:
+def copied_table(data: Mapping[str, Any], key: tuple[str, ...]) -> dict[str, Any] | None:
     """Replace a table of the file by a copy that may be changed, and return the copy; None if it does not exist."""
     table: Any = data
     for part in key:

@@ -14,7 +14,7 @@ from sweep.families.base import Accuracy, Family
 from sweep.families.machines.specification import Specification
 from sweep.quantities.limits import Limit
 from sweep.study.accuracy import accuracy_table, check_proofs, read_accuracy
-from sweep.study.design import Elsewhere, check_varied, read_reference, read_space, take, taken_reference
+from sweep.study.design import OtherTables, check_varied, read_reference, read_space, take, taken_reference
 from sweep.study.file import Faults, StudyFile
 from sweep.study.limits import read_limits
 from sweep.study.loads import Inputs, check_unused, read_inputs, read_window, speeds, tables_of_inputs, with_effects
@@ -115,8 +115,8 @@ def merged(base: Mapping[str, Any], over: Mapping[str, Any], key: tuple[str, ...
     result = copy.deepcopy(dict(base))
     for name, new in over.items():
         old = result.get(name)
-        tables = isinstance(old, dict) and isinstance(new, dict)
-        if tables and (*key, name) not in WHOLE and {"value", "values"}.isdisjoint({*old, *new}):
+        mixed = (*key, name) not in WHOLE
+        if isinstance(old, dict) and isinstance(new, dict) and mixed and {"value", "values"}.isdisjoint({*old, *new}):
             result[name] = merged(old, new, (*key, name))
         else:
             result[name] = copy.deepcopy(new)
@@ -169,7 +169,7 @@ def _study(
     check_objective(objective, family, faults)
     check_steady(file, family, objective, limits)
     front = read_pareto(sections.pareto, file, family, objective, sections.optimise, limits)
-    other = _elsewhere(file, bare, family, fitted, sections.scene.speed, locus, prescribed, inputs)
+    other = _other_tables(file, bare, family, fitted, sections.scene.speed, locus, prescribed, inputs)
     space = read_space(file, family, other)
     if space is not None and fit is None and (locus is None or sections.optimise.variables != "parameters"):
         check_varied(file, family, space, inputs.raw)
@@ -209,14 +209,14 @@ def _study(
     )
 
 
-def _elsewhere(
+def _other_tables(
     file: StudyFile, bare: Family, family: Family, fitted: tuple[str, ...], speed: float | None, locus: OnLocus | None,
     prescribed: dict[str, Entry], inputs: Inputs,
-) -> Elsewhere:  # fmt: skip
+) -> OtherTables:  # fmt: skip
     """Collect the parameters that other tables than [design] give."""
     tables = tables_of_inputs(file, bare, family, inputs)
     made = () if locus is None else locus.made
-    return Elsewhere(fitted, speeds(family, speed), made, prescribed, inputs.raw, tables)
+    return OtherTables(fitted, speeds(family, speed), made, prescribed, inputs.raw, tables)
 
 
 def _computed(

@@ -72,7 +72,7 @@ def read_inputs(file: StudyFile, bare: Family) -> Inputs:
     """Read [bodies] and [loads]; report names that are no inputs of effects or stand in the wrong table."""
     inputs = Inputs()
     given = {table: entries for table in ("bodies", "loads") if (entries := file.free_table(table)) is not None}
-    tables = {name: home(bare, name) for name in (input_names(bare) if given else ())}
+    tables = {name: table_of(bare, name) for name in (input_names(bare) if given else ())}
     design = file.free_table("design") or {}
     for table, entries in given.items():
         for name, entry in _with_rods(entries, file.faults).items() if table == "bodies" else entries.items():
@@ -114,7 +114,7 @@ def tables_of_inputs(file: StudyFile, bare: Family, family: Family, inputs: Inpu
     """Return the table of every input of the effects; a missing input has the table it belongs to."""
     design = file.free_table("design") or {}
     added = [name for name in family.parameter_names if name not in bare.parameter_names and name not in design]
-    return {name: inputs.tables.get(name, home(bare, name)) for name in added}
+    return {name: inputs.tables.get(name, table_of(bare, name)) for name in added}
 
 
 def check_unused(file: StudyFile, bare: Family, family: Family, inputs: Inputs) -> None:
@@ -126,7 +126,7 @@ def check_unused(file: StudyFile, bare: Family, family: Family, inputs: Inputs) 
             read_entry(all_inputs(bare)[name], entry, key, file.faults, sampled="sample" in design)
 
 
-def home(family: Family, name: str) -> str:
+def table_of(family: Family, name: str) -> str:
     """Return the table that an input of an effect belongs to.
 
     The speed of the crank is given in [scene] or swept in [design].
@@ -143,15 +143,15 @@ def plain_name(family: Family, name: str) -> str:
     return next((plain for stage in family.stages if (plain := at_stage(name, stage.tail))), name)
 
 
-def _misplaced(bare: Family, key: Key, entry: object, homes: dict[str, str], faults: Faults) -> None:
+def _misplaced(bare: Family, key: Key, entry: object, owners: dict[str, str], faults: Faults) -> None:
     table, name = str(key[0]), str(key[1])
     if name in bare.parameter_names:
         faults.value(key, entry, "nothing here: it is a parameter of the mechanism and stands in [design]")
-    elif name in homes:
-        home = {"design": "[scene] or [design]"}.get(homes[name], f"[{homes[name]}]")
-        faults.value(key, entry, f"nothing here: it stands in {home}")
+    elif name in owners:
+        owner = {"design": "[scene] or [design]"}.get(owners[name], f"[{owners[name]}]")
+        faults.value(key, entry, f"nothing here: it stands in {owner}")
     else:
-        names = sorted(name for name, home in homes.items() if home == table)
+        names = sorted(name for name, owner in owners.items() if owner == table)
         guess = closest(name, names)  # the inputs of a chain are hundreds
         names = names if guess is None else [guess]
         faults.unknown(key, names, f"input of the effects of {bare.name}")

@@ -28,7 +28,7 @@ from sweep.study.file import (
     ThreeLengths,
     TwoLengths,
     holds,
-    own_table,
+    copied_table,
     quantity,
     read_section,
 )
@@ -155,7 +155,7 @@ def flattened(data: Mapping[str, Any], members: object) -> dict[str, Any]:
     if not isinstance(members, dict):
         return result
     for key in BY_MEMBER:
-        table, flat = own_table(result, key) or {}, dict[str, Any]()
+        table, flat = copied_table(result, key) or {}, dict[str, Any]()
         for name, entry in table.items():
             nested = name in members and isinstance(entry, dict)
             flat |= {f"{name}.{inner}": value for inner, value in entry.items()} if nested else {name: entry}

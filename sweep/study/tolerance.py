@@ -39,11 +39,11 @@ def read_tolerance(section: ToleranceSection, file: StudyFile, family: Family) -
     if not 2 <= samples <= MOST_SAMPLES or samples & (samples - 1):
         allowed = f"a power of two, 2 to {MOST_SAMPLES}: a Sobol sample keeps its balance only so"
         file.faults.value(("tolerance", "samples"), samples, allowed)
-    single = tuple(_own(section.own, file, family).items())
+    single = tuple(_of_patterns(section.own, file, family).items())
     return Tolerance(section.lengths or 0.0, section.angles or 0.0, section.robust, single, samples)
 
 
-def _own(given: Mapping[str, str], file: StudyFile, family: Family) -> dict[str, float]:
+def _of_patterns(given: Mapping[str, str], file: StudyFile, family: Family) -> dict[str, float]:
     """Return the tolerances of single parameters; of several matching patterns the last holds."""
     tolerances: dict[str, float] = {}
     for pattern, text in given.items():

@@ -46,7 +46,7 @@ def read_toml(file: Path) -> dict[str, Any]:
     try:
         data = tomllib.loads(text)
     except tomllib.TOMLDecodeError as error:
-        raise _fault(file, _said(text, str(error))) from None
+        raise _fault(file, _clearer(text, str(error))) from None
     except ValueError:  # Python refuses to read an integer of thousands of digits
         match = _DIGITS.search(text)
         line = text.count("\n", 0, match.start() if match else 0) + 1
@@ -84,7 +84,7 @@ def _fault(file: Path, text: str) -> StudyError:
     return StudyError(str(file), [f"{place}: {re.sub('^line [0-9]+: ', '', text)}"])
 
 
-def _said(text: str, message: str) -> str:
+def _clearer(text: str, message: str) -> str:
     """Return tomllib's message in clearer words; for a duplicate key with the line of the first one."""
     line, column = text.count("\n") + 1, len(text) - text.rfind("\n")
     message = message.replace("at end of document", f"at line {line}, column {column}, the end of the file")

@@ -115,16 +115,16 @@ def _fitted(
     """Return the fitted parameters (4, n), the travel (n,) and the status of guides at their input angles (n, m)."""
     names = ("x_b", "y_b", "x_c", "y_c")
     pins = guide.poses(links, Angles.of(angles), frozenset(names))
-    coordinates = floats(pins, *names)
+    xy = floats(pins, *names)
     missing = pins["status"] != codes.OK
     if missing.any():
-        for coordinate in coordinates:
-            coordinate[missing] = np.nan
+        for column in xy:
+            column[missing] = np.nan
     values = np.array([links[:, guide.parameter_names.index(name)] for name in guided.fitted])
     along, across, direction, offset = values
     deviation, travel = np.empty(len(links)), np.empty(len(links))
     line = Straightest(along, across, offset, deviation, travel, np.empty(len(links), np.uint8))
-    line_fit(*coordinates, limits, direction, fit.free_direction, line)
+    line_fit(xy[0], xy[1], xy[2], xy[3], limits, direction, fit.free_direction, line)
     return values, travel, line.status
 
 

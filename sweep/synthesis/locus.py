@@ -32,7 +32,7 @@ if TYPE_CHECKING:
 ARC_ENDS = 8
 
 
-class Found(NamedTuple):
+class LocusSolutions(NamedTuple):
     """Mechanisms of a requirement: the design matrix, and per row its status and the failed acceptance test, (n,) each.
 
     ``phi1`` (not reduced to one turn) and ``start`` are the crank angle and the follower's position at the extended
@@ -52,7 +52,7 @@ class Locus:
     """One form of a requirement on the motion of a follower.
 
     ``chosen_by`` is the column that distinguishes this form from the others of its family; ``kernel`` computes designs
-    and the fields of `Found` in ``gives``.  ``arc_ends`` computes the possible ends of arcs of phi1, at most ARC_ENDS,
+    and the fields of `LocusSolutions` in ``gives``.  ``arc_ends`` computes the possible ends of arcs of phi1, at most ARC_ENDS,
     nan for missing ones; None if unknown.
     """
 
@@ -91,7 +91,7 @@ class Locus:
             refuse_rows(bad, matrix[:, self.parameter_names.index(name)], name, allowed)
         return matrix
 
-    def solve(self, matrix: Array) -> Found:
+    def solve(self, matrix: Array) -> LocusSolutions:
         """Compute the mechanisms of (n, P) requirements; with phi1 these may be complex128, for exact gradients."""
         n, names = len(matrix), ({"psi1": "start", "s1": "start"}.get(name, name) for name in self.parameter_names)
         columns = dict(zip(names, matrix.T, strict=True))
@@ -101,7 +101,7 @@ class Locus:
         roots = [np.ascontiguousarray(columns["root"])] if self.has_roots else []
         self.kernel(matrix, *roots, status, failed, designs, *results.values())
         known = columns | results
-        return Found(designs, status, failed, known["phi1"], known["start"], known["phi0"])
+        return LocusSolutions(designs, status, failed, known["phi1"], known["start"], known["phi0"])
 
     def _ranges(self, matrix: Array) -> list[tuple[str, str, NDArray[np.bool_]]]:
         columns = dict(zip(self.parameter_names, matrix.T, strict=True))
@@ -304,7 +304,7 @@ class OnLocus:
         solved = form.solve(form.read({name: columns[self.outside(name)] for name in form.parameter_names}))
         return self.links_of(solved), solved.status
 
-    def links_of(self, solved: Found) -> dict[str, Array]:
+    def links_of(self, solved: LocusSolutions) -> dict[str, Array]:
         """Return the parameters in ``made`` from mechanisms of this stage alone."""
         parameters = find_family(self.family).parameter_names
         return {name: solved.designs[:, parameters.index(name.removesuffix(self.number))] for name in self.made}

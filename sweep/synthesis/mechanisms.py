@@ -21,7 +21,7 @@ from sweep.evaluation.summaries import design_outputs
 from sweep.evaluation.tables import Sheet, design_matrix, index_of, parameter_units, refuse_rows
 from sweep.families import family as find_family
 from sweep.families.base import Accuracy, Array, Parameter
-from sweep.synthesis.locus import Found, Locus, locus
+from sweep.synthesis.locus import LocusSolutions, Locus, locus
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -168,7 +168,7 @@ def _units(form: Locus) -> dict[str, str]:
     return parameter_units(mechanism.parameters) | root | limits | angles | {"margin": "1"}
 
 
-def _limits(form: Locus, solved: Found, amplitude: Array) -> dict[str, object]:
+def _limits(form: Locus, solved: LocusSolutions, amplitude: Array) -> dict[str, object]:
     letter, name = find_family(form.family).position, form.parameter_names[0]
     exists = solved.status == st.OK
     phi1, start = (np.where(exists, x, np.nan) for x in (solved.phi1, solved.start))
@@ -182,7 +182,7 @@ def _limits(form: Locus, solved: Found, amplitude: Array) -> dict[str, object]:
     }
 
 
-def _verdict(family: str, solved: Found, limit: float | None) -> dict[str, object]:
+def _verdict(family: str, solved: LocusSolutions, limit: float | None) -> dict[str, object]:
     """Return tests (iv) and (v) of the mechanisms that passed the first three."""
     import pandas as pd
 

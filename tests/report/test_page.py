@@ -21,7 +21,7 @@ from sweep.plot.mechanisms import aligned_turn
 from sweep.report.answer import answer, searched
 from sweep.report.dataset import gather, marked
 from sweep.report.figures import house_style
-from sweep.report.live import in_window, lowest, whole
+from sweep.report.live import in_window, lowest, without_jumps
 from sweep.report.maps import design_map, map_figure, overlays
 from sweep.report.page import write_report
 from sweep.report.quantities import quantity
@@ -275,10 +275,10 @@ def test_angle_is_shown_where_it_is_known_and_without_jumps() -> None:
     path = 3.0 - np.cos(phi - 1.0)
     jumping = np.where(phi > 5.0, np.nan, np.angle(np.exp(1j * path)))
     for name in ("psi", "needle.psi", "alpha"):
-        found = whole(name, jumping)
+        found = without_jumps(name, jumping)
         np.testing.assert_array_equal(np.isnan(found), np.isnan(jumping))
         np.testing.assert_allclose(found[phi <= 5.0], path[phi <= 5.0], atol=1e-12)
-    np.testing.assert_array_equal(whole("s", jumping), jumping)
+    np.testing.assert_array_equal(without_jumps("s", jumping), jumping)
 
 
 def test_window_is_counted_from_the_lowest_position() -> None:

@@ -18,7 +18,7 @@ from sweep.evaluation.summaries import design_outputs
 from sweep.evaluation.tables import design_matrix
 from sweep.families import family
 from sweep.families.base import Accuracy, Angles, Array
-from sweep.synthesis.tasks.problem import Found, Task, Unknown, turning
+from sweep.synthesis.tasks.problem import NamedCandidates, Task, Unknown, turning
 
 Number: TypeAlias = Array | float
 
@@ -150,7 +150,7 @@ class EngineeringMethod(OnLocus):
         low, high = self.f_range
         return (turning("phi1"),) if low == high else (turning("phi1"), Unknown("f", low, high))
 
-    def found(self, x: Mapping[str, Array]) -> Found:
+    def named_candidates(self, x: Mapping[str, Array]) -> NamedCandidates:
         """Compute equations, limits, curve and mechanisms of candidates from their unknowns, (n,) each."""
         designs, psi1 = self.drive(x["phi1"], x.get("f", self.f_range[0]))
         columns = named(designs)
@@ -161,7 +161,7 @@ class EngineeringMethod(OnLocus):
             curve = np.sqrt(1.0 - least_cos2(designs))[:, None]  # sine of the largest pressure angle
         limits = {"pressure angle": pressure_limit(designs, self.max_pressure_angle)}
         limits |= {"bearings": bearing_reserve(designs, self.bearings)} if self.bearings else {}
-        return Found({}, limits, curve, columns)
+        return NamedCandidates({}, limits, curve, columns)
 
     def offset_ranges(self, places: int = 180, offsets: int = 181) -> list[tuple[float, float]]:
         """Return the ranges of f in which some place of the locus satisfies all limits: step 3 of the method.

@@ -13,7 +13,7 @@ from sweep.evaluation.summaries import design_outputs
 from sweep.families import slotted
 from sweep.families.base import Accuracy, Angles, Array, floats
 from sweep.synthesis.tasks.crank_rocker import RSSR, OnLocus, named, pressure_limit, turn, with_tops
-from sweep.synthesis.tasks.problem import Found, Unknown, ranges, turning
+from sweep.synthesis.tasks.problem import NamedCandidates, Unknown, ranges, turning
 from sweep.synthesis.tasks.second_stage import RSSP, chain_motion, second_pressure_limit
 
 EXACT = Accuracy(target=1e-12)
@@ -78,7 +78,7 @@ class Task5(OnLocus):
         """Places of both stages on their loci."""
         return (turning("phi1"), *ranges(self, "f"), turning("t1"), *ranges(self, "ratio"))
 
-    def found(self, x: Mapping[str, Array]) -> Found:
+    def named_candidates(self, x: Mapping[str, Array]) -> NamedCandidates:
         """Compute equations, limits, curve and mechanisms of candidates from their unknowns, (n,) each."""
         phi1, t1, ones = x["phi1"], x["t1"], np.ones(len(x["phi1"]))
         designs, psi1 = self.drive(phi1, x["f"])
@@ -104,7 +104,7 @@ class Task5(OnLocus):
             "a2 positive": a2 / abs(self.rho0),
             "no return of the pin": np.minimum(sign * np.sin(t1), sign * np.sin(t2)),
         }
-        return Found(
+        return NamedCandidates(
             equations, limits, curve, named(designs, "1") | {"a2": a2, "e2": e2, "t1": t1, "kappa": self.kappa}
         )
 
@@ -152,7 +152,7 @@ class Task8(OnLocus):
         """Places on both loci."""
         return (turning("phi1"), *ranges(self, "f", "coupler", "offset"))
 
-    def found(self, x: Mapping[str, Array]) -> Found:
+    def named_candidates(self, x: Mapping[str, Array]) -> NamedCandidates:
         """Compute equations, limits, curve and mechanisms of candidates from their unknowns, (n,) each."""
         coupler, offset, ones = x["coupler"], x["offset"], np.ones(len(x["phi1"]))
         designs, psi1 = self.drive(x["phi1"], x["f"])
@@ -183,7 +183,7 @@ class Task8(OnLocus):
             # all steps of the slider have the direction of the whole stroke
             "no return of the slider": (np.diff(slide, axis=1) * np.sign(travel)[:, None]).min(axis=1),
         }
-        return Found({}, limits, with_tops(d2s), columns | {"dwell_deviation": deviation})
+        return NamedCandidates({}, limits, with_tops(d2s), columns | {"dwell_deviation": deviation})
 
     def _deviation(self, designs: Array, phi1: Array, psi1: Array, theta: Array, lengths: Array) -> Array:
         """Return the largest distance from the dwell position during the dwell."""

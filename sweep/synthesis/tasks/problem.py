@@ -152,7 +152,7 @@ class Solution:
         return "\n".join(lines)
 
 
-class Found(NamedTuple):
+class NamedCandidates(NamedTuple):
     """`Candidates` of a task by name: equations and limits (n,) each, the curve (n, m), the mechanisms."""
 
     equations: Mapping[str, Array]
@@ -188,11 +188,11 @@ class Task(ABC):
         """Unknowns of the task."""
 
     @abstractmethod
-    def found(self, x: Mapping[str, Array]) -> Found:
+    def named_candidates(self, x: Mapping[str, Array]) -> NamedCandidates:
         """Compute equations, limits, curve and mechanisms of candidates from their unknowns by name, (n,) each."""
 
     @cached_property
-    def _named(self) -> Found:
+    def _named(self) -> NamedCandidates:
         return self._bounded(np.array([[0.5 * (u.low + u.high) for u in self.unknowns]]))
 
     @property
@@ -211,9 +211,9 @@ class Task(ABC):
         columns = {name: np.broadcast_to(np.asarray(values, np.float64), n) for name, values in named.results.items()}
         return Candidates(_stacked(n, named.equations), _stacked(n, named.limits), named.curve, columns)
 
-    def _bounded(self, x: Array) -> Found:
+    def _bounded(self, x: Array) -> NamedCandidates:
         """Return the values of candidates x (n, unknowns), with slacks of the bounds in units of their range."""
-        named = self.found(dict(zip((u.name for u in self.unknowns), x.T, strict=True)))
+        named = self.named_candidates(dict(zip((u.name for u in self.unknowns), x.T, strict=True)))
         limits = dict(named.limits)
         for name, (low, high) in self.bounds.items():
             if name not in named.results:

@@ -19,7 +19,7 @@ from sweep.evaluation.tables import design_matrix
 from sweep.families import family
 from sweep.families.base import Accuracy, Angles, Array
 from sweep.synthesis.tasks.crank_rocker import RSSR, named, turn, with_tops
-from sweep.synthesis.tasks.problem import Found, Task, Unknown, turning
+from sweep.synthesis.tasks.problem import NamedCandidates, Task, Unknown, turning
 
 RSSP = family("rssp")
 SIDEWAYS = {"along": (-4.0, 6.0), "across": (-4.0, 4.0)}
@@ -195,7 +195,7 @@ class Task6(Task):
         """Proportions of the second stage relative to its crank, and the crank angle at J1."""
         return (*(Unknown(name, *ends) for name, ends in STAGES[self.second].shape.items()), turning("theta1"))
 
-    def found(self, x: Mapping[str, Array]) -> Found:
+    def named_candidates(self, x: Mapping[str, Array]) -> NamedCandidates:
         """Compute equations, limits, curve and mechanisms of candidates from their unknowns, (n,) each."""
         first, stage, theta = self._first, STAGES[self.second], x["theta1"]
         shape = {name: x[name] for name in stage.shape}
@@ -229,7 +229,7 @@ class Task6(Task):
             family(["rssr", self.second]).parameter_names
         )
         named_columns = {name: column for name, column in columns.items() if name not in beyond}
-        return Found(
+        return NamedCandidates(
             equations, limits, with_tops(d2s), named_columns | {"x0": origin.real, "y0": origin.imag, "beta0": beta}
         )
 
@@ -293,7 +293,7 @@ class Task7(Task):
         low, high = (limit * abs(self.stroke) for limit in self.size_range)
         return Unknown("a2", low, high), Unknown("b2", low, high), Unknown("e2", -high, high), turning("theta1")
 
-    def found(self, x: Mapping[str, Array]) -> Found:
+    def named_candidates(self, x: Mapping[str, Array]) -> NamedCandidates:
         """Compute equations, limits, curve and mechanisms of candidates from their unknowns, (n,) each."""
         theta, first = x["theta1"], self._first
         ones = np.ones(len(theta))
@@ -316,4 +316,6 @@ class Task7(Task):
             equations[f"acceleration at the {end}"] = self.kappa * second * ds[:, k] / value - 1.0
         d2s, angle = chain_motion("rssp", columns, "d2s", "pressure_angle2")
         limits = {"pressure angle 2": second_pressure_limit(angle, self.max_pressure_angle)}
-        return Found(equations, limits, with_tops(d2s if self.objective == "acceleration" else np.sin(angle)), columns)
+        return NamedCandidates(
+            equations, limits, with_tops(d2s if self.objective == "acceleration" else np.sin(angle)), columns
+        )

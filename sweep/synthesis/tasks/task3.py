@@ -15,7 +15,7 @@ from sweep.evaluation.summaries import design_outputs
 from sweep.evaluation.tables import design_matrix
 from sweep.families.base import Accuracy, Array, floats
 from sweep.synthesis.tasks.crank_rocker import RSSR, acceleration, designs_on_locus, named, outputs_of, pressure_limit
-from sweep.synthesis.tasks.problem import Found, Task, Unknown, ranges, turning
+from sweep.synthesis.tasks.problem import NamedCandidates, Task, Unknown, ranges, turning
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -89,7 +89,7 @@ class Task3(Task):
     def _value(self, k: int) -> str:
         return f"{self.adjusted} of setting {k}"
 
-    def found(self, x: Mapping[str, Array]) -> Found:
+    def named_candidates(self, x: Mapping[str, Array]) -> NamedCandidates:
         """Compute equations, limits, curve and mechanisms of candidates from their unknowns, (n,) each."""
         place = (x["phi1"], self.e, x["f"], x.get("g", self.g), x.get("alpha", self.alpha))
         first, _ = designs_on_locus(self.swing, self.phi0, *place)
@@ -105,7 +105,7 @@ class Task3(Task):
             f"pressure angle of setting {k}": pressure_limit(design, self.max_pressure_angle)
             for k, design in enumerate(designs, 1)
         }
-        return Found(equations, limits, np.hstack([acceleration(design) for design in designs]), results)
+        return NamedCandidates(equations, limits, np.hstack([acceleration(design) for design in designs]), results)
 
 
 def adjustments(design: Mapping[str, float]) -> pd.DataFrame:
