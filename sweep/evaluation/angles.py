@@ -67,7 +67,8 @@ def in_radians(
         like degrees.
     """
     _check_unit(angles)
-    units: dict[str, str] = {name: p.unit for name, p in others.items()} | {p.name: p.unit for p in family.parameters}
+    units: dict[str, str] = {name: p.unit for name, p in others.items()}
+    units |= {p.name: p.unit for p in family.parameters}
     variable = "" if domain is None else domain.name
     if domain is not None:
         units[variable] = domain.unit

@@ -17,7 +17,7 @@ from kernels.types import TWO_PI, Status
 from sweep import costs
 from sweep.errors import InputError
 from sweep.evaluation import route
-from sweep.evaluation.route import Window, Route, check_window, general_route, own_route
+from sweep.evaluation.route import Route, Window, check_window, general_route, own_route
 from sweep.evaluation.statuses import explained
 from sweep.families.base import Accuracy, Array, Columns, Family, Interval, March, Stage, Step, Work, of_family
 from sweep.families.capabilities import Assembly

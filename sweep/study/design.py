@@ -16,7 +16,7 @@ from typing import Any, Literal
 from sweep.errors import choices
 from sweep.families.base import Family
 from sweep.quantities.units import internal_unit
-from sweep.study.file import Faults, Key, Section, Seed, StudyFile, holds, copied_table, read_section
+from sweep.study.file import Faults, Key, Section, Seed, StudyFile, copied_table, holds, read_section
 from sweep.study.parameter import Entry, forms, missing_parameter, read_entry
 from sweep.study.sobol import DIMENSIONS
 from sweep.study.space import Axis, DesignSpace

@@ -27,8 +27,8 @@ from sweep.study.file import (
     Three,
     ThreeLengths,
     TwoLengths,
-    holds,
     copied_table,
+    holds,
     quantity,
     read_section,
 )

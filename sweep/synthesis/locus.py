@@ -52,8 +52,8 @@ class Locus:
     """One form of a requirement on the motion of a follower.
 
     ``chosen_by`` is the column that distinguishes this form from the others of its family; ``kernel`` computes designs
-    and the fields of `LocusSolutions` in ``gives``.  ``arc_ends`` computes the possible ends of arcs of phi1, at most ARC_ENDS,
-    nan for missing ones; None if unknown.
+    and the fields of `LocusSolutions` in ``gives``.  ``arc_ends`` computes the possible ends of arcs of phi1, at most
+    ARC_ENDS, nan for missing ones; None if unknown.
     """
 
     family: str

@@ -21,7 +21,7 @@ from sweep.evaluation.summaries import design_outputs
 from sweep.evaluation.tables import Sheet, design_matrix, index_of, parameter_units, refuse_rows
 from sweep.families import family as find_family
 from sweep.families.base import Accuracy, Array, Parameter
-from sweep.synthesis.locus import LocusSolutions, Locus, locus
+from sweep.synthesis.locus import Locus, LocusSolutions, locus
 
 if TYPE_CHECKING:
     import pandas as pd
