@@ -11,7 +11,7 @@ import numpy as np
 
 from kernels.status import OK
 from sweep.chunks.cascade import BLOCK, Batch, Cascade, Recalled, levels
-from sweep.chunks.parameters import Parameters, runs_matrix
+from sweep.chunks.parameters import leading_columns, leading_matrix, runs_matrix
 from sweep.errors import InputError
 from sweep.evaluation.summaries import design_outputs
 from sweep.families.base import Array, Columns
@@ -112,7 +112,7 @@ def compute_chunk(
         raise InputError("designs", f"{start}:{stop}", f"a range inside 0:{study.space.count}", f"study {study.name}")
     keep = study.output.keep == "all"
     cascades = [Cascade(study, keep, should_stop)]
-    parameters = Parameters.of(study, cascades[0].levels[0].columns)
+    leading = leading_columns(study, cascades[0].levels[0].columns)
     designs_known = np.empty(0, np.int64)
     if known is not None:
         feasible = known["status"] == OK
@@ -121,7 +121,7 @@ def compute_chunk(
         cascades.append(Recalled(study, keep, should_stop, recalled))
     for low in range(start, stop, BLOCK):
         index = np.arange(low, min(low + BLOCK, stop))
-        matrix, status = parameters.first(low, low + index.size)
+        matrix, status = leading_matrix(study, leading, low, low + index.size)
         if known is None:
             cascades[0].feed(index, matrix, status)
             continue

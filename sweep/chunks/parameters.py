@@ -8,7 +8,6 @@ surviving designs.
 from __future__ import annotations
 
 from collections.abc import Iterable
-from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -60,36 +59,26 @@ def parameter_ns(study: Study) -> float:
     return cost + sum(log if axis.scale == "log" else plain for axis in study.space.axes)
 
 
-@dataclass(frozen=True)
-class Parameters:
-    """Generator of the parameters of a study's designs; their bits do not depend on when they are generated.
+def leading_columns(study: Study, needed: int | None) -> int:
+    """Choose how many columns of the design matrix are generated at first: ``needed``, or all if it is None.
 
-    Parameters
-    ----------
-    study : the study
-    leading : number of columns of the design matrix that `first` generates
+    All are generated at first where rows are kept anyway, where [locus] computes some from others, and where a value
+    may be invalid, so that the error names its place.
     """
+    if needed is None or study.output.keep == "all" or study.locus is not None or not _is_valid(study):
+        return len(study.family.parameters)
+    return needed
 
-    study: Study
-    leading: int
 
-    @classmethod
-    def of(cls, study: Study, needed: int | None) -> Parameters:
-        """Choose how many columns are generated at first: ``needed``, or all if it is None.
+def leading_matrix(study: Study, leading: int, start: int, stop: int) -> tuple[Array, NDArray[np.uint8]]:
+    """Return the leading columns of the designs start, ..., stop - 1, (n, leading), and their status (n,).
 
-        All are generated at first where rows are kept anyway, where [locus] computes some from others, and where a
-        value may be invalid, so that the error names its place.
-        """
-        count = len(study.family.parameters)
-        deferrable = needed is not None and study.output.keep != "all" and study.locus is None and _is_valid(study)
-        return cls(study, needed if needed is not None and deferrable else count)
-
-    def first(self, start: int, stop: int) -> tuple[Array, NDArray[np.uint8]]:
-        """Return the leading columns of the designs start, ..., stop - 1, (n, leading), and their status (n,)."""
-        names = self.study.family.parameter_names
-        if self.leading == len(names):
-            return parameter_matrix(self.study, start, stop)
-        return self.study.space.matrix(start, stop, names[: self.leading]), np.zeros(stop - start, np.uint8)
+    The bits of a parameter do not depend on when it is generated.
+    """
+    names = study.family.parameter_names
+    if leading == len(names):
+        return parameter_matrix(study, start, stop)
+    return study.space.matrix(start, stop, names[:leading]), np.zeros(stop - start, np.uint8)
 
 
 def completed(study: Study, index: NDArray[np.int64], designs: Array) -> Array:

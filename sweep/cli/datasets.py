@@ -10,6 +10,7 @@ import click
 from sweep.cli.options import FOLDER, IS_FOLDER, OUT, SMOKE, STUDY
 from sweep.dataset.comparison import compare as compare_datasets
 from sweep.dataset.files import DESIGNS
+from sweep.dataset.verification import INCOMPLETE
 from sweep.dataset.verification import verify as verify_dataset
 from sweep.engine.parts import merge as merge_parts
 from sweep.engine.parts import split as split_study
@@ -55,9 +56,6 @@ def compare(old: Path, new: Path, rtol: float, slower: float) -> None:
     for line in comparison.lines():
         click.echo(line)
     click.get_current_context().exit(comparison.exit_code)
-
-
-INCOMPLETE = 11
 
 
 @click.command()

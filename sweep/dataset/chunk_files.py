@@ -19,7 +19,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from kernels import status as codes
-from sweep.dataset.files import beside, read_plan, store_errors, write_atomically
+from sweep.dataset.files import beside, located, read_plan, store_errors, write_atomically
 from sweep.errors import InputError, StoreError
 
 if TYPE_CHECKING:
@@ -141,6 +141,20 @@ def parts(folder: Path) -> list[Part]:
         names = ", ".join(path.name for path in strangers[:3])
         raise InputError("file", names, "chunks named part-<index>-<identity>-<hash>.parquet", str(folder))
     return found
+
+
+def required_parts(folder: str | Path, verb: str) -> tuple[Path, list[Part]]:
+    """Return the folder of designs of a dataset, and its chunk files as :func:`parts` lists them.
+
+    Raises
+    ------
+    InputError
+        also if there are none.
+    """
+    place = located(folder)
+    if not (chunks := parts(place)):
+        raise InputError("folder", str(folder), "a folder with part-*.parquet written by sweep run", verb)
+    return place, chunks
 
 
 def listing(folder: Path) -> tuple[list[Part], list[Path]]:

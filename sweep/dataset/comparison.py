@@ -173,8 +173,7 @@ def compare(old: str | Path, new: str | Path, rtol: float = 0.0, slower: float =
         raise InputError("rtol", rtol, "a relative change from 0", "compare")
     if not slower >= 1.0:
         raise InputError("slower", slower, "a factor from 1", "compare")
-    folders = files.located(old), files.located(new)
-    chunks = [_chunks(folder) for folder in folders]
+    folders, chunks = zip(*(chunk_files.required_parts(folder, "compare") for folder in (old, new)), strict=True)
     names = [_columns(parts) for parts in chunks]
     result = Comparison(slower=slower, notes=_notes(*folders), seconds=_seconds(*folders))
     result.columns_only_old = tuple(name for name in names[0] if name not in names[1])
@@ -187,13 +186,6 @@ def compare(old: str | Path, new: str | Path, rtol: float = 0.0, slower: float =
         _look(result, before, after, rtol)
     _compare_optima(result, *folders, rtol)
     return result
-
-
-def _chunks(folder: Path) -> list[chunk_files.Part]:
-    parts = chunk_files.parts(folder) if folder.is_dir() else []
-    if not parts:
-        raise InputError("folder", str(folder), "a folder with part-*.parquet written by sweep run", "compare")
-    return parts
 
 
 def _columns(chunks: Sequence[chunk_files.Part]) -> list[str]:

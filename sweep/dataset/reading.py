@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from sweep.dataset import chunk_files, files
+from sweep.dataset import chunk_files
 from sweep.errors import InputError, StoreError, nearest
 from sweep.quantities.limits import compared
 
@@ -57,10 +57,7 @@ def scan(folder: str | Path) -> ds.Dataset:
     """
     import pyarrow.dataset as ds
 
-    place = files.located(folder)
-    chunks = chunk_files.parts(place) if place.is_dir() else []
-    if not chunks:
-        raise InputError("folder", str(folder), "a folder with part-*.parquet written by sweep run", "scan")
+    place, chunks = chunk_files.required_parts(folder, "scan")
     for one, other in pairwise(chunks):
         if one.identity != other.identity or one.index == other.index:
             raise StoreError(f"{place}: {one.path.name} and {other.path.name} are not chunks of one table")
@@ -137,14 +134,18 @@ def pareto(folder: str | Path, first: str, second: str) -> pd.DataFrame:
         as :func:`scan`; also for an unknown output.
     """
 
-    def unbeaten(rows: pd.DataFrame) -> NDArray[np.intp]:
-        x, y = (compared(name, rows[name].to_numpy()) for name in (first, second))
-        order: NDArray[np.intp] = np.lexsort((rows["design"].to_numpy(), y, x))
-        least = np.minimum.accumulate(y[order])
-        front: NDArray[np.intp] = order[np.concatenate([[True], least[1:] < least[:-1]])[: len(order)]]
-        return front
+    def front(rows: pd.DataFrame) -> NDArray[np.intp]:
+        # Designs are read in their order, so that of rows equal in both outputs the first one stays.
+        return non_dominated(*(compared(name, rows[name].to_numpy()) for name in (first, second)))
 
-    return _chosen(folder, [first, second], "pareto", unbeaten)
+    return _chosen(folder, [first, second], "pareto", front)
+
+
+def non_dominated(x: NDArray[np.float64], y: NDArray[np.float64]) -> NDArray[np.intp]:
+    """Return the indices of non-dominated points, sorted by x; smaller is better, of equal points the first counts."""
+    order: NDArray[np.intp] = np.lexsort((y, x))
+    front: NDArray[np.intp] = order[np.diff(np.minimum.accumulate(y[order]), prepend=np.inf) < 0.0]
+    return front
 
 
 def _chosen(
@@ -242,13 +243,11 @@ def _all_columns(source: Any, designs: NDArray[np.int64]) -> pd.DataFrame:
     wanted = pc.field("design").isin(designs) & (pc.field("status") == 0)
     scanner = source.scanner(filter=wanted, batch_size=BATCH_ROWS, batch_readahead=1, fragment_readahead=1)
     rows: pd.DataFrame = scanner.to_table().to_pandas()
-    order = np.argsort(rows["design"].to_numpy())[np.argsort(np.argsort(designs))]
-    return _with_units(rows.iloc[order].reset_index(drop=True), source)
+    return _with_units(rows.set_index("design", drop=False).loc[designs].reset_index(drop=True), source)
 
 
-def _check_outputs(source: Any, names: Sequence[str], place: str) -> Sequence[str]:
+def _check_outputs(source: Any, names: Sequence[str], place: str) -> None:
     for name in names:
         if name not in source.schema.names:
             columns = ", ".join(source.schema.names)
             raise InputError("output", name, f"a column: {columns}{nearest(name, source.schema.names)}", place)
-    return names

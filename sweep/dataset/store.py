@@ -151,10 +151,7 @@ def load(folder: str | Path, units: bool = False) -> pd.DataFrame:
     """
     import pyarrow as pa
 
-    place = located(folder)
-    chunks = chunk_files.parts(place) if place.is_dir() else []
-    if not chunks:
-        raise InputError("folder", str(folder), "a folder with part-*.parquet written by sweep run", "load")
+    place, chunks = chunk_files.required_parts(folder, "load")
     for one, other in pairwise(chunks):
         if one.identity != other.identity:
             names = f"{one.path.name} and {other.path.name}"

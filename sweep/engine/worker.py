@@ -54,9 +54,7 @@ class ChunkTask:
         start, end = self.plan.bounds(number)
         try:
             self._check_sources()
-            known = self._known(number)
-            arguments = (self.study, start, end, should_stop)
-            result = compute_chunk(*arguments) if known is None else compute_chunk(*arguments, known)
+            result = compute_chunk(self.study, start, end, should_stop, self._known(number))
             write_chunk(self.folder, self.plan, number, result)
         except Dropped:
             return Done(number, dropped=True)

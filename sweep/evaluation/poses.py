@@ -18,7 +18,7 @@ from sweep.evaluation.statuses import explained, meanings
 from sweep.evaluation.tables import design_matrix, kept_columns, numbers, plain_columns, wanted_names
 from sweep.families import Mechanism
 from sweep.families import family as find_family
-from sweep.families.base import Angles, Columns, Domain, Family, March
+from sweep.families.base import Angles, Domain, Family, March
 from sweep.quantities.resolve import output, output_names
 
 if TYPE_CHECKING:
@@ -108,9 +108,11 @@ def evaluate(
     if status_text:
         made["status_text"] = np.array(meanings(made["status"]), dtype=object)
     result = pd.DataFrame(made, index=index, copy=False)  # the arrays are not shared
-    whole = _beside(kept_columns(given, keep, made, len(matrix)), result, len(matrix), repeats)
-    whole.attrs["units"] = {variable: mechanism.domain.unit, **units}
-    return whole
+    if kept := kept_columns(given, keep, made, len(matrix)):
+        inputs = pd.DataFrame(kept).loc[np.repeat(np.arange(len(matrix)), repeats)].set_axis(result.index)
+        result = pd.concat([inputs, result], axis=1)
+    result.attrs["units"] = {variable: mechanism.domain.unit, **units}
+    return result
 
 
 class Request(NamedTuple):
@@ -140,16 +142,6 @@ def requested(
     if not loads:
         cache[key] = request
     return request
-
-
-def _beside(kept: Columns, result: pd.DataFrame, designs: int, repeats: int) -> pd.DataFrame:
-    """Put input columns in front of the result; each input row is repeated ``repeats`` times."""
-    import pandas as pd
-
-    if not kept:
-        return result
-    inputs = pd.DataFrame(kept).loc[np.repeat(np.arange(designs), repeats)].set_axis(result.index)
-    return pd.concat([inputs, result], axis=1)
 
 
 def values_of_the_variable(phi: ArrayLike) -> NDArray[np.float64]:

@@ -50,7 +50,7 @@ class Route:
     name: str
     outputs: tuple[str, ...]
     ns_per_design: float
-    run: Callable[[Array, Accuracy, Window], Columns] | None = None
+    run: Callable[[Array, Accuracy, Window], Columns]
     general: Group | Literal[""] = ""
     order: tuple[Work, int] = (Work.SEARCH, 0)
     columns: int | None = None

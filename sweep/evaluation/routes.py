@@ -83,7 +83,6 @@ def design_outputs(
     decided = accuracy.samples is None or any(step.general == "margin" for step in steps) or not margin_suffixes(family)
     with np.errstate(all="ignore"):  # values beyond float64 get a status below
         for step in steps:
-            assert step.run is not None
             if step.general and not decided:  # quicker outputs such as the margin are computed by now
                 status, decided = np.where(status == st.OK, _turning(family, designs, accuracy), status), True
             # A follower that turns fully lacks limit positions or a dwell, but has extrema; one that jams still moves.

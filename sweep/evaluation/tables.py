@@ -122,13 +122,9 @@ def wanted_names(want: str | Sequence[str], place: str) -> list[str]:
     InputError
         if ``want`` is neither a name nor a list of names.
     """
-    names = (
-        [name.strip() for name in want.split(",")]
-        if isinstance(want, str)
-        else list(want)
-        if isinstance(want, Iterable)
-        else [want]
-    )
+    if isinstance(want, str):
+        return list(dict.fromkeys(name.strip() for name in want.split(",")))
+    names = list(want) if isinstance(want, Iterable) else [want]
     for name in names:
         if not isinstance(name, str):
             raise InputError("want", name, "a name, or a list of names", place)

@@ -89,6 +89,7 @@ class Processes:
     def outcomes(self, task: Task[T], numbers: Iterator[int], jobs: int, stop: Stop) -> Iterator[T]:
         """Yield results as `Executor.outcomes` does."""
         from joblib import delayed
+        from joblib.externals.loky import get_reusable_executor
 
         _begin_tracker()
         with tempfile.TemporaryDirectory(prefix="linksweep-", ignore_cleanup_errors=True) as folder:
@@ -99,7 +100,7 @@ class Processes:
 
             def kill() -> None:
                 killed.set()
-                _kill_workers()
+                get_reusable_executor(reuse=True).shutdown(wait=False, kill_workers=True)
 
             stop.tell(flag.touch)
             with _watched(stop, kill):
@@ -169,12 +170,6 @@ def _begin_tracker() -> None:
         resource_tracker.ensure_running()
     finally:
         sys.warnoptions[:] = before
-
-
-def _kill_workers() -> None:
-    from joblib.externals.loky import get_reusable_executor
-
-    get_reusable_executor(reuse=True).shutdown(wait=False, kill_workers=True)
 
 
 EXECUTORS: dict[str, Callable[..., Executor]] = {"threading": Threads, "loky": Processes, "dask": Dask}

@@ -112,7 +112,8 @@ def _optimum(study: Study, old: Path, new: Path) -> tuple[list[str], list[str]]:
     if before is None or after is None or study.objective is None:
         return [], []
     name, lines = study.objective.output, []
-    if _far(before[name], after[name], OBJECTIVE_RTOL):
+    both_missing = math.isnan(before[name]) and math.isnan(after[name])
+    if not both_missing and not math.isclose(before[name], after[name], rel_tol=OBJECTIVE_RTOL):
         lines.append(f"optimum moved: {name} {before[name]:.10g} -> {after[name]:.10g}")
     sizes = {p.name: max(abs(before[p.name]), abs(after[p.name])) for p in study.family.parameters}
     # A length near zero is compared relative to the longest one.
@@ -181,10 +182,6 @@ def slower(name: str, seconds: float, history: Sequence[NightRecord]) -> Changes
         return Changes(0, ())
     words = f"slower twice in a row: {last[0]:.3g} s and {seconds:.3g} s, the median before is {median(before):.3g} s"
     return Changes(SLOWER, (words,))
-
-
-def _far(old: float, new: float, rtol: float) -> bool:
-    return not (math.isclose(old, new, rel_tol=rtol) or (math.isnan(old) and math.isnan(new)))
 
 
 def _role(path: Path, role: str) -> pd.Series[Any] | None:

@@ -136,15 +136,11 @@ def _suited(study: Study) -> ProvableLocus | None:
     On that locus e and g follow, and their ranges become limits; otherwise e and g are coordinates, and the rocker
     follows.
     """
-    ways = study.family.every(ProvableLocus)
+    ways, known = study.family.every(ProvableLocus), {*study.space.bounds, *study.space.fixed}
     given = {limit.output for limit in study.parameter_limits if limit.minimum == limit.maximum is not None}
     by_rocker = [way for way in ways if given & set(way.coordinates)]
-    others = [way for way in ways if way not in by_rocker and set(way.coordinates) <= _known(study)]
+    others = [way for way in ways if way not in by_rocker and set(way.coordinates) <= known]
     return next(iter(by_rocker or others), None)
-
-
-def _known(study: Study) -> set[str]:
-    return {*study.space.bounds, *study.space.fixed}
 
 
 def _entries(study: Study, coordinates: tuple[str, ...], place: str) -> dict[str, tuple[float, float]]:

@@ -8,7 +8,7 @@ resumes.
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, NamedTuple, TypeAlias
@@ -168,7 +168,8 @@ def explored(
         most = max(int(settings.boxes * share) // UNITS, 1)
         unit = Unit(question, target, _split(todo, question), most, settings.smallest, folder, number)
         counts = [_read(path).judged for path in _finished(unit)]  # of a stopped run
-        for _, count in _run(unit, cores):
+        missing = (k for k in range(UNITS) if not unit.path(k).is_file())
+        for _, count in cores.place.outcomes(unit, missing, cores.jobs, cores.stop):
             counts.append(count)
             here = sum(counts)
             # A unit that used its whole share has boxes left.
@@ -203,8 +204,3 @@ def _split(boxes: Leaves, question: Question) -> Leaves:
 
 def _finished(unit: Unit) -> list[Path]:
     return [path for path in map(unit.path, range(UNITS)) if path.is_file()]
-
-
-def _run(unit: Unit, cores: Cores) -> Iterator[tuple[int, int]]:
-    missing = (number for number in range(UNITS) if not unit.path(number).is_file())
-    yield from cores.place.outcomes(unit, missing, cores.jobs, cores.stop)

@@ -267,7 +267,8 @@ def chosen(folder: str | Path, design: str | int | None = None) -> Chosen:
     """
     path = files.located(folder)
     if isinstance(design, int) or (isinstance(design, str) and design.lstrip("-").isdigit()):
-        return _row(path, int(design))
+        data = read_dataset(path)
+        return _chosen(data, records(_with_defaults(data.study, of_number(path, int(design))))[0])
     if design is not None and design not in ROLES:
         raise InputError("design", design, f"{', '.join(ROLES)}, or a number of the column design", str(folder))
     data = read_dataset(path)
@@ -278,11 +279,6 @@ def chosen(folder: str | Path, design: str | int | None = None) -> Chosen:
         allowed = f"one this dataset has, of {', '.join(ROLES)}, or a number of the column design"
         raise InputError("design", design or "result", allowed, str(folder))
     return _chosen(data, row)
-
-
-def _row(folder: Path, number: int) -> Chosen:
-    data = read_dataset(folder)
-    return _chosen(data, records(_with_defaults(data.study, of_number(folder, number)))[0])
 
 
 def _chosen(data: Dataset, row: Row) -> Chosen:

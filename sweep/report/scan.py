@@ -14,8 +14,9 @@ from pathlib import Path
 import numpy as np
 
 from sweep.dataset.chunk_files import batches
+from sweep.dataset.reading import non_dominated
 from sweep.families.base import Array
-from sweep.families.names import is_error
+from sweep.families.names import is_error, without_error
 from sweep.quantities.limits import compared
 from sweep.study import Study
 
@@ -160,7 +161,7 @@ def scan(
         result.feasible += int(ok.sum())
         for name in names:
             if is_error(name) and ok.any():
-                _note_errors(result, name, np.abs(batch[name][ok]), np.abs(batch[name[4:]][ok]))
+                _note_errors(result, name, np.abs(batch[name][ok]), np.abs(batch[without_error(name)][ok]))
         if not ok.any():
             continue
         score = compared(objective, batch[objective]) if objective is not None else np.zeros(ok.size)
@@ -172,7 +173,8 @@ def scan(
             other = sense * compared(second, batch[second])
             both = ok & np.isfinite(other)
             points = np.column_stack([score, other])
-            result.front = non_dominated(np.vstack([result.front, points[both]]))
+            known = np.vstack([result.front, points[both]])
+            result.front = known[non_dominated(*known.T)]
             sampled = points[offset::stride]
             samples.append(sampled[both[offset::stride]])
     if samples:
@@ -199,15 +201,6 @@ def _note_errors(result: Scan, name: str, errors: Array, values: Array) -> None:
         relative = float(np.max(errors[finite] / values[finite]))
         before = result.errors.get(name, (0.0, 0.0))
         result.errors[name] = (max(before[0], float(errors[finite].max())), max(before[1], relative))
-
-
-def non_dominated(points: Array) -> Array:
-    """Return the non-dominated points, sorted by the first coordinate; smaller is better."""
-    if not len(points):
-        return points
-    ordered = points[np.lexsort((points[:, 1], points[:, 0]))]
-    least_before = np.concatenate([[np.inf], np.minimum.accumulate(ordered[:, 1])[:-1]])
-    return ordered[ordered[:, 1] < least_before]
 
 
 def most_telling(scanned: Scan) -> tuple[str, str] | None:

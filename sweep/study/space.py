@@ -112,7 +112,8 @@ class DesignSpace:
         """Return parameter values of the designs start to stop - 1, one array per parameter in the family's order.
 
         ``names`` are the wanted parameters, None for all.  A design has the same bits in every slice.
-        Measured on one core, per design and swept parameter: lattice 9 to 16 ns, sample 1 ns, sample on a log
+        Measured on one core, per design and swept parameter: lattice 9 to 16 ns, sample 1 ns, sample on a log scale
+        180 ns.
         """
         wanted = self.names if names is None else names
         return dict(zip(wanted, self.matrix(start, stop, wanted).T.copy(), strict=True))

@@ -6,7 +6,7 @@ import json
 import re
 import tomllib
 from collections import Counter
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from pathlib import Path
 from typing import Any
 
@@ -98,23 +98,21 @@ def _clearer(text: str, message: str) -> str:
     if place is None or not message.startswith(_TWICE):
         return message
     lines = text.splitlines()[: int(place[1])]
-    table = _TABLE.fullmatch(lines[-1]) if lines else None
-    if table is not None:
-        earlier = _earlier(lines[:-1], lambda above, own: own is not None and own[1].strip() == table[1].strip())
-        return f"the table [{table[1].strip()}] stands twice {place[0]}{earlier}"
+    if lines and _TABLE.fullmatch(lines[-1]) is not None:
+        title = _heading(lines)
+        first = _first(k for k in range(1, len(lines)) if _heading(lines[k - 1 : k]) == title)
+        return f"the table [{title}] stands twice {place[0]}{first}"
     number = next((k for k in range(len(lines), 0, -1) if _KEY.match(lines[k - 1])), None)
     if number is None or message.startswith("Duplicate inline"):
         return message
     key, here = _name(lines[number - 1]), _heading(lines[:number])
-    earlier = _earlier(lines[: number - 1], lambda above, own: _name(above[-1]) == key and _heading(above) == here)
-    return f"{f'{here}.' if here else ''}{key} is given twice {place[0]}{earlier}"
+    first = _first(k for k in range(1, number) if _name(lines[k - 1]) == key and _heading(lines[:k]) == here)
+    return f"{f'{here}.' if here else ''}{key} is given twice {place[0]}{first}"
 
 
-def _earlier(lines: list[str], is_it: Any) -> str:
-    for k in range(1, len(lines) + 1):
-        if is_it(lines[:k], _TABLE.fullmatch(lines[k - 1])):
-            return f", first in line {k}"
-    return ""
+def _first(numbers: Iterable[int]) -> str:
+    """Name the first of the lines, if there is one."""
+    return next((f", first in line {number}" for number in numbers), "")
 
 
 def _name(line: str) -> str | None:

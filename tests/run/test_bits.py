@@ -14,7 +14,7 @@ import sweep.chunks.plan
 from kernels import status as codes
 from sweep.chunks.cascade import Batch, Cascade, Level, levels
 from sweep.chunks.chunk import compute_chunk, output_columns
-from sweep.chunks.parameters import Parameters, parameter_matrix
+from sweep.chunks.parameters import leading_columns, parameter_matrix
 from sweep.chunks.plan import make_plan
 from sweep.dataset.files import beside, read_plan, read_runs
 from sweep.dataset.store import is_complete, load
@@ -79,7 +79,7 @@ class Recorder:
         self.ran: dict[str, list[int]] = {}
 
     def routes(self, family: object, want: object, accuracy: object, windowed: bool) -> tuple[Route, ...]:
-        return tuple(Route(name, (name,), 1.0) for name in "xyz")
+        return tuple(Route(name, (name,), 1.0, lambda *_: {}) for name in "xyz")
 
     def design_outputs(
         self, family: object, designs: Array, wanted: tuple[str, ...], accuracy: object, window: object
@@ -261,17 +261,17 @@ def test_feasible_rows_have_the_bits_of_those_whose_parameters_were_all_made_at_
 def test_a_bad_value_of_a_space_is_refused_before_it_is_met(study: Study) -> None:
     """Parameters made late are not looked at one by one: the ends of their axes are."""
     needle = load_study(ROOT / "studies" / "needle208", smoke=True)
-    assert Parameters.of(needle, 8).leading == 8
-    assert Parameters.of(needle, None).leading == Parameters.of(study, None).leading + 13 == 21
+    assert leading_columns(needle, 8) == 8
+    assert leading_columns(needle, None) == leading_columns(study, None) + 13 == 21
     axes = tuple(replace(axis, low=-1.0) if axis.name == "b2" else axis for axis in needle.space.axes)
     bad = replace(needle, space=replace(needle.space, axes=axes))
-    assert Parameters.of(bad, 8).leading == 21
+    assert leading_columns(bad, 8) == 21
     with pytest.raises(InputError, match="b2"):
         compute_chunk(bad, 0, bad.space.count)
     signs = tuple(
         replace(axis, values=np.array([1.0, 0.5])) if axis.name == "branch2" else axis for axis in needle.space.axes
     )
-    assert Parameters.of(replace(needle, space=replace(needle.space, axes=signs)), 8).leading == 21
+    assert leading_columns(replace(needle, space=replace(needle.space, axes=signs)), 8) == 21
 
 
 def test_chunk_outside_the_space_is_refused(study: Study) -> None:
