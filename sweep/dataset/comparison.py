@@ -173,7 +173,8 @@ def compare(old: str | Path, new: str | Path, rtol: float = 0.0, slower: float =
         raise InputError("rtol", rtol, "a relative change from 0", "compare")
     if not slower >= 1.0:
         raise InputError("slower", slower, "a factor from 1", "compare")
-    folders, chunks = zip(*(chunk_files.required_parts(folder, "compare") for folder in (old, new)), strict=True)
+    datasets = [chunk_files.required_parts(folder, "compare") for folder in (old, new)]
+    folders, chunks = (datasets[0][0], datasets[1][0]), [parts for _, parts in datasets]
     names = [_columns(parts) for parts in chunks]
     result = Comparison(slower=slower, notes=_notes(*folders), seconds=_seconds(*folders))
     result.columns_only_old = tuple(name for name in names[0] if name not in names[1])
