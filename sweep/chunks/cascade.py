@@ -135,7 +135,7 @@ class Cascade:
         Designs whose status (k,) is not OK leave at once.
         """
         self._sort(Batch(index, designs, {}, status), status == codes.OK, 0)
-        self._work(0, whole=False)
+        self._work(0, flush=False)
 
     def end(self, names: Sequence[str]) -> Batch:
         """Finish every waiting design, and return the results.
@@ -147,7 +147,7 @@ class Cascade:
             limit, LIMIT_EXCEEDED for those that miss one, otherwise the status of the kernel that returned no value.
         """
         for number in range(len(self.levels)):
-            self._work(number, whole=True)
+            self._work(number, flush=True)
         batches, width = self._left, len(self.study.family.parameters)
         index = np.concatenate([np.empty(0, np.int64), *(batch.index for batch in batches)])
         order = np.argsort(index, kind="stable")
@@ -163,16 +163,16 @@ class Cascade:
         batches.clear()
         return Batch(index[order], designs, outputs, status)
 
-    def _work(self, number: int, whole: bool) -> None:
-        """Compute the batches that wait at a level and at later levels; incomplete batches only if ``whole``."""
+    def _work(self, number: int, flush: bool) -> None:
+        """Compute the batches that wait at a level and at later levels; incomplete batches only to ``flush``."""
         if number == len(self.levels):
             return
         level, waiting = self.levels[number], self._waiting[number]
         count = sum(batch.index.size for batch in waiting)
-        if not count or (count < level.batch and not whole):
+        if not count or (count < level.batch and not flush):
             return
         together = Batch.joined(waiting)
-        end = count if whole else count - count % level.batch
+        end = count if flush else count - count % level.batch
         waiting[:] = [together.only(slice(end, None))] if end < count else []
         for low in range(0, end, level.batch):
             if self.should_stop():
@@ -183,7 +183,7 @@ class Cascade:
                 part = self._completed(part)
             done, goes_on = self._fitted(part) if level.route is None else self._computed(level, part)
             self._sort(done, goes_on, number + 1)
-            self._work(number + 1, whole=False)
+            self._work(number + 1, flush=False)
 
     def _completed(self, batch: Batch) -> Batch:
         """Add the missing parameter columns to the designs of a batch."""

@@ -71,7 +71,7 @@ def families(name: str | None) -> None:
     """List the mechanism families, or the parameters and outputs of one (or of a chain: rssr+guide)."""
     if name is None:
         entries = [family(known) for known in NAMES]
-        rows = [(entry.name, over(entry), entry.title, ", ".join(capability_words(entry))) for entry in entries]
+        rows = [(entry.name, domain_words(entry), entry.title, ", ".join(capability_words(entry))) for entry in entries]
         echo_columns([("family", "over", "", "can be asked for"), *rows])
         click.echo("\nchains: any of them in series, such as rssr+guide; `sweep families NAME` shows what one takes")
         return
@@ -79,7 +79,7 @@ def families(name: str | None) -> None:
         click.echo(line)
 
 
-def over(family: Family) -> str:
+def domain_words(family: Family) -> str:
     """Name the domain over which a family is evaluated."""
     domain = family.domain
     return domain.kind if domain.kind != "interval" else f"interval of {domain.name}"
@@ -95,7 +95,7 @@ def describe(family: Family) -> list[str]:
     words = ", ".join(capability_words(family))
     points = ", ".join(family.points)
     outputs = [output(family, name) for name in main_outputs(family)]
-    lines = [f"{family.name}: {family.title}", "", f"over: {over(family)}"]
+    lines = [f"{family.name}: {family.title}", "", f"over: {domain_words(family)}"]
     lines += [f"can be asked for: {words}"] if words else []
     lines += [f"points: {points}"] if points else []
     lines += ["", "parameters (one length unit throughout, angles in rad)"]

@@ -32,7 +32,7 @@ POSES = 8
 WHOLE_STROKE = (0.0, 1.0)
 
 
-class Part(NamedTuple):
+class WarmPart(NamedTuple):
     """Unit of work that one process compiles.
 
     For a study it is the step of a number, or without one everything after the steps; for a family some outputs, or
@@ -48,7 +48,7 @@ class Part(NamedTuple):
 class Compile:
     """Compile a part by its number, in a worker."""
 
-    parts: tuple[Part, ...]
+    parts: tuple[WarmPart, ...]
 
     def __call__(self, number: int, should_stop: Callable[[], bool]) -> str:
         """Compile or load the kernels of the part, on a few designs; return the name of its study or family."""
@@ -83,7 +83,7 @@ def _accuracy(family: Family) -> Accuracy:
     return Accuracy(samples=POSES) if isinstance(family.domain, March) else Accuracy(target=DEFAULT_TARGET)
 
 
-def rounds(what: Sequence[str]) -> tuple[list[Part], list[Part]]:
+def rounds(what: Sequence[str]) -> tuple[list[WarmPart], list[WarmPart]]:
     """Return the parts of studies and families: those that processes share first, then the rest of each study.
 
     The rest are the optimiser, the front and the proof, compiled by running the tiny version.
@@ -93,23 +93,23 @@ def rounds(what: Sequence[str]) -> tuple[list[Part], list[Part]]:
     InputError
         for a name that is neither a study nor a family.
     """
-    first: list[Part] = []
-    then: list[Part] = []
+    first: list[WarmPart] = []
+    then: list[WarmPart] = []
     for name in what:
         if not Path(name).exists():
             family = find_family(name)
             selected = routes(family, main_outputs(family), _accuracy(family))
-            first += [Part(name), *(Part(name, route.outputs) for route in selected)]
+            first += [WarmPart(name), *(WarmPart(name, route.outputs) for route in selected)]
             continue
         for file in files_of(Path(name)):
             study = load_study(file)
-            first += [Part(str(file), step=number) for number in reversed(range(KernelStep(study).count))]
+            first += [WarmPart(str(file), step=number) for number in reversed(range(KernelStep(study).count))]
             if study.optimise is not None and (file.parent / TINY).exists():
-                then.append(Part(str(file)))
+                then.append(WarmPart(str(file)))
     return list(dict.fromkeys(first)), list(dict.fromkeys(then))
 
 
-def compile_parts(parts: Sequence[Part], jobs: int, stop: Stop, advance: Callable[[int], None]) -> None:
+def compile_parts(parts: Sequence[WarmPart], jobs: int, stop: Stop, advance: Callable[[int], None]) -> None:
     """Compile parts in ``jobs`` processes; ``advance`` is called with 1 after each part.
 
     Raises

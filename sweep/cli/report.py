@@ -48,7 +48,7 @@ def report(folder: Path, others: tuple[Path, ...], out: Path | None) -> None:
     written(folder, out)
 
 
-def own_figures(study: Path) -> Path | None:
+def figure_program(study: Path) -> Path | None:
     """Return the program in a study's folder that draws its own figures, or None if there is none."""
     program = (study if study.is_dir() else study.parent) / FIGURE
     return program if program.exists() else None

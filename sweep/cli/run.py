@@ -56,9 +56,9 @@ def run(
     model = load_study(study, smoke=smoke)
     after: list[str] = []
     if report:
-        from sweep.cli.report import own_figures, written  # pandas and everything that draws
+        from sweep.cli.report import figure_program, written  # pandas and everything that draws
 
-        figures = own_figures(study)
+        figures = figure_program(study)
         after = ["report"] if figures is None else ["figures", "report"]
     with stages(*stages_of(model), *after):
         try:

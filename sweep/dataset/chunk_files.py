@@ -44,7 +44,7 @@ STATUS_NAMES = {value: name for name, value in vars(codes).items() if name.isupp
 
 
 @dataclass(frozen=True)
-class Part:
+class ChunkFile:
     """A chunk file, described by its name."""
 
     path: Path
@@ -88,7 +88,7 @@ class Part:
             raise StoreError(f"{self.path}: damaged chunk; {REMEDY}")
 
 
-def about(part: Part) -> dict[str, Any]:
+def about(part: ChunkFile) -> dict[str, Any]:
     """Read the metadata of a chunk: study, code, identity, index, range of designs, counts.
 
     Raises
@@ -100,7 +100,7 @@ def about(part: Part) -> dict[str, Any]:
     return _opened(part, part.path)[1]
 
 
-def _opened(part: Part, source: Path | pa.BufferReader) -> tuple[pq.ParquetFile, dict[str, Any]]:
+def _opened(part: ChunkFile, source: Path | pa.BufferReader) -> tuple[pq.ParquetFile, dict[str, Any]]:
     import pyarrow as pa
     import pyarrow.parquet as pq
 
@@ -127,7 +127,7 @@ def content_hash(data: bytes) -> str:
     return hashlib.sha256(data).hexdigest()[:16]
 
 
-def parts(folder: Path) -> list[Part]:
+def parts(folder: Path) -> list[ChunkFile]:
     """List the chunk files of a folder in design order.
 
     Raises
@@ -143,7 +143,7 @@ def parts(folder: Path) -> list[Part]:
     return found
 
 
-def required_parts(folder: str | Path, verb: str) -> tuple[Path, list[Part]]:
+def required_parts(folder: str | Path, verb: str) -> tuple[Path, list[ChunkFile]]:
     """Return the folder of designs of a dataset, and its chunk files as :func:`parts` lists them.
 
     Raises
@@ -157,7 +157,7 @@ def required_parts(folder: str | Path, verb: str) -> tuple[Path, list[Part]]:
     return place, chunks
 
 
-def listing(folder: Path) -> tuple[list[Part], list[Path]]:
+def listing(folder: Path) -> tuple[list[ChunkFile], list[Path]]:
     """List the chunks of a folder in design order, and all other entries; no file is opened.
 
     Hidden files are ignored.
@@ -165,12 +165,12 @@ def listing(folder: Path) -> tuple[list[Part], list[Path]]:
     with store_errors(folder):
         entries = sorted(path for path in folder.iterdir() if path.name[0] != ".") if folder.is_dir() else []
     named = {path: match for path in entries if (match := _PART.fullmatch(path.name)) is not None}
-    chunks = {path: Part(path, int(match[1]), match[2], match[3]) for path, match in named.items()}
+    chunks = {path: ChunkFile(path, int(match[1]), match[2], match[3]) for path, match in named.items()}
     ordered = sorted(chunks.values(), key=lambda part: (part.index, part.path.name))
     return ordered, [path for path in entries if path not in chunks]
 
 
-def is_whole(part: Part) -> bool:
+def is_whole(part: ChunkFile) -> bool:
     """Whether the file is undamaged and holds the chunk that its name says."""
     try:
         part.read()
@@ -193,7 +193,7 @@ def batches(paths: Iterable[Path], columns: list[str] | None = None) -> Iterator
             yield from source.iter_batches(batch_size=ROWS_PER_BATCH, columns=columns, use_threads=False)
 
 
-def check_columns(chunks: Sequence[Part], schemas: Iterable[pa.Schema] = ()) -> None:
+def check_columns(chunks: Sequence[ChunkFile], schemas: Iterable[pa.Schema] = ()) -> None:
     """Check that all chunks have the columns of the first one; ``schemas`` are those of the chunks, if known.
 
     Raises
@@ -213,7 +213,7 @@ def check_columns(chunks: Sequence[Part], schemas: Iterable[pa.Schema] = ()) -> 
             )
 
 
-def _schema(part: Part) -> pa.Schema:
+def _schema(part: ChunkFile) -> pa.Schema:
     import pyarrow as pa
     import pyarrow.parquet as pq
 
@@ -225,7 +225,7 @@ def _schema(part: Part) -> pa.Schema:
         raise StoreError(f"{part.path}: damaged chunk; {REMEDY}") from error
 
 
-def missing_chunks(folder: Path, chunks: list[Part]) -> list[int]:
+def missing_chunks(folder: Path, chunks: list[ChunkFile]) -> list[int]:
     """List the indices of missing chunks; their number is taken from the first chunk, or from the plan."""
     plan = read_plan(folder) or {}
     count = about(chunks[0]).get("chunks") if chunks else None

@@ -182,21 +182,23 @@ def compare(old: str | Path, new: str | Path, rtol: float = 0.0, slower: float =
     shared = [name for name in names[0] if name in names[1] and name not in ("design", "status")]
     result.moved = {name: Moved(name) for name in shared}
     stops = [*(chunk_files.about(part)["stop"] for part in chunks[0]), math.inf]
-    streams = [_pieces(parts, columns, stops) for parts, columns in zip(chunks, names, strict=True)]
+    streams = [_rows(parts, columns, stops) for parts, columns in zip(chunks, names, strict=True)]
     for before, after in zip(*streams, strict=True):
         _look(result, before, after, rtol)
     _compare_optima(result, *folders, rtol)
     return result
 
 
-def _columns(chunks: Sequence[chunk_files.Part]) -> list[str]:
+def _columns(chunks: Sequence[chunk_files.ChunkFile]) -> list[str]:
     for part in chunks:
         chunk_files.about(part)
     chunk_files.check_columns(chunks)
     return [name for name in chunks[0].read()[0].schema_arrow.names if not is_error(name)]
 
 
-def _pieces(chunks: Iterable[chunk_files.Part], columns: list[str], stops: Iterable[float]) -> Iterator[pd.DataFrame]:
+def _rows(
+    chunks: Iterable[chunk_files.ChunkFile], columns: list[str], stops: Iterable[float]
+) -> Iterator[pd.DataFrame]:
     """Yield the rows of a dataset in design order, split at the stops; one chunk at a time is in memory."""
     import pandas as pd
 

@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 
 def finished_chunks(
     folder: Path, plan: Plan, tell: Callable[[int, int], None] = lambda _, __: None
-) -> dict[int, chunk_files.Part]:
+) -> dict[int, chunk_files.ChunkFile]:
     """List the chunks of the plan that need not be computed again; damaged ones are moved to ``_bad/``.
 
     ``tell`` is called with the number of chunks read and of all chunks in the folder.
@@ -31,7 +31,7 @@ def finished_chunks(
     InputError
         if a chunk belongs to another study or another version of the code.
     """
-    finished: dict[int, chunk_files.Part] = {}
+    finished: dict[int, chunk_files.ChunkFile] = {}
     present = chunk_files.parts(folder)
     for k, part in enumerate(present):
         tell(k, len(present))
@@ -46,7 +46,7 @@ def finished_chunks(
     return finished
 
 
-def _twice(folder: Path, one: chunk_files.Part, other: chunk_files.Part) -> StoreError:
+def _twice(folder: Path, one: chunk_files.ChunkFile, other: chunk_files.ChunkFile) -> StoreError:
     names = f"{one.path.name} and {other.path.name}"
     return StoreError(f"{folder}: two different chunks {one.index}, {names}; remove the one you do not trust")
 

@@ -162,10 +162,10 @@ def _study(result: Verification, plan: dict[str, Any]) -> Study | None:
 
 
 def _sound_chunks(
-    result: Verification, chunks: list[chunk_files.Part], about: dict[str, Any], study: Study | None
-) -> dict[int, chunk_files.Part]:
+    result: Verification, chunks: list[chunk_files.ChunkFile], about: dict[str, Any], study: Study | None
+) -> dict[int, chunk_files.ChunkFile]:
     """Return the undamaged chunks; faults of the others and of the rows are added to the findings."""
-    sound: dict[int, chunk_files.Part] = {}
+    sound: dict[int, chunk_files.ChunkFile] = {}
     for part in chunks:
         if part.identity != about.get("identity", part.identity):
             words = f"belongs to other data ({part.identity}, not {about['identity']})"
@@ -192,7 +192,7 @@ def _sound_chunks(
     return sound
 
 
-def _missing(result: Verification, plan: dict[str, Any], number: int, sound: dict[int, chunk_files.Part]) -> None:
+def _missing(result: Verification, plan: dict[str, Any], number: int, sound: dict[int, chunk_files.ChunkFile]) -> None:
     """Report missing chunks and searches that the plan asks for, and counts that differ from the chunks'."""
     named = {finding.path.name[: len("part-000000-")] for finding in result.findings}
     missing = [k for k in range(number) if k not in sound and f"part-{k:06d}-" not in named]
@@ -232,7 +232,7 @@ def _side_files(result: Verification, plan: dict[str, Any]) -> None:
 
 
 def _recompute(
-    result: Verification, study: Study, about: dict[str, Any], sound: dict[int, chunk_files.Part], number: int
+    result: Verification, study: Study, about: dict[str, Any], sound: dict[int, chunk_files.ChunkFile], number: int
 ) -> None:
     """Recompute some designs, each by itself, since a design's row does not depend on other designs."""
     if about.get("code") != plans.code_hash():

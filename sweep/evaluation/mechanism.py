@@ -13,7 +13,7 @@ from kernels.types import TWO_PI, Array
 from sweep.effects import inputs_beside
 from sweep.errors import InputError, MissingInput, nearest
 from sweep.evaluation.angles import TURNING, grid_in_radians, is_plausible
-from sweep.evaluation.poses import check_march, requested, values_of_the_variable
+from sweep.evaluation.poses import check_march, query_of, values_of_the_variable
 from sweep.evaluation.routes import design_outputs
 from sweep.evaluation.statuses import explained
 from sweep.evaluation.summaries import chosen_accuracy
@@ -66,15 +66,15 @@ class BoundDesign:
             an array like ``phi`` for each wanted name and ``status``, or a number each for one angle; ``pd.DataFrame``
             accepts it
         """
-        request = requested(self._precise, want, None, "pose")
+        query = query_of(self._precise, want, None, "pose")
         angles, is_scalar = _angles(self.family.domain, phi)
         with np.errstate(all="ignore"):  # values beyond float64 get a status below
             outputs = explained(
-                request.family.poses(self._row(request.family), angles, frozenset(request.wanted)), request.wanted
+                query.family.poses(self._row(query.family), angles, frozenset(query.wanted)), query.wanted
             )
         if is_scalar:
-            return {name: outputs[name].item() for name in (*request.wanted, "status")}
-        return {name: outputs[name][0] for name in (*request.wanted, "status")}
+            return {name: outputs[name].item() for name in (*query.wanted, "status")}
+        return {name: outputs[name][0] for name in (*query.wanted, "status")}
 
     def outputs(
         self,
@@ -91,9 +91,9 @@ class BoundDesign:
         dict
             a number for each wanted name, with ``accuracy`` also ``err_<name>``, and ``status``
         """
-        request = requested(self.family, want, None, "design")
+        query = query_of(self.family, want, None, "design")
         chosen = chosen_accuracy(self.family.domain, samples, accuracy)
-        outputs = design_outputs(request.family, self._row(request.family), request.wanted, chosen, window)
+        outputs = design_outputs(query.family, self._row(query.family), query.wanted, chosen, window)
         return {name: values.item() for name, values in outputs.items()}
 
     def with_(self, **dimensions: Number) -> BoundDesign:

@@ -84,7 +84,7 @@ def evaluate(
     import pandas as pd
 
     bare = find_family(family).precise()
-    mechanism, wanted, units = requested(bare, want, loads, "pose")
+    mechanism, wanted, units = query_of(bare, want, loads, "pose")
     given = table
     table = plain_columns(table)
     others = inputs_beside(bare, plain_names(table))
@@ -115,21 +115,19 @@ def evaluate(
     return result
 
 
-class Request(NamedTuple):
-    """A request to a mechanism: its family with the effects that it needs, the names in order, their units."""
+class Query(NamedTuple):
+    """A query to a mechanism: its family with the effects that it needs, the names in order, their units."""
 
     family: Family
     wanted: tuple[str, ...]
     units: Mapping[str, str]
 
 
-def requested(
-    family: Family, want: str | Sequence[str], loads: Loads | None, kind: Literal["pose", "design"]
-) -> Request:
-    """Make the request for pose outputs of a family with precise poses, or for design outputs of a family."""
+def query_of(family: Family, want: str | Sequence[str], loads: Loads | None, kind: Literal["pose", "design"]) -> Query:
+    """Make the query for pose outputs of a family with precise poses, or for design outputs of a family."""
     given = wanted_names(want, f"{kind} outputs of {family.name}")
     # Requests without loads are looked at once.
-    cache: dict[tuple[str, ...], Request] = family.derived.setdefault(requested, {})
+    cache: dict[tuple[str, ...], Query] = family.derived.setdefault(query_of, {})
     if (key := (kind, *given)) in cache and not loads:
         return cache[key]
     names = expanded(family, given, poses=kind == "pose")
@@ -138,10 +136,10 @@ def requested(
         units = {name: mechanism.pose_output[name].unit for name in pose_wants(mechanism, names)}
     else:
         units = {name: output(mechanism, name).unit for name in names if name != "status"}
-    request = Request(mechanism, tuple(units), units)
+    query = Query(mechanism, tuple(units), units)
     if not loads:
-        cache[key] = request
-    return request
+        cache[key] = query
+    return query
 
 
 def values_of_the_variable(phi: ArrayLike) -> NDArray[np.float64]:

@@ -12,7 +12,7 @@ from sweep.effects import inputs_beside
 from sweep.errors import InputError
 from sweep.evaluation.angles import AngleUnit, in_radians, plain_names
 from sweep.evaluation.loads import Loads
-from sweep.evaluation.poses import requested
+from sweep.evaluation.poses import query_of
 from sweep.evaluation.route import Route
 from sweep.evaluation.routes import design_outputs, routes, with_errors
 from sweep.evaluation.statuses import meanings
@@ -106,7 +106,7 @@ def summarise(
     import pandas as pd
 
     bare = find_family(family)
-    mechanism, wanted, units = requested(bare, want, loads, "design")
+    mechanism, wanted, units = query_of(bare, want, loads, "design")
     chosen = chosen_accuracy(mechanism.domain, samples, accuracy, certify)
     if certify:
         check_certifiable(mechanism, wanted, chosen, window is not None)

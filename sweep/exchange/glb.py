@@ -34,7 +34,7 @@ ARRAY_BUFFER, ELEMENT_BUFFER = 34962, 34963
 SIDES, RINGS = 24, 12
 
 
-class Model:
+class GltfModel:
     """Nodes, meshes and accessors of a model, and their binary data."""
 
     def __init__(self) -> None:
@@ -99,7 +99,7 @@ class Model:
 
 def write_glb(name: str, placed: list[Placed], path: Path, metres: float, seconds: float) -> None:
     """Write an animation of one turn in ``seconds``; ``metres`` is the length unit of the joints."""
-    model = Model()
+    model = GltfModel()
     poses = placed[0].part.phi.size
     times = model.accessor(np.linspace(0.0, seconds, poses), "SCALAR")
     size = extent([one.part for one in placed])
@@ -132,7 +132,7 @@ def _material(name: str, rgb: tuple[float, float, float]) -> dict[str, Any]:
     return {"name": name, "pbrMetallicRoughness": surface}
 
 
-def _group(model: Model, placed: Placed, times: int, size: float) -> int:
+def _group(model: GltfModel, placed: Placed, times: int, size: float) -> int:
     """Return the node of a part with those of its links, joints and axes."""
     part, children, thick = placed.part, [], 0.008 * size
     for k, link in enumerate(part.links):
@@ -171,7 +171,7 @@ def _group(model: Model, placed: Placed, times: int, size: float) -> int:
     return model.node(name=name, translation=placed.shift.tolist(), children=children)
 
 
-def _block(model: Model, part: Part, link: Link, colour: str, times: int, thick: float) -> int:
+def _block(model: GltfModel, part: Part, link: Link, colour: str, times: int, thick: float) -> int:
     """Return a block at the joint of a slider, along its line of motion."""
     slides = [part.axes[name] for name, kind in part.kinds.items() if kind == "slide"]
     axis, reach = slides[0] if slides else np.array([0.0, 0.0, 1.0]), 4.0 * thick
@@ -184,7 +184,7 @@ def _block(model: Model, part: Part, link: Link, colour: str, times: int, thick:
     return node
 
 
-def _bar(model: Model, name: str, colour: str, start: Array, end: Array, times: int, thick: float) -> int:
+def _bar(model: GltfModel, name: str, colour: str, start: Array, end: Array, times: int, thick: float) -> int:
     """Return a bar between two paths, turned with its direction, and stretched if a joint slides along it."""
     along = end - start
     length = np.linalg.norm(along, axis=1)

@@ -16,7 +16,7 @@ from sweep.nights.archive import Journal, NightRecord, State, StudyRecord
 from sweep.nights.carry import REPORT, Carried, carry
 from sweep.nights.changes import Changes, changes, figures, slower
 from sweep.nights.page import write_page
-from sweep.nights.studies import FIGURE, RUN_LOG, Chosen, Ended, call, chosen, draw, in_order, notify
+from sweep.nights.studies import FIGURE, RUN_LOG, Ended, StudyEntry, call, draw, in_order, notify, studies_in
 from sweep.report.terminal import INFEASIBLE
 from sweep.study import Study
 
@@ -67,7 +67,7 @@ def nightly(studies: Iterable[str | Path], settings: Settings, say: Callable[[st
         raise InputError("budget", settings.budget, "a time above 0 s", "nightly")
     if settings.keep < 1:
         raise InputError("keep", settings.keep, "a number of nights from 1", "nightly")
-    wanted = chosen(map(Path, studies), settings.smoke)
+    wanted = studies_in(map(Path, studies), settings.smoke)
     with archive.one_at_a_time(settings.into):
         earlier = archive.nights(settings.into)[::-1]
         night = _Night(settings, earlier, archive.new_night(settings.into), say)
@@ -89,7 +89,7 @@ class _Night:
         """Remaining time [s]."""
         return self.settings.budget - (time.monotonic() - self.begin)
 
-    def through(self, studies: list[Chosen]) -> NightRecord:
+    def through(self, studies: list[StudyEntry]) -> NightRecord:
         """Process all studies, then the page, old nights and the notification, and return the record."""
         names = ", ".join(one.name for one in studies)
         self.journal.note("night", f"night {self.folder.name}: {names}", studies=[one.name for one in studies])
@@ -125,7 +125,7 @@ class _Night:
         archive.append_history(self.settings.into, result)
         return result
 
-    def interrupted(self, studies: list[Chosen], records: Mapping[str, StudyRecord], code: int) -> None:
+    def interrupted(self, studies: list[StudyEntry], records: Mapping[str, StudyRecord], code: int) -> None:
         """Write the record and the page of a night that a signal has interrupted."""
         left = [one.name for one in studies if one.name not in records]
         message = "the night was interrupted"
@@ -137,7 +137,7 @@ class _Night:
         self.journal.note("interrupted", words, exit_code=code)
         write_page(self.settings.into)
 
-    def study(self, one: Chosen) -> StudyRecord:
+    def study(self, one: StudyEntry) -> StudyRecord:
         """Link, compute, report and compare one study."""
         if one.study is None:
             return StudyRecord("failed", 2, message=one.fault)
@@ -163,7 +163,7 @@ class _Night:
         except LinksweepError as error:
             return StudyRecord("failed", error.exit_code, message=str(error))
 
-    def run(self, one: Chosen, target: Path) -> Ended:
+    def run(self, one: StudyEntry, target: Path) -> Ended:
         """Compute what is missing, within the remaining time."""
         words = ["run", str(one.path.resolve()), "--out", str(target / files.DESIGNS)]
         words += ["--jobs", str(self.settings.jobs), "--backend", self.settings.backend]

@@ -30,7 +30,7 @@ COMMAND_SECONDS = 60.0
 
 
 @dataclass(frozen=True)
-class Chosen:
+class StudyEntry:
     """A study of the night; ``study`` is None if its file has faults, which ``fault`` lists."""
 
     name: str
@@ -39,7 +39,7 @@ class Chosen:
     fault: str = ""
 
 
-def chosen(places: Iterable[Path], smoke: bool) -> list[Chosen]:
+def studies_in(places: Iterable[Path], smoke: bool) -> list[StudyEntry]:
     """Return the studies of some places: study files, folders with one, or folders of such folders.
 
     Raises
@@ -48,7 +48,7 @@ def chosen(places: Iterable[Path], smoke: bool) -> list[Chosen]:
         if there is no study, or two have the same name: each has a folder of its name in the night.
     """
     places = list(places)
-    selected: list[Chosen] = []
+    selected: list[StudyEntry] = []
     broken: list[tuple[int, Path, str]] = []
     for path in [path for place in places for path in files_of(place)]:
         try:
@@ -59,14 +59,14 @@ def chosen(places: Iterable[Path], smoke: bool) -> list[Chosen]:
         twin = next((other for other in selected if other.name == study.name), None)
         if twin is not None:
             raise InputError("study", study.name, f"one study of a name, {twin.path} has it already", str(path))
-        selected.append(Chosen(study.name, path, study))
+        selected.append(StudyEntry(study.name, path, study))
     for place, path, fault in broken:
         name = free = path.parent.name if path.name == FILE else path.stem
         count = 1
         while free in [one.name for one in selected]:
             count += 1
             free = f"{name}-{count}"
-        selected.insert(place, Chosen(free, path, None, fault))
+        selected.insert(place, StudyEntry(free, path, None, fault))
     if not selected:
         raise InputError("studies", ", ".join(map(str, places)), f"study files, or folders with a {FILE}", "nightly")
     return selected
@@ -79,7 +79,7 @@ def files_of(place: Path) -> list[Path]:
     return [place / FILE] if os.path.lexists(place / FILE) else sorted(place.glob(f"*/{FILE}"))
 
 
-def in_order(studies: Sequence[Chosen], earlier: Sequence[Path]) -> list[Chosen]:
+def in_order(studies: Sequence[StudyEntry], earlier: Sequence[Path]) -> list[StudyEntry]:
     """Sort the studies: those cut off or not begun in the last night come first, the rest in the given order.
 
     Parameters
@@ -92,7 +92,7 @@ def in_order(studies: Sequence[Chosen], earlier: Sequence[Path]) -> list[Chosen]
     last = earlier[0]
     record = read_night(last)
 
-    def late(one: Chosen) -> bool:
+    def late(one: StudyEntry) -> bool:
         if record is not None:
             return one.name in record.studies and record.studies[one.name].state in ("cut", "waiting")
         return not store.is_complete(last / one.name / files.DESIGNS)

@@ -39,7 +39,7 @@ def mechanism_figure(parts: Sequence[Part], unit: str, view: str | None = None, 
         handles, labels = axes.get_legend_handles_labels()
         once = dict(zip(labels, handles, strict=True))  # members of a machine have links of the same name
         axes.legend(once.values(), once.keys(), fontsize="small")
-    spread(figure)
+    separate_names(figure)
     return figure
 
 
@@ -91,7 +91,7 @@ def draw_frame(axes: Axes, parts: Sequence[Part], seen: Array, *, pose: int = 0)
     axes.grid(False)
 
 
-def spread(figure: Figure) -> None:
+def separate_names(figure: Figure) -> None:
     """Move the names of joints so that they cover neither each other nor another joint, once all places are known."""
     figure.draw_without_rendering()
     point = figure.dpi / 72.0

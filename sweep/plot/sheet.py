@@ -16,7 +16,7 @@ from sweep.exchange.dxf import add_tables
 from sweep.exchange.export import export
 from sweep.exchange.scene import exists, finite, frames_of, is_spatial, over, pose, shown_name
 from sweep.optimise.manufacture.tolerance import tolerances_of
-from sweep.plot.drawing import draw, spread
+from sweep.plot.drawing import draw, separate_names
 from sweep.report.dataset import Dataset, as_result, chosen, cyclogram_of, read_dataset, row_of
 from sweep.report.figures import house_style, new_figure
 from sweep.report.quantities import number, quantity, rpm
@@ -152,7 +152,7 @@ def _draw(data: Dataset, parts: Sequence[Part], tables: Sequence[Table], target:
                 _set(axes, table)
         speed = f", {rpm(data.study.speed)}" if data.study.speed is not None else ""
         figure.suptitle(f"{data.study.title or data.study.name}{speed}. Lengths in mm, angles in degrees.")
-        spread(figure)
+        separate_names(figure)
         form = target.suffix[1:].lower()
         # Without the date files of the same data are equal.
         figure.savefig(target, format=form, metadata={"CreationDate" if form == "pdf" else "Date": None})

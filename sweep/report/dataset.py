@@ -243,7 +243,7 @@ ROLES = ("optimum", "reference", "best")
 
 
 @dataclass(frozen=True)
-class Chosen:
+class ChosenDesign:
     """A design with its mechanism; ``speed`` is that of the study's scene [rad/s]."""
 
     family: Family
@@ -251,7 +251,7 @@ class Chosen:
     speed: float | None
 
 
-def chosen(folder: str | Path, design: str | int | None = None) -> Chosen:
+def chosen(folder: str | Path, design: str | int | None = None) -> ChosenDesign:
     """Return a design of a dataset.
 
     Parameters
@@ -281,8 +281,8 @@ def chosen(folder: str | Path, design: str | int | None = None) -> Chosen:
     return _chosen(data, row)
 
 
-def _chosen(data: Dataset, row: Row) -> Chosen:
-    return Chosen(data.study.family, data.design(row), data.study.speed)
+def _chosen(data: Dataset, row: Row) -> ChosenDesign:
+    return ChosenDesign(data.study.family, data.design(row), data.study.speed)
 
 
 def as_result(data: Dataset, row: Row) -> Dataset:

@@ -19,7 +19,7 @@ from sweep.study.locus import prescribed_limits
 from sweep.study.parameter import Entry
 
 
-class Setting(NamedTuple):
+class MachineSetting(NamedTuple):
     """Bounds in a machine's manual, (least, most) [mm] each; None if the manual does not state them."""
 
     source: str
@@ -32,19 +32,19 @@ class Setting(NamedTuple):
 
 # `reach` is the looper's gauge at its far end, as manuals measure it.  A single value is given a band of 0.1 mm.
 SETTINGS = {
-    "juki-mo-104d": Setting("Juki MO-104D, overlock", clearance=(0.01, 0.1), back_height=(-0.2, 0.2)),
-    "janome-213d": Setting("Janome MyLock 213D, overlock", clearance=(0.0, 0.05)),
-    "pfaff-4772": Setting("Pfaff coverlock 4772, overlock and cover stitch", clearance=(0.0, 0.05)),
-    "juki-mf-7200d": Setting("Juki MF-7200D, cover stitch", clearance=(0.0, 0.05)),
-    "janome-1200d": Setting("Janome 1200D, overlock with chain looper", clearance=(0.0, 0.05), reach=(1.5, 1.8)),
-    "union-special-56500r": Setting("Union Special 56500R, chain stitch", reach=(3.1, 3.3)),
-    "duerkopp-adler-838": Setting(
+    "juki-mo-104d": MachineSetting("Juki MO-104D, overlock", clearance=(0.01, 0.1), back_height=(-0.2, 0.2)),
+    "janome-213d": MachineSetting("Janome MyLock 213D, overlock", clearance=(0.0, 0.05)),
+    "pfaff-4772": MachineSetting("Pfaff coverlock 4772, overlock and cover stitch", clearance=(0.0, 0.05)),
+    "juki-mf-7200d": MachineSetting("Juki MF-7200D, cover stitch", clearance=(0.0, 0.05)),
+    "janome-1200d": MachineSetting("Janome 1200D, overlock with chain looper", clearance=(0.0, 0.05), reach=(1.5, 1.8)),
+    "union-special-56500r": MachineSetting("Union Special 56500R, chain stitch", reach=(3.1, 3.3)),
+    "duerkopp-adler-838": MachineSetting(
         "Duerkopp Adler 838, hook", rise=(2.4, 2.6), clearance=(0.02, 0.1), above_eye=(1.4, 1.6)
     ),
-    "duerkopp-adler-867": Setting("Duerkopp Adler 867, hook", rise=(1.9, 2.1), clearance=(0.0, 0.1)),
-    "pfaff-1243": Setting("Pfaff 1243, hook", rise=(2.0, 2.4), clearance=(0.05, 0.1), above_eye=(0.8, 1.0)),
-    "juki-lu-2210n-7": Setting("Juki LU-2210N-7, hook", rise=(1.8, 2.2), above_eye=(1.2, 1.6)),
-    "janome-1600p": Setting("Janome 1600P, hook", rise=(1.9, 2.1), clearance=(0.0, 0.1)),
+    "duerkopp-adler-867": MachineSetting("Duerkopp Adler 867, hook", rise=(1.9, 2.1), clearance=(0.0, 0.1)),
+    "pfaff-1243": MachineSetting("Pfaff 1243, hook", rise=(2.0, 2.4), clearance=(0.05, 0.1), above_eye=(0.8, 1.0)),
+    "juki-lu-2210n-7": MachineSetting("Juki LU-2210N-7, hook", rise=(1.8, 2.2), above_eye=(1.2, 1.6)),
+    "janome-1600p": MachineSetting("Janome 1600P, hook", rise=(1.9, 2.1), clearance=(0.0, 0.1)),
 }
 
 

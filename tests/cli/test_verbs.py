@@ -16,7 +16,7 @@ from click.testing import CliRunner, Result
 import sweep
 from sweep.cli import main
 from sweep.cli.families import family_names
-from sweep.cli.kernels import Part, rounds
+from sweep.cli.kernels import WarmPart, rounds
 from sweep.cli.main import VERBS
 from sweep.cli.tables import read_table, wanted
 from sweep.report.terminal import Ending
@@ -258,7 +258,7 @@ def test_an_accuracy_out_of_range_is_a_fault_of_the_option_not_of_the_study_file
 
 def test_warm_compiles_levels_in_processes_and_the_rest_by_the_tiny_version(study: Path) -> None:
     first, then = rounds([str(study), "geared_dwell"])
-    assert [part.of for part in first].count("geared_dwell") > 1 and Part("geared_dwell") in first
+    assert [part.of for part in first].count("geared_dwell") > 1 and WarmPart("geared_dwell") in first
     assert [part.step for part in first if part.of.startswith(str(study))]
     assert all(part.of.startswith(str(study)) and part.step is None for part in then)
     result = call("warm", study, "geared_dwell")

@@ -18,7 +18,7 @@ from sweep.errors import LinksweepWarning, LockedError
 from sweep.nights import archive
 from sweep.nights.archive import HISTORY, NIGHT, read_history, read_night
 from sweep.nights.page import write_page
-from sweep.nights.studies import Ended, chosen
+from sweep.nights.studies import Ended, studies_in
 from tests.nights.conftest import called
 from tests.nights.test_nightly import night, written
 from tests.support.selection import mostly_long
@@ -81,7 +81,7 @@ def test_broken_studies_fail_by_themselves(tmp_path: Path) -> None:
     lost = tmp_path / "lost"
     lost.mkdir()
     (lost / "study.toml").symlink_to("nowhere.toml")
-    found = chosen([places[0], sound, places[1], places[1] / "other.toml", lost], smoke=False)
+    found = studies_in([places[0], sound, places[1], places[1] / "other.toml", lost], smoke=False)
     assert [(one.name, one.study is not None) for one in found] == [
         ("broken-2", False), ("broken", True), ("more", False), ("other", False), ("lost", False)
     ]  # fmt: skip

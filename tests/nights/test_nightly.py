@@ -24,7 +24,7 @@ from sweep.nights import Settings, archive, nightly
 from sweep.nights.archive import NightRecord, StudyRecord, write_night
 from sweep.nights.carry import carry
 from sweep.nights.changes import changes
-from sweep.nights.studies import chosen, in_order
+from sweep.nights.studies import in_order, studies_in
 from sweep.study import ParetoSettings, load_study
 from tests.faults.ground import SLOW_DISK
 from tests.optimise.test_study import STUDY as OPTIMUM
@@ -132,7 +132,7 @@ def test_a_changed_constant_in_a_kernel_is_found_with_rows_study_and_outputs(tmp
 
 
 def test_what_the_last_night_did_not_finish_comes_first(tmp_path: Path) -> None:
-    studies = chosen([written(tmp_path / name, name) for name in ("a", "b", "c", "d")], smoke=False)
+    studies = studies_in([written(tmp_path / name, name) for name in ("a", "b", "c", "d")], smoke=False)
     waiting = StudyRecord("waiting", 124)
     last = noted(tmp_path, "2026-01-01T00-00-00Z", a=GOOD, b=CUT, c=GOOD, d=waiting)
     assert [one.name for one in in_order(studies, [last])] == ["b", "d", "a", "c"]
@@ -143,7 +143,7 @@ def test_of_a_killed_night_its_datasets_tell_what_was_not_finished(tmp_path: Pat
     paths = [written(tmp_path / name, name) for name in ("a", "b")]
     killed = tmp_path / "2026-01-01T00-00-00Z"
     sweep.run(paths[0], killed / "a" / "designs", jobs=1)
-    assert [one.name for one in in_order(chosen(paths, smoke=False), [killed])] == ["b", "a"]
+    assert [one.name for one in in_order(studies_in(paths, smoke=False), [killed])] == ["b", "a"]
 
 
 def test_a_night_whose_time_is_over_ends_with_124_and_latest_stays(

@@ -11,7 +11,7 @@ from kernels.families import eyelet as eyelet_kernels
 from kernels.families import free_cam as free_cam_kernels
 from kernels.families import guided_cam as guided_cam_kernels
 from kernels.status import OK, SINGULAR
-from sweep.evaluation.thread.rows import Sheet, columns_of, computed, frame, side_by_side
+from sweep.evaluation.thread.rows import Sheet, columns_of, computed, frame, matrix_of
 from sweep.families.base import Array, Parameter
 
 if TYPE_CHECKING:
@@ -93,7 +93,7 @@ def wrap(table: Table) -> pd.DataFrame:
     0  5.6569  1.5708       0
     """
     given = columns_of(_WRAP, table)
-    guides, place = side_by_side(given, GUIDES), side_by_side(given, POINT)
+    guides, place = matrix_of(given, GUIDES), matrix_of(given, POINT)
     n = len(place)
     status, (total, angle) = np.zeros((n, 1), np.uint8), (np.empty((n, 1)) for _ in range(2))
     thread_over_point(guides, place[:, None], None, None, status, total, None, None, angle)
@@ -127,8 +127,8 @@ def feed(table: Table) -> pd.DataFrame:
     0  5.6569   1.4142       0
     """
     given = columns_of(_FEED, table)
-    guides = side_by_side(given, GUIDES)
-    place, first, second = (side_by_side(given, names)[:, None] for names in (POINT, FIRST, SECOND))
+    guides = matrix_of(given, GUIDES)
+    place, first, second = (matrix_of(given, names)[:, None] for names in (POINT, FIRST, SECOND))
     units = {"length": "L dL_dphi d2L_dphi2", "rad": "wrap"}
     return computed(table, units, thread_over_point, guides, place, first, second)
 
@@ -156,7 +156,7 @@ def eyelet(table: Table) -> pd.DataFrame:
     1  1.0806  1.9563  0.0707  8.9066  1.3377
     """
     given = columns_of(_EYELET, table)
-    parameters = side_by_side(given, ("a", "e", "f", "alpha", "Z1", "Z2", "phi_h", "P_h"))
+    parameters = matrix_of(given, ("a", "e", "f", "alpha", "Z1", "Z2", "phi_h", "P_h"))
     n = len(parameters)
     designs = np.hstack([parameters, np.zeros((n, 4))])
     cos, sin = np.cos(given["phi"])[:, None], np.sin(given["phi"])[:, None]
@@ -193,11 +193,11 @@ def follower(table: Table) -> pd.DataFrame:
     0  2.2913  1.2002       0
     """
     given = columns_of(_FOLLOWER, table)
-    data = side_by_side(given, ("L", "dL", "d2L", "Z1", "e", "X1"))
+    data = matrix_of(given, ("L", "dL", "d2L", "Z1", "e", "X1"))
     n = len(data)
     status, out = np.empty(n, np.uint8), [np.empty(n) for _ in range(5)]
     guided_cam_kernels.follower(data, status, *out[:3])
-    guided_cam_kernels.jam_angles(side_by_side(given, ("mu1", "mu2")), out[3], out[4])
+    guided_cam_kernels.jam_angles(matrix_of(given, ("mu1", "mu2")), out[3], out[4])
     names = ("S", "dS", "d2S", "theta_jam", "tan_half_theta_jam")
     units = {"length": "S dS d2S", "rad": "theta_jam", "1": "tan_half_theta_jam"}
     return frame(table, dict(zip(names, out, strict=True)) | {"status": status}, units)
@@ -231,13 +231,13 @@ def free_cam(table: Table) -> pd.DataFrame:
     """
     given = columns_of(_FREE_CAM, table)
     n = len(given["a"])
-    designs = np.hstack([side_by_side(given, ("a", *GUIDES)), np.zeros((n, 1))])
+    designs = np.hstack([matrix_of(given, ("a", *GUIDES)), np.zeros((n, 1))])
     cos, sin = np.cos(given["phi"])[:, None], np.sin(given["phi"])[:, None]
     status, judged = np.empty((n, 1), np.uint8), np.empty((n, 1), np.uint8)
     names = ("L", "wrap", "y_contact", "X", "Y", "contact", "n_minima")
     columns: dict[str, Array] = {name: np.empty((n, 1)) for name in names}
     free_cam_kernels.poses(designs, cos, sin, status, free_cam_kernels.Outputs(None, None, None, *columns.values()))
-    friction = side_by_side(given, ("tension_ratio", "mu_thread", "mu"))
+    friction = matrix_of(given, ("tension_ratio", "mu_thread", "mu"))
     limits: dict[str, Array] = {name: np.empty((n, 1)) for name in ("y_limit_plus", "y_limit_minus")}
     free_cam_kernels.limit_points(designs, friction, cos, sin, judged, *limits.values())
     units = {"length": "L y_contact X Y y_limit_plus y_limit_minus", "rad": "wrap", "1": "contact n_minima"}

@@ -27,7 +27,7 @@ def columns_of(sheet: Parametrised, table: Table) -> dict[str, Array]:
     return {name: np.ascontiguousarray(matrix[:, k]) for k, name in enumerate(sheet.parameter_names)}
 
 
-def side_by_side(columns: Mapping[str, Array], names: tuple[str, ...]) -> Array:
+def matrix_of(columns: Mapping[str, Array], names: tuple[str, ...]) -> Array:
     """Stack columns into a matrix (n, len(names))."""
     return np.ascontiguousarray(np.column_stack([columns[name] for name in names]))
 

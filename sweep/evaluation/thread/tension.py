@@ -17,7 +17,7 @@ from kernels.effects.thread import capstan as capstan_kernel
 from kernels.status import SINGULAR
 from sweep.errors import InputError
 from sweep.evaluation.tables import numbers
-from sweep.evaluation.thread.rows import Sheet, columns_of, computed, frame, side_by_side, warn_outside
+from sweep.evaluation.thread.rows import Sheet, columns_of, computed, frame, matrix_of, warn_outside
 from sweep.families.base import Parameter
 from sweep.families.machines import thread_balance
 
@@ -78,7 +78,7 @@ def contour(table: Table) -> pd.DataFrame:
     """
     given = columns_of(_CONTOUR, table)
     warn_outside(given["R"], thread_balance.MEASURED_RADIUS, FITTED, table)
-    data = side_by_side(given, CONTOUR_COLUMNS)
+    data = matrix_of(given, CONTOUR_COLUMNS)
     units = {"gf": "T2 capstan bending adhesion", "mm": "r_thread"}
     return computed(table, units, thread_contour, given["T1"][:, None], given["theta_deg"][:, None], data)
 
@@ -129,7 +129,7 @@ def path(T1: ArrayLike, contours: Table, theta_deg: ArrayLike | None = None) -> 
     poses = max(start.size, angles.shape[1])
     tension = np.ascontiguousarray(np.broadcast_to(start, poses))[None]
     status = np.zeros((1, poses), np.uint8)
-    data = side_by_side(given, CONTOUR_COLUMNS)
+    data = matrix_of(given, CONTOUR_COLUMNS)
     columns = {"T1": tension[0]}
     for k in range(count):
         behind, angle = np.empty((1, poses)), np.ascontiguousarray(np.broadcast_to(angles[k], (1, poses)))
@@ -163,7 +163,7 @@ def least_tension_radius(table: Table) -> pd.DataFrame:
     given = columns_of(_CONSTANTS, table)
     n = len(given["alpha"])
     given["R"], zero = np.zeros(n), np.zeros((n, 1))
-    data, radius = side_by_side(given, CONTOUR_COLUMNS), np.empty(n)
+    data, radius = matrix_of(given, CONTOUR_COLUMNS), np.empty(n)
     contour_of_least_tension(data, radius)
     thread, status = np.empty((n, 1)), np.zeros((n, 1), np.uint8)
     thread_contour(zero, zero, data, status, None, None, None, None, thread)
@@ -202,7 +202,7 @@ def speed(table: Table) -> pd.DataFrame:
     """
     given = columns_of(_SPEED, table)
     warn_outside(np.abs(given["v"]), thread_balance.MEASURED_SPEED, thread_balance.SPEED_CONSTANTS, table)
-    data = side_by_side(given, SPEED_COLUMNS)
+    data = matrix_of(given, SPEED_COLUMNS)
     return computed(table, {"1": "ratio_to_ref"}, thread_speed, given["v"][:, None], data)
 
 

@@ -34,7 +34,7 @@ def turn(poses: int = POSES) -> Angles:
     return Angles.of(phi)
 
 
-def side_by_side(*columns: Array | float) -> Array:
+def broadcast_columns(*columns: Array | float) -> Array:
     """Return columns, or numbers that represent whole columns, side by side."""
     return np.column_stack(np.broadcast_arrays(*columns)).astype(np.float64)
 
@@ -43,7 +43,7 @@ def designs_on_locus(
     swing: Number, phi0: Number, phi1: Array, e: Number, f: Number, g: Number, alpha: Number
 ) -> tuple[Array, Array]:
     """Return designs (n, 8) and rocker angles psi1 (n,) of the extended position; nan if a test (i)-(iii) fails."""
-    requirements = side_by_side(swing, phi0, phi1, e, f, g, alpha)
+    requirements = broadcast_columns(swing, phi0, phi1, e, f, g, alpha)
     n = len(requirements)
     designs, psi1 = np.empty((n, 8)), np.empty(n)
     kernels.rssr_on_locus(requirements, np.empty(n, np.uint8), np.empty(n, np.uint8), designs, psi1)
@@ -111,7 +111,7 @@ def named(designs: Array, suffix: str = "") -> dict[str, Array]:
 
 
 @dataclass(frozen=True)
-class OnLocus(Task):
+class LocusTask(Task):
     """A task about a crank-rocker with given limit positions; the fields are those of `EngineeringMethod`."""
 
     swing: float
@@ -126,7 +126,7 @@ class OnLocus(Task):
 
 
 @dataclass(frozen=True)
-class EngineeringMethod(OnLocus):
+class EngineeringMethod(LocusTask):
     """Swing, phi0, e, g, alpha are given; the place phi1 on the locus and the offset f of the crank plane are unknown.
 
     Parameters
@@ -170,7 +170,7 @@ class EngineeringMethod(OnLocus):
         """
         f: Array = np.linspace(*self.f_range, offsets, dtype=np.float64)
         phi1: Array = np.arange(places, dtype=np.float64) * (2.0 * np.pi / places)
-        feasible = np.array([(self.evaluate(side_by_side(phi1, x)).limits >= 0.0).all(axis=1).any() for x in f])
+        feasible = np.array([(self.evaluate(broadcast_columns(phi1, x)).limits >= 0.0).all(axis=1).any() for x in f])
         edges = np.flatnonzero(np.diff(np.concatenate([[False], feasible, [False]]).astype(np.int8)))
         return [(float(f[a]), float(f[b - 1])) for a, b in edges.reshape(-1, 2)]
 

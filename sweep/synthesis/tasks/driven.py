@@ -12,7 +12,7 @@ from sweep.errors import InputError
 from sweep.evaluation.summaries import design_outputs
 from sweep.families import slotted
 from sweep.families.base import Accuracy, Angles, Array, floats
-from sweep.synthesis.tasks.crank_rocker import RSSR, OnLocus, named, pressure_limit, turn, with_tops
+from sweep.synthesis.tasks.crank_rocker import RSSR, LocusTask, named, pressure_limit, turn, with_tops
 from sweep.synthesis.tasks.problem import NamedCandidates, Unknown, ranges, turning
 from sweep.synthesis.tasks.second_stage import RSSP, chain_motion, second_pressure_limit
 
@@ -50,7 +50,7 @@ def slot(a2: Array, e2: Array, t: Array) -> Slot:
 
 
 @dataclass(frozen=True)
-class Task5(OnLocus):
+class Task5(LocusTask):
     """The unknowns are phi1 and f of stage 1, angle t1 and ratio e2/a2 of the slotted link; a2 follows from rho0.
 
     Parameters
@@ -110,7 +110,7 @@ class Task5(OnLocus):
 
 
 @dataclass(frozen=True)
-class Task8(OnLocus):
+class Task8(LocusTask):
     """The unknowns are phi1 and f of the crank-rocker, proportions of the slider-crank; the stroke gives its size.
 
     Both stages stand in a limit position at the same time, the first in its extended one: velocity, acceleration and

@@ -16,13 +16,13 @@ from kernels import synthesis as kernels
 from sweep.errors import InputError
 from sweep.families.base import Array
 from sweep.synthesis.tasks.crank_rocker import (
+    LocusTask,
     Number,
-    OnLocus,
     acceleration,
+    broadcast_columns,
     designs_on_locus,
     named,
     pressure_limit,
-    side_by_side,
 )
 from sweep.synthesis.tasks.problem import NamedCandidates, Task, Unknown, ranges, turning
 
@@ -46,7 +46,7 @@ def through_positions(
     ball from the crank axis.
     """
     points, e = np.empty((len(phi1), 4)), task.e
-    kernels.rssr_points(side_by_side(swing, phi0, phi1, e, 0.0, g, alpha), points)
+    kernels.rssr_points(broadcast_columns(swing, phi0, phi1, e, 0.0, g, alpha), points)
     x1, y1, rho1, rho2 = points.T  # of the ball, about the rocker axis
 
     def turned(angle: Number) -> tuple[Array, Array]:
@@ -86,7 +86,7 @@ def _branch_slack(designs: Array, psi: Array, phi: Array) -> Array:
 
 
 @dataclass(frozen=True)
-class Task1(OnLocus):
+class Task1(LocusTask):
     """The unknowns are phi1 and f.  The first position gives f, in which it is linear, a second an equation for phi1.
 
     Parameters
