@@ -187,9 +187,9 @@ def test_bad_arguments_are_refused(dataset: Path, tmp_path: Path) -> None:
 
 def test_it_needs_no_more_memory_for_more_chunks(study: Study, dataset: Path, tmp_path: Path) -> None:
     """A chunk at a time: what was read and compared is let go."""
-    from sweep.dataset.comparison import _chunks, _columns, _pieces
+    from sweep.dataset.comparison import _columns, _rows
 
-    chunks = _chunks(dataset)
+    chunks = chunk_files.parts(dataset)
     stops = [chunk_files.about(part)["stop"] for part in chunks]
-    sizes = [len(rows) for rows in _pieces(chunks, _columns(chunks), stops)]
+    sizes = [len(rows) for rows in _rows(chunks, _columns(chunks), stops)]
     assert sum(sizes) == study.space.count and max(sizes) == SMALL_CHUNKS["CHUNK_STEP"]
