@@ -84,6 +84,8 @@ def in_radians(
             if name in map(str, table):
                 here = f"column {name} [{unit}]"
                 raise InputError("column", name, f"either {name} or {name} [{unit}], not both", here)
+            if name in renamed.values():
+                raise InputError("column", name, "one heading with its unit, not two", f"column {key}")
             renamed[key] = name
             scale = heading_factor(name, unit, internal_unit(units[name]))
             if scale != 1.0:

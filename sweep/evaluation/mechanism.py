@@ -204,10 +204,13 @@ def _angles(domain: Domain, phi: ArrayLike) -> tuple[Angles, bool]:
     """Check and tabulate crank angles, cached for grids of the usual size; also return whether it is one angle."""
     if isinstance(phi, float) and isinstance(domain, Turn) and abs(phi) <= TWO_PI:
         return Angles.of(np.array([[phi]])), True
-    grid = np.asarray(phi)
-    if grid.dtype == np.float64 and grid.ndim == 1 and grid.size <= KEPT:
-        return _tabulated(domain, grid.tobytes()), False
-    return _checked(domain, phi), grid.ndim == 0
+    if isinstance(phi, list) and all(isinstance(x, float) for x in phi):
+        phi = np.array(phi, np.float64)
+    # A quantity of pint is no array: as one it would lose its unit.
+    if isinstance(phi, np.ndarray) and phi.dtype == np.float64 and phi.ndim == 1 and phi.size <= KEPT:
+        return _tabulated(domain, phi.tobytes()), False
+    is_list = isinstance(phi, Sequence) and not isinstance(phi, str)
+    return _checked(domain, phi), getattr(phi, "ndim", int(is_list)) == 0
 
 
 def _checked(domain: Domain, phi: ArrayLike) -> Angles:

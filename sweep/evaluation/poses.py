@@ -180,6 +180,8 @@ def check_march(domain: Domain, grid: NDArray[np.float64]) -> None:
     """Raise if the domain is a march and the crank angles are not equal steps of one turn from 0."""
     if not isinstance(domain, March):
         return
+    if not grid.size:
+        raise InputError("phi", "no angle", "equal steps of one turn from 0: a pose depends on those before it", "phi")
     steps = np.arange(grid.size) * (TWO_PI / grid.size)
     off = np.abs(grid - steps) > 1e-12 * TWO_PI
     if off.any():

@@ -147,6 +147,8 @@ class Hand:
     def saved(self, given: Mapping[str, object], swept: Mapping[str, Sequence[float]]) -> str:
         """Return a study around a design: ``swept`` dimensions vary between two ends, all others keep their values.
 
+        Raises
+        ------
         InputError, StudyError
             if a search has nothing to vary, or the study does not allow plain dimensions.
         """

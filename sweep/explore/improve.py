@@ -19,6 +19,8 @@ LOOKS = 20_000  # evaluations of designs, as for one start of a study
 def problem_in_hand(hand: Hand, design: Mapping[str, float], free: Mapping[str, Sequence[float]]) -> Problem:
     """Return the study's problem with ``free`` dimensions between two ends as variables, and the others fixed.
 
+    Raises
+    ------
     InputError
         if the study has no objective, or nothing may change.
     """

@@ -83,9 +83,7 @@ def carry(study: Study, earlier: Sequence[Path], target: Path) -> Carried | None
 def searched(study: Study, folder: Path) -> bool:
     """Tell whether optimum, proof and front in a folder belong to the study and were made by these sources.
 
-    Parts that the study does not ask for do not count.
-
-    A search that ran out of time is repeated.
+    Parts that the study does not ask for do not count.  A search that ran out of time is repeated.
     """
     note = files.read_plan(folder / files.DESIGNS) or {}
     if study.optimise is not None and note.get("optimised") != optimum_key(replace(study, pareto=None), note):

@@ -205,7 +205,6 @@ def five_links_with_limits(table: Table, h: float) -> pd.DataFrame:
 
     Swing, phi0 and stroke ratio are those of the crank-rocker; crank and coupler change with h, all other links stay.
 
-
     Parameters
     ----------
     table : crank-rockers, a b c e f g alpha branch, one row each; synthesis gives such tables

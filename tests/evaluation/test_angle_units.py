@@ -90,6 +90,7 @@ def test_a_whole_turn_is_no_parameter_too_large():
     (RADIANS | {"a [mm]": 10.0}, "either a or a"),
     ({name: x for name, x in RADIANS.items() if name != "a"} | {"a [kg]": 10.0}, "a length, in mm"),
     (DESIGN | {"alpha [deg]": "sixty"}, r"column alpha \[deg\], row 0"),
+    (HEADED | {"alpha [rad]": 0.5}, "one heading with its unit, not two"),
 ])  # fmt: skip
 def test_header_that_cannot_be_is_refused(table, words):
     with pytest.raises(sweep.InputError, match=words):

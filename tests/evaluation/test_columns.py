@@ -15,6 +15,7 @@ from sweep.cli import main
 from sweep.cli.tables import read_table
 from sweep.errors import InputError
 from sweep.evaluation.statuses import meaning, meanings
+from sweep.families import family
 
 ROCKER = {"a": 1.0, "b": 4.0, "c": 2.0, "e": 3.0, "f": 0.5, "g": 0.2, "alpha": 0.3}
 # The second one's crank is too long to turn.
@@ -111,6 +112,12 @@ def test_status_in_words() -> None:
 )
 def test_crank_angles_that_are_no_plain_list_are_refused(phi: Any, words: str) -> None:
     refused(words, sweep.evaluate, "rssr", ROCKER, "psi", phi=phi)
+
+
+def test_a_march_over_no_angle_is_refused() -> None:
+    foot = family("foot")
+    words = "phi = 'no angle'; allowed: equal steps of one turn from 0"
+    refused(words, sweep.evaluate, "foot", foot.example, foot.position, phi=[], angles="rad")
 
 
 def test_column_of_crank_angles_beside_the_argument_is_refused() -> None:

@@ -48,6 +48,9 @@ def test_crank_angles_speeds_and_bound_designs_say_theirs():
         assert sweep.evaluate("rssr", BARE, "psi", phi=phi)["psi"][0] == pytest.approx(bare, rel=1e-14)
     bound = sweep.mechanism("rssr", **BARE | {"a": UNITS.Quantity(1.0, "cm"), "alpha": "60 deg"})
     assert bound.dimensions["a"] == 10.0
+    for phi in (UNITS.Quantity(np.array([1.0, 30.0]), "degree"), [UNITS.Quantity(x, "degree") for x in (1.0, 30.0)]):
+        assert bound.poses(phi, "psi")["psi"].tolist() == bound.poses(np.radians([1.0, 30.0]), "psi")["psi"].tolist()
+    assert bound.poses(UNITS.Quantity(30.0, "degree"), "psi") == bound.poses("30 deg", "psi")
     (axes, *_) = sweep.plot.motion("rssr", BARE, "d2psi", speed="7000 rpm")
     assert axes.child_axes
 

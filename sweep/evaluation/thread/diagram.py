@@ -47,7 +47,7 @@ def diagram(
     Raises
     ------
     InputError
-        for a mechanism without threads, or several designs.
+        for a mechanism without threads, several designs, or a number of samples below 1.
 
     Warns
     -----
@@ -72,6 +72,8 @@ def diagram(
     threads = [r for r in getattr(family, "relations", ()) if isinstance(r, ThreadBalance)]
     if not threads:
         raise InputError("mechanism", family.name, "a machine with threads", "thread diagram")
+    if not isinstance(samples, int | np.integer) or samples < 1:
+        raise InputError("samples", samples, "a whole number from 1", "thread diagram")
     given = in_radians(family, design, angles)
     known = {o.name for thread in threads for o in thread.outputs}
     wanted = [name for t in threads for name in (f"{t.name}_{key}" for key in COLUMNS) if name in known]

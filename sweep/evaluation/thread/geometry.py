@@ -13,6 +13,8 @@ from kernels.families import guided_cam as guided_cam_kernels
 from kernels.status import OK, SINGULAR
 from sweep.evaluation.thread.rows import Sheet, columns_of, computed, frame, matrix_of
 from sweep.families.base import Array, Parameter
+from sweep.families.eyelet import PARAMETERS as EYELET_PARAMETERS
+from sweep.families.free_cam import PARAMETERS as FREE_CAM_PARAMETERS
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -37,12 +39,7 @@ _WRAP, _FEED = Sheet("wrap", _POINTS), Sheet("feed", (*_POINTS, *_RATES))
 _EYELET = Sheet(
     "eyelet",
     (
-        Parameter("a", "length", "radius of the eyelet's circle", positive=True),
-        *_lengths("e f", "place of the crank axis:"),
-        Parameter("alpha", "angle", "angle between the crank axis and the line of the guides"),
-        *_lengths("Z1 Z2", "guide on the line x = e, y = 0:"),
-        Parameter("phi_h", "angle", "angle of the eyelet on the crank"),
-        Parameter("P_h", "length", "length of thread at P = 0", default=0.0),
+        *EYELET_PARAMETERS[:8],
         Parameter("phi", "angle", "crank angle"),
         Parameter("P", "length", "wanted P", default=0.0),
     ),
@@ -60,9 +57,8 @@ _FOLLOWER = Sheet(
 _FREE_CAM = Sheet(
     "free_cam",
     (
-        Parameter("a", "1/length", "bend of the edge x = a y^2", not_negative=True),
+        *FREE_CAM_PARAMETERS[:7],
         Parameter("phi", "angle", "cam angle"),
-        *_lengths(" ".join(GUIDES), "coordinate of a guide"),
         Parameter("mu", "ratio", "coefficient of friction along the edge", default=0.0, not_negative=True),
         Parameter("tension_ratio", "ratio", "T2/T1", default=1.0, positive=True),
         Parameter("mu_thread", "ratio", "coefficient of friction along the thread", default=0.0, not_negative=True),

@@ -16,7 +16,7 @@ from kernels.effects.thread import (
 from kernels.effects.thread import capstan as capstan_kernel
 from kernels.status import SINGULAR
 from sweep.errors import InputError
-from sweep.evaluation.tables import numbers
+from sweep.evaluation.tables import numbers, refuse_rows
 from sweep.evaluation.thread.rows import Sheet, columns_of, computed, frame, matrix_of, warn_outside
 from sweep.families.base import Parameter
 from sweep.families.machines import thread_balance
@@ -126,6 +126,8 @@ def path(T1: ArrayLike, contours: Table, theta_deg: ArrayLike | None = None) -> 
         raise InputError("theta_deg", f"shape {angles.shape}", allowed, "theta_deg")
     if 1 not in (start.size, angles.shape[1]) and start.size != angles.shape[1]:
         raise InputError("T1", f"{start.size} values", f"one, or one per pose of theta_deg, {angles.shape[1]}", "T1")
+    for name, values in (("T1", start), ("theta_deg", angles)):
+        refuse_rows(~(np.isfinite(values) & (values >= 0.0)), values, name, "a finite number that is not negative")
     poses = max(start.size, angles.shape[1])
     tension = np.ascontiguousarray(np.broadcast_to(start, poses))[None]
     status = np.zeros((1, poses), np.uint8)

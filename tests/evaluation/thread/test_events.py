@@ -119,6 +119,8 @@ def test_tension_grows_with_the_speed_by_its_law_within_the_measured_range():
 def test_extremes_of_the_surplus_are_found_at_the_jumps():
     made = machine(stock=150.0, sewn=4.0, feeding=["cast", "a"], drawing=["a", "cast"])
     found = sweep.summarise(made, DESIGN, ["min_upper_surplus", "max_upper_surplus"], accuracy=1e-9).iloc[0]
+    with pytest.raises(sweep.InputError, match="samples = 0; allowed: a whole number from 1"):
+        sweep.thread.diagram(made, DESIGN, samples=0)
     grid = sweep.thread.diagram(made, DESIGN, samples=20000)
     assert found["status"] == 0
     for name, value in (("min", grid["upper_surplus"].min()), ("max", grid["upper_surplus"].max())):

@@ -158,6 +158,12 @@ def test_path_refuses_tensions_that_do_not_fit_the_poses():
         sweep.thread.path([5.0, 6.0], {"R": [1.0, 2.0]}, np.zeros((2, 3)))
 
 
+@pytest.mark.parametrize("start, angles", [(-5.0, [[20.0]]), (np.nan, [[20.0]]), (5.0, [[-20.0]]), (5.0, [[np.inf]])])
+def test_path_refuses_tensions_and_wrap_angles_that_are_negative_or_no_numbers(start, angles):
+    with pytest.raises(sweep.InputError, match="a finite number that is not negative"):
+        sweep.thread.path(start, {"R": [1.0]}, angles)
+
+
 def test_radius_outside_the_measured_range_warns_only_for_reported_constants():
     with pytest.warns(
         sweep.thread.MeasuredRangeWarning, match=r"R = 0\.1 to 8 mm: 2 of 3 values outside 0\.125 to 7\.5 mm"
