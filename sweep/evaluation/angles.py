@@ -74,7 +74,8 @@ def in_radians(
         units[variable] = domain.unit
     if not (isinstance(table, Mapping) or hasattr(table, "columns")):
         return table  # not a table: the reader of the table raises
-    renamed, changed = {}, {}
+    renamed: dict[Any, str] = {}
+    changed: dict[str, Any] = {}
     columns: Any = table
     for key in columns:
         match = _HEADER.fullmatch(str(key))
